@@ -1,6 +1,7 @@
 // Controls of the page: settings, buttons and keys.
 
 import { csv, link } from "./link.js";
+import { sound } from "./sound.js";
 
 export const SPEEDS = [0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30];
 
@@ -81,13 +82,28 @@ export function bind(page) {
       file.click();
       setTimeout(() => URL.revokeObjectURL(file.href), 1000);
     },
+    sound: () => {
+      page.sound = page.sound ? undefined : sound();
+      $("sound").setAttribute("aria-pressed", String(!!page.sound));
+      $("sound").textContent = page.sound ? "Sound on" : "Sound off";
+    },
+    // What the status strip recommends.
+    act: () => actions[page.advised](),
     help: () => {
       $("about").hidden = !$("about").hidden;
       $("help").setAttribute("aria-expanded", String(!$("about").hidden));
     },
   };
   for (const [id, action] of Object.entries(actions)) $(id).onclick = action;
-  const keys = { " ": "play", ".": "impact", d: "drive", t: "track", r: "restart", "?": "help" };
+  Object.assign(actions, {
+    now: () => page.toEnd(),
+    faster: () => page.setSpeed(10),
+    closed: () => page.change("closed", 1),
+    // What dragging does: the mass to b, the particle to a wall.
+    mass: () => page.change("mass", 1),
+    particle: () => page.change("particle", 1),
+  });
+  const keys = { " ": "play", ".": "impact", d: "drive", t: "track", r: "restart", m: "mass", p: "particle", "?": "help" };
   document.addEventListener("keydown", (event) => {
     // Fields take letters, buttons and check boxes the space; sliders take neither.
     if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("select, input[type=number]")) return;
@@ -96,7 +112,7 @@ export function bind(page) {
     if (change) {
       const next = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, SPEEDS.indexOf(page.speed) + change))];
       page.setSpeed(next);
-    } else if (keys[event.key] && !$(keys[event.key]).disabled) actions[keys[event.key]]();
+    } else if (keys[event.key] && !$(keys[event.key])?.disabled) actions[keys[event.key]]();
     else return;
     event.preventDefault();
   });

@@ -5,6 +5,9 @@ const MOST_CHANGES = 150;
 // Samples that a link repeats; more would take seconds.
 const MOST_SAMPLES = 3e6;
 
+// Largest displacement over b that a mass is put to: C_max of the default scene.
+const MOST_PLACE = 4;
+
 // The address that repeats the motion of `page`. A motion with too many changes or samples is left out, and a sentence says so: the link
 // then has the present settings, from the start.
 export function link(page) {
@@ -24,7 +27,7 @@ export function link(page) {
 }
 
 export function csv(record) {
-  const header = "time [s],base [m],response [m],relative displacement [m],phase error [deg],omega [rad/s],base amplitude [m],response amplitude [m]";
+  const header = "time [s],base [m],response [m],relative displacement [m],phase error [deg],frequency of the drive [rad/s],base amplitude [m],response amplitude [m],frequency of the motion [rad/s],particle speed [m/s],free decay along the backbone";
   const rows = Array.from({ length: record.length }, (_, i) => record.row(i).join(","));
   return `${header}\n${rows.join("\n")}\n`;
 }
@@ -40,6 +43,7 @@ export function read(hash, table) {
   };
   const setting = (key, text) => {
     if (key === "drive" || key === "track") return number(text, key, 0, 1);
+    if (key === "mass" || key === "particle") return number(text, key, -MOST_PLACE, MOST_PLACE);
     if (!limits[key]) throw new Error(`The link is invalid: there is no setting "${key}". The default scene is shown.`);
     return number(text, limits[key].name, limits[key].min, limits[key].max);
   };

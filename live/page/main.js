@@ -3,8 +3,9 @@
 import { $, SPEEDS, bind, bindScenes, control, say } from "./controls.js";
 import { read } from "./link.js";
 import { load } from "./module.js";
-import { Pictures } from "./pictures.js";
+import { MINUTE, Pictures } from "./pictures.js";
 import { Record } from "./record.js";
+import { story } from "./story.js";
 
 // Most samples in one frame: a slower machine falls behind the clock instead of freezing the page.
 const MOST_SAMPLES = 6000;
@@ -27,9 +28,11 @@ class Page {
   // ---- the motion ----
 
   start(values, changes = []) {
+    this.pictures.keepGhost();
     this.values = { ...this.bench.defaults, ...values };
     this.first = { ...this.values };
     this.bench.restart(this.values);
+    this.pictures.restart();
     this.changes = [];
     this.pending = changes;
     this.samples = 0;
@@ -37,7 +40,6 @@ class Page {
     this.driving = true;
     this.points = [];
     this.rows.clear();
-    this.pictures.restart();
     this.showControls();
     this.#run(1);
     this.status = this.bench.status();
@@ -46,6 +48,7 @@ class Page {
 
   // Notes a change, so that a link repeats it, and makes it.
   change(key, value) {
+    this.toEnd();
     const last = this.changes.at(-1);
     if (last && last[0] === this.samples && last[1] === key) last[2] = value;
     else this.changes.push([this.samples, key, value]);
@@ -61,6 +64,8 @@ class Page {
       } else if (key === "track") {
         this.bench.track();
         this.driving = true;
+      } else if (key === "mass" || key === "particle") {
+        this.bench.place(key, value);
       } else {
         this.values = { ...before, [key]: value };
         this.bench.apply(this.values);
@@ -104,7 +109,43 @@ class Page {
     return count === need;
   }
 
+  // ---- the past ----
+
+  // Whether a time before the present is shown.
+  replays() { return this.shown < (this.samples - 1.5) * this.step; }
+
+  // Shows a time of the record; running goes on from there, from the record up to the present.
+  scrub(time) {
+    this.play(false);
+    this.shown = Math.max(this.rows.row(0)[0], Math.min(this.samples * this.step, time));
+  }
+
+  toEnd() { if (this.replays()) this.shown = this.samples * this.step; }
+
+  // The row of the record at a time.
+  rowAt(time) {
+    return Math.max(0, Math.min(this.rows.length - 1, this.rows.length - this.samples + Math.floor(time / this.step + 1e-6)));
+  }
+
+  showTime() {
+    const end = this.samples * this.step;
+    $("time").min = -Math.min(MINUTE, end - this.rows.row(0)[0]);
+    $("time").value = this.replays() ? this.shown - end : 0;
+    $("ago").textContent = this.replays() ? `${(end - this.shown).toFixed(1)} s ago` : "now";
+  }
+
+  // ---- going somewhere ----
+
+  // Drives to a point [sigma, C, 1 if stable, G] of the backbone.
+  goToPoint([sigma, c, stable, g]) {
+    const where = `σ = ${sigma.toFixed(2)}, C = ${c.toFixed(2)}`;
+    if (!stable) return say(`The point ${where} is unstable under a constant drive: Track backbone reaches and holds it.`);
+    if (!this.values.closed) this.change("detuning", Number(sigma.toFixed(4)));
+    this.change("excitation", Number(g.toFixed(4)));
+  }
+
   toNextImpact() {
+    this.toEnd();
     let after = this.shown - (this.samples - 1) * this.step;
     for (let i = 0; i < 20000; i++) {
       const ahead = this.bench.nextImpact(after + 1e-12);
@@ -123,7 +164,8 @@ class Page {
 
   #controls() {
     $("speed").replaceChildren(...SPEEDS.map((speed) => new Option(speed < 1 ? `1/${Math.round(1 / speed)}` : `${speed}×`, speed)));
-    $("speed").onchange = () => (this.speed = Number($("speed").value));
+    $("speed").onchange = () => this.setSpeed(Number($("speed").value));
+    $("time").oninput = () => this.scrub(this.samples * this.step + Number($("time").value));
     $("settings").onsubmit = (event) => event.preventDefault();
     $("settings").replaceChildren(...this.table.settings.map((setting) => control(this, setting)));
   }
@@ -181,6 +223,7 @@ async function main() {
   // Back, forward, or a link that was pasted.
   addEventListener("hashchange", follow);
   bind(page);
+  story(page);
   window.live = { page, frames: 0 };
   let before = performance.now();
   const frame = (now) => {
@@ -189,6 +232,7 @@ async function main() {
     try {
       if (page.playing) page.goTo(page.shown + passed * page.speed);
       page.pictures.draw(now);
+      page.showTime();
     } catch (error) {
       page.play(false);
       say(error.message);

@@ -1,11 +1,13 @@
 // The WebAssembly module: plant, controller and theory. Its exports are described in live/module/src/exports.rs.
 
-const COLUMNS = ["time", "base", "response", "relative", "phaseError", "omega", "amplitude", "responseAmplitude"];
-const STATUS = ["time", "sampleTime", "omega0", "sigma", "C", "B", "phaseError", "G", "locked", "settled", "state", "fault", "impacts", "perPeriod", "dissipated"];
+const COLUMNS = ["time", "base", "response", "relative", "phaseError", "omega", "amplitude", "responseAmplitude", "motion", "speed", "decays"];
+// Places of the columns in a row.
+export const ROW = Object.fromEntries(COLUMNS.map((name, i) => [name, i]));
+const STATUS = ["time", "sampleTime", "omega0", "sigma", "C", "B", "phaseError", "G", "locked", "settled", "state", "fault", "impacts", "perPeriod", "dissipated", "tolerance", "unlock"];
 const LOOK = ["time", "base", "q1", "q2", "relative", "speed", "wall", "impacts"];
 
 // States of the loop, by number.
-export const LOOP = ["idle", "the drive rises", "searching", "locked", "lock lost", "switched off", "shut down"];
+export const LOOP = ["idle", "the drive rises", "searching", "locked", "lock lost", "switched off", "off"];
 
 const named = (names, values) => Object.fromEntries(names.map((name, i) => [name, values[i]]));
 
@@ -56,6 +58,7 @@ class Bench {
   restart(values) { this.#write(values); this.#check(this.exports.restart()); }
   apply(values) { this.#write(values); this.#check(this.exports.apply()); }
   drive(on) { this.#check(this.exports.drive(on ? 1 : 0)); }
+  place(part, to) { this.#check(this.exports.place(part === "mass" ? 1 : 0, to)); }
   track() { this.#check(this.exports.track()); }
   // Rows of the record, COLUMNS values each; valid until the next call.
   run(samples) { return this.#values(this.exports.run(samples)); }
@@ -68,8 +71,8 @@ class Bench {
     const values = this.#values(count);
     return Array.from({ length: count / width }, (_, i) => Array.from(values.subarray(i * width, (i + 1) * width)));
   }
-  manifold(bMax, points) { return this.#rows(this.exports.manifold(bMax, points), 2); }
+  manifold(bMax, points) { return this.#rows(this.exports.manifold(bMax, points), 3); }
   theory(points) { return this.#rows(this.exports.theory_backbone(points), 3); }
-  exact(points) { return this.#rows(this.exports.exact_backbone(points), 3); }
+  exact(points) { return this.#rows(this.exports.exact_backbone(points), 4); }
   tracked() { return this.#rows(this.exports.tracked(), 5); }
 }

@@ -1,9 +1,18 @@
 // Pictures and numbers of the page.
 
 import { $ } from "./controls.js";
-import { LOOP } from "./module.js";
+import { LOOP, ROW } from "./module.js";
 import { Plot, extent } from "./plots.js";
 import { Rig } from "./rig.js";
+import { Strip } from "./strip.js";
+
+// The time over which the record is shown and can be scrubbed, s, and the points that a curve over it has at least.
+export const MINUTE = 60;
+const POINTS = 1500;
+// Part of the past that is drawn as the trail of the present point, s.
+const TRAIL = 3;
+// Pixels within which a click on the backbone means a point of it.
+const NEAR = 24;
 
 const colours = new Map();
 const colour = (name) => {
@@ -12,126 +21,249 @@ const colour = (name) => {
 };
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => colours.clear());
 
+// The end of an axis: `least`, or the next of its multiples by 1.25, so that it rarely changes.
+const end = (least, value) => { while (least < value && Number.isFinite(value)) least *= 1.25; return least; };
+
+// Whether a motion has a frequency: with a drive, or along a free decay until synchrony is lost.
+const onBackbone = (one) => one.G > 0 || one.decays;
+
 export class Pictures {
   // `calm`: whether motion is to be reduced.
   constructor(page, calm) {
-    Object.assign(this, { page, calm });
+    Object.assign(this, { page, calm, past: [], ghost: [], reach: { mass: 1, base: 1 } });
     this.rig = new Rig($("rig"), colour);
-    const plot = (id, xLabel, yLabel) => new Plot($(id), colour, { xLabel, yLabel });
+    this.strip = new Strip(colour);
+    const plot = (id, axes) => new Plot($(id), colour, axes);
     this.plots = {
-      scope: plot("scope", "time, s", "displacement over b"),
-      history: plot("history", "time, s", "phase error, °; σ"),
-      manifold: plot("manifold", "speed of the particle B", "amplitude C"),
-      backbone: plot("backbone", "detuning σ", "amplitude C"),
+      scope: plot("scope", { xLabel: "time, s", yLabel: "displacement over b" }),
+      phase: plot("history", { yLabel: "error, °", area: [0, 0.5] }),
+      detuning: plot("history", { xLabel: "time, s", yLabel: "σ", area: [0.5, 1] }),
+      manifold: plot("manifold", { xLabel: "speed of the particle B", yLabel: "amplitude C" }),
+      backbone: plot("backbone", { xLabel: "detuning σ", yLabel: "amplitude C" }),
     };
+    this.#pointers();
+  }
+
+  // ---- pointers ----
+
+  #pointers() {
+    const { page, plots: { scope, phase, backbone } } = this;
+    // The time axes: hovering links the cursors, a click goes back there.
+    for (const plot of [scope, phase]) {
+      plot.canvas.onpointermove = (event) => (this.hover = { plot, event });
+      plot.canvas.onpointerleave = () => (this.hover = undefined);
+      plot.canvas.onclick = (event) => { const time = plot.xAt(event); if (time !== undefined) page.scrub(time); };
+    }
+    backbone.canvas.onclick = (event) => {
+      const [point, distance] = backbone.nearest(this.lines.exact, event);
+      if (distance < NEAR) page.goToPoint(point);
+    };
+    const { canvas } = this.rig;
+    let resume;
+    const to = (event) => this.rig.dragged(this.drag.part, event.offsetX - this.drag.offset);
+    canvas.onpointerdown = (event) => {
+      const part = this.rig.under(event);
+      if (!part) return;
+      canvas.setPointerCapture(event.pointerId);
+      resume = page.playing;
+      page.play(false);
+      page.toEnd();
+      this.drag = { part, offset: event.offsetX - (part === "mass" ? this.rig.centre : this.rig.particle) };
+      this.drag.to = to(event);
+    };
+    canvas.onpointermove = (event) => {
+      canvas.style.cursor = this.drag || this.rig.under(event) ? "grab" : "";
+      if (this.drag) this.drag.to = Math.max(-this.reach.mass, Math.min(this.reach.mass, to(event)));
+    };
+    canvas.onpointerup = () => {
+      if (!this.drag) return;
+      const { part, to } = this.drag;
+      this.drag = undefined;
+      page.change(part, to);
+      page.play(resume);
+    };
+    canvas.onpointercancel = () => { this.drag = undefined; };
+  }
+
+  // ---- the run ----
+
+  // The run that ends stays as a ghost, unless it has just begun.
+  keepGhost() {
+    if (this.units && this.page.samples > 1000) this.ghost = this.#thinned(Infinity);
   }
 
   restart() {
     this.impacts = 0;
-    this.trail = [];
+    this.reach = { mass: 1, base: 1 };
     this.curves();
   }
 
   curves() {
     const { bench } = this.page;
-    this.lines = { manifold: bench.manifold(2.2, 160), theory: bench.theory(160), exact: bench.exact(120) };
+    this.lines = { theory: bench.theory(160), exact: bench.exact(120) };
+    this.manifoldEnd = 0;
+  }
+
+  // A row of the record, dimensionless.
+  #point(row) {
+    const { b, epsilon, omega0 } = this.units;
+    return {
+      time: row[ROW.time], base: row[ROW.base] / (b * epsilon), v: row[ROW.response] / b, w: row[ROW.relative] / b,
+      error: row[ROW.phaseError], omega: row[ROW.motion], sigma: (row[ROW.motion] / omega0 - 1) / epsilon,
+      C: row[ROW.responseAmplitude] / b, B: row[ROW.speed] / (b * omega0), G: row[ROW.amplitude] / (b * epsilon), decays: row[ROW.decays] !== 0,
+    };
+  }
+
+  // Points of the last `seconds`, thinned: every sample whose number is a multiple of a power of two.
+  #thinned(seconds) {
+    const { rows, samples, step } = this.page;
+    const count = Math.min(rows.length, Math.ceil(seconds / step));
+    const stride = 2 ** Math.max(0, Math.floor(Math.log2(count / POINTS)));
+    const points = [];
+    for (let i = rows.length - count; i < rows.length; i++) {
+      if ((samples - rows.length + i) % stride === 0 || i === rows.length - 1) points.push(this.#point(rows.row(i)));
+    }
+    return points;
   }
 
   draw(now) {
-    const { page } = this;
-    const look = page.bench.look(page.shown - (page.samples - 1) * page.step);
+    const { page, plots } = this;
     const status = (page.status = page.bench.status());
-    // Displacements over b; that of the base over epsilon b.
-    this.b = page.values.gap * 1e-3;
-    this.baseUnit = this.b * page.values.mass_ratio;
-    const scale = { q1: look.q1 / this.b, q2: look.q2 / this.b, base: look.base / this.baseUnit, wall: look.wall };
-    if (look.impacts > this.impacts) this.rig.hit(Math.sign(look.relative), now);
-    this.impacts = look.impacts;
-    this.rig.draw(scale, now, this.calm.matches);
+    this.units = { b: page.values.gap * 1e-3, epsilon: page.values.mass_ratio, omega0: status.omega0 };
+    const index = page.rowAt(page.shown);
+    const point = (this.now = this.#point(page.rows.row(index)));
+    const replay = page.replays();
+    this.past = this.#thinned(MINUTE);
 
-    const last = this.trail.at(-1);
-    if (!last || status.time - last[3] > 0.02) this.trail.push([status.sigma, status.C, status.B, status.time]);
-    if (this.trail.length > 600) this.trail.splice(0, this.trail.length - 400);
+    // The last four periods before the time that is shown.
+    const count = Math.min(index + 1, Math.ceil((8 * Math.PI) / status.omega0 / page.step) + 1);
+    const motion = Array.from({ length: count }, (_, i) => this.#point(page.rows.row(index - count + 1 + i)));
+    this.#rig(point, motion, replay, now);
 
-    const period = 2 * Math.PI / status.omega0;
-    this.#motion(period);
-    this.#history(period, status);
-    const top = Math.max(1.05, 1.05 * status.C, this.lines.manifold[0][1]);
-    this.#manifold(top, status);
-    const done = page.points.filter((point) => point[0] <= page.shown + page.step);
-    this.#backbone(top, status, done);
-    this.#numbers(status, done.length);
+    const { hover } = this;
+    const time = hover && (hover.plot.xAt(hover.event) ?? undefined);
+    const cursor = time ?? (replay ? page.shown : undefined);
+    const linked = time === undefined ? undefined : this.#point(page.rows.row(page.rowAt(time)));
+    this.#motion(motion, status, cursor);
+    this.#history(cursor);
+    const seen = this.past.filter((one) => one.time <= page.shown + page.step);
+    const top = end(1.05, Math.max(...seen.slice(-POINTS).map((one) => one.C)));
+    this.#manifold(top, seen, point, linked);
+    const done = page.points.filter((one) => one[0] <= page.shown + page.step);
+    this.#backbone(top, seen, point, linked, done);
+    const words = page.bench.words();
+    this.strip.draw(page, status, point, words, replay);
+    this.#numbers(status, point, words, replay, done.length);
   }
 
-  // The last four periods of the record.
-  #motion(period) {
-    const { page, b, plots: { scope } } = this;
-    const count = Math.min(page.rows.length, Math.ceil(4 * period / page.step) + 1);
-    const rows = Array.from({ length: count }, (_, i) => page.rows.row(i - count));
-    const begin = rows[0][0], end = rows.at(-1)[0];
-    const motion = rows.map((row) => [row[0], row[1] / this.baseUnit, row[2] / b, row[3] / b]);
-    const top = 1.05 * motion.reduce((most, row) => Math.max(most, Math.abs(row[1]), Math.abs(row[2]), Math.abs(row[3])), 1.1);
-    const column = (n) => motion.map((row) => [row[0], row[n]]);
-    scope.begin([begin, Math.max(end, begin + period)], [-top, top]);
-    scope.line(column(1), "blue", { label: "base/(ε b)" });
-    scope.line(column(2), "ink", { label: "response v" });
-    scope.line(column(3), "red", { label: "relative w" });
+  #rig(point, motion, replay, now) {
+    const { page, drag, reach, units: { b, epsilon } } = this;
+    // The primary mass, from v = q1 + epsilon q2 and w = q1 - q2.
+    let look = { q1: (point.v + epsilon * point.w) / (1 + epsilon), base: point.base, wall: 0 };
+    look.q2 = look.q1 - point.w;
+    if (!replay) {
+      const plant = page.bench.look(page.shown - (page.samples - 1) * page.step);
+      look = { q1: plant.q1 / b, q2: plant.q2 / b, base: plant.base / (b * epsilon), wall: plant.wall };
+      if (plant.impacts > this.impacts) {
+        this.rig.hit(Math.sign(plant.relative), now);
+        page.sound?.(point.B);
+      }
+      this.impacts = plant.impacts;
+    }
+    if (drag?.part === "mass") look = { ...look, q1: drag.to, q2: drag.to + look.q2 - look.q1 };
+    if (drag?.part === "particle") look.q2 = look.q1 + drag.to;
+    // The scale grows at once and shrinks slowly.
+    const largest = (values) => values.reduce((most, value) => Math.max(most, Math.abs(value)), 1);
+    const need = { mass: largest([...motion.map((one) => one.v), look.q1]), base: largest([...motion.map((one) => one.base), look.base]) };
+    for (const key of ["mass", "base"]) reach[key] = Math.max(need[key], reach[key] + 0.02 * (need[key] - reach[key]));
+    this.rig.draw(look, reach, now, this.calm.matches);
+  }
+
+  #motion(motion, status, cursor) {
+    const { page, plots: { scope } } = this;
+    const top = 1.05 * motion.reduce((most, one) => Math.max(most, Math.abs(one.base), Math.abs(one.v), Math.abs(one.w)), 1.1);
+    const begin = motion[0].time;
+    const column = (key) => motion.map((one) => [one.time, one[key]]);
+    scope.begin([begin, Math.max(motion.at(-1).time, begin + (2 * Math.PI) / status.omega0)], [-top, top]);
+    scope.line(column("base"), "blue", { label: "base/(ε b)" });
+    scope.line(column("v"), "ink", { label: "response v" });
+    scope.line(column("w"), "red", { label: "relative w" });
+    scope.cursor(cursor);
     scope.end();
   }
 
-  // Phase error and detuning since the start.
-  #history(period, status) {
-    const { page, plots: { history } } = this;
-    const stride = Math.max(1, Math.floor(page.rows.length / 700));
-    const past = [];
-    for (let i = (page.rows.length - 1) % stride; i < page.rows.length; i += stride) past.push(page.rows.row(i));
-    const sigma = (omega) => (omega / status.omega0 - 1) / page.values.mass_ratio;
-    const late = past.slice(Math.floor(past.length * 0.05));
-    const range = extent(late.flatMap((row) => [Math.max(-30, Math.min(30, row[4])), sigma(row[5])]).concat([-2, 2]), 2);
-    history.begin([past[0][0], Math.max(past.at(-1)[0], past[0][0] + period)], range);
-    history.line(past.map((row) => [row[0], row[4]]), "violet", { label: "phase error, °" });
-    history.line(past.map((row) => [row[0], sigma(row[5])]), "green", { label: "detuning σ" });
-    history.end();
+  // The last minute, with the run before at the same times.
+  #history(cursor) {
+    const { past, ghost, plots: { phase, detuning } } = this;
+    const x = [past[0].time, Math.max(past.at(-1).time, past[0].time + 1)];
+    const old = ghost.filter((one) => one.time >= x[0] && one.time <= x[1]);
+    for (const [plot, key, name, shade] of [[phase, "error", "phase error", "violet"], [detuning, "sigma", "detuning", "green"]]) {
+      const shows = (one) => key === "error" || onBackbone(one);
+      plot.begin(x, extent([...past, ...old].filter(shows).map((one) => one[key]), key === "error" ? 1 : 0.5));
+      const values = (run) => run.map((one) => (shows(one) ? [one.time, one[key]] : null));
+      if (old.length) plot.line(values(old), "ghost", { label: "run before" });
+      plot.line(values(past), shade, { label: name });
+      plot.cursor(cursor);
+      plot.end();
+    }
   }
 
-  #manifold(top, status) {
-    const { lines, trail, plots: { manifold } } = this;
-    manifold.begin([0, 2.2], [0, top]);
-    manifold.line(lines.manifold, "ink", { label: "manifold, first order", dash: [6, 4] });
-    manifold.line(trail.slice(-200).map((point) => [point[2], point[1]]), "blue", { width: 1 });
-    manifold.points([[status.B, status.C]], "red", { label: "now", radius: 5 });
+  // The past as curves [x, y] of a plane: the trail of the present point, the free decay, and the run before.
+  #tracks(plot, seen, place) {
+    const from = (seen.at(-1)?.time ?? 0) - TRAIL;
+    const some = (kind) => (one) => (kind(one) ? place(one) : null);
+    const decays = (one) => one.decays;
+    if (this.ghost.length) {
+      plot.line(this.ghost.map(some(decays)), "ghost", { width: 2 });
+      plot.points([place(this.ghost.findLast(onBackbone) ?? this.ghost[0])], "ghost", { label: "run before", radius: 5, open: true });
+    }
+    plot.line(seen.filter((one) => one.time > from).map(some((one) => one.G > 0)), "trail", { width: 1 });
+    plot.line(seen.map(some(decays)), "decay", { width: 3, label: seen.some(decays) ? "free decay" : "" });
+  }
+
+  #manifold(top, seen, point, linked) {
+    const { page, plots: { manifold } } = this;
+    const right = end(2.2, Math.max(point.B, ...seen.map((one) => one.B)));
+    if (this.manifoldEnd !== right) this.lines.manifold = page.bench.manifold((this.manifoldEnd = right), 240);
+    manifold.begin([0, right], [0, top]);
+    manifold.curve(this.lines.manifold, "ink", { label: "first-order theory" });
+    this.#tracks(manifold, seen, (one) => [one.B, one.C]);
+    manifold.points([[point.B, point.C]], "red", { label: "now", radius: 5 });
+    if (linked) manifold.points([[linked.B, linked.C]], "ink", { radius: 7, open: true });
     manifold.end();
   }
 
-  #backbone(top, status, tracked) {
-    const { lines, trail, plots: { backbone } } = this;
-    const sigmas = [...lines.exact, ...lines.theory].map((point) => point[0]).filter((x) => x > -8 && x < 8);
-    backbone.begin(extent(sigmas.concat([Math.max(-8, Math.min(8, status.sigma))]), 0.5), [0, top]);
-    backbone.line(lines.theory, "ink", { label: "theory", dash: [6, 4] });
-    backbone.line(lines.exact.map((point) => (point[2] ? point : null)), "green", { label: "exact" });
-    backbone.line(lines.exact.map((point) => (point[2] ? null : point)), "green", { dash: [1, 3] });
-    backbone.line(trail.slice(-200), "blue", { width: 1 });
-    backbone.points(tracked.map((point) => [point[1], point[2]]), "violet", { label: "tracked", open: true });
-    backbone.points([[status.sigma, status.C]], "red", { label: "now", radius: 5 });
+  #backbone(top, seen, point, linked, tracked) {
+    const { lines, plots: { backbone } } = this;
+    const curves = [...lines.exact, ...lines.theory].filter((one) => one[1] <= top).map((one) => one[0]);
+    const sigmas = [...curves, ...[...seen.filter((one) => one.time > point.time - TRAIL || one.decays), ...this.ghost.filter((one) => one.decays), point].filter(onBackbone).map((one) => one.sigma)];
+    backbone.begin(extent(sigmas, 0.5), [0, top]);
+    backbone.curve(lines.theory, "ink", { label: "theory", width: 1.2 });
+    backbone.curve(lines.exact, "blue", { label: "exact", width: 2.4 });
+    this.#tracks(backbone, seen, (one) => [one.sigma, one.C]);
+    backbone.points(tracked.map((one) => [one[1], one[2]]), "violet", { label: "tracked", open: true });
+    if (onBackbone(point)) backbone.points([[point.sigma, point.C]], "red", { label: "now", radius: 5 });
+    if (linked && onBackbone(linked)) backbone.points([[linked.sigma, linked.C]], "ink", { radius: 7, open: true });
     backbone.end();
   }
 
-  #numbers(status, tracked) {
+  #numbers(status, point, [regime, fault], replay, tracked) {
     const { page } = this;
-    const [regime, fault] = page.bench.words();
     const periods = (page.shown * status.omega0) / (2 * Math.PI);
     const state = page.values.closed ? LOOP[status.state] + (status.settled ? ", settled" : "") + (fault ? `: ${fault}` : "") : "open";
+    // Only the present has these.
+    const present = (text) => (replay ? "– (replay)" : text);
     const entries = [
       ["Time", `${page.shown.toFixed(3)} s, ${periods.toFixed(1)} natural periods`],
-      ["Loop", state],
-      ["Regime", regime.startsWith("unknown") ? "too few impacts yet" : regime],
-      ["Detuning σ", status.sigma.toFixed(6)],
-      ["Amplitude C", status.C.toFixed(6)],
-      ["Particle speed B", status.B.toFixed(6)],
-      ["Phase error", `${(Math.round(status.phaseError * 1e4) / 1e4 + 0).toFixed(4)}°`],
-      ["Excitation G", status.G.toFixed(4)],
-      ["Impacts", `${status.impacts}, ${status.perPeriod.toFixed(3)} per period`],
-      ["Dissipated by impacts", `${(status.dissipated * 1e3).toPrecision(4)} mJ`],
+      ["Loop", present(state)],
+      ["Regime", present(regime.startsWith("unknown") ? "too few impacts yet" : regime)],
+      ["Detuning σ", point.sigma.toFixed(6)],
+      ["Amplitude C", point.C.toFixed(6)],
+      ["Particle speed B", point.B.toFixed(6)],
+      ["Phase error", `${(Math.round(point.error * 1e4) / 1e4 + 0).toFixed(4)}°`],
+      ["Excitation G", point.G.toFixed(4)],
+      ["Impacts", present(`${status.impacts}, ${status.perPeriod.toFixed(3)} per period`)],
+      ["Dissipated by impacts", present(`${(status.dissipated * 1e3).toPrecision(4)} mJ`)],
     ];
     if (page.points.length) entries.push(["Tracked points", tracked < page.points.length ? `${tracked} of ${page.points.length}` : `${tracked}`]);
     const list = $("numbers");

@@ -1,19 +1,22 @@
-// Plots on canvas: axes with ticks, lines, points.
+// Plots on canvas: axes with ticks, lines, points, a cursor.
 
 import { surface } from "./rig.js";
 
-const MARGIN = { left: 56, right: 10, top: 24, bottom: 34 };
+const MARGIN = { left: 56, right: 12, top: 24, bottom: 34 };
 
 export class Plot {
-  constructor(canvas, colour, axes) {
-    Object.assign(this, { canvas, colour, ...axes });
+  // `area`: top and bottom of the plot as shares of its canvas, which plots of one time axis share.
+  constructor(canvas, colour, { xLabel = "", yLabel, area = [0, 1] }) {
+    Object.assign(this, { canvas, colour, xLabel, yLabel, area });
   }
 
   // Begins a picture with the ranges x and y, [low, high] each.
   begin(x, y) {
     const { context: c, width, height } = surface(this.canvas);
-    Object.assign(this, { c, x, y, box: [MARGIN.left, MARGIN.top, width - MARGIN.left - MARGIN.right, height - MARGIN.top - MARGIN.bottom] });
-    c.clearRect(0, 0, width, height);
+    const [above, below] = this.area.map((share) => share * height);
+    const bottom = this.xLabel ? MARGIN.bottom : 4;
+    Object.assign(this, { c, x, y, box: [MARGIN.left, above + MARGIN.top, width - MARGIN.left - MARGIN.right, below - above - MARGIN.top - bottom] });
+    c.clearRect(0, above, width, below - above);
     const [left, top, wide, high] = this.box;
     c.font = "12px system-ui, sans-serif";
     c.lineWidth = 1;
@@ -22,7 +25,7 @@ export class Plot {
     c.textAlign = "center";
     for (const tick of ticks(x, wide / 70)) {
       this.#line([[tick, y[0]], [tick, y[1]]]);
-      c.fillText(shown(tick), this.#at([tick, 0])[0], top + high + 14);
+      if (this.xLabel) c.fillText(shown(tick), this.#at([tick, 0])[0], top + high + 14);
     }
     c.textAlign = "right";
     for (const tick of ticks(y, high / 34)) {
@@ -40,6 +43,19 @@ export class Plot {
   #at([x, y]) {
     const [left, top, wide, high] = this.box;
     return [left + ((x - this.x[0]) / (this.x[1] - this.x[0])) * wide, top + (1 - (y - this.y[0]) / (this.y[1] - this.y[0])) * high];
+  }
+
+  // x under a pointer, or undefined outside the axes.
+  xAt(event) {
+    const [left, , wide] = this.box ?? [0, 0, 0];
+    const share = (event.offsetX - left) / wide;
+    return share >= 0 && share <= 1 ? this.x[0] + share * (this.x[1] - this.x[0]) : undefined;
+  }
+
+  // The point of `points` nearest to a pointer, and its distance in pixels.
+  nearest(points, event) {
+    const distance = (point) => { const [x, y] = this.#at(point); return Math.hypot(x - event.offsetX, y - event.offsetY); };
+    return points.map((point) => [point, distance(point)]).reduce((best, next) => (next[1] < best[1] ? next : best), [undefined, Infinity]);
   }
 
   #line(points) {
@@ -65,16 +81,31 @@ export class Plot {
     if (label) this.#legend(label, colour, dash);
   }
 
+  // A curve of points [x, y, 1 if stable], dashed where it is unstable.
+  curve(points, colour, { label, width = 2 }) {
+    // Unstable pieces begin and end at the stable neighbour.
+    const unstable = points.map((point, i) => ([points[i - 1], point, points[i + 1]].some((near) => near && !near[2]) ? point : null));
+    this.line(unstable, colour, { dash: [4, 4], width: 0.7 * width });
+    this.line(points.map((point) => (point[2] ? point : null)), colour, { label, width });
+  }
+
   points(points, colour, { label, radius = 3, open = false } = {}) {
     const { c } = this;
-    c.fillStyle = c.strokeStyle = this.colour(colour);
+    // Whole discs, also on the edge of the axes; none beyond.
+    c.restore();
     c.lineWidth = 1.5;
-    for (const point of points) {
+    c.fillStyle = c.strokeStyle = this.colour(colour);
+    const inside = ([x, y]) => x >= this.x[0] && x <= this.x[1] && y >= this.y[0] && y <= this.y[1];
+    for (const point of points.filter(inside)) {
       c.beginPath(); c.arc(...this.#at(point), radius, 0, 7);
       if (open) c.stroke(); else c.fill();
     }
+    this.#clip();
     if (label && points.length) this.#legend(label, colour, null);
   }
+
+  // A vertical line at x.
+  cursor(x) { if (x !== undefined) this.line([[x, this.y[0]], [x, this.y[1]]], "ink", { width: 1 }); }
 
   // One row above the axes, outside the clipped area.
   #legend(label, colour, dash) {
@@ -105,14 +136,17 @@ export class Plot {
 function ticks([low, high], count) {
   const rough = (high - low) / Math.max(2, count);
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((factor) => factor * power).find((one) => one >= rough);
-  const values = [];
-  for (let i = Math.ceil(low / step); i * step <= high; i++) values.push(i * step);
-  return values;
+  const steps = [0.2, 0.5, 1, 2, 5, 10].map((factor) => factor * power);
+  const multiples = (step) => Array.from({ length: Math.max(0, Math.floor(high / step) - Math.ceil(low / step) + 1) }, (_, i) => (Math.ceil(low / step) + i) * step);
+  // The finest that is coarse enough, but at least two ticks.
+  let at = steps.findIndex((step) => step >= rough);
+  while (at > 0 && multiples(steps[at]).length < 2) at--;
+  return multiples(steps[at]);
 }
 
 const shown = (value) => String(Number(value.toPrecision(5))).replace("-", "−");
 
+// The range of values with a margin, at least `least` to either side of its middle.
 export const extent = (values, least) => {
   let low = Infinity, high = -Infinity;
   for (const value of values) { low = Math.min(low, value); high = Math.max(high, value); }

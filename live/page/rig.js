@@ -1,20 +1,33 @@
 // The rig, drawn to scale: base, spring and damper, mass with its cavity, particle. Displacements are over b.
 
+// Lengths in the drawing, over b: half of the mass, the spring at rest, the radius of the particle, the base's displacement over epsilon b.
+const HALF = 1.5, SPRING = 1.5, RADIUS = 0.28, BASE = 0.35;
+// Smallest margins, pixels.
+const SIDE = 16, LABELS = 40;
+
 export class Rig {
   constructor(canvas, colour) {
     Object.assign(this, { canvas, colour, flash: { wall: 0, at: -1 } });
   }
 
-  // `look`: displacements over b; base over b epsilon, since it is too small to be seen to scale.
-  draw(look, now, calm) {
+  // `look`: displacements over b; base over b epsilon, since it is too small to be seen to scale. `reach`: largest displacements of late
+  // of mass and base, which fit into the canvas.
+  draw(look, reach, now, calm) {
     const { context: c, width, height } = surface(this.canvas);
     const { colour } = this;
     c.clearRect(0, 0, width, height);
-    const b = Math.min(width / 9, height / 3.2);
-    const floor = Math.min(height - 24, height / 2 + 0.875 * b);
-    const centre = width * 0.6 + look.q1 * b;
-    const half = 1.28 * b;
-    const wall = width * 0.09 + look.base * b * 0.35;
+    const lengths = 2 * BASE * reach.base + SPRING + 2 * HALF + 2 * reach.mass;
+    // Before the page has its layout, the canvas has no size.
+    const b = Math.max(0, Math.min((width - 2 * SIDE) / lengths, (height - LABELS) / 2));
+    const floor = 0.5 * (height - LABELS) + 0.875 * b + 16;
+    const slack = width - 2 * SIDE - lengths * b;
+    const wall = SIDE + 0.2 * slack + BASE * (reach.base + look.base) * b;
+    const rest = SIDE + 0.6 * slack + (2 * BASE * reach.base + SPRING + reach.mass + HALF) * b;
+    const centre = rest + look.q1 * b;
+    const radius = RADIUS * b;
+    const inside = b + radius;
+    const outside = HALF * b;
+    const particle = centre + (look.q2 - look.q1) * b;
     c.lineWidth = 2;
     c.strokeStyle = c.fillStyle = colour("faint");
     c.beginPath(); c.moveTo(0, floor + 1); c.lineTo(width, floor + 1); c.stroke();
@@ -23,14 +36,12 @@ export class Rig {
     c.fillRect(wall - 10, floor - 1.75 * b, 10, 1.75 * b);
     // Spring and damper
     c.strokeStyle = colour("ink");
-    spring(c, wall, centre - half - 0.22 * b, floor - 1.25 * b, b * 0.16);
-    damper(c, wall, centre - half - 0.22 * b, floor - 0.5 * b, b * 0.14);
+    spring(c, wall, centre - outside, floor - 1.25 * b, b * 0.16);
+    damper(c, wall, centre - outside, floor - 0.5 * b, b * 0.14);
     // Mass with its cavity: the particle's centre moves from -b to b
-    const radius = 0.28 * b;
-    const inside = b + radius;
     const top = floor - 1.6 * b;
     c.fillStyle = colour("line");
-    c.fillRect(centre - inside - 0.22 * b, top, 2 * inside + 0.44 * b, floor - top);
+    c.fillRect(centre - outside, top, 2 * outside, floor - top);
     c.fillStyle = colour("panel");
     c.fillRect(centre - inside, floor - 1.12 * b, 2 * inside, 0.66 * b);
     const age = now - this.flash.at;
@@ -44,11 +55,25 @@ export class Rig {
       }
     }
     c.fillStyle = colour("red");
-    c.beginPath(); c.arc(centre + (look.q2 - look.q1) * b, floor - 0.79 * b, radius, 0, 7); c.fill();
+    c.beginPath(); c.arc(particle, floor - 0.79 * b, radius, 0, 7); c.fill();
     c.fillStyle = colour("faint");
     c.font = "12px system-ui, sans-serif";
+    c.textAlign = "left";
     c.fillText("base (not to scale)", 6, floor + 17);
-    c.fillText(look.wall ? "the particle rests on a wall" : "", centre - 60, top - 8);
+    c.textAlign = "center";
+    c.fillText(look.wall ? "the particle rests on a wall" : "mass with particle", centre, floor + 17);
+    Object.assign(this, { b, rest, centre, particle, outside, top, floor, left: wall - 10, right: centre + outside });
+  }
+
+  // What a pointer is on: "particle", "mass" or undefined.
+  under({ offsetX: x, offsetY: y }) {
+    if (Math.hypot(x - this.particle, y - (this.floor - 0.79 * this.b)) < 1.3 * RADIUS * this.b) return "particle";
+    return Math.abs(x - this.centre) < this.outside && y > this.top && y < this.floor ? "mass" : undefined;
+  }
+
+  // Where a pointer drags it: the displacement over b of the mass, or of the particle from the middle of its cavity.
+  dragged(part, x) {
+    return part === "mass" ? (x - this.rest) / this.b : Math.max(-1, Math.min(1, (x - this.centre) / this.b));
   }
 
   hit(wall, now) { this.flash = { wall, at: now }; }

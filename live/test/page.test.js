@@ -50,12 +50,14 @@ for (const { name, options } of BROWSERS) {
     after(() => browser?.close());
 
     // A page that is ready, and the errors it reported.
-    async function open(hash = "", prepare = async () => {}) {
+    async function open(hash = "", prepare = async () => {}, seen = true) {
       const page = await browser.newPage();
       const errors = [];
       page.on("pageerror", (error) => errors.push(String(error)));
       page.on("console", (line) => line.type() === "error" && errors.push(line.text()));
       await page.setViewport({ width: 1600, height: 1000 });
+      // Who has seen the introduction gets the bench at once.
+      await page.evaluateOnNewDocument((seen) => (seen ? localStorage.setItem("vines-story", "seen") : localStorage.clear()), seen);
       await prepare(page);
       await page.goto(`${address}${hash}`);
       return { page, errors };
@@ -96,7 +98,8 @@ for (const { name, options } of BROWSERS) {
           return ((performance.now() - start) * 1e6) / (100 * samples);
         }));
       }, 1000);
-      assert.ok(least > 0);
+      // Measured: 1.0 in Chromium, 1.3 in Firefox; the machine is shared.
+      assert.ok(least < 4 * Number(NATIVE), `${least} ns`);
       console.log(`${name}: ${least.toFixed(0)} ns for a sample, ${(least / Number(NATIVE)).toFixed(2)} times the native ${NATIVE} ns`);
       assert.deepEqual(errors, []);
       await page.close();
@@ -166,7 +169,7 @@ for (const { name, options } of BROWSERS) {
       const { page: other } = await open(first[0].slice(first[0].indexOf("#")));
       await ready(other);
       assert.deepEqual(await other.evaluate(state), first);
-      assert.equal(first[1].length, 8);
+      assert.equal(first[1].length, 11);
       await page.close();
       await other.close();
     });
@@ -316,7 +319,7 @@ for (const { name, options } of BROWSERS) {
     test("every control works by keyboard", async () => {
       const { page, errors } = await open();
       await ready(page);
-      const controls = () => page.evaluate(() => [...document.querySelectorAll("button:not(:disabled), select, input:not(:disabled)")].map((one) => one.id || `${one.previousElementSibling.id} slider`));
+      const controls = () => page.evaluate(() => [...document.querySelectorAll("button:not(:disabled), select, input:not(:disabled)")].filter((one) => one.checkVisibility({ visibilityProperty: true })).map((one) => one.id || `${one.previousElementSibling.id} slider`));
       // The last one, "closed", changes which settings have an effect.
       const all = await controls();
       const seen = new Set();
@@ -362,6 +365,185 @@ for (const { name, options } of BROWSERS) {
       await page.close();
     });
 
+    test("the free decay follows the exact backbone until synchrony is lost", async () => {
+      const { page, errors } = await open();
+      await ready(page);
+      const found = await page.evaluate(async () => {
+        const one = window.live.page;
+        const drawn = async () => { const { frames } = window.live; while (window.live.frames < frames + 2) await new Promise((done) => requestAnimationFrame(done)); };
+        one.play(false);
+        one.start({});
+        one.goTo(45, 1e6);
+        one.change("drive", 0);
+        one.goTo(50, 1e6);
+        await drawn();
+        const exact = one.bench.exact(2000).filter((point) => point[2]);
+        const decay = one.pictures.past.filter((point) => point.decays);
+        const distance = ({ sigma, C }) => Math.min(...exact.map(([s, c]) => Math.hypot(s - sigma, c - C)));
+        const upper = decay.filter(({ C }) => C > 0.25 && C < 0.43);
+        return { count: upper.length, worst: Math.max(...upper.map(distance)), lowest: decay.at(-1).C, lamp: document.getElementById("lamp").textContent, advice: document.getElementById("advice").textContent };
+      });
+      console.log(`${name}: ${found.count} points of the decay, at most ${found.worst.toFixed(2)} from the exact backbone`);
+      // The decay is shifted by the rate at which it slides, to first order in epsilon: 0.08 in sigma here.
+      assert.ok(found.count > 20 && found.worst < 0.12, JSON.stringify(found));
+      assert.ok(found.lowest < 0.134, "the decay goes on to the fold");
+      assert.equal(found.lamp, "FREE DECAY");
+      assert.match(found.advice, /the backbone ends/);
+      assert.deepEqual(errors, []);
+      await page.close();
+    });
+
+    test("the strip has lamp, hertz and millimetres, and after a fault the next action, which works", async () => {
+      const { page, errors } = await open();
+      await ready(page);
+      const strip = async (seconds, key, value) => page.evaluate(async (seconds, key, value) => {
+        const one = window.live.page;
+        one.play(false);
+        if (key) one.change(key, value);
+        one.goTo(one.shown + seconds, 1e6);
+        const { frames } = window.live;
+        while (window.live.frames < frames + 2) await new Promise((done) => requestAnimationFrame(done));
+        const text = (id) => document.getElementById(id).textContent;
+        return { lamp: text("lamp"), hertz: text("hertz"), sigma: text("sigma"), millimetres: text("millimetres"), act: text("act"), advice: text("advice"), height: document.querySelector(".strip").offsetHeight };
+      }, seconds, key, value);
+      const locked = await strip(45);
+      assert.deepEqual({ ...locked, advice: "", height: 0 }, { lamp: "LOCKED", hertz: "8.731 Hz", sigma: "σ = −1.139", millimetres: "4.48 mm", act: "Let go", advice: "", height: 0 });
+      const fault = await strip(15, "excitation", 0.3);
+      assert.equal(fault.lamp, "FAULT");
+      assert.match(fault.advice, /^The lock was lost\. Raise G/);
+      assert.equal(fault.height, locked.height, "the layout stays");
+      await page.click("#act");
+      assert.ok(await page.evaluate(() => window.live.page.samples < 1000), "Restart");
+      // At rest the particle meets no wall; once moved, it is captured.
+      await page.evaluate(() => window.live.page.start({ start_speed: 0 }));
+      assert.equal((await strip(10)).act, "Move it");
+      await page.click("#act");
+      await strip(45);
+      assert.equal(await page.evaluate(() => window.live.page.bench.words()[0]), "symmetric 1:1");
+      assert.deepEqual(errors, []);
+      await page.close();
+    });
+
+    test("the introduction is shown once, not to who follows a link, and leads to a decay", async () => {
+      const { page, errors } = await open("", undefined, false);
+      await ready(page);
+      const state = () => page.evaluate(() => ({ shown: !document.getElementById("story").hidden, step: document.getElementById("story-step").textContent, speed: window.live.page.speed, driving: window.live.page.driving }));
+      assert.deepEqual(await state(), { shown: true, step: "1 of 3", speed: 0.1, driving: true });
+      await page.click("#story-next");
+      assert.deepEqual(await state(), { shown: true, step: "2 of 3", speed: 10, driving: true });
+      await page.click("#story-next");
+      assert.deepEqual(await state(), { shown: true, step: "3 of 3", speed: 0.3, driving: false });
+      await page.click("#story-skip");
+      assert.deepEqual(await state(), { shown: false, step: "3 of 3", speed: 1, driving: false });
+      assert.equal(await page.evaluate(() => localStorage.getItem("vines-story")), "seen");
+      assert.deepEqual(errors, []);
+      await page.close();
+      const { page: other } = await open("#excitation=1.3", undefined, false);
+      await ready(other);
+      assert.equal(await other.evaluate(() => document.getElementById("story").hidden), true);
+      await other.close();
+    });
+
+    test("the last minute can be scrubbed, replayed and left again, and the run before stays as a ghost", async () => {
+      const { page, errors } = await open();
+      await ready(page);
+      const found = await page.evaluate(async () => {
+        const one = window.live.page;
+        const drawn = async () => { const { frames } = window.live; while (window.live.frames < frames + 2) await new Promise((done) => requestAnimationFrame(done)); };
+        const text = (id) => document.getElementById(id).textContent;
+        one.play(false);
+        one.start({});
+        one.goTo(70, 1e6);
+        const slider = document.getElementById("time");
+        await drawn();
+        const range = [Number(slider.min), Number(slider.value)];
+        slider.value = -30;
+        slider.dispatchEvent(new Event("input"));
+        await drawn();
+        const back = { time: Math.round(10 * one.shown) / 10, lamp: text("lamp"), samples: one.samples };
+        const { samples } = one;
+        one.goTo(one.shown + 5);
+        const replayed = { time: Math.round(10 * one.shown) / 10, same: one.samples === samples };
+        one.change("excitation", 1.2);
+        const after = { present: !one.replays(), at: one.changes.at(-1)[0] === samples };
+        one.start({ excitation: 1.3 });
+        await drawn();
+        return { range, back, replayed, after, samples, ghost: one.pictures.ghost.length > 1000 };
+      });
+      assert.deepEqual(found, { range: [-60, 0], back: { time: 40, lamp: "REPLAY", samples: found.samples }, replayed: { time: 45, same: true }, after: { present: true, at: true }, samples: found.samples, ghost: true });
+      // A pointer on a time axis links the cursors; a click goes there.
+      await page.evaluate(() => window.live.page.goTo(20, 1e6));
+      const box = await (await page.$("#history")).boundingBox();
+      await page.mouse.click(box.x + 0.6 * box.width, box.y + 0.2 * box.height);
+      assert.ok(await page.evaluate(() => window.live.page.replays() && window.live.page.pictures.hover !== undefined));
+      assert.deepEqual(errors, []);
+      await page.close();
+    });
+
+    test("a click on the backbone leads there, and the particle can be dragged", async () => {
+      const { page, errors } = await open();
+      await ready(page);
+      const aim = await page.evaluate(async () => {
+        const one = window.live.page;
+        one.play(false);
+        one.start({});
+        one.goTo(30, 1e6);
+        const { frames } = window.live;
+        while (window.live.frames < frames + 2) await new Promise((done) => requestAnimationFrame(done));
+        const { backbone } = one.pictures.plots;
+        backbone.canvas.scrollIntoView({ block: "center" });
+        const point = one.pictures.lines.exact.find((point) => point[2] && point[1] > 0.6);
+        const [left, top, wide, high] = backbone.box, { x, y } = backbone;
+        const box = backbone.canvas.getBoundingClientRect();
+        return { point, x: box.left + left + (wide * (point[0] - x[0])) / (x[1] - x[0]), y: box.top + top + high * (1 - (point[1] - y[0]) / (y[1] - y[0])) };
+      });
+      await page.mouse.click(aim.x, aim.y);
+      const there = await page.evaluate(() => { const one = window.live.page; one.goTo(one.shown + 60, 1e6); const { sigma, C, locked } = one.bench.status(); return { sigma, C, locked }; });
+      assert.ok(Math.hypot(there.sigma - aim.point[0], there.C - aim.point[1]) < 0.03 && there.locked, JSON.stringify([aim, there]));
+      const particle = await page.evaluate(async () => {
+        const { rig } = window.live.page.pictures;
+        rig.canvas.scrollIntoView({ block: "center" });
+        const { frames } = window.live;
+        while (window.live.frames < frames + 2) await new Promise((done) => requestAnimationFrame(done));
+        const box = rig.canvas.getBoundingClientRect();
+        return [box.left + rig.particle, box.top + rig.floor - 0.79 * rig.b];
+      });
+      await page.mouse.move(...particle);
+      await page.mouse.down();
+      await page.mouse.move(particle[0] - 300, particle[1]);
+      await page.mouse.up();
+      assert.deepEqual(await page.evaluate(() => window.live.page.changes.at(-1).slice(1)), ["particle", -1]);
+      assert.deepEqual(errors, []);
+      await page.close();
+    });
+
+    test("in every scene, rig, axes and present point stay on their canvases", async () => {
+      const { page, errors } = await open();
+      await ready(page);
+      const found = await page.evaluate(async () => {
+        const one = window.live.page;
+        one.play(false);
+        const outside = [];
+        for (const scene of one.table.scenes) {
+          one.start(scene.values);
+          for (let look = 0; look < 150; look++) {
+            one.goTo(one.shown + 0.3, 1e6);
+            one.pictures.draw(performance.now());
+            const { rig, plots } = one.pictures;
+            if (rig.left < 0 || rig.right > rig.canvas.clientWidth || rig.top < 0 || rig.floor > rig.canvas.clientHeight) outside.push([scene.name, "rig", rig.left, rig.right]);
+            const { sigma, C, B, G } = one.pictures.now;
+            const inside = (value, [low, high]) => value >= low && value <= high;
+            if (!inside(B, plots.manifold.x) || !inside(C, plots.manifold.y)) outside.push([scene.name, "manifold", B, C]);
+            if (G > 0 && (!inside(sigma, plots.backbone.x) || !inside(C, plots.backbone.y))) outside.push([scene.name, "backbone", sigma, C]);
+          }
+        }
+        return outside;
+      });
+      assert.deepEqual(found, []);
+      assert.deepEqual(errors, []);
+      await page.close();
+    });
+
     test("screenshots and frames per second", async () => {
       await mkdir(SCREENS, { recursive: true });
       for (const scheme of name === "chromium" ? ["light", "dark"] : ["light"]) {
@@ -387,6 +569,8 @@ for (const { name, options } of BROWSERS) {
         const end = await page.evaluate(() => [window.live.frames, performance.now()]);
         counts.push((1000 * (end[0] - start[0])) / (end[1] - start[1]));
       }
+      // 60 on an idle machine; this one may be shared.
+      assert.ok(Math.min(...counts) >= 20, `${counts}`);
       console.log(`${name}: at real time at least ${Math.min(...counts).toFixed(0)} frames per second in ten seconds`);
       await page.close();
     });

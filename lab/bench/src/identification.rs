@@ -11,7 +11,7 @@ use crate::record::Record;
 use crate::scene::{Dimensionless, Scene};
 
 pub use balance::{Balance, Cycle, Slopes};
-pub use decay::{DecayEnd, DecayPoint, DecayPoints, decay_points};
+pub use decay::{DecayEnd, DecayPoint, DecayPoints, Harmonic, decay_points, harmonic};
 pub use lock::{Lock, Measured};
 use lock::{measure, on_target, sensors_after_release};
 use response::longer_after;

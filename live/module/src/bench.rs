@@ -8,6 +8,7 @@ use vines_model::regime::Impact;
 use vines_testbench::rig::{Command, Drive};
 use vines_testbench::scene::Scene;
 
+use crate::decay::Decay;
 use crate::message::Message;
 use crate::rig::NoisyRig;
 use crate::settings::{COUNT, Settings, changed, default_scene, index, settings_of};
@@ -28,6 +29,14 @@ pub struct Row {
     pub output: Output,
     /// The drive from this sample on: the controller's, or that of the open loop.
     pub drive: Drive,
+    /// Frequency of the motion, rad/s: of the drive or, along a free decay, of the fit.
+    pub omega: f64,
+    /// Amplitude of the response, m: the controller's or, along a free decay, of the fit.
+    pub amplitude: f64,
+    /// Speed of the particle, m/s: along a free decay, the mean over the window of the fit.
+    pub speed: f64,
+    /// Whether this is a free decay with two impacts per period, along the backbone.
+    pub decays: bool,
 }
 
 /// Impacts that are kept to determine the regime from.
@@ -49,12 +58,15 @@ pub struct Bench {
     pub active: bool,
     /// Output of the controller at the last sample.
     pub output: Output,
+    /// Frequency (rad/s) and amplitude (m) of the motion at the last sample, as in [`Row`].
+    pub motion: (f64, f64),
     /// The last impacts; times are phases of the drive, rad.
     pub impacts: Vec<Impact>,
     /// Phase of the drive since the start, rad.
     pub phase: f64,
     /// The tracking of the backbone, while it runs, and the points of one that was ended.
     pub tracking: Option<Tracking>,
+    decay: Decay,
     rig: NoisyRig,
     /// The plant at the last sample, and the drive from there on.
     before: (Plant, Drive),
@@ -76,9 +88,11 @@ impl Bench {
             samples: 0,
             active: true,
             output: lock.idle(),
+            motion: (0.0, 0.0),
             impacts: Vec::new(),
             phase: 0.0,
             tracking: None,
+            decay: Decay::default(),
             rig: NoisyRig::new(plant, settings[index::NOISE] * 0.01 * scene.plant.half_width),
             before: (plant, Drive::default()),
             settings,
@@ -159,6 +173,18 @@ impl Bench {
         };
         let output = self.lock.process(&mut self.state, input);
         let drive = self.requested(&output);
+        let step = self.lock.config().sample_time;
+        let speed = self.rig.plant.state().dq2.abs();
+        if drive.amplitude == 0.0 {
+            self.decay.sample(sensors.response, speed, step);
+            self.decay.watch(&self.impacts, self.phase);
+        } else {
+            self.decay.release(drive.omega, step, self.scene.record.window_periods);
+        }
+        let fit = self.decay.fit.as_ref();
+        let (omega, amplitude) = fit.map_or((drive.omega, output.response_amplitude), |fit| {
+            (fit.omega, fit.amplitude)
+        });
         let row = Row {
             time,
             base: sensors.reference.unwrap_or_default(),
@@ -166,10 +192,15 @@ impl Bench {
             relative: self.rig.plant.relative_displacement(),
             output,
             drive,
+            omega,
+            amplitude,
+            speed: fit.map_or(speed, |_| self.decay.speed),
+            decays: drive.amplitude == 0.0 && self.decay.synchronous,
         };
         if is_last {
             self.before = (self.rig.plant, drive);
             self.output = output;
+            self.motion = (omega, amplitude);
         }
         self.step(drive)?;
         self.samples += 1;
@@ -264,11 +295,32 @@ impl Bench {
         }
     }
 
-    /// Frequency (rad/s) and amplitude (m) of the drive.
+    /// Amplitude of the drive, m.
     #[must_use]
-    pub fn drive_now(&self) -> (f64, f64) {
-        let drive = self.before.1;
-        (drive.omega, drive.amplitude)
+    pub fn drive_amplitude(&self) -> f64 {
+        self.before.1.amplitude
+    }
+
+    /// Puts the primary mass (together with the particle) or the particle alone somewhere, at rest: `to` is the displacement over b
+    /// of the mass, or of the particle from the middle of its cavity. Base, clock and controller run on.
+    ///
+    /// # Errors
+    /// The message for a displacement that the plant refuses.
+    pub fn place(&mut self, primary: bool, to: f64) -> Result<(), Message> {
+        let b = self.scene.plant.half_width;
+        let plant = &mut self.rig.plant;
+        let mut state = plant.state();
+        let mut from_mass = -plant.relative_displacement();
+        if primary {
+            (state.q1, state.dq1) = (to * b, 0.0);
+        } else {
+            from_mass = to * b;
+        }
+        // Rounding of the sum must not put the particle beyond a wall.
+        let inside = b * (1.0 - 4.0 * f64::EPSILON) - f64::EPSILON * state.q1.abs();
+        (state.q2, state.dq2) = (state.q1 + from_mass.clamp(-inside, inside), 0.0);
+        plant.set_state(state)?;
+        Ok(())
     }
 
     /// The plant at the next sample.

@@ -4,10 +4,11 @@ use vines_model::Dimensionless;
 use vines_model::orbit::exact_backbone;
 use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow};
 
-/// `points` points (B, C) of the slow invariant manifold up to `b_max`.
-pub fn manifold(scene: &Dimensionless, b_max: f64, points: usize) -> impl Iterator<Item = [f64; 2]> {
+/// `points` points (B, C, 1 if the impacts are stable) of the slow invariant manifold up to `b_max`.
+pub fn manifold(scene: &Dimensionless, b_max: f64, points: usize) -> impl Iterator<Item = [f64; 3]> {
     let manifold = Manifold::new(scene.r);
-    steps(0.0, b_max, points).map(move |b| [b, manifold.c(b)])
+    let stable = manifold.b_min()..B_SYMMETRY_BREAKING;
+    steps(0.0, b_max, points).map(move |b| [b, manifold.c(b), f64::from(u8::from(stable.contains(&b)))])
 }
 
 /// `points` points (sigma, C, 1 if stable) of the backbone by first-order theory.
@@ -20,15 +21,15 @@ pub fn backbone(scene: &Dimensionless, points: usize) -> impl Iterator<Item = [f
     })
 }
 
-/// Points (sigma, C, 1 if stable) of the backbone by exact orbits, at the detunings of the theory's backbone.
-pub fn exact(scene: &Dimensionless, points: usize) -> impl Iterator<Item = [f64; 3]> {
+/// Points (sigma, C, 1 if stable, G) of the backbone by exact orbits, at the detunings of the theory's backbone.
+pub fn exact(scene: &Dimensionless, points: usize) -> impl Iterator<Item = [f64; 4]> {
     backbone(scene, points).filter_map(|[sigma, c, _]| {
         let orbits = exact_backbone(scene, 1.0 + scene.epsilon * sigma);
         let distance = |c_exact: f64| (c_exact - c).abs();
         let nearest = orbits
             .into_iter()
             .min_by(|one, other| distance(one.c).total_cmp(&distance(other.c)))?;
-        Some([nearest.sigma, nearest.c, f64::from(u8::from(nearest.stable))])
+        Some([nearest.sigma, nearest.c, f64::from(u8::from(nearest.stable)), nearest.g])
     })
 }
 

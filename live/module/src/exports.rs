@@ -2,11 +2,12 @@
 //!
 //! | call | result in the output array |
 //! |---|---|
-//! | [`run`] | rows of the record: time (s), base, response, relative displacement (m), phase error (degrees), frequency (rad/s), base amplitude, response amplitude (m) |
+//! | [`run`] | rows of the record: time (s), base, response, relative displacement (m), phase error (degrees), frequency of the drive (rad/s), base amplitude, response amplitude (m), frequency of the motion (rad/s), speed of the particle (m/s), 1 in a free decay along the backbone |
 //! | [`look`] | time (s), base, q1, q2, relative displacement (m), particle's velocity (m/s), wall that it rests on (-1, 0, 1), impacts since the start |
 //! | [`status`] | see there |
-//! | [`manifold`] | pairs (B, C) |
-//! | [`theory_backbone`], [`exact_backbone`] | triples (sigma, C, 1 if stable) |
+//! | [`manifold`] | triples (B, C, 1 if stable) |
+//! | [`theory_backbone`] | triples (sigma, C, 1 if stable) |
+//! | [`exact_backbone`] | quadruples (sigma, C, 1 if stable, G) |
 //! | [`tracked`] | quintuples (time it is known, s; sigma; C; G; 1 if settled) |
 
 use std::cell::RefCell;
@@ -19,7 +20,7 @@ use crate::settings::{COUNT, Settings};
 /// Largest number of values of one call.
 const CAPACITY: usize = 1 << 16;
 /// Columns of a row of the record.
-const COLUMNS: usize = 8;
+const COLUMNS: usize = 11;
 
 struct Page {
     // Boxed: bytes of zeros for a bench would be a part of the module.
@@ -130,6 +131,12 @@ pub extern "C" fn drive(on: i32) -> i32 {
     })
 }
 
+/// Puts the primary mass (not 0) or the particle (0) at `to`, over b, at rest; see [`Bench::place`].
+#[unsafe(no_mangle)]
+pub extern "C" fn place(primary: i32, to: f64) -> i32 {
+    values(|bench, _| bench.place(primary != 0, to))
+}
+
 /// Takes `samples` samples; returns the number of values of their rows.
 #[unsafe(no_mangle)]
 pub extern "C" fn run(samples: u32) -> i32 {
@@ -144,7 +151,10 @@ pub extern "C" fn run(samples: u32) -> i32 {
                 controller.phase_error.unwrap_or(0.0).to_degrees(),
                 row.drive.omega,
                 row.drive.amplitude,
-                controller.response_amplitude,
+                row.amplitude,
+                row.omega,
+                row.speed,
+                f64::from(u8::from(row.decays)),
             ]);
         })
     })
@@ -183,24 +193,26 @@ pub extern "C" fn next_impact(after: f64) -> i32 {
 }
 
 /// The numbers of the page: time (s), sample time (s), omega0 (rad/s), sigma, C, B, phase error (degrees), G, locked, settled, state
-/// and fault of the loop, impacts since the start, impacts per period, energy dissipated (J).
+/// and fault of the loop, impacts since the start, impacts per period, energy dissipated (J); phase errors below which the loop is
+/// locked, and above which the lock is lost (degrees).
 #[unsafe(no_mangle)]
 pub extern "C" fn status() -> i32 {
     values(|bench, output| {
         let (d, out) = (bench.scene.dimensionless(), bench.output);
         let closed = bench.settings[crate::settings::index::CLOSED] != 0.0;
-        let (omega, amplitude) = bench.drive_now();
+        let (omega, amplitude) = bench.motion;
         let totals = bench.plant().totals();
+        let lock = bench.lock.config().lock;
         let yes = |condition: bool| f64::from(u8::from(condition));
         output.extend([
             bench.time(),
             bench.lock.config().sample_time,
             d.omega0,
             d.sigma(omega),
-            out.response_amplitude / d.b,
+            amplitude / d.b,
             bench.particle_speed(),
             out.phase_error.unwrap_or(0.0).to_degrees(),
-            d.excitation(amplitude),
+            d.excitation(bench.drive_amplitude()),
             yes(out.locked && closed),
             yes(out.settled && closed),
             f64::from(out.state as u8),
@@ -208,6 +220,8 @@ pub extern "C" fn status() -> i32 {
             totals.impacts as f64,
             bench.impacts_per_period(),
             totals.dissipated,
+            lock.phase_tolerance.to_degrees(),
+            lock.unlock_tolerance.to_degrees(),
         ]);
         Ok(())
     })

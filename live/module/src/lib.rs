@@ -6,6 +6,7 @@
 
 pub mod bench;
 mod curves;
+mod decay;
 pub mod exports;
 #[cfg(target_arch = "wasm32")]
 mod mathematics;

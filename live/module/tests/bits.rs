@@ -1,8 +1,11 @@
 //! The live bench is the lab's experiment, sample by sample.
 
+use std::f64::consts::TAU;
+
 use vines_live::bench::Bench;
 use vines_live::settings::{default_scene, index};
 use vines_testbench::experiment::{Plan, run};
+use vines_testbench::identification::decay_points;
 use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
 
@@ -43,6 +46,70 @@ fn the_default_lock_has_the_bits_of_the_lab_under_a_constant_drive() {
         );
     }
     assert!(bench.output.locked);
+}
+
+#[test]
+fn the_free_decay_has_the_bits_of_the_lab() {
+    let scene = paper();
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut controller = ConstantDrive(BuiltIn::new(&scene.controller_config()).unwrap());
+    let record = run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap();
+    let points = decay_points(&record, &scene).points;
+    assert!(points.len() > 50, "{} points", points.len());
+    let mut bench = Bench::new(Bench::default_settings()).unwrap();
+    bench.run(record.released, |_| {}).unwrap();
+    bench.drive(false);
+    let mut fits: Vec<(f64, f64, f64)> = Vec::new();
+    let mut lost = None;
+    bench
+        .run(record.decay().len(), |row| {
+            let fit = (row.omega, row.amplitude, row.speed);
+            if row.omega != row.drive.omega && fits.last() != Some(&fit) {
+                fits.push(fit);
+            }
+            if !row.decays {
+                lost.get_or_insert(row.time - record.decay()[0].time);
+            }
+        })
+        .unwrap();
+    for (point, (omega, amplitude, speed)) in points.iter().zip(&fits) {
+        assert_eq!(
+            (point.f_hz, point.a_m),
+            (omega / TAU, *amplitude),
+            "t = {} s",
+            point.t_s
+        );
+        let b = scene.dimensionless().speed(*speed);
+        assert!((b - point.b.unwrap()).abs() < 1e-12, "B = {b} at t = {} s", point.t_s);
+    }
+    // The last window has 2.5 periods and ends with the synchrony; the impact that is missed next is due half a period later.
+    let period = TAU / record.decay()[0].command.drive.omega;
+    let late = (lost.unwrap() - points.last().unwrap().t_s) / period;
+    assert!(
+        (1.25..2.5).contains(&late),
+        "synchrony is lost {late} periods after the last point"
+    );
+    assert!(fits.len() >= points.len());
+}
+
+#[test]
+fn a_mass_that_is_put_somewhere_starts_from_rest_there() {
+    let mut bench = Bench::new(Bench::default_settings()).unwrap();
+    bench.run(500, |_| {}).unwrap();
+    let b = bench.scene.plant.half_width;
+    for to in [-1.0, 0.3, 1.0] {
+        bench.place(false, to).unwrap();
+        let state = bench.plant().state();
+        assert!((state.q2 - state.q1 - to * b).abs() < 1e-14, "particle at {to}");
+        bench.place(true, 2.0 * to).unwrap();
+        let moved = bench.plant().state();
+        assert_eq!((moved.q1, moved.dq1, moved.dq2), (2.0 * to * b, 0.0, 0.0));
+        assert!(
+            (moved.q2 - moved.q1 - to * b).abs() < 1e-14,
+            "particle with the mass at {to}"
+        );
+        bench.run(10, |_| {}).unwrap();
+    }
 }
 
 #[test]

@@ -1,0 +1,86 @@
+//! Frequency and amplitude along the free decay, fitted as the lab fits them, while the samples arrive.
+
+use std::f64::consts::{PI, TAU};
+
+use vines_model::regime::{Impact, end_of_synchrony};
+use vines_testbench::identification::{Harmonic, harmonic};
+
+/// Fits per period, as in the lab.
+const PER_PERIOD: f64 = 8.0;
+/// Share of the first amplitude at which the fits end: the lab records a decay down to it.
+const END: f64 = 0.05;
+
+/// Impacts that synchrony is determined from at every sample; it is lost once.
+const LAST: usize = 4;
+
+/// The sliding window of a free decay.
+#[derive(Default)]
+pub struct Decay {
+    /// Responses, m, of the samples that the next fit uses.
+    values: Vec<f64>,
+    /// Speeds of the particle there, m/s.
+    speeds: Vec<f64>,
+    /// Length of the window, and distance between the beginnings of two windows, samples.
+    window: usize,
+    stride: usize,
+    /// Frequency of the last fit, or of the drive before the release, rad/s.
+    omega: f64,
+    /// Amplitude of the first fit, m.
+    first: Option<f64>,
+    /// The last fit.
+    pub fit: Option<Harmonic>,
+    /// Speed of the particle, m/s: the mean over its window.
+    pub speed: f64,
+    /// Whether the particle has met both walls in turn, at even intervals, since the release.
+    pub synchronous: bool,
+}
+
+impl Decay {
+    /// The next decay begins after a drive of `omega` rad/s; the window has `periods` periods.
+    pub fn release(&mut self, omega: f64, sample_time: f64, periods: f64) {
+        let period = TAU / omega / sample_time;
+        self.window = (periods * period).round() as usize + 1;
+        self.stride = ((period / PER_PERIOD).round() as usize).max(1);
+        self.values.clear();
+        self.speeds.clear();
+        self.synchronous = true;
+        (self.omega, self.first, self.fit) = (omega, None, None);
+    }
+
+    /// A sample without a drive: response, m, and speed of the particle, m/s.
+    pub fn sample(&mut self, response: f64, speed: f64, sample_time: f64) {
+        let has_ended = |first: f64| self.fit.is_some_and(|fit| fit.amplitude < END * first);
+        // A plant that starts without a drive has no window.
+        if self.window == 0 || self.first.is_some_and(has_ended) {
+            return;
+        }
+        self.values.push(response);
+        self.speeds.push(speed);
+        if self.values.len() < self.window {
+            return;
+        }
+        match harmonic(&self.values, sample_time, self.omega) {
+            Some(fit) => {
+                self.omega = fit.omega;
+                self.first.get_or_insert(fit.amplitude);
+                self.fit = Some(fit);
+                self.speed = self.speeds.iter().sum::<f64>() / self.speeds.len() as f64;
+                self.values.drain(..self.stride);
+                self.speeds.drain(..self.stride);
+            }
+            // No motion of that frequency is left.
+            None => self.window = 0,
+        }
+    }
+
+    /// Compares the last impacts with 1:1 motion; their times and `now` are phases of the drive before the release, rad.
+    pub fn watch(&mut self, impacts: &[Impact], now: f64) {
+        let last = &impacts[impacts.len().saturating_sub(LAST)..];
+        // `end_of_synchrony` ends at an interval that is longer by a quarter.
+        let late = |impact: &Impact| now - impact.time > 1.25 * PI;
+        let end = end_of_synchrony(last, PI);
+        self.synchronous &= last
+            .last()
+            .is_some_and(|impact| end == Some(impact.time) && !late(impact));
+    }
+}
