@@ -3,9 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-#[cfg(feature = "sweep")]
-use vines::scene::Family;
-use vines::scene::{Override, Scene, SceneError};
+use vines::scene::{Family, Override, Scene, SceneError};
 
 #[derive(Debug, Args)]
 pub(super) struct SceneArguments {
@@ -24,7 +22,6 @@ impl SceneArguments {
     }
 
     /// The scene, of which numbers may vary.
-    #[cfg(feature = "sweep")]
     pub(super) fn family(&self) -> Result<Family, SceneError> {
         let Some(path) = &self.scene else {
             return Family::parse("", None, &self.set);

@@ -13,10 +13,10 @@ use super::theme::dark;
 use crate::backbone::Point;
 use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoint};
 use crate::files::{self, FileError};
-use crate::map::{Cell, Map, MapError};
 use crate::orbit::Periodic;
 use crate::record::{Sample, table};
 use crate::regime::Regime;
+use crate::sweep::{Map, MapCell, SweepError};
 
 /// Why a report could not be computed, or the files of a run could not be written.
 #[derive(Debug, Error)]
@@ -27,7 +27,7 @@ pub enum ReportError {
     #[error(transparent)]
     Controller(#[from] ConfigError),
     #[error(transparent)]
-    Map(#[from] MapError),
+    Map(#[from] SweepError),
     #[error(transparent)]
     File(#[from] FileError),
     #[error("{source}")]
@@ -193,25 +193,36 @@ pub(super) fn tracked_csv(found: &TrackedComparison) -> Result<String, ReportErr
 
 /// The cells of a map, as CSV.
 pub fn map_csv(map: &Map) -> Result<String, ReportError> {
-    #[derive(Serialize)]
-    struct Row {
-        sigma: f64,
-        #[serde(rename = "G")]
-        g: f64,
-        r: f64,
-    }
-    #[derive(Serialize)]
-    struct More {
-        theory_stable: bool,
-        coexisting: String,
-    }
-    let row = |cell: &Cell| {
-        let Cell { sigma, g, r, point, theory_stable, .. } = *cell;
-        let names: Vec<&str> = cell.coexisting.iter().map(Regime::name).collect();
-        let coexisting = names.join("; ");
-        (Row { sigma, g, r }, point, More { theory_stable, coexisting })
+    const HEADINGS: [&str; 16] = [
+        "sigma",
+        "G",
+        "r",
+        "regime",
+        "followed",
+        "transient",
+        "recurrence",
+        "exponent",
+        "exponent_error",
+        "synchrony",
+        "impacts_per_period",
+        "impacts",
+        "periods",
+        "sticks_per_period",
+        "theory_stable",
+        "coexisting",
+    ];
+    // Axes that are not among the first three columns come before them.
+    let own = map.names().map(|name| !HEADINGS.contains(&name));
+    let names = map.names().into_iter().zip(own).filter(|(_, own)| *own).map(|(name, _)| name);
+    let headings: Vec<&str> = names.chain(HEADINGS).collect();
+    let row = |(n, cell): (u64, &MapCell)| {
+        let MapCell { sigma, g, r, point, theory_stable, .. } = *cell;
+        let place = [map.x.at(n % map.x.points), map.y.at(n / map.x.points)];
+        let place: Vec<f64> = place.into_iter().zip(own).filter(|(_, own)| *own).map(|(value, _)| value).collect();
+        let coexisting: Vec<&str> = cell.coexisting.iter().map(Regime::name).collect();
+        (place, [sigma, g, r], point, theory_stable, coexisting.join("; "))
     };
-    csv(&[], map.cells.iter().map(row))
+    csv(&headings, (0..).zip(&map.cells).map(row))
 }
 
 /// The points of the bifurcation curves.

@@ -4,16 +4,18 @@ use serde::{Deserialize, Serialize};
 
 use super::files::ReportError;
 use super::table::Table;
-use crate::map::Range;
-use crate::scene::Scene;
+use crate::scene::{Family, Scene};
+use crate::sweep::Axis;
 
 /// The subject of a report.
 #[derive(Debug, Clone)]
 pub struct Subject {
     /// The scene.
     pub scene: Scene,
-    /// Axes of the regime map.
-    pub map: [Range; 2],
+    /// The scene again, for the sweep behind the regime map.
+    pub family: Family,
+    /// Axes of the regime map, horizontal first.
+    pub map: [Axis; 2],
 }
 
 /// Computes one section; calls the callback with the fraction done, from 0 to 1.

@@ -10,6 +10,7 @@ use super::page::page;
 use super::section::{Block, Section, Subject};
 use super::sections::SECTIONS;
 use crate::files;
+use crate::sweep::Axis;
 
 /// Folder of cached sections, inside the folder of the report.
 const KEPT: &str = ".vines";
@@ -97,7 +98,8 @@ fn found(file: &Path, key: &str) -> Option<Section> {
 /// Everything that a section depends on.
 fn key(subject: &Subject, section: &str) -> String {
     let axes = if section == "regimes" {
-        format!("{} {}", subject.map[0], subject.map[1])
+        let [x, y] = subject.map.each_ref().map(Axis::short_form);
+        format!("{x} {y}")
     } else {
         String::new()
     };

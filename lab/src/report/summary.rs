@@ -3,8 +3,8 @@
 use super::table::{Table, number, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use crate::identification::{DecayEnd, Regime};
-use crate::map::Map;
 use crate::scene::{Definition, Dimensionless, Sensor};
+use crate::sweep::Map;
 
 /// Periods over which the ripple of an acceleration averages out.
 const RIPPLE: usize = 200;

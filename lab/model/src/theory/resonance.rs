@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 use nalgebra::Complex;
 
-use super::{backbone::BackbonePoint, manifold::BranchSide, slow_flow::SlowFlow};
+use super::slow_flow::{BackbonePoint, BranchSide, SlowFlow};
 use crate::numerics::equally_spaced;
 use crate::{Dimensionless, Resonance, Sensor};
 

@@ -2,23 +2,24 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::map::{LIMIT, Map, Plan};
+use crate::map::LIMIT;
 use crate::regime::Regime;
 use crate::report::figures::regimes;
 use crate::report::files::{ReportError, bifurcations_csv, map_csv};
 use crate::report::section::{Section, Subject};
 use crate::report::summary;
+use crate::sweep::{Axis, Map};
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError> {
     let mut section = Section::new("Regimes of the driven response");
-    let (scene, [x, y]) = (&subject.scene, subject.map);
-    let plan = Plan::new(scene.dimensionless(), scene.dimensionless_start(), x, y);
-    let (count, all) = (AtomicUsize::new(0), plan.cells());
-    let map = plan.run(|| {
+    let [x, y] = &subject.map;
+    let map = Map::new(subject.family.clone(), x, y, None, LIMIT)?;
+    let (count, all) = (AtomicUsize::new(0), map.sweep.cells());
+    let map = map.run(0, || {
         let n = count.fetch_add(1, Ordering::Relaxed) + 1;
         done(n as f64 / all as f64);
     })?;
-    describe(&mut section, &map);
+    describe(&mut section, &map, subject);
     section.figure(
         "regimes",
         "The regime map. The black line is the border of the island in which first-order theory has a stable symmetric 1:1 motion. The \
@@ -36,7 +37,8 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     Ok(section)
 }
 
-fn describe(section: &mut Section, map: &Map) {
+fn describe(section: &mut Section, map: &Map, subject: &Subject) {
+    let [x, y] = subject.map.each_ref().map(Axis::short_form);
     let all = map.cells.len();
     let inside = map.cells.iter().filter(|one| one.theory_stable).count();
     let (_, agree) = map.count(Regime::Symmetric);
@@ -50,7 +52,7 @@ fn describe(section: &mut Section, map: &Map) {
          at most for {} periods. A motion that has not repeated itself by then is chaotic if its largest Lyapunov exponent exceeds zero by \
          four standard errors, modulated if also a fifth of its impacts or more are captured into 1:1 resonance for a while, \
          quasi-periodic if the exponent is zero within its uncertainty, and otherwise undecided.",
-        map.plan.x, map.plan.y, LIMIT
+        x, y, LIMIT
     ));
     section.table("How often each regime occurs.", summary::regimes(map));
     section.words(section.finding.clone());

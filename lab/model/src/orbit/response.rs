@@ -1,4 +1,4 @@
-//! The exact frequency response at one excitation: all of its components.
+//! Exact curves: all components of the frequency response, the backbone, and the bifurcation curves of the 1:1 motions.
 //!
 //! Symmetric 1:1 motions have a closed form at every sigma, so that none is missed on the grid of detunings that is searched, both ends of
 //! the range and isolas between two of its detunings included. Motions of other patterns are reached by switching branches at symmetry
@@ -6,13 +6,13 @@
 
 use serde::Serialize;
 
-use super::settle::LONGEST;
-use super::{
-    Bifurcation, Branch, Condition, ImpactPattern, Limits, Periodic, branch_off, continue_both_ways,
-    search::least_excitation, symmetric_orbits,
-};
+use super::continuation::{Branch, Limits, Special, branch_off, continue_both_ways};
+use super::periodic::{Bifurcation, Condition, ImpactPattern, LONGEST, Periodic};
+use super::symmetric::{exact_backbone, least_excitation, phase_resonant, symmetric_orbits};
+use super::Orbit;
 use crate::Dimensionless;
 use crate::numerics::{equally_spaced, golden_section};
+use crate::theory::Manifold;
 
 /// The exact frequency response at one excitation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -189,5 +189,79 @@ impl Branch {
             // At a fold Newton's method may fail.
             Periodic::find(scene, &from.pattern, &guess, conditions).is_none_or(|found| apart(&found, motion) < same)
         })
+    }
+}
+
+/// Detunings at which the backbone is searched for if it has no motion at the scene's G.
+const MET_AT: [f64; 6] = [-1.0, -0.7, -1.4, -0.5, -2.0, 0.0];
+
+/// The exact backbone, through the scene's phase-resonant motion or, without one, through another (with G = 0 where there is neither
+/// damping nor loss): the one with the fastest particle, on the right branch. Without damping and with r = 1 it is the conservative
+/// nonlinear mode.
+pub fn backbone(scene: &Dimensionless, limits: &Limits) -> Option<Branch> {
+    let condition = Condition::backbone(scene);
+    let fastest = |orbits: Vec<Orbit>| orbits.into_iter().max_by(|one, other| one.b.total_cmp(&other.b));
+    let right = Manifold::new(scene.r).b_min();
+    let at_any_excitation = |sigma: f64| {
+        let met = exact_backbone(scene, 1.0 + scene.epsilon * sigma);
+        let orbit = fastest(met).filter(|one| one.b > right)?;
+        orbit.periodic(scene, [Condition::Sigma(sigma), condition])
+    };
+    let start = fastest(phase_resonant(scene))
+        .and_then(|orbit| orbit.periodic(scene, [Condition::Excitation(scene.g), condition]))
+        .or_else(|| MET_AT.into_iter().find_map(at_any_excitation))?;
+    Some(continue_both_ways(scene, &start, condition, limits))
+}
+
+/// A curve in (sigma, G) on which 1:1 motions bifurcate.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BifurcationCurve {
+    /// What happens on it.
+    pub kind: Bifurcation,
+    /// The motions on it. Where the others of their multipliers are inside the unit circle, the curve bounds stability.
+    #[serde(flatten)]
+    pub branch: Branch,
+}
+
+/// Excitations at which the curves are searched for.
+const LEVELS: usize = 25;
+
+/// The curves of folds, symmetry breakings, period doublings and Neimark-Sacker bifurcations of the symmetric and asymmetric 1:1
+/// motions that cross one of 25 levels of G in `limits`.
+pub fn bifurcation_curves(scene: &Dimensionless, limits: &Limits) -> Vec<BifurcationCurve> {
+    let mut found: Vec<BifurcationCurve> = Vec::new();
+    let [low, high] = limits.g;
+    for g in equally_spaced(low, high, LEVELS).filter(|g| *g > 0.0) {
+        let scene = Dimensionless { g, ..*scene };
+        for component in response(&scene, limits, 1).components {
+            if !component.branch.points[0].pattern.is_one_to_one() {
+                continue;
+            }
+            for special in &component.branch.special {
+                if !found.iter().any(|curve| curve.passes(&scene, special)) {
+                    let condition = Condition::Bifurcation(special.kind);
+                    let branch = continue_both_ways(&scene, &special.motion, condition, limits);
+                    found.push(BifurcationCurve { kind: special.kind, branch });
+                }
+            }
+        }
+    }
+    found.sort_by_key(|one| (one.kind.name(), !one.branch.points[0].pattern.mirrored));
+    found
+}
+
+impl BifurcationCurve {
+    /// As in a table: the bifurcation and the motions.
+    pub fn name(&self) -> String {
+        format!("{} of {}", self.kind.name(), self.branch.points[0].pattern.name())
+    }
+
+    fn passes(&self, scene: &Dimensionless, special: &Special) -> bool {
+        let motion = &special.motion;
+        if self.kind != special.kind || self.branch.points[0].pattern.mirrored != motion.pattern.mirrored {
+            return false;
+        }
+        let conditions = [Condition::Excitation(motion.g), Condition::Bifurcation(self.kind)];
+        self.branch.leads_to(scene, motion, conditions, |one| one.g, 1e-4)
     }
 }
