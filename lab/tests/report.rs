@@ -5,7 +5,7 @@ use std::process::Command;
 
 use vines::{
     report::{Report, SECTIONS, Subject, write_report},
-    scene::{Override, Scene},
+    scene::{Family, Override, Scene},
 };
 
 fn subject(settings: &[&str]) -> Subject {
@@ -16,6 +16,7 @@ fn subject(settings: &[&str]) -> Subject {
     let text = include_str!("../../scenes/dimensionless.toml");
     Subject {
         scene: Scene::parse("dimensionless.toml", text, &overrides).unwrap(),
+        family: Family::parse("dimensionless.toml", Some(text), &overrides).unwrap(),
         map: ["sigma=-2:1:7", "G=0.8:1.8:6"].map(|range| range.parse().unwrap()),
     }
 }

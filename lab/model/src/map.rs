@@ -24,9 +24,10 @@ use crate::numerics::{SIGNIFICANT, mean, standard_deviation};
 use crate::orbit::{Periodic, periodic_near};
 use crate::regime::{Impact, Regime, synchrony};
 
-/// Usual largest number of periods that a cell is followed.
+/// Default of the largest number of periods that a cell is followed.
 pub const LIMIT: usize = 20_000;
-/// Usual number of further motions that must agree where chance decides when chaos ends.
+/// Default of the number of further motions that must agree where chance decides when chaos ends. docs/regimes.md
+/// says how often chaos that passes for lasting ends later.
 pub const CONFIRMATIONS: usize = 6;
 
 /// Periods after which the motion is examined for the first time; from then on whenever their number has grown by a quarter.
@@ -37,16 +38,19 @@ const FIRST: usize = 16;
 ///
 /// # Errors
 /// Invalid parameters or an invalid start.
-pub fn observe(scene: &Dimensionless, sigma: f64, start: [f64; 4], limit: usize) -> Result<Point, InvalidValue> {
+pub fn observe(scene: &Dimensionless, sigma: f64, start: [f64; 4], limit: usize) -> Result<RegimeResult, InvalidValue> {
     Run::new(scene, sigma, start)?.decided(0, limit)
 }
 
-/// Difference of the starts of motions that must agree, and periods from which on a transient may be chaos that ends at random.
+/// Difference of the starts of motions that must agree: far above rounding, and chaos
+/// magnifies it to order one in ln(1e9) = 21 Lyapunov times.
 const APART: f64 = 1e-9;
+/// Transient, periods, from which on it may be chaos that ends at random: on the default scene,
+/// the free motion of the primary mass decays by exp(pi epsilon lambda 500) = e^19 within it.
 const LATE: f64 = 500.0;
 
-/// As [`observe`], with the regime of a motion from another start, 1e-9 and more apart, that differs. `others` such motions are followed
-/// where chance decides when chaos ends: the regime is irregular, or it began late.
+/// The regime as by [`observe`], and the regime of a motion from another start, 1e-9 and more apart, if it differs. `others` such motions
+/// are followed where chance decides when chaos ends: the regime is irregular, or it began late.
 ///
 /// # Errors
 /// As [`observe`].
@@ -56,43 +60,27 @@ pub fn observe_confirmed(
     start: [f64; 4],
     limit: usize,
     others: usize,
-) -> Result<(Point, Option<Regime>), InvalidValue> {
-    let point = observe(scene, sigma, start, limit)?;
-    let irregular = point.impacts == 0 && ![Regime::NoImpacts, Regime::Undecided].contains(&point.regime);
-    let count = if irregular || point.transient > LATE { others } else { 0 };
+) -> Result<(RegimeResult, Option<Regime>), InvalidValue> {
+    let result = observe(scene, sigma, start, limit)?;
+    let irregular = result.impacts == 0 && ![Regime::NoImpacts, Regime::Undecided].contains(&result.regime);
+    let count = if irregular || result.transient > LATE {
+        others
+    } else {
+        0
+    };
     for n in 1..=count {
         let [q1, dq1, q2, dq2] = start;
         let regime = observe(scene, sigma, [q1, dq1 + n as f64 * APART, q2, dq2], limit)?.regime;
-        if regime != point.regime {
-            return Ok((point, Some(regime)));
+        if regime != result.regime {
+            return Ok((result, Some(regime)));
         }
     }
-    Ok((point, None))
+    Ok((result, None))
 }
 
-impl Run {
-    /// Follows the motion until its regime is decided, for at most `limit` periods; it is not examined before `first` periods.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn decided(&mut self, first: usize, limit: usize) -> Result<Point, InvalidValue> {
-        let mut periods = first.max(FIRST).min(limit);
-        loop {
-            self.follow(periods)?;
-            if let Some(point) = self.lasting() {
-                return Ok(point);
-            }
-            if periods >= limit {
-                return Ok(self.irregular());
-            }
-            periods = (periods + periods / 4).min(limit);
-        }
-    }
-}
-
-/// Result at one point.
+/// The regime of a motion, and how it was decided.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Point {
+pub struct RegimeResult {
     /// Regime of the response.
     pub regime: Regime,
     /// Periods of the base that were simulated.
@@ -120,10 +108,7 @@ pub struct Point {
     pub state: [f64; 4],
 }
 
-/// Number of events for which there is room at first.
-const EXPECTED: usize = 1024;
-
-/// Longest step of the plant, in times of the oscillator: some ten milliseconds where there is no impact.
+/// Longest step of the plant, over 1/omega0: bounds the time until a stop is noticed to some ten milliseconds where there is no impact.
 const STRETCH: f64 = 1e4;
 
 /// A simulated motion.
@@ -140,11 +125,11 @@ pub struct Run {
     moments: Vec<Moment>,
     /// States at the beginning of every half period and now, as far as they were needed.
     states: Vec<OnceCell<[f64; 4]>>,
-    /// A disturbance, the period in which it begins, the number of moments that it has passed, and its growth over each period, as a
-    /// natural logarithm; a period without impacts may belong to the next one.
     disturbance: Disturbance,
+    /// Period in which the disturbance begins, and the number of moments that it has passed.
     begun: usize,
     passed: usize,
+    /// Growth of the disturbance over each period, as a natural logarithm; a period without impacts may belong to the next one.
     growth: Vec<f64>,
     impacts: Vec<Impact>,
     /// Phases of the base at which the particle came to rest, rad.
@@ -161,8 +146,7 @@ impl Run {
         let drive = scene.drive(sigma);
         let plant = Box::new(scene.plant(start)?);
         let driven = Driven::new(scene, drive.omega);
-        let mut moments = Vec::with_capacity(EXPECTED);
-        moments.push(driven.moment(0.0, plant.state(), plant.contact()));
+        let moments = vec![driven.moment(0.0, plant.state(), plant.contact())];
         Ok(Self {
             scene: *scene,
             sigma,
@@ -176,7 +160,7 @@ impl Run {
             begun: usize::MAX,
             passed: 0,
             growth: Vec::new(),
-            impacts: Vec::with_capacity(EXPECTED),
+            impacts: Vec::new(),
             sticks: Vec::new(),
             stop: Arc::default(),
         })
@@ -186,6 +170,24 @@ impl Run {
     #[must_use]
     pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
         Self { stop, ..self }
+    }
+
+    /// Follows the motion until its regime is decided, for at most `limit` periods; it is not examined before `first` periods.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn decided(&mut self, first: usize, limit: usize) -> Result<RegimeResult, InvalidValue> {
+        let mut periods = first.max(FIRST).min(limit);
+        loop {
+            self.follow(periods)?;
+            if let Some(result) = self.lasting() {
+                return Ok(result);
+            }
+            if periods >= limit {
+                return Ok(self.irregular());
+            }
+            periods = (periods + periods / 4).min(limit);
+        }
     }
 
     /// Half periods so far.
@@ -211,7 +213,7 @@ impl Run {
         ]
     }
 
-    /// Follows the motion to the end of so many periods, in steps of the plant of at most [`STRETCH`].
+    /// Follows the motion to the end of period `periods`, in steps of the plant of at most [`STRETCH`].
     fn follow(&mut self, periods: usize) -> Result<(), InvalidValue> {
         if periods <= self.periods {
             return Ok(());
@@ -295,11 +297,11 @@ impl Run {
         (mean(batches.iter().copied()), error)
     }
 
-    /// What all regimes have, over the half periods from `from` on.
-    fn point(&self, regime: Regime, from: usize) -> Point {
+    /// The result without recurrence and exponent, averaged over the half periods from `from` on.
+    fn result(&self, regime: Regime, from: usize) -> RegimeResult {
         let periods = 0.5 * (self.halves() - from) as f64;
         let [[before, rested], [all, rests]] = [self.counts(from), self.counts(self.halves())];
-        Point {
+        RegimeResult {
             regime,
             followed: self.halves() / 2,
             transient: 0.5 * from as f64,
@@ -320,7 +322,7 @@ impl Run {
 const NEAR: f64 = 1e-2;
 /// Differences below which it repeats: far above rounding, far below what separates two motions.
 const SAME: f64 = 1e-6;
-/// Longest repetition in the search, half periods. The window is a third of that, and at least two repetitions.
+/// Longest repetition in the search, half periods. The window is a third of it, and at least two repetitions.
 const REPETITION: usize = 192;
 /// Largest uncertainty of an exponent that is called zero, per period.
 const ZERO: f64 = 2e-3;
@@ -329,24 +331,24 @@ const CAPTURES: f64 = 0.2;
 
 impl Run {
     /// The regime, if the motion so far shows one that lasts: no impacts, or a stable periodic motion.
-    fn lasting(&mut self) -> Option<Point> {
+    fn lasting(&mut self) -> Option<RegimeResult> {
         self.without_impacts().or_else(|| self.periodic())
     }
 
     /// The particle rests, and the primary mass cannot reach it: the free part of its motion only decays.
-    fn without_impacts(&self) -> Option<Point> {
+    fn without_impacts(&self) -> Option<RegimeResult> {
         let n = self.halves();
         let [q1, dq1, q2, dq2] = self.state(n);
         let reach = self.driven.reach(PI * n as f64, [q1, dq1]);
         (dq2 == 0.0 && reach + q2.abs() < 1.0).then(|| {
             let last = self.impacts.last().map_or(0.0, |impact| impact.time / PI);
-            self.point(Regime::NoImpacts, (last.ceil() as usize).min(n - 1))
+            self.result(Regime::NoImpacts, (last.ceil() as usize).min(n - 1))
         })
     }
 
     /// The motion repeats and its exponent is negative. The multipliers of an exact orbit close by give the exponent before the motion
     /// has settled; without such an orbit (the particle sticks, or there are very many impacts), the linearised disturbance gives it.
-    fn periodic(&mut self) -> Option<Point> {
+    fn periodic(&mut self) -> Option<RegimeResult> {
         let n = self.halves();
         let (count, recurrence) = self.recurrence()?;
         let orbit = periodic_near(&self.scene, self.sigma, 0.0, self.state(n));
@@ -367,40 +369,40 @@ impl Run {
         let begun = |half: &usize| self.distance(*half, count) > NEAR;
         stable.then(|| {
             let transient = (count..=n).rev().find(begun).unwrap_or(0);
-            Point {
+            RegimeResult {
                 transient: 0.5 * transient as f64,
                 recurrence: Some(recurrence),
                 exponent: Some(exponent.0),
                 exponent_error: Some(exponent.1),
                 impacts,
                 periods,
-                ..self.point(regime, transient.min(n - count))
+                ..self.result(regime, transient.min(n - count))
             }
         })
     }
 
     /// Nothing repeats: the Lyapunov exponent decides, over all but the first third.
-    fn irregular(&mut self) -> Point {
+    fn irregular(&mut self) -> RegimeResult {
         let n = self.halves();
         let (exponent, error) = self.exponent(n / 3);
         let periods = n as f64 / 3.0;
         // A disturbance that grows as its time, as on a torus, has this exponent.
         let linear = periods.ln() / periods;
         let zero = linear.max(SIGNIFICANT * error);
-        let mut point = self.point(Regime::Undecided, n / 3);
+        let mut result = self.result(Regime::Undecided, n / 3);
         // With less than one impact per block of periods, the exponent is not measured: a particle that is almost at rest.
-        let measured = point.impacts_per_period * periods > 2.0 * periods.sqrt();
-        point.regime = match exponent {
+        let measured = result.impacts_per_period * periods > 2.0 * periods.sqrt();
+        result.regime = match exponent {
             _ if !measured => Regime::Undecided,
-            exponent if exponent > zero && point.synchrony < CAPTURES => Regime::Chaotic,
+            exponent if exponent > zero && result.synchrony < CAPTURES => Regime::Chaotic,
             exponent if exponent > zero => Regime::Modulated,
             exponent if exponent > -zero && zero < ZERO => Regime::QuasiPeriodic,
             _ => Regime::Undecided,
         };
-        Point {
+        RegimeResult {
             exponent: Some(exponent),
             exponent_error: Some(error),
-            ..point
+            ..result
         }
     }
 
@@ -438,14 +440,14 @@ fn regime(orbit: &Periodic) -> Regime {
 const STEPS: usize = 64;
 /// Smallest number of periods over which it is averaged.
 const AVERAGED: usize = 64;
-/// Natural logarithm of the factor by which the distance to a periodic motion shrinks before the response is read, and the largest
-/// number of periods for that.
+/// Natural logarithm of the factor by which the distance to a periodic motion shrinks before the response is read: 1e-6.
 const SHRUNK: f64 = 14.0;
+/// Largest number of periods until the response is read.
 const WAITED: f64 = 2000.0;
 
 /// Amplitude and powers, dimensionless: lengths over b, powers over `k b^2 omega0`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Response {
+pub struct SteadyResponse {
     /// Amplitude of the first harmonic of v.
     pub c: f64,
     /// Mean power that the impacts dissipate.
@@ -459,12 +461,12 @@ impl Run {
     ///
     /// # Errors
     /// As [`Run::new`].
-    pub fn response(&mut self, point: &Point) -> Result<Response, InvalidValue> {
-        let repeats = point.periods > 0;
-        if let Some(exponent) = point.exponent.filter(|exponent| repeats && *exponent < 0.0) {
+    pub fn response(&mut self, result: &RegimeResult) -> Result<SteadyResponse, InvalidValue> {
+        let repeats = result.periods > 0;
+        if let Some(exponent) = result.exponent.filter(|exponent| repeats && *exponent < 0.0) {
             self.follow(self.halves() / 2 + (-SHRUNK / exponent).min(WAITED) as usize + 1)?;
         }
-        let unit = if repeats { point.periods as usize } else { 1 };
+        let unit = if repeats { result.periods as usize } else { 1 };
         let periods = unit * AVERAGED.div_ceil(unit);
         let plant = &mut self.plant;
         let (omega, e) = (self.drive.omega, self.drive.amplitude);
@@ -487,7 +489,7 @@ impl Run {
         let ends = damping * (plant.state().q1 - before.2) * e * omega * phase(0).cos();
         let impacts = (plant.totals().dissipated - before.1) / duration;
         let input = work / count as f64 - (ends + energy(plant, count) - before.0) / duration;
-        Ok(Response {
+        Ok(SteadyResponse {
             c: 2.0 * harmonic[0].hypot(harmonic[1]) / count as f64,
             impact_power: impacts,
             damper_power: input - impacts,

@@ -16,11 +16,13 @@ mod symmetric;
 use crate::Dimensionless;
 use serde::Serialize;
 
-pub use continuation::{Branch, Ended, Limits, Special, branch_off, continue_both_ways, continue_from};
+pub use continuation::{
+    Branch, BranchBifurcation, BranchEnd, ContinuationLimits, branch_off, continue_both_ways, continue_from,
+};
 pub use convergence::{Convergence, Difference, convergence};
 pub use impact_map::{Bounce, ImpactMap};
 pub use periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, periodic_near, settle};
-pub use response::{BifurcationCurve, Component, DOUBLINGS, Response, backbone, bifurcation_curves, response};
+pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, backbone, bifurcation_curves, response};
 pub use symmetric::{exact_backbone, phase_resonant, stable_resonant, symmetric_orbits};
 
 /// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.

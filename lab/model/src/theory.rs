@@ -17,6 +17,5 @@ pub use decay::{Decay, DecayPoint, Waveform, triangle_wave};
 pub use modulation::{Drift, ImpactSequence, Modulation};
 pub use resonance::{backbone, backbone_at_level, free_sigma, reading, resonant};
 pub use slow_flow::{
-    B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, Manifold, ResponsePoint, SlowFlow, half_period_map,
-    half_period_multipliers, impacts_stable,
+    B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, Manifold, ResponsePoint, SlowFlow, impacts_stable,
 };

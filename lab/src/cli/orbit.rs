@@ -1,15 +1,16 @@
 //! `vines orbit`: exact orbits at resonance, and their curves.
 
-mod studies;
-mod text;
+use std::fmt::Write;
 
 use clap::Args;
-use vines::orbit::{Condition, DOUBLINGS, Limits, backbone, continue_both_ways, phase_resonant, response, settle};
-use vines::{ArgumentError, scene::Dimensionless};
+use vines::orbit::{
+    Branch, BranchEnd, Condition, ContinuationLimits, DOUBLINGS, Orbit, Periodic, backbone, continue_both_ways,
+    phase_resonant, response, settle,
+};
+use vines::report::{Table, number, summary::parameters};
+use vines::{ArgumentError, numerics::range, scene::Dimensionless};
 
-use studies::{converged, defined};
-use text::{SEARCHED, curve, described, listing, shown};
-
+use super::output::{output, yes_no};
 use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
@@ -29,8 +30,6 @@ Examples:
   vines orbit --response --set excitation.G=1.6
   vines orbit --backbone --set plant.c=0 --set plant.r=1 --set excitation.G=0
   vines orbit --sigma=-0.6 --set excitation.G=2.2   the orbit that settles there, here six impacts in two periods
-  vines orbit --definitions                   resonance by phase or peak, by e or force, of v, q1 or acceleration
-  vines orbit --convergence                   how theory approaches the exact orbit
   vines orbit --set excitation.G=1.0 --set plant.r=0.7
   vines orbit --scene scenes/dimensionless.toml --json";
 
@@ -42,7 +41,12 @@ pub(super) struct Arguments {
     scene: SceneArguments,
 
     /// The orbit of any pattern that the scene's start leads to at this detuning; with --response, its frequency response
-    #[arg(long, value_name = "SIGMA", allow_negative_numbers = true, conflicts_with_all = ["backbone", "convergence"])]
+    #[arg(
+        long,
+        value_name = "SIGMA",
+        allow_negative_numbers = true,
+        conflicts_with = "backbone"
+    )]
     sigma: Option<f64>,
 
     /// Follow the exact backbone; without damping and with r = 1 it is the conservative nonlinear mode
@@ -57,14 +61,6 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FIRST:LAST", default_value = "-6:6", allow_hyphen_values = true, value_parser = detunings)]
     range: [f64; 2],
 
-    /// Theory minus exact orbit at epsilon and its halvings, with the fitted exponent
-    #[arg(long, group = "what")]
-    convergence: bool,
-
-    /// Theory minus exact orbit at epsilon and four halvings, for all definitions of resonance, references and sensors
-    #[arg(long, group = "what")]
-    definitions: bool,
-
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
@@ -76,11 +72,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if let Some(sigma) = arguments.sigma {
         return settled(arguments, &scene, sigma, loaded.dimensionless_start());
     }
-    let [lowest, highest] = Limits::default().g;
-    let limits = Limits {
+    let [lowest, highest] = ContinuationLimits::default().g;
+    let limits = ContinuationLimits {
         sigma: arguments.range,
         g: [lowest, highest.max(2.0 * scene.g)],
-        ..Limits::default()
+        ..ContinuationLimits::default()
     };
     if arguments.backbone {
         let branch = backbone(&scene, &limits).ok_or_else(|| {
@@ -96,19 +92,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if arguments.response {
         return components(arguments, &scene, &limits);
     }
-    if arguments.convergence {
-        return converged(&scene, arguments.json);
-    }
-    if arguments.definitions {
-        return defined(&scene, arguments.json);
-    }
     let orbits = phase_resonant(&scene);
     let title = format!("Exact symmetric 1:1 orbits at resonance: {}", scene.definition.name());
     shown(&scene, &title, &orbits, arguments.json, || listing(&scene, &orbits))
 }
 
 /// All components of the frequency response.
-fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> Result<String, Failure> {
+fn components(arguments: &Arguments, scene: &Dimensionless, limits: &ContinuationLimits) -> Result<String, Failure> {
     let [from, to] = arguments.range;
     if 1.0 + scene.epsilon * from <= 0.0 {
         let rule = "1 + epsilon sigma must be above 0";
@@ -169,7 +159,7 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
             scene,
             &motion,
             condition,
-            &Limits { sigma: arguments.range, ..Limits::default() },
+            &ContinuationLimits { sigma: arguments.range, ..ContinuationLimits::default() },
         );
         return shown(scene, "Exact frequency response", &branch, arguments.json, || {
             curve(&pattern, &branch)
@@ -178,4 +168,98 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
     shown(scene, "Exact orbit", &motion, arguments.json, || {
         described(&pattern, &motion)
     })
+}
+
+/// What was found as JSON, or as text under a title and the parameters of the scene.
+fn shown(
+    scene: &Dimensionless,
+    title: &str,
+    found: &impl serde::Serialize,
+    json: bool,
+    text: impl FnOnce() -> String,
+) -> Result<String, Failure> {
+    output(json, found, || {
+        format!("{title}\n  {}\n\n{}", parameters(scene), text())
+    })
+}
+
+/// What `--response` searches for.
+const SEARCHED: &str = "Complete: symmetric 1:1 motions and what branches off them. Isolated branches of other patterns are missed; \
+    --sigma follows the\none that a start leads to.\n";
+
+/// The motion and the states after its impacts.
+fn described(pattern: &str, motion: &Periodic) -> String {
+    let Periodic { sigma, c, b, gamma, .. } = motion;
+    let multipliers = motion.multipliers.map(|[re, im]| format!("{re:.5}{im:+.5}i"));
+    let rows = motion.bounces.iter().map(|one| {
+        let phase = one.phase.to_degrees().rem_euclid(360.0);
+        let mut cells = vec![format!("{:+}", one.wall)];
+        cells.extend([phase, one.q1, one.dq1, one.dq2].map(number));
+        cells
+    });
+    let table = Table::new("wall | phase, degrees | q1 | q1' after | q2' after").rows(rows);
+    format!(
+        "{pattern}\n  sigma = {sigma:.6}, C = {c:.6}, phase {:.4} degrees, B = {b:.6}\n  multipliers {}\n\n{}",
+        gamma.to_degrees(),
+        multipliers.join(", "),
+        table.text()
+    )
+}
+
+/// Rows of a curve in a text table.
+const ROWS: usize = 24;
+
+/// A curve: its ends, some of its orbits, its bifurcations.
+fn curve(name: &str, branch: &Branch) -> String {
+    let stable = branch.points.iter().filter(|one| one.stable).count();
+    let sigmas = || branch.points.iter().map(|one| one.sigma);
+    let (low, high) = range((f64::MAX, f64::MIN), sigmas());
+    let ends = match branch.ended {
+        [BranchEnd::Closed, _] => "closed".into(),
+        [one, other] => format!("ends: {}; {}", one.name(), other.name()),
+    };
+    let mut text = format!(
+        "{name}: sigma from {low:.4} to {high:.4}, {} orbits, {stable} of them stable; {ends}\n",
+        branch.points.len()
+    );
+    let row = |motion: &Periodic| -> Vec<String> {
+        let largest = motion.moduli()[3];
+        let numbers = [motion.sigma, motion.g, motion.c, motion.gamma.to_degrees(), motion.b];
+        let mut cells: Vec<String> = numbers.map(number).into();
+        cells.extend([number(largest), yes_no(motion.stable)]);
+        cells
+    };
+    let table = Table::new("sigma | G | C | phase, degrees | B | largest mult. | stable");
+    let thinned = branch.points.iter().step_by(branch.points.len().div_ceil(ROWS));
+    text += &table.rows(thinned.map(row)).text();
+    for special in &branch.special {
+        let what = special.name();
+        let Periodic { sigma, g, c, b, .. } = special.motion;
+        let _ = writeln!(
+            text,
+            "  {what} at sigma = {sigma:.6}, G = {g:.6}, C = {c:.6}, B = {b:.6}"
+        );
+    }
+    text + "\n"
+}
+
+/// Orbits, a line each.
+fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
+    if orbits.is_empty() {
+        return if scene.g == 0.0 {
+            "  none: without excitation (G = 0) there is no resonance\n".into()
+        } else {
+            "  none between 0.2 and 3 omega0 at this excitation\n".into()
+        };
+    }
+    let rows = orbits.iter().map(|orbit| {
+        let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.gamma.to_degrees(), orbit.b];
+        let mut row: Vec<String> = numbers.map(number).into();
+        row.extend(orbit.multipliers.map(|one| format!("{one:.4}")));
+        row.push(yes_no(orbit.stable));
+        row
+    });
+    Table::new("sigma | Omega | C | phase, degrees | B | mult1 | mult2 | mult3 | mult4 | stable")
+        .rows(rows)
+        .text()
 }

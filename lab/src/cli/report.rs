@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::report::{ReportError, Subject, write_report};
 use vines::map::LIMIT;
+use vines::report::{ReportError, Subject, write_report};
 use vines::rig::BuiltIn;
 use vines::sweep::{Axis, Map};
 

@@ -213,14 +213,24 @@ pub fn map_csv(map: &Map) -> Result<String, ReportError> {
     ];
     // Axes that are not among the first three columns come before them.
     let own = map.names().map(|name| !HEADINGS.contains(&name));
-    let names = map.names().into_iter().zip(own).filter(|(_, own)| *own).map(|(name, _)| name);
+    let names = map
+        .names()
+        .into_iter()
+        .zip(own)
+        .filter(|(_, own)| *own)
+        .map(|(name, _)| name);
     let headings: Vec<&str> = names.chain(HEADINGS).collect();
     let row = |(n, cell): (u64, &MapCell)| {
-        let MapCell { sigma, g, r, point, theory_stable, .. } = *cell;
+        let MapCell { sigma, g, r, result, theory_stable, .. } = *cell;
         let place = [map.x.at(n % map.x.points), map.y.at(n / map.x.points)];
-        let place: Vec<f64> = place.into_iter().zip(own).filter(|(_, own)| *own).map(|(value, _)| value).collect();
+        let place: Vec<f64> = place
+            .into_iter()
+            .zip(own)
+            .filter(|(_, own)| *own)
+            .map(|(value, _)| value)
+            .collect();
         let coexisting: Vec<&str> = cell.coexisting.iter().map(Regime::name).collect();
-        (place, [sigma, g, r], point, theory_stable, coexisting.join("; "))
+        (place, [sigma, g, r], result, theory_stable, coexisting.join("; "))
     };
     csv(&headings, (0..).zip(&map.cells).map(row))
 }

@@ -5,7 +5,7 @@ use std::error::Error;
 use Read::{Count, Failure, Number, Regime as Code};
 use vines_model::{
     ArgumentError, Dimensionless,
-    map::{Point, Response, Run},
+    map::{RegimeResult, Run, SteadyResponse},
     orbit::{Orbit, symmetric_orbits},
     regime::Regime,
 };
@@ -25,7 +25,7 @@ pub struct Results {
     pub response: bool,
     /// The exact symmetric 1:1 orbits at the drive of the cell, and their stability.
     pub orbits: bool,
-    /// The locked point: the experiment of `vines identify` without its decay.
+    /// The locked result: the experiment of `vines identify` without its decay.
     pub lock: bool,
 }
 
@@ -72,8 +72,8 @@ pub struct Cell {
     pub regime: Option<Regime>,
     /// Whether the regime is that of the neighbours, not computed.
     pub inferred: bool,
-    pub(crate) point: Option<Point>,
-    pub(crate) response: Option<Response>,
+    pub(crate) result: Option<RegimeResult>,
+    pub(crate) response: Option<SteadyResponse>,
     pub(crate) orbits: Option<Vec<Orbit>>,
     pub(crate) lock: Option<Lock>,
     /// `k b^2 omega0`, W.
@@ -87,20 +87,20 @@ pub(crate) fn compute(scene: &Scene, sigma: f64, numbers: &Dimensionless, settin
     let results = settings.results;
     let simulated = || {
         let mut run = Run::new(numbers, sigma, scene.dimensionless_start())?;
-        let point = run.decided(0, settings.periods)?;
-        let response = results.response.then(|| run.response(&point)).transpose()?;
-        Ok((point, response))
+        let result = run.decided(0, settings.periods)?;
+        let response = results.response.then(|| run.response(&result)).transpose()?;
+        Ok((result, response))
     };
     match simulated() {
-        Ok((point, response)) => {
+        Ok((result, response)) => {
             let (lock, failure) = match results.lock.then(|| locked(scene)).transpose() {
                 Ok(lock) => (lock, String::new()),
-                Err(error) => (None, format!("no locked point: {error}")),
+                Err(error) => (None, format!("no locked result: {error}")),
             };
             Cell {
-                regime: Some(point.regime),
+                regime: Some(result.regime),
                 inferred: false,
-                point: Some(point),
+                result: Some(result),
                 response,
                 orbits: results.orbits.then(|| symmetric_orbits(numbers, sigma)),
                 power: scene.plant.stiffness * numbers.b * numbers.b * numbers.omega0,
@@ -131,11 +131,11 @@ impl Cell {
         self.regime.is_some() || !self.failure.is_empty()
     }
 
-    pub(crate) fn number(&self, of: impl Fn(&Point) -> f64) -> f64 {
-        self.point.as_ref().map_or(f64::NAN, of)
+    pub(crate) fn number(&self, of: impl Fn(&RegimeResult) -> f64) -> f64 {
+        self.result.as_ref().map_or(f64::NAN, of)
     }
 
-    pub(crate) fn response(&self, of: impl Fn(&Response) -> f64) -> f64 {
+    pub(crate) fn response(&self, of: impl Fn(&SteadyResponse) -> f64) -> f64 {
         self.response.as_ref().map_or(f64::NAN, of)
     }
 
@@ -200,12 +200,12 @@ const fn variable(
 const VARIABLES: [Variable; 25] = [
     variable("", "regime", "1", "regime of the response", Code),
     variable("adaptive", "inferred", "1", "1 if the regime is that of the neighbours, 0 if it was computed", Count(|c| c.is_known().then_some(u32::from(c.inferred)))),
-    variable("regime", "followed", "1", "periods of the base that were simulated", Count(|c| c.point.map(|p| p.followed as u32))),
+    variable("regime", "followed", "1", "periods of the base that were simulated", Count(|c| c.result.map(|p| p.followed as u32))),
     variable("regime", "settling", "1", "periods of the base before the regime began", Number(|c| c.number(|p| p.transient))),
     variable("regime", "impacts_per_period", "1", "impacts per period of the base", Number(|c| c.number(|p| p.impacts_per_period))),
     variable("regime", "sticks_per_period", "1", "how often the particle comes to rest on a wall, per period of the base", Number(|c| c.number(|p| p.sticks_per_period))),
-    variable("regime", "impacts", "1", "impacts of one repetition; 0 if nothing repeats", Count(|c| c.point.map(|p| p.impacts as u32))),
-    variable("regime", "periods", "1", "periods of the base that a repetition takes; 0 if nothing repeats", Count(|c| c.point.map(|p| p.periods))),
+    variable("regime", "impacts", "1", "impacts of one repetition; 0 if nothing repeats", Count(|c| c.result.map(|p| p.impacts as u32))),
+    variable("regime", "periods", "1", "periods of the base that a repetition takes; 0 if nothing repeats", Count(|c| c.result.map(|p| p.periods))),
     variable("regime", "recurrence", "1", "largest difference between the state and that one repetition before", Number(|c| c.number(|p| p.recurrence.unwrap_or(f64::NAN)))),
     variable("regime", "exponent", "1", "largest Lyapunov exponent per period of the base", Number(|c| c.number(|p| p.exponent.unwrap_or(f64::NAN)))),
     variable("regime", "exponent_error", "1", "standard error of the exponent", Number(|c| c.number(|p| p.exponent_error.unwrap_or(f64::NAN)))),
@@ -218,7 +218,7 @@ const VARIABLES: [Variable; 25] = [
     variable("orbits", "orbit_C", "1", "amplitude of the first harmonic of v over b, on the orbit with the larger B", Number(|c| c.orbit(|one| one.c))),
     variable("orbits", "orbit_B", "1", "speed of the particle over b omega0, on the orbit with the larger B", Number(|c| c.orbit(|one| one.b))),
     variable("orbits", "orbit_multiplier", "1", "largest modulus of the multipliers of that orbit over half a period", Number(|c| c.orbit(|one| one.multipliers[3]))),
-    variable("lock", "lock_sigma", "1", "detuning of the locked point", Number(|c| c.lock(|l| l.at.sigma))),
+    variable("lock", "lock_sigma", "1", "detuning of the locked result", Number(|c| c.lock(|l| l.at.sigma))),
     variable("lock", "lock_C", "1", "amplitude of the first harmonic of v over b at the lock", Number(|c| c.lock(|l| l.at.c))),
     variable("lock", "lock_B", "1", "mean speed of the particle over b omega0 at the lock", Number(|c| c.lock(|l| l.b.unwrap_or(f64::NAN)))),
     variable("lock", "periods_to_lock", "1", "periods from the start to the settled lock", Number(|c| c.lock(|l| l.periods_to_lock))),

@@ -5,7 +5,10 @@
 //! bytes as one that was not. Without the feature `store`, no part of Zarr is compiled.
 
 #![forbid(unsafe_code)]
-#![cfg_attr(not(feature = "store"), allow(dead_code, reason = "chunks and variables serve the store"))]
+#![cfg_attr(
+    not(feature = "store"),
+    allow(dead_code, reason = "chunks and variables serve the store")
+)]
 
 mod axis;
 mod cell;

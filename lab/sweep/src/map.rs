@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 use serde::Serialize;
 use vines_model::{
-    map::{Point, observe_confirmed},
-    orbit::{BifurcationCurve, Limits, bifurcation_curves},
+    map::{RegimeResult, observe_confirmed},
+    orbit::{BifurcationCurve, ContinuationLimits, bifurcation_curves},
     regime::Regime,
     theory::SlowFlow,
 };
@@ -30,7 +30,7 @@ pub struct MapCell {
     pub r: f64,
     /// Result.
     #[serde(flatten)]
-    pub point: Point,
+    pub result: RegimeResult,
     /// First-order theory has a stable symmetric 1:1 motion here.
     pub theory_stable: bool,
     /// The regimes of motions from starts close by, where they differ; the cell is undecided then.
@@ -77,7 +77,12 @@ impl Map {
             cells: Vec::new(),
             curves: Vec::new(),
         };
-        for [x, y] in [[map.x.from, map.y.from], [map.x.to, map.y.from], [map.x.from, map.y.to], [map.x.to, map.y.to]] {
+        for [x, y] in [
+            [map.x.from, map.y.from],
+            [map.x.to, map.y.from],
+            [map.x.from, map.y.to],
+            [map.x.to, map.y.to],
+        ] {
             map.sweep.at(&[y, x])?;
         }
         Ok(map)
@@ -90,7 +95,11 @@ impl Map {
     /// Values that scene or plant refuse.
     pub fn run(mut self, confirmations: usize, done: impl Fn() + Sync) -> Result<Self, SweepError> {
         let cells = (0..self.sweep.cells()).into_par_iter().map(|n| {
-            let cell = self.cell(self.x.at(n % self.x.points), self.y.at(n / self.x.points), confirmations);
+            let cell = self.cell(
+                self.x.at(n % self.x.points),
+                self.y.at(n / self.x.points),
+                confirmations,
+            );
             done();
             cell
         });
@@ -102,19 +111,19 @@ impl Map {
     fn cell(&self, x: f64, y: f64, confirmations: usize) -> Result<MapCell, SweepError> {
         let (scene, sigma, numbers) = self.sweep.at(&[y, x])?;
         let periods = self.sweep.settings().periods;
-        let (mut point, other) =
+        let (mut result, other) =
             observe_confirmed(&numbers, sigma, scene.dimensionless_start(), periods, confirmations)?;
         let mut coexisting = Vec::new();
         if let Some(other) = other {
-            coexisting.extend([point.regime, other]);
+            coexisting.extend([result.regime, other]);
             coexisting.sort();
-            point.regime = Regime::Undecided;
+            result.regime = Regime::Undecided;
         }
         Ok(MapCell {
             sigma,
             g: numbers.g,
             r: numbers.r,
-            point,
+            result,
             theory_stable: SlowFlow::new(numbers.lambda, numbers.r).has_stable_motion(numbers.g, sigma),
             coexisting,
         })
@@ -127,10 +136,10 @@ impl Map {
             ["G", SIGMA] => (self.y, self.x),
             _ => return Vec::new(),
         };
-        let limits = Limits {
+        let limits = ContinuationLimits {
             sigma: [sigma.from, sigma.to],
             g: [g.from, g.to],
-            ..Limits::default()
+            ..ContinuationLimits::default()
         };
         bifurcation_curves(&self.sweep.scene().dimensionless(), &limits)
     }
@@ -153,7 +162,7 @@ impl Map {
     /// How many cells show a regime, and how many of them lie where theory has a stable 1:1 motion.
     #[must_use]
     pub fn count(&self, regime: Regime) -> (usize, usize) {
-        let cells = || self.cells.iter().filter(|cell| cell.point.regime == regime);
+        let cells = || self.cells.iter().filter(|cell| cell.result.regime == regime);
         (cells().count(), cells().filter(|cell| cell.theory_stable).count())
     }
 }

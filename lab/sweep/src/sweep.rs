@@ -62,8 +62,7 @@ impl Settings {
             .enumerate()
             .find(|(n, axis)| axes[..*n].iter().any(|one| one.name == axis.name))
         {
-            let name = axis.short_name();
-            return refused(format!("axis {} is {name} again: every axis needs a key of its own", n + 1));
+            return refused(format!("axis {} is {} again", n + 1, axis.name));
         }
         if self.sigma.is_some() && self.has(SIGMA) {
             return refused("sigma is an axis and a constant: give one of them".into());
@@ -231,15 +230,7 @@ impl Sweep {
         } else {
             settings.sigma.unwrap_or_else(resonant)
         };
-        Ok(Self {
-            family,
-            settings,
-            scene,
-            sigma,
-            dimensions,
-            shape,
-            chunk,
-        })
+        Ok(Self { family, settings, scene, sigma, dimensions, shape, chunk })
     }
 
     /// The scene without the values of the axes.
@@ -370,7 +361,10 @@ impl Sweep {
 
     /// Computes the cell with these indices.
     pub(crate) fn cell_at(&self, index: &[u64]) -> Cell {
-        let values: Vec<f64> = self.coordinates().map(|(_, dimension, at)| at(index[dimension])).collect();
+        let values: Vec<f64> = self
+            .coordinates()
+            .map(|(_, dimension, at)| at(index[dimension]))
+            .collect();
         match self.at(&values) {
             Ok((scene, sigma, numbers)) => compute(&scene, sigma, &numbers, &self.settings),
             Err(error) => Cell::failed(error.to_string()),
@@ -436,7 +430,9 @@ impl Shard {
     /// Number of its cells.
     #[must_use]
     pub fn cells(self, sweep: &Sweep) -> u64 {
-        self.chunks(sweep).map(|n| sweep.chunk_cells(&sweep.chunk_index(n))).sum()
+        self.chunks(sweep)
+            .map(|n| sweep.chunk_cells(&sweep.chunk_index(n)))
+            .sum()
     }
 
     /// Its chunks.

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use vines_model::Dimensionless;
 use vines_model::numerics::golden_section;
-use vines_model::orbit::{Limits, backbone};
+use vines_model::orbit::{ContinuationLimits, backbone};
 
 /// Largest step along the curve, which bounds the error of the polygon to 1e-5.
 const STEP: f64 = 4e-3;
@@ -33,7 +33,7 @@ pub struct Distance {
 impl ExactCurve {
     /// The curve of a scene.
     pub fn of(scene: &Dimensionless) -> Self {
-        let limits = Limits { step: STEP, points: 20_000, ..Limits::default() };
+        let limits = ContinuationLimits { step: STEP, points: 20_000, ..ContinuationLimits::default() };
         let mut points = backbone(scene, &limits).map_or(Vec::new(), |branch| branch.points);
         if points
             .first()

@@ -16,9 +16,9 @@ use super::periodic::{Bifurcation, Condition, Periodic, Returned, Unknowns, foll
 use crate::Dimensionless;
 use crate::numerics::{golden_section, try_bisection};
 
-/// Limits of a continuation.
+/// ContinuationLimits of a continuation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub struct ContinuationLimits {
     /// Range of sigma.
     pub sigma: [f64; 2],
     /// Range of G.
@@ -29,7 +29,7 @@ pub struct Limits {
     pub step: f64,
 }
 
-impl Default for Limits {
+impl Default for ContinuationLimits {
     /// Detunings from -6 to 6, G up to 10, 2000 points at most 0.05 apart.
     fn default() -> Self {
         Self {
@@ -43,7 +43,7 @@ impl Default for Limits {
 
 /// Why a branch ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Ended {
+pub enum BranchEnd {
     /// It left the range of sigma or G.
     #[serde(rename = "left the range")]
     Range,
@@ -69,7 +69,7 @@ pub enum Ended {
 
 /// A point where stability changes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Special {
+pub struct BranchBifurcation {
     /// What happens.
     pub kind: Bifurcation,
     /// The motion is stable on one side.
@@ -84,9 +84,9 @@ pub struct Branch {
     /// Its motions in order.
     pub points: Vec<Periodic>,
     /// Where stability changes, in order.
-    pub special: Vec<Special>,
+    pub special: Vec<BranchBifurcation>,
     /// Why it ended, before its first and after its last motion.
-    pub ended: [Ended; 2],
+    pub ended: [BranchEnd; 2],
 }
 
 /// Points without a stable motion after which a branch that is not 1:1 ends.
@@ -178,22 +178,22 @@ fn off(motion: &Periodic, [from, to]: [&Periodic; 2]) -> f64 {
     (beside - chord * part).norm()
 }
 
-impl Ended {
+impl BranchEnd {
     /// As in a table.
     pub fn name(&self) -> &'static str {
         match self {
-            Ended::Range => "left the range",
-            Ended::Closed => "closed",
-            Ended::Points => "number of points",
-            Ended::Unstable => "unstable from there on",
-            Ended::Joins => "joins a shorter pattern",
-            Ended::Resonance => "strong resonance",
-            Ended::Graze => "graze",
+            BranchEnd::Range => "left the range",
+            BranchEnd::Closed => "closed",
+            BranchEnd::Points => "number of points",
+            BranchEnd::Unstable => "unstable from there on",
+            BranchEnd::Joins => "joins a shorter pattern",
+            BranchEnd::Resonance => "strong resonance",
+            BranchEnd::Graze => "graze",
         }
     }
 }
 
-impl Special {
+impl BranchBifurcation {
     /// As in a table. A modulation begins at a torus bifurcation only if the motion was stable before.
     pub fn name(&self) -> &'static str {
         match (self.kind, self.of_stable) {
@@ -204,7 +204,7 @@ impl Special {
     }
 }
 
-impl Limits {
+impl ContinuationLimits {
     /// Whether a motion lies in the ranges.
     fn contain(&self, sigma: f64, g: f64) -> bool {
         let inside = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
@@ -294,12 +294,12 @@ impl Curve<'_> {
         let last = branch.points.last().unwrap_or(self.start);
         if joins(last, motion) {
             branch.points.extend(self.joint(last, tangent, step));
-            branch.ended[1] = Ended::Joins;
+            branch.ended[1] = BranchEnd::Joins;
             return true;
         }
         match self.condition {
             Condition::Bifurcation(Bifurcation::Torus) if !motion.on_circle_in_pairs() => {
-                branch.ended[1] = Ended::Resonance;
+                branch.ended[1] = BranchEnd::Resonance;
                 return true;
             }
             Condition::Bifurcation(_) => {}
@@ -313,7 +313,7 @@ impl Curve<'_> {
     }
 
     /// The bifurcations that cancel between the point before the last one and `motion`.
-    fn pairs(&self, points: &[Periodic], motion: &Periodic) -> Vec<Special> {
+    fn pairs(&self, points: &[Periodic], motion: &Periodic) -> Vec<BranchBifurcation> {
         let [.., before, last] = points else {
             return Vec::new();
         };
@@ -328,7 +328,7 @@ impl Curve<'_> {
     }
 
     /// Whether a motion lies in the ranges; that of G does not limit a curve at constant G.
-    fn within(&self, limits: &Limits, sigma: f64, g: f64) -> bool {
+    fn within(&self, limits: &ContinuationLimits, sigma: f64, g: f64) -> bool {
         let free = !matches!(self.condition, Condition::Excitation(_));
         limits.contain(sigma, if free { g } else { limits.g[0] })
     }
@@ -352,7 +352,7 @@ impl Curve<'_> {
             // The last step passed the start, and what is beyond it was known.
             branch.special.pop();
         }
-        branch.ended[1] = Ended::Closed;
+        branch.ended[1] = BranchEnd::Closed;
         true
     }
 
@@ -392,14 +392,14 @@ pub fn continue_from(
     start: &Periodic,
     condition: Condition,
     towards: &Unknowns,
-    limits: &Limits,
+    limits: &ContinuationLimits,
 ) -> Branch {
     let reach = APPROACH * limits.step;
     let curve = Curve { scene, start, condition, reach };
     let mut branch = Branch {
         points: vec![start.clone()],
         special: Vec::new(),
-        ended: [Ended::Graze; 2],
+        ended: [BranchEnd::Graze; 2],
     };
     let Some((mut tangent, sign)) = curve.tangent(&start.unknowns(), towards) else {
         return branch;
@@ -408,7 +408,7 @@ pub fn continue_from(
     let mut step = limits.step / 8.0;
     while step >= SHORTEST {
         if branch.points.len() >= limits.points {
-            branch.ended[1] = Ended::Points;
+            branch.ended[1] = BranchEnd::Points;
             return branch;
         }
         let last = branch.points.last().unwrap_or(start);
@@ -424,15 +424,15 @@ pub fn continue_from(
             return branch;
         }
         if !curve.within(limits, next[4], next[5]) {
-            let inside = |one: &Special| curve.within(limits, one.motion.sigma, one.motion.g);
+            let inside = |one: &BranchBifurcation| curve.within(limits, one.motion.sigma, one.motion.g);
             branch.special.retain(inside);
-            branch.ended[1] = Ended::Range;
+            branch.ended[1] = BranchEnd::Range;
             return branch;
         }
         if branch.winds() {
             let stable = branch.points.iter().rposition(|one| one.stable);
             branch.points.truncate(stable.unwrap_or(0) + 2);
-            branch.ended[1] = Ended::Unstable;
+            branch.ended[1] = BranchEnd::Unstable;
             return branch;
         }
         let straight = turned.dot(&tangent) > 0.5 * (1.0 + STRAIGHT);
@@ -442,24 +442,29 @@ pub fn continue_from(
         }
     }
     if curve.stops_at_joint(branch.points.last().unwrap_or(start)) {
-        branch.ended[1] = Ended::Joins;
+        branch.ended[1] = BranchEnd::Joins;
     }
     branch
 }
 
 /// Follows the curve of `condition` through `start` in both directions, from falling to rising sigma.
-pub fn continue_both_ways(scene: &Dimensionless, start: &Periodic, condition: Condition, limits: &Limits) -> Branch {
+pub fn continue_both_ways(
+    scene: &Dimensionless,
+    start: &Periodic,
+    condition: Condition,
+    limits: &ContinuationLimits,
+) -> Branch {
     let mut towards = Unknowns::zeros();
     towards[4] = 1.0;
     let mut up = continue_from(scene, start, condition, &towards, limits);
-    if up.ended[1] == Ended::Closed {
-        up.ended[0] = Ended::Closed;
+    if up.ended[1] == BranchEnd::Closed {
+        up.ended[0] = BranchEnd::Closed;
         return up;
     }
     let down = continue_from(scene, start, condition, &-towards, limits);
     let mut points: Vec<Periodic> = down.points.into_iter().skip(1).rev().collect();
     points.append(&mut up.points);
-    let mut special: Vec<Special> = down.special.into_iter().rev().collect();
+    let mut special: Vec<BranchBifurcation> = down.special.into_iter().rev().collect();
     special.append(&mut up.special);
     Branch { points, special, ended: [down.ended[1], up.ended[1]] }
 }
@@ -469,7 +474,12 @@ const ASIDE: f64 = 1e-3;
 
 /// The branch of motions that leaves a symmetry breaking or a period doubling, along the curve of `condition`. Its mirror image, or
 /// itself one repetition later, leaves in the opposite direction and counts as the same branch.
-pub fn branch_off(scene: &Dimensionless, at: &Special, condition: Condition, limits: &Limits) -> Option<Branch> {
+pub fn branch_off(
+    scene: &Dimensionless,
+    at: &BranchBifurcation,
+    condition: Condition,
+    limits: &ContinuationLimits,
+) -> Option<Branch> {
     let from = &at.motion;
     let returned = follow(scene, &from.pattern, &from.unknowns())?;
     // The eigenvector of the map for the multiplier -1.
@@ -483,7 +493,7 @@ pub fn branch_off(scene: &Dimensionless, at: &Special, condition: Condition, lim
     let x = curve.correct(&from.unknowns(), &towards, ASIDE)?;
     let start = curve.motion(&x)?;
     let mut branch = continue_from(scene, &start, condition, &towards, limits);
-    branch.ended[0] = Ended::Joins;
+    branch.ended[0] = BranchEnd::Joins;
     Some(branch)
 }
 
@@ -502,7 +512,7 @@ struct Part<F: Fn(f64) -> Option<Periodic>>(pub F);
 
 impl<F: Fn(f64) -> Option<Periodic>> Part<F> {
     /// The bifurcations between two neighbouring points, in order.
-    fn crossings(&self, from: &Periodic, to: &Periodic) -> Vec<Special> {
+    fn crossings(&self, from: &Periodic, to: &Periodic) -> Vec<BranchBifurcation> {
         let found = kinds(from)
             .into_iter()
             .filter_map(|kind| self.crossing(kind, [(0.0, from), (1.0, to)]));
@@ -512,14 +522,14 @@ impl<F: Fn(f64) -> Option<Periodic>> Part<F> {
     }
 
     /// The bifurcations that cancel around the second of three neighbouring points.
-    fn pairs(&self, points: [&Periodic; 3]) -> Vec<Special> {
+    fn pairs(&self, points: [&Periodic; 3]) -> Vec<BranchBifurcation> {
         kinds(points[0])
             .into_iter()
             .flat_map(|kind| self.pair(kind, points))
             .collect()
     }
 
-    fn pair(&self, kind: Bifurcation, points: [&Periodic; 3]) -> Vec<Special> {
+    fn pair(&self, kind: Bifurcation, points: [&Periodic; 3]) -> Vec<BranchBifurcation> {
         let sign = kind.test(&points[1].monodromy).signum();
         let [before, at, after] = points.map(|one| sign * kind.test(&one.monodromy));
         // A smooth function does not come nearer to zero than at the points by more than it changes between them.
@@ -542,7 +552,7 @@ impl<F: Fn(f64) -> Option<Periodic>> Part<F> {
 
     /// The part at which a test function passes zero between two motions, and the motion there; None if it does not, or if only a
     /// saddle is neutral.
-    fn crossing(&self, kind: Bifurcation, [from, to]: [(f64, &Periodic); 2]) -> Option<(f64, Special)> {
+    fn crossing(&self, kind: Bifurcation, [from, to]: [(f64, &Periodic); 2]) -> Option<(f64, BranchBifurcation)> {
         let [first, last] = [from, to].map(|one| kind.test(&one.1.monodromy));
         if first * last >= 0.0 || is_rounding(kind, [from.1, to.1], first.abs().max(last.abs())) {
             return None;
@@ -555,7 +565,7 @@ impl<F: Fn(f64) -> Option<Periodic>> Part<F> {
         let (_, beyond) = try_bisection(from.0, to.0, FINEST, like_first).ok()?;
         let motion = (self.0)(beyond)?;
         let of_stable = motion.bounds_stability();
-        on_circle(kind, &motion).then_some((beyond, Special { kind, of_stable, motion }))
+        on_circle(kind, &motion).then_some((beyond, BranchBifurcation { kind, of_stable, motion }))
     }
 }
 

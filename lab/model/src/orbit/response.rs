@@ -6,17 +6,17 @@
 
 use serde::Serialize;
 
-use super::continuation::{Branch, Limits, Special, branch_off, continue_both_ways};
+use super::Orbit;
+use super::continuation::{Branch, BranchBifurcation, ContinuationLimits, branch_off, continue_both_ways};
 use super::periodic::{Bifurcation, Condition, ImpactPattern, LONGEST, Periodic};
 use super::symmetric::{exact_backbone, least_excitation, phase_resonant, symmetric_orbits};
-use super::Orbit;
 use crate::Dimensionless;
 use crate::numerics::{equally_spaced, golden_section};
 use crate::theory::Manifold;
 
 /// The exact frequency response at one excitation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Response {
+pub struct FrequencyResponse {
     /// Base amplitude over `b epsilon`.
     #[serde(rename = "G")]
     pub g: f64,
@@ -44,7 +44,7 @@ const SAME: f64 = 1e-6;
 
 /// The exact frequency response at the scene's G over the range of sigma in `limits`: symmetric 1:1 motions, and what branches off them at
 /// `doublings` symmetry breakings and period doublings in a row.
-pub fn response(scene: &Dimensionless, limits: &Limits, doublings: usize) -> Response {
+pub fn response(scene: &Dimensionless, limits: &ContinuationLimits, doublings: usize) -> FrequencyResponse {
     let condition = Condition::Excitation(scene.g);
     let mut search = Search { scene, limits, condition, doublings, found: Vec::new() };
     let [low, high] = limits.sigma;
@@ -62,12 +62,12 @@ pub fn response(scene: &Dimensionless, limits: &Limits, doublings: usize) -> Res
             }
         }
     }
-    Response { g: scene.g, components: search.named() }
+    FrequencyResponse { g: scene.g, components: search.named() }
 }
 
 struct Search<'a> {
     scene: &'a Dimensionless,
-    limits: &'a Limits,
+    limits: &'a ContinuationLimits,
     condition: Condition,
     doublings: usize,
     found: Vec<Branch>,
@@ -133,7 +133,7 @@ impl Search<'_> {
     }
 }
 
-impl Response {
+impl FrequencyResponse {
     /// The components of symmetric 1:1 motions.
     pub fn symmetric(&self) -> impl Iterator<Item = &Branch> {
         let symmetric = |one: &&Branch| one.points[0].pattern.is_symmetric();
@@ -198,7 +198,7 @@ const MET_AT: [f64; 6] = [-1.0, -0.7, -1.4, -0.5, -2.0, 0.0];
 /// The exact backbone, through the scene's phase-resonant motion or, without one, through another (with G = 0 where there is neither
 /// damping nor loss): the one with the fastest particle, on the right branch. Without damping and with r = 1 it is the conservative
 /// nonlinear mode.
-pub fn backbone(scene: &Dimensionless, limits: &Limits) -> Option<Branch> {
+pub fn backbone(scene: &Dimensionless, limits: &ContinuationLimits) -> Option<Branch> {
     let condition = Condition::backbone(scene);
     let fastest = |orbits: Vec<Orbit>| orbits.into_iter().max_by(|one, other| one.b.total_cmp(&other.b));
     let right = Manifold::new(scene.r).b_min();
@@ -228,7 +228,7 @@ const LEVELS: usize = 25;
 
 /// The curves of folds, symmetry breakings, period doublings and Neimark-Sacker bifurcations of the symmetric and asymmetric 1:1
 /// motions that cross one of 25 levels of G in `limits`.
-pub fn bifurcation_curves(scene: &Dimensionless, limits: &Limits) -> Vec<BifurcationCurve> {
+pub fn bifurcation_curves(scene: &Dimensionless, limits: &ContinuationLimits) -> Vec<BifurcationCurve> {
     let mut found: Vec<BifurcationCurve> = Vec::new();
     let [low, high] = limits.g;
     for g in equally_spaced(low, high, LEVELS).filter(|g| *g > 0.0) {
@@ -256,7 +256,7 @@ impl BifurcationCurve {
         format!("{} of {}", self.kind.name(), self.branch.points[0].pattern.name())
     }
 
-    fn passes(&self, scene: &Dimensionless, special: &Special) -> bool {
+    fn passes(&self, scene: &Dimensionless, special: &BranchBifurcation) -> bool {
         let motion = &special.motion;
         if self.kind != special.kind || self.branch.points[0].pattern.mirrored != motion.pattern.mirrored {
             return false;

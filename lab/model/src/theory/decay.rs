@@ -1,4 +1,4 @@
-//! The free decay along the manifold in closed form (docs/theory.md, eqs. 20 and 21), and the first-order motion in physical time: a sine for
+//! The free decay along the manifold in closed form (docs/theory.md, eq. 20), and the first-order motion in physical time: a sine for
 //! v, and a sine with a triangle wave for w (eq. 22).
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
@@ -33,15 +33,6 @@ pub struct Decay {
     flow: SlowFlow,
     start: f64,
 }
-
-/// Nodes and weights of Gauss' rule of three points on [-1, 1].
-const GAUSS: [(f64, f64); 3] = [
-    (-0.774_596_669_241_483_4, 5.0 / 9.0),
-    (0.0, 8.0 / 9.0),
-    (0.774_596_669_241_483_4, 5.0 / 9.0),
-];
-/// Panels of that rule over a decay.
-const PANELS: u32 = 64;
 
 impl SlowFlow {
     /// The free decay from the particle speed `b`; None left of the fold, or without dissipation.
@@ -78,20 +69,6 @@ impl Decay {
         equally_spaced(self.start, b_min, points)
             .map(|b| self.point(self.time(b), b))
             .collect()
-    }
-
-    /// Phase, rad, by which v leads `omega0 t` when the particle speed has fallen to `b`: the integral of sigma
-    /// over tau1 (docs/theory.md, eq. 21), by Gauss' rule on panels; its integrand is smooth.
-    pub fn turned(&self, b: f64) -> f64 {
-        let curvature = self.flow.manifold.curvature();
-        let integrand = |b: f64| self.flow.free_detuning(b) * (2.0 * curvature * b - PI) / self.flow.loss(b);
-        let width = (self.start - b) / f64::from(PANELS);
-        (0..PANELS)
-            .map(|n| b + (f64::from(n) + 0.5) * width)
-            .flat_map(|middle| GAUSS.map(|(x, weight)| weight * integrand(middle + 0.5 * x * width)))
-            .sum::<f64>()
-            * 0.5
-            * width
     }
 
     fn point(&self, tau1: f64, b: f64) -> DecayPoint {
@@ -180,16 +157,4 @@ impl Waveform {
 /// The triangle wave Pi: slope ±1, height pi/2, zero and rising at 0.
 pub fn triangle_wave(phase: f64) -> f64 {
     phase.sin().asin()
-}
-
-impl Decay {
-    /// (v, w) over b at the fast time `tau = omega0 t` since the release, for v at the phase `gamma` (rad) then; None
-    /// once the fold is passed. The phase advances by `tau` and the integral of sigma (docs/theory.md, eq. 21).
-    pub fn motion(&self, epsilon: f64, gamma: f64, tau: f64) -> Option<[f64; 2]> {
-        let point = self.at(epsilon * tau)?;
-        let phase = gamma + tau + self.turned(point.b);
-        let v = point.c * phase.sin();
-        let psi = self.flow.psi(point.b, phase);
-        Some([v, v + point.b * triangle_wave(psi)])
-    }
 }

@@ -5,7 +5,6 @@
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI, TAU};
 
-use nalgebra::Complex;
 use serde::Serialize;
 
 use crate::numerics::{bisection, equally_spaced};
@@ -108,33 +107,10 @@ impl SlowFlow {
     pub fn free_detuning(&self, b: f64) -> f64 {
         FRAC_2_PI * b * (1.0 - FRAC_PI_2 * b) / self.manifold.c(b).powi(2)
     }
-
-    /// `(D1 C~, D1 gamma)` at the particle speed `b` and the phase `gamma`, rad (eq. 11).
-    pub fn rates(&self, g: f64, sigma: f64, b: f64, gamma: f64) -> [f64; 2] {
-        let c = self.manifold.c(b);
-        [
-            -self.loss(b) - g * c * gamma.sin(),
-            self.free_detuning(b) - g * gamma.cos() / (2.0 * c) - sigma,
-        ]
-    }
 }
 
 /// Above this particle speed, `2 pi/(pi^2 - 4)`, the orbit loses its symmetry, whatever r (docs/theory.md, eq. 10).
 pub const B_SYMMETRY_BREAKING: f64 = 2.0 * PI / (PI * PI - 4.0);
-
-/// Trace and determinant of the fast half-period map at the particle speed `b`:
-/// `2 r + (1 + r)^2 (pi/(2 B) - pi^2/4)` and `r^2` (eq. 9).
-pub fn half_period_map(r: f64, b: f64) -> [f64; 2] {
-    let trace = 2.0 * r + (1.0 + r).powi(2) * (PI / (2.0 * b) - PI * PI / 4.0);
-    [trace, r * r]
-}
-
-/// Multipliers of that map.
-pub fn half_period_multipliers(r: f64, b: f64) -> [Complex<f64>; 2] {
-    let [trace, determinant] = half_period_map(r, b);
-    let root = Complex::new(0.25 * trace * trace - determinant, 0.0).sqrt();
-    [0.5 * trace + root, 0.5 * trace - root]
-}
 
 /// The impacts keep their symmetric 1:1 pattern: `Bmin < B < 2 pi/(pi^2 - 4)` (eq. 10).
 pub fn impacts_stable(manifold: &Manifold, b: f64) -> bool {
@@ -287,11 +263,6 @@ impl SlowFlow {
         let c = self.manifold.c(b);
         let through_b = 4.0 * b * self.manifold.slope(b) - (b / c).powi(2);
         self.lambda + 2.0 * FRAC_2_PI * r * through_b
-    }
-
-    /// The detuning sigma_R at the amplitude `c` on a branch; None below the fold.
-    pub fn backbone_sigma(&self, c: f64, side: BranchSide) -> Option<f64> {
-        self.manifold.b(c, side).map(|b| self.free_detuning(b))
     }
 
     /// All phase-resonant solutions at the excitation `g`, on both branches, by increasing B.

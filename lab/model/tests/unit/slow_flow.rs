@@ -3,16 +3,6 @@
 use super::*;
 
 #[test]
-fn a_multiplier_is_one_at_the_fold_and_minus_one_where_symmetry_breaks() {
-    for r in [0.3, 0.65, 0.9] {
-        let nearest = |b: f64, to: f64| half_period_multipliers(r, b).map(|one| (one - to).norm());
-        let fold = nearest(Manifold::new(r).b_min(), 1.0);
-        let breaking = nearest(B_SYMMETRY_BREAKING, -1.0);
-        assert!(fold[0].min(fold[1]) < 1e-12 && breaking[0].min(breaking[1]) < 1e-12);
-    }
-}
-
-#[test]
 fn all_roots_of_a_product_are_found() {
     // (x - 1)(x - 2)(x + 3)(x - 0.5)
     let roots = real_roots(&[-3.0, 9.5, -7.0, -0.5, 1.0]);

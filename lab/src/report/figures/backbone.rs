@@ -3,7 +3,7 @@
 use super::{DECAY_LABEL, THINNED, decay_points, error_bars, locked_point};
 use crate::comparison::Comparison;
 use crate::numerics::range;
-use crate::orbit::{self, Limits};
+use crate::orbit::{self, ContinuationLimits};
 use crate::report::figure::{DETUNING, Figure, Legend, Marked, Panel, amplitude, caption, clipped, line, thinned};
 use crate::report::theme::{EXACT, FAINT, LOCK, THEORY, UNSTABLE};
 use crate::scene::{Definition, Dimensionless};
@@ -65,7 +65,7 @@ pub fn add_backbones(panel: &mut Panel, p: &Dimensionless, x: (f64, f64), y: (f6
         .iter()
         .map(|point| ((point.sigma, point.c), point.stable()))
         .collect();
-    let exact: Vec<Marked> = orbit::backbone(p, &Limits::default())
+    let exact: Vec<Marked> = orbit::backbone(p, &ContinuationLimits::default())
         .map(|branch| branch.points)
         .unwrap_or_default()
         .iter()

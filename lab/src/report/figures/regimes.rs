@@ -138,8 +138,8 @@ fn stripes(map: &Map, regime: Regime) -> Vec<[Place; 2]> {
     let mut found = Vec::new();
     for (row, cells) in (0..).zip(map.cells.chunks(x.points as usize)) {
         let mut column = 0;
-        for run in cells.chunk_by(|one, other| one.point.regime == other.point.regime) {
-            if run[0].point.regime == regime {
+        for run in cells.chunk_by(|one, other| one.result.regime == other.result.regime) {
+            if run[0].result.regime == regime {
                 let left = x.at(column) - x.step() / 2.0;
                 let right = x.at(column + run.len() as u64 - 1) + x.step() / 2.0;
                 let low = y.at(row) - y.step() / 2.0;
@@ -191,7 +191,7 @@ fn letters(map: &Map) -> Vec<(Regime, Place)> {
 
 /// The regimes of the cells, except where a curve passes.
 fn without_curves(map: &Map) -> Vec<Option<Regime>> {
-    let mut free: Vec<Option<Regime>> = map.cells.iter().map(|cell| Some(cell.point.regime)).collect();
+    let mut free: Vec<Option<Regime>> = map.cells.iter().map(|cell| Some(cell.result.regime)).collect();
     let bifurcations = map.curves.iter().flat_map(|curve| {
         let place = place_on(map);
         curve.branch.points.iter().map(place)

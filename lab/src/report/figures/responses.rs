@@ -1,6 +1,6 @@
 //! Frequency responses at several excitations, exact and first-order, with the backbone near their maxima.
 
-use crate::orbit::{Branch, Response};
+use crate::orbit::{Branch, FrequencyResponse};
 use crate::report::figure::{
     BLACK, DETUNING, Figure, Legend, Marked, Panel, Place, amplitude, clipped, line, rig, thinned,
 };
@@ -12,11 +12,11 @@ const POINTS: usize = 600;
 const DETUNINGS: (f64, f64) = (-5.0, 5.0);
 
 /// The exact responses and, for the same G, those of theory.
-pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
+pub fn figure(p: &Dimensionless, responses: &[FrequencyResponse]) -> Figure {
     let flow = SlowFlow::new(p.lambda, p.r);
     let top = responses
         .iter()
-        .flat_map(Response::symmetric)
+        .flat_map(FrequencyResponse::symmetric)
         .flat_map(|one| &one.points)
         .filter(|one| one.b > flow.manifold.b_min())
         .fold(0.6, |most: f64, one| most.max(1.08 * one.c));
@@ -53,7 +53,7 @@ pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
 }
 
 /// One response, by theory and exact.
-fn add_response(panel: &mut Panel, p: &Dimensionless, response: &Response, (x, y): (Place, Place)) {
+fn add_response(panel: &mut Panel, p: &Dimensionless, response: &FrequencyResponse, (x, y): (Place, Place)) {
     let styles = [line(THEORY, 12), line(UNSTABLE, 8)];
     for curve in SlowFlow::new(p.lambda, p.r).frequency_responses(response.g, POINTS) {
         let mark = |one: &ResponsePoint| {

@@ -1,8 +1,8 @@
 //! Exact frequency responses and backbone, and one period of the locked motion.
 
 use crate::orbit::{
-    Branch, Component, Condition, DOUBLINGS, ImpactPattern, Limits, Periodic, Response, backbone, response,
-    stable_resonant,
+    Branch, Component, Condition, ContinuationLimits, DOUBLINGS, FrequencyResponse, ImpactPattern, Periodic, backbone,
+    response, stable_resonant,
 };
 use crate::report::figures::{period, responses};
 use crate::report::files::{ReportError, csv};
@@ -14,9 +14,9 @@ use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow};
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError> {
     let mut section = Section::new("Exact periodic motions");
     let p = subject.scene.dimensionless();
-    let limits = Limits::default();
+    let limits = ContinuationLimits::default();
     let excitations = excitations(&p);
-    let mut found: Vec<Response> = Vec::new();
+    let mut found: Vec<FrequencyResponse> = Vec::new();
     for (n, g) in excitations.iter().enumerate() {
         found.push(response(&Dimensionless { g: *g, ..p }, &limits, DOUBLINGS));
         done((n + 1) as f64 / (excitations.len() + 1) as f64);
@@ -86,7 +86,7 @@ fn describe_backbone(section: &mut Section, curve: &Branch) {
 }
 
 /// Where stability changes on the responses.
-fn changes(found: &[Response]) -> Table {
+fn changes(found: &[FrequencyResponse]) -> Table {
     let all = found.iter().flat_map(|one| {
         one.symmetric()
             .flat_map(|branch| &branch.special)
@@ -121,7 +121,7 @@ fn excitations(p: &Dimensionless) -> Vec<f64> {
 }
 
 /// The orbits of all curves, as CSV.
-fn table(backbone: &Branch, responses: &[Response]) -> Result<String, ReportError> {
+fn table(backbone: &Branch, responses: &[FrequencyResponse]) -> Result<String, ReportError> {
     let headings = ["curve", "sigma", "G", "C", "gamma", "B", "largest_multiplier", "stable"];
     let components = responses.iter().flat_map(|response| {
         let name = |one: &Component| format!("G={:.4}: {}", response.g, one.name);
