@@ -18,7 +18,7 @@ use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 use vines_model::{
     Dimensionless,
-    orbit::{Limits, Periodic, backbone},
+    orbit::{ContinuationLimits, Periodic, backbone},
 };
 use vines_testbench::{
     advice,
@@ -224,7 +224,9 @@ fn run(d: Dimensionless, effects: [f64; 6], snr: &str, noise: u64) -> Result<Fou
     let stable = advice::largest_stable(&d).ok_or("no stable orbit")?;
     let curve = ExactCurve::of(&d);
     let fold = curve.places().first().ok_or("no backbone")?[0];
-    let orbits = backbone(&d, &Limits::default()).ok_or("no backbone")?.points;
+    let orbits = backbone(&d, &ContinuationLimits::default())
+        .ok_or("no backbone")?
+        .points;
     let settings = [
         format!("plant.epsilon={:?}", d.epsilon),
         format!("plant.lambda={:?}", d.lambda),

@@ -12,7 +12,6 @@ pub use vines_fmu as fmu;
 pub use vines_helic as helic;
 pub use vines_model::{ArgumentError, map, numerics, orbit, regime, theory};
 pub use vines_net as net;
-#[cfg(feature = "sweep")]
 pub use vines_sweep as sweep;
 pub use vines_testbench::{
     advice, backbone, comparison, experiment, fit, identification, loop_check, record, rig, scene,

@@ -16,16 +16,18 @@ pub use figure::FigureError;
 pub use files::{ReportError, decay_csv, map_csv, write, write_interrupted, write_lateness, write_map, write_tracked};
 pub use table::{Table, number, row, with_uncertainty};
 
-use crate::map::Range;
-use crate::scene::Scene;
+use crate::scene::{Family, Scene};
+use crate::sweep::Axis;
 
 /// The subject of a report.
 #[derive(Debug, Clone)]
 pub struct Subject {
     /// The scene.
     pub scene: Scene,
-    /// Axes of the regime map.
-    pub map: [Range; 2],
+    /// The scene again, for the sweep behind the regime map.
+    pub family: Family,
+    /// Axes of the regime map, horizontal first.
+    pub map: [Axis; 2],
 }
 
 /// One part of a section. A figure is SVG for white paper; its name is the name of its files, without ending.

@@ -103,7 +103,6 @@ fn bad_input_ends_with_code_two_and_one_message() {
 
 #[test]
 fn counts_of_zero_are_refused_with_the_allowed_range() {
-    fails(&["map", "--starts", "0"], 2, "from 1 to 1000000000");
     for server in ["rig", "controller"] {
         fails(&[server, "--listen", "127.0.0.1:0", "--sessions", "0"], 2, "from 1 to");
     }
@@ -174,12 +173,8 @@ fn curves_and_settled_orbits_come_as_json_too() {
     };
     assert!(components[0]["special"].as_array().map_or(0, Vec::len) >= 3);
     assert_eq!((named("symmetric 1:1"), named("asymmetric 1:1")), (1, 1));
-    let study = json(&["orbit", "--definitions", "--json"]);
-    assert_eq!(study.as_array().map(Vec::len), Some(9));
-    let settled = json(&["orbit", "--sigma=-0.6", "--json", "--set=excitation.G=2.2"]);
+    let settled = json(&["orbit", "--sigma=-0.6", "--json", "--set", "excitation.G=2.2"]);
     assert_eq!(settled["bounces"].as_array().map(Vec::len), Some(6));
-    let study = json(&["orbit", "--convergence", "--json"]);
-    assert!((study["slopes"][0].as_f64().unwrap() - 1.0).abs() < 0.05);
     let theory = json(&["theory", "--sigma=-1", "--json"]);
     assert_eq!(theory["equilibria"].as_array().map(Vec::len), Some(2));
 }
@@ -196,8 +191,6 @@ fn a_map_is_written_as_table_and_figures() {
         "G=1:1.4:3",
         "--periods",
         "2000",
-        "--starts",
-        "2",
         "--out",
         out,
     ]);
@@ -223,9 +216,17 @@ fn absurd_curves_and_maps_are_refused() {
     fails(&["theory", "--sigma=nan"], 2, "finite");
     let refused = ["identify", "--set=controller.G_max=1.0"];
     fails(&refused, 2, "amplitude_max is controller.G_max");
-    fails(&["map", "--x", "G=1:2:3", "--y", "G=1:2:3"], 2, "both axes are G");
-    fails(&["map", "--sigma=-1.1"], 2, "sigma is on an axis already");
-    fails(&["report", "--x", "r=0.5:1:3", "--y", "r=0.5:1:3"], 2, "both r");
+    fails(
+        &["map", "--x", "G=1:2:3", "--y", "G=1:2:3"],
+        2,
+        "axis 2 is excitation.G again",
+    );
+    fails(&["map", "--sigma=-1.1"], 2, "sigma is an axis and a constant");
+    fails(
+        &["report", "--x", "r=0.5:1:3", "--y", "r=0.5:1:3"],
+        2,
+        "axis 2 is plant.r again",
+    );
 }
 
 #[test]

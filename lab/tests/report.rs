@@ -5,7 +5,7 @@ use std::process::Command;
 
 use vines::{
     report::{Subject, write_report},
-    scene::{Override, Scene},
+    scene::{Family, Override, Scene},
 };
 
 /// Writes a report on a coarse map, after an early lock.
@@ -15,6 +15,7 @@ fn write(out: &Path) {
     let text = include_str!("../../scenes/dimensionless.toml");
     let subject = Subject {
         scene: Scene::parse("dimensionless.toml", text, &overrides).unwrap(),
+        family: Family::parse("dimensionless.toml", Some(text), &overrides).unwrap(),
         map: ["sigma=-2:1:7", "G=0.8:1.8:6"].map(|range| range.parse().unwrap()),
     };
     write_report(&subject, out, &|_, _| {}).unwrap().written.unwrap();

@@ -11,7 +11,7 @@ use pyo3::{
     prelude::*,
     types::PyDict,
 };
-use vines_sweep::{Axis, Monitor, Plan, Results, Settings, Shard, StoreError, Values, estimate, run};
+use vines_sweep::{self as sweeps, Axis, Grid, Monitor, Results, Settings, Shard, StoreError, Values, estimate, run};
 
 use crate::{
     scene::{Scene, invalid},
@@ -27,13 +27,13 @@ enum Given {
     List(Vec<f64>),
 }
 
-fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -> PyResult<Plan> {
+fn checked(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -> PyResult<sweeps::Sweep> {
     let axes = axes
         .iter()
         .map(|(name, values)| {
             let name: String = name.extract()?;
             let values = match values.extract()? {
-                Given::Grid(from, to, points) => Values::Grid { from, to, points },
+                Given::Grid(from, to, points) => Values::Grid(Grid { from, to, points }),
                 Given::List(list) => Values::List(list),
                 Given::Paired((list,)) => Values::Paired(list),
                 Given::Design(design, from, to) => match design.as_str() {
@@ -70,7 +70,7 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
         chunk: whole("chunk")?.unwrap_or_default(),
         adaptive: whole("adaptive")?,
     };
-    Plan::new(scene.family.clone(), settings).map_err(invalid)
+    sweeps::Sweep::new(scene.family.clone(), settings).map_err(invalid)
 }
 
 /// An `OSError` with the number of the system's error, if it is one.
@@ -83,13 +83,13 @@ fn system(error: &StoreError) -> PyErr {
 
 /// A checked sweep.
 #[pyclass(frozen)]
-pub struct Sweep(Plan);
+pub struct Sweep(sweeps::Sweep);
 
 #[pymethods]
 impl Sweep {
     #[new]
     fn new(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -> PyResult<Self> {
-        plan(scene, axes, settings).map(Self)
+        checked(scene, axes, settings).map(Self)
     }
 
     #[getter]

@@ -3,7 +3,7 @@
 use lovines::State;
 use serde::Serialize;
 use vines_model::numerics::{golden_section, mean_square};
-use vines_model::orbit::{self, Limits, Orbit, backbone};
+use vines_model::orbit::{self, ContinuationLimits, Orbit, backbone};
 use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow, free_sigma, resonant};
 
 use crate::backbone::{Point, Tracked};
@@ -162,7 +162,7 @@ pub struct Distance {
 impl ExactCurve {
     /// The curve of a scene.
     pub fn of(scene: &Dimensionless) -> Self {
-        let limits = Limits { step: STEP, points: 20_000, ..Limits::default() };
+        let limits = ContinuationLimits { step: STEP, points: 20_000, ..ContinuationLimits::default() };
         let mut points = backbone(scene, &limits).map_or(Vec::new(), |branch| branch.points);
         if points
             .first()

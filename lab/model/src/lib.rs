@@ -6,7 +6,6 @@
 
 #![forbid(unsafe_code)]
 
-mod argument;
 mod definition;
 mod dimensionless;
 pub mod map;
@@ -15,6 +14,16 @@ pub mod orbit;
 pub mod regime;
 pub mod theory;
 
-pub use argument::ArgumentError;
 pub use definition::{Definition, Reference, Resonance, Sensor};
 pub use dimensionless::Dimensionless;
+
+/// An argument or a setting that cannot be read; the message says what is expected.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ArgumentError(String);
+
+impl<T: Into<String>> From<T> for ArgumentError {
+    fn from(message: T) -> Self {
+        Self(message.into())
+    }
+}

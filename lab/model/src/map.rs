@@ -1,20 +1,498 @@
-//! The regime map: the regime of the response over a grid of two parameters, from simulated impact sequences.
+//! The regime of one cell of a regime map, from a simulated sequence of impacts.
 //!
-//! Every point of the grid is one plant, driven at a fixed frequency from the scene's start until its regime is decided: by a motion
-//! that repeats itself or, after the largest number of periods, by its largest Lyapunov exponent. Where several regimes are stable,
-//! another start may lead to another regime.
+//! A plant is driven at a fixed frequency from a start until its regime is decided: by a motion that repeats itself or, after the largest
+//! number of periods, by its largest Lyapunov exponent. Where several regimes are stable, another start may lead to another regime.
+//!
+//! States are compared at half periods of the base, because a symmetric motion is its own mirror image half a period later. A motion
+//! repeats if all states of a window at its end agree with the states one repetition before.
 
-mod axis;
-mod decide;
-mod grid;
-mod island;
-mod observe;
-mod response;
-mod run;
+mod disturbance;
 
-pub use axis::{Axis, Range};
-pub use grid::{CONFIRMATIONS, Cell, LIMIT, Map, MapError, Plan};
-pub use island::outline;
-pub use observe::{observe, observe_confirmed};
-pub use response::Response;
-pub use run::{Point, Run};
+use std::cell::OnceCell;
+use std::f64::consts::{PI, TAU};
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering::Relaxed},
+};
+
+use lovines::{Drive, Event, InvalidValue, Plant, State};
+use serde::Serialize;
+
+use self::disturbance::{Disturbance, Driven, Moment};
+use crate::Dimensionless;
+use crate::numerics::{SIGNIFICANT, mean, standard_deviation};
+use crate::orbit::{Periodic, periodic_near};
+use crate::regime::{Impact, Regime, synchrony};
+
+/// Default of the largest number of periods that a cell is followed.
+pub const LIMIT: usize = 20_000;
+/// Default of the number of further motions that must agree where chance decides when chaos ends. docs/regimes.md
+/// says how often chaos that passes for lasting ends later.
+pub const CONFIRMATIONS: usize = 6;
+
+/// Periods after which the motion is examined for the first time; from then on whenever their number has grown by a quarter.
+const FIRST: usize = 16;
+
+/// Drives the dimensionless plant of `scene` at the detuning `sigma` from `start` = (q1, q1', q2, q2') until its regime is decided, for
+/// at most `limit` periods. A motion that settles on a periodic one, or cannot reach a wall, is decided earlier.
+///
+/// # Errors
+/// Invalid parameters or an invalid start.
+pub fn observe(scene: &Dimensionless, sigma: f64, start: [f64; 4], limit: usize) -> Result<RegimeResult, InvalidValue> {
+    Run::new(scene, sigma, start)?.decided(0, limit)
+}
+
+/// Difference of the starts of motions that must agree: far above rounding, and chaos
+/// magnifies it to order one in ln(1e9) = 21 Lyapunov times.
+const APART: f64 = 1e-9;
+/// Transient, periods, from which on it may be chaos that ends at random: on the default scene,
+/// the free motion of the primary mass decays by exp(pi epsilon lambda 500) = e^19 within it.
+const LATE: f64 = 500.0;
+
+/// The regime as by [`observe`], and the regime of a motion from another start, 1e-9 and more apart, if it differs. `others` such motions
+/// are followed where chance decides when chaos ends: the regime is irregular, or it began late.
+///
+/// # Errors
+/// As [`observe`].
+pub fn observe_confirmed(
+    scene: &Dimensionless,
+    sigma: f64,
+    start: [f64; 4],
+    limit: usize,
+    others: usize,
+) -> Result<(RegimeResult, Option<Regime>), InvalidValue> {
+    let result = observe(scene, sigma, start, limit)?;
+    let irregular = result.impacts == 0 && ![Regime::NoImpacts, Regime::Undecided].contains(&result.regime);
+    let count = if irregular || result.transient > LATE {
+        others
+    } else {
+        0
+    };
+    for n in 1..=count {
+        let [q1, dq1, q2, dq2] = start;
+        let regime = observe(scene, sigma, [q1, dq1 + n as f64 * APART, q2, dq2], limit)?.regime;
+        if regime != result.regime {
+            return Ok((result, Some(regime)));
+        }
+    }
+    Ok((result, None))
+}
+
+/// The regime of a motion, and how it was decided.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RegimeResult {
+    /// Regime of the response.
+    pub regime: Regime,
+    /// Periods of the base that were simulated.
+    pub followed: usize,
+    /// Periods of the base before the regime began; without a repeating motion, those left out of the averages.
+    pub transient: f64,
+    /// Largest difference between the state and that one repetition before, over the last repetitions; absent if nothing repeats.
+    pub recurrence: Option<f64>,
+    /// Largest Lyapunov exponent per period of the base; absent without impacts.
+    pub exponent: Option<f64>,
+    /// Its standard error.
+    pub exponent_error: Option<f64>,
+    /// Share of the impacts that belong to captures into 1:1 resonance.
+    pub synchrony: f64,
+    /// Impacts per period of the base.
+    pub impacts_per_period: f64,
+    /// Impacts of one repetition; 0 if nothing repeats.
+    pub impacts: usize,
+    /// Periods of the base that it takes; 0 likewise.
+    pub periods: u32,
+    /// How often the particle comes to rest on a wall, per period of the base.
+    pub sticks_per_period: f64,
+    /// (q1, q1', q2, q2') at the end, at phase 0 of the base.
+    #[serde(skip)]
+    pub state: [f64; 4],
+}
+
+/// Longest step of the plant, over 1/omega0: bounds the time until a stop is noticed to some ten milliseconds where there is no impact.
+const STRETCH: f64 = 1e4;
+
+/// A simulated motion.
+pub struct Run {
+    scene: Dimensionless,
+    sigma: f64,
+    /// Its caches are large.
+    plant: Box<Plant>,
+    drive: Drive,
+    driven: Driven,
+    /// Periods so far.
+    periods: usize,
+    /// The motion at the start, after every event, and wherever it was examined.
+    moments: Vec<Moment>,
+    /// States at the beginning of every half period and now, as far as they were needed.
+    states: Vec<OnceCell<[f64; 4]>>,
+    disturbance: Disturbance,
+    /// Period in which the disturbance begins, and the number of moments that it has passed.
+    begun: usize,
+    passed: usize,
+    /// Growth of the disturbance over each period, as a natural logarithm; a period without impacts may belong to the next one.
+    growth: Vec<f64>,
+    impacts: Vec<Impact>,
+    /// Phases of the base at which the particle came to rest, rad.
+    sticks: Vec<f64>,
+    stop: Arc<AtomicBool>,
+}
+
+impl Run {
+    /// The dimensionless plant of `scene` at the detuning `sigma`, from `start` = (q1, q1', q2, q2').
+    ///
+    /// # Errors
+    /// Invalid parameters or an invalid start.
+    pub fn new(scene: &Dimensionless, sigma: f64, start: [f64; 4]) -> Result<Self, InvalidValue> {
+        let drive = scene.drive(sigma);
+        let plant = Box::new(scene.plant(start)?);
+        let driven = Driven::new(scene, drive.omega);
+        let moments = vec![driven.moment(0.0, plant.state(), plant.contact())];
+        Ok(Self {
+            scene: *scene,
+            sigma,
+            plant,
+            drive,
+            driven,
+            periods: 0,
+            moments,
+            states: vec![OnceCell::from(start)],
+            disturbance: Disturbance::default(),
+            begun: usize::MAX,
+            passed: 0,
+            growth: Vec::new(),
+            impacts: Vec::new(),
+            sticks: Vec::new(),
+            stop: Arc::default(),
+        })
+    }
+
+    /// Ends the thread that follows the motion, by unwinding, soon after `stop` was set: one period of a slow base has millions of events.
+    #[must_use]
+    pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
+        Self { stop, ..self }
+    }
+
+    /// Follows the motion until its regime is decided, for at most `limit` periods; it is not examined before `first` periods.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn decided(&mut self, first: usize, limit: usize) -> Result<RegimeResult, InvalidValue> {
+        let mut periods = first.max(FIRST).min(limit);
+        loop {
+            self.follow(periods)?;
+            if let Some(result) = self.lasting() {
+                return Ok(result);
+            }
+            if periods >= limit {
+                return Ok(self.irregular());
+            }
+            periods = (periods + periods / 4).min(limit);
+        }
+    }
+
+    /// Half periods so far.
+    fn halves(&self) -> usize {
+        2 * self.periods
+    }
+
+    /// (q1, q1', q2, q2') at the beginning of half period `n`.
+    fn state(&self, n: usize) -> [f64; 4] {
+        *self.states[n].get_or_init(|| {
+            let phase = PI * n as f64;
+            let after = self.moments.partition_point(|one| one.phase <= phase);
+            self.driven.state(&self.moments[after - 1], phase)
+        })
+    }
+
+    /// Number of impacts before half period `n`, and of times that the particle came to rest.
+    fn counts(&self, n: usize) -> [usize; 2] {
+        let phase = PI * n as f64;
+        [
+            self.impacts.partition_point(|one| one.time < phase),
+            self.sticks.partition_point(|one| *one < phase),
+        ]
+    }
+
+    /// Follows the motion to the end of period `periods`, in steps of the plant of at most [`STRETCH`].
+    fn follow(&mut self, periods: usize) -> Result<(), InvalidValue> {
+        if periods <= self.periods {
+            return Ok(());
+        }
+        let (start, end) = (TAU * self.periods as f64, TAU * periods as f64);
+        let omega = self.drive.omega;
+        let Self { driven, moments, impacts, sticks, stop, .. } = self;
+        let stopped = || {
+            if stop.load(Relaxed) {
+                std::panic::resume_unwind(Box::new("the motion was stopped"));
+            }
+        };
+        let mut now = moments[moments.len() - 1];
+        let duration = (end - start) / omega;
+        let stretches = (duration / STRETCH).ceil().max(1.0);
+        for stretch in 0..stretches as u64 {
+            stopped();
+            let from = start + (end - start) * (stretch as f64 / stretches);
+            self.plant.advance_with(self.drive, duration / stretches, |event| {
+                stopped();
+                let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) = event;
+                let phase = from + omega * t;
+                now = driven.after(&now, phase, &event);
+                moments.push(now);
+                match event {
+                    Event::Impact { velocity, .. } => impacts.push(Impact { time: phase, velocity }),
+                    Event::Stuck { .. } => sticks.push(phase),
+                    Event::Released { .. } => {}
+                }
+            })?;
+        }
+        moments.push(driven.moment(end, self.plant.state(), self.plant.contact()));
+        let State { q1, dq1, q2, dq2 } = self.plant.state();
+        self.periods = periods;
+        self.states.resize_with(2 * periods, OnceCell::new);
+        self.states.push(OnceCell::from([q1, dq1, q2, dq2]));
+        Ok(())
+    }
+
+    /// Growth of the disturbance over each period from the period `from` on. It begins before that, to find its direction.
+    fn growth(&mut self, from: usize) -> &[f64] {
+        if from < self.begun {
+            let phase = TAU * (0.75 * from as f64);
+            self.passed = self.moments.partition_point(|one| one.phase < phase);
+            (self.begun, self.disturbance) = (from, Disturbance::default());
+        }
+        self.growth.resize(self.periods, 0.0);
+        let mut period = ((self.moments[self.passed].phase / TAU) as usize).min(self.periods - 1);
+        for pair in self.moments[self.passed..].windows(2) {
+            self.disturbance.flow(&self.driven, &pair[0], &pair[1]);
+            let now = ((pair[1].phase / TAU) as usize).min(self.periods);
+            if now > period {
+                self.growth[period] = self.disturbance.growth();
+                period = now;
+            }
+            self.disturbance.jump(&self.driven, &pair[1]);
+        }
+        self.passed = self.moments.len() - 1;
+        &self.growth[from..]
+    }
+
+    /// Distance between the state at half period `n` and the one `count` half periods earlier, or its mirror image.
+    fn distance(&self, n: usize, count: usize) -> f64 {
+        let sign = if count % 2 == 1 { -1.0 } else { 1.0 };
+        let (now, then) = (self.state(n), self.state(n - count));
+        let differences = now.iter().zip(then).map(|(a, b)| (sign * a - b).abs());
+        // Nothing is near a value that cannot be computed: the steady response at an undamped resonance.
+        differences.fold(0.0, |largest, one| if one <= largest { largest } else { one })
+    }
+
+    /// Largest Lyapunov exponent per period from half period `from` on, and its standard error by batch means: as many batches as each
+    /// has periods.
+    fn exponent(&mut self, from: usize) -> (f64, f64) {
+        let growth = self.growth(from / 2);
+        let length = ((growth.len() as f64).sqrt() as usize).max(1);
+        let batches: Vec<f64> = growth
+            .chunks_exact(length)
+            .map(|batch| mean(batch.iter().copied()))
+            .collect();
+        let error = standard_deviation(&batches) / (batches.len() as f64).sqrt();
+        (mean(batches.iter().copied()), error)
+    }
+
+    /// The result without recurrence and exponent, averaged over the half periods from `from` on.
+    fn result(&self, regime: Regime, from: usize) -> RegimeResult {
+        let periods = 0.5 * (self.halves() - from) as f64;
+        let [[before, rested], [all, rests]] = [self.counts(from), self.counts(self.halves())];
+        RegimeResult {
+            regime,
+            followed: self.halves() / 2,
+            transient: 0.5 * from as f64,
+            recurrence: None,
+            exponent: None,
+            exponent_error: None,
+            synchrony: synchrony(&self.impacts[before..]),
+            impacts_per_period: (all - before) as f64 / periods,
+            impacts: 0,
+            periods: 0,
+            sticks_per_period: (rests - rested) as f64 / periods,
+            state: self.state(self.halves()),
+        }
+    }
+}
+
+/// Differences of states (q1/b, q1'/(b omega0), ...) below which a motion may be on its way to a periodic one.
+const NEAR: f64 = 1e-2;
+/// Differences below which it repeats: far above rounding, far below what separates two motions.
+const SAME: f64 = 1e-6;
+/// Longest repetition in the search, half periods. The window is a third of it, and at least two repetitions.
+const REPETITION: usize = 192;
+/// Largest uncertainty of an exponent that is called zero, per period.
+const ZERO: f64 = 2e-3;
+/// Share of captured impacts from which a chaotic motion is called modulated.
+const CAPTURES: f64 = 0.2;
+
+impl Run {
+    /// The regime, if the motion so far shows one that lasts: no impacts, or a stable periodic motion.
+    fn lasting(&mut self) -> Option<RegimeResult> {
+        self.without_impacts().or_else(|| self.periodic())
+    }
+
+    /// The particle rests, and the primary mass cannot reach it: the free part of its motion only decays.
+    fn without_impacts(&self) -> Option<RegimeResult> {
+        let n = self.halves();
+        let [q1, dq1, q2, dq2] = self.state(n);
+        let reach = self.driven.reach(PI * n as f64, [q1, dq1]);
+        (dq2 == 0.0 && reach + q2.abs() < 1.0).then(|| {
+            let last = self.impacts.last().map_or(0.0, |impact| impact.time / PI);
+            self.result(Regime::NoImpacts, (last.ceil() as usize).min(n - 1))
+        })
+    }
+
+    /// The motion repeats and its exponent is negative. The multipliers of an exact orbit close by give the exponent before the motion
+    /// has settled; without such an orbit (the particle sticks, or there are very many impacts), the linearised disturbance gives it.
+    fn periodic(&mut self) -> Option<RegimeResult> {
+        let n = self.halves();
+        let (count, recurrence) = self.recurrence()?;
+        let orbit = periodic_near(&self.scene, self.sigma, 0.0, self.state(n));
+        let (regime, impacts, periods, exponent) = if let Some(orbit) = &orbit {
+            let pattern = &orbit.pattern;
+            let exponent = (orbit.exponent(), 0.0);
+            (regime(orbit), pattern.impacts(), pattern.periods(), exponent)
+        } else if recurrence < SAME {
+            // A repetition of an odd number of half periods is followed by its mirror image.
+            let whole = 1 + count % 2;
+            let impacts = whole * (self.counts(n)[0] - self.counts(n - count)[0]);
+            let exponent = self.exponent(n / 3);
+            (Regime::Several, impacts, (whole * count / 2) as u32, exponent)
+        } else {
+            return None;
+        };
+        let stable = impacts > 0 && exponent.0 < 0.0;
+        let begun = |half: &usize| self.distance(*half, count) > NEAR;
+        stable.then(|| {
+            let transient = (count..=n).rev().find(begun).unwrap_or(0);
+            RegimeResult {
+                transient: 0.5 * transient as f64,
+                recurrence: Some(recurrence),
+                exponent: Some(exponent.0),
+                exponent_error: Some(exponent.1),
+                impacts,
+                periods,
+                ..self.result(regime, transient.min(n - count))
+            }
+        })
+    }
+
+    /// Nothing repeats: the Lyapunov exponent decides, over all but the first third.
+    fn irregular(&mut self) -> RegimeResult {
+        let n = self.halves();
+        let (exponent, error) = self.exponent(n / 3);
+        let periods = n as f64 / 3.0;
+        // A disturbance that grows as its time, as on a torus, has this exponent.
+        let linear = periods.ln() / periods;
+        let zero = linear.max(SIGNIFICANT * error);
+        let mut result = self.result(Regime::Undecided, n / 3);
+        // With less than one impact per block of periods, the exponent is not measured: a particle that is almost at rest.
+        let measured = result.impacts_per_period * periods > 2.0 * periods.sqrt();
+        result.regime = match exponent {
+            _ if !measured => Regime::Undecided,
+            exponent if exponent > zero && result.synchrony < CAPTURES => Regime::Chaotic,
+            exponent if exponent > zero => Regime::Modulated,
+            exponent if exponent > -zero && zero < ZERO => Regime::QuasiPeriodic,
+            _ => Regime::Undecided,
+        };
+        RegimeResult {
+            exponent: Some(exponent),
+            exponent_error: Some(error),
+            ..result
+        }
+    }
+
+    /// Shortest repetition, half periods, and the largest difference between the states of the window and those one repetition before.
+    /// They do not grow from one half of the window to the other.
+    fn recurrence(&self) -> Option<(usize, f64)> {
+        let n = self.halves();
+        // From the end: most motions that do not repeat are far off there.
+        let largest = |count: usize, from: usize, to: usize| {
+            (from..=to).rev().try_fold(0.0_f64, |largest, half| {
+                let distance = self.distance(half, count);
+                (distance < NEAR).then(|| largest.max(distance))
+            })
+        };
+        (1..=REPETITION.min(n / 4)).find_map(|count| {
+            let window = (2 * count).max(REPETITION / 3).min(n - count);
+            let late = largest(count, n - window / 2, n)?;
+            let early = largest(count, n - window, n - window / 2)?;
+            (late <= early.max(SAME)).then_some((count, late))
+        })
+    }
+}
+
+/// The regime of an exact orbit.
+fn regime(orbit: &Periodic) -> Regime {
+    let pattern = &orbit.pattern;
+    match (pattern.impacts(), pattern.periods(), pattern.mirrored) {
+        (2, 1, true) => Regime::Symmetric,
+        (2, 1, false) if pattern.walls[0] != pattern.walls[1] => Regime::Asymmetric,
+        _ => Regime::Several,
+    }
+}
+
+/// Steps per period at which the response is read.
+const STEPS: usize = 64;
+/// Smallest number of periods over which it is averaged.
+const AVERAGED: usize = 64;
+/// Natural logarithm of the factor by which the distance to a periodic motion shrinks before the response is read: 1e-6.
+const SHRUNK: f64 = 14.0;
+/// Largest number of periods until the response is read.
+const WAITED: f64 = 2000.0;
+
+/// Amplitude and powers, dimensionless: lengths over b, powers over `k b^2 omega0`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SteadyResponse {
+    /// Amplitude of the first harmonic of v.
+    pub c: f64,
+    /// Mean power that the impacts dissipate.
+    pub impact_power: f64,
+    /// Mean power that the damper dissipates.
+    pub damper_power: f64,
+}
+
+impl Run {
+    /// Follows the motion further, and reads its response over whole repetitions or, if nothing repeats, over 64 periods.
+    ///
+    /// # Errors
+    /// As [`Run::new`].
+    pub fn response(&mut self, result: &RegimeResult) -> Result<SteadyResponse, InvalidValue> {
+        let repeats = result.periods > 0;
+        if let Some(exponent) = result.exponent.filter(|exponent| repeats && *exponent < 0.0) {
+            self.follow(self.halves() / 2 + (-SHRUNK / exponent).min(WAITED) as usize + 1)?;
+        }
+        let unit = if repeats { result.periods as usize } else { 1 };
+        let periods = unit * AVERAGED.div_ceil(unit);
+        let plant = &mut self.plant;
+        let (omega, e) = (self.drive.omega, self.drive.amplitude);
+        let damping = plant.parameters().damping;
+        let phase = |n: usize| 2.0 * PI * n as f64 / STEPS as f64;
+        let energy = |plant: &lovines::Plant, n: usize| plant.energy(e * phase(n).sin());
+        let before = (energy(plant, 0), plant.totals().dissipated, plant.state().q1);
+        let count = periods * STEPS;
+        let (mut harmonic, mut work) = ([0.0; 2], 0.0);
+        for n in 0..count {
+            let (sin, cos) = phase(n).sin_cos();
+            let (v, q1) = (plant.centre(), plant.state().q1);
+            harmonic = [harmonic[0] + v * sin, harmonic[1] + v * cos];
+            // Power of the base, (k (e - q1) + c (e' - q1')) e', with the jumps of q1' integrated by parts.
+            let (slope, curvature) = (e * omega * cos, -e * omega * omega * sin);
+            work += (e * sin - q1) * slope + damping * (slope * slope + q1 * curvature);
+            plant.advance(self.drive, 2.0 * PI / (omega * STEPS as f64))?;
+        }
+        let duration = periods as f64 * 2.0 * PI / omega;
+        let ends = damping * (plant.state().q1 - before.2) * e * omega * phase(0).cos();
+        let impacts = (plant.totals().dissipated - before.1) / duration;
+        let input = work / count as f64 - (ends + energy(plant, count) - before.0) / duration;
+        Ok(SteadyResponse {
+            c: 2.0 * harmonic[0].hypot(harmonic[1]) / count as f64,
+            impact_power: impacts,
+            damper_power: input - impacts,
+        })
+    }
+}

@@ -1,16 +1,376 @@
-//! Numerical methods that several modules share: roots, minima, statistics, least squares.
+//! Numerical methods that several modules share: roots and minima, statistics, least squares with uncertainties.
+
+use std::convert::Infallible;
+
+use nalgebra::{Complex, DMatrix, DVector, Dyn, linalg::QR};
 
 /// Standard errors from which on a difference is not noise: 0.3 % of normal noise is beyond.
 pub const SIGNIFICANT: f64 = 3.0;
 /// Standard errors of a difference that are taken for noise where what is beyond becomes a part of an uncertainty: 5 % of normal noise.
 pub const RANDOM: f64 = 2.0;
 
-mod estimate;
-mod least_squares;
-mod roots;
-mod statistics;
+/// Roots of `a x^2 + b x + c`, without cancellation; each is a continuous function of the coefficients, also through
+/// `a = 0`, where one of them becomes infinite.
+pub fn quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
+    let discriminant = b * b - 4.0 * a * c;
+    if discriminant.is_nan() || discriminant < 0.0 {
+        return None;
+    }
+    let root = discriminant.sqrt();
+    if b >= 0.0 {
+        let q = -(b + root) / 2.0;
+        Some([q / a, c / q])
+    } else {
+        let q = (root - b) / 2.0;
+        Some([c / q, q / a])
+    }
+}
 
-pub use estimate::{Estimate, Prior, Regression, student_factor};
-pub use least_squares::{HarmonicBasis, HarmonicFit};
-pub use roots::{bisection, golden_section, quadratic, try_bisection};
-pub use statistics::{equally_spaced, mean, mean_square, noise, range, slope, standard_deviation};
+/// Neighbouring doubles between `a` and `b` at which `f` differs; the first keeps the value that `f` has at `a`.
+pub fn bisection(a: f64, b: f64, mut f: impl FnMut(f64) -> bool) -> (f64, f64) {
+    let at_a = f(a);
+    let Ok(ends) = try_bisection(a, b, 0.0, |x| Ok::<_, Infallible>(f(x) == at_a));
+    ends
+}
+
+/// Ends of an interval, at most `width` wide or of neighbouring doubles, at which `like_a` changes; it is true at `a`.
+pub fn try_bisection<E>(
+    mut a: f64,
+    mut b: f64,
+    width: f64,
+    mut like_a: impl FnMut(f64) -> Result<bool, E>,
+) -> Result<(f64, f64), E> {
+    while (b - a).abs() > width {
+        let middle = a + (b - a) / 2.0;
+        if middle <= a.min(b) || middle >= a.max(b) {
+            break;
+        }
+        if like_a(middle)? {
+            a = middle;
+        } else {
+            b = middle;
+        }
+    }
+    Ok((a, b))
+}
+
+/// Minimum of `f` between `a` and `b` by golden-section search; `f` has one minimum there.
+pub fn golden_section(mut a: f64, mut b: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let ratio = (5f64.sqrt() - 1.0) / 2.0;
+    let (mut x, mut y) = (b - ratio * (b - a), a + ratio * (b - a));
+    let (mut fx, mut fy) = (f(x), f(y));
+    // 60 steps shrink the interval by 3e-13: beyond that a minimum is flat in doubles.
+    for _ in 0..60 {
+        if fx <= fy {
+            (b, y, fy) = (y, x, fx);
+            x = b - ratio * (b - a);
+            fx = f(x);
+        } else {
+            (a, x, fx) = (x, y, fy);
+            y = a + ratio * (b - a);
+            fy = f(y);
+        }
+    }
+    a + (b - a) / 2.0
+}
+
+/// Arithmetic mean; NaN for no values.
+pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for value in values {
+        sum += value;
+        count += 1;
+    }
+    sum / count as f64
+}
+
+/// Mean of the squares; NaN for no values.
+pub fn mean_square(values: impl IntoIterator<Item = f64>) -> f64 {
+    mean(values.into_iter().map(|value| value * value))
+}
+
+/// Standard deviation of the values themselves (divided by n), not of a population they stand for; NaN for no values.
+pub fn standard_deviation(values: &[f64]) -> f64 {
+    let mean = mean(values.iter().copied());
+    mean_square(values.iter().map(|value| value - mean)).sqrt()
+}
+
+/// Smallest and largest of `start` and the values.
+pub fn range(start: (f64, f64), values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    values
+        .into_iter()
+        .fold(start, |(low, high), value| (low.min(value), high.max(value)))
+}
+
+/// `count` values from `from` to `to` at equal distances, both ends included.
+pub fn equally_spaced(from: f64, to: f64, count: usize) -> impl Iterator<Item = f64> + Clone {
+    let steps = count.saturating_sub(1).max(1) as f64;
+    (0..count).map(move |n| from + (to - from) * n as f64 / steps)
+}
+
+/// Standard deviation of the white noise on a smooth signal, from third differences; 0 for fewer than six values.
+pub fn noise(values: &[f64]) -> f64 {
+    let differences = values.windows(4).map(|v| v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]);
+    if differences.len() < 3 {
+        return 0.0;
+    }
+    // White noise of variance 1 gives them the variance 1 + 9 + 9 + 1.
+    (mean_square(differences) / 20.0).sqrt()
+}
+
+/// Slope of the straight line that fits equally spaced values best, from a value to the next.
+pub fn slope(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let middle = 0.5 * (n - 1.0);
+    let mean = mean(values.iter().copied());
+    let spread = n * (n * n - 1.0) / 12.0;
+    let moment = |(i, value): (usize, &f64)| (i as f64 - middle) * (value - mean);
+    values.iter().enumerate().map(moment).sum::<f64>() / spread
+}
+
+/// Basis functions at given phases: a polynomial, and harmonics whose amplitudes are polynomials in time.
+///
+/// Time runs from -1 at the first sample to 1 at the last. The factors serve any number of signals.
+pub struct HarmonicBasis {
+    matrix: DMatrix<f64>,
+    factors: QR<f64, Dyn, Dyn>,
+    /// Column of each harmonic's constant part.
+    columns: Vec<usize>,
+}
+
+/// The coefficients of a signal in such a basis.
+pub struct HarmonicFit {
+    coefficients: DVector<f64>,
+    columns: Vec<usize>,
+}
+
+impl HarmonicBasis {
+    /// The basis at the `phases` (rad) of the fundamental: a polynomial of degree `trend`, and each of the harmonics 1, 2, …
+    /// of `harmonics` that is given with the degree of its amplitude; `None` leaves one out.
+    pub fn new(phases: &[f64], trend: usize, harmonics: &[Option<usize>]) -> Self {
+        let last = (phases.len().max(2) - 1) as f64;
+        let time = |row: usize| 2.0 * row as f64 / last - 1.0;
+        let mut terms: Vec<(usize, usize, bool)> = (0..=trend).map(|degree| (0, degree, true)).collect();
+        let mut columns = Vec::new();
+        for (n, degree) in harmonics.iter().enumerate() {
+            columns.push(terms.len());
+            for degree in degree.map_or(0..0, |degree| 0..degree + 1) {
+                terms.extend([(n + 1, degree, false), (n + 1, degree, true)]);
+            }
+        }
+        let matrix = DMatrix::from_fn(phases.len(), terms.len(), |row, column| {
+            let (harmonic, degree, cosine) = terms[column];
+            let angle = harmonic as f64 * phases[row];
+            let wave = if cosine { angle.cos() } else { angle.sin() };
+            time(row).powi(degree as i32) * wave
+        });
+        Self { factors: matrix.clone().qr(), matrix, columns }
+    }
+
+    /// Number of unknowns.
+    pub fn terms(&self) -> usize {
+        self.matrix.ncols()
+    }
+
+    /// The best fit of `values`, one for each phase; `None` for fewer values than unknowns, or phases for which the
+    /// terms are not independent.
+    pub fn fit(&self, values: &DVector<f64>) -> Option<HarmonicFit> {
+        if self.matrix.nrows() < self.terms() {
+            return None;
+        }
+        let mut right = values.clone();
+        self.factors.q_tr_mul(&mut right);
+        let right = right.rows(0, self.terms()).into_owned();
+        let coefficients = self.factors.r().solve_upper_triangular(&right)?;
+        Some(HarmonicFit { coefficients, columns: self.columns.clone() })
+    }
+
+    /// Variances of a harmonic's sine and cosine coefficient of this degree, for values with noise of variance 1; NaN where the
+    /// terms are not independent. `harmonic` counts from 1.
+    pub fn variances(&self, harmonic: usize, degree: usize) -> [f64; 2] {
+        let column = self.columns[harmonic - 1] + 2 * degree;
+        let identity = DMatrix::identity(self.terms(), self.terms());
+        let Some(inverse) = self.factors.r().solve_upper_triangular(&identity) else {
+            return [f64::NAN; 2];
+        };
+        [column, column + 1].map(|row| inverse.row(row).norm_squared())
+    }
+
+    /// The residual of a fit.
+    pub fn residual(&self, values: &DVector<f64>, fit: &HarmonicFit) -> DVector<f64> {
+        values - &self.matrix * &fit.coefficients
+    }
+}
+
+impl HarmonicFit {
+    /// Complex amplitude a of a harmonic in the middle: `Im(a exp(i n phase))`. `harmonic` counts from 1.
+    pub fn harmonic(&self, harmonic: usize) -> Complex<f64> {
+        self.pair(self.columns[harmonic - 1])
+    }
+
+    /// Change of that amplitude per half of the window; the basis has it where the harmonic's degree is at least 1.
+    pub fn drift(&self, harmonic: usize) -> Complex<f64> {
+        self.pair(self.columns[harmonic - 1] + 2)
+    }
+
+    fn pair(&self, column: usize) -> Complex<f64> {
+        Complex::new(self.coefficients[column], self.coefficients[column + 1])
+    }
+}
+
+/// A value and its standard uncertainty: the value ± 1.96 uncertainties is a 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// Its standard uncertainty, in the same unit.
+    pub uncertainty: f64,
+}
+
+/// Scatter over the noise beyond which it is a misfit.
+const MISFIT: f64 = 10.0;
+/// Quantile of the normal distribution for a two-sided interval of 95 %.
+const NORMAL: f64 = 1.959_964;
+
+impl Estimate {
+    /// An estimate from a value and the independent parts of its uncertainty.
+    pub fn new(value: f64, parts: &[f64]) -> Self {
+        let uncertainty = parts.iter().map(|part| part * part).sum::<f64>().sqrt();
+        Self { value, uncertainty }
+    }
+
+    /// The mean of independent values.
+    pub fn mean(values: &[f64]) -> Self {
+        let fit = Regression::fit(&[vec![1.0; values.len()]], values, &[], 0.0);
+        fit.map_or(Self { value: f64::NAN, uncertainty: f64::NAN }, |fit| {
+            fit.estimate(&[1.0])
+        })
+    }
+
+    /// In another unit.
+    pub fn scaled(self, factor: f64) -> Self {
+        Self {
+            value: self.value * factor,
+            uncertainty: self.uncertainty * factor.abs(),
+        }
+    }
+}
+
+/// Half width of a 95 % interval of Student's distribution over that of the normal distribution (Cornish and Fisher's expansion;
+/// within 1 % from 4 degrees of freedom on).
+pub fn student_factor(degrees: f64) -> f64 {
+    let (z, n) = (NORMAL, degrees.max(1.0));
+    let first = (z.powi(3) + z) / (4.0 * n);
+    let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * n * n);
+    let third = (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / (384.0 * n * n * n);
+    1.0 + (first + second + third) / z
+}
+
+/// Standard deviation of a sum of residuals over that of as many independent ones, from the correlation of neighbours (a process of first
+/// order): the effective number of values is smaller than their number.
+fn colour(residuals: &[f64]) -> f64 {
+    let neighbours: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    let squares: f64 = residuals.iter().map(|one| one * one).sum();
+    // A correlation over more than a twelfth of the record cannot be told from a trend.
+    let longest = (1.0 - 12.0 / residuals.len() as f64).clamp(0.0, 0.9);
+    let correlation = (neighbours / squares).clamp(0.0, longest);
+    ((1.0 + correlation) / (1.0 - correlation)).sqrt()
+}
+
+/// What is known of a coefficient in advance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// Number of the coefficient.
+    pub coefficient: usize,
+    /// Its expected value.
+    pub value: f64,
+    /// The standard uncertainty of that.
+    pub uncertainty: f64,
+}
+
+/// A linear least-squares fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Regression {
+    coefficients: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// Standard deviation of the residuals over that of the noise; 1 where the noise is not known.
+    pub excess: f64,
+}
+
+impl Regression {
+    /// Fits `values` by the sum of `columns`. `noise` is the standard deviation of a value, 0 where it is not known; where the
+    /// residuals scatter significantly more, their scatter counts, with Student's distribution and the correlation of neighbours. Priors need a known noise. `None` for
+    /// too few values, or columns that are not independent.
+    pub fn fit(columns: &[Vec<f64>], values: &[f64], priors: &[Prior], noise: f64) -> Option<Self> {
+        let (rows, terms) = (values.len(), columns.len());
+        let degrees = (rows + priors.len())
+            .checked_sub(terms)
+            .filter(|n| *n > 0 || noise > 0.0)? as f64;
+        let data = DMatrix::from_fn(rows, terms, |row, column| columns[column][row]);
+        let values = DVector::from_column_slice(values);
+        // A prior counts as one more value, weighted by its uncertainty relative to the noise.
+        let (mut matrix, mut right) = (data, values);
+        for prior in priors {
+            let (row, weight) = (matrix.nrows(), noise / prior.uncertainty);
+            matrix = matrix.insert_row(row, 0.0);
+            right = right.insert_row(row, prior.value * weight);
+            matrix[(row, prior.coefficient)] = weight;
+        }
+        // Columns of very different size make the normal equations ill-conditioned; scaled to length 1 they are not.
+        let lengths: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
+        if lengths.contains(&0.0) {
+            return None;
+        }
+        for (mut column, length) in matrix.column_iter_mut().zip(&lengths) {
+            column /= *length;
+        }
+        let factors = matrix.clone().qr();
+        let inverse = factors.r().solve_upper_triangular(&DMatrix::identity(terms, terms))?;
+        let mut turned = right.clone();
+        factors.q_tr_mul(&mut turned);
+        let scaled = &inverse * turned.rows(0, terms);
+        let residual = &right - &matrix * &scaled;
+        let scatter = (residual.norm_squared() / degrees.max(1.0)).sqrt();
+        // White noise alone exceeds this in one case of twenty.
+        let is_noise = scatter <= noise * (1.0 + 1.64 / (2.0 * degrees).sqrt());
+        let deviation = if is_noise {
+            noise
+        } else {
+            // Residuals far above the noise are those of the model, not a random process.
+            let colour = if scatter <= MISFIT * noise {
+                colour(&residual.as_slice()[..rows])
+            } else {
+                1.0
+            };
+            scatter * student_factor(degrees) * colour
+        };
+        let variance = deviation * deviation;
+        let excess = if noise > 0.0 { scatter / noise } else { 1.0 };
+        let covariance = DMatrix::from_fn(terms, terms, |i, j| {
+            inverse.row(i).dot(&inverse.row(j)) * variance / (lengths[i] * lengths[j])
+        });
+        let coefficients = DVector::from_fn(terms, |i, _| scaled[i] / lengths[i]);
+        coefficients
+            .iter()
+            .all(|one| one.is_finite())
+            .then_some(Self { coefficients, covariance, excess })
+    }
+
+    /// A coefficient.
+    pub fn coefficient(&self, n: usize) -> f64 {
+        self.coefficients[n]
+    }
+
+    /// The sum of the coefficients with these weights.
+    pub fn estimate(&self, weights: &[f64]) -> Estimate {
+        let weights = DVector::from_column_slice(weights);
+        Estimate {
+            value: weights.dot(&self.coefficients),
+            uncertainty: weights.dot(&(&self.covariance * &weights)).max(0.0).sqrt(),
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "../tests/unit/numerics.rs"]
+mod tests;

@@ -5,47 +5,25 @@
 //! alternating impulses of known size on the oscillator, and their periodic response has a closed form. At a given frequency
 //! one quadratic equation for B remains. There is no first-order approximation.
 
-mod at_speed;
-mod bifurcations;
-mod bounce;
-mod branch;
-mod candidate;
-mod components;
-mod condition;
 mod continuation;
 mod convergence;
-mod crossings;
-mod curves;
-mod driven;
-mod forced_oscillator;
-mod from_rest;
 mod impact_map;
-mod oscillator;
-mod particle_flight;
-mod pattern;
+pub(crate) mod oscillator;
 mod periodic;
-mod search;
-mod settle;
+mod response;
+mod symmetric;
 
 use crate::Dimensionless;
 use serde::Serialize;
 
-pub use at_speed::backbone_at_speed;
-pub use bifurcations::{BifurcationCurve, bifurcation_curves};
-pub use bounce::Bounce;
-pub use branch::{Branch, Ended, Limits, Special};
-pub use components::{Component, DOUBLINGS, Response, response};
-pub use condition::{Bifurcation, Condition};
-pub use continuation::{branch_off, continue_both_ways, continue_from};
+pub use continuation::{
+    Branch, BranchBifurcation, BranchEnd, ContinuationLimits, branch_off, continue_both_ways, continue_from,
+};
 pub use convergence::{Convergence, Difference, convergence};
-pub use curves::backbone;
-pub use driven::{Disturbance, Driven, Moment};
-pub use from_rest::impacts_from_rest;
-pub use impact_map::ImpactMap;
-pub use pattern::{ImpactPattern, Unknowns};
-pub use periodic::Periodic;
-pub use search::{exact_backbone, phase_resonant, stable_resonant, symmetric_orbits};
-pub use settle::{periodic_near, settle};
+pub use impact_map::{Bounce, ImpactMap};
+pub use periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, periodic_near, settle};
+pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, backbone, bifurcation_curves, response};
+pub use symmetric::{backbone_at_speed, exact_backbone, phase_resonant, stable_resonant, symmetric_orbits};
 
 /// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -7,28 +7,15 @@
 //! fast and slow time are combined: in the modulation from impact to impact, and in a waveform. Equation numbers are those of docs/theory.md.
 
 mod activation;
-mod backbone;
 mod decay;
-mod drift;
-mod equilibrium;
-mod manifold;
 mod modulation;
-mod polynomial;
 mod resonance;
-mod response;
 mod slow_flow;
-mod stability;
-mod waveform;
 
 pub use activation::Activation;
-pub use backbone::BackbonePoint;
-pub use decay::{Decay, DecayPoint};
-pub use drift::Drift;
-pub use equilibrium::Equilibrium;
-pub use manifold::{BranchSide, Manifold};
-pub use modulation::{ImpactSequence, Modulation};
+pub use decay::{Decay, DecayPoint, Waveform, triangle_wave};
+pub use modulation::{Drift, ImpactSequence, Modulation};
 pub use resonance::{backbone, backbone_at_level, free_sigma, reading, resonant};
-pub use response::ResponsePoint;
-pub use slow_flow::SlowFlow;
-pub use stability::{B_SYMMETRY_BREAKING, half_period_map, half_period_multipliers, impacts_stable};
-pub use waveform::{Waveform, triangle_wave};
+pub use slow_flow::{
+    B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, Manifold, ResponsePoint, SlowFlow, impacts_stable,
+};

@@ -15,7 +15,7 @@ use rand_chacha::{
 use rayon::prelude::*;
 use vines_model::{
     Dimensionless,
-    map::{CONFIRMATIONS, LIMIT, Point, observe_confirmed},
+    map::{CONFIRMATIONS, LIMIT, RegimeResult, observe_confirmed},
     regime::{Impact, Regime, synchrony},
 };
 
@@ -153,7 +153,7 @@ fn place(case: &Case, seed: u64) -> (f64, Dimensionless) {
 }
 
 /// A random cell, its regime by the map, that of its motion further on, and that of another plant after so many periods.
-fn cell(case: &Case, seed: u64, [limit, periods, others]: [usize; 3]) -> (Point, [Regime; 2], String) {
+fn cell(case: &Case, seed: u64, [limit, periods, others]: [usize; 3]) -> (RegimeResult, [Regime; 2], String) {
     let (sigma, scene) = place(case, seed);
     let (mut point, different) = observe_confirmed(&scene, sigma, case.start, limit, others).unwrap();
     if different.is_some() {
@@ -161,7 +161,7 @@ fn cell(case: &Case, seed: u64, [limit, periods, others]: [usize; 3]) -> (Point,
     }
     let (further, _) = regime_of(&scene, sigma, point.state, FURTHER, FURTHER);
     let (other, growth) = regime_of(&scene, sigma, case.start, 2 * periods, periods);
-    let Point { regime, followed, transient, exponent, synchrony, .. } = point;
+    let RegimeResult { regime, followed, transient, exponent, synchrony, .. } = point;
     let text = format!(
         "sigma = {sigma:.4}, G = {:.4}: {regime} after {followed} (transient {transient}, exponent {exponent:.3?}, synchrony {synchrony:.3}), \
          further on {further:?}, other plant {other:?} after {periods} (growth {growth:.4})",

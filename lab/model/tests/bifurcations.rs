@@ -7,13 +7,16 @@ use rand_chacha::{
 };
 use vines_model::{
     Dimensionless,
-    orbit::{Bifurcation, BifurcationCurve, Ended, Limits, Periodic, Special, bifurcation_curves, response},
+    orbit::{
+        Bifurcation, BifurcationCurve, BranchBifurcation, BranchEnd, ContinuationLimits, Periodic, bifurcation_curves,
+        response,
+    },
 };
 
 mod common;
 use common::setting;
 
-const LIMITS: Limits = Limits { sigma: [-5.0, 5.0], g: [0.1, 3.0], points: 2000, step: 0.05 };
+const LIMITS: ContinuationLimits = ContinuationLimits { sigma: [-5.0, 5.0], g: [0.1, 3.0], points: 2000, step: 0.05 };
 /// Largest distance of a bifurcation from a curve, or from the nearest one of a frequency response.
 const NEAR: f64 = 2e-3;
 /// Random points of the curves of a scene that are compared with the frequency response through them.
@@ -30,14 +33,14 @@ fn off_circle(curve: &BifurcationCurve, motion: &Periodic) -> f64 {
 }
 
 /// The bifurcations of the 1:1 motions at one excitation.
-fn bifurcations(scene: &Dimensionless) -> Vec<Special> {
+fn bifurcations(scene: &Dimensionless) -> Vec<BranchBifurcation> {
     let found = response(scene, &LIMITS, 1);
     let specials = found.components.into_iter().flat_map(|one| one.branch.special);
     specials.filter(|one| one.motion.pattern.is_one_to_one()).collect()
 }
 
 /// Distance in (sigma, G) of a bifurcation from the curves of its kind.
-fn from_curves(curves: &[BifurcationCurve], special: &Special) -> f64 {
+fn from_curves(curves: &[BifurcationCurve], special: &BranchBifurcation) -> f64 {
     let at = (special.motion.sigma, special.motion.g);
     let curves = curves.iter().filter(|one| one.kind == special.kind);
     let segments = curves.flat_map(|one| one.branch.points.windows(2));
@@ -156,9 +159,9 @@ fn a_curve_of_asymmetric_folds_reaches_the_symmetry_breaking_where_it_ends() {
         .iter()
         .find(|one| one.name() == "fold of asymmetric 1:1")
         .unwrap();
-    assert_eq!(folds.branch.ended, [Ended::Joins; 2]);
+    assert_eq!(folds.branch.ended, [BranchEnd::Joins; 2]);
     // 3e-6 above the end, both halves of the motion differ by 3e-3.
     let found = bifurcations(&scene);
-    let fold = |one: &&Special| one.kind == Bifurcation::Fold && (one.motion.sigma + 0.854126).abs() < 1e-5;
+    let fold = |one: &&BranchBifurcation| one.kind == Bifurcation::Fold && (one.motion.sigma + 0.854126).abs() < 1e-5;
     assert!(found.iter().any(|one| fold(&one)), "{found:?}");
 }

@@ -7,7 +7,10 @@ use rand_chacha::{
 use vines_model::{
     Dimensionless,
     numerics::range,
-    orbit::{Bifurcation, Branch, DOUBLINGS, Ended, Limits, Periodic, Response, response, settle, symmetric_orbits},
+    orbit::{
+        Bifurcation, Branch, BranchEnd, ContinuationLimits, DOUBLINGS, FrequencyResponse, Periodic, response, settle,
+        symmetric_orbits,
+    },
 };
 
 mod common;
@@ -18,15 +21,15 @@ fn scene(g: f64) -> Dimensionless {
 }
 
 /// The response of a scene over the usual range.
-fn searched(scene: &Dimensionless) -> Response {
-    response(scene, &Limits::default(), DOUBLINGS)
+fn searched(scene: &Dimensionless) -> FrequencyResponse {
+    response(scene, &ContinuationLimits::default(), DOUBLINGS)
 }
 
-fn followed(g: f64) -> Response {
+fn followed(g: f64) -> FrequencyResponse {
     searched(&scene(g))
 }
 
-fn list(response: &Response) {
+fn list(response: &FrequencyResponse) {
     for one in &response.components {
         let Branch { points, special, ended } = &one.branch;
         let sigmas = range((f64::MAX, f64::MIN), points.iter().map(|one| one.sigma));
@@ -50,11 +53,11 @@ fn beside_the_closed_isola_the_response_has_the_component_of_slow_particles() {
         list(&found);
         let symmetric: Vec<_> = found.symmetric().collect();
         assert!(symmetric.len() >= 2, "G = {g}");
-        assert!(symmetric.iter().any(|one| one.ended == [Ended::Closed; 2]));
+        assert!(symmetric.iter().any(|one| one.ended == [BranchEnd::Closed; 2]));
         for one in &symmetric {
             let folds = one.special.iter().filter(|one| one.kind == Bifurcation::Fold).count();
             assert!(
-                one.ended != [Ended::Closed; 2] || folds == 2,
+                one.ended != [BranchEnd::Closed; 2] || folds == 2,
                 "a closed curve turns twice, G = {g}: {folds}"
             );
         }
@@ -191,7 +194,7 @@ fn an_isola_between_two_detunings_of_the_search_is_found_with_its_folds() {
         list(&found);
         assert_eq!(found.components.len(), 1);
         let Branch { ended, special, .. } = &found.components[0].branch;
-        assert_eq!((*ended, special.len()), ([Ended::Closed; 2], 2));
+        assert_eq!((*ended, special.len()), ([BranchEnd::Closed; 2], 2));
     }
 }
 
@@ -208,7 +211,7 @@ fn continuation_does_not_step_from_one_branch_to_another_one_close_by() {
     // At G = 0.84278 two branches meet at sigma = -0.435; below, each of them has a fold there, and above none.
     for (g, folds) in [(0.84275, 2), (0.8428, 0), (0.84285, 0)] {
         let scene = Dimensionless::new(0.008650812324298334, 1.3523112557067605, 0.9126958726492855, g);
-        let limits = Limits { sigma: [-5.0, 5.0], ..Limits::default() };
+        let limits = ContinuationLimits { sigma: [-5.0, 5.0], ..ContinuationLimits::default() };
         let found = response(&scene, &limits, DOUBLINGS);
         list(&found);
         let special = found.symmetric().flat_map(|one| &one.special);
@@ -230,7 +233,7 @@ fn a_branch_reaches_the_motion_that_it_joins() {
         let ends = [&points[0], &points[points.len() - 1]]
             .into_iter()
             .zip(one.branch.ended);
-        for (end, _) in ends.filter(|(_, ended)| *ended == Ended::Joins) {
+        for (end, _) in ends.filter(|(_, ended)| *ended == BranchEnd::Joins) {
             assert!(asymmetry(end).abs() < 0.01, "{}: sigma = {}", one.name, end.sigma);
         }
     }

@@ -2,7 +2,7 @@
 
 use vines_model::{
     Definition, Dimensionless, Reference, Resonance, Sensor,
-    orbit::{Limits, Orbit, convergence, phase_resonant, response, symmetric_orbits},
+    orbit::{ContinuationLimits, Orbit, convergence, phase_resonant, response, symmetric_orbits},
     theory::resonant,
 };
 
@@ -28,7 +28,7 @@ fn the_peak_is_the_largest_amplitude_of_the_frequency_response() {
     for sensor in [Sensor::V, Sensor::Q1, Sensor::Acceleration] {
         let definition = Definition { resonance: Resonance::Peak, sensor, ..Definition::default() };
         let peak = orbit(definition);
-        let fine = Limits { step: 0.005, points: 20_000, ..Limits::default() };
+        let fine = ContinuationLimits { step: 0.005, points: 20_000, ..ContinuationLimits::default() };
         let found = response(&scene(definition), &fine, 0);
         let motions = found.symmetric().flat_map(|one| &one.points).filter(|one| one.stable);
         let largest = motions.max_by(|one, other| one.c.total_cmp(&other.c)).unwrap();

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use vines_model::{
     Dimensionless,
     orbit::{
-        Bifurcation, Branch, Condition, Ended, ImpactPattern, Limits, Periodic, Unknowns, branch_off,
+        Bifurcation, Branch, BranchEnd, Condition, ContinuationLimits, ImpactPattern, Periodic, Unknowns, branch_off,
         continue_both_ways, convergence, exact_backbone, phase_resonant, settle,
     },
     theory::{B_SYMMETRY_BREAKING, SlowFlow},
@@ -70,7 +70,7 @@ fn response(g: f64) -> (Dimensionless, Branch) {
     let orbit = phase_resonant(&scene).into_iter().max_by(fastest).unwrap();
     let conditions = [Condition::Excitation(g), Condition::PhaseResonance];
     let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
-    let branch = continue_both_ways(&scene, &start, Condition::Excitation(g), &Limits::default());
+    let branch = continue_both_ways(&scene, &start, Condition::Excitation(g), &ContinuationLimits::default());
     (scene, branch)
 }
 
@@ -134,7 +134,7 @@ fn symmetry_breaks_near_the_theorys_speed_and_asymmetric_motions_leave_it() {
         breaking.motion.b
     );
     assert!((breaking.motion.b - B_SYMMETRY_BREAKING).abs() < 0.03);
-    let limits = Limits { points: 60, ..Limits::default() };
+    let limits = ContinuationLimits { points: 60, ..ContinuationLimits::default() };
     let aside = branch_off(&scene, breaking, Condition::Excitation(1.6), &limits).unwrap();
     let uneven = |one: &Periodic| (one.bounces[1].phase - one.bounces[0].phase - std::f64::consts::PI).abs();
     let interval = aside.points.iter().map(uneven).fold(0.0, f64::max);
@@ -155,7 +155,12 @@ fn the_exact_backbone_continued_is_the_closed_form() {
     let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
     let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
     let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
-    let branch = continue_both_ways(&scene, &start, Condition::PhaseResonance, &Limits::default());
+    let branch = continue_both_ways(
+        &scene,
+        &start,
+        Condition::PhaseResonance,
+        &ContinuationLimits::default(),
+    );
     assert!(branch.points.len() > 40, "{}: {:?}", branch.points.len(), branch.ended);
     for motion in &branch.points {
         let closed = exact_backbone(&scene, 1.0 + scene.epsilon * motion.sigma);
@@ -181,7 +186,11 @@ fn without_damping_drive_and_loss_the_backbone_is_the_conservative_mode() {
         .unwrap();
     let conditions = [Condition::Sigma(mode.sigma), Condition::PhaseResonance];
     let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &mode.unknowns(), conditions).unwrap();
-    let limits = Limits { sigma: [-3.0, 0.5], points: 200, ..Limits::default() };
+    let limits = ContinuationLimits {
+        sigma: [-3.0, 0.5],
+        points: 200,
+        ..ContinuationLimits::default()
+    };
     let branch = continue_both_ways(&scene, &start, Condition::PhaseResonance, &limits);
     assert!(branch.points.len() > 20);
     let (mut most_g, mut energies) = (0f64, 0f64);
@@ -227,7 +236,7 @@ fn a_motion_with_more_impacts_is_followed_like_any_other() {
         .unwrap()
         .expect("a pattern");
     assert!(motion.pattern.impacts() > 2);
-    let limits = Limits { points: 40, ..Limits::default() };
+    let limits = ContinuationLimits { points: 40, ..ContinuationLimits::default() };
     let branch = continue_both_ways(&scene, &motion, Condition::Excitation(2.2), &limits);
     let kinds: Vec<_> = branch.special.iter().map(|one| (one.kind, one.motion.sigma)).collect();
     println!(
@@ -257,7 +266,7 @@ fn a_branch_says_why_it_ended() {
     let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
     let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
     let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
-    let limits = Limits { points: 5, ..Limits::default() };
+    let limits = ContinuationLimits { points: 5, ..ContinuationLimits::default() };
     let branch = continue_both_ways(&scene, &start, Condition::Excitation(1.1), &limits);
-    assert_eq!(branch.ended, [Ended::Points; 2]);
+    assert_eq!(branch.ended, [BranchEnd::Points; 2]);
 }

@@ -4,13 +4,14 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::map::{Axis, CONFIRMATIONS, LIMIT, Map, Plan, Range};
+use vines::map::{CONFIRMATIONS, LIMIT};
+use vines::orbit::Branch;
 use vines::report;
 use vines::report::summary::{parameters, regimes};
-use vines::{orbit::Branch, scene::Scene};
+use vines::sweep::{Axis, Map};
 
 use super::failure::Failure;
-use super::options::{SceneArguments, count};
+use super::options::SceneArguments;
 use super::output::{progress_bar, saved, writable, written};
 
 const HELP: &str = "\
@@ -28,31 +29,34 @@ the recurrence, the exponent with its standard error, the share of captured impa
 Chaos may end after a random time. A cell is named modulated or chaotic only if all of 1 + --confirmations motions remain so for
 --periods; docs/regimes.md says how often chaos ends later. The column `coexisting` has the regimes of motions that differ.
 Where several regimes are stable, the start decides: a particle at rest may remain at rest where a moving one hits the walls.
+`vines sweep` with random axes such as start.dq2 shows which starts lead to which regime.
+
+A key is sigma, G, r, or section.key of a scene, as in `vines sweep`.
 
 Examples:
   vines map                                               sigma and G, in out/
-  vines map --starts 5                                    with four random starts in every cell
   vines map --x r=0.3:1:71 --y G=0.2:3:57 --sigma=-1.1
+  vines map --x plant.b=0.005:0.02:31 --y r=0.3:1:36
   vines map --x sigma=-2:1:61 --y G=0.5:2:61 --set start.dq2=0 --set start.q2=0.005
 
 Over sigma and G, the curves on which 1:1 motions bifurcate are followed and drawn, solid where they bound the stability of a motion.
 
 Writes map.csv, map.svg and map-dark.svg, and over sigma and G also bifurcations.csv.";
 
-/// Map the regimes of the response over two of sigma, G and r
+/// Map the regimes of the response over sigma and G, or two other keys of a scene
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
 
-    /// Horizontal axis: sigma, G or r, its first and last value, and the number of points
-    #[arg(long, value_name = "AXIS=FIRST:LAST:POINTS", default_value = "sigma=-5:5:101")]
-    x: Range,
+    /// Horizontal axis: its key, first and last value, and the number of points
+    #[arg(long, value_name = "KEY=FIRST:LAST:POINTS", default_value = "sigma=-5:5:101")]
+    x: Axis,
 
     /// Vertical axis, in the same form
-    #[arg(long, value_name = "AXIS=FIRST:LAST:POINTS", default_value = "G=0.1:3:59")]
-    y: Range,
+    #[arg(long, value_name = "KEY=FIRST:LAST:POINTS", default_value = "G=0.1:3:59")]
+    y: Axis,
 
     /// Detuning, if it is not on an axis [default: that of the scene's stable phase-resonant orbit, or 0]
     #[arg(long, value_name = "SIGMA", allow_negative_numbers = true)]
@@ -61,10 +65,6 @@ pub(super) struct Arguments {
     /// Largest number of periods that a cell is followed; at least 100
     #[arg(long, value_name = "PERIODS", default_value_t = LIMIT)]
     periods: usize,
-
-    /// Starts per cell: that of the scene, and random ones that show where regimes coexist
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = count::<usize>)]
-    starts: usize,
 
     /// Further motions, from starts 1e-9 apart, that must lead to the same regime in chaotic and modulated cells, and
     /// after transients of more than 500 periods
@@ -77,62 +77,28 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let scene = arguments.scene.load()?;
-    let plan = plan(arguments, &scene)?;
-    writable(&arguments.out)?;
-    let bar = progress_bar(plan.cells() as u64, "mapping regimes [{wide_bar}] {pos}/{len} cells");
-    let map = plan.run(|| bar.inc(1)).map_err(Failure::input)?;
+    let Arguments { x, y, sigma, periods, confirmations, out, .. } = arguments;
+    let map = Map::new(arguments.scene.family()?, x, y, *sigma, *periods).map_err(Failure::input)?;
+    writable(out)?;
+    let bar = progress_bar(map.sweep.cells(), "mapping regimes [{wide_bar}] {pos}/{len} cells");
+    let map = map.run(*confirmations, || bar.inc(1)).map_err(Failure::input)?;
     bar.finish_and_clear();
-    let files = saved(report::write_map(&map, &arguments.out), || {
+    let summary = summary(arguments, &map);
+    let files = saved(report::write_map(&map, out), || {
         let cells = report::map_csv(&map).map_err(Failure::run)?;
-        Ok(format!("{}\n{cells}", summary(&map)))
+        Ok(format!("{summary}\n{cells}"))
     })?;
-    Ok(format!("{}\n{}", summary(&map), written(&files)))
+    Ok(format!("{summary}\n{}", written(&files)))
 }
 
-fn plan(arguments: &Arguments, scene: &Scene) -> Result<Plan, Failure> {
-    if let Some(sigma) = arguments.sigma.filter(|sigma| !sigma.is_finite()) {
-        return Err(Failure::input(format!(
-            "--sigma = {sigma} (dimensionless) is not a finite number"
-        )));
-    }
-    if arguments.sigma.is_some() && [arguments.x.axis, arguments.y.axis].contains(&Axis::Sigma) {
-        return Err(Failure::input(
-            "--sigma: sigma is on an axis already, by default on that of --x; leave --sigma out, or take --x r=0.3:1:71",
-        ));
-    }
-    let plan = Plan::new(
-        scene.dimensionless(),
-        scene.dimensionless_start(),
-        arguments.x,
-        arguments.y,
-    );
-    Ok(Plan {
-        sigma: arguments.sigma.unwrap_or(plan.sigma),
-        limit: arguments.periods,
-        starts: arguments.starts,
-        confirmations: arguments.confirmations,
-        ..plan
-    })
-}
-
-fn summary(map: &Map) -> String {
+fn summary(arguments: &Arguments, map: &Map) -> String {
     let mut text = format!(
         "Regimes over {} and {}\n  {}\n\n{}",
-        map.plan.x,
-        map.plan.y,
-        parameters(&map.plan.scene),
+        arguments.x.short_form(),
+        arguments.y.short_form(),
+        parameters(&map.sweep.scene().dimensionless()),
         regimes(map).text()
     );
-    if map.plan.starts > 1 {
-        let count = map.cells.iter().filter(|cell| !cell.coexisting.is_empty()).count();
-        let part = format!("{:.1} %", 100.0 * count as f64 / map.cells.len() as f64);
-        let _ = writeln!(
-            text,
-            "\n{} starts per cell lead to several regimes in {count} cells ({part})",
-            map.plan.starts
-        );
-    }
     if !map.curves.is_empty() {
         text.push('\n');
     }

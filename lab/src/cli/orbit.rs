@@ -1,16 +1,12 @@
 //! `vines orbit`: exact orbits at resonance, and their curves.
 
-mod studies;
-
 use clap::Args;
 use vines::orbit::{
-    Branch, Condition, DOUBLINGS, Ended, Limits, Orbit, Periodic, backbone, continue_both_ways, phase_resonant,
-    response, settle,
+    Branch, BranchEnd, Condition, ContinuationLimits, DOUBLINGS, Orbit, Periodic, backbone, continue_both_ways,
+    phase_resonant, response, settle,
 };
 use vines::report::{Table, number, row, summary::parameters};
 use vines::{ArgumentError, numerics::range, scene::Dimensionless};
-
-use studies::{converged, defined};
 
 use super::output::{output, yes_no};
 use super::{failure::Failure, options::SceneArguments};
@@ -32,8 +28,6 @@ Examples:
   vines orbit --response --set excitation.G=1.6
   vines orbit --backbone --set plant.c=0 --set plant.r=1 --set excitation.G=0
   vines orbit --sigma=-0.6 --set excitation.G=2.2   the orbit that settles there, here six impacts in two periods
-  vines orbit --definitions                   resonance by phase or peak, by e or force, of v, q1 or acceleration
-  vines orbit --convergence                   how theory approaches the exact orbit
   vines orbit --set excitation.G=1.0 --set plant.r=0.7
   vines orbit --scene scenes/dimensionless.toml --json";
 
@@ -45,7 +39,12 @@ pub(super) struct Arguments {
     scene: SceneArguments,
 
     /// The orbit of any pattern that the scene's start leads to at this detuning; with --response, its frequency response
-    #[arg(long, value_name = "SIGMA", allow_negative_numbers = true, conflicts_with_all = ["backbone", "convergence"])]
+    #[arg(
+        long,
+        value_name = "SIGMA",
+        allow_negative_numbers = true,
+        conflicts_with = "backbone"
+    )]
     sigma: Option<f64>,
 
     /// Follow the exact backbone; without damping and with r = 1 it is the conservative nonlinear mode
@@ -60,14 +59,6 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FIRST:LAST", default_value = "-6:6", allow_hyphen_values = true, value_parser = detunings)]
     range: [f64; 2],
 
-    /// Theory minus exact orbit at epsilon and its halvings, with the fitted exponent
-    #[arg(long, group = "what")]
-    convergence: bool,
-
-    /// Theory minus exact orbit at epsilon and four halvings, for all definitions of resonance, references and sensors
-    #[arg(long, group = "what")]
-    definitions: bool,
-
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
@@ -79,11 +70,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if let Some(sigma) = arguments.sigma {
         return settled(arguments, &scene, sigma, loaded.dimensionless_start());
     }
-    let [lowest, highest] = Limits::default().g;
-    let limits = Limits {
+    let [lowest, highest] = ContinuationLimits::default().g;
+    let limits = ContinuationLimits {
         sigma: arguments.range,
         g: [lowest, highest.max(2.0 * scene.g)],
-        ..Limits::default()
+        ..ContinuationLimits::default()
     };
     if arguments.backbone {
         let branch = backbone(&scene, &limits).ok_or_else(|| {
@@ -99,19 +90,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if arguments.response {
         return components(arguments, &scene, &limits);
     }
-    if arguments.convergence {
-        return converged(&scene, arguments.json);
-    }
-    if arguments.definitions {
-        return defined(&scene, arguments.json);
-    }
     let orbits = phase_resonant(&scene);
     let title = format!("Exact symmetric 1:1 orbits at resonance: {}", scene.definition.name());
     shown(&scene, &title, &orbits, arguments.json, || listing(&scene, &orbits))
 }
 
 /// All components of the frequency response.
-fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> Result<String, Failure> {
+fn components(arguments: &Arguments, scene: &Dimensionless, limits: &ContinuationLimits) -> Result<String, Failure> {
     let [from, to] = arguments.range;
     if 1.0 + scene.epsilon * from <= 0.0 {
         let rule = "1 + epsilon sigma must be above 0";
@@ -169,7 +154,7 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
     })?;
     let pattern = motion.pattern.name();
     if arguments.response {
-        let limits = Limits { sigma: arguments.range, ..Limits::default() };
+        let limits = ContinuationLimits { sigma: arguments.range, ..ContinuationLimits::default() };
         let branch = continue_both_ways(scene, &motion, Condition::Excitation(scene.g), &limits);
         return shown(scene, "Exact frequency response", &branch, arguments.json, || {
             curve(&pattern, &branch)
@@ -219,7 +204,7 @@ fn curve(name: &str, branch: &Branch) -> String {
     let sigmas = branch.points.iter().map(|motion| motion.sigma);
     let (low, high) = range((f64::MAX, f64::MIN), sigmas);
     let ends = match branch.ended {
-        [Ended::Closed, _] => "closed".into(),
+        [BranchEnd::Closed, _] => "closed".into(),
         [first, last] => format!("ends: {}; {}", first.name(), last.name()),
     };
     let mut text = format!(

@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use vines::map::LIMIT;
 use vines::report::{Subject, write_report};
-use vines::{map::Range, rig::BuiltIn};
+use vines::rig::BuiltIn;
+use vines::sweep::{Axis, Map};
 
 use super::output::{progress_bar, saved, writable};
 use super::{failure::Failure, options::SceneArguments};
@@ -32,25 +34,22 @@ pub(super) struct Arguments {
 
     /// Horizontal axis of the regime map, as in `vines map`
     #[arg(long, value_name = "AXIS=FIRST:LAST:POINTS", default_value = "sigma=-5:5:101")]
-    x: Range,
+    x: Axis,
 
     /// Vertical axis of the regime map
     #[arg(long, value_name = "AXIS=FIRST:LAST:POINTS", default_value = "G=0.1:3:59")]
-    y: Range,
+    y: Axis,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     // Invalid settings are refused before anything runs or is written.
     BuiltIn::new(&scene.controller_config())?;
-    if arguments.x.axis == arguments.y.axis {
-        return Err(Failure::input(format!(
-            "--x and --y are both {}: take two of sigma, G and r",
-            arguments.x.axis
-        )));
-    }
+    let (family, [x, y]) = (arguments.scene.family()?, [&arguments.x, &arguments.y]);
+    Map::new(family.clone(), x, y, None, LIMIT).map_err(Failure::input)?;
     writable(&arguments.out)?;
-    let subject = Subject { scene, map: [arguments.x, arguments.y] };
+    let map = [x.clone(), y.clone()];
+    let subject = Subject { scene, family, map };
     let bar = progress_bar(1000, "{msg:10} [{wide_bar}] {percent} %");
     let report = write_report(&subject, &arguments.out, &|section, done| {
         if bar.message() != section {

@@ -5,7 +5,7 @@ use std::{path::PathBuf, thread, time::Duration};
 
 use clap::Args;
 use vines::ArgumentError;
-use vines::sweep::{self, Axis, Estimate, Monitor, Plan, Results, Settings, Shard, StoreError};
+use vines::sweep::{self, Axis, Estimate, Monitor, Results, Settings, Shard, StoreError, Sweep};
 
 use super::failure::{Failure, INTERRUPTED, stop_flag};
 use super::{options::SceneArguments, output::progress_bar};
@@ -113,14 +113,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         chunk: arguments.chunk,
         adaptive: arguments.adaptive,
     };
-    let plan = Plan::new(arguments.scene.family()?, settings).map_err(Failure::input)?;
+    let sweep = Sweep::new(arguments.scene.family()?, settings).map_err(Failure::input)?;
     if !arguments.merge.is_empty() {
-        return merge(&plan, arguments);
+        return merge(&sweep, arguments);
     }
     if arguments.verify {
-        return verify(&plan, arguments);
+        return verify(&sweep, arguments);
     }
-    let estimate = sweep::estimate(&plan, &AtomicBool::new(false)).map_err(Failure::input)?;
+    let estimate = sweep::estimate(&sweep, &AtomicBool::new(false)).map_err(Failure::input)?;
     if estimate.is_large() && !arguments.yes {
         let Estimate { cells, hours, bytes } = estimate;
         return Err(Failure::input(format!(
@@ -129,8 +129,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         )));
     }
     let monitor = Monitor::default();
-    let work = || sweep::run(&plan, &arguments.out, arguments.part(), &monitor);
-    let complete = watched(&plan, "sweeping", &monitor, work)?;
+    let work = || sweep::run(&sweep, &arguments.out, arguments.part(), &monitor);
+    let complete = watched(&sweep, "sweeping", &monitor, work)?;
     let (found, computed, failed) = (
         monitor.found.load(Relaxed),
         monitor.computed.load(Relaxed),
@@ -138,12 +138,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     );
     let mut text = format!(
         "{} cells (chunks: {}): {found} already complete, {computed} computed, {failed} of these failed\n",
-        plan.cells(),
-        plan.chunks()
+        sweep.cells(),
+        sweep.chunks()
     );
     let inferred = monitor.inferred.load(Relaxed);
     if inferred > 0 {
-        let share = 100.0 * inferred as f64 / plan.cells() as f64;
+        let share = 100.0 * inferred as f64 / sweep.cells() as f64;
         text += &format!("{inferred} cells ({share:.1} %) were inferred from their neighbours\n");
     }
     let damage = damage(&monitor, "They were replaced");
@@ -170,29 +170,29 @@ fn shard(text: &str) -> Result<Shard, ArgumentError> {
     }
 }
 
-fn merge(plan: &Plan, arguments: &Arguments) -> Result<String, Failure> {
+fn merge(sweep: &Sweep, arguments: &Arguments) -> Result<String, Failure> {
     let out = arguments.out.display();
     let monitor = Monitor::default();
-    let missing = sweep::merge(plan, &arguments.out, &arguments.merge, &monitor).map_err(Failure::input)?;
+    let missing = sweep::merge(sweep, &arguments.out, &arguments.merge, &monitor).map_err(Failure::input)?;
     let computed = monitor.computed.load(Relaxed);
     let damage = damage(&monitor, &format!("{out} does not have them"));
     match missing {
         0 => Ok(format!(
             "{} cells, complete; {computed} of them computed\n{damage}Written: {out}\n",
-            plan.cells()
+            sweep.cells()
         )),
         missing => Err(Failure::run(format!(
             "{damage}{missing} of {} cells are in none of these stores; {out} has the others. Without --merge, the same command computes them",
-            plan.cells()
+            sweep.cells()
         ))),
     }
 }
 
-fn verify(plan: &Plan, arguments: &Arguments) -> Result<String, Failure> {
+fn verify(sweep: &Sweep, arguments: &Arguments) -> Result<String, Failure> {
     let monitor = Monitor::default();
     let (out, part) = (arguments.out.display(), arguments.part());
-    let complete = watched(plan, "verifying", &monitor, || {
-        sweep::verify(plan, &arguments.out, part, &monitor)
+    let complete = watched(sweep, "verifying", &monitor, || {
+        sweep::verify(sweep, &arguments.out, part, &monitor)
     })?;
     if !complete {
         return Err(Failure::new(
@@ -200,7 +200,7 @@ fn verify(plan: &Plan, arguments: &Arguments) -> Result<String, Failure> {
             "interrupted; nothing was written".to_string(),
         ));
     }
-    let (found, cells) = (monitor.found.load(Relaxed), part.cells(plan));
+    let (found, cells) = (monitor.found.load(Relaxed), part.cells(sweep));
     let undamaged = format!("{found} of {cells} cells are complete and undamaged");
     match monitor.damage() {
         None if found == cells => Ok(format!("{undamaged}\nVerified: {out}\n")),
@@ -221,14 +221,14 @@ fn damage(monitor: &Monitor, consequence: &str) -> String {
 
 /// Does some work with a bar that shows the progress, until it is complete or a signal stops it.
 fn watched(
-    plan: &Plan,
+    sweep: &Sweep,
     verb: &str,
     monitor: &Monitor,
     work: impl FnOnce() -> Result<bool, StoreError> + Send,
 ) -> Result<bool, Failure> {
     let signal = stop_flag()?;
     let template = format!("{verb} [{{wide_bar}}] {{pos}}/{{len}} cells, {{per_sec}}, {{eta}} left");
-    let bar = progress_bar(plan.cells(), &template);
+    let bar = progress_bar(sweep.cells(), &template);
     thread::scope(|scope| {
         let work = scope.spawn(work);
         let mut started = false;

@@ -13,7 +13,7 @@ use super::figure::{
 use super::theme::{DECAY, EXACT, FAINT, LOCK, THEORY, UNSTABLE};
 use crate::comparison::{Comparison, TrackedComparison};
 use crate::numerics::{HarmonicBasis, equally_spaced, range};
-use crate::orbit::{self, Limits, Periodic, Response};
+use crate::orbit::{self, ContinuationLimits, FrequencyResponse, Periodic};
 use crate::record::Record;
 use crate::scene::{Definition, Dimensionless, Scene};
 use crate::theory::{self, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, SlowFlow, Waveform, reading};
@@ -56,7 +56,7 @@ fn theory_backbone(p: &Dimensionless, top: f64) -> Vec<Marked> {
 /// Adds the right branch of the backbone, by theory and exact, each with its stability.
 fn add_backbones(panel: &mut Panel, p: &Dimensionless, theory: &[Marked]) {
     let fold = SlowFlow::new(p.lambda, p.r).manifold.b_min();
-    let branch = orbit::backbone(p, &Limits::default());
+    let branch = orbit::backbone(p, &ContinuationLimits::default());
     let exact: Vec<Marked> = branch
         .iter()
         .flat_map(|branch| &branch.points)
@@ -392,9 +392,9 @@ pub fn backbones(p: &Dimensionless) -> Figure {
 }
 
 /// Frequency responses at several excitations, exact and first-order, with the backbone near their maxima.
-pub fn responses(p: &Dimensionless, responses: &[Response]) -> Figure {
+pub fn responses(p: &Dimensionless, responses: &[FrequencyResponse]) -> Figure {
     let fold = SlowFlow::new(p.lambda, p.r).manifold.b_min();
-    let symmetric = responses.iter().flat_map(Response::symmetric);
+    let symmetric = responses.iter().flat_map(FrequencyResponse::symmetric);
     let top = symmetric
         .flat_map(|branch| &branch.points)
         .filter(|point| point.b > fold)
@@ -425,7 +425,7 @@ pub fn responses(p: &Dimensionless, responses: &[Response]) -> Figure {
 }
 
 /// One frequency response, by theory and exact.
-fn add_response(panel: &mut Panel, p: &Dimensionless, response: &Response) {
+fn add_response(panel: &mut Panel, p: &Dimensionless, response: &FrequencyResponse) {
     let (styles, labels) = (
         [line(THEORY, 12), line(UNSTABLE, 8)],
         ["theory, stable", "theory, unstable"],

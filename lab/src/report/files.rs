@@ -12,10 +12,10 @@ use super::figures::{backbone, manifold, regimes, tracked_with_drive};
 use super::theme::dark;
 use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
 use crate::files::{self, FileError};
-use crate::map::{Cell, Map, MapError};
 use crate::orbit::Periodic;
 use crate::record::{Sample, table};
 use crate::regime::Regime;
+use crate::sweep::{Map, MapCell, SweepError};
 
 /// Why a report could not be computed, or the files of a run could not be written.
 #[derive(Debug, Error)]
@@ -26,7 +26,7 @@ pub enum ReportError {
     #[error(transparent)]
     Controller(#[from] ConfigError),
     #[error(transparent)]
-    Map(#[from] MapError),
+    Map(#[from] SweepError),
     #[error(transparent)]
     File(#[from] FileError),
     #[error(transparent)]
@@ -176,25 +176,46 @@ pub(super) fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportEr
 
 /// The cells of a map, as CSV.
 pub fn map_csv(map: &Map) -> Result<String, ReportError> {
-    #[derive(Serialize)]
-    struct Row {
-        sigma: f64,
-        #[serde(rename = "G")]
-        g: f64,
-        r: f64,
-    }
-    #[derive(Serialize)]
-    struct More {
-        theory_stable: bool,
-        coexisting: String,
-    }
-    let row = |cell: &Cell| {
-        let Cell { sigma, g, r, point, theory_stable, .. } = *cell;
-        let names: Vec<&str> = cell.coexisting.iter().map(Regime::name).collect();
-        let coexisting = names.join("; ");
-        (Row { sigma, g, r }, point, More { theory_stable, coexisting })
+    const HEADINGS: [&str; 16] = [
+        "sigma",
+        "G",
+        "r",
+        "regime",
+        "followed",
+        "transient",
+        "recurrence",
+        "exponent",
+        "exponent_error",
+        "synchrony",
+        "impacts_per_period",
+        "impacts",
+        "periods",
+        "sticks_per_period",
+        "theory_stable",
+        "coexisting",
+    ];
+    // Axes that are not among the first three columns come before them.
+    let own = map.names().map(|name| !HEADINGS.contains(&name));
+    let names = map
+        .names()
+        .into_iter()
+        .zip(own)
+        .filter(|(_, own)| *own)
+        .map(|(name, _)| name);
+    let headings: Vec<&str> = names.chain(HEADINGS).collect();
+    let row = |(n, cell): (u64, &MapCell)| {
+        let MapCell { sigma, g, r, result, theory_stable, .. } = *cell;
+        let place = [map.x.at(n % map.x.points), map.y.at(n / map.x.points)];
+        let place: Vec<f64> = place
+            .into_iter()
+            .zip(own)
+            .filter(|(_, own)| *own)
+            .map(|(value, _)| value)
+            .collect();
+        let coexisting: Vec<&str> = cell.coexisting.iter().map(Regime::name).collect();
+        (place, [sigma, g, r], result, theory_stable, coexisting.join("; "))
     };
-    csv(&[], map.cells.iter().map(row))
+    csv(&headings, (0..).zip(&map.cells).map(row))
 }
 
 /// The points of the bifurcation curves.

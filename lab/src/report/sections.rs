@@ -10,14 +10,15 @@ use crate::backbone::track;
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use crate::experiment::{self, Plan};
 use crate::identification::{DecayEnd, identify};
-use crate::map::{self, LIMIT, Map};
+use crate::map::LIMIT;
 use crate::orbit::{
-    Branch, Condition, DOUBLINGS, ImpactPattern, Limits, Periodic, Response, backbone, convergence, response,
-    stable_resonant,
+    Branch, Condition, ContinuationLimits, DOUBLINGS, FrequencyResponse, ImpactPattern, Periodic, backbone,
+    convergence, response, stable_resonant,
 };
 use crate::regime::Regime;
 use crate::rig::{BuiltIn, Simulated};
 use crate::scene::Dimensionless;
+use crate::sweep::{Axis, Map};
 use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, resonant};
 
 /// Gets the fraction of a section that is done, from 0 to 1.
@@ -291,9 +292,9 @@ fn describe_activation(section: &mut Section, scene: &Dimensionless, sigma: f64)
 fn curves(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("Exact periodic motions");
     let p = subject.scene.dimensionless();
-    let limits = Limits::default();
+    let limits = ContinuationLimits::default();
     let excitations = excitations(&p);
-    let mut responses: Vec<Response> = Vec::new();
+    let mut responses: Vec<FrequencyResponse> = Vec::new();
     for (n, g) in excitations.iter().enumerate() {
         responses.push(response(&Dimensionless { g: *g, ..p }, &limits, DOUBLINGS));
         done((n + 1) as f64 / (excitations.len() + 1) as f64);
@@ -362,7 +363,7 @@ fn describe_backbone(section: &mut Section, curve: &Branch) {
 }
 
 /// Where stability changes on the responses.
-fn changes(responses: &[Response]) -> Table {
+fn changes(responses: &[FrequencyResponse]) -> Table {
     let rows = responses.iter().flat_map(|response| {
         let changes = response.symmetric().flat_map(|branch| &branch.special);
         changes.map(|special| {
@@ -395,7 +396,7 @@ fn excitations(p: &Dimensionless) -> Vec<f64> {
 }
 
 /// The orbits of all curves, as CSV.
-fn curves_csv(backbone: &Branch, responses: &[Response]) -> Result<String, ReportError> {
+fn curves_csv(backbone: &Branch, responses: &[FrequencyResponse]) -> Result<String, ReportError> {
     let headings = ["curve", "sigma", "G", "C", "gamma", "B", "largest_multiplier", "stable"];
     let components = responses.iter().flat_map(|response| {
         let components = response.components.iter();
@@ -414,14 +415,14 @@ fn curves_csv(backbone: &Branch, responses: &[Response]) -> Result<String, Repor
 /// The regime map.
 fn regimes(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("Regimes of the driven response");
-    let (scene, [x, y]) = (&subject.scene, subject.map);
-    let plan = map::Plan::new(scene.dimensionless(), scene.dimensionless_start(), x, y);
-    let (count, all) = (AtomicUsize::new(0), plan.cells());
-    let map = plan.run(|| {
+    let [x, y] = &subject.map;
+    let map = Map::new(subject.family.clone(), x, y, None, LIMIT)?;
+    let (count, all) = (AtomicUsize::new(0), map.sweep.cells());
+    let map = map.run(0, || {
         let n = count.fetch_add(1, Ordering::Relaxed) + 1;
         done(n as f64 / all as f64);
     })?;
-    describe_map(&mut section, &map);
+    describe_map(&mut section, &map, subject);
     section.figure(
         "regimes",
         "The regime map. The black line is the border of the island in which first-order theory has a stable symmetric 1:1 motion. The \
@@ -439,7 +440,8 @@ fn regimes(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
     Ok(section)
 }
 
-fn describe_map(section: &mut Section, map: &Map) {
+fn describe_map(section: &mut Section, map: &Map, subject: &Subject) {
+    let [x, y] = subject.map.each_ref().map(Axis::short_form);
     let all = map.cells.len();
     let inside = map.cells.iter().filter(|cell| cell.theory_stable).count();
     let (_, agree) = map.count(Regime::Symmetric);
@@ -453,7 +455,7 @@ fn describe_map(section: &mut Section, map: &Map) {
          at most for {} periods. A motion that has not repeated itself by then is chaotic if its largest Lyapunov exponent exceeds zero by \
          four standard errors, modulated if also a fifth of its impacts or more are captured into 1:1 resonance for a while, \
          quasi-periodic if the exponent is zero within its uncertainty, and otherwise undecided.",
-        map.plan.x, map.plan.y, LIMIT
+        x, y, LIMIT
     ));
     section.table("How often each regime occurs.", summary::regimes(map));
     section.words(section.finding.clone());

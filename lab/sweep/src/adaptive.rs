@@ -11,12 +11,10 @@ use rayon::prelude::*;
 use vines_model::regime::Regime;
 
 use crate::{
-    cell::Cell,
-    error::StoreError,
-    monitor::Monitor,
-    plan::Plan,
-    store::{ROUNDS, Store},
-    variables::{ABSENT, FAILED, code},
+    cell::{ABSENT, Cell, FAILED, code},
+    run::Monitor,
+    store::{ROUNDS, Store, StoreError},
+    sweep::Sweep,
 };
 
 /// Smallest number of cells of the first grid along a side, roughly.
@@ -32,8 +30,8 @@ struct Cells {
 }
 
 /// Computes the store of an adaptive sweep. False if the monitor stopped it.
-pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) -> Result<bool, StoreError> {
-    let [rows, columns] = [plan.shape[0] as usize, plan.shape[1] as usize];
+pub(crate) fn run(sweep: &Sweep, store: &Store, stride: usize, monitor: &Monitor) -> Result<bool, StoreError> {
+    let [rows, columns] = [sweep.shape[0] as usize, sweep.shape[1] as usize];
     let mut cells = Cells {
         rows,
         columns,
@@ -46,8 +44,8 @@ pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) 
     let mut round = 0;
     loop {
         while !next.is_empty() {
-            for (batch, part) in next.chunks(plan.chunk_size()).enumerate() {
-                if !cells.compute(plan, store, &format!("{ROUNDS}/{round}-{batch}"), part, monitor)? {
+            for (batch, part) in next.chunks(sweep.chunk_size()).enumerate() {
+                if !cells.compute(sweep, store, &format!("{ROUNDS}/{round}-{batch}"), part, monitor)? {
                     return Ok(false);
                 }
             }
@@ -59,7 +57,7 @@ pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) 
             );
         }
         if stride == 1 {
-            return cells.write(plan, store, monitor);
+            return cells.write(sweep, store, monitor);
         }
         cells.infer(stride);
         stride /= 2;
@@ -117,7 +115,7 @@ impl Cells {
     /// Computes cells, or reads their results. False if the monitor stopped it.
     fn compute(
         &mut self,
-        plan: &Plan,
+        sweep: &Sweep,
         store: &Store,
         key: &str,
         cells: &[usize],
@@ -134,7 +132,7 @@ impl Cells {
             let compute = |n: &usize| {
                 let index = [(n / self.columns) as u64, (n % self.columns) as u64];
                 (!monitor.stop.load(Relaxed)).then(|| {
-                    let cell = plan.cell_at(&index);
+                    let cell = sweep.cell_at(&index);
                     monitor.note(&cell);
                     (*n, code(&cell), cell.failure)
                 })
@@ -156,7 +154,7 @@ impl Cells {
     }
 
     /// Writes all chunks.
-    fn write(&self, plan: &Plan, store: &Store, monitor: &Monitor) -> Result<bool, StoreError> {
+    fn write(&self, sweep: &Sweep, store: &Store, monitor: &Monitor) -> Result<bool, StoreError> {
         let inferred = || "not computed, as a neighbouring cell failed".to_string();
         let cell = |index: Vec<u64>| {
             let n = index[0] as usize * self.columns + index[1] as usize;
@@ -170,12 +168,12 @@ impl Cells {
                 ..Cell::default()
             }
         };
-        for index in (0..plan.chunks()).map(|n| plan.chunk_index(n)) {
+        for index in (0..sweep.chunks()).map(|n| sweep.chunk_index(n)) {
             if monitor.stop.load(Relaxed) {
                 return Ok(false);
             }
-            let cells: Vec<Cell> = (0..plan.chunk_size() as u64)
-                .map(|n| plan.cell_index(&index, n).map_or_else(Cell::default, cell))
+            let cells: Vec<Cell> = (0..sweep.chunk_size() as u64)
+                .map(|n| sweep.cell_index(&index, n).map_or_else(Cell::default, cell))
                 .collect();
             store.write(&index, &cells)?;
         }

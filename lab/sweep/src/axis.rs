@@ -14,18 +14,39 @@ use vines_model::ArgumentError;
 /// The detuning, which belongs to the drive and not to the scene.
 pub const SIGMA: &str = "sigma";
 
+/// Short names of two keys, as the axes of a map use them: the numbers of the theory, both dimensionless.
+const SHORT: [(&str, &str); 2] = [("G", "excitation.G"), ("r", "plant.r")];
+
+/// Values at equal distances.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// First value.
+    pub from: f64,
+    /// Last value.
+    pub to: f64,
+    /// Number of values.
+    pub points: u64,
+}
+
+impl Grid {
+    /// The n-th value.
+    #[must_use]
+    pub fn at(&self, n: u64) -> f64 {
+        self.from + self.step() * n as f64
+    }
+
+    /// Distance of two neighbouring values.
+    #[must_use]
+    pub fn step(&self) -> f64 {
+        (self.to - self.from) / (self.points - 1) as f64
+    }
+}
+
 /// Values of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
     /// At equal distances from the first to the last.
-    Grid {
-        /// First value.
-        from: f64,
-        /// Last value.
-        to: f64,
-        /// Number of values.
-        points: u64,
-    },
+    Grid(Grid),
     /// As listed.
     List(Vec<f64>),
     /// As listed, one per sample: all such axes of a sweep belong together.
@@ -34,11 +55,11 @@ pub enum Values {
     Random([f64; 2]),
 }
 
-/// A number of the scene, or [`SIGMA`], with the values it takes. Parse it from `plant.r=0.3:1:71` (first : last : how many),
+/// A number of the scene, or [`SIGMA`], with its values. Parse it from `plant.r=0.3:1:71` (first : last : how many),
 /// `plant.r=0.3,0.5,0.8`, `plant.r=paired:0.3,0.5,0.5` or `start.dq2=random:-1:1`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// `section.key` of a scene, or `sigma`.
+    /// `section.key` of a scene, or `sigma`. In text, `G` and `r` stand for `excitation.G` and `plant.r`.
     pub name: String,
     /// Its values.
     pub values: Values,
@@ -55,7 +76,7 @@ impl Axis {
             false => Err(ArgumentError::from(format!("{name} = {value} is not a finite number"))),
         };
         match &values {
-            Values::Grid { from, to, points } => {
+            Values::Grid(Grid { from, to, points }) => {
                 [*from, *to].into_iter().try_for_each(finite)?;
                 few(name, *points, *from)?;
                 if from >= to {
@@ -89,7 +110,7 @@ impl Axis {
     #[must_use]
     pub fn points(&self) -> Option<u64> {
         match &self.values {
-            Values::Grid { points, .. } => Some(*points),
+            Values::Grid(grid) => Some(grid.points),
             Values::List(list) => Some(list.len() as u64),
             Values::Paired(_) | Values::Random(_) => None,
         }
@@ -101,6 +122,40 @@ impl Axis {
             Values::Paired(list) => Some(list.len() as u64),
             _ => None,
         }
+    }
+
+    /// The axis as text, with its short name.
+    #[must_use]
+    pub fn short_form(&self) -> String {
+        let name = self.short_name().to_string();
+        Self { name, values: self.values.clone() }.to_string()
+    }
+
+    /// The n-th value. Random axes have the same `seed`, and each a `stream` of its own.
+    pub(crate) fn at(&self, n: u64, seed: u64, stream: u64) -> f64 {
+        match &self.values {
+            Values::Grid(grid) => grid.at(n),
+            Values::List(list) | Values::Paired(list) => list[n as usize],
+            Values::Random([from, to]) => {
+                // One block of the generator per sample: any sample is found without those before it.
+                let mut random = ChaCha8Rng::seed_from_u64(seed);
+                random.set_stream(stream);
+                random.set_word_pos(16 * u128::from(n));
+                from + (to - from) * ((random.next_u64() >> 11) as f64 / 2_f64.powi(53))
+            }
+        }
+    }
+
+    /// The name as on a map: short where there is a short one.
+    #[must_use]
+    pub fn short_name(&self) -> &str {
+        let short = SHORT.iter().find(|(_, key)| *key == self.name);
+        short.map_or(&self.name, |(short, _)| short)
+    }
+
+    /// Whether its values are random numbers.
+    pub(crate) fn is_random(&self) -> bool {
+        matches!(self.values, Values::Random(_))
     }
 
     /// Unit: `1` for a count, and for what a scene states relative to omega0, b or a period.
@@ -122,6 +177,7 @@ impl Axis {
     }
 }
 
+/// Refuses fewer than two values; a constant belongs elsewhere.
 fn few(name: &str, points: u64, value: f64) -> Result<(), ArgumentError> {
     match points {
         0 => Err(format!("{name} has no values; at least 2 are needed").into()),
@@ -142,43 +198,12 @@ fn few(name: &str, points: u64, value: f64) -> Result<(), ArgumentError> {
     }
 }
 
-/// The values of an axis as a function of the position.
-#[derive(Debug, Clone)]
-pub(crate) struct Sequence {
-    values: Values,
-    seed: u64,
-    /// Position among the sampled axes.
-    stream: u64,
-}
-
-impl Sequence {
-    /// `sampled`: how many axes before this one have one value per sample.
-    pub(crate) fn new(axis: &Axis, seed: u64, sampled: usize) -> Self {
-        Self { values: axis.values.clone(), seed, stream: sampled as u64 }
-    }
-
-    pub(crate) fn at(&self, n: u64) -> f64 {
-        let within = |[from, to]: [f64; 2], part: f64| from + (to - from) * part;
-        match &self.values {
-            Values::Grid { from, to, points } => from + (to - from) / (points - 1) as f64 * n as f64,
-            Values::List(list) | Values::Paired(list) => list[n as usize],
-            Values::Random(interval) => {
-                // One block of the generator per sample: any sample is found without those before it.
-                let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-                random.set_stream(self.stream);
-                random.set_word_pos(16 * u128::from(n));
-                within(*interval, (random.next_u64() >> 11) as f64 / 2_f64.powi(53))
-            }
-        }
-    }
-}
-
 impl Display for Axis {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         write!(f, "{}=", self.name)?;
         let text = |list: &[f64]| list.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
         match &self.values {
-            Values::Grid { from, to, points } => write!(f, "{from}:{to}:{points}"),
+            Values::Grid(Grid { from, to, points }) => write!(f, "{from}:{to}:{points}"),
             Values::List(list) => f.write_str(&text(list)),
             Values::Paired(list) => write!(f, "paired:{}", text(list)),
             Values::Random([from, to]) => write!(f, "random:{from}:{to}"),
@@ -203,17 +228,19 @@ impl FromStr for Axis {
         let values = match parts[..] {
             ["paired", list] => Values::Paired(listed(list)?),
             ["random", from, to] => Values::Random([number(from)?, number(to)?]),
-            [from, to, points] => Values::Grid {
+            [from, to, points] => Values::Grid(Grid {
                 from: number(from)?,
                 to: number(to)?,
                 points: points
                     .trim()
                     .parse()
                     .map_err(|_| format!("`{points}` is not a number of points; {form}"))?,
-            },
+            }),
             [list] => Values::List(listed(list)?),
             _ => return Err(form.into()),
         };
-        Self::new(name.trim(), values)
+        let name = name.trim();
+        let key = SHORT.iter().find(|(short, _)| *short == name);
+        Self::new(key.map_or(name, |(_, key)| key), values)
     }
 }

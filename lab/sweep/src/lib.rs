@@ -1,28 +1,33 @@
-//! Sweeps over any numbers of a scene and of its start, written to a Zarr store as they are computed.
+//! Sweeps over any numbers of a scene and of its start: in memory as a regime map, or written to a Zarr store as they are computed.
 //!
-//! A [`Plan`] has the cells in their order, [`run`] computes the chunks that the store does not have, or whose checksums are wrong.
-//! Every cell depends only on its position: a sweep that was killed gives the same bytes as one that was not.
+//! A [`Sweep`] has the cells in their order. [`Map::run`] keeps the regimes of two axes in memory; [`run()`] computes the chunks that
+//! the store does not have, or whose checksums are wrong. Every cell depends only on its position: a sweep that was killed gives the same
+//! bytes as one that was not. Without the feature `store`, no part of Zarr is compiled.
 
 #![forbid(unsafe_code)]
+#![cfg_attr(
+    not(feature = "store"),
+    allow(dead_code, reason = "chunks and variables serve the store")
+)]
 
-mod adaptive;
 mod axis;
 mod cell;
-mod error;
-mod folder;
-mod gzip;
-mod monitor;
-mod plan;
-mod run;
-mod settings;
-mod store;
-mod variables;
+mod map;
+mod sweep;
 
-pub use axis::{Axis, SIGMA, Values};
-pub use cell::Results;
-pub use error::StoreError;
-pub use monitor::Monitor;
-pub use plan::{Plan, Shard};
-pub use run::{Estimate, EstimateError, estimate, merge, run, verify};
-pub use settings::{PlanError, Settings};
-pub use variables::{ABSENT, FAILED, UNCOUNTED};
+#[cfg(feature = "store")]
+mod adaptive;
+#[cfg(feature = "store")]
+mod run;
+#[cfg(feature = "store")]
+mod store;
+
+pub use axis::{Axis, Grid, SIGMA, Values};
+pub use cell::{ABSENT, FAILED, Results, UNCOUNTED};
+pub use map::{Map, MapCell};
+pub use sweep::{Settings, Shard, Sweep, SweepError};
+
+#[cfg(feature = "store")]
+pub use run::{Estimate, EstimateError, Monitor, estimate, merge, run, verify};
+#[cfg(feature = "store")]
+pub use store::StoreError;

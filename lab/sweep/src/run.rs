@@ -1,10 +1,10 @@
-//! Runs a sweep on all cores, chunk by chunk.
+//! The engine of a sweep with a store: computes its chunks on all cores, verifies and merges stores, and reports the progress.
 
 use std::{
     path::{Path, PathBuf},
     sync::{
         Mutex,
-        atomic::{AtomicBool, Ordering::Relaxed},
+        atomic::{AtomicBool, AtomicU64, Ordering::Relaxed},
     },
     time::{Duration, Instant},
 };
@@ -14,50 +14,48 @@ use rayon::prelude::*;
 use crate::{
     adaptive,
     cell::Cell,
-    error::StoreError,
-    monitor::Monitor,
-    plan::{Plan, Shard},
-    store::{Chunk, Store},
+    store::{Chunk, Fault, Store, StoreError},
+    sweep::{Shard, Sweep},
 };
 
 /// Chunks that are computed at the same time for every eight threads: the last cells of one and the first of the next.
 const AT_ONCE: usize = 2;
 
-/// Computes the chunks of a part of `plan` that its store in `folder` does not have, or whose files are damaged. True if all are there at
+/// Computes the chunks of a part of `sweep` that its store in `folder` does not have, or whose files are damaged. True if all are there at
 /// the end; false if the monitor stopped it.
 ///
 /// # Errors
 /// A folder that cannot be used.
-pub fn run(plan: &Plan, folder: &Path, shard: Shard, monitor: &Monitor) -> Result<bool, StoreError> {
-    let opened = Store::open(plan, folder, shard, monitor);
+pub fn run(sweep: &Sweep, folder: &Path, shard: Shard, monitor: &Monitor) -> Result<bool, StoreError> {
+    let opened = Store::open(sweep, folder, shard, monitor);
     if monitor.stop.load(Relaxed) {
         return Ok(false);
     }
     let store = opened?;
-    if let Some(stride) = plan.settings().adaptive {
+    if let Some(stride) = sweep.settings().adaptive {
         if shard != Shard::ALL {
             return Err(StoreError::Part);
         }
-        if count(plan, &store, shard, monitor) == plan.cells() {
+        if count(sweep, &store, shard, monitor) == sweep.cells() {
             store.tidy()?;
             return Ok(true);
         }
         monitor.found.store(0, Relaxed);
-        return adaptive::run(plan, &store, stride as usize, monitor);
+        return adaptive::run(sweep, &store, stride as usize, monitor);
     }
-    let next = Mutex::new(shard.chunks(plan));
+    let next = Mutex::new(shard.chunks(sweep));
     let error = Mutex::new(None);
     let work = || {
         loop {
             let n = next.lock().ok().and_then(|mut chunks| chunks.next());
-            let Some(index) = n.filter(|_| !monitor.stop.load(Relaxed)).map(|n| plan.chunk_index(n)) else {
+            let Some(index) = n.filter(|_| !monitor.stop.load(Relaxed)).map(|n| sweep.chunk_index(n)) else {
                 return;
             };
             if let Chunk::Complete(_) = store.chunk(&index, monitor) {
-                monitor.found.fetch_add(plan.chunk_cells(&index), Relaxed);
+                monitor.found.fetch_add(sweep.chunk_cells(&index), Relaxed);
                 continue;
             }
-            let Some(cells) = chunk(plan, &index, monitor) else {
+            let Some(cells) = chunk(sweep, &index, monitor) else {
                 return;
             };
             if let Err(failure) = store.write(&index, &cells) {
@@ -86,29 +84,29 @@ pub fn run(plan: &Plan, folder: &Path, shard: Shard, monitor: &Monitor) -> Resul
     }
 }
 
-/// Verifies a part of the store of `plan` in `folder`, and counts its undamaged cells; nothing is written. The monitor has the damage.
+/// Verifies a part of the store of `sweep` in `folder`, and counts its undamaged cells; nothing is written. The monitor has the damage.
 ///
 /// # Errors
 /// No store of this sweep.
-pub fn verify(plan: &Plan, folder: &Path, shard: Shard, monitor: &Monitor) -> Result<bool, StoreError> {
-    let store = Store::existing(plan, folder)?;
-    let inspected = store.inspect(plan, shard, monitor);
+pub fn verify(sweep: &Sweep, folder: &Path, shard: Shard, monitor: &Monitor) -> Result<bool, StoreError> {
+    let store = Store::existing(sweep, folder)?;
+    let inspected = store.inspect(sweep, shard, monitor);
     if monitor.stop.load(Relaxed) {
         return Ok(false);
     }
     inspected?;
-    count(plan, &store, shard, monitor);
+    count(sweep, &store, shard, monitor);
     Ok(!monitor.stop.load(Relaxed))
 }
 
 /// Counts the cells of undamaged chunks, until the monitor stops it.
-fn count(plan: &Plan, store: &Store, shard: Shard, monitor: &Monitor) -> u64 {
-    shard.chunks(plan).par_bridge().for_each(|n| {
-        let index = plan.chunk_index(n);
+fn count(sweep: &Sweep, store: &Store, shard: Shard, monitor: &Monitor) -> u64 {
+    shard.chunks(sweep).par_bridge().for_each(|n| {
+        let index = sweep.chunk_index(n);
         if !monitor.stop.load(Relaxed)
             && let Chunk::Complete(_) = store.chunk(&index, monitor)
         {
-            monitor.found.fetch_add(plan.chunk_cells(&index), Relaxed);
+            monitor.found.fetch_add(sweep.chunk_cells(&index), Relaxed);
         }
     });
     monitor.found.load(Relaxed)
@@ -119,14 +117,14 @@ fn count(plan: &Plan, store: &Store, shard: Shard, monitor: &Monitor) -> u64 {
 ///
 /// # Errors
 /// A folder that cannot be used, or a store of another sweep.
-pub fn merge(plan: &Plan, folder: &Path, from: &[PathBuf], monitor: &Monitor) -> Result<u64, StoreError> {
+pub fn merge(sweep: &Sweep, folder: &Path, from: &[PathBuf], monitor: &Monitor) -> Result<u64, StoreError> {
     let sources = from
         .iter()
-        .map(|one| Store::existing(plan, one))
+        .map(|one| Store::existing(sweep, one))
         .collect::<Result<Vec<_>, _>>()?;
-    let store = Store::open(plan, folder, Shard::ALL, monitor)?;
+    let store = Store::open(sweep, folder, Shard::ALL, monitor)?;
     let mut missing = 0;
-    for index in (0..plan.chunks()).map(|n| plan.chunk_index(n)) {
+    for index in (0..sweep.chunks()).map(|n| sweep.chunk_index(n)) {
         let mut damaged = match store.chunk(&index, monitor) {
             Chunk::Complete(_) => continue,
             Chunk::Damaged => true,
@@ -143,11 +141,11 @@ pub fn merge(plan: &Plan, folder: &Path, from: &[PathBuf], monitor: &Monitor) ->
         match undamaged {
             Some(files) => store.copy(&index, &files)?,
             None if damaged => {
-                if let Some(cells) = chunk(plan, &index, monitor) {
+                if let Some(cells) = chunk(sweep, &index, monitor) {
                     store.write(&index, &cells)?;
                 }
             }
-            None => missing += plan.chunk_cells(&index),
+            None => missing += sweep.chunk_cells(&index),
         }
     }
     if missing == 0 {
@@ -157,14 +155,14 @@ pub fn merge(plan: &Plan, folder: &Path, from: &[PathBuf], monitor: &Monitor) ->
 }
 
 /// All cells of a chunk; None if it was stopped.
-fn chunk(plan: &Plan, index: &[u64], monitor: &Monitor) -> Option<Vec<Cell>> {
-    (0..plan.chunk_size() as u64)
+fn chunk(sweep: &Sweep, index: &[u64], monitor: &Monitor) -> Option<Vec<Cell>> {
+    (0..sweep.chunk_size() as u64)
         .into_par_iter()
         .map(|n| {
             if monitor.stop.load(Relaxed) {
                 return None;
             }
-            let cell = plan.cell(index, n);
+            let cell = sweep.cell(index, n);
             monitor.note(&cell);
             Some(cell)
         })
@@ -206,13 +204,13 @@ const TRIAL: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// If all of them fail: the reason of the first.
-pub fn estimate(plan: &Plan, stop: &AtomicBool) -> Result<Estimate, EstimateError> {
+pub fn estimate(sweep: &Sweep, stop: &AtomicBool) -> Result<Estimate, EstimateError> {
     let start = Instant::now();
     // Positions that do not follow a regular grid: the golden ratio.
     let tried: Vec<Cell> = (0..TRIED)
         .map(|n| (0.5 + 0.618_033_988_749_895 * n as f64).fract())
         .take_while(|n| *n == 0.5 || start.elapsed() < TRIAL && !stop.load(Relaxed))
-        .map(|position| plan.cell_near(position))
+        .map(|position| sweep.cell_near(position))
         .collect();
     if tried.iter().all(|cell| !cell.failure.is_empty()) {
         let reason = tried.first().map_or(String::new(), |cell| cell.failure.clone());
@@ -221,8 +219,72 @@ pub fn estimate(plan: &Plan, stop: &AtomicBool) -> Result<Estimate, EstimateErro
     let cell = start.elapsed().as_secs_f64() / tried.len() as f64;
     let threads = rayon::current_num_threads() as f64;
     Ok(Estimate {
-        cells: plan.cells(),
-        hours: plan.cells() as f64 * cell / threads / 3600.0,
-        bytes: plan.bytes(),
+        cells: sweep.cells(),
+        hours: sweep.cells() as f64 * cell / threads / 3600.0,
+        bytes: sweep.bytes(),
     })
+}
+
+/// Number of damaged files that are named.
+const NAMED: usize = 10;
+
+/// The progress of a sweep, and the flag that stops it.
+#[derive(Debug, Default)]
+pub struct Monitor {
+    /// Cells that were in the store, undamaged.
+    pub found: AtomicU64,
+    /// Cells computed since the start.
+    pub computed: AtomicU64,
+    /// Those of them that failed.
+    pub failed: AtomicU64,
+    /// Cells that were inferred; known at the end of an adaptive sweep.
+    pub inferred: AtomicU64,
+    /// Ends the sweep within the duration of a cell; unfinished chunks are dropped.
+    pub stop: AtomicBool,
+    /// Reason of the first failure.
+    pub reason: Mutex<Option<String>>,
+    /// Number of damaged files, and what is wrong with the first of them.
+    damage: Mutex<(u64, Vec<String>)>,
+}
+
+impl Monitor {
+    /// Counts a cell.
+    pub(crate) fn note(&self, cell: &Cell) {
+        if !cell.failure.is_empty() {
+            self.failed.fetch_add(1, Relaxed);
+            if let Ok(mut reason) = self.reason.lock() {
+                reason.get_or_insert_with(|| cell.failure.clone());
+            }
+        }
+        if cell.is_known() {
+            self.computed.fetch_add(1, Relaxed);
+        }
+    }
+
+    /// Counts a damaged file.
+    pub(crate) fn damaged(&self, file: &Path, fault: &Fault) {
+        if let Ok(mut damage) = self.damage.lock() {
+            damage.0 += 1;
+            if damage.1.len() < NAMED {
+                damage.1.push(format!("{} {fault}", file.display()));
+            }
+        }
+    }
+
+    /// The damaged files that were found in stores, and what is wrong with them; None if there are none.
+    #[must_use]
+    pub fn damage(&self) -> Option<String> {
+        let damage = self.damage.lock().ok()?;
+        let (count, named) = &*damage;
+        let files = match count {
+            0 => return None,
+            1 => "1 damaged or incomplete file: ".to_string(),
+            _ => format!("{count} damaged or incomplete files: "),
+        };
+        let further = match count - named.len() as u64 {
+            0 => String::new(),
+            further => format!("; and {further} more"),
+        };
+        Some(files + &named.join("; ") + &further)
+    }
 }

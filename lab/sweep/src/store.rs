@@ -1,28 +1,31 @@
-//! The Zarr store of a sweep: one array per variable and per axis.
+//! The Zarr store of a sweep: one array per variable and per axis, in a folder whose files are complete, with a checksum, or absent.
 
 use std::{
-    fs, io,
+    error::Error,
+    fs,
+    hash::{BuildHasher, RandomState},
+    io::{self, Read as _, Write as _},
     path::{Path, PathBuf},
-    sync::{Arc, atomic::Ordering::Relaxed},
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering::Relaxed},
+    },
 };
 
+use flate2::{Compression, bufread::GzDecoder, write::GzEncoder};
 use serde_json::{Map, Value, json};
 use vines_model::regime::Regime;
 use zarrs::array::{
-    Array, ArrayBuilder, ArrayError, CodecOptions, DataType, builder::ArrayBuilderFillValue, codec::GzipCodec,
-    data_type,
+    Array, ArrayBuilder, ArrayCreateError, ArrayError, CodecOptions, DataType, builder::ArrayBuilderFillValue,
+    codec::GzipCodec, data_type,
 };
-use zarrs::storage::StoreKey;
+use zarrs::storage::{Bytes, OffsetBytesIterator, StorageError, StoreKey, StorePrefix, WritableStorageTraits};
 
 use crate::{
     axis::Axis,
-    cell::Cell,
-    error::StoreError,
-    folder::{Folder, PARTIAL},
-    gzip::{Fault, LEVEL, pack, unpack},
-    monitor::Monitor,
-    plan::{Plan, Shard},
-    variables::{ABSENT, FAILED, Read, UNCOUNTED, Variable, code, count, reason, variables},
+    cell::{ABSENT, Cell, FAILED, Read, UNCOUNTED, Variable, code, count, reason, variables},
+    run::Monitor,
+    sweep::{Shard, Sweep},
 };
 
 /// Folder of the results of an adaptive sweep's rounds; removed at the end.
@@ -66,40 +69,40 @@ const VERSION: &str = "version";
 type Failed = Box<dyn std::error::Error + Send + Sync>;
 
 impl Store {
-    /// Opens the store of `plan` in a folder, or creates it, and restores damaged metadata. Axes may be long: a part checks its share of
+    /// Opens the store of `sweep` in a folder, or creates it, and restores damaged metadata. Axes may be long: a part checks its share of
     /// them, and the monitor ends this with an error.
-    pub(crate) fn open(plan: &Plan, root: &Path, shard: Shard, monitor: &Monitor) -> Result<Self, StoreError> {
-        let store = Self::new(plan, root)?;
-        let created = if store.is_there(plan)? {
-            store.describe(plan, shard, monitor, Repair::Restore)
+    pub(crate) fn open(sweep: &Sweep, root: &Path, shard: Shard, monitor: &Monitor) -> Result<Self, StoreError> {
+        let store = Self::new(sweep, root)?;
+        let created = if store.is_there(sweep)? {
+            store.describe(sweep, shard, monitor, Repair::Restore)
         } else {
-            store.describe(plan, Shard::ALL, monitor, Repair::Create)
+            store.describe(sweep, Shard::ALL, monitor, Repair::Create)
         };
         created.map_err(|error| store.failed(error))?;
         Ok(store)
     }
 
-    /// Opens the store of `plan` in a folder that must have it; nothing is written.
-    pub(crate) fn existing(plan: &Plan, root: &Path) -> Result<Self, StoreError> {
-        let store = Self::new(plan, root)?;
-        match store.is_there(plan)? {
+    /// Opens the store of `sweep` in a folder that must have it; nothing is written.
+    pub(crate) fn existing(sweep: &Sweep, root: &Path) -> Result<Self, StoreError> {
+        let store = Self::new(sweep, root)?;
+        match store.is_there(sweep)? {
             true => Ok(store),
             false => Err(StoreError::NotAStore(root.into())),
         }
     }
 
     /// Reports damage of metadata and axes to the monitor.
-    pub(crate) fn inspect(&self, plan: &Plan, shard: Shard, monitor: &Monitor) -> Result<(), StoreError> {
-        self.describe(plan, shard, monitor, Repair::Report)
+    pub(crate) fn inspect(&self, sweep: &Sweep, shard: Shard, monitor: &Monitor) -> Result<(), StoreError> {
+        self.describe(sweep, shard, monitor, Repair::Report)
             .map_err(|error| self.failed(error))
     }
 
-    fn new(plan: &Plan, root: &Path) -> Result<Self, StoreError> {
+    fn new(sweep: &Sweep, root: &Path) -> Result<Self, StoreError> {
         let folder = Arc::new(Folder::new(root));
-        let arrays = variables(plan.settings()).map(|one| Ok((one, variable(plan, &folder, &one)?)));
-        let axes = plan
+        let arrays = variables(sweep.settings()).map(|one| Ok((one, variable(sweep, &folder, &one)?)));
+        let axes = sweep
             .coordinates()
-            .map(|(one, _, dimension)| axis(plan, &folder, one, dimension));
+            .map(|(one, dimension, _)| axis(sweep, &folder, one, dimension));
         let failed = |source| StoreError::Write { folder: root.into(), source };
         Ok(Self {
             arrays: arrays.collect::<Result<_, Failed>>().map_err(failed)?,
@@ -109,13 +112,13 @@ impl Store {
         })
     }
 
-    /// Whether the folder has the store of `plan`. False if it has nothing, or what a program left that was killed before it wrote the
+    /// Whether the folder has the store of `sweep`. False if it has nothing, or what a program left that was killed before it wrote the
     /// group.
-    fn is_there(&self, plan: &Plan) -> Result<bool, StoreError> {
+    fn is_there(&self, sweep: &Sweep) -> Result<bool, StoreError> {
         match fs::read(self.root.join(GROUP)) {
             Ok(text) => {
                 if let Ok(group) = serde_json::from_slice::<Value>(&text) {
-                    return self.check(plan, &group).map(|()| true);
+                    return self.check(sweep, &group).map(|()| true);
                 }
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
@@ -137,7 +140,7 @@ impl Store {
     }
 
     /// Compares metadata and axes with what the sweep writes.
-    fn describe(&self, plan: &Plan, shard: Shard, monitor: &Monitor, repair: Repair) -> Result<(), Failed> {
+    fn describe(&self, sweep: &Sweep, shard: Shard, monitor: &Monitor, repair: Repair) -> Result<(), Failed> {
         let note = |key: &str, fault: &Fault| {
             if repair != Repair::Create {
                 monitor.damaged(&self.folder.path(key), fault);
@@ -163,13 +166,13 @@ impl Store {
             compare(&format!("{}/{GROUP}", name(array)), &metadata)?;
             all.insert(name(array).into(), metadata);
         }
-        for (array, (_, sequence, dimension)) in self.axes.iter().zip(plan.coordinates()) {
-            let (length, chunk) = (plan.shape[dimension], plan.chunk[dimension]);
+        for (array, (_, dimension, at)) in self.axes.iter().zip(sweep.coordinates()) {
+            let (length, chunk) = (sweep.shape[dimension], sweep.chunk[dimension]);
             for n in (shard.number..length.div_ceil(chunk)).step_by(shard.of as usize) {
                 if monitor.stop.load(Relaxed) {
                     return Err("stopped".into());
                 }
-                let value = |k| if k < length { sequence.at(k) } else { f64::NAN };
+                let value = |k| if k < length { at(k) } else { f64::NAN };
                 let values: Vec<f64> = (n * chunk..(n + 1) * chunk).map(value).collect();
                 let key = array.chunk_key(&[n]);
                 let fault = match self.folder.read(key.as_str()) {
@@ -185,16 +188,16 @@ impl Store {
                 }
             }
         }
-        compare(GROUP, &group(plan, all))
+        compare(GROUP, &group(sweep, all))
     }
 
-    /// Compares the metadata of an existing store with the plan.
-    fn check(&self, plan: &Plan, group: &Value) -> Result<(), StoreError> {
+    /// Compares the metadata of an existing store with the sweep.
+    fn check(&self, sweep: &Sweep, group: &Value) -> Result<(), StoreError> {
         let Some(Value::Object(found)) = group.pointer("/attributes/vines") else {
             return Err(StoreError::NotAStore(self.root.clone()));
         };
         // Both have been text once: the same digits give the same numbers.
-        let here = object(serde_json::from_str(&plan.description().to_string()).unwrap_or_default());
+        let here = object(serde_json::from_str(&sweep.description().to_string()).unwrap_or_default());
         let differs: Vec<&str> = here
             .iter()
             .filter(|(key, value)| found.get(*key) != Some(*value))
@@ -301,7 +304,7 @@ impl Store {
     }
 }
 
-fn variable(plan: &Plan, folder: &Arc<Folder>, variable: &Variable) -> Result<Array<Folder>, Failed> {
+fn variable(sweep: &Sweep, folder: &Arc<Folder>, variable: &Variable) -> Result<Array<Folder>, Failed> {
     // A cell without a file looks as one that is not computed.
     let absent = Cell::default();
     let (data_type, fill): (DataType, ArrayBuilderFillValue) = match variable.read {
@@ -327,30 +330,30 @@ fn variable(plan: &Plan, folder: &Arc<Folder>, variable: &Variable) -> Result<Ar
         Read::Number(_) | Read::Failure => {}
     }
     Ok(
-        ArrayBuilder::new(plan.shape.clone(), plan.chunk.clone(), data_type, fill)
+        ArrayBuilder::new(sweep.shape.clone(), sweep.chunk.clone(), data_type, fill)
             .bytes_to_bytes_codecs(vec![Arc::new(GzipCodec::new(LEVEL)?)])
-            .dimension_names(Some(plan.dimensions.iter().map(String::as_str)))
+            .dimension_names(Some(sweep.dimensions.iter().map(String::as_str)))
             .attributes(object(attributes))
             .build(folder.clone(), &format!("/{}", variable.name))?,
     )
 }
 
 /// The array of an axis.
-fn axis(plan: &Plan, folder: &Arc<Folder>, axis: &Axis, dimension: usize) -> Result<Array<Folder>, Failed> {
+fn axis(sweep: &Sweep, folder: &Arc<Folder>, axis: &Axis, dimension: usize) -> Result<Array<Folder>, Failed> {
     let attributes = json!({ "long_name": axis.name, "units": axis.unit() });
-    let (length, chunk) = (plan.shape[dimension], plan.chunk[dimension]);
+    let (length, chunk) = (sweep.shape[dimension], sweep.chunk[dimension]);
     Ok(
         ArrayBuilder::new(vec![length], vec![chunk], data_type::float64(), f64::NAN)
             .bytes_to_bytes_codecs(vec![Arc::new(GzipCodec::new(LEVEL)?)])
-            .dimension_names(Some([plan.dimensions[dimension].as_str()]))
+            .dimension_names(Some([sweep.dimensions[dimension].as_str()]))
             .attributes(object(attributes))
             .build(folder.clone(), &format!("/{}", axis.name))?,
     )
 }
 
 /// The metadata of the group, with those of all arrays.
-fn group(plan: &Plan, arrays: Map<String, Value>) -> Value {
-    let sampled: Vec<&str> = plan
+fn group(sweep: &Sweep, arrays: Map<String, Value>) -> Value {
+    let sampled: Vec<&str> = sweep
         .coordinates()
         .filter(|(axis, ..)| axis.points().is_none())
         .map(|(axis, ..)| axis.name.as_str())
@@ -361,7 +364,7 @@ fn group(plan: &Plan, arrays: Map<String, Value>) -> Value {
         "attributes": {
             "title": "Sweep of a linear oscillator with a vibro-impact nonlinear energy sink",
             "coordinates": sampled.join(" "),
-            "vines": plan.description(),
+            "vines": sweep.description(),
         },
         "consolidated_metadata": { "kind": "inline", "must_understand": false, "metadata": arrays },
     })
@@ -391,5 +394,239 @@ fn object(value: Value) -> Map<String, Value> {
     match value {
         Value::Object(map) => map,
         _ => Map::new(),
+    }
+}
+
+/// Why a store cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The store belongs to another sweep.
+    #[error(
+        "{} belongs to another sweep, with another {differs}. It stays as it is; write to another folder, or delete it",
+        folder.display()
+    )]
+    Other {
+        /// The folder.
+        folder: PathBuf,
+        /// What differs.
+        differs: String,
+    },
+    /// The store is of the same sweep, computed by another program.
+    #[error(
+        "{} was computed by another version of vines ({found}, here {here}), and results of both must not be mixed. \
+         It stays as it is; continue it with the version that began it, or write to another folder",
+        folder.display()
+    )]
+    Build {
+        /// The folder.
+        folder: PathBuf,
+        /// Version of the store.
+        found: String,
+        /// Version of this program.
+        here: String,
+    },
+    /// Chunks without the file that says to which sweep they belong.
+    #[error(
+        "{} has chunks, but its zarr.json, which says to which sweep they belong, is missing or damaged. \
+         The store stays as it is; restore that file, delete the folder, or name another one",
+        .0.display()
+    )]
+    Group(PathBuf),
+    /// The folder holds something else.
+    #[error("{} is not the store of a sweep; name another folder", .0.display())]
+    NotAStore(PathBuf),
+    /// An adaptive sweep in parts.
+    #[error(
+        "an adaptive sweep cannot be computed in parts: what is computed next depends on all cells. Leave out the part"
+    )]
+    Part,
+    /// Reading or writing failed.
+    #[error("cannot write to {}: {source}. Complete chunks stay; the same command continues the sweep", folder.display())]
+    Write {
+        /// The folder.
+        folder: PathBuf,
+        /// Error of the system or of the format.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+}
+
+impl StoreError {
+    /// Number of the system's error, if it is one.
+    #[must_use]
+    pub fn os_error(&self) -> Option<i32> {
+        let mut cause: Option<&(dyn Error + 'static)> = Some(self);
+        while let Some(one) = cause {
+            // Those of zarrs hide their cause.
+            let storage = match (one.downcast_ref(), one.downcast_ref()) {
+                (Some(ArrayError::StorageError(storage)), _) => Some(storage),
+                (_, Some(ArrayCreateError::StorageError(storage))) => Some(storage),
+                _ => one.downcast_ref(),
+            };
+            let system = match storage {
+                Some(StorageError::IOError(error)) => Some(&**error),
+                _ => one.downcast_ref::<io::Error>(),
+            };
+            if let Some(number) = system.and_then(io::Error::raw_os_error) {
+                return Some(number);
+            }
+            cause = one.source();
+        }
+        None
+    }
+}
+
+/// Where files are written before they get their name.
+pub(crate) const PARTIAL: &str = ".partial";
+
+/// A folder. (The storage of the crate `zarrs_filesystem` writes in place, and remembers every key.)
+#[derive(Debug)]
+pub(crate) struct Folder {
+    root: PathBuf,
+    /// A random number. Threads, processes and machines may write to one store: numbers of processes repeat on other machines.
+    writer: u64,
+    written: AtomicU64,
+}
+
+impl Folder {
+    pub(crate) fn new(root: &Path) -> Self {
+        Self {
+            root: root.into(),
+            writer: RandomState::new().hash_one(0),
+            written: AtomicU64::new(0),
+        }
+    }
+
+    pub(crate) fn path(&self, key: &str) -> PathBuf {
+        self.root.join(key)
+    }
+
+    /// The content of a file that ends with its checksum.
+    pub(crate) fn read(&self, key: &str) -> Result<Vec<u8>, Fault> {
+        unpack(&fs::read(self.path(key))?)
+    }
+
+    /// Writes a file completely or not at all: under another name first.
+    pub(crate) fn write(&self, key: &str, content: &[u8]) -> io::Result<()> {
+        let target = self.path(key);
+        let path = self.partial();
+        fs::create_dir_all(self.path(PARTIAL))?;
+        let complete = || {
+            // Not flushed to the disk for each chunk: only a power failure needs it, and loses no more than the last chunks.
+            fs::write(&path, content)?;
+            if let Some(parent) = target.parent() {
+                fs::create_dir_all(parent)?;
+            }
+            fs::rename(&path, &target)
+        };
+        complete().inspect_err(|_| drop(fs::remove_file(&path)))
+    }
+
+    /// A new name for a file that is not complete.
+    fn partial(&self) -> PathBuf {
+        let number = self.written.fetch_add(1, Relaxed);
+        self.path(PARTIAL).join(format!("{:016x}-{number}", self.writer))
+    }
+
+    /// Removes a folder inside, if it is there.
+    pub(crate) fn remove(&self, name: &str) -> io::Result<()> {
+        match fs::remove_dir_all(self.path(name)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl WritableStorageTraits for Folder {
+    fn set(&self, key: &StoreKey, value: Bytes) -> Result<(), StorageError> {
+        Ok(self.write(key.as_str(), &value)?)
+    }
+
+    fn set_partial_many(&self, _: &StoreKey, _: OffsetBytesIterator) -> Result<(), StorageError> {
+        Err(StorageError::Unsupported("files are written as a whole".into()))
+    }
+
+    fn erase(&self, key: &StoreKey) -> Result<(), StorageError> {
+        Ok(fs::remove_file(self.path(key.as_str()))?)
+    }
+
+    fn erase_prefix(&self, prefix: &StorePrefix) -> Result<(), StorageError> {
+        Ok(fs::remove_dir_all(self.path(prefix.as_str()))?)
+    }
+
+    fn supports_set_partial(&self) -> bool {
+        false
+    }
+}
+
+/// Compression level: the default of gzip.
+pub(crate) const LEVEL: u32 = 6;
+
+/// The header that encoder and Zarr codec write: no name, no time. The checksum does not cover it.
+const HEADER: [u8; 10] = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 0xff];
+
+/// What is wrong with a file.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Fault {
+    #[error("is missing")]
+    Missing,
+    #[error("is empty")]
+    Empty,
+    #[error("is truncated")]
+    Truncated,
+    #[error("has a damaged header")]
+    Header,
+    #[error("continues after its end")]
+    Trailing,
+    #[error("has a damaged content or checksum")]
+    Checksum,
+    #[error("is not what the sweep wrote")]
+    Content,
+    #[error("cannot be read ({0})")]
+    Unreadable(io::Error),
+}
+
+impl From<io::Error> for Fault {
+    fn from(error: io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::NotFound => Self::Missing,
+            _ => Self::Unreadable(error),
+        }
+    }
+}
+
+/// Compresses a content.
+pub(crate) fn pack(content: &[u8]) -> io::Result<Vec<u8>> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::new(LEVEL));
+    encoder.write_all(content)?;
+    encoder.finish()
+}
+
+/// The content of a file whose checksum is right.
+pub(crate) fn unpack(file: &[u8]) -> Result<Vec<u8>, Fault> {
+    if file.is_empty() {
+        return Err(Fault::Empty);
+    }
+    if !HEADER.starts_with(&file[..file.len().min(HEADER.len())]) {
+        return Err(Fault::Header);
+    }
+    let mut decoder = GzDecoder::new(file);
+    let mut content = Vec::new();
+    match decoder.read_to_end(&mut content) {
+        Ok(_) if decoder.into_inner().is_empty() => Ok(content),
+        Ok(_) => Err(Fault::Trailing),
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Err(Fault::Truncated),
+        Err(_) => Err(Fault::Checksum),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn writers_in_one_process_or_in_processes_of_the_same_number_do_not_share_partial_files() {
+        let [one, other] = [(); 2].map(|()| Folder::new(Path::new("store")));
+        assert_ne!(one.partial(), other.partial());
+        assert_ne!(one.partial(), one.partial());
     }
 }

@@ -5,7 +5,7 @@ mod common;
 use std::{collections::BTreeMap, fs, io::Read, path::Path, sync::atomic::Ordering::Relaxed, thread, time::Duration};
 
 use common::{array, files, numbers, plan, refused, settings};
-use vines_sweep::{ABSENT, FAILED, Monitor, Plan, Settings, Shard, UNCOUNTED, merge, run, verify};
+use vines_sweep::{ABSENT, FAILED, Monitor, Settings, Shard, Sweep, UNCOUNTED, merge, run, verify};
 
 #[test]
 fn a_folder_of_other_stores_does_not_become_a_store() {
@@ -49,11 +49,11 @@ fn a_chunk_that_does_not_fit_into_memory_is_refused() {
 }
 
 /// Three chunks: two of seven cells, and one of four.
-fn three_chunks() -> Plan {
+fn three_chunks() -> Sweep {
     plan(settings(&["plant.r=0.3:0.9:18"])).unwrap()
 }
 
-fn computed(plan: &Plan, folder: &Path) -> BTreeMap<String, Vec<u8>> {
+fn computed(plan: &Sweep, folder: &Path) -> BTreeMap<String, Vec<u8>> {
     assert!(run(plan, folder, Shard::ALL, &Monitor::default()).unwrap());
     files(folder)
 }

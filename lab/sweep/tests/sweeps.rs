@@ -9,9 +9,63 @@ use std::{
 
 use common::{files, numbers, plan, refused, settings};
 
-use vines_model::map::{LIMIT, Plan as MapPlan};
-use vines_sweep::{Axis, Monitor, Plan, Results, Settings, Shard, estimate, merge, run};
+use vines_model::{map::LIMIT, regime::Regime};
+use vines_sweep::{Axis, Map, Monitor, Results, Settings, Shard, Sweep, estimate, merge, run};
 use vines_testbench::scene::Family;
+
+/// A map of the default scene.
+fn map(x: &str, y: &str, periods: usize) -> Result<Map, String> {
+    let [x, y] = [x, y].map(|axis| axis.parse::<Axis>().map_err(|error| error.to_string()));
+    Map::new(Family::parse("", None, &[]).unwrap(), &x?, &y?, None, periods).map_err(|error| error.to_string())
+}
+
+#[test]
+fn the_map_shows_the_island_of_the_theory() {
+    let map = map("sigma=-2:1:7", "G=0.7:1.9:7", 2000).unwrap().run(0, || {}).unwrap();
+    let (symmetric, inside) = map.count(Regime::Symmetric);
+    let island = map.cells.iter().filter(|cell| cell.theory_stable).count();
+    println!("{inside} of {island} cells inside the island are symmetric 1:1, {symmetric} in all");
+    assert!(island >= 10 && 10 * inside >= 8 * island);
+}
+
+#[test]
+fn the_axes_of_a_map_may_be_any_two_numbers_of_a_scene() {
+    let map = map("r=0.5:0.8:3", "plant.b=0.01:0.02:2", 2000)
+        .unwrap()
+        .run(0, || {})
+        .unwrap();
+    assert_eq!(map.names(), ["r", "plant.b"]);
+    // G = E/(b epsilon), and the scene states G.
+    let places: Vec<_> = map
+        .cells
+        .iter()
+        .map(|cell| (cell.r, cell.g, Some(cell.sigma)))
+        .collect();
+    assert_eq!(places.len(), 6);
+    assert_eq!(places[1], (0.65, 1.1, map.sweep.sigma()));
+    assert!((places[5].0 - 0.8).abs() < 1e-12);
+    assert!(map.curves.is_empty());
+}
+
+#[test]
+fn maps_that_make_no_sense_are_refused() {
+    for (x, y, periods, part) in [
+        ("sigma=1:0:5", "G=0:1:3", 400, "below the last"),
+        ("sigma=0:1:3", "G=-1:2:5", 400, "G"),
+        ("sigma=0:1:3", "r=0.2:1.2:5", 400, "restitution"),
+        ("sigma=0:1:1", "G=0:1:3", 400, "at least 2"),
+        ("sigma=0:1:2001", "G=0:1:3", 400, "2 to 2000"),
+        ("sigma=0,1,2", "G=0:1:3", 400, "FIRST:LAST:POINTS"),
+        ("x=0:1:5", "G=0:1:3", 400, "section.key"),
+        ("sigma=0:1:3", "G=0:nan:5", 400, "finite"),
+        ("G=0:1:3", "G=0:1:3", 400, "again"),
+        ("sigma=0:1:3", "G=0:1:3", 3, "from 100"),
+        ("sigma=-200:1:3", "G=0:1:3", 400, "above 0"),
+    ] {
+        let message = map(x, y, periods).unwrap_err();
+        assert!(message.contains(part), "{x} {y}: {message}");
+    }
+}
 
 #[test]
 fn every_axis_has_a_unit() {
@@ -39,26 +93,14 @@ fn a_sweep_over_sigma_and_g_has_the_bits_of_the_map() {
     })
     .unwrap();
     assert!(run(&plan, folder.path(), Shard::ALL, &Monitor::default()).unwrap());
-    let scene = vines_testbench::scene::Scene::load(None, &[]).unwrap();
-    let map = MapPlan {
-        scene: scene.dimensionless(),
-        sigma: 0.0,
-        start: scene.dimensionless_start(),
-        x: "G=0.4:2.4:6".parse().unwrap(),
-        y: "sigma=-3:3:7".parse().unwrap(),
-        limit: 400,
-        starts: 1,
-        confirmations: 0,
-    }
-    .run(|| {})
-    .unwrap();
-    let settling: Vec<f64> = map.cells.iter().map(|cell| cell.point.transient).collect();
+    let map = map("G=0.4:2.4:6", "sigma=-3:3:7", 400).unwrap().run(0, || {}).unwrap();
+    let settling: Vec<f64> = map.cells.iter().map(|cell| cell.result.transient).collect();
     assert_eq!(numbers(folder.path(), "settling"), settling);
     let bits = |values: Vec<f64>| values.into_iter().map(f64::to_bits).collect::<Vec<_>>();
     let exponents = map
         .cells
         .iter()
-        .map(|cell| cell.point.exponent.unwrap_or(f64::NAN))
+        .map(|cell| cell.result.exponent.unwrap_or(f64::NAN))
         .collect();
     assert_eq!(bits(numbers(folder.path(), "exponent")), bits(exponents));
 }
@@ -254,7 +296,7 @@ fn a_store_of_another_sweep_or_other_files_stay_as_they_are() {
     let axes = go(settings(&["plant.r=0.3,0.6"])).unwrap_err().to_string();
     assert!(axes.contains("another `axes`"), "{axes}");
     let family = Family::parse("", None, &["plant.b=0.02".parse().unwrap()]).unwrap();
-    let other = Plan::new(family, settings(&["plant.r=0.3,0.5"])).unwrap();
+    let other = Sweep::new(family, settings(&["plant.r=0.3,0.5"])).unwrap();
     let scene = run(&other, folder.path(), Shard::ALL, &Monitor::default())
         .unwrap_err()
         .to_string();

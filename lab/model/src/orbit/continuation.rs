@@ -3,16 +3,214 @@
 //! The unknowns are the state after an impact, sigma and G; four equations close the motion and one more selects the curve:
 //! fixed G for a frequency response, phase resonance for the backbone. The step follows the tangent and shrinks where the
 //! curve bends. A branch ends where its pattern of impacts ends, at a graze.
+//!
+//! Each kind of bifurcation has a test function of the multipliers that is zero there, and smooth also where multipliers meet. A change of
+//! its sign shows one bifurcation; two of a kind between two points of the branch cancel, and are found where the function is closest to
+//! zero.
 
 use nalgebra::{Matrix4, Matrix6, SVector};
+use serde::{Serialize, Serializer, ser::SerializeStruct};
 
-use super::branch::{Branch, Ended, Limits, Special};
-use super::condition::{Bifurcation, Condition};
-use super::crossings::Part;
-use super::pattern::{Returned, Unknowns, follow};
-use super::periodic::{Periodic, newton};
+use super::impact_map::Bounce;
+use super::periodic::{Bifurcation, Condition, Periodic, Returned, Unknowns, follow, newton, wrapped};
 use crate::Dimensionless;
-use crate::numerics::try_bisection;
+use crate::numerics::{golden_section, try_bisection};
+
+/// ContinuationLimits of a continuation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContinuationLimits {
+    /// Range of sigma.
+    pub sigma: [f64; 2],
+    /// Range of G.
+    pub g: [f64; 2],
+    /// Most points.
+    pub points: usize,
+    /// Longest step in the space of the unknowns.
+    pub step: f64,
+}
+
+impl Default for ContinuationLimits {
+    /// Detunings from -6 to 6, G up to 10, 2000 points at most 0.05 apart.
+    fn default() -> Self {
+        Self {
+            sigma: [-6.0, 6.0],
+            g: [-1e-6, 10.0],
+            points: 2000,
+            step: 0.05,
+        }
+    }
+}
+
+/// Why a branch ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum BranchEnd {
+    /// It left the range of sigma or G.
+    #[serde(rename = "left the range")]
+    Range,
+    /// It came back to its start.
+    #[serde(rename = "closed")]
+    Closed,
+    /// The largest number of points was reached.
+    #[serde(rename = "number of points")]
+    Points,
+    /// Its motions, which are not 1:1, are unstable for a hundred points from there on: such a branch winds on within chaos.
+    #[serde(rename = "unstable from there on")]
+    Unstable,
+    /// It joins the branch whose symmetry it breaks or whose period it doubles; beyond that it is its own mirror image.
+    #[serde(rename = "joins a shorter pattern")]
+    Joins,
+    /// The complex pair of multipliers on the unit circle becomes real.
+    #[serde(rename = "strong resonance")]
+    Resonance,
+    /// The pattern of impacts ends here: a graze, or impacts that accumulate.
+    #[serde(rename = "graze")]
+    Graze,
+}
+
+/// A point where stability changes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BranchBifurcation {
+    /// What happens.
+    pub kind: Bifurcation,
+    /// The motion is stable on one side.
+    pub of_stable: bool,
+    /// The motion there.
+    pub motion: Periodic,
+}
+
+/// A continued curve. It is serialised with its pattern once, and with the points that a drawing needs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Branch {
+    /// Its motions in order.
+    pub points: Vec<Periodic>,
+    /// Where stability changes, in order.
+    pub special: Vec<BranchBifurcation>,
+    /// Why it ended, before its first and after its last motion.
+    pub ended: [BranchEnd; 2],
+}
+
+/// Points without a stable motion after which a branch that is not 1:1 ends.
+const UNSTABLE: usize = 100;
+/// Largest distance of a motion of a branch from the lines between those that are serialised, in sigma, G, B and both parts of C.
+const DRAWN: f64 = 1e-4;
+
+/// A motion of a branch as it is serialised; the impacts follow from the first one.
+#[derive(Serialize)]
+struct DrawnMotion<'a> {
+    #[serde(rename = "G")]
+    g: f64,
+    sigma: f64,
+    #[serde(rename = "C")]
+    c: f64,
+    gamma: f64,
+    #[serde(rename = "B")]
+    b: f64,
+    multipliers: [[f64; 2]; 4],
+    stable: bool,
+    start: &'a Bounce,
+}
+
+impl<'a> From<&'a Periodic> for DrawnMotion<'a> {
+    fn from(motion: &'a Periodic) -> Self {
+        let Periodic { g, sigma, c, gamma, b, multipliers, stable, ref bounces, .. } = *motion;
+        Self {
+            g,
+            sigma,
+            c,
+            gamma,
+            b,
+            multipliers,
+            stable,
+            start: &bounces[0],
+        }
+    }
+}
+
+impl Serialize for Branch {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let points: Vec<DrawnMotion> = self.drawn().into_iter().map(DrawnMotion::from).collect();
+        let mut fields = serializer.serialize_struct("Branch", 4)?;
+        fields.serialize_field("shape", &self.points[0].pattern)?;
+        fields.serialize_field("points", &points)?;
+        fields.serialize_field("special", &self.special)?;
+        fields.serialize_field("ended", &self.ended)?;
+        fields.end()
+    }
+}
+
+impl Branch {
+    /// The motions that a drawing needs: the ends, both sides of a change of stability, and those without which a line is too far off.
+    pub fn drawn(&self) -> Vec<&Periodic> {
+        let points = &self.points;
+        let (mut drawn, mut from) = (vec![&points[0]], 0);
+        for to in 1..points.len() {
+            let changes = |n: usize| points[n].stable != points[n - 1].stable;
+            let passed = from + 1..to;
+            let ends = changes(to) || to > 1 && changes(to - 1);
+            if !passed.is_empty()
+                && (ends
+                    || passed
+                        .into_iter()
+                        .any(|n| off(&points[n], [&points[from], &points[to]]) > DRAWN))
+            {
+                from = to - 1;
+                drawn.push(&points[from]);
+            }
+        }
+        drawn.extend(points[1..].last());
+        drawn
+    }
+
+    /// Its motions are not 1:1, and the last ones are unstable.
+    fn winds(&self) -> bool {
+        let last = self.points.len().checked_sub(UNSTABLE).map(|from| &self.points[from..]);
+        !self.points[0].pattern.is_one_to_one() && last.is_some_and(|last| last.iter().all(|one| !one.stable))
+    }
+}
+
+/// Distance of a motion from the line between two others.
+fn off(motion: &Periodic, [from, to]: [&Periodic; 2]) -> f64 {
+    let (chord, beside) = (
+        to.invariants() - from.invariants(),
+        motion.invariants() - from.invariants(),
+    );
+    let part = (beside.dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0);
+    (beside - chord * part).norm()
+}
+
+impl BranchEnd {
+    /// As in a table.
+    pub fn name(&self) -> &'static str {
+        match self {
+            BranchEnd::Range => "left the range",
+            BranchEnd::Closed => "closed",
+            BranchEnd::Points => "number of points",
+            BranchEnd::Unstable => "unstable from there on",
+            BranchEnd::Joins => "joins a shorter pattern",
+            BranchEnd::Resonance => "strong resonance",
+            BranchEnd::Graze => "graze",
+        }
+    }
+}
+
+impl BranchBifurcation {
+    /// As in a table. A modulation begins at a torus bifurcation only if the motion was stable before.
+    pub fn name(&self) -> &'static str {
+        match (self.kind, self.of_stable) {
+            (Bifurcation::Torus, true) => "torus (modulation begins)",
+            (Bifurcation::Torus, false) => "Neimark-Sacker of an unstable motion",
+            (kind, _) => kind.name(),
+        }
+    }
+}
+
+impl ContinuationLimits {
+    /// Whether a motion lies in the ranges.
+    fn contain(&self, sigma: f64, g: f64) -> bool {
+        let inside = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
+        inside(sigma, self.sigma) && inside(g, self.g)
+    }
+}
 
 /// Steps below this end a branch.
 const SHORTEST: f64 = 1e-7;
@@ -20,7 +218,7 @@ const SHORTEST: f64 = 1e-7;
 const STRAIGHT: f64 = 0.98;
 /// Part of the longest step with which a branch reaches the one that it joins: near there, the plane at the end of a step meets both.
 const APPROACH: f64 = 1.0 / 256.0;
-/// Fraction of a step to which the end of a branch is located.
+/// Fraction of a step to which the end of a branch or a bifurcation is located.
 const FINEST: f64 = 1e-12;
 /// Largest distance from the joint at which a curve that cannot reach it ends.
 const NEXT: f64 = 0.05;
@@ -96,12 +294,12 @@ impl Curve<'_> {
         let last = branch.points.last().unwrap_or(self.start);
         if joins(last, motion) {
             branch.points.extend(self.joint(last, tangent, step));
-            branch.ended[1] = Ended::Joins;
+            branch.ended[1] = BranchEnd::Joins;
             return true;
         }
         match self.condition {
             Condition::Bifurcation(Bifurcation::Torus) if !motion.on_circle_in_pairs() => {
-                branch.ended[1] = Ended::Resonance;
+                branch.ended[1] = BranchEnd::Resonance;
                 return true;
             }
             Condition::Bifurcation(_) => {}
@@ -115,7 +313,7 @@ impl Curve<'_> {
     }
 
     /// The bifurcations that cancel between the point before the last one and `motion`.
-    fn pairs(&self, points: &[Periodic], motion: &Periodic) -> Vec<Special> {
+    fn pairs(&self, points: &[Periodic], motion: &Periodic) -> Vec<BranchBifurcation> {
         let [.., before, last] = points else {
             return Vec::new();
         };
@@ -130,7 +328,7 @@ impl Curve<'_> {
     }
 
     /// Whether a motion lies in the ranges; that of G does not limit a curve at constant G.
-    fn within(&self, limits: &Limits, sigma: f64, g: f64) -> bool {
+    fn within(&self, limits: &ContinuationLimits, sigma: f64, g: f64) -> bool {
         let free = !matches!(self.condition, Condition::Excitation(_));
         limits.contain(sigma, if free { g } else { limits.g[0] })
     }
@@ -139,7 +337,7 @@ impl Curve<'_> {
     fn closes(&self, branch: &mut Branch, next: &Unknowns, turned: &Unknowns, step: f64, first: &Unknowns) -> bool {
         // A phase difference of 2 pi is the same motion.
         let mut apart = next - self.start.unknowns();
-        apart[0] = super::pattern::wrapped(apart[0]);
+        apart[0] = wrapped(apart[0]);
         if branch.points.len() <= 10 || apart.norm() >= step || turned.dot(first) <= 0.9 {
             return false;
         }
@@ -154,7 +352,7 @@ impl Curve<'_> {
             // The last step passed the start, and what is beyond it was known.
             branch.special.pop();
         }
-        branch.ended[1] = Ended::Closed;
+        branch.ended[1] = BranchEnd::Closed;
         true
     }
 
@@ -194,14 +392,14 @@ pub fn continue_from(
     start: &Periodic,
     condition: Condition,
     towards: &Unknowns,
-    limits: &Limits,
+    limits: &ContinuationLimits,
 ) -> Branch {
     let reach = APPROACH * limits.step;
     let curve = Curve { scene, start, condition, reach };
     let mut branch = Branch {
         points: vec![start.clone()],
         special: Vec::new(),
-        ended: [Ended::Graze; 2],
+        ended: [BranchEnd::Graze; 2],
     };
     let Some((mut tangent, sign)) = curve.tangent(&start.unknowns(), towards) else {
         return branch;
@@ -210,7 +408,7 @@ pub fn continue_from(
     let mut step = limits.step / 8.0;
     while step >= SHORTEST {
         if branch.points.len() >= limits.points {
-            branch.ended[1] = Ended::Points;
+            branch.ended[1] = BranchEnd::Points;
             return branch;
         }
         let last = branch.points.last().unwrap_or(start);
@@ -226,15 +424,15 @@ pub fn continue_from(
             return branch;
         }
         if !curve.within(limits, next[4], next[5]) {
-            let inside = |one: &Special| curve.within(limits, one.motion.sigma, one.motion.g);
+            let inside = |one: &BranchBifurcation| curve.within(limits, one.motion.sigma, one.motion.g);
             branch.special.retain(inside);
-            branch.ended[1] = Ended::Range;
+            branch.ended[1] = BranchEnd::Range;
             return branch;
         }
         if branch.winds() {
             let stable = branch.points.iter().rposition(|one| one.stable);
             branch.points.truncate(stable.unwrap_or(0) + 2);
-            branch.ended[1] = Ended::Unstable;
+            branch.ended[1] = BranchEnd::Unstable;
             return branch;
         }
         let straight = turned.dot(&tangent) > 0.5 * (1.0 + STRAIGHT);
@@ -244,24 +442,29 @@ pub fn continue_from(
         }
     }
     if curve.stops_at_joint(branch.points.last().unwrap_or(start)) {
-        branch.ended[1] = Ended::Joins;
+        branch.ended[1] = BranchEnd::Joins;
     }
     branch
 }
 
 /// Follows the curve of `condition` through `start` in both directions, from falling to rising sigma.
-pub fn continue_both_ways(scene: &Dimensionless, start: &Periodic, condition: Condition, limits: &Limits) -> Branch {
+pub fn continue_both_ways(
+    scene: &Dimensionless,
+    start: &Periodic,
+    condition: Condition,
+    limits: &ContinuationLimits,
+) -> Branch {
     let mut towards = Unknowns::zeros();
     towards[4] = 1.0;
     let mut up = continue_from(scene, start, condition, &towards, limits);
-    if up.ended[1] == Ended::Closed {
-        up.ended[0] = Ended::Closed;
+    if up.ended[1] == BranchEnd::Closed {
+        up.ended[0] = BranchEnd::Closed;
         return up;
     }
     let down = continue_from(scene, start, condition, &-towards, limits);
     let mut points: Vec<Periodic> = down.points.into_iter().skip(1).rev().collect();
     points.append(&mut up.points);
-    let mut special: Vec<Special> = down.special.into_iter().rev().collect();
+    let mut special: Vec<BranchBifurcation> = down.special.into_iter().rev().collect();
     special.append(&mut up.special);
     Branch { points, special, ended: [down.ended[1], up.ended[1]] }
 }
@@ -271,7 +474,12 @@ const ASIDE: f64 = 1e-3;
 
 /// The branch of motions that leaves a symmetry breaking or a period doubling, along the curve of `condition`. Its mirror image, or
 /// itself one repetition later, leaves in the opposite direction and counts as the same branch.
-pub fn branch_off(scene: &Dimensionless, at: &Special, condition: Condition, limits: &Limits) -> Option<Branch> {
+pub fn branch_off(
+    scene: &Dimensionless,
+    at: &BranchBifurcation,
+    condition: Condition,
+    limits: &ContinuationLimits,
+) -> Option<Branch> {
     let from = &at.motion;
     let returned = follow(scene, &from.pattern, &from.unknowns())?;
     // The eigenvector of the map for the multiplier -1.
@@ -285,6 +493,107 @@ pub fn branch_off(scene: &Dimensionless, at: &Special, condition: Condition, lim
     let x = curve.correct(&from.unknowns(), &towards, ASIDE)?;
     let start = curve.motion(&x)?;
     let mut branch = continue_from(scene, &start, condition, &towards, limits);
-    branch.ended[0] = Ended::Joins;
+    branch.ended[0] = BranchEnd::Joins;
     Some(branch)
+}
+
+/// Test functions below this are rounding: in conservative motions, some are zero everywhere.
+const ROUNDING: f64 = 1e-9;
+/// The same for folds where both halves of a motion differ by less than [`HALVES`], because the function is small there.
+const ROUNDING_OF_FOLDS: f64 = 1e-12;
+const HALVES: f64 = 0.1;
+/// Difference of the halves below which a fold cannot be told from rounding, which grows with its inverse.
+const EQUAL_HALVES: f64 = 5e-4;
+/// Largest distance of a multiplier from the circle where a crossing is located.
+const LOCATED: f64 = 1e-4;
+
+/// A part of a branch, from 0 to 1.
+struct Part<F: Fn(f64) -> Option<Periodic>>(pub F);
+
+impl<F: Fn(f64) -> Option<Periodic>> Part<F> {
+    /// The bifurcations between two neighbouring points, in order.
+    fn crossings(&self, from: &Periodic, to: &Periodic) -> Vec<BranchBifurcation> {
+        let found = kinds(from)
+            .into_iter()
+            .filter_map(|kind| self.crossing(kind, [(0.0, from), (1.0, to)]));
+        let mut found: Vec<_> = found.collect();
+        found.sort_by(|one, other| one.0.total_cmp(&other.0));
+        found.into_iter().map(|one| one.1).collect()
+    }
+
+    /// The bifurcations that cancel around the second of three neighbouring points.
+    fn pairs(&self, points: [&Periodic; 3]) -> Vec<BranchBifurcation> {
+        kinds(points[0])
+            .into_iter()
+            .flat_map(|kind| self.pair(kind, points))
+            .collect()
+    }
+
+    fn pair(&self, kind: Bifurcation, points: [&Periodic; 3]) -> Vec<BranchBifurcation> {
+        let sign = kind.test(&points[1].monodromy).signum();
+        let [before, at, after] = points.map(|one| sign * kind.test(&one.monodromy));
+        // A smooth function does not come nearer to zero than at the points by more than it changes between them.
+        if at >= before || at > after || at >= before.max(after) - at {
+            return Vec::new();
+        }
+        let value = |part: f64| (self.0)(part).map_or(f64::INFINITY, |one| sign * kind.test(&one.monodromy));
+        let nearest = golden_section(0.0, 1.0, value);
+        let Some(motion) = (self.0)(nearest) else {
+            return Vec::new();
+        };
+        let both = [
+            [(0.0, points[0]), (nearest, &motion)],
+            [(nearest, &motion), (1.0, points[2])],
+        ];
+        both.into_iter()
+            .filter_map(|ends| Some(self.crossing(kind, ends)?.1))
+            .collect()
+    }
+
+    /// The part at which a test function passes zero between two motions, and the motion there; None if it does not, or if only a
+    /// saddle is neutral.
+    fn crossing(&self, kind: Bifurcation, [from, to]: [(f64, &Periodic); 2]) -> Option<(f64, BranchBifurcation)> {
+        let [first, last] = [from, to].map(|one| kind.test(&one.1.monodromy));
+        if first * last >= 0.0 || is_rounding(kind, [from.1, to.1], first.abs().max(last.abs())) {
+            return None;
+        }
+        let like_first = |part: f64| {
+            (self.0)(part)
+                .map(|one| kind.test(&one.monodromy) * first > 0.0)
+                .ok_or(())
+        };
+        let (_, beyond) = try_bisection(from.0, to.0, FINEST, like_first).ok()?;
+        let motion = (self.0)(beyond)?;
+        let of_stable = motion.bounds_stability();
+        on_circle(kind, &motion).then_some((beyond, BranchBifurcation { kind, of_stable, motion }))
+    }
+}
+
+fn kinds(motion: &Periodic) -> [Bifurcation; 3] {
+    [
+        Bifurcation::Fold,
+        Bifurcation::flip(&motion.pattern),
+        Bifurcation::Torus,
+    ]
+}
+
+/// Whether a change of sign between two motions is rounding; `largest` is the larger of the two values.
+fn is_rounding(kind: Bifurcation, motions: [&Periodic; 2], largest: f64) -> bool {
+    let apart = motions.map(|one| one.halves_apart().map_or(f64::INFINITY, |apart| apart.norm()));
+    let apart = apart[0].min(apart[1]);
+    if kind == Bifurcation::Fold && apart < HALVES {
+        largest < ROUNDING_OF_FOLDS || apart < EQUAL_HALVES
+    } else {
+        largest < ROUNDING
+    }
+}
+
+/// Two real multipliers whose product is one are a neutral saddle, not a bifurcation.
+fn on_circle(kind: Bifurcation, motion: &Periodic) -> bool {
+    let complex = kind == Bifurcation::Torus;
+    let mut of_kind = motion
+        .multipliers
+        .iter()
+        .filter(|[_, im]| !complex || im.abs() > LOCATED);
+    of_kind.any(|[re, im]| (re.hypot(*im) - 1.0).abs() < LOCATED)
 }

@@ -26,7 +26,7 @@ pub struct Difference {
 }
 
 /// The study: the differences, and the exponents of epsilon that fit them.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Convergence {
     /// One row a mass ratio, from the scene's down.
     pub rows: Vec<Difference>,

@@ -1,14 +1,55 @@
 //! The impact map: from the state just after an impact to that just after the next, with its derivatives (docs/theory.md, eqs. 24 and 25).
 //!
-//! Between impacts the motion has a closed form. The derivative covers flight and impact: a disturbed motion reaches the wall a
-//! little earlier or later (saltation).
+//! Between impacts the motion has a closed form. The first contact is found by steps that a bound of `|w''|` proves free of contact. They
+//! become Newton steps near the wall, so no contact is missed and the last is accurate to the last bits. The derivative covers flight
+//! and impact: a disturbed motion reaches the wall a little earlier or later (saltation).
 
-use nalgebra::{RowSVector, SMatrix};
+use nalgebra::{Matrix2, RowSVector, SMatrix, Vector2, Vector4};
+use serde::Serialize;
 
-use super::bounce::{Bounce, State};
-use super::forced_oscillator::ForcedOscillator;
-use super::particle_flight::ParticleFlight;
+use super::oscillator::ForcedOscillator;
 use crate::Dimensionless;
+
+/// Dimensionless positions and velocities (q1, q1', q2, q2').
+type State = [f64; 4];
+
+/// State just after an impact. The base displacement is `epsilon G sin(phase)` there, and the particle is at `q1 - wall`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Bounce {
+    /// Phase of the base, rad; it grows from impact to impact.
+    pub phase: f64,
+    /// Displacement of the primary mass over b.
+    pub q1: f64,
+    /// Velocity of the primary mass over `b omega0`.
+    pub dq1: f64,
+    /// Velocity of the particle over `b omega0`.
+    pub dq2: f64,
+    /// The wall that was hit: +1 for w = +1, -1 for w = -1.
+    pub wall: f64,
+}
+
+impl Bounce {
+    pub(super) fn vector(&self) -> Vector4<f64> {
+        Vector4::new(self.phase, self.q1, self.dq1, self.dq2)
+    }
+
+    pub(super) fn from_vector(x: &Vector4<f64>, wall: f64) -> Self {
+        let [phase, q1, dq1, dq2] = (*x).into();
+        Self { phase, q1, dq1, dq2, wall }
+    }
+
+    /// How far `later` is from repeating this state after the base has turned by `turn`, rad; with the sign -1, from its mirror image.
+    pub(super) fn apart(&self, later: &Bounce, turn: f64, sign: f64) -> Vector4<f64> {
+        let mut apart = later.vector() * sign - self.vector();
+        apart[0] = later.phase - self.phase - turn;
+        apart
+    }
+
+    /// Displacement of the particle over b.
+    pub fn q2(&self) -> f64 {
+        self.q1 - self.wall
+    }
+}
 
 /// Derivative of four state variables by (phase, q1, q1', q2', Omega, G) where it began.
 pub(super) type ByAll = SMatrix<f64, 4, 6>;
@@ -131,5 +172,98 @@ impl ImpactMap {
     pub(super) fn state(&self, from: &Bounce, t: f64) -> State {
         let [q1, dq1] = ParticleFlight::new(&self.oscillator, from).primary(t).into();
         [q1, dq1, from.q2() + from.dq2 * t, from.dq2]
+    }
+}
+
+/// A contact slower than this is a graze, where the map has no derivative.
+const GRAZING: f64 = 1e-9;
+/// Longest flight, periods.
+const LONGEST: f64 = 64.0;
+/// Most steps of a flight: far more than any flight needs, except in chatter.
+const STEPS: usize = 4000;
+
+struct ParticleFlight<'a> {
+    oscillator: &'a ForcedOscillator,
+    /// Where it begins: phase of the base, particle, and relative displacement and velocity.
+    phase: f64,
+    q2: f64,
+    dq2: f64,
+    w: f64,
+    dw: f64,
+    /// State of the free part of the oscillator's motion at the start.
+    free: Vector2<f64>,
+    /// Bound of `|w''|`.
+    curvature: f64,
+}
+
+impl<'a> ParticleFlight<'a> {
+    /// The flight after a bounce.
+    fn new(oscillator: &'a ForcedOscillator, from: &Bounce) -> Self {
+        let state = [from.q1, from.dq1, from.q2(), from.dq2];
+        Self::between(oscillator, from.phase, state, from.wall)
+    }
+
+    /// The flight from a state with the relative displacement `w`.
+    fn between(oscillator: &'a ForcedOscillator, phase: f64, [q1, dq1, q2, dq2]: State, w: f64) -> Self {
+        let free = Vector2::new(q1, dq1) - oscillator.harmonic(phase);
+        // Of the free motion q^2 + q'^2 never grows.
+        Self {
+            oscillator,
+            phase,
+            q2,
+            dq2,
+            w,
+            dw: dq1 - dq2,
+            free,
+            curvature: oscillator.acceleration() + free.norm() * (1.0 + 2.0 * oscillator.zeta),
+        }
+    }
+
+    /// (q1, q1') at the time `t`.
+    fn primary(&self, t: f64) -> Vector2<f64> {
+        let propagator: Matrix2<f64> = self.oscillator.free.propagator(t);
+        propagator * self.free + self.oscillator.harmonic(self.phase + self.oscillator.omega * t)
+    }
+
+    /// Time and wall of the first contact.
+    fn contact(&self) -> Option<(f64, f64)> {
+        let horizon = LONGEST * std::f64::consts::TAU / self.oscillator.omega;
+        let k = self.curvature;
+        if !k.is_finite() || k <= 0.0 {
+            return None;
+        }
+        // Time before which the wall at the distance `gap`, approached at `speed`, cannot be reached.
+        let free_for = |gap: f64, speed: f64| {
+            let root = (speed * speed + 2.0 * k * gap).sqrt();
+            if speed > 0.0 {
+                2.0 * gap / (speed + root)
+            } else {
+                (root - speed) / k
+            }
+        };
+        let (mut t, mut w, mut dw) = (0.0, self.w, self.dw);
+        if w.abs() >= 1.0 && w * dw >= 0.0 {
+            return None;
+        }
+        for _ in 0..STEPS {
+            let step = free_for(1.0 - w, dw).min(free_for(1.0 + w, -dw));
+            t += step;
+            if t > horizon {
+                return None;
+            }
+            let primary = self.primary(t);
+            w = primary[0] - self.q2 - self.dq2 * t;
+            dw = primary[1] - self.dq2;
+            let side = dw.signum();
+            let gap = 1.0 - side * w;
+            if gap <= 1e-15 || step <= 1e-16 * (1.0 + t) {
+                let fast = dw.abs() > GRAZING;
+                // A wall is reached in its own direction; the step over the remaining gap corrects the rounding.
+                return fast.then(|| (t + gap / dw.abs(), side));
+            }
+            // Rounding may place w just beyond the wall behind.
+            w = w.clamp(-1.0, 1.0);
+        }
+        None
     }
 }

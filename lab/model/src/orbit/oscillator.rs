@@ -1,20 +1,22 @@
-//! The oscillator between impacts: `q'' + 2 zeta q' + q = f`, in closed form for every damping ratio.
+//! The oscillator between impacts, `q'' + 2 zeta q' + q = f`, in closed form for every damping ratio: free, and under the harmonic base.
 
-use nalgebra::{Complex, Matrix2};
+use nalgebra::{Complex, Matrix2, Vector2};
+
+use crate::Dimensionless;
 
 /// The damped oscillator with unit natural frequency; `zeta = epsilon lambda/2`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Oscillator {
+pub(crate) struct Oscillator {
     zeta: f64,
 }
 
 impl Oscillator {
-    pub(super) fn new(zeta: f64) -> Self {
+    pub(crate) fn new(zeta: f64) -> Self {
         Self { zeta }
     }
 
     /// Maps (q, q') over the time `t` without forcing.
-    pub(super) fn propagator(&self, t: f64) -> Matrix2<f64> {
+    pub(crate) fn propagator(&self, t: f64) -> Matrix2<f64> {
         let (cosine, sine) = self.envelope(t);
         let zeta = self.zeta;
         Matrix2::new(cosine + zeta * sine, sine, -sine, cosine - zeta * sine)
@@ -42,7 +44,7 @@ impl Oscillator {
     }
 
     /// As [`Self::propagator`], with functions of single precision.
-    pub(super) fn rough_propagator(&self, t: f64) -> Matrix2<f64> {
+    pub(crate) fn rough_propagator(&self, t: f64) -> Matrix2<f64> {
         let square = 1.0 - self.zeta * self.zeta;
         if square < 1e-4 {
             return self.propagator(t);
@@ -56,30 +58,107 @@ impl Oscillator {
     }
 
     /// Response to the force `exp(i omega t)`: `1/(1 - omega^2 + 2 i zeta omega)`.
-    pub(super) fn compliance(&self, omega: f64) -> Complex<f64> {
+    pub(crate) fn compliance(&self, omega: f64) -> Complex<f64> {
         self.stiffness(omega).inv()
     }
 
     /// `1 - omega^2 + 2 i zeta omega`.
-    pub(super) fn stiffness(&self, omega: f64) -> Complex<f64> {
+    pub(crate) fn stiffness(&self, omega: f64) -> Complex<f64> {
         Complex::new(1.0 - omega * omega, 2.0 * self.zeta * omega)
     }
 
     /// Force made by the base displacement `exp(i omega t)`: `1 + 2 i zeta omega`, through spring and damper.
-    pub(super) fn base_force(&self, omega: f64) -> Complex<f64> {
+    pub(crate) fn base_force(&self, omega: f64) -> Complex<f64> {
         Complex::new(1.0, 2.0 * self.zeta * omega)
     }
 
     /// `-q - 2 zeta q'`: acceleration without forcing.
-    pub(super) fn free_acceleration(&self, q: f64, dq: f64) -> f64 {
+    pub(crate) fn free_acceleration(&self, q: f64, dq: f64) -> f64 {
         -q - 2.0 * self.zeta * dq
     }
 }
 
 /// Sine and cosine in single precision.
-pub(super) fn rough_sin_cos(angle: f64) -> (f64, f64) {
+pub(crate) fn rough_sin_cos(angle: f64) -> (f64, f64) {
     let (sine, cosine) = (angle as f32).sin_cos();
     (f64::from(sine), f64::from(cosine))
+}
+
+/// The oscillator at one frequency and excitation.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ForcedOscillator {
+    pub(super) free: Oscillator,
+    pub(super) zeta: f64,
+    pub(super) omega: f64,
+    epsilon: f64,
+    g: f64,
+    /// Harmonic response of q1 to the base, per G, and its derivative by Omega.
+    unit: [Complex<f64>; 2],
+}
+
+impl ForcedOscillator {
+    /// The oscillator of `scene` (except its G) at the frequency `omega` over omega0 and the excitation `g`.
+    pub(super) fn new(scene: &Dimensionless, omega: f64, g: f64) -> Self {
+        let zeta = scene.epsilon * scene.lambda / 2.0;
+        let free = Oscillator::new(zeta);
+        let (force, compliance) = (free.base_force(omega), free.compliance(omega));
+        let unit = force * compliance * scene.epsilon;
+        let stiffness_by = Complex::new(-2.0 * omega, 2.0 * zeta);
+        let unit_by = (Complex::new(0.0, 2.0 * zeta) * scene.epsilon - unit * stiffness_by) * compliance;
+        Self {
+            free,
+            zeta,
+            omega,
+            epsilon: scene.epsilon,
+            g,
+            unit: [unit, unit_by],
+        }
+    }
+
+    /// Bound of the acceleration of the steady response.
+    pub(super) fn acceleration(&self) -> f64 {
+        if self.g == 0.0 {
+            0.0
+        } else {
+            (self.unit[0] * self.g).norm() * self.omega * self.omega
+        }
+    }
+
+    /// Force of the base on the primary mass.
+    pub(super) fn force(&self, phase: f64) -> f64 {
+        let amplitude = self.free.base_force(self.omega) * (self.epsilon * self.g);
+        (amplitude * Complex::from_polar(1.0, phase)).im
+    }
+
+    /// Harmonic response (q, q') at a phase of the base.
+    pub(super) fn harmonic(&self, phase: f64) -> Vector2<f64> {
+        let z = self.turned(self.unit[0] * self.g, phase);
+        Vector2::new(z.im, self.omega * z.re)
+    }
+
+    pub(super) fn by_phase(&self, phase: f64) -> Vector2<f64> {
+        let z = self.turned(self.unit[0] * self.g, phase);
+        Vector2::new(z.re, -self.omega * z.im)
+    }
+
+    pub(super) fn by_omega(&self, phase: f64) -> Vector2<f64> {
+        let z = self.turned(self.unit[0] * self.g, phase);
+        let slope = self.turned(self.unit[1] * self.g, phase);
+        Vector2::new(slope.im, z.re + self.omega * slope.re)
+    }
+
+    pub(super) fn by_g(&self, phase: f64) -> Vector2<f64> {
+        let z = self.turned(self.unit[0], phase);
+        Vector2::new(z.im, self.omega * z.re)
+    }
+
+    /// Without excitation the response is zero, even at an undamped resonance.
+    fn turned(&self, z: Complex<f64>, phase: f64) -> Complex<f64> {
+        if z.is_nan() && self.g == 0.0 {
+            return Complex::new(0.0, 0.0);
+        }
+        z * Complex::from_polar(1.0, phase)
+    }
 }
 
 #[cfg(test)]

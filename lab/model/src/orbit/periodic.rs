@@ -1,12 +1,394 @@
-//! A periodic motion of any pattern, its stability, and the Newton iteration that finds it.
+//! Periodic motions of any pattern of impacts: the equations that close and select them, Newton's method, stability, and the motion near a
+//! simulated state (docs/theory.md, eq. 26).
 
-use nalgebra::{Complex, Matrix4, Matrix6, SVector, Vector4};
+use std::f64::consts::{PI, TAU};
+
+use lovines::{InvalidValue, State};
+use nalgebra::{Complex, Matrix4, Matrix6, RowSVector, SVector, Vector4};
 use serde::Serialize;
 
-use super::condition::{Condition, Row};
-use super::pattern::{ImpactPattern, Returned, Unknowns, follow, wrapped};
-use super::{bounce::Bounce, impact_map::ImpactMap};
-use crate::Dimensionless;
+use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll, Step};
+use crate::{Definition, Dimensionless, Resonance, Sensor};
+
+/// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ImpactPattern {
+    /// Walls hit, one after another, over the map; the first is the one the motion starts from.
+    pub walls: Vec<f64>,
+    /// Half periods of the base over the map: even, except for a mirrored pattern, where it is odd.
+    pub half_periods: u32,
+    /// Minus itself after those half periods.
+    pub mirrored: bool,
+}
+
+impl ImpactPattern {
+    /// Two impacts per period, half a period apart: symmetric 1:1.
+    pub fn symmetric() -> Self {
+        Self { walls: vec![1.0], half_periods: 1, mirrored: true }
+    }
+
+    /// Two impacts per period, half a period apart.
+    pub fn is_symmetric(&self) -> bool {
+        self.mirrored && self.is_one_to_one()
+    }
+
+    /// Two impacts per period.
+    pub fn is_one_to_one(&self) -> bool {
+        self.periods() == 1 && self.impacts() == 2
+    }
+
+    /// As in a table.
+    pub fn name(&self) -> String {
+        let (impacts, periods) = (self.impacts(), self.periods());
+        match (impacts, periods) {
+            (2, 1) if self.mirrored => "symmetric 1:1".into(),
+            (2, 1) => "asymmetric 1:1".into(),
+            _ => {
+                let plural = |count: usize| if count == 1 { "" } else { "s" };
+                let mirrored = if self.mirrored { ", mirrored" } else { "" };
+                let (s, t) = (plural(impacts), plural(periods as usize));
+                format!("{impacts} impact{s} in {periods} period{t}{mirrored}")
+            }
+        }
+    }
+
+    /// The same pattern over a whole period, as after symmetry breaking.
+    pub fn doubled(&self) -> Self {
+        let mut walls = self.walls.clone();
+        if self.mirrored {
+            walls.extend(self.walls.iter().map(|wall| -wall));
+        } else {
+            walls.extend(&self.walls);
+        }
+        Self { walls, half_periods: 2 * self.half_periods, mirrored: false }
+    }
+
+    /// The pattern of half the length that this one doubles; None if it does not repeat itself or its mirror image.
+    pub fn halved(&self) -> Option<Self> {
+        let count = self.walls.len() / 2;
+        let (walls, rest) = self.walls.split_at(count);
+        let half = Self {
+            walls: walls.into(),
+            half_periods: self.half_periods / 2,
+            mirrored: !self.half_periods.is_multiple_of(4),
+        };
+        let same = walls.iter().zip(rest).all(|(one, other)| half.sign() * one == *other);
+        (!self.mirrored && self.walls.len().is_multiple_of(2) && count > 0 && same).then_some(half)
+    }
+
+    /// Impacts over the whole period of the motion.
+    pub fn impacts(&self) -> usize {
+        self.walls.len() * if self.mirrored { 2 } else { 1 }
+    }
+
+    /// Periods of the base over the whole period of the motion.
+    pub fn periods(&self) -> u32 {
+        if self.mirrored {
+            self.half_periods
+        } else {
+            self.half_periods / 2
+        }
+    }
+
+    pub(super) fn sign(&self) -> f64 {
+        if self.mirrored { -1.0 } else { 1.0 }
+    }
+
+    pub(super) fn turn(&self) -> f64 {
+        f64::from(self.half_periods) * PI
+    }
+}
+
+/// Unknowns of a periodic motion: (phase, q1, q1', q2') after its first impact, sigma, G.
+pub type Unknowns = nalgebra::SVector<f64, 6>;
+
+/// The return map of a pattern from one start.
+#[derive(Debug, Clone)]
+pub(super) struct Returned {
+    /// Closing error of the motion.
+    pub residual: Vector4<f64>,
+    /// Derivative of the residual by the unknowns.
+    pub by: ByAll,
+    /// First harmonic of the response relative to the reference: `Im(S exp(i phase))`.
+    pub s: Complex<f64>,
+    /// Derivative of S by the unknowns, real and imaginary part.
+    pub s_by: [RowByAll; 2],
+    /// The bounces over the map, with the start and without the return.
+    pub bounces: Vec<Bounce>,
+    /// Time of flight after each.
+    pub durations: Vec<f64>,
+    /// Derivative of the return map by the state: its eigenvalues are the multipliers.
+    pub monodromy: Matrix4<f64>,
+}
+
+/// Follows the pattern from the unknowns `x`; None if the impacts have another pattern or graze.
+pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Returned> {
+    let (sigma, g) = (x[4], x[5]);
+    let omega = 1.0 + scene.epsilon * sigma;
+    if !(omega > 0.0 && omega.is_finite() && g.is_finite()) {
+        return None;
+    }
+    let map = ImpactMap::new(scene, omega, g);
+    let start = Bounce::from_vector(&x.fixed_rows::<4>(0).into(), pattern.walls[0]);
+    let mut at = start;
+    let mut by = ByAll::identity();
+    let mut sum = Complex::new(0.0, 0.0);
+    let mut sum_by = [RowByAll::zeros(); 2];
+    let (mut bounces, mut durations) = (Vec::new(), Vec::new());
+    for n in 0..pattern.walls.len() {
+        let step = map.step(&at)?;
+        let wall = match pattern.walls.get(n + 1) {
+            Some(wall) => *wall,
+            None => pattern.sign() * pattern.walls[0],
+        };
+        if step.next.wall != wall {
+            return None;
+        }
+        bounces.push(at);
+        durations.push(step.duration);
+        let impulse_by;
+        (by, impulse_by) = chained(&step, &by);
+        at = step.next;
+        let phasor = Complex::from_polar(1.0, -at.phase);
+        sum += phasor * step.impulse;
+        let phase_by = by.row(0) * -step.impulse;
+        sum_by[0] += impulse_by * phasor.re - phase_by * phasor.im;
+        sum_by[1] += impulse_by * phasor.im + phase_by * phasor.re;
+    }
+
+    let residual = start.apart(&at, pattern.turn(), pattern.sign());
+    by.fixed_rows_mut::<3>(1).scale_mut(pattern.sign());
+    let monodromy: Matrix4<f64> = by.fixed_columns::<4>(0).into();
+    by.fixed_columns_mut::<4>(0)
+        .copy_from(&(monodromy - Matrix4::identity()));
+    by.column_mut(4).scale_mut(scene.epsilon);
+
+    let harmonic = Harmonic::new(scene, &map, pattern);
+    let (s, s_by) = harmonic.of(g, sum, &sum_by, scene.epsilon);
+    Some(Returned { residual, by, s, s_by, bounces, durations, monodromy })
+}
+
+/// The chain rule: derivatives of a step by the unknowns. The step itself also depends on Omega and G.
+fn chained(step: &Step, by: &ByAll) -> (ByAll, RowByAll) {
+    let state: Matrix4<f64> = step.by.fixed_columns::<4>(0).into();
+    let mut all = state * by;
+    let mut impulse_by = step.impulse_by.fixed_columns::<4>(0) * by;
+    for column in 4..6 {
+        all.set_column(column, &(all.column(column) + step.by.column(column)));
+        impulse_by[column] += step.impulse_by[column];
+    }
+    (all, impulse_by)
+}
+
+/// `S = direct G + impulses sum`: the base through the oscillator, and the impulses through the oscillator and, for v, the particle.
+struct Harmonic {
+    direct: [Complex<f64>; 2],
+    impulses: [Complex<f64>; 2],
+}
+
+impl Harmonic {
+    /// Each coefficient with its derivative by Omega.
+    fn new(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern) -> Self {
+        let omega = map.oscillator.omega;
+        let zeta = scene.epsilon * scene.lambda / 2.0;
+        let compliance = map.oscillator.free.compliance(omega);
+        let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * zeta);
+        let force = map.oscillator.free.base_force(omega);
+        let direct = force * compliance * scene.epsilon;
+        let direct_by = (Complex::new(0.0, 2.0 * zeta) * compliance + force * compliance_by) * scene.epsilon;
+        // (2i/duration) times the response to a force through the oscillator, less that of a free mass: the impulse on the
+        // particle is the opposite one.
+        let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
+        let Definition { sensor, reference, .. } = scene.definition;
+        let particle = f64::from(u8::from(sensor == Sensor::V));
+        let inner = compliance + particle / (omega * omega);
+        let inner_by = compliance_by - 2.0 * particle / omega.powi(3);
+        // The factor of the sensor, seen from the reference, and its logarithmic derivative.
+        let damping = scene.epsilon * scene.lambda;
+        let (factor, slope) = if sensor == Sensor::Acceleration {
+            (omega * omega, 2.0 / omega)
+        } else {
+            (1.0, 0.0)
+        };
+        let seen = Complex::from_polar(factor, -reference.phase(damping, omega));
+        let seen_by = Complex::new(slope, -reference.phase_slope(damping, omega));
+        let read = |[z, by]: [Complex<f64>; 2]| [z * seen, (by + z * seen_by) * seen];
+        Self {
+            direct: read([direct, direct_by]),
+            impulses: read([weight * inner, weight * inner_by + weight / omega * inner]),
+        }
+    }
+
+    fn of(&self, g: f64, sum: Complex<f64>, sum_by: &[RowByAll; 2], epsilon: f64) -> (Complex<f64>, [RowByAll; 2]) {
+        let zero_if_undriven = |z: Complex<f64>| {
+            if g == 0.0 && z.is_nan() {
+                Complex::new(0.0, 0.0)
+            } else {
+                z
+            }
+        };
+        let s = zero_if_undriven(self.direct[0] * g) + self.impulses[0] * sum;
+        let a = self.impulses[0];
+        let mut by = [sum_by[0] * a.re - sum_by[1] * a.im, sum_by[0] * a.im + sum_by[1] * a.re];
+        let own = [
+            zero_if_undriven(self.direct[1] * g) + self.impulses[1] * sum,
+            self.direct[0],
+        ];
+        for (column, own) in [4, 5].into_iter().zip(own) {
+            by[0][column] += own.re;
+            by[1][column] += own.im;
+        }
+        for row in &mut by {
+            row[4] *= epsilon;
+        }
+        (s, by)
+    }
+}
+
+/// A phase in (-pi, pi].
+pub(super) fn wrapped(phase: f64) -> f64 {
+    phase - TAU * (phase / TAU).round()
+}
+
+/// An equation that selects a motion, in addition to the four that close it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Condition {
+    /// sigma has this value.
+    Sigma(f64),
+    /// G has this value.
+    Excitation(f64),
+    /// The first harmonic of the response lags (or leads) the reference by a quarter of a period.
+    PhaseResonance,
+    /// The amplitude of the first harmonic of the response is extreme along the frequency response.
+    Peak,
+    /// A multiplier, or a pair of them, is on the unit circle.
+    Bifurcation(Bifurcation),
+}
+
+/// How stability changes at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Bifurcation {
+    /// A multiplier passes +1: the frequency response turns back.
+    #[serde(rename = "fold")]
+    Fold,
+    /// The half-period map of a mirrored motion has a multiplier passing -1: it loses its symmetry.
+    #[serde(rename = "symmetry breaking")]
+    SymmetryBreaking,
+    /// A multiplier of the whole period passes -1.
+    #[serde(rename = "period doubling")]
+    PeriodDoubling,
+    /// A complex pair leaves the unit circle (Neimark-Sacker): modulation begins.
+    #[serde(rename = "torus")]
+    Torus,
+}
+
+/// The value of an equation and its derivative by the unknowns.
+pub(super) type Row = (f64, RowSVector<f64, 6>);
+
+/// Step of the central differences for conditions on second derivatives of the map. It affects how fast Newton's method converges, not where to.
+const STEP: f64 = 1e-6;
+
+impl Bifurcation {
+    /// As in a table.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Bifurcation::Fold => "fold",
+            Bifurcation::SymmetryBreaking => "symmetry breaking",
+            Bifurcation::PeriodDoubling => "period doubling",
+            Bifurcation::Torus => "Neimark-Sacker",
+        }
+    }
+
+    /// The one at which a multiplier of a pattern's map is -1.
+    pub(super) fn flip(pattern: &ImpactPattern) -> Self {
+        if pattern.mirrored {
+            Bifurcation::SymmetryBreaking
+        } else {
+            Bifurcation::PeriodDoubling
+        }
+    }
+
+    /// Zero where the multipliers of a map are on the unit circle as the bifurcation says, and smooth also where multipliers meet.
+    pub(super) fn test(self, map: &Matrix4<f64>) -> f64 {
+        match self {
+            Bifurcation::Fold => (map - Matrix4::identity()).determinant(),
+            Bifurcation::SymmetryBreaking | Bifurcation::PeriodDoubling => (map + Matrix4::identity()).determinant(),
+            // The products of two multipliers are the eigenvalues of the second compound matrix.
+            Bifurcation::Torus => {
+                let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+                let minor = |(a, b): (usize, usize), (c, d): (usize, usize)| {
+                    map[(a, c)] * map[(b, d)] - map[(a, d)] * map[(b, c)]
+                };
+                let compound = Matrix6::from_fn(|row, column| minor(pairs[row], pairs[column]));
+                (compound - Matrix6::identity()).determinant()
+            }
+        }
+    }
+}
+
+impl Condition {
+    /// What selects the backbone by the scene's definition.
+    pub fn backbone(scene: &Dimensionless) -> Self {
+        match scene.definition.resonance {
+            Resonance::Phase => Condition::PhaseResonance,
+            Resonance::Peak => Condition::Peak,
+        }
+    }
+
+    pub(super) fn value(
+        &self,
+        scene: &Dimensionless,
+        pattern: &ImpactPattern,
+        x: &Unknowns,
+        returned: &Returned,
+    ) -> Row {
+        let mut row = RowSVector::<f64, 6>::zeros();
+        match *self {
+            Condition::Sigma(sigma) => {
+                row[4] = 1.0;
+                (x[4] - sigma, row)
+            }
+            Condition::Excitation(g) => {
+                row[5] = 1.0;
+                (x[5] - g, row)
+            }
+            Condition::PhaseResonance => (returned.s.re, returned.s_by[0]),
+            Condition::Peak => by_differences(scene, pattern, x, returned, slope_of_amplitude),
+            Condition::Bifurcation(kind) => by_differences(scene, pattern, x, returned, |at| kind.test(&at.monodromy)),
+        }
+    }
+}
+
+/// The value of `f` and its derivative by central differences; NaN where the pattern ends.
+fn by_differences(
+    scene: &Dimensionless,
+    pattern: &ImpactPattern,
+    x: &Unknowns,
+    returned: &Returned,
+    f: impl Fn(&Returned) -> f64,
+) -> Row {
+    let at = |n: usize, step: f64| {
+        let mut moved = *x;
+        moved[n] += step;
+        follow(scene, pattern, &moved).map_or(f64::NAN, |returned| f(&returned))
+    };
+    let slope = |n: usize| (at(n, STEP) - at(n, -STEP)) / (2.0 * STEP);
+    (f(returned), RowSVector::from_fn(|_, n| slope(n)))
+}
+
+/// The change of half the square of the amplitude along a direction that closes the motion at constant G, by phase, q1, q1', q2' and
+/// sigma. The direction's components are the minors of the closing equations, so that it has no sign to choose.
+fn slope_of_amplitude(returned: &Returned) -> f64 {
+    let by_sigma = returned.by.fixed_columns::<5>(0);
+    (0..5)
+        .map(|n| {
+            let minor: Matrix4<f64> = by_sigma.remove_fixed_columns::<1>(n);
+            let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
+            let change = returned.s.re * returned.s_by[0][n] + returned.s.im * returned.s_by[1][n];
+            sign * minor.determinant() * change
+        })
+        .sum()
+}
 
 /// An exact periodic motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -215,4 +597,82 @@ pub(super) fn newton(
         last = size;
     }
     None
+}
+
+/// States after one repetition that are closer than this belong to a motion that settles, if there is a stable one near.
+const NEAR: f64 = 1e-2;
+/// The same for an exact motion.
+const EXACT: f64 = 1e-8;
+/// Patterns that are tried, from the shortest: after a period doubling, only the second is stable.
+const MULTIPLES: usize = 3;
+/// Longest pattern in the search, impacts.
+pub(super) const LONGEST: usize = 48;
+
+/// The stable periodic motion that `start` = (q1, q1', q2, q2') leads to after `periods` at the detuning `sigma` and
+/// the scene's G; None without a repeating pattern, without impacts, or if the particle sticks.
+pub fn settle(
+    scene: &Dimensionless,
+    sigma: f64,
+    start: [f64; 4],
+    periods: usize,
+) -> Result<Option<Periodic>, InvalidValue> {
+    let mut plant = scene.plant(start)?;
+    let drive = scene.drive(sigma);
+    for _ in 0..periods {
+        plant.advance(drive, TAU / drive.omega)?;
+    }
+    let State { q1, dq1, q2, dq2 } = plant.state();
+    Ok(periodic_near(scene, sigma, 0.0, [q1, dq1, q2, dq2]).filter(|motion| motion.stable))
+}
+
+/// The periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at a phase of the base, rad; a
+/// stable one rather than an unstable one.
+pub fn periodic_near(scene: &Dimensionless, sigma: f64, phase: f64, state: [f64; 4]) -> Option<Periodic> {
+    let map = ImpactMap::new(scene, 1.0 + scene.epsilon * sigma, scene.g);
+    let first = map.first(phase, state)?;
+    let Bounce { phase, q1, dq1, dq2, .. } = first;
+    let guess = Unknowns::from([phase, q1, dq1, dq2, sigma, scene.g]);
+    let conditions = [Condition::Sigma(sigma), Condition::Excitation(scene.g)];
+    let mut unstable = None;
+    let found = patterns(&map, first, NEAR).take(MULTIPLES).find_map(|pattern| {
+        let found = Periodic::find(scene, &pattern, &guess, conditions)?;
+        let close = (found.unknowns() - guess).norm() < 10.0 * NEAR;
+        if close && !found.stable {
+            unstable.get_or_insert(found);
+            return None;
+        }
+        close.then_some(found)
+    });
+    let Some(found) = found else {
+        return unstable;
+    };
+    // The pattern may be a multiple of that of the motion: near a period doubling the motion settles slowly, in alternation.
+    let shortest = patterns(&map, found.bounces[0], EXACT)
+        .take_while(|one| one.walls.len() < found.bounces.len())
+        .next();
+    match shortest {
+        Some(pattern) => Periodic::find(scene, &pattern, &found.unknowns(), conditions),
+        None => Some(found),
+    }
+}
+
+/// The patterns that the bounces from `first` on repeat, from the shortest.
+fn patterns(map: &ImpactMap, first: Bounce, tolerance: f64) -> impl Iterator<Item = ImpactPattern> {
+    let half = std::f64::consts::PI;
+    let mut walls = vec![first.wall];
+    let following = std::iter::successors(map.next(&first), |from| map.next(from));
+    following.take(LONGEST).filter_map(move |then| {
+        let half_periods = ((then.phase - first.phase) / half).round();
+        let mirrored = half_periods % 2.0 == 1.0;
+        let sign = if mirrored { -1.0 } else { 1.0 };
+        let apart = first.apart(&then, half_periods * half, sign);
+        let same = half_periods > 0.0 && sign * then.wall == first.wall && apart.amax() < tolerance;
+        let pattern = same.then(|| ImpactPattern {
+            walls: walls.clone(),
+            half_periods: half_periods as u32,
+            mirrored,
+        });
+        walls.push(then.wall);
+        pattern
+    })
 }

@@ -1,10 +1,12 @@
-//! The free decay along the manifold, in closed form (docs/theory.md, eqs. 20 and 21).
+//! The free decay along the manifold in closed form (docs/theory.md, eq. 20), and the first-order motion in physical time: a sine for
+//! v, and a sine with a triangle wave for w (eq. 22).
 
-use std::f64::consts::{FRAC_2_PI, PI};
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
 
 use serde::Serialize;
 
 use super::slow_flow::SlowFlow;
+use crate::Dimensionless;
 use crate::numerics::{bisection, equally_spaced};
 
 /// One point of the free decay.
@@ -31,15 +33,6 @@ pub struct Decay {
     flow: SlowFlow,
     start: f64,
 }
-
-/// Nodes and weights of Gauss' rule of three points on [-1, 1].
-const GAUSS: [(f64, f64); 3] = [
-    (-0.774_596_669_241_483_4, 5.0 / 9.0),
-    (0.0, 8.0 / 9.0),
-    (0.774_596_669_241_483_4, 5.0 / 9.0),
-];
-/// Panels of that rule over a decay.
-const PANELS: u32 = 64;
 
 impl SlowFlow {
     /// The free decay from the particle speed `b`; None left of the fold, or without dissipation.
@@ -78,24 +71,6 @@ impl Decay {
             .collect()
     }
 
-    /// Phase, rad, by which v leads `omega0 t` when the particle speed has fallen to `b`: the integral of sigma
-    /// over tau1 (docs/theory.md, eq. 21), by Gauss' rule on panels; its integrand is smooth.
-    pub fn turned(&self, b: f64) -> f64 {
-        let curvature = self.flow.manifold.curvature();
-        let integrand = |b: f64| self.flow.free_detuning(b) * (2.0 * curvature * b - PI) / self.flow.loss(b);
-        let width = (self.start - b) / f64::from(PANELS);
-        (0..PANELS)
-            .map(|n| b + (f64::from(n) + 0.5) * width)
-            .flat_map(|middle| GAUSS.map(|(x, weight)| weight * integrand(middle + 0.5 * x * width)))
-            .sum::<f64>()
-            * 0.5
-            * width
-    }
-
-    pub(super) fn flow(&self) -> &SlowFlow {
-        &self.flow
-    }
-
     fn point(&self, tau1: f64, b: f64) -> DecayPoint {
         DecayPoint {
             tau1,
@@ -120,4 +95,66 @@ impl Decay {
         let rest = if r > 0.0 { 8.0 * r / a * arc } else { 0.0 };
         k / a * self.flow.loss(b).ln() + rest
     }
+}
+
+/// A motion of the 1:1 regime at one instant of its slow time; displacements in m (docs/theory.md, eq. 22).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Waveform {
+    /// Amplitude of v, m.
+    pub amplitude: f64,
+    /// Particle speed over the angular frequency, m: the triangle wave has the height pi/2 times this.
+    pub triangle: f64,
+    /// Angular frequency, rad/s.
+    pub omega: f64,
+    /// Phase of v at t = 0, rad.
+    pub gamma: f64,
+    /// Phase of the triangle wave at t = 0, rad.
+    pub psi: f64,
+    epsilon: f64,
+}
+
+impl Waveform {
+    /// The motion at the particle speed `b` on the manifold, the detuning `sigma` and the phase `gamma`, rad; time counts from
+    /// a passage of the base through zero, upwards.
+    pub fn new(scene: &Dimensionless, sigma: f64, b: f64, gamma: f64) -> Self {
+        let flow = SlowFlow::new(scene.lambda, scene.r);
+        Self {
+            amplitude: scene.b * flow.manifold.c(b),
+            triangle: scene.b * b,
+            omega: scene.omega(sigma),
+            gamma,
+            psi: flow.psi(b, gamma),
+            epsilon: scene.epsilon,
+        }
+    }
+
+    /// `v = q1 + epsilon q2`, m, at the time `t`, s.
+    pub fn v(&self, t: f64) -> f64 {
+        self.amplitude * (self.omega * t + self.gamma).sin()
+    }
+
+    /// `w = q1 - q2`, m, at the time `t`, s.
+    pub fn w(&self, t: f64) -> f64 {
+        self.v(t) + self.triangle * triangle_wave(self.omega * t + self.psi)
+    }
+
+    /// Displacement of the primary mass, m: `(v + epsilon w)/(1 + epsilon)`.
+    pub fn q1(&self, t: f64) -> f64 {
+        (self.v(t) + self.epsilon * self.w(t)) / (1.0 + self.epsilon)
+    }
+
+    /// Displacement of the particle, m: `(v - w)/(1 + epsilon)`.
+    pub fn q2(&self, t: f64) -> f64 {
+        (self.v(t) - self.w(t)) / (1.0 + self.epsilon)
+    }
+
+    /// The first impact on the wall w = +b at or after t = 0, s.
+    pub fn impact_time(&self) -> f64 {
+        (FRAC_PI_2 - self.psi).rem_euclid(std::f64::consts::TAU) / self.omega
+    }
+}
+
+/// The triangle wave Pi: slope ±1, height pi/2, zero and rising at 0.
+pub fn triangle_wave(phase: f64) -> f64 {
+    phase.sin().asin()
 }

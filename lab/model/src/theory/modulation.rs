@@ -2,13 +2,29 @@
 //!
 //! Between impacts B and psi are constant, and `Z = C exp(i gamma)` obeys a linear equation, so the sequence has a closed form except for
 //! the times of the impacts. It shows the fast approach to the manifold and the end of the slow flow.
+//!
+//! The end of this file has amplitudes that drift along the manifold: how far a slowly changing motion differs from the steady one of the same
+//! amplitude.
+//!
+//! While C changes by `d = pi dC/dtau` from impact to impact, B and the phase x of v at an impact
+//! follow late:
+//!
+//! ```text
+//! B+ = r B- + (1 + r) (C cos x + (d/pi) sin x),      2 - C sin x - B+ (x+ + pi - x) - (C + d) sin x+ = 0
+//! ```
+//!
+//! Steady drift, `B+ - B- = d dB/dC` and `x+ - x = d dx/dC`, makes this two linear equations for the deviations of B and x. The mean of the
+//! particle's force on v over the flight gives the change of sigma per unit of `C' = dC/dtau`. Over many flights it differs from that of
+//! one flight, because the force grows within a flight: by `m d(R B^2/C)/dC / C` in sigma and by `-2 m d(B sin x)/dC` in the drive, with the
+//! mean `m = pi/2 - 4/pi` of `s^2 cos s` over half a period. Three terms of the same order follow from the oscillator: `lambda C'/(2C)`, `lambda C'/C`
+//! and `-C' G_R'(C)/(4C)`. The map of the impacts, iterated at a constant rate, confirms all of this (tests/unit/modulation.rs).
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI, TAU};
 
 use nalgebra::Complex;
 use serde::Serialize;
 
-use super::slow_flow::SlowFlow;
+use super::slow_flow::{BranchSide, SlowFlow};
 use crate::numerics::bisection;
 
 /// Amplitudes and phases just after an impact; on or off the manifold.
@@ -167,3 +183,70 @@ impl Iterator for ImpactSequence {
         Some(Modulation { tau: phase / self.omega, c: z.norm(), gamma: z.arg(), b, psi })
     }
 }
+
+/// Change of detuning and drive by a drift of the amplitude, per unit of `dC/dtau`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drift {
+    /// Of the detuning of phase resonance.
+    pub sigma: f64,
+    /// Of the drive of phase resonance G, beyond the drive that changes the amplitude.
+    pub g: f64,
+}
+
+impl SlowFlow {
+    /// The effect of a slow drift at the amplitude `c` on the right branch. `None` at the fold and below.
+    pub fn drift(&self, c: f64) -> Option<Drift> {
+        let b = self.manifold.b(c, BranchSide::Right)?;
+        let rate = 1e-6 * c;
+        let [up, down] = [rate, -rate].map(|rate| self.flight(c, b, rate));
+        let slope = |i: usize| (up[i] - down[i]) / (2.0 * rate);
+        let step = 1e-3 * c;
+        let beside = self.backbone_at(self.manifold.b(c + step, BranchSide::Right)?);
+        let here = self.backbone_at(b);
+        let by_drive = (beside.g - here.g) / step;
+        let turned = (beside.sigma * (c + step) - here.sigma * c) / step;
+        // The mean over a flight, in which the particle's force grows, is not that over many flights: the difference has the mean of
+        // s² cos s over half a period.
+        let grown = FRAC_PI_2 - 4.0 / PI;
+        let drift = Drift {
+            // The damper acts on the velocity, which a change of C shifts in phase; at phase resonance the damper's force
+            // on the base leads it by 2 zeta; and the losses change with C.
+            sigma: slope(0) + (0.25 * PI * grown * (by_drive - self.lambda) + 1.5 * self.lambda - 0.25 * by_drive) / c,
+            // The last part is the work that a change of the frequency needs at a constant amplitude.
+            g: slope(1) - PI * grown * turned + (turned - here.sigma),
+        };
+        (drift.sigma.is_finite() && drift.g.is_finite()).then_some(drift)
+    }
+
+    /// Detuning and drive of phase resonance by the flight in the middle of which the amplitude is `c` and changes at `rate`.
+    fn flight(&self, c: f64, b: f64, rate: f64) -> [f64; 2] {
+        let (change, r) = (PI * rate, self.manifold.dissipation);
+        let c = c - 0.5 * change;
+        let slope = 2.0 * c * self.manifold.slope(b);
+        let b = b - 0.5 * change * slope;
+        let (cos, sin) = (r * b, 1.0 - FRAC_PI_2 * b);
+        // x = atan2(C sin x, C cos x) on the manifold.
+        let b_step = change * slope;
+        let x_step = -(FRAC_PI_2 * cos + r * sin) * b_step / (c * c);
+        let x = sin.atan2(cos);
+        let restitution = (1.0 - r) / (1.0 + r);
+        // (1 - r) beta + (1 + r) C sin x xi = first,  pi beta + 2 C cos x xi = second.
+        let first = (1.0 + restitution) * rate * x.sin() - b_step;
+        let second = -PI * b_step - (b + cos) * x_step - change * x.sin();
+        let (a11, a12, a21, a22) = (1.0 - restitution, (1.0 + restitution) * sin, PI, 2.0 * cos);
+        let determinant = a11 * a22 - a12 * a21;
+        let beta = (first * a22 - a12 * second) / determinant;
+        let xi = (a11 * second - a21 * first) / determinant;
+        let (x, speed) = (x + xi, b + beta + b_step);
+        let (begin, length) = (1.0 - c * x.sin(), PI + x_step);
+        let (end, after) = (begin - speed * length, x + length);
+        let by_sin = begin * x.cos() - end * after.cos() - speed * (after.sin() - x.sin());
+        let by_cos = end * after.sin() - begin * x.sin() - speed * (after.cos() - x.cos());
+        let middle = c + 0.5 * change;
+        [by_sin / (length * middle), self.lambda * middle + 2.0 * by_cos / length]
+    }
+}
+
+#[cfg(test)]
+#[path = "../../tests/unit/modulation.rs"]
+mod tests;

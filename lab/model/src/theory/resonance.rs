@@ -1,13 +1,13 @@
 //! Resonance by the scene's definition: the first-order motion read by a sensor, its phase relative to a reference, or its peak.
 //!
 //! Sensor and reference change phase and amplitude by terms of first order in epsilon, which is also the order of the theory's own error
-//! (`vines orbit --definitions`).
+//! (validation/convergence.csv).
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 use nalgebra::Complex;
 
-use super::{backbone::BackbonePoint, manifold::BranchSide, slow_flow::SlowFlow};
+use super::slow_flow::{BackbonePoint, BranchSide, SlowFlow};
 use crate::numerics::equally_spaced;
 use crate::{Dimensionless, Resonance, Sensor};
 

@@ -1,8 +1,87 @@
-//! The slow flow on the manifold (docs/theory.md, eq. 11).
+//! The slow invariant manifold, the slow flow on it with all its equilibria, and the stability of its motions (docs/theory.md, eqs. 4 to 18).
+//!
+//! The two detunings at which a particle speed B occurs have a closed form, so B parametrises each frequency response. Its turning points are
+//! the points of the backbone, where `loss = G C`.
 
-use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI, TAU};
 
-use super::manifold::Manifold;
+use serde::Serialize;
+
+use crate::numerics::{bisection, equally_spaced};
+
+/// The manifold `C^2 = R^2 B^2 + (1 - pi B/2)^2` with `R = (1 - r)/(1 + r)` (eq. 4).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Manifold {
+    /// `R = (1 - r)/(1 + r)`: 0 for elastic impacts.
+    pub dissipation: f64,
+}
+
+/// Which side of the fold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BranchSide {
+    /// `B < Bmin`: always unstable.
+    Left,
+    /// `B >= Bmin`.
+    Right,
+}
+
+impl Manifold {
+    /// The manifold for the restitution coefficient `r`, in (0, 1].
+    pub fn new(r: f64) -> Self {
+        Self { dissipation: (1.0 - r) / (1.0 + r) }
+    }
+
+    /// `R^2 + pi^2/4`: the coefficient of B^2.
+    pub(super) fn curvature(&self) -> f64 {
+        self.dissipation * self.dissipation + FRAC_PI_2 * FRAC_PI_2
+    }
+
+    /// Particle speed at the fold, `Bmin = (pi/2)/(R^2 + pi^2/4)` (eq. 5).
+    pub fn b_min(&self) -> f64 {
+        FRAC_PI_2 / self.curvature()
+    }
+
+    /// Smallest amplitude, at the fold: `Cmin = R/sqrt(R^2 + pi^2/4)` (eq. 5).
+    pub fn c_min(&self) -> f64 {
+        self.dissipation / self.curvature().sqrt()
+    }
+
+    /// Amplitude C at the particle speed `b`.
+    pub fn c(&self, b: f64) -> f64 {
+        (self.dissipation * b).hypot(1.0 - FRAC_PI_2 * b)
+    }
+
+    /// Particle speed `B = Bmin ± sqrt((2/pi) Bmin (C^2 - Cmin^2))` on a branch; None below the fold, and where B < 0.
+    ///
+    /// Eq. 6; the published text prints pi/2 in that root, but 2/pi follows from the manifold.
+    pub fn b(&self, c: f64, side: BranchSide) -> Option<f64> {
+        let (b_min, c_min) = (self.b_min(), self.c_min());
+        if c.is_nan() || c < c_min {
+            return None;
+        }
+        let square = 2.0 / PI * b_min * (c - c_min) * (c + c_min);
+        let b = match side {
+            BranchSide::Left => b_min - square.sqrt(),
+            BranchSide::Right => b_min + square.sqrt(),
+        };
+        (b >= 0.0).then_some(b)
+    }
+
+    /// The branch on which `b` lies.
+    pub fn side(&self, b: f64) -> BranchSide {
+        if b < self.b_min() {
+            BranchSide::Left
+        } else {
+            BranchSide::Right
+        }
+    }
+
+    /// Slope `dB/d(C^2) = 1/(2 (R^2 + pi^2/4)(B - Bmin))`; infinite at the fold.
+    pub fn slope(&self, b: f64) -> f64 {
+        0.5 / (self.curvature() * (b - self.b_min()))
+    }
+}
 
 /// The slow flow in `tau1 = epsilon tau`, for given damping and restitution.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,13 +107,297 @@ impl SlowFlow {
     pub fn free_detuning(&self, b: f64) -> f64 {
         FRAC_2_PI * b * (1.0 - FRAC_PI_2 * b) / self.manifold.c(b).powi(2)
     }
+}
 
-    /// `(D1 C~, D1 gamma)` at the particle speed `b` and the phase `gamma`, rad (eq. 11).
-    pub fn rates(&self, g: f64, sigma: f64, b: f64, gamma: f64) -> [f64; 2] {
+/// Above this particle speed, `2 pi/(pi^2 - 4)`, the orbit loses its symmetry, whatever r (docs/theory.md, eq. 10).
+pub const B_SYMMETRY_BREAKING: f64 = 2.0 * PI / (PI * PI - 4.0);
+
+/// The impacts keep their symmetric 1:1 pattern: `Bmin < B < 2 pi/(pi^2 - 4)` (eq. 10).
+pub fn impacts_stable(manifold: &Manifold, b: f64) -> bool {
+    manifold.b_min() < b && b < B_SYMMETRY_BREAKING
+}
+
+/// A steady 1:1 motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Equilibrium {
+    /// Amplitude of v over b.
+    #[serde(rename = "C")]
+    pub c: f64,
+    /// Particle speed over `b omega0`.
+    #[serde(rename = "B")]
+    pub b: f64,
+    /// Phase of v relative to the base, rad.
+    pub gamma: f64,
+    /// Side of the fold.
+    pub branch: BranchSide,
+    /// The impact pattern is stable.
+    pub impacts_stable: bool,
+    /// Both eigenvalues of the slow flow have negative real parts.
+    pub slow_flow_stable: bool,
+}
+
+impl SlowFlow {
+    /// All equilibria at the excitation `g` and the detuning `sigma`, on both branches, by rising B.
+    ///
+    /// The squares of the two equilibrium conditions (eq. 12) add up to a quartic in B (eq. 14).
+    pub fn equilibria(&self, g: f64, sigma: f64) -> Vec<Equilibrium> {
+        self.equilibrium_speeds(g, Some(sigma))
+            .into_iter()
+            .map(|b| {
+                let sine = -self.loss(b);
+                let cosine = self.spring(sigma, b);
+                self.equilibrium(g, b, sine.atan2(cosine))
+            })
+            .collect()
+    }
+
+    /// `G C cos gamma = (4/pi) B (1 - pi B/2) - 2 sigma C^2` at an equilibrium.
+    pub(super) fn spring(&self, sigma: f64, b: f64) -> f64 {
+        2.0 * (self.free_detuning(b) - sigma) * self.manifold.c(b).powi(2)
+    }
+
+    pub(super) fn equilibrium(&self, g: f64, b: f64, gamma: f64) -> Equilibrium {
+        Equilibrium {
+            c: self.manifold.c(b),
+            b,
+            gamma,
+            branch: self.manifold.side(b),
+            impacts_stable: impacts_stable(&self.manifold, b),
+            slow_flow_stable: self.is_attracting(g, b, gamma),
+        }
+    }
+
+    /// Trace negative and determinant positive of the slow flow's Jacobian in (C~, gamma).
+    fn is_attracting(&self, g: f64, b: f64, gamma: f64) -> bool {
+        let r = self.manifold.dissipation;
         let c = self.manifold.c(b);
-        [
-            -self.loss(b) - g * c * gamma.sin(),
-            self.free_detuning(b) - g * gamma.cos() / (2.0 * c) - sigma,
-        ]
+        let slope = self.manifold.slope(b);
+        let (sine, cosine) = gamma.sin_cos();
+        let loss_slope = self.lambda + 4.0 * FRAC_2_PI * r * b * slope;
+        let free_slope = (FRAC_2_PI * (1.0 - 2.0 * FRAC_PI_2 * b) * slope - self.free_detuning(b)) / (c * c);
+        let jacobian = [
+            [-loss_slope - g * sine / (2.0 * c), -g * c * cosine],
+            [free_slope + g * cosine / (4.0 * c.powi(3)), g * sine / (2.0 * c)],
+        ];
+        let trace = jacobian[0][0] + jacobian[1][1];
+        let determinant = jacobian[0][0] * jacobian[1][1] - jacobian[0][1] * jacobian[1][0];
+        trace < 0.0 && determinant > 0.0
+    }
+
+    /// Particle speeds of all equilibria, ascending; without `sigma`, of those at phase resonance.
+    pub(super) fn equilibrium_speeds(&self, g: f64, sigma: Option<f64>) -> Vec<f64> {
+        let mut speeds = real_roots(&self.equilibrium_polynomial(g, sigma));
+        // Elastic impacts reach C = 0 at the fold: there everything squared vanishes, but nothing rests.
+        speeds.retain(|b| *b > 0.0 && self.manifold.c(*b) > 1e-6);
+        speeds
+    }
+
+    /// `loss^2 + spring^2 - G^2 C^2` in powers of B, ascending; without `sigma`, phase resonance: no spring term.
+    fn equilibrium_polynomial(&self, g: f64, sigma: Option<f64>) -> [f64; 5] {
+        // C^2 = 1 - pi B + (R^2 + pi^2/4) B^2
+        let square = [1.0, -2.0 * FRAC_PI_2, self.manifold.curvature()];
+        let mut loss = square.map(|one| self.lambda * one);
+        loss[2] += 2.0 * FRAC_2_PI * self.manifold.dissipation;
+        let spring = sigma.map_or([0.0; 3], |sigma| {
+            let free = [0.0, 2.0 * FRAC_2_PI, -2.0];
+            std::array::from_fn(|i| free[i] - 2.0 * sigma * square[i])
+        });
+        let mut sum = [0.0; 5];
+        for i in 0..3 {
+            for j in 0..3 {
+                sum[i + j] += loss[i] * loss[j] + spring[i] * spring[j];
+            }
+            sum[i] -= g * g * square[i];
+        }
+        sum
     }
 }
+
+/// One point of the backbone, with the excitation that it needs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BackbonePoint {
+    /// Amplitude of v over b.
+    #[serde(rename = "C")]
+    pub c: f64,
+    /// Particle speed over `b omega0`.
+    #[serde(rename = "B")]
+    pub b: f64,
+    /// Detuning sigma_R.
+    pub sigma: f64,
+    /// Base amplitude over `b epsilon` for phase resonance here: `lambda C + (4/pi) R B^2/C`.
+    #[serde(rename = "G")]
+    pub g: f64,
+    /// Side of the fold.
+    pub branch: BranchSide,
+    /// The impact pattern is stable: `Bmin < B < 2 pi/(pi^2 - 4)`.
+    pub impacts_stable: bool,
+    /// The slow flow is stable: `dG/dC > 0`.
+    pub slow_flow_stable: bool,
+}
+
+impl BackbonePoint {
+    /// Stable in both senses: a phase-locked loop can settle here.
+    pub fn stable(&self) -> bool {
+        self.impacts_stable && self.slow_flow_stable
+    }
+}
+
+impl SlowFlow {
+    /// The backbone point at the particle speed `b > 0`.
+    pub fn backbone_at(&self, b: f64) -> BackbonePoint {
+        let c = self.manifold.c(b);
+        BackbonePoint {
+            c,
+            b,
+            sigma: self.free_detuning(b),
+            g: self.loss(b) / c,
+            branch: self.manifold.side(b),
+            impacts_stable: impacts_stable(&self.manifold, b),
+            slow_flow_stable: self.excitation_slope(b) > 0.0,
+        }
+    }
+
+    /// Slope dG/dC of the excitation along the backbone (eq. 18).
+    pub fn excitation_slope(&self, b: f64) -> f64 {
+        let r = self.manifold.dissipation;
+        let c = self.manifold.c(b);
+        let through_b = 4.0 * b * self.manifold.slope(b) - (b / c).powi(2);
+        self.lambda + 2.0 * FRAC_2_PI * r * through_b
+    }
+
+    /// All phase-resonant solutions at the excitation `g`, on both branches, by increasing B.
+    ///
+    /// `(G C)^2 = (lambda C^2 + (4/pi) R B^2)^2` (eq. 17) is a quartic in B.
+    pub fn phase_resonant(&self, g: f64) -> Vec<BackbonePoint> {
+        self.equilibrium_speeds(g, None)
+            .into_iter()
+            .map(|b| self.backbone_at(b))
+            .collect()
+    }
+
+    /// `points` samples of the backbone at equal steps of B, from `from` to `to`.
+    pub fn backbone(&self, from: f64, to: f64, points: usize) -> Vec<BackbonePoint> {
+        equally_spaced(from, to, points).map(|b| self.backbone_at(b)).collect()
+    }
+}
+
+/// One point of a frequency response.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ResponsePoint {
+    /// Detuning.
+    pub sigma: f64,
+    /// The steady motion there.
+    #[serde(flatten)]
+    pub motion: Equilibrium,
+}
+
+impl SlowFlow {
+    /// The detunings at which the excitation `g` holds the particle speed `b`, and the phase of v there, rad:
+    /// `sigma = sigma_R ± sqrt(G^2 C^2 - loss^2)/(2 C^2)` (docs/theory.md, eq. 15); None if `g` is too small.
+    pub fn detunings(&self, g: f64, b: f64) -> Option<[(f64, f64); 2]> {
+        let c = self.manifold.c(b);
+        let loss = self.loss(b);
+        let square = (g * c - loss) * (g * c + loss);
+        (square >= 0.0).then(|| {
+            let spring = square.sqrt();
+            let shift = spring / (2.0 * c * c);
+            let free = self.free_detuning(b);
+            [
+                (free - shift, (-loss).atan2(spring)),
+                (free + shift, (-loss).atan2(-spring)),
+            ]
+        })
+    }
+
+    /// The frequency responses at the excitation `g`: closed curves over all B > 0, each of `points` points from its
+    /// smallest C on one side to its largest and back. A curve that reaches B = 0 starts there, at C = 1.
+    pub fn frequency_responses(&self, g: f64, points: usize) -> Vec<Vec<ResponsePoint>> {
+        let mut ends: Vec<f64> = self.equilibrium_speeds(g, None);
+        // At B = 0 the loss is lambda and C is 1.
+        if g > self.lambda {
+            ends.insert(0, 0.0);
+        }
+        ends.chunks_exact(2)
+            .map(|pair| self.loop_between(g, [pair[0], pair[1]], points))
+            .collect()
+    }
+
+    /// The loop of a response between the two speeds at which it turns.
+    fn loop_between(&self, g: f64, [low, high]: [f64; 2], points: usize) -> Vec<ResponsePoint> {
+        let steps = points.saturating_sub(1).max(1) as f64;
+        (0..points)
+            .filter_map(|n| {
+                let turn = TAU * n as f64 / steps;
+                let b = low + (high - low) * 0.5 * (1.0 - turn.cos());
+                let b = b.clamp(low, high).max(1e-9);
+                // Rounding may make the square root imaginary at the ends, which are phase-resonant.
+                let [left, right] = self
+                    .detunings(g, b)
+                    .unwrap_or_else(|| [(self.free_detuning(b), -PI / 2.0); 2]);
+                let (sigma, gamma) = if turn < PI { left } else { right };
+                let motion = self.equilibrium(g, b, gamma);
+                sigma.is_finite().then_some(ResponsePoint { sigma, motion })
+            })
+            .collect()
+    }
+}
+
+/// All real roots of a polynomial, ascending; coefficients by rising power. A double root counts once. Between two turning points there
+/// is at most one root, so the derivative brackets them all.
+fn real_roots(coefficients: &[f64]) -> Vec<f64> {
+    let Some(degree) = coefficients.iter().rposition(|one| *one != 0.0) else {
+        return Vec::new();
+    };
+    if degree == 0 {
+        return Vec::new();
+    }
+    let coefficients = &coefficients[..=degree];
+    let derivative: Vec<f64> = coefficients
+        .iter()
+        .enumerate()
+        .skip(1)
+        .map(|(power, one)| power as f64 * one)
+        .collect();
+    // Cauchy's bound: no root is larger.
+    let leading = coefficients[degree].abs();
+    let bound = 1.0 + coefficients.iter().fold(0f64, |most, one| most.max(one.abs())) / leading;
+
+    let mut ends = vec![-bound];
+    ends.extend(real_roots(&derivative));
+    ends.push(bound);
+    let mut roots: Vec<f64> = ends
+        .windows(2)
+        .filter_map(|pair| root_between(coefficients, pair[0], pair[1]))
+        .collect();
+    // A turning point that touches zero to within rounding.
+    let touches = |x: &f64| {
+        let size = coefficients
+            .iter()
+            .rev()
+            .fold(0.0, |sum, one| sum * x.abs() + one.abs());
+        value(coefficients, *x).abs() <= 8.0 * f64::EPSILON * size
+    };
+    roots.extend(ends[1..ends.len() - 1].iter().copied().filter(touches));
+    roots.sort_by(f64::total_cmp);
+    roots.dedup_by(|one, other| (*one - *other).abs() <= 1e-7 * (1.0 + other.abs()));
+    roots
+}
+
+fn value(coefficients: &[f64], x: f64) -> f64 {
+    coefficients.iter().rev().fold(0.0, |sum, one| sum * x + one)
+}
+
+/// The root between `a` and `b`, if the sign changes.
+fn root_between(coefficients: &[f64], a: f64, b: f64) -> Option<f64> {
+    let positive = |x| value(coefficients, x) > 0.0;
+    (positive(a) != positive(b)).then(|| midpoint(bisection(a, b, positive)))
+}
+
+/// Rounds to one of two neighbouring doubles.
+fn midpoint((a, b): (f64, f64)) -> f64 {
+    a + (b - a) / 2.0
+}
+
+#[cfg(test)]
+#[path = "../../tests/unit/slow_flow.rs"]
+mod tests;

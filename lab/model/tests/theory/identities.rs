@@ -5,11 +5,11 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use vines_model::{
     Dimensionless,
     orbit::phase_resonant,
-    theory::{B_SYMMETRY_BREAKING, BranchSide, Manifold, SlowFlow, half_period_map},
+    theory::{B_SYMMETRY_BREAKING, BranchSide, Manifold, SlowFlow},
 };
 
 use crate::reference::rows;
-use crate::{LAMBDA, R, close, flow};
+use crate::{LAMBDA, R, close, flow, half_period_map, rates};
 
 #[test]
 fn both_branches_lie_on_the_manifold() {
@@ -77,7 +77,7 @@ fn equilibria_rest_on_the_manifold_and_satisfy_k1_to_k6() {
         let [k1, k2, k3, k4, k5, k6] = published(&flow, sigma);
         for one in flow.equilibria(g, sigma) {
             seen += 1;
-            let [amplitude, phase] = flow.rates(g, sigma, one.b, one.gamma);
+            let [amplitude, phase] = rates(&flow, (g, sigma), one.b, one.gamma);
             close(amplitude, 0.0, 1e-12);
             close(phase, 0.0, 1e-12);
             let square = one.c * one.c;
@@ -97,7 +97,7 @@ fn slow_flow_stability_is_that_of_the_linearised_rates() {
     for (g, sigma) in [(1.1, -1.0), (1.3, 0.2), (0.9, -1.2), (1.6, -0.8)] {
         for one in flow.equilibria(g, sigma) {
             let h = 1e-6;
-            let rates = |db: f64, dgamma: f64| flow.rates(g, sigma, one.b + db, one.gamma + dgamma);
+            let rates = |db: f64, dgamma: f64| rates(&flow, (g, sigma), one.b + db, one.gamma + dgamma);
             let squares = Manifold::new(R).slope(one.b);
             let by = |plus: [f64; 2], minus: [f64; 2], i: usize| (plus[i] - minus[i]) / (2.0 * h);
             let (b_plus, b_minus) = (rates(h, 0.0), rates(-h, 0.0));
@@ -146,7 +146,7 @@ fn the_extended_periodic_motion_concept_gives_the_same_backbone() {
         // Half of the negative damping at which the loss vanishes: the same amplitude rests without drive (docs/theory.md, eq. 23).
         let delta = flow.loss(b) / (2.0 * driven.c * driven.c);
         let undamped = SlowFlow::new(LAMBDA - 2.0 * delta, R);
-        let [amplitude, phase] = undamped.rates(0.0, driven.sigma, b, 0.0);
+        let [amplitude, phase] = rates(&undamped, (0.0, driven.sigma), b, 0.0);
         close(amplitude, 0.0, 1e-14);
         close(phase, 0.0, 1e-14);
         close(driven.g, 2.0 * delta * driven.c, 1e-14);
@@ -188,7 +188,7 @@ fn the_decay_in_closed_form_follows_the_slow_flow() {
         close(rate, -flow.loss(middle), 1e-7);
         close(
             point.sigma,
-            flow.backbone_sigma(point.c, BranchSide::Right).unwrap(),
+            flow.free_detuning(flow.manifold.b(point.c, BranchSide::Right).unwrap()),
             1e-9,
         );
     }

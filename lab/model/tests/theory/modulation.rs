@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use vines_model::theory::{SlowFlow, half_period_map};
+use vines_model::theory::SlowFlow;
 
-use crate::{LAMBDA, R, close, flow};
+use crate::{LAMBDA, R, close, flow, half_period_map};
 
 /// (B, psi) one impact later at frozen C and gamma: the fast map.
 fn fast_map(r: f64, (c, gamma): (f64, f64), (b, psi): (f64, f64)) -> [f64; 2] {
@@ -75,7 +75,7 @@ fn distance_from_slow_flow(epsilon: f64) -> f64 {
             .b(square.sqrt(), vines_model::theory::BranchSide::Right)
             .expect("above the fold")
     };
-    let rates = |[square, gamma]: [f64; 2]| flow.rates(g, sigma, speed(square), gamma);
+    let rates = |[square, gamma]: [f64; 2]| crate::rates(&flow, (g, sigma), speed(square), gamma);
     let mut state = [start.0 * start.0, gamma];
     let mut reached = 0.0;
     let mut largest = 0f64;

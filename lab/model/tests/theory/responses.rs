@@ -18,7 +18,7 @@ fn every_point_of_a_frequency_response_is_an_equilibrium() {
         let curves = flow.frequency_responses(g, 81);
         assert!(!curves.is_empty());
         for point in curves.iter().flatten() {
-            let [amplitude, phase] = flow.rates(g, point.sigma, point.motion.b, point.motion.gamma);
+            let [amplitude, phase] = crate::rates(&flow, (g, point.sigma), point.motion.b, point.motion.gamma);
             close(amplitude, 0.0, 1e-7);
             close(phase, 0.0, 1e-7);
         }

@@ -56,28 +56,3 @@ fn the_waveform_approaches_the_exact_motion_as_epsilon() {
     println!("q2 of the waveform less the exact one: {coarse:.1e}, {fine:.1e}, as epsilon^{slope:.2}");
     close(slope, 1.0, 0.1);
 }
-
-#[test]
-fn the_phase_of_a_decay_is_the_integral_of_its_detuning() {
-    let decay = flow().decay(0.9).unwrap();
-    let (tau1, h) = (0.3, 1e-5);
-    let turned = |tau1: f64| decay.turned(decay.at(tau1).unwrap().b);
-    let rate = (turned(tau1 + h) - turned(tau1 - h)) / (2.0 * h);
-    close(rate, decay.at(tau1).unwrap().sigma, 1e-6);
-}
-
-#[test]
-fn a_decaying_motion_stays_between_its_walls() {
-    let decay = flow().decay(0.9).unwrap();
-    let epsilon = 0.001;
-    let end = decay.duration() / epsilon;
-    let mut touched = 0f64;
-    for n in 0..4000 {
-        let tau = end * f64::from(n) / 4000.0;
-        let [v, w] = decay.motion(epsilon, 0.4, tau).unwrap();
-        assert!(w.abs() <= 1.0 + 1e-9 && v.abs() < 1.0, "tau = {tau}: v = {v}, w = {w}");
-        touched = touched.max(w.abs());
-    }
-    assert!(touched > 0.999);
-    assert_eq!(decay.motion(epsilon, 0.4, 1.001 * end), None);
-}

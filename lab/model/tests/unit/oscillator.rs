@@ -1,4 +1,4 @@
-//! Tests of `oscillator`.
+//! Unit tests of oscillator.
 
 use super::*;
 

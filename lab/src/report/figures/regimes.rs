@@ -1,12 +1,16 @@
 //! The regime map: coloured cells, a letter on each region, and the theory's stable island.
 
-use crate::map::{Axis, Map, Range, outline};
+use std::convert::Infallible;
+
+use crate::numerics::try_bisection;
 use crate::orbit::{BifurcationCurve, Periodic};
 use crate::regime::Regime;
 use crate::report::figure::{
     BLACK, Color, DETUNING, Figure, FigureError, Mark, Marked, Panel, Place, WHITE, clipped, line, thinned,
 };
 use crate::report::theme;
+use crate::scene::Dimensionless;
+use crate::sweep::{Grid, Map, SIGMA};
 
 /// Size of the figure, px, and how much of its width belongs to the axes; the key stands beside them.
 const SIZE: (u32, u32) = (980, 600);
@@ -21,28 +25,25 @@ pub fn svg(map: &Map) -> Result<String, FigureError> {
 }
 
 fn figure(map: &Map) -> Figure {
-    let plan = &map.plan;
-    let axis = |range: &Range| {
-        let half = range.step() / 2.0;
-        ((range.from - half, range.to + half), label(range.axis))
+    let (Map { x, y, .. }, [x_name, y_name]) = (map, map.names());
+    let axis = |grid: &Grid, name| {
+        let half = grid.step() / 2.0;
+        ((grid.from - half, grid.to + half), label(name))
     };
-    let mut panel = Panel::new(axis(&plan.x), axis(&plan.y))
+    let mut panel = Panel::new(axis(x, x_name), axis(y, y_name))
         .at([0, 0, WIDTH, SIZE.1])
         .heading("Regimes of the driven response", &caption(map));
     for regime in Regime::SIMULATED {
         panel.rectangles(stripes(map, regime), theme::regime(regime).0);
     }
-    let segments = outline(plan);
+    let segments = outline(map);
     panel.segments(segments.clone(), line(WHITE, 50));
     panel.segments(segments, line(BLACK, 22));
     for curve in &map.curves {
         draw_curve(&mut panel, map, curve);
     }
-    let cells = map.cells.iter().enumerate();
-    let several = cells.filter(|(_, cell)| !cell.coexisting.is_empty());
-    let dots: Vec<Place> = several
-        .map(|(n, _)| (plan.x.at(n % plan.x.points), plan.y.at(n / plan.x.points)))
-        .collect();
+    let several = (0..).zip(&map.cells).filter(|(_, cell)| !cell.coexisting.is_empty());
+    let dots: Vec<Place> = several.map(|(n, _)| (x.at(n % x.points), y.at(n / x.points))).collect();
     let dotted = !dots.is_empty();
     panel.circles(dots, 1, BLACK.filled(), "");
     for (regime, place) in letters(map) {
@@ -69,7 +70,7 @@ fn key(map: &Map, dotted: bool) -> Vec<(&'static str, Mark)> {
 
 /// Where a motion lies on a map over sigma and G.
 fn place_on(map: &Map) -> impl Fn(&Periodic) -> Place {
-    let swapped = map.plan.x.axis == Axis::G;
+    let swapped = map.names()[1] == SIGMA;
     move |one| {
         if swapped {
             (one.g, one.sigma)
@@ -88,7 +89,7 @@ fn draw_curve(panel: &mut Panel, map: &Map, curve: &BifurcationCurve) {
         .iter()
         .map(|one| (place(one), one.bounds_stability()))
         .collect();
-    let (x, y) = (map.plan.x, map.plan.y);
+    let (x, y) = (map.x, map.y);
     let mut colours = theme::BIFURCATIONS.into_iter();
     let colour = colours
         .find(|(kind, _)| *kind == curve.kind)
@@ -104,51 +105,47 @@ fn draw_curve(panel: &mut Panel, map: &Map, curve: &BifurcationCurve) {
 }
 
 fn caption(map: &Map) -> String {
-    let plan = &map.plan;
-    let held = [Axis::Sigma, Axis::G, Axis::R]
-        .into_iter()
-        .filter(|axis| plan.x.axis != *axis && plan.y.axis != *axis)
-        .map(|axis| match axis {
-            Axis::Sigma => format!(", σ = {:.4}", plan.sigma),
-            Axis::G => format!(", G = {:.3}", plan.scene.g),
-            Axis::R => format!(", r = {}", plan.scene.r),
-        });
+    let numbers = map.sweep.scene().dimensionless();
+    let Dimensionless { epsilon, lambda, g, r, .. } = numbers;
+    let sigma = map.sweep.sigma().map(|sigma| format!(", σ = {sigma:.4}"));
+    let free = |name: &str| !map.names().contains(&name);
+    let g = free("G").then(|| format!(", G = {g:.3}"));
+    let r = free("r").then(|| format!(", r = {r}"));
+    let held: String = [sigma, g, r].into_iter().flatten().collect();
     let dashed = if map.curves.is_empty() {
         ""
     } else {
         "; dashed: of unstable motions"
     };
     format!(
-        "ε = {:.5}, λ = {:.3}{}; each cell from the same start, followed until it repeats, at most {} periods{dashed}",
-        plan.scene.epsilon,
-        plan.scene.lambda,
-        held.collect::<String>(),
-        plan.limit
+        "ε = {epsilon:.5}, λ = {lambda:.3}{held}; each cell from the same start, followed until it repeats, at most {} periods{dashed}",
+        map.sweep.settings().periods
     )
 }
 
-fn label(axis: Axis) -> &'static str {
-    match axis {
-        Axis::Sigma => DETUNING,
-        Axis::G => "base amplitude G = E/(b ε)",
-        Axis::R => "restitution coefficient r",
+fn label(name: &str) -> &str {
+    match name {
+        SIGMA => DETUNING,
+        "G" => "base amplitude G = E/(b ε)",
+        "r" => "restitution coefficient r",
+        key => key,
     }
 }
 
 /// The cells of a regime, with neighbours in a row merged.
 fn stripes(map: &Map, regime: Regime) -> Vec<[Place; 2]> {
-    let (x, y) = (map.plan.x, map.plan.y);
+    let (x, y) = (map.x, map.y);
     let mut found = Vec::new();
-    for (row, cells) in map.cells.chunks(x.points).enumerate() {
+    for (row, cells) in (0..).zip(map.cells.chunks(x.points as usize)) {
         let mut column = 0;
-        for run in cells.chunk_by(|one, other| one.point.regime == other.point.regime) {
-            if run[0].point.regime == regime {
+        for run in cells.chunk_by(|one, other| one.result.regime == other.result.regime) {
+            if run[0].result.regime == regime {
                 let left = x.at(column) - x.step() / 2.0;
-                let right = x.at(column + run.len() - 1) + x.step() / 2.0;
+                let right = x.at(column + run.len() as u64 - 1) + x.step() / 2.0;
                 let low = y.at(row) - y.step() / 2.0;
                 found.push([(left, low), (right, low + y.step())]);
             }
-            column += run.len();
+            column += run.len() as u64;
         }
     }
     found
@@ -156,7 +153,7 @@ fn stripes(map: &Map, regime: Regime) -> Vec<[Place; 2]> {
 
 /// For each regime, the places farthest from its border and from the curves, far apart from each other.
 fn letters(map: &Map) -> Vec<(Regime, Place)> {
-    let (columns, rows) = (map.plan.x.points, map.plan.y.points);
+    let (columns, rows) = (map.x.points as usize, map.y.points as usize);
     let free = without_curves(map);
     // Largest half-width of a square around the cell that contains no other regime and no curve.
     let depth = |column: usize, row: usize| {
@@ -188,26 +185,60 @@ fn letters(map: &Map) -> Vec<(Regime, Place)> {
             }
         }
     }
-    let place = |[column, row]: [usize; 2]| (map.plan.x.at(column), map.plan.y.at(row));
+    let place = |[column, row]: [usize; 2]| (map.x.at(column as u64), map.y.at(row as u64));
     found.into_iter().map(|(regime, cell)| (regime, place(cell))).collect()
 }
 
 /// The regimes of the cells, except where a curve passes.
 fn without_curves(map: &Map) -> Vec<Option<Regime>> {
-    let mut free: Vec<Option<Regime>> = map.cells.iter().map(|cell| Some(cell.point.regime)).collect();
+    let mut free: Vec<Option<Regime>> = map.cells.iter().map(|cell| Some(cell.result.regime)).collect();
     let bifurcations = map.curves.iter().flat_map(|curve| {
         let place = place_on(map);
         curve.branch.points.iter().map(place)
     });
-    let (x, y) = (map.plan.x, map.plan.y);
-    let index = |range: Range, value: f64| {
-        let n = ((value - range.from) / range.step()).round();
-        (n >= 0.0 && n < range.points as f64).then_some(n as usize)
+    let (x, y) = (map.x, map.y);
+    let index = |grid: Grid, value: f64| {
+        let n = ((value - grid.from) / grid.step()).round();
+        (n >= 0.0 && n < grid.points as f64).then_some(n as usize)
     };
-    for place in bifurcations.chain(outline(&map.plan).into_iter().flatten()) {
+    for place in bifurcations.chain(outline(map).into_iter().flatten()) {
         if let (Some(column), Some(row)) = (index(x, place.0), index(y, place.1)) {
-            free[row * x.points + column] = None;
+            free[row * x.points as usize + column] = None;
         }
     }
     free
+}
+
+/// Parts of the map across, in each direction, in which the border of the theory's island is searched for.
+const PARTS: usize = 100;
+/// Fraction of such a part to which the border is located: far below a pixel.
+const LOCATED: f64 = 1.0 / 4096.0;
+
+/// Segments of the border of the region where first-order theory has a stable symmetric 1:1 motion, by marching squares.
+fn outline(map: &Map) -> Vec<[Place; 2]> {
+    let along = |grid: Grid, n: usize| grid.from + (grid.to - grid.from) * n as f64 / PARTS as f64;
+    let place = |column: usize, row: usize| (along(map.x, column), along(map.y, row));
+    let inside = |(x, y): Place| map.theory_stable(x, y);
+    let corners: Vec<Vec<bool>> = (0..=PARTS)
+        .map(|row| (0..=PARTS).map(|column| inside(place(column, row))).collect())
+        .collect();
+    let border = |(from, from_inside): (Place, bool), (to, _): (Place, bool)| {
+        let at = |part: f64| (from.0 + part * (to.0 - from.0), from.1 + part * (to.1 - from.1));
+        let before = |part: f64| Ok::<_, Infallible>(inside(at(part)) == from_inside);
+        let Ok((_, end)) = try_bisection(0.0, 1.0, LOCATED, before);
+        at(end)
+    };
+    let mut segments = Vec::new();
+    for (row, column) in (0..PARTS).flat_map(|row| (0..PARTS).map(move |column| (row, column))) {
+        // The corners in turn, each with whether it is inside.
+        let around = [(0, 0), (1, 0), (1, 1), (0, 1)]
+            .map(|(dx, dy)| (place(column + dx, row + dy), corners[row + dy][column + dx]));
+        let sides = (0..4).map(|n| (around[n], around[(n + 1) % 4]));
+        let crossings: Vec<Place> = sides
+            .filter(|(from, to)| from.1 != to.1)
+            .map(|(from, to)| border(from, to))
+            .collect();
+        segments.extend(crossings.chunks_exact(2).map(|pair| [pair[0], pair[1]]));
+    }
+    segments
 }

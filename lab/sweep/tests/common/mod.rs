@@ -4,7 +4,7 @@
 
 use std::{collections::BTreeMap, fs, path::Path, sync::Arc};
 
-use vines_sweep::{Plan, Settings};
+use vines_sweep::{Settings, Sweep};
 use vines_testbench::scene::Family;
 use zarrs::{
     array::Array,
@@ -20,8 +20,8 @@ pub fn settings(axes: &[&str]) -> Settings {
     }
 }
 
-pub fn plan(settings: Settings) -> Result<Plan, String> {
-    Plan::new(Family::parse("", None, &[]).unwrap(), settings).map_err(|error| error.to_string())
+pub fn plan(settings: Settings) -> Result<Sweep, String> {
+    Sweep::new(Family::parse("", None, &[]).unwrap(), settings).map_err(|error| error.to_string())
 }
 
 pub fn refused(settings: Settings) -> String {

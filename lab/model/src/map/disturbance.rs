@@ -10,8 +10,8 @@ use std::f64::consts::TAU;
 use lovines::{Event, State, Wall};
 use nalgebra::{Complex, Matrix2, Vector2};
 
-use super::oscillator::{Oscillator, rough_sin_cos};
 use crate::Dimensionless;
+use crate::orbit::oscillator::{Oscillator, rough_sin_cos};
 
 /// The primary mass, alone or with the particle on its wall, and its steady response to the base.
 #[derive(Debug, Clone, Copy)]

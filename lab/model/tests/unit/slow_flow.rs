@@ -1,4 +1,4 @@
-//! Tests of `polynomial`.
+//! Unit tests of slow flow.
 
 use super::*;
 

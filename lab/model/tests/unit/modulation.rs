@@ -1,4 +1,4 @@
-//! Tests of `drift`.
+//! Unit tests of modulation.
 
 use super::*;
 

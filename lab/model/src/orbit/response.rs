@@ -1,4 +1,4 @@
-//! The exact frequency response at one excitation: all of its components.
+//! Exact curves: all components of the frequency response, the backbone, and the bifurcation curves of the 1:1 motions.
 //!
 //! Symmetric 1:1 motions have a closed form at every sigma, so that none is missed on the grid of detunings that is searched, both ends of
 //! the range and isolas between two of its detunings included. Motions of other patterns are reached by switching branches at symmetry
@@ -6,17 +6,17 @@
 
 use serde::Serialize;
 
-use super::settle::LONGEST;
-use super::{
-    Bifurcation, Branch, Condition, ImpactPattern, Limits, Periodic, branch_off, continue_both_ways,
-    search::least_excitation, symmetric_orbits,
-};
+use super::Orbit;
+use super::continuation::{Branch, BranchBifurcation, ContinuationLimits, branch_off, continue_both_ways};
+use super::periodic::{Bifurcation, Condition, ImpactPattern, LONGEST, Periodic};
+use super::symmetric::{exact_backbone, least_excitation, phase_resonant, symmetric_orbits};
 use crate::Dimensionless;
 use crate::numerics::{equally_spaced, golden_section};
+use crate::theory::Manifold;
 
 /// The exact frequency response at one excitation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Response {
+pub struct FrequencyResponse {
     /// Base amplitude over `b epsilon`.
     #[serde(rename = "G")]
     pub g: f64,
@@ -44,7 +44,7 @@ const SAME: f64 = 1e-6;
 
 /// The exact frequency response at the scene's G over the range of sigma in `limits`: symmetric 1:1 motions, and what branches off them at
 /// `doublings` symmetry breakings and period doublings in a row.
-pub fn response(scene: &Dimensionless, limits: &Limits, doublings: usize) -> Response {
+pub fn response(scene: &Dimensionless, limits: &ContinuationLimits, doublings: usize) -> FrequencyResponse {
     let condition = Condition::Excitation(scene.g);
     let mut search = Search { scene, limits, condition, doublings, found: Vec::new() };
     let [low, high] = limits.sigma;
@@ -62,12 +62,12 @@ pub fn response(scene: &Dimensionless, limits: &Limits, doublings: usize) -> Res
             }
         }
     }
-    Response { g: scene.g, components: search.named() }
+    FrequencyResponse { g: scene.g, components: search.named() }
 }
 
 struct Search<'a> {
     scene: &'a Dimensionless,
-    limits: &'a Limits,
+    limits: &'a ContinuationLimits,
     condition: Condition,
     doublings: usize,
     found: Vec<Branch>,
@@ -133,7 +133,7 @@ impl Search<'_> {
     }
 }
 
-impl Response {
+impl FrequencyResponse {
     /// The components of symmetric 1:1 motions.
     pub fn symmetric(&self) -> impl Iterator<Item = &Branch> {
         let symmetric = |one: &&Branch| one.points[0].pattern.is_symmetric();
@@ -189,5 +189,79 @@ impl Branch {
             // At a fold Newton's method may fail.
             Periodic::find(scene, &from.pattern, &guess, conditions).is_none_or(|found| apart(&found, motion) < same)
         })
+    }
+}
+
+/// Detunings at which the backbone is searched for if it has no motion at the scene's G.
+const MET_AT: [f64; 6] = [-1.0, -0.7, -1.4, -0.5, -2.0, 0.0];
+
+/// The exact backbone, through the scene's phase-resonant motion or, without one, through another (with G = 0 where there is neither
+/// damping nor loss): the one with the fastest particle, on the right branch. Without damping and with r = 1 it is the conservative
+/// nonlinear mode.
+pub fn backbone(scene: &Dimensionless, limits: &ContinuationLimits) -> Option<Branch> {
+    let condition = Condition::backbone(scene);
+    let fastest = |orbits: Vec<Orbit>| orbits.into_iter().max_by(|one, other| one.b.total_cmp(&other.b));
+    let right = Manifold::new(scene.r).b_min();
+    let at_any_excitation = |sigma: f64| {
+        let met = exact_backbone(scene, 1.0 + scene.epsilon * sigma);
+        let orbit = fastest(met).filter(|one| one.b > right)?;
+        orbit.periodic(scene, [Condition::Sigma(sigma), condition])
+    };
+    let start = fastest(phase_resonant(scene))
+        .and_then(|orbit| orbit.periodic(scene, [Condition::Excitation(scene.g), condition]))
+        .or_else(|| MET_AT.into_iter().find_map(at_any_excitation))?;
+    Some(continue_both_ways(scene, &start, condition, limits))
+}
+
+/// A curve in (sigma, G) on which 1:1 motions bifurcate.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BifurcationCurve {
+    /// What happens on it.
+    pub kind: Bifurcation,
+    /// The motions on it. Where the others of their multipliers are inside the unit circle, the curve bounds stability.
+    #[serde(flatten)]
+    pub branch: Branch,
+}
+
+/// Excitations at which the curves are searched for.
+const LEVELS: usize = 25;
+
+/// The curves of folds, symmetry breakings, period doublings and Neimark-Sacker bifurcations of the symmetric and asymmetric 1:1
+/// motions that cross one of 25 levels of G in `limits`.
+pub fn bifurcation_curves(scene: &Dimensionless, limits: &ContinuationLimits) -> Vec<BifurcationCurve> {
+    let mut found: Vec<BifurcationCurve> = Vec::new();
+    let [low, high] = limits.g;
+    for g in equally_spaced(low, high, LEVELS).filter(|g| *g > 0.0) {
+        let scene = Dimensionless { g, ..*scene };
+        for component in response(&scene, limits, 1).components {
+            if !component.branch.points[0].pattern.is_one_to_one() {
+                continue;
+            }
+            for special in &component.branch.special {
+                if !found.iter().any(|curve| curve.passes(&scene, special)) {
+                    let condition = Condition::Bifurcation(special.kind);
+                    let branch = continue_both_ways(&scene, &special.motion, condition, limits);
+                    found.push(BifurcationCurve { kind: special.kind, branch });
+                }
+            }
+        }
+    }
+    found.sort_by_key(|one| (one.kind.name(), !one.branch.points[0].pattern.mirrored));
+    found
+}
+
+impl BifurcationCurve {
+    /// As in a table: the bifurcation and the motions.
+    pub fn name(&self) -> String {
+        format!("{} of {}", self.kind.name(), self.branch.points[0].pattern.name())
+    }
+
+    fn passes(&self, scene: &Dimensionless, special: &BranchBifurcation) -> bool {
+        let motion = &special.motion;
+        if self.kind != special.kind || self.branch.points[0].pattern.mirrored != motion.pattern.mirrored {
+            return false;
+        }
+        let conditions = [Condition::Excitation(motion.g), Condition::Bifurcation(self.kind)];
+        self.branch.leads_to(scene, motion, conditions, |one| one.g, 1e-4)
     }
 }

@@ -1,0 +1,154 @@
+//! Unit tests of numerical methods.
+
+use super::*;
+
+#[test]
+fn a_small_root_beside_a_large_one_keeps_its_digits() {
+    let [large, small] = quadratic(1e-12, 1.0, -1.0).unwrap();
+    assert!((small - (1.0 - 1e-12)).abs() < 1e-15);
+    assert!((large + 1e12).abs() < 2.0);
+}
+
+#[test]
+fn both_roots_are_continuous_where_the_linear_coefficient_changes_sign() {
+    let above = quadratic(1.0, 1e-9, -1.0).unwrap();
+    let below = quadratic(1.0, -1e-9, -1.0).unwrap();
+    assert!((above[0] - below[0]).abs() < 1e-8 && (above[1] - below[1]).abs() < 1e-8);
+}
+
+#[test]
+fn bisection_ends_between_neighbouring_numbers() {
+    let (a, b) = bisection(1.0, 2.0, |x| x * x > 2.0);
+    assert!(a * a <= 2.0 && b * b > 2.0 && b - a < 3e-16);
+    let (b, a) = bisection(2.0, 1.0, |x| x * x > 2.0);
+    assert!(a * a <= 2.0 && b * b > 2.0 && b - a < 3e-16);
+}
+
+#[test]
+fn bisection_stops_at_the_width_or_at_an_error() {
+    let (a, b) = try_bisection(0.0, 1.0, 0.1, |x| Ok::<_, ()>(x < 0.3)).unwrap();
+    assert!(a < 0.3 && b >= 0.3 && b - a <= 0.1);
+    assert_eq!(try_bisection(0.0, 1.0, 0.1, |_| Err("no")), Err("no"));
+}
+
+#[test]
+fn the_minimum_of_a_parabola_is_found() {
+    assert!((golden_section(-1.0, 2.0, |x| (x - 0.3).powi(2)) - 0.3).abs() < 1e-7);
+}
+
+#[test]
+fn four_numbers_have_their_mean_and_deviation() {
+    let values = [1.0, 3.0, 5.0, 7.0];
+    assert_eq!(mean(values), 4.0);
+    assert_eq!(mean_square(values), 21.0);
+    assert!((standard_deviation(&values) - 5f64.sqrt()).abs() < 1e-15);
+    assert_eq!(range((2.0, 2.0), values), (1.0, 7.0));
+    assert!(mean([]).is_nan());
+}
+
+#[test]
+fn both_ends_are_included() {
+    assert!(equally_spaced(1.0, 2.0, 5).eq([1.0, 1.25, 1.5, 1.75, 2.0]));
+    assert!(equally_spaced(1.0, 2.0, 1).eq([1.0]));
+}
+
+#[test]
+fn third_differences_see_noise_and_no_cubic() {
+    let cubic = |n: usize| 1e-3 * (n as f64).powi(2) - 2.0;
+    let smooth: Vec<f64> = (0..200).map(cubic).collect();
+    assert!(noise(&smooth) < 1e-12);
+    // Alternating signs: every third difference is eight times the amplitude.
+    let rough: Vec<f64> = (0..200)
+        .map(|n| cubic(n) + 0.1 * f64::from(1 - 2 * (n as i32 % 2)))
+        .collect();
+    assert!((noise(&rough) - 0.8 / 20f64.sqrt()).abs() < 1e-9);
+    assert_eq!(noise(&[1.0; 5]), 0.0);
+}
+
+#[test]
+fn a_line_has_its_slope() {
+    assert!((slope(&[1.0, 1.5, 2.0, 2.5]) - 0.5).abs() < 1e-15);
+    assert_eq!(slope(&[0.0, 1.0, 0.0]), 0.0);
+}
+
+fn signal(phases: &[f64]) -> DVector<f64> {
+    let n = phases.len() as f64;
+    DVector::from_iterator(
+        phases.len(),
+        phases.iter().enumerate().map(|(i, phase)| {
+            let t = 2.0 * i as f64 / (n - 1.0) - 1.0;
+            let first = (0.7 + 0.1 * t) * phase.sin() - 0.2 * phase.cos();
+            0.3 + first + 0.05 * (3.0 * phase + 0.4).sin()
+        }),
+    )
+}
+
+#[test]
+fn amplitudes_and_drift_are_found_to_rounding() {
+    let phases: Vec<f64> = (0..150).map(|n| 0.1 * f64::from(n)).collect();
+    let basis = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(0)]);
+    let values = signal(&phases);
+    let fit = basis.fit(&values).unwrap();
+    assert!((fit.harmonic(1) - Complex::new(0.7, -0.2)).norm() < 1e-14);
+    assert!((fit.drift(1) - Complex::new(0.1, 0.0)).norm() < 1e-14);
+    assert!((fit.harmonic(3) - Complex::from_polar(0.05, 0.4)).norm() < 1e-14);
+    assert!(basis.residual(&values, &fit).norm() < 1e-13);
+}
+
+#[test]
+fn too_few_or_equal_phases_give_no_fit() {
+    let few = [0.0, 0.1];
+    assert!(
+        HarmonicBasis::new(&few, 0, &[Some(0)])
+            .fit(&DVector::zeros(2))
+            .is_none()
+    );
+    let equal = [0.0; 20];
+    assert!(
+        HarmonicBasis::new(&equal, 0, &[Some(0)])
+            .fit(&DVector::zeros(20))
+            .is_none()
+    );
+}
+
+#[test]
+fn students_factor_is_that_of_the_tables() {
+    // t(0.975) of 4, 10 and 30 degrees of freedom: 2.776, 2.228, 2.042.
+    for (degrees, quantile) in [(4.0, 2.776), (10.0, 2.228), (30.0, 2.042)] {
+        assert!((student_factor(degrees) * NORMAL / quantile - 1.0).abs() < 0.01);
+    }
+}
+
+#[test]
+fn a_mean_has_the_uncertainty_of_the_textbook() {
+    let mean = Estimate::mean(&[1.0, 3.0, 5.0, 7.0, 9.0]);
+    assert!((mean.value - 5.0).abs() < 1e-12);
+    // The standard deviation is sqrt(10), for four degrees of freedom.
+    assert!((mean.uncertainty - (10f64 / 5.0).sqrt() * student_factor(4.0)).abs() < 1e-9);
+}
+
+#[test]
+fn a_wandering_mean_is_less_certain_than_one_of_independent_values() {
+    // Each value repeated four times has a quarter of the independent ones.
+    let values: Vec<f64> = (0..200).map(|n| f64::from((n / 4 * 37) % 50) - 24.5).collect();
+    let fit = Regression::fit(&[vec![1.0; 200]], &values, &[], 3.0).unwrap();
+    let independent = 50f64.mul_add(50.0, -1.0) / 12.0 / 200.0;
+    let ratio = fit.estimate(&[1.0]).uncertainty / independent.sqrt();
+    assert!((1.8..3.0).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn a_known_noise_is_the_least_uncertainty_and_a_prior_narrows_it() {
+    let columns = [vec![1.0; 8], (0..8).map(f64::from).collect()];
+    let values: Vec<f64> = (0..8).map(|n| 2.0 + 0.5 * f64::from(n)).collect();
+    let fit = Regression::fit(&columns, &values, &[], 0.1).unwrap();
+    assert!((fit.coefficient(1) - 0.5).abs() < 1e-12 && fit.excess < 1e-9);
+    let free = fit.estimate(&[0.0, 1.0]).uncertainty;
+    assert!((free - 0.1 / 42f64.sqrt()).abs() < 1e-12);
+    let prior = Prior { coefficient: 1, value: 0.5, uncertainty: free };
+    let held = Regression::fit(&columns, &values, &[prior], 0.1)
+        .unwrap()
+        .estimate(&[0.0, 1.0]);
+    assert!((held.uncertainty - free / 2f64.sqrt()).abs() < 1e-9);
+    assert_eq!(Regression::fit(&[vec![0.0; 3]], &[1.0; 3], &[], 0.1), None);
+}

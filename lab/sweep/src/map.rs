@@ -1,0 +1,168 @@
+//! A regime map: a sweep over two grids in memory, with the bifurcation curves of the 1:1 motions.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use vines_model::{
+    map::{RegimeResult, observe_confirmed},
+    orbit::{BifurcationCurve, ContinuationLimits, bifurcation_curves},
+    regime::Regime,
+    theory::SlowFlow,
+};
+use vines_testbench::scene::Family;
+
+use crate::{
+    axis::{Axis, Grid, SIGMA, Values},
+    sweep::{Settings, Sweep, SweepError},
+};
+
+/// Most values of an axis: all cells are in memory, 200 bytes each, and in one figure.
+const MOST: u64 = 2000;
+
+/// One cell of a map.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MapCell {
+    /// Detuning.
+    pub sigma: f64,
+    /// Base amplitude over `b epsilon`.
+    #[serde(rename = "G")]
+    pub g: f64,
+    /// Restitution coefficient.
+    pub r: f64,
+    /// Result.
+    #[serde(flatten)]
+    pub result: RegimeResult,
+    /// First-order theory has a stable symmetric 1:1 motion here.
+    pub theory_stable: bool,
+    /// The regimes of motions from starts close by, where they differ; the cell is undecided then.
+    pub coexisting: Vec<Regime>,
+}
+
+/// A map, row by row from the smallest y, each from the smallest x.
+#[derive(Debug)]
+pub struct Map {
+    /// Its sweep: the axes are y and x.
+    pub sweep: Sweep,
+    /// Values of the horizontal axis.
+    pub x: Grid,
+    /// Values of the vertical axis.
+    pub y: Grid,
+    /// Its cells; none before [`Map::run`].
+    pub cells: Vec<MapCell>,
+    /// Where the 1:1 motions bifurcate; only over sigma and G.
+    pub curves: Vec<BifurcationCurve>,
+}
+
+impl Map {
+    /// Checks a map over numbers of `family`; nothing is computed yet.
+    ///
+    /// # Errors
+    /// Axes, numbers of periods or values at the corners of the map that are not allowed.
+    pub fn new(family: Family, x: &Axis, y: &Axis, sigma: Option<f64>, periods: usize) -> Result<Self, SweepError> {
+        let grid = |axis: &Axis| match axis.values {
+            Values::Grid(grid) if grid.points <= MOST => Ok(grid),
+            _ => Err(SweepError::Setting(format!(
+                "{axis}: a map needs FIRST:LAST:POINTS with 2 to {MOST} points"
+            ))),
+        };
+        let settings = Settings {
+            axes: vec![y.clone(), x.clone()],
+            sigma,
+            periods,
+            ..Settings::default()
+        };
+        let map = Self {
+            x: grid(x)?,
+            y: grid(y)?,
+            sweep: Sweep::new(family, settings)?,
+            cells: Vec::new(),
+            curves: Vec::new(),
+        };
+        for [x, y] in [
+            [map.x.from, map.y.from],
+            [map.x.to, map.y.from],
+            [map.x.from, map.y.to],
+            [map.x.to, map.y.to],
+        ] {
+            map.sweep.at(&[y, x])?;
+        }
+        Ok(map)
+    }
+
+    /// Computes all cells on all cores; calls `done` after each. `confirmations` motions from starts close by must lead to the same
+    /// regime where chance decides when chaos ends.
+    ///
+    /// # Errors
+    /// Values that scene or plant refuse.
+    pub fn run(mut self, confirmations: usize, done: impl Fn() + Sync) -> Result<Self, SweepError> {
+        let cells = (0..self.sweep.cells()).into_par_iter().map(|n| {
+            let cell = self.cell(
+                self.x.at(n % self.x.points),
+                self.y.at(n / self.x.points),
+                confirmations,
+            );
+            done();
+            cell
+        });
+        self.cells = cells.collect::<Result<_, _>>()?;
+        self.curves = self.bifurcations();
+        Ok(self)
+    }
+
+    fn cell(&self, x: f64, y: f64, confirmations: usize) -> Result<MapCell, SweepError> {
+        let (scene, sigma, numbers) = self.sweep.at(&[y, x])?;
+        let periods = self.sweep.settings().periods;
+        let (mut result, other) =
+            observe_confirmed(&numbers, sigma, scene.dimensionless_start(), periods, confirmations)?;
+        let mut coexisting = Vec::new();
+        if let Some(other) = other {
+            coexisting.extend([result.regime, other]);
+            coexisting.sort();
+            result.regime = Regime::Undecided;
+        }
+        Ok(MapCell {
+            sigma,
+            g: numbers.g,
+            r: numbers.r,
+            result,
+            theory_stable: SlowFlow::new(numbers.lambda, numbers.r).has_stable_motion(numbers.g, sigma),
+            coexisting,
+        })
+    }
+
+    fn bifurcations(&self) -> Vec<BifurcationCurve> {
+        let [x, y] = self.names();
+        let (sigma, g) = match [x, y] {
+            [SIGMA, "G"] => (self.x, self.y),
+            ["G", SIGMA] => (self.y, self.x),
+            _ => return Vec::new(),
+        };
+        let limits = ContinuationLimits {
+            sigma: [sigma.from, sigma.to],
+            g: [g.from, g.to],
+            ..ContinuationLimits::default()
+        };
+        bifurcation_curves(&self.sweep.scene().dimensionless(), &limits)
+    }
+
+    /// Names of the axes, horizontal first: sigma, G, r, or a key of the scene.
+    #[must_use]
+    pub fn names(&self) -> [&str; 2] {
+        let [y, x] = [0, 1].map(|n| self.sweep.settings().axes[n].short_name());
+        [x, y]
+    }
+
+    /// First-order theory has a stable symmetric 1:1 motion at a point of the plane.
+    #[must_use]
+    pub fn theory_stable(&self, x: f64, y: f64) -> bool {
+        self.sweep.at(&[y, x]).is_ok_and(|(_, sigma, numbers)| {
+            SlowFlow::new(numbers.lambda, numbers.r).has_stable_motion(numbers.g, sigma)
+        })
+    }
+
+    /// How many cells show a regime, and how many of them lie where theory has a stable 1:1 motion.
+    #[must_use]
+    pub fn count(&self, regime: Regime) -> (usize, usize) {
+        let cells = || self.cells.iter().filter(|cell| cell.result.regime == regime);
+        (cells().count(), cells().filter(|cell| cell.theory_stable).count())
+    }
+}
