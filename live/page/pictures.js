@@ -69,20 +69,18 @@ export class Pictures {
       page.play(false);
       page.toEnd();
       this.drag = { part, offset: event.offsetX - (part === "mass" ? this.rig.centre : this.rig.particle) };
-      this.drag.to = to(event);
     };
     canvas.onpointermove = (event) => {
       canvas.style.cursor = this.drag || this.rig.under(event) ? "grab" : "";
       if (this.drag) this.drag.to = Math.max(-this.reach.mass, Math.min(this.reach.mass, to(event)));
     };
-    canvas.onpointerup = () => {
+    canvas.onpointerup = canvas.onpointercancel = ({ type }) => {
       if (!this.drag) return;
       const { part, to } = this.drag;
       this.drag = undefined;
-      page.change(part, to);
+      if (type === "pointerup" && to !== undefined) page.change(part, to);
       page.play(resume);
     };
-    canvas.onpointercancel = () => { this.drag = undefined; };
   }
 
   // ---- the run ----
@@ -119,10 +117,10 @@ export class Pictures {
     const { rows, samples, step } = this.page;
     const count = Math.min(rows.length, Math.ceil(seconds / step));
     const stride = 2 ** Math.max(0, Math.floor(Math.log2(count / POINTS)));
+    const first = samples - count;
     const points = [];
-    for (let i = rows.length - count; i < rows.length; i++) {
-      if ((samples - rows.length + i) % stride === 0 || i === rows.length - 1) points.push(this.#point(rows.row(i)));
-    }
+    for (let sample = Math.ceil(first / stride) * stride; sample < samples - 1; sample += stride) points.push(this.#point(rows.row(sample - samples)));
+    points.push(this.#point(rows.row(-1)));
     return points;
   }
 
@@ -141,7 +139,7 @@ export class Pictures {
     this.#rig(point, motion, replay, now);
 
     const { hover } = this;
-    const time = hover && (hover.plot.xAt(hover.event) ?? undefined);
+    const time = hover?.plot.xAt(hover.event);
     const cursor = time ?? (replay ? page.shown : undefined);
     const linked = time === undefined ? undefined : this.#point(page.rows.row(page.rowAt(time)));
     this.#motion(motion, status, cursor);
@@ -170,8 +168,7 @@ export class Pictures {
       }
       this.impacts = plant.impacts;
     }
-    if (drag?.part === "mass") look = { ...look, q1: drag.to, q2: drag.to + look.q2 - look.q1 };
-    if (drag?.part === "particle") look.q2 = look.q1 + drag.to;
+    if (drag?.to !== undefined) look = drag.part === "mass" ? { ...look, q1: drag.to, q2: drag.to + look.q2 - look.q1 } : { ...look, q2: look.q1 + drag.to };
     // The scale grows at once and shrinks slowly.
     const largest = (values) => values.reduce((most, value) => Math.max(most, Math.abs(value)), 1);
     const need = { mass: largest([...motion.map((one) => one.v), look.q1]), base: largest([...motion.map((one) => one.base), look.base]) };

@@ -57,7 +57,10 @@ for (const { name, options } of BROWSERS) {
       page.on("console", (line) => line.type() === "error" && errors.push(line.text()));
       await page.setViewport({ width: 1600, height: 1000 });
       // Who has seen the introduction gets the bench at once.
-      await page.evaluateOnNewDocument((seen) => (seen ? localStorage.setItem("vines-story", "seen") : localStorage.clear()), seen);
+      await page.evaluateOnNewDocument((seen) => {
+        // The blank page before it has no storage in Firefox.
+        try { if (seen) localStorage.setItem("vines-story", "seen"); else localStorage.clear(); } catch { /* the page itself follows */ }
+      }, seen);
       await prepare(page);
       await page.goto(`${address}${hash}`);
       return { page, errors };
@@ -384,7 +387,7 @@ for (const { name, options } of BROWSERS) {
         return { count: upper.length, worst: Math.max(...upper.map(distance)), lowest: decay.at(-1).C, lamp: document.getElementById("lamp").textContent, advice: document.getElementById("advice").textContent };
       });
       console.log(`${name}: ${found.count} points of the decay, at most ${found.worst.toFixed(2)} from the exact backbone`);
-      // The decay is shifted by the rate at which it slides, to first order in epsilon: 0.08 in sigma here.
+      // The decay is shifted by the rate at which it slides, to first order in epsilon: by 0.06 here.
       assert.ok(found.count > 20 && found.worst < 0.12, JSON.stringify(found));
       assert.ok(found.lowest < 0.134, "the decay goes on to the fold");
       assert.equal(found.lamp, "FREE DECAY");

@@ -176,10 +176,11 @@ impl Bench {
         let step = self.lock.config().sample_time;
         let speed = self.rig.plant.state().dq2.abs();
         if drive.amplitude == 0.0 {
-            self.decay.sample(sensors.response, speed, step);
+            self.decay
+                .sample(sensors.response, speed, step, self.scene.record.window_periods);
             self.decay.watch(&self.impacts, self.phase);
         } else {
-            self.decay.release(drive.omega, step, self.scene.record.window_periods);
+            self.decay.drive(drive.omega);
         }
         let fit = self.decay.fit.as_ref();
         let (omega, amplitude) = fit.map_or((drive.omega, output.response_amplitude), |fit| {

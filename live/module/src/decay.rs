@@ -13,7 +13,7 @@ const END: f64 = 0.05;
 /// Impacts that synchrony is determined from at every sample; it is lost once.
 const LAST: usize = 4;
 
-/// The sliding window of a free decay.
+/// The sliding window of a free decay; without a window while there is a drive.
 #[derive(Default)]
 pub struct Decay {
     /// Responses, m, of the samples that the next fit uses.
@@ -33,26 +33,30 @@ pub struct Decay {
     pub speed: f64,
     /// Whether the particle has met both walls in turn, at even intervals, since the release.
     pub synchronous: bool,
+    /// Whether there are no further fits: the motion has died out.
+    ended: bool,
 }
 
 impl Decay {
-    /// The next decay begins after a drive of `omega` rad/s; the window has `periods` periods.
-    pub fn release(&mut self, omega: f64, sample_time: f64, periods: f64) {
-        let period = TAU / omega / sample_time;
-        self.window = (periods * period).round() as usize + 1;
-        self.stride = ((period / PER_PERIOD).round() as usize).max(1);
-        self.values.clear();
-        self.speeds.clear();
-        self.synchronous = true;
-        (self.omega, self.first, self.fit) = (omega, None, None);
+    /// A sample with a drive of `omega` rad/s: what was fitted before is over.
+    pub fn drive(&mut self, omega: f64) {
+        self.omega = omega;
+        if self.window > 0 {
+            *self = Self { omega, ..Self::default() };
+        }
     }
 
-    /// A sample without a drive: response, m, and speed of the particle, m/s.
-    pub fn sample(&mut self, response: f64, speed: f64, sample_time: f64) {
-        let has_ended = |first: f64| self.fit.is_some_and(|fit| fit.amplitude < END * first);
-        // A plant that starts without a drive has no window.
-        if self.window == 0 || self.first.is_some_and(has_ended) {
+    /// A sample without a drive: response, m, and speed of the particle, m/s. The window has `periods` periods.
+    pub fn sample(&mut self, response: f64, speed: f64, sample_time: f64, periods: f64) {
+        // A plant that has not been driven yet has no decay.
+        if self.omega == 0.0 || self.ended {
             return;
+        }
+        if self.window == 0 {
+            let period = TAU / self.omega / sample_time;
+            self.window = (periods * period).round() as usize + 1;
+            self.stride = ((period / PER_PERIOD).round() as usize).max(1);
+            self.synchronous = true;
         }
         self.values.push(response);
         self.speeds.push(speed);
@@ -62,14 +66,14 @@ impl Decay {
         match harmonic(&self.values, sample_time, self.omega) {
             Some(fit) => {
                 self.omega = fit.omega;
-                self.first.get_or_insert(fit.amplitude);
+                self.ended = fit.amplitude < END * *self.first.get_or_insert(fit.amplitude);
                 self.fit = Some(fit);
                 self.speed = self.speeds.iter().sum::<f64>() / self.speeds.len() as f64;
                 self.values.drain(..self.stride);
                 self.speeds.drain(..self.stride);
             }
             // No motion of that frequency is left.
-            None => self.window = 0,
+            None => self.ended = true,
         }
     }
 

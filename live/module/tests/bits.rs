@@ -82,11 +82,12 @@ fn the_free_decay_has_the_bits_of_the_lab() {
         let b = scene.dimensionless().speed(*speed);
         assert!((b - point.b.unwrap()).abs() < 1e-12, "B = {b} at t = {} s", point.t_s);
     }
-    // The last window has 2.5 periods and ends with the synchrony; the impact that is missed next is due half a period later.
+    // The last window of the lab has 2.5 periods and ends with the synchrony, which the bench judges as it goes, without the impacts
+    // that follow: the two agree within the longest interval in synchrony, 1.25 half periods.
     let period = TAU / record.decay()[0].command.drive.omega;
     let late = (lost.unwrap() - points.last().unwrap().t_s) / period;
     assert!(
-        (1.25..2.5).contains(&late),
+        (1.25 - 0.625..1.25 + 0.625).contains(&late),
         "synchrony is lost {late} periods after the last point"
     );
     assert!(fits.len() >= points.len());
