@@ -140,8 +140,8 @@ def outputs(program):
         grids = ["--x", "sigma=-2:-1:3", "--y", "G=1:1.2:3", "--periods", "200", "--confirmations", "0"]
         run(program, "map", *grids, "--out", out)
         page = "# Output files\n\n" + NOTE + "\n"
-        page += "A file is complete or absent. JSON files have the same names as the columns. A value that does not exist is empty "
-        page += "in CSV and `null` in JSON.\n\n"
+        page += "A file is complete or absent. JSON files have the same names as the columns.\n"
+        page += "A value that does not exist is empty in CSV and `null` in JSON.\n\n"
         rows = [[f"`{name}`", f"`vines {command}`", text] for name, (command, text) in FILES.items()]
         missing = {name for name in FILES if not (out / name).is_file()}
         extra = {file.name for file in out.iterdir()} - FILES.keys() - {"map-dark.svg", "LoViNes.fmu", "PhaseLock.fmu"}

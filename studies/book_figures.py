@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib as mpl
@@ -37,7 +38,7 @@ def save(figure, name):
 def pieces(points):
     """Parts of a branch between changes of stability; neighbours share a point."""
     part = points[:1]
-    for start, end in zip(points, points[1:], strict=False):
+    for start, end in pairwise(points):
         part.append(end)
         if start["stable"] != end["stable"]:
             yield start["stable"], part
@@ -68,7 +69,7 @@ def manifold():
 
 
 def window():
-    """Where a stable symmetric 1:1 orbit at phase resonance exists, over r and G, and what `vines identify` says there."""
+    """Where stable symmetric 1:1 orbits at phase resonance exist, over r and G, and what `vines identify` says."""
     figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
     ratios = [0.3 + 0.02 * n for n in range(36)]
     for r in ratios:

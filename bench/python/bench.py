@@ -263,7 +263,7 @@ def main():
     parser.add_argument(
         "--keep",
         action="store_true",
-        help="renew performance and run time map in validation/, docs/work-precision.svg and the table in docs/benchmarks.md",
+        help="renew the results in validation/, docs/work-precision.svg and the table in docs/benchmarks.md",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("out/bench"), help="folder for tables and figure (default %(default)s)"
