@@ -101,15 +101,14 @@ def variables():
         for variable in model.iter("ScalarVariable"):
             value = variable[0]
             declared = types.get(value.get("declaredType"), value)
-            bounds = [value.get(end, declared.get(end)) for end in ("min", "max")]
-            limits = " to ".join(end or "" for end in bounds).strip() if any(bounds) else ""
+            low, high = (value.get(end, declared.get(end)) for end in ("min", "max"))
             groups.setdefault(variable.get("causality"), []).append(
                 [
                     f"`{variable.get('name')}`",
                     value.tag,
                     value.get("unit", declared.get("unit", "")),
                     value.get("start", ""),
-                    limits.removesuffix(" to"),
+                    f"{low} to {high}" if low and high else f"from {low}" if low else f"up to {high}" if high else "",
                     variable.get("description"),
                 ]
             )
