@@ -1,6 +1,6 @@
 """The two figures of docs/measuring.md, on the default scene.
 
-python studies/measuring.py    writes docs/measuring-balance.svg and docs/measuring-backbone.svg
+python studies/measuring.py    writes both into docs/
 
 A balance: the phase-locked loop under a constant drive, period by period. The amplitude A still varies, but less the
 integral of g E cos(phi) and the slope's term it is a straight line, whose slope is -g E_R. The backbone: E_R(A) and

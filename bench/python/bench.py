@@ -8,6 +8,7 @@ Started by scripts/bench, which builds and installs what is needed.
 import argparse
 import json
 import random
+import shutil
 import statistics
 import subprocess
 import sys
@@ -22,6 +23,14 @@ from scenes import LOOP_PERIODS, fingerprint, load
 from worker import Missing, Worker
 
 HERE = Path(__file__).resolve().parent.parent
+# Where `--keep` puts what a full run writes.
+KEPT = {
+    "performance.txt": "validation",
+    "performance.csv": "validation",
+    "run_time_map.csv": "validation",
+    "run-time-map.svg": "validation",
+    "work-precision.svg": "docs",
+}
 TOLERANCES = (1e-6, 1e-9, 1e-12)
 COARSE = (1e-4, 1e-6, 1e-9)
 STEPS = (100, 1000, 10000)
@@ -236,7 +245,7 @@ def only_map(options):
     run_time_map.write(rows, lock, options.out)
     print(f"\r{run_time_map.as_text(rows, lock)}" if watched else run_time_map.as_text(rows, lock))
     print(report.idle(busy))
-    print(f"Written: {options.out}/run-time-map.csv and .svg", file=sys.stderr)
+    print(f"Written: {options.out}/run_time_map.csv and run-time-map.svg", file=sys.stderr)
 
 
 def main():
@@ -254,7 +263,7 @@ def main():
     parser.add_argument(
         "--keep",
         action="store_true",
-        help="renew docs/performance.*, docs/work-precision.svg, docs/run-time-map.* and the ratios in docs/plant.md",
+        help="renew the results in validation/, docs/work-precision.svg and the table in docs/benchmarks.md",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("out/bench"), help="folder for tables and figure (default %(default)s)"
@@ -266,8 +275,6 @@ def main():
     options = parser.parse_args()
     if options.keep and options.quick:
         parser.error("--keep is for a full run: it renews what docs/ says of all scenes")
-    if options.keep:
-        options.out = HERE.parent / "docs"
     if options.map:
         only_map(options)
         return
@@ -285,15 +292,14 @@ def main():
 
     options.out.mkdir(parents=True, exist_ok=True)
     run_time_map.write(rows, lock, options.out)
-    text = report.write(bench, growth, loop, profiles, (rows, lock), options.out)
+    print(report.write(bench, growth, loop, profiles, (rows, lock), options.out))
     figure.write(bench, options.out / "work-precision.svg")
     if options.keep:
-        report.renew(HERE.parent / "docs/plant.md", bench)
-    print(text)
-    bench.say(
-        f"Written: {options.out}/performance.txt, .csv, .md, work-precision.svg, run-time-map.csv and .svg"
-        f"{', and docs/plant.md' if options.keep else ''}, after {time.monotonic() - began:.0f} s"
-    )
+        root = HERE.parent
+        for name, folder in KEPT.items():
+            shutil.copy(options.out / name, root / folder / name)
+        report.renew(root / "docs/benchmarks.md", bench)
+    bench.say(f"Written: {', '.join(KEPT)} in {options.out}, after {time.monotonic() - began:.0f} s")
 
 
 if __name__ == "__main__":

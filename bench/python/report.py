@@ -208,38 +208,19 @@ def renew(readme, bench):
 
 
 def write(bench, growth, loop, profiles, run_times, folder):
-    """Writes performance.txt, .csv and .md; returns the text."""
-    from run_time_map import as_markdown, as_text
+    """Writes performance.txt and performance.csv; returns the text."""
+    from run_time_map import as_text
 
-    scenes = list(dict.fromkeys(row.scene for row in bench.rows))
-    text, mark = ["Run time against error", ""], ["# Run time against error", ""]
+    head, rows = matrix(bench)
+    text = ["Run time against error", ""]
     for note in notes(bench):
         text += [note, ""]
-        mark += [note, ""]
-    mark += [
-        "`scripts/bench --keep` writes this page; the figure's numbers are in [performance.csv](performance.csv).",
-        "",
-    ]
-    mark += ["![Error against time, scene by scene](work-precision.svg)", ""]
-    head, rows = matrix(bench)
-    mark += ["## At a glance", "", MATRIX_NOTE, "", markdown_table(head, rows), ""]
-    text += ["At a glance", MATRIX_NOTE, text_table(head, rows), ""]
-    text += [as_text(*run_times), ""]
-    mark += [*as_markdown(*run_times), ""]
-    for scene in scenes:
-        title = bench.scenes[scene]["title"]
-        impacts = bench.truth[scene]["impacts"]
+    text += ["At a glance", MATRIX_NOTE, text_table(head, rows), "", as_text(*run_times), ""]
+    for scene in dict.fromkeys(row.scene for row in bench.rows):
+        title, impacts = bench.scenes[scene]["title"], bench.truth[scene]["impacts"]
         count = f"{impacts} impact{'s' if impacts != 1 else ''}"
         rows = [cells(row, bench) for row in bench.rows if row.scene == scene]
         text += [f"{scene}: {title} ({count})", text_table(HEAD, rows), ""]
-        mark += [
-            f"## {title[0].upper()}{title[1:]}",
-            "",
-            f"{count[0].upper()}{count[1:]}.",
-            "",
-            markdown_table(HEAD, rows),
-            "",
-        ]
     sections = [
         ("What the plant skips, and what that saves", SAVINGS_NOTE, *savings(bench, profiles)),
         ("Cost of a sample in the loop scene", SAMPLE_NOTE, *samples(bench)),
@@ -247,13 +228,9 @@ def write(bench, growth, loop, profiles, run_times, folder):
     ]
     for title, note, head, rows in sections:
         text += [title, note, text_table(head, rows), ""]
-        mark += [f"## {title}", "", note, "", markdown_table(head, rows), ""]
     sample = f"{min(loop):.3g} ns per sample (least), {statistics.median(loop):.3g} (median)"
-    pair = f"Plant and controller in the loop: {sample}."
-    text += [pair]
-    mark += [pair, ""]
+    text += [f"Plant and controller in the loop: {sample}."]
     replace(folder / "performance.txt", "\n".join(text) + "\n")
-    replace(folder / "performance.md", wrapped("\n".join(mark).rstrip() + "\n"))
     table = io.StringIO()
     sheet = csv.writer(table, lineterminator="\n")
     sheet.writerow(

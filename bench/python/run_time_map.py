@@ -4,7 +4,7 @@ import csv
 import io
 from statistics import median
 
-from tables import markdown_table, number, replace, text_table
+from tables import number, replace, text_table
 
 # First and last values are those of docs/regimes.svg (`vines map`).
 SIGMA, G = (-5.0, 5.0), (0.1, 3.0)
@@ -96,28 +96,11 @@ def as_text(rows, lock):
     return "\n".join(["Map of run time", NOTE, lock_line(lock), text_table(*summary(rows))])
 
 
-def as_markdown(rows, lock):
-    figure = "![ns per impact over detuning and base amplitude](run-time-map.svg)"
-    numbers = "The cells are in [run-time-map.csv](run-time-map.csv)."
-    return [
-        "## Map of run time",
-        "",
-        NOTE,
-        "",
-        figure,
-        "",
-        lock_line(lock),
-        numbers,
-        "",
-        markdown_table(*summary(rows)),
-    ]
-
-
 COLUMNS = ["sigma", "G", "regime", "impacts_per_period", "unit", "ns", "ratio", "evaluations", "brent_ns", "difference"]
 
 
 def write(rows, lock, folder):
-    """run-time-map.csv and run-time-map.svg."""
+    """run_time_map.csv and run-time-map.svg."""
     table = io.StringIO()
     sheet = csv.writer(table, lineterminator="\n")
     sheet.writerow(COLUMNS)
@@ -132,7 +115,7 @@ def write(rows, lock, folder):
             "difference": "" if cell["difference"] is None else f"{cell['difference']:.1e}",
         }
         sheet.writerow([shown[name] for name in COLUMNS])
-    replace(folder / "run-time-map.csv", table.getvalue())
+    replace(folder / "run_time_map.csv", table.getvalue())
     draw(rows, lock, folder / "run-time-map.svg")
 
 

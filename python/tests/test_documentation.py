@@ -46,9 +46,8 @@ def test_the_commands_and_the_example_of_the_page_on_sweeps_run(tmp_path, monkey
         words = shlex.split(re.sub(r"(=[-\d.]+:[-\d.]+):\d+", r"\1:5", command).replace("10000", "20"))
         subprocess.run([os.environ["VINES"], *words[1:], "--periods=400"], check=True)
     examples = [block for kind, block in blocks if kind == "python"]
-    # The other one needs a queueing system.
-    assert ["dask_jobqueue" in one for one in examples] == [False, True]
     matplotlib.use("agg")
+    assert len(examples) == 1
     exec(examples[0], {})
     assert xarray.open_zarr("map.zarr").regime.shape == (5, 5)
 

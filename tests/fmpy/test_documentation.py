@@ -1,0 +1,167 @@
+"""The book: links lead somewhere, sentences are short, commands run, and generated pages are up to date."""
+
+import importlib.util
+import re
+import socket
+import subprocess
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+
+from references import ROOT
+
+DOCS = ROOT / "docs"
+PAGES = sorted(set(DOCS.glob("*.md")) - {DOCS / "SUMMARY.md"})
+# Pages written by hand: lines of one, and of all with the README; words of a sentence.
+MOST_LINES = 200
+MOST_LINES_IN_ALL = 2400
+MOST_WORDS = 37
+README = ROOT / "README.md"
+GENERATED = DOCS / "reference"
+
+spec = importlib.util.spec_from_file_location("reference", ROOT / "scripts" / "reference.py")
+reference = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(reference)
+
+
+def blocks(page: Path) -> list[tuple[str, str]]:
+    """Code blocks: kind and text."""
+    return re.findall(r"^```([\w,]*)\n(.*?)^```$", page.read_text(), re.DOTALL | re.MULTILINE)
+
+
+def prose(text: str) -> str:
+    """The text without code blocks, comments and formulas."""
+    text = re.sub(r"^```.*?^```$|<!--.*?-->", "\n", text, flags=re.DOTALL | re.MULTILINE)
+    return re.sub(r"^    .*$", "\n", text, flags=re.MULTILINE)
+
+
+def sentences(text: str) -> list[str]:
+    paragraphs = re.split(r"\n\s*\n|\n(?=\s*(?:[-*|#>]|\d+\.) ?)", prose(text))
+    cells = [cell for paragraph in paragraphs for cell in re.split(r"(?<!\\)\|", paragraph)]
+    end = r"(?<=[.!?:])[*_]*\s+(?=[`\[]|\W*[A-Z0-9])"
+    return [one for cell in cells for one in re.split(end, " ".join(cell.split()))]
+
+
+def anchors(page: Path) -> set[str]:
+    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+    titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", [README, *sorted(DOCS.rglob("*.md"))], ids=lambda page: page.name)
+def test_every_link_of_a_page_leads_somewhere(page):
+    text = re.sub(r"^```.*?^```$|`[^`\n]*`", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"https?://|rust/", link):
+            continue
+        name, _, anchor = link.partition("#")
+        target = (page.parent / name).resolve() if name else page
+        assert target.exists(), f"{page.name}: {link}"
+        if anchor and target.suffix == ".md":
+            assert anchor in anchors(target), f"{page.name}: {link}"
+
+
+@pytest.mark.parametrize("page", [README, *PAGES], ids=lambda page: page.name)
+def test_no_sentence_of_a_page_is_long(page):
+    long = [one for one in sentences(page.read_text()) if len(one.split()) > MOST_WORDS]
+    assert not long
+
+
+def test_the_book_contains_every_page_and_is_short():
+    lengths = {page.name: len(page.read_text().splitlines()) for page in (README, *PAGES)}
+    assert {name: length for name, length in lengths.items() if length > MOST_LINES} == {}
+    assert sum(lengths.values()) <= MOST_LINES_IN_ALL
+    listed = re.findall(r"\(([\w/-]+\.md)\)", (DOCS / "SUMMARY.md").read_text())
+    pages = {str(page.relative_to(DOCS)) for page in DOCS.rglob("*.md")} - {"SUMMARY.md"}
+    assert set(listed) == pages
+
+
+def test_the_generated_pages_are_those_of_the_program(vines):
+    written = {page.name: page.read_text() for page in GENERATED.glob("*.md")}
+    assert reference.variables() == written["fmu-variables.md"]
+    assert reference.python() == written["python-api.md"]
+    assert reference.outputs(vines) == written["output-files.md"]
+    # A program without `sweep` has the other commands.
+    for name, section in reference.commands(vines).items():
+        if name != "vines":
+            assert section in written["cli.md"], f"{name}: run scripts/docs"
+
+
+def is_run(page: Path) -> bool:
+    return any(kind.split(",")[0] == "sh" and "norun" not in kind for kind, _ in blocks(page))
+
+
+class Shell:
+    """Runs the commands of a page in an empty folder; servers end with it."""
+
+    def __init__(self, vines: Path, folder: Path):
+        self.vines, self.folder, self.servers, self.ports = vines, folder, [], {}
+
+    def command(self, line: str) -> str:
+        # The ports of the page may be in use.
+        def port(match):
+            if match[0] not in self.ports:
+                with socket.create_server(("127.0.0.1", 0)) as free:
+                    self.ports[match[0]] = str(free.getsockname()[1])
+            return self.ports[match[0]]
+
+        line = re.sub(r"\b55[12]\d\b", port, line)
+        return re.sub(r"^vines\b", str(self.vines), line)
+
+    def run(self, line: str, fails: bool) -> str:
+        if line.endswith("&"):
+            server = subprocess.Popen(
+                ["bash", "-c", "exec " + self.command(line[:-1])],
+                cwd=self.folder,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+            self.servers.append(server)
+            self.wait_for(next(int(mine) for theirs, mine in self.ports.items() if theirs in line))
+            return ""
+        done = subprocess.run(
+            ["bash", "-c", self.command(line)], cwd=self.folder, capture_output=True, text=True, timeout=120
+        )
+        assert (done.returncode != 0) == fails, f"{line}\n{done.stdout}{done.stderr}"
+        return done.stdout + done.stderr
+
+    def wait_for(self, port: int):
+        """A connection would be a session: the tables of the system show that the port is open."""
+        end = time.monotonic() + 20
+        while time.monotonic() < end:
+            tables = (Path("/proc/net/tcp").read_text(), Path("/proc/net/udp").read_text())
+            if any(f":{port:04X} " in table for table in tables):
+                return
+            time.sleep(0.05)
+        raise AssertionError(f"no server on port {port}")
+
+    def close(self):
+        for server in self.servers:
+            server.kill()
+            server.wait()
+
+
+@pytest.mark.parametrize("page", filter(is_run, PAGES), ids=lambda page: page.name)
+def test_the_commands_of_a_page_run_and_print_what_it_shows(page, vines, tmp_path):
+    (tmp_path / "scenes").symlink_to(ROOT / "scenes")
+    shell, output = Shell(vines, tmp_path), ""
+    try:
+        for kind, text in blocks(page):
+            name = re.match(r"(?:#|/\*|<!--) (\w+\.\w+)\b", text)
+            if name and "norun" not in kind:
+                (tmp_path / name[1]).write_text(text)
+            language, *flags = kind.split(",")
+            if language == "sh" and "norun" not in flags:
+                for line in text.replace("\\\n", " ").splitlines():
+                    # tests of the Python package run the sweeps
+                    if line.strip() and not line.startswith(("#", "vines sweep")):
+                        output = shell.run(line, "fails" in flags) + output
+            elif language == "text" and output:
+                lines = [" ".join(line.split()) for line in output.splitlines()]
+                shown = [" ".join(line.split()) for line in textwrap.dedent(text).splitlines() if line.strip()]
+                missing = [line for line in shown if line not in lines]
+                assert not missing, f"{page.name} shows what the program does not print: {missing}"
+    finally:
+        shell.close()
