@@ -1,6 +1,7 @@
 //! A linear oscillator with a vibro-impact nonlinear energy sink, exact between events.
 #![forbid(unsafe_code)]
 
+mod advance;
 mod arithmetic;
 pub mod base_motion;
 pub mod clearance;
@@ -8,13 +9,10 @@ pub mod contact;
 mod fast;
 pub mod flight;
 pub mod forcing;
-mod moving;
 pub mod oscillator;
-mod overdamped;
 pub mod parameters;
 pub mod plant;
 pub mod segment;
-pub mod sticking;
 
 pub use base_motion::{BaseMotion, Drive};
 pub use contact::Wall;

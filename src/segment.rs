@@ -8,8 +8,7 @@
 use crate::arithmetic::sincos_of_product;
 use crate::base_motion::BaseMotion;
 use crate::forcing::Forcing;
-use crate::oscillator::Oscillator;
-use crate::overdamped::{is_apart, pushed};
+use crate::oscillator::{Oscillator, is_apart, pushed};
 use num_complex::Complex64;
 
 /// The series is used while `fastest rate * t` is at most this; degree 15 then leaves out less than 1e-18.
