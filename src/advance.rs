@@ -2,12 +2,12 @@
 
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::Drive;
-use crate::contact::{Resolution, Wall};
+use crate::contact::{ImpactLaw, Resolution, Wall};
 use crate::fast::Next;
-use crate::flight::{Flight, until_released};
+use crate::flight::{Flight, FlightEnd, Grip, until_released};
 use crate::oscillator::Oscillator;
 use crate::parameters::InvalidValue;
-use crate::plant::{Event, MOST_EVALUATIONS, MOST_IMPACTS, Masses, Outcome, Plant};
+use crate::plant::{Contact, Event, MOST_EVALUATIONS, MOST_IMPACTS, Masses, Outcome, Plant, Rig};
 use crate::segment::Segment;
 
 /// Largest number of releases per step: rounding can tear a particle off its wall again and again where values are extreme.
@@ -121,8 +121,10 @@ impl Plant {
         }
         while step.goes_on() {
             let left = step.left.value();
-            if let Some(wall) = self.contact {
-                self.stay(wall, left, &mut step);
+            if let Some(contact) = self.contact {
+                self.stay(contact, left, &mut step);
+            } else if self.moving.rig.forces.holding > 0.0 {
+                self.slide(left, None, &mut step);
             } else {
                 match self.fast.next(&mut self.moving, left, duration) {
                     Next::ContactFree(t) if t == left => step.left = Sum::default(),
@@ -149,15 +151,67 @@ impl Plant {
     /// just ceased to push.
     #[inline(never)]
     fn search(&mut self, limit: f64, released: Option<Wall>, step: &mut Step<impl FnMut(Event)>) {
-        let masses = self.moving.masses;
-        let motion = Segment::new(&self.moving.rig.free, self.moving.base, masses.primary.values.into());
-        let half_width = self.moving.rig.parameters.half_width;
-        let flight = Flight::new(motion, (masses.w.value(), masses.dw), half_width);
+        let (rig, masses) = (&self.moving.rig, self.moving.masses);
+        let motion = Segment::new(&rig.free, self.moving.base, masses.primary.values.into());
+        let pull = rig.forces.gravity;
+        let flight = Flight::new(motion, (masses.w.value(), masses.dw), rig.half_width, pull);
         let end = flight.first_contact(limit, released);
+        self.fly(&end, pull, step);
+    }
+
+    /// Slides to a wall or a reversal, or for `limit` seconds; `slips` is the sign of `w'` where the particle has just been released. A
+    /// particle without relative velocity sticks if friction can hold it.
+    #[inline(never)]
+    fn slide(&mut self, limit: f64, slips: Option<f64>, step: &mut Step<impl FnMut(Event)>) {
+        let (rig, masses) = (&self.moving.rig, self.moving.masses);
+        let direction = match slips {
+            Some(direction) => direction,
+            None => self.direction(),
+        };
+        if direction == 0.0 {
+            self.contact = Some(Contact::Floor);
+            self.totals.sticks += 1;
+            let t = step.now();
+            (step.on_event)(Event::Sticking { t });
+            return;
+        }
+        let friction = rig.forces.kinetic * direction;
+        let base = rig.pushed(self.moving.base, -friction);
+        let motion = Segment::new(&rig.free, base, masses.primary.values.into());
+        let pull = rig.forces.gravity + friction;
+        let flight = Flight::new(motion, (masses.w.value(), masses.dw), rig.half_width, pull);
+        let end = flight.first_wall_or_reversal(limit, direction, slips.is_some() || masses.dw == 0.0);
+        let start = masses.w.value();
+        let weight = rig.parameters.particle_mass * rig.forces.kinetic;
+        let half_width = rig.half_width;
+        self.fly(&end, pull, step);
+        // An impact leaves the particle on the wall.
+        let moved = match end.wall {
+            Some(wall) => wall.sign() * half_width - start,
+            None => self.moving.masses.w.value() - start,
+        };
+        self.totals.friction += weight * moved.abs();
+        if end.reversed {
+            let masses = &mut self.moving.masses;
+            (masses.dw, masses.particle) = (0.0, masses.primary.values[1]);
+            step.outcome.released += 1;
+            let direction = self.direction();
+            if direction != 0.0 {
+                let t = step.now();
+                (step.on_event)(Event::Reversal { t, direction });
+            }
+        }
+    }
+
+    /// Moves on to the end of a flight or of a stretch of sliding, in which the particle has the constant acceleration `pull`, m/s².
+    fn fly(&mut self, end: &FlightEnd, pull: f64, step: &mut Step<impl FnMut(Event)>) {
+        let half_width = self.moving.rig.half_width;
         self.fast.evaluations += end.evaluations;
-        self.moving.masses.primary = masses.primary.plus([end.moved, end.gained]);
-        self.moving.masses.dw += end.gained;
-        self.moving.masses.drift(end.drifted, half_width);
+        let masses = &mut self.moving.masses;
+        masses.primary = masses.primary.plus([end.moved, end.gained]);
+        masses.dw += end.gained - pull * end.t;
+        masses.particle += pull * end.t;
+        masses.drift(end.drifted, half_width);
         self.base_moves(end.t);
         step.left = step.left.plus(-end.t);
         if let Some(wall) = end.wall {
@@ -165,25 +219,70 @@ impl Plant {
         }
     }
 
-    /// Both masses move as one for at most `left` seconds, until the wall ceases to push; then the particle flies on. The release
-    /// is not remembered beyond this call: another drive or other parameters may press the wall on the particle again.
-    fn stay(&mut self, wall: Wall, left: f64, step: &mut Step<impl FnMut(Event)>) {
+    /// Sign of the relative velocity `w'` from now on while the particle slides; 0 where static friction holds it, and where there is no
+    /// friction.
+    pub(crate) fn direction(&self) -> f64 {
+        let Rig { forces, mass_ratio, .. } = &self.moving.rig;
+        let masses = &self.moving.masses;
+        if forces.holding == 0.0 {
+            return 0.0;
+        }
+        if masses.dw != 0.0 {
+            return 1f64.copysign(masses.dw);
+        }
+        // The acceleration that the particle needs to follow the primary mass, times (M + m)/M.
+        let velocity = masses.primary.values[1];
+        let needed = self.acceleration(velocity) - forces.gravity;
+        let holding = (1.0 + mass_ratio) * (forces.holding + self.acceleration_error(velocity));
+        if needed.abs() <= holding {
+            0.0
+        } else {
+            1f64.copysign(needed)
+        }
+    }
+
+    /// Both masses move as one for at most `left` seconds, until the particle is released; then it goes on. The release is not
+    /// remembered beyond this call: another drive or other parameters may hold the particle again.
+    fn stay(&mut self, contact: Contact, left: f64, step: &mut Step<impl FnMut(Event)>) {
+        let rig = &self.moving.rig;
         let start = self.moving.masses.primary.values;
+        let wall = match contact {
+            Contact::Wall(wall) => Some(wall),
+            Contact::Floor => None,
+        };
+        let forces = &rig.forces;
         let noise = self.acceleration_error(start[1]);
-        let motion = Segment::new(&self.moving.rig.stuck, self.moving.base, start.into());
-        let stay = until_released(&motion, wall, left, noise);
+        let base = rig.pushed(self.moving.base, forces.gravity);
+        let motion = Segment::new(&rig.stuck, base, start.into());
+        let grip = Grip {
+            wall,
+            gravity: forces.gravity,
+            holding: forces.holding,
+            noise,
+        };
+        let stay = until_released(&motion, &grip, left);
         self.fast.evaluations += stay.evaluations;
         self.moving.masses.primary = Sums { values: stay.state, errors: [0.0; 2] };
         self.moving.masses.particle = stay.state[1];
         self.moving.masses.dw = 0.0;
         self.base_moves(stay.t);
         step.left = step.left.plus(-stay.t);
-        if stay.released {
+        if wall.is_none() {
+            self.totals.stuck_time += stay.t;
+        }
+        if let Some(direction) = stay.released {
             self.contact = None;
             step.outcome.released += 1;
-            let t = step.now();
-            (step.on_event)(Event::Released { t, wall });
-            self.search(step.left.value(), Some(wall), step);
+            let (t, left) = (step.now(), step.left.value());
+            (step.on_event)(match wall {
+                Some(wall) => Event::Released { t, wall },
+                None => Event::Slip { t, direction },
+            });
+            if self.moving.rig.forces.holding > 0.0 {
+                self.slide(left, Some(direction), step);
+            } else {
+                self.search(left, wall, step);
+            }
         }
     }
 
@@ -223,14 +322,14 @@ impl Plant {
     /// The wall that the particle touches.
     #[inline]
     pub(crate) fn wall_touched(&self) -> Option<Wall> {
-        let (w, b) = (self.moving.masses.w.value(), self.moving.rig.parameters.half_width);
+        let (w, b) = (self.moving.masses.w.value(), self.moving.rig.half_width);
         (w.abs() >= b).then(|| Wall::ahead(w))
     }
 
     /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave.
     #[inline]
     pub(crate) fn touch(&mut self, wall: Wall, step: &mut Step<impl FnMut(Event)>) {
-        let half_width = self.moving.rig.parameters.half_width;
+        let half_width = self.moving.rig.half_width;
         self.moving.masses.w = Sum::from(wall.sign() * half_width);
         let resolution = Resolution {
             lowest_hop: LOWEST_HOP * half_width,
@@ -240,11 +339,24 @@ impl Plant {
         };
         let Masses { primary, particle, dw, .. } = self.moving.masses;
         let velocities = (primary.values[1], particle, dw);
-        let touch = self.moving.rig.law.touch(wall, velocities, |primary, speed| {
-            let largest = self.acceleration_bound(primary);
-            !(self.moving.rig.law).certainly_leaves(speed, largest, &resolution)
-                && (self.moving.rig.law).rests(speed, self.pressing(wall, primary), &resolution)
-        });
+        let rig = &self.moving.rig;
+        let touch = if rig.varies || rig.is_forced() {
+            let law = if rig.varies {
+                let r = rig.rebound.of_impact(wall, dw.abs(), self.totals.impacts);
+                ImpactLaw::with(&rig.parameters, r)
+            } else {
+                rig.law
+            };
+            law.touch(wall, velocities, |primary, speed| {
+                self.rests(wall, primary, speed, &resolution)
+            })
+        } else {
+            rig.law.touch(wall, velocities, |primary, speed| {
+                let largest = self.acceleration_bound(primary);
+                !rig.law.certainly_leaves(speed, largest, &resolution)
+                    && rig.law.rests(speed, self.pressing(wall, primary), &resolution)
+            })
+        };
         self.moving.masses.primary = self.moving.masses.primary.plus([0.0, touch.kick]);
         self.moving.masses.particle = touch.particle;
         self.moving.masses.dw = touch.relative;
@@ -255,18 +367,56 @@ impl Plant {
             (step.on_event)(Event::Impact { t, wall, velocity });
         }
         if touch.stuck {
-            self.contact = Some(wall);
+            self.contact = Some(Contact::Wall(wall));
             step.outcome.stuck += 1;
             (step.on_event)(Event::Stuck { t, wall });
         }
     }
 
-    /// Acceleration of `wall` towards the particle while the primary mass moves alone, and its rounding error, m/s².
+    /// Whether a particle that leaves `wall` at `speed` is in truth at rest on it, with constant forces and a restitution that varies.
+    ///
+    /// On its way from the wall and back the particle has the accelerations `up` and `down` towards the wall: friction adds to the
+    /// first and takes from the second. A hop lasts `u/up + u/sqrt(up down)`, and the particle comes back at `u sqrt(down/up)`. Hops
+    /// therefore die out as those under one acceleration and a smaller coefficient of restitution do. Where friction stops the
+    /// particle before it comes back, there is one hop only.
+    fn rests(&self, wall: Wall, primary: f64, speed: f64, resolution: &Resolution) -> bool {
+        let rig = &self.moving.rig;
+        let (free, error) = self.pressing(wall, primary);
+        let joint = 1.0 + rig.mass_ratio;
+        let pressing = free - wall.sign() * rig.forces.gravity;
+        let (up, down) = (
+            pressing + joint * rig.forces.kinetic,
+            pressing - joint * rig.forces.kinetic,
+        );
+        if speed == 0.0 {
+            return pressing + joint * rig.forces.holding >= -error;
+        }
+        if up <= 0.0 {
+            return false;
+        }
+        let (mean, back) = if down > 0.0 && pressing > joint * rig.forces.holding {
+            (2.0 / (1.0 / up + 1.0 / libm::sqrt(up * down)), libm::sqrt(down / up))
+        } else {
+            (up, 0.0)
+        };
+        let restitution = back * rig.rebound.mean(wall, speed * back);
+        rig.law
+            .resting_with(restitution)
+            .rests(speed, (mean, error), resolution)
+    }
+
+    /// Acceleration of `wall` towards a particle without acceleration while the primary mass moves alone, and its rounding error, m/s².
     fn pressing(&self, wall: Wall, velocity: f64) -> (f64, f64) {
+        (
+            wall.sign() * self.acceleration(velocity),
+            self.acceleration_error(velocity),
+        )
+    }
+
+    /// Acceleration of the primary mass at a velocity, while it moves alone and without friction, m/s².
+    fn acceleration(&self, velocity: f64) -> f64 {
         let start = (self.moving.masses.primary.values[0], velocity);
-        let motion = Segment::new(&self.moving.rig.free, self.moving.base, start);
-        let acceleration = motion.derivatives_at_start()[2];
-        (wall.sign() * acceleration, self.acceleration_error(velocity))
+        Segment::new(&self.moving.rig.free, self.moving.base, start).derivatives_at_start()[2]
     }
 
     /// An upper bound of the acceleration's magnitude, m/s²: the sum of its terms.
@@ -281,7 +431,7 @@ impl Plant {
 
     /// Rounding error of the acceleration, m/s².
     pub(crate) fn acceleration_error(&self, velocity: f64) -> f64 {
-        let nothing = NOTHING * self.moving.rig.parameters.half_width * self.moving.rig.free.omega0_squared;
-        ROUNDING * self.acceleration_bound(velocity) + nothing
+        let nothing = NOTHING * self.moving.rig.half_width * self.moving.rig.free.omega0_squared;
+        ROUNDING * (self.acceleration_bound(velocity) + self.moving.rig.forces.size()) + nothing
     }
 }

@@ -34,6 +34,14 @@ impl Wall {
         }
     }
 
+    /// 0 or 1.
+    pub(crate) fn index(self) -> usize {
+        match self {
+            Wall::Plus => 0,
+            Wall::Minus => 1,
+        }
+    }
+
     /// The wall that `w` approaches with this velocity, or lies beyond.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn ahead(w: f64) -> Self {
@@ -90,15 +98,20 @@ pub struct Resolution {
 impl ImpactLaw {
     /// The law for these masses and this coefficient of restitution.
     pub fn new(p: &Parameters) -> Self {
+        Self::with(p, p.restitution)
+    }
+
+    /// The law for these masses and the coefficient of restitution `r`.
+    pub(crate) fn with(p: &Parameters, r: f64) -> Self {
         let total = two_sum(p.primary_mass, p.particle_mass);
-        let factor = two_sum(1.0, p.restitution);
+        let factor = two_sum(1.0, r);
         let share = factor.0 * (p.particle_mass / total.0);
         // `factor m - share total`, to first order in the rounding errors.
         let wanted = times(factor, (p.particle_mass, 0.0));
         let got = times((share, 0.0), total);
         let (lost, error) = plus(wanted, (-got.0, -got.1));
         Self {
-            restitution: p.restitution,
+            restitution: r,
             primary_share: split_coefficient((share, (lost + error) / total.0)),
             particle_fraction: p.particle_mass / total.0,
             half_relative_mass: 0.5 * p.relative_mass(),
@@ -135,6 +148,11 @@ impl ImpactLaw {
             touch.stuck = true;
         }
         touch
+    }
+
+    /// This law with another coefficient of restitution in the question whether the particle rests.
+    pub(crate) fn resting_with(&self, restitution: f64) -> Self {
+        Self { restitution, ..*self }
     }
 
     /// Whether a rebound at `speed` is certainly not at rest, whatever the acceleration up to `largest`.

@@ -16,7 +16,7 @@ use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive, Phase, shift};
 use crate::contact::Wall;
 use crate::oscillator::Oscillator;
-use crate::plant::Moving;
+use crate::plant::{Moving, Rig};
 use crate::segment::Segment;
 use propagator::{Coefficients, Grid, Increment, Point, Propagator, SAME, ShortStep};
 use verify::{Horizon, Start};
@@ -41,6 +41,8 @@ pub(crate) enum Next {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct FastPath {
     pub disabled: bool,
+    /// Whether it serves: it is not disabled, and the particle flies straight.
+    serves: bool,
     /// How long there is no contact from now on.
     pub contact_free: Horizon,
     /// `e^{i phase}` of the base: cosine and sine.
@@ -68,10 +70,23 @@ pub(crate) struct SavedPath {
 }
 
 impl FastPath {
+    /// Empty, for a rig.
+    pub fn new(rig: &Rig) -> Self {
+        let mut path = Self::default();
+        path.choose(rig);
+        path
+    }
+
+    /// Decides whether it serves.
+    pub fn choose(&mut self, rig: &Rig) {
+        self.serves = !self.disabled && !rig.is_forced();
+    }
+
     /// What is saved of it.
     pub fn save(&self) -> SavedPath {
         let Self {
             disabled,
+            serves: _,
             contact_free,
             phasor,
             rotations,
@@ -135,7 +150,7 @@ impl FastPath {
     /// Takes a step whose propagator is cached, if it meets no contact. Returns whether it was taken.
     #[inline]
     pub fn step(&mut self, moving: &mut Moving, duration: f64) -> bool {
-        if self.disabled {
+        if !self.serves {
             return false;
         }
         if duration != self.cache.step.t {
@@ -203,7 +218,7 @@ impl FastPath {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn drift(&mut self, moving: &mut Moving, dx: f64, t: f64) {
         let Moving { rig, masses, .. } = moving;
-        masses.drift(dx - masses.particle * t, rig.parameters.half_width);
+        masses.drift(dx - masses.particle * t, rig.half_width);
         self.contact_free.t -= t;
     }
 

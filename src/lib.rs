@@ -4,6 +4,7 @@
 mod advance;
 mod arithmetic;
 pub mod base_motion;
+pub mod cavity;
 pub mod clearance;
 pub mod contact;
 mod fast;
@@ -15,6 +16,7 @@ pub mod plant;
 pub mod segment;
 
 pub use base_motion::{BaseMotion, Drive};
+pub use cavity::{Cavity, Restitution};
 pub use contact::Wall;
 pub use parameters::{InvalidValue, Parameters};
 pub use plant::{Event, Outcome, Plant, State, Totals};

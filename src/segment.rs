@@ -126,6 +126,11 @@ impl Segment {
         self.bound::<3>(d, window, signal)
     }
 
+    /// A bound on the fourth derivative over the next `window` seconds, given the derivatives now.
+    pub fn fourth_derivative_bound(&self, d: &Derivatives, window: f64) -> f64 {
+        self.bound::<4>(d, window, 0.0)
+    }
+
     /// A bound on the fifth derivative over the next `window` seconds, given the derivatives now.
     pub fn fifth_derivative_bound(&self, d: &Derivatives, window: f64) -> f64 {
         self.bound::<5>(d, window, 0.0)

@@ -69,6 +69,7 @@ fn run([epsilon, lambda, r]: [f64; 3], noise: u64, snr: &str, [k, c, m, b, dr]: 
         particle_mass: epsilon,
         half_width: 1.0,
         restitution: r,
+        cavity: lovines::Cavity::IDEAL,
     };
     let width = 1.0 + b;
     let settings = [

@@ -27,7 +27,7 @@ impl FastPath {
     /// What comes next within `left` seconds of a step of `duration`.
     #[inline]
     pub fn next(&mut self, moving: &mut Moving, left: f64, duration: f64) -> Next {
-        if self.disabled {
+        if !self.serves {
             return Next::Search(left);
         }
         let to_search = core::mem::take(&mut self.to_search);
@@ -98,7 +98,7 @@ impl FastPath {
             let increment = propagator.increment(drive.amplitude, point);
             let increment = Nearby::<4>::new(&self.coefficients, drive.amplitude, point, &increment).at(h);
             let w = start.here.sample.w + (increment.y + start.drift * left);
-            if w.abs() >= start.rig.parameters.half_width || !start.is_monotone(&start.here, left) {
+            if w.abs() >= start.rig.half_width || !start.is_monotone(&start.here, left) {
                 return None;
             }
             let angle = propagator.angle.plus(self.coefficients.omega * h);
@@ -122,7 +122,7 @@ impl FastPath {
 fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
     let oscillator = &rig.free;
     let [offset, slope, ..] = base.drive.signal;
-    let widest = WIDEST * rig.parameters.half_width;
+    let widest = WIDEST * rig.half_width;
     let fastest = widest * oscillator.omega0;
     base.drive.is_straight()
         && base.drive.omega >= 0.0
@@ -136,7 +136,7 @@ fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
 /// That displacement is at most the amplitude of the steady response and that of the free motion, which never grows.
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn out_of_reach(coefficients: &Coefficients, start: &Start) -> Option<f64> {
-    let (b, here) = (start.rig.parameters.half_width, &start.here);
+    let (b, here) = (start.rig.half_width, &start.here);
     let steady = coefficients.forcing.steady()? * start.base.drive.amplitude;
     let particle = here.point.y - here.sample.w;
     let room = b * (1.0 - 1e-9) - particle.abs() - steady.l1_norm();
@@ -166,7 +166,7 @@ impl FastPath {
     /// The return to the wall that the particle has just left, if it is a short hop that ends within `left` seconds.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn hop(&mut self, start: &Start, left: f64) -> Option<Arrival> {
-        let (here, b) = (&start.here.sample, start.rig.parameters.half_width);
+        let (here, b) = (&start.here.sample, start.rig.half_width);
         if here.w.abs() != b {
             return None;
         }
@@ -276,7 +276,7 @@ impl FastPath {
     fn rest(&mut self, start: &Start, from: &Mark) -> Option<Arrival> {
         let wall = Wall::ahead(start.drift);
         // If the primary mass stood still.
-        let t = (wall.sign() * start.rig.parameters.half_width - from.sample.w) / start.drift;
+        let t = (wall.sign() * start.rig.half_width - from.sample.w) / start.drift;
         if t > self.coefficients.span || !start.is_monotone(from, from.t + t) {
             return None;
         }
@@ -336,7 +336,7 @@ impl FastPath {
 /// What happens between two marks.
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn stretch(start: &Start, from: &Mark, to: &Mark) -> Stretch {
-    let (b, t) = (start.rig.parameters.half_width, to.t - from.t);
+    let (b, t) = (start.rig.half_width, to.t - from.t);
     if to.sample.w.abs() < b {
         return if start.is_open(from, &to.sample, to.t) {
             Stretch::Open
@@ -405,7 +405,7 @@ impl Arrival {
     pub fn is_first(&self, start: &Start, coefficients: &Coefficients, from: &Mark) -> bool {
         let there = self.added.to(&start.here.point);
         let sample = Sample {
-            w: self.wall.sign() * start.rig.parameters.half_width,
+            w: self.wall.sign() * start.rig.half_width,
             dw: start.here.sample.dw + self.added.dy,
             ddw: start.acceleration(coefficients, &there),
         };
@@ -421,7 +421,7 @@ pub(super) fn arrive(coefficients: &Coefficients, propagator: &Propagator, start
     let increment = propagator.increment(amplitude, &here.point);
     let w = here.sample.w + (increment.y + start.drift * propagator.t);
     let slowness = 1.0 / (here.point.dy + increment.dy + start.drift);
-    let first = (wall.sign() * start.rig.parameters.half_width - w) * slowness;
+    let first = (wall.sign() * start.rig.half_width - w) * slowness;
     // Not a number where the approach has no speed.
     let close = first.abs() < coefficients.near;
     if !close {
@@ -457,7 +457,7 @@ impl FastPath {
     /// one point of the grid to a nearer one.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn arrive_after(&mut self, start: &Start, from: &Mark, mut t: f64, wall: Wall) -> Option<Arrival> {
-        let ahead = wall.sign() * start.rig.parameters.half_width - from.sample.w;
+        let ahead = wall.sign() * start.rig.half_width - from.sample.w;
         for _ in 0..MOST_POINTS {
             let (at, nearby) = self.near_point(start, from, t);
             let gap = ahead - (nearby.there.y + start.drift * (at - from.t));

@@ -148,7 +148,7 @@ impl<'a> Start<'a> {
     #[inline(always)]
     pub fn is_open(&self, from: &Mark, to: &Sample, t: f64) -> bool {
         let t = t - from.t;
-        let (b, jerk, half) = (self.rig.parameters.half_width, self.jerk(from, t), 0.5 * t);
+        let (b, jerk, half) = (self.rig.half_width, self.jerk(from, t), 0.5 * t);
         let backwards = Sample { dw: -to.dw, ..*to };
         t > 0.0 && from.sample.is_open(b, jerk, half) && backwards.is_open(b, jerk, half)
     }
@@ -188,7 +188,7 @@ impl Horizon {
     /// What a bound from the start alone shows: no contact for `t` seconds or more, or nothing.
     pub(super) fn ahead(moving: &Moving, start: &Point, t: f64) -> Self {
         let Moving { rig, masses, base } = moving;
-        let (b, w, dw, reach) = (rig.parameters.half_width, masses.w.value(), masses.dw, AHEAD * t);
+        let (b, w, dw, reach) = (rig.half_width, masses.w.value(), masses.dw, AHEAD * t);
         let forcing = forcing(&rig.free, &base.drive, reach) * (1.0 + MARGIN);
         let speed = speed_squared(&rig.free, start).sqrt() + forcing * reach;
         let jumps = MARGIN * speed;

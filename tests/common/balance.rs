@@ -5,7 +5,7 @@
 //! along the motion, with panels that no impact falls into, and panels far shorter than the fastest rate.
 
 use crate::common::Scene;
-use lovines::{Drive, Event, Plant};
+use lovines::{Drive, Plant};
 
 /// Nodes and weights of the Gauss-Legendre formula with 8 points on [-1, 1] (positive half).
 const NODES: [(f64, f64); 4] = [
@@ -69,8 +69,7 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
         let mut ahead = plant;
         ahead
             .advance_with(plant.base().drive, panel, |event| {
-                let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) = event;
-                first.get_or_insert(t);
+                first.get_or_insert(event.time());
             })
             .expect("a valid step");
         let length = first.unwrap_or(panel);

@@ -24,15 +24,16 @@ impl Movement {
     pub fn of(plant: &Plant) -> Self {
         let (p, state) = (plant.parameters(), plant.state());
         let base = rates_of(&plant.base());
-        let stuck = plant.contact().is_some();
+        let stuck = plant.contact().is_some() || plant.sticks();
+        let (of_primary, of_particle) = plant.constant_accelerations();
         let moved = p.primary_mass + if stuck { p.particle_mass } else { 0.0 };
         let mut primary = [state.q1, state.dq1, 0.0, 0.0, 0.0];
         for n in 2..primary.len() {
             let damper = p.damping * (base[n - 1] - primary[n - 1]);
             let spring = p.stiffness * (base[n - 2] - primary[n - 2]);
-            primary[n] = (damper + spring) / moved;
+            primary[n] = (damper + spring) / moved + if n == 2 { of_primary } else { 0.0 };
         }
-        let mut particle = [state.q2, state.dq2, 0.0, 0.0, 0.0];
+        let mut particle = [state.q2, state.dq2, of_particle, 0.0, 0.0];
         if stuck {
             particle[2..].copy_from_slice(&primary[2..]);
         }
