@@ -180,17 +180,14 @@ impl Plant {
         let motion = Segment::new(&rig.free, base, masses.primary.values.into());
         let pull = rig.forces.gravity + friction;
         let flight = Flight::new(motion, (masses.w.value(), masses.dw), rig.half_width, pull);
+        let flight = flight.with_error(masses.w.error());
         let end = flight.first_wall_or_reversal(limit, direction, slips.is_some() || masses.dw == 0.0);
-        let start = masses.w.value();
-        let weight = rig.parameters.particle_mass * rig.forces.kinetic;
-        let half_width = rig.half_width;
-        self.fly(&end, pull, step);
-        // An impact leaves the particle on the wall.
         let moved = match end.wall {
-            Some(wall) => wall.sign() * half_width - start,
-            None => self.moving.masses.w.value() - start,
+            Some(wall) => (wall.sign() * rig.half_width - masses.w.value()) - masses.w.error(),
+            None => end.drifted,
         };
-        self.totals.friction += weight * moved.abs();
+        self.totals.friction += rig.parameters.particle_mass * rig.forces.kinetic * moved.abs();
+        self.fly(&end, pull, step);
         if end.reversed {
             let masses = &mut self.moving.masses;
             (masses.dw, masses.particle) = (0.0, masses.primary.values[1]);
@@ -335,7 +332,7 @@ impl Plant {
             lowest_hop: LOWEST_HOP * half_width,
             longest_chatter: step.left.value(),
             fastest: self.moving.rig.free.fastest,
-            elastic: true,
+            elastic: !self.moving.rig.varies,
         };
         let Masses { primary, particle, dw, .. } = self.moving.masses;
         let velocities = (primary.values[1], particle, dw);

@@ -15,6 +15,8 @@ pub struct Flight {
     /// `w` from the middle of the cavity at the start, m, and its velocity, m/s.
     start: (f64, f64),
     half_width: f64,
+    /// Rounding error of `w` at the start, m: near a wall, where friction turns the particle round, the gap is made of it.
+    error: f64,
     /// Constant acceleration of the particle, m/s².
     pull: f64,
 }
@@ -42,7 +44,21 @@ impl Flight {
     /// A flight of a particle at `w` (m) with velocity `w'` (m/s) relative to the primary mass in `motion`, and with the constant
     /// acceleration `pull`, m/s².
     pub fn new(motion: Segment, start: (f64, f64), half_width: f64, pull: f64) -> Self {
-        Self { series: motion.series(), motion, start, half_width, pull }
+        let error = 0.0;
+        Self {
+            series: motion.series(),
+            motion,
+            start,
+            half_width,
+            error,
+            pull,
+        }
+    }
+
+    /// The same flight from a start whose `w` has a rounding error, m.
+    #[must_use]
+    pub fn with_error(self, error: f64) -> Self {
+        Self { error, ..self }
     }
 
     /// Follows the stretch of sliding with `w'` of the sign `direction` to the wall ahead or to `w' = 0`, or for `limit` seconds if
@@ -139,7 +155,7 @@ impl Flight {
     fn gap(&self, wall: Wall, change: (f64, f64), d: &Derivatives) -> Gap {
         let s = wall.sign();
         // On the wall the bracket is exactly 0: what is left is the change alone, with all its digits.
-        let gap = (self.half_width - s * self.start.0) - s * change.0;
+        let gap = (self.half_width - s * self.start.0) - s * (self.error + change.0);
         Gap {
             gap: gap.max(0.0),
             closing: s * (self.start.1 + change.1),

@@ -128,3 +128,121 @@ trajectories! {
     scattered_restitution_is_followed: "scatter";
     all_effects_together_are_followed: "all";
 }
+
+/// The default rig near its 1:1 motion, with a cavity.
+fn lock(cavity: Cavity) -> (Plant, Drive) {
+    let parameters = Parameters { cavity, ..Parameters::dimensionless(0.0084, 1.43, 0.65) };
+    let start = State { q1: -0.4384, dq1: 0.0077, q2: -1.0039, dq2: -0.8781 };
+    (
+        Plant::new(parameters, start).expect("a valid scene"),
+        Drive::harmonic(0.0084 * 1.1, 0.990_417),
+    )
+}
+
+/// The largest distance of the lock with a cavity from the ideal lock within 20 periods.
+fn distance(cavity: Cavity) -> f64 {
+    let ((mut ideal, drive), (mut real, _)) = (lock(Cavity::IDEAL), lock(cavity));
+    let mut largest = 0.0f64;
+    for _ in 0..1270 {
+        ideal.advance(drive, 0.1).expect("a valid step");
+        real.advance(drive, 0.1).expect("a valid step");
+        let (a, b) = (ideal.state(), real.state());
+        largest = largest.max((a.q1 - b.q1).abs()).max((a.q2 - b.q2).abs());
+    }
+    assert!(ideal.totals().impacts > 30);
+    largest
+}
+
+#[test]
+fn a_small_effect_changes_the_motion_in_proportion() {
+    let effect = |size: f64| {
+        [
+            Cavity { kinetic_friction: size, ..Cavity::IDEAL },
+            Cavity { tilt: size, ..Cavity::IDEAL },
+            Cavity { b_plus: Some(1.0 + size), ..Cavity::IDEAL },
+            Cavity {
+                restitution: [Some(Restitution::Constant(0.65 + size)), None],
+                ..Cavity::IDEAL
+            },
+            Cavity { scatter: size, ..Cavity::IDEAL },
+        ]
+    };
+    for (small, smaller) in effect(1e-7).into_iter().zip(effect(1e-9)) {
+        let ratio = distance(small) / distance(smaller);
+        assert!((ratio - 100.0).abs() < 0.5, "{small:?}: {ratio}");
+    }
+    for nothing in effect(0.0) {
+        assert_eq!(distance(nothing), 0.0, "{nothing:?}");
+    }
+    // The general path against the fast one.
+    for least in effect(1e-300) {
+        assert!(distance(least) < 1e-12, "{least:?}");
+    }
+}
+
+#[test]
+fn a_mirrored_cavity_has_the_mirrored_motion() {
+    let laws = [Some(Restitution::Viscoelastic(0.3)), Some(Restitution::Constant(0.7))];
+    let cavity = Cavity {
+        b_plus: Some(1.1),
+        b_minus: Some(0.9),
+        tilt: 0.01,
+        kinetic_friction: 0.003,
+        restitution: laws,
+        ..Cavity::IDEAL
+    };
+    let mirrored = Cavity {
+        b_plus: Some(0.9),
+        b_minus: Some(1.1),
+        tilt: -0.01,
+        restitution: [laws[1], laws[0]],
+        ..cavity
+    };
+    let ((mut plant, drive), (mut mirror, _)) = (lock(cavity), lock(mirrored));
+    let State { q1, dq1, q2, dq2 } = plant.state();
+    mirror
+        .set_state(State { q1: -q1, dq1: -dq1, q2: -q2, dq2: -dq2 })
+        .expect("a valid state");
+    let opposite = Drive { amplitude: -drive.amplitude, ..drive };
+    for _ in 0..500 {
+        plant.advance(drive, 0.37).expect("a valid step");
+        mirror.advance(opposite, 0.37).expect("a valid step");
+        let (a, b) = (plant.state(), mirror.state());
+        assert!((a.q1 + b.q1).abs() < 1e-12 && (a.q2 + b.q2).abs() < 1e-12);
+    }
+    assert!(plant.totals().impacts > 40);
+}
+
+#[test]
+fn the_scatter_does_not_depend_on_the_steps_or_on_a_rollback() {
+    let cavity = Cavity { scatter: 0.1, seed: 3, ..Cavity::IDEAL };
+    let follow = |step: f64, n: u32, rollback: bool| {
+        let (mut plant, drive) = lock(cavity);
+        let mut velocities = Vec::new();
+        for _ in 0..n {
+            if rollback {
+                let saved = plant.save();
+                plant.advance(drive, 3.7 * step).expect("a valid step");
+                plant.restore(&saved);
+            }
+            let on_event = |event| {
+                if let lovines::Event::Impact { velocity, .. } = event {
+                    velocities.push(velocity);
+                }
+            };
+            plant.advance_with(drive, step, on_event).expect("a valid step");
+        }
+        velocities
+    };
+    let (long, short, back) = (
+        follow(400.0, 1, false),
+        follow(0.1, 4000, false),
+        follow(0.1, 4000, true),
+    );
+    assert!(long.len() > 100);
+    assert_eq!(short, back);
+    assert_eq!(long.len(), short.len());
+    for (a, b) in long.iter().zip(&short) {
+        assert!((a - b).abs() < 1e-11, "{a} {b}");
+    }
+}

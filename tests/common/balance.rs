@@ -62,6 +62,8 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
     let panel = PANEL / fastest;
     let at_start = plant.energy(base(&plant).0);
     let (mut lost, mut done, mut exchanged) = (0.0, 0.0, 0.0);
+    // The energy of a weight on a tilted axis has no natural zero.
+    let mut largest = at_start.abs();
     let mut result = Walk::default();
     while result.panels < panels {
         let mut first = None;
@@ -88,8 +90,9 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
             let s = plant.state();
             // The difference of the two displacements carries their rounding.
             let rounding = 4.0 * f64::EPSILON * s.q1.abs().max(s.q2.abs());
-            let w = (s.q1 - s.q2).abs() - rounding;
-            result.outside = result.outside.max(w / p.half_width - 1.0);
+            let ([plus, minus], w) = (p.gaps(), s.q1 - s.q2);
+            let outside = (w - plus).max(-w - minus) - rounding;
+            result.outside = result.outside.max(outside / p.half_width);
         }
         if first.is_some() {
             // To just behind the event; the next panel begins there. The power hardly changes on the way from it.
@@ -103,11 +106,12 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
         } else {
             go(&mut plant, length - gone);
         }
+        largest = largest.max(plant.energy(base(&plant).0).abs());
         result.panels += 1;
     }
-    let dissipated = plant.totals().dissipated;
+    let dissipated = plant.totals().dissipated + plant.totals().friction;
     let error = plant.energy(base(&plant).0) + dissipated + lost - done - at_start;
-    let scale = at_start + exchanged + dissipated;
+    let scale = largest + exchanged + dissipated;
     if scale > 0.0 {
         result.imbalance = error.abs() / scale;
     }
