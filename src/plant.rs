@@ -171,17 +171,11 @@ impl Plant {
         self.contact == Some(Contact::Floor)
     }
 
-    /// Constant accelerations now, m/s²: of the primary mass, or of both masses as one while the particle sticks or rests, and of the
-    /// particle while it slides. They come on top of those by spring and damper.
+    /// Constant accelerations of the particle now, m/s²: by gravity along the axis, and by kinetic friction while it slides.
     pub fn constant_accelerations(&self) -> (f64, f64) {
-        let rig = &self.moving.rig;
-        if self.contact.is_some() {
-            let joint = rig.forces.gravity * rig.particle_fraction();
-            return (joint, joint);
-        }
-        let direction = self.direction();
-        let friction = rig.forces.kinetic * direction;
-        (-rig.mass_ratio * friction, rig.forces.gravity + friction)
+        let forces = &self.moving.rig.forces;
+        let direction = if self.contact.is_some() { 0.0 } else { self.direction() };
+        (forces.gravity, forces.kinetic * direction)
     }
 
     /// Totals since the start.
@@ -272,11 +266,6 @@ impl Rig {
     /// Whether constant forces act: then the particle does not fly straight.
     pub fn is_forced(&self) -> bool {
         self.forces != Forces::default()
-    }
-
-    /// `m/(M + m)`.
-    pub fn particle_fraction(&self) -> f64 {
-        self.mass_ratio / (1.0 + self.mass_ratio)
     }
 
     /// The base that moves the primary mass as `base` and a constant force on it do; the force is in units of the particle's weight,
