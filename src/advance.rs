@@ -2,7 +2,7 @@
 
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::Drive;
-use crate::contact::{ImpactLaw, Resolution, Wall};
+use crate::contact::{Resolution, Wall};
 use crate::fast::Next;
 use crate::flight::{Flight, FlightEnd, Grip, until_released};
 use crate::oscillator::Oscillator;
@@ -151,6 +151,9 @@ impl Plant {
     /// just ceased to push.
     #[inline(never)]
     fn search(&mut self, limit: f64, released: Option<Wall>, step: &mut Step<impl FnMut(Event)>) {
+        if released.is_none() && self.arrives(limit, 0.0, step) {
+            return;
+        }
         let (rig, masses) = (&self.moving.rig, self.moving.masses);
         let motion = Segment::new(&rig.free, self.moving.base, masses.primary.values.into());
         let pull = rig.forces.gravity;
@@ -163,7 +166,7 @@ impl Plant {
     /// particle without relative velocity sticks if friction can hold it.
     #[inline(never)]
     fn slide(&mut self, limit: f64, slips: Option<f64>, step: &mut Step<impl FnMut(Event)>) {
-        let (rig, masses) = (&self.moving.rig, self.moving.masses);
+        let masses = self.moving.masses;
         let direction = match slips {
             Some(direction) => direction,
             None => self.direction(),
@@ -175,7 +178,11 @@ impl Plant {
             (step.on_event)(Event::Sticking { t });
             return;
         }
-        let friction = rig.forces.kinetic * direction;
+        if slips.is_none() && masses.dw != 0.0 && self.arrives(limit, direction, step) {
+            return;
+        }
+        let rig = &self.moving.rig;
+        let friction = rig.friction(direction);
         let base = rig.pushed(self.moving.base, -friction);
         let motion = Segment::new(&rig.free, base, masses.primary.values.into());
         let pull = rig.forces.gravity + friction;
@@ -198,6 +205,23 @@ impl Plant {
                 (step.on_event)(Event::Reversal { t, direction });
             }
         }
+    }
+
+    /// Moves on to the wall ahead, if constant forces act and the fast path finds the contact within `limit` seconds.
+    fn arrives(&mut self, limit: f64, direction: f64, step: &mut Step<impl FnMut(Event)>) -> bool {
+        if !self.moving.rig.is_forced() {
+            return false;
+        }
+        let w = self.moving.masses.w;
+        let Some((t, wall)) = self.fast.next_with_forces(&mut self.moving, limit, direction) else {
+            return false;
+        };
+        let rig = &self.moving.rig;
+        let moved = (wall.sign() * rig.half_width - w.value()) - w.error();
+        self.totals.friction += rig.parameters.particle_mass * rig.forces.kinetic * moved.abs();
+        step.left = step.left.minus(t);
+        self.touch(wall, step);
+        true
     }
 
     /// Moves on to the end of a flight or of a stretch of sliding, in which the particle has the constant acceleration `pull`, m/s².
@@ -340,7 +364,7 @@ impl Plant {
         let touch = if rig.varies || rig.is_forced() {
             let law = if rig.varies {
                 let r = rig.rebound.of_impact(wall, dw.abs(), self.totals.impacts);
-                ImpactLaw::with(&rig.parameters, r)
+                rig.law.with_restitution(r)
             } else {
                 rig.law
             };
@@ -378,8 +402,12 @@ impl Plant {
     /// particle before it comes back, there is one hop only.
     fn rests(&self, wall: Wall, primary: f64, speed: f64, resolution: &Resolution) -> bool {
         let rig = &self.moving.rig;
-        let (free, error) = self.pressing(wall, primary);
         let joint = 1.0 + rig.mass_ratio;
+        let largest = self.acceleration_bound(primary) + joint * rig.forces.size();
+        if rig.law.resting_with(1.0).certainly_leaves(speed, largest, resolution) {
+            return false;
+        }
+        let (free, error) = self.pressing(wall, primary);
         let pressing = free - wall.sign() * rig.forces.gravity;
         let (up, down) = (
             pressing + joint * rig.forces.kinetic,

@@ -32,7 +32,8 @@ impl Restitution {
     fn at(self, v: f64) -> f64 {
         match self {
             Self::Constant(r) => r,
-            Self::Viscoelastic(k) => 1.0 - k * libm::pow(v, 0.2),
+            // Half the work of `pow`.
+            Self::Viscoelastic(k) => 1.0 - k * libm::exp(0.2 * libm::log(v)),
             Self::Plastic(yield_speed) => libm::sqrt(libm::sqrt(yield_speed / v)).min(1.0),
         }
     }

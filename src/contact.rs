@@ -98,24 +98,26 @@ pub struct Resolution {
 impl ImpactLaw {
     /// The law for these masses and this coefficient of restitution.
     pub fn new(p: &Parameters) -> Self {
-        Self::with(p, p.restitution)
-    }
-
-    /// The law for these masses and the coefficient of restitution `r`.
-    pub(crate) fn with(p: &Parameters, r: f64) -> Self {
         let total = two_sum(p.primary_mass, p.particle_mass);
-        let factor = two_sum(1.0, r);
+        let factor = two_sum(1.0, p.restitution);
         let share = factor.0 * (p.particle_mass / total.0);
         // `factor m - share total`, to first order in the rounding errors.
         let wanted = times(factor, (p.particle_mass, 0.0));
         let got = times((share, 0.0), total);
         let (lost, error) = plus(wanted, (-got.0, -got.1));
         Self {
-            restitution: r,
+            restitution: p.restitution,
             primary_share: split_coefficient((share, (lost + error) / total.0)),
             particle_fraction: p.particle_mass / total.0,
             half_relative_mass: 0.5 * p.relative_mass(),
         }
+    }
+
+    /// The law for another coefficient of restitution. Its share has one rounding error only: that of a coefficient which changes from
+    /// impact to impact does not add up.
+    pub(crate) fn with_restitution(&self, r: f64) -> Self {
+        let primary_share = ((1.0 + r) * self.particle_fraction, 0.0);
+        Self { restitution: r, primary_share, ..*self }
     }
 
     /// The particle is at `wall` with velocities of primary mass and particle and a relative velocity. If it approaches, Newton's

@@ -268,10 +268,19 @@ impl Rig {
         self.forces != Forces::default()
     }
 
-    /// The base that moves the primary mass as `base` and a constant force on it do; the force is in units of the particle's weight,
-    /// `m` times an acceleration, m/s².
+    /// Acceleration of the particle by kinetic friction while `w'` has the sign `direction`, m/s².
+    pub fn friction(&self, direction: f64) -> f64 {
+        self.forces.kinetic * direction
+    }
+
+    /// The displacement of the equilibrium, m, by the force that gives the particle the acceleration `acceleration`, m/s².
+    pub fn shift(&self, acceleration: f64) -> f64 {
+        self.parameters.particle_mass * acceleration / self.parameters.stiffness
+    }
+
+    /// The base that moves the primary mass as `base` and that force on it do.
     pub fn pushed(&self, base: BaseMotion, acceleration: f64) -> BaseMotion {
-        let shift = self.parameters.particle_mass * acceleration / self.parameters.stiffness;
+        let shift = self.shift(acceleration);
         let [u0, u1, u2, u3] = base.drive.signal;
         BaseMotion {
             drive: Drive { signal: [u0 + shift, u1, u2, u3], ..base.drive },

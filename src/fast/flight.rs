@@ -59,6 +59,37 @@ impl FastPath {
         self.take(moving, &point, &found, left, duration)
     }
 
+    /// The contact within `left` seconds of a particle with a constant acceleration and friction in `direction`, if it certainly moves
+    /// towards the wall ahead all the time: the plant has moved on to it.
+    pub fn next_with_forces(&mut self, moving: &mut Moving, left: f64, direction: f64) -> Option<(Sum, Wall)> {
+        let (rig, base) = (&moving.rig, &moving.base);
+        let mut point = self.point(moving);
+        point.y -= rig.shift(-rig.friction(direction));
+        if self.disabled || !applies(rig, base, &point) {
+            return None;
+        }
+        self.coefficients.prepare(&rig.free, base.drive.omega);
+        let pull = rig.forces.gravity + rig.friction(direction);
+        let start = Start { pull, ..Start::new(moving, point) };
+        self.evaluations += 1;
+        let expected = (self.cache)
+            .expected(&rig.free, &self.coefficients)
+            .and_then(|propagator| arrive(&self.coefficients, propagator, &start))
+            .filter(|arrival| start.is_monotone(&start.here, arrival.t.value()));
+        let Arrival { t, wall, added, angle } = match expected {
+            Some(arrival) => arrival,
+            None => self.rest(&start, &start.here)?,
+        };
+        if t.value() > left {
+            return None;
+        }
+        self.cache.learn(&self.coefficients, t.value());
+        self.apply(moving, &added, angle, t.value());
+        moving.masses.dw -= pull * t.value();
+        moving.masses.particle += pull * t.value();
+        Some((t, wall))
+    }
+
     /// Does what was found.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn take(&mut self, moving: &mut Moving, point: &Point, found: &Found, left: f64, duration: f64) -> Next {
@@ -419,8 +450,9 @@ pub(super) fn arrive(coefficients: &Coefficients, propagator: &Propagator, start
     let (amplitude, here) = (start.base.drive.amplitude, &start.here);
     let wall = Wall::ahead(here.sample.dw);
     let increment = propagator.increment(amplitude, &here.point);
-    let w = here.sample.w + (increment.y + start.drift * propagator.t);
-    let slowness = 1.0 / (here.point.dy + increment.dy + start.drift);
+    let (t, half) = (propagator.t, 0.5 * start.pull);
+    let w = here.sample.w + (increment.y + (start.drift - half * t) * t);
+    let slowness = 1.0 / (here.point.dy + increment.dy + (start.drift - start.pull * t));
     let first = (wall.sign() * start.rig.half_width - w) * slowness;
     // Not a number where the approach has no speed.
     let close = first.abs() < coefficients.near;
@@ -429,10 +461,12 @@ pub(super) fn arrive(coefficients: &Coefficients, propagator: &Propagator, start
     }
     let nearby = Nearby::<4>::new(coefficients, amplitude, &here.point, &increment);
     // Where the approach is slow and curved, the reversed series is not accurate.
-    if (nearby.c[0] * slowness * first).abs() >= NEAR {
+    let [c2, c3, c4, _] = nearby.c;
+    let c2 = c2 - half;
+    if (c2 * slowness * first).abs() >= NEAR {
         return None;
     }
-    let h = reversed(&nearby.c, first, slowness);
+    let h = reversed(&[c2, c3, c4], first, slowness);
     Some(Arrival {
         t: Sum::of(propagator.t, h),
         wall,
@@ -460,9 +494,11 @@ impl FastPath {
         let ahead = wall.sign() * start.rig.half_width - from.sample.w;
         for _ in 0..MOST_POINTS {
             let (at, nearby) = self.near_point(start, from, t);
-            let gap = ahead - (nearby.there.y + start.drift * (at - from.t));
-            let slowness = 1.0 / (from.sample.dw + nearby.there.dy);
-            let h = reversed(&nearby.c, gap * slowness, slowness);
+            let (elapsed, half) = (at - from.t, 0.5 * start.pull);
+            let gap = ahead - (nearby.there.y + (start.drift - half * elapsed) * elapsed);
+            let slowness = 1.0 / (from.sample.dw + nearby.there.dy - start.pull * elapsed);
+            let [c2, c3, c4, ..] = nearby.c;
+            let h = reversed(&[c2 - half, c3, c4], gap * slowness, slowness);
             if h.abs() <= self.coefficients.reach {
                 return self.polish(start, from, wall, (at, &nearby), (gap, h));
             }
@@ -487,17 +523,18 @@ impl FastPath {
         (gap, mut h): (f64, f64),
     ) -> Option<Arrival> {
         let there = &nearby.there;
-        let speed = from.sample.dw + there.dy;
+        let speed = from.sample.dw + there.dy - start.pull * (at - from.t);
+        let half = 0.5 * start.pull;
         for _ in 0..MOST_ITERATIONS {
             let (deviation, gained) = nearby.change(h);
-            let slowness = 1.0 / (speed + gained);
-            let step = ((gap - h * speed) - deviation) * slowness;
+            let slowness = 1.0 / (speed + (gained - start.pull * h));
+            let step = ((gap - h * speed) - (deviation - half * h * h)) * slowness;
             let within = (h + step).abs() <= self.coefficients.reach;
             if !within {
                 break;
             }
             // Newton's method squares the error.
-            let error = (nearby.c[0] * slowness * (step * step)).abs();
+            let error = ((nearby.c[0] - half) * slowness * (step * step)).abs();
             if error <= ENOUGH * (at - from.t + h) && step.abs() <= SHORT * self.coefficients.reach {
                 let phasor = nearby.phasor(h + step);
                 let (y, dy) = (there.y + (h * nearby.dy + deviation), nearby.dy + gained);

@@ -89,6 +89,8 @@ pub(super) struct Start<'a> {
     pub here: Mark,
     /// Velocity of the base's line less that of the particle, m/s.
     pub drift: f64,
+    /// Constant acceleration of the particle, m/s².
+    pub pull: f64,
 }
 
 impl<'a> Start<'a> {
@@ -101,6 +103,7 @@ impl<'a> Start<'a> {
             base,
             here: Mark { t: 0.0, point, sample },
             drift: base.drive.signal[1] - masses.particle,
+            pull: 0.0,
         }
     }
 
@@ -129,7 +132,7 @@ impl<'a> Start<'a> {
     #[inline(always)]
     pub fn is_monotone(&self, from: &Mark, t: f64) -> bool {
         let (oscillator, drive, t) = (&self.rig.free, &self.base.drive, t - from.t);
-        let spare = self.drift.abs() - forcing(oscillator, drive, t) * t;
+        let spare = self.drift.abs() - (forcing(oscillator, drive, t) + self.pull.abs()) * t;
         spare > 0.0 && spare * spare * (1.0 - 1e-9) > speed_squared(oscillator, &from.point)
     }
 
