@@ -25,6 +25,11 @@ impl Sum {
         self.value
     }
 
+    /// The rounding error.
+    pub fn error(self) -> f64 {
+        self.error
+    }
+
     /// The sum of this and a number that is not much larger.
     #[must_use]
     #[inline(always)]

@@ -23,7 +23,7 @@ pub struct Gap {
     pub jerk: f64,
 }
 
-/// Bounds of the derivatives of all gaps over the next so many seconds, given the derivatives of the motion now.
+/// Bounds of the derivatives of the gaps over the next so many seconds, given the derivatives of the motion now.
 pub trait Bounds {
     /// A bound of the third derivative.
     fn third(&self, d: &Derivatives, window: f64) -> f64;
@@ -33,8 +33,8 @@ pub trait Bounds {
         f64::INFINITY
     }
 
-    /// How long `gap` is certainly open, s, at most `window`.
-    fn open(&self, gap: &Gap, d: &Derivatives, window: f64) -> f64 {
+    /// How long gap number `_which` is certainly open, s, at most `window`.
+    fn open(&self, _which: usize, gap: &Gap, d: &Derivatives, window: f64) -> f64 {
         let open = gap.certainly_open(window, |h| self.third(d, h));
         open.max((gap.gap / self.first(d, window)).min(window))
     }
@@ -69,10 +69,10 @@ const MOST_WINDOWS: usize = 40;
 /// The first closure of any of `N` gaps in `[from, limit]`, or until when there is none, and how often the motion was evaluated.
 ///
 /// `look` returns the gaps at a time and the derivatives of the motion there; `fastest` is the fastest rate of the motion, 1/s;
-/// `resolution` is the rounding error of the gaps.
+/// `resolutions` are the rounding errors of the gaps.
 pub fn first_closure<const N: usize>(
     (from, limit): (f64, f64),
-    (fastest, resolution): (f64, f64),
+    (fastest, resolutions): (f64, [f64; N]),
     look: impl Fn(f64) -> ([Gap; N], Derivatives),
     bounds: impl Bounds,
 ) -> (Result<Closure, f64>, u64) {
@@ -89,7 +89,7 @@ pub fn first_closure<const N: usize>(
             let open = if gap.gap < 0.0 {
                 0.0
             } else {
-                bounds.open(gap, &derivatives, left)
+                bounds.open(which, gap, &derivatives, left)
             };
             if open * fastest < NEAR && open < left {
                 let contact = gap.contact_nearby(2.0 * NEAR / fastest);
@@ -109,11 +109,15 @@ pub fn first_closure<const N: usize>(
         if tiny_steps > MOST_TINY_STEPS {
             // A gap that has no digits left, and neither closes nor opens, would hold the march for ever: move on by a time
             // in which nothing that can be told happens.
-            let blurred = gaps.map(|gap| {
-                let gap = Gap { gap: gap.gap + resolution, ..gap };
-                bounds.open(&gap, &derivatives, left)
-            });
-            least = blurred.into_iter().fold(left, f64::min).max(least);
+            let blurred = gaps
+                .iter()
+                .zip(resolutions)
+                .enumerate()
+                .map(|(which, (gap, resolution))| {
+                    let gap = Gap { gap: gap.gap + resolution, ..*gap };
+                    bounds.open(which, &gap, &derivatives, left)
+                });
+            least = blurred.fold(left, f64::min).max(least);
         }
         t += step.max(least);
     }

@@ -34,6 +34,14 @@ impl Wall {
         }
     }
 
+    /// 0 or 1.
+    pub(crate) fn index(self) -> usize {
+        match self {
+            Wall::Plus => 0,
+            Wall::Minus => 1,
+        }
+    }
+
     /// The wall that `w` approaches with this velocity, or lies beyond.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn ahead(w: f64) -> Self {
@@ -105,6 +113,13 @@ impl ImpactLaw {
         }
     }
 
+    /// The law for another coefficient of restitution. Its share has one rounding error only: that of a coefficient which changes from
+    /// impact to impact does not add up.
+    pub(crate) fn with_restitution(&self, r: f64) -> Self {
+        let primary_share = ((1.0 + r) * self.particle_fraction, 0.0);
+        Self { restitution: r, primary_share, ..*self }
+    }
+
     /// The particle is at `wall` with velocities of primary mass and particle and a relative velocity. If it approaches, Newton's
     /// law reverses the relative velocity and reduces it by `r`. If then `rests` holds for the velocity of the primary mass and
     /// the speed away from the wall, both go on as one mass. Momentum is conserved.
@@ -135,6 +150,11 @@ impl ImpactLaw {
             touch.stuck = true;
         }
         touch
+    }
+
+    /// This law with another coefficient of restitution in the question whether the particle rests.
+    pub(crate) fn resting_with(&self, restitution: f64) -> Self {
+        Self { restitution, ..*self }
     }
 
     /// Whether a rebound at `speed` is certainly not at rest, whatever the acceleration up to `largest`.

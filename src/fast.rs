@@ -8,30 +8,18 @@
 //! Everything kept between steps lives in [`Cache`], and each entry carries its key: the time it belongs to and
 //! the frequency of the base. An entry whose key differs is not used; nothing else invalidates it.
 
-mod arrival;
-mod cache;
-mod coefficients;
 mod flight;
-mod free_increment;
-mod grid;
-mod hop;
-mod horizon;
-mod march;
 mod propagator;
-mod short_step;
 mod verify;
 
 use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive, Phase, shift};
 use crate::contact::Wall;
-use crate::moving::Moving;
 use crate::oscillator::Oscillator;
+use crate::plant::{Moving, Rig};
 use crate::segment::Segment;
-use cache::{Cache, Keys};
-use coefficients::Coefficients;
-use horizon::Horizon;
-use propagator::{Increment, Point};
-use verify::Start;
+use propagator::{Coefficients, Grid, Increment, Point, Propagator, SAME, ShortStep};
+use verify::{Horizon, Start};
 
 /// How often a phasor is rotated before it is computed from the phase again.
 const ROTATIONS: u32 = 16;
@@ -53,6 +41,8 @@ pub(crate) enum Next {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct FastPath {
     pub disabled: bool,
+    /// Whether it serves: it is not disabled, and the particle flies straight.
+    serves: bool,
     /// How long there is no contact from now on.
     pub contact_free: Horizon,
     /// `e^{i phase}` of the base: cosine and sine.
@@ -80,10 +70,23 @@ pub(crate) struct SavedPath {
 }
 
 impl FastPath {
+    /// Empty, for a rig.
+    pub fn new(rig: &Rig) -> Self {
+        let mut path = Self::default();
+        path.choose(rig);
+        path
+    }
+
+    /// Decides whether it serves.
+    pub fn choose(&mut self, rig: &Rig) {
+        self.serves = !self.disabled && !rig.is_forced();
+    }
+
     /// What is saved of it.
     pub fn save(&self) -> SavedPath {
         let Self {
             disabled,
+            serves: _,
             contact_free,
             phasor,
             rotations,
@@ -147,7 +150,7 @@ impl FastPath {
     /// Takes a step whose propagator is cached, if it meets no contact. Returns whether it was taken.
     #[inline]
     pub fn step(&mut self, moving: &mut Moving, duration: f64) -> bool {
-        if self.disabled {
+        if !self.serves {
             return false;
         }
         if duration != self.cache.step.t {
@@ -215,7 +218,7 @@ impl FastPath {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn drift(&mut self, moving: &mut Moving, dx: f64, t: f64) {
         let Moving { rig, masses, .. } = moving;
-        masses.drift(dx - masses.particle * t, rig.parameters.half_width);
+        masses.drift(dx - masses.particle * t, rig.half_width);
         self.contact_free.t -= t;
     }
 
@@ -246,7 +249,7 @@ impl FastPath {
             }
         } else {
             self.coefficients.prepare(oscillator, drive.omega);
-            if t * fastest > short_step::LONGEST {
+            if t * fastest > propagator::LONGEST {
                 self.cache.learn(&self.coefficients, t);
             }
             self.after(&Start::new(moving, *start), t)
@@ -254,5 +257,127 @@ impl FastPath {
         let dx = self.apply(moving, &increment, propagator::angle(drive.omega, t), t);
         self.drift(moving, dx, t);
         Next::ContactFree(t)
+    }
+}
+
+// Cache
+//
+// What is kept between steps. Each entry is used only if its key matches.
+
+/// Flights kept: a motion of so many different flights per period, or flights and parts of them, is predicted.
+const FLIGHTS: usize = 8;
+
+/// Propagators. What is saved of one is its key.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cache {
+    /// Of a step that repeats.
+    step: ShortStep,
+    /// Of flights, and of what is left of a step after one. Until it is needed a propagator has only its key.
+    flights: [Propagator; FLIGHTS],
+    sequence: Sequence,
+    /// Of points of a march.
+    grid: Grid,
+    /// Length of the last whole step without contact, s.
+    last_duration: f64,
+}
+
+/// Which flight follows which.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Sequence {
+    /// Which followed which when they were last used.
+    followers: [u8; FLIGHTS],
+    last: u8,
+    /// Whether the last one was the follower of the one before.
+    regular: bool,
+    /// The one to be replaced next.
+    oldest: u8,
+}
+
+/// What is saved of the propagators: the times they belong to, s. All else is computed again when it is needed.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Keys {
+    step: f64,
+    flights: [f64; FLIGHTS],
+    sequence: Sequence,
+    last_duration: f64,
+}
+
+impl Cache {
+    fn keys(&self) -> Keys {
+        let Self { step, flights, sequence, grid: _, last_duration } = self;
+        Keys {
+            step: step.t,
+            flights: flights.map(|flight| flight.t),
+            sequence: *sequence,
+            last_duration: *last_duration,
+        }
+    }
+
+    /// Makes these the keys. Propagators that have theirs already stay.
+    fn restore(&mut self, keys: &Keys) {
+        if self.step.t.to_bits() != keys.step.to_bits() {
+            self.step = ShortStep::from(keys.step);
+        }
+        for (flight, t) in self.flights.iter_mut().zip(keys.flights) {
+            if flight.t != t {
+                flight.reset(t);
+            }
+        }
+        (self.sequence, self.last_duration) = (keys.sequence, keys.last_duration);
+    }
+
+    /// Whether a whole step without contact can be taken with [`Self::step`]: it is short, and has been taken before.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn repeats(&mut self, oscillator: &Oscillator, drive: &Drive, duration: f64) -> bool {
+        if self.step.serves(drive, duration - self.step.t) {
+            return true;
+        }
+        let again = (duration - self.last_duration).abs() <= SAME * duration;
+        self.last_duration = duration;
+        if again && ShortStep::is_short(oscillator, drive.omega, duration) {
+            self.step = ShortStep::from(duration);
+        }
+        duration == self.step.t
+    }
+
+    /// The propagator that followed the last one before, if flights have been regular.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn expected(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) -> Option<&Propagator> {
+        let Sequence { followers, last, regular, .. } = self.sequence;
+        if !regular {
+            return None;
+        }
+        let propagator = &mut self.flights[usize::from(followers[usize::from(last)]) % FLIGHTS];
+        if propagator.omega != coefficients.omega {
+            if propagator.free_t != propagator.t {
+                let increment = self.grid.increment(oscillator, coefficients.spacing, propagator.t);
+                propagator.set(propagator.t, oscillator.split(&increment));
+            }
+            propagator.respond(oscillator, coefficients);
+        }
+        Some(propagator)
+    }
+
+    /// A flight to a contact, or what was left of a step, took `t` seconds.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn learn(&mut self, coefficients: &Coefficients, t: f64) {
+        // Nearer than an unused propagator, which has a time of 0.
+        let is_near = |n: u8| (self.flights[usize::from(n) % FLIGHTS].t - t).abs() < coefficients.near.min(t);
+        let sequence = &mut self.sequence;
+        let expected = sequence.followers[usize::from(sequence.last)];
+        sequence.regular = is_near(expected);
+        let n = if sequence.regular {
+            expected
+        } else {
+            (0..FLIGHTS as u8).find(|&n| is_near(n)).unwrap_or_else(|| {
+                sequence.oldest = (sequence.oldest + 1) % FLIGHTS as u8;
+                self.flights[usize::from(sequence.oldest)].reset(t);
+                sequence.oldest
+            })
+        };
+        sequence.followers[usize::from(sequence.last)] = n;
+        sequence.last = n;
     }
 }

@@ -3,7 +3,7 @@
 //! `x'' + 2 delta x' + omega0² x = 0`. Position and velocity after `t` are a linear map of those now; the map's four
 //! entries are written so that none loses digits at any damping ratio, however near to critical.
 
-use crate::arithmetic::{product, quotient, sincos_of_product, two_sum};
+use crate::arithmetic::{divided, plus, product, quotient, sincos_of_product, split_coefficient, times, two_sum};
 use num_complex::Complex64;
 
 /// Below this part of the decay rate the two rates are too near each other to be told apart by subtraction.
@@ -163,6 +163,131 @@ impl Oscillator {
             (mean + self.delta * s, mean - self.delta * s)
         };
         Transition { xx, xv: s, vx: -self.omega0_squared * s, vv }
+    }
+}
+
+// A constant or growing force on an overdamped oscillator
+//
+// What a steady push does to an oscillator that is overdamped, from rest.
+//
+// `x'' + 2 delta x' + omega0² x = 1` and `= t`: the integrals of `(e^{slow t} - e^{fast t})/(slow - fast)`, once and twice.
+// With damping far above critical the position at which such a motion comes to rest at last lies far off, and taking it off
+// at the start to add it again later would leave no digits of what happens in between.
+
+/// Whether the rates of `oscillator` are far apart.
+pub(crate) fn is_apart(oscillator: &Oscillator) -> bool {
+    matches!(oscillator.regime, Regime::Overdamped { half_gap, .. } if half_gap > APART * oscillator.delta)
+}
+
+/// Positions after `t` seconds under a push of 1 and under one that grows as the time, s² and s³, where the rates are apart.
+pub(crate) fn pushed(oscillator: &Oscillator, t: f64) -> (f64, f64) {
+    let Regime::Overdamped { slow, fast, .. } = oscillator.regime else {
+        return (0.0, 0.0);
+    };
+    let (of_slow, of_fast) = (integrals(slow, t), integrals(fast, t));
+    let gap = slow - fast;
+    ((of_slow.0 - of_fast.0) / gap, (of_slow.1 - of_fast.1) / gap)
+}
+
+/// The integral of `e^{rate t}` from 0 to `t`, and the integral of that, for a rate of 0 or below.
+fn integrals(rate: f64, t: f64) -> (f64, f64) {
+    let z = rate * t;
+    if z > -0.5 {
+        // `(e^z - 1 - z)/z²`; the first term left out is below 2^-14/16! = 3e-18.
+        let mut series = 1.0;
+        for n in (3..=15).rev() {
+            series = series * z / f64::from(n) + 1.0;
+        }
+        let twice = 0.5 * series;
+        (t * (1.0 + z * twice), t * t * twice)
+    } else {
+        let once = libm::expm1(z);
+        (once / rate, (once - z) / rate / rate)
+    }
+}
+
+// The free motion in double-double arithmetic
+//
+// What the free motion adds, in double-double arithmetic: for a propagator that is used many times.
+
+/// `1/n!` with its rounding error.
+const PER_FACTORIAL: [(f64, f64); 18] = {
+    let (mut terms, mut n) = ([(1.0, 0.0); 18], 2);
+    while n < terms.len() {
+        terms[n] = divided(terms[n - 1], n as f64);
+        n += 1;
+    }
+    terms
+};
+
+impl Oscillator {
+    /// What the free motion over `t` seconds adds: a Taylor series over a time that is short against every rate, doubled as often as
+    /// needed.
+    pub(crate) fn increment(&self, t: f64) -> FreeIncrement {
+        // Terms from `PLAIN` on are so small that rounding them leaves 23 digits; those from `TERMS` on are below that.
+        const PLAIN: usize = 7;
+        const TERMS: usize = 18;
+        let (mut t, mut doublings) = (t, 0);
+        while 4.0 * self.fastest * t > 1.0 {
+            (t, doublings) = (0.5 * t, doublings + 1);
+        }
+        let (damping, spring) = self.rates();
+        let (damping, spring) = (times(damping, (-t, 0.0)), times(spring, product(-t, t)));
+        // Derivatives of the motion that starts with a displacement of 0 and a velocity of 1/t, in units of time of t.
+        let (mut d, mut s, mut p) = ([(0.0, 0.0), (1.0, 0.0)], (1.0, 0.0), (0.0, 0.0));
+        for n in 2..PLAIN {
+            d = [d[1], plus(times(damping, d[1]), times(spring, d[0]))];
+            s = plus(s, times(d[1], PER_FACTORIAL[n]));
+            p = plus(p, times(d[1], PER_FACTORIAL[n - 1]));
+        }
+        let (mut d, mut small) = (d.map(|(d, _)| d), (0.0, 0.0));
+        for n in PLAIN..TERMS {
+            d = [d[1], damping.0 * d[1] + spring.0 * d[0]];
+            small = (
+                small.0 + PER_FACTORIAL[n].0 * d[1],
+                small.1 + PER_FACTORIAL[n - 1].0 * d[1],
+            );
+        }
+        let short = FreeIncrement {
+            p: plus(p, (small.1, 0.0)),
+            s: times(plus(s, (small.0, 0.0)), (t, 0.0)),
+        };
+        (0..doublings).fold(short, |one, _| self.composed(&one, &one))
+    }
+
+    /// What two times, one after the other, add.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub(crate) fn composed(&self, a: &FreeIncrement, b: &FreeIncrement) -> FreeIncrement {
+        let (damping, spring) = self.rates();
+        let square = times(a.s, b.s);
+        let p = plus(times(a.p, b.p), times((-spring.0, -spring.1), square));
+        let s = plus(plus(times(a.p, b.s), times(b.p, a.s)), times(damping, square));
+        FreeIncrement { p: plus(plus(a.p, b.p), p), s: plus(plus(a.s, b.s), s) }
+    }
+
+    /// What an increment adds to position and velocity, as the sum of two maps: for one that is used many times. A rounded one would be a
+    /// steady source or sink of energy, and shift the phase.
+    pub(crate) fn split(&self, FreeIncrement { p, s }: &FreeIncrement) -> (Transition, Transition) {
+        let (damping, spring) = self.rates();
+        let entries = [plus(*p, times(damping, *s)), *s, times((-spring.0, -spring.1), *s), *p];
+        let [xx, xv, vx, vv] = entries.map(split_coefficient);
+        let part = |xx, xv, vx, vv| Transition { xx, xv, vx, vv };
+        (part(xx.0, xv.0, vx.0, vv.0), part(xx.1, xv.1, vx.1, vv.1))
+    }
+}
+
+/// What a transition adds, in double-double arithmetic: `p = vv - 1` and `s = xv`. With them `xx = 1 + p + 2 delta s` and
+/// `vx = -omega0² s`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FreeIncrement {
+    p: (f64, f64),
+    s: (f64, f64),
+}
+
+/// From its two maps ([`Oscillator::split`]).
+impl From<&(Transition, Transition)> for FreeIncrement {
+    fn from((head, tail): &(Transition, Transition)) -> Self {
+        Self { p: two_sum(head.vv, tail.vv), s: two_sum(head.xv, tail.xv) }
     }
 }
 

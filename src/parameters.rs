@@ -1,5 +1,6 @@
 //! What the rig is made of, in SI units, validated once.
 
+use crate::cavity::Cavity;
 use core::fmt;
 
 /// Fastest rate that is accepted, rad/s: the series of the motion contain its powers, up to the fifteenth.
@@ -21,6 +22,8 @@ pub struct Parameters {
     pub half_width: f64,
     /// Newton's coefficient of restitution `r`.
     pub restitution: f64,
+    /// Unequal gaps, tilt, friction and other restitution; off by default.
+    pub cavity: Cavity,
 }
 
 impl Parameters {
@@ -33,6 +36,7 @@ impl Parameters {
             particle_mass: epsilon,
             half_width: 1.0,
             restitution,
+            cavity: Cavity::IDEAL,
         }
     }
 
@@ -54,6 +58,11 @@ impl Parameters {
     /// Effective mass of the relative motion, `M m/(M + m)`, kg.
     pub fn relative_mass(&self) -> f64 {
         self.primary_mass * (self.particle_mass / (self.primary_mass + self.particle_mass))
+    }
+
+    /// Gaps to the walls at `w = b_plus` and at `w = -b_minus`, m.
+    pub fn gaps(&self) -> [f64; 2] {
+        [self.cavity.b_plus, self.cavity.b_minus].map(|gap| gap.unwrap_or(self.half_width))
     }
 
     /// Checks every value and the rates that follow from them.
@@ -83,7 +92,8 @@ impl Parameters {
             self.damping / self.primary_mass,
             0.0,
             "at most 1e12 rad/s",
-        )
+        )?;
+        self.cavity.validate()
     }
 }
 

@@ -3,19 +3,13 @@
 //! `advance` holds the loop over events. What comes next is either found by the plain solver, a certified search along one
 //! [`crate::segment::Segment`], or predicted and verified by the fast path (`crate::fast`).
 
-mod advance;
-mod at_wall;
-mod events;
-mod saved;
-
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::{BaseMotion, Drive};
-use crate::contact::Wall;
-use crate::fast::FastPath;
-use crate::moving::{Masses, Moving, Rig};
+use crate::cavity::{Forces, Rebound};
+use crate::contact::{ImpactLaw, Touch, Wall};
+use crate::fast::{FastPath, SavedPath};
+use crate::oscillator::Oscillator;
 use crate::parameters::{InvalidValue, Parameters};
-pub use events::{Event, Outcome, State, Totals};
-pub use saved::Saved;
 
 /// Largest number of impacts per step.
 pub const MOST_IMPACTS: u64 = 10_000_000;
@@ -30,14 +24,14 @@ pub const MOST_EVALUATIONS: u64 = 500_000_000;
     serde(from = "Saved", into = "Saved")
 )]
 pub struct Plant {
-    moving: Moving,
-    /// The wall that the particle is stuck to.
-    contact: Option<Wall>,
+    pub(crate) moving: Moving,
+    /// What the particle is at rest on.
+    pub(crate) contact: Option<Contact>,
     /// Whether the base has a position: the first drive sets it, later ones may make it jump.
-    begun: bool,
-    time: f64,
-    totals: Totals,
-    fast: FastPath,
+    pub(crate) begun: bool,
+    pub(crate) time: f64,
+    pub(crate) totals: Totals,
+    pub(crate) fast: FastPath,
 }
 
 impl Plant {
@@ -47,17 +41,18 @@ impl Plant {
     /// Invalid parameters, a state that is not finite, a particle outside its cavity.
     pub fn new(parameters: Parameters, start: State) -> Result<Self, InvalidValue> {
         parameters.validate()?;
+        let rig = Rig::from(parameters);
         Ok(Self {
             moving: Moving {
-                rig: Rig::from(parameters),
-                masses: masses(&parameters, start)?,
+                rig,
+                masses: masses(&rig, start)?,
                 base: BaseMotion::default(),
             },
             contact: None,
             begun: false,
             time: 0.0,
             totals: Totals::default(),
-            fast: FastPath::default(),
+            fast: FastPath::new(&rig),
         })
     }
 
@@ -66,7 +61,7 @@ impl Plant {
     /// # Errors
     /// A state that is not finite, a particle outside its cavity; the plant stays as it is.
     pub fn set_state(&mut self, state: State) -> Result<(), InvalidValue> {
-        self.moving.masses = masses(&self.moving.rig.parameters, state)?;
+        self.moving.masses = masses(&self.moving.rig, state)?;
         self.contact = None;
         self.fast.state_changed(&self.moving.base);
         Ok(())
@@ -88,6 +83,7 @@ impl Plant {
     /// the test oracle of the fast path.
     pub fn set_fast_path(&mut self, on: bool) {
         self.fast.disabled = !on;
+        self.fast.choose(&self.moving.rig);
     }
 
     /// Changes the parameters from now on; displacements, velocities and totals stay. A change of masses or half-width has
@@ -99,6 +95,7 @@ impl Plant {
         parameters.validate()?;
         self.moving.rig = Rig::from(parameters);
         self.fast.parameters_changed(&self.moving.base);
+        self.fast.choose(&self.moving.rig);
         Ok(())
     }
 
@@ -122,13 +119,18 @@ impl Plant {
     pub fn state(&self) -> State {
         let masses = &self.moving.masses;
         let [q1, dq1] = masses.primary.values;
-        State { q1, dq1, q2: q1 - masses.w.value(), dq2: masses.particle }
+        State {
+            q1,
+            dq1,
+            q2: q1 - self.relative_displacement(),
+            dq2: masses.particle,
+        }
     }
 
     /// Relative displacement `w = q1 - q2`, m.
     #[inline]
     pub fn relative_displacement(&self) -> f64 {
-        self.moving.masses.w.value()
+        self.moving.masses.w.value() + self.moving.rig.middle
     }
 
     /// Relative velocity `w'`, m/s.
@@ -141,7 +143,7 @@ impl Plant {
     #[inline]
     pub fn centre(&self) -> f64 {
         let q1 = self.moving.masses.primary.values[0];
-        q1 + self.moving.rig.mass_ratio * (q1 - self.moving.masses.w.value())
+        q1 + self.moving.rig.mass_ratio * (q1 - self.relative_displacement())
     }
 
     /// The base motion now: drive, and the phase of its oscillator.
@@ -158,7 +160,22 @@ impl Plant {
 
     /// The wall the particle is stuck to, if it is.
     pub fn contact(&self) -> Option<Wall> {
-        self.contact
+        match self.contact {
+            Some(Contact::Wall(wall)) => Some(wall),
+            _ => None,
+        }
+    }
+
+    /// Whether the particle sticks to the floor inside the cavity.
+    pub fn sticks(&self) -> bool {
+        self.contact == Some(Contact::Floor)
+    }
+
+    /// Constant accelerations of the particle now, m/s²: by gravity along the axis, and by kinetic friction while it slides.
+    pub fn constant_accelerations(&self) -> (f64, f64) {
+        let forces = &self.moving.rig.forces;
+        let direction = if self.contact.is_some() { 0.0 } else { self.direction() };
+        (forces.gravity, forces.kinetic * direction)
     }
 
     /// Totals since the start.
@@ -166,18 +183,20 @@ impl Plant {
         &self.totals
     }
 
-    /// Mechanical energy, J: of both masses' motion, and of the spring between the primary mass and a base at `displacement`, m.
+    /// Mechanical energy, J: of both masses' motion, of the spring between the primary mass and a base at `displacement`, m, and of the
+    /// particle's weight on a tilted axis (0 at `q2 = 0`).
     pub fn energy(&self, displacement: f64) -> f64 {
         let p = &self.moving.rig.parameters;
-        let State { q1, dq1, dq2, .. } = self.state();
+        let State { q1, dq1, q2, dq2 } = self.state();
         let stretch = q1 - displacement;
         0.5 * (p.primary_mass * dq1 * dq1 + p.particle_mass * dq2 * dq2 + p.stiffness * stretch * stretch)
+            - p.particle_mass * self.moving.rig.forces.gravity * q2
     }
 }
 
 /// The masses at `start`, checked.
-fn masses(parameters: &Parameters, start: State) -> Result<Masses, InvalidValue> {
-    let b = parameters.half_width;
+fn masses(rig: &Rig, start: State) -> Result<Masses, InvalidValue> {
+    let b = rig.half_width;
     let finite = |name, value: f64, unit| {
         let allowed = "a finite number from -1e100 to 1e100";
         InvalidValue::unless(value.abs() <= 1e100, name, value, unit, allowed)
@@ -186,17 +205,369 @@ fn masses(parameters: &Parameters, start: State) -> Result<Masses, InvalidValue>
     finite("der(q1) (velocity of the primary mass)", start.dq1, "m/s")?;
     finite("q2 (displacement of the particle)", start.q2, "m")?;
     finite("der(q2) (velocity of the particle)", start.dq2, "m/s")?;
-    let w = start.q1 - start.q2;
+    let w = (start.q1 - start.q2) - rig.middle;
     // The difference of two displacements carries their rounding; a start on the wall means on the wall.
     let slack = 4.0 * f64::EPSILON * (b + start.q1.abs().max(start.q2.abs()));
     let name = "w = q1 - q2 (particle outside its cavity)";
-    InvalidValue::unless(w.abs() <= b + slack, name, w, "m", "a number from -b to b")?;
+    let allowed = "a number from -b_minus to b_plus, which are b unless set";
+    InvalidValue::unless(w.abs() <= b + slack, name, w + rig.middle, "m", allowed)?;
     Ok(Masses {
         primary: Sums { values: [start.q1, start.dq1], errors: [0.0; 2] },
         w: Sum::from(w.clamp(-b, b)),
         dw: start.dq1 - start.dq2,
         particle: start.dq2,
     })
+}
+
+// State
+//
+// What moves: the rig, its two masses, and its base.
+
+/// The parameters and what follows from them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rig {
+    pub parameters: Parameters,
+    pub mass_ratio: f64,
+    /// Half the distance between the walls, m.
+    pub half_width: f64,
+    /// The middle between the walls, as a value of `q1 - q2`, m.
+    pub middle: f64,
+    /// The law of impacts, where the coefficient of restitution is constant.
+    pub law: ImpactLaw,
+    /// The coefficient of restitution, where it `varies`.
+    pub rebound: Rebound,
+    pub varies: bool,
+    pub forces: Forces,
+    /// The primary mass while the particle is free, and both masses while it is stuck.
+    pub free: Oscillator,
+    pub stuck: Oscillator,
+}
+
+impl From<Parameters> for Rig {
+    fn from(p: Parameters) -> Self {
+        let total = p.primary_mass + p.particle_mass;
+        let ([plus, minus], rebound) = (p.gaps(), Rebound::new(&p));
+        Self {
+            half_width: 0.5 * plus + 0.5 * minus,
+            middle: 0.5 * (plus - minus),
+            varies: !rebound.is_constant(p.restitution),
+            rebound,
+            forces: Forces::new(&p.cavity),
+            parameters: p,
+            mass_ratio: p.mass_ratio(),
+            law: ImpactLaw::new(&p),
+            free: Oscillator::new(p.primary_mass, p.stiffness, p.damping),
+            stuck: Oscillator::new(total, p.stiffness, p.damping),
+        }
+    }
+}
+
+impl Rig {
+    /// Whether constant forces act: then the particle does not fly straight.
+    pub fn is_forced(&self) -> bool {
+        self.forces != Forces::default()
+    }
+
+    /// Acceleration of the particle by kinetic friction while `w'` has the sign `direction`, m/s².
+    pub fn friction(&self, direction: f64) -> f64 {
+        self.forces.kinetic * direction
+    }
+
+    /// The displacement of the equilibrium, m, by the force that gives the particle the acceleration `acceleration`, m/s².
+    pub fn shift(&self, acceleration: f64) -> f64 {
+        self.parameters.particle_mass * acceleration / self.parameters.stiffness
+    }
+
+    /// The base that moves the primary mass as `base` and that force on it do.
+    pub fn pushed(&self, base: BaseMotion, acceleration: f64) -> BaseMotion {
+        let shift = self.shift(acceleration);
+        let [u0, u1, u2, u3] = base.drive.signal;
+        BaseMotion {
+            drive: Drive { signal: [u0 + shift, u1, u2, u3], ..base.drive },
+            ..base
+        }
+    }
+}
+
+/// What a particle at rest relative to the primary mass is held by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) enum Contact {
+    /// A wall, which pushes, and friction.
+    Wall(Wall),
+    /// Friction alone.
+    Floor,
+}
+
+/// Displacements and velocities of both masses.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Masses {
+    /// Displacement of the primary mass, m, and its velocity, m/s.
+    pub primary: Sums,
+    /// Relative displacement from the middle of the cavity, `w = q1 - q2 - middle`, m. It is carried itself: in a narrow gap the
+    /// difference of two large displacements would have lost it.
+    pub w: Sum,
+    /// Relative velocity `w'`, m/s. After an impact it has more digits than the difference of two large velocities.
+    pub dw: f64,
+    /// Velocity of the particle, m/s.
+    pub particle: f64,
+}
+
+impl Masses {
+    /// Adds `dw` to the relative displacement, in which no wall is met.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub fn drift(&mut self, dw: f64, half_width: f64) {
+        self.w = self.w.plus(dw);
+        if self.w.value().abs() > half_width {
+            self.w = Sum::from(half_width.copysign(self.w.value()));
+        }
+    }
+}
+
+/// The parts of a plant that move, and the rig.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moving {
+    pub rig: Rig,
+    pub masses: Masses,
+    pub base: BaseMotion,
+}
+
+// Events and totals
+//
+// What a plant tells: state, events, totals.
+
+/// Positions (m) and velocities (m/s) of both masses.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct State {
+    /// Displacement of the primary mass.
+    pub q1: f64,
+    /// Velocity of the primary mass.
+    pub dq1: f64,
+    /// Displacement of the particle.
+    pub q2: f64,
+    /// Velocity of the particle.
+    pub dq2: f64,
+}
+
+/// An event of a step; times are in seconds since the step began.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// The particle hit a wall.
+    Impact {
+        /// When, s.
+        t: f64,
+        /// Which wall.
+        wall: Wall,
+        /// Relative velocity `w'` just before, m/s.
+        velocity: f64,
+    },
+    /// The particle came to rest on a wall.
+    Stuck {
+        /// When, s.
+        t: f64,
+        /// Which wall.
+        wall: Wall,
+    },
+    /// The particle came to rest on the floor inside the cavity, and sticks to it.
+    Sticking {
+        /// When, s.
+        t: f64,
+    },
+    /// The force needed exceeded static friction: the particle slides again.
+    Slip {
+        /// When, s.
+        t: f64,
+        /// Sign of the relative velocity `w'` from now on.
+        direction: f64,
+    },
+    /// The relative velocity `w'` changed its sign inside the cavity without sticking, and friction its direction.
+    Reversal {
+        /// When, s.
+        t: f64,
+        /// Sign of the relative velocity `w'` from now on.
+        direction: f64,
+    },
+    /// The wall ceased to push and released the particle.
+    Released {
+        /// When, s.
+        t: f64,
+        /// Which wall.
+        wall: Wall,
+    },
+}
+
+impl Event {
+    /// When the event happened, s after the step began.
+    pub fn time(&self) -> f64 {
+        match *self {
+            Self::Impact { t, .. }
+            | Self::Stuck { t, .. }
+            | Self::Sticking { t }
+            | Self::Slip { t, .. }
+            | Self::Reversal { t, .. }
+            | Self::Released { t, .. } => t,
+        }
+    }
+}
+
+/// The events of a step, counted, and how far the step came.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Outcome {
+    /// Impacts followed one by one.
+    pub impacts: u64,
+    /// How often the particle came to rest on a wall.
+    pub stuck: u64,
+    /// How often a wall or the floor released it, and how often it turned round on the floor.
+    pub released: u64,
+    /// Time by which the plant advanced, s: less than the step where it was cut short.
+    pub elapsed: f64,
+    /// Whether the step ended early, at the largest number of impacts, releases or evaluations.
+    pub cut_short: bool,
+    /// Evaluations of the motion (closed form, propagator or series).
+    pub evaluations: u64,
+}
+
+/// Totals since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Totals {
+    /// Impacts followed one by one. A chatter is followed until its hops can no longer be resolved.
+    pub impacts: u64,
+    /// Time of the last impact, s; 0 before the first.
+    pub impact_time: f64,
+    /// Relative velocity `w'` just before the last impact, m/s; 0 before the first.
+    pub impact_velocity: f64,
+    /// Energy dissipated by impacts, J.
+    pub dissipated: f64,
+    /// Energy dissipated by friction, J.
+    pub friction: f64,
+    /// How often the particle stuck to the floor inside the cavity.
+    pub sticks: u64,
+    /// How long it stuck there, s.
+    pub stuck_time: f64,
+}
+
+impl Totals {
+    /// Counts an impact, if `touch` is one, and what it dissipated.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub fn add(&mut self, touch: &Touch, time: f64) {
+        if let Some(velocity) = touch.impact {
+            self.impacts += 1;
+            self.impact_time = time;
+            self.impact_velocity = velocity;
+        }
+        self.dissipated += touch.dissipated;
+    }
+}
+
+// Saving
+//
+// A plant without what can be computed again.
+
+/// A plant without what can be computed again: 0.4 kB instead of 8. The motion continues with the same bits.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Saved {
+    parameters: Parameters,
+    masses: Masses,
+    base: BaseMotion,
+    contact: Option<Contact>,
+    begun: bool,
+    time: f64,
+    totals: Totals,
+    fast: SavedPath,
+}
+
+impl Plant {
+    /// The plant without what can be computed again.
+    pub fn save(&self) -> Saved {
+        let Self {
+            moving: Moving { rig, masses, base },
+            contact,
+            begun,
+            time,
+            totals,
+            fast,
+        } = *self;
+        let parameters = rig.parameters;
+        Saved {
+            parameters,
+            masses,
+            base,
+            contact,
+            begun,
+            time,
+            totals,
+            fast: fast.save(),
+        }
+    }
+
+    /// Makes this plant the one that was saved. One plant can take the place of many in turn: what it has computed for the last one is
+    /// used again as far as it serves.
+    pub fn restore(&mut self, saved: &Saved) {
+        let Saved {
+            parameters,
+            masses,
+            base,
+            contact,
+            begun,
+            time,
+            totals,
+            ref fast,
+        } = *saved;
+        if self.moving.rig.parameters != parameters {
+            let rig = Rig::from(parameters);
+            if self.moving.rig.free != rig.free {
+                self.fast = FastPath::default();
+            }
+            self.moving.rig = rig;
+        }
+        (self.moving.masses, self.moving.base, self.contact) = (masses, base, contact);
+        (self.begun, self.time, self.totals) = (begun, time, totals);
+        self.fast.restore(fast);
+        self.fast.choose(&self.moving.rig);
+    }
+}
+
+impl From<Plant> for Saved {
+    fn from(plant: Plant) -> Self {
+        plant.save()
+    }
+}
+
+impl From<&Saved> for Plant {
+    fn from(saved: &Saved) -> Self {
+        let Saved {
+            parameters,
+            masses,
+            base,
+            contact,
+            begun,
+            time,
+            totals,
+            ref fast,
+        } = *saved;
+        let rig = Rig::from(parameters);
+        let mut path = FastPath::default();
+        path.restore(fast);
+        path.choose(&rig);
+        Self {
+            moving: Moving { rig, masses, base },
+            contact,
+            begun,
+            time,
+            totals,
+            fast: path,
+        }
+    }
+}
+
+impl From<Saved> for Plant {
+    fn from(saved: Saved) -> Self {
+        Self::from(&saved)
+    }
 }
 
 #[cfg(all(test, feature = "serde"))]

@@ -8,8 +8,7 @@
 use crate::arithmetic::sincos_of_product;
 use crate::base_motion::BaseMotion;
 use crate::forcing::Forcing;
-use crate::oscillator::Oscillator;
-use crate::overdamped::{is_apart, pushed};
+use crate::oscillator::{Oscillator, is_apart, pushed};
 use num_complex::Complex64;
 
 /// The series is used while `fastest rate * t` is at most this; degree 15 then leaves out less than 1e-18.
@@ -125,6 +124,11 @@ impl Segment {
     pub fn third_derivative_bound(&self, d: &Derivatives, window: f64) -> f64 {
         let signal = self.oscillator.omega0_squared * 6.0 * libm::fabs(self.base.drive.signal[3]);
         self.bound::<3>(d, window, signal)
+    }
+
+    /// A bound on the fourth derivative over the next `window` seconds, given the derivatives now.
+    pub fn fourth_derivative_bound(&self, d: &Derivatives, window: f64) -> f64 {
+        self.bound::<4>(d, window, 0.0)
     }
 
     /// A bound on the fifth derivative over the next `window` seconds, given the derivatives now.

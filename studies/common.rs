@@ -121,6 +121,7 @@ pub fn tracked(
         particle_mass: epsilon,
         half_width: 1.0,
         restitution: r,
+        cavity: lovines::Cavity::IDEAL,
     };
     let width = 1.0 + b;
     let settings = [

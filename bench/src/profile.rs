@@ -19,7 +19,7 @@ pub fn of(scene: &Scene) -> anyhow::Result<Value> {
         let outcome = plant.advance_with(step.drive(), step.duration, |event| match event {
             Event::Stuck { t, .. } => since = Some(t),
             Event::Released { t, .. } => at_rest += t - since.take().unwrap_or(t),
-            Event::Impact { .. } => {}
+            _ => {}
         });
         let outcome = outcome?;
         at_rest += since.map_or(0.0, |since| step.duration - since);

@@ -91,6 +91,7 @@ impl Scene {
                 particle_mass: scene.m,
                 half_width: scene.b,
                 restitution: scene.r,
+                cavity: lovines::Cavity::IDEAL,
             },
             start: scene.start,
             steps,

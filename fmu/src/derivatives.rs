@@ -5,7 +5,8 @@ use super::{LoViNes, Progress, Rig};
 use crate::model_exchange::equations::{Dual, Instant, Scalar};
 use crate::model_exchange::rates::Movement;
 use fmi2_component::{Causality, Key, Refusal};
-use lovines::Plant;
+use lovines::cavity::GRAVITY;
+use lovines::{Cavity, Plant};
 
 /// The highest order of output derivatives, as the description says it.
 const MOST: u32 = 3;
@@ -37,6 +38,7 @@ impl LoViNes {
     pub(super) fn instant(&self, plant: &Plant) -> Instant<f64> {
         let (p, state) = (&self.parameters, plant.state());
         let base = self.base_motion(plant);
+        let (gravity, friction) = plant.constant_accelerations();
         Instant {
             primary_mass: p.primary_mass,
             stiffness: p.stiffness,
@@ -51,7 +53,9 @@ impl LoViNes {
             dq1: state.dq1,
             q2: state.q2,
             dq2: state.dq2,
-            contact: plant.contact(),
+            gravity,
+            friction,
+            stuck: plant.contact().is_some() || plant.sticks(),
         }
     }
 
@@ -89,7 +93,25 @@ impl LoViNes {
             Real::der_q1 | Real::der_q2 => false,
             _ => integrated,
         };
-        let dual = perturbed(&now, known, reduced_are_states)?;
+        let mut dual = perturbed(&now, known, reduced_are_states)?;
+        // The friction has the sign of the relative velocity.
+        let Cavity { tilt, kinetic_friction, .. } = self.parameters.cavity;
+        let ((sin, cos), sign) = (
+            tilt.sin_cos(),
+            if now.friction == 0.0 {
+                0.0
+            } else {
+                now.friction.signum()
+            },
+        );
+        match known {
+            Real::theta => {
+                dual.gravity.slope = GRAVITY * cos;
+                dual.friction.slope = -sign * kinetic_friction * GRAVITY * sin;
+            }
+            Real::mu_k => dual.friction.slope = sign * GRAVITY * cos,
+            _ => {}
+        }
         Ok(of_instant(&dual, unknown).slope)
     }
 
@@ -105,7 +127,7 @@ impl LoViNes {
             )));
         }
         let n = order as usize;
-        let Movement { base, primary, particle } = Movement::of(plant);
+        let Movement { base, primary, particle, .. } = Movement::of(plant);
         let p = &self.parameters;
         Ok(match variable {
             Real::q1 => primary[n],
@@ -141,12 +163,24 @@ fn perturbed(now: &Instant<f64>, known: Real, reduced_are_states: bool) -> Resul
         dq1: along(Real::der_q1, now.dq1),
         q2: along(Real::q2, now.q2),
         dq2: along(Real::der_q2, now.dq2),
-        contact: now.contact,
+        gravity: Dual::from(now.gravity),
+        friction: Dual::from(now.friction),
+        stuck: now.stuck,
     };
     let (u1, u2) = now.reduced_velocities();
     match known {
-        // Only the next impact depends on them.
-        Real::b | Real::r => Ok(instant),
+        // Only the next event depends on them, or what is constant.
+        Real::b
+        | Real::r
+        | Real::b_plus
+        | Real::b_minus
+        | Real::theta
+        | Real::mu_k
+        | Real::mu_s
+        | Real::r_plus
+        | Real::r_minus
+        | Real::r_min
+        | Real::r_scatter => Ok(instant),
         Real::M
         | Real::k
         | Real::c

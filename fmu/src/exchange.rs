@@ -20,6 +20,8 @@ impl LoViNes {
             Real::impact_time => hybrid.totals().impact_time,
             Real::impact_velocity => hybrid.totals().impact_velocity,
             Real::dissipated => hybrid.totals().dissipated,
+            Real::stuck_time => hybrid.totals().stuck_time,
+            Real::friction_loss => hybrid.totals().friction,
             _ => (self.setting(variable)).unwrap_or_else(|| of_instant(&hybrid.instant(), variable)),
         }
     }

@@ -18,6 +18,7 @@ use fmi2_component::{Archive, Component, Key, Log, Refusal};
 use lovines::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
 use outputs::Outputs;
 use reach::Reach;
+use settings::CavitySettings;
 use std::cell::Cell;
 use variables::{Integer, Model, Real, category};
 
@@ -49,6 +50,7 @@ struct LoViNes {
     #[serde(skip, default = "unknown")]
     longest: Cell<f64>,
     parameters: Parameters,
+    cavity: CavitySettings,
     start: State,
 }
 
@@ -103,6 +105,7 @@ impl Component for LoViNes {
             reach: Reach::default(),
             longest: unknown(),
             parameters,
+            cavity: CavitySettings::default(),
             start,
         }
     }
@@ -137,7 +140,25 @@ impl Component for LoViNes {
         match variable {
             Integer::impacts => i32::try_from(totals.impacts).unwrap_or(i32::MAX),
             Integer::contact => contact.map_or(0, |wall| wall.sign() as i32),
+            Integer::sticks => i32::try_from(totals.sticks).unwrap_or(i32::MAX),
+            Integer::r_law => self.cavity.r_law,
+            Integer::seed => self.cavity.seed,
         }
+    }
+
+    fn set_integer(&mut self, variable: Integer, value: i32) -> Result<(), Refusal> {
+        let mut cavity = self.cavity;
+        match variable {
+            Integer::r_law if !(0..=2).contains(&value) => {
+                return Err(Refusal::error(format!(
+                    "r_law = {value} is refused; allowed are 0 (constant), 1 (viscoelastic) and 2 (plastic)"
+                )));
+            }
+            Integer::r_law => cavity.r_law = value,
+            Integer::seed => cavity.seed = value,
+            _ => return Err(Refusal::error("this variable is computed, not set")),
+        }
+        self.set_cavity(cavity)
     }
 
     fn initialise(&mut self, start_time: f64, _log: &Log) -> Result<(), Refusal> {

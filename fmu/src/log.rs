@@ -12,6 +12,10 @@ fn side(wall: Wall) -> &'static str {
     }
 }
 
+fn sign(direction: f64) -> &'static str {
+    if direction > 0.0 { "> 0" } else { "< 0" }
+}
+
 /// One line for one event of model exchange at `time`.
 pub(super) fn tell_exchange(log: &Log, time: f64, happening: Happening) {
     match happening {
@@ -44,6 +48,22 @@ pub(super) fn tell(log: &Log, time: f64, event: Event) {
                 "the particle came to rest on the wall {} at t = {} s",
                 side(wall),
                 time + t
+            ),
+        ),
+        Event::Sticking { t } => log.tell(
+            category::logEvents,
+            format_args!("the particle stuck to the floor at t = {} s", time + t),
+        ),
+        Event::Slip { t, direction } => log.tell(
+            category::logEvents,
+            format_args!("the particle slipped at t = {} s; der(w) {}", time + t, sign(direction)),
+        ),
+        Event::Reversal { t, direction } => log.tell(
+            category::logEvents,
+            format_args!(
+                "friction changed its direction at t = {} s; der(w) {}",
+                time + t,
+                sign(direction)
             ),
         ),
         Event::Released { t, wall } => log.tell(

@@ -80,7 +80,7 @@ impl LoViNes {
             totals.impact_velocity,
         ]
         .map(Cell::new);
-        self.reach.holds(&state) && w.abs() <= self.parameters.half_width
+        self.reach.holds(&state) && self.reach.holds_particle(w)
     }
 
     /// A value that is not kept.
@@ -116,6 +116,8 @@ impl LoViNes {
             Real::impact_velocity => plant.totals().impact_velocity,
             Real::energy => plant.energy(self.base(plant)),
             Real::dissipated => plant.totals().dissipated,
+            Real::stuck_time => plant.totals().stuck_time,
+            Real::friction_loss => plant.totals().friction,
             _ => self
                 .setting(variable)
                 .unwrap_or_else(|| derivatives::of_instant(&self.instant(plant), variable)),

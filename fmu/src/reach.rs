@@ -13,12 +13,17 @@ pub(super) struct Reach {
     displacement: f64,
     /// m/s: it leads to that displacement at most.
     velocity: f64,
+    /// The middle between the walls and half their distance, m.
+    cavity: (f64, f64),
 }
 
 impl Reach {
     pub fn of(parameters: &Parameters) -> Self {
         let displacement = parameters.half_width * RESOLUTION;
+        let [plus, minus] = parameters.gaps();
         Self {
+            // The position on a wall has a rounding error if the gaps differ.
+            cavity: (0.5 * (plus - minus), 0.5 * (plus + minus) * (1.0 + 1e-12)),
             displacement,
             velocity: displacement * parameters.fastest_rate(),
         }
@@ -28,6 +33,12 @@ impl Reach {
     #[inline]
     pub fn holds(&self, state: &State) -> bool {
         state.q1.abs() <= self.displacement && state.dq1.abs() + state.dq2.abs() <= self.velocity
+    }
+
+    /// Whether the particle is in its cavity.
+    #[inline]
+    pub fn holds_particle(&self, w: f64) -> bool {
+        (w - self.cavity.0).abs() <= self.cavity.1
     }
 
     /// Whether the base stays within for `span` seconds under `drive`.

@@ -35,14 +35,18 @@ impl Events {
     #[inline(never)]
     fn push(&mut self, plant: usize, time: f64, event: Event) {
         let (kind, t, wall, velocity) = match event {
-            Event::Impact { t, wall, velocity } => (0, t, wall, velocity),
-            Event::Stuck { t, wall } => (1, t, wall, f64::NAN),
-            Event::Released { t, wall } => (2, t, wall, f64::NAN),
+            Event::Impact { t, wall, velocity } => (0, t, Some(wall), velocity),
+            Event::Stuck { t, wall } => (1, t, Some(wall), f64::NAN),
+            Event::Released { t, wall } => (2, t, Some(wall), f64::NAN),
+            Event::Sticking { t } => (3, t, None, f64::NAN),
+            Event::Slip { t, .. } => (4, t, None, f64::NAN),
+            Event::Reversal { t, .. } => (5, t, None, f64::NAN),
         };
         self.plant.push(plant as u64);
         self.time.push(time + t);
         self.kind.push(kind);
-        self.wall.push(if wall == Wall::Plus { 1 } else { -1 });
+        self.wall
+            .push(wall.map_or(0, |wall| if wall == Wall::Plus { 1 } else { -1 }));
         self.velocity.push(velocity);
     }
 
@@ -136,6 +140,7 @@ fn parameters([primary_mass, stiffness, damping, particle_mass, half_width, rest
         particle_mass,
         half_width,
         restitution,
+        cavity: lovines::Cavity::IDEAL,
     }
 }
 

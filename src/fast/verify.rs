@@ -8,11 +8,10 @@
 //!
 //! Taylor's theorem with Lagrange's remainder then bounds each gap from below (R. E. Moore, "Interval Analysis", Prentice-Hall 1966).
 
-use super::coefficients::Coefficients;
-use super::propagator::Point;
+use super::propagator::{Coefficients, Point};
 use crate::base_motion::{BaseMotion, Drive};
-use crate::moving::{Moving, Rig};
 use crate::oscillator::Oscillator;
+use crate::plant::{Moving, Rig};
 
 /// Rounding error of a gap, in half-widths, and of a bound, relative.
 pub(super) const ROUNDING: f64 = 1e-14;
@@ -90,6 +89,8 @@ pub(super) struct Start<'a> {
     pub here: Mark,
     /// Velocity of the base's line less that of the particle, m/s.
     pub drift: f64,
+    /// Constant acceleration of the particle, m/s².
+    pub pull: f64,
 }
 
 impl<'a> Start<'a> {
@@ -102,6 +103,7 @@ impl<'a> Start<'a> {
             base,
             here: Mark { t: 0.0, point, sample },
             drift: base.drive.signal[1] - masses.particle,
+            pull: 0.0,
         }
     }
 
@@ -130,7 +132,7 @@ impl<'a> Start<'a> {
     #[inline(always)]
     pub fn is_monotone(&self, from: &Mark, t: f64) -> bool {
         let (oscillator, drive, t) = (&self.rig.free, &self.base.drive, t - from.t);
-        let spare = self.drift.abs() - forcing(oscillator, drive, t) * t;
+        let spare = self.drift.abs() - (forcing(oscillator, drive, t) + self.pull.abs()) * t;
         spare > 0.0 && spare * spare * (1.0 - 1e-9) > speed_squared(oscillator, &from.point)
     }
 
@@ -149,9 +151,83 @@ impl<'a> Start<'a> {
     #[inline(always)]
     pub fn is_open(&self, from: &Mark, to: &Sample, t: f64) -> bool {
         let t = t - from.t;
-        let (b, jerk, half) = (self.rig.parameters.half_width, self.jerk(from, t), 0.5 * t);
+        let (b, jerk, half) = (self.rig.half_width, self.jerk(from, t), 0.5 * t);
         let backwards = Sample { dw: -to.dw, ..*to };
         t > 0.0 && from.sample.is_open(b, jerk, half) && backwards.is_open(b, jerk, half)
+    }
+}
+
+// Horizon
+//
+// A time without contact that is known in advance, and that outlasts small changes of the drive.
+//
+// With `R`, `F` and `y` of [`super::verify`]: if the drive changes, `f` changes with it, and `R` jumps by at most what `omega0 y` and `y'`
+// do. A bound with a margin for both remains true until the margin is used up. A drive that changes at every sample, as a phase-locked
+// loop changes it, therefore asks for no new bound.
+
+/// Contact is looked for so many steps ahead.
+const AHEAD: f64 = 32.0;
+/// Margins, as parts of `F` and of `R`.
+const MARGIN: f64 = 1.0 / 16.0;
+
+/// A time without contact.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Horizon {
+    /// No contact for this time from now on, s,
+    pub t: f64,
+    /// while `F` is at most this, m/s²,
+    forcing: f64,
+    /// and the jumps of `R` add up to at most this, m/s.
+    jumps: f64,
+}
+
+impl Horizon {
+    /// No contact for `t` seconds under the drive as it is.
+    pub fn unchanged(t: f64) -> Self {
+        Self { t, forcing: f64::NEG_INFINITY, jumps: 0.0 }
+    }
+
+    /// What a bound from the start alone shows: no contact for `t` seconds or more, or nothing.
+    pub(super) fn ahead(moving: &Moving, start: &Point, t: f64) -> Self {
+        let Moving { rig, masses, base } = moving;
+        let (b, w, dw, reach) = (rig.half_width, masses.w.value(), masses.dw, AHEAD * t);
+        let forcing = forcing(&rig.free, &base.drive, reach) * (1.0 + MARGIN);
+        let speed = speed_squared(&rig.free, start).sqrt() + forcing * reach;
+        let jumps = MARGIN * speed;
+        let acceleration = (rig.free.omega0 + 2.0 * rig.free.delta) * (speed + jumps) + forcing;
+        // The bound of the gap to either wall is concave: it is above 0 in between if it is at the end.
+        let open = |t: f64| {
+            let (moved, lost) = (dw * t, t * (jumps + 0.5 * acceleration * t));
+            b - (w + moved).abs() - lost > ROUNDING * (moved.abs() + lost)
+        };
+        // Where the bound of the gap ahead ends.
+        let (gap, closing) = (b - w * 1f64.copysign(dw), dw.abs() + jumps);
+        let end = 2.0 * gap / (closing + (closing * closing + 2.0 * acceleration * gap).sqrt());
+        let far = reach.min(end * (1.0 - 1e-6));
+        match [far, t].into_iter().find(|&one| one >= t && open(one)) {
+            Some(t) if !base.drive.is_straight() => Self::unchanged(t),
+            Some(t) => Self { t, forcing, jumps },
+            None => Self::default(),
+        }
+    }
+
+    /// The drive changes.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub fn drive_changed(&mut self, oscillator: &Oscillator, drive: &Drive) {
+        if harmonic_forcing(oscillator, drive) > self.forcing {
+            self.t = 0.0;
+        }
+    }
+
+    /// The base jumps to another drive, and the velocity of the primary mass changes by `kick`, m/s.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub fn jump(&mut self, oscillator: &Oscillator, before: &Drive, drive: &Drive, kick: f64) {
+        let ([u0, u1, ..], [v0, v1, ..]) = (before.signal, drive.signal);
+        self.jumps -= kick.abs() + oscillator.omega0 * (v0 - u0).abs() + (v1 - u1).abs();
+        if self.jumps < 0.0 || !drive.is_straight() {
+            self.t = 0.0;
+        }
     }
 }
 

@@ -5,7 +5,7 @@
 //! along the motion, with panels that no impact falls into, and panels far shorter than the fastest rate.
 
 use crate::common::Scene;
-use lovines::{Drive, Event, Plant};
+use lovines::{Drive, Plant};
 
 /// Nodes and weights of the Gauss-Legendre formula with 8 points on [-1, 1] (positive half).
 const NODES: [(f64, f64); 4] = [
@@ -62,6 +62,8 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
     let panel = PANEL / fastest;
     let at_start = plant.energy(base(&plant).0);
     let (mut lost, mut done, mut exchanged) = (0.0, 0.0, 0.0);
+    // The energy of a weight on a tilted axis has no natural zero.
+    let mut largest = at_start.abs();
     let mut result = Walk::default();
     while result.panels < panels {
         let mut first = None;
@@ -69,8 +71,7 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
         let mut ahead = plant;
         ahead
             .advance_with(plant.base().drive, panel, |event| {
-                let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) = event;
-                first.get_or_insert(t);
+                first.get_or_insert(event.time());
             })
             .expect("a valid step");
         let length = first.unwrap_or(panel);
@@ -89,8 +90,9 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
             let s = plant.state();
             // The difference of the two displacements carries their rounding.
             let rounding = 4.0 * f64::EPSILON * s.q1.abs().max(s.q2.abs());
-            let w = (s.q1 - s.q2).abs() - rounding;
-            result.outside = result.outside.max(w / p.half_width - 1.0);
+            let ([plus, minus], w) = (p.gaps(), s.q1 - s.q2);
+            let outside = (w - plus).max(-w - minus) - rounding;
+            result.outside = result.outside.max(outside / p.half_width);
         }
         if first.is_some() {
             // To just behind the event; the next panel begins there. The power hardly changes on the way from it.
@@ -104,11 +106,12 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
         } else {
             go(&mut plant, length - gone);
         }
+        largest = largest.max(plant.energy(base(&plant).0).abs());
         result.panels += 1;
     }
-    let dissipated = plant.totals().dissipated;
+    let dissipated = plant.totals().dissipated + plant.totals().friction;
     let error = plant.energy(base(&plant).0) + dissipated + lost - done - at_start;
-    let scale = at_start + exchanged + dissipated;
+    let scale = largest + exchanged + dissipated;
     if scale > 0.0 {
         result.imbalance = error.abs() / scale;
     }

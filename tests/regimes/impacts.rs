@@ -83,6 +83,7 @@ fn follow(case: &Case) -> (f64, u64) {
         particle_mass: 0.1 * case.mass,
         half_width: 1.0,
         restitution: 0.8,
+        cavity: lovines::Cavity::IDEAL,
     };
     let at_start = State { q1: case.start.0, dq1: case.start.1, q2: 0.2, dq2: -0.9 };
     let system = System::new(case.mass, case.stiffness, case.damping, &case.drive);

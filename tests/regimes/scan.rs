@@ -128,6 +128,7 @@ fn ways(case: &Case, oscillator: &Oscillator, t: f64) -> Vec<(&'static str, (f64
         // No wall in reach.
         half_width: 1e13,
         restitution: 0.65,
+        cavity: lovines::Cavity::IDEAL,
     };
     let start = State { q1: case.start.0, dq1: case.start.1, ..State::default() };
     let advanced = |fast: bool| {

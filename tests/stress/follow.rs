@@ -70,13 +70,13 @@ pub struct Name {
 }
 
 impl Hardest {
-    fn see(&mut self, figure: f64, scene: Name) {
+    pub fn see(&mut self, figure: f64, scene: Name) {
         if figure > self.figure {
             *self = Self { figure, scene };
         }
     }
 
-    fn or(self, other: Self) -> Self {
+    pub fn or(self, other: Self) -> Self {
         if other.figure > self.figure { other } else { self }
     }
 

@@ -3,6 +3,7 @@
 
 #[path = "../common/balance.rs"]
 mod balance;
+mod cavity;
 #[path = "../common/mod.rs"]
 mod common;
 mod drives;
@@ -40,5 +41,17 @@ fn hard_scenes_are_survived() {
     steps::short(&mut table);
     simple::steps(&mut table);
     work::sweep(n > 10_000, &mut table);
+    table.end();
+}
+
+/// `scripts/stress --cavity` runs the long form (`SCENES=50000`). `CAVITY=17` follows one scene only.
+#[test]
+fn random_cavities_are_survived() {
+    if let Ok(number) = std::env::var("CAVITY") {
+        return cavity::one(number.parse().expect("a number"));
+    }
+    let n = std::env::var("SCENES").map_or(1500, |n| n.parse().expect("a number of scenes"));
+    let mut table = Table::begin();
+    cavity::scenes(n, &mut table);
     table.end();
 }

@@ -13,6 +13,7 @@ pub const RIG: Parameters = Parameters {
     particle_mass: 0.032,
     half_width: 0.01,
     restitution: 0.65,
+    cavity: lovines::Cavity::IDEAL,
 };
 /// Its start: velocity of the particle, m/s.
 const START: f64 = 0.5;

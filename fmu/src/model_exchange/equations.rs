@@ -13,8 +13,6 @@
 
 pub use super::dual::{Dual, Scalar};
 
-use lovines::contact::Wall;
-
 /// Parameters, drive and state of the rig at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Instant<T> {
@@ -44,8 +42,12 @@ pub struct Instant<T> {
     pub q2: T,
     /// Velocity of the particle, m/s.
     pub dq2: T,
-    /// The wall that the particle is stuck to.
-    pub contact: Option<Wall>,
+    /// Acceleration of the particle by gravity along the axis, m/s².
+    pub gravity: T,
+    /// Acceleration of the particle by kinetic friction, m/s²; 0 while it does not slide.
+    pub friction: T,
+    /// Whether both masses move as one.
+    pub stuck: bool,
 }
 
 impl<T: Scalar> Instant<T> {
@@ -74,30 +76,29 @@ impl<T: Scalar> Instant<T> {
         self.dq1 - self.dq2
     }
 
-    /// Mechanical energy of both masses and the spring, J.
+    /// Mechanical energy of both masses, the spring and the particle's weight on a tilted axis, J.
     pub fn energy(&self) -> T {
         let stretch = self.q1 - self.base();
         T::from(0.5)
             * (self.primary_mass * self.dq1 * self.dq1
                 + self.particle_mass * self.dq2 * self.dq2
                 + self.stiffness * stretch * stretch)
+            - self.particle_mass * self.gravity * self.q2
     }
 
     /// The mass that the spring moves: the primary one alone, or both.
     fn moved_mass(&self) -> T {
-        match self.contact {
-            None => self.primary_mass,
-            Some(_) => self.primary_mass + self.particle_mass,
+        if self.stuck {
+            self.primary_mass + self.particle_mass
+        } else {
+            self.primary_mass
         }
     }
 
     /// Contributions of the base displacement to the velocities of the primary mass and of the particle.
     fn reductions(&self) -> (T, T) {
         let passed_on = self.damping / self.moved_mass() * self.base();
-        match self.contact {
-            None => (passed_on, T::from(0.0)),
-            Some(_) => (passed_on, passed_on),
-        }
+        (passed_on, if self.stuck { passed_on } else { T::from(0.0) })
     }
 
     /// The reduced velocities `u1` and `u2`, m/s.
@@ -117,11 +118,18 @@ impl<T: Scalar> Instant<T> {
     /// The derivatives of `u1` and `u2`, m/s².
     pub fn reduced_accelerations(&self) -> (T, T) {
         let force = self.stiffness * (self.base() - self.q1) - self.damping * self.dq1;
-        let acceleration = force / self.moved_mass();
-        match self.contact {
-            None => (acceleration, T::from(0.0)),
-            Some(_) => (acceleration, acceleration),
-        }
+        let transmitted = if self.stuck {
+            self.gravity
+        } else {
+            T::from(0.0) - self.friction
+        };
+        let acceleration = (force + self.particle_mass * transmitted) / self.moved_mass();
+        let of_particle = if self.stuck {
+            acceleration
+        } else {
+            self.gravity + self.friction
+        };
+        (acceleration, of_particle)
     }
 
     /// Acceleration of the primary mass, or of both, m/s²; contains the derivative of the signal as far as it is known.

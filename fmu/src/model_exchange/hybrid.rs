@@ -114,7 +114,9 @@ impl Hybrid {
             dq1: 0.0,
             q2,
             dq2: 0.0,
-            contact: self.contact,
+            gravity: 0.0,
+            friction: 0.0,
+            stuck: self.contact.is_some(),
         };
         instant.with_reduced((u1, u2))
     }

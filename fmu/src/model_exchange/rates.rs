@@ -17,6 +17,8 @@ pub struct Movement {
     pub primary: Rates,
     /// Displacement of the particle.
     pub particle: Rates,
+    /// Acceleration of the particle by gravity along the axis, m/s².
+    pub gravity: f64,
 }
 
 impl Movement {
@@ -24,27 +26,31 @@ impl Movement {
     pub fn of(plant: &Plant) -> Self {
         let (p, state) = (plant.parameters(), plant.state());
         let base = rates_of(&plant.base());
-        let stuck = plant.contact().is_some();
+        let stuck = plant.contact().is_some() || plant.sticks();
+        let (gravity, friction) = plant.constant_accelerations();
+        // What is constant acts on the primary mass too: friction while the particle slides, its weight while it does not.
+        let force = p.particle_mass * if stuck { gravity } else { -friction };
         let moved = p.primary_mass + if stuck { p.particle_mass } else { 0.0 };
         let mut primary = [state.q1, state.dq1, 0.0, 0.0, 0.0];
         for n in 2..primary.len() {
             let damper = p.damping * (base[n - 1] - primary[n - 1]);
             let spring = p.stiffness * (base[n - 2] - primary[n - 2]);
-            primary[n] = (damper + spring) / moved;
+            primary[n] = (damper + spring + if n == 2 { force } else { 0.0 }) / moved;
         }
-        let mut particle = [state.q2, state.dq2, 0.0, 0.0, 0.0];
+        let mut particle = [state.q2, state.dq2, gravity + friction, 0.0, 0.0];
         if stuck {
             particle[2..].copy_from_slice(&primary[2..]);
         }
-        Self { base, primary, particle }
+        Self { base, primary, particle, gravity }
     }
 
     /// The `order`-th time derivative (0 to 3) of the mechanical energy.
     pub fn energy(&self, p: &Parameters, order: usize) -> f64 {
         let stretch = core::array::from_fn(|n| self.primary[n] - self.base[n]);
+        let weight = p.particle_mass * self.gravity * self.particle[order];
         let moving = |mass: f64, x: &Rates| mass * squared([x[1], x[2], x[3], x[4], 0.0], order);
         let spring = p.stiffness * squared(stretch, order);
-        0.5 * (moving(p.primary_mass, &self.primary) + moving(p.particle_mass, &self.particle) + spring)
+        0.5 * (moving(p.primary_mass, &self.primary) + moving(p.particle_mass, &self.particle) + spring) - weight
     }
 }
 

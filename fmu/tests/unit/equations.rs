@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 fn velocities_come_back_from_reduced_ones() {
-    for contact in [None, Some(Wall::Plus)] {
+    for stuck in [false, true] {
         let instant = Instant {
             primary_mass: 3.0,
             stiffness: 20.0,
@@ -15,7 +15,7 @@ fn velocities_come_back_from_reduced_ones() {
             phase: 0.3,
             dq1: -0.4,
             dq2: -0.4,
-            contact,
+            stuck,
             ..Instant::default()
         };
         let reduced = instant.reduced_velocities();

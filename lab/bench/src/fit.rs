@@ -317,6 +317,7 @@ impl Fit {
             particle_mass: Quantity::ParticleMass.of(&x),
             half_width: Quantity::B.of(&x),
             restitution: Quantity::R.of(&x),
+            cavity: scene.cavity,
         }
     }
 }

@@ -314,6 +314,7 @@ impl PlantSection {
                 particle_mass: need(self.m, "m")?,
                 half_width: need(self.b, "b")?,
                 restitution: need(self.r, "r")?,
+                cavity: lovines::Cavity::IDEAL,
             }
         } else {
             let (epsilon, lambda) = (need(self.epsilon, "epsilon")?, need(self.lambda, "lambda")?);

@@ -15,6 +15,7 @@ const RIG: Parameters = Parameters {
     particle_mass: 0.036,
     half_width: 0.0095,
     restitution: 0.55,
+    cavity: lovines::Cavity::IDEAL,
 };
 
 /// Twelve points of the rig from the fold on, with this relative standard uncertainty of both amplitudes, and a hundredth of it of the frequency.

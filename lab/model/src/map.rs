@@ -234,14 +234,13 @@ impl Run {
             let from = start + (end - start) * (stretch as f64 / stretches);
             self.plant.advance_with(self.drive, duration / stretches, |event| {
                 stopped();
-                let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) = event;
-                let phase = from + omega * t;
+                let phase = from + omega * event.time();
                 now = driven.after(&now, phase, &event);
                 moments.push(now);
                 match event {
                     Event::Impact { velocity, .. } => impacts.push(Impact { time: phase, velocity }),
                     Event::Stuck { .. } => sticks.push(phase),
-                    Event::Released { .. } => {}
+                    _ => {}
                 }
             })?;
         }

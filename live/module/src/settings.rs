@@ -28,6 +28,7 @@ pub fn default_scene() -> Scene {
         particle_mass,
         half_width,
         restitution,
+        cavity: lovines::Cavity::IDEAL,
     };
     let [q1, dq1, q2, dq2] = START;
     let d = Dimensionless::of(&plant, 0.0);

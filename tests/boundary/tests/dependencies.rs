@@ -140,6 +140,9 @@ const RIGS: [[f64; 13]; 2] = [
     [2.0, 300.0, 7.5, 0.5, 0.2, 0.7, 0.013, 0.021, 12.0, -0.05, -0.3, 0.02, 0.4],
     [1.3, 170.0, 2.5, 0.3, 0.3, 0.8, 0.017, 0.013, 14.0, 0.07, 0.2, -0.1, -0.2],
 ];
+/// Tilt and kinetic friction.
+const THETA: u32 = 35;
+const MU_K: u32 = 36;
 /// What makes a particle rest on its wall: it is there, and is pressed against it.
 const AT_REST: [(u32, f64); 5] = [(4, 0.2), (9, -0.08), (10, 0.0), (11, -0.28), (12, 0.0)];
 
@@ -148,6 +151,11 @@ fn plant(interface: Interface, rig: &[f64; 13], stuck: bool) -> Master {
     let rest = if stuck { &AT_REST[..] } else { &[] };
     for (vr, &value) in (0..).zip(rig).chain(rest.iter().map(|(vr, value)| (*vr, value))) {
         m.well(m.set_real(vr, value));
+    }
+    if interface == Interface::CoSimulation {
+        // Model exchange knows the ideal cavity only.
+        m.well(m.set_real(THETA, 0.1));
+        m.well(m.set_real(MU_K, 0.2));
     }
     m
 }

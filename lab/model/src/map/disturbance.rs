@@ -143,6 +143,9 @@ impl Driven {
                 let moment = self.moment(phase, State { q1, dq1, q2, dq2 }, None);
                 Moment { rested: true, ..moment }
             }
+            Event::Sticking { .. } | Event::Slip { .. } | Event::Reversal { .. } => {
+                unreachable!("the ideal cavity has no friction")
+            }
         }
     }
 

@@ -1,4 +1,4 @@
-//! Tests of `fast/short_step`.
+//! Tests of `fast/propagator`.
 
 use super::*;
 use crate::base_motion::BaseMotion;

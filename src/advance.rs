@@ -1,0 +1,462 @@
+//! The loop over events.
+
+use crate::arithmetic::{Sum, Sums};
+use crate::base_motion::Drive;
+use crate::contact::{Resolution, Wall};
+use crate::fast::Next;
+use crate::flight::{Flight, FlightEnd, Grip, until_released};
+use crate::oscillator::Oscillator;
+use crate::parameters::InvalidValue;
+use crate::plant::{Contact, Event, MOST_EVALUATIONS, MOST_IMPACTS, Masses, Outcome, Plant, Rig};
+use crate::segment::Segment;
+
+/// Largest number of releases per step: rounding can tear a particle off its wall again and again where values are extreme.
+const MOST_RELEASES: u64 = 2_000_000;
+
+/// A step under way.
+pub(crate) struct Step<F> {
+    /// Its length, s.
+    pub duration: f64,
+    /// What is left of it, s.
+    pub left: Sum,
+    /// What has happened so far.
+    pub outcome: Outcome,
+    pub on_event: F,
+}
+
+impl<F: FnMut(Event)> Step<F> {
+    /// Time since the step began, s.
+    pub fn now(&self) -> f64 {
+        Sum::from(self.duration).minus(self.left).value()
+    }
+
+    /// Whether time is left and the step is not to be cut short.
+    fn goes_on(&self) -> bool {
+        self.left.value() > 0.0 && self.outcome.impacts < MOST_IMPACTS && !self.outcome.cut_short
+    }
+}
+
+impl Plant {
+    /// Advances by `duration` seconds under `drive`.
+    ///
+    /// A jump of the base displacement against the end of the last step gives the primary mass the velocity jump
+    /// `c Δe/M` that the equation of motion implies.
+    ///
+    /// # Errors
+    /// An invalid drive or duration; the plant stays as it is.
+    #[inline]
+    pub fn advance(&mut self, drive: Drive, duration: f64) -> Result<Outcome, InvalidValue> {
+        self.advance_with(drive, duration, |_| {})
+    }
+
+    /// As [`Self::advance`]; calls `on_event` at every event.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    #[inline]
+    pub fn advance_with(
+        &mut self,
+        drive: Drive,
+        duration: f64,
+        on_event: impl FnMut(Event),
+    ) -> Result<Outcome, InvalidValue> {
+        if !self.begun {
+            check_duration(duration)?;
+            self.begin(drive)?;
+        }
+        let before = &self.moving.base.drive;
+        // Number by number: code for size would compare arrays in a loop.
+        let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (drive.signal, before.signal);
+        if (a0 != b0) | (a1 != b1) | (a2 != b2) | (a3 != b3) | (drive.amplitude != before.amplitude) {
+            drive.validate()?;
+            check_duration(duration)?;
+            self.jump(&drive);
+            self.fast.drive_changed(&self.moving.rig.free, &self.moving.base.drive);
+        } else if drive.omega != before.omega {
+            drive.validate_frequency()?;
+            check_duration(duration)?;
+            self.moving.base.drive.omega = drive.omega;
+            self.fast.drive_changed(&self.moving.rig.free, &self.moving.base.drive);
+        }
+        if self.contact.is_none() && self.fast.step(&mut self.moving, duration) {
+            self.time += duration;
+            return Ok(Outcome { elapsed: duration, evaluations: 1, ..Outcome::default() });
+        }
+        check_duration(duration)?;
+        let outcome = self.follow(duration, on_event);
+        self.time += outcome.elapsed;
+        Ok(outcome)
+    }
+
+    /// Makes signal and amplitude those of `drive`: the base may jump.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn jump(&mut self, drive: &Drive) {
+        let before = core::mem::replace(&mut self.moving.base.drive, *drive);
+        let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * self.fast.phasor.1;
+        let oscillator = &self.moving.rig.free;
+        let kick = 2.0 * oscillator.delta * jump;
+        if jump != 0.0 {
+            self.moving.masses.primary = self.moving.masses.primary.plus([0.0, kick]);
+            self.moving.masses.dw += kick;
+            // The impulse acts on the primary mass alone; contact is decided anew.
+            self.contact = None;
+        }
+        self.fast.contact_free.jump(oscillator, &before, drive, kick);
+    }
+
+    /// Follows the motion from event to event to the end of the step. (A call: most steps do not need it, and its code is long.)
+    #[inline(never)]
+    fn follow(&mut self, duration: f64, on_event: impl FnMut(Event)) -> Outcome {
+        self.fast.evaluations = 0;
+        let mut step = Step {
+            duration,
+            left: Sum::from(duration),
+            outcome: Outcome::default(),
+            on_event,
+        };
+        if self.contact.is_none()
+            && let Some(wall) = self.wall_touched()
+        {
+            self.touch(wall, &mut step);
+        }
+        while step.goes_on() {
+            let left = step.left.value();
+            if let Some(contact) = self.contact {
+                self.stay(contact, left, &mut step);
+            } else if self.moving.rig.forces.holding > 0.0 {
+                self.slide(left, None, &mut step);
+            } else {
+                match self.fast.next(&mut self.moving, left, duration) {
+                    Next::ContactFree(t) if t == left => step.left = Sum::default(),
+                    Next::ContactFree(t) => step.left = step.left.plus(-t),
+                    Next::Contact(t, wall) => {
+                        step.left = step.left.minus(t);
+                        self.touch(wall, &mut step);
+                        continue;
+                    }
+                    Next::Search(limit) => self.search(limit, None, &mut step),
+                }
+            }
+            step.outcome.cut_short =
+                self.fast.evaluations >= MOST_EVALUATIONS || step.outcome.released >= MOST_RELEASES;
+        }
+        let left = step.left.value();
+        step.outcome.cut_short = left > 0.0;
+        step.outcome.elapsed = if left > 0.0 { step.now() } else { duration };
+        step.outcome.evaluations = self.fast.evaluations;
+        step.outcome
+    }
+
+    /// Follows the flight to its first contact by certified search, or for `limit` seconds; `released` names the wall that has
+    /// just ceased to push.
+    #[inline(never)]
+    fn search(&mut self, limit: f64, released: Option<Wall>, step: &mut Step<impl FnMut(Event)>) {
+        if released.is_none() && self.arrives(limit, 0.0, step) {
+            return;
+        }
+        let (rig, masses) = (&self.moving.rig, self.moving.masses);
+        let motion = Segment::new(&rig.free, self.moving.base, masses.primary.values.into());
+        let pull = rig.forces.gravity;
+        let flight = Flight::new(motion, (masses.w.value(), masses.dw), rig.half_width, pull);
+        let end = flight.first_contact(limit, released);
+        self.fly(&end, pull, step);
+    }
+
+    /// Slides to a wall or a reversal, or for `limit` seconds; `slips` is the sign of `w'` where the particle has just been released. A
+    /// particle without relative velocity sticks if friction can hold it.
+    #[inline(never)]
+    fn slide(&mut self, limit: f64, slips: Option<f64>, step: &mut Step<impl FnMut(Event)>) {
+        let masses = self.moving.masses;
+        let direction = match slips {
+            Some(direction) => direction,
+            None => self.direction(),
+        };
+        if direction == 0.0 {
+            self.contact = Some(Contact::Floor);
+            self.totals.sticks += 1;
+            let t = step.now();
+            (step.on_event)(Event::Sticking { t });
+            return;
+        }
+        if slips.is_none() && masses.dw != 0.0 && self.arrives(limit, direction, step) {
+            return;
+        }
+        let rig = &self.moving.rig;
+        let friction = rig.friction(direction);
+        let base = rig.pushed(self.moving.base, -friction);
+        let motion = Segment::new(&rig.free, base, masses.primary.values.into());
+        let pull = rig.forces.gravity + friction;
+        let flight = Flight::new(motion, (masses.w.value(), masses.dw), rig.half_width, pull);
+        let flight = flight.with_error(masses.w.error());
+        let end = flight.first_wall_or_reversal(limit, direction, slips.is_some() || masses.dw == 0.0);
+        let moved = match end.wall {
+            Some(wall) => (wall.sign() * rig.half_width - masses.w.value()) - masses.w.error(),
+            None => end.drifted,
+        };
+        self.totals.friction += rig.parameters.particle_mass * rig.forces.kinetic * moved.abs();
+        self.fly(&end, pull, step);
+        if end.reversed {
+            let masses = &mut self.moving.masses;
+            (masses.dw, masses.particle) = (0.0, masses.primary.values[1]);
+            step.outcome.released += 1;
+            let direction = self.direction();
+            if direction != 0.0 {
+                let t = step.now();
+                (step.on_event)(Event::Reversal { t, direction });
+            }
+        }
+    }
+
+    /// Moves on to the wall ahead, if constant forces act and the fast path finds the contact within `limit` seconds.
+    fn arrives(&mut self, limit: f64, direction: f64, step: &mut Step<impl FnMut(Event)>) -> bool {
+        if !self.moving.rig.is_forced() {
+            return false;
+        }
+        let w = self.moving.masses.w;
+        let Some((t, wall)) = self.fast.next_with_forces(&mut self.moving, limit, direction) else {
+            return false;
+        };
+        let rig = &self.moving.rig;
+        let moved = (wall.sign() * rig.half_width - w.value()) - w.error();
+        self.totals.friction += rig.parameters.particle_mass * rig.forces.kinetic * moved.abs();
+        step.left = step.left.minus(t);
+        self.touch(wall, step);
+        true
+    }
+
+    /// Moves on to the end of a flight or of a stretch of sliding, in which the particle has the constant acceleration `pull`, m/s².
+    fn fly(&mut self, end: &FlightEnd, pull: f64, step: &mut Step<impl FnMut(Event)>) {
+        let half_width = self.moving.rig.half_width;
+        self.fast.evaluations += end.evaluations;
+        let masses = &mut self.moving.masses;
+        masses.primary = masses.primary.plus([end.moved, end.gained]);
+        masses.dw += end.gained - pull * end.t;
+        masses.particle += pull * end.t;
+        masses.drift(end.drifted, half_width);
+        self.base_moves(end.t);
+        step.left = step.left.plus(-end.t);
+        if let Some(wall) = end.wall {
+            self.touch(wall, step);
+        }
+    }
+
+    /// Sign of the relative velocity `w'` from now on while the particle slides; 0 where static friction holds it, and where there is no
+    /// friction.
+    pub(crate) fn direction(&self) -> f64 {
+        let Rig { forces, mass_ratio, .. } = &self.moving.rig;
+        let masses = &self.moving.masses;
+        if forces.holding == 0.0 {
+            return 0.0;
+        }
+        if masses.dw != 0.0 {
+            return 1f64.copysign(masses.dw);
+        }
+        // The acceleration that the particle needs to follow the primary mass, times (M + m)/M.
+        let velocity = masses.primary.values[1];
+        let needed = self.acceleration(velocity) - forces.gravity;
+        let holding = (1.0 + mass_ratio) * (forces.holding + self.acceleration_error(velocity));
+        if needed.abs() <= holding {
+            0.0
+        } else {
+            1f64.copysign(needed)
+        }
+    }
+
+    /// Both masses move as one for at most `left` seconds, until the particle is released; then it goes on. The release is not
+    /// remembered beyond this call: another drive or other parameters may hold the particle again.
+    fn stay(&mut self, contact: Contact, left: f64, step: &mut Step<impl FnMut(Event)>) {
+        let rig = &self.moving.rig;
+        let start = self.moving.masses.primary.values;
+        let wall = match contact {
+            Contact::Wall(wall) => Some(wall),
+            Contact::Floor => None,
+        };
+        let forces = &rig.forces;
+        let noise = self.acceleration_error(start[1]);
+        let base = rig.pushed(self.moving.base, forces.gravity);
+        let motion = Segment::new(&rig.stuck, base, start.into());
+        let grip = Grip {
+            wall,
+            gravity: forces.gravity,
+            holding: forces.holding,
+            noise,
+        };
+        let stay = until_released(&motion, &grip, left);
+        self.fast.evaluations += stay.evaluations;
+        self.moving.masses.primary = Sums { values: stay.state, errors: [0.0; 2] };
+        self.moving.masses.particle = stay.state[1];
+        self.moving.masses.dw = 0.0;
+        self.base_moves(stay.t);
+        step.left = step.left.plus(-stay.t);
+        if wall.is_none() {
+            self.totals.stuck_time += stay.t;
+        }
+        if let Some(direction) = stay.released {
+            self.contact = None;
+            step.outcome.released += 1;
+            let (t, left) = (step.now(), step.left.value());
+            (step.on_event)(match wall {
+                Some(wall) => Event::Released { t, wall },
+                None => Event::Slip { t, direction },
+            });
+            if self.moving.rig.forces.holding > 0.0 {
+                self.slide(left, Some(direction), step);
+            } else {
+                self.search(left, wall, step);
+            }
+        }
+    }
+
+    /// The base has moved on by `t` seconds.
+    fn base_moves(&mut self, t: f64) {
+        self.moving.base = self.moving.base.after(t);
+        self.fast.state_changed(&self.moving.base);
+    }
+}
+
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+fn check_duration(duration: f64) -> Result<(), InvalidValue> {
+    match duration {
+        0.0..=1e100 => Ok(()),
+        _ => refuse_duration(duration),
+    }
+}
+
+#[cold]
+fn refuse_duration(duration: f64) -> Result<(), InvalidValue> {
+    let name = "duration (length of the step)";
+    InvalidValue::unless(false, name, duration, "s", "a number from 0 to 1e100")
+}
+
+// At a wall
+//
+// The particle at a wall: impact, then rest if it cannot leave.
+
+/// A hop lower than this fraction of the half-width cannot be told from contact in double precision.
+const LOWEST_HOP: f64 = 1.0 / (1u64 << 56) as f64;
+/// Relative rounding error of an acceleration that is the sum of a few terms.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+/// Accelerations this small against `omega0² b` are zero: subnormal values carry no significant digits.
+const NOTHING: f64 = 1e-200;
+
+impl Plant {
+    /// The wall that the particle touches.
+    #[inline]
+    pub(crate) fn wall_touched(&self) -> Option<Wall> {
+        let (w, b) = (self.moving.masses.w.value(), self.moving.rig.half_width);
+        (w.abs() >= b).then(|| Wall::ahead(w))
+    }
+
+    /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave.
+    #[inline]
+    pub(crate) fn touch(&mut self, wall: Wall, step: &mut Step<impl FnMut(Event)>) {
+        let half_width = self.moving.rig.half_width;
+        self.moving.masses.w = Sum::from(wall.sign() * half_width);
+        let resolution = Resolution {
+            lowest_hop: LOWEST_HOP * half_width,
+            longest_chatter: step.left.value(),
+            fastest: self.moving.rig.free.fastest,
+            elastic: !self.moving.rig.varies,
+        };
+        let Masses { primary, particle, dw, .. } = self.moving.masses;
+        let velocities = (primary.values[1], particle, dw);
+        let rig = &self.moving.rig;
+        let touch = if rig.varies || rig.is_forced() {
+            let law = if rig.varies {
+                let r = rig.rebound.of_impact(wall, dw.abs(), self.totals.impacts);
+                rig.law.with_restitution(r)
+            } else {
+                rig.law
+            };
+            law.touch(wall, velocities, |primary, speed| {
+                self.rests(wall, primary, speed, &resolution)
+            })
+        } else {
+            rig.law.touch(wall, velocities, |primary, speed| {
+                let largest = self.acceleration_bound(primary);
+                !rig.law.certainly_leaves(speed, largest, &resolution)
+                    && rig.law.rests(speed, self.pressing(wall, primary), &resolution)
+            })
+        };
+        self.moving.masses.primary = self.moving.masses.primary.plus([0.0, touch.kick]);
+        self.moving.masses.particle = touch.particle;
+        self.moving.masses.dw = touch.relative;
+        let t = step.now();
+        self.totals.add(&touch, self.time + t);
+        if let Some(velocity) = touch.impact {
+            step.outcome.impacts += 1;
+            (step.on_event)(Event::Impact { t, wall, velocity });
+        }
+        if touch.stuck {
+            self.contact = Some(Contact::Wall(wall));
+            step.outcome.stuck += 1;
+            (step.on_event)(Event::Stuck { t, wall });
+        }
+    }
+
+    /// Whether a particle that leaves `wall` at `speed` is in truth at rest on it, with constant forces and a restitution that varies.
+    ///
+    /// On its way from the wall and back the particle has the accelerations `up` and `down` towards the wall: friction adds to the
+    /// first and takes from the second. A hop lasts `u/up + u/sqrt(up down)`, and the particle comes back at `u sqrt(down/up)`. Hops
+    /// therefore die out as those under one acceleration and a smaller coefficient of restitution do. Where friction stops the
+    /// particle before it comes back, there is one hop only.
+    fn rests(&self, wall: Wall, primary: f64, speed: f64, resolution: &Resolution) -> bool {
+        let rig = &self.moving.rig;
+        let joint = 1.0 + rig.mass_ratio;
+        let largest = self.acceleration_bound(primary) + joint * rig.forces.size();
+        if rig.law.resting_with(1.0).certainly_leaves(speed, largest, resolution) {
+            return false;
+        }
+        let (free, error) = self.pressing(wall, primary);
+        let pressing = free - wall.sign() * rig.forces.gravity;
+        let (up, down) = (
+            pressing + joint * rig.forces.kinetic,
+            pressing - joint * rig.forces.kinetic,
+        );
+        if speed == 0.0 {
+            return pressing + joint * rig.forces.holding >= -error;
+        }
+        if up <= 0.0 {
+            return false;
+        }
+        let (mean, back) = if down > 0.0 && pressing > joint * rig.forces.holding {
+            (2.0 / (1.0 / up + 1.0 / libm::sqrt(up * down)), libm::sqrt(down / up))
+        } else {
+            (up, 0.0)
+        };
+        let restitution = back * rig.rebound.mean(wall, speed * back);
+        rig.law
+            .resting_with(restitution)
+            .rests(speed, (mean, error), resolution)
+    }
+
+    /// Acceleration of `wall` towards a particle without acceleration while the primary mass moves alone, and its rounding error, m/s².
+    fn pressing(&self, wall: Wall, velocity: f64) -> (f64, f64) {
+        (
+            wall.sign() * self.acceleration(velocity),
+            self.acceleration_error(velocity),
+        )
+    }
+
+    /// Acceleration of the primary mass at a velocity, while it moves alone and without friction, m/s².
+    fn acceleration(&self, velocity: f64) -> f64 {
+        let start = (self.moving.masses.primary.values[0], velocity);
+        Segment::new(&self.moving.rig.free, self.moving.base, start).derivatives_at_start()[2]
+    }
+
+    /// An upper bound of the acceleration's magnitude, m/s²: the sum of its terms.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn acceleration_bound(&self, velocity: f64) -> f64 {
+        let Oscillator { delta, omega0_squared, .. } = self.moving.rig.free;
+        let drive = &self.moving.base.drive;
+        let position = self.moving.masses.primary.values[0].abs() + drive.signal[0].abs() + drive.amplitude.abs();
+        let velocity = velocity.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
+        (omega0_squared * position + 2.0 * delta * velocity) * (1.0 + 1e-9)
+    }
+
+    /// Rounding error of the acceleration, m/s².
+    pub(crate) fn acceleration_error(&self, velocity: f64) -> f64 {
+        let nothing = NOTHING * self.moving.rig.half_width * self.moving.rig.free.omega0_squared;
+        ROUNDING * (self.acceleration_bound(velocity) + self.moving.rig.forces.size()) + nothing
+    }
+}

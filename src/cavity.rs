@@ -1,0 +1,305 @@
+//! A real cavity: unequal gaps, tilt, friction, and a restitution that depends on the speed, on the wall and on chance.
+//!
+//! With `theta` the tilt, `a_g = g sin(theta)` and `g_n = g cos(theta)`, the particle obeys
+//!
+//! - sliding: `m q2'' = m a_g + mu_k m g_n sign(w')`, and the opposite friction acts on the primary mass;
+//! - sticking to the floor, at `w' = 0`, while `|q'' - a_g| <= mu_s g_n`: both masses move as one under the force `m a_g`;
+//! - resting on the wall of sign `s` while `s (q'' - a_g) >= -mu_s g_n`: the wall pushes without limit, friction holds either way.
+//!
+//! All these forces are constant between events. A constant force `F` on the oscillator moves its equilibrium by `F/k`, as a base
+//! displaced by `F/k` does; the particle's flight is a parabola. The closed form therefore stays.
+
+use crate::contact::Wall;
+use crate::parameters::{InvalidValue, Parameters};
+
+/// Standard gravity, m/s².
+pub const GRAVITY: f64 = 9.80665;
+
+/// How a wall returns the particle: the coefficient of restitution `r` at the speed of approach `v`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Restitution {
+    /// `r`, whatever the speed.
+    Constant(f64),
+    /// `r = 1 - k v^(1/5)`, with `k` in (s/m)^(1/5): viscoelastic spheres (Ramírez et al., Phys. Rev. E 60 (1999) 4465).
+    Viscoelastic(f64),
+    /// `r = min(1, (v/v_y)^(-1/4))`, with the yield speed `v_y` in m/s: plastic impact (Johnson, "Contact Mechanics", 1985, chapter 11).
+    Plastic(f64),
+}
+
+impl Restitution {
+    /// The coefficient at the speed of approach `v`, m/s, before limits.
+    fn at(self, v: f64) -> f64 {
+        match self {
+            Self::Constant(r) => r,
+            // Half the work of `pow`.
+            Self::Viscoelastic(k) => 1.0 - k * libm::exp(0.2 * libm::log(v)),
+            Self::Plastic(yield_speed) => libm::sqrt(libm::sqrt(yield_speed / v)).min(1.0),
+        }
+    }
+
+    fn validate(self) -> Result<(), InvalidValue> {
+        let unless = InvalidValue::unless;
+        match self {
+            Self::Constant(r) => {
+                let name = "r of a wall (coefficient of restitution)";
+                unless(r > 0.0 && r <= 1.0, name, r, "", "a number above 0 and at most 1")
+            }
+            Self::Viscoelastic(k) => {
+                let name = "k of a wall (viscoelastic restitution)";
+                unless(
+                    (0.0..=1e100).contains(&k),
+                    name,
+                    k,
+                    "(s/m)^(1/5)",
+                    "a number from 0 to 1e100",
+                )
+            }
+            Self::Plastic(v) => {
+                let name = "v_y of a wall (yield speed)";
+                unless(
+                    (1e-100..=1e100).contains(&v),
+                    name,
+                    v,
+                    "m/s",
+                    "a number from 1e-100 to 1e100",
+                )
+            }
+        }
+    }
+}
+
+/// What distinguishes a real cavity from the ideal one. The default is the ideal one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Cavity {
+    /// Gap `b_plus` to the wall at `w = b_plus`, m; `None`: the half-width `b`.
+    pub b_plus: Option<f64>,
+    /// Gap `b_minus` to the wall at `w = -b_minus`, m; `None`: the half-width `b`.
+    pub b_minus: Option<f64>,
+    /// Tilt `theta` of the axis, rad: gravity accelerates the particle by `g sin(theta)` along the axis.
+    pub tilt: f64,
+    /// Coefficient `mu_k` of kinetic friction between particle and floor.
+    pub kinetic_friction: f64,
+    /// Coefficient `mu_s` of static friction, at least `mu_k`; `None`: `mu_k`.
+    pub static_friction: Option<f64>,
+    /// Restitution of the walls at `w = b_plus` and at `w = -b_minus`; `None`: the constant of the parameters.
+    pub restitution: [Option<Restitution>; 2],
+    /// Least coefficient of restitution `r_min`.
+    pub least_restitution: f64,
+    /// Relative standard deviation of the coefficient of restitution from impact to impact.
+    pub scatter: f64,
+    /// Seed of the scatter.
+    pub seed: u64,
+}
+
+impl Cavity {
+    /// The ideal cavity.
+    pub const IDEAL: Self = Self {
+        b_plus: None,
+        b_minus: None,
+        tilt: 0.0,
+        kinetic_friction: 0.0,
+        static_friction: None,
+        restitution: [None; 2],
+        least_restitution: 0.0,
+        scatter: 0.0,
+        seed: 0,
+    };
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first invalid value, with its unit and the allowed range.
+    pub fn validate(&self) -> Result<(), InvalidValue> {
+        let within = |name, value: f64, unit, (low, high): (f64, f64), allowed| {
+            InvalidValue::unless((low..=high).contains(&value), name, value, unit, allowed)
+        };
+        for (name, gap) in [
+            ("b_plus (gap to the wall w = b_plus)", self.b_plus),
+            ("b_minus (gap to the wall w = -b_minus)", self.b_minus),
+        ] {
+            if let Some(gap) = gap {
+                within(name, gap, "m", (1e-100, 1e100), "a number from 1e-100 to 1e100")?;
+            }
+        }
+        let right = core::f64::consts::FRAC_PI_2;
+        within(
+            "theta (tilt)",
+            self.tilt,
+            "rad",
+            (-right, right),
+            "a number from -pi/2 to pi/2",
+        )?;
+        let (mu, name) = (self.kinetic_friction, "mu_k (kinetic friction)");
+        within(name, mu, "", (0.0, 100.0), "a number from 0 to 100")?;
+        if let Some(held) = self.static_friction {
+            within(
+                "mu_s (static friction)",
+                held,
+                "",
+                (mu, 100.0),
+                "a number from mu_k to 100",
+            )?;
+        }
+        for law in self.restitution.into_iter().flatten() {
+            law.validate()?;
+        }
+        let name = "r_min (least coefficient of restitution)";
+        within(name, self.least_restitution, "", (0.0, 1.0), "a number from 0 to 1")?;
+        let name = "s (scatter of the restitution)";
+        within(name, self.scatter, "", (0.0, 1.0), "a number from 0 to 1")
+    }
+}
+
+impl Default for Cavity {
+    fn default() -> Self {
+        Self::IDEAL
+    }
+}
+
+/// Constant accelerations of the particle, m/s².
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Forces {
+    /// By gravity along the axis, `a_g`.
+    pub gravity: f64,
+    /// By kinetic friction, `mu_k g_n`.
+    pub kinetic: f64,
+    /// The largest by static friction, `mu_s g_n`; 0 where there is no friction.
+    pub holding: f64,
+}
+
+impl Forces {
+    pub fn new(cavity: &Cavity) -> Self {
+        let (sin, cos) = libm::sincos(cavity.tilt);
+        // A vertical floor carries nothing: the cosine of the nearest double to pi/2 is 6e-17.
+        let normal = if cos < f64::EPSILON { 0.0 } else { GRAVITY * cos };
+        let held = cavity.static_friction.unwrap_or(cavity.kinetic_friction);
+        Self {
+            gravity: GRAVITY * sin,
+            kinetic: cavity.kinetic_friction * normal,
+            holding: held * normal,
+        }
+    }
+
+    /// The size of all.
+    pub fn size(&self) -> f64 {
+        self.gravity.abs() + self.holding
+    }
+}
+
+/// The coefficient of restitution of every impact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rebound {
+    laws: [Restitution; 2],
+    least: f64,
+    scatter: f64,
+    seed: u64,
+}
+
+impl Rebound {
+    pub fn new(p: &Parameters) -> Self {
+        let Cavity { restitution, least_restitution, scatter, seed, .. } = p.cavity;
+        let laws = restitution.map(|law| law.unwrap_or(Restitution::Constant(p.restitution)));
+        Self { laws, least: least_restitution, scatter, seed }
+    }
+
+    /// Whether the coefficient is the same at every impact, and equal to `r`.
+    pub fn is_constant(&self, r: f64) -> bool {
+        self.laws == [Restitution::Constant(r); 2] && self.scatter == 0.0 && self.least <= r
+    }
+
+    /// The coefficient at a speed of approach (m/s) without scatter.
+    pub fn mean(&self, wall: Wall, speed: f64) -> f64 {
+        self.laws[wall.index()].at(speed).clamp(self.least, 1.0)
+    }
+
+    /// The coefficient of impact number `number` at a speed of approach, m/s.
+    pub fn of_impact(&self, wall: Wall, speed: f64, number: u64) -> f64 {
+        let mean = self.mean(wall, speed);
+        if self.scatter == 0.0 {
+            return mean;
+        }
+        (mean * (1.0 + self.scatter * normal_deviate(self.seed, number))).clamp(self.least, 1.0)
+    }
+}
+
+/// A standard normal deviate that depends on `seed` and `counter` alone.
+///
+/// Two outputs of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), whose state is a counter, by the transformation of Box and Muller
+/// (1958). The mixed seed keeps the streams of neighbouring seeds apart.
+pub fn normal_deviate(seed: u64, counter: u64) -> f64 {
+    const GAMMA: u64 = 0x9E37_79B9_7F4A_7C15;
+    let mix = |z: u64| {
+        let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    };
+    let start = mix(seed.wrapping_add(GAMMA));
+    let output = |n: u64| mix(start.wrapping_add(GAMMA.wrapping_mul(n)));
+    let first = counter.wrapping_mul(2);
+    // 53 bits, in (0, 1] and in [0, 1).
+    let unit = (1u64 << 53) as f64;
+    let radius = ((output(first.wrapping_add(1)) >> 11) + 1) as f64 / unit;
+    let angle = (output(first.wrapping_add(2)) >> 11) as f64 / unit;
+    libm::sqrt(-2.0 * libm::log(radius)) * libm::cos(core::f64::consts::TAU * angle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_deviates_have_the_moments_of_a_normal_distribution() {
+        for seed in [0, 1, 2, u64::MAX] {
+            let n = 200_000;
+            let x: Vec<f64> = (0..n).map(|k| normal_deviate(seed, k)).collect();
+            let moment = |power: i32| x.iter().map(|x| x.powi(power)).sum::<f64>() / n as f64;
+            // Five standard errors.
+            let error = 5.0 / (n as f64).sqrt();
+            assert!(moment(1).abs() < error, "{seed}");
+            assert!((moment(2) - 1.0).abs() < error * 2f64.sqrt(), "{seed}");
+            assert!(moment(3).abs() < error * 15f64.sqrt(), "{seed}");
+            assert!((moment(4) - 3.0).abs() < error * 96f64.sqrt(), "{seed}");
+            let next = x.windows(2).map(|x| x[0] * x[1]).sum::<f64>() / n as f64;
+            assert!(next.abs() < error, "{seed}");
+        }
+    }
+
+    #[test]
+    fn the_deviates_are_the_same_on_every_platform() {
+        let bits = [(0, 0), (0, 1), (1, 0), (42, 1_000_000)].map(|(seed, n)| normal_deviate(seed, n).to_bits());
+        assert_eq!(bits, BITS);
+    }
+
+    /// As computed on Linux x86-64.
+    const BITS: [u64; 4] = [
+        13822067420762450554,
+        13828430763993287423,
+        4608649114510895303,
+        4590280571091359939,
+    ];
+
+    #[test]
+    fn every_law_is_limited_to_the_allowed_range() {
+        let cavity = Cavity {
+            restitution: [Some(Restitution::Viscoelastic(0.5)), Some(Restitution::Plastic(0.1))],
+            least_restitution: 0.3,
+            ..Cavity::IDEAL
+        };
+        let rebound = Rebound::new(&Parameters { cavity, ..Parameters::dimensionless(0.01, 1.0, 0.6) });
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-15, "{a} {b}");
+        near(rebound.mean(Wall::Plus, 1.0), 0.5);
+        near(rebound.mean(Wall::Plus, 1e3), 0.3);
+        near(rebound.mean(Wall::Minus, 0.05), 1.0);
+        near(rebound.mean(Wall::Minus, 1.6), 0.5);
+        near(rebound.mean(Wall::Minus, 1e6), 0.3);
+        for scatter in [0.1, 1.0] {
+            let rebound = Rebound { scatter, ..rebound };
+            for n in 0..1000 {
+                let r = rebound.of_impact(Wall::Plus, 0.2, n);
+                assert!((0.3..=1.0).contains(&r), "{r}");
+            }
+        }
+    }
+}
