@@ -291,3 +291,35 @@ fn packing_refuses_what_it_cannot_pack_before_it_writes() {
     fails(&pack(&["--set=plant.r=2"]), 2, "r (coefficient of restitution) = 2");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+#[test]
+fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let tracked = vines(&["backbone", "--set", "backbone.points=8", "--out", out]);
+    assert!(tracked.status.success(), "{tracked:?}");
+    assert!(!String::from_utf8_lossy(&tracked.stdout).contains("do not belong"));
+    let (points, rig) = (format!("{out}/tracked.csv"), format!("{out}/rig.toml"));
+    let fit = vines(&[
+        "fit",
+        &points,
+        "--set",
+        "plant.r=0.75",
+        "--known",
+        "m=0.032±0.0003",
+        "--out",
+        &rig,
+    ]);
+    let text = String::from_utf8_lossy(&fit.stdout).into_owned();
+    assert!(
+        fit.status.success() && text.contains("the model describes them"),
+        "{fit:?}"
+    );
+    let scene = json(&["theory", "--scene", &rig, "--json"])["scene"].clone();
+    assert!((scene["r"].as_f64().unwrap() - 0.65).abs() < 2e-3, "{scene}");
+    let refused = vines(&["fit", &points, "--column", "A=amplitude:mm"]);
+    assert!(
+        String::from_utf8_lossy(&refused.stderr).contains("has no column `amplitude`"),
+        "{refused:?}"
+    );
+}

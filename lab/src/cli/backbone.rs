@@ -2,7 +2,7 @@
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::{backbone::track_into, comparison::TrackedComparison, report};
+use vines::{backbone::track_into, comparison::TrackedComparison, fit::contradiction, report};
 
 use super::experiment::{ExperimentArguments, interrupted};
 use super::failure::Failure;
@@ -69,7 +69,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         return Err(failure);
     }
     let files = saved?;
-    let text = experiment.result(&result, &summary, &files, timing)?;
+    let mut text = experiment.result(&result, &summary, &files, timing)?;
+    let settled = result.points.iter().filter(|one| one.point.settled);
+    let points: Vec<_> = settled.map(|one| (&one.point.at).into()).collect();
+    if let Some(line) = contradiction(&points, scene.resonance, &scene.plant).filter(|_| !experiment.json) {
+        text += &format!("{line}\n");
+    }
     match result.doubt() {
         Some(reason) => {
             print(&text)?;

@@ -12,9 +12,7 @@ use vines::fmu::{FmuController, FmuError, FmuRig};
 use vines::helic::{Channels, DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable};
-#[cfg(feature = "sweep")]
-use vines::scene::Family;
-use vines::scene::{Name, Names, Override, PAPER, Scene, SceneError};
+use vines::scene::{Family, Name, Names, Override, PAPER, Scene, SceneError};
 
 use super::failure::{Failure, stop_flag};
 
@@ -58,7 +56,6 @@ impl SceneArguments {
     }
 
     /// The scene, of which numbers may vary.
-    #[cfg(feature = "sweep")]
     pub(super) fn family(&self) -> Result<Family, SceneError> {
         let Some(path) = &self.scene else {
             return Family::parse("", None, &self.set);
