@@ -17,6 +17,8 @@ PAGES = sorted(set(DOCS.glob("*.md")) - {DOCS / "SUMMARY.md"})
 # Pages written by hand: lines of one, and of all with the README; words of a sentence.
 MOST_LINES = 200
 MOST_LINES_IN_ALL = 2400
+# Written by a test of the controller.
+MADE = ("controller-settings.md",)
 MOST_WORDS = 37
 README = ROOT / "README.md"
 GENERATED = DOCS / "reference"
@@ -70,7 +72,7 @@ def test_no_sentence_of_a_page_is_long(page):
 
 
 def test_the_book_contains_every_page_and_is_short():
-    lengths = {page.name: len(page.read_text().splitlines()) for page in (README, *PAGES)}
+    lengths = {page.name: len(page.read_text().splitlines()) for page in (README, *PAGES) if page.name not in MADE}
     assert {name: length for name, length in lengths.items() if length > MOST_LINES} == {}
     assert sum(lengths.values()) <= MOST_LINES_IN_ALL
     listed = re.findall(r"\(([\w/-]+\.md)\)", (DOCS / "SUMMARY.md").read_text())
