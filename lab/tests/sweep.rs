@@ -246,7 +246,7 @@ fn a_large_sweep_needs_a_confirmation() {
 fn an_axis_that_no_scene_has_is_named_as_an_axis() {
     for (axis, message) in [
         ("plant.x=1:2:3", "axis plant.x: unknown field `x`"),
-        ("r=0.3:1:3", "axis r: expected sigma or section.key"),
+        ("x=0.3:1:3", "axis x: expected sigma or section.key"),
     ] {
         let output = vines(&["sweep", "--axis", axis], Path::new("never")).output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{}", text(&output));

@@ -11,7 +11,7 @@ use super::failure::{Failure, INTERRUPTED, stop_flag};
 use super::{options::SceneArguments, output::progress_bar};
 
 const HELP: &str = "\
-Axes; a key is sigma (the detuning) or section.key of a scene:
+Axes; a key is sigma (the detuning), section.key of a scene, or G and r for excitation.G and plant.r:
   --axis plant.r=0.3:1:71          first : last : number of values
   --axis plant.r=0.3,0.5,0.8       a list
   --axis start.dq2=random:-1:1     one random number per sample; with --samples and --seed

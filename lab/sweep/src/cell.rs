@@ -25,7 +25,7 @@ pub struct Results {
     pub response: bool,
     /// The exact symmetric 1:1 orbits at the drive of the cell, and their stability.
     pub orbits: bool,
-    /// The locked result: the experiment of `vines identify` without its decay.
+    /// The locked point: the experiment of `vines identify` without its decay.
     pub lock: bool,
 }
 
@@ -95,7 +95,7 @@ pub(crate) fn compute(scene: &Scene, sigma: f64, numbers: &Dimensionless, settin
         Ok((result, response)) => {
             let (lock, failure) = match results.lock.then(|| locked(scene)).transpose() {
                 Ok(lock) => (lock, String::new()),
-                Err(error) => (None, format!("no locked result: {error}")),
+                Err(error) => (None, format!("no locked point: {error}")),
             };
             Cell {
                 regime: Some(result.regime),
@@ -218,7 +218,7 @@ const VARIABLES: [Variable; 25] = [
     variable("orbits", "orbit_C", "1", "amplitude of the first harmonic of v over b, on the orbit with the larger B", Number(|c| c.orbit(|one| one.c))),
     variable("orbits", "orbit_B", "1", "speed of the particle over b omega0, on the orbit with the larger B", Number(|c| c.orbit(|one| one.b))),
     variable("orbits", "orbit_multiplier", "1", "largest modulus of the multipliers of that orbit over half a period", Number(|c| c.orbit(|one| one.multipliers[3]))),
-    variable("lock", "lock_sigma", "1", "detuning of the locked result", Number(|c| c.lock(|l| l.at.sigma))),
+    variable("lock", "lock_sigma", "1", "detuning of the locked point", Number(|c| c.lock(|l| l.at.sigma))),
     variable("lock", "lock_C", "1", "amplitude of the first harmonic of v over b at the lock", Number(|c| c.lock(|l| l.at.c))),
     variable("lock", "lock_B", "1", "mean speed of the particle over b omega0 at the lock", Number(|c| c.lock(|l| l.b.unwrap_or(f64::NAN)))),
     variable("lock", "periods_to_lock", "1", "periods from the start to the settled lock", Number(|c| c.lock(|l| l.periods_to_lock))),
