@@ -273,6 +273,6 @@ fn cells_that_are_not_computed_differ_from_computed_and_failed_ones() {
     }
     let failure = array(folder.path(), "failure");
     let reasons: Vec<String> = failure.retrieve_array_subset(&failure.subset_all()).unwrap();
-    assert!(reasons[0].contains("from -b to b"), "{reasons:?}");
+    assert!(reasons[0].contains("from -b_minus to b_plus"), "{reasons:?}");
     assert_eq!(reasons[1..], ["", "not computed", "not computed", ""]);
 }

@@ -223,7 +223,7 @@ fn a_failed_cell_has_its_reason_and_stops_nothing() {
     assert_eq!((monitor.computed.load(Relaxed), monitor.failed.load(Relaxed)), (4, 1));
     let reason = monitor.reason.lock().unwrap().clone().unwrap();
     assert!(
-        reason.contains("0.012") && reason.contains('m') && reason.contains("from -b to b"),
+        reason.contains("0.012") && reason.contains('m') && reason.contains("from -b_minus to b_plus"),
         "{reason}"
     );
     let settling = numbers(folder.path(), "settling");
