@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use lovines::{Cavity, Drive, Parameters, Plant, Restitution, State};
 use vines_model::orbit::{
     DriveCondition, NoMotion, PlantMotion, backbone_at_speed, exact_backbone, periodic_motion, resonant_motion,
+    resonant_motion_under, settled_motion,
 };
 use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
 
@@ -227,6 +228,21 @@ fn a_motion_is_found_from_another_one_and_at_a_given_drive() {
     ];
     let same = periodic_motion(&p, Definition::default(), &near, under).expect("a motion");
     assert!((same.omega / fresh.omega - 1.0).abs() < 1e-11);
+}
+
+#[test]
+fn a_simulated_motion_and_one_continued_under_the_same_drive_are_the_same() {
+    for cavity in effects() {
+        let (p, definition) = (rig(cavity), Definition::default());
+        let near = resonant(cavity, definition);
+        let under = resonant_motion_under(&p, definition, near.amplitude).expect("a motion");
+        assert!(difference(&p, &under.state, &near.state, 1.0) < 1e-9, "{cavity:?}");
+        let drive = [near.omega, near.amplitude];
+        let settled = settled_motion(&p, definition, drive, near.state, 300).expect("a rig");
+        let settled = settled.expect("a motion that repeats");
+        assert_eq!((settled.periods, settled.impacts), (1, 2));
+        assert!(difference(&p, &settled.state, &near.state, 1.0) < 1e-9, "{cavity:?}");
+    }
 }
 
 #[test]

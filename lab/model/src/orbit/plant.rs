@@ -14,7 +14,7 @@ use lovines::{Cavity, Drive, Event, InvalidValue, Outcome, Parameters, Plant, Re
 use nalgebra::{Complex, Matrix4, Matrix6, Vector4, Vector6};
 use thiserror::Error;
 
-use super::symmetric::{Candidate, at_amplitude, at_speed};
+use super::symmetric::{Candidate, at_amplitude, at_speed, stable_resonant};
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
 use crate::{Definition, Dimensionless, Resonance, Sensor};
 
@@ -78,6 +78,10 @@ pub enum NoMotion {
     Peak,
     #[error("the ideal cavity has no symmetric 1:1 motion at resonance with a response of {0} m, from which to start")]
     NoIdealMotion(f64),
+    #[error(
+        "the ideal cavity has no stable symmetric 1:1 motion at resonance under a base of {0} m, from which to start"
+    )]
+    NoIdealMotionUnder(f64),
     #[error("Newton's method finds no periodic motion near its start")]
     NotConverged,
     #[error("the resonant motion of the ideal cavity is lost when {} % of the cavity's effects act", 100.0 * .0)]
@@ -116,6 +120,65 @@ pub fn periodic_motion(
     let mut solver = Solver::new(parameters, definition, periods, conditions)?;
     let start = unknowns(&solver.scale, &state, omega, amplitude);
     solver.solve(0.0, start).map(|(motion, ..)| motion)
+}
+
+/// The motion at phase resonance under a base of the amplitude `amplitude`, m, continued from the stable symmetric motion of the ideal cavity
+/// with the smallest response.
+///
+/// # Errors
+/// As [`resonant_motion`].
+pub fn resonant_motion_under(
+    parameters: &Parameters,
+    definition: Definition,
+    amplitude: f64,
+) -> Result<PlantMotion, NoMotion> {
+    let conditions = [DriveCondition::PhaseResonance, DriveCondition::Amplitude(amplitude)];
+    Solver::new(parameters, definition, 1, conditions)?;
+    let motion = |scene: &Dimensionless| {
+        let g = scene.excitation(amplitude);
+        stable_resonant(&Dimensionless { g, ..*scene }).and_then(|orbit| at_speed(scene, orbit.b))
+    };
+    let ideal = Ideal::with(parameters, definition, motion).ok_or(NoMotion::NoIdealMotionUnder(amplitude))?;
+    Ideal { amplitude, ..ideal }.continued(parameters, definition, None)
+}
+
+/// Largest difference, over b and b omega0, between a simulated state and one some periods later from which Newton's method starts.
+const NEAR: f64 = 1e-2;
+/// Longest motion that is searched, periods of the base.
+const LONGEST: u32 = 32;
+
+/// The motion that a state at phase 0 of the base leads to under a drive within `settle` periods; `None` if it does not repeat within 32.
+///
+/// # Errors
+/// As [`resonant_motion`].
+pub fn settled_motion(
+    parameters: &Parameters,
+    definition: Definition,
+    [omega, amplitude]: [f64; 2],
+    start: State,
+    settle: usize,
+) -> Result<Option<PlantMotion>, NoMotion> {
+    let conditions = [DriveCondition::Omega(omega), DriveCondition::Amplitude(amplitude)];
+    Solver::new(parameters, definition, 1, conditions)?;
+    let (mut plant, drive) = (Plant::new(*parameters, start)?, Drive::harmonic(amplitude, omega));
+    plant.begin(drive)?;
+    plant.advance(drive, settle as f64 * TAU / omega)?;
+    let state = plant.state();
+    let scale = scale(parameters);
+    let here = unknowns(&scale, &state, omega, amplitude);
+    for periods in 1..=LONGEST {
+        plant.advance(drive, TAU / omega)?;
+        let apart = (unknowns(&scale, &plant.state(), omega, amplitude) - here).amax();
+        if apart < NEAR {
+            let guess = PlantMotion::guess(state, omega, amplitude, periods);
+            match periodic_motion(parameters, definition, &guess, conditions) {
+                Ok(motion) if motion.is_stable() => return Ok(Some(motion)),
+                Ok(_) | Err(NoMotion::NotConverged) => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+    Ok(None)
 }
 
 impl PlantMotion {
@@ -211,17 +274,30 @@ impl Ideal {
         ideal
     }
 
-    /// The motion with all effects and this response, m.
-    fn continued(&self, p: &Parameters, definition: Definition, response: f64) -> Result<PlantMotion, NoMotion> {
+    /// The motion at phase resonance with all effects under the drive of the ideal motion or, if `response` is given, with this response, m.
+    fn continued(
+        &self,
+        p: &Parameters,
+        definition: Definition,
+        response: Option<f64>,
+    ) -> Result<PlantMotion, NoMotion> {
         let (mut phase, mut at) = (self.phase, unknowns(&scale(p), &self.state, self.omega, self.amplitude));
         // Up to 1 the effects grow, from 1 to 2 the response changes.
-        let end = if response == self.response { 1.0 } else { 2.0 };
+        let end = if response.is_none_or(|response| response == self.response) {
+            1.0
+        } else {
+            2.0
+        };
         let (mut done, mut increase) = (0.0, 1.0);
         loop {
             let next = f64::min(done + increase, if done < 1.0 { 1.0 } else { end });
             let partial = self.with_effects(p, next.min(1.0));
-            let amplitude = self.response + (next - 1.0).max(0.0) * (response - self.response);
-            match Solver::new(&partial, definition, 1, at_response(amplitude))?.solve(phase, at) {
+            let second = match response {
+                Some(end) => DriveCondition::Response(self.response + (next - 1.0).max(0.0) * (end - self.response)),
+                None => DriveCondition::Amplitude(self.amplitude),
+            };
+            let conditions = [DriveCondition::PhaseResonance, second];
+            match Solver::new(&partial, definition, 1, conditions)?.solve(phase, at) {
                 // A particle that only rests is another motion: a linear one.
                 Ok((motion, ..)) if motion.impacts == 0 => return Err(NoMotion::Lost(next.min(1.0))),
                 Ok((motion, ..)) if next == end => return Ok(motion),
@@ -287,11 +363,11 @@ fn continued(p: &Parameters, definition: Definition, response: f64) -> Result<Pl
     // Refuses what cannot be solved before anything is computed.
     Solver::new(p, definition, 1, at_response(response))?;
     let ideal = Ideal::new(p, definition, response).ok_or(NoMotion::NoIdealMotion(response))?;
-    let motion = ideal.continued(p, definition, response);
+    let motion = ideal.continued(p, definition, Some(response));
     if motion.as_ref().is_ok_and(PlantMotion::is_stable) {
         return motion;
     }
-    let detour = Ideal::in_the_middle(p, definition).map(|ideal| ideal.continued(p, definition, response));
+    let detour = Ideal::in_the_middle(p, definition).map(|ideal| ideal.continued(p, definition, Some(response)));
     match detour {
         Some(Ok(other)) if motion.is_err() || other.is_stable() => Ok(other),
         _ => motion,
