@@ -21,10 +21,10 @@ use std::f64::consts::TAU;
 
 use common::{Failure, arguments, client, is_kept, quantile, share, tracked, uniform, write};
 use rayon::prelude::*;
-use vines_model::numerics::mean_square;
-use vines_testbench::experiment::{Plan, run};
+use vines_model::numerics::{Estimate, mean_square};
 use vines_testbench::backbone::track;
-use vines_testbench::fit::{Effect, Fit, MeasuredPoint, Quantity, Recording, at, explain, fit};
+use vines_testbench::experiment::{Plan, run};
+use vines_testbench::fit::{Effect, Fit, Known, MeasuredPoint, Quantity, Recording, at, explain, fit};
 use vines_testbench::rig::{BuiltIn, Chain, SensorsOnly, Simulated};
 use vines_testbench::scene::{Parameters, Scene};
 
@@ -62,7 +62,8 @@ fn main() -> Result<(), Failure> {
     let kept: Vec<&&Fitted> = found.iter().filter(|one| !one.fit.is_rejected()).collect();
     let mut rows = Vec::new();
     for (n, quantity) in Quantity::ALL[..5].iter().enumerate() {
-        let gather = |values: fn(&Fitted) -> &[f64; 5]| kept.iter().map(|one| values(one)[n].abs()).collect::<Vec<f64>>();
+        let gather =
+            |values: fn(&Fitted) -> &[f64; 5]| kept.iter().map(|one| values(one)[n].abs()).collect::<Vec<f64>>();
         let (ratios, over_bound) = (gather(|one| &one.over_u), gather(|one| &one.over_bound));
         let rms = |values: &[f64]| mean_square(values.iter().copied()).sqrt();
         rows.push(format!(
@@ -148,14 +149,24 @@ fn effects(count: usize, seed: &str, snr: &str) -> Result<(), Failure> {
             let ratios = [epsilon, uniform(0.4, 2.5), uniform(0.4, 0.9)];
             let noise = uniform(0.0, 1e6) as u64;
             let scales = [0.01, 0.3, 0.2, 0.1, 0.2].map(|range| uniform(-range, range));
-            (ratios, noise, scales, (n < count).then(|| Effect::ALL[n % 4]), uniform(0.3, 1.0))
+            let mut scales = scales;
+            scales[4] = scales[4].min(0.95 / ratios[2] - 1.0);
+            (
+                ratios,
+                noise,
+                scales,
+                (n < count).then(|| Effect::ALL[n % 4]),
+                uniform(0.3, 1.0),
+            )
         })
         .collect();
     let named: Vec<Option<Named>> = cases
         .par_iter()
         .map(|case| {
             let result = named(case, snr);
-            result.inspect_err(|error| println!("{:.4?} {:?}: {error}", case.0, case.3)).ok()
+            result
+                .inspect_err(|error| println!("{:.4?} {:?}: {error}", case.0, case.3))
+                .ok()
         })
         .collect();
     let mut rows = Vec::new();
@@ -194,7 +205,7 @@ fn named((ratios, noise, scales, effect, size): &Hidden, snr: &str) -> Result<Na
     let (strength, cavity) = match effect {
         None => (f64::NAN, ideal.cavity),
         Some(Effect::Friction) => {
-            let mu = 0.01 * size / g;
+            let mu = 0.03 * size / g;
             (mu, lovines::Cavity { kinetic_friction: mu, ..ideal.cavity })
         }
         Some(Effect::Tilt) => {
@@ -202,13 +213,20 @@ fn named((ratios, noise, scales, effect, size): &Hidden, snr: &str) -> Result<Na
             (tilt.to_degrees(), lovines::Cavity { tilt, ..ideal.cavity })
         }
         Some(law) => {
-            let strength = if *law == Effect::Viscoelastic { (1.0 - ideal.restitution) / 2f64.powf(0.2) } else { 2.0 * ideal.restitution.powi(4) };
+            let strength = if *law == Effect::Viscoelastic {
+                (1.0 - ideal.restitution) / 2f64.powf(0.2)
+            } else {
+                2.0 * ideal.restitution.powi(4)
+            };
             let law = if *law == Effect::Viscoelastic {
                 lovines::Restitution::Viscoelastic(strength)
             } else {
                 lovines::Restitution::Plastic(strength)
             };
-            (strength, lovines::Cavity { restitution: [Some(law); 2], ..ideal.cavity })
+            (
+                strength,
+                lovines::Cavity { restitution: [Some(law); 2], ..ideal.cavity },
+            )
         }
     };
     let truth = Parameters { cavity, ..ideal };
@@ -216,14 +234,42 @@ fn named((ratios, noise, scales, effect, size): &Hidden, snr: &str) -> Result<Na
     let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let tracked = track(&mut rig, &mut controller, &scene, |_, _| {})?;
-    let points: Vec<MeasuredPoint> = tracked.points.iter().filter(is_kept).map(|point| (&point.at).into()).collect();
+    let points: Vec<MeasuredPoint> = tracked
+        .points
+        .iter()
+        .filter(is_kept)
+        .map(|point| (&point.at).into())
+        .collect();
+    let moved = at(&points, scene.resonance, &ideal, &[]).ok_or("the rig has no such motion")?;
+    let moved = moved
+        .residuals
+        .iter()
+        .flatten()
+        .fold(0.0, |most: f64, one| most.max(one.abs()));
     let begin = std::time::Instant::now();
-    let found = explain(&points, scene.resonance, &scene.plant, &[], |_| {})?;
-    let (best, right) = (found.explains(), found.candidates.iter().find(|one| Some(one.effect) == *effect));
+    // A ruler and a scale.
+    let mut random = uniform(*noise);
+    let known = [(Quantity::B, 1.0), (Quantity::Epsilon, ratios[0])].map(|(quantity, value)| {
+        let relative = 0.003;
+        let estimate = Estimate {
+            value: value * (1.0 + relative * random(-1.7, 1.7)),
+            uncertainty: relative * value,
+        };
+        Known { quantity, estimate }
+    });
+    let found = explain(&points, scene.resonance, &scene.plant, &known, |_| {})?;
+    let (best, right) = (
+        found.explains(),
+        found.candidates.iter().find(|one| Some(one.effect) == *effect),
+    );
     println!(
-        "{ratios:.4?} {effect:?} {strength:.5}: {} points, {}; right one {:?}, {:.2?}",
+        "{ratios:.4?} {effect:?} {strength:.5} moves by {moved:.0} u: {} points, {}; right one {:?}, {:.2?}",
         points.len(),
-        if found.ideal.is_rejected() { found.verdict() } else { format!("ideal, {:.1} for {}", found.ideal.chi_square, found.ideal.degrees) },
+        if found.ideal.is_rejected() {
+            found.verdict()
+        } else {
+            format!("ideal, {:.1} for {}", found.ideal.chi_square, found.ideal.degrees)
+        },
         right.map(|one| (one.fit.chi_square, one.strength)),
         begin.elapsed()
     );
@@ -265,11 +311,25 @@ fn recorded((rig, noise, scales): &Case, snr: &str) -> Result<(Vec<MeasuredPoint
     scene.measured = None;
     let parts = recording.parts(&scene)?;
     if std::env::var("VERBOSE").is_ok() {
-        let residuals = at(&parts.iter().filter_map(|part| part.point).collect::<Vec<_>>(), scene.resonance, &truth, &[]).map(|one| one.residuals).unwrap_or_default();
+        let residuals = at(
+            &parts.iter().filter_map(|part| part.point).collect::<Vec<_>>(),
+            scene.resonance,
+            &truth,
+            &[],
+        )
+        .map(|one| one.residuals)
+        .unwrap_or_default();
         let mut residuals = residuals.iter();
         for part in &parts {
             let point = part.point.map(|one| (one.response.value, one.omega, one.drive));
-            println!("{:.1?} {:?} {} {:.6?} {:.1?}", part.seconds.map(|t| t / TAU), part.kind, part.regime, point, point.and_then(|_| residuals.next()));
+            println!(
+                "{:.1?} {:?} {} {:.6?} {:.1?}",
+                part.seconds.map(|t| t / TAU),
+                part.kind,
+                part.regime,
+                point,
+                point.and_then(|_| residuals.next())
+            );
         }
     }
     Ok((parts.into_iter().filter_map(|part| part.point).collect(), scene))

@@ -447,12 +447,12 @@ struct Problem<'a> {
     free: bool,
 }
 
-/// Relative shift of frequency and drive at equal amplitude by an effect of some strength, and its derivative.
+/// Relative shifts of frequency and drive at equal amplitude by an effect, and their gradients, at some unknowns.
 #[derive(Clone, Copy)]
 struct Shift {
-    strength: f64,
+    at: Unknowns,
     value: [f64; 2],
-    slope: [f64; 2],
+    gradient: [Unknowns; 2],
 }
 
 /// A place on the curve: amplitude of the response, m, frequency, rad/s, and amplitude of the base, m.
@@ -474,7 +474,14 @@ struct Sums {
 impl<'a> Problem<'a> {
     fn new(points: Vec<MeasuredPoint>, definition: Definition, known: &'a [Known]) -> Self {
         let has_scale = known.iter().any(|one| one.quantity.needs_a_scale());
-        Self { points, definition, known, has_scale, shifts: Vec::new(), free: false }
+        Self {
+            points,
+            definition,
+            known,
+            has_scale,
+            shifts: Vec::new(),
+            free: false,
+        }
     }
 
     /// The smallest of the minima that are reached from the expected rig and from other restitution coefficients.
@@ -593,12 +600,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The speed at which the curve is nearest to a point, the residual there, and its derivative by the speed.
-    fn nearest(
-        &self,
-        x: &Unknowns,
-        point: usize,
-        start: Option<f64>,
-    ) -> Option<(f64, Vector3<f64>, Vector3<f64>)> {
+    fn nearest(&self, x: &Unknowns, point: usize, start: Option<f64>) -> Option<(f64, Vector3<f64>, Vector3<f64>)> {
         let (b, epsilon) = (x[3].exp(), x[4].exp());
         let manifold = SlowFlow::new(2.0 * x[1] / epsilon, x[2]).manifold;
         let by_theory = || {
@@ -640,19 +642,27 @@ impl<'a> Problem<'a> {
             ..Dimensionless::new(epsilon, 2.0 * x[1] / epsilon, x[2], 0.0)
         };
         let [omega, c, g] = backbone_at_speed(&model, speed)?;
-        Some(Curve { response: b * c, omega: omega0 * omega, drive: b * epsilon * g })
+        Some(Curve {
+            response: b * c,
+            omega: omega0 * omega,
+            drive: b * epsilon * g,
+        })
     }
 
     /// The curve at a speed less a point, over its standard uncertainties.
     fn residual(&self, x: &Unknowns, point: usize, speed: f64) -> Option<Vector3<f64>> {
         let Curve { response, mut omega, mut drive } = self.curve(x, speed)?;
-        if let Some(Shift { strength, value, slope }) = self.shifts.get(point) {
-            let [by_omega, by_drive] = [0, 1].map(|i| value[i] + slope[i] * (x[6] - strength));
+        if let Some(Shift { at, value, gradient }) = self.shifts.get(point) {
+            let [by_omega, by_drive] = [0, 1].map(|i| value[i] + gradient[i].dot(&(x - at)));
             (omega, drive) = (omega * (1.0 + by_omega), drive * (1.0 + by_drive));
         }
         let point = &self.points[point];
         let over = |value: f64, measured: Estimate| (value - measured.value) / measured.uncertainty;
-        Some(Vector3::new(over(response, point.response), over(omega, point.omega), over(drive, point.drive)))
+        Some(Vector3::new(
+            over(response, point.response),
+            over(omega, point.omega),
+            over(drive, point.drive),
+        ))
     }
 }
 
