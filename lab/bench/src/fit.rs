@@ -14,6 +14,7 @@ use std::f64::consts::TAU;
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
+use lovines::Cavity;
 use nalgebra::{SMatrix, SVector, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -27,7 +28,7 @@ use crate::identification::Measured;
 use crate::scene::{Dimensionless, Parameters};
 
 pub use effects::{Candidate, Effect, Explanation, decimals, explain};
-pub use recording::{Kind, Part, Recording, RecordingError};
+pub use recording::{Kind, Part, Recording, RecordingError, parts};
 
 /// A measured point of phase resonance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -399,15 +400,28 @@ pub fn at(points: &[MeasuredPoint], definition: Definition, plant: &Parameters, 
     })
 }
 
-/// What is to be said where the points contradict the rig `expected`: which parameters fit instead. `None` where they do not, or cannot tell.
+/// What is to be said where the points contradict the rig `expected`: which parameters fit instead. `None` where they do not, or cannot tell, or
+/// where the rig has effects of a real cavity, which the model has not.
 #[must_use]
 pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected: &Parameters) -> Option<String> {
-    if !at(points, definition, expected, &[])?.is_rejected() {
+    if expected.cavity != Cavity::IDEAL {
         return None;
+    }
+    let scene = at(points, definition, expected, &[])?;
+    if !scene.is_rejected() {
+        return None;
+    }
+    let chi_square = format!("chi-square is {:.0} for {}", scene.chi_square, scene.degrees);
+    if points.len() < FEWEST {
+        return Some(format!(
+            "the locked point does not belong to this scene ({chi_square}): track the backbone with `vines backbone`, and run `vines fit`"
+        ));
     }
     let fit = fit(points, definition, expected, &[]).ok()?;
     if fit.is_rejected() {
-        return Some("the points contradict the model, whatever its parameters; see `vines fit`".into());
+        return Some(format!(
+            "the points do not belong to this scene ({chi_square}), nor to the ideal cavity with other parameters; run `vines fit`"
+        ));
     }
     let report = fit.report(expected);
     let differs = |one: &&FittedParameter| (one.value - one.expected).abs() > SIGNIFICANT * one.uncertainty;
@@ -431,7 +445,7 @@ pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected:
         texts.join("; ")
     };
     Some(format!(
-        "the points do not belong to this scene: {texts}; see `vines fit`"
+        "the points do not belong to this scene: {texts}; run `vines fit`"
     ))
 }
 

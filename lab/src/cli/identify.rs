@@ -3,6 +3,7 @@
 use clap::Args;
 use indicatif::ProgressBar;
 use vines::experiment::{Plan, Stage, run_into};
+use vines::fit::contradiction;
 use vines::identification::{IdentificationError, identify};
 use vines::{advice, comparison::Comparison, report};
 
@@ -64,7 +65,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if arguments.rig.is_none() {
         files.extend(fmus(&experiment.out)?);
     }
-    experiment.result(&result, &summary, &files, timing)
+    let mut text = experiment.result(&result, &summary, &files, timing)?;
+    let lock = (&identification.lock.at).into();
+    if let Some(line) = contradiction(&[lock], scene.resonance, &scene.plant).filter(|_| !experiment.json) {
+        text += &format!("{line}\n");
+    }
+    Ok(text)
 }
 
 fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {

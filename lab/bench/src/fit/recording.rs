@@ -20,7 +20,7 @@ use thiserror::Error;
 use vines_model::numerics::{Estimate, RANDOM, equally_spaced, mean, slope};
 use vines_model::regime::Regime;
 
-use super::MeasuredPoint;
+use super::{Known, MeasuredPoint, Quantity, fit};
 use crate::backbone::{Criterion, LevelEstimate};
 use crate::identification::{Balance, Cycle, Harmonic, harmonic, regime_by_response};
 use crate::record::Sample;
@@ -194,6 +194,39 @@ const APART: f64 = 0.01;
 const SWEPT: f64 = 0.01;
 /// Periods by which the impacts follow a change of the amplitude late.
 const LAG: f64 = 1.6;
+
+/// The parts of each recording. The natural frequency and the damping are those of `scene` first, and then those that fit the points.
+///
+/// # Errors
+/// As [`Recording::parts`].
+pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result<Vec<Vec<Part>>, RecordingError> {
+    let all = |scene: &Scene| {
+        recordings
+            .iter()
+            .map(|one| one.parts(scene))
+            .collect::<Result<Vec<_>, _>>()
+    };
+    let first = all(scene)?;
+    let points: Vec<MeasuredPoint> = first.iter().flatten().filter_map(|part| part.point).collect();
+    let Some(fit) = fit(&points, scene.resonance, &scene.plant, known)
+        .ok()
+        .filter(|fit| !fit.is_rejected())
+    else {
+        return Ok(first);
+    };
+    let plant = fit.plant(&scene.plant);
+    let [omega0, damping] = [plant.natural_frequency(), 0.5 * plant.damping / plant.primary_mass];
+    let uncertainty =
+        [Quantity::F0, Quantity::Zeta].map(|one| fit.estimate(one).map_or(f64::NAN, |one| one.uncertainty));
+    let measured = LinearResponse {
+        omega0,
+        damping_rate: damping,
+        uncertainty: (TAU * uncertainty[0]).max(omega0 * uncertainty[1]),
+        gain: Complex64::new(0.0, -0.5 * omega0),
+    };
+    let scene = Scene { measured: Some(measured), ..scene.clone() };
+    all(&scene).or(Ok(first))
+}
 
 impl Recording {
     /// The parts of the recording, with their points. `scene` says what the sensors read, and the natural frequency and the damping of the structure
