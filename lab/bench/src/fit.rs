@@ -27,7 +27,7 @@ use vines_model::{ArgumentError, Definition};
 use crate::identification::Measured;
 use crate::scene::{Dimensionless, Parameters};
 
-pub use effects::{Candidate, Effect, Explanation, decimals, explain};
+pub use effects::{Candidate, Effect, Explanation, Found, decimals, explain, find};
 pub use recording::{Kind, Part, Recording, RecordingError, parts};
 
 /// A measured point of phase resonance.

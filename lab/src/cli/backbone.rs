@@ -46,11 +46,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let (scene, mut session) = experiment.start(Some(&arguments.rig), |scene| scene.backbone_config())?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let mut samples = Vec::new();
-    let (rig, controller) = (&mut session.open.rig, session.controller.as_mut());
-    let tracked = track_into(&mut samples, rig, controller, &scene, |done, _| {
+    let (mut rig, controller) = (experiment.recorded(&mut session.open.rig), session.controller.as_mut());
+    let tracked = track_into(&mut samples, &mut rig, controller, &scene, |done, _| {
         bar.set_position(done as u64);
     });
     bar.finish_and_clear();
+    rig.finish()?;
     let timing = session.close();
     let tracked = tracked.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let result = TrackedComparison::of(&tracked, &scene);

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::ProgressBar;
 use serde::Serialize;
-use vines::fit::{Effect, Explanation, Fit, FitReport, Known, Part, decimals, explain, fit, parts};
+use vines::fit::{Effect, Fit, FitReport, Found, Known, Part, decimals, find, parts};
 use vines::points::{Channel, Channels, Column, Measurement, read};
 use vines::report::Table;
 
@@ -116,23 +116,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .map_err(Failure::run)?
         .concat();
     points.extend(parts.iter().filter_map(|part| part.point));
-    let mut found = fit(&points, scene.resonance, &scene.plant, &arguments.known).map_err(Failure::run)?;
-    let explanation = if found.is_rejected() || !found.left_out.is_empty() {
-        let bar = ProgressBar::new(Effect::ALL.len() as u64);
-        let explanation = explain(&points, scene.resonance, &scene.plant, &arguments.known, |done| {
-            bar.set_position(done as u64)
-        });
-        bar.finish_and_clear();
-        Some(explanation.map_err(Failure::run)?)
-    } else {
-        None
-    };
-    let mut plant = found.plant(&scene.plant);
-    if let Some(best) = explanation.as_ref().and_then(Explanation::explains) {
-        (found, plant) = (best.fit.clone(), best.plant(&scene.plant));
-    }
-    let report = found.report(&scene.plant);
-    let verdict = explanation.as_ref().map(Explanation::verdict);
+    let bar = ProgressBar::new(Effect::ALL.len() as u64);
+    let progress = |done: usize| bar.set_position(done as u64);
+    let found = find(&points, scene.resonance, &scene.plant, &arguments.known, progress);
+    bar.finish_and_clear();
+    let Found { fit, plant, verdict } = found.map_err(Failure::run)?;
+    let report = fit.report(&scene.plant);
     let printed = Output {
         report: &report,
         verdict: verdict.clone(),
@@ -147,7 +136,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         let verdict = verdict
             .as_ref()
             .map_or_else(String::new, |verdict| format!("{verdict}\n"));
-        parts + &summary(&report, &found, points.len(), skipped) + &verdict
+        parts + &summary(&report, &fit, points.len(), skipped) + &verdict
     })?;
     if let Some(path) = &arguments.out {
         let plant = plant_section(&report, &plant, verdict.as_deref());
@@ -164,7 +153,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     Err(Failure::run(format!(
         "the model does not describe the points: chi-square is {:.0} for {} degrees of freedom. Uncertainties that are too small, points of \
          several branches, or several effects at a time may be the reason",
-        found.chi_square, found.degrees
+        fit.chi_square, fit.degrees
     )))
 }
 

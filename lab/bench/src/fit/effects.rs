@@ -13,10 +13,10 @@ use lovines::cavity::GRAVITY;
 use lovines::{Cavity, Restitution};
 use vines_model::Definition;
 use vines_model::numerics::{Estimate, mean};
-use vines_model::orbit::{PlantMotion, resonant_motion};
+use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
 
 use super::{
-    Curve, Fit, FitError, Known, MeasuredPoint, Problem, Quantity, Shift, UNKNOWNS, Unknowns, checked, unknowns,
+    Curve, Fit, FitError, Known, MeasuredPoint, Problem, Quantity, Shift, UNKNOWNS, Unknowns, checked, fit, unknowns,
 };
 use crate::scene::Parameters;
 
@@ -47,7 +47,7 @@ pub struct Candidate {
 }
 
 /// Rounds in which the shifts are computed again.
-const ROUNDS: usize = 20;
+const ROUNDS: usize = 12;
 /// What a further step would take from chi-square, at which the minimum counts as found.
 const FOUND: f64 = 0.02;
 /// Smallest share of a step.
@@ -204,6 +204,41 @@ impl Candidate {
     }
 }
 
+/// The rig that fits some points.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// The fit: of the ideal cavity, or with the effect that explains why the points contradict it.
+    pub fit: Fit,
+    /// Its plant.
+    pub plant: Parameters,
+    /// What the effects say, if the ideal cavity does not describe all points.
+    pub verdict: Option<String>,
+}
+
+/// [`fit()`], and where the ideal cavity does not describe all points, the effect that does. `progress` is told the number of effects tried.
+///
+/// # Errors
+/// As [`fit()`].
+pub fn find(
+    points: &[MeasuredPoint],
+    definition: Definition,
+    expected: &Parameters,
+    known: &[Known],
+    progress: impl FnMut(usize),
+) -> Result<Found, FitError> {
+    let ideal = fit(points, definition, expected, known)?;
+    let plant = ideal.plant(expected);
+    if !ideal.is_rejected() && ideal.left_out.is_empty() {
+        return Ok(Found { fit: ideal, plant, verdict: None });
+    }
+    let explanation = explain(points, definition, expected, known, progress)?;
+    let verdict = Some(explanation.verdict());
+    Ok(match explanation.explains() {
+        Some(best) => Found { fit: best.fit.clone(), plant: best.plant(expected), verdict },
+        None => Found { fit: ideal, plant, verdict },
+    })
+}
+
 /// Fits the ideal cavity to all points, and, if they contradict it, each effect alone. `progress` is told the number of candidates done.
 ///
 /// # Errors
@@ -229,24 +264,31 @@ pub fn explain(
 }
 
 impl Problem<'_> {
-    /// The better one of the fits with an effect from the fit without and from the rig that was expected; `None` if the plant has no such motions.
+    /// The best one of the fits with an effect from several starts, up to the first that describes the points; `None` if the plant has no such
+    /// motions.
     fn with_effect(&self, effect: Effect, ideal: &Fit, expected: &Parameters) -> Option<Candidate> {
-        let from_ideal = self.with_effect_from(effect, ideal.x, ideal);
-        if from_ideal.as_ref().is_some_and(|one| !one.fit.is_rejected()) {
-            return from_ideal;
+        let mut best: Option<Candidate> = None;
+        for (x, strength) in [(ideal.x, 1.0), (unknowns(expected), 1.0), (ideal.x, 4.0)] {
+            if strength > 1.0 && !effect.adds_a_parameter() {
+                continue;
+            }
+            let found = self.with_effect_from(effect, x, strength * TYPICAL, ideal);
+            let both = best.into_iter().chain(found);
+            best = both.min_by(|one, other| one.criterion().total_cmp(&other.criterion()));
+            if best.as_ref().is_some_and(|one| !one.fit.is_rejected()) {
+                break;
+            }
         }
-        let from_expected = self.with_effect_from(effect, unknowns(expected), ideal);
-        let both = from_ideal.into_iter().chain(from_expected);
-        both.min_by(|one, other| one.criterion().total_cmp(&other.criterion()))
+        best
     }
 
     /// The fit with an effect, from the unknowns `x`: Gauss and Newton's method with the plant's motions, in steps that reduce chi-square.
-    fn with_effect_from(&self, effect: Effect, mut x: Unknowns, ideal: &Fit) -> Option<Candidate> {
+    fn with_effect_from(&self, effect: Effect, mut x: Unknowns, strength: f64, ideal: &Fit) -> Option<Candidate> {
         let [b, omega0] = [Quantity::B.of(&x), x[0].exp()];
         // The particle turns from -B to B: its speed relative to the wall before the impact is 2 B (1 + epsilon)/(1 + r).
         let particle = mean(ideal.speeds.iter().copied());
         let speed = 2.0 * particle * (1.0 + x[4].exp()) / (1.0 + x[2]) * b * omega0;
-        let typical = TYPICAL * b * omega0 * omega0 / GRAVITY;
+        let typical = strength * b * omega0 * omega0 / GRAVITY;
         let (typical, free) = match effect {
             Effect::Friction => (typical, true),
             Effect::Tilt => (4.0 * typical * typical, true),
@@ -260,7 +302,12 @@ impl Problem<'_> {
             let Curve { response, omega, drive } = self.curve(x, particle)?;
             let cavity = effect.cavity(x[6], x[2], speed);
             let rig = Parameters { cavity, ..plant(x) };
-            let motion = resonant_motion(&rig, self.definition, response, motions[n].as_ref()).ok()?;
+            let conditions = [DriveCondition::PhaseResonance, DriveCondition::Response(response)];
+            let motion = match &motions[n] {
+                Some(near) => periodic_motion(&rig, self.definition, near, conditions),
+                None => resonant_motion(&rig, self.definition, response, None),
+            };
+            let motion = motion.ok()?;
             let shift = [motion.omega / omega - 1.0, motion.amplitude / drive - 1.0];
             motions[n] = Some(motion);
             Some(shift)

@@ -651,7 +651,9 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
     let damping = linear.damping_rate;
     let taken = |one: &Harmonic| -one.rate - damping * one.amplitude;
     let at_first = fits.first().map_or(0.0, |(_, one)| taken(one));
-    let synchronous: Vec<_> = fits.iter().take_while(|(_, one)| taken(one) > 0.5 * at_first).collect();
+    // Without impacts nothing is taken but by an error of the damping.
+    let has_impacts = |one: &Harmonic| taken(one) > 0.5 * f64::max(at_first, damping * one.amplitude);
+    let synchronous: Vec<_> = fits.iter().take_while(|(_, one)| has_impacts(one)).collect();
     let count = synchronous.len() as f64;
     let half = 0.5 * WINDOW * TAU / linear.omega0;
     synchronous
