@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use vines_model::numerics::{Estimate, mean_square};
 use vines_testbench::backbone::track;
 use vines_testbench::experiment::{Plan, run};
-use vines_testbench::fit::{Effect, Fit, Known, MeasuredPoint, Quantity, Recording, at, explain, fit};
+use vines_testbench::fit::{Effect, Fit, Known, MeasuredPoint, Quantity, Recording, at, explain, fit, parts};
 use vines_testbench::rig::{BuiltIn, Chain, SensorsOnly, Simulated};
 use vines_testbench::scene::{Parameters, Scene};
 
@@ -309,28 +309,6 @@ fn recorded((rig, noise, scales): &Case, snr: &str) -> Result<(Vec<MeasuredPoint
     };
     // The client knows the linear response from its scene only.
     scene.measured = None;
-    let parts = recording.parts(&scene)?;
-    if std::env::var("VERBOSE").is_ok() {
-        let residuals = at(
-            &parts.iter().filter_map(|part| part.point).collect::<Vec<_>>(),
-            scene.resonance,
-            &truth,
-            &[],
-        )
-        .map(|one| one.residuals)
-        .unwrap_or_default();
-        let mut residuals = residuals.iter();
-        for part in &parts {
-            let point = part.point.map(|one| (one.response.value, one.omega, one.drive));
-            println!(
-                "{:.1?} {:?} {} {:.6?} {:.1?}",
-                part.seconds.map(|t| t / TAU),
-                part.kind,
-                part.regime,
-                point,
-                point.and_then(|_| residuals.next())
-            );
-        }
-    }
+    let parts = parts(&[recording], &scene, &[])?.concat();
     Ok((parts.into_iter().filter_map(|part| part.point).collect(), scene))
 }

@@ -192,40 +192,45 @@ const SEARCHED: usize = 8192;
 const APART: f64 = 0.01;
 /// Relative change of the amplitude within a window from which on it is a sweep.
 const SWEPT: f64 = 0.01;
+/// Relative standard uncertainty of the damping that a scene states: three of them are 30 %.
+const DAMPING: f64 = 0.1;
 /// Periods by which the impacts follow a change of the amplitude late.
 const LAG: f64 = 1.6;
 
-/// The parts of each recording. The natural frequency and the damping are those of `scene` first, and then those that fit the points.
+/// The parts of each recording. The natural frequency and the damping are those of `scene` first, and then those that fit the points, if these
+/// determine them better.
 ///
 /// # Errors
 /// As [`Recording::parts`].
 pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result<Vec<Vec<Part>>, RecordingError> {
-    let all = |scene: &Scene| {
+    let all = |linear: LinearResponse| {
+        let scene = Scene { measured: Some(linear), ..scene.clone() };
         recordings
             .iter()
-            .map(|one| one.parts(scene))
+            .map(|one| one.parts(&scene))
             .collect::<Result<Vec<_>, _>>()
     };
-    let first = all(scene)?;
+    let stated = scene.linear();
+    let uncertainty = DAMPING * stated.damping_rate;
+    let first = all(LinearResponse { uncertainty, ..stated })?;
     let points: Vec<MeasuredPoint> = first.iter().flatten().filter_map(|part| part.point).collect();
-    let Some(fit) = fit(&points, scene.resonance, &scene.plant, known)
-        .ok()
-        .filter(|fit| !fit.is_rejected())
-    else {
+    let Ok(fit) = fit(&points, scene.resonance, &scene.plant, known) else {
         return Ok(first);
     };
     let plant = fit.plant(&scene.plant);
-    let [omega0, damping] = [plant.natural_frequency(), 0.5 * plant.damping / plant.primary_mass];
-    let uncertainty =
+    let omega0 = plant.natural_frequency();
+    let [u_f0, u_zeta] =
         [Quantity::F0, Quantity::Zeta].map(|one| fit.estimate(one).map_or(f64::NAN, |one| one.uncertainty));
-    let measured = LinearResponse {
+    let fitted = LinearResponse {
         omega0,
-        damping_rate: damping,
-        uncertainty: (TAU * uncertainty[0]).max(omega0 * uncertainty[1]),
+        damping_rate: 0.5 * plant.damping / plant.primary_mass,
+        uncertainty: (TAU * u_f0).max(omega0 * u_zeta),
         gain: Complex64::new(0.0, -0.5 * omega0),
     };
-    let scene = Scene { measured: Some(measured), ..scene.clone() };
-    all(&scene).or(Ok(first))
+    if fit.is_rejected() || fitted.uncertainty.is_nan() || fitted.uncertainty > uncertainty {
+        return Ok(first);
+    }
+    all(fitted).or(Ok(first))
 }
 
 impl Recording {
