@@ -360,7 +360,13 @@ impl Recording {
             let length = rest.iter().enumerate().take_while(belongs).count();
             let taken = rest.iter().take(length.max(1)).map(|one| one.samples).sum::<usize>();
             if length >= LEAST {
-                windows.push(Window { cycles: begin..begin + length, samples: from..from + taken });
+                // The impacts follow a move late.
+                let late = if length >= 3 * LEAST { LEAST } else { 0 };
+                let left = rest.iter().take(late).map(|one| one.samples).sum::<usize>();
+                windows.push(Window {
+                    cycles: begin + late..begin + length,
+                    samples: from + left..from + taken,
+                });
             }
             (begin, from) = (begin + length.max(1), from + taken);
         }
