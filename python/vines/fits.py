@@ -153,8 +153,7 @@ def fit_recordings(
     Raises
     ------
     ValueError
-        A recording without a stretch near phase resonance, a channel that is clipped, swapped or interrupted, or too few
-        points.
+        A recording without a stretch near phase resonance, a channel that is clipped or swapped, or too few points.
     """
     every = [recordings] if isinstance(recordings, Recording) else list(recordings)
     given = [(one.origin, list(one.channels), one.sample_time, one.response, one.drive) for one in every]

@@ -73,17 +73,16 @@ def read_recording(
     file = Path(path)
     read = _READERS.get(file.suffix.lower())
     if read is None:
-        raise ValueError(f"{file}: the format {file.suffix or 'without extension'} is unknown; {', '.join(_READERS)} are")
+        raise ValueError(
+            f"{file}: the format {file.suffix or 'without extension'} is unknown; {', '.join(_READERS)} are"
+        )
     channels, increment = read(file)
     names, values = [], []
     for text, option in ((response, "response"), (drive, "drive")):
         name, factor = _parsed(text)
         names.append(name)
         values.append(factor * _channel(file, channels, name, option))
-    if rate is not None:
-        step = 1.0 / rate
-    else:
-        step = _step(file, channels, time, increment.get(names[0]))
+    step = 1.0 / rate if rate is not None else _step(file, channels, time, increment.get(names[0]))
     return Recording(str(file), (names[0], names[1]), step, *values)
 
 
@@ -98,7 +97,9 @@ def _parsed(text: str) -> tuple[str, float]:
     except ValueError:
         factor = 0.0
     if factor == 0.0 or not np.isfinite(factor):
-        raise ValueError(f"{text}: the unit {unit} is unknown; m, mm and um are known, or metres per unit, as in {name}:0.5")
+        raise ValueError(
+            f"{text}: the unit {unit} is unknown; m, mm and um are known, or metres per unit, as in {name}:0.5"
+        )
     return name, factor
 
 
@@ -110,7 +111,9 @@ def _channel(file: Path, channels: Mapping[str, Any], name: str, option: str) ->
     except (TypeError, ValueError):
         raise ValueError(f"{file}, channel {name}: its values are not real numbers; name another channel") from None
     if values.size != max(values.shape, default=0):
-        raise ValueError(f"{file}, channel {name} has the shape {values.shape}: a channel is one row or column of numbers")
+        raise ValueError(
+            f"{file}, channel {name} has the shape {values.shape}: a channel is one row or column of numbers"
+        )
     return np.ascontiguousarray(values.ravel())
 
 
@@ -120,7 +123,9 @@ def _step(file: Path, channels: Mapping[str, Any], time: str | None, increment: 
     if name is None:
         if time is None and increment:
             return increment
-        raise ValueError(f"{file} has no channel {' or '.join(names)} with the time in seconds; give rate= (samples a second)")
+        raise ValueError(
+            f"{file} has no channel {' or '.join(names)} with the time in seconds; give rate= (samples a second)"
+        )
     times = _channel(file, channels, name, "time")
     if times.size < 2:
         raise ValueError(f"{file}, channel {name} has {times.size} values: a recording has more")
@@ -130,8 +135,8 @@ def _step(file: Path, channels: Mapping[str, Any], time: str | None, increment: 
     if uneven.size:
         n = int(uneven[0])
         raise ValueError(
-            f"{file}, channel {name}: the time goes from {times[n]:g} s to {times[n + 1]:g} s, where a step is {step:.6g} s: the "
-            "recording is interrupted there; fit the parts as files of their own"
+            f"{file}, channel {name}: the time goes from {times[n]:g} s to {times[n + 1]:g} s, where a step is {step:.6g} s: "
+            "the recording is interrupted there; fit the parts as files of their own"
         )
     return step
 
