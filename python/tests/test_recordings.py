@@ -4,10 +4,10 @@ import subprocess
 import sys
 
 import h5py
-import numpy as np
 import nptdms
-import pyuff
+import numpy as np
 import pytest
+import pyuff
 import scipy.io
 
 import vines

@@ -135,7 +135,7 @@ def _step(file: Path, channels: Mapping[str, Any], time: str | None, increment: 
     if uneven.size:
         n = int(uneven[0])
         raise ValueError(
-            f"{file}, channel {name}: the time goes from {times[n]:g} s to {times[n + 1]:g} s, where a step is {step:.6g} s: "
+            f"{file}, channel {name}: the time goes from {times[n]:g} s to {times[n + 1]:g} s, a step is {step:.6g} s: "
             "the recording is interrupted there; fit the parts as files of their own"
         )
     return step
