@@ -271,8 +271,10 @@ pub fn track_into(
     progress: impl FnMut(usize, usize),
 ) -> Result<Tracked, ExperimentError> {
     experiment::holds_a_phase(scene)?;
+    let limit = (scene.lock_periods() * scene.controller.samples_per_period) as usize;
+    let mut quiet = |_, _| {};
     let mut tracker = Tracker {
-        run: experiment::ControlLoop::new(rig, controller, scene, samples),
+        run: experiment::ControlLoop::new(rig, controller, scene, samples, limit, &mut quiet),
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
@@ -296,13 +298,8 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     /// One period of the drive.
     fn cycle(&mut self) -> Result<Cycle, ExperimentError> {
         loop {
-            let begin = self.run.samples.len();
-            let first = self.run.periods;
-            while self.run.periods < first.floor() + 1.0 {
-                self.run.sample(self.stage)?;
-            }
-            let samples = &self.run.samples[begin..];
-            if let Some(cycle) = Cycle::of(samples, self.run.sample_time, first * TAU, self.target) {
+            let period = self.run.period(self.stage)?;
+            if let Some(cycle) = self.run.cycle(period, self.target) {
                 return Ok(cycle);
             }
         }
@@ -310,9 +307,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
 
     /// Goes to a symmetric motion with impacts, if there is one.
     fn approach(&mut self) -> Result<(), ExperimentError> {
-        let scene = self.scene;
-        let limit = (scene.lock_periods() * scene.controller.samples_per_period) as usize;
-        Search::new(&mut self.run, scene, limit, &mut |_| {}).impacts()?;
+        Search::new(&mut self.run, self.scene).impacts()?;
         let cycle = self.cycle()?;
         self.closed = [cycle.amplitude(), cycle.base.norm(), cycle.omega];
         Ok(())

@@ -19,7 +19,7 @@ use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, noise};
 
 use super::{ControlLoop, ExperimentError, Sample, Stage};
 use crate::identification::{ASYMMETRIC, Balance, Cycle, Slopes, without_tones};
-use crate::rig::{Command, Controller, ControllerError, LoopState, Move, Rig};
+use crate::rig::{Controller, ControllerError, LoopState, Move, Rig};
 use crate::scene::{LinearResponse, Scene};
 
 /// Phase error, rad, below which the control of the response begins: the drive then does 94 % of its largest work. Periods for which.
@@ -75,9 +75,6 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     bench: &'b mut ControlLoop<'a, R, C>,
     scene: &'b Scene,
     linear: LinearResponse,
-    /// Time limit, samples.
-    limit: usize,
-    progress: &'b mut dyn FnMut(usize),
     /// Half-width of the cavity, and requested drive, m.
     b: f64,
     requested: f64,
@@ -87,32 +84,23 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     period: f64,
     /// Setpoint of the response, m.
     setpoint: f64,
-    last: Command,
     /// The symmetric motions of the smallest and the largest holding drive: response and drive, m.
     extremes: Option<[[f64; 2]; 2]>,
 }
 
 impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
-    /// The search on a bench, for at most `limit` samples; `progress` receives their number.
-    pub fn new(
-        bench: &'b mut ControlLoop<'a, R, C>,
-        scene: &'b Scene,
-        limit: usize,
-        progress: &'b mut dyn FnMut(usize),
-    ) -> Self {
+    /// The search on a bench.
+    pub fn new(bench: &'b mut ControlLoop<'a, R, C>, scene: &'b Scene) -> Self {
         let d = scene.dimensionless();
         Self {
             bench,
             scene,
             linear: scene.linear(),
-            limit,
-            progress,
             b: d.b,
             requested: scene.amplitude,
             target: scene.controller.phase_target_radians(),
             period: d.natural_period(),
             setpoint: 0.0,
-            last: Command::default(),
             extremes: None,
         }
     }
@@ -145,12 +133,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     fn begin(&mut self) -> Result<Leg, ExperimentError> {
         let mut near = 0;
         while near < NEAR_FOR {
-            let period = self.one_period()?;
-            let closed = self
-                .last
-                .state
-                .is_none_or(|state| matches!(state, LoopState::Acquiring | LoopState::Locked));
-            let is_near = period.is_some_and(|one| {
+            let period = self.bench.period(Stage::Locking)?;
+            let state = self.bench.last.state;
+            let closed = state.is_none_or(|state| matches!(state, LoopState::Acquiring | LoopState::Locked));
+            let is_near = self.bench.cycle(period, self.target).is_some_and(|one| {
                 self.setpoint = one.amplitude();
                 one.phase_error.abs() < NEAR
             });
@@ -254,7 +240,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             let before = leg.asymmetry;
             *leg = self.measure(LEG)?;
             grown = if leg.asymmetry > before { grown + 1 } else { 0 };
-            if self.last.settled && grown < GROWN {
+            if self.bench.last.settled && grown < GROWN {
                 return Ok(true);
             }
             // Noise may hide an asymmetry, but not where the motion goes.
@@ -304,9 +290,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Measures over so many periods, or until the lock has settled.
     fn measure(&mut self, periods: usize) -> Result<Leg, ExperimentError> {
         let mut begins = Vec::new();
-        while begins.len() < periods.max(Balance::FEWEST) && !(self.last.settled && begins.len() >= Balance::FEWEST) {
-            begins.push((self.bench.samples.len(), self.bench.periods));
-            self.one_period()?;
+        while begins.len() < periods.max(Balance::FEWEST)
+            && !(self.bench.last.settled && begins.len() >= Balance::FEWEST)
+        {
+            begins.push(self.bench.period(Stage::Locking)?);
         }
         // Two periods tell the harmonics from a drift of the fundamental.
         let from = (begins[0].0 + begins[0].0).saturating_sub(begins[1].0);
@@ -358,21 +345,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             symmetric,
             asymmetry: ((even - doubtful).max(0.0) / odd.max(doubtful)).sqrt(),
         })
-    }
-
-    /// One period of the drive; `None` without a motion.
-    fn one_period(&mut self) -> Result<Option<Cycle>, ExperimentError> {
-        let begin = self.bench.samples.len();
-        let first = self.bench.periods;
-        while self.bench.periods < first.floor() + 1.0 {
-            self.last = self.bench.sample(Stage::Locking)?;
-            (self.progress)(self.bench.taken);
-            if self.bench.taken >= self.limit {
-                return Err(self.bench.no_lock(&self.last));
-            }
-        }
-        let samples = &self.bench.samples[begin..];
-        Ok(Cycle::of(samples, self.bench.sample_time, first * TAU, self.target))
     }
 
     /// Why the requested drive was not reached.
