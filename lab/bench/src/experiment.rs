@@ -36,7 +36,7 @@ impl<'a> Plan<'a> {
     /// The plan of a scene.
     pub fn of(scene: &'a Scene) -> Self {
         let sample_time = scene.sample_time();
-        let period = scene.dimensionless().natural_period();
+        let period = TAU / scene.linear().omega0;
         let samples = |periods: f64| (periods * period / sample_time).round() as usize;
         Self {
             scene,
@@ -222,6 +222,11 @@ pub(crate) fn holds_a_phase(scene: &Scene) -> Result<(), ExperimentError> {
 }
 
 // Rig and controller, sample by sample. Whatever fails, the rig is left with a drive of zero as far as it still takes one.
+
+/// Periods within which the loops, whose slowest time constant is five periods, and the particle follow a change of their setpoint.
+pub(crate) const FOLLOWED: usize = 8;
+/// Observations in succession that are not taken for chance: periods, or legs of the search.
+pub(crate) const CONFIRMED: u32 = 3;
 
 /// Rig and controller, and the samples so far.
 pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
