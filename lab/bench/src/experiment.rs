@@ -505,7 +505,8 @@ mod tests {
 
     #[test]
     fn a_fault_is_stated_with_the_readings_and_the_limit_of_the_scene() {
-        let cases: [(&str, Fault, fn(usize) -> (f64, Option<f64>), &str); 7] = [
+        type Reading = fn(usize) -> (f64, Option<f64>);
+        let cases: [(&str, Fault, Reading, &str); 7] = [
             // The largest reading of the last period, also if the controller switched the drive off a few samples later.
             (
                 "controller.C_max=0.3",
