@@ -11,6 +11,7 @@ from references import trajectory
 
 STATES = ("q1", "der(q1)", "q2", "der(q2)")
 OUTPUTS = (*STATES, "v", "w", "base", "impacts", "contact", "dissipated")
+LOSSES = ("sticks", "stuck_time", "friction_loss")
 
 
 def lock() -> tuple[dict[str, float], float]:
@@ -29,6 +30,20 @@ def chatter() -> tuple[dict[str, float], float]:
     return rig | start | {"omega": float(scene["Om"]), "E": epsilon * excitation}, stop
 
 
+def rough() -> tuple[dict[str, float], float]:
+    """Friction, tilt, unequal gaps and a restitution that depends on speed, wall and chance; the particle also sticks."""
+    cavity = {"b_plus": 1.1, "b_minus": 0.9, "theta": 2e-4, "mu_k": 2e-4, "mu_s": 3e-4, "r_scatter": 0.05, "seed": 7}
+    laws = {"r_law": 1, "r_plus": 0.4, "r_minus": 0.3, "r_min": 0.1}
+    start, stop = lock()
+    return start | cavity | laws, stop
+
+
+def sliding() -> tuple[dict[str, float], float]:
+    """Stick and slip under strong friction, without impacts."""
+    start = Scene().plant() | {"der(q2)": 0.0, "E": 0.3, "omega": 1.0, "theta": 0.01, "mu_k": 0.04, "mu_s": 0.06}
+    return start | {"q1": 0.0, "q2": 0.0}, 10 * PERIOD
+
+
 def exchanged(fmus, start, stop, samples, tolerance):
     return simulate_fmu(
         str(fmus["LoViNes"].path),
@@ -38,22 +53,23 @@ def exchanged(fmus, start, stop, samples, tolerance):
         output_interval=stop / samples,
         relative_tolerance=tolerance,
         start_values=start,
-        output=OUTPUTS,
+        output=[*OUTPUTS, *LOSSES],
         record_events=False,
     )
 
 
 def stepped(instance, start, times):
+    names = (*OUTPUTS, *LOSSES)
     plant = instance("LoViNes").start(start)
     rows = []
     for time in times:
         if time > plant.time:
             plant.step(time - plant.time)
-        rows.append(tuple(plant.get(name) for name in OUTPUTS))
-    return np.array(rows, dtype=[(name, float) for name in OUTPUTS])
+        rows.append(tuple(plant.get(name) for name in names))
+    return np.array(rows, dtype=[(name, float) for name in names])
 
 
-@pytest.mark.parametrize("scene", [lock, chatter], ids=lambda scene: scene.__name__)
+@pytest.mark.parametrize("scene", [lock, chatter, rough, sliding], ids=lambda scene: scene.__name__)
 def test_both_interfaces_agree_to_the_tolerance_of_the_integrator(fmus, instance, figure, scene):
     start, stop = scene()
     errors = []
@@ -71,9 +87,9 @@ def test_both_interfaces_agree_to_the_tolerance_of_the_integrator(fmus, instance
         abs(exchange["dissipated"][-1] / steps["dissipated"][-1] - 1),
         below=1e-6,
     )
-    if scene is lock:
-        assert exchange["impacts"][-1] == steps["impacts"][-1]
-    else:
+    for name in LOSSES[1:]:
+        figure(f"{name} at the end, {scene.__name__}", abs(exchange[name][-1] - steps[name][-1]), below=1e-6)
+    if scene is chatter:
         assert set(exchange["contact"]) <= {-1, 0, 1}
         assert np.any(exchange["contact"] != 0)
         figure(
@@ -81,6 +97,11 @@ def test_both_interfaces_agree_to_the_tolerance_of_the_integrator(fmus, instance
             (exchange["contact"] == steps["contact"]).mean(),
             between=(0.99, 1),
         )
+    else:
+        assert exchange["impacts"][-1] == steps["impacts"][-1]
+        assert exchange["sticks"][-1] == steps["sticks"][-1]
+        assert (steps["friction_loss"][-1] > 0) == (scene is not lock)
+        assert (steps["sticks"][-1] > 10) == (scene is sliding)
 
 
 # Hard impacts from five half-widths away; and low hops on a wall that presses, which end in contact at any r.
