@@ -31,7 +31,7 @@ def chatter() -> tuple[dict[str, float], float]:
 
 
 def rough() -> tuple[dict[str, float], float]:
-    """Friction, tilt, unequal gaps and a restitution that depends on speed, wall and chance; the particle also sticks."""
+    """Friction, tilt, unequal gaps and a restitution that depends on speed, wall and chance."""
     cavity = {"b_plus": 1.1, "b_minus": 0.9, "theta": 2e-4, "mu_k": 2e-4, "mu_s": 3e-4, "r_scatter": 0.05, "seed": 7}
     laws = {"r_law": 1, "r_plus": 0.4, "r_minus": 0.3, "r_min": 0.1}
     start, stop = lock()
@@ -39,9 +39,10 @@ def rough() -> tuple[dict[str, float], float]:
 
 
 def sliding() -> tuple[dict[str, float], float]:
-    """Stick and slip under strong friction, without impacts."""
-    start = Scene().plant() | {"der(q2)": 0.0, "E": 0.3, "omega": 1.0, "theta": 0.01, "mu_k": 0.04, "mu_s": 0.06}
-    return start | {"q1": 0.0, "q2": 0.0}, 10 * PERIOD
+    """Stick and slip without impacts."""
+    cavity = {"theta": 1e-3, "mu_k": 0.01, "mu_s": 0.012}
+    start = {"c": 0.1, "q1": 0.0, "q2": 0.0, "der(q2)": 0.0, "E": 0.3, "omega": 0.5}
+    return Scene().plant() | cavity | start, 10 * PERIOD
 
 
 def exchanged(fmus, start, stop, samples, tolerance):
@@ -76,19 +77,16 @@ def test_both_interfaces_agree_to_the_tolerance_of_the_integrator(fmus, instance
     for tolerance, limit in ((1e-5, 2e-2), (1e-7, 3e-4), (1e-9, 1e-5), (1e-11, 2e-7)):
         exchange = exchanged(fmus, start, stop, 500, tolerance)
         steps = stepped(instance, start, exchange["time"])
-        assert steps["impacts"][-1] > 10
+        assert (steps["impacts"][-1] > 10) != (scene is sliding)
         # Beside an impact a velocity of one run is from before it and of the other from after: displacements tell.
         errors.append(max(np.abs(exchange[name] - steps[name]).max() for name in ("q1", "q2", "v", "w", "base")))
         what = f"model exchange by CVode at tolerance {tolerance:g} against steps, {scene.__name__}: displacements"
         figure(what, errors[-1], below=limit)
     assert errors == sorted(errors, reverse=True)
-    figure(
-        f"dissipated energy at the end, {scene.__name__}",
-        abs(exchange["dissipated"][-1] / steps["dissipated"][-1] - 1),
-        below=1e-6,
-    )
-    for name in LOSSES[1:]:
-        figure(f"{name} at the end, {scene.__name__}", abs(exchange[name][-1] - steps[name][-1]), below=1e-6)
+    for name in ("dissipated", "friction_loss", "stuck_time"):
+        end = steps[name][-1]
+        error = abs(exchange[name][-1] - end)
+        figure(f"{name} at the end, {scene.__name__}", error / end if end > 0 else error, below=1e-6)
     if scene is chatter:
         assert set(exchange["contact"]) <= {-1, 0, 1}
         assert np.any(exchange["contact"] != 0)
@@ -101,7 +99,7 @@ def test_both_interfaces_agree_to_the_tolerance_of_the_integrator(fmus, instance
         assert exchange["impacts"][-1] == steps["impacts"][-1]
         assert exchange["sticks"][-1] == steps["sticks"][-1]
         assert (steps["friction_loss"][-1] > 0) == (scene is not lock)
-        assert (steps["sticks"][-1] > 10) == (scene is sliding)
+        assert (steps["sticks"][-1] > 5) == (scene is sliding)
 
 
 # Hard impacts from five half-widths away; and low hops on a wall that presses, which end in contact at any r.

@@ -339,8 +339,7 @@ impl Hybrid {
                 rest = Rest { hop: 0.5 * speed * speed / up, energy };
             }
             let error = 0.5 * DEPTH * fast * fast / b;
-            unresolved && up > 0.0
-                || rebound.rests(&law, &self.forces, (wall, speed), (free, error), &resolution)
+            unresolved && up > 0.0 || rebound.rests(&law, &self.forces, (wall, speed), (free, error), &resolution)
         });
         self.totals.add(&touch, self.time);
         if touch.impact.is_some() || touch.stuck {

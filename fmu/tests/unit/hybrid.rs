@@ -260,9 +260,8 @@ fn compare(name: &str, cavities: fn(&mut Random) -> Cavity) {
             let size = [state.q1, state.dq1, state.dq2, amplitude, 1.0]
                 .into_iter()
                 .fold(0.0f64, |size, x| size.max(x.abs()));
-            let difference = |a: &[f64], b: &[f64]| {
-                (a.iter().zip(b)).fold(0.0f64, |most, (a, b)| most.max((a - b).abs())) / size
-            };
+            let difference =
+                |a: &[f64], b: &[f64]| (a.iter().zip(b)).fold(0.0f64, |most, (a, b)| most.max((a - b).abs())) / size;
             let scale = 1.0 + difference(&changed, &exchanged) / CHANGE;
             let figure = difference(&stepped, &exchanged) / scale;
             assert!(
@@ -274,14 +273,21 @@ fn compare(name: &str, cavities: fn(&mut Random) -> Cavity) {
             let now = *plant.totals();
             let energy = parameters.particle_mass * size;
             // The last hop at a wall, of 1e-10 half-widths, ends on the floor in one and on the wall in the other.
-            let stuck_time = if outcome.stuck + rests == 0 { totals.stuck_time } else { now.stuck_time };
+            let stuck_time = if outcome.stuck + rests == 0 {
+                totals.stuck_time
+            } else {
+                now.stuck_time
+            };
             for (a, b, unit) in [
                 (now.dissipated, totals.dissipated, energy),
                 (now.friction, totals.friction, energy),
                 (now.stuck_time, stuck_time, 1.0),
             ] {
                 let figure = difference(&[a / unit], &[b / unit]) / scale;
-                assert!(figure < 10.0 * allowed, "scene {number}, sample {sample}: {figure:e} {now:?} {totals:?}");
+                assert!(
+                    figure < 10.0 * allowed,
+                    "scene {number}, sample {sample}: {figure:e} {now:?} {totals:?}"
+                );
             }
             impacts += now.impacts - before.impacts;
             sticks += now.sticks - before.sticks;
@@ -292,7 +298,10 @@ fn compare(name: &str, cavities: fn(&mut Random) -> Cavity) {
          of them end at rest | {worst:.1e} | {allowed:.1e} |",
         scenes * SAMPLES as u64
     );
-    assert!(held_samples > scenes / 2 && impacts > scenes || scenes < SCENES, "{held_samples} {impacts} {sticks}");
+    assert!(
+        held_samples > scenes / 2 && impacts > scenes || scenes < SCENES,
+        "{held_samples} {impacts} {sticks}"
+    );
     println!("{impacts} impacts, {sticks} sticks");
 }
 
