@@ -65,7 +65,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let loaded = arguments.scene.load()?;
+    let loaded = arguments.scene.load_for("exact orbits are")?;
     let scene = loaded.dimensionless();
     if let Some(sigma) = arguments.sigma {
         return settled(arguments, &scene, sigma, loaded.dimensionless_start());
