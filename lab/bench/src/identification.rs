@@ -12,7 +12,7 @@ use crate::scene::{Dimensionless, Scene};
 
 pub use balance::{Balance, Cycle, Slopes};
 pub use decay::{DecayEnd, DecayPoint, DecayPoints, Harmonic, decay_points, harmonic};
-pub use lock::{Lock, Measured};
+pub use lock::{Friction, Lock, Measured};
 use lock::{measure, on_target, sensors_after_release};
 use response::longer_after;
 pub(crate) use response::{ASYMMETRIC, without_tones};

@@ -216,6 +216,7 @@ pub(crate) fn read_reading(frame: &Frame) -> Reading {
             impact_time,
             impact_velocity,
             particle_velocity,
+            friction: None,
         }),
     }
 }

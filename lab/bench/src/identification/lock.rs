@@ -8,7 +8,7 @@ use vines_model::regime::Regime;
 
 use super::response::{Tone, classify, foreign_tone, regime_by_response};
 use super::{Balance, Cycle, IdentificationError, Slopes};
-use crate::record::Record;
+use crate::record::{Record, Sample};
 use crate::scene::{Dimensionless, LinearResponse, Scene};
 
 /// The locked point as measured over the hold.
@@ -33,9 +33,37 @@ pub struct Lock {
     pub impacts_per_period: f64,
     /// The regime: from the impacts, or from the response alone if the rig does not report them.
     pub regime: Regime,
+    /// What friction did over the hold; absent without friction, or if the rig does not report it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction: Option<Friction>,
     /// A tone in the response that is not part of the motion; not looked for in a simulation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tone: Option<Tone>,
+}
+
+/// What friction in the cavity did over the hold, per period of the motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Friction {
+    /// How often the particle stuck to the floor inside the cavity.
+    pub sticks_per_period: f64,
+    /// How long it stuck there, s.
+    #[serde(rename = "stuck_s_per_period")]
+    pub stuck_time: f64,
+    /// Energy lost to friction, J.
+    #[serde(rename = "friction_J_per_period")]
+    pub loss: f64,
+}
+
+impl Friction {
+    fn of(hold: &[Sample], periods: f64) -> Option<Self> {
+        let totals = |sample: &Sample| sample.ground_truth?.friction;
+        let (first, last) = (totals(hold.first()?)?, totals(hold.last()?)?);
+        Some(Self {
+            sticks_per_period: (last.sticks - first.sticks) as f64 / periods,
+            stuck_time: (last.stuck_time - first.stuck_time) / periods,
+            loss: (last.loss - first.loss) / periods,
+        })
+    }
 }
 
 impl Lock {
@@ -104,6 +132,7 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
         held: record.held,
         impacts_per_period,
         regime,
+        friction: Friction::of(hold, (hold.len() - 1) as f64 * dt * omega.value / TAU),
         tone,
     })
 }

@@ -83,7 +83,7 @@ proptest! {
         let reading = Reading {
             sensors: Sensors { response, reference },
             ground_truth: ground_truth.map(|(impacts, impact_time, impact_velocity, particle_velocity)| GroundTruth {
-                impacts: impacts.into(), impact_time, impact_velocity, particle_velocity,
+                impacts: impacts.into(), impact_time, impact_velocity, particle_velocity, friction: None,
             }),
         };
         let frame = write_reading(Frame::new(Kind::Hello, 1), &reading);
