@@ -169,7 +169,7 @@ impl Endpoint {
                     let rule = "a controller has an address tcp://HOST:PORT";
                     return Err(Failure::input(format!("{address}: {rule}")));
                 };
-                Box::new(NetController::connect(peer, config.sample_time, pace, scope.key())?)
+                Box::new(NetController::connect(peer, config, pace, scope.key())?)
             }
         })
     }
