@@ -1,6 +1,6 @@
 // The WebAssembly module: plant, controller and theory. Its exports are described in live/module/src/exports.rs.
 
-const COLUMNS = ["time", "base", "response", "relative", "phaseError", "omega", "amplitude", "responseAmplitude", "motion", "speed", "decays"];
+export const COLUMNS = ["time", "base", "response", "relative", "phaseError", "omega", "amplitude", "responseAmplitude", "motion", "speed", "decays"];
 // Places of the columns in a row.
 export const ROW = Object.fromEntries(COLUMNS.map((name, i) => [name, i]));
 const STATUS = ["time", "sampleTime", "omega0", "sigma", "C", "B", "phaseError", "G", "locked", "settled", "state", "fault", "impacts", "perPeriod", "dissipated", "tolerance", "unlock"];

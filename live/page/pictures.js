@@ -21,8 +21,13 @@ const colour = (name) => {
 };
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => colours.clear());
 
+const digits = (value, count, unit = "") => (Number.isNaN(value) ? "not measured" : value.toFixed(count) + unit);
+
 // The end of an axis: `least`, or the next of its multiples by 1.25, so that it rarely changes.
 const end = (least, value) => { while (least < value && Number.isFinite(value)) least *= 1.25; return least; };
+
+// The largest of numbers of which some may not be measured (NaN).
+const largest = (values, least) => values.reduce((most, value) => (value > most ? value : most), least);
 
 // Whether a motion has a frequency: with a drive, or along a free decay until synchrony is lost.
 const onBackbone = (one) => one.G > 0 || one.decays;
@@ -63,7 +68,8 @@ export class Pictures {
     const to = (event) => this.rig.dragged(this.drag.part, event.offsetX - this.drag.offset);
     canvas.onpointerdown = (event) => {
       const part = this.rig.under(event);
-      if (!part) return;
+      // An experiment that is only watched has no place to drag to.
+      if (!part || !page.bench.place) return;
       canvas.setPointerCapture(event.pointerId);
       resume = page.playing;
       page.play(false);
@@ -71,7 +77,7 @@ export class Pictures {
       this.drag = { part, offset: event.offsetX - (part === "mass" ? this.rig.centre : this.rig.particle) };
     };
     canvas.onpointermove = (event) => {
-      canvas.style.cursor = this.drag || this.rig.under(event) ? "grab" : "";
+      canvas.style.cursor = page.bench.place && (this.drag || this.rig.under(event)) ? "grab" : "";
       if (this.drag) this.drag.to = Math.max(-this.reach.mass, Math.min(this.reach.mass, to(event)));
     };
     canvas.onpointerup = canvas.onpointercancel = ({ type }) => {
@@ -114,8 +120,8 @@ export class Pictures {
 
   // Points of the last `seconds`, thinned: every sample whose number is a multiple of a power of two.
   #thinned(seconds) {
-    const { rows, samples, step } = this.page;
-    const count = Math.min(rows.length, Math.ceil(seconds / step));
+    const { rows, samples, end } = this.page;
+    const count = rows.length - this.page.rowAt(end - seconds);
     const stride = 2 ** Math.max(0, Math.floor(Math.log2(count / POINTS)));
     const first = samples - count;
     const points = [];
@@ -134,9 +140,9 @@ export class Pictures {
     this.past = this.#thinned(MINUTE);
 
     // The last four periods before the time that is shown.
-    const count = Math.min(index + 1, Math.ceil((8 * Math.PI) / status.omega0 / page.step) + 1);
+    const count = index + 1 - page.rowAt(point.time - (8 * Math.PI) / status.omega0);
     const motion = Array.from({ length: count }, (_, i) => this.#point(page.rows.row(index - count + 1 + i)));
-    this.#rig(point, motion, replay, now);
+    this.#rig(point, motion, replay, status, now);
 
     const { hover } = this;
     const time = hover?.plot.xAt(hover.event);
@@ -145,7 +151,7 @@ export class Pictures {
     this.#motion(motion, status, cursor);
     this.#history(cursor);
     const seen = this.past.filter((one) => one.time <= page.shown + page.step);
-    const top = end(1.05, Math.max(...seen.slice(-POINTS).map((one) => one.C)));
+    const top = end(1.05, largest(seen.slice(-POINTS).map((one) => one.C), 0));
     this.#manifold(top, seen, point, linked);
     const done = page.points.filter((one) => one[0] <= page.shown + page.step);
     this.#backbone(top, seen, point, linked, done);
@@ -154,31 +160,32 @@ export class Pictures {
     this.#numbers(status, point, words, replay, done.length);
   }
 
-  #rig(point, motion, replay, now) {
+  #rig(point, motion, replay, status, now) {
     const { page, drag, reach, units: { b, epsilon } } = this;
     // The primary mass, from v = q1 + epsilon q2 and w = q1 - q2.
-    let look = { q1: (point.v + epsilon * point.w) / (1 + epsilon), base: point.base, wall: 0 };
+    let look = { q1: Number.isNaN(point.w) ? point.v : (point.v + epsilon * point.w) / (1 + epsilon), base: point.base || 0, wall: 0 };
     look.q2 = look.q1 - point.w;
     if (!replay) {
       const plant = page.bench.look(page.shown - (page.samples - 1) * page.step);
-      look = { q1: plant.q1 / b, q2: plant.q2 / b, base: plant.base / (b * epsilon), wall: plant.wall };
-      if (plant.impacts > this.impacts) {
-        this.rig.hit(Math.sign(plant.relative), now);
+      if (plant) look = { q1: plant.q1 / b, q2: plant.q2 / b, base: plant.base / (b * epsilon), wall: plant.wall };
+      const impacts = plant?.impacts ?? status.impacts;
+      if (impacts > this.impacts) {
+        this.rig.hit(Math.sign(look.q1 - look.q2), now);
         page.sound?.(point.B);
       }
-      this.impacts = plant.impacts;
+      this.impacts = impacts;
     }
     if (drag?.to !== undefined) look = drag.part === "mass" ? { ...look, q1: drag.to, q2: drag.to + look.q2 - look.q1 } : { ...look, q2: look.q1 + drag.to };
     // The scale grows at once and shrinks slowly.
-    const largest = (values) => values.reduce((most, value) => Math.max(most, Math.abs(value)), 1);
-    const need = { mass: largest([...motion.map((one) => one.v), look.q1]), base: largest([...motion.map((one) => one.base), look.base]) };
+    const most = (key, present) => largest([...motion.map((one) => Math.abs(one[key])), Math.abs(present)], 1);
+    const need = { mass: most("v", look.q1), base: most("base", look.base) };
     for (const key of ["mass", "base"]) reach[key] = Math.max(need[key], reach[key] + 0.02 * (need[key] - reach[key]));
     this.rig.draw(look, reach, now, this.calm.matches);
   }
 
   #motion(motion, status, cursor) {
     const { page, plots: { scope } } = this;
-    const top = 1.05 * motion.reduce((most, one) => Math.max(most, Math.abs(one.base), Math.abs(one.v), Math.abs(one.w)), 1.1);
+    const top = 1.05 * largest(motion.flatMap((one) => [one.base, one.v, one.w].map(Math.abs)), 1.1);
     const begin = motion[0].time;
     const column = (key) => motion.map((one) => [one.time, one[key]]);
     scope.begin([begin, Math.max(motion.at(-1).time, begin + (2 * Math.PI) / status.omega0)], [-top, top]);
@@ -220,7 +227,7 @@ export class Pictures {
 
   #manifold(top, seen, point, linked) {
     const { page, plots: { manifold } } = this;
-    const right = end(2.2, Math.max(point.B, ...seen.map((one) => one.B)));
+    const right = end(2.2, largest(seen.map((one) => one.B), point.B));
     if (this.manifoldEnd !== right) this.lines.manifold = page.bench.manifold((this.manifoldEnd = right), 240);
     manifold.begin([0, right], [0, top]);
     manifold.curve(this.lines.manifold, "ink", { label: "first-order theory" });
@@ -253,15 +260,15 @@ export class Pictures {
     const entries = [
       ["Time", `${page.shown.toFixed(3)} s, ${periods.toFixed(1)} natural periods`],
       ["Loop", present(state)],
-      ["Regime", present(regime.startsWith("unknown") ? "too few impacts yet" : regime)],
-      ["Detuning σ", point.sigma.toFixed(6)],
-      ["Amplitude C", point.C.toFixed(6)],
-      ["Particle speed B", point.B.toFixed(6)],
-      ["Phase error", `${(Math.round(point.error * 1e4) / 1e4 + 0).toFixed(4)}°`],
+      ["Regime", present(regime.startsWith("unknown") ? "too few impacts yet" : regime || "no impacts are measured")],
+      ["Detuning σ", digits(point.sigma, 6)],
+      ["Amplitude C", digits(point.C, 6)],
+      ["Particle speed B", digits(point.B, 6)],
+      ["Phase error", digits(Math.round(point.error * 1e4) / 1e4 + 0, 4, "°")],
       ["Excitation G", point.G.toFixed(4)],
-      ["Impacts", present(`${status.impacts}, ${status.perPeriod.toFixed(3)} per period`)],
-      ["Dissipated by impacts", present(`${(status.dissipated * 1e3).toPrecision(4)} mJ`)],
     ];
+    if (status.impacts !== undefined) entries.push(["Impacts", present(`${status.impacts}, ${status.perPeriod.toFixed(3)} per period`)]);
+    if (status.dissipated !== undefined) entries.push(["Dissipated by impacts", present(`${(status.dissipated * 1e3).toPrecision(4)} mJ`)]);
     if (page.points.length) entries.push(["Tracked points", tracked < page.points.length ? `${tracked} of ${page.points.length}` : `${tracked}`]);
     const list = $("numbers");
     if (list.childElementCount !== 2 * entries.length) {

@@ -55,13 +55,14 @@ export class Rig {
       }
     }
     c.fillStyle = colour("red");
-    c.beginPath(); c.arc(particle, floor - 0.79 * b, radius, 0, 7); c.fill();
+    const seen = !Number.isNaN(particle);
+    if (seen) { c.beginPath(); c.arc(particle, floor - 0.79 * b, radius, 0, 7); c.fill(); }
     c.fillStyle = colour("faint");
     c.font = "12px system-ui, sans-serif";
     c.textAlign = "left";
     c.fillText("base (not to scale)", 6, floor + 17);
     c.textAlign = "center";
-    c.fillText(look.wall ? "the particle rests on a wall" : "mass with particle", centre, floor + 17);
+    c.fillText(look.wall ? "the particle rests on a wall" : seen ? "mass with particle" : "mass (the particle is not measured)", centre, floor + 17);
     Object.assign(this, { b, rest, centre, particle, outside, top, floor, left: wall - 10, right: centre + outside });
   }
 

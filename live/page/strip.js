@@ -19,6 +19,7 @@ const REMEDIES = {
 // The sentence, and the button that it recommends.
 function advice(page, status, point, regime, replay) {
   if (replay) return ["A replay of the record. Run goes on from here; Now returns to the present.", "now", "Now"];
+  if (status.advice) return [status.advice, "", ""];
   if (page.values.closed && status.fault) return [REMEDIES[status.fault], "restart", "Restart"];
   if (!page.driving) {
     const where = point.decays ? "The drive is off: the motion slides down the backbone." : "The particle no longer meets both walls in turn: the backbone ends, and the mass rings down alone.";
@@ -38,6 +39,7 @@ export class Strip {
   draw(page, status, point, [regime], replay) {
     const closed = page.values.closed !== 0;
     const [text, kind] = replay ? ["REPLAY", "off"]
+      : status.lamp ? status.lamp
       : !closed ? [page.driving ? "OPEN LOOP" : "FREE DECAY", page.driving ? "off" : "decay"]
       : LAMPS[status.state];
     set("lamp", text);
@@ -52,7 +54,7 @@ export class Strip {
     $("act").style.visibility = action ? "" : "hidden";
     page.advised = action;
     // Without a drive there is no phase to speak of.
-    this.#gauge(closed && point.G > 0 ? point.error : undefined, status);
+    this.#gauge(closed && point.G > 0 && !Number.isNaN(point.error) ? point.error : undefined, status);
   }
 
   // The phase error between the limits beyond which the lock is lost; in the green band it counts as locked.

@@ -1,14 +1,12 @@
 //! Plant and controller, coupled sample by sample as `vines identify` couples them.
 
-use std::f64::consts::TAU;
-
 use lovines::{Event, Plant, Wall};
 use phase_lock::{Input, Move, Output, PhaseLock, State};
-use vines_model::regime::Impact;
+use vines_model::regime::{Impact, Regime};
+use vines_testbench::live::{Decay, LastImpacts};
 use vines_testbench::rig::{Command, Drive};
 use vines_testbench::scene::Scene;
 
-use crate::decay::Decay;
 use crate::message::Message;
 use crate::rig::NoisyRig;
 use crate::settings::{COUNT, Settings, changed, default_scene, index, settings_of};
@@ -39,9 +37,6 @@ pub struct Row {
     pub decays: bool,
 }
 
-/// Impacts that are kept to determine the regime from.
-const KEPT: usize = 40;
-
 /// The bench: rig, controller and clock.
 pub struct Bench {
     /// The scene, with the settings applied.
@@ -60,8 +55,8 @@ pub struct Bench {
     pub output: Output,
     /// Frequency (rad/s) and amplitude (m) of the motion at the last sample, as in [`Row`].
     pub motion: (f64, f64),
-    /// The last impacts; times are phases of the drive, rad.
-    pub impacts: Vec<Impact>,
+    /// The last impacts.
+    pub impacts: LastImpacts,
     /// Phase of the drive since the start, rad.
     pub phase: f64,
     /// The tracking of the backbone, while it runs, and the points of one that was ended.
@@ -89,7 +84,7 @@ impl Bench {
             active: true,
             output: lock.idle(),
             motion: (0.0, 0.0),
-            impacts: Vec::new(),
+            impacts: LastImpacts::default(),
             phase: 0.0,
             tracking: None,
             decay: Decay::default(),
@@ -222,13 +217,12 @@ impl Bench {
         let (impacts, phase) = (&mut self.impacts, self.phase);
         let mut count = |event: Event| {
             if let Event::Impact { t, velocity, .. } = event {
-                impacts.push(Impact { time: phase + drive.omega * t, velocity });
+                impacts.0.push(Impact { time: phase + drive.omega * t, velocity });
             }
         };
         let step = self.lock.config().sample_time;
         self.rig.step(drive, step, &mut count)?;
-        let surplus = self.impacts.len().saturating_sub(KEPT);
-        self.impacts.drain(..surplus);
+        self.impacts.trim();
         self.phase += drive.omega * step;
         Ok(())
     }
@@ -285,15 +279,10 @@ impl Bench {
         self.scene.dimensionless().speed(self.rig.plant.state().dq2.abs())
     }
 
-    /// Impacts per period of the drive over those that are kept.
+    /// The regime of the last impacts.
     #[must_use]
-    pub fn impacts_per_period(&self) -> f64 {
-        match (self.impacts.first(), self.impacts.last()) {
-            (Some(first), Some(last)) if last.time > first.time => {
-                (self.impacts.len() - 1) as f64 * TAU / (last.time - first.time)
-            }
-            _ => 0.0,
-        }
+    pub fn regime(&self) -> Regime {
+        self.impacts.regime(self.phase)
     }
 
     /// Amplitude of the drive, m.

@@ -12,8 +12,9 @@
 
 use std::cell::RefCell;
 
+use vines_model::curves;
+
 use crate::bench::Bench;
-use crate::curves;
 use crate::message::Message;
 use crate::settings::{COUNT, Settings};
 
@@ -218,7 +219,7 @@ pub extern "C" fn status() -> i32 {
             f64::from(out.state as u8),
             out.fault.map_or(0.0, |fault| f64::from(fault as u8)),
             totals.impacts as f64,
-            bench.impacts_per_period(),
+            bench.impacts.per_period(),
             totals.dissipated,
             lock.phase_tolerance.to_degrees(),
             lock.unlock_tolerance.to_degrees(),

@@ -1,20 +1,65 @@
-//! Frequency and amplitude along the free decay, fitted as the lab fits them, while the samples arrive.
+//! What a view of a running experiment shows beside its samples: the regime of the last impacts, and frequency and amplitude along the
+//! free decay, fitted as the identification fits them, while the samples arrive.
 
 use std::f64::consts::{PI, TAU};
 
-use vines_model::regime::{Impact, end_of_synchrony};
-use vines_testbench::identification::{Harmonic, harmonic};
+use vines_model::regime::{Impact, MEASURED, Regime, end_of_synchrony, one_to_one};
 
-/// Fits per period, as in the lab.
+use crate::identification::{Harmonic, harmonic};
+
+/// Impacts that are kept to determine the regime from.
+const KEPT: usize = 40;
+/// Periods without an impact after which there are none.
+const QUIET: f64 = 20.0;
+/// Smallest number of impacts that a regime is determined from.
+const ENOUGH: usize = 12;
+
+/// The last impacts; times are phases of the drive, rad.
+#[derive(Debug, Default)]
+pub struct LastImpacts(pub Vec<Impact>);
+
+impl LastImpacts {
+    /// Forgets the impacts before the last [`KEPT`].
+    pub fn trim(&mut self) {
+        let surplus = self.0.len().saturating_sub(KEPT);
+        self.0.drain(..surplus);
+    }
+
+    /// Impacts per period of the drive.
+    #[must_use]
+    pub fn per_period(&self) -> f64 {
+        match (self.0.first(), self.0.last()) {
+            (Some(first), Some(last)) if last.time > first.time => {
+                (self.0.len() - 1) as f64 * TAU / (last.time - first.time)
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Their regime at the phase `now`, rad, as it is determined in an experiment.
+    #[must_use]
+    pub fn regime(&self, now: f64) -> Regime {
+        let since = self.0.last().map_or(now, |last| now - last.time);
+        if since > QUIET * TAU {
+            return Regime::NoImpacts;
+        }
+        if self.0.len() < ENOUGH {
+            return Regime::Unknown;
+        }
+        one_to_one(&self.0, self.per_period(), MEASURED)
+    }
+}
+
+/// Fits per period, as in the identification.
 const PER_PERIOD: f64 = 8.0;
-/// Share of the first amplitude at which the fits end: the lab records a decay down to it.
+/// Share of the first amplitude at which the fits end: an experiment records a decay down to it.
 const END: f64 = 0.05;
 
 /// Impacts that synchrony is determined from at every sample; it is lost once.
 const LAST: usize = 4;
 
 /// The sliding window of a free decay; without a window while there is a drive.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Decay {
     /// Responses, m, of the samples that the next fit uses.
     values: Vec<f64>,
@@ -34,7 +79,7 @@ pub struct Decay {
     /// Whether the particle has met both walls in turn, at even intervals, since the release.
     pub synchronous: bool,
     /// Whether there are no further fits: the motion has died out.
-    ended: bool,
+    pub ended: bool,
 }
 
 impl Decay {
@@ -78,7 +123,8 @@ impl Decay {
     }
 
     /// Compares the last impacts with 1:1 motion; their times and `now` are phases of the drive before the release, rad.
-    pub fn watch(&mut self, impacts: &[Impact], now: f64) {
+    pub fn watch(&mut self, impacts: &LastImpacts, now: f64) {
+        let impacts = &impacts.0;
         let last = &impacts[impacts.len().saturating_sub(LAST)..];
         // `end_of_synchrony` ends at an interval that is longer by a quarter.
         let late = |impact: &Impact| now - impact.time > 1.25 * PI;
