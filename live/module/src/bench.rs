@@ -101,13 +101,13 @@ impl Bench {
         settings_of(&default_scene())
     }
 
-    /// Applies changed settings to the running bench. A change of the half-gap or of the mass ratio restarts it.
+    /// Applies changed settings to the running bench. A change of a gap or of the mass ratio restarts it.
     ///
     /// # Errors
     /// The message for a value that is refused; then nothing changes.
     pub fn apply(&mut self, settings: Settings) -> Result<(), Message> {
         let differs = |one: usize| settings[one] != self.settings[one];
-        if differs(index::GAP) || differs(index::MASS_RATIO) {
+        if [index::GAP, index::GAP_DIFFERENCE, index::MASS_RATIO].into_iter().any(differs) {
             *self = Self::new(settings)?;
             return Ok(());
         }
@@ -307,8 +307,9 @@ impl Bench {
             from_mass = to * b;
         }
         // Rounding of the sum must not put the particle beyond a wall.
-        let inside = b * (1.0 - 4.0 * f64::EPSILON) - f64::EPSILON * state.q1.abs();
-        (state.q2, state.dq2) = (state.q1 + from_mass.clamp(-inside, inside), 0.0);
+        let inside = |gap: f64| gap * (1.0 - 4.0 * f64::EPSILON) - f64::EPSILON * state.q1.abs();
+        let [plus, minus] = plant.parameters().gaps().map(inside);
+        (state.q2, state.dq2) = (state.q1 + from_mass.clamp(-plus, minus), 0.0);
         plant.set_state(state)?;
         Ok(())
     }
