@@ -7,7 +7,7 @@ const STATUS = ["time", "sampleTime", "omega0", "sigma", "C", "B", "phaseError",
 const LOOK = ["time", "base", "q1", "q2", "relative", "speed", "wall", "impacts"];
 
 // States of the loop, by number.
-export const LOOP = ["idle", "the drive rises", "searching", "locked", "lock lost", "switched off", "off"];
+export const LOOP = ["idle", "the drive rises", "searching", "locked", "switched off", "switched off", "off"];
 
 const named = (names, values) => Object.fromEntries(names.map((name, i) => [name, values[i]]));
 

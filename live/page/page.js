@@ -66,7 +66,7 @@ export class Page {
       } else {
         this.values = { ...before, [key]: value };
         this.bench.apply(this.values);
-        if (key === "gap" || key === "mass_ratio") {
+        if (["gap", "gap_difference", "mass_ratio"].includes(key)) {
           this.start(this.values);
         } else {
           this.pictures.curves();

@@ -11,6 +11,8 @@ export const MINUTE = 60;
 const POINTS = 1500;
 // Part of the past that is drawn as the trail of the present point, s.
 const TRAIL = 3;
+// Settings that the motion has and the curves leave out.
+const EFFECTS = ["gap_difference", "friction", "tilt"];
 // Pixels within which a click on the backbone means a point of it.
 const NEAR = 24;
 
@@ -22,6 +24,8 @@ const colour = (name) => {
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => colours.clear());
 
 const digits = (value, count, unit = "") => (Number.isNaN(value) ? "not measured" : value.toFixed(count) + unit);
+
+const energy = (joules) => (joules < 1 ? `${(joules * 1e3).toPrecision(4)} mJ` : `${joules.toPrecision(4)} J`);
 
 // The end of an axis: `least`, or the next of its multiples by 1.25, so that it rarely changes.
 const end = (least, value) => { while (least < value && Number.isFinite(value)) least *= 1.25; return least; };
@@ -65,7 +69,6 @@ export class Pictures {
     };
     const { canvas } = this.rig;
     let resume;
-    const to = (event) => this.rig.dragged(this.drag.part, event.offsetX - this.drag.offset);
     canvas.onpointerdown = (event) => {
       const part = this.rig.under(event);
       // An experiment that is only watched has no place to drag to.
@@ -74,15 +77,15 @@ export class Pictures {
       resume = page.playing;
       page.play(false);
       page.toEnd();
-      this.drag = { part, offset: event.offsetX - (part === "mass" ? this.rig.centre : this.rig.particle) };
+      this.drag = { part };
     };
     canvas.onpointermove = (event) => {
       canvas.style.cursor = page.bench.place && (this.drag || this.rig.under(event)) ? "grab" : "";
-      if (this.drag) this.drag.to = Math.max(-this.reach.mass, Math.min(this.reach.mass, to(event)));
+      if (this.drag) this.drag.to = this.rig.dragged(this.drag.part, event, this.reach.mass);
     };
     canvas.onpointerup = canvas.onpointercancel = ({ type }) => {
       if (!this.drag) return;
-      const { part, to } = this.drag;
+      const { part: [part], to } = this.drag;
       this.drag = undefined;
       if (type === "pointerup" && to !== undefined) page.change(part, to);
       page.play(resume);
@@ -106,6 +109,8 @@ export class Pictures {
     const { bench } = this.page;
     this.lines = { theory: bench.theory(160), exact: bench.exact(120) };
     this.manifoldEnd = 0;
+    // The curves leave the effects of a real cavity out.
+    this.ideal = EFFECTS.some((key) => this.page.values[key]) ? ", ideal cavity" : "";
   }
 
   // A row of the record, dimensionless.
@@ -151,7 +156,7 @@ export class Pictures {
     this.#motion(motion, status, cursor);
     this.#history(cursor);
     const seen = this.past.filter((one) => one.time <= page.shown + page.step);
-    const top = end(1.05, largest(seen.slice(-POINTS).map((one) => one.C), 0));
+    const top = end(1.05, 1.03 * largest(seen.slice(-POINTS).map((one) => one.C), 0));
     this.#manifold(top, seen, point, linked);
     const done = page.points.filter((one) => one[0] <= page.shown + page.step);
     this.#backbone(top, seen, point, linked, done);
@@ -175,12 +180,13 @@ export class Pictures {
       }
       this.impacts = impacts;
     }
-    if (drag?.to !== undefined) look = drag.part === "mass" ? { ...look, q1: drag.to, q2: drag.to + look.q2 - look.q1 } : { ...look, q2: look.q1 + drag.to };
+    if (drag?.to !== undefined) look = drag.part[0] === "mass" ? { ...look, q1: drag.to, q2: drag.to + look.q2 - look.q1 } : { ...look, q2: look.q1 + drag.to };
     // The scale grows at once and shrinks slowly.
     const most = (key, present) => largest([...motion.map((one) => Math.abs(one[key])), Math.abs(present)], 1);
     const need = { mass: most("v", look.q1), base: most("base", look.base) };
     for (const key of ["mass", "base"]) reach[key] = Math.max(need[key], reach[key] + 0.02 * (need[key] - reach[key]));
-    this.rig.draw(look, reach, now, this.calm.matches);
+    const difference = (page.values.gap_difference ?? 0) / 100;
+    this.rig.draw(look, reach, [1 + difference, 1 - difference], page.values.tilt ?? 0, now, this.calm.matches);
   }
 
   #motion(motion, status, cursor) {
@@ -202,7 +208,7 @@ export class Pictures {
     const x = [past[0].time, Math.max(past.at(-1).time, past[0].time + 1)];
     const old = ghost.filter((one) => one.time >= x[0] && one.time <= x[1]);
     for (const [plot, key, name, shade] of [[phase, "error", "phase error", "violet"], [detuning, "sigma", "detuning", "green"]]) {
-      const shows = (one) => key === "error" || onBackbone(one);
+      const shows = (one) => (key === "error" ? one.G > 0 : onBackbone(one));
       plot.begin(x, extent([...past, ...old].filter(shows).map((one) => one[key]), key === "error" ? 1 : 0.5));
       const values = (run) => run.map((one) => (shows(one) ? [one.time, one[key]] : null));
       if (old.length) plot.line(values(old), "ghost", { label: "run before" });
@@ -230,7 +236,7 @@ export class Pictures {
     const right = end(2.2, largest(seen.map((one) => one.B), point.B));
     if (this.manifoldEnd !== right) this.lines.manifold = page.bench.manifold((this.manifoldEnd = right), 240);
     manifold.begin([0, right], [0, top]);
-    manifold.curve(this.lines.manifold, "ink", { label: "first-order theory" });
+    manifold.curve(this.lines.manifold, "ink", { label: `first-order theory${this.ideal}` });
     this.#tracks(manifold, seen, (one) => [one.B, one.C]);
     manifold.points([[point.B, point.C]], "red", { label: "now", radius: 5 });
     if (linked) manifold.points([[linked.B, linked.C]], "ink", { radius: 7, open: true });
@@ -242,8 +248,8 @@ export class Pictures {
     const curves = [...lines.exact, ...lines.theory].filter((one) => one[1] <= top).map((one) => one[0]);
     const sigmas = [...curves, ...[...seen.filter((one) => one.time > point.time - TRAIL || one.decays), ...this.ghost.filter((one) => one.decays), point].filter(onBackbone).map((one) => one.sigma)];
     backbone.begin(extent(sigmas, 0.5), [0, top]);
-    backbone.curve(lines.theory, "ink", { label: "theory", width: 1.2 });
-    backbone.curve(lines.exact, "blue", { label: "exact", width: 2.4 });
+    backbone.curve(lines.theory, "ink", { label: `theory${this.ideal}`, width: 1.2 });
+    backbone.curve(lines.exact, "blue", { label: `exact${this.ideal}`, width: 2.4 });
     this.#tracks(backbone, seen, (one) => [one.sigma, one.C]);
     backbone.points(tracked.map((one) => [one[1], one[2]]), "violet", { label: "tracked", open: true });
     if (onBackbone(point)) backbone.points([[point.sigma, point.C]], "red", { label: "now", radius: 5 });
@@ -259,16 +265,17 @@ export class Pictures {
     const present = (text) => (replay ? "– (replay)" : text);
     const entries = [
       ["Time", `${page.shown.toFixed(3)} s, ${periods.toFixed(1)} natural periods`],
-      ["Loop", present(state)],
+      ["Loop", status.state === undefined ? undefined : present(state)],
       ["Regime", present(regime.startsWith("unknown") ? "too few impacts yet" : regime || "no impacts are measured")],
       ["Detuning σ", digits(point.sigma, 6)],
       ["Amplitude C", digits(point.C, 6)],
       ["Particle speed B", digits(point.B, 6)],
-      ["Phase error", digits(Math.round(point.error * 1e4) / 1e4 + 0, 4, "°")],
+      ["Phase error", point.G > 0 ? digits(Math.round(point.error * 1e4) / 1e4 + 0, 4, "°") : "– (no drive)"],
       ["Excitation G", point.G.toFixed(4)],
-    ];
-    if (status.impacts !== undefined) entries.push(["Impacts", present(`${status.impacts}, ${status.perPeriod.toFixed(3)} per period`)]);
-    if (status.dissipated !== undefined) entries.push(["Dissipated by impacts", present(`${(status.dissipated * 1e3).toPrecision(4)} mJ`)]);
+      ["Impacts", status.impacts === undefined ? undefined : present(`${status.impacts}, ${status.perPeriod.toFixed(3)} per period`)],
+      ["Dissipated by impacts", status.dissipated === undefined ? undefined : present(energy(status.dissipated))],
+      // An experiment that is watched does not know all of these.
+    ].filter(([, text]) => text !== undefined);
     if (page.points.length) entries.push(["Tracked points", tracked < page.points.length ? `${tracked} of ${page.points.length}` : `${tracked}`]);
     const list = $("numbers");
     if (list.childElementCount !== 2 * entries.length) {

@@ -25,6 +25,8 @@ function advice(page, status, point, regime, replay) {
     const where = point.decays ? "The drive is off: the motion slides down the backbone." : "The particle no longer meets both walls in turn: the backbone ends, and the mass rings down alone.";
     return [where, "drive", "Drive on"];
   }
+  const done = page.points.filter((one) => one[0] <= page.shown).length;
+  if (done < page.points.length) return [`The backbone is tracked level by level: ${done} of ${page.points.length} points are measured.`, page.speed < 10 ? "faster" : "", "Faster"];
   if (regime === "no impacts") return ["The particle does not meet the walls: drag it to one, or raise G.", "particle", "Move it"];
   if (!page.values.closed) return ["The loop is open: the drive keeps its frequency. Close it to find resonance.", "closed", "Close the loop"];
   if (status.locked) return ["Resonance is found. Let go to see the free decay, or track the backbone.", "drive", "Let go"];

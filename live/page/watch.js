@@ -20,7 +20,7 @@ class Experiment {
     const { watch, state, driven } = this;
     const status = {
       sampleTime: watch.sample_time, omega0: watch.omega0, tolerance: watch.tolerance, unlock: watch.unlock,
-      state: state.state ?? 0, settled: state.settled, locked: state.state === 3, fault: state.fault ?? 0,
+      state: state.state ?? undefined, settled: state.settled, locked: state.state === 3, fault: state.fault ?? 0,
       impacts: state.impacts ?? undefined, perPeriod: state.per_period,
       advice: this.outcome ?? `${watch.title} is running, and this page only shows it. The slider below the rig goes back.`,
     };
@@ -52,6 +52,7 @@ export class Watching extends Page {
     }
     document.body.classList.add("watching");
     $("tour").hidden = true;
+    document.querySelector(".backbone h2").textContent = "Backbone (dashed: unstable)";
     this.start();
     const source = new EventSource("rows");
     source.onmessage = ({ data }) => this.#take(JSON.parse(data), source);

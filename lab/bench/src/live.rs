@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use vines_model::regime::{Impact, MEASURED, Regime, end_of_synchrony, one_to_one};
 
-use crate::identification::{Harmonic, harmonic};
+use crate::identification::harmonic;
 
 /// Impacts that are kept to determine the regime from.
 const KEPT: usize = 40;
@@ -58,6 +58,17 @@ const END: f64 = 0.05;
 /// Impacts that synchrony is determined from at every sample; it is lost once.
 const LAST: usize = 4;
 
+/// A motion that is nearly harmonic.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Motion {
+    /// Frequency, rad/s.
+    pub omega: f64,
+    /// Amplitude of the response, m.
+    pub amplitude: f64,
+    /// Speed of the particle, m/s: the mean over the window of the fit.
+    pub speed: f64,
+}
+
 /// The sliding window of a free decay; without a window while there is a drive.
 #[derive(Debug, Default)]
 pub struct Decay {
@@ -68,14 +79,10 @@ pub struct Decay {
     /// Length of the window, and distance between the beginnings of two windows, samples.
     window: usize,
     stride: usize,
-    /// Frequency of the last fit, or of the drive before the release, rad/s.
-    omega: f64,
     /// Amplitude of the first fit, m.
     first: Option<f64>,
-    /// The last fit.
-    pub fit: Option<Harmonic>,
-    /// Speed of the particle, m/s: the mean over its window.
-    pub speed: f64,
+    /// The motion by the last fit; before the first one, as it was at the release.
+    pub motion: Motion,
     /// Whether the particle has met both walls in turn, at even intervals, since the release.
     pub synchronous: bool,
     /// Whether there are no further fits: the motion has died out.
@@ -83,22 +90,22 @@ pub struct Decay {
 }
 
 impl Decay {
-    /// A sample with a drive of `omega` rad/s: what was fitted before is over.
-    pub fn drive(&mut self, omega: f64) {
-        self.omega = omega;
+    /// A sample with a drive, and its motion: what was fitted before is over.
+    pub fn drive(&mut self, motion: Motion) {
+        self.motion = motion;
         if self.window > 0 {
-            *self = Self { omega, ..Self::default() };
+            *self = Self { motion, ..Self::default() };
         }
     }
 
     /// A sample without a drive: response, m, and speed of the particle, m/s. The window has `periods` periods.
     pub fn sample(&mut self, response: f64, speed: f64, sample_time: f64, periods: f64) {
         // A plant that has not been driven yet has no decay.
-        if self.omega == 0.0 || self.ended {
+        if self.motion.omega == 0.0 || self.ended {
             return;
         }
         if self.window == 0 {
-            let period = TAU / self.omega / sample_time;
+            let period = TAU / self.motion.omega / sample_time;
             self.window = (periods * period).round() as usize + 1;
             self.stride = ((period / PER_PERIOD).round() as usize).max(1);
             self.synchronous = true;
@@ -108,12 +115,14 @@ impl Decay {
         if self.values.len() < self.window {
             return;
         }
-        match harmonic(&self.values, sample_time, self.omega) {
+        match harmonic(&self.values, sample_time, self.motion.omega) {
             Some(fit) => {
-                self.omega = fit.omega;
                 self.ended = fit.amplitude < END * *self.first.get_or_insert(fit.amplitude);
-                self.fit = Some(fit);
-                self.speed = self.speeds.iter().sum::<f64>() / self.speeds.len() as f64;
+                self.motion = Motion {
+                    omega: fit.omega,
+                    amplitude: fit.amplitude,
+                    speed: self.speeds.iter().sum::<f64>() / self.speeds.len() as f64,
+                };
                 self.values.drain(..self.stride);
                 self.speeds.drain(..self.stride);
             }

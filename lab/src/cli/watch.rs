@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use serde_json::{Value, json};
 use vines::curves;
-use vines::live::{Decay, LastImpacts};
+use vines::live::{Decay, LastImpacts, Motion};
 use vines::regime::Impact;
 use vines::rig::{Command, Controller, ControllerError, Drive, GroundTruth, Move, Rig, RigError, RigStage, Sensors};
 use vines::scene::Scene;
@@ -222,7 +222,6 @@ struct View {
     phase: f64,
     impacts: LastImpacts,
     fit: Decay,
-    amplitude: f64,
     /// Position of the particle, m, where the rig reports its impacts.
     particle: f64,
 }
@@ -235,7 +234,6 @@ impl View {
             phase: 0.0,
             impacts: LastImpacts::default(),
             fit: Decay::default(),
-            amplitude: 0.0,
             particle: scene.start.q2,
         }
     }
@@ -249,18 +247,21 @@ impl View {
         // A window of samples without gaps, under a drive or without one.
         if !follows || driven != was_driven || self.fit.ended {
             let omega0 = self.scene.dimensionless().omega0;
-            self.fit.drive(if drive.omega > 0.0 { drive.omega } else { omega0 });
+            let omega = if drive.omega > 0.0 { drive.omega } else { omega0 };
+            self.fit.drive(Motion { omega, ..self.fit.motion });
         }
         self.particle(now);
         let speed = ground_truth.map_or(f64::NAN, |truth| truth.particle_velocity.abs());
         self.fit
             .sample(sensors.response, speed, step, self.scene.record.window_periods);
         self.fit.watch(&self.impacts, self.phase);
-        let fit = self.fit.fit.as_ref();
-        self.amplitude = fit.map_or(self.amplitude, |fit| fit.amplitude);
-        let omega = fit
-            .filter(|_| !driven || drive.omega == 0.0)
-            .map_or(drive.omega, |fit| fit.omega);
+        let mut motion = self.fit.motion;
+        if driven {
+            motion.speed = speed;
+            if drive.omega > 0.0 {
+                motion.omega = drive.omega;
+            }
+        }
         let epsilon = self.scene.plant.particle_mass / self.scene.plant.primary_mass;
         let relative = match (ground_truth, self.scene.resonance.sensor) {
             (Some(_), Sensor::V) => sensors.response - (1.0 + epsilon) * self.particle,
@@ -279,13 +280,9 @@ impl View {
                 .map_or(f64::NAN, f64::to_degrees),
             drive.omega,
             drive.amplitude,
-            self.amplitude,
-            omega,
-            if driven {
-                speed
-            } else {
-                self.fit.fit.as_ref().map_or(speed, |_| self.fit.speed)
-            },
+            motion.amplitude,
+            motion.omega,
+            motion.speed,
             f64::from(u8::from(decays)),
         ]
     }
@@ -309,10 +306,9 @@ impl View {
         let epsilon = plant.particle_mass / plant.primary_mass;
         // The response v = q1 + epsilon q2 is smooth at an impact; the relative displacement is that of the wall there.
         let rate = (now.sensors.response - self.last.sensors.response) / self.last.step.max(f64::MIN_POSITIVE);
-        let (response, wall) = (
-            now.sensors.response - rate * since,
-            truth.impact_velocity.signum() * plant.half_width,
-        );
+        let response = now.sensors.response - rate * since;
+        let [plus, minus] = plant.gaps();
+        let wall = if truth.impact_velocity > 0.0 { plus } else { -minus };
         self.particle = (response - wall) / (1.0 + epsilon) + velocity * since;
     }
 
@@ -337,11 +333,13 @@ impl View {
 fn table(title: &str, scene: &Scene) -> Value {
     let d = scene.dimensionless();
     let lock = scene.controller_config().lock;
+    let ([plus, minus], cavity) = (scene.plant.gaps(), scene.plant.cavity);
     let mut table: Value = serde_json::from_str(include_str!("../../../live/settings.json")).unwrap_or_default();
     table["watch"] = json!({
         "title": title,
         "values": {
             "excitation": d.g, "restitution": d.r, "damping": d.lambda, "mass_ratio": d.epsilon, "gap": 1e3 * d.b,
+            "gap_difference": 50.0 * (plus - minus) / d.b, "friction": cavity.kinetic_friction, "tilt": cavity.tilt.to_degrees(),
             "phase_target": scene.controller.phase_target, "bandwidth": scene.controller.bandwidth,
         },
         "sample_time": scene.sample_time(),
