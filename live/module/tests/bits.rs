@@ -6,6 +6,7 @@ use vines_live::bench::Bench;
 use vines_live::settings::{default_scene, index, settings_of};
 use vines_testbench::experiment::{Plan, run};
 use vines_testbench::identification::decay_points;
+use vines_testbench::live::Motion;
 use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
 
@@ -59,20 +60,19 @@ fn the_free_decay_has_the_bits_of_the_lab() {
     let mut bench = Bench::new(Bench::default_settings()).unwrap();
     bench.run(record.released, |_| {}).unwrap();
     bench.drive(false);
-    let mut fits: Vec<(f64, f64, f64)> = Vec::new();
+    let mut fits: Vec<Motion> = Vec::new();
     let mut lost = None;
     bench
         .run(record.decay().len(), |row| {
-            let fit = (row.omega, row.amplitude, row.speed);
-            if row.omega != row.drive.omega && fits.last() != Some(&fit) {
-                fits.push(fit);
+            if row.motion.omega != row.drive.omega && fits.last() != Some(&row.motion) {
+                fits.push(row.motion);
             }
             if !row.decays {
                 lost.get_or_insert(row.time - record.decay()[0].time);
             }
         })
         .unwrap();
-    for (point, (omega, amplitude, speed)) in points.iter().zip(&fits) {
+    for (point, Motion { omega, amplitude, speed }) in points.iter().zip(&fits) {
         assert_eq!(
             (point.f_hz, point.a_m),
             (omega / TAU, *amplitude),
@@ -137,7 +137,11 @@ fn gap_difference_friction_and_tilt_reach_the_plant() {
     let time = bench.time();
     (settings[index::FRICTION], settings[index::TILT]) = (0.0, 0.0);
     bench.apply(settings).unwrap();
-    let ideal = lovines::Cavity { b_plus: plant.cavity.b_plus, b_minus: plant.cavity.b_minus, ..lovines::Cavity::IDEAL };
+    let ideal = lovines::Cavity {
+        b_plus: plant.cavity.b_plus,
+        b_minus: plant.cavity.b_minus,
+        ..lovines::Cavity::IDEAL
+    };
     assert_eq!((bench.time(), bench.plant().parameters().cavity), (time, ideal));
     assert_eq!(settings_of(&bench.scene), settings);
     settings[index::GAP_DIFFERENCE] = 0.0;
