@@ -55,7 +55,8 @@ fn main() -> Result<(), Failure> {
     let kept: Vec<&&Fitted> = found.iter().filter(|one| !one.fit.is_rejected()).collect();
     let mut rows = Vec::new();
     for (n, quantity) in Quantity::ALL[..5].iter().enumerate() {
-        let gather = |values: fn(&Fitted) -> &[f64; 5]| kept.iter().map(|one| values(one)[n].abs()).collect::<Vec<f64>>();
+        let gather =
+            |values: fn(&Fitted) -> &[f64; 5]| kept.iter().map(|one| values(one)[n].abs()).collect::<Vec<f64>>();
         let (ratios, over_bound) = (gather(|one| &one.over_u), gather(|one| &one.over_bound));
         let rms = |values: &[f64]| mean_square(values.iter().copied()).sqrt();
         rows.push(format!(
@@ -144,11 +145,25 @@ fn recorded((rig, noise, scales): &Case, snr: &str) -> Result<(Vec<MeasuredPoint
     scene.measured = None;
     let parts = recording.parts(&scene)?;
     if std::env::var("VERBOSE").is_ok() {
-        let residuals = at(&parts.iter().filter_map(|part| part.point).collect::<Vec<_>>(), scene.resonance, &truth, &[]).map(|one| one.residuals).unwrap_or_default();
+        let residuals = at(
+            &parts.iter().filter_map(|part| part.point).collect::<Vec<_>>(),
+            scene.resonance,
+            &truth,
+            &[],
+        )
+        .map(|one| one.residuals)
+        .unwrap_or_default();
         let mut residuals = residuals.iter();
         for part in &parts {
             let point = part.point.map(|one| (one.response.value, one.omega, one.drive));
-            println!("{:.1?} {:?} {} {:.6?} {:.1?}", part.seconds.map(|t| t / TAU), part.kind, part.regime, point, point.and_then(|_| residuals.next()));
+            println!(
+                "{:.1?} {:?} {} {:.6?} {:.1?}",
+                part.seconds.map(|t| t / TAU),
+                part.kind,
+                part.regime,
+                point,
+                point.and_then(|_| residuals.next())
+            );
         }
     }
     Ok((parts.into_iter().filter_map(|part| part.point).collect(), scene))
