@@ -7,7 +7,7 @@ use phase_lock::Value;
 use vines_testbench::rig::{Drive, GroundTruth, Measured, Rig, RigError, Sensors};
 use vines_testbench::scene::{Definition, Names, Parameters, Reference as ReferenceSignal, Sensor};
 
-use crate::instance::{Fmu, FmuError, Kind, Named, Reference, names_are_known};
+use crate::instance::{Fmu, FmuError, Kind, Named, Reference, names_exist};
 
 /// The names of this bench that a scene may map.
 const NAMES: &str =
@@ -50,7 +50,7 @@ impl FmuRig {
         plant: &Parameters,
         names: &Names,
     ) -> Result<Measured<Self>, FmuError> {
-        names_are_known(names, NAMES)?;
+        names_exist(names, NAMES)?;
         let mut fmu = Fmu::load(path, "plant")?;
         let [omega, amplitude] = ["omega", "E"].map(|ours| fmu.named(Kind::Real, names, ours));
         let inputs = omega?.zip(amplitude?).map(|(omega, amplitude)| [omega, amplitude]);
