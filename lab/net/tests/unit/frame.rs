@@ -49,7 +49,7 @@ proptest! {
         (state, fault) in (-1..8, 0..7),
     ) {
         let ground_truth = motion.map(|(impacts, impact_time, impact_velocity, particle_velocity)| {
-            GroundTruth { impacts: impacts.into(), impact_time, impact_velocity, particle_velocity }
+            GroundTruth { impacts: impacts.into(), impact_time, impact_velocity, particle_velocity, friction: None }
         });
         let reading = Reading { sensors: Sensors { response, reference }, ground_truth };
         let frame = write_reading(Frame::new(Kind::Hello, 1), &reading);
