@@ -20,7 +20,7 @@ pub enum FmuError {
     #[error("cannot load {}: {reason}", path.display())]
     Load { path: PathBuf, reason: String },
     #[error("{} has no {kind:?} variable `{name}`, which the bench needs; [rig.names] and [controller_names] of the scene map names", path.display())]
-    Variable { path: PathBuf, kind: Kind, name: String },
+    Variable { path: PathBuf, kind: FmiType, name: String },
     #[error(
         "[rig.names] or [controller_names] of the scene maps `{name}`, which this bench does not have; it has: {names}"
     )]
@@ -82,13 +82,13 @@ impl From<FmuError> for ControllerError {
 /// Type of a variable in FMI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[expect(missing_docs, reason = "the names are those of the standard")]
-pub enum Kind {
+pub enum FmiType {
     Real,
     Integer,
     Boolean,
 }
 
-impl Kind {
+impl FmiType {
     /// The type of a variable, if it is one of the three.
     fn of(element: &ScalarVariableElement) -> Option<Self> {
         match element {
@@ -100,7 +100,7 @@ impl Kind {
     }
 }
 
-impl From<Value> for Kind {
+impl From<Value> for FmiType {
     fn from(value: Value) -> Self {
         match value {
             Value::Real(_) => Self::Real,
@@ -133,37 +133,31 @@ impl Fmu {
         Ok(Self { instance, import, path: path.into(), time: 0.0 })
     }
 
-    /// The variable of that name and kind, if there is one.
-    pub fn find(&self, kind: Kind, name: &str) -> Option<Reference> {
-        let variables = &self.import.model_description().model_variables.variables;
-        let variable = variables.iter().find(|variable| variable.name == name)?;
-        (Kind::of(&variable.elem) == Some(kind)).then_some(variable.value_reference)
-    }
-
-    /// The variable of that name and kind.
-    pub fn need(&self, kind: Kind, name: &str) -> Result<Reference, FmuError> {
-        self.find(kind, name)
-            .ok_or_else(|| FmuError::Variable { path: self.path.clone(), kind, name: name.into() })
-    }
-
-    /// The variable that `names` has for `ours`, and its factor. A name that the user gave must exist.
-    pub fn named(&self, kind: Kind, names: &Names, ours: &str) -> Result<Option<Named>, FmuError> {
+    /// The variable of this type that `names` has for `ours`, and its factor. A name that the user gave must exist.
+    pub fn named(&self, kind: FmiType, names: &Names, ours: &str) -> Result<Option<Named>, FmuError> {
         let Name { name, factor } = names.of(ours);
-        match names.mapped(ours) {
-            Some(_) => self.need(kind, &name).map(|reference| Some((reference, factor))),
-            None => Ok(self.find(kind, &name).map(|reference| (reference, factor))),
+        let variables = &self.import.model_description().model_variables.variables;
+        let variable = variables
+            .iter()
+            .find(|variable| variable.name == name && FmiType::of(&variable.elem) == Some(kind));
+        match variable {
+            None if names.mapped(ours).is_some() => Err(self.missing(kind, &name)),
+            variable => Ok(variable.map(|variable| (variable.value_reference, factor))),
         }
     }
 
-    /// The same for a variable without a unit.
-    pub fn switch(&self, kind: Kind, names: &Names, ours: &str) -> Result<Option<Reference>, FmuError> {
+    /// The reference of a variable without a unit, if there is one.
+    pub fn switch(&self, kind: FmiType, names: &Names, ours: &str) -> Result<Option<Reference>, FmuError> {
         Ok(self.named(kind, names, ours)?.map(|(reference, _)| reference))
     }
 
-    /// The same for a variable that the bench needs.
-    pub fn need_named(&self, kind: Kind, names: &Names, ours: &str) -> Result<Named, FmuError> {
-        let missing = || FmuError::Variable { path: self.path.clone(), kind, name: ours.into() };
-        self.named(kind, names, ours)?.ok_or_else(missing)
+    /// A variable that the bench needs.
+    pub fn need(&self, kind: FmiType, names: &Names, ours: &str) -> Result<Named, FmuError> {
+        self.named(kind, names, ours)?.ok_or_else(|| self.missing(kind, ours))
+    }
+
+    fn missing(&self, kind: FmiType, name: &str) -> FmuError {
+        FmuError::Variable { path: self.path.clone(), kind, name: name.into() }
     }
 
     /// Sets the values that the FMU has variables for, and initialises it at time 0. A warning in the log names the

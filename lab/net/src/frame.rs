@@ -178,7 +178,7 @@ pub(crate) fn write_reading(frame: Frame, reading: &Reading) -> Frame {
     let motion = reading.ground_truth;
     let flags = bit(flag::REFERENCE, reference.is_some()) | bit(flag::GROUND_TRUTH, motion.is_some());
     let [count, time, impact, particle] = motion.map_or([0.0; 4], |motion| {
-        let GroundTruth { impacts, impact_time, impact_velocity, particle_velocity } = motion;
+        let GroundTruth { impacts, impact_time, impact_velocity, particle_velocity, .. } = motion;
         [impacts as f64, impact_time, impact_velocity, particle_velocity]
     });
     let values = [response, reference.unwrap_or(0.0), count, time, impact, particle];
