@@ -10,8 +10,7 @@ use vines_testbench::scene::{Definition, Names, Parameters, Reference as Referen
 use crate::instance::{Fmu, FmuError, Kind, Named, Reference, names_are_known};
 
 /// The names of this bench that a scene may map.
-const NAMES: &str =
-    "omega, E, e, response, base, impacts, impact_time, impact_velocity, sticks, stuck_time, friction_loss, M, k, c, m, b, r, b_plus, b_minus, \
+const NAMES: &str = "omega, E, e, response, base, impacts, impact_time, impact_velocity, sticks, stuck_time, friction_loss, M, k, c, m, b, r, b_plus, b_minus, \
      theta, mu_k, mu_s, r_law, r_plus, r_minus, r_min, r_scatter, seed, q1, der(q1), q2, der(q2)";
 
 /// A plant FMU, stepped sample by sample.

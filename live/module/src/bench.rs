@@ -112,7 +112,10 @@ impl Bench {
     /// The message for a value that is refused; then nothing changes.
     pub fn apply(&mut self, settings: Settings) -> Result<(), Message> {
         let differs = |one: usize| settings[one] != self.settings[one];
-        if [index::GAP, index::GAP_DIFFERENCE, index::MASS_RATIO].into_iter().any(differs) {
+        if [index::GAP, index::GAP_DIFFERENCE, index::MASS_RATIO]
+            .into_iter()
+            .any(differs)
+        {
             *self = Self::new(settings)?;
             return Ok(());
         }

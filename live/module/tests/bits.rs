@@ -137,7 +137,11 @@ fn gap_difference_friction_and_tilt_reach_the_plant() {
     let time = bench.time();
     (settings[index::FRICTION], settings[index::TILT]) = (0.0, 0.0);
     bench.apply(settings).unwrap();
-    let ideal = lovines::Cavity { b_plus: plant.cavity.b_plus, b_minus: plant.cavity.b_minus, ..lovines::Cavity::IDEAL };
+    let ideal = lovines::Cavity {
+        b_plus: plant.cavity.b_plus,
+        b_minus: plant.cavity.b_minus,
+        ..lovines::Cavity::IDEAL
+    };
     assert_eq!((bench.time(), bench.plant().parameters().cavity), (time, ideal));
     assert_eq!(settings_of(&bench.scene), settings);
     settings[index::GAP_DIFFERENCE] = 0.0;
