@@ -115,6 +115,14 @@ impl Scene {
         })
     }
 
+    /// Whether a motion of the scene's plant has a mirror image, half a period later, as in an ideal cavity: neither tilt nor walls of
+    /// different restitution. Where it has none, the 1:1 motion is asymmetric. (Unequal gaps move the middle of the cavity only.)
+    pub fn has_mirror_images(&self) -> bool {
+        let r = Restitution::Constant(self.plant.restitution);
+        let [plus, minus] = self.plant.cavity.restitution.map(|law| law.unwrap_or(r));
+        self.plant.cavity.tilt == 0.0 && plus == minus
+    }
+
     /// The controller's sample time, s: rig and controller agree on it before anything is measured.
     pub fn sample_time(&self) -> f64 {
         Dimensionless::of(&self.plant, self.amplitude).natural_period() / self.controller.samples_per_period
