@@ -180,10 +180,9 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
         })
     };
     let keep = |session: &Session| {
-        let (Some(file), Some(all)) = (&arguments.histogram, &session.punctuality) else {
-            return;
-        };
-        if let Err(error) = report::write_lateness(&all.classes(), file) {
+        if let Some(file) = &arguments.histogram
+            && let Err(error) = report::write_lateness(&session.histogram, file)
+        {
             eprintln!("warning: {error}");
         }
     };
