@@ -1,8 +1,9 @@
 """Figures of the book, from what the program `vines` prints and writes.
 
-python studies/book_figures.py PROGRAM    writes backbone, manifold, regimes, window and responses (SVG) into docs/
+python studies/book_figures.py PROGRAM    writes backbone, manifold, regimes, window, responses, coverage (SVG) in docs/
 """
 
+import csv
 import json
 import re
 import shutil
@@ -16,7 +17,7 @@ import matplotlib as mpl
 
 mpl.use("svg")
 import matplotlib.pyplot as plt
-from styles import COLOURS, EXACT, EXACT_UNSTABLE, MEASURED
+from styles import COLOURS, EXACT, EXACT_UNSTABLE, MEASURED, THEORY
 
 DOCS = Path(__file__).parent.parent / "docs"
 PROGRAM = sys.argv[1]
@@ -110,6 +111,27 @@ def responses():
     save(figure, "responses.svg")
 
 
+def coverage():
+    """How much the share of errors within the stated 95 % differs from it, from the results in validation/."""
+    figure, axes = plt.subplots(figsize=(6, 2.6), layout="constrained")
+    names = []
+    for study, count, name in (("tracking", "settled", "tracked"), ("locks", "correct", "locks")):
+        with (DOCS.parent / f"validation/{study}.csv").open() as table:
+            for row in csv.DictReader(table):
+                noise = "clean" if row["snr_dB"] == "none" else f"{row['snr_dB']} dB"
+                deviation, number = 100 * (float(row["within_1.96u"]) - 0.95), int(row[count])
+                axes.plot(deviation, len(names), "o", color=MEASURED, ms=5)
+                band = 100 * 1.96 * (0.95 * 0.05 / number) ** 0.5
+                axes.barh(len(names), 2 * band, left=-band, height=0.7, color=COLOURS["symmetric 1:1"], zorder=0)
+                names.append(f"{name}, {noise}, {row.get('scene', 'the rig').replace('another', 'wrong scene')}")
+    axes.axvline(0, color=THEORY, lw=0.8)
+    axes.set_yticks(range(len(names)), names)
+    axes.invert_yaxis()
+    axes.set(xlabel="share of errors within 1.96 u, less 95 %, in percentage points")
+    save(figure, "coverage.svg")
+
+
 own()
 window()
 responses()
+coverage()

@@ -62,7 +62,7 @@ axes[1].plot(time, (balance - coefficients[2] * deviation) / b, ".", color=MEASU
 axes[1].plot(time, (columns[:, :2] @ coefficients[:2]) / b, color=THEORY, lw=1)
 axes[1].set(ylabel="balance / b", title=f"… its balance is a line: $E_R$ = {-coefficients[1]:.3e} m")
 axes[2].plot(time, 1e3 * residual / b, ".", color=MEASURED)
-axes[2].set(ylabel="residual / (b/1000)", xlabel="time, periods")
+axes[2].set(ylabel="rest / (b/1000)", xlabel="periods")
 figure.savefig(DOCS / "measuring-balance.svg", metadata={"Date": None})
 
 points = vines.backbone().points
