@@ -7,6 +7,8 @@
 //! is chi-square; the parameters minimise it (Levenberg and Marquardt). Half of its second derivative, with every B eliminated, is the inverse
 //! of the covariance.
 
+mod recording;
+
 use std::f64::consts::TAU;
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
@@ -22,6 +24,8 @@ use vines_model::{ArgumentError, Definition};
 
 use crate::identification::Measured;
 use crate::scene::{Dimensionless, Parameters};
+
+pub use recording::{Kind, Part, Recording, RecordingError};
 
 /// A measured point of phase resonance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -370,18 +374,24 @@ pub fn fit(
     Ok(fit)
 }
 
+/// As [`fit`], with the parameters held at those of `plant`: its chi-square and residuals say whether the points belong to the plant, and its
+/// uncertainties are the Cramér–Rao bound of the points. `None` where the plant has no such motion.
+#[must_use]
+pub fn at(points: &[MeasuredPoint], definition: Definition, plant: &Parameters, known: &[Known]) -> Option<Fit> {
+    let has_scale = known.iter().any(|one| one.quantity.needs_a_scale());
+    let problem = Problem { points: points.to_vec(), definition, known, has_scale };
+    let x = unknowns(plant);
+    let sums = problem.sums(&x, &mut vec![None; points.len()])?;
+    Some(Fit {
+        degrees: 2 * points.len() + known.len(),
+        ..problem.found(x, sums)
+    })
+}
+
 /// What is to be said where the points contradict the rig `expected`: which parameters fit instead. `None` where they do not, or cannot tell.
 #[must_use]
 pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected: &Parameters) -> Option<String> {
-    let problem = Problem {
-        points: points.to_vec(),
-        definition,
-        known: &[],
-        has_scale: false,
-    };
-    let sums = problem.sums(&unknowns(expected), &mut vec![None; points.len()])?;
-    let distribution = ChiSquared::new(2.0 * points.len() as f64).ok()?;
-    if distribution.sf(sums.chi_square) >= REJECTED {
+    if !at(points, definition, expected, &[])?.is_rejected() {
         return None;
     }
     let fit = fit(points, definition, expected, &[]).ok()?;
@@ -441,8 +451,13 @@ impl Problem<'_> {
         let (x, sums) = minima
             .min_by(|one, other| one.1.chi_square.total_cmp(&other.1.chi_square))
             .ok_or(FitError::NoMotion)?;
+        Ok(self.found(x, sums))
+    }
+
+    /// The fit with these unknowns.
+    fn found(&self, x: Unknowns, sums: Sums) -> Fit {
         let equations = 2 * self.points.len() + self.known.len();
-        Ok(Fit {
+        Fit {
             x,
             covariance: sums.normal.try_inverse().unwrap_or(Matrix6::from_element(f64::NAN)),
             has_scale: self.has_scale,
@@ -450,7 +465,7 @@ impl Problem<'_> {
             degrees: equations.saturating_sub(5 + usize::from(self.has_scale)),
             residuals: sums.residuals,
             left_out: Vec::new(),
-        })
+        }
     }
 
     /// The minimum that is reached from `x`.

@@ -108,7 +108,7 @@ impl<T: Transport> Host<T> {
             _ if answer.sequence != self.sequence => Err(Malformed.into()),
             (message::ERROR, &[code, cause]) if cause == kind => {
                 let code = ErrorCode::of_number(code).ok_or(Malformed)?;
-                Err(HostError(format!("the helic device refuses {what}: {code}")))
+                Err(HostError(format!("the helic device refuses {what}: {code:?}")))
             }
             (answered, _) if answered == kind => Ok(answer.payload),
             _ => Err(Malformed.into()),

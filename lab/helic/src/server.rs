@@ -62,7 +62,7 @@ impl HelicServer {
             {
                 stream.set_nodelay(true)?;
                 stream.set_nonblocking(true)?;
-                clock.punctuality = Default::default();
+                clock.forget();
                 let (bytes, opened) = (Vec::new(), Instant::now());
                 host = Some(Connection { stream, peer, bytes, opened, first: tick });
             }
@@ -77,7 +77,8 @@ impl HelicServer {
                     samples: tick - host.first,
                     sample_time: self.sample_time,
                     seconds: host.opened.elapsed().as_secs_f64(),
-                    punctuality: Some(clock.punctuality.clone()),
+                    timing: Some(clock.timing(0)),
+                    histogram: clock.classes(),
                     counters: None,
                 });
             }

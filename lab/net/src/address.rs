@@ -152,8 +152,6 @@ pub enum LinkError {
         "{peer} sent a frame that is damaged, has a value that is not allowed, or is not the answer, at t = {time} s of the experiment"
     )]
     Invalid { peer: Address, time: f64 },
-    #[error("the step of {step} s is not the sample time of the session with {peer}, {sample_time} s")]
-    Step { peer: Address, step: f64, sample_time: f64 },
     #[error("the network: {0}")]
     System(#[from] io::Error),
 }

@@ -93,11 +93,8 @@ impl Seal {
         }
         let (bytes, tag) = bytes.split_at(bytes.len().min(SIZE));
         let frame = Frame::decode(bytes)?;
-        let other = match self.side {
-            Side::Client => Side::Server,
-            Side::Server => Side::Client,
-        };
-        let mac = self.mac(&frame, bytes, other).ok_or(FrameError::Tag)?;
+        let from = if self.side == Side::Client { Side::Server } else { Side::Client };
+        let mac = self.mac(&frame, bytes, from).ok_or(FrameError::Tag)?;
         // In constant time.
         mac.verify_slice(tag).map_err(|_| FrameError::Tag)?;
         Ok(frame)

@@ -13,6 +13,7 @@ use vines::{ArgumentError, report};
 use super::failure::{Failure, stop_flag};
 use super::options::{Endpoint, ReachArguments, SceneArguments, count, fmu, no_key, positive};
 use super::output::print;
+use super::watch::WatchArguments;
 
 const RIG_HELP: &str = "\
 Examples:
@@ -47,6 +48,9 @@ pub(super) struct RigArguments {
 
     #[command(flatten)]
     serving: ServingArguments,
+
+    #[command(flatten)]
+    watch: WatchArguments,
 
     /// Write the histogram of the lateness of each session to this file (CSV); each session overwrites it
     #[arg(long, value_name = "FILE")]
@@ -160,21 +164,25 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
         Endpoint::BuiltIn => {}
     }
     let (serving, json) = (&arguments.serving, arguments.serving.json);
+    let watch = arguments.watch.start("vines rig", &scene)?;
     let make = || -> Result<Box<dyn Rig>, RigError> {
-        Ok(match (&arguments.rig, arguments.fault) {
+        let rig: Box<dyn Rig> = match (&arguments.rig, arguments.fault) {
             (Endpoint::Fmu(file), _) => Box::new(fmu(file, &scene)?),
             (_, Some(Fault { kind, seconds })) => {
                 Box::new(faulty(&scene, kind, seconds, move |zero| tell(zero, json))?)
             }
             _ if arguments.sensors_only => Box::new(SensorsOnly::around(Simulated::of(&scene)?)),
             _ => Box::new(plant.clone()),
+        };
+        Ok(match &watch {
+            Some(watch) => watch.rig(rig),
+            None => rig,
         })
     };
     let keep = |session: &Session| {
-        let (Some(file), Some(all)) = (&arguments.histogram, &session.punctuality) else {
-            return;
-        };
-        if let Err(error) = report::write_lateness(&all.classes(), file) {
+        if let Some(file) = &arguments.histogram
+            && let Err(error) = report::write_lateness(&session.histogram, file)
+        {
             eprintln!("warning: {error}");
         }
     };

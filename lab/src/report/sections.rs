@@ -198,6 +198,9 @@ fn describe_lock(section: &mut Section, result: &Comparison) {
          standard uncertainties.",
         Table::new(&format!(" | {}", names.join(" | "))).rows(rows),
     );
+    if let Some(friction) = &lock.friction {
+        section.words(format!("Friction: {}.", summary::friction_text(friction)));
+    }
 }
 
 /// The backbone tracked with the loop closed, level by level.

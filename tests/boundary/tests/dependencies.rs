@@ -152,11 +152,8 @@ fn plant(interface: Interface, rig: &[f64; 13], stuck: bool) -> Master {
     for (vr, &value) in (0..).zip(rig).chain(rest.iter().map(|(vr, value)| (*vr, value))) {
         m.well(m.set_real(vr, value));
     }
-    if interface == Interface::CoSimulation {
-        // Model exchange knows the ideal cavity only.
-        m.well(m.set_real(THETA, 0.1));
-        m.well(m.set_real(MU_K, 0.2));
-    }
+    m.well(m.set_real(THETA, 0.1));
+    m.well(m.set_real(MU_K, 0.2));
     m
 }
 
