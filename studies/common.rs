@@ -106,12 +106,22 @@ pub fn write(name: &str, header: &str, key: usize, rows: &[String]) -> Result<()
 
 /// The backbone of a rig of these epsilon, lambda and r with M = k = b = 1, tracked from sensor readings alone by a client whose scene differs:
 /// `scales` are its relative errors of k, c, m, b and r. Returns that scene as well.
-pub fn tracked(
+pub fn tracked(rig: [f64; 3], noise: u64, snr: &str, scales: [f64; 5]) -> Result<(Tracked, Scene), Failure> {
+    let (truth, scene) = client(rig, noise, snr, scales)?;
+    let rig = Simulated::new(truth, scene.start)?;
+    let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
+    let mut controller = BuiltIn::new(&scene.backbone_config())?;
+    let tracked = track(&mut rig, &mut controller, &scene, |_, _| {})?;
+    Ok((tracked, scene))
+}
+
+/// The rig, and the scene of the client, of [`tracked`].
+pub fn client(
     [epsilon, lambda, r]: [f64; 3],
     noise: u64,
     snr: &str,
     [k, c, m, b, dr]: [f64; 5],
-) -> Result<(Tracked, Scene), Failure> {
+) -> Result<(Parameters, Scene), Failure> {
     let d = Dimensionless::new(epsilon, lambda, r, 0.0);
     let [low, high] = advice::stable_range(&d).ok_or("no stable orbit")?;
     let g = 0.5 * (low + high);
@@ -153,11 +163,7 @@ pub fn tracked(
         uncertainty: 0.0,
         gain: LinearResponse::of(&scene).gain,
     });
-    let rig = Simulated::new(truth, scene.start)?;
-    let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
-    let mut controller = BuiltIn::new(&scene.backbone_config())?;
-    let tracked = track(&mut rig, &mut controller, &scene, |_, _| {})?;
-    Ok((tracked, scene))
+    Ok((truth, scene))
 }
 
 /// Distance of the detunings at which [`advice::stable_range`] searches for stable orbits, and parts of it in which the end is located.

@@ -418,7 +418,7 @@ fn plant(scene: &Scene) -> impl Iterator<Item = (&str, Value)> {
             "der(q2)" => "der_q2_start",
             name => name,
         };
-        (parameter, Value::Real(value))
+        (parameter, value)
     })
 }
 

@@ -23,6 +23,9 @@ pub const COMPARED_ABOVE: f64 = 0.2;
 pub struct Comparison {
     /// The numbers all of this belongs to.
     pub parameters: Dimensionless,
+    /// What theory and exact orbits leave out of the scene's cavity; absent if it is ideal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<String>,
     /// The phase of the response relative to the reference that the lock held, degrees.
     pub phase_target_deg: f64,
     /// The locked point as measured.
@@ -98,6 +101,7 @@ impl Comparison {
             rms_sigma_exact: rms(&decay, |one| Some(one.point.sigma - one.sigma_exact?)),
             rms_sigma_predicted: rms(&decay, |one| Some(one.point.sigma - one.sigma_predicted?)),
             parameters,
+            left_out: scene.left_out(),
             phase_target_deg: scene.controller.phase_target,
             lock,
             theory,
@@ -229,6 +233,9 @@ fn to_segment(point: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
 pub struct TrackedComparison {
     /// The numbers all of this belongs to.
     pub parameters: Dimensionless,
+    /// What exact orbits leave out of the scene's cavity; absent if it is ideal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<String>,
     /// Periods from the start to the closed loop.
     pub periods_to_lock: f64,
     /// All periods, from the start to the last point.
@@ -266,6 +273,7 @@ impl TrackedComparison {
             points: tracked.points.iter().map(compare).collect(),
             periods_to_lock: tracked.periods_to_lock,
             periods: tracked.periods,
+            left_out: scene.left_out(),
             parameters,
             exact: curve,
         }

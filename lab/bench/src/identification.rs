@@ -98,7 +98,12 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
     let parameters = scene.dimensionless();
     let lock = measure(record, scene, &parameters).ok_or(IdentificationError::NoMotion)?;
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
-    if !matches!(lock.regime, Regime::Symmetric | Regime::Unresolved) {
+    let is_expected = match lock.regime {
+        Regime::Symmetric | Regime::Unresolved => true,
+        Regime::Asymmetric => !scene.has_mirror_images(),
+        _ => false,
+    };
+    if !is_expected {
         return Err(IdentificationError::Regime {
             regime: lock.regime,
             sigma: lock.at.sigma,
@@ -138,9 +143,37 @@ pub struct Lock {
     pub impacts_per_period: f64,
     /// The regime: from the impacts, or from the response alone if the rig does not report them.
     pub regime: Regime,
+    /// What friction did over the hold; absent without friction, or if the rig does not report it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction: Option<Friction>,
     /// A tone in the response that is not part of the motion; not looked for in a simulation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tone: Option<Tone>,
+}
+
+/// What friction in the cavity did over the hold, per period of the motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Friction {
+    /// How often the particle stuck to the floor inside the cavity.
+    pub sticks_per_period: f64,
+    /// How long it stuck there, s.
+    #[serde(rename = "stuck_s_per_period")]
+    pub stuck_time: f64,
+    /// Energy lost to friction, J.
+    #[serde(rename = "friction_J_per_period")]
+    pub loss: f64,
+}
+
+impl Friction {
+    fn of(hold: &[Sample], periods: f64) -> Option<Self> {
+        let totals = |sample: &Sample| sample.ground_truth?.friction;
+        let (first, last) = (totals(hold.first()?)?, totals(hold.last()?)?);
+        Some(Self {
+            sticks_per_period: (last.sticks - first.sticks) as f64 / periods,
+            stuck_time: (last.stuck_time - first.stuck_time) / periods,
+            loss: (last.loss - first.loss) / periods,
+        })
+    }
 }
 
 impl Lock {
@@ -205,6 +238,7 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
         held: record.held,
         impacts_per_period,
         regime,
+        friction: Friction::of(hold, (hold.len() - 1) as f64 * dt * omega.value / TAU),
         tone,
     })
 }
