@@ -12,7 +12,7 @@ use vines_model::numerics::{Estimate, RANDOM};
 
 use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stage};
 use crate::identification::{
-    Balance, Cycle, Measured, Regime, Slopes, Tone, classify, foreign_tone, regime_by_response,
+    Balance, Cycle, Regime, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
 };
 use crate::record::Sample;
 use crate::rig::{Controller, Move, Rig};
@@ -180,10 +180,10 @@ impl LevelEstimate {
 
 /// One point of the backbone.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Point {
+pub struct LevelPoint {
     /// Where it is; frequency and base amplitude are those of phase resonance at this response amplitude.
     #[serde(flatten)]
-    pub at: Measured,
+    pub at: ResonancePoint,
     /// Target level, over b.
     pub level: f64,
     /// Periods of the move to this level and at this level.
@@ -208,7 +208,7 @@ pub struct Point {
 #[derive(Debug)]
 pub struct Tracked {
     /// The points, in the order in which they were taken.
-    pub points: Vec<Point>,
+    pub points: Vec<LevelPoint>,
     /// Periods from the start to the closed loop.
     pub periods_to_lock: f64,
     /// All periods, from the start to the last point.
@@ -240,7 +240,7 @@ struct Tracker<'a, R: Rig + ?Sized, C: ?Sized> {
     closed: Held,
     /// The points so far.
     states: Vec<Held>,
-    points: Vec<Point>,
+    points: Vec<LevelPoint>,
 }
 
 /// Tracks the backbone of `scene`.
@@ -331,7 +331,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     }
 
     /// Goes to a level, m, and holds it until the point has settled, or for the longest time allowed.
-    fn hold(&mut self, level: f64) -> Result<Point, ExperimentError> {
+    fn hold(&mut self, level: f64) -> Result<LevelPoint, ExperimentError> {
         let (start, settings) = (self.run.periods, &self.scene.backbone);
         let (to, periods) = self.step(level);
         self.run.controller.hold_response(to, self.target)?;
@@ -393,7 +393,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         estimate: &LevelEstimate,
         cycles: &[Cycle],
         criterion: &Criterion,
-    ) -> Point {
+    ) -> LevelPoint {
         let d = self.scene.dimensionless();
         let samples = cycles[cycles.len() - estimate.periods..]
             .iter()
@@ -402,8 +402,8 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let [base, omega] = estimate.at;
         let regime = regime_by_response(averaged, self.scene, base.value, self.target, omega.value);
         let reached = is_reached(estimate.response, level);
-        Point {
-            at: Measured::new([estimate.response, base, omega, estimate.phase_error], &d),
+        LevelPoint {
+            at: ResonancePoint::new([estimate.response, base, omega, estimate.phase_error], &d),
             // The level as a person would write it.
             level: (1e9 * level / d.b).round() / 1e9,
             periods: self.run.periods - start,

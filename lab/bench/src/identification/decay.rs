@@ -14,7 +14,7 @@ use crate::scene::{Dimensionless, Scene};
 
 /// One point along the decay, in SI units, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct DecayPoint {
+pub struct FreeDecayPoint {
     /// Time since the release, s.
     pub t_s: f64,
     /// Frequency, Hz.
@@ -66,7 +66,7 @@ pub enum DecayEnd {
 #[derive(Debug, Clone, PartialEq)]
 pub struct DecayPoints {
     /// The points.
-    pub points: Vec<DecayPoint>,
+    pub points: Vec<FreeDecayPoint>,
     /// Why there are no further ones.
     pub end: DecayEnd,
 }
@@ -126,12 +126,12 @@ struct Window {
 }
 
 impl Window {
-    fn point(&self, decay: &[Sample], d: &Dimensionless) -> DecayPoint {
+    fn point(&self, decay: &[Sample], d: &Dimensionless) -> FreeDecayPoint {
         let Harmonic { amplitude, omega, rate, uncertainties, .. } = self.fit;
         let speeds = decay[self.samples.clone()]
             .iter()
             .map(|s| s.ground_truth.map(|w| w.particle_velocity.abs()));
-        DecayPoint {
+        FreeDecayPoint {
             t_s: self.time,
             f_hz: omega / TAU,
             a_m: amplitude,
