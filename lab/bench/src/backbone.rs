@@ -57,12 +57,13 @@ pub struct LevelEstimate {
 /// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 beside the
 /// fold, 0.03 rad change sigma at equal C by 1.1e-3.
 const BESIDE: f64 = 0.02;
-/// Periods by which the impacts follow a change of the amplitude late: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
+/// Delay of the impacts behind a change of the amplitude, periods: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
 /// (studies/off_scene.rs).
 const LAG: f64 = 1.6;
 /// Largest scatter of the periods about the fit, over the noise of the sensors: chi-square per degree of freedom is then at most 4.
 const EXCESS: f64 = 2.0;
-/// Relative standard uncertainty of the slope of a straight line through two points: away from the fold it changes by less from level to level.
+/// Relative standard uncertainty of the slope of a straight line through two points: away from the fold the slope changes by less from level to
+/// level.
 const SLOPE: f64 = 0.5;
 /// Shares of the periods that are considered, from the last one backwards.
 const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
@@ -181,7 +182,7 @@ impl LevelEstimate {
 /// One point of the backbone.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LevelPoint {
-    /// Where it is; frequency and base amplitude are those of phase resonance at this response amplitude.
+    /// The point: frequency and base amplitude of phase resonance at this amplitude of the response.
     #[serde(flatten)]
     pub at: ResonancePoint,
     /// Target level, over b.
@@ -256,7 +257,7 @@ pub fn track(
     track_into(&mut Vec::new(), rig, controller, scene, progress)
 }
 
-/// As [`track`]; if it ends before the first point, what was measured last stays in `samples`.
+/// [`track`], which leaves what was measured last in `samples` if it ends before the first point.
 ///
 /// # Errors
 /// As [`track`].
@@ -366,7 +367,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         Ok(self.point(level, start, &estimate, &cycles, &criterion))
     }
 
-    /// The move to a level, m, and its periods: those of the scene, or as many as the drive needs to change the response that much.
+    /// The move to a level, m, and its periods: [`MOVE`], or as many as the drive needs for this change of the response.
     fn step(&self, level: f64) -> (Move, f64) {
         let omega0 = self.scene.linear().omega0;
         let [response, drive, omega] = *self.states.last().unwrap_or(&self.closed);

@@ -21,7 +21,7 @@ pub const COMPARED_ABOVE: f64 = 0.2;
 /// An identified system beside theory and exact orbits; dimensionless throughout.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// The numbers all of this belongs to.
+    /// The numbers of the scene.
     pub parameters: Dimensionless,
     /// What theory and exact orbits leave out of the scene's cavity; absent if it is ideal.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -231,7 +231,7 @@ fn to_segment(point: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
 /// A tracked backbone beside the exact one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TrackedComparison {
-    /// The numbers all of this belongs to.
+    /// The numbers of the scene.
     pub parameters: Dimensionless,
     /// What exact orbits leave out of the scene's cavity; absent if it is ideal.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -258,7 +258,7 @@ pub struct TrackedPoint {
 }
 
 impl TrackedComparison {
-    /// Compares the points with the exact backbone of the scene; not where the loop holds another phase than that of resonance.
+    /// Compares the points with the exact backbone of the scene; not where the loop holds another phase than resonance.
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
         let parameters = scene.dimensionless();
         let curve = ExactCurve::of(&parameters);

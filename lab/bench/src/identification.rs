@@ -82,7 +82,7 @@ fn mirrored(longer: Option<i8>) -> String {
 /// What a record says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
-    /// The numbers all of this belongs to.
+    /// The numbers of the scene.
     pub parameters: Dimensionless,
     /// The locked point as measured.
     pub lock: Lock,
@@ -124,7 +124,7 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
 /// The locked point as measured over the hold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lock {
-    /// Where it is.
+    /// The point.
     #[serde(flatten)]
     pub at: ResonancePoint,
     /// Mean particle speed over `b omega0`; absent if the rig does not report it.
@@ -344,7 +344,7 @@ pub struct ResonancePoint {
 }
 
 impl ResonancePoint {
-    /// From the amplitude of the response, m, that of the base, m, the frequency, rad/s, and the phase error, rad.
+    /// From the amplitudes of response and base, m, the frequency, rad/s, and the phase error, rad.
     pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], d: &Dimensionless) -> Self {
         Self {
             f_hz: omega.value / TAU,

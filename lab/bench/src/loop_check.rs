@@ -14,9 +14,9 @@ use vines_model::numerics::{SIGNIFICANT, mean, mean_square, standard_deviation};
 use crate::rig::{Drive, Rig, RigError};
 use crate::scene::{LinearResponse, Reference, Scene};
 
-/// Drive, as a share of that of the scene.
+/// Drive of the check, over the scene's drive: too small for impacts.
 const SHARE: f64 = 0.01;
-/// Periods without a drive, with it, and at their end those that are evaluated.
+/// Numbers of periods: without a drive, with it, and evaluated at the end of it.
 const PERIODS: [usize; 3] = [2, 24, 4];
 
 /// Result of the check.
@@ -225,13 +225,13 @@ fn scatter(readings: &[[f64; 3]], of: usize) -> f64 {
 
 // What the check of a loop measures, beside what the scene says.
 
-/// Largest relative error of a factor: amplitudes and drives that are measured later have the same.
+/// Largest relative error of an amplitude: later measurements of response and drive would be wrong by it.
 const FACTOR: f64 = 0.05;
-/// Largest phase of the response relative to the base that is not explained, degrees. On the default scene 1 degree shifts sigma by 0.026.
+/// Largest unexplained phase of the response relative to the base, degrees. On the default scene 1 degree shifts sigma by 0.026.
 const PHASE: f64 = 1.0;
-/// Largest relative difference of the clocks: frequencies in hertz that are measured later have the same.
+/// Largest relative difference of the clocks: later measurements of frequencies in hertz would be wrong by it.
 const CLOCK: f64 = 1e-3;
-/// Relative differences of natural frequency and damping below which nothing is said, whatever the uncertainty.
+/// Relative differences of natural frequency and damping from which they are reported, beyond their uncertainty.
 const NOTED: [f64; 2] = [1e-4, 0.02];
 
 /// A measured quantity.
@@ -241,11 +241,11 @@ pub struct CheckedQuantity {
     pub name: &'static str,
     /// Its unit; empty for a pure number.
     pub unit: &'static str,
-    /// As measured.
+    /// Measured value.
     pub measured: f64,
     /// Standard uncertainty.
     pub uncertainty: f64,
-    /// As the scene says.
+    /// Value of the scene.
     pub expected: f64,
     /// Largest difference beyond the uncertainty.
     pub tolerance: f64,
@@ -346,13 +346,13 @@ fn quantity(
 
 // What the check of a loop says of its channels.
 
-/// Largest RMS of what is not the drive's frequency, as a share of the amplitude.
+/// Largest RMS of the residual of the fit at the drive's frequency, over the amplitude.
 const NOISE: f64 = 0.15;
 /// Share of the expected amplitude below which a sensor is dead.
 const DEAD: f64 = 0.01;
 /// Factor by which an amplitude may differ from the expected one, or its inverse: the damping is known roughly.
 const GAIN: f64 = 2.0;
-/// RMS of the response without a drive over that of its noise with it, from which the rig moves.
+/// Smallest RMS of the response without a drive, over its noise with the drive, of a rig that moves.
 const AT_REST: f64 = 3.0;
 /// Deviation of the phase, rad, up to which a channel is in time, or reversed.
 const IN_TIME: f64 = 0.7;
@@ -364,7 +364,7 @@ pub struct CheckedChannel {
     pub gain: f64,
     /// Phase less the expected one, degrees; a delay is negative.
     pub phase: f64,
-    /// The same as a delay, samples.
+    /// This phase as a delay, samples.
     pub delay: f64,
     /// RMS of everything else, m.
     pub noise: f64,
@@ -373,7 +373,7 @@ pub struct CheckedChannel {
 }
 
 impl CheckedChannel {
-    /// The same with another ratio to what is expected; `turn`: phase of a sample, rad.
+    /// With another ratio to the expected phasor; `turn`: phase of a sample, rad.
     fn at(self, ratio: Complex64, turn: f64) -> Self {
         Self {
             gain: ratio.norm(),
@@ -603,7 +603,7 @@ impl Linear {
 const FROM_REST: f64 = 0.5;
 /// Largest relative standard uncertainty of the gain of a response that is more than noise.
 const DETERMINED: f64 = 0.1;
-/// Rounds of the fit; each squares the relative error.
+/// Number of steps of Newton's method; each squares the relative error.
 const ROUNDS: usize = 8;
 
 /// First values of `q`, and of `s` and `a`, by the recursion `z' = q z + (1 - q) s` from period to period. `None` without a growth.

@@ -98,7 +98,7 @@ pub fn decay_points(record: &Record, scene: &Scene) -> DecayPoints {
     };
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
     let windows = fitted(&values, dt, omega, scene.record.window_periods);
-    // What the impacts alone take away, m/s; the mean over the first period is that of the 1:1 motion.
+    // Loss of amplitude by the impacts alone, m/s; the mean over the first period belongs to the 1:1 motion.
     let damping = scene.linear().damping_rate;
     let taken = |window: &Window| -window.fit.rate - damping * window.fit.amplitude;
     let at_release = mean(windows.iter().take(PER_PERIOD as usize).map(taken));
