@@ -195,7 +195,13 @@ pub(crate) fn read_reading(frame: &Frame) -> Reading {
         particle_velocity,
     ] = frame.values;
     let (reference, impacts) = (frame.has(flag::REFERENCE).then_some(reference), impacts as i64);
-    let motion = GroundTruth { impacts, impact_time, impact_velocity, particle_velocity, friction: None };
+    let motion = GroundTruth {
+        impacts,
+        impact_time,
+        impact_velocity,
+        particle_velocity,
+        friction: None,
+    };
     let ground_truth = frame.has(flag::GROUND_TRUTH).then_some(motion);
     Reading { sensors: Sensors { response, reference }, ground_truth }
 }

@@ -93,7 +93,11 @@ impl Seal {
         }
         let (bytes, tag) = bytes.split_at(bytes.len().min(SIZE));
         let frame = Frame::decode(bytes)?;
-        let from = if self.side == Side::Client { Side::Server } else { Side::Client };
+        let from = if self.side == Side::Client {
+            Side::Server
+        } else {
+            Side::Client
+        };
         let mac = self.mac(&frame, bytes, from).ok_or(FrameError::Tag)?;
         // In constant time.
         mac.verify_slice(tag).map_err(|_| FrameError::Tag)?;
