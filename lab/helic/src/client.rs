@@ -15,7 +15,7 @@ use super::codec::{
     COEFFICIENTS, ErrorCode, Frame, HARMONICS, Malformed, Packet, Status, VERSION, message, take, take_text, to_bytes,
 };
 use super::device::WATCHDOG;
-use vines_net::{Bridge, Counters, is_loopback};
+use vines_net::{Bridge, CONNECT, Counters, is_loopback};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 
 /// Largest relative difference between the sample rates: the device states its own with 24 bits.
@@ -482,8 +482,6 @@ impl<T: Transport> Drop for HelicRig<T> {
     }
 }
 
-/// Longest time for an answer while the device is set up and nothing is driven: the time after which a client of the other protocol gives up.
-const PATIENCE: Duration = Duration::from_secs(2);
 /// Longest silence of a driven device, and of a host that drives it. The drive stops within 0.2 s, with 50 ms for the network.
 pub const LONGEST_SILENCE: Duration = Duration::from_millis(150);
 
@@ -536,7 +534,7 @@ impl Network {
     /// Connects to the control channel at `peer`, and sends the device's stream port the datagram that opens firewalls. The drive stops after
     /// a silence of either side that is longer than `silence`; [`LONGEST_SILENCE`] fits a device that sends a packet every 5 ms.
     pub fn connect(peer: SocketAddr, silence: Duration) -> io::Result<Self> {
-        let control = TcpStream::connect_timeout(&peer, PATIENCE)?;
+        let control = TcpStream::connect_timeout(&peer, CONNECT)?;
         control.set_nodelay(true)?;
         let stream = UdpSocket::bind((control.local_addr()?.ip(), 0))?;
         stream.set_read_timeout(Some(silence))?;
@@ -548,7 +546,7 @@ impl Network {
         let (shared, channel) = (Arc::downgrade(&watchdog), control.try_clone()?);
         thread::Builder::new().spawn(move || watch(&shared, channel, silence))?;
         let network = Self { control, stream, bytes: Vec::new(), silence, watchdog };
-        network.patience(PATIENCE)?;
+        network.patience(CONNECT)?;
         Ok(network)
     }
 
@@ -619,7 +617,7 @@ impl Transport for Network {
     }
 
     fn guard(&mut self, stop: &[Frame]) -> io::Result<()> {
-        self.patience(if stop.is_empty() { PATIENCE } else { self.silence })?;
+        self.patience(if stop.is_empty() { CONNECT } else { self.silence })?;
         let mut watchdog = lock(&self.watchdog);
         watchdog.stop = stop.iter().flat_map(Frame::encode).collect();
         watchdog.last_reading = Instant::now();

@@ -5,13 +5,13 @@ use std::f64::consts::TAU;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::codec::{
     COEFFICIENTS, ErrorCode, Frame, HARMONICS, MAX_PAYLOAD, Packet, Status, VERSION, message, of_bytes, size, take,
     to_bytes,
 };
-use vines_net::{Ended, RealTimeClock, ServerError, Session, is_loopback};
+use vines_net::{Ended, POLL, RealTimeClock, ServerError, Session, is_loopback};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 
 /// Longest silence of the host, s, before the output is disarmed; 0: no limit.
@@ -407,8 +407,6 @@ fn value(coefficients: &[f64], phase: u32) -> f64 {
 
 /// Port of the control channel; the stream has the next one.
 pub const DEFAULT_PORT: u16 = 2350;
-/// Polling interval: a third of a sample of the default device.
-const POLL: Duration = Duration::from_micros(50);
 
 /// The server of a device, one host at a time.
 pub struct HelicServer {
