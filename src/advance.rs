@@ -2,7 +2,7 @@
 
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::Drive;
-use crate::contact::{Resolution, Wall};
+use crate::contact::{Resolution, Touch, Wall};
 use crate::fast::Next;
 use crate::flight::{Flight, FlightEnd, Grip, until_released};
 use crate::oscillator::Oscillator;
@@ -123,7 +123,7 @@ impl Plant {
             let left = step.left.value();
             if let Some(contact) = self.contact {
                 self.stay(contact, left, &mut step);
-            } else if self.moving.rig.forces.holding > 0.0 {
+            } else if self.moving.rig.is_real && self.moving.rig.forces.holding > 0.0 {
                 self.slide(left, None, &mut step);
             } else {
                 match self.fast.next(&mut self.moving, left, duration) {
@@ -209,7 +209,7 @@ impl Plant {
 
     /// Moves on to the wall ahead, if constant forces act and the fast path finds the contact within `limit` seconds.
     fn arrives(&mut self, limit: f64, direction: f64, step: &mut Step<impl FnMut(Event)>) -> bool {
-        if !self.moving.rig.is_forced() {
+        if !self.moving.rig.forces.act() {
             return false;
         }
         let w = self.moving.masses.w;
@@ -340,30 +340,14 @@ impl Plant {
     /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave.
     #[inline]
     pub(crate) fn touch(&mut self, wall: Wall, step: &mut Step<impl FnMut(Event)>) {
-        let half_width = self.moving.rig.half_width;
-        self.moving.masses.w = Sum::from(wall.sign() * half_width);
-        let resolution = Resolution {
-            lowest_hop: LOWEST_HOP * half_width,
-            longest_chatter: step.left.value(),
-            fastest: self.moving.rig.free.fastest,
-            elastic: !self.moving.rig.varies,
-        };
-        let Masses { primary, particle, dw, .. } = self.moving.masses;
-        let velocities = (primary.values[1], particle, dw);
         let rig = &self.moving.rig;
-        let touch = if rig.varies || rig.is_forced() {
-            let law = if rig.varies {
-                let r = rig.rebound.of_impact(wall, dw.abs(), self.totals.impacts);
-                rig.law.with_restitution(r)
-            } else {
-                rig.law
-            };
-            law.touch(wall, velocities, |primary, speed| {
-                self.rests(wall, primary, speed, &resolution)
-            })
+        self.moving.masses.w = Sum::from(wall.sign() * rig.half_width);
+        let left = step.left.value();
+        let touch = if rig.is_real {
+            self.real_touch(wall, left)
         } else {
-            rig.law.touch(wall, velocities, |primary, speed| {
-                let largest = self.acceleration_bound(primary);
+            rig.law.touch(wall, self.velocities(), |primary, speed| {
+                let (largest, resolution) = (self.acceleration_bound(primary), self.resolution(left));
                 !rig.law.certainly_leaves(speed, largest, &resolution)
                     && rig.law.rests(speed, self.pressing(wall, primary), &resolution)
             })
@@ -384,15 +368,44 @@ impl Plant {
         }
     }
 
-    /// Whether a particle that leaves `wall` at `speed` is in truth at rest on it, with constant forces and a restitution that varies.
-    fn rests(&self, wall: Wall, primary: f64, speed: f64, resolution: &Resolution) -> bool {
-        let rig = &self.moving.rig;
-        let largest = self.acceleration_bound(primary) + rig.forces.joint * rig.forces.size();
-        if rig.law.resting_with(1.0).certainly_leaves(speed, largest, resolution) {
-            return false;
+    /// The same in a cavity with constant forces or a restitution that varies.
+    #[inline(never)]
+    fn real_touch(&self, wall: Wall, left: f64) -> Touch {
+        let (rig, velocities) = (&self.moving.rig, self.velocities());
+        let mut law = rig.law;
+        if rig.varies {
+            law = law.with_restitution((rig.rebound).of_impact(wall, velocities.2.abs(), self.totals.impacts));
         }
-        let pressing = self.pressing(wall, primary);
-        (rig.rebound).rests(&rig.law, &rig.forces, (wall, speed), pressing, resolution)
+        let resolution = Resolution { elastic: !rig.varies, ..self.resolution(left) };
+        law.touch(wall, velocities, |primary, speed| {
+            let largest = self.acceleration_bound(primary) + rig.forces.joint * rig.forces.size();
+            !law.resting_with(1.0).certainly_leaves(speed, largest, &resolution)
+                && (rig.rebound).rests(
+                    &law,
+                    &rig.forces,
+                    (wall, speed),
+                    self.pressing(wall, primary),
+                    &resolution,
+                )
+        })
+    }
+
+    /// Velocities of primary mass and particle, and the relative velocity.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn velocities(&self) -> (f64, f64, f64) {
+        let Masses { primary, particle, dw, .. } = &self.moving.masses;
+        (primary.values[1], *particle, *dw)
+    }
+
+    /// What hops can be told from rest, with `left` seconds of the step to come.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn resolution(&self, left: f64) -> Resolution {
+        Resolution {
+            lowest_hop: LOWEST_HOP * self.moving.rig.half_width,
+            longest_chatter: left,
+            fastest: self.moving.rig.free.fastest,
+            elastic: true,
+        }
     }
 
     /// Acceleration of `wall` towards a particle without acceleration while the primary mass moves alone, and its rounding error, m/s².

@@ -32,8 +32,7 @@ impl Restitution {
     fn at(self, v: f64) -> f64 {
         match self {
             Self::Constant(r) => r,
-            // Half the work of `pow`.
-            Self::Viscoelastic(k) => 1.0 - k * libm::exp(0.2 * libm::log(v)),
+            Self::Viscoelastic(k) => 1.0 - k * fifth_root(v),
             Self::Plastic(yield_speed) => libm::sqrt(libm::sqrt(yield_speed / v)).min(1.0),
         }
     }
@@ -242,17 +241,19 @@ impl Rebound {
     }
 
     /// The coefficient at a speed of approach (m/s) without scatter.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn mean(&self, wall: Wall, speed: f64) -> f64 {
         self.laws[wall.index()].at(speed).clamp(self.least, 1.0)
     }
 
     /// The coefficient of impact number `number` at a speed of approach, m/s.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn of_impact(&self, wall: Wall, speed: f64, number: u64) -> f64 {
         let mean = self.mean(wall, speed);
         if self.scatter == 0.0 {
             return mean;
         }
-        (mean * (1.0 + self.scatter * normal_deviate(self.seed, number))).clamp(self.least, 1.0)
+        (mean * (1.0 + self.scatter * deviate(self.seed, number))).clamp(self.least, 1.0)
     }
 
     /// Whether a particle that leaves a wall at a speed (m/s) is in truth at rest on it, as [`ImpactLaw::rests`] has it for one constant
@@ -287,12 +288,30 @@ impl Rebound {
     }
 }
 
-/// A standard normal deviate that depends on `seed` and `counter` alone.
+/// The fifth root of a positive number, a third of the work of `pow`: by Halley's method from a fifth of the exponent, which is off by
+/// 4 % at most. Every step cubes the error and doubles it.
+fn fifth_root(v: f64) -> f64 {
+    const FOUR_FIFTHS_OF_ONE: u64 = 1f64.to_bits() / 5 * 4;
+    let mut x = f64::from_bits(v.to_bits() / 5 + FOUR_FIFTHS_OF_ONE);
+    for _ in 0..3 {
+        let square = x * x;
+        let fifth = square * square * x;
+        x += x * ((v - fifth) / (3.0 * fifth + 2.0 * v));
+    }
+    x
+}
+
+/// A random number with mean 0 and standard deviation 1 that depends on `seed` and `counter` alone, on every platform alike.
 ///
-/// Two outputs of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), whose state is a counter, by the transformation of Box and Muller
-/// (1958). The mixed seed keeps the streams of neighbouring seeds apart.
-pub fn normal_deviate(seed: u64, counter: u64) -> f64 {
+/// The sum of eight uniform numbers of 16 bits is nearly normal: the excess of the fourth moment is -0.15, and the largest deviate is 4.9.
+/// They come from two outputs of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), whose state is a counter. The mixed seed keeps the
+/// streams of neighbouring seeds apart.
+pub fn deviate(seed: u64, counter: u64) -> f64 {
     const GAMMA: u64 = 0x9E37_79B9_7F4A_7C15;
+    /// Every other number of 16 bits.
+    const LANES: u64 = 0x0000_FFFF_0000_FFFF;
+    /// Standard deviation of the sum: eight uniform numbers of `n` values have the variance `8 (n² - 1)/12`.
+    const DEVIATION: f64 = 53_509.919_921_450_08;
     let mix = |z: u64| {
         let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -301,11 +320,10 @@ pub fn normal_deviate(seed: u64, counter: u64) -> f64 {
     let start = mix(seed.wrapping_add(GAMMA));
     let output = |n: u64| mix(start.wrapping_add(GAMMA.wrapping_mul(n)));
     let first = counter.wrapping_mul(2);
-    // 53 bits, in (0, 1] and in [0, 1).
-    let unit = (1u64 << 53) as f64;
-    let radius = ((output(first.wrapping_add(1)) >> 11) + 1) as f64 / unit;
-    let angle = (output(first.wrapping_add(2)) >> 11) as f64 / unit;
-    libm::sqrt(-2.0 * libm::log(radius)) * libm::cos(core::f64::consts::TAU * angle)
+    let [a, b] = [1, 2].map(|n| output(first.wrapping_add(n)));
+    let pairs = (a & LANES) + ((a >> 16) & LANES) + (b & LANES) + ((b >> 16) & LANES);
+    let sum = (pairs & 0xFFFF_FFFF) + (pairs >> 32);
+    (sum as f64 - 4.0 * 65_535.0) / DEVIATION
 }
 
 #[cfg(test)]
@@ -313,17 +331,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_deviates_have_the_moments_of_a_normal_distribution() {
+    fn the_fifth_root_is_exact_to_rounding() {
+        for n in -3000..3000 {
+            let v = 1.07f64.powi(n);
+            let x = fifth_root(v);
+            assert!((x.powi(5) / v - 1.0).abs() < 1e-14, "{v:e}");
+            let times_32 = fifth_root(32.0 * v) / x;
+            assert!((times_32 - 2.0).abs() < 8.0 * f64::EPSILON, "{v:e}: {times_32}");
+        }
+    }
+
+    #[test]
+    fn the_deviates_have_the_moments_of_a_nearly_normal_distribution() {
         for seed in [0, 1, 2, u64::MAX] {
             let n = 200_000;
-            let x: Vec<f64> = (0..n).map(|k| normal_deviate(seed, k)).collect();
+            let x: Vec<f64> = (0..n).map(|k| deviate(seed, k)).collect();
             let moment = |power: i32| x.iter().map(|x| x.powi(power)).sum::<f64>() / n as f64;
             // Five standard errors.
             let error = 5.0 / (n as f64).sqrt();
             assert!(moment(1).abs() < error, "{seed}");
             assert!((moment(2) - 1.0).abs() < error * 2f64.sqrt(), "{seed}");
             assert!(moment(3).abs() < error * 15f64.sqrt(), "{seed}");
-            assert!((moment(4) - 3.0).abs() < error * 96f64.sqrt(), "{seed}");
+            assert!((moment(4) - 2.85).abs() < error * 96f64.sqrt(), "{seed}");
             let next = x.windows(2).map(|x| x[0] * x[1]).sum::<f64>() / n as f64;
             assert!(next.abs() < error, "{seed}");
         }
@@ -331,16 +360,16 @@ mod tests {
 
     #[test]
     fn the_deviates_are_the_same_on_every_platform() {
-        let bits = [(0, 0), (0, 1), (1, 0), (42, 1_000_000)].map(|(seed, n)| normal_deviate(seed, n).to_bits());
-        assert_eq!(bits, BITS);
+        let values = [(0, 0), (0, 1), (1, 0), (42, 1_000_000)].map(|(seed, n)| deviate(seed, n).to_bits());
+        assert_eq!(values, VALUES);
     }
 
-    /// As computed on Linux x86-64.
-    const BITS: [u64; 4] = [
-        13822067420762450554,
-        13828430763993287423,
-        4608649114510895303,
-        4590280571091359939,
+    /// By tests/reference/cavity.py.
+    const VALUES: [u64; 4] = [
+        4607718464952031028,
+        4607358664592858913,
+        4602848668514658691,
+        4611386156192265518,
     ];
 
     #[test]

@@ -79,7 +79,7 @@ impl FastPath {
 
     /// Decides whether it serves.
     pub fn choose(&mut self, rig: &Rig) {
-        self.serves = !self.disabled && !rig.is_forced();
+        self.serves = !self.disabled && !rig.forces.act();
     }
 
     /// What is saved of it.

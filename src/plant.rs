@@ -235,6 +235,8 @@ pub(crate) struct Rig {
     pub rebound: Rebound,
     pub varies: bool,
     pub forces: Forces,
+    /// Whether it varies or forces act.
+    pub is_real: bool,
     /// The primary mass while the particle is free, and both masses while it is stuck.
     pub free: Oscillator,
     pub stuck: Oscillator,
@@ -243,13 +245,15 @@ pub(crate) struct Rig {
 impl From<Parameters> for Rig {
     fn from(p: Parameters) -> Self {
         let total = p.primary_mass + p.particle_mass;
-        let ([plus, minus], rebound) = (p.gaps(), Rebound::new(&p));
+        let ([plus, minus], rebound, forces) = (p.gaps(), Rebound::new(&p), Forces::new(&p));
+        let varies = !rebound.is_constant(p.restitution);
         Self {
             half_width: 0.5 * plus + 0.5 * minus,
             middle: 0.5 * (plus - minus),
-            varies: !rebound.is_constant(p.restitution),
+            varies,
             rebound,
-            forces: Forces::new(&p),
+            forces,
+            is_real: varies || forces.act(),
             parameters: p,
             mass_ratio: p.mass_ratio(),
             law: ImpactLaw::new(&p),
@@ -260,11 +264,6 @@ impl From<Parameters> for Rig {
 }
 
 impl Rig {
-    /// Whether constant forces act: then the particle does not fly straight.
-    pub fn is_forced(&self) -> bool {
-        self.forces.act()
-    }
-
     /// Acceleration of the particle by kinetic friction while `w'` has the sign `direction`, m/s².
     pub fn friction(&self, direction: f64) -> f64 {
         self.forces.kinetic * direction

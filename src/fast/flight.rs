@@ -74,7 +74,7 @@ impl FastPath {
         self.evaluations += 1;
         let expected = (self.cache)
             .expected(&rig.free, &self.coefficients)
-            .and_then(|propagator| arrive(&self.coefficients, propagator, &start))
+            .and_then(|propagator| arrive::<true>(&self.coefficients, propagator, &start))
             .filter(|arrival| start.is_monotone(&start.here, arrival.t.value()));
         let Arrival { t, wall, added, angle } = match expected {
             Some(arrival) => arrival,
@@ -138,7 +138,7 @@ impl FastPath {
             self.drift(moving, dx, left);
             return Some(Next::ContactFree(left));
         }
-        let arrival = arrive(&self.coefficients, propagator, &start)?;
+        let arrival = arrive::<false>(&self.coefficients, propagator, &start)?;
         if start.is_monotone(&start.here, arrival.t.value()) {
             return Some(self.meet(moving, point, &arrival, left, duration));
         }
@@ -446,13 +446,19 @@ impl Arrival {
 
 /// The contact at the wall ahead, if it is so near the time of `propagator` that its digits can be trusted.
 #[inline(always)]
-pub(super) fn arrive(coefficients: &Coefficients, propagator: &Propagator, start: &Start) -> Option<Arrival> {
+pub(super) fn arrive<const FORCED: bool>(
+    coefficients: &Coefficients,
+    propagator: &Propagator,
+    start: &Start,
+) -> Option<Arrival> {
     let (amplitude, here) = (start.base.drive.amplitude, &start.here);
     let wall = Wall::ahead(here.sample.dw);
     let increment = propagator.increment(amplitude, &here.point);
-    let (t, half) = (propagator.t, 0.5 * start.pull);
-    let w = here.sample.w + (increment.y + (start.drift - half * t) * t);
-    let slowness = 1.0 / (here.point.dy + increment.dy + (start.drift - start.pull * t));
+    let (t, half) = (propagator.t, if FORCED { 0.5 * start.pull } else { 0.0 });
+    // Without forces these terms cost nothing.
+    let drift = |rate: f64| if FORCED { start.drift - rate * t } else { start.drift };
+    let w = here.sample.w + (increment.y + drift(half) * t);
+    let slowness = 1.0 / (here.point.dy + increment.dy + drift(start.pull));
     let first = (wall.sign() * start.rig.half_width - w) * slowness;
     // Not a number where the approach has no speed.
     let close = first.abs() < coefficients.near;
