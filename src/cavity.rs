@@ -38,33 +38,30 @@ impl Restitution {
     }
 
     fn validate(self) -> Result<(), InvalidValue> {
-        let unless = InvalidValue::unless;
-        match self {
-            Self::Constant(r) => {
-                let name = "r of a wall (coefficient of restitution)";
-                unless(r > 0.0 && r <= 1.0, name, r, "", "a number above 0 and at most 1")
-            }
-            Self::Viscoelastic(k) => {
-                let name = "k of a wall (viscoelastic restitution)";
-                unless(
-                    (0.0..=1e100).contains(&k),
-                    name,
-                    k,
-                    "(s/m)^(1/5)",
-                    "a number from 0 to 1e100",
-                )
-            }
-            Self::Plastic(v) => {
-                let name = "v_y of a wall (yield speed)";
-                unless(
-                    (1e-100..=1e100).contains(&v),
-                    name,
-                    v,
-                    "m/s",
-                    "a number from 1e-100 to 1e100",
-                )
-            }
-        }
+        let (name, value, unit, (low, high), allowed) = match self {
+            Self::Constant(r) => (
+                "r of a wall (coefficient of restitution)",
+                r,
+                "",
+                (f64::MIN_POSITIVE, 1.0),
+                "a number above 0 and at most 1",
+            ),
+            Self::Viscoelastic(k) => (
+                "k of a wall (viscoelastic restitution)",
+                k,
+                "(s/m)^(1/5)",
+                (0.0, 1e100),
+                "a number from 0 to 1e100",
+            ),
+            Self::Plastic(v) => (
+                "v_y of a wall (yield speed)",
+                v,
+                "m/s",
+                (1e-100, 1e100),
+                "a number from 1e-100 to 1e100",
+            ),
+        };
+        InvalidValue::unless((low..=high).contains(&value), name, value, unit, allowed)
     }
 }
 
@@ -114,40 +111,31 @@ impl Cavity {
         let within = |name, value: f64, unit, (low, high): (f64, f64), allowed| {
             InvalidValue::unless((low..=high).contains(&value), name, value, unit, allowed)
         };
-        for (name, gap) in [
-            ("b_plus (gap to the wall w = b_plus)", self.b_plus),
-            ("b_minus (gap to the wall w = -b_minus)", self.b_minus),
-        ] {
-            if let Some(gap) = gap {
-                within(name, gap, "m", (1e-100, 1e100), "a number from 1e-100 to 1e100")?;
-            }
-        }
-        let right = core::f64::consts::FRAC_PI_2;
+        let (gap, share) = ("a number from 1e-100 to 1e100", "a number from 0 to 1");
+        let (plus, minus) = (
+            "b_plus (gap to the wall w = b_plus)",
+            "b_minus (gap to the wall w = -b_minus)",
+        );
+        within(plus, self.b_plus.unwrap_or(1.0), "m", (1e-100, 1e100), gap)?;
+        within(minus, self.b_minus.unwrap_or(1.0), "m", (1e-100, 1e100), gap)?;
+        let (right, tilt) = (core::f64::consts::FRAC_PI_2, "a number from -pi/2 to pi/2");
+        within("theta (tilt)", self.tilt, "rad", (-right, right), tilt)?;
+        let mu = self.kinetic_friction;
         within(
-            "theta (tilt)",
-            self.tilt,
-            "rad",
-            (-right, right),
-            "a number from -pi/2 to pi/2",
+            "mu_k (kinetic friction)",
+            mu,
+            "",
+            (0.0, 100.0),
+            "a number from 0 to 100",
         )?;
-        let (mu, name) = (self.kinetic_friction, "mu_k (kinetic friction)");
-        within(name, mu, "", (0.0, 100.0), "a number from 0 to 100")?;
-        if let Some(held) = self.static_friction {
-            within(
-                "mu_s (static friction)",
-                held,
-                "",
-                (mu, 100.0),
-                "a number from mu_k to 100",
-            )?;
-        }
+        let (held, allowed) = (self.static_friction.unwrap_or(mu), "a number from mu_k to 100");
+        within("mu_s (static friction)", held, "", (mu, 100.0), allowed)?;
         for law in self.restitution.into_iter().flatten() {
             law.validate()?;
         }
         let name = "r_min (least coefficient of restitution)";
-        within(name, self.least_restitution, "", (0.0, 1.0), "a number from 0 to 1")?;
-        let name = "s (scatter of the restitution)";
-        within(name, self.scatter, "", (0.0, 1.0), "a number from 0 to 1")
+        within(name, self.least_restitution, "", (0.0, 1.0), share)?;
+        within("s (scatter of the restitution)", self.scatter, "", (0.0, 1.0), share)
     }
 }
 
@@ -327,71 +315,5 @@ pub fn deviate(seed: u64, counter: u64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_fifth_root_is_exact_to_rounding() {
-        for n in -3000..3000 {
-            let v = 1.07f64.powi(n);
-            let x = fifth_root(v);
-            assert!((x.powi(5) / v - 1.0).abs() < 1e-14, "{v:e}");
-            let times_32 = fifth_root(32.0 * v) / x;
-            assert!((times_32 - 2.0).abs() < 8.0 * f64::EPSILON, "{v:e}: {times_32}");
-        }
-    }
-
-    #[test]
-    fn the_deviates_have_the_moments_of_a_nearly_normal_distribution() {
-        for seed in [0, 1, 2, u64::MAX] {
-            let n = 200_000;
-            let x: Vec<f64> = (0..n).map(|k| deviate(seed, k)).collect();
-            let moment = |power: i32| x.iter().map(|x| x.powi(power)).sum::<f64>() / n as f64;
-            // Five standard errors.
-            let error = 5.0 / (n as f64).sqrt();
-            assert!(moment(1).abs() < error, "{seed}");
-            assert!((moment(2) - 1.0).abs() < error * 2f64.sqrt(), "{seed}");
-            assert!(moment(3).abs() < error * 15f64.sqrt(), "{seed}");
-            assert!((moment(4) - 2.85).abs() < error * 96f64.sqrt(), "{seed}");
-            let next = x.windows(2).map(|x| x[0] * x[1]).sum::<f64>() / n as f64;
-            assert!(next.abs() < error, "{seed}");
-        }
-    }
-
-    #[test]
-    fn the_deviates_are_the_same_on_every_platform() {
-        let values = [(0, 0), (0, 1), (1, 0), (42, 1_000_000)].map(|(seed, n)| deviate(seed, n).to_bits());
-        assert_eq!(values, VALUES);
-    }
-
-    /// By tests/reference/cavity.py.
-    const VALUES: [u64; 4] = [
-        4607718464952031028,
-        4607358664592858913,
-        4602848668514658691,
-        4611386156192265518,
-    ];
-
-    #[test]
-    fn every_law_is_limited_to_the_allowed_range() {
-        let cavity = Cavity {
-            restitution: [Some(Restitution::Viscoelastic(0.5)), Some(Restitution::Plastic(0.1))],
-            least_restitution: 0.3,
-            ..Cavity::IDEAL
-        };
-        let rebound = Rebound::new(&Parameters { cavity, ..Parameters::dimensionless(0.01, 1.0, 0.6) });
-        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-15, "{a} {b}");
-        near(rebound.mean(Wall::Plus, 1.0), 0.5);
-        near(rebound.mean(Wall::Plus, 1e3), 0.3);
-        near(rebound.mean(Wall::Minus, 0.05), 1.0);
-        near(rebound.mean(Wall::Minus, 1.6), 0.5);
-        near(rebound.mean(Wall::Minus, 1e6), 0.3);
-        for scatter in [0.1, 1.0] {
-            let rebound = Rebound { scatter, ..rebound };
-            for n in 0..1000 {
-                let r = rebound.of_impact(Wall::Plus, 0.2, n);
-                assert!((0.3..=1.0).contains(&r), "{r}");
-            }
-        }
-    }
-}
+#[path = "../tests/unit/cavity.rs"]
+mod tests;
