@@ -13,7 +13,7 @@ mod common;
 
 use std::f64::consts::TAU;
 
-use common::{Failure, Found, STATISTICS, arguments, quantile, scene, statistics, uniform, write};
+use common::{Failure, Found, STATISTICS, arguments, largest_stable, quantile, scene, statistics, uniform, write};
 use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 use vines_model::{
@@ -221,7 +221,7 @@ impl Rig for Imperfect {
 /// Counts the points, the settled ones, those whose truth was not found, and whether tracking ended early.
 fn run(d: Dimensionless, effects: [f64; 6], snr: &str, noise: u64) -> Result<Found, Failure> {
     let [low, high] = advice::stable_range(&d).ok_or("no stable orbit")?;
-    let stable = advice::largest_stable(&d).ok_or("no stable orbit")?;
+    let stable = largest_stable(&d).ok_or("no stable orbit")?;
     let curve = ExactCurve::of(&d);
     let fold = curve.places().first().ok_or("no backbone")?[0];
     let orbits = backbone(&d, &ContinuationLimits::default())

@@ -165,6 +165,10 @@ fn body(scene: &Scene, sections: &[Section]) -> Markup {
             (format!("b = {} m, ω₀ = {:.4} rad/s", p.b, p.omega0))
         }
         "\n"
+        @if let Some(left_out) = scene.left_out() {
+            p { (summary::ideal("Theory, exact orbits and the regime map on this page are", &left_out)) ". The measurements have it." }
+            "\n"
+        }
         section {
             h2 { "What was found" } "\n"
             ul { "\n" @for section in sections { li { (section.finding) } "\n" } }

@@ -81,7 +81,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let loaded = arguments.scene.load()?;
+    let loaded = arguments.scene.load_for("exact orbits are")?;
     let scene = loaded.dimensionless();
     if arguments.periodic {
         return of_the_plant(arguments, &loaded);

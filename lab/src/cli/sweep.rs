@@ -8,7 +8,8 @@ use vines::ArgumentError;
 use vines::sweep::{self, Axis, Estimate, Monitor, Results, Settings, Shard, StoreError, Sweep};
 
 use super::failure::{Failure, INTERRUPTED, stop_flag};
-use super::{options::SceneArguments, output::progress_bar};
+use super::options::{SceneArguments, warn_left_out};
+use super::output::progress_bar;
 
 const HELP: &str = "\
 Axes; a key is sigma (the detuning), section.key of a scene, or G and r for excitation.G and plant.r:
@@ -114,6 +115,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         adaptive: arguments.adaptive,
     };
     let sweep = Sweep::new(arguments.scene.family()?, settings).map_err(Failure::input)?;
+    warn_left_out(
+        sweep.scene(),
+        "regimes, responses and exact orbits of a sweep (not its locked points) are",
+    );
     if !arguments.merge.is_empty() {
         return merge(&sweep, arguments);
     }

@@ -176,6 +176,9 @@ fn describe_lock(section: &mut Section, result: &Comparison) {
         "The locked point. σ: detuning, C: amplitude of v over b, B: particle speed over b ω₀.",
         Table::new(" | σ | C | B").rows(rows),
     );
+    if let Some(friction) = &lock.friction {
+        section.words(format!("Friction: {}.", summary::friction_text(friction)));
+    }
 }
 
 /// The backbone tracked with the loop closed, level by level.

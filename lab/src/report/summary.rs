@@ -2,7 +2,7 @@
 
 use super::table::{Table, row, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
-use crate::identification::{DecayEnd, Measured, Regime};
+use crate::identification::{DecayEnd, Friction, Measured, Regime};
 use crate::scene::{Definition, Dimensionless, Sensor};
 use crate::sweep::Map;
 
@@ -77,6 +77,12 @@ pub fn identification(result: &Comparison) -> String {
         table.text(),
     );
     let mut note = |note: &str| text += &format!("  ({note})\n");
+    if let Some(friction) = lock.friction {
+        note(&friction_text(&friction));
+    }
+    if let Some(left_out) = &result.left_out {
+        note(&ideal("theory and exact orbits are", left_out));
+    }
     if result.exact.is_none() && result.theory.is_none() {
         note("theory and exact orbits are for phase resonance, -90 degrees; there is none to compare with");
     }
@@ -100,6 +106,20 @@ pub fn identification(result: &Comparison) -> String {
         note("the nearest exact orbit is unstable under a constant drive and frequency; the loop holds it");
     }
     format!("{text}\n{}\n{}\n", decay(result), agreement(result))
+}
+
+/// That `results` of the ideal cavity leave something out.
+pub fn ideal(results: &str, left_out: &str) -> String {
+    format!("{results} of the ideal cavity, without {left_out}")
+}
+
+/// What friction did, as a sentence.
+pub fn friction_text(friction: &Friction) -> String {
+    let Friction { sticks_per_period, stuck_time, loss } = friction;
+    format!(
+        "per period of the hold, the particle stuck to the floor {sticks_per_period:.3} times, for {stuck_time:.3e} s in all, and friction \
+         took {loss:.3e} J"
+    )
 }
 
 fn decay(result: &Comparison) -> String {
@@ -184,6 +204,10 @@ pub fn tracked(result: &TrackedComparison) -> String {
             worst.at_equal_c, worst.nearest
         )
     });
+    let worst = match &result.left_out {
+        Some(left_out) => format!("{worst}({})\n", ideal("the exact backbone is", left_out)),
+        None => worst,
+    };
     format!(
         "{}\n\n{}\n{} points in {:.0} periods, {:.1} of which before the loop held the response: {:.1} periods per point\n{worst}",
         rig(&result.parameters),

@@ -384,7 +384,7 @@ impl Sweep {
     pub(crate) fn description(&self) -> Value {
         let axes: Vec<String> = self.settings.axes.iter().map(Axis::to_string).collect();
         let scene = serde_json::to_value(&self.scene).unwrap_or_default();
-        json!({
+        let mut description = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "scene": scene,
             "sigma": self.sigma(),
@@ -395,7 +395,11 @@ impl Sweep {
             "results": self.settings.results.names(),
             "chunk": self.chunk,
             "adaptive": self.settings.adaptive,
-        })
+        });
+        if let Some(left_out) = self.scene.left_out() {
+            description["left_out_of_regime_response_orbits"] = left_out.into();
+        }
+        description
     }
 }
 
