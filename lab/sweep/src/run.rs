@@ -112,46 +112,30 @@ fn count(sweep: &Sweep, store: &Store, shard: Shard, monitor: &Monitor) -> u64 {
     monitor.found.load(Relaxed)
 }
 
-/// Collects the chunks of other stores of the same sweep, and computes those again that are damaged in all of them. Returns the number of
-/// cells that are still missing.
+/// Copies the chunks that the store in `folder` does not have, or whose files are damaged, from other stores of the same sweep; [`run`] computes
+/// those that none of them has.
 ///
 /// # Errors
 /// A folder that cannot be used, or a store of another sweep.
-pub fn merge(sweep: &Sweep, folder: &Path, from: &[PathBuf], monitor: &Monitor) -> Result<u64, StoreError> {
+pub fn collect(sweep: &Sweep, folder: &Path, from: &[PathBuf], monitor: &Monitor) -> Result<(), StoreError> {
     let sources = from
         .iter()
         .map(|one| Store::existing(sweep, one))
         .collect::<Result<Vec<_>, _>>()?;
     let store = Store::open(sweep, folder, Shard::ALL, monitor)?;
-    let mut missing = 0;
     for index in (0..sweep.chunks()).map(|n| sweep.chunk_index(n)) {
-        let mut damaged = match store.chunk(&index, monitor) {
-            Chunk::Complete(_) => continue,
-            Chunk::Damaged => true,
-            Chunk::Absent => false,
-        };
+        if matches!(store.chunk(&index, monitor), Chunk::Complete(_)) {
+            continue;
+        }
         let undamaged = sources.iter().find_map(|source| match source.chunk(&index, monitor) {
             Chunk::Complete(files) => Some(files),
-            Chunk::Damaged => {
-                damaged = true;
-                None
-            }
-            Chunk::Absent => None,
+            Chunk::Damaged | Chunk::Absent => None,
         });
-        match undamaged {
-            Some(files) => store.copy(&index, &files)?,
-            None if damaged => {
-                if let Some(cells) = chunk(sweep, &index, monitor) {
-                    store.write(&index, &cells)?;
-                }
-            }
-            None => missing += sweep.chunk_cells(&index),
+        if let Some(files) = undamaged {
+            store.copy(&index, &files)?;
         }
     }
-    if missing == 0 {
-        store.tidy()?;
-    }
-    Ok(missing)
+    Ok(())
 }
 
 /// All cells of a chunk; None if it was stopped.

@@ -70,7 +70,7 @@ pub enum DriveCondition {
 pub enum NoMotion {
     #[error(transparent)]
     Invalid(#[from] InvalidValue),
-    #[error("with a scatter of the restitution (s = {0}) no motion is periodic: set s to 0")]
+    #[error("with a scatter of the restitution, here {0}, no motion is periodic: set it to 0 (r_scatter in a scene)")]
     Scatter(f64),
     #[error(
         "periodic motions with effects of the cavity are found at phase resonance, not at the peak of the response"
