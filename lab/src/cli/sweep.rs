@@ -226,7 +226,7 @@ fn watched(
             }
             let computed = monitor.computed.load(Relaxed);
             if computed > 0 && !started {
-                // The rate is that of the cells computed now.
+                // The rate counts only cells that are computed now.
                 started = true;
                 bar.set_position(monitor.found.load(Relaxed));
                 bar.reset_eta();

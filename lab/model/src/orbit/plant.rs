@@ -6,7 +6,7 @@
 //! sticks later: the map then loses rank, but the map minus the identity does not.
 //!
 //! The first harmonic of the particle is integrated by Gauss's rule from event to event, where the motion is analytic. With it, the balance of
-//! momentum gives that of the primary mass: `(k - M omega² + i c omega) Q1 = (k + i c omega) E + m omega² Q2`.
+//! momentum gives the harmonic of the primary mass: `(k - M omega² + i c omega) Q1 = (k + i c omega) E + m omega² Q2`.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
