@@ -7,7 +7,7 @@ use crate::fast::Next;
 use crate::flight::{Flight, FlightEnd, Grip, until_released};
 use crate::oscillator::Oscillator;
 use crate::parameters::InvalidValue;
-use crate::plant::{Contact, Event, MOST_EVALUATIONS, MOST_IMPACTS, Masses, Outcome, Plant, Rig};
+use crate::plant::{Contact, Event, MOST_EVALUATIONS, MOST_IMPACTS, Masses, Outcome, Plant};
 use crate::segment::Segment;
 
 /// Largest number of releases per step: rounding can tear a particle off its wall again and again where values are extreme.
@@ -243,7 +243,7 @@ impl Plant {
     /// Sign of the relative velocity `w'` from now on while the particle slides; 0 where static friction holds it, and where there is no
     /// friction.
     pub(crate) fn direction(&self) -> f64 {
-        let Rig { forces, mass_ratio, .. } = &self.moving.rig;
+        let forces = &self.moving.rig.forces;
         let masses = &self.moving.masses;
         if forces.holding == 0.0 {
             return 0.0;
@@ -251,15 +251,8 @@ impl Plant {
         if masses.dw != 0.0 {
             return 1f64.copysign(masses.dw);
         }
-        // The acceleration that the particle needs to follow the primary mass, times (M + m)/M.
         let velocity = masses.primary.values[1];
-        let needed = self.acceleration(velocity) - forces.gravity;
-        let holding = (1.0 + mass_ratio) * (forces.holding + self.acceleration_error(velocity));
-        if needed.abs() <= holding {
-            0.0
-        } else {
-            1f64.copysign(needed)
-        }
+        forces.slips((self.acceleration(velocity), self.acceleration_error(velocity)))
     }
 
     /// Both masses move as one for at most `left` seconds, until the particle is released; then it goes on. The release is not
@@ -267,10 +260,7 @@ impl Plant {
     fn stay(&mut self, contact: Contact, left: f64, step: &mut Step<impl FnMut(Event)>) {
         let rig = &self.moving.rig;
         let start = self.moving.masses.primary.values;
-        let wall = match contact {
-            Contact::Wall(wall) => Some(wall),
-            Contact::Floor => None,
-        };
+        let wall = contact.wall();
         let forces = &rig.forces;
         let noise = self.acceleration_error(start[1]);
         let base = rig.pushed(self.moving.base, forces.gravity);
@@ -395,39 +385,14 @@ impl Plant {
     }
 
     /// Whether a particle that leaves `wall` at `speed` is in truth at rest on it, with constant forces and a restitution that varies.
-    ///
-    /// On its way from the wall and back the particle has the accelerations `up` and `down` towards the wall: friction adds to the
-    /// first and takes from the second. A hop lasts `u/up + u/sqrt(up down)`, and the particle comes back at `u sqrt(down/up)`. Hops
-    /// therefore die out as those under one acceleration and a smaller coefficient of restitution do. Where friction stops the
-    /// particle before it comes back, there is one hop only.
     fn rests(&self, wall: Wall, primary: f64, speed: f64, resolution: &Resolution) -> bool {
         let rig = &self.moving.rig;
-        let joint = 1.0 + rig.mass_ratio;
-        let largest = self.acceleration_bound(primary) + joint * rig.forces.size();
+        let largest = self.acceleration_bound(primary) + rig.forces.joint * rig.forces.size();
         if rig.law.resting_with(1.0).certainly_leaves(speed, largest, resolution) {
             return false;
         }
-        let (free, error) = self.pressing(wall, primary);
-        let pressing = free - wall.sign() * rig.forces.gravity;
-        let (up, down) = (
-            pressing + joint * rig.forces.kinetic,
-            pressing - joint * rig.forces.kinetic,
-        );
-        if speed == 0.0 {
-            return pressing + joint * rig.forces.holding >= -error;
-        }
-        if up <= 0.0 {
-            return false;
-        }
-        let (mean, back) = if down > 0.0 && pressing > joint * rig.forces.holding {
-            (2.0 / (1.0 / up + 1.0 / libm::sqrt(up * down)), libm::sqrt(down / up))
-        } else {
-            (up, 0.0)
-        };
-        let restitution = back * rig.rebound.mean(wall, speed * back);
-        rig.law
-            .resting_with(restitution)
-            .rests(speed, (mean, error), resolution)
+        let pressing = self.pressing(wall, primary);
+        (rig.rebound).rests(&rig.law, &rig.forces, (wall, speed), pressing, resolution)
     }
 
     /// Acceleration of `wall` towards a particle without acceleration while the primary mass moves alone, and its rounding error, m/s².

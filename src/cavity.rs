@@ -9,7 +9,7 @@
 //! All these forces are constant between events. A constant force `F` on the oscillator moves its equilibrium by `F/k`, as a base
 //! displaced by `F/k` does; the particle's flight is a parabola. The closed form therefore stays.
 
-use crate::contact::Wall;
+use crate::contact::{ImpactLaw, Resolution, Wall};
 use crate::parameters::{InvalidValue, Parameters};
 
 /// Standard gravity, m/s².
@@ -159,38 +159,69 @@ impl Default for Cavity {
 }
 
 /// Constant accelerations of the particle, m/s².
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Forces {
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Forces {
     /// By gravity along the axis, `a_g`.
     pub gravity: f64,
     /// By kinetic friction, `mu_k g_n`.
     pub kinetic: f64,
     /// The largest by static friction, `mu_s g_n`; 0 where there is no friction.
     pub holding: f64,
+    /// Relative acceleration per acceleration of the particle by friction, `1 + m/M`: the opposite force acts on the primary mass.
+    pub joint: f64,
 }
 
 impl Forces {
-    pub fn new(cavity: &Cavity) -> Self {
-        let (sin, cos) = libm::sincos(cavity.tilt);
+    /// The accelerations that follow from the parameters.
+    pub fn new(p: &Parameters) -> Self {
+        let (sin, cos) = libm::sincos(p.cavity.tilt);
         // A vertical floor carries nothing: the cosine of the nearest double to pi/2 is 6e-17.
         let normal = if cos < f64::EPSILON { 0.0 } else { GRAVITY * cos };
-        let held = cavity.static_friction.unwrap_or(cavity.kinetic_friction);
+        let held = p.cavity.static_friction.unwrap_or(p.cavity.kinetic_friction);
         Self {
             gravity: GRAVITY * sin,
-            kinetic: cavity.kinetic_friction * normal,
+            kinetic: p.cavity.kinetic_friction * normal,
             holding: held * normal,
+            joint: 1.0 + p.mass_ratio(),
         }
+    }
+
+    /// Whether any acts: then the particle does not fly straight.
+    pub fn act(&self) -> bool {
+        self.gravity != 0.0 || self.holding != 0.0
     }
 
     /// The size of all.
     pub fn size(&self) -> f64 {
         self.gravity.abs() + self.holding
     }
+
+    /// Sign of the relative velocity `w'` of a particle that slides from `w' = 0` on; 0 where static friction holds it. `acceleration`
+    /// is that of the primary mass while it moves alone and without friction, with its rounding error, m/s².
+    pub fn slips(&self, (acceleration, error): (f64, f64)) -> f64 {
+        let needed = acceleration - self.gravity;
+        if needed.abs() <= self.joint * (self.holding + error) {
+            0.0
+        } else {
+            1f64.copysign(needed)
+        }
+    }
+
+    /// Accelerations of `wall` towards a particle that moves away from it, and towards one that comes back, m/s²: friction adds to the
+    /// first and takes from the second. `free` is the acceleration towards a particle without any.
+    pub fn pressing(&self, wall: Wall, free: f64) -> (f64, f64) {
+        let pressing = free - wall.sign() * self.gravity;
+        (
+            pressing + self.joint * self.kinetic,
+            pressing - self.joint * self.kinetic,
+        )
+    }
 }
 
 /// The coefficient of restitution of every impact.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rebound {
+pub struct Rebound {
     laws: [Restitution; 2],
     least: f64,
     scatter: f64,
@@ -198,6 +229,7 @@ pub(crate) struct Rebound {
 }
 
 impl Rebound {
+    /// The coefficients that follow from the parameters.
     pub fn new(p: &Parameters) -> Self {
         let Cavity { restitution, least_restitution, scatter, seed, .. } = p.cavity;
         let laws = restitution.map(|law| law.unwrap_or(Restitution::Constant(p.restitution)));
@@ -221,6 +253,37 @@ impl Rebound {
             return mean;
         }
         (mean * (1.0 + self.scatter * normal_deviate(self.seed, number))).clamp(self.least, 1.0)
+    }
+
+    /// Whether a particle that leaves a wall at a speed (m/s) is in truth at rest on it, as [`ImpactLaw::rests`] has it for one constant
+    /// acceleration. `free` is the acceleration of the wall towards a particle without any, with its rounding error, m/s².
+    ///
+    /// A hop up under one acceleration and down under another lasts `u/up + u/sqrt(up down)`, and the particle comes back at
+    /// `u sqrt(down/up)`. Hops therefore die out as those under the mean acceleration and a smaller coefficient of restitution do.
+    /// Where friction stops the particle before it comes back, there is one hop only.
+    pub fn rests(
+        &self,
+        law: &ImpactLaw,
+        forces: &Forces,
+        (wall, speed): (Wall, f64),
+        (free, error): (f64, f64),
+        resolution: &Resolution,
+    ) -> bool {
+        let ((up, down), held) = (forces.pressing(wall, free), forces.joint * forces.holding);
+        let pressing = free - wall.sign() * forces.gravity;
+        if speed == 0.0 {
+            return pressing + held >= -error;
+        }
+        if up <= 0.0 {
+            return false;
+        }
+        let (mean, back) = if down > 0.0 && pressing > held {
+            (2.0 / (1.0 / up + 1.0 / libm::sqrt(up * down)), libm::sqrt(down / up))
+        } else {
+            (up, 0.0)
+        };
+        law.resting_with(back * self.mean(wall, speed * back))
+            .rests(speed, (mean, error), resolution)
     }
 }
 

@@ -160,10 +160,7 @@ impl Plant {
 
     /// The wall the particle is stuck to, if it is.
     pub fn contact(&self) -> Option<Wall> {
-        match self.contact {
-            Some(Contact::Wall(wall)) => Some(wall),
-            _ => None,
-        }
+        self.contact.and_then(Contact::wall)
     }
 
     /// Whether the particle sticks to the floor inside the cavity.
@@ -252,7 +249,7 @@ impl From<Parameters> for Rig {
             middle: 0.5 * (plus - minus),
             varies: !rebound.is_constant(p.restitution),
             rebound,
-            forces: Forces::new(&p.cavity),
+            forces: Forces::new(&p),
             parameters: p,
             mass_ratio: p.mass_ratio(),
             law: ImpactLaw::new(&p),
@@ -265,7 +262,7 @@ impl From<Parameters> for Rig {
 impl Rig {
     /// Whether constant forces act: then the particle does not fly straight.
     pub fn is_forced(&self) -> bool {
-        self.forces != Forces::default()
+        self.forces.act()
     }
 
     /// Acceleration of the particle by kinetic friction while `w'` has the sign `direction`, m/s².
@@ -292,11 +289,21 @@ impl Rig {
 /// What a particle at rest relative to the primary mass is held by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) enum Contact {
+pub enum Contact {
     /// A wall, which pushes, and friction.
     Wall(Wall),
     /// Friction alone.
     Floor,
+}
+
+impl Contact {
+    /// The wall, if it is one.
+    pub fn wall(self) -> Option<Wall> {
+        match self {
+            Self::Wall(wall) => Some(wall),
+            Self::Floor => None,
+        }
+    }
 }
 
 /// Displacements and velocities of both masses.

@@ -1,10 +1,9 @@
 //! Are tracked points right on rigs with effects that no part of the bench models?
 //!
-//! The rig has one effect at a time, or all of a real cavity: friction of the particle, unequal gaps, tilt, and a restitution that falls with the
-//! speed, which the plant has; a shaker that lags and distorts, and a structure whose spring hardens, for which there is a simulation here
-//! (Runge-Kutta of the fourth order, impacts located by bisection). The client has the scene of the ideal rig, and reads its sensors only. The
-//! truth is the periodic motion of the same rig at phase resonance and the measured amplitude, by Newton's method. Rigs are drawn as in
-//! `off_scene.rs`.
+//! The rig has one effect at a time, or all of a real cavity: friction of the particle, unequal gaps, tilt and a restitution that falls with the
+//! speed, which the plant has; a shaker that lags and distorts, and a structure whose spring hardens, which are simulated here (Runge-Kutta of
+//! the fourth order, impacts located by bisection). The client has the scene of the ideal rig, and reads its sensors only. The truth is the
+//! periodic motion of the same rig at phase resonance and the measured amplitude, by Newton's method. Rigs are drawn as in `off_scene.rs`.
 //!
 //! ```sh
 //! cargo run --release -p vines-testbench --example unmodelled -- RIGS SEED SNR    # SNR: dB, or none; writes validation/unmodelled.csv
@@ -14,20 +13,20 @@ mod common;
 
 use std::f64::consts::TAU;
 
-use common::{Failure, Found, STATISTICS, arguments, quantile, scene, statistics, uniform, write};
-use lovines::{Cavity, Parameters, Plant, Restitution, cavity::GRAVITY};
+use common::{Failure, Found, STATISTICS, arguments, largest_stable, quantile, scene, statistics, uniform, write};
+use lovines::{Cavity, Parameters, Restitution, cavity::GRAVITY};
 use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 use vines_model::{
     Dimensionless,
-    orbit::{ContinuationLimits, Periodic, backbone},
+    orbit::{ContinuationLimits, Periodic, backbone, resonant_motion},
 };
 use vines_testbench::{
     advice,
     backbone::{Point, track},
     comparison::ExactCurve,
     identification::Regime,
-    rig::{BuiltIn, Chain, Drive, Rig, RigError, Sensors},
+    rig::{BuiltIn, Chain, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated},
     scene::LinearResponse,
 };
 
@@ -41,9 +40,11 @@ const EFFECTS: [&str; 7] = [
     "shaker",
     "hardening spring",
 ];
-/// Largest sizes: friction and tilt over `b omega0²` (0.05 and 3 degrees on the default rig) and half of the difference of the gaps over b;
-/// whether r = 1 - k |v|^(1/5), with the r of the scene at the usual relative speed 2; lag of the base, rad, and share of its harmonics, and the
-/// cubic part of the spring at b.
+/// Number of effects of the cavity.
+const CAVITY: usize = 4;
+/// Largest sizes: friction and tilt over `b omega0²` (0.05 and 3 degrees on the default rig), half of the difference of the gaps over b, a switch
+/// (r = 1 - k |v|^(1/5), with the r of the scene at the relative speed 2, the usual one of a 1:1 motion); lag of the base, rad, and share of its
+/// harmonics, and the cubic part of the spring at b.
 const SIZES: [f64; 6] = [0.015, 0.05, 0.015, 1.0, 0.05, 0.003];
 /// Steps of the simulation per period of the base, about.
 const STEPS: f64 = 400.0;
@@ -53,67 +54,27 @@ const CHATTER: f64 = 1e-5;
 /// (q1, q1', q2, q2'), with M = k = b = 1.
 type State = [f64; 4];
 
-/// A rig that can be started anywhere.
-trait Motion: Sized {
-    /// The motion of `scene` with the effects, in the units of [`SIZES`], from `state` at the phase 0 of the drive; `None` for a particle
-    /// outside its cavity.
-    fn start(scene: &Dimensionless, effects: [f64; 6], state: State, drive: Drive) -> Option<Self>;
-    fn drive(&mut self, drive: Drive);
-    /// Follows the motion for `duration`, over 1/omega0.
-    fn follow(&mut self, duration: f64);
-    fn state(&self) -> State;
-    fn base(&self) -> f64;
-}
-
-/// The plant, with a real cavity.
-struct RealCavity {
-    plant: Plant,
-    drive: Drive,
-}
-
-impl Motion for RealCavity {
-    fn start(scene: &Dimensionless, effects: [f64; 6], [q1, dq1, q2, dq2]: State, drive: Drive) -> Option<Self> {
-        let [friction, gaps, tilt, speed, ..] = effects;
-        let viscoelastic = Restitution::Viscoelastic((1.0 - scene.r) / 2_f64.powf(0.2));
-        let cavity = Cavity {
-            b_plus: Some(1.0 + gaps),
-            b_minus: Some(1.0 - gaps),
-            // In SI units gravity is 9.8 b omega0² here.
-            tilt: (tilt / GRAVITY).asin(),
-            kinetic_friction: friction / GRAVITY,
-            restitution: [(speed == 1.0).then_some(viscoelastic); 2],
-            ..Cavity::IDEAL
-        };
-        let parameters = Parameters::dimensionless(scene.epsilon, scene.lambda, scene.r);
-        let start = lovines::State { q1, dq1, q2, dq2 };
-        let plant = Plant::new(Parameters { cavity, ..parameters }, start).ok()?;
-        Some(Self { plant, drive })
-    }
-
-    fn drive(&mut self, drive: Drive) {
-        self.drive = drive;
-    }
-
-    fn follow(&mut self, duration: f64) {
-        let Drive { amplitude, omega, .. } = self.drive;
-        let drive = lovines::Drive::harmonic(amplitude, omega);
-        self.plant.advance(drive, duration).expect("a drive within its limits");
-    }
-
-    fn state(&self) -> State {
-        let lovines::State { q1, dq1, q2, dq2 } = self.plant.state();
-        [q1, dq1, q2, dq2]
-    }
-
-    fn base(&self) -> f64 {
-        self.plant.base_displacement()
-    }
+/// The plant with effects of the cavity, in the units of [`SIZES`].
+fn real_cavity(scene: &Dimensionless, [friction, gaps, tilt, speed]: [f64; CAVITY]) -> Parameters {
+    let viscoelastic = Restitution::Viscoelastic((1.0 - scene.r) / 2_f64.powf(0.2));
+    let cavity = Cavity {
+        b_plus: Some(1.0 + gaps),
+        b_minus: Some(1.0 - gaps),
+        // Gravity is 9.8 b omega0² here.
+        tilt: (tilt / GRAVITY).asin(),
+        kinetic_friction: friction / GRAVITY,
+        restitution: [(speed != 0.0).then_some(viscoelastic); 2],
+        ..Cavity::IDEAL
+    };
+    let ideal = Parameters::dimensionless(scene.epsilon, scene.lambda, scene.r);
+    Parameters { cavity, ..ideal }
 }
 
 /// A rig with another shaker and another spring.
+#[derive(Clone, Copy)]
 struct Imperfect {
     scene: Dimensionless,
-    /// Of the shaker and of the spring.
+    /// Of the shaker and of the spring, in the units of [`SIZES`].
     effects: [f64; 2],
     state: State,
     /// Phase of the command, rad.
@@ -123,7 +84,7 @@ struct Imperfect {
 
 impl Imperfect {
     /// Displacement and velocity of the base at a phase of the command.
-    fn base_at(&self, phase: f64) -> [f64; 2] {
+    fn base(&self, phase: f64) -> [f64; 2] {
         let (lag, Drive { omega, amplitude, .. }) = (self.effects[0], self.drive);
         let parts = [(1.0, 1.0), (2.0, 0.5 * lag), (3.0, 0.5 * lag)].map(|(n, share)| {
             let (sine, cosine) = (n * (phase - lag)).sin_cos();
@@ -134,7 +95,7 @@ impl Imperfect {
 
     fn derivative(&self, [q1, dq1, _, dq2]: State, phase: f64) -> State {
         let Dimensionless { epsilon, lambda, .. } = self.scene;
-        let [e, de] = self.base_at(phase);
+        let [e, de] = self.base(phase);
         let spring = (q1 - e) + self.effects[1] * (q1 - e).powi(3);
         [dq1, -spring - epsilon * lambda * (dq1 - de), dq2, 0.0]
     }
@@ -159,32 +120,8 @@ impl Imperfect {
         let kick = (1.0 + r) * (dq1 - dq2) / (1.0 + epsilon);
         [q1, dq1 - epsilon * kick, q2, dq2 + kick]
     }
-}
 
-impl Motion for Imperfect {
-    fn start(scene: &Dimensionless, effects: [f64; 6], state: State, drive: Drive) -> Option<Self> {
-        let [.., shaker, spring] = effects;
-        Some(Self {
-            scene: *scene,
-            effects: [shaker, spring],
-            state,
-            phase: 0.0,
-            drive,
-        })
-    }
-
-    fn drive(&mut self, drive: Drive) {
-        self.drive = drive;
-    }
-
-    fn state(&self) -> State {
-        self.state
-    }
-
-    fn base(&self) -> f64 {
-        self.base_at(self.phase)[0]
-    }
-
+    /// Follows the motion for `duration`, over 1/omega0.
     fn follow(&mut self, duration: f64) {
         let steps = (duration * self.drive.omega * STEPS / TAU).ceil().max(1.0);
         for _ in 0..steps as usize {
@@ -210,43 +147,34 @@ impl Motion for Imperfect {
             }
         }
     }
-}
 
-/// A rig of a scene with effects, in the units of [`SIZES`].
-#[derive(Clone, Copy)]
-struct Case {
-    scene: Dimensionless,
-    effects: [f64; 6],
-}
-
-impl Case {
-    fn response(&self, [q1, _, q2, _]: State) -> f64 {
-        q1 + self.scene.epsilon * q2
+    fn response(&self) -> f64 {
+        self.state[0] + self.scene.epsilon * self.state[2]
     }
 
     /// Residual of the periodic motion at phase resonance with the amplitude `c`; `x`: state at the phase 0, E and omega.
-    fn residual<M: Motion>(&self, x: &Vector6<f64>, c: f64) -> Option<Vector6<f64>> {
+    fn residual(&self, x: &Vector6<f64>, c: f64) -> Vector6<f64> {
         let drive = Drive { amplitude: x[4], omega: x[5], ..Drive::default() };
-        let mut rig = M::start(&self.scene, self.effects, [x[0], x[1], x[2], x[3]], drive)?;
+        let mut rig = Self { state: [x[0], x[1], x[2], x[3]], phase: 0.0, drive, ..*self };
         let samples = 64;
         let (mut response, mut base) = ([0.0; 2], [0.0; 2]);
-        for n in 0..samples {
-            let (sine, cosine) = (TAU * f64::from(n) / f64::from(samples)).sin_cos();
-            // The plant's base is where the last drive left it: at the start, at 0, as that of this drive.
-            let [v, e] = [self.response(rig.state()), rig.base()].map(|value| 2.0 / f64::from(samples) * value);
+        for _ in 0..samples {
+            let (sine, cosine) = rig.phase.sin_cos();
+            let [v, e] = [rig.response(), rig.base(rig.phase)[0]].map(|value| 2.0 / f64::from(samples) * value);
             response = [response[0] + v * cosine, response[1] - v * sine];
             base = [base[0] + e * cosine, base[1] - e * sine];
             rig.follow(TAU / drive.omega / f64::from(samples));
         }
+        let end = rig.state;
         // In phase resonance the response lags the base by a quarter of a period.
         let across = (response[0] * base[0] + response[1] * base[1]) / base[0].hypot(base[1]);
-        let end = rig.state();
-        let [a, b, p, q]: State = std::array::from_fn(|n| end[n] - x[n]);
-        Some([a, b, p, q, response[0].hypot(response[1]) - c, across].into())
+        let closing: [f64; 4] = std::array::from_fn(|n| end[n] - x[n]);
+        let [a, b, p, q] = closing;
+        [a, b, p, q, response[0].hypot(response[1]) - c, across].into()
     }
 
     /// `[sigma, G]` of phase resonance at the amplitude `c`, near `sigma`: from an exact orbit of the ideal rig, by effects that grow step by step.
-    fn truth<M: Motion>(&self, orbits: &[Periodic], c: f64, sigma: f64) -> Option<[f64; 2]> {
+    fn truth(&self, orbits: &[Periodic], c: f64, sigma: f64) -> Option<[f64; 2]> {
         // The start of Newton's method only.
         let distance = |one: &Periodic| (one.c - c).hypot(one.sigma - sigma);
         let orbit = orbits.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
@@ -255,22 +183,20 @@ impl Case {
         let mut x = Vector6::from([q1, dq1, q2, dq2, epsilon * orbit.g, 1.0 + epsilon * orbit.sigma]);
         for grown in 0..=8 {
             let effects = self.effects.map(|effect| effect * f64::from(grown) / 8.0);
-            // The middle of the cavity moves with its gaps.
-            x[2] -= if grown > 0 { self.effects[1] / 8.0 } else { 0.0 };
-            x = Self { effects, ..*self }.newton::<M>(x, c)?;
+            x = Self { effects, ..*self }.newton(x, c)?;
         }
         Some([(x[5] - 1.0) / epsilon, x[4] / epsilon])
     }
 
-    fn newton<M: Motion>(&self, mut x: Vector6<f64>, c: f64) -> Option<Vector6<f64>> {
+    fn newton(&self, mut x: Vector6<f64>, c: f64) -> Option<Vector6<f64>> {
         for _ in 0..12 {
-            let now = self.residual::<M>(&x, c)?;
+            let now = self.residual(&x, c);
             let mut matrix = Matrix6::zeros();
             for n in 0..6 {
                 let h = 1e-7 * if n == 4 { self.scene.epsilon } else { 1.0 };
                 let [mut up, mut down] = [x; 2];
                 (up[n], down[n]) = (x[n] + h, x[n] - h);
-                let column = (self.residual::<M>(&up, c)? - self.residual::<M>(&down, c)?) / (2.0 * h);
+                let column = (self.residual(&up, c) - self.residual(&down, c)) / (2.0 * h);
                 matrix.set_column(n, &column);
             }
             let change = matrix.lu().solve(&now)?;
@@ -286,29 +212,25 @@ impl Case {
     }
 }
 
-/// A rig of a case, whose sensor reads the response.
-struct Driven<M>(Case, M);
-
-impl<M: Motion> Rig for Driven<M> {
+impl Rig for Imperfect {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         Ok(Sensors {
-            response: self.0.response(self.1.state()),
-            reference: Some(self.1.base()),
+            response: self.response(),
+            reference: Some(self.base(self.phase)[0]),
         })
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.1.drive(drive);
-        self.1.follow(step);
+        self.drive = drive;
+        self.follow(step);
         Ok(())
     }
 }
 
 /// Counts the points, the settled ones, those whose truth was not found, and whether tracking ended early.
-fn run<M: Motion + 'static>(case: Case, snr: &str, noise: u64) -> Result<Found, Failure> {
-    let d = case.scene;
+fn run(d: Dimensionless, effects: [f64; 6], snr: &str, noise: u64) -> Result<Found, Failure> {
     let [low, high] = advice::stable_range(&d).ok_or("no stable orbit")?;
-    let stable = advice::largest_stable(&d).ok_or("no stable orbit")?;
+    let stable = largest_stable(&d).ok_or("no stable orbit")?;
     let curve = ExactCurve::of(&d);
     let fold = curve.places().first().ok_or("no backbone")?[0];
     let orbits = backbone(&d, &ContinuationLimits::default())
@@ -332,9 +254,30 @@ fn run<M: Motion + 'static>(case: Case, snr: &str, noise: u64) -> Result<Found, 
     let mut scene = scene("[plant]\n[start]\n[excitation]\n", &settings)?;
     // As a loop check measures it.
     scene.measured = Some(LinearResponse::of(&scene));
-    let drive = Drive { omega: 1.0, ..Drive::default() };
-    let rig = M::start(&d, case.effects, [0.0, 0.0, 0.0, 0.9], drive).ok_or("a start outside the cavity")?;
-    let mut chain = Chain::around(Box::new(Driven(case, rig)), &scene);
+    let [friction, gaps, tilt, speed, shaker, spring] = effects;
+    let parameters = real_cavity(&d, [friction, gaps, tilt, speed]);
+    let imperfect = Imperfect {
+        scene: d,
+        effects: [shaker, spring],
+        state: [0.0, 0.0, 0.0, 0.9],
+        phase: 0.0,
+        drive: Drive { omega: 1.0, ..Drive::default() },
+    };
+    let is_simulated_here = imperfect.effects != [0.0; 2];
+    let rig: Box<dyn Rig> = if is_simulated_here {
+        Box::new(imperfect)
+    } else {
+        let start = lovines::State { dq2: 0.9, ..Default::default() };
+        Box::new(SensorsOnly::around(Box::new(Simulated::new(parameters, start)?)))
+    };
+    let truth = |c: f64, sigma: f64| {
+        if is_simulated_here {
+            return imperfect.truth(&orbits, c, sigma);
+        }
+        let motion = resonant_motion(&parameters, d.definition, c, None).ok()?;
+        Some([d.sigma(motion.omega), d.excitation(motion.amplitude)])
+    };
+    let mut chain = Chain::around(rig, &scene);
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let tracked = track(chain.as_mut(), &mut controller, &scene, |_, _| {})?;
     let is_backbone = |regime| matches!(regime, Regime::Symmetric | Regime::Unresolved);
@@ -342,7 +285,7 @@ fn run<M: Motion + 'static>(case: Case, snr: &str, noise: u64) -> Result<Found, 
     let (mut found, mut settled, mut without) = (Found::default(), 0, 0);
     for Point { at, .. } in tracked.points.iter().filter(kept) {
         settled += 1;
-        let Some([sigma, g]) = case.truth::<M>(&orbits, at.c, at.sigma) else {
+        let Some([sigma, g]) = truth(at.c, at.sigma) else {
             without += 1;
             continue;
         };
@@ -365,36 +308,30 @@ fn main() -> Result<(), Failure> {
     let mut uniform = uniform(seed.parse()?);
     let mut rows = Vec::new();
     for (n, name) in EFFECTS.into_iter().enumerate() {
-        let cases: Vec<_> = (0..count.parse::<u64>()?)
+        let rigs: Vec<_> = (0..count.parse::<u64>()?)
             .map(|noise| {
                 let epsilon = uniform(1e-3_f64.ln(), 0.02_f64.ln()).exp();
-                let scene = Dimensionless::new(epsilon, uniform(0.7, 2.5), uniform(0.5, 0.8), 0.0);
-                let mut sizes: [f64; 6] = std::array::from_fn(|m| {
-                    let lowest = if m == 0 { 0.0 } else { -SIZES[m] };
-                    uniform(lowest, SIZES[m])
+                let d = Dimensionless::new(epsilon, uniform(0.7, 2.5), uniform(0.5, 0.8), 0.0);
+                let effects = std::array::from_fn(|m| {
+                    let lowest = if [0, 3].contains(&m) { 0.0 } else { -SIZES[m] };
+                    let size = uniform(lowest, SIZES[m]);
+                    let is_on = match n {
+                        CAVITY => m < CAVITY,
+                        n if n < CAVITY => m == n,
+                        n => m == n - 1,
+                    };
+                    if is_on { size } else { 0.0 }
                 });
-                sizes[3] = SIZES[3];
-                let is_on = |m: usize| match n {
-                    4 => m < 4,
-                    n if n < 4 => m == n,
-                    n => m == n - 1,
-                };
-                let effects = std::array::from_fn(|m| if is_on(m) { sizes[m] } else { 0.0 });
-                (Case { scene, effects }, noise)
+                (d, effects, noise)
             })
             .collect();
-        let one = |(case, noise): &(Case, u64)| {
-            let found = if n < 5 {
-                run::<RealCavity>(*case, snr, *noise)
-            } else {
-                run::<Imperfect>(*case, snr, *noise)
-            };
-            found.unwrap_or_else(|error| {
-                println!("{:?}: {error}", case.scene);
+        let one = |(d, effects, noise): &(Dimensionless, [f64; 6], u64)| {
+            run(*d, *effects, snr, *noise).unwrap_or_else(|error| {
+                println!("{d:?}: {error}");
                 Found { counts: [0, 0, 0, 1], ..Found::default() }
             })
         };
-        let (text, [points, settled, without, ended]) = statistics(&cases.par_iter().map(one).collect::<Vec<_>>());
+        let (text, [points, settled, without, ended]) = statistics(&rigs.par_iter().map(one).collect::<Vec<_>>());
         rows.push(format!(
             "{name},{count},{seed},{snr},{points},{settled},{without},{text},{ended}"
         ));

@@ -154,11 +154,11 @@ fn a_rig_in_real_time_gives_the_same_sigma_within_5e_3() {
     let report: Value = serde_json::from_str(&rig.report()).unwrap();
     println!("{report}");
     assert_eq!(report["ended"], "farewell");
-    let classes = report["punctuality"]["histogram"].as_array().unwrap();
+    let classes = report["histogram"].as_array().unwrap();
     let counted: u64 = classes.iter().map(|class| class[1].as_u64().unwrap()).sum();
     assert_eq!(report["samples"].as_u64(), Some(counted));
     // The client prints what its rig missed, and its exit code depends on it.
-    let late = report["punctuality"]["missed"]
+    let late = report["timing"]["missed"]
         .as_u64()
         .max(report["counters"]["held"].as_u64())
         .unwrap();

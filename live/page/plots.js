@@ -149,7 +149,8 @@ const shown = (value) => String(Number(value.toPrecision(5))).replace("-", "−"
 // The range of values with a margin, at least `least` to either side of its middle.
 export const extent = (values, least) => {
   let low = Infinity, high = -Infinity;
-  for (const value of values) { low = Math.min(low, value); high = Math.max(high, value); }
+  // Comparisons leave out what is not measured (NaN).
+  for (const value of values) { if (value < low) low = value; if (value > high) high = value; }
   if (!(high >= low)) return [-least, least];
   const middle = 0.5 * (low + high), half = Math.max(least, 0.55 * (high - low));
   return [middle - half, middle + half];

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use vines_model::numerics::{Estimate, RANDOM};
 
-use crate::experiment::{self, ExperimentError, Search, Stage};
+use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stage};
 use crate::identification::{
     Balance, Cycle, Measured, Regime, Slopes, Tone, classify, foreign_tone, regime_by_response,
 };
@@ -41,7 +41,7 @@ pub struct Criterion {
 /// A point of the backbone from a window of periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LevelEstimate {
-    /// How many periods.
+    /// Number of periods.
     pub periods: usize,
     /// Mean amplitude of the response, m.
     pub response: Estimate,
@@ -49,7 +49,8 @@ pub struct LevelEstimate {
     pub phase_error: Estimate,
     /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
     pub at: [Estimate; 2],
-    /// Whether what is left is noise: the fit describes the window, and the rest is within the precision.
+    /// Whether only noise is larger than the precision: the fit describes the window, and the systematic part of the uncertainty is small
+    /// enough.
     pub steady: bool,
 }
 
@@ -219,15 +220,11 @@ pub struct Tracked {
 /// Where the loop holds the rig: response amplitude, m, drive amplitude, m, frequency, rad/s.
 type Held = [f64; 3];
 
-/// Periods between a move and the first that is measured: the loops and the particle follow late.
-const LATE: usize = 8;
-/// Periods of the first level more than those, because the start of the loop disturbs the particle, too.
+/// Additional periods before the first level is measured, because the start of the loop disturbs the particle, too.
 const FIRST: usize = 24;
-/// Periods in succession in which the criterion must be met: the halves of a transient can agree by chance.
-const CONFIRMED: usize = 3;
-/// Share of the drive that a move may need in addition to the drive that holds the response.
+/// Largest additional drive of a move, as a share of the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
-/// Duration of a move, periods.
+/// Shortest duration of a move, periods.
 const MOVE: f64 = 4.0;
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
@@ -271,8 +268,10 @@ pub fn track_into(
     progress: impl FnMut(usize, usize),
 ) -> Result<Tracked, ExperimentError> {
     experiment::holds_a_phase(scene)?;
+    let limit = (scene.lock_periods() * scene.controller.samples_per_period) as usize;
+    let mut quiet = |_, _| {};
     let mut tracker = Tracker {
-        run: experiment::ControlLoop::new(rig, controller, scene, samples),
+        run: experiment::ControlLoop::new(rig, controller, scene, samples, limit, &mut quiet),
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
@@ -296,13 +295,8 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     /// One period of the drive.
     fn cycle(&mut self) -> Result<Cycle, ExperimentError> {
         loop {
-            let begin = self.run.samples.len();
-            let first = self.run.periods;
-            while self.run.periods < first.floor() + 1.0 {
-                self.run.sample(self.stage)?;
-            }
-            let samples = &self.run.samples[begin..];
-            if let Some(cycle) = Cycle::of(samples, self.run.sample_time, first * TAU, self.target) {
+            let period = self.run.period(self.stage)?;
+            if let Some(cycle) = self.run.cycle(period, self.target) {
                 return Ok(cycle);
             }
         }
@@ -310,9 +304,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
 
     /// Goes to a symmetric motion with impacts, if there is one.
     fn approach(&mut self) -> Result<(), ExperimentError> {
-        let scene = self.scene;
-        let limit = (scene.lock_periods() * scene.controller.samples_per_period) as usize;
-        Search::new(&mut self.run, scene, limit, &mut |_| {}).impacts()?;
+        Search::new(&mut self.run, self.scene).impacts()?;
         let cycle = self.cycle()?;
         self.closed = [cycle.amplitude(), cycle.base.norm(), cycle.omega];
         Ok(())
@@ -344,7 +336,11 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let (to, periods) = self.step(level);
         self.run.controller.hold_response(to, self.target)?;
         self.run.samples.clear();
-        let late = if self.states.is_empty() { FIRST + LATE } else { LATE };
+        let late = if self.states.is_empty() {
+            FIRST + FOLLOWED
+        } else {
+            FOLLOWED
+        };
         while self.run.periods - start < periods + late as f64 {
             self.cycle()?;
         }
@@ -356,6 +352,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             let estimate = criterion.best(&cycles);
             let is_met =
                 estimate.is_some_and(|estimate| criterion.is_met(&estimate) && is_reached(estimate.response, level));
+            // The halves of a transient can agree by chance.
             confirmed = if is_met { confirmed + 1 } else { 0 };
             if cycles.len() >= settings.dwell_max as usize || confirmed >= CONFIRMED {
                 break estimate;

@@ -7,6 +7,7 @@ use vines_model::orbit::{self, ContinuationLimits, Orbit, backbone};
 use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow, free_sigma, resonant};
 
 use crate::backbone::{Point, Tracked};
+use crate::experiment::Plan;
 use crate::identification::{DecayEnd, DecayPoint, Identification, Lock, Regime, decay_points};
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Drive, Rig, Simulated};
@@ -32,7 +33,7 @@ pub struct Comparison {
     /// First-order theory at the same G: the stable solution nearest to the lock; absent if the phase target is not
     /// phase resonance.
     pub theory: Option<BackbonePoint>,
-    /// The exact phase-resonant orbit at the same G nearest to the lock; absent as above.
+    /// The exact phase-resonant orbit at the same G nearest to the lock; absent if the phase target is not phase resonance.
     pub exact: Option<Orbit>,
     /// All exact phase-resonant orbits at the same G, by rising C; the lock followed `exact`.
     pub orbits: Vec<Orbit>,
@@ -42,9 +43,9 @@ pub struct Comparison {
     pub decay_end: DecayEnd,
     /// RMS of the decay's sigma minus theory, over the points with C > 0.2.
     pub rms_sigma_error: Option<f64>,
-    /// RMS of the decay's sigma minus that of the exact backbone at the same C, over the same points.
+    /// RMS of the decay's sigma minus the exact backbone's at the same C, over the same points.
     pub rms_sigma_exact: Option<f64>,
-    /// RMS of the decay's sigma minus that of the exact plant, released on the exact orbit and evaluated alike, over the same points.
+    /// RMS of the decay's sigma minus `sigma_predicted`, over the same points.
     pub rms_sigma_predicted: Option<f64>,
 }
 
@@ -70,18 +71,19 @@ impl Comparison {
         let (parameters, lock) = (found.parameters, found.lock);
         let at_resonance = scene.controller.is_at_phase_resonance();
         let distance = |sigma: f64, c: f64| (sigma - lock.at.sigma).hypot(c - lock.at.c);
-        let theory = resonant(&parameters)
+        let mut solutions = resonant(&parameters);
+        solutions.retain(|point| at_resonance && point.stable());
+        let theory = solutions
             .into_iter()
-            .filter(|point| at_resonance && point.stable())
             .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
-        let orbits: Vec<Orbit> = orbit::phase_resonant(&parameters)
-            .into_iter()
-            .filter(|_| at_resonance)
-            .collect();
-        let exact = nearest(&orbits, &lock);
+        let mut orbits = orbit::phase_resonant(&parameters);
+        orbits.retain(|_| at_resonance);
+        let exact = orbits
+            .iter()
+            .copied()
+            .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
         let curve = ExactCurve::of(&parameters);
-        let samples = crate::experiment::Plan::of(scene).decay;
-        let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene, samples));
+        let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene));
         let decay: Vec<ComparedPoint> = found
             .decay
             .points
@@ -89,9 +91,9 @@ impl Comparison {
             .map(|point| ComparedPoint {
                 point: *point,
                 sigma_theory: free_sigma(&parameters, point.c),
-                sigma_exact: curve.at(point.c).map(|[sigma, _]| sigma),
+                sigma_exact: at(&curve.places, point.c).map(|[sigma, _]| sigma),
                 sigma_slow_flow: by_slow_flow(&parameters, point.c),
-                sigma_predicted: sigma_at(&predicted, point.c),
+                sigma_predicted: at(&predicted, point.c).map(|[sigma, _]| sigma),
             })
             .collect();
         Self {
@@ -116,15 +118,6 @@ impl Comparison {
             .iter()
             .filter(|orbit| orbit.stable && self.exact.as_ref() != Some(*orbit))
     }
-}
-
-/// The orbit that is nearest to a lock.
-fn nearest(orbits: &[Orbit], lock: &Lock) -> Option<Orbit> {
-    let distance = |one: &Orbit| (one.sigma - lock.at.sigma).hypot(one.c - lock.at.c);
-    orbits
-        .iter()
-        .copied()
-        .min_by(|one, other| distance(one).total_cmp(&distance(other)))
 }
 
 /// RMS of an error over the points above [`COMPARED_ABOVE`]; `None` where there is none.
@@ -158,7 +151,7 @@ pub struct Distance {
     pub nearest: f64,
     /// Difference in sigma at the same C; absent outside the curve.
     pub sigma: Option<f64>,
-    /// Difference in G at the same C; absent as above.
+    /// Difference in G at the same C; absent outside the curve.
     #[serde(rename = "G")]
     pub g: Option<f64>,
 }
@@ -191,12 +184,7 @@ impl ExactCurve {
 
     /// `[sigma, G]` at the amplitude `c`; `None` outside the curve.
     pub fn at(&self, c: f64) -> Option<[f64; 2]> {
-        let pair = self
-            .places
-            .windows(2)
-            .rfind(|pair| (pair[0][0] - c) * (pair[1][0] - c) <= 0.0 && pair[0][0] != pair[1][0])?;
-        let x = (c - pair[0][0]) / (pair[1][0] - pair[0][0]);
-        Some([1, 2].map(|i| pair[0][i] + x * (pair[1][i] - pair[0][i])))
+        at(&self.places, c)
     }
 
     /// How far `(C, sigma, G)` lies from the curve; `None` where there is no curve.
@@ -213,6 +201,15 @@ impl ExactCurve {
             g: same.map(|[_, exact]| g - exact),
         })
     }
+}
+
+/// The second and the third value, interpolated linearly at the first value `c`, in the last pair of places around it.
+fn at(places: &[[f64; 3]], c: f64) -> Option<[f64; 2]> {
+    let pair = places
+        .windows(2)
+        .rfind(|pair| (pair[0][0] - c) * (pair[1][0] - c) <= 0.0 && pair[0][0] != pair[1][0])?;
+    let x = (c - pair[0][0]) / (pair[1][0] - pair[0][0]);
+    Some([1, 2].map(|i| pair[0][i] + x * (pair[1][i] - pair[0][i])))
 }
 
 /// Smallest value, over a segment, of the largest difference; it is convex along the segment.
@@ -334,9 +331,9 @@ pub struct Worst {
 
 // The decay as theory and the exact plant predict it, integrated forward.
 
-/// The decay of the scene's plant from `orbit` on, over `samples` samples, as it would be identified without noise; without points if the plant
-/// refuses the scene.
-fn predicted(orbit: &Orbit, scene: &Scene, samples: usize) -> Vec<DecayPoint> {
+/// C, sigma and rate along the decay of the scene's plant from `orbit` on, as it would be identified without noise; empty if the plant refuses
+/// the scene.
+fn predicted(orbit: &Orbit, scene: &Scene) -> Vec<[f64; 3]> {
     let (d, step) = (scene.dimensionless(), scene.sample_time());
     let start = orbit.start;
     let [q1, q2] = [start.q1, start.q2].map(|length| length * d.b);
@@ -359,7 +356,7 @@ fn predicted(orbit: &Orbit, scene: &Scene, samples: usize) -> Vec<DecayPoint> {
         Some(sample)
     };
     // The first sample stands for the hold, which gives the frequency at the release.
-    let samples = (0..samples + 1).map_while(&mut sample).collect();
+    let samples = (0..Plan::of(scene).decay + 1).map_while(&mut sample).collect();
     let record = Record {
         sample_time: step,
         samples,
@@ -367,20 +364,12 @@ fn predicted(orbit: &Orbit, scene: &Scene, samples: usize) -> Vec<DecayPoint> {
         released: 1,
         held: false,
     };
-    decay_points(&record, scene).points
+    let points = decay_points(&record, scene).points;
+    points.iter().map(|one| [one.c, one.sigma, one.rate]).collect()
 }
 
-/// sigma at the amplitude `c` along falling amplitudes; `None` outside.
-fn sigma_at(points: &[DecayPoint], c: f64) -> Option<f64> {
-    let pair = points
-        .windows(2)
-        .find(|pair| pair[0].c >= c && c >= pair[1].c && pair[0].c > pair[1].c)?;
-    let share = (pair[0].c - c) / (pair[0].c - pair[1].c);
-    Some(pair[0].sigma + share * (pair[1].sigma - pair[0].sigma))
-}
-
-/// sigma of the slow flow at the amplitude `c` along the free decay: that of the backbone, and of the first order in the rate of the decay;
-/// `None` where there is no 1:1 motion.
+/// sigma of the slow flow at the amplitude `c` along the free decay: the backbone's, corrected to the first order in the rate of the decay; `None`
+/// where there is no 1:1 motion.
 fn by_slow_flow(d: &Dimensionless, c: f64) -> Option<f64> {
     let flow = SlowFlow::new(d.lambda, d.r);
     let g = flow.backbone_at(flow.manifold.b(c, BranchSide::Right)?).g;

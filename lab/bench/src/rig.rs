@@ -3,6 +3,7 @@
 
 mod chain;
 mod faulty;
+mod settling;
 mod stages;
 
 use std::error::Error;
@@ -17,6 +18,7 @@ use crate::scene::Scene;
 
 pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
+pub use settling::Settling;
 pub use stages::{Interrupted, Measured, SensorsOnly, Stoppable};
 
 /// What the controller asks of the rig for the coming sample period.

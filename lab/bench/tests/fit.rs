@@ -4,7 +4,10 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use vines_model::numerics::Estimate;
 use vines_model::orbit::backbone_at_speed;
-use vines_testbench::fit::{Fit, FitError, Known, MeasuredPoint, Quantity, contradiction, fit};
+use vines_testbench::experiment::{Plan, run};
+use vines_testbench::fit::{Fit, FitError, Known, MeasuredPoint, Quantity, Recording, at, contradiction, fit};
+use vines_testbench::record::Sample;
+use vines_testbench::rig::{BuiltIn, Chain, SensorsOnly, Simulated};
 use vines_testbench::scene::{Definition, Dimensionless, Parameters, Scene};
 
 /// The rig that the points belong to.
@@ -174,4 +177,60 @@ fn points_of_another_rig_contradict_the_scene_and_those_of_its_own_do_not() {
         text.contains("r = 5.5") && text.contains("the scene says 6.5000e-1"),
         "{text}"
     );
+}
+
+/// A recording of a whole experiment on [`RIG`]: search, lock, hold and decay.
+fn recording(settings: &[&str]) -> Recording {
+    let overrides: Vec<_> = settings.iter().map(|one| one.parse().unwrap()).collect();
+    let scene = Scene::load(None, &overrides).unwrap();
+    let rig = Simulated::new(RIG, Default::default()).unwrap();
+    let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let plan = Plan::of(&scene);
+    let record = run(&mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
+    let channel = |value: fn(&Sample) -> f64| record.samples.iter().map(value).collect();
+    Recording {
+        origin: "record.csv".into(),
+        channels: ["y".into(), "x".into()],
+        sample_time: record.sample_time,
+        response: channel(|one| one.sensors.response),
+        drive: channel(|one| one.sensors.reference.unwrap()),
+    }
+}
+
+#[test]
+fn a_recording_of_a_search_a_hold_and_a_decay_gives_points_on_the_backbone_of_the_rig() {
+    for snr in ["none", "60", "40"] {
+        let recording = recording(&[&format!("chain.snr={snr}")]);
+        let scene = Scene::load(None, &[]).unwrap();
+        let parts = recording.parts(&scene).unwrap();
+        let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
+        for part in &parts {
+            println!(
+                "{:.2?} {:?} {:?} {:?}",
+                part.seconds, part.kind, part.regime, part.point
+            );
+        }
+        let at = at(&points, Definition::default(), &RIG, &[]).unwrap();
+        println!(
+            "{snr}: {} points, chi-square {} residuals {:.1?}",
+            points.len(),
+            at.chi_square,
+            at.residuals
+        );
+        let fit = fit(&points, Definition::default(), &scene.plant, &[]);
+        match fit {
+            Ok(fit) => {
+                for quantity in &Quantity::ALL[..5] {
+                    println!(
+                        "{quantity} {:?} {:.2} u",
+                        fit.estimate(*quantity),
+                        pull(&fit, *quantity)
+                    );
+                }
+                println!("{:?} {} {:?}", fit.p_value(), fit.chi_square, fit.left_out);
+            }
+            Err(e) => println!("{e}"),
+        }
+    }
 }

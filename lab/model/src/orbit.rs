@@ -10,6 +10,7 @@ mod convergence;
 mod impact_map;
 pub(crate) mod oscillator;
 mod periodic;
+mod plant;
 mod response;
 mod symmetric;
 
@@ -22,6 +23,9 @@ pub use continuation::{
 pub use convergence::{Convergence, Difference, convergence};
 pub use impact_map::{Bounce, ImpactMap};
 pub use periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, periodic_near, settle};
+pub use plant::{
+    DriveCondition, NoMotion, PlantMotion, periodic_motion, resonant_motion, resonant_motion_under, settled_motion,
+};
 pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, backbone, bifurcation_curves, response};
 pub use symmetric::{backbone_at_speed, exact_backbone, phase_resonant, stable_resonant, symmetric_orbits};
 

@@ -24,4 +24,4 @@ pub use client::{NetController, NetRig};
 pub use frame::Refusal;
 pub use link::Key;
 pub use server::{RAMP_SAMPLES, Role, Served, Server, Service};
-pub use timing::{Counters, Ended, Punctuality, RealTimeClock, ReportLost, Session, Timing};
+pub use timing::{Counters, Ended, RealTimeClock, ReportLost, Session, Timing};

@@ -43,15 +43,16 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let experiment = &arguments.experiment;
-    let (scene, mut session) = experiment.start(Some(&arguments.rig), |scene| scene.backbone_config())?;
+    let (scene, mut session) =
+        experiment.start("vines backbone", Some(&arguments.rig), |scene| scene.backbone_config())?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let mut samples = Vec::new();
-    let (rig, controller) = (&mut session.open.rig, session.controller.as_mut());
+    let (rig, controller) = (session.open.rig.as_mut(), session.controller.as_mut());
     let tracked = track_into(&mut samples, rig, controller, &scene, |done, _| {
         bar.set_position(done as u64);
     });
     bar.finish_and_clear();
-    let timing = session.close();
+    let timing = session.close(&tracked);
     let tracked = tracked.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let result = TrackedComparison::of(&tracked, &scene);
     let summary = report::summary::tracked(&result);

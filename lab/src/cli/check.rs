@@ -50,7 +50,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     log_warnings();
     scene.start = Default::default();
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach()?)?;
-    let checked = check(&mut open.rig, &scene).map_err(ExperimentError::from)?;
+    let checked = check(open.rig.as_mut(), &scene).map_err(ExperimentError::from)?;
     open.close();
     let text = output(arguments.json, &checked, || described(&checked))?;
     if checked.verdict == Verdict::Healthy {

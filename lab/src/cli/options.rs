@@ -114,7 +114,7 @@ impl FromStr for Endpoint {
 }
 
 pub(super) struct OpenRig {
-    pub rig: Stoppable,
+    pub rig: Box<dyn Rig>,
     /// In real time, the longest silence that it tolerates, s.
     pub pace: Option<f64>,
     /// In real time, what it reports when the session has ended.
@@ -149,7 +149,7 @@ impl Endpoint {
             }
         };
         let rig = Chain::around(rig, scene);
-        let rig = Stoppable::around(rig, scene.sample_time(), &stop_flag()?);
+        let rig = Box::new(Stoppable::around(rig, scene.sample_time(), &stop_flag()?));
         Ok(OpenRig { rig, pace, timing })
     }
 
@@ -169,7 +169,7 @@ impl Endpoint {
                     let rule = "a controller has an address tcp://HOST:PORT";
                     return Err(Failure::input(format!("{address}: {rule}")));
                 };
-                Box::new(NetController::connect(peer, config.sample_time, pace, scope.key())?)
+                Box::new(NetController::connect(peer, config, pace, scope.key())?)
             }
         })
     }

@@ -1,12 +1,19 @@
 //! `vines orbit`: exact orbits at resonance, and their curves.
 
+use std::f64::consts::TAU;
+
 use clap::Args;
+use lovines::{Event, State};
 use vines::orbit::{
     Branch, BranchEnd, Condition, ContinuationLimits, DOUBLINGS, Orbit, Periodic, backbone, continue_both_ways,
-    phase_resonant, response, settle,
+    phase_resonant, resonant_motion_under, response, settle, settled_motion,
 };
 use vines::report::{Table, number, row, summary::parameters};
-use vines::{ArgumentError, numerics::range, scene::Dimensionless};
+use vines::{
+    ArgumentError,
+    numerics::range,
+    scene::{Dimensionless, Scene},
+};
 
 use super::output::{output, yes_no};
 use super::{failure::Failure, options::SceneArguments};
@@ -23,12 +30,17 @@ breakings and period doublings, up to three in a row (mirror images count once).
 within chaos, are missed; --sigma with --response follows the branch that a start leads to. A branch that is not 1:1 ends after a
 hundred unstable orbits in a row.
 
+--periodic computes a motion of the plant with all effects of its cavity (friction, tilt, gaps, restitution that depends on the speed) by
+Newton's method on the plant's own period map: at phase resonance under the scene's drive, continued from the ideal cavity, or, with
+--sigma, the motion that the scene's start leads to. All other results are those of the ideal cavity.
+
 Examples:
   vines orbit
   vines orbit --response --set excitation.G=1.6
   vines orbit --backbone --set plant.c=0 --set plant.r=1 --set excitation.G=0
   vines orbit --sigma=-0.6 --set excitation.G=2.2   the orbit that settles there, here six impacts in two periods
   vines orbit --set excitation.G=1.0 --set plant.r=0.7
+  vines orbit --periodic --scene scenes/rough.toml  the plant's own motion, with friction
   vines orbit --scene scenes/dimensionless.toml --json";
 
 /// Compute all exact symmetric 1:1 orbits (two impacts per period) at phase resonance
@@ -55,6 +67,10 @@ pub(super) struct Arguments {
     #[arg(long, group = "what")]
     response: bool,
 
+    /// The periodic motion of the plant with all effects of its cavity, at resonance or at --sigma
+    #[arg(long, group = "what")]
+    periodic: bool,
+
     /// Detunings of --response and --backbone
     #[arg(long, value_name = "FIRST:LAST", default_value = "-6:6", allow_hyphen_values = true, value_parser = detunings)]
     range: [f64; 2],
@@ -67,6 +83,9 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let loaded = arguments.scene.load_for("exact orbits are")?;
     let scene = loaded.dimensionless();
+    if arguments.periodic {
+        return of_the_plant(arguments, &loaded);
+    }
     if let Some(sigma) = arguments.sigma {
         return settled(arguments, &scene, sigma, loaded.dimensionless_start());
     }
@@ -140,11 +159,7 @@ const SETTLE: usize = 1000;
 
 /// The motion that the start leads to at one detuning, or its frequency response.
 fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64; 4]) -> Result<String, Failure> {
-    if !(1.0 + scene.epsilon * sigma > 0.0 && sigma.is_finite()) {
-        return Err(Failure::input(format!(
-            "--sigma = {sigma} (dimensionless): it must be finite, and 1 + epsilon sigma above 0"
-        )));
-    }
+    positive_frequency(scene, sigma)?;
     let motion = settle(scene, sigma, start, SETTLE).map_err(Failure::input)?;
     let motion = motion.ok_or_else(|| {
         Failure::run(format!(
@@ -163,6 +178,129 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
     shown(scene, "Exact orbit", &motion, arguments.json, || {
         described(&pattern, &motion)
     })
+}
+
+/// A periodic motion of the plant, as it is printed.
+#[derive(serde::Serialize)]
+struct PlantOrbit {
+    /// Frequency, Hz, its detuning, and the amplitude of the base, m.
+    f_hz: f64,
+    sigma: f64,
+    e_m: f64,
+    /// Amplitude (m) and phase (degrees, to the reference) of the first harmonic of the response.
+    a_m: f64,
+    phase_deg: f64,
+    periods: u32,
+    /// Per motion: impacts, how often the particle comes to rest on a wall, how often it sticks to the floor inside the cavity.
+    impacts: usize,
+    rests: usize,
+    sticks: usize,
+    /// Real and imaginary parts over the whole motion, by rising modulus.
+    multipliers: [[f64; 2]; 4],
+    stable: bool,
+    /// (q1, q1', q2, q2') where the phase of the base is 0, m and m/s.
+    state: [f64; 4],
+    events: Vec<PlantEvent>,
+}
+
+#[derive(serde::Serialize)]
+struct PlantEvent {
+    phase_deg: f64,
+    event: &'static str,
+    /// +1 or -1: the wall of an impact, of coming to rest or of a release; the direction of w' after slip or reversal.
+    side: Option<f64>,
+    /// Relative velocity just before an impact, m/s.
+    velocity: Option<f64>,
+}
+
+/// The motion of the plant with the effects of its cavity.
+fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure> {
+    let (plant, definition, numbers) = (&scene.plant, scene.resonance, scene.dimensionless());
+    let motion = match arguments.sigma {
+        None => resonant_motion_under(plant, definition, scene.amplitude).map_err(Failure::run)?,
+        Some(sigma) => {
+            positive_frequency(&numbers, sigma)?;
+            let drive = [numbers.omega(sigma), scene.amplitude];
+            let motion = settled_motion(plant, definition, drive, scene.start, SETTLE).map_err(Failure::run)?;
+            motion.ok_or_else(|| {
+                Failure::run(format!(
+                    "the scene's start leads to no motion that repeats within 32 periods, at sigma = {sigma} (dimensionless) after {SETTLE} \
+                     periods: simulate it with `vines identify` or choose another start"
+                ))
+            })?
+        }
+    };
+    let events = motion.events.iter().map(|(phase, event)| {
+        let phase_deg = phase.to_degrees();
+        let (event, side, velocity) = match *event {
+            Event::Impact { wall, velocity, .. } => ("impact", Some(wall.sign()), Some(velocity)),
+            Event::Stuck { wall, .. } => ("rests on the wall", Some(wall.sign()), None),
+            Event::Released { wall, .. } => ("leaves the wall", Some(wall.sign()), None),
+            Event::Sticking { .. } => ("sticks to the floor", None, None),
+            Event::Slip { direction, .. } => ("slips", Some(direction), None),
+            Event::Reversal { direction, .. } => ("turns round", Some(direction), None),
+        };
+        PlantEvent { phase_deg, event, side, velocity }
+    });
+    let State { q1, dq1, q2, dq2 } = motion.state;
+    let orbit = PlantOrbit {
+        f_hz: motion.omega / TAU,
+        sigma: numbers.sigma(motion.omega),
+        e_m: motion.amplitude,
+        a_m: motion.response.norm(),
+        phase_deg: motion.response.arg().to_degrees(),
+        periods: motion.periods,
+        impacts: motion.impacts,
+        rests: motion.rests,
+        sticks: motion.sticks,
+        multipliers: motion.multipliers.map(|z| [z.re, z.im]),
+        stable: motion.is_stable(),
+        state: [q1, dq1, q2, dq2],
+        events: events.collect(),
+    };
+    let title = "Periodic motion of the plant with all effects of its cavity";
+    shown(&numbers, title, &orbit, arguments.json, || plant_text(&orbit))
+}
+
+/// A motion and its events.
+fn plant_text(orbit: &PlantOrbit) -> String {
+    let PlantOrbit {
+        f_hz,
+        sigma,
+        e_m,
+        a_m,
+        phase_deg,
+        periods,
+        impacts,
+        rests,
+        sticks,
+        ..
+    } = orbit;
+    let multipliers = orbit.multipliers.map(|[re, im]| format!("{re:.5}{im:+.5}i"));
+    let s = if *periods == 1 { "" } else { "s" };
+    let blank = |value: Option<f64>| value.map_or("-".into(), number);
+    let rows = orbit.events.iter().map(|one| {
+        let side = one.side.map_or("-".into(), |side| format!("{side:+}"));
+        vec![number(one.phase_deg), one.event.to_string(), side, blank(one.velocity)]
+    });
+    let table = Table::new("phase, degrees | event | side | w' before, m/s").rows(rows);
+    format!(
+        "  {f_hz:.6} Hz, sigma = {sigma:.6}; base {e_m:.6e} m; response {a_m:.6e} m at {phase_deg:.4} degrees\n  in {periods} period{s}: impacts \
+         {impacts}, at rest on a wall {rests}, sticking to the floor {sticks}\n  multipliers {}: {}\n\n{}",
+        multipliers.join(", "),
+        if orbit.stable { "stable" } else { "unstable" },
+        table.text()
+    )
+}
+
+/// Refuses a detuning whose frequency is not positive.
+fn positive_frequency(scene: &Dimensionless, sigma: f64) -> Result<(), Failure> {
+    match 1.0 + scene.epsilon * sigma > 0.0 && sigma.is_finite() {
+        true => Ok(()),
+        false => Err(Failure::input(format!(
+            "--sigma = {sigma} (dimensionless): it must be finite, and 1 + epsilon sigma above 0"
+        ))),
+    }
 }
 
 /// A result as JSON, or as text under a title and the parameters of the scene.

@@ -6,6 +6,7 @@ use vines_live::bench::Bench;
 use vines_live::settings::{default_scene, index, settings_of};
 use vines_testbench::experiment::{Plan, run};
 use vines_testbench::identification::decay_points;
+use vines_testbench::live::Motion;
 use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
 
@@ -58,21 +59,23 @@ fn the_free_decay_has_the_bits_of_the_lab() {
     assert!(points.len() > 50, "{} points", points.len());
     let mut bench = Bench::new(Bench::default_settings()).unwrap();
     bench.run(record.released, |_| {}).unwrap();
+    let released = bench.motion;
     bench.drive(false);
-    let mut fits: Vec<(f64, f64, f64)> = Vec::new();
+    let mut fits: Vec<Motion> = Vec::new();
     let mut lost = None;
     bench
         .run(record.decay().len(), |row| {
-            let fit = (row.omega, row.amplitude, row.speed);
-            if row.omega != row.drive.omega && fits.last() != Some(&fit) {
-                fits.push(fit);
+            if fits.last() != Some(&row.motion) {
+                fits.push(row.motion);
             }
             if !row.decays {
                 lost.get_or_insert(row.time - record.decay()[0].time);
             }
         })
         .unwrap();
-    for (point, (omega, amplitude, speed)) in points.iter().zip(&fits) {
+    // Until the first fit, the motion is that of the release.
+    assert_eq!(fits.remove(0), released);
+    for (point, Motion { omega, amplitude, speed }) in points.iter().zip(&fits) {
         assert_eq!(
             (point.f_hz, point.a_m),
             (omega / TAU, *amplitude),

@@ -53,16 +53,12 @@ struct Content {
 impl Content {
     /// Whether a residual is left that is not noise.
     fn is_irregular(&self) -> bool {
-        self.rest > STEADY && !self.is_noise()
-    }
-
-    fn is_noise(&self) -> bool {
-        self.noise >= NOISE_SHARE * self.rest
+        self.rest > STEADY && self.noise < NOISE_SHARE * self.rest
     }
 
     /// Fits the samples; `None` for too few samples or no motion.
-    fn of(samples: &[Sample], sample_time: f64, omega: f64, d: &Dimensionless) -> Option<Self> {
-        let n = samples.len();
+    fn of(samples: &[Sample], scene: &Scene, omega: f64) -> Option<Self> {
+        let (n, sample_time, d) = (samples.len(), scene.sample_time(), scene.dimensionless());
         // The phase of the response is more uniform than that of a drive that a loop still corrects.
         let phases: Vec<f64> = (0..n).map(|n| n as f64 * sample_time * omega).collect();
         let basis = HarmonicBasis::new(&phases, 1, &HARMONICS);
@@ -76,7 +72,7 @@ impl Content {
         while content.is_irregular() && lines.len() < LINES {
             let line = Line::strongest(rest.as_slice());
             let is_known = |one: &Line| (one.turn - line.turn).abs() < TAU / n as f64;
-            if !line.is_foreign(d, sample_time) && !lines.iter().any(is_known) {
+            if !line.is_foreign(&d, sample_time) && !lines.iter().any(is_known) {
                 break;
             }
             values -= DVector::from_fn(n, |n, _| line.at(n));
@@ -112,17 +108,18 @@ impl Content {
 /// The largest foreign tone in the response of these samples, if they would be irregular with it. `omega` (rad/s) is the frequency of the motion.
 #[must_use]
 pub fn foreign_tone(samples: &[Sample], scene: &Scene, omega: f64) -> Option<Tone> {
-    let content = Content::of(samples, scene.sample_time(), omega, &scene.dimensionless())?;
-    let largest = content
-        .tones
-        .iter()
-        .max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
-    Some(largest.tone(scene.sample_time(), content.amplitude))
+    let content = Content::of(samples, scene, omega)?;
+    let tones = content.tones.iter();
+    let largest = tones.max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
+    Some(Tone {
+        hertz: largest.turn / (TAU * scene.sample_time()),
+        share: largest.amplitude() / content.amplitude,
+    })
 }
 
 /// These samples without the foreign tones in their response; `None` if there are none.
 pub(crate) fn without_tones(samples: &[Sample], scene: &Scene, omega: f64) -> Option<Vec<Sample>> {
-    let tones = Content::of(samples, scene.sample_time(), omega, &scene.dimensionless())?.tones;
+    let tones = Content::of(samples, scene, omega)?.tones;
     let mut cleaned = samples.to_vec();
     for (n, sample) in cleaned.iter_mut().enumerate() {
         sample.sensors.response -= tones.iter().map(|line| line.at(n)).sum::<f64>();
@@ -137,7 +134,7 @@ pub(crate) fn without_tones(samples: &[Sample], scene: &Scene, omega: f64) -> Op
 /// sufficient; where that of the scene stands for it, the third harmonic must be significant as well.
 #[must_use]
 pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, phase: f64, omega: f64) -> Regime {
-    let Some(content) = Content::of(samples, scene.sample_time(), omega, &scene.dimensionless()) else {
+    let Some(content) = Content::of(samples, scene, omega) else {
         return Regime::Unknown;
     };
     if content.is_irregular() {
@@ -199,7 +196,7 @@ impl Display for Tone {
 
 /// A line of a signal.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Line {
+struct Line {
     /// Frequency, rad per sample.
     pub turn: f64,
     /// Amplitudes of the cosine and the sine.
@@ -215,8 +212,9 @@ impl Line {
         };
         let last = &values[values.len().saturating_sub(SEARCHED)..];
         let [bin, fine] = [last.len(), values.len()].map(|count| PI / count as f64);
-        let (coarse, _) = (1..last.len())
-            .map(|k| (k as f64 * bin, power(last, k as f64 * bin)))
+        let bins = (1..last.len()).map(|k| k as f64 * bin);
+        let (coarse, _) = bins
+            .map(|turn| (turn, power(last, turn)))
             .fold((bin, 0.0), |best, next| if next.1 > best.1 { next } else { best });
         let turn = highest(values, highest(last, coarse, bin), fine);
         let scale = 2.0 / values.len() as f64;
@@ -247,14 +245,6 @@ impl Line {
         let largest = 4.0 / PI * d.epsilon * d.b * factor / (square - 1.0).abs();
         self.amplitude() > ABOVE * largest
     }
-
-    /// As a share of a response of the amplitude `response`, m.
-    pub fn tone(&self, sample_time: f64, response: f64) -> Tone {
-        Tone {
-            hertz: self.turn / (TAU * sample_time),
-            share: self.amplitude() / response,
-        }
-    }
 }
 
 /// Sums of the values times cosine and sine.
@@ -282,7 +272,7 @@ pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
 }
 
 /// The wall, -1 or 1, after which the longer flights begin, on average; `None` without impacts.
-pub(super) fn longer_after(samples: &[Sample]) -> Option<i8> {
+pub(crate) fn longer_after(samples: &[Sample]) -> Option<i8> {
     let impacts = impacts(samples);
     let after = |wall: f64| {
         let flights = impacts.windows(2).filter(move |pair| pair[0].velocity * wall > 0.0);

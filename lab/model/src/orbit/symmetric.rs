@@ -17,12 +17,12 @@ use nalgebra::{Complex, Matrix2, Vector2};
 use super::oscillator::Oscillator;
 use super::{AfterImpact, Condition, ImpactPattern, Orbit, Periodic, Unknowns};
 use crate::numerics::{bisection, golden_section, quadratic};
-use crate::theory::SlowFlow;
+use crate::theory::{BranchSide, Manifold, SlowFlow};
 use crate::{Definition, Dimensionless, Sensor};
 
 /// A symmetric motion that satisfies the impact law and the phase resonance, not yet checked for `|w| <= 1` in flight.
 #[derive(Debug, Clone, Copy)]
-struct Candidate {
+pub(super) struct Candidate {
     /// Angular frequency over omega0.
     pub omega: f64,
     /// Speed of the particle; not physical unless positive.
@@ -252,7 +252,7 @@ fn accept(scene: &Dimensionless, candidate: &Candidate) -> Option<Orbit> {
         c,
         gamma: candidate.gamma,
         b,
-        impact_velocity: 2.0 * b * (1.0 + scene.epsilon) / (1.0 + scene.r),
+        impact_velocity: candidate.impact_speed(scene),
         start,
         multipliers: motion.moduli(),
         stable: motion.stable,
@@ -356,6 +356,12 @@ const SECANT: f64 = 1e-4;
 ///
 /// Stability and the flights between the impacts are not examined; [`exact_backbone`] does.
 pub fn backbone_at_speed(scene: &Dimensionless, b: f64) -> Option<[f64; 3]> {
+    let motion = at_speed(scene, b)?;
+    Some([motion.omega, motion.c, motion.g])
+}
+
+/// The motion at phase resonance with the particle speed `b`.
+pub(super) fn at_speed(scene: &Dimensionless, b: f64) -> Option<Candidate> {
     let Dimensionless { epsilon, lambda, r, .. } = *scene;
     let off = |omega: f64| {
         let [square, linear, constant] = Family::new(scene, omega)?.resonance();
@@ -373,5 +379,26 @@ pub fn backbone_at_speed(scene: &Dimensionless, b: f64) -> Option<[f64; 3]> {
     }
     let motion = Family::new(scene, omega)?.at(b);
     let values = [omega, motion.c, motion.g];
-    (values.iter().all(|value| value.is_finite()) && last.abs() < CONVERGED * epsilon).then_some(values)
+    (values.iter().all(|value| value.is_finite()) && last.abs() < CONVERGED * epsilon).then_some(motion)
+}
+
+/// The motion at phase resonance beyond the fold whose response has the amplitude `c` over b: the secant method over the particle speed.
+pub(super) fn at_amplitude(scene: &Dimensionless, c: f64) -> Option<Candidate> {
+    let start = Manifold::new(scene.r).b(c, BranchSide::Right)?;
+    let (mut before, mut at) = (at_speed(scene, start)?, at_speed(scene, start * (1.0 + SECANT))?);
+    for _ in 0..SPEED_ROUNDS {
+        let next = at.b - (at.c - c) * (at.b - before.b) / (at.c - before.c);
+        if (at.c - c).abs() < CONVERGED || next == at.b {
+            break;
+        }
+        (before, at) = (at, at_speed(scene, next)?);
+    }
+    ((at.c - c).abs() < CONVERGED).then_some(at)
+}
+
+impl Candidate {
+    /// Relative speed just before an impact, over `b omega0`.
+    pub(super) fn impact_speed(&self, scene: &Dimensionless) -> f64 {
+        2.0 * self.b * (1.0 + scene.epsilon) / (1.0 + scene.r)
+    }
 }

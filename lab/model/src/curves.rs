@@ -1,8 +1,8 @@
-//! Curves of the page: manifold, and backbones of theory and of exact orbits.
+//! Curves of the live bench: manifold, and backbones of theory and of exact orbits.
 
-use vines_model::Dimensionless;
-use vines_model::orbit::exact_backbone;
-use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow};
+use crate::Dimensionless;
+use crate::orbit::exact_backbone;
+use crate::theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow};
 
 /// `points` points (B, C, 1 if the impacts are stable) of the slow invariant manifold up to `b_max`.
 pub fn manifold(scene: &Dimensionless, b_max: f64, points: usize) -> impl Iterator<Item = [f64; 3]> {

@@ -1,0 +1,649 @@
+//! Points of phase resonance from a recording: two channels, the response and the base, of any run near resonance.
+//!
+//! 1. The base is the clock. Where it moves, its amplitude and phase over [`WINDOW`] periods, interpolated, stand for the command that a bench
+//!    would know; where it rests, the rig decays.
+//! 2. The periods of a driven part are cut into windows of about the same amplitude, near phase resonance: long where the response is held,
+//!    short where it is swept.
+//! 3. Each window gives a point by the fit that the bench itself uses ([`Criterion::best`]); the slopes are those of the points whose amplitudes are
+//!    next to it.
+//! 4. A decay gives drive and frequency from the rate and the frequency of the response, with E = 0 in the balance of the amplitude.
+//!
+//! The impacts follow a change of the amplitude late. The errors by this are alike within a sweep or a decay of n points, so that averaging does
+//! not reduce them: each counts with the factor √n.
+
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
+use num_complex::Complex64;
+use serde::Serialize;
+use thiserror::Error;
+use vines_model::numerics::{Estimate, RANDOM, equally_spaced, mean, slope};
+use vines_model::regime::Regime;
+
+use super::MeasuredPoint;
+use crate::backbone::{Criterion, LevelEstimate};
+use crate::identification::{Balance, Cycle, Harmonic, harmonic, regime_by_response};
+use crate::record::Sample;
+use crate::rig::{Command, Drive, Sensors};
+use crate::scene::{LinearResponse, Scene};
+
+/// Two channels of a measurement, sampled at equal distances.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// Where it comes from, for messages: the name of a file.
+    pub origin: String,
+    /// Names of the channels of response and base, for messages.
+    pub channels: [String; 2],
+    /// Time from sample to sample, s.
+    pub sample_time: f64,
+    /// Response, m.
+    pub response: Vec<f64>,
+    /// Displacement of the base, m.
+    pub drive: Vec<f64>,
+}
+
+/// What a part of a recording is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// The response is held.
+    Held,
+    /// The response changes slowly while the base moves.
+    Sweep,
+    /// The base rests.
+    Decay,
+}
+
+/// A part of a recording that gives a point, or the reason why it gives none.
+#[derive(Debug, Clone, Serialize)]
+pub struct Part {
+    /// Its begin and end, s since the first sample.
+    pub seconds: [f64; 2],
+    /// What it is.
+    pub kind: Kind,
+    /// The point; absent if it is not one of the backbone.
+    #[serde(skip)]
+    pub point: Option<MeasuredPoint>,
+    /// The regime of its motion.
+    pub regime: Regime,
+}
+
+/// Why a recording gives no points.
+#[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
+pub enum RecordingError {
+    #[error(
+        "{origin}, channel {channel}: sample {sample} ({seconds:.4} s) is not a finite number; cut the recording there, or repair the channel"
+    )]
+    NotANumber {
+        origin: String,
+        channel: String,
+        sample: usize,
+        seconds: f64,
+    },
+    #[error("{origin}: channel {} has {} samples and channel {} has {}; both must have been sampled together", channels[0], lengths[0], channels[1], lengths[1])]
+    Lengths {
+        origin: String,
+        channels: [String; 2],
+        lengths: [usize; 2],
+    },
+    #[error(
+        "{origin}: {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {FEWEST} are needed"
+    )]
+    Short {
+        origin: String,
+        seconds: f64,
+        periods: f64,
+        hertz: f64,
+    },
+    #[error(
+        "{origin}: {rate:.6} samples a second are {per_period:.1} in a period of the scene's natural frequency {hertz:.4} Hz, and at least {COARSEST} \
+         are needed: give the rate with --rate, or the stiffness and the mass with --scene"
+    )]
+    Coarse {
+        origin: String,
+        rate: f64,
+        per_period: f64,
+        hertz: f64,
+    },
+    #[error(
+        "{origin}, channel {channel}: the strongest oscillation has {found:.4} Hz, and the scene's natural frequency is {hertz:.4} Hz. If the rate \
+         of {rate:.6} samples a second is wrong, give it with --rate; if the scene is wrong, give stiffness and mass with --scene"
+    )]
+    Frequency {
+        origin: String,
+        channel: String,
+        found: f64,
+        hertz: f64,
+        rate: f64,
+    },
+    #[error(
+        "{origin}, channel {channel} is clipped: {share:.1} % of its samples are equal to its largest or smallest value, {value:e} m; reduce the gain, and record again"
+    )]
+    Clipped {
+        origin: String,
+        channel: String,
+        share: f64,
+        value: f64,
+    },
+    #[error("{origin}, channel {channel} is constant: is it connected, and is it the right one?")]
+    Constant { origin: String, channel: String },
+    #[error(
+        "{origin}: channel {drive} (base) is {ratio:.1} times as large as channel {response} (response), and at resonance the response is the \
+         larger one: are the channels swapped, or their units different?"
+    )]
+    Swapped {
+        origin: String,
+        response: String,
+        drive: String,
+        ratio: f64,
+    },
+    #[error(
+        "{origin}: the response {response} leads the base {drive} by about a quarter of a period, where it lags on every passive rig: one of the \
+         channels has the wrong sign; give it with a negative factor, for instance --drive {drive}:-1"
+    )]
+    Sign {
+        origin: String,
+        response: String,
+        drive: String,
+    },
+    #[error(
+        "{origin}: no stretch of {} periods near phase resonance is symmetric 1:1 ({found}). A point needs a held response, a slow sweep, or a \
+         decay, where the response {response} lags the base {drive} by a quarter of a period",
+        LEAST
+    )]
+    NoPoints {
+        origin: String,
+        response: String,
+        drive: String,
+        found: String,
+    },
+}
+
+/// Periods of the fits that make the clock, and of those of a decay.
+const WINDOW: f64 = 2.5;
+/// Fewest periods of a recording.
+const FEWEST: f64 = 16.0;
+/// Fewest samples in a period: the fit of one has nine unknowns, and the third harmonic must be resolved.
+const COARSEST: f64 = 12.0;
+/// Fewest periods of a window: the fit needs four, and so do its halves, which are compared.
+const LEAST: usize = 2 * Balance::FEWEST;
+/// Largest relative distance of the amplitude from the mean of the first [`LEAST`] periods of a window, in these: drive and frequency are nearly
+/// linear in the amplitude there.
+const RANGE: f64 = 0.04;
+/// The same for a window with more periods, whose response is held.
+const HELD: f64 = 0.005;
+/// Largest phase error of a period, rad: the balances are of the first order in it.
+const PHASE_RANGE: f64 = 0.1;
+/// Largest relative standard uncertainty of the drive of a point: beyond that, it says nothing.
+const VAGUE: f64 = 0.2;
+/// Base over its largest amplitude below which it rests, unless the noise is larger.
+const RESTS: f64 = 0.02;
+/// Amplitude over its standard uncertainty by which an oscillation is one.
+const SEEN: f64 = 8.0;
+/// Share of the samples at the same extreme value from which a channel is clipped: a sine that is sampled 100 times a period and rounded to 10
+/// bits has 4 %.
+const CLIPPED: f64 = 0.06;
+/// Largest relative distance of the frequency from the natural frequency near resonance.
+const FARTHEST: f64 = 0.2;
+/// Most samples in which a frequency is searched for.
+const SEARCHED: usize = 8192;
+/// Relative distance of amplitudes from which on two points give a slope.
+const APART: f64 = 0.01;
+/// Relative change of the amplitude within a window from which on it is a sweep.
+const SWEPT: f64 = 0.01;
+/// Periods by which the impacts follow a change of the amplitude late.
+const LAG: f64 = 1.6;
+
+impl Recording {
+    /// The parts of the recording, with their points. `scene` says what the sensors read, and the natural frequency and the damping of the structure
+    /// without impacts.
+    ///
+    /// # Errors
+    /// Channels that cannot be those of a rig near resonance; the message says which, and what to do.
+    pub fn parts(&self, scene: &Scene) -> Result<Vec<Part>, RecordingError> {
+        let linear = scene.linear();
+        self.check(&linear)?;
+        let anchors = self.anchors(&linear);
+        let target = scene.controller.phase_target_radians();
+        let runs: Vec<Run> = anchors
+            .chunk_by(|one, other| one.kind() == other.kind())
+            .filter_map(|anchors| match anchors[0].kind()? {
+                Motion::Driven => Some(Run::Driven(self.driven(anchors, target))),
+                Motion::Free => Some(Run::Free(anchors)),
+            })
+            .collect();
+        self.plausible(&runs)?;
+        let parts = evaluated(&runs, scene, self.sample_time);
+        if parts.iter().all(|part| part.point.is_none()) {
+            return Err(self.nothing(&anchors, &parts, &linear));
+        }
+        Ok(parts)
+    }
+
+    /// Refuses what is no measurement.
+    fn check(&self, linear: &LinearResponse) -> Result<(), RecordingError> {
+        let origin = || self.origin.clone();
+        let (dt, hertz) = (self.sample_time, linear.omega0 / TAU);
+        let both = [&self.response, &self.drive];
+        let lengths = both.map(Vec::len);
+        if lengths[0] != lengths[1] {
+            let channels = self.channels.clone();
+            return Err(RecordingError::Lengths { origin: origin(), channels, lengths });
+        }
+        for (values, channel) in both.into_iter().zip(&self.channels) {
+            if let Some(sample) = values.iter().position(|value| !value.is_finite()) {
+                let (channel, seconds) = (channel.clone(), sample as f64 * dt);
+                return Err(RecordingError::NotANumber { origin: origin(), channel, sample: sample + 1, seconds });
+            }
+        }
+        let per_period = 1.0 / (hertz * dt);
+        if per_period < COARSEST {
+            return Err(RecordingError::Coarse { origin: origin(), rate: 1.0 / dt, per_period, hertz });
+        }
+        let seconds = self.response.len() as f64 * dt;
+        if seconds * hertz < FEWEST {
+            let periods = seconds * hertz;
+            return Err(RecordingError::Short { origin: origin(), seconds, periods, hertz });
+        }
+        for (values, channel) in both.into_iter().zip(&self.channels) {
+            let (low, high) = values
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                    (low.min(*value), high.max(*value))
+                });
+            let channel = channel.clone();
+            if low == high {
+                return Err(RecordingError::Constant { origin: origin(), channel });
+            }
+            for value in [low, high] {
+                let count = values.iter().filter(|one| **one == value).count();
+                let share = count as f64 / values.len() as f64;
+                if share > CLIPPED && value != 0.0 {
+                    return Err(RecordingError::Clipped { origin: origin(), channel, share: 100.0 * share, value });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Both channels at intervals of a period.
+    fn anchors(&self, linear: &LinearResponse) -> Vec<Anchor> {
+        let dt = self.sample_time;
+        let period = TAU / linear.omega0 / dt;
+        let window = (WINDOW * period).round() as usize + 1;
+        let step = (period.round() as usize).max(1);
+        let mut omega = linear.omega0;
+        let mut anchors: Vec<Anchor> = (0..(self.response.len() + 1).saturating_sub(window))
+            .step_by(step)
+            .map(|from| {
+                let fit = |values: &[f64], omega| {
+                    let found = harmonic(&values[from..from + window], dt, omega);
+                    found.filter(|one| {
+                        one.amplitude > SEEN * one.uncertainties[0] && (one.omega / omega - 1.0).abs() < FARTHEST
+                    })
+                };
+                let response = fit(&self.response, omega).or_else(|| fit(&self.response, linear.omega0));
+                omega = response.map_or(linear.omega0, |one| one.omega);
+                let drive = fit(&self.drive, omega);
+                Anchor {
+                    middle: from as f64 + 0.5 * (window - 1) as f64,
+                    response,
+                    drive,
+                }
+            })
+            .collect();
+        let largest = anchors
+            .iter()
+            .filter_map(|one| one.drive)
+            .map(|one| one.amplitude)
+            .fold(0.0, f64::max);
+        for anchor in &mut anchors {
+            anchor.drive = anchor.drive.filter(|one| one.amplitude > RESTS * largest);
+        }
+        anchors
+    }
+
+    /// The windows of a part in which the base moves: periods of about the same amplitude, near phase resonance.
+    fn driven(&self, run: &[Anchor], target: f64) -> Driven {
+        let samples = self.samples(run);
+        let cycles = Cycle::all(&samples, self.sample_time, target);
+        let (mut windows, mut begin, mut from) = (Vec::new(), 0, 0);
+        while begin < cycles.len() {
+            let rest = &cycles[begin..];
+            let level = mean(rest.iter().take(LEAST).map(Cycle::amplitude));
+            let belongs = |(n, cycle): &(usize, &Cycle)| {
+                let [noise, base_noise] = cycle.noise.map(|variance| 4.0 * variance.sqrt());
+                let phase_noise = (noise / level).hypot(base_noise / cycle.base.norm());
+                let range = if *n < LEAST { RANGE } else { HELD };
+                (cycle.amplitude() - level).abs() <= (range * level).max(noise)
+                    && cycle.phase_error.abs() <= PHASE_RANGE.max(phase_noise)
+            };
+            let length = rest.iter().enumerate().take_while(belongs).count();
+            let taken = rest.iter().take(length.max(1)).map(|one| one.samples).sum::<usize>();
+            if length >= LEAST {
+                windows.push(Window { cycles: begin..begin + length, samples: from..from + taken });
+            }
+            (begin, from) = (begin + length.max(1), from + taken);
+        }
+        Driven { samples, cycles, windows }
+    }
+
+    /// The samples of a part in which the base moves, with the command that its fits stand for.
+    fn samples(&self, run: &[Anchor]) -> Vec<Sample> {
+        let knots: Vec<(f64, Harmonic)> = run.iter().filter_map(|one| Some((one.middle, one.drive?))).collect();
+        let mut samples = Vec::new();
+        for pair in knots.windows(2) {
+            let [(from, left), (to, right)] = [pair[0], pair[1]];
+            let duration = (to - from) * self.sample_time;
+            // The number of turns between the two phases is that of the mean frequency.
+            let expected = 0.5 * (left.omega + right.omega) * duration;
+            let rest = right.phase - left.phase - expected;
+            let omega = (expected + rest - TAU * (rest / TAU).round()) / duration;
+            for n in from.round() as usize..to.round() as usize {
+                let share = (n as f64 - from) / (to - from);
+                let amplitude = left.amplitude + share * (right.amplitude - left.amplitude);
+                let drive = Drive { omega, amplitude, displacement: 0.0 };
+                samples.push(Sample {
+                    time: n as f64 * self.sample_time,
+                    sensors: Sensors { response: self.response[n], reference: Some(self.drive[n]) },
+                    command: Command { drive, ..Command::default() },
+                    ground_truth: None,
+                });
+            }
+        }
+        samples
+    }
+
+    /// Refuses channels that are swapped, or of which one has the wrong sign.
+    fn plausible(&self, runs: &[Run]) -> Result<(), RecordingError> {
+        let cycles = || {
+            runs.iter().flat_map(|run| match run {
+                Run::Driven(driven) => &driven.cycles[..],
+                Run::Free(_) => &[],
+            })
+        };
+        let [response, drive] = self.channels.clone();
+        let origin = self.origin.clone();
+        let ratio = mean(cycles().map(|one| one.base.norm())) / mean(cycles().map(Cycle::amplitude));
+        if ratio > 1.0 {
+            return Err(RecordingError::Swapped { origin, response, drive, ratio });
+        }
+        let near = |phase: f64| {
+            cycles()
+                .filter(|one| (one.phase_error.abs() - phase).abs() < PHASE_RANGE)
+                .count()
+        };
+        if near(PI) > near(0.0) {
+            return Err(RecordingError::Sign { origin, response, drive });
+        }
+        Ok(())
+    }
+
+    /// Why there are no points.
+    fn nothing(&self, anchors: &[Anchor], parts: &[Part], linear: &LinearResponse) -> RecordingError {
+        let [response, drive] = self.channels.clone();
+        let (origin, hertz) = (self.origin.clone(), linear.omega0 / TAU);
+        let seen = anchors.iter().filter(|one| one.kind().is_some()).count();
+        let found = self.strongest(linear);
+        if 2 * seen < anchors.len() && (found / hertz - 1.0).abs() > FARTHEST {
+            let rate = 1.0 / self.sample_time;
+            return RecordingError::Frequency { origin, channel: response, found, hertz, rate };
+        }
+        let mut regimes: Vec<String> = parts.iter().map(|part| part.regime.to_string()).collect();
+        regimes.sort();
+        regimes.dedup();
+        let found = match regimes.join(", ") {
+            none if none.is_empty() => "no such stretch".into(),
+            some => format!("found: {some}"),
+        };
+        RecordingError::NoPoints { origin, response, drive, found }
+    }
+
+    /// Frequency of the strongest oscillation of the response between a twentieth and twenty times the natural frequency, Hz.
+    fn strongest(&self, linear: &LinearResponse) -> f64 {
+        let dt = self.sample_time;
+        let last = &self.response[self.response.len().saturating_sub(SEARCHED)..];
+        let middle = mean(last.iter().copied());
+        let lowest = (linear.omega0 / 20.0).max(TAU / (last.len() as f64 * dt));
+        let highest = (20.0 * linear.omega0).min(PI / dt);
+        let power = |omega: f64| {
+            let sum: Complex64 = last
+                .iter()
+                .enumerate()
+                .map(|(n, value)| Complex64::from_polar(value - middle, omega * n as f64 * dt))
+                .sum();
+            sum.norm()
+        };
+        let count = (2.0 * highest * last.len() as f64 * dt / TAU).min(4000.0) as usize;
+        let grid = equally_spaced(lowest, highest, count.max(2));
+        let best = grid
+            .map(|omega| (power(omega), omega))
+            .max_by(|one, other| one.0.total_cmp(&other.0));
+        best.map_or(f64::NAN, |(_, omega)| omega / TAU)
+    }
+}
+
+/// Both channels at one time.
+struct Anchor {
+    /// In samples.
+    middle: f64,
+    response: Option<Harmonic>,
+    drive: Option<Harmonic>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Motion {
+    Driven,
+    Free,
+}
+
+impl Anchor {
+    /// What moves, if anything does.
+    fn kind(&self) -> Option<Motion> {
+        match (self.response, self.drive) {
+            (Some(_), Some(_)) => Some(Motion::Driven),
+            (Some(_), None) => Some(Motion::Free),
+            (None, _) => None,
+        }
+    }
+}
+
+/// Periods of about the same amplitude.
+struct Window {
+    cycles: Range<usize>,
+    samples: Range<usize>,
+}
+
+/// A part in which the base moves.
+struct Driven {
+    samples: Vec<Sample>,
+    cycles: Vec<Cycle>,
+    windows: Vec<Window>,
+}
+
+/// A part of one kind.
+enum Run<'a> {
+    Driven(Driven),
+    Free(&'a [Anchor]),
+}
+
+/// Amplitude of the response, m, drive, m, and frequency, rad/s.
+type Held = [f64; 3];
+
+/// The parts of all runs. Windows in which the base moves are evaluated twice: the points of the first time give the slopes of the second.
+fn evaluated(runs: &[Run], scene: &Scene, sample_time: f64) -> Vec<Part> {
+    let linear = scene.linear();
+    let estimate = |driven: &Driven, window: &Window, before| {
+        let cycles = &driven.cycles[window.cycles.clone()];
+        let largest = cycles.iter().map(Cycle::amplitude).fold(0.0, f64::max);
+        Criterion { linear, precision: 1.0, largest, before }.best(cycles)
+    };
+    let held = |one: &LevelEstimate| [one.response.value, one.at[0].value, one.at[1].value];
+    let driven = || {
+        runs.iter().filter_map(|run| match run {
+            Run::Driven(driven) => Some(driven),
+            Run::Free(_) => None,
+        })
+    };
+    let windows = driven().flat_map(|one| one.windows.iter().map(move |window| (one, window)));
+    let mut curve: Vec<Held> = windows
+        .filter_map(|(driven, window)| estimate(driven, window, [None; 2]).as_ref().map(held))
+        .collect();
+    curve.sort_by(|one, other| one[0].total_cmp(&other[0]));
+    let mut parts = Vec::new();
+    for run in runs {
+        match run {
+            Run::Free(anchors) => parts.extend(decay(anchors, &linear, sample_time)),
+            Run::Driven(driven) => {
+                let estimates: Vec<Option<LevelEstimate>> = driven
+                    .windows
+                    .iter()
+                    .map(|window| {
+                        let first = held(&estimate(driven, window, [None; 2])?);
+                        estimate(driven, window, neighbours(&curve, first))
+                    })
+                    .collect();
+                let changes: Vec<f64> = driven
+                    .windows
+                    .iter()
+                    .map(|window| change(&driven.cycles[window.cycles.clone()]))
+                    .collect();
+                let alike = |n: usize| (0..changes.len()).filter(|m| changes[*m] * changes[n] > 0.0).count() as f64;
+                for (n, (window, estimate)) in driven.windows.iter().zip(estimates).enumerate() {
+                    parts.push(part(driven, window, estimate, changes[n], alike(n), &curve, scene));
+                }
+            }
+        }
+    }
+    parts
+}
+
+/// Change of the amplitude in a period, m; 0 if it is noise.
+fn change(cycles: &[Cycle]) -> f64 {
+    let change = slope(&cycles.iter().map(Cycle::amplitude).collect::<Vec<f64>>());
+    let n = cycles.len() as f64;
+    let noise = (12.0 * mean(cycles.iter().map(|one| one.noise[0])) / n.powi(3)).sqrt();
+    if change.abs() > RANDOM * noise { change } else { 0.0 }
+}
+
+/// The two points whose amplitudes are next to that of `here`, the nearest last.
+fn neighbours(curve: &[Held], here: Held) -> [Option<Held>; 2] {
+    let mut others: Vec<Held> = curve
+        .iter()
+        .copied()
+        .filter(|one| (one[0] / here[0] - 1.0).abs() > APART)
+        .collect();
+    others.sort_by(|one, other| (one[0] - here[0]).abs().total_cmp(&(other[0] - here[0]).abs()));
+    [others.get(1).copied(), others.first().copied()]
+}
+
+/// The part of a window.
+fn part(
+    driven: &Driven,
+    window: &Window,
+    estimate: Option<LevelEstimate>,
+    change: f64,
+    alike: f64,
+    curve: &[Held],
+    scene: &Scene,
+) -> Part {
+    let samples = &driven.samples[window.samples.clone()];
+    let cycles = &driven.cycles[window.cycles.clone()];
+    let seconds = [samples[0].time, samples[samples.len() - 1].time];
+    let target = scene.controller.phase_target_radians();
+    let Some(estimate) = estimate else {
+        return Part {
+            seconds,
+            kind: Kind::Held,
+            point: None,
+            regime: Regime::Unknown,
+        };
+    };
+    let [base, omega] = estimate.at;
+    let level = estimate.response;
+    let averaged = cycles[cycles.len() - estimate.periods..]
+        .iter()
+        .map(|one| one.samples)
+        .sum::<usize>();
+    let samples = &samples[samples.len() - averaged..];
+    let kind = if (change * cycles.len() as f64).abs() > SWEPT * level.value {
+        Kind::Sweep
+    } else {
+        Kind::Held
+    };
+    let regime = regime_by_response(samples, scene, base.value, target, omega.value);
+    // What the estimate contains once of the lag, and of the phase error in the second order.
+    let here = [level.value, base.value, omega.value];
+    let slopes = neighbours(curve, here)[1].map_or([0.0; 2], |other| {
+        [1, 2].map(|i| (other[i] - here[i]) / (other[0] - here[0]))
+    });
+    let late = LAG * change * (alike - 1.0).max(0.0).sqrt();
+    let beside = estimate.phase_error.value.abs() * base.value / level.value;
+    let linear = scene.linear();
+    let drive = Estimate::new(base.value, &[base.uncertainty, slopes[0] * late, beside * base.value]);
+    let omega = Estimate::new(
+        omega.value,
+        &[
+            omega.uncertainty,
+            slopes[1] * late,
+            beside * (omega.value - linear.omega0),
+        ],
+    );
+    let is_point = matches!(regime, Regime::Symmetric | Regime::Unresolved)
+        && drive.value > 0.0
+        && drive.uncertainty < VAGUE * drive.value
+        && omega.uncertainty.is_finite();
+    Part {
+        seconds,
+        kind,
+        point: is_point.then_some(MeasuredPoint { response: level, omega, drive }),
+        regime,
+    }
+}
+
+/// The points of a decay, with `E = -A'/g`. The fits do not overlap.
+fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<Part> {
+    let apart = WINDOW.ceil() as usize;
+    let fits: Vec<(f64, Harmonic)> = anchors
+        .iter()
+        .step_by(apart)
+        .filter_map(|one| Some((one.middle * sample_time, one.response?)))
+        .collect();
+    let held = |one: &Harmonic| {
+        let gain = 0.5 * linear.omega0 * linear.omega0 / one.omega;
+        [one.amplitude, -one.rate / gain, one.omega]
+    };
+    // The impacts have ended where what remains is the damping of the structure.
+    let damping = linear.damping_rate;
+    let taken = |one: &Harmonic| -one.rate - damping * one.amplitude;
+    let at_first = fits.first().map_or(0.0, |(_, one)| taken(one));
+    let synchronous: Vec<_> = fits.iter().take_while(|(_, one)| taken(one) > 0.5 * at_first).collect();
+    let count = synchronous.len() as f64;
+    let half = 0.5 * WINDOW * TAU / linear.omega0;
+    synchronous
+        .windows(2)
+        .map(|pair| {
+            let [(time, one), (_, other)] = [pair[0], pair[1]];
+            let (here, there) = (held(one), held(other));
+            let slopes = [1, 2].map(|i| (there[i] - here[i]) / (there[0] - here[0]));
+            let late = LAG * one.rate * TAU / one.omega;
+            let gain = -one.rate / here[1];
+            // What is seen in one balance may be in the other, too.
+            let units = [1.0, one.amplitude / gain];
+            let systematic = (slopes[0] * late).hypot(units[1] * slopes[1] * late) * count.sqrt();
+            let [u_amplitude, u_omega] = one.uncertainties;
+            let u_rate = u_omega * one.amplitude;
+            let drive = Estimate::new(here[1], &[u_rate / gain, systematic]);
+            let omega = Estimate::new(one.omega, &[u_omega, systematic / units[1]]);
+            let is_point = drive.value > 0.0 && drive.uncertainty < VAGUE * drive.value;
+            let response = Estimate { value: one.amplitude, uncertainty: u_amplitude };
+            Part {
+                seconds: [time - half, time + half],
+                kind: Kind::Decay,
+                point: is_point.then_some(MeasuredPoint { response, omega, drive }),
+                regime: Regime::Unresolved,
+            }
+        })
+        .collect()
+}
