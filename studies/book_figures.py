@@ -129,9 +129,7 @@ def cavities():
     fold = min(orbits, key=lambda point: point["C"])["B"]
     ideal = [point for point in orbits if fold <= point["B"] < 1.3]
     for axes, name in zip(both, ("sigma", "G"), strict=True):
-        axes.plot(
-            [p[name] for p in ideal], [p["C"] for p in ideal], color="black", lw=1, label="ideal (exact orbits)"
-        )
+        axes.plot([p[name] for p in ideal], [p["C"] for p in ideal], color="black", lw=1, label="ideal (exact orbits)")
     for name, (label, colour, mark) in scenes.items():
         with tempfile.TemporaryDirectory() as folder:
             points = printed("backbone", "--scene", f"scenes/{name}.toml", "--out", folder)["points"]
