@@ -42,7 +42,7 @@ export class Rig {
     c.strokeStyle = c.fillStyle = colour("faint");
     c.beginPath(); c.moveTo(0, floor + 1); c.lineTo(width, floor + 1); c.stroke();
     // Base
-    c.fillStyle = colour("blue");
+    c.fillStyle = colour("base");
     c.fillRect(wall - 10, floor - 1.75 * b, 10, 1.75 * b);
     // Spring and damper
     c.strokeStyle = colour("ink");
@@ -66,12 +66,12 @@ export class Rig {
       const lit = look.wall === -side ? 1 : side === -this.flash.wall && !calm ? Math.max(0, 1 - age / 180) : 0;
       if (lit > 0) {
         c.globalAlpha = lit;
-        c.fillStyle = colour("red");
+        c.fillStyle = colour("particle");
         c.fillRect(side < 0 ? inside[0] - 0.12 * b : inside[1], floor - 1.12 * b, 0.12 * b, 0.66 * b);
         c.globalAlpha = 1;
       }
     }
-    c.fillStyle = colour("red");
+    c.fillStyle = colour("particle");
     const seen = !Number.isNaN(particle);
     if (seen) { c.beginPath(); c.arc(particle, floor - 0.79 * b, radius, 0, 7); c.fill(); }
     c.fillStyle = colour("faint");
