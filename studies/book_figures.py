@@ -1,6 +1,6 @@
 """Figures of the tutorials, from what the program `vines` prints.
 
-python studies/book_figures.py PROGRAM    writes docs/manifold.svg, docs/window.svg and docs/responses.svg
+python studies/book_figures.py PROGRAM [FIGURE ...]    writes docs/FIGURE.svg: manifold, window, responses, cavities; all by default
 """
 
 import json
@@ -121,6 +121,33 @@ def responses():
     save(figure, "responses.svg")
 
 
-manifold()
-window()
-responses()
+def cavities():
+    """Backbones of four real cavities, tracked by `vines backbone`, and that of the ideal cavity by exact orbits."""
+    scenes = {
+        "rough": ("friction, mu = 0.05", MEASURED, "o"),
+        "skewed": ("gaps 1.1 : 0.9", STABLE, "s"),
+        "vertical": ("vertical, gravity 0.08 b omega0²", "#009e73", "^"),
+        "viscoelastic": ("viscoelastic, r falls with the speed", "#cc79a7", "D"),
+    }
+    figure, both = plt.subplots(1, 2, figsize=(7.5, 4), layout="constrained", sharey=True)
+    ideal = [point for point in printed("orbit", "--backbone")["points"] if point["B"] < 1.3]
+    for axes, name in zip(both, ("sigma", "G"), strict=True):
+        axes.plot(
+            [p[name] for p in ideal], [p["C"] for p in ideal], color="black", lw=1, label="ideal cavity, exact orbits"
+        )
+    for name, (label, colour, mark) in scenes.items():
+        with tempfile.TemporaryDirectory() as folder:
+            points = printed("backbone", "--scene", f"scenes/{name}.toml", "--out", folder)["points"]
+        points = [p for p in points if p["settled"] and p["regime_by_impacts"] != "no impacts"]
+        for axes, key in zip(both, ("sigma", "G"), strict=True):
+            place = [p[key] for p in points], [p["C"] for p in points]
+            axes.plot(*place, mark, color=colour, mfc="none", ms=4, lw=0, label=label)
+    both[0].set(xlabel="detuning sigma", ylabel="amplitude of the response C", xlim=(-2.2, 0.4), ylim=(0, 0.75))
+    both[1].set(xlabel="base amplitude G", xlim=(0.8, 1.6))
+    both[1].legend(frameon=False, loc="lower right", fontsize=8)
+    save(figure, "cavities.svg")
+
+
+FIGURES = {"manifold": manifold, "window": window, "responses": responses, "cavities": cavities}
+for figure in sys.argv[2:] or FIGURES:
+    FIGURES[figure]()
