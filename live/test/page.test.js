@@ -590,6 +590,8 @@ for (const { name, options } of BROWSERS) {
           return page;
         }));
         for (const page of pages) {
+          // A page in the background draws nothing.
+          await page.bringToFront();
           await page.waitForFunction(() => window.live?.page.end > 3, { timeout: 60000 });
           const found = await page.evaluate(async () => {
             const one = window.live.page;
@@ -599,13 +601,15 @@ for (const { name, options } of BROWSERS) {
             const enabled = [...document.querySelectorAll("#settings input:not(:disabled)")].length;
             await new Promise((done) => setTimeout(done, 1000));
             const last = one.rows.row(-1);
-            return { grows: one.end > before, enabled, lamp: text("lamp"), advice: text("advice"), G: one.pictures.now.G, w: Math.abs(last[3]) <= 0.0101, wide: document.documentElement.scrollWidth - innerWidth, buttons: [...document.querySelectorAll("button:not(:disabled)")].filter((one) => one.checkVisibility({ visibilityProperty: true })).map((one) => one.id) };
+            return { grows: one.end > before, enabled, lamp: text("lamp"), advice: text("advice"), G: one.pictures.now.G, w: Math.abs(last[3]) <= 0.0101, wide: Math.max(0, document.documentElement.scrollWidth - innerWidth), buttons: [...document.querySelectorAll("button:not(:disabled)")].filter((one) => one.checkVisibility({ visibilityProperty: true })).map((one) => one.id) };
           });
           assert.match(found.lamp, /STARTING|SEARCHING|LOCKED|FREE DECAY/);
           assert.match(found.advice, /vines identify is running/);
           assert.deepEqual({ ...found, lamp: "", advice: "", G: 0 }, { grows: true, enabled: 0, lamp: "", advice: "", G: 0, w: true, wide: 0, buttons: ["play", "csv", "sound", "help"] });
         }
-        // One minute is kept on the page: pausing shows the past, the experiment goes on.
+        // Pausing shows the past, and the experiment goes on.
+        await pages[1].close();
+        await pages[0].bringToFront();
         await pages[0].click("#play");
         const paused = await pages[0].evaluate(async () => {
           const one = window.live.page, { shown, end } = one;
@@ -616,7 +620,6 @@ for (const { name, options } of BROWSERS) {
         await mkdir(SCREENS, { recursive: true });
         await pages[0].click("#play");
         await pages[0].screenshot({ path: join(SCREENS, `${name}-watch.png`), fullPage: true });
-        await pages[1].close();
         experiment.child.kill("SIGINT");
         await pages[0].waitForFunction(() => document.getElementById("lamp").textContent === "FAILED", { timeout: 20000 });
         assert.match(await pages[0].$eval("#advice", (element) => element.textContent), /has failed: .*interrupted/);
