@@ -45,6 +45,10 @@ pub fn regimes(map: &Map) -> Table {
     Table::new("regime | cells | share | inside the theory's stable island").rows(rows)
 }
 
+/// What the symbols of an identification mean.
+const SYMBOLS: &str = "  sigma: detuning (omega/omega0 - 1)/epsilon; C: amplitude of the response over b; B: particle speed over b omega0; G: base amplitude \
+                       over b epsilon\n";
+
 /// An identification: the locked point beside theory and exact orbit, then the decay.
 pub fn identification(result: &Comparison) -> String {
     let (lock, at) = (&result.lock, &result.lock.at);
@@ -76,6 +80,7 @@ pub fn identification(result: &Comparison) -> String {
         at.u_phase_deg,
         table.text(),
     );
+    text += SYMBOLS;
     let mut note = |note: &str| text += &format!("  ({note})\n");
     if let Some(friction) = lock.friction {
         note(&friction_text(&friction));
