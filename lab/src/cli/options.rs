@@ -10,8 +10,8 @@ use phase_lock::Config;
 use vines::ArgumentError;
 use vines::fmu::{FmuController, FmuError, FmuRig};
 use vines::helic::{Channels, DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
-use vines::report::summary::ideal;
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
+use vines::report::summary::ideal;
 use vines::rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable};
 use vines::scene::{Family, Name, Names, Override, PAPER, Scene, SceneError};
 

@@ -115,7 +115,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         adaptive: arguments.adaptive,
     };
     let sweep = Sweep::new(arguments.scene.family()?, settings).map_err(Failure::input)?;
-    warn_left_out(sweep.scene(), "regimes, responses and exact orbits of a sweep (not its locked points) are");
+    warn_left_out(
+        sweep.scene(),
+        "regimes, responses and exact orbits of a sweep (not its locked points) are",
+    );
     if !arguments.merge.is_empty() {
         return merge(&sweep, arguments);
     }
