@@ -1,6 +1,7 @@
 """Figures of the book, from what the program `vines` prints and writes.
 
-python studies/book_figures.py PROGRAM    writes backbone, manifold, regimes, window, responses, coverage (SVG) in docs/
+python studies/book_figures.py PROGRAM [FIGURE ...]    writes docs/FIGURE.svg, all by default: own (backbone, manifold,
+                                                       regimes), window, responses, coverage, cavities
 """
 
 import csv
@@ -66,7 +67,9 @@ def window():
         for stable, part in pieces(points):
             if stable:
                 drives = [point["G"] for point in part]
-                axes.plot([r, r], [min(drives), max(drives)], color=COLOURS["symmetric 1:1"], lw=5, solid_capstyle="butt")
+                axes.plot(
+                    [r, r], [min(drives), max(drives)], color=COLOURS["symmetric 1:1"], lw=5, solid_capstyle="butt"
+                )
     marks = {"lock and decay": "o", "lock, no decay": "s", "held by control": "D", "refused": "x"}
     shown = set()
     for r in (0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 1.0):
@@ -81,7 +84,9 @@ def window():
         label = None if kind in shown else kind
         shown.add(kind)
         axes.plot(r, 1.1, marks[kind], color=MEASURED if kind != "refused" else "black", mfc="white", ms=7, label=label)
-    axes.set(xlabel="coefficient of restitution r", ylabel="base amplitude G = E/(b ε)", xlim=(0.27, 1.03), ylim=(0, 2.6))
+    axes.set(
+        xlabel="coefficient of restitution r", ylabel="base amplitude G = E/(b ε)", xlim=(0.27, 1.03), ylim=(0, 2.6)
+    )
     axes.legend(frameon=False, title="vines identify at G = 1.1")
     save(figure, "window.svg")
 
@@ -106,9 +111,36 @@ def responses():
     axes.plot([], [], color=EXACT, lw=2, label="backbone (phase resonance)")
     axes.plot([], [], color=EXACT, lw=1, label="frequency response")
     axes.plot([], [], color=EXACT_UNSTABLE, lw=1, ls="--", label="unstable")
-    axes.set(xlabel="detuning σ", ylabel="amplitude of the response C, over b", xlim=(-2.5, 0.5), ylim=(0, 0.9))
+    axes.set(xlabel="detuning sigma", ylabel="amplitude of the response C, over b", xlim=(-2.5, 0.5), ylim=(0, 0.9))
     axes.legend(frameon=False, loc="upper left", fontsize=8)
     save(figure, "responses.svg")
+
+
+def cavities():
+    """Backbones of four real cavities, tracked by `vines backbone`, and that of the ideal cavity by exact orbits."""
+    scenes = {
+        "rough": ("friction, mu = 0.05", MEASURED, "o"),
+        "skewed": ("gaps 1.1 : 0.9", COLOURS["symmetric 1:1"], "s"),
+        "vertical": ("vertical, gravity 0.08 b omega0²", "#009e73", "^"),
+        "viscoelastic": ("viscoelastic, r falls with the speed", "#cc79a7", "D"),
+    }
+    figure, both = plt.subplots(1, 2, figsize=(7.5, 4), layout="constrained", sharey=True)
+    ideal = [point for point in printed("orbit", "--backbone")["points"] if point["B"] < 1.3]
+    for axes, name in zip(both, ("sigma", "G"), strict=True):
+        axes.plot(
+            [p[name] for p in ideal], [p["C"] for p in ideal], color="black", lw=1, label="ideal cavity, exact orbits"
+        )
+    for name, (label, colour, mark) in scenes.items():
+        with tempfile.TemporaryDirectory() as folder:
+            points = printed("backbone", "--scene", f"scenes/{name}.toml", "--out", folder)["points"]
+        points = [p for p in points if p["settled"] and p["regime_by_impacts"] != "no impacts"]
+        for axes, key in zip(both, ("sigma", "G"), strict=True):
+            place = [p[key] for p in points], [p["C"] for p in points]
+            axes.plot(*place, mark, color=colour, mfc="none", ms=4, lw=0, label=label)
+    both[0].set(xlabel="detuning sigma", ylabel="amplitude of the response C", xlim=(-2.2, 0.4), ylim=(0, 0.75))
+    both[1].set(xlabel="base amplitude G", xlim=(0.8, 1.6))
+    both[1].legend(frameon=False, loc="lower right", fontsize=8)
+    save(figure, "cavities.svg")
 
 
 def coverage():
@@ -131,7 +163,6 @@ def coverage():
     save(figure, "coverage.svg")
 
 
-own()
-window()
-responses()
-coverage()
+FIGURES = {"own": own, "window": window, "responses": responses, "coverage": coverage, "cavities": cavities}
+for name in sys.argv[2:] or FIGURES:
+    FIGURES[name]()

@@ -6,8 +6,13 @@
 //! the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the error over u, and that over the
 //! Cramér–Rao bound of the same points; and the numbers of fits that are rejected, and of rigs without a fit.
 //!
+//! `effects` gives each rig one hidden effect of its cavity, in turn friction, tilt, and two laws of restitution, that moves its points by more than
+//! 5 u, and half of the rigs none. The table has the numbers of rigs that are flagged, because the ideal cavity does not describe their points, that
+//! are explained by the right effect, by a wrong one alone, and by the right one only among others; and the coverage of the strength.
+//!
 //! ```sh
 //! cargo run --release -p vines-testbench --example fit -- points|recordings RIGS SEED SNR    # SNR: dB, or none; writes validation/fit.csv
+//! cargo run --release -p vines-testbench --example fit -- effects RIGS SEED SNR              # writes validation/fit_effects.csv
 //! ```
 
 mod common;
@@ -18,7 +23,8 @@ use common::{Failure, arguments, client, is_kept, quantile, share, tracked, unif
 use rayon::prelude::*;
 use vines_model::numerics::mean_square;
 use vines_testbench::experiment::{Plan, run};
-use vines_testbench::fit::{Fit, MeasuredPoint, Quantity, Recording, at, fit};
+use vines_testbench::backbone::track;
+use vines_testbench::fit::{Effect, Fit, MeasuredPoint, Quantity, Recording, at, explain, fit};
 use vines_testbench::rig::{BuiltIn, Chain, SensorsOnly, Simulated};
 use vines_testbench::scene::{Parameters, Scene};
 
@@ -32,6 +38,7 @@ fn main() -> Result<(), Failure> {
     let measure: fn(&Case, &str) -> Result<(Vec<MeasuredPoint>, Scene), Failure> = match &**source {
         "points" => points,
         "recordings" => recorded,
+        "effects" => return effects(count.parse()?, seed, snr),
         other => return Err(format!("{other}: there are points and recordings").into()),
     };
     let mut uniform = uniform(seed.parse()?);
@@ -55,7 +62,8 @@ fn main() -> Result<(), Failure> {
     let kept: Vec<&&Fitted> = found.iter().filter(|one| !one.fit.is_rejected()).collect();
     let mut rows = Vec::new();
     for (n, quantity) in Quantity::ALL[..5].iter().enumerate() {
-        let gather = |values: fn(&Fitted) -> &[f64; 5]| kept.iter().map(|one| values(one)[n].abs()).collect::<Vec<f64>>();
+        let gather =
+            |values: fn(&Fitted) -> &[f64; 5]| kept.iter().map(|one| values(one)[n].abs()).collect::<Vec<f64>>();
         let (ratios, over_bound) = (gather(|one| &one.over_u), gather(|one| &one.over_bound));
         let rms = |values: &[f64]| mean_square(values.iter().copied()).sqrt();
         rows.push(format!(
@@ -84,17 +92,9 @@ struct Fitted {
     over_bound: [f64; 5],
 }
 
-fn fitted(([epsilon, lambda, r], ..): &Case, points: &[MeasuredPoint], scene: &Scene) -> Result<Fitted, Failure> {
+fn fitted((ratios, ..): &Case, points: &[MeasuredPoint], scene: &Scene) -> Result<Fitted, Failure> {
     let fit = fit(points, scene.resonance, &scene.plant, &[])?;
-    let truth = Parameters {
-        primary_mass: 1.0,
-        stiffness: 1.0,
-        damping: epsilon * lambda,
-        particle_mass: *epsilon,
-        half_width: 1.0,
-        restitution: *r,
-        cavity: lovines::Cavity::IDEAL,
-    };
+    let truth = rig(*ratios);
     let bound = at(points, scene.resonance, &truth, &[]).ok_or("the rig has no such motion")?;
     let over = |u: &Fit| {
         [0, 1, 2, 3, 4].map(|n| {
@@ -106,7 +106,7 @@ fn fitted(([epsilon, lambda, r], ..): &Case, points: &[MeasuredPoint], scene: &S
     let (over_u, over_bound) = (over(&fit), over(&bound));
     println!(
         "{:.4?} {} of {} points: {over_u:.1?} u, chi-square {:.1} of {}, of the rig {:.1}",
-        [epsilon, lambda, r],
+        ratios,
         fit.residuals.len(),
         points.len(),
         fit.chi_square,
@@ -114,6 +114,128 @@ fn fitted(([epsilon, lambda, r], ..): &Case, points: &[MeasuredPoint], scene: &S
         bound.chi_square
     );
     Ok(Fitted { fit, over_u, over_bound })
+}
+
+/// A rig with M = k = b = 1.
+fn rig([epsilon, lambda, r]: [f64; 3]) -> Parameters {
+    Parameters {
+        primary_mass: 1.0,
+        stiffness: 1.0,
+        damping: epsilon * lambda,
+        particle_mass: epsilon,
+        half_width: 1.0,
+        restitution: r,
+        cavity: lovines::Cavity::IDEAL,
+    }
+}
+
+/// What a fit says of a rig with a hidden effect, or with none.
+struct Named {
+    effect: Option<Effect>,
+    flagged: bool,
+    /// Whether the best explanation is right, whether there is one, and whether the right one is possible.
+    right: bool,
+    explained: bool,
+    possible: bool,
+    /// Error of the strength over its standard uncertainty.
+    over_u: Option<f64>,
+}
+
+fn effects(count: usize, seed: &str, snr: &str) -> Result<(), Failure> {
+    let mut uniform = uniform(seed.parse()?);
+    let cases: Vec<_> = (0..2 * count)
+        .map(|n| {
+            let epsilon = uniform(2e-3_f64.ln(), 0.03_f64.ln()).exp();
+            let ratios = [epsilon, uniform(0.4, 2.5), uniform(0.4, 0.9)];
+            let noise = uniform(0.0, 1e6) as u64;
+            let scales = [0.01, 0.3, 0.2, 0.1, 0.2].map(|range| uniform(-range, range));
+            (ratios, noise, scales, (n < count).then(|| Effect::ALL[n % 4]), uniform(0.3, 1.0))
+        })
+        .collect();
+    let named: Vec<Option<Named>> = cases
+        .par_iter()
+        .map(|case| {
+            let result = named(case, snr);
+            result.inspect_err(|error| println!("{:.4?} {:?}: {error}", case.0, case.3)).ok()
+        })
+        .collect();
+    let mut rows = Vec::new();
+    for effect in Effect::ALL.map(Some).into_iter().chain([None]) {
+        let of: Vec<&Named> = named.iter().flatten().filter(|one| one.effect == effect).collect();
+        let number = |is: fn(&Named) -> bool| of.iter().filter(|one| is(one)).count();
+        let pulls: Vec<f64> = of.iter().filter_map(|one| one.over_u.map(f64::abs)).collect();
+        let name = effect.map_or_else(|| "none".into(), |effect| effect.to_string());
+        rows.push(format!(
+            "{name},{snr},{seed},{},{},{},{},{},{:.3},{:.1}",
+            of.len(),
+            number(|one| one.flagged),
+            number(|one| one.right),
+            number(|one| one.explained && !one.right),
+            number(|one| one.possible && !one.right),
+            share(&pulls, 1.96),
+            quantile(&pulls, 1.0)
+        ));
+    }
+    write(
+        "fit_effects",
+        "effect,snr_dB,seed,rigs,flagged,named,misnamed,among_others,strength_within_1.96u,largest_u",
+        2,
+        &rows,
+    )
+}
+
+/// A rig, the seed of its noise, the client's errors, an effect, and its size.
+type Hidden = ([f64; 3], u64, [f64; 5], Option<Effect>, f64);
+
+fn named((ratios, noise, scales, effect, size): &Hidden, snr: &str) -> Result<Named, Failure> {
+    let (_, scene) = client(*ratios, *noise, snr, *scales)?;
+    let ideal = rig(*ratios);
+    // Friction and tilt over b omega0²: up to a hundredth and a thirtieth; laws of restitution with the value r at the usual speed of impacts, 2 b omega0.
+    let g = lovines::cavity::GRAVITY;
+    let (strength, cavity) = match effect {
+        None => (f64::NAN, ideal.cavity),
+        Some(Effect::Friction) => {
+            let mu = 0.01 * size / g;
+            (mu, lovines::Cavity { kinetic_friction: mu, ..ideal.cavity })
+        }
+        Some(Effect::Tilt) => {
+            let tilt = 0.05 * size / g;
+            (tilt.to_degrees(), lovines::Cavity { tilt, ..ideal.cavity })
+        }
+        Some(law) => {
+            let strength = if *law == Effect::Viscoelastic { (1.0 - ideal.restitution) / 2f64.powf(0.2) } else { 2.0 * ideal.restitution.powi(4) };
+            let law = if *law == Effect::Viscoelastic {
+                lovines::Restitution::Viscoelastic(strength)
+            } else {
+                lovines::Restitution::Plastic(strength)
+            };
+            (strength, lovines::Cavity { restitution: [Some(law); 2], ..ideal.cavity })
+        }
+    };
+    let truth = Parameters { cavity, ..ideal };
+    let rig = Simulated::new(truth, scene.start)?;
+    let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
+    let mut controller = BuiltIn::new(&scene.backbone_config())?;
+    let tracked = track(&mut rig, &mut controller, &scene, |_, _| {})?;
+    let points: Vec<MeasuredPoint> = tracked.points.iter().filter(is_kept).map(|point| (&point.at).into()).collect();
+    let begin = std::time::Instant::now();
+    let found = explain(&points, scene.resonance, &scene.plant, &[], |_| {})?;
+    let (best, right) = (found.explains(), found.candidates.iter().find(|one| Some(one.effect) == *effect));
+    println!(
+        "{ratios:.4?} {effect:?} {strength:.5}: {} points, {}; right one {:?}, {:.2?}",
+        points.len(),
+        if found.ideal.is_rejected() { found.verdict() } else { format!("ideal, {:.1} for {}", found.ideal.chi_square, found.ideal.degrees) },
+        right.map(|one| (one.fit.chi_square, one.strength)),
+        begin.elapsed()
+    );
+    Ok(Named {
+        effect: *effect,
+        flagged: found.ideal.is_rejected(),
+        right: best.is_some_and(|one| Some(one.effect) == *effect),
+        explained: best.is_some(),
+        possible: right.is_some_and(|one| !one.fit.is_rejected()),
+        over_u: right.map(|one| (one.strength.value - strength) / one.strength.uncertainty),
+    })
 }
 
 /// The points of a tracked backbone.
@@ -144,11 +266,25 @@ fn recorded((rig, noise, scales): &Case, snr: &str) -> Result<(Vec<MeasuredPoint
     scene.measured = None;
     let parts = recording.parts(&scene)?;
     if std::env::var("VERBOSE").is_ok() {
-        let residuals = at(&parts.iter().filter_map(|part| part.point).collect::<Vec<_>>(), scene.resonance, &truth, &[]).map(|one| one.residuals).unwrap_or_default();
+        let residuals = at(
+            &parts.iter().filter_map(|part| part.point).collect::<Vec<_>>(),
+            scene.resonance,
+            &truth,
+            &[],
+        )
+        .map(|one| one.residuals)
+        .unwrap_or_default();
         let mut residuals = residuals.iter();
         for part in &parts {
             let point = part.point.map(|one| (one.response.value, one.omega, one.drive));
-            println!("{:.1?} {:?} {} {:.6?} {:.1?}", part.seconds.map(|t| t / TAU), part.kind, part.regime, point, point.and_then(|_| residuals.next()));
+            println!(
+                "{:.1?} {:?} {} {:.6?} {:.1?}",
+                part.seconds.map(|t| t / TAU),
+                part.kind,
+                part.regime,
+                point,
+                point.and_then(|_| residuals.next())
+            );
         }
     }
     Ok((parts.into_iter().filter_map(|part| part.point).collect(), scene))

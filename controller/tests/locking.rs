@@ -1,7 +1,8 @@
-//! The loop around a resonator: whether it locks, at which frequency, and how fast.
+//! Guards the loop around a resonator: whether it locks, at which frequency and how fast, ramps, the control of the response amplitude,
+//! and refused configurations.
 
 mod rig;
-use phase_lock::{Config, Detector, LoopState};
+use phase_lock::{Config, Detector, LoopState, Move};
 use rig::{AMPLITUDE, Bench, Noise, OMEGA_0, ZETA, config};
 
 fn relative(a: f64, b: f64) -> f64 {
@@ -235,4 +236,104 @@ fn retuning_leaves_no_trace_of_the_values_before() {
         retuned.retune(amplitude, config.phase_target).unwrap();
         assert_eq!(retuned, Config { amplitude, ..config }.build().unwrap());
     }
+}
+
+#[test]
+fn ramps_stay_within_their_rates() {
+    let mut bench = Bench::new(Config {
+        ramp_rate: Some(0.5 * AMPLITUDE),
+        omega_rate: Some(0.5),
+        omega_start: 0.97 * OMEGA_0,
+        ..config()
+    });
+    let Config { sample_time, amplitude, .. } = *bench.controller.config();
+    let mut before = bench.sample();
+    for _ in 0..60_000 {
+        let output = bench.sample();
+        let (omega, level) = (output.omega - before.omega, output.amplitude - before.amplitude);
+        assert!(omega.abs() <= 0.5 * sample_time * (1.0 + 1e-9));
+        assert!(level.abs() <= amplitude * sample_time / 2.0 * (1.0 + 1e-9));
+        before = output;
+    }
+    assert!(before.locked);
+}
+
+#[test]
+fn an_invalid_configuration_is_refused_by_name() {
+    let refusal = |config: Config| config.build().expect_err("must be refused").to_string();
+    assert_eq!(
+        refusal(Config { sample_time: f64::NAN, ..config() }),
+        "sample_time = NaN s is refused; allowed is above 0 (1e-30 to 1e30)"
+    );
+    for (name, bad) in [
+        ("omega_max", Config { omega_max: 1.0, ..config() }),
+        ("omega_start", Config { omega_start: 1e3, ..config() }),
+        ("amplitude", Config { amplitude: -1.0, ..config() }),
+        ("bandwidth", Config { bandwidth: 1e4, ..config() }),
+        ("phase_target", Config { phase_target: 4.0, ..config() }),
+        ("sample_time", Config { sample_time: 0.05, bandwidth: 0.1, ..config() }),
+        ("delay", Config { delay: f64::INFINITY, ..config() }),
+    ] {
+        assert!(refusal(bad).starts_with(name), "{}", refusal(bad));
+    }
+}
+
+#[test]
+fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
+    let mut bench = Bench::new(Config {
+        amplitude_max: Some(4.0 * AMPLITUDE),
+        damping_rate: Some(ZETA * OMEGA_0),
+        ..config()
+    });
+    bench.run_to_lock(2000).expect("a lock");
+    let before = AMPLITUDE / (2.0 * ZETA);
+    for (share, drive) in [(0.8, -0.2 * AMPLITUDE), (1.3, 0.0)] {
+        let to = Move {
+            response: share * before,
+            duration: 0.5,
+            amplitude: drive,
+            ..Move::default()
+        };
+        bench
+            .controller
+            .hold_response(&mut bench.state, to)
+            .expect("a closed loop");
+        // A free transient would decay by a factor of 2.6 in 30 periods.
+        let output = bench.run(30);
+        println!("{share}: {:.5}", output.response_amplitude / before);
+        assert!(relative(output.response_amplitude, share * before) < 0.02);
+        assert!(output.locked && output.response_target == Some(share * before));
+        let output = bench.run(200);
+        assert!(relative(output.response_amplitude, share * before) < 1e-5);
+        assert!(relative(output.amplitude, share * AMPLITUDE) < 1e-5);
+        assert!(output.settled);
+    }
+    // The drive returns to its own setpoint.
+    bench.controller.hold_drive(&mut bench.state);
+    let output = bench.run(30);
+    assert_eq!((output.response_target, output.amplitude), (None, AMPLITUDE));
+    bench
+        .controller
+        .hold_response(&mut bench.state, Move { response: before, ..Move::default() })
+        .unwrap();
+    assert!(bench.sample().response_target.is_some());
+    // Switching the drive off ends the control of the response.
+    bench.active = false;
+    assert_eq!(bench.sample().response_target, None);
+}
+
+#[test]
+fn the_response_cannot_be_controlled_without_a_limit_of_the_drive_or_in_an_open_loop() {
+    let to = Move { response: 0.01, ..Move::default() };
+    let mut bench = Bench::new(Config { amplitude_max: None, ..config() });
+    bench.run(10);
+    let refusal = |bench: &mut Bench, to| {
+        let refused = bench.controller.hold_response(&mut bench.state, to);
+        refused.expect_err("must be refused").to_string()
+    };
+    assert!(refusal(&mut bench, to).starts_with("amplitude_max = none is refused"));
+    let mut bench = Bench::new(Config { amplitude_max: Some(1.0), ..config() });
+    assert!(refusal(&mut bench, to).starts_with("state = 0 is refused"));
+    bench.run(10);
+    assert!(refusal(&mut bench, Move::default()).starts_with("response = 0 m"));
 }

@@ -110,7 +110,9 @@ export class Pictures {
     this.lines = { theory: bench.theory(160), exact: bench.exact(120) };
     this.manifoldEnd = 0;
     // The curves leave the effects of a real cavity out.
-    this.ideal = EFFECTS.some((key) => this.page.values[key]) ? ", ideal cavity" : "";
+    const real = EFFECTS.some((key) => this.page.values[key]);
+    this.ideal = real ? " (ideal)" : "";
+    for (const note of document.querySelectorAll(".ideal")) note.hidden = !real;
   }
 
   // A row of the record, dimensionless.

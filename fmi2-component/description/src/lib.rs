@@ -119,6 +119,8 @@ elements! {
         index: usize = "@index",
         /// Indices of variables, separated by spaces.
         dependencies: Option<String> = "@dependencies",
+        /// How it depends on each of them, separated by spaces.
+        dependencies_kind: Option<String> = "@dependenciesKind",
     }
 }
 
@@ -158,7 +160,7 @@ pub enum Initial {
 
 /// The name of the element that gives a variable or a declared type its type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum FmiType {
     Real,
     Integer,
     Boolean,
@@ -207,12 +209,12 @@ macro_rules! content {
         impl $element {
             /// The type and the attributes of its element, if there is exactly one.
             #[must_use]
-            pub fn content(&self) -> Option<(Kind, &Content)> {
-                let numbers = [(Kind::Real, &self.real), (Kind::Integer, &self.integer)];
-                let others = [(Kind::Boolean, &self.boolean), (Kind::String, &self.string)];
+            pub fn content(&self) -> Option<(FmiType, &Content)> {
+                let numbers = [(FmiType::Real, &self.real), (FmiType::Integer, &self.integer)];
+                let others = [(FmiType::Boolean, &self.boolean), (FmiType::String, &self.string)];
                 let elements = numbers.into_iter().chain(others);
                 let mut present = elements
-                    .chain([(Kind::Enumeration, &self.enumeration)])
+                    .chain([(FmiType::Enumeration, &self.enumeration)])
                     .filter_map(|(kind, content)| Some((kind, content.as_ref()?)));
                 present.next().filter(|_| present.next().is_none())
             }
@@ -233,7 +235,7 @@ mod tests {
     fn variables_are_found_by_name_with_their_type_and_attributes() {
         let description = Description::parse(TANK).unwrap();
         let (kind, level) = description.variable("level").and_then(ScalarVariable::content).unwrap();
-        assert_eq!((kind, level.declared_type.as_deref()), (Kind::Real, Some("Length")));
+        assert_eq!((kind, level.declared_type.as_deref()), (FmiType::Real, Some("Length")));
         let area = description.variable("area").expect("a variable");
         assert_eq!(
             (area.value_reference, area.content().unwrap().1.start.as_deref()),

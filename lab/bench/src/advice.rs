@@ -1,5 +1,6 @@
 //! Advice after a run without the expected lock, from the exact orbits of the scene.
 
+use lovines::cavity::GRAVITY;
 use vines_model::numerics::range;
 use vines_model::orbit::{Orbit, exact_backbone, phase_resonant};
 use vines_model::regime::Regime;
@@ -49,6 +50,25 @@ fn stable_ranges(d: &Dimensionless) -> Vec<[f64; 2]> {
 /// Why a run that was expected to lock the symmetric 1:1 motion may not have done so, from the scene and the regime of the last periods.
 /// `None` where the exact orbits give no reason.
 pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
+    let reason = ideal_reason(scene, regime)?;
+    let Some(left_out) = scene.left_out() else {
+        return Some(reason);
+    };
+    let weight =
+        GRAVITY * scene.plant.cavity.tilt.sin().abs() / (scene.plant.half_width * scene.dimensionless().omega0.powi(2));
+    let weight = match weight {
+        0.0 => String::new(),
+        weight => format!(
+            ". Gravity along the axis is {weight:.2} b omega0^2: at r = 0.65 and G = 1.1, the 1:1 motion between both walls is lost at about \
+             0.15, and the particle stays near the lower wall"
+        ),
+    };
+    Some(format!(
+        "{reason}. This is said of the ideal cavity, without {left_out}{weight}"
+    ))
+}
+
+fn ideal_reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
     let d = scene.dimensionless();
     let mut stable = phase_resonant(&d);
     stable.retain(|orbit| orbit.stable);

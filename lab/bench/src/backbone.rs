@@ -408,9 +408,11 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             level: (1e9 * level / d.b).round() / 1e9,
             periods: self.run.periods - start,
             averaged: estimate.periods,
-            // An irregular motion can seem steady for a while; an asymmetric one is no point of this backbone.
+            // An irregular motion can seem steady for a while; where motions have mirror images, an asymmetric one is no point of this
+            // backbone.
             settled: reached
-                && !matches!(regime, Regime::Other | Regime::Asymmetric)
+                && regime != Regime::Other
+                && (regime != Regime::Asymmetric || !self.scene.has_mirror_images())
                 && (estimate.steady || criterion.is_met(estimate)),
             reached,
             regime,

@@ -7,13 +7,14 @@
 //! is chi-square; the parameters minimise it (Levenberg and Marquardt). Half of its second derivative, with every B eliminated, is the inverse
 //! of the covariance.
 
+mod effects;
 mod recording;
 
 use std::f64::consts::TAU;
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{SMatrix, SVector, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
@@ -25,6 +26,7 @@ use vines_model::{ArgumentError, Definition};
 use crate::identification::Measured;
 use crate::scene::{Dimensionless, Parameters};
 
+pub use effects::{Candidate, Effect, Explanation, decimals, explain};
 pub use recording::{Kind, Part, Recording, RecordingError};
 
 /// A measured point of phase resonance.
@@ -185,8 +187,11 @@ impl FromStr for Known {
     }
 }
 
-/// The unknowns: the logarithm of omega0 (rad/s), zeta, r, and the logarithms of b (m), epsilon and M (kg).
-type Unknowns = Vector6<f64>;
+/// Number of unknowns.
+const UNKNOWNS: usize = 7;
+/// The unknowns: the logarithm of omega0 (rad/s), zeta, r, the logarithms of b (m), epsilon and M (kg), and the strength of an effect.
+type Unknowns = SVector<f64, UNKNOWNS>;
+type Covariance = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
 /// Step of a difference, relative or, of zeta and r, absolute: the curve is exact to 1e-13, and smooth.
 const STEP: f64 = 1e-6;
@@ -213,6 +218,7 @@ fn unknowns(plant: &Parameters) -> Unknowns {
         plant.half_width.ln(),
         plant.mass_ratio().ln(),
         plant.primary_mass.ln(),
+        0.0,
     ])
 }
 
@@ -245,7 +251,7 @@ pub enum FitError {
 #[derive(Debug, Clone)]
 pub struct Fit {
     x: Unknowns,
-    covariance: Matrix6<f64>,
+    covariance: Covariance,
     has_scale: bool,
     /// Chi-square.
     pub chi_square: f64,
@@ -255,6 +261,8 @@ pub struct Fit {
     pub residuals: Vec<[f64; 3]>,
     /// Numbers, from 0, of the points that contradict the others and are left out.
     pub left_out: Vec<usize>,
+    /// Particle speeds B of the points.
+    speeds: Vec<f64>,
 }
 
 impl Fit {
@@ -339,6 +347,27 @@ pub fn fit(
     expected: &Parameters,
     known: &[Known],
 ) -> Result<Fit, FitError> {
+    let all = Problem::new(checked(points)?, definition, known).fit(expected)?;
+    let (mut rest, mut fit) = ((0..points.len()).collect::<Vec<usize>>(), all.clone());
+    while fit.is_rejected() {
+        if (points.len() - rest.len() + 1) * LEFT_OUT > points.len() {
+            return Ok(all);
+        }
+        let size = |residual: &[f64; 3]| residual.iter().map(|part| part * part).sum::<f64>();
+        let sizes = fit.residuals.iter().map(size).enumerate();
+        let (worst, _) = sizes
+            .max_by(|one, other| one.1.total_cmp(&other.1))
+            .ok_or(FitError::NoMotion)?;
+        rest.remove(worst);
+        let points = rest.iter().map(|n| points[*n]).collect();
+        fit = Problem::new(points, definition, known).fit(expected)?;
+    }
+    fit.left_out = (0..points.len()).filter(|n| !rest.contains(n)).collect();
+    Ok(fit)
+}
+
+/// The points, if they are enough and their numbers are positive.
+fn checked(points: &[MeasuredPoint]) -> Result<Vec<MeasuredPoint>, FitError> {
     if points.len() < FEWEST {
         return Err(FitError::TooFew(points.len()));
     }
@@ -354,32 +383,14 @@ pub fn fit(
             }
         }
     }
-    let has_scale = known.iter().any(|one| one.quantity.needs_a_scale());
-    let all = Problem { points: points.to_vec(), definition, known, has_scale }.fit(expected)?;
-    let (mut rest, mut fit) = ((0..points.len()).collect::<Vec<usize>>(), all.clone());
-    while fit.is_rejected() {
-        if (points.len() - rest.len() + 1) * LEFT_OUT > points.len() {
-            return Ok(all);
-        }
-        let size = |residual: &[f64; 3]| residual.iter().map(|part| part * part).sum::<f64>();
-        let sizes = fit.residuals.iter().map(size).enumerate();
-        let (worst, _) = sizes
-            .max_by(|one, other| one.1.total_cmp(&other.1))
-            .ok_or(FitError::NoMotion)?;
-        rest.remove(worst);
-        let points = rest.iter().map(|n| points[*n]).collect();
-        fit = Problem { points, definition, known, has_scale }.fit(expected)?;
-    }
-    fit.left_out = (0..points.len()).filter(|n| !rest.contains(n)).collect();
-    Ok(fit)
+    Ok(points.to_vec())
 }
 
 /// As [`fit`], with the parameters held at those of `plant`: its chi-square and residuals say whether the points belong to the plant, and its
 /// uncertainties are the Cramér–Rao bound of the points. `None` where the plant has no such motion.
 #[must_use]
 pub fn at(points: &[MeasuredPoint], definition: Definition, plant: &Parameters, known: &[Known]) -> Option<Fit> {
-    let has_scale = known.iter().any(|one| one.quantity.needs_a_scale());
-    let problem = Problem { points: points.to_vec(), definition, known, has_scale };
+    let problem = Problem::new(points.to_vec(), definition, known);
     let x = unknowns(plant);
     let sums = problem.sums(&x, &mut vec![None; points.len()])?;
     Some(Fit {
@@ -430,17 +441,42 @@ struct Problem<'a> {
     definition: Definition,
     known: &'a [Known],
     has_scale: bool,
+    /// How an effect of the cavity shifts the curve at each point; empty for the ideal cavity.
+    shifts: Vec<Shift>,
+    /// Whether the strength of the effect is unknown.
+    free: bool,
+}
+
+/// Relative shift of frequency and drive at equal amplitude by an effect of some strength, and its derivative.
+#[derive(Clone, Copy)]
+struct Shift {
+    strength: f64,
+    value: [f64; 2],
+    slope: [f64; 2],
+}
+
+/// A place on the curve: amplitude of the response, m, frequency, rad/s, and amplitude of the base, m.
+struct Curve {
+    response: f64,
+    omega: f64,
+    drive: f64,
 }
 
 /// Chi-square at some unknowns, with the gradient and the matrix of its quadratic approximation.
 struct Sums {
     chi_square: f64,
     gradient: Unknowns,
-    normal: Matrix6<f64>,
+    normal: Covariance,
     residuals: Vec<[f64; 3]>,
+    speeds: Vec<f64>,
 }
 
-impl Problem<'_> {
+impl<'a> Problem<'a> {
+    fn new(points: Vec<MeasuredPoint>, definition: Definition, known: &'a [Known]) -> Self {
+        let has_scale = known.iter().any(|one| one.quantity.needs_a_scale());
+        Self { points, definition, known, has_scale, shifts: Vec::new(), free: false }
+    }
+
     /// The smallest of the minima that are reached from the expected rig and from other restitution coefficients.
     fn fit(&self, expected: &Parameters) -> Result<Fit, FitError> {
         let starts = [expected.restitution].into_iter().chain(STARTS).map(|restitution| {
@@ -459,12 +495,13 @@ impl Problem<'_> {
         let equations = 2 * self.points.len() + self.known.len();
         Fit {
             x,
-            covariance: sums.normal.try_inverse().unwrap_or(Matrix6::from_element(f64::NAN)),
+            covariance: sums.normal.try_inverse().unwrap_or(Covariance::from_element(f64::NAN)),
             has_scale: self.has_scale,
             chi_square: sums.chi_square,
-            degrees: equations.saturating_sub(5 + usize::from(self.has_scale)),
+            degrees: equations.saturating_sub(5 + usize::from(self.has_scale) + usize::from(self.free)),
             residuals: sums.residuals,
             left_out: Vec::new(),
+            speeds: sums.speeds,
         }
     }
 
@@ -475,7 +512,7 @@ impl Problem<'_> {
         let mut damping = 1e-3;
         for _ in 0..ROUNDS {
             let mut matrix = here.normal;
-            for i in 0..6 {
+            for i in 0..UNKNOWNS {
                 matrix[(i, i)] *= 1.0 + damping;
             }
             let step = matrix.cholesky()?.solve(&here.gradient);
@@ -508,24 +545,29 @@ impl Problem<'_> {
         let mut sums = Sums {
             chi_square: 0.0,
             gradient: Unknowns::zeros(),
-            normal: Matrix6::zeros(),
+            normal: Covariance::zeros(),
             residuals: Vec::with_capacity(self.points.len()),
+            speeds: Vec::with_capacity(self.points.len()),
         };
-        for (point, speed) in self.points.iter().zip(speeds) {
-            let (b, residual, by_speed) = self.nearest(x, point, *speed)?;
+        for (n, speed) in speeds.iter_mut().enumerate() {
+            let (b, residual, by_speed) = self.nearest(x, n, *speed)?;
             *speed = Some(b);
+            sums.speeds.push(b);
             // The speed follows the parameters: only what is perpendicular to the curve counts.
             let along = by_speed.normalize();
-            let mut rows = [Vector3::zeros(); 6];
-            for (i, row) in rows.iter_mut().enumerate().take(5) {
-                let [below, above] = [-STEP, STEP].map(|step| self.residual(&shifted(x, i, step), point, b));
+            let mut rows = [Vector3::zeros(); UNKNOWNS];
+            for (i, row) in rows.iter_mut().enumerate() {
+                if i == 5 || (i == 6 && !self.free) {
+                    continue;
+                }
+                let [below, above] = [-STEP, STEP].map(|step| self.residual(&shifted(x, i, step), n, b));
                 let slope = (above? - below?) / (2.0 * STEP);
                 *row = slope - along * along.dot(&slope);
             }
             let residual = residual - along * along.dot(&residual);
-            for i in 0..6 {
+            for i in 0..UNKNOWNS {
                 sums.gradient[i] += rows[i].dot(&residual);
-                for j in 0..6 {
+                for j in 0..UNKNOWNS {
                     sums.normal[(i, j)] += rows[i].dot(&rows[j]);
                 }
             }
@@ -544,6 +586,9 @@ impl Problem<'_> {
             // Without a scale the primary mass has no influence.
             sums.normal[(5, 5)] += 1.0;
         }
+        if !self.free {
+            sums.normal[(6, 6)] += 1.0;
+        }
         sums.chi_square.is_finite().then_some(sums)
     }
 
@@ -551,13 +596,13 @@ impl Problem<'_> {
     fn nearest(
         &self,
         x: &Unknowns,
-        point: &MeasuredPoint,
+        point: usize,
         start: Option<f64>,
     ) -> Option<(f64, Vector3<f64>, Vector3<f64>)> {
         let (b, epsilon) = (x[3].exp(), x[4].exp());
         let manifold = SlowFlow::new(2.0 * x[1] / epsilon, x[2]).manifold;
         let by_theory = || {
-            let c = point.response.value / b;
+            let c = self.points[point].response.value / b;
             manifold.b(c, BranchSide::Right).unwrap_or(1.02 * manifold.b_min())
         };
         let mut speed = start.unwrap_or_else(by_theory);
@@ -587,20 +632,27 @@ impl Problem<'_> {
         Some((speed, residual, by_speed))
     }
 
-    /// The curve at a speed less the point, over its standard uncertainties.
-    fn residual(&self, x: &Unknowns, point: &MeasuredPoint, speed: f64) -> Option<Vector3<f64>> {
+    /// The curve of the ideal cavity at a speed.
+    fn curve(&self, x: &Unknowns, speed: f64) -> Option<Curve> {
         let (omega0, b, epsilon) = (x[0].exp(), x[3].exp(), x[4].exp());
         let model = Dimensionless {
             definition: self.definition,
             ..Dimensionless::new(epsilon, 2.0 * x[1] / epsilon, x[2], 0.0)
         };
         let [omega, c, g] = backbone_at_speed(&model, speed)?;
+        Some(Curve { response: b * c, omega: omega0 * omega, drive: b * epsilon * g })
+    }
+
+    /// The curve at a speed less a point, over its standard uncertainties.
+    fn residual(&self, x: &Unknowns, point: usize, speed: f64) -> Option<Vector3<f64>> {
+        let Curve { response, mut omega, mut drive } = self.curve(x, speed)?;
+        if let Some(Shift { strength, value, slope }) = self.shifts.get(point) {
+            let [by_omega, by_drive] = [0, 1].map(|i| value[i] + slope[i] * (x[6] - strength));
+            (omega, drive) = (omega * (1.0 + by_omega), drive * (1.0 + by_drive));
+        }
+        let point = &self.points[point];
         let over = |value: f64, measured: Estimate| (value - measured.value) / measured.uncertainty;
-        Some(Vector3::new(
-            over(b * c, point.response),
-            over(omega0 * omega, point.omega),
-            over(b * epsilon * g, point.drive),
-        ))
+        Some(Vector3::new(over(response, point.response), over(omega, point.omega), over(drive, point.drive)))
     }
 }
 

@@ -98,7 +98,12 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
     let parameters = scene.dimensionless();
     let lock = measure(record, scene, &parameters).ok_or(IdentificationError::NoMotion)?;
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
-    if !matches!(lock.regime, Regime::Symmetric | Regime::Unresolved) {
+    let is_expected = match lock.regime {
+        Regime::Symmetric | Regime::Unresolved => true,
+        Regime::Asymmetric => !scene.has_mirror_images(),
+        _ => false,
+    };
+    if !is_expected {
         return Err(IdentificationError::Regime {
             regime: lock.regime,
             sigma: lock.at.sigma,

@@ -104,12 +104,23 @@ impl Scene {
             ),
             (scatter != 0.0, "the scatter of the restitution"),
         ];
-        let effects: Vec<&str> = effects.into_iter().filter_map(|(is, name)| is.then_some(name)).collect();
+        let effects: Vec<&str> = effects
+            .into_iter()
+            .filter_map(|(is, name)| is.then_some(name))
+            .collect();
         let (last, others) = effects.split_last()?;
         Some(match others {
             [] => (*last).to_string(),
             others => format!("{} and {last}", others.join(", ")),
         })
+    }
+
+    /// Whether a motion of the scene's plant has a mirror image, half a period later, as in an ideal cavity: neither tilt nor walls of
+    /// different restitution. Where it has none, the 1:1 motion is asymmetric. (Unequal gaps move the middle of the cavity only.)
+    pub fn has_mirror_images(&self) -> bool {
+        let r = Restitution::Constant(self.plant.restitution);
+        let [plus, minus] = self.plant.cavity.restitution.map(|law| law.unwrap_or(r));
+        self.plant.cavity.tilt == 0.0 && plus == minus
     }
 
     /// The controller's sample time, s: rig and controller agree on it before anything is measured.
@@ -388,7 +399,8 @@ impl PlantSection {
             ));
         }
         // The FMU has a signed seed of 32 bits.
-        Checked::new("plant.seed", self.seed.into(), "").check(self.seed <= i32::MAX as u32, "must be from 0 to 2147483647")?;
+        Checked::new("plant.seed", self.seed.into(), "")
+            .check(self.seed <= i32::MAX as u32, "must be from 0 to 2147483647")?;
         let cavity = self.cavity();
         let plant = if is_si {
             Parameters {
@@ -455,7 +467,8 @@ fn symbols(plant: &Parameters) -> Vec<(&'static str, Value)> {
     let [plus, minus] = restitution.map(|law| law.map(Law::of));
     let law = plus.or(minus).map_or(Law::Constant, |(law, _)| law);
     let real = |(symbol, value)| (symbol, Value::Real(value));
-    let given = |(symbol, value): (_, Option<f64>)| value.filter(|value| *value != 0.0).map(|value| real((symbol, value)));
+    let given =
+        |(symbol, value): (_, Option<f64>)| value.filter(|value| *value != 0.0).map(|value| real((symbol, value)));
     let plants = [
         ("M", plant.primary_mass),
         ("k", plant.stiffness),
@@ -477,7 +490,11 @@ fn symbols(plant: &Parameters) -> Vec<(&'static str, Value)> {
     ];
     let codes = [("r_law", law as i32), ("seed", seed as i32)];
     let codes = codes.into_iter().filter(|(_, code)| *code != 0);
-    let mut symbols: Vec<_> = plants.map(real).into_iter().chain(cavity.into_iter().filter_map(given)).collect();
+    let mut symbols: Vec<_> = plants
+        .map(real)
+        .into_iter()
+        .chain(cavity.into_iter().filter_map(given))
+        .collect();
     symbols.extend(codes.map(|(symbol, code)| (symbol, Value::Integer(code))));
     symbols
 }

@@ -201,20 +201,36 @@ fn recording(settings: &[&str]) -> Recording {
 #[test]
 fn a_recording_of_a_search_a_hold_and_a_decay_gives_points_on_the_backbone_of_the_rig() {
     for snr in ["none", "60", "40"] {
-    let recording = recording(&[&format!("chain.snr={snr}")]);
-    let scene = Scene::load(None, &[]).unwrap();
-    let parts = recording.parts(&scene).unwrap();
-    let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
-    for part in &parts {
-        println!("{:.2?} {:?} {:?} {:?}", part.seconds, part.kind, part.regime, part.point);
-    }
-    let at = at(&points, Definition::default(), &RIG, &[]).unwrap();
-    println!("{snr}: {} points, chi-square {} residuals {:.1?}", points.len(), at.chi_square, at.residuals);
-    let fit = fit(&points, Definition::default(), &scene.plant, &[]);
-    match fit { Ok(fit) => {
-    for quantity in &Quantity::ALL[..5] {
-        println!("{quantity} {:?} {:.2} u", fit.estimate(*quantity), pull(&fit, *quantity));
-    }
-    println!("{:?} {} {:?}", fit.p_value(), fit.chi_square, fit.left_out);} Err(e) => println!("{e}")}
+        let recording = recording(&[&format!("chain.snr={snr}")]);
+        let scene = Scene::load(None, &[]).unwrap();
+        let parts = recording.parts(&scene).unwrap();
+        let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
+        for part in &parts {
+            println!(
+                "{:.2?} {:?} {:?} {:?}",
+                part.seconds, part.kind, part.regime, part.point
+            );
+        }
+        let at = at(&points, Definition::default(), &RIG, &[]).unwrap();
+        println!(
+            "{snr}: {} points, chi-square {} residuals {:.1?}",
+            points.len(),
+            at.chi_square,
+            at.residuals
+        );
+        let fit = fit(&points, Definition::default(), &scene.plant, &[]);
+        match fit {
+            Ok(fit) => {
+                for quantity in &Quantity::ALL[..5] {
+                    println!(
+                        "{quantity} {:?} {:.2} u",
+                        fit.estimate(*quantity),
+                        pull(&fit, *quantity)
+                    );
+                }
+                println!("{:?} {} {:?}", fit.p_value(), fit.chi_square, fit.left_out);
+            }
+            Err(e) => println!("{e}"),
+        }
     }
 }

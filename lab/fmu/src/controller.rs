@@ -7,7 +7,7 @@ use phase_lock::{Config, MOVE, PARAMETERS};
 use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Sensors, Settling};
 use vines_testbench::scene::Names;
 
-use crate::instance::{Fmu, FmuError, Kind, Named, Reference, names_are_known};
+use crate::instance::{FmiType, Fmu, FmuError, Named, Reference, names_exist};
 
 /// The names of this bench that a scene may map, beside those of the parameters.
 const NAMES: &str = "response, reference, active, omega, E, drive, phase_error, phase_measured, hold_response, \
@@ -56,9 +56,9 @@ struct ResponseLoop {
 impl ResponseLoop {
     fn of(fmu: &Fmu, names: &Names) -> Result<Option<Self>, FmuError> {
         let reals = std::iter::once("phase_target".to_owned()).chain(moves());
-        let reals = reals.map(|ours| fmu.named(Kind::Real, names, &ours));
+        let reals = reals.map(|ours| fmu.named(FmiType::Real, names, &ours));
         let reals: Option<Vec<Named>> = reals.collect::<Result<_, _>>()?;
-        let hold = fmu.switch(Kind::Boolean, names, "hold_response")?;
+        let hold = fmu.switch(FmiType::Boolean, names, "hold_response")?;
         Ok(reals.zip(hold).map(|(reals, hold)| Self { reals, hold }))
     }
 }
@@ -66,22 +66,22 @@ impl ResponseLoop {
 impl FmuController {
     /// Loads the controller at `path` and initialises it with a configuration.
     pub fn load(path: &Path, config: &Config, names: &Names) -> Result<Self, FmuError> {
-        let parameters = PARAMETERS.iter().map(|one| one.name.to_owned());
-        let known: Vec<String> = std::iter::once(NAMES.to_owned())
+        let parameters = PARAMETERS.iter().map(|parameter| parameter.name.to_owned());
+        let all: Vec<String> = std::iter::once(NAMES.to_owned())
             .chain(parameters)
             .chain(moves())
             .collect();
-        names_are_known(names, &known.join(", "))?;
+        names_exist(names, &all.join(", "))?;
         let mut fmu = Fmu::load(path, "controller")?;
-        let mut sensors = vec![fmu.need_named(Kind::Real, names, "response")?];
-        sensors.extend(fmu.named(Kind::Real, names, "reference")?);
-        let (active, _) = fmu.need_named(Kind::Boolean, names, "active")?;
+        let mut sensors = vec![fmu.need(FmiType::Real, names, "response")?];
+        sensors.extend(fmu.named(FmiType::Real, names, "reference")?);
+        let (active, _) = fmu.need(FmiType::Boolean, names, "active")?;
         let drive = [
-            fmu.need_named(Kind::Real, names, "omega")?,
-            fmu.need_named(Kind::Real, names, "E")?,
+            fmu.need(FmiType::Real, names, "omega")?,
+            fmu.need(FmiType::Real, names, "E")?,
         ];
-        let phase_error = fmu.named(Kind::Real, names, "phase_error")?;
-        let switch = |ours| fmu.switch(Kind::Boolean, names, ours);
+        let phase_error = fmu.named(FmiType::Real, names, "phase_error")?;
+        let switch = |ours| fmu.switch(FmiType::Boolean, names, ours);
         let settled = match (switch("settled")?, switch("locked")?) {
             (Some(settled), _) => Settled::Reported(settled),
             (None, locked) => {
@@ -94,12 +94,15 @@ impl FmuController {
                 Settled::Judged(locked, Settling::new(config))
             }
         };
-        let integer = |ours| fmu.switch(Kind::Integer, names, ours);
+        let integer = |ours| fmu.switch(FmiType::Integer, names, ours);
         let states = [integer("state")?, integer("fault")?];
-        let displacement = fmu.named(Kind::Real, names, "drive")?;
+        let displacement = fmu.named(FmiType::Real, names, "drive")?;
         let phase_measured = switch("phase_measured")?;
         let response_loop = ResponseLoop::of(&fmu, names)?;
-        let values: Vec<_> = PARAMETERS.iter().map(|one| (one.name, one.get(config))).collect();
+        let values: Vec<_> = PARAMETERS
+            .iter()
+            .map(|parameter| (parameter.name, parameter.get(config)))
+            .collect();
         fmu.start(names, &values)?;
         Ok(Self {
             sample_time: config.sample_time,
@@ -117,7 +120,7 @@ impl FmuController {
     }
 
     fn optional(&mut self, variable: Option<Named>) -> Result<Option<f64>, FmuError> {
-        let value = variable.map(|one| self.fmu.read("give its outputs", [one]).map(|[x]| x));
+        let value = variable.map(|variable| self.fmu.read("give its outputs", [variable]).map(|[x]| x));
         value.transpose()
     }
 
@@ -129,7 +132,7 @@ impl FmuController {
     }
 
     fn integer(&mut self, reference: Option<Reference>) -> Result<Option<i32>, FmuError> {
-        let value = reference.map(|one| self.fmu.integer("give its outputs", one));
+        let value = reference.map(|variable| self.fmu.integer("give its outputs", variable));
         value.transpose()
     }
 
@@ -146,7 +149,7 @@ impl FmuController {
             Settled::Judged(locked, _) => locked,
         };
         let flag = flag.map(|flag| self.boolean(flag)).transpose()?;
-        let measured = self.phase_measured.map_or(Ok(true), |one| self.boolean(one))?;
+        let measured = self.phase_measured.map_or(Ok(true), |flag| self.boolean(flag))?;
         let phase_error = self.optional(self.phase_error.filter(|_| measured))?;
         let settled = match &mut self.settled {
             Settled::Reported(_) => flag == Some(true),

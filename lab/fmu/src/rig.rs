@@ -7,12 +7,12 @@ use phase_lock::Value;
 use vines_testbench::rig::{Drive, FrictionTotals, GroundTruth, Measured, Rig, RigError, Sensors, has_friction};
 use vines_testbench::scene::{Definition, Names, Parameters, Reference as ReferenceSignal, Sensor};
 
-use crate::instance::{Fmu, FmuError, Kind, Named, Reference, names_are_known};
+use crate::instance::{FmiType, Fmu, FmuError, Named, Reference, names_exist};
 
 /// The names of this bench that a scene may map.
-const NAMES: &str =
-    "omega, E, e, response, base, impacts, impact_time, impact_velocity, sticks, stuck_time, friction_loss, M, k, c, m, b, r, b_plus, b_minus, \
-     theta, mu_k, mu_s, r_law, r_plus, r_minus, r_min, r_scatter, seed, q1, der(q1), q2, der(q2)";
+const NAMES: &str = "omega, E, e, response, base, impacts, impact_time, impact_velocity, sticks, stuck_time, friction_loss, M, k, c, \
+                     m, b, r, b_plus, b_minus, theta, mu_k, mu_s, r_law, r_plus, r_minus, r_min, r_scatter, seed, q1, der(q1), q2, \
+                     der(q2)";
 
 /// A plant FMU, stepped sample by sample.
 ///
@@ -54,23 +54,23 @@ impl FmuRig {
         plant: &Parameters,
         names: &Names,
     ) -> Result<Measured<Self>, FmuError> {
-        names_are_known(names, NAMES)?;
+        names_exist(names, NAMES)?;
         let mut fmu = Fmu::load(path, "plant")?;
-        let [omega, amplitude] = ["omega", "E"].map(|ours| fmu.named(Kind::Real, names, ours));
+        let [omega, amplitude] = ["omega", "E"].map(|ours| fmu.named(FmiType::Real, names, ours));
         let inputs = omega?.zip(amplitude?).map(|(omega, amplitude)| [omega, amplitude]);
         let held = match inputs {
-            Some(_) => fmu.named(Kind::Real, names, "e")?,
-            None => Some(fmu.need_named(Kind::Real, names, "e")?),
+            Some(_) => fmu.named(FmiType::Real, names, "e")?,
+            None => Some(fmu.need(FmiType::Real, names, "e")?),
         };
         let ours = match definition.sensor {
             _ if names.mapped("response").is_some() => "response",
             Sensor::V => "v",
             Sensor::Q1 | Sensor::Acceleration => "q1",
         };
-        let response = fmu.need_named(Kind::Real, names, ours)?;
+        let response = fmu.need(FmiType::Real, names, ours)?;
         let reference = match definition.reference {
-            ReferenceSignal::Base => fmu.named(Kind::Real, names, "base")?,
-            ReferenceSignal::Force => Some(fmu.need_named(Kind::Real, names, "base")?),
+            ReferenceSignal::Base => fmu.named(FmiType::Real, names, "base")?,
+            ReferenceSignal::Force => Some(fmu.need(FmiType::Real, names, "base")?),
         };
         fmu.start(names, values)?;
         let inside = Inside::of(&fmu, names, has_friction(plant))?;
@@ -81,12 +81,13 @@ impl FmuRig {
 
 impl Inside {
     fn of(fmu: &Fmu, names: &Names, has_friction: bool) -> Result<Option<Self>, FmuError> {
-        let real = |ours| fmu.named(Kind::Real, names, ours);
+        let real = |ours| fmu.named(FmiType::Real, names, ours);
         let reals = [real("impact_time")?, real("impact_velocity")?, real("der(q2)")?];
-        let (Some(impacts), [Some(a), Some(b), Some(c)]) = (fmu.switch(Kind::Integer, names, "impacts")?, reals) else {
+        let (Some(impacts), [Some(a), Some(b), Some(c)]) = (fmu.switch(FmiType::Integer, names, "impacts")?, reals)
+        else {
             return Ok(None);
         };
-        let sticks = fmu.switch(Kind::Integer, names, "sticks")?.filter(|_| has_friction);
+        let sticks = fmu.switch(FmiType::Integer, names, "sticks")?.filter(|_| has_friction);
         let losses = real("stuck_time")?.zip(real("friction_loss")?);
         let friction = sticks.zip(losses.map(|(time, loss)| [time, loss]));
         Ok(Some(Self { impacts, reals: [a, b, c], friction }))

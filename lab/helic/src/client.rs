@@ -20,7 +20,8 @@ const SAME_RATE: f64 = 1e-6;
 /// Largest relative difference between the commanded frequency and the present one of the device at which the drive begins: an error of the
 /// phase that the next packet corrects.
 const RUNNING: f64 = 0.01;
-/// Interval at which the device is asked whether its output is on, as a share of the longest silence.
+/// Interval at which the device is asked whether its output is on, as a share of the longest silence: a trip ends the run before the silence
+/// of a device that has stopped would.
 const SUPERVISION: f64 = 0.25;
 
 /// Why a device cannot be used, in words.
@@ -56,14 +57,8 @@ struct Host<T> {
 impl<T: Transport> Host<T> {
     /// Reads what the device has.
     fn new(transport: T) -> Result<Self, HostError> {
-        let (parameters, sources) = (Vec::new(), Vec::new());
-        let mut host = Self {
-            transport,
-            sequence: 0,
-            parameters,
-            sources,
-            sample_rate: 0.0,
-        };
+        let (parameters, sources, sample_rate) = (Vec::new(), Vec::new(), 0.0);
+        let mut host = Self { transport, sequence: 0, parameters, sources, sample_rate };
         let advice = "Status (is `vines rig --protocol helic` or the device running, with no other host?)";
         let answer = host.request(message::STATUS, Vec::new(), advice)?;
         // The version first: everything after it may differ between versions.
@@ -149,13 +144,13 @@ impl<T: Transport> Host<T> {
 
     /// Sets the stream up without an end, and starts it.
     fn stream(&mut self, sources: &[u8], decimation: u16) -> Result<(), HostError> {
-        self.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
         let [d, e] = decimation.to_le_bytes();
         let setup = [&[d, e, 0, 0, 0, 0, sources.len() as u8], sources].concat();
-        self.request(message::STREAM_SETUP, setup, "StreamSetup")?;
         let port = self.transport.port().map_err(lost("its stream"))?;
-        let start = port.to_le_bytes().into();
-        self.request(message::STREAM_START, start, "StreamStart").map(drop)
+        self.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
+        self.request(message::STREAM_SETUP, setup, "StreamSetup")?;
+        self.request(message::STREAM_START, port.to_le_bytes().into(), "StreamStart")
+            .map(drop)
     }
 }
 

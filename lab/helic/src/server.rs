@@ -11,7 +11,7 @@ use vines_net::{Ended, RealTimeClock, ServerError, Session, is_loopback};
 
 /// Port of the control channel; the stream has the next one.
 pub const DEFAULT_PORT: u16 = 2350;
-/// Polling interval.
+/// Polling interval: a third of a sample of the default device.
 const POLL: Duration = Duration::from_micros(50);
 
 /// The server of a device, one host at a time.
@@ -50,8 +50,8 @@ impl HelicServer {
         self.control.local_addr()
     }
 
-    /// Serves until `stop` returns true. `tell` receives a report when a host has left.
-    pub fn serve(&mut self, mut stop: impl FnMut() -> bool, mut tell: impl FnMut(&Session)) -> Result<(), ServerError> {
+    /// Serves until `stop` returns true. `report` receives the report when a host has left.
+    pub fn serve(&mut self, mut stop: impl FnMut() -> bool, mut report: impl FnMut(&Session)) -> Result<(), ServerError> {
         let mut clock = RealTimeClock::start(self.sample_time);
         let mut host: Option<Connection> = None;
         let mut tick = 0;
@@ -71,7 +71,7 @@ impl HelicServer {
             let left = host.as_mut().is_some_and(|host| !host.exchange(device, uptime));
             if let Some(host) = host.take_if(|_| left || stopped) {
                 device.disconnect();
-                tell(&Session {
+                report(&Session {
                     peer: host.peer,
                     ended: if left { Ended::Farewell } else { Ended::Stopped },
                     samples: tick - host.first,

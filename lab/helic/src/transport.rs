@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use super::codec::Frame;
 use vines_net::is_loopback;
 
-/// Longest time for an answer while the device is set up.
+/// Longest time for an answer while the device is set up and nothing is driven: the time after which a client of the other protocol gives up.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Longest silence of a driven device, and of a host that drives it. The drive stops within 0.2 s, with 50 ms for the network.
 pub const LONGEST_SILENCE: Duration = Duration::from_millis(150);

@@ -178,7 +178,7 @@ pub(crate) fn write_reading(frame: Frame, reading: &Reading) -> Frame {
     let motion = reading.ground_truth;
     let flags = bit(flag::REFERENCE, reference.is_some()) | bit(flag::GROUND_TRUTH, motion.is_some());
     let [count, time, impact, particle] = motion.map_or([0.0; 4], |motion| {
-        let GroundTruth { impacts, impact_time, impact_velocity, particle_velocity } = motion;
+        let GroundTruth { impacts, impact_time, impact_velocity, particle_velocity, .. } = motion;
         [impacts as f64, impact_time, impact_velocity, particle_velocity]
     });
     let values = [response, reference.unwrap_or(0.0), count, time, impact, particle];
@@ -195,7 +195,13 @@ pub(crate) fn read_reading(frame: &Frame) -> Reading {
         particle_velocity,
     ] = frame.values;
     let (reference, impacts) = (frame.has(flag::REFERENCE).then_some(reference), impacts as i64);
-    let motion = GroundTruth { impacts, impact_time, impact_velocity, particle_velocity, friction: None };
+    let motion = GroundTruth {
+        impacts,
+        impact_time,
+        impact_velocity,
+        particle_velocity,
+        friction: None,
+    };
     let ground_truth = frame.has(flag::GROUND_TRUTH).then_some(motion);
     Reading { sensors: Sensors { response, reference }, ground_truth }
 }

@@ -15,7 +15,8 @@ use super::timing::{Counters, Ended, RealTimeClock, Session, Timing};
 use vines_testbench::rig::{Controller, Drive, Rig, RigError};
 use vines_testbench::scene::Definition;
 
-/// Largest relative difference of two sample times that count as equal.
+/// Largest relative difference of two sample times that count as equal: far above the rounding error of another program, and one sample in
+/// 10⁹, which is two weeks at 882 samples a second.
 const SAME_TIME: f64 = 1e-9;
 
 /// What a server offers.
@@ -79,9 +80,9 @@ impl Service {
     }
 }
 
-/// Interval at which a server without a running clock checks whether it should stop.
+/// Interval at which a server without a running clock checks whether it should stop: Ctrl-C acts without a noticeable delay.
 const IDLE: Duration = Duration::from_millis(50);
-/// Largest number of frames that are read after the deadline has passed: a flood of them must not stop the clock.
+/// Largest number of frames that are read after the deadline has passed. Bounds the delay of a sample by a flood of frames.
 const BURST: u32 = 256;
 
 /// A server, one session at a time. Over UDP a rig runs in real time; over TCP it is in lock-step with the drives.

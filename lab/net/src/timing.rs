@@ -77,7 +77,9 @@ impl RealTimeClock {
     /// The classes of lateness with samples: upper limit, s, and number of samples.
     pub fn classes(&self) -> Vec<(f64, u64)> {
         let classes = self.lateness.iter_recorded();
-        classes.map(|class| (class.value_iterated_to() as f64 * NANO, class.count_at_value())).collect()
+        classes
+            .map(|class| (class.value_iterated_to() as f64 * NANO, class.count_at_value()))
+            .collect()
     }
 
     /// Forgets the lateness of the samples until now.
@@ -281,7 +283,10 @@ mod tests {
             counters: None,
         };
         let text = session.to_string();
-        assert!(text.contains("0 samples in 0.000 s: 0.0 per second") && !text.contains("NaN"), "{text}");
+        assert!(
+            text.contains("0 samples in 0.000 s: 0.0 per second") && !text.contains("NaN"),
+            "{text}"
+        );
     }
 
     #[test]
@@ -290,7 +295,11 @@ mod tests {
         assert_eq!(timing(10, 10).doubt(0.01), None);
         for (missed, held, parts) in [
             (11, 0, ["the rig missed deadlines: its machine", "11 missed"]),
-            (0, 999, ["drives did not reach the rig in time: the network", "999 had no drive"]),
+            (
+                0,
+                999,
+                ["drives did not reach the rig in time: the network", "999 had no drive"],
+            ),
             (11, 11, ["the rig missed deadlines, and drives", "11 had no drive"]),
         ] {
             let doubt = timing(missed, held).doubt(0.01).unwrap();

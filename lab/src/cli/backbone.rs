@@ -73,7 +73,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut text = experiment.result(&result, &summary, &files, timing)?;
     let settled = result.points.iter().filter(|one| one.point.settled);
     let points: Vec<_> = settled.map(|one| (&one.point.at).into()).collect();
-    if let Some(line) = contradiction(&points, scene.resonance, &scene.plant).filter(|_| !experiment.json) {
+    if let Some(line) =
+        contradiction(&points, scene.resonance, &scene.plant).filter(|_| !experiment.json && result.left_out.is_none())
+    {
         text += &format!("{line}\n");
     }
     match result.doubt() {

@@ -95,7 +95,7 @@ pub(super) struct RigArguments {
 }
 
 /// Prints the time from the fault to a drive of zero, s.
-fn tell(zero: Option<f64>, json: bool) {
+fn print_reaction(zero: Option<f64>, json: bool) {
     let text = match zero {
         _ if json => format!("{}\n", serde_json::json!({ "drive_zero_after_fault": zero })),
         Some(seconds) => format!("the drive was zero {:.1} ms after the fault\n", 1e3 * seconds),
@@ -169,7 +169,7 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
         let rig: Box<dyn Rig> = match (&arguments.rig, arguments.fault) {
             (Endpoint::Fmu(file), _) => Box::new(fmu(file, &scene)?),
             (_, Some(Fault { kind, seconds })) => {
-                Box::new(faulty(&scene, kind, seconds, move |zero| tell(zero, json))?)
+                Box::new(faulty(&scene, kind, seconds, move |zero| print_reaction(zero, json))?)
             }
             _ if arguments.sensors_only => Box::new(SensorsOnly::around(Simulated::of(&scene)?)),
             _ => Box::new(plant.clone()),
@@ -274,8 +274,8 @@ impl ServingArguments {
         let scope = self.reach.reach()?;
         let mut server = Server::listen(transport(resolve(&self.listen, scope)?), service, scope.key())?;
         let address = server.address().map_err(Failure::run)?;
-        self.run(&format!("{what} on {address}"), keep, |stop, tell| {
-            server.serve(make, stop, tell)
+        self.run(&format!("{what} on {address}"), keep, |stop, report_session| {
+            server.serve(make, stop, report_session)
         })
     }
 
@@ -288,8 +288,8 @@ impl ServingArguments {
         let mut server = HelicServer::listen(address, device, sample_time).map_err(listen)?;
         let what = format!("helic device, {:.1} samples per second, on", 1.0 / sample_time);
         let address = server.address().map_err(Failure::run)?;
-        self.run(&format!("{what} helic://{address}"), keep, |stop, tell| {
-            server.serve(stop, tell)
+        self.run(&format!("{what} helic://{address}"), keep, |stop, report_session| {
+            server.serve(stop, report_session)
         })
     }
 
@@ -308,7 +308,7 @@ impl ServingArguments {
             .map(|seconds| Instant::now() + Duration::from_secs_f64(seconds));
         let mut stop = move || stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end);
         let (json, sessions, mut served) = (self.json, self.sessions, 0);
-        let mut tell = move |session: &Session| {
+        let mut report_session = move |session: &Session| {
             let text = match json {
                 true => serde_json::to_string(session).map_or_else(|error| error.to_string(), |line| line + "\n"),
                 false => session.to_string(),
@@ -321,7 +321,7 @@ impl ServingArguments {
                 enough.store(true, Ordering::Relaxed);
             }
         };
-        serve(&mut stop, &mut tell).map_err(Failure::run)?;
+        serve(&mut stop, &mut report_session).map_err(Failure::run)?;
         Ok(String::new())
     }
 }

@@ -401,9 +401,6 @@ fn serve(
     loop {
         let over = locked(shared).over;
         evaluate(samples, &mut view, shared);
-        if over {
-            break;
-        }
         while let Ok((stream, _)) = listener.accept() {
             browsers.retain(|browser| !browser.is_finished());
             if browsers.len() < MOST {
@@ -412,11 +409,18 @@ fn serve(
                 browsers.push(thread::spawn(move || drop(answer(&stream, address, &shared, &table))));
             }
         }
+        if over {
+            break;
+        }
         thread::sleep(PACE);
     }
     locked(shared).complete = true;
-    let end = Instant::now() + PATIENCE;
-    while locked(shared).streams > 0 && Instant::now() < end {
+    let since = Instant::now();
+    // Browsers also hold connections without a request, which are not worth a long wait.
+    while since.elapsed() < PATIENCE
+        && (locked(shared).streams > 0
+            || since.elapsed() < PATIENCE / 4 && browsers.iter().any(|browser| !browser.is_finished()))
+    {
         thread::sleep(PACE);
     }
 }

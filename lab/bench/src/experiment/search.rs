@@ -324,7 +324,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let (even, odd) = (even - noise, odd - noise);
         let doubtful = SIGNIFICANT * noise / (0.5 * all.len() as f64).sqrt();
         let possible = self.setpoint > LOWEST * self.b && response < UNREACHED * self.b;
-        let symmetric = departed && possible && even <= (ASYMMETRIC * ASYMMETRIC * odd).max(doubtful);
+        // Without mirror images there is no symmetric motion to tell from others.
+        let is_even_small = !self.scene.has_mirror_images() || even <= (ASYMMETRIC * ASYMMETRIC * odd).max(doubtful);
+        let symmetric = departed && possible && is_even_small;
         if symmetric {
             self.held = range(self.held, [drive.value]);
         }

@@ -72,7 +72,9 @@ pub struct Part {
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum RecordingError {
-    #[error("{origin}, channel {channel}: sample {sample} ({seconds:.4} s) is not a finite number; cut the recording there, or repair the channel")]
+    #[error(
+        "{origin}, channel {channel}: sample {sample} ({seconds:.4} s) is not a finite number; cut the recording there, or repair the channel"
+    )]
     NotANumber {
         origin: String,
         channel: String,
@@ -85,7 +87,9 @@ pub enum RecordingError {
         channels: [String; 2],
         lengths: [usize; 2],
     },
-    #[error("{origin}: {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {FEWEST} are needed")]
+    #[error(
+        "{origin}: {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {FEWEST} are needed"
+    )]
     Short {
         origin: String,
         seconds: f64,
@@ -113,7 +117,9 @@ pub enum RecordingError {
         hertz: f64,
         rate: f64,
     },
-    #[error("{origin}, channel {channel} is clipped: {share:.1} % of its samples are equal to its largest or smallest value, {value:e} m; reduce the gain, and record again")]
+    #[error(
+        "{origin}, channel {channel} is clipped: {share:.1} % of its samples are equal to its largest or smallest value, {value:e} m; reduce the gain, and record again"
+    )]
     Clipped {
         origin: String,
         channel: String,
@@ -241,9 +247,11 @@ impl Recording {
             return Err(RecordingError::Short { origin: origin(), seconds, periods, hertz });
         }
         for (values, channel) in both.into_iter().zip(&self.channels) {
-            let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-                (low.min(*value), high.max(*value))
-            });
+            let (low, high) = values
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                    (low.min(*value), high.max(*value))
+                });
             let channel = channel.clone();
             if low == high {
                 return Err(RecordingError::Constant { origin: origin(), channel });
@@ -271,15 +279,25 @@ impl Recording {
             .map(|from| {
                 let fit = |values: &[f64], omega| {
                     let found = harmonic(&values[from..from + window], dt, omega);
-                    found.filter(|one| one.amplitude > SEEN * one.uncertainties[0] && (one.omega / omega - 1.0).abs() < FARTHEST)
+                    found.filter(|one| {
+                        one.amplitude > SEEN * one.uncertainties[0] && (one.omega / omega - 1.0).abs() < FARTHEST
+                    })
                 };
                 let response = fit(&self.response, omega).or_else(|| fit(&self.response, linear.omega0));
                 omega = response.map_or(linear.omega0, |one| one.omega);
                 let drive = fit(&self.drive, omega);
-                Anchor { middle: from as f64 + 0.5 * (window - 1) as f64, response, drive }
+                Anchor {
+                    middle: from as f64 + 0.5 * (window - 1) as f64,
+                    response,
+                    drive,
+                }
             })
             .collect();
-        let largest = anchors.iter().filter_map(|one| one.drive).map(|one| one.amplitude).fold(0.0, f64::max);
+        let largest = anchors
+            .iter()
+            .filter_map(|one| one.drive)
+            .map(|one| one.amplitude)
+            .fold(0.0, f64::max);
         for anchor in &mut anchors {
             anchor.drive = anchor.drive.filter(|one| one.amplitude > RESTS * largest);
         }
@@ -351,7 +369,11 @@ impl Recording {
         if ratio > 1.0 {
             return Err(RecordingError::Swapped { origin, response, drive, ratio });
         }
-        let near = |phase: f64| cycles().filter(|one| (one.phase_error.abs() - phase).abs() < PHASE_RANGE).count();
+        let near = |phase: f64| {
+            cycles()
+                .filter(|one| (one.phase_error.abs() - phase).abs() < PHASE_RANGE)
+                .count()
+        };
         if near(PI) > near(0.0) {
             return Err(RecordingError::Sign { origin, response, drive });
         }
@@ -395,7 +417,9 @@ impl Recording {
         };
         let count = (2.0 * highest * last.len() as f64 * dt / TAU).min(4000.0) as usize;
         let grid = equally_spaced(lowest, highest, count.max(2));
-        let best = grid.map(|omega| (power(omega), omega)).max_by(|one, other| one.0.total_cmp(&other.0));
+        let best = grid
+            .map(|omega| (power(omega), omega))
+            .max_by(|one, other| one.0.total_cmp(&other.0));
         best.map_or(f64::NAN, |(_, omega)| omega / TAU)
     }
 }
@@ -480,7 +504,11 @@ fn evaluated(runs: &[Run], scene: &Scene, sample_time: f64) -> Vec<Part> {
                         estimate(driven, window, neighbours(&curve, first))
                     })
                     .collect();
-                let changes: Vec<f64> = driven.windows.iter().map(|window| change(&driven.cycles[window.cycles.clone()])).collect();
+                let changes: Vec<f64> = driven
+                    .windows
+                    .iter()
+                    .map(|window| change(&driven.cycles[window.cycles.clone()]))
+                    .collect();
                 let alike = |n: usize| (0..changes.len()).filter(|m| changes[*m] * changes[n] > 0.0).count() as f64;
                 for (n, (window, estimate)) in driven.windows.iter().zip(estimates).enumerate() {
                     parts.push(part(driven, window, estimate, changes[n], alike(n), &curve, scene));
@@ -501,7 +529,11 @@ fn change(cycles: &[Cycle]) -> f64 {
 
 /// The two points whose amplitudes are next to that of `here`, the nearest last.
 fn neighbours(curve: &[Held], here: Held) -> [Option<Held>; 2] {
-    let mut others: Vec<Held> = curve.iter().copied().filter(|one| (one[0] / here[0] - 1.0).abs() > APART).collect();
+    let mut others: Vec<Held> = curve
+        .iter()
+        .copied()
+        .filter(|one| (one[0] / here[0] - 1.0).abs() > APART)
+        .collect();
     others.sort_by(|one, other| (one[0] - here[0]).abs().total_cmp(&(other[0] - here[0]).abs()));
     [others.get(1).copied(), others.first().copied()]
 }
@@ -521,22 +553,43 @@ fn part(
     let seconds = [samples[0].time, samples[samples.len() - 1].time];
     let target = scene.controller.phase_target_radians();
     let Some(estimate) = estimate else {
-        return Part { seconds, kind: Kind::Held, point: None, regime: Regime::Unknown };
+        return Part {
+            seconds,
+            kind: Kind::Held,
+            point: None,
+            regime: Regime::Unknown,
+        };
     };
     let [base, omega] = estimate.at;
     let level = estimate.response;
-    let averaged = cycles[cycles.len() - estimate.periods..].iter().map(|one| one.samples).sum::<usize>();
+    let averaged = cycles[cycles.len() - estimate.periods..]
+        .iter()
+        .map(|one| one.samples)
+        .sum::<usize>();
     let samples = &samples[samples.len() - averaged..];
-    let kind = if (change * cycles.len() as f64).abs() > SWEPT * level.value { Kind::Sweep } else { Kind::Held };
+    let kind = if (change * cycles.len() as f64).abs() > SWEPT * level.value {
+        Kind::Sweep
+    } else {
+        Kind::Held
+    };
     let regime = regime_by_response(samples, scene, base.value, target, omega.value);
     // What the estimate contains once of the lag, and of the phase error in the second order.
     let here = [level.value, base.value, omega.value];
-    let slopes = neighbours(curve, here)[1].map_or([0.0; 2], |other| [1, 2].map(|i| (other[i] - here[i]) / (other[0] - here[0])));
+    let slopes = neighbours(curve, here)[1].map_or([0.0; 2], |other| {
+        [1, 2].map(|i| (other[i] - here[i]) / (other[0] - here[0]))
+    });
     let late = LAG * change * (alike - 1.0).max(0.0).sqrt();
     let beside = estimate.phase_error.value.abs() * base.value / level.value;
     let linear = scene.linear();
     let drive = Estimate::new(base.value, &[base.uncertainty, slopes[0] * late, beside * base.value]);
-    let omega = Estimate::new(omega.value, &[omega.uncertainty, slopes[1] * late, beside * (omega.value - linear.omega0)]);
+    let omega = Estimate::new(
+        omega.value,
+        &[
+            omega.uncertainty,
+            slopes[1] * late,
+            beside * (omega.value - linear.omega0),
+        ],
+    );
     let is_point = matches!(regime, Regime::Symmetric | Regime::Unresolved)
         && drive.value > 0.0
         && drive.uncertainty < VAGUE * drive.value
