@@ -35,7 +35,7 @@ impl Wall {
     }
 
     /// 0 or 1.
-    pub(crate) fn index(self) -> usize {
+    pub fn index(self) -> usize {
         match self {
             Wall::Plus => 0,
             Wall::Minus => 1,
@@ -115,7 +115,7 @@ impl ImpactLaw {
 
     /// The law for another coefficient of restitution. Its share has one rounding error only: that of a coefficient which changes from
     /// impact to impact does not add up.
-    pub(crate) fn with_restitution(&self, r: f64) -> Self {
+    pub fn with_restitution(&self, r: f64) -> Self {
         let primary_share = ((1.0 + r) * self.particle_fraction, 0.0);
         Self { restitution: r, primary_share, ..*self }
     }

@@ -1,18 +1,24 @@
-//! What the studies share: scenes, random numbers, statistics, and the tables in validation/.
+//! What the studies and the tests of the bench share: scenes, random rigs and faults, statistics, and the tables in validation/.
 
 #![allow(dead_code, reason = "no study uses everything")]
 
+use std::f64::consts::TAU;
 use std::{fs, path::Path};
 
 use lovines::Parameters;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
 use vines_model::Dimensionless;
+use vines_model::numerics::{bisection, mean_square};
+use vines_model::orbit::{Orbit, exact_backbone, phase_resonant};
 use vines_testbench::advice;
-use vines_testbench::backbone::{Point, Tracked, track};
+use vines_testbench::backbone::{LevelPoint, Tracked, track};
 use vines_testbench::comparison::ExactCurve;
 use vines_testbench::identification::Regime;
-use vines_testbench::rig::{BuiltIn, Chain, SensorsOnly, Simulated};
+use vines_testbench::loop_check::Verdict;
+use vines_testbench::record::Record;
+use vines_testbench::rig::{BuiltIn, Chain, Controller, Rig, RigFault, SensorFault, SensorsOnly, Simulated};
 use vines_testbench::scene::{LinearResponse, Override, Scene};
 
 /// Any error of a study.
@@ -120,7 +126,7 @@ pub fn client(
     let [low, high] = advice::stable_range(&d).ok_or("no stable orbit")?;
     let g = 0.5 * (low + high);
     let curve = ExactCurve::of(&d);
-    let stable = advice::largest_stable(&d).ok_or("no stable orbit")?;
+    let stable = largest_stable(&d).ok_or("no stable orbit")?;
     let fold = curve.places().first().ok_or("no backbone")?[0];
     let (from, to) = (0.95 * stable.min(0.75), 1.05 * fold);
     // The rig with M = k = b = 1, and the scene of the client in SI units.
@@ -160,7 +166,174 @@ pub fn client(
     Ok((truth, scene))
 }
 
+/// Distance of the detunings at which [`advice::stable_range`] searches for stable orbits, and parts of it in which the end is located.
+const STEP: f64 = 0.005;
+const FINER: i32 = 20;
+
+/// The largest response amplitude over b of the stable symmetric 1:1 orbits at phase resonance, at any drive.
+pub fn largest_stable(d: &Dimensionless) -> Option<f64> {
+    let largest = |orbits: Vec<Orbit>| {
+        let stable = orbits.into_iter().filter(|orbit| orbit.stable);
+        stable.max_by(|one, other| one.c.total_cmp(&other.c))
+    };
+    let first = largest(advice::stable_orbits(d))?;
+    let steps = (1..FINER).map(|n| first.sigma + STEP * f64::from(n) / f64::from(FINER));
+    let finer = steps.filter_map(|sigma| largest(exact_backbone(d, 1.0 + d.epsilon * sigma)));
+    Some(finer.map(|orbit| orbit.c).fold(first.c, f64::max))
+}
+
 /// Whether a point counts as one of the backbone.
-pub fn is_kept(point: &&Point) -> bool {
+pub fn is_kept(point: &&LevelPoint) -> bool {
     point.settled && matches!(point.regime, Regime::Symmetric | Regime::Unresolved)
+}
+
+/// A record with noise after the release; `ratio`: of the held response to it, dB.
+pub fn noisy(record: &Record, ratio: f64, seed: u64) -> Record {
+    let mut noisy = record.clone();
+    let power = mean_square(record.hold().iter().map(|sample| sample.sensors.response));
+    let deviation = power.sqrt() * 10_f64.powf(-ratio / 20.0);
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    for sample in &mut noisy.samples[record.released..] {
+        let normal: f64 = StandardNormal.sample(&mut random);
+        sample.sensors.response += deviation * normal;
+    }
+    noisy
+}
+
+/// Time since the release, times omega0, and sigma in every period of a free decay between alternate zero crossings: without a model, exact on
+/// clean data.
+///
+/// A crossing is located on the cubic through four samples; at a hundred samples per period its error is below 1e-7 of a sample.
+/// A period spans two crossings, so that an offset and even harmonics have no effect to first order.
+pub fn crossings(record: &Record, scene: &Scene) -> Vec<[f64; 2]> {
+    let values: Vec<f64> = record.decay().iter().map(|sample| sample.sensors.response).collect();
+    let zeros: Vec<f64> = (1..values.len().saturating_sub(2))
+        .filter(|&n| (values[n] > 0.0) != (values[n + 1] > 0.0))
+        .map(|n| n as f64 + zero([values[n - 1], values[n], values[n + 1], values[n + 2]]))
+        .collect();
+    let d = scene.dimensionless();
+    let step = record.sample_time;
+    zeros
+        .windows(3)
+        .map(|span| {
+            let omega = TAU / ((span[2] - span[0]) * step);
+            [0.5 * (span[0] + span[2]) * step * d.omega0, d.sigma(omega)]
+        })
+        .collect()
+}
+
+/// Sigma at a time, interpolated linearly; `None` outside the points.
+pub fn at(points: &[[f64; 2]], tau: f64) -> Option<f64> {
+    let after = points.partition_point(|point| point[0] < tau);
+    let (from, to) = (points.get(after.checked_sub(1)?)?, points.get(after)?);
+    Some(from[1] + (tau - from[0]) / (to[0] - from[0]) * (to[1] - from[1]))
+}
+
+/// Where the cubic through values at -1, 0, 1 and 2 is zero, between 0 and 1.
+fn zero(y: [f64; 4]) -> f64 {
+    let cubic = |x: f64| {
+        -y[0] * x * (x - 1.0) * (x - 2.0) / 6.0 + y[1] * (x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0
+            - y[2] * (x + 1.0) * x * (x - 2.0) / 2.0
+            + y[3] * (x + 1.0) * x * (x - 1.0) / 6.0
+    };
+    let (low, high) = bisection(0.0, 1.0, |x| (cubic(x) > 0.0) == (y[2] > y[1]));
+    0.5 * (low + high)
+}
+
+/// A scene at rest with a drive at which a stable symmetric 1:1 orbit exists within 20 % of omega0: epsilon 0.001 to 0.05, lambda 0.1 to 3
+/// (uniform logarithms), r 0.2 to 0.97.
+pub fn rig_with_stable_orbit(
+    uniform: &mut impl FnMut(f64, f64) -> f64,
+    settings: &[impl AsRef<str>],
+) -> Result<Scene, Failure> {
+    loop {
+        let epsilon = uniform(1e-3_f64.ln(), 0.05_f64.ln()).exp();
+        let lambda = uniform(0.1_f64.ln(), 3_f64.ln()).exp();
+        let (r, share) = (uniform(0.2, 0.97), uniform(0.0, 1.0));
+        let d = Dimensionless::new(epsilon, lambda, r, 0.0);
+        let Some([low, high]) = advice::stable_range(&d) else {
+            continue;
+        };
+        let d = Dimensionless { g: low + share * (high - low), ..d };
+        let orbits = phase_resonant(&d);
+        if orbits.iter().any(|one| one.stable && (0.8..=1.2).contains(&one.omega)) {
+            let plant = format!("[plant]\nepsilon = {epsilon:?}\nlambda = {lambda:?}\nr = {r:?}\n");
+            let rest = "[controller]\nomega_min = 0.8\nomega_max = 1.2\n[record]\ndecay_periods = 3\n";
+            return scene(&format!("{plant}[excitation]\nG = {:?}\n{rest}", d.g), settings);
+        }
+    }
+}
+
+/// Bandwidths of the detector, in units of omega0, and the periods that are published for this rule of gains on such a plant.
+pub const LOCK_TIMES: [(f64, f64); 5] = [(0.02, 234.0), (0.05, 102.0), (0.1, 55.0), (0.2, 35.0), (0.5, 25.0)];
+
+/// Only the phase is to settle; the largest bandwidth needs more than a hundred samples per period.
+pub const LOCK_TIME_SETTINGS: [&str; 5] = [
+    "controller.phase_tolerance=2.0",
+    "controller.dwell_periods=20",
+    "controller.frequency_tolerance=0.22",
+    "controller.amplitude_tolerance=27.0",
+    "controller.samples_per_period=200",
+];
+
+/// Periods until a loop settles, if that ends the run, at most 800.
+pub fn periods_to_settle(rig: &mut Simulated, scene: &Scene, ends: bool) -> Result<f64, Failure> {
+    let mut controller = BuiltIn::new(&scene.controller_config())?;
+    let (step, mut periods) = (scene.sample_time(), 0.0);
+    while periods < 800.0 {
+        let command = controller.sample(rig.sense()?, true)?;
+        if ends && command.settled {
+            break;
+        }
+        rig.advance(command.drive, step)?;
+        periods += command.drive.omega * step / TAU;
+    }
+    Ok(periods)
+}
+
+/// A random scene for the loop check, and the scene of a rig that differs: mass ratio 0.001 to 0.05, lambda 0.1 to 3, r 0.2 to 0.97, a stiffness
+/// up to 1 % and a damping up to 20 % away, 30 to 80 dB, 16 to 24 bits, up to 3 samples of delay.
+pub fn checked_rig(between: &mut impl FnMut(f64, f64) -> f64) -> Result<[Scene; 2], Failure> {
+    let mut scene = scene("", &["start.dq2=0"])?;
+    let epsilon = between(0.001_f64.ln(), 0.05_f64.ln()).exp();
+    let lambda = between(0.1_f64.ln(), 3_f64.ln()).exp();
+    scene.plant.particle_mass = epsilon * scene.plant.primary_mass;
+    scene.plant.damping = lambda * scene.plant.particle_mass * scene.plant.natural_frequency();
+    scene.plant.restitution = between(0.2, 0.97);
+    scene.amplitude = epsilon * scene.plant.half_width * between(0.3, 3.0);
+    scene.chain.snr = Some(between(30.0, 80.0));
+    scene.chain.seed = between(0.0, 1e6) as u64;
+    scene.chain.delay = between(0.0, 4.0) as u32;
+    scene.chain.filter = Some(between(8.0, 40.0));
+    scene.chain.adc_bits = Some(between(16.0, 25.0) as u32);
+    let mut rig = scene.clone();
+    rig.plant.stiffness *= between(0.99, 1.01);
+    rig.plant.damping *= between(0.8, 1.2);
+    Ok([scene, rig])
+}
+
+/// Faults that the loop check names, with random sizes.
+pub fn checked_faults(between: &mut impl FnMut(f64, f64) -> f64) -> [(Verdict, RigFault); 16] {
+    use {RigFault::*, SensorFault::*};
+    let strong = Gain(between(1.15_f64.ln(), 1000_f64.ln()).exp());
+    let weak = Gain(between(0.25, 0.85));
+    let late = Late(between(2.0, 33.0) as usize);
+    [
+        (Verdict::NotANumber, Response(Value(f64::NAN))),
+        (Verdict::NotANumber, Base(Value(f64::INFINITY))),
+        (Verdict::ShakerOff, Shaker(0.0)),
+        (Verdict::ResponseDead, Response(Dead)),
+        (Verdict::BaseDead, Base(Dead)),
+        (Verdict::Swapped, Swapped),
+        (Verdict::ResponseReversed, Response(Reversed)),
+        (Verdict::BaseReversed, Base(Reversed)),
+        (Verdict::BothReversed, Both(Reversed)),
+        (Verdict::ResponseGain, Response(strong)),
+        (Verdict::ResponseGain, Response(weak)),
+        (Verdict::BaseGain, Base(strong)),
+        (Verdict::ResponseLate, Response(late)),
+        (Verdict::BaseLate, Base(late)),
+        (Verdict::ResponseNoisy, Response(Noisy)),
+        (Verdict::BaseNoisy, Base(Noisy)),
+    ]
 }

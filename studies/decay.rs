@@ -9,16 +9,12 @@
 //! ```
 
 mod common;
-mod crossings;
 
-use common::{Failure, arguments, scene, share, write};
-use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
-use rand_distr::{Distribution, StandardNormal};
+use common::{Failure, arguments, at, crossings, noisy, scene, share, write};
 use vines_model::numerics::{mean, mean_square};
 use vines_testbench::comparison::COMPARED_ABOVE;
 use vines_testbench::experiment::{self, Plan};
 use vines_testbench::identification::decay_points;
-use vines_testbench::record::Record;
 use vines_testbench::rig::{BuiltIn, Simulated};
 
 /// Windows of the fit, periods.
@@ -26,25 +22,13 @@ const WINDOWS: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0];
 /// Noise, dB.
 const RATIOS: [f64; 4] = [f64::INFINITY, 60.0, 50.0, 40.0];
 
-fn noisy(record: &Record, ratio: f64, seed: u64) -> Record {
-    let mut noisy = record.clone();
-    let power = mean_square(record.hold().iter().map(|sample| sample.sensors.response));
-    let deviation = power.sqrt() * 10_f64.powf(-ratio / 20.0);
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    for sample in &mut noisy.samples[record.released..] {
-        let normal: f64 = StandardNormal.sample(&mut random);
-        sample.sensors.response += deviation * normal;
-    }
-    noisy
-}
-
 fn main() -> Result<(), Failure> {
     let seeds: u64 = arguments().first().map_or(Ok(20), |seeds| seeds.parse())?;
     let mut scene = scene("", &[""; 0])?;
     let mut rig = Simulated::new(scene.plant, scene.start)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
     let clean = experiment::run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {})?;
-    let truth = crossings::detunings(&clean, &scene);
+    let truth = crossings(&clean, &scene);
     let mut rows = Vec::new();
     for window in WINDOWS {
         scene.record.window_periods = window;
@@ -55,8 +39,8 @@ fn main() -> Result<(), Failure> {
             for seed in 1..=if ratio.is_finite() { seeds } else { 1 } {
                 let points = decay_points(&noisy(&clean, ratio, seed), &scene).points;
                 for point in points.iter().filter(|point| point.c > COMPARED_ABOVE) {
-                    errors.extend(crossings::at(&truth, point.tau).map(|exact| point.sigma - exact));
-                    let noise = crossings::at(&noiseless, point.tau).map(|sigma| (point.sigma - sigma).abs());
+                    errors.extend(at(&truth, point.tau).map(|exact| point.sigma - exact));
+                    let noise = at(&noiseless, point.tau).map(|sigma| (point.sigma - sigma).abs());
                     pulls.extend(noise.map(|noise| noise / point.u_sigma));
                 }
             }

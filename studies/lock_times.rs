@@ -10,47 +10,19 @@
 
 mod common;
 
-use common::{Failure, scene, write};
-use vines_testbench::rig::{BuiltIn, Controller, Rig, Simulated};
-use vines_testbench::scene::Scene;
-
-/// Bandwidths, in units of omega0, and published periods.
-const PUBLISHED: [(f64, f64); 5] = [(0.02, 234.0), (0.05, 102.0), (0.1, 55.0), (0.2, 35.0), (0.5, 25.0)];
-
-/// Only the phase is to settle; the largest bandwidth needs more than a hundred samples per period.
-const SETTINGS: [&str; 5] = [
-    "controller.phase_tolerance=2.0",
-    "controller.dwell_periods=20",
-    "controller.frequency_tolerance=0.22",
-    "controller.amplitude_tolerance=27.0",
-    "controller.samples_per_period=200",
-];
-
-/// Periods until a loop settles, if that ends the run, at most 800.
-fn run(rig: &mut Simulated, scene: &Scene, ends: bool) -> Result<f64, Failure> {
-    let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let (step, mut periods) = (scene.sample_time(), 0.0);
-    while periods < 800.0 {
-        let command = controller.sample(rig.sense()?, true)?;
-        if ends && command.settled {
-            break;
-        }
-        rig.advance(command.drive, step)?;
-        periods += command.drive.omega * step / std::f64::consts::TAU;
-    }
-    Ok(periods)
-}
+use common::{Failure, LOCK_TIME_SETTINGS, LOCK_TIMES, periods_to_settle, scene, write};
+use vines_testbench::rig::Simulated;
 
 fn main() -> Result<(), Failure> {
-    let mut scene = scene("", &SETTINGS)?;
+    let mut scene = scene("", &LOCK_TIME_SETTINGS)?;
     let start = Simulated::new(scene.plant, scene.start)?;
     let mut motion = start.clone();
-    run(&mut motion, &scene, false)?;
+    periods_to_settle(&mut motion, &scene, false)?;
     let mut rows = Vec::new();
-    for (bandwidth, published) in PUBLISHED {
+    for (bandwidth, published) in LOCK_TIMES {
         scene.controller.bandwidth = bandwidth;
-        let from_start = run(&mut start.clone(), &scene, true)?;
-        let from_motion = run(&mut motion.clone(), &scene, true)?;
+        let from_start = periods_to_settle(&mut start.clone(), &scene, true)?;
+        let from_motion = periods_to_settle(&mut motion.clone(), &scene, true)?;
         rows.push(format!("{bandwidth},{from_start:.0},{from_motion:.0},{published}"));
     }
     write("lock_times", "bandwidth,from_start,from_motion,published", 1, &rows)

@@ -11,13 +11,13 @@
 
 mod common;
 
-use common::{Failure, Found, STATISTICS, arguments, scene, statistics, uniform, write};
+use common::{Failure, Found, STATISTICS, arguments, rig_with_stable_orbit, statistics, uniform, write};
 use rayon::prelude::*;
-use vines_model::{Dimensionless, orbit::phase_resonant};
+use vines_model::orbit::phase_resonant;
 use vines_testbench::experiment::{Plan, run};
 use vines_testbench::identification::identify;
 use vines_testbench::rig::{BuiltIn, Simulated};
-use vines_testbench::{advice, scene::Scene};
+use vines_testbench::scene::Scene;
 
 /// Locks a rig, and counts it as correct, uncertain or wrong.
 fn lock(scene: &Scene) -> Result<Found, Failure> {
@@ -59,30 +59,12 @@ fn main() -> Result<(), Failure> {
     let [count, seed, snr] = &arguments()[..] else {
         return Err("arguments: RIGS SEED SNR|none".into());
     };
-    let (count, mut uniform, mut scenes) = (count.parse()?, uniform(seed.parse()?), Vec::new());
-    while scenes.len() < count {
-        let epsilon = uniform(1e-3_f64.ln(), 0.05_f64.ln()).exp();
-        let lambda = uniform(0.1_f64.ln(), 3_f64.ln()).exp();
-        let (r, share) = (uniform(0.2, 0.97), uniform(0.0, 1.0));
-        let d = Dimensionless::new(epsilon, lambda, r, 0.0);
-        let Some([low, high]) = advice::stable_range(&d) else {
-            continue;
-        };
-        let d = Dimensionless { g: low + share * (high - low), ..d };
-        let is_allowed = |omega: f64| (0.8..=1.2).contains(&omega);
-        if phase_resonant(&d)
-            .iter()
-            .any(|orbit| orbit.stable && is_allowed(orbit.omega))
-        {
-            let plant = format!(
-                "[plant]\nepsilon = {epsilon:?}\nlambda = {lambda:?}\nr = {r:?}\n[excitation]\nG = {:?}\n",
-                d.g
-            );
-            let text = plant + "[controller]\nomega_min = 0.8\nomega_max = 1.2\n[record]\ndecay_periods = 3\n";
-            let seed = format!("chain.seed={}", scenes.len());
-            scenes.push(scene(&text, &[format!("chain.snr={snr}"), seed])?);
-        }
-    }
+    let (count, mut uniform) = (count.parse::<usize>()?, uniform(seed.parse()?));
+    let scene = |n| {
+        let chain = [format!("chain.snr={snr}"), format!("chain.seed={n}")];
+        rig_with_stable_orbit(&mut uniform, &chain)
+    };
+    let scenes = (0..count).map(scene).collect::<Result<Vec<_>, _>>()?;
     let one = |scene: &Scene| {
         lock(scene).unwrap_or_else(|error| {
             println!("{:?}: {error}", scene.dimensionless());

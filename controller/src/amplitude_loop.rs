@@ -338,7 +338,7 @@ mod tests {
             }
             rates
         };
-        let is = |rates: [f64; 2], rate: f64| rates.iter().all(|one| (one - rate).abs() < 1e-9);
+        let is = |rates: [f64; 2], rate: f64| rates.iter().all(|value| (value - rate).abs() < 1e-9);
         let crossing = Move {
             response: 0.9,
             duration: 1.0,

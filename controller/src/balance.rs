@@ -132,7 +132,7 @@ mod tests {
         let (mut state, mut response) = (Balance::default(), 0.0);
         (0..1000).position(|_| {
             response += 0.03 * factor - 3e-4 * response;
-            let seen = Powers {
+            let sample = Powers {
                 reading: 0.0,
                 turn: 0.01 * TAU,
                 drive: 1.0,
@@ -141,7 +141,7 @@ mod tests {
                 response,
                 cosine,
             };
-            state.contradicts(&config(), &seen)
+            state.contradicts(&config(), &sample)
         })
     }
 

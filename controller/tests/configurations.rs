@@ -7,6 +7,11 @@ extern crate phase_lock_f32 as phase_lock;
 use phase_lock::{Config, Input, LoopState, Move, Output, PARAMETERS, PhaseLock, State, Value};
 use proptest::prelude::*;
 
+#[cfg(feature = "f32")]
+use std::f32::consts::PI;
+#[cfg(not(feature = "f32"))]
+use std::f64::consts::PI;
+
 #[cfg(not(feature = "f32"))]
 type Real = f64;
 #[cfg(feature = "f32")]
@@ -78,7 +83,9 @@ struct Part {
 }
 
 fn part() -> impl Strategy<Value = Part> {
-    let noise = prop::collection::vec((-1.0..1.0 as Real, signed()), 0..3);
+    let invalid = || prop::sample::select(vec![Real::NAN, Real::INFINITY, Real::NEG_INFINITY, Real::MAX]);
+    let response = prop_oneof![20 => -1.0..1.0 as Real, 1 => invalid()];
+    let noise = prop::collection::vec((response, prop_oneof![20 => signed(), 1 => invalid()]), 0..3);
     let to = (mostly_common(), mostly_common(), signed(), signed(), signed());
     (signed(), signed(), noise, to, number()).prop_map(|(response, reference, noise, to, amplitude)| Part {
         response,
@@ -116,6 +123,12 @@ fn check(output: &Output, config: &Config) -> Result<(), TestCaseError> {
         output.response_mean,
     ];
     prop_assert!(numbers.iter().all(|number| number.is_finite()), "{output:?}");
+    let error = output.phase_error.unwrap_or(0.0);
+    prop_assert!(
+        error.abs() <= PI && (0.0..=1.0).contains(&output.coherence),
+        "{output:?}"
+    );
+    prop_assert!(!output.locked || output.state == LoopState::Locked, "{output:?}");
     Ok(())
 }
 

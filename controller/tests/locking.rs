@@ -1,7 +1,8 @@
-//! The loop around a resonator: whether it locks, at which frequency, and how fast.
+//! Guards the loop around a resonator: whether it locks, at which frequency and how fast, ramps, the control of the response amplitude,
+//! and refused configurations.
 
 mod rig;
-use phase_lock::{Config, Detector, LoopState};
+use phase_lock::{Config, Detector, LoopState, Move};
 use rig::{AMPLITUDE, Bench, Noise, OMEGA_0, ZETA, config};
 
 fn relative(a: f64, b: f64) -> f64 {
@@ -24,7 +25,7 @@ fn locks_at_the_natural_frequency_from_ten_percent_off() {
 }
 
 #[test]
-fn locks_with_either_detector() {
+fn locks_with_either_detector_and_with_the_internal_oscillator_as_with_a_measured_reference() {
     for (detector, harmonics, odd_only) in [
         (Detector::Demodulator, 1, true),
         (Detector::Adaptive, 1, true),
@@ -34,19 +35,13 @@ fn locks_with_either_detector() {
         let (_, output) = bench.run_to_lock(2000).expect("a lock");
         assert!(relative(output.frequency, OMEGA_0) < 1e-4, "{detector:?} {output:?}");
     }
-}
-
-#[test]
-fn the_internal_oscillator_agrees_with_a_measured_reference() {
-    let locked = |measured_reference| {
-        let mut bench = Bench::new(config());
-        bench.measured_reference = measured_reference;
+    let [own, measured] = [false, true].map(|measured_reference| {
+        let mut bench = Bench { measured_reference, ..Bench::new(config()) };
         bench.run_to_lock(2000).expect("a lock");
         bench.run(400)
-    };
-    let (own, other) = (locked(false), locked(true));
-    assert!(relative(own.frequency, other.frequency) < 1e-9);
-    assert!(relative(own.response_amplitude, other.response_amplitude) < 1e-9);
+    });
+    assert!(relative(own.frequency, measured.frequency) < 1e-9);
+    assert!(relative(own.response_amplitude, measured.response_amplitude) < 1e-9);
 }
 
 /// Both sensors with a delay of one sample, as in FMI co-simulation.
@@ -65,13 +60,9 @@ fn locked_frequency_with_a_late_sensor(delay_samples: f64, measured_reference: b
 }
 
 #[test]
-fn a_stated_delay_is_compensated() {
+fn a_stated_delay_is_compensated_and_one_common_to_both_sensors_cancels() {
     assert!(relative(locked_frequency_with_a_late_sensor(1.0, false), OMEGA_0) < 1e-6);
     assert!(relative(locked_frequency_with_a_late_sensor(0.0, false), OMEGA_0) > 1e-4);
-}
-
-#[test]
-fn a_delay_common_to_both_sensors_cancels() {
     assert!(relative(locked_frequency_with_a_late_sensor(0.0, true), OMEGA_0) < 1e-6);
 }
 
@@ -91,16 +82,29 @@ fn follows_a_resonance_that_moves() {
 }
 
 #[test]
-fn retuning_keeps_the_lock_and_settles_again() {
+fn retuning_keeps_the_lock_settles_again_and_leaves_no_trace_of_the_values_before() {
     let mut bench = Bench::new(config());
     bench.run_to_lock(2000).expect("a lock");
-    let target = bench.controller.config().phase_target;
+    let target = config().phase_target;
     bench.controller.retune(0.9 * AMPLITUDE, target).expect("within limits");
     let output = bench.sample();
     assert!(output.locked && !output.settled);
     let output = bench.run(400);
     assert!(output.locked && output.settled);
     assert!(relative(output.response_amplitude, 0.9 * AMPLITUDE / (2.0 * ZETA)) < 1e-3);
+
+    let (ramp_rate, release_rate) = (Some(AMPLITUDE), Some(0.1 * AMPLITUDE));
+    let config = Config {
+        ramp_rate,
+        release_rate,
+        amplitude_max: Some(1.0),
+        ..config()
+    };
+    let mut retuned = config.build().unwrap();
+    for amplitude in [100.0 * AMPLITUDE, 0.0, AMPLITUDE] {
+        retuned.retune(amplitude, target).unwrap();
+        assert_eq!(retuned, Config { amplitude, ..config }.build().unwrap());
+    }
 }
 
 #[test]
@@ -140,8 +144,7 @@ fn locks_through_sensor_noise() {
 }
 
 #[test]
-fn periods_to_lock_over_bandwidth() {
-    println!("wLP/omega0   phase within 0.5 deg   locked");
+fn locks_at_every_bandwidth_in_time() {
     for (ratio, most) in [(0.02, 400), (0.05, 350), (0.1, 320), (0.2, 320), (0.5, 320)] {
         let mut bench = Bench::new(Config {
             bandwidth: ratio * OMEGA_0,
@@ -149,21 +152,8 @@ fn periods_to_lock_over_bandwidth() {
             omega_start: 0.98 * OMEGA_0,
             ..config()
         });
-        let mut last_outside = 0;
-        let mut locked = None;
-        for n in 0..100 * most {
-            let output = bench.sample();
-            if output
-                .phase_error
-                .is_none_or(|error| error.abs() > 0.5_f64.to_radians())
-            {
-                last_outside = n;
-            }
-            if output.locked {
-                locked.get_or_insert(f64::from(n) / 100.0);
-            }
-        }
-        println!("{ratio:10} {:22.1} {locked:?}", f64::from(last_outside) / 100.0);
+        let locked = bench.run_to_lock(most).map(|(periods, _)| periods);
+        println!("bandwidth {ratio}: locked after {locked:?} periods");
         assert!(locked.is_some(), "{ratio}");
     }
 }
@@ -223,16 +213,101 @@ fn a_ramp_down_to_zero_has_the_rate_of_the_ramp_up() {
 }
 
 #[test]
-fn retuning_leaves_no_trace_of_the_values_before() {
-    let config = Config {
-        ramp_rate: Some(AMPLITUDE),
-        release_rate: Some(0.1 * AMPLITUDE),
+fn ramps_stay_within_their_rates() {
+    let mut bench = Bench::new(Config {
+        ramp_rate: Some(0.5 * AMPLITUDE),
+        omega_rate: Some(0.5),
+        omega_start: 0.97 * OMEGA_0,
         ..config()
-    };
-    let config = Config { amplitude_max: Some(1.0), ..config };
-    let mut retuned = config.build().unwrap();
-    for amplitude in [100.0 * AMPLITUDE, 0.0, AMPLITUDE] {
-        retuned.retune(amplitude, config.phase_target).unwrap();
-        assert_eq!(retuned, Config { amplitude, ..config }.build().unwrap());
+    });
+    let Config { sample_time, amplitude, .. } = *bench.controller.config();
+    let mut before = bench.sample();
+    for _ in 0..60_000 {
+        let output = bench.sample();
+        let (omega, level) = (output.omega - before.omega, output.amplitude - before.amplitude);
+        assert!(omega.abs() <= 0.5 * sample_time * (1.0 + 1e-9));
+        assert!(level.abs() <= amplitude * sample_time / 2.0 * (1.0 + 1e-9));
+        before = output;
     }
+    assert!(before.locked);
+}
+
+#[test]
+fn an_invalid_configuration_is_refused_by_name() {
+    let refusal = |config: Config| config.build().expect_err("must be refused").to_string();
+    assert_eq!(
+        refusal(Config { sample_time: f64::NAN, ..config() }),
+        "sample_time = NaN s is refused; allowed is above 0 (1e-30 to 1e30)"
+    );
+    for (name, bad) in [
+        ("omega_max", Config { omega_max: 1.0, ..config() }),
+        ("omega_start", Config { omega_start: 1e3, ..config() }),
+        ("amplitude", Config { amplitude: -1.0, ..config() }),
+        ("bandwidth", Config { bandwidth: 1e4, ..config() }),
+        ("phase_target", Config { phase_target: 4.0, ..config() }),
+        ("sample_time", Config { sample_time: 0.05, bandwidth: 0.1, ..config() }),
+        ("delay", Config { delay: f64::INFINITY, ..config() }),
+    ] {
+        assert!(refusal(bad).starts_with(name), "{}", refusal(bad));
+    }
+}
+
+#[test]
+fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
+    let mut bench = Bench::new(Config {
+        amplitude_max: Some(4.0 * AMPLITUDE),
+        damping_rate: Some(ZETA * OMEGA_0),
+        ..config()
+    });
+    bench.run_to_lock(2000).expect("a lock");
+    let before = AMPLITUDE / (2.0 * ZETA);
+    for (share, drive) in [(0.8, -0.2 * AMPLITUDE), (1.3, 0.0)] {
+        let to = Move {
+            response: share * before,
+            duration: 0.5,
+            amplitude: drive,
+            ..Move::default()
+        };
+        bench
+            .controller
+            .hold_response(&mut bench.state, to)
+            .expect("a closed loop");
+        // A free transient would decay by a factor of 2.6 in 30 periods.
+        let output = bench.run(30);
+        println!("{share}: {:.5}", output.response_amplitude / before);
+        assert!(relative(output.response_amplitude, share * before) < 0.02);
+        assert!(output.locked && output.response_target == Some(share * before));
+        let output = bench.run(200);
+        assert!(relative(output.response_amplitude, share * before) < 1e-5);
+        assert!(relative(output.amplitude, share * AMPLITUDE) < 1e-5);
+        assert!(output.settled);
+    }
+    // The drive returns to its own setpoint.
+    bench.controller.hold_drive(&mut bench.state);
+    let output = bench.run(30);
+    assert_eq!((output.response_target, output.amplitude), (None, AMPLITUDE));
+    bench
+        .controller
+        .hold_response(&mut bench.state, Move { response: before, ..Move::default() })
+        .unwrap();
+    assert!(bench.sample().response_target.is_some());
+    // Switching the drive off ends the control of the response.
+    bench.active = false;
+    assert_eq!(bench.sample().response_target, None);
+}
+
+#[test]
+fn the_response_cannot_be_controlled_without_a_limit_of_the_drive_or_in_an_open_loop() {
+    let to = Move { response: 0.01, ..Move::default() };
+    let mut bench = Bench::new(Config { amplitude_max: None, ..config() });
+    bench.run(10);
+    let refusal = |bench: &mut Bench, to| {
+        let refused = bench.controller.hold_response(&mut bench.state, to);
+        refused.expect_err("must be refused").to_string()
+    };
+    assert!(refusal(&mut bench, to).starts_with("amplitude_max = none is refused"));
+    let mut bench = Bench::new(Config { amplitude_max: Some(1.0), ..config() });
+    assert!(refusal(&mut bench, to).starts_with("state = 0 is refused"));
+    bench.run(10);
+    assert!(refusal(&mut bench, Move::default()).starts_with("response = 0 m"));
 }

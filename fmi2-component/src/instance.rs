@@ -322,13 +322,13 @@ pub(crate) fn deserialise<C: Component>(bytes: &[u8], select: Select<C>) -> Resu
         ));
     }
     let mut archive = Archive::reader(body);
-    let mut found = Identity::default();
-    archive.whole(&mut found)?;
+    let mut written = Identity::default();
+    archive.whole(&mut written)?;
     let expected = identity::<C>();
-    if found != expected {
+    if written != expected {
         return Err(Refusal::error(format!(
             "the serialised state is of another model: its GUID and version are {} and {}, expected {} and {}",
-            found.0, found.1, expected.0, expected.1
+            written.0, written.1, expected.0, expected.1
         )));
     }
     let mut session = Session::new(select)?;

@@ -133,13 +133,13 @@ impl Log {
     /// Switches on the categories named and no other; answers whether each of them exists.
     pub(crate) fn enable_only<'a>(&mut self, names: impl Iterator<Item = &'a str>) -> bool {
         self.enabled = 0;
-        let mut known = true;
+        let mut all_exist = true;
         for name in names {
             match self.categories.iter().position(|&c| c == name) {
                 _ if name == "logAll" => self.enable_all(true),
                 Some(index) => self.enabled |= 1 << index,
                 None => {
-                    known = false;
+                    all_exist = false;
                     let categories = self.categories.join(", ");
                     self.reason(
                         Status::Warning,
@@ -148,7 +148,7 @@ impl Log {
                 }
             }
         }
-        known
+        all_exist
     }
 
     #[cold]

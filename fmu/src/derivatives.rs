@@ -94,6 +94,11 @@ impl LoViNes {
             _ => integrated,
         };
         let mut dual = perturbed(&now, known, reduced_are_states)?;
+        if unknown == Real::friction_loss {
+            // The force times the way since the last event; in co-simulation it changes with a step only.
+            let way = (dual.q1 - dual.q2).slope * f64::from(u8::from(integrated));
+            return Ok(now.particle_mass * now.friction * way);
+        }
         // The friction has the sign of the relative velocity.
         let Cavity { tilt, kinetic_friction, .. } = self.parameters.cavity;
         let ((sin, cos), sign) = (
@@ -140,6 +145,9 @@ impl LoViNes {
             Real::base => base[n],
             Real::phase if n == 1 => plant.base().drive.omega,
             Real::energy => Movement::of(plant).energy(p, n),
+            // `w'` and the friction have the same sign.
+            Real::friction_loss => p.particle_mass * plant.constant_accelerations().1 * (primary[n] - particle[n]),
+            Real::stuck_time if n == 1 => f64::from(u8::from(plant.sticks())),
             // The phase grows at a constant rate, and the outputs of impacts change at the next impact only.
             _ => 0.0,
         })

@@ -60,6 +60,10 @@ impl ModelExchange for LoViNes {
         }
     }
 
+    fn set_time(&mut self, time: f64) {
+        self.hybrid_mut().time = time;
+    }
+
     fn event_indicator(&self, index: usize) -> f64 {
         self.hybrid().event_functions()[index]
     }
@@ -70,7 +74,7 @@ impl ModelExchange for LoViNes {
 
     fn new_discrete_states(&mut self, time: f64, log: &Log) -> Result<Discrete, Refusal> {
         self.progress = Progress::UnderWay;
-        let jumped = (self.hybrid_mut()).resolve(time, |happening| log::tell_exchange(log, time, happening));
+        let jumped = (self.hybrid_mut()).resolve(time, |event, rest| log::tell_exchange(log, time, event, rest));
         Ok(Discrete { states_changed: jumped, ..Discrete::default() })
     }
 

@@ -15,6 +15,7 @@ mod settings;
 use crate::limits::lost;
 use crate::model_exchange::hybrid::Hybrid;
 use fmi2_component::{Archive, Component, Key, Log, Refusal};
+use lovines::plant::Contact;
 use lovines::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
 use outputs::Outputs;
 use reach::Reach;
@@ -134,8 +135,8 @@ impl Component for LoViNes {
 
     fn get_integer(&self, variable: Integer) -> i32 {
         let (totals, contact) = match &self.rig {
-            Rig::Steps(plant) => (plant.totals(), plant.contact()),
-            Rig::Equations(hybrid) => (hybrid.totals(), hybrid.contact()),
+            Rig::Steps(plant) => (*plant.totals(), plant.contact()),
+            Rig::Equations(hybrid) => (hybrid.totals(), hybrid.contact().and_then(Contact::wall)),
         };
         match variable {
             Integer::impacts => i32::try_from(totals.impacts).unwrap_or(i32::MAX),
@@ -171,6 +172,7 @@ impl Component for LoViNes {
             }
             Rig::Equations(hybrid) => {
                 *hybrid = Hybrid::new(self.parameters, self.start, self.drive)?;
+                hybrid.time = start_time;
             }
         }
         self.epsilon = self.parameters.mass_ratio();

@@ -1,7 +1,7 @@
 //! Events as lines for the master's log.
 
 use super::category;
-use crate::model_exchange::hybrid::{Happening, Rest};
+use crate::model_exchange::hybrid::Rest;
 use fmi2_component::Log;
 use lovines::{Event, Wall};
 
@@ -17,10 +17,9 @@ fn sign(direction: f64) -> &'static str {
 }
 
 /// One line for one event of model exchange at `time`.
-pub(super) fn tell_exchange(log: &Log, time: f64, happening: Happening) {
-    match happening {
-        Happening::Event(event) => tell(log, time, event),
-        Happening::Rest(Rest { wall, hop, energy }) => log.tell(
+pub(super) fn tell_exchange(log: &Log, time: f64, event: Event, rest: Option<Rest>) {
+    match (event, rest) {
+        (Event::Stuck { wall, .. }, Some(Rest { hop, energy })) => log.tell(
             category::logEvents,
             format_args!(
                 "the particle came to rest on the wall {} at t = {time} s; left out are hops of at most {hop:e} m, which the \
@@ -28,6 +27,7 @@ pub(super) fn tell_exchange(log: &Log, time: f64, happening: Happening) {
                 side(wall),
             ),
         ),
+        _ => tell(log, time, event),
     }
 }
 

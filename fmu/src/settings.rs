@@ -136,12 +136,6 @@ impl LoViNes {
 
     /// Passes changed parameters of the cavity to the rig.
     pub(super) fn set_cavity(&mut self, cavity: CavitySettings) -> Result<(), Refusal> {
-        if matches!(self.rig, Rig::Equations(_)) && Cavity::from(cavity) != Cavity::IDEAL {
-            return Err(Refusal::error(
-                "model exchange knows the ideal cavity only: b_plus, b_minus, theta, mu_k, mu_s, r_law, r_plus, r_minus, r_min, \
-                 r_scatter and seed must keep their start values; use co-simulation",
-            ));
-        }
         self.set_parameters(Parameters { cavity: cavity.into(), ..self.parameters })?;
         self.cavity = cavity;
         Ok(())

@@ -19,6 +19,7 @@ mod sweep;
 #[path = "cli/without_sweep.rs"]
 mod sweep;
 mod theory;
+mod watch;
 
 use std::process::ExitCode;
 

@@ -10,9 +10,9 @@ pub mod report;
 pub use files::{FileError, write_file};
 pub use vines_fmu as fmu;
 pub use vines_helic as helic;
-pub use vines_model::{ArgumentError, map, numerics, orbit, regime, theory};
+pub use vines_model::{ArgumentError, curves, map, numerics, orbit, regime, theory};
 pub use vines_net as net;
 pub use vines_sweep as sweep;
 pub use vines_testbench::{
-    advice, backbone, comparison, experiment, fit, identification, loop_check, record, rig, scene,
+    advice, backbone, comparison, experiment, fit, identification, live, loop_check, record, rig, scene,
 };

@@ -1,238 +1,49 @@
-// The page: clock, motion and changes.
+// The start of the page: on the module, or on an experiment that `vines ... --watch` serves.
 
-import { $, SPEEDS, bind, bindScenes, control, say } from "./controls.js";
+import { $, bind, say } from "./controls.js";
 import { read } from "./link.js";
 import { load } from "./module.js";
-import { MINUTE, Pictures } from "./pictures.js";
-import { Record } from "./record.js";
+import { Page, calm } from "./page.js";
 import { story } from "./story.js";
+import { Watching } from "./watch.js";
 
-// Most samples in one frame: a slower machine falls behind the clock instead of freezing the page.
-const MOST_SAMPLES = 6000;
-const calm = matchMedia("(prefers-reduced-motion: reduce)");
-
-class Page {
-  playing = true;
-  speed = 1;
-  driving = true;
-
-  constructor(table, bench) {
-    this.table = table;
-    this.bench = bench;
-    this.rows = new Record(bench.columns.length);
-    this.pictures = new Pictures(this, calm);
-    this.#controls();
-    bindScenes(this);
+// Starts what the address asks for.
+function follow(page) {
+  let wanted = { values: {}, changes: [], samples: 0 };
+  say("");
+  try {
+    wanted = read(location.hash, page.table);
+  } catch (error) {
+    say(error.message);
   }
-
-  // ---- the motion ----
-
-  start(values, changes = []) {
-    this.pictures.keepGhost();
-    this.values = { ...this.bench.defaults, ...values };
-    this.first = { ...this.values };
-    this.bench.restart(this.values);
-    this.pictures.restart();
-    this.changes = [];
-    this.pending = changes;
-    this.samples = 0;
-    this.shown = 0;
-    this.driving = true;
-    this.points = [];
-    this.rows.clear();
-    this.showControls();
-    this.#run(1);
-    this.status = this.bench.status();
-    this.step = this.status.sampleTime;
-  }
-
-  // Notes a change, so that a link repeats it, and makes it.
-  change(key, value) {
-    this.toEnd();
-    const last = this.changes.at(-1);
-    if (last && last[0] === this.samples && last[1] === key) last[2] = value;
-    else this.changes.push([this.samples, key, value]);
-    this.#make(key, value);
-  }
-
-  #make(key, value) {
-    const before = this.values;
-    try {
-      if (key === "drive") {
-        this.driving = value !== 0;
-        this.bench.drive(this.driving);
-      } else if (key === "track") {
-        this.bench.track();
-        this.driving = true;
-      } else if (key === "mass" || key === "particle") {
-        this.bench.place(key, value);
-      } else {
-        this.values = { ...before, [key]: value };
-        this.bench.apply(this.values);
-        if (key === "gap" || key === "mass_ratio") {
-          this.start(this.values);
-        } else {
-          this.pictures.curves();
-        }
-      }
-      say("");
-    } catch (error) {
-      this.values = before;
-      this.changes.pop();
-      say(error.message);
-    }
-    this.points = this.bench.tracked();
-    this.showControls();
-  }
-
-  #run(count) {
-    while (count > 0) {
-      const next = this.pending[0];
-      if (next && next[0] <= this.samples) {
-        this.pending.shift();
-        this.change(next[1], next[2]);
-        continue;
-      }
-      const now = Math.min(count, 4000, next ? next[0] - this.samples : Infinity);
-      this.rows.push(this.bench.run(now));
-      this.samples += now;
-      count -= now;
-    }
-  }
-
-  // Runs until `time`, s, and shows the plant at that instant.
-  goTo(time, most = MOST_SAMPLES) {
-    const need = Math.max(0, Math.floor(time / this.step) + 1 - this.samples);
-    const count = Math.min(most, need);
-    this.#run(count);
-    this.shown = Math.min(time, this.samples * this.step);
-    return count === need;
-  }
-
-  // ---- the past ----
-
-  // Whether a time before the present is shown.
-  replays() { return this.shown < (this.samples - 1.5) * this.step; }
-
-  // Shows a time of the record; running goes on from there, from the record up to the present.
-  scrub(time) {
-    this.play(false);
-    this.shown = Math.max(this.rows.row(0)[0], Math.min(this.samples * this.step, time));
-  }
-
-  toEnd() { if (this.replays()) this.shown = this.samples * this.step; }
-
-  // The row of the record at a time.
-  rowAt(time) {
-    return Math.max(0, Math.min(this.rows.length - 1, this.rows.length - this.samples + Math.floor(time / this.step + 1e-6)));
-  }
-
-  showTime() {
-    const end = this.samples * this.step;
-    $("time").min = -Math.min(MINUTE, end - this.rows.row(0)[0]);
-    $("time").value = this.replays() ? this.shown - end : 0;
-    $("ago").textContent = this.replays() ? `${(end - this.shown).toFixed(1)} s ago` : "now";
-  }
-
-  // ---- going somewhere ----
-
-  // Drives to a point [sigma, C, 1 if stable, G] of the backbone.
-  goToPoint([sigma, c, stable, g]) {
-    const where = `σ = ${sigma.toFixed(2)}, C = ${c.toFixed(2)}`;
-    if (!stable) return say(`The point ${where} is unstable under a constant drive: Track backbone reaches and holds it.`);
-    if (!this.values.closed) this.change("detuning", Number(sigma.toFixed(4)));
-    this.change("excitation", Number(g.toFixed(4)));
-  }
-
-  toNextImpact() {
-    this.toEnd();
-    let after = this.shown - (this.samples - 1) * this.step;
-    for (let i = 0; i < 20000; i++) {
-      const ahead = this.bench.nextImpact(after + 1e-12);
-      if (ahead !== undefined) {
-        this.shown = (this.samples - 1) * this.step + ahead;
-        return true;
-      }
-      this.#run(1);
-      after = -1;
-    }
-    say("No impact follows within 20,000 samples: raise G, or start with a moving particle.");
-    return false;
-  }
-
-  // ---- controls ----
-
-  #controls() {
-    $("speed").replaceChildren(...SPEEDS.map((speed) => new Option(speed < 1 ? `1/${Math.round(1 / speed)}` : `${speed}×`, speed)));
-    $("speed").onchange = () => this.setSpeed(Number($("speed").value));
-    $("time").oninput = () => this.scrub(this.samples * this.step + Number($("time").value));
-    $("settings").onsubmit = (event) => event.preventDefault();
-    $("settings").replaceChildren(...this.table.settings.map((setting) => control(this, setting)));
-  }
-
-  showControls() {
-    for (const { key, unit } of this.table.settings) {
-      const input = $(key), value = this.values[key];
-      if (unit === "bool") input.checked = value !== 0;
-      else {
-        input.value = Number(value.toPrecision(6));
-        input.parentElement.lastElementChild.value = value;
-      }
-    }
-    // Settings without an effect in the present loop.
-    for (const [key, inert] of [["detuning", this.values.closed !== 0], ["phase_target", this.values.closed === 0], ["bandwidth", this.values.closed === 0]]) {
-      const box = $(key).parentElement;
-      box.classList.toggle("inert", inert);
-      for (const input of box.querySelectorAll("input")) input.disabled = inert;
-    }
-    $("drive").textContent = this.driving ? "Drive on" : "Drive off";
-    $("drive").setAttribute("aria-pressed", String(this.driving));
-    $("play").textContent = this.playing ? "Pause" : "Run";
-    $("track").disabled = this.values.closed === 0;
-  }
-
-  play(on) {
-    this.playing = on;
-    this.showControls();
-  }
-
-  setSpeed(speed) {
-    this.speed = speed;
-    $("speed").value = speed;
-  }
+  page.start(wanted.values, wanted.changes);
+  if (wanted.samples > 0) page.goTo((wanted.samples - 1) * page.step, wanted.samples);
+  page.play(wanted.samples === 0 && !calm.matches);
 }
 
 async function main() {
   const table = await (await fetch("settings.json")).json();
-  const bench = await load("vines_live.wasm", table.settings);
-  const page = new Page(table, bench);
-  const follow = () => {
-    let wanted = { values: {}, changes: [], samples: 0 };
-    say("");
-    try {
-      wanted = read(location.hash, table);
-    } catch (error) {
-      say(error.message);
-    }
-    page.start(wanted.values, wanted.changes);
-    if (wanted.samples > 0) page.goTo((wanted.samples - 1) * page.step, wanted.samples);
-    page.play(wanted.samples === 0 && !calm.matches);
-  };
-  follow();
-  page.setSpeed(1);
-  // Back, forward, or a link that was pasted.
-  addEventListener("hashchange", follow);
+  const page = table.watch ? new Watching(table) : new Page(table, await load("vines_live.wasm", table.settings));
+  if (!table.watch) {
+    follow(page);
+    page.setSpeed(1);
+    // Back, forward, or a link that was pasted.
+    addEventListener("hashchange", () => follow(page));
+    story(page);
+  }
   bind(page);
-  story(page);
   window.live = { page, frames: 0 };
   let before = performance.now();
   const frame = (now) => {
     const passed = Math.min(0.1, (now - before) / 1000);
     before = now;
     try {
-      if (page.playing) page.goTo(page.shown + passed * page.speed);
-      page.pictures.draw(now);
-      page.showTime();
+      page.advance(passed);
+      // An experiment may not have begun yet.
+      if (page.rows.length) {
+        page.pictures.draw(now);
+        page.showTime();
+      }
     } catch (error) {
       page.play(false);
       say(error.message);

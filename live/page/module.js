@@ -1,13 +1,13 @@
 // The WebAssembly module: plant, controller and theory. Its exports are described in live/module/src/exports.rs.
 
-const COLUMNS = ["time", "base", "response", "relative", "phaseError", "omega", "amplitude", "responseAmplitude", "motion", "speed", "decays"];
+export const COLUMNS = ["time", "base", "response", "relative", "phaseError", "omega", "amplitude", "responseAmplitude", "motion", "speed", "decays"];
 // Places of the columns in a row.
 export const ROW = Object.fromEntries(COLUMNS.map((name, i) => [name, i]));
 const STATUS = ["time", "sampleTime", "omega0", "sigma", "C", "B", "phaseError", "G", "locked", "settled", "state", "fault", "impacts", "perPeriod", "dissipated", "tolerance", "unlock"];
 const LOOK = ["time", "base", "q1", "q2", "relative", "speed", "wall", "impacts"];
 
 // States of the loop, by number.
-export const LOOP = ["idle", "the drive rises", "searching", "locked", "lock lost", "switched off", "off"];
+export const LOOP = ["idle", "the drive rises", "searching", "locked", "switched off", "switched off", "off"];
 
 const named = (names, values) => Object.fromEntries(names.map((name, i) => [name, values[i]]));
 

@@ -11,6 +11,8 @@ export const MINUTE = 60;
 const POINTS = 1500;
 // Part of the past that is drawn as the trail of the present point, s.
 const TRAIL = 3;
+// Settings that the motion has and the curves leave out.
+const EFFECTS = ["gap_difference", "friction", "tilt"];
 // Pixels within which a click on the backbone means a point of it.
 const NEAR = 24;
 
@@ -21,8 +23,15 @@ const colour = (name) => {
 };
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => colours.clear());
 
+const digits = (value, count, unit = "") => (Number.isNaN(value) ? "not measured" : value.toFixed(count) + unit);
+
+const energy = (joules) => (joules < 1 ? `${(joules * 1e3).toPrecision(4)} mJ` : `${joules.toPrecision(4)} J`);
+
 // The end of an axis: `least`, or the next of its multiples by 1.25, so that it rarely changes.
 const end = (least, value) => { while (least < value && Number.isFinite(value)) least *= 1.25; return least; };
+
+// The largest of numbers of which some may not be measured (NaN).
+const largest = (values, least) => values.reduce((most, value) => (value > most ? value : most), least);
 
 // Whether a motion has a frequency: with a drive, or along a free decay until synchrony is lost.
 const onBackbone = (one) => one.G > 0 || one.decays;
@@ -60,23 +69,23 @@ export class Pictures {
     };
     const { canvas } = this.rig;
     let resume;
-    const to = (event) => this.rig.dragged(this.drag.part, event.offsetX - this.drag.offset);
     canvas.onpointerdown = (event) => {
       const part = this.rig.under(event);
-      if (!part) return;
+      // An experiment that is only watched has no place to drag to.
+      if (!part || !page.bench.place) return;
       canvas.setPointerCapture(event.pointerId);
       resume = page.playing;
       page.play(false);
       page.toEnd();
-      this.drag = { part, offset: event.offsetX - (part === "mass" ? this.rig.centre : this.rig.particle) };
+      this.drag = { part };
     };
     canvas.onpointermove = (event) => {
-      canvas.style.cursor = this.drag || this.rig.under(event) ? "grab" : "";
-      if (this.drag) this.drag.to = Math.max(-this.reach.mass, Math.min(this.reach.mass, to(event)));
+      canvas.style.cursor = page.bench.place && (this.drag || this.rig.under(event)) ? "grab" : "";
+      if (this.drag) this.drag.to = this.rig.dragged(this.drag.part, event, this.reach.mass);
     };
     canvas.onpointerup = canvas.onpointercancel = ({ type }) => {
       if (!this.drag) return;
-      const { part, to } = this.drag;
+      const { part: [part], to } = this.drag;
       this.drag = undefined;
       if (type === "pointerup" && to !== undefined) page.change(part, to);
       page.play(resume);
@@ -100,6 +109,10 @@ export class Pictures {
     const { bench } = this.page;
     this.lines = { theory: bench.theory(160), exact: bench.exact(120) };
     this.manifoldEnd = 0;
+    // The curves leave the effects of a real cavity out.
+    const real = EFFECTS.some((key) => this.page.values[key]);
+    this.ideal = real ? " (ideal)" : "";
+    for (const note of document.querySelectorAll(".ideal")) note.hidden = !real;
   }
 
   // A row of the record, dimensionless.
@@ -114,8 +127,8 @@ export class Pictures {
 
   // Points of the last `seconds`, thinned: every sample whose number is a multiple of a power of two.
   #thinned(seconds) {
-    const { rows, samples, step } = this.page;
-    const count = Math.min(rows.length, Math.ceil(seconds / step));
+    const { rows, samples, end } = this.page;
+    const count = rows.length - this.page.rowAt(end - seconds);
     const stride = 2 ** Math.max(0, Math.floor(Math.log2(count / POINTS)));
     const first = samples - count;
     const points = [];
@@ -134,9 +147,9 @@ export class Pictures {
     this.past = this.#thinned(MINUTE);
 
     // The last four periods before the time that is shown.
-    const count = Math.min(index + 1, Math.ceil((8 * Math.PI) / status.omega0 / page.step) + 1);
+    const count = index + 1 - page.rowAt(point.time - (8 * Math.PI) / status.omega0);
     const motion = Array.from({ length: count }, (_, i) => this.#point(page.rows.row(index - count + 1 + i)));
-    this.#rig(point, motion, replay, now);
+    this.#rig(point, motion, replay, status, now);
 
     const { hover } = this;
     const time = hover?.plot.xAt(hover.event);
@@ -145,7 +158,7 @@ export class Pictures {
     this.#motion(motion, status, cursor);
     this.#history(cursor);
     const seen = this.past.filter((one) => one.time <= page.shown + page.step);
-    const top = end(1.05, Math.max(...seen.slice(-POINTS).map((one) => one.C)));
+    const top = end(1.05, 1.03 * largest(seen.slice(-POINTS).map((one) => one.C), 0));
     this.#manifold(top, seen, point, linked);
     const done = page.points.filter((one) => one[0] <= page.shown + page.step);
     this.#backbone(top, seen, point, linked, done);
@@ -154,37 +167,39 @@ export class Pictures {
     this.#numbers(status, point, words, replay, done.length);
   }
 
-  #rig(point, motion, replay, now) {
+  #rig(point, motion, replay, status, now) {
     const { page, drag, reach, units: { b, epsilon } } = this;
     // The primary mass, from v = q1 + epsilon q2 and w = q1 - q2.
-    let look = { q1: (point.v + epsilon * point.w) / (1 + epsilon), base: point.base, wall: 0 };
+    let look = { q1: Number.isNaN(point.w) ? point.v : (point.v + epsilon * point.w) / (1 + epsilon), base: point.base || 0, wall: 0 };
     look.q2 = look.q1 - point.w;
     if (!replay) {
       const plant = page.bench.look(page.shown - (page.samples - 1) * page.step);
-      look = { q1: plant.q1 / b, q2: plant.q2 / b, base: plant.base / (b * epsilon), wall: plant.wall };
-      if (plant.impacts > this.impacts) {
-        this.rig.hit(Math.sign(plant.relative), now);
+      if (plant) look = { q1: plant.q1 / b, q2: plant.q2 / b, base: plant.base / (b * epsilon), wall: plant.wall };
+      const impacts = plant?.impacts ?? status.impacts;
+      if (impacts > this.impacts) {
+        this.rig.hit(Math.sign(look.q1 - look.q2), now);
         page.sound?.(point.B);
       }
-      this.impacts = plant.impacts;
+      this.impacts = impacts;
     }
-    if (drag?.to !== undefined) look = drag.part === "mass" ? { ...look, q1: drag.to, q2: drag.to + look.q2 - look.q1 } : { ...look, q2: look.q1 + drag.to };
+    if (drag?.to !== undefined) look = drag.part[0] === "mass" ? { ...look, q1: drag.to, q2: drag.to + look.q2 - look.q1 } : { ...look, q2: look.q1 + drag.to };
     // The scale grows at once and shrinks slowly.
-    const largest = (values) => values.reduce((most, value) => Math.max(most, Math.abs(value)), 1);
-    const need = { mass: largest([...motion.map((one) => one.v), look.q1]), base: largest([...motion.map((one) => one.base), look.base]) };
+    const most = (key, present) => largest([...motion.map((one) => Math.abs(one[key])), Math.abs(present)], 1);
+    const need = { mass: most("v", look.q1), base: most("base", look.base) };
     for (const key of ["mass", "base"]) reach[key] = Math.max(need[key], reach[key] + 0.02 * (need[key] - reach[key]));
-    this.rig.draw(look, reach, now, this.calm.matches);
+    const difference = (page.values.gap_difference ?? 0) / 100;
+    this.rig.draw(look, reach, [1 + difference, 1 - difference], page.values.tilt ?? 0, now, this.calm.matches);
   }
 
   #motion(motion, status, cursor) {
     const { page, plots: { scope } } = this;
-    const top = 1.05 * motion.reduce((most, one) => Math.max(most, Math.abs(one.base), Math.abs(one.v), Math.abs(one.w)), 1.1);
+    const top = 1.05 * largest(motion.flatMap((one) => [one.base, one.v, one.w].map(Math.abs)), 1.1);
     const begin = motion[0].time;
     const column = (key) => motion.map((one) => [one.time, one[key]]);
     scope.begin([begin, Math.max(motion.at(-1).time, begin + (2 * Math.PI) / status.omega0)], [-top, top]);
-    scope.line(column("base"), "blue", { label: "base/(ε b)" });
+    scope.line(column("base"), "base", { label: "base/(ε b)" });
     scope.line(column("v"), "ink", { label: "response v" });
-    scope.line(column("w"), "red", { label: "relative w" });
+    scope.line(column("w"), "particle", { label: "relative w" });
     scope.cursor(cursor);
     scope.end();
   }
@@ -194,8 +209,8 @@ export class Pictures {
     const { past, ghost, plots: { phase, detuning } } = this;
     const x = [past[0].time, Math.max(past.at(-1).time, past[0].time + 1)];
     const old = ghost.filter((one) => one.time >= x[0] && one.time <= x[1]);
-    for (const [plot, key, name, shade] of [[phase, "error", "phase error", "violet"], [detuning, "sigma", "detuning", "green"]]) {
-      const shows = (one) => key === "error" || onBackbone(one);
+    for (const [plot, key, name, shade] of [[phase, "error", "phase error", "modulation"], [detuning, "sigma", "detuning", "green"]]) {
+      const shows = (one) => (key === "error" ? one.G > 0 : onBackbone(one));
       plot.begin(x, extent([...past, ...old].filter(shows).map((one) => one[key]), key === "error" ? 1 : 0.5));
       const values = (run) => run.map((one) => (shows(one) ? [one.time, one[key]] : null));
       if (old.length) plot.line(values(old), "ghost", { label: "run before" });
@@ -215,17 +230,17 @@ export class Pictures {
       plot.points([place(this.ghost.findLast(onBackbone) ?? this.ghost[0])], "ghost", { label: "run before", radius: 5, open: true });
     }
     plot.line(seen.filter((one) => one.time > from).map(some((one) => one.G > 0)), "trail", { width: 1 });
-    plot.line(seen.map(some(decays)), "decay", { width: 3, label: seen.some(decays) ? "free decay" : "" });
+    plot.line(seen.map(some(decays)), "measured", { width: 3, label: seen.some(decays) ? "free decay" : "" });
   }
 
   #manifold(top, seen, point, linked) {
     const { page, plots: { manifold } } = this;
-    const right = end(2.2, Math.max(point.B, ...seen.map((one) => one.B)));
+    const right = end(2.2, largest(seen.map((one) => one.B), point.B));
     if (this.manifoldEnd !== right) this.lines.manifold = page.bench.manifold((this.manifoldEnd = right), 240);
     manifold.begin([0, right], [0, top]);
-    manifold.curve(this.lines.manifold, "ink", { label: "first-order theory" });
+    manifold.curve(this.lines.manifold, "theory", { label: `first-order theory${this.ideal}` });
     this.#tracks(manifold, seen, (one) => [one.B, one.C]);
-    manifold.points([[point.B, point.C]], "red", { label: "now", radius: 5 });
+    manifold.points([[point.B, point.C]], "particle", { label: "now", radius: 5 });
     if (linked) manifold.points([[linked.B, linked.C]], "ink", { radius: 7, open: true });
     manifold.end();
   }
@@ -235,11 +250,11 @@ export class Pictures {
     const curves = [...lines.exact, ...lines.theory].filter((one) => one[1] <= top).map((one) => one[0]);
     const sigmas = [...curves, ...[...seen.filter((one) => one.time > point.time - TRAIL || one.decays), ...this.ghost.filter((one) => one.decays), point].filter(onBackbone).map((one) => one.sigma)];
     backbone.begin(extent(sigmas, 0.5), [0, top]);
-    backbone.curve(lines.theory, "ink", { label: "theory", width: 1.2 });
-    backbone.curve(lines.exact, "blue", { label: "exact", width: 2.4 });
+    backbone.curve(lines.theory, "theory", { label: `theory${this.ideal}`, width: 1.2 });
+    backbone.curve(lines.exact, "exact", { label: `exact${this.ideal}`, width: 2.4 });
     this.#tracks(backbone, seen, (one) => [one.sigma, one.C]);
-    backbone.points(tracked.map((one) => [one[1], one[2]]), "violet", { label: "tracked", open: true });
-    if (onBackbone(point)) backbone.points([[point.sigma, point.C]], "red", { label: "now", radius: 5 });
+    backbone.points(tracked.map((one) => [one[1], one[2]]), "measured", { label: "tracked", open: true });
+    if (onBackbone(point)) backbone.points([[point.sigma, point.C]], "particle", { label: "now", radius: 5 });
     if (linked && onBackbone(linked)) backbone.points([[linked.sigma, linked.C]], "ink", { radius: 7, open: true });
     backbone.end();
   }
@@ -252,16 +267,17 @@ export class Pictures {
     const present = (text) => (replay ? "– (replay)" : text);
     const entries = [
       ["Time", `${page.shown.toFixed(3)} s, ${periods.toFixed(1)} natural periods`],
-      ["Loop", present(state)],
-      ["Regime", present(regime.startsWith("unknown") ? "too few impacts yet" : regime)],
-      ["Detuning σ", point.sigma.toFixed(6)],
-      ["Amplitude C", point.C.toFixed(6)],
-      ["Particle speed B", point.B.toFixed(6)],
-      ["Phase error", `${(Math.round(point.error * 1e4) / 1e4 + 0).toFixed(4)}°`],
+      ["Loop", status.state === undefined ? undefined : present(state)],
+      ["Regime", present(regime.startsWith("unknown") ? "too few impacts yet" : regime || "no impacts are measured")],
+      ["Detuning σ", digits(point.sigma, 6)],
+      ["Amplitude C", digits(point.C, 6)],
+      ["Particle speed B", digits(point.B, 6)],
+      ["Phase error", point.G > 0 ? digits(Math.round(point.error * 1e4) / 1e4 + 0, 4, "°") : "– (no drive)"],
       ["Excitation G", point.G.toFixed(4)],
-      ["Impacts", present(`${status.impacts}, ${status.perPeriod.toFixed(3)} per period`)],
-      ["Dissipated by impacts", present(`${(status.dissipated * 1e3).toPrecision(4)} mJ`)],
-    ];
+      ["Impacts", status.impacts === undefined ? undefined : present(`${status.impacts}, ${status.perPeriod.toFixed(3)} per period`)],
+      ["Dissipated by impacts", status.dissipated === undefined ? undefined : present(energy(status.dissipated))],
+      // An experiment that is watched does not know all of these.
+    ].filter(([, text]) => text !== undefined);
     if (page.points.length) entries.push(["Tracked points", tracked < page.points.length ? `${tracked} of ${page.points.length}` : `${tracked}`]);
     const list = $("numbers");
     if (list.childElementCount !== 2 * entries.length) {

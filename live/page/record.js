@@ -28,4 +28,15 @@ export class Record {
     const at = ((this.#first + (i < 0 ? this.length + i : i)) % MOST_ROWS) * this.columns;
     return this.values.subarray(at, at + this.columns);
   }
+
+  // The last row that is not later than `time`, s, or the first one.
+  at(time) {
+    let [low, high] = [0, this.length - 1];
+    while (low < high) {
+      const middle = Math.ceil((low + high) / 2);
+      if (this.row(middle)[0] <= time) low = middle;
+      else high = middle - 1;
+    }
+    return low;
+  }
 }

@@ -19,11 +19,14 @@ const REMEDIES = {
 // The sentence, and the button that it recommends.
 function advice(page, status, point, regime, replay) {
   if (replay) return ["A replay of the record. Run goes on from here; Now returns to the present.", "now", "Now"];
+  if (status.advice) return [status.advice, "", ""];
   if (page.values.closed && status.fault) return [REMEDIES[status.fault], "restart", "Restart"];
   if (!page.driving) {
     const where = point.decays ? "The drive is off: the motion slides down the backbone." : "The particle no longer meets both walls in turn: the backbone ends, and the mass rings down alone.";
     return [where, "drive", "Drive on"];
   }
+  const done = page.points.filter((one) => one[0] <= page.shown).length;
+  if (done < page.points.length) return [`The backbone is tracked level by level: ${done} of ${page.points.length} points are measured.`, page.speed < 10 ? "faster" : "", "Faster"];
   if (regime === "no impacts") return ["The particle does not meet the walls: drag it to one, or raise G.", "particle", "Move it"];
   if (!page.values.closed) return ["The loop is open: the drive keeps its frequency. Close it to find resonance.", "closed", "Close the loop"];
   if (status.locked) return ["Resonance is found. Let go to see the free decay, or track the backbone.", "drive", "Let go"];
@@ -38,6 +41,7 @@ export class Strip {
   draw(page, status, point, [regime], replay) {
     const closed = page.values.closed !== 0;
     const [text, kind] = replay ? ["REPLAY", "off"]
+      : status.lamp ? status.lamp
       : !closed ? [page.driving ? "OPEN LOOP" : "FREE DECAY", page.driving ? "off" : "decay"]
       : LAMPS[status.state];
     set("lamp", text);
@@ -52,7 +56,7 @@ export class Strip {
     $("act").style.visibility = action ? "" : "hidden";
     page.advised = action;
     // Without a drive there is no phase to speak of.
-    this.#gauge(closed && point.G > 0 ? point.error : undefined, status);
+    this.#gauge(closed && point.G > 0 && !Number.isNaN(point.error) ? point.error : undefined, status);
   }
 
   // The phase error between the limits beyond which the lock is lost; in the green band it counts as locked.
@@ -62,9 +66,9 @@ export class Strip {
     const x = (degrees) => 8 + (0.5 + Math.max(-0.5, Math.min(0.5, degrees / (2 * range)))) * (width - 16);
     c.clearRect(0, 0, width, height);
     const bar = (low, high, shade) => { c.fillStyle = this.colour(shade); c.fillRect(x(low), y - thick / 2, Math.max(2, x(high) - x(low)), thick); };
-    bar(-range, -unlock, "red");
+    bar(-range, -unlock, "bad");
     bar(-unlock, unlock, "line");
-    bar(unlock, range, "red");
+    bar(unlock, range, "bad");
     bar(-tolerance, tolerance, "green");
     c.font = "12px system-ui, sans-serif";
     c.textAlign = "center";

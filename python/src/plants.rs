@@ -5,7 +5,9 @@ use std::{
     sync::atomic::{AtomicBool, Ordering::Relaxed},
 };
 
-use lovines::{Drive, Event, InvalidValue, Parameters, Plant as OnePlant, State, Wall, plant::Saved};
+use lovines::{
+    Cavity, Drive, Event, InvalidValue, Parameters, Plant as OnePlant, Restitution, State, Wall, plant::Saved,
+};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ndarray::Array2};
 use pyo3::{
     exceptions::{PyKeyboardInterrupt, PyMemoryError},
@@ -21,7 +23,7 @@ use crate::{
     wait::{own_threads, wait},
 };
 
-/// Number of the plant, time, kind (0 impact, 1 stuck, 2 released), wall, relative velocity.
+/// Number of the plant, time, kind (its position in `KINDS` of plants.py), wall, relative velocity.
 #[derive(Default)]
 struct Events {
     plant: Vec<u64>,
@@ -132,7 +134,39 @@ fn advance(
     Ok(())
 }
 
-fn parameters([primary_mass, stiffness, damping, particle_mass, half_width, restitution]: [f64; 6]) -> Parameters {
+/// Values that make a plant, in the order of `_PARAMETERS` and `_CAVITY` in plants.py; NaN where the cavity has its default.
+const VALUES: usize = 17;
+
+fn parameters(values: [f64; VALUES]) -> Parameters {
+    let [
+        primary_mass,
+        stiffness,
+        damping,
+        particle_mass,
+        half_width,
+        restitution,
+        cavity @ ..,
+    ] = values;
+    let cavity: [Option<f64>; 11] = cavity.map(|value| Some(value).filter(|value| !value.is_nan()));
+    let [
+        b_plus,
+        b_minus,
+        theta,
+        mu_k,
+        mu_s,
+        r_law,
+        r_plus,
+        r_minus,
+        r_min,
+        r_scatter,
+        seed,
+    ] = cavity;
+    let law = |parameter| match r_law {
+        Some(1.0) => Restitution::Viscoelastic(parameter),
+        Some(2.0) => Restitution::Plastic(parameter),
+        _ => Restitution::Constant(parameter),
+    };
+    let of = |value: Option<f64>| value.unwrap_or(0.0);
     Parameters {
         primary_mass,
         stiffness,
@@ -140,7 +174,17 @@ fn parameters([primary_mass, stiffness, damping, particle_mass, half_width, rest
         particle_mass,
         half_width,
         restitution,
-        cavity: lovines::Cavity::IDEAL,
+        cavity: Cavity {
+            b_plus,
+            b_minus,
+            tilt: of(theta),
+            kinetic_friction: of(mu_k),
+            static_friction: mu_s,
+            restitution: [r_plus, r_minus.or(r_plus)].map(|parameter| parameter.map(law)),
+            least_restitution: of(r_min),
+            scatter: of(r_scatter),
+            seed: of(seed) as u64,
+        },
     }
 }
 
@@ -197,9 +241,9 @@ impl Plant {
 
 #[pymethods]
 impl Plant {
-    /// M, k, c, m, b, r and q1, dq1, q2, dq2.
+    /// Parameters, and q1, dq1, q2, dq2.
     #[new]
-    fn new(values: [Real; 6], start: [Real; 4]) -> PyResult<Self> {
+    fn new(values: [Real; VALUES], start: [Real; 4]) -> PyResult<Self> {
         let plant = OnePlant::new(parameters(values.map(|one| one.0)), state(start.map(|one| one.0)));
         plant.map(Self::of).map_err(invalid)
     }
@@ -347,6 +391,30 @@ impl Plant {
         self.plant.totals().dissipated
     }
 
+    /// Whether the particle sticks to the floor inside the cavity.
+    #[getter]
+    fn sticking(&self) -> bool {
+        self.plant.sticks()
+    }
+
+    /// How often the particle has stuck to the floor inside the cavity since the start.
+    #[getter]
+    fn sticks(&self) -> u64 {
+        self.plant.totals().sticks
+    }
+
+    /// How long it has stuck there, s.
+    #[getter]
+    fn stuck_time(&self) -> f64 {
+        self.plant.totals().stuck_time
+    }
+
+    /// Energy lost to friction in the cavity since the start, J.
+    #[getter]
+    fn friction_loss(&self) -> f64 {
+        self.plant.totals().friction
+    }
+
     /// q1 (m), q1' (m/s), q2 (m) and q2' (m/s) as an array of shape (1, 4), as of a `Batch`.
     #[getter]
     fn states<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
@@ -402,7 +470,7 @@ fn restored<'a>(workspace: &'a mut Option<OnePlant>, saved: &Saved) -> &'a mut O
 
 #[pymethods]
 impl Plants {
-    /// Rows of M, k, c, m, b, r and of q1, dq1, q2, dq2.
+    /// Rows of parameters, those of the cavity absent where it is ideal, and of q1, dq1, q2, dq2.
     #[new]
     fn new(values: PyReadonlyArray2<'_, f64>, starts: PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
         let (values, starts) = (values.as_array(), starts.as_array());
@@ -410,7 +478,7 @@ impl Plants {
         reserve(&mut plants, values.nrows())?;
         for (n, (p, s)) in values.rows().into_iter().zip(starts.rows()).enumerate() {
             let (parameters, start) = (
-                parameters(std::array::from_fn(|i| p[i])),
+                parameters(std::array::from_fn(|i| p.get(i).copied().unwrap_or(f64::NAN))),
                 state(std::array::from_fn(|i| s[i])),
             );
             let plant = OnePlant::new(parameters, start).map_err(|error| invalid(format!("plant {n}: {error}")))?;
@@ -519,6 +587,23 @@ impl Plants {
         (
             self.each(|plant| plant.totals().impacts).into_pyarray(py),
             self.each(|plant| plant.totals().dissipated).into_pyarray(py),
+        )
+    }
+
+    /// How often the particle stuck to the floor, how long, s, and the energy lost to friction, J.
+    #[allow(clippy::type_complexity)]
+    fn friction<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> (
+        Bound<'py, PyArray1<u64>>,
+        Bound<'py, PyArray1<f64>>,
+        Bound<'py, PyArray1<f64>>,
+    ) {
+        (
+            self.each(|plant| plant.totals().sticks).into_pyarray(py),
+            self.each(|plant| plant.totals().stuck_time).into_pyarray(py),
+            self.each(|plant| plant.totals().friction).into_pyarray(py),
         )
     }
 }

@@ -14,16 +14,19 @@ def points():
 def test_a_wrong_scene_is_corrected_by_the_points(points):
     wrong = vines.Scene(plant={"r": 0.75, "b": 0.011, "m": 0.036, "c": 2.0})
     fit = vines.fit(points, wrong)
-    assert fit.describes and fit.left_out == ()
+    assert fit.describes
+    assert fit.left_out == ()
     for symbol, truth in (("r", 0.65), ("b", 0.01), ("epsilon", 0.032 / 3.807)):
         value, uncertainty = fit[symbol]
-        assert abs(value - truth) < 4 * uncertainty and uncertainty < 0.01 * truth, (symbol, value, uncertainty)
+        assert abs(value - truth) < 4 * uncertainty, (symbol, value, uncertainty)
+        assert uncertainty < 0.01 * truth, (symbol, value, uncertainty)
 
 
 def test_a_known_mass_gives_a_plant_for_a_scene(points):
     fit = vines.fit(points, known={"m": (0.032, 0.0003)})
     plant = vines.Scene(plant=fit.plant).settings["plant"]
-    assert plant["M"] == pytest.approx(3.807, rel=0.03) and plant["r"] == pytest.approx(0.65, abs=1e-3)
+    assert plant["M"] == pytest.approx(3.807, rel=0.03)
+    assert plant["r"] == pytest.approx(0.65, abs=1e-3)
     assert np.allclose(np.diag(fit.correlations), 1)
 
 

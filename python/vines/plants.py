@@ -18,12 +18,21 @@ if TYPE_CHECKING:
     import xarray
 
 _PARAMETERS = ("M", "k", "c", "m", "b", "r")
+#: Parameters of a real cavity; what is left out is ideal.
+_CAVITY = (
+    "b_plus", "b_minus", "theta", "mu_k", "mu_s", "r_law", "r_plus", "r_minus", "r_min", "r_scatter", "seed",
+)  # fmt: skip
+#: Laws of restitution, in the order of their codes.
+_LAWS = ("constant", "viscoelastic", "plastic")
 _START = ("q1", "dq1", "q2", "dq2")
 _UNITS = {"M": "kg", "k": "N/m", "c": "N s/m", "m": "kg", "b": "m", "r": "1"}
-_STATE_UNITS = {"q1": "m", "dq1": "m/s", "q2": "m", "dq2": "m/s", "time": "s", "impacts": "1", "dissipated": "J"}
+_STATE_UNITS = {
+    "q1": "m", "dq1": "m/s", "q2": "m", "dq2": "m/s", "time": "s", "impacts": "1", "dissipated": "J",
+    "sticks": "1", "stuck_time": "s", "friction_loss": "J",
+}  # fmt: skip
 
 #: Kinds of events, by their code.
-KINDS = ("impact", "stuck", "released")
+KINDS = ("impact", "stuck", "released", "sticking", "slip", "reversal")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,9 +46,10 @@ class Events(Result):
     time : ndarray of float64, shape (n,)
         Time since the plant's start, s.
     kind : ndarray of uint8, shape (n,)
-        0: the particle hit a wall; 1: it came to rest on a wall; 2: the wall released it.
+        0: the particle hit a wall; 1: it came to rest on a wall; 2: the wall released it. With friction also 3: it
+        stuck to the floor inside the cavity; 4: it slid again; 5: it turned round without sticking.
     wall : ndarray of int8, shape (n,)
-        1 at w = q1 - q2 = b, -1 at w = -b.
+        1 at w = q1 - q2 = b (or b_plus), -1 at w = -b (or -b_minus), 0 inside the cavity.
     velocity : ndarray of float64, shape (n,)
         Relative velocity w' just before an impact, m/s; NaN for other events.
     """
@@ -78,6 +88,7 @@ class Batch:
     ----------
     parameters : mapping of str to array_like, or Scene
         M (kg), k (N/m), c (N s/m), m (kg), b (m) and r, each a number or an array; they are broadcast to shape (n,).
+        Those of a real cavity likewise: see `Plant`.
     starts : mapping of str to array_like, optional
         q1, q2 (m), dq1 and dq2 (m/s) likewise. What is left out is zero, or that of the scene.
 
@@ -101,12 +112,14 @@ class Batch:
         try:
             rows = np.stack(np.broadcast_arrays(*np.atleast_1d(*columns)), axis=-1)
         except ValueError:
-            names = zip((*_PARAMETERS, *_START), columns, strict=True)
+            cavity = _CAVITY if len(columns) > len(_PARAMETERS) + len(_START) else ()
+            names = zip((*_PARAMETERS, *cavity, *_START), columns, strict=True)
             shapes = ", ".join(f"{name} {value.shape}" for name, value in names if value.ndim)
             raise ValueError(f"arrays of different shapes: {shapes}; numbers and equal lengths are allowed") from None
         if rows.ndim != 2:
             raise ValueError(f"parameters and starts of shape {rows.shape[:-1]}: one-dimensional arrays are allowed")
-        self._native = _native.Plants(np.ascontiguousarray(rows[:, :6]), np.ascontiguousarray(rows[:, 6:]))
+        values, first = np.split(rows, [-len(_START)], axis=1)
+        self._native = _native.Plants(np.ascontiguousarray(values), np.ascontiguousarray(first))
 
     def __len__(self) -> int:
         return len(self._native)
@@ -208,9 +221,24 @@ class Batch:
         """Energy dissipated by impacts since the start, J, shape (n,)."""
         return self._native.totals()[1]
 
+    @property
+    def sticks(self) -> NDArray[np.uint64]:
+        """How often the particle has stuck to the floor inside the cavity since the start, shape (n,)."""
+        return self._native.friction()[0]
+
+    @property
+    def stuck_time(self) -> NDArray[np.float64]:
+        """How long it has stuck there, s, shape (n,)."""
+        return self._native.friction()[1]
+
+    @property
+    def friction_loss(self) -> NDArray[np.float64]:
+        """Energy lost to friction in the cavity since the start, J, shape (n,)."""
+        return self._native.friction()[2]
+
     def to_xarray(self) -> "xarray.Dataset":
         """Return the present states as a dataset over the dimension `plant`, with units as attributes."""
-        columns = [*self.states.T, self.times, *self._native.totals()]
+        columns = [*self.states.T, self.times, *self._native.totals(), *self._native.friction()]
         named = zip(_STATE_UNITS, columns, strict=True)
         return dataset({name: ("plant", values) for name, values in named}, _STATE_UNITS)
 
@@ -266,12 +294,22 @@ class Plant(_native.Plant):
     - `v` = q1 + epsilon q2 (m), `w` = q1 - q2 (m) and its velocity `dw` (m/s);
     - `base` (m) and `phase` (rad): displacement of the base, and phase of its oscillator;
     - `time` (s), `impacts`, `dissipated` (J): since the start; `wall`: 1 or -1 if the particle is stuck to the wall at
-      w = b or -b, otherwise 0.
+      w = b or -b, otherwise 0;
+    - with friction `sticking`, whether the particle sticks to the floor inside the cavity, and since the start
+      `sticks`, `stuck_time` (s) and `friction_loss` (J).
 
     Parameters
     ----------
     parameters : Scene or mapping of str to float, optional
-        M (kg), k (N/m), c (N s/m), m (kg), b (m) and r; default: the default scene.
+        M (kg), k (N/m), c (N s/m), m (kg), b (m) and r; default: the default scene. A real cavity has, each optional:
+
+        - b_plus, b_minus (m): gaps to the walls at w = b_plus and w = -b_minus; default b;
+        - theta (rad): tilt; gravity accelerates the particle by 9.80665 m/s² sin(theta) along the axis;
+        - mu_k, mu_s: kinetic friction, and static friction, at least mu_k (default mu_k);
+        - r_law: "constant", "viscoelastic" (r = 1 - k v^(1/5)) or "plastic" (r = min(1, (v/v_y)^(-1/4))), with the
+          speed of approach v in m/s; r_plus, r_minus: r, k or v_y (m/s) at the two walls, r_minus by default r_plus;
+        - r_min: least coefficient of restitution;
+        - r_scatter, seed: relative standard deviation of r from impact to impact, and the seed of this scatter.
     **start : float
         q1, q2 (m), dq1, dq2 (m/s).
 
@@ -302,7 +340,9 @@ class Plant(_native.Plant):
                 f"values for {max(sizes) if min(sizes) else 0} plants: one is allowed here; Batch has more"
             )
         numbers = [float(value.item()) for value in values]
-        return super().__new__(cls, numbers[:6], numbers[6:])
+        values, first = numbers[: -len(_START)], numbers[-len(_START) :]
+        ideal = [np.nan] * (len(_PARAMETERS) + len(_CAVITY) - len(values))
+        return super().__new__(cls, values + ideal, first)
 
     def __repr__(self) -> str:
         state = ", ".join(f"{name} = {value:.6g}" for name, value in self.state.items())
@@ -397,7 +437,7 @@ class Plant(_native.Plant):
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the present state as a dataset without dimensions, with units as attributes."""
-        values = self.state | {"time": self.time, "impacts": self.impacts, "dissipated": self.dissipated}
+        values = {name: getattr(self, name) for name in _STATE_UNITS}
         return dataset({name: ((), value) for name, value in values.items()}, _STATE_UNITS)
 
 
@@ -416,7 +456,7 @@ _ANY = dict.fromkeys(_PARAMETERS, 1.0)
 def _values(
     parameters: Scene | Mapping[str, ArrayLike], starts: Mapping[str, ArrayLike] | None
 ) -> list[NDArray[np.float64]]:
-    """Return parameters and starts, checked, in the order of `_PARAMETERS` and `_START`."""
+    """Return parameters and starts, checked: `_PARAMETERS`, `_CAVITY` unless the cavity is ideal, and `_START`."""
     first: dict[str, ArrayLike] = dict.fromkeys(_START, 0.0)
     values: Mapping[str, ArrayLike] = {}
     if isinstance(parameters, Scene):
@@ -425,16 +465,35 @@ def _values(
     else:
         values = parameters
     given = dict(first) | dict(starts or {})
-    _check("parameters", values, _PARAMETERS)
+    _check("parameters", values, _PARAMETERS, _CAVITY)
     _check("starts", given, _START)
-    given = {**values, **given}
-    return [reals(name, given[name]) for name in (*_PARAMETERS, *_START)]
+    if values.get("r_law", "constant") != "constant" and "r_plus" not in values:
+        raise ValueError(f"parameters: r_law = {values['r_law']!r} without r_plus, which is its parameter k or v_y")
+    columns = [reals(name, values[name]) for name in _PARAMETERS]
+    # Most batches have an ideal cavity: without its columns they need less memory.
+    if any(name in values for name in _CAVITY):
+        columns += [_of_cavity(name, values[name]) if name in values else np.array(np.nan) for name in _CAVITY]
+    return columns + [reals(name, given[name]) for name in _START]
 
 
-def _check(what: str, given: Mapping[str, Any], names: tuple[str, ...]) -> None:
+def _of_cavity(name: str, given: Any) -> NDArray[np.float64]:
+    """Return values of a parameter of the cavity; the law of restitution as its code."""
+    if name == "r_law":
+        if given not in _LAWS:
+            raise ValueError(f"r_law = {given!r}: {', '.join(_LAWS)} are allowed")
+        given = _LAWS.index(given)
+    values = reals(name, given)
+    if np.isnan(values).any():
+        raise ValueError(f"{name} = nan: a number is allowed")
+    if name == "seed" and not ((values >= 0) & (values < 2**31) & (values % 1 == 0)).all():
+        raise ValueError(f"seed = {given!r}: whole numbers from 0 to {2**31 - 1} are allowed")
+    return values
+
+
+def _check(what: str, given: Mapping[str, Any], names: tuple[str, ...], optional: tuple[str, ...] = ()) -> None:
     for name in given:
-        if name not in names:
-            raise ValueError(f"{what}: unknown {name!r}; known are {', '.join(names)}")
+        if name not in (*names, *optional):
+            raise ValueError(f"{what}: unknown {name!r}; known are {', '.join((*names, *optional))}")
     for name in names:
         if name not in given:
             raise ValueError(f"{what}: {name} ({_UNITS.get(name, 'm or m/s')}) is missing")

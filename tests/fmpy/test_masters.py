@@ -162,6 +162,6 @@ def test_the_page_shows_the_unit_of_every_real_variable(fmus):
         rows = dict(re.findall(r"<tr><td>(.*?)</td><td.*?>.*?</td><td.*?>(.*?)</td>", page))
         for variable in fmu.description.modelVariables:
             if variable.type == "Real":
-                assert rows[variable.name] == variable.unit, f"{name}: {variable.name}"
+                assert rows[variable.name] == (variable.unit or ""), f"{name}: {variable.name}"
     page = (fmus["LoViNes"].folder / "documentation" / "index.html").read_text()
     assert re.search(r"<tr><td>r</td><td.*?>0.65</td><td.*?>1</td>", page)

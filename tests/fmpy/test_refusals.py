@@ -17,7 +17,7 @@ BAD_PLANTS = [
     ({"b": inf}, ["b", "inf", "m", "finite number"]),
     ({"r": 1.5}, ["r", "1.5", "above 0 and at most 1"]),
     ({"r": 0}, ["r", "0", "above 0 and at most 1"]),
-    ({"q2": 0.02}, ["q1 - q2", "-0.02 m", "cavity", "-b to b"]),
+    ({"q2": 0.02}, ["q1 - q2", "-0.02 m", "cavity", "-b_minus to b_plus"]),
     ({"der(q1)": -inf}, ["der(q1)", "inf", "m/s", "finite number"]),
     ({"E": nan}, ["E", "NaN", "m", "finite number"]),
 ]

@@ -74,13 +74,13 @@ mod tests {
     #[test]
     fn uneven_steps_lose_no_sample() {
         let mut clock = SampleClock::new(0.1);
-        let mut seen = 0;
+        let mut count = 0;
         for until in [0.05, 0.35, 0.35, 0.2, f64::NAN, 0.4, 1.01] {
             for n in clock.take(until) {
-                assert_eq!(n, seen);
-                seen += 1;
+                assert_eq!(n, count);
+                count += 1;
             }
         }
-        assert_eq!((seen, clock.taken), (11, 11));
+        assert_eq!((count, clock.taken), (11, 11));
     }
 }

@@ -1,11 +1,11 @@
 //! The Rust source of a table.
 
 use crate::guid;
-use crate::table::{Kind, Literal, Table, Variable};
+use crate::table::{CType, Literal, Table, Variable};
 
 /// The contents of `variables.rs`.
 pub(crate) fn source(table: &Table) -> String {
-    let keys = Kind::ALL.map(|kind| key(kind, &table.of(kind).collect::<Vec<_>>()));
+    let keys = CType::ALL.map(|kind| key(kind, &table.of(kind).collect::<Vec<_>>()));
     identity(table) + &keys.concat() + &categories(&table.categories)
 }
 
@@ -61,12 +61,12 @@ impl ::fmi2_component::Model for Model {{
     )
 }
 
-fn key(kind: Kind, variables: &[&Variable]) -> String {
+fn key(kind: CType, variables: &[&Variable]) -> String {
     let value = match kind {
-        Kind::Real => "f64",
-        Kind::Integer => "i32",
-        Kind::Boolean => "bool",
-        Kind::String => "&'static str",
+        CType::Real => "f64",
+        CType::Integer => "i32",
+        CType::Boolean => "bool",
+        CType::String => "&'static str",
     };
     let names: Vec<_> = variables.iter().map(|v| identifier(&v.name)).collect();
     let documented = variables.iter().zip(&names);
@@ -113,7 +113,7 @@ impl ::fmi2_component::Key for {kind:?} {{
 }
 
 /// How a variable is found by its value reference: by its index in a table, unless most entries would be empty.
-fn find(kind: Kind, variables: &[&Variable], names: &[String]) -> String {
+fn find(kind: CType, variables: &[&Variable], names: &[String]) -> String {
     let named = || variables.iter().map(|v| v.value_reference as usize).zip(names);
     let places = named().map(|(reference, _)| reference + 1).max().unwrap_or(0);
     if places > 4 * variables.len() + 64 {

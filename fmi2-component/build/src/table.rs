@@ -24,14 +24,14 @@ pub(crate) struct Table {
 
 /// The four types of the C interface; an enumeration is an integer there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum CType {
     Real,
     Integer,
     Boolean,
     String,
 }
 
-impl Kind {
+impl CType {
     pub const ALL: [Self; 4] = [Self::Real, Self::Integer, Self::Boolean, Self::String];
 }
 
@@ -47,7 +47,7 @@ pub(crate) struct Variable {
     pub causality: Causality,
     pub variability: Variability,
     pub initial: Option<Initial>,
-    pub kind: Kind,
+    pub kind: CType,
     pub unit: Option<String>,
     pub start: Option<Literal>,
     pub min: Option<Literal>,
@@ -57,7 +57,7 @@ pub(crate) struct Variable {
 
 impl Table {
     /// The variables of one type, in order.
-    pub fn of(&self, kind: Kind) -> impl Iterator<Item = &Variable> {
+    pub fn of(&self, kind: CType) -> impl Iterator<Item = &Variable> {
         self.variables.iter().filter(move |v| v.kind == kind)
     }
 
@@ -98,7 +98,7 @@ impl Table {
         if let Some(name) = names.find(|name| identifier(name) != **name) {
             return Err(format!("{name:?} is not a C identifier"));
         }
-        for kind in Kind::ALL {
+        for kind in CType::ALL {
             let (mut references, mut variants) = (HashMap::new(), HashMap::new());
             for Variable { name, value_reference, .. } in self.of(kind) {
                 if let Some(other) = references.insert(value_reference, name) {
@@ -146,12 +146,12 @@ fn read(v: &ScalarVariable, types: &[SimpleType]) -> Result<Variable, String> {
         }
     };
     let (kind, literal): (_, fn(&str) -> Option<Literal>) = match kind {
-        xml::Kind::Real => (Kind::Real, |text| {
+        xml::FmiType::Real => (CType::Real, |text| {
             literal(text.parse().ok().filter(|x: &f64| x.is_finite()))
         }),
-        xml::Kind::Integer | xml::Kind::Enumeration => (Kind::Integer, |text| literal(text.parse::<i32>().ok())),
-        xml::Kind::Boolean => (Kind::Boolean, |text| literal(truth(text))),
-        xml::Kind::String => (Kind::String, |text| literal(Some(text))),
+        xml::FmiType::Integer | xml::FmiType::Enumeration => (CType::Integer, |text| literal(text.parse::<i32>().ok())),
+        xml::FmiType::Boolean => (CType::Boolean, |text| literal(truth(text))),
+        xml::FmiType::String => (CType::String, |text| literal(Some(text))),
     };
     let attribute = |attribute: &str, text: Option<&String>| {
         let value = text.map(|text| {

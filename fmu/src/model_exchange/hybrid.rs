@@ -1,8 +1,12 @@
 //! The rig as a hybrid system for an integrator: differential equations ([`crate::model_exchange::equations`]), functions whose zeros
 //! are events, and the jumps at events.
 //!
-//! An integrator stops a little before or behind a zero. A contact is therefore reported [`DEPTH`] half-widths behind the wall, and a release
-//! slightly below a contact force of zero. A function without a meaning in the present contact state is held above zero.
+//! An integrator stops a little before or behind a zero. A contact is therefore reported [`DEPTH`] half-widths behind the wall, a release
+//! slightly beyond the largest force of wall and friction, and a reversal slightly beyond `w' = 0`. A function without a meaning in the
+//! present contact state is held above zero.
+//!
+//! While the particle slides, its direction is kept: friction does not change with the sign of `w'` inside an integrator's step, but at
+//! the reversal. There the particle sticks, if static friction holds it, or slides the other way.
 //!
 //! An integrator cannot follow a chatter to its accumulation point. It ends in contact where the integrator no longer resolves the
 //! hops. That shows by itself: the integrator reports a contact while the particle, free since its last impact, still moves away from
@@ -17,11 +21,14 @@
 
 use crate::model_exchange::equations::Instant;
 use lovines::base_motion::Drive;
+use lovines::cavity::{Forces, Rebound};
 use lovines::contact::{ImpactLaw, Resolution, Wall};
 use lovines::parameters::{InvalidValue, Parameters};
-use lovines::plant::{Event, Plant, State, Totals};
+use lovines::plant::{Contact, Event, Plant, State, Totals};
 
-/// Distance behind a wall at which a contact is reported, as a fraction of the half-width.
+/// Number of event functions.
+pub const EVENTS: usize = 5;
+/// Distance behind a wall at which a contact is reported, as a fraction of the half-width; and likewise for the other event functions.
 pub const DEPTH: f64 = 1e-12;
 /// The lowest hop that is followed with any integrator, as a fraction of the half-width.
 pub const LOWEST_HOP: f64 = 1e-10;
@@ -43,34 +50,30 @@ pub struct States {
     pub phase: f64,
 }
 
-/// The end of a chatter, and what the rest leaves out.
+/// What a rest at the end of a chatter leaves out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rest {
-    /// The wall that the particle rests on.
-    pub wall: Wall,
     /// Height of the next hop, m.
     pub hop: f64,
     /// Kinetic energy of the relative motion, J; counted as dissipated.
     pub energy: f64,
 }
 
-/// An event that is logged.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Happening {
-    /// An impact or a release, as in the plant in closed form.
-    Event(Event),
-    /// The particle came to rest on a wall.
-    Rest(Rest),
-}
-
 /// The rig between two calls of an integrator.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Hybrid {
     parameters: Parameters,
-    contact: Option<Wall>,
+    forces: Forces,
+    contact: Option<Contact>,
+    /// Sign of `w'` while the particle slides with friction; 0 where there is none, and before the first event.
+    direction: f64,
+    /// Totals up to the last event, and its time (s) and place `w` (m).
     totals: Totals,
+    last_event: (f64, f64),
     /// Where the base was when the event began.
     base_before: Option<f64>,
+    /// Time, s: set at any time.
+    pub time: f64,
     /// What moves the base now: set at any time.
     pub drive: Drive,
     /// What is integrated: set at any time between events.
@@ -86,9 +89,13 @@ impl Hybrid {
         let State { q1, dq1, q2, dq2 } = Plant::new(parameters, start)?.state();
         let mut hybrid = Self {
             parameters,
+            forces: Forces::new(&parameters),
             contact: None,
+            direction: 0.0,
             totals: Totals::default(),
+            last_event: (0.0, q1 - q2),
             base_before: None,
+            time: 0.0,
             drive,
             states: States { q1, q2, ..States::default() },
         };
@@ -114,40 +121,59 @@ impl Hybrid {
             dq1: 0.0,
             q2,
             dq2: 0.0,
-            gravity: 0.0,
-            friction: 0.0,
+            gravity: self.forces.gravity,
+            friction: self.forces.kinetic * self.direction,
             stuck: self.contact.is_some(),
         };
         instant.with_reduced((u1, u2))
     }
 
-    /// The wall that the particle is stuck to.
-    pub fn contact(&self) -> Option<Wall> {
+    /// What the particle is at rest on.
+    pub fn contact(&self) -> Option<Contact> {
         self.contact
     }
 
-    /// What has been counted since the start.
-    pub fn totals(&self) -> &Totals {
-        &self.totals
+    /// What has been counted since the start, up to the present.
+    pub fn totals(&self) -> Totals {
+        let (time, w) = self.last_event;
+        let mut totals = self.totals;
+        if self.contact == Some(Contact::Floor) {
+            totals.stuck_time += self.time - time;
+        }
+        // Between two events `w'` keeps its sign, so that the way is the distance.
+        let way = (self.states.q1 - self.states.q2 - w).abs();
+        totals.friction += self.parameters.particle_mass * self.forces.kinetic * self.direction.abs() * way;
+        totals
     }
 
     /// Typical sizes of displacements (m) and velocities (m/s).
-    pub fn scales(&self) -> (f64, f64) {
-        let b = self.parameters.half_width;
+    fn scales(&self) -> (f64, f64) {
+        let [plus, minus] = self.parameters.gaps();
+        let b = 0.5 * plus + 0.5 * minus;
         (b, b * self.parameters.natural_frequency())
     }
 
-    /// Functions of the state whose change of sign is an event: the gaps to both walls (as a fraction of the half-width)
-    /// and the push of the wall that the particle is stuck to (as a fraction of `omega0² b`).
-    pub fn event_functions(&self) -> [f64; 3] {
+    /// Functions of the state whose change of sign is an event: the gaps to both walls (as a fraction of the half-width); what wall and
+    /// friction can still transmit before the particle goes on with `w' > 0` and with `w' < 0` (as a fraction of `omega0² b`); and the
+    /// speed of sliding (as a fraction of `omega0 b`).
+    pub fn event_functions(&self) -> [f64; EVENTS] {
         let now = self.instant();
+        let mut functions = [1.0; EVENTS];
         match self.contact {
             None => {
-                let [plus, minus] = Wall::BOTH.map(|wall| self.gap(wall, &now));
-                [plus + DEPTH, minus + DEPTH, 1.0]
+                [functions[0], functions[1]] = Wall::BOTH.map(|wall| self.gap(wall, &now) + DEPTH);
+                if self.direction != 0.0 {
+                    functions[4] = self.sliding(&now) + DEPTH;
+                }
             }
-            Some(wall) => [1.0, 1.0, self.push(wall, &now) + DEPTH],
+            Some(contact) => {
+                for &direction in releases(contact) {
+                    let which = if direction > 0.0 { 2 } else { 3 };
+                    functions[which] = self.hold(direction, &now) + DEPTH;
+                }
+            }
         }
+        functions
     }
 
     /// Whether an integrator has stepped over an event.
@@ -160,28 +186,66 @@ impl Hybrid {
         self.base_before = Some(self.instant().base());
     }
 
-    /// Applies what is due now, at `time`: a jump of the base, an impact, rest, release; whether states have jumped.
-    pub fn resolve(&mut self, time: f64, mut on_event: impl FnMut(Happening)) -> bool {
-        let before = (self.states, self.contact);
+    /// Applies what is due now, at `time`: a jump of the base, an impact, rest, release, reversal; whether states have jumped.
+    pub fn resolve(&mut self, time: f64, mut on_event: impl FnMut(Event, Option<Rest>)) -> bool {
+        let before = (self.states, self.contact, self.direction);
+        self.time = time;
+        self.totals = self.totals();
         // After a jump of the base or a release, a particle behind the wall may leave it: that is no hop.
         let hops = self.contact.is_none() && self.base_before == Some(self.instant().base());
         self.base_jump();
-        if let Some(wall) = self.contact
-            && self.push(wall, &self.instant()) < -0.5 * DEPTH
-        {
-            self.part(None);
-            on_event(Happening::Event(Event::Released { t: 0.0, wall }));
-        } else if self.contact.is_none() {
-            let now = self.instant();
+        let now = self.instant();
+        if let Some(contact) = self.contact {
+            let due = |direction: &&f64| self.hold(**direction, &now) < -0.5 * DEPTH;
+            if let Some(&direction) = releases(contact).iter().find(due) {
+                self.part(None, direction);
+                let event = match contact {
+                    Contact::Wall(wall) => Event::Released { t: 0.0, wall },
+                    Contact::Floor => Event::Slip { t: 0.0, direction },
+                };
+                on_event(event, None);
+            }
+        } else {
             let touched = (Wall::BOTH.into_iter()).find(|&wall| self.gap(wall, &now) <= 0.5 * DEPTH);
             if let Some(wall) = touched {
-                self.touch(wall, time, hops, &mut on_event);
+                self.touch(wall, hops, &mut on_event);
+            }
+            if self.contact.is_none() && self.forces.holding > 0.0 {
+                self.slide(&mut on_event);
             }
         }
         // States may jump now, so that the phase can be brought back to one turn.
         self.states.phase = self.states.phase.rem_euclid(core::f64::consts::TAU);
         self.base_before = Some(self.instant().base());
-        before != (self.states, self.contact)
+        self.last_event = (time, self.states.q1 - self.states.q2);
+        before != (self.states, self.contact, self.direction)
+    }
+
+    /// The particle slides: decides on its direction after a jump of `w'`, and whether it sticks at a reversal.
+    fn slide(&mut self, on_event: &mut impl FnMut(Event, Option<Rest>)) {
+        let now = self.instant();
+        let reverses = self.direction != 0.0 && self.sliding(&now) < -0.5 * DEPTH;
+        if self.direction != 0.0 && !reverses {
+            return;
+        }
+        if !reverses && now.relative_velocity() != 0.0 {
+            return self.part(None, 1f64.copysign(now.relative_velocity()));
+        }
+        self.part(None, 0.0);
+        self.set_velocities(now.dq1, now.dq1);
+        let (b, fast) = self.scales();
+        let error = 0.5 * DEPTH * fast * fast / b;
+        let direction = self.forces.slips((self.instant().acceleration(), error));
+        if direction == 0.0 {
+            self.totals.sticks += 1;
+            self.part(Some(Contact::Floor), 0.0);
+            on_event(Event::Sticking { t: 0.0 }, None);
+        } else {
+            self.part(None, direction);
+            if reverses {
+                on_event(Event::Reversal { t: 0.0, direction }, None);
+            }
+        }
     }
 
     /// Takes over other parameters; displacements and velocities stay.
@@ -190,19 +254,28 @@ impl Hybrid {
     /// Parameters that are not allowed; the old ones stay.
     pub fn set_parameters(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
         parameters.validate()?;
-        let Instant { dq1, dq2, .. } = self.instant();
-        self.parameters = parameters;
+        self.totals = self.totals();
+        let Instant { dq1, dq2, q1, q2, .. } = self.instant();
+        self.last_event = (self.time, q1 - q2);
+        (self.parameters, self.forces) = (parameters, Forces::new(&parameters));
+        // The next event decides on it.
+        self.direction = 0.0;
         self.set_velocities(dq1, dq2);
         Ok(())
     }
 
     fn gap(&self, wall: Wall, now: &Instant<f64>) -> f64 {
-        1.0 - wall.sign() * now.relative_displacement() / self.parameters.half_width
+        (self.parameters.gaps()[wall.index()] - wall.sign() * now.relative_displacement()) / self.scales().0
     }
 
-    fn push(&self, wall: Wall, now: &Instant<f64>) -> f64 {
-        let omega0_squared = self.parameters.stiffness / self.parameters.primary_mass;
-        wall.sign() * now.acceleration() / (omega0_squared * self.parameters.half_width)
+    /// What is left of the force that keeps the particle from going on with `w'` of the sign `direction`.
+    fn hold(&self, direction: f64, now: &Instant<f64>) -> f64 {
+        let (b, fast) = self.scales();
+        (self.forces.holding - direction * (now.acceleration() - self.forces.gravity)) / (fast * fast / b)
+    }
+
+    fn sliding(&self, now: &Instant<f64>) -> f64 {
+        self.direction * now.relative_velocity() / self.scales().1
     }
 
     fn set_velocities(&mut self, dq1: f64, dq2: f64) {
@@ -210,10 +283,11 @@ impl Hybrid {
         (self.states.u1, self.states.u2) = now.reduced_velocities();
     }
 
-    /// Changes the contact; velocities stay.
-    fn part(&mut self, contact: Option<Wall>) {
+    /// Changes contact and direction of sliding; velocities stay.
+    fn part(&mut self, contact: Option<Contact>, direction: f64) {
         let Instant { dq1, dq2, .. } = self.instant();
         self.contact = contact;
+        self.direction = if self.forces.holding > 0.0 { direction } else { 0.0 };
         self.set_velocities(dq1, dq2);
     }
 
@@ -223,59 +297,71 @@ impl Hybrid {
             return;
         };
         let jump = self.instant().base() - before;
-        if jump != 0.0 && self.contact.is_some() {
-            let joint = self.parameters.primary_mass + self.parameters.particle_mass;
-            let both = self.instant().dq1 - self.parameters.damping / joint * jump;
+        if jump == 0.0 {
+            return;
+        }
+        if self.contact.is_some() {
+            let total = self.parameters.primary_mass + self.parameters.particle_mass;
+            let both = self.instant().dq1 - self.parameters.damping / total * jump;
             self.contact = None;
             let alone = both + self.parameters.damping / self.parameters.primary_mass * jump;
             self.set_velocities(alone, both);
         }
+        // With the relative velocity, the direction may have changed.
+        self.direction = 0.0;
     }
 
     /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave, or if the integrator cannot resolve that
     /// it leaves. `hops`: it has been free since its last impact.
-    fn touch(&mut self, wall: Wall, time: f64, hops: bool, on_event: &mut impl FnMut(Happening)) {
-        let now = self.instant();
-        let unresolved = hops && self.gap(wall, &now) < -0.5 * DEPTH && wall.sign() * now.relative_velocity() < 0.0;
-        self.states.q2 = self.states.q1 - wall.sign() * self.parameters.half_width;
-        let law = ImpactLaw::new(&self.parameters);
-        let velocities = (now.dq1, now.dq2, now.dq1 - now.dq2);
-        let (mut hop, mut energy) = (0.0, 0.0);
-        let touch = law.touch(wall, velocities, |primary, speed| {
-            let pressing = self.pressing(wall, primary);
-            if speed > 0.0 {
-                hop = 0.5 * speed * speed / pressing;
-                energy = 0.5 * self.parameters.relative_mass() * speed * speed;
-            }
-            unresolved && pressing > 0.0 || self.rests(&law, speed, pressing)
-        });
-        self.totals.add(&touch, time);
-        if let Some(velocity) = touch.impact {
-            on_event(Happening::Event(Event::Impact { t: 0.0, wall, velocity }));
+    fn touch(&mut self, wall: Wall, hops: bool, on_event: &mut impl FnMut(Event, Option<Rest>)) {
+        let (now, p) = (self.instant(), &self.parameters);
+        let relative = now.relative_velocity();
+        let unresolved = hops && self.gap(wall, &now) < -0.5 * DEPTH && wall.sign() * relative < 0.0;
+        self.states.q2 = self.states.q1 - wall.sign() * p.gaps()[wall.index()];
+        let (mut law, rebound) = (ImpactLaw::new(p), Rebound::new(p));
+        if !rebound.is_constant(p.restitution) {
+            law = law.with_restitution(rebound.of_impact(wall, relative.abs(), self.totals.impacts));
         }
-        if touch.stuck {
-            self.contact = Some(wall);
-            on_event(Happening::Rest(Rest { wall, hop, energy }));
-        }
-        self.set_velocities(touch.primary, touch.particle);
-    }
-
-    /// Acceleration, m/s², of `wall` towards a free particle on it, at this velocity of the primary mass, m/s.
-    fn pressing(&self, wall: Wall, primary: f64) -> f64 {
-        let now = Instant { dq1: primary, ..self.instant() };
-        wall.sign() * now.acceleration()
-    }
-
-    /// Whether a particle that leaves a wall at `speed` counts as at rest on it, however accurate the integrator is.
-    fn rests(&self, law: &ImpactLaw, speed: f64, pressing: f64) -> bool {
         let (b, fast) = self.scales();
         let resolution = Resolution {
             lowest_hop: LOWEST_HOP * b,
             longest_chatter: LONGEST_CHATTER * b / fast,
-            fastest: self.parameters.fastest_rate(),
+            fastest: p.fastest_rate(),
             elastic: false,
         };
-        law.rests(speed, (pressing, 0.5 * DEPTH * fast * fast / b), &resolution)
+        let mut rest = Rest { hop: 0.0, energy: 0.0 };
+        let touch = law.touch(wall, (now.dq1, now.dq2, relative), |primary, speed| {
+            let alone = Instant { dq1: primary, stuck: false, friction: 0.0, ..self.instant() };
+            let free = wall.sign() * alone.acceleration();
+            let (up, _) = self.forces.pressing(wall, free);
+            if speed > 0.0 {
+                let energy = 0.5 * p.relative_mass() * speed * speed;
+                rest = Rest { hop: 0.5 * speed * speed / up, energy };
+            }
+            let error = 0.5 * DEPTH * fast * fast / b;
+            unresolved && up > 0.0 || rebound.rests(&law, &self.forces, (wall, speed), (free, error), &resolution)
+        });
+        self.totals.add(&touch, self.time);
+        if touch.impact.is_some() || touch.stuck {
+            self.direction = 0.0;
+        }
+        if let Some(velocity) = touch.impact {
+            on_event(Event::Impact { t: 0.0, wall, velocity }, None);
+        }
+        if touch.stuck {
+            self.contact = Some(Contact::Wall(wall));
+            on_event(Event::Stuck { t: 0.0, wall }, Some(rest));
+        }
+        self.set_velocities(touch.primary, touch.particle);
+    }
+}
+
+/// Signs of `w'` with which the particle can be released.
+fn releases(contact: Contact) -> &'static [f64] {
+    match contact {
+        Contact::Wall(Wall::Plus) => &[-1.0],
+        Contact::Wall(Wall::Minus) => &[1.0],
+        Contact::Floor => &[1.0, -1.0],
     }
 }
 

@@ -1,5 +1,7 @@
 //! Advice after a run without the expected lock, from the exact orbits of the scene.
 
+use lovines::cavity::GRAVITY;
+use vines_model::numerics::range;
 use vines_model::orbit::{Orbit, exact_backbone, phase_resonant};
 use vines_model::regime::Regime;
 
@@ -10,8 +12,6 @@ use crate::scene::{Dimensionless, Scene};
 /// Detunings at which the backbone is searched for stable orbits, and their distance.
 const SEARCHED: [f64; 2] = [-6.0, 3.0];
 const STEP: f64 = 0.005;
-/// Parts of a step in which the end of the stable range is located.
-const FINER: i32 = 20;
 /// Smallest gap in the range of drives that is searched for.
 const GAP: f64 = 2e-3;
 
@@ -19,35 +19,14 @@ const GAP: f64 = 2e-3;
 pub fn stable_orbits(d: &Dimensionless) -> Vec<Orbit> {
     let steps = ((SEARCHED[1] - SEARCHED[0]) / STEP) as i32;
     let omega = |n: i32| 1.0 + d.epsilon * (SEARCHED[0] + STEP * f64::from(n));
-    let mut orbits = Vec::new();
-    for n in 0..=steps {
-        orbits.extend(exact_backbone(d, omega(n)));
-    }
-    orbits.retain(|orbit| orbit.stable);
-    orbits
-}
-
-/// The largest response amplitude over b of these orbits, by falling steps from the largest that was found.
-pub fn largest_stable(d: &Dimensionless) -> Option<f64> {
-    let largest = |orbits: Vec<Orbit>| {
-        orbits
-            .into_iter()
-            .filter(|orbit| orbit.stable)
-            .max_by(|one, other| one.c.total_cmp(&other.c))
-    };
-    let first = largest(stable_orbits(d))?;
-    let steps = (1..FINER).map(|n| first.sigma + STEP * f64::from(n) / f64::from(FINER));
-    let finer = steps.filter_map(|sigma| largest(exact_backbone(d, 1.0 + d.epsilon * sigma)));
-    Some(finer.map(|orbit| orbit.c).fold(first.c, f64::max))
+    let orbits = (0..=steps).flat_map(|n| exact_backbone(d, omega(n)));
+    orbits.filter(|orbit| orbit.stable).collect()
 }
 
 /// The range of drives, base amplitude over `b epsilon`, with a stable symmetric 1:1 orbit at phase resonance; there may be gaps in it.
 pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
-    let drives = stable_orbits(d).into_iter().map(|orbit| orbit.g);
-    drives.fold(None, |range, g| {
-        let [low, high] = range.unwrap_or([g, g]);
-        Some([low.min(g), high.max(g)])
-    })
+    let (low, high) = range((f64::INFINITY, 0.0), stable_orbits(d).iter().map(|orbit| orbit.g));
+    (low <= high).then_some([low, high])
 }
 
 /// The ranges of drives with a stable symmetric 1:1 orbit at phase resonance, without gaps wider than `GAP`.
@@ -71,15 +50,31 @@ fn stable_ranges(d: &Dimensionless) -> Vec<[f64; 2]> {
 /// Why a run that was expected to lock the symmetric 1:1 motion may not have done so, from the scene and the regime of the last periods.
 /// `None` where the exact orbits give no reason.
 pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
+    let reason = ideal_reason(scene, regime)?;
+    let Some(left_out) = scene.left_out() else {
+        return Some(reason);
+    };
+    let weight =
+        GRAVITY * scene.plant.cavity.tilt.sin().abs() / (scene.plant.half_width * scene.dimensionless().omega0.powi(2));
+    let weight = match weight {
+        0.0 => String::new(),
+        weight => format!(
+            ". Gravity along the axis is {weight:.2} b omega0^2: at r = 0.65 and G = 1.1, the 1:1 motion between both walls is lost at about \
+             0.15, and the particle stays near the lower wall"
+        ),
+    };
+    Some(format!(
+        "{reason}. This is said of the ideal cavity, without {left_out}{weight}"
+    ))
+}
+
+fn ideal_reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
     let d = scene.dimensionless();
     let mut stable = phase_resonant(&d);
     stable.retain(|orbit| orbit.stable);
     if stable.is_empty() {
-        let ranges = stable_ranges(&d);
-        let ranges: Vec<String> = ranges
-            .iter()
-            .map(|[low, high]| format!("from {low:.3} to {high:.3}"))
-            .collect();
+        let text = |[low, high]: &[f64; 2]| format!("from {low:.3} to {high:.3}");
+        let ranges: Vec<String> = stable_ranges(&d).iter().map(text).collect();
         let range = match ranges[..] {
             [] => "at no G".into(),
             _ => format!("for G {}", ranges.join(" and ")),
@@ -89,14 +84,11 @@ pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
             d.g
         ));
     }
-    let places: Vec<String> = stable
-        .iter()
-        .map(|orbit| format!("sigma = {:.4}, C = {:.4}", orbit.sigma, orbit.c))
-        .collect();
-    let plural = if stable.len() == 1 {
-        "orbit of this G is"
-    } else {
-        "orbits of this G are"
+    let place = |orbit: &Orbit| format!("sigma = {:.4}, C = {:.4}", orbit.sigma, orbit.c);
+    let places: Vec<String> = stable.iter().map(place).collect();
+    let plural = match places[..] {
+        [_] => "orbit of this G is",
+        _ => "orbits of this G are",
     };
     let place = format!("the stable symmetric 1:1 {plural} at {}", places.join(" and at "));
     let omegas = || stable.iter().map(|orbit| 1.0 + d.epsilon * orbit.sigma);

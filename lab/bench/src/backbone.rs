@@ -10,9 +10,9 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use vines_model::numerics::{Estimate, RANDOM};
 
-use crate::experiment::{self, ExperimentError, Search, Stage};
+use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stage};
 use crate::identification::{
-    Balance, Cycle, Measured, Regime, Slopes, Tone, classify, foreign_tone, regime_by_response,
+    Balance, Cycle, Regime, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
 };
 use crate::record::Sample;
 use crate::rig::{Controller, Move, Rig};
@@ -41,7 +41,7 @@ pub struct Criterion {
 /// A point of the backbone from a window of periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LevelEstimate {
-    /// How many periods.
+    /// Number of periods.
     pub periods: usize,
     /// Mean amplitude of the response, m.
     pub response: Estimate,
@@ -49,19 +49,21 @@ pub struct LevelEstimate {
     pub phase_error: Estimate,
     /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
     pub at: [Estimate; 2],
-    /// Whether what is left is noise: the fit describes the window, and the rest is within the precision.
+    /// Whether only noise is larger than the precision: the fit describes the window, and the systematic part of the uncertainty is small
+    /// enough.
     pub steady: bool,
 }
 
 /// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 beside the
 /// fold, 0.03 rad change sigma at equal C by 1.1e-3.
 const BESIDE: f64 = 0.02;
-/// Periods by which the impacts follow a change of the amplitude late: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
+/// Delay of the impacts behind a change of the amplitude, periods: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
 /// (studies/off_scene.rs).
 const LAG: f64 = 1.6;
 /// Largest scatter of the periods about the fit, over the noise of the sensors: chi-square per degree of freedom is then at most 4.
 const EXCESS: f64 = 2.0;
-/// Relative standard uncertainty of the slope of a straight line through two points: away from the fold it changes by less from level to level.
+/// Relative standard uncertainty of the slope of a straight line through two points: away from the fold the slope changes by less from level to
+/// level.
 const SLOPE: f64 = 0.5;
 /// Shares of the periods that are considered, from the last one backwards.
 const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
@@ -179,10 +181,10 @@ impl LevelEstimate {
 
 /// One point of the backbone.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Point {
-    /// Where it is; frequency and base amplitude are those of phase resonance at this response amplitude.
+pub struct LevelPoint {
+    /// The point: frequency and base amplitude of phase resonance at this amplitude of the response.
     #[serde(flatten)]
-    pub at: Measured,
+    pub at: ResonancePoint,
     /// Target level, over b.
     pub level: f64,
     /// Periods of the move to this level and at this level.
@@ -207,7 +209,7 @@ pub struct Point {
 #[derive(Debug)]
 pub struct Tracked {
     /// The points, in the order in which they were taken.
-    pub points: Vec<Point>,
+    pub points: Vec<LevelPoint>,
     /// Periods from the start to the closed loop.
     pub periods_to_lock: f64,
     /// All periods, from the start to the last point.
@@ -219,15 +221,11 @@ pub struct Tracked {
 /// Where the loop holds the rig: response amplitude, m, drive amplitude, m, frequency, rad/s.
 type Held = [f64; 3];
 
-/// Periods between a move and the first that is measured: the loops and the particle follow late.
-const LATE: usize = 8;
-/// Periods of the first level more than those, because the start of the loop disturbs the particle, too.
+/// Additional periods before the first level is measured, because the start of the loop disturbs the particle, too.
 const FIRST: usize = 24;
-/// Periods in succession in which the criterion must be met: the halves of a transient can agree by chance.
-const CONFIRMED: usize = 3;
-/// Share of the drive that a move may need in addition to the drive that holds the response.
+/// Largest additional drive of a move, as a share of the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
-/// Duration of a move, periods.
+/// Shortest duration of a move, periods.
 const MOVE: f64 = 4.0;
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
@@ -243,7 +241,7 @@ struct Tracker<'a, R: Rig + ?Sized, C: ?Sized> {
     closed: Held,
     /// The points so far.
     states: Vec<Held>,
-    points: Vec<Point>,
+    points: Vec<LevelPoint>,
 }
 
 /// Tracks the backbone of `scene`.
@@ -259,7 +257,7 @@ pub fn track(
     track_into(&mut Vec::new(), rig, controller, scene, progress)
 }
 
-/// As [`track`]; if it ends before the first point, what was measured last stays in `samples`.
+/// [`track`], which leaves what was measured last in `samples` if it ends before the first point.
 ///
 /// # Errors
 /// As [`track`].
@@ -271,8 +269,10 @@ pub fn track_into(
     progress: impl FnMut(usize, usize),
 ) -> Result<Tracked, ExperimentError> {
     experiment::holds_a_phase(scene)?;
+    let limit = (scene.lock_periods() * scene.controller.samples_per_period) as usize;
+    let mut quiet = |_, _| {};
     let mut tracker = Tracker {
-        run: experiment::ControlLoop::new(rig, controller, scene, samples),
+        run: experiment::ControlLoop::new(rig, controller, scene, samples, limit, &mut quiet),
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
@@ -296,13 +296,8 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     /// One period of the drive.
     fn cycle(&mut self) -> Result<Cycle, ExperimentError> {
         loop {
-            let begin = self.run.samples.len();
-            let first = self.run.periods;
-            while self.run.periods < first.floor() + 1.0 {
-                self.run.sample(self.stage)?;
-            }
-            let samples = &self.run.samples[begin..];
-            if let Some(cycle) = Cycle::of(samples, self.run.sample_time, first * TAU, self.target) {
+            let period = self.run.period(self.stage)?;
+            if let Some(cycle) = self.run.cycle(period, self.target) {
                 return Ok(cycle);
             }
         }
@@ -310,9 +305,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
 
     /// Goes to a symmetric motion with impacts, if there is one.
     fn approach(&mut self) -> Result<(), ExperimentError> {
-        let scene = self.scene;
-        let limit = (scene.lock_periods() * scene.controller.samples_per_period) as usize;
-        Search::new(&mut self.run, scene, limit, &mut |_| {}).impacts()?;
+        Search::new(&mut self.run, self.scene).impacts()?;
         let cycle = self.cycle()?;
         self.closed = [cycle.amplitude(), cycle.base.norm(), cycle.omega];
         Ok(())
@@ -339,12 +332,16 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     }
 
     /// Goes to a level, m, and holds it until the point has settled, or for the longest time allowed.
-    fn hold(&mut self, level: f64) -> Result<Point, ExperimentError> {
+    fn hold(&mut self, level: f64) -> Result<LevelPoint, ExperimentError> {
         let (start, settings) = (self.run.periods, &self.scene.backbone);
         let (to, periods) = self.step(level);
         self.run.controller.hold_response(to, self.target)?;
         self.run.samples.clear();
-        let late = if self.states.is_empty() { FIRST + LATE } else { LATE };
+        let late = if self.states.is_empty() {
+            FIRST + FOLLOWED
+        } else {
+            FOLLOWED
+        };
         while self.run.periods - start < periods + late as f64 {
             self.cycle()?;
         }
@@ -356,6 +353,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             let estimate = criterion.best(&cycles);
             let is_met =
                 estimate.is_some_and(|estimate| criterion.is_met(&estimate) && is_reached(estimate.response, level));
+            // The halves of a transient can agree by chance.
             confirmed = if is_met { confirmed + 1 } else { 0 };
             if cycles.len() >= settings.dwell_max as usize || confirmed >= CONFIRMED {
                 break estimate;
@@ -369,7 +367,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         Ok(self.point(level, start, &estimate, &cycles, &criterion))
     }
 
-    /// The move to a level, m, and its periods: those of the scene, or as many as the drive needs to change the response that much.
+    /// The move to a level, m, and its periods: [`MOVE`], or as many as the drive needs for this change of the response.
     fn step(&self, level: f64) -> (Move, f64) {
         let omega0 = self.scene.linear().omega0;
         let [response, drive, omega] = *self.states.last().unwrap_or(&self.closed);
@@ -396,7 +394,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         estimate: &LevelEstimate,
         cycles: &[Cycle],
         criterion: &Criterion,
-    ) -> Point {
+    ) -> LevelPoint {
         let d = self.scene.dimensionless();
         let samples = cycles[cycles.len() - estimate.periods..]
             .iter()
@@ -405,15 +403,17 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let [base, omega] = estimate.at;
         let regime = regime_by_response(averaged, self.scene, base.value, self.target, omega.value);
         let reached = is_reached(estimate.response, level);
-        Point {
-            at: Measured::new([estimate.response, base, omega, estimate.phase_error], &d),
+        LevelPoint {
+            at: ResonancePoint::new([estimate.response, base, omega, estimate.phase_error], &d),
             // The level as a person would write it.
             level: (1e9 * level / d.b).round() / 1e9,
             periods: self.run.periods - start,
             averaged: estimate.periods,
-            // An irregular motion can seem steady for a while; an asymmetric one is no point of this backbone.
+            // An irregular motion can seem steady for a while; where motions have mirror images, an asymmetric one is no point of this
+            // backbone.
             settled: reached
-                && !matches!(regime, Regime::Other | Regime::Asymmetric)
+                && regime != Regime::Other
+                && (regime != Regime::Asymmetric || !self.scene.has_mirror_images())
                 && (estimate.steady || criterion.is_met(estimate)),
             reached,
             regime,

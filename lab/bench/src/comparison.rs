@@ -6,8 +6,9 @@ use vines_model::numerics::{golden_section, mean_square};
 use vines_model::orbit::{self, ContinuationLimits, Orbit, backbone};
 use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow, free_sigma, resonant};
 
-use crate::backbone::{Point, Tracked};
-use crate::identification::{DecayEnd, DecayPoint, Identification, Lock, Regime, decay_points};
+use crate::backbone::{LevelPoint, Tracked};
+use crate::experiment::Plan;
+use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime, decay_points};
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Drive, Rig, Simulated};
 use crate::scene::{Dimensionless, Scene};
@@ -20,8 +21,11 @@ pub const COMPARED_ABOVE: f64 = 0.2;
 /// An identified system beside theory and exact orbits; dimensionless throughout.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// The numbers all of this belongs to.
+    /// The numbers of the scene.
     pub parameters: Dimensionless,
+    /// What theory and exact orbits leave out of the scene's cavity; absent if it is ideal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<String>,
     /// The phase of the response relative to the reference that the lock held, degrees.
     pub phase_target_deg: f64,
     /// The locked point as measured.
@@ -29,7 +33,7 @@ pub struct Comparison {
     /// First-order theory at the same G: the stable solution nearest to the lock; absent if the phase target is not
     /// phase resonance.
     pub theory: Option<BackbonePoint>,
-    /// The exact phase-resonant orbit at the same G nearest to the lock; absent as above.
+    /// The exact phase-resonant orbit at the same G nearest to the lock; absent if the phase target is not phase resonance.
     pub exact: Option<Orbit>,
     /// All exact phase-resonant orbits at the same G, by rising C; the lock followed `exact`.
     pub orbits: Vec<Orbit>,
@@ -39,9 +43,9 @@ pub struct Comparison {
     pub decay_end: DecayEnd,
     /// RMS of the decay's sigma minus theory, over the points with C > 0.2.
     pub rms_sigma_error: Option<f64>,
-    /// RMS of the decay's sigma minus that of the exact backbone at the same C, over the same points.
+    /// RMS of the decay's sigma minus the exact backbone's at the same C, over the same points.
     pub rms_sigma_exact: Option<f64>,
-    /// RMS of the decay's sigma minus that of the exact plant, released on the exact orbit and evaluated alike, over the same points.
+    /// RMS of the decay's sigma minus `sigma_predicted`, over the same points.
     pub rms_sigma_predicted: Option<f64>,
 }
 
@@ -50,7 +54,7 @@ pub struct Comparison {
 pub struct ComparedPoint {
     /// The point.
     #[serde(flatten)]
-    pub point: DecayPoint,
+    pub point: FreeDecayPoint,
     /// Detuning of the backbone at this C, to first order; absent below the fold.
     pub sigma_theory: Option<f64>,
     /// Detuning of the exact backbone at this C; absent outside it.
@@ -67,18 +71,19 @@ impl Comparison {
         let (parameters, lock) = (found.parameters, found.lock);
         let at_resonance = scene.controller.is_at_phase_resonance();
         let distance = |sigma: f64, c: f64| (sigma - lock.at.sigma).hypot(c - lock.at.c);
-        let theory = resonant(&parameters)
+        let mut solutions = resonant(&parameters);
+        solutions.retain(|point| at_resonance && point.stable());
+        let theory = solutions
             .into_iter()
-            .filter(|point| at_resonance && point.stable())
             .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
-        let orbits: Vec<Orbit> = orbit::phase_resonant(&parameters)
-            .into_iter()
-            .filter(|_| at_resonance)
-            .collect();
-        let exact = nearest(&orbits, &lock);
+        let mut orbits = orbit::phase_resonant(&parameters);
+        orbits.retain(|_| at_resonance);
+        let exact = orbits
+            .iter()
+            .copied()
+            .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
         let curve = ExactCurve::of(&parameters);
-        let samples = crate::experiment::Plan::of(scene).decay;
-        let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene, samples));
+        let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene));
         let decay: Vec<ComparedPoint> = found
             .decay
             .points
@@ -86,9 +91,9 @@ impl Comparison {
             .map(|point| ComparedPoint {
                 point: *point,
                 sigma_theory: free_sigma(&parameters, point.c),
-                sigma_exact: curve.at(point.c).map(|[sigma, _]| sigma),
+                sigma_exact: at(&curve.places, point.c).map(|[sigma, _]| sigma),
                 sigma_slow_flow: by_slow_flow(&parameters, point.c),
-                sigma_predicted: sigma_at(&predicted, point.c),
+                sigma_predicted: at(&predicted, point.c).map(|[sigma, _]| sigma),
             })
             .collect();
         Self {
@@ -96,6 +101,7 @@ impl Comparison {
             rms_sigma_exact: rms(&decay, |one| Some(one.point.sigma - one.sigma_exact?)),
             rms_sigma_predicted: rms(&decay, |one| Some(one.point.sigma - one.sigma_predicted?)),
             parameters,
+            left_out: scene.left_out(),
             phase_target_deg: scene.controller.phase_target,
             lock,
             theory,
@@ -112,15 +118,6 @@ impl Comparison {
             .iter()
             .filter(|orbit| orbit.stable && self.exact.as_ref() != Some(*orbit))
     }
-}
-
-/// The orbit that is nearest to a lock.
-fn nearest(orbits: &[Orbit], lock: &Lock) -> Option<Orbit> {
-    let distance = |one: &Orbit| (one.sigma - lock.at.sigma).hypot(one.c - lock.at.c);
-    orbits
-        .iter()
-        .copied()
-        .min_by(|one, other| distance(one).total_cmp(&distance(other)))
 }
 
 /// RMS of an error over the points above [`COMPARED_ABOVE`]; `None` where there is none.
@@ -154,7 +151,7 @@ pub struct Distance {
     pub nearest: f64,
     /// Difference in sigma at the same C; absent outside the curve.
     pub sigma: Option<f64>,
-    /// Difference in G at the same C; absent as above.
+    /// Difference in G at the same C; absent outside the curve.
     #[serde(rename = "G")]
     pub g: Option<f64>,
 }
@@ -187,12 +184,7 @@ impl ExactCurve {
 
     /// `[sigma, G]` at the amplitude `c`; `None` outside the curve.
     pub fn at(&self, c: f64) -> Option<[f64; 2]> {
-        let pair = self
-            .places
-            .windows(2)
-            .rfind(|pair| (pair[0][0] - c) * (pair[1][0] - c) <= 0.0 && pair[0][0] != pair[1][0])?;
-        let x = (c - pair[0][0]) / (pair[1][0] - pair[0][0]);
-        Some([1, 2].map(|i| pair[0][i] + x * (pair[1][i] - pair[0][i])))
+        at(&self.places, c)
     }
 
     /// How far `(C, sigma, G)` lies from the curve; `None` where there is no curve.
@@ -209,6 +201,15 @@ impl ExactCurve {
             g: same.map(|[_, exact]| g - exact),
         })
     }
+}
+
+/// The second and the third value, interpolated linearly at the first value `c`, in the last pair of places around it.
+fn at(places: &[[f64; 3]], c: f64) -> Option<[f64; 2]> {
+    let pair = places
+        .windows(2)
+        .rfind(|pair| (pair[0][0] - c) * (pair[1][0] - c) <= 0.0 && pair[0][0] != pair[1][0])?;
+    let x = (c - pair[0][0]) / (pair[1][0] - pair[0][0]);
+    Some([1, 2].map(|i| pair[0][i] + x * (pair[1][i] - pair[0][i])))
 }
 
 /// Smallest value, over a segment, of the largest difference; it is convex along the segment.
@@ -230,8 +231,11 @@ fn to_segment(point: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
 /// A tracked backbone beside the exact one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TrackedComparison {
-    /// The numbers all of this belongs to.
+    /// The numbers of the scene.
     pub parameters: Dimensionless,
+    /// What exact orbits leave out of the scene's cavity; absent if it is ideal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<String>,
     /// Periods from the start to the closed loop.
     pub periods_to_lock: f64,
     /// All periods, from the start to the last point.
@@ -248,18 +252,18 @@ pub struct TrackedComparison {
 pub struct TrackedPoint {
     /// The point.
     #[serde(flatten)]
-    pub point: Point,
+    pub point: LevelPoint,
     /// Its distance.
     pub exact: Option<Distance>,
 }
 
 impl TrackedComparison {
-    /// Compares the points with the exact backbone of the scene; not where the loop holds another phase than that of resonance.
+    /// Compares the points with the exact backbone of the scene; not where the loop holds another phase than resonance.
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
         let parameters = scene.dimensionless();
         let curve = ExactCurve::of(&parameters);
-        let exact = |point: &Point| curve.distance(point.at.c, point.at.sigma, point.at.g);
-        let compare = |point: &Point| TrackedPoint {
+        let exact = |point: &LevelPoint| curve.distance(point.at.c, point.at.sigma, point.at.g);
+        let compare = |point: &LevelPoint| TrackedPoint {
             point: *point,
             exact: Some(point)
                 .filter(|_| scene.controller.is_at_phase_resonance())
@@ -269,6 +273,7 @@ impl TrackedComparison {
             points: tracked.points.iter().map(compare).collect(),
             periods_to_lock: tracked.periods_to_lock,
             periods: tracked.periods,
+            left_out: scene.left_out(),
             parameters,
             exact: curve,
         }
@@ -302,13 +307,13 @@ impl TrackedComparison {
     }
 
     /// Largest error at equal C, in sigma or G, and largest distance from the exact backbone, of the settled points.
-    pub fn worst(&self) -> Option<Worst> {
+    pub fn worst(&self) -> Option<LargestErrors> {
         let errors = self.points.iter().filter(|one| one.point.settled).filter_map(|one| {
             let Distance { nearest, sigma, g } = one.exact?;
             let at_equal_c = sigma?.abs().max(g?.abs());
-            Some(Worst { at_equal_c, nearest })
+            Some(LargestErrors { at_equal_c, nearest })
         });
-        errors.reduce(|one, other| Worst {
+        errors.reduce(|one, other| LargestErrors {
             at_equal_c: one.at_equal_c.max(other.at_equal_c),
             nearest: one.nearest.max(other.nearest),
         })
@@ -317,7 +322,7 @@ impl TrackedComparison {
 
 /// Largest errors of the points of a tracked backbone.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Worst {
+pub struct LargestErrors {
     /// Largest difference in sigma or G from the exact backbone at the same C.
     pub at_equal_c: f64,
     /// Largest distance from the nearest place of the exact backbone: the largest of the differences in C, sigma and G there.
@@ -326,9 +331,9 @@ pub struct Worst {
 
 // The decay as theory and the exact plant predict it, integrated forward.
 
-/// The decay of the scene's plant from `orbit` on, over `samples` samples, as it would be identified without noise; without points if the plant
-/// refuses the scene.
-fn predicted(orbit: &Orbit, scene: &Scene, samples: usize) -> Vec<DecayPoint> {
+/// C, sigma and rate along the decay of the scene's plant from `orbit` on, as it would be identified without noise; empty if the plant refuses
+/// the scene.
+fn predicted(orbit: &Orbit, scene: &Scene) -> Vec<[f64; 3]> {
     let (d, step) = (scene.dimensionless(), scene.sample_time());
     let start = orbit.start;
     let [q1, q2] = [start.q1, start.q2].map(|length| length * d.b);
@@ -351,7 +356,7 @@ fn predicted(orbit: &Orbit, scene: &Scene, samples: usize) -> Vec<DecayPoint> {
         Some(sample)
     };
     // The first sample stands for the hold, which gives the frequency at the release.
-    let samples = (0..samples + 1).map_while(&mut sample).collect();
+    let samples = (0..Plan::of(scene).decay + 1).map_while(&mut sample).collect();
     let record = Record {
         sample_time: step,
         samples,
@@ -359,20 +364,12 @@ fn predicted(orbit: &Orbit, scene: &Scene, samples: usize) -> Vec<DecayPoint> {
         released: 1,
         held: false,
     };
-    decay_points(&record, scene).points
+    let points = decay_points(&record, scene).points;
+    points.iter().map(|one| [one.c, one.sigma, one.rate]).collect()
 }
 
-/// sigma at the amplitude `c` along falling amplitudes; `None` outside.
-fn sigma_at(points: &[DecayPoint], c: f64) -> Option<f64> {
-    let pair = points
-        .windows(2)
-        .find(|pair| pair[0].c >= c && c >= pair[1].c && pair[0].c > pair[1].c)?;
-    let share = (pair[0].c - c) / (pair[0].c - pair[1].c);
-    Some(pair[0].sigma + share * (pair[1].sigma - pair[0].sigma))
-}
-
-/// sigma of the slow flow at the amplitude `c` along the free decay: that of the backbone, and of the first order in the rate of the decay;
-/// `None` where there is no 1:1 motion.
+/// sigma of the slow flow at the amplitude `c` along the free decay: the backbone's, corrected to the first order in the rate of the decay; `None`
+/// where there is no 1:1 motion.
 fn by_slow_flow(d: &Dimensionless, c: f64) -> Option<f64> {
     let flow = SlowFlow::new(d.lambda, d.r);
     let g = flow.backbone_at(flow.manifold.b(c, BranchSide::Right)?).g;

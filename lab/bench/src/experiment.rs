@@ -7,11 +7,12 @@ mod search;
 use std::f64::consts::TAU;
 use std::fmt::{self, Display, Formatter};
 
-use phase_lock::Config;
 use thiserror::Error;
+use vines_model::numerics::mean;
 
+use crate::identification::Cycle;
 use crate::record::{Record, Sample};
-use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Rig, RigError, Sensors};
+use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Rig, RigError};
 use crate::scene::{Resonance, Scene, key};
 
 pub(crate) use search::Search;
@@ -35,7 +36,7 @@ impl<'a> Plan<'a> {
     /// The plan of a scene.
     pub fn of(scene: &'a Scene) -> Self {
         let sample_time = scene.sample_time();
-        let period = scene.dimensionless().natural_period();
+        let period = TAU / scene.linear().omega0;
         let samples = |periods: f64| (periods * period / sample_time).round() as usize;
         Self {
             scene,
@@ -45,15 +46,25 @@ impl<'a> Plan<'a> {
             decay: samples(decay_periods(scene)),
         }
     }
+
+    /// Samples of a stage, at most.
+    fn samples(&self, stage: Stage) -> usize {
+        match stage {
+            Stage::Locking => self.lock,
+            Stage::Holding => self.hold,
+            Stage::Decaying => self.decay,
+            Stage::Tracking => usize::MAX,
+        }
+    }
 }
 
-/// Share of its amplitude to which the response of the linear rig falls in the recorded decay: the range of the 1:1 motion, from
-/// symmetry breaking to the fold, is smaller, and impacts make the decay faster.
+/// Share of its amplitude to which the response of the linear rig falls in the recorded decay. The 1:1 motion has a smaller range, from symmetry
+/// breaking to the fold, and impacts make the decay faster.
 const DECAYED: f64 = 0.05;
-/// Longest recorded decay, natural periods, that is not asked for.
+/// Longest recorded decay, natural periods, unless the scene asks for a longer one: a bound for rigs with little damping.
 const LONGEST_DECAY: f64 = 5000.0;
 
-/// Length of the recorded decay, natural periods: that of the scene, or as long as the linear rig takes to fall to [`DECAYED`].
+/// Length of the recorded decay, natural periods: `record.decay_periods`, or as long as the linear rig takes to fall to [`DECAYED`].
 fn decay_periods(scene: &Scene) -> f64 {
     let relaxations = -DECAYED.ln();
     let periods = scene.record.decay_periods;
@@ -128,12 +139,12 @@ pub enum ExperimentError {
     },
     #[error("the requested drive G = {g:.4} was not reached within {periods:.0} periods: {why}")]
     NotReached { periods: f64, g: f64, why: String },
-    #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}; {}", stage.name(), evidence.text(*fault))]
+    #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}; {evidence}", stage.name())]
     Tripped {
         periods: f64,
         stage: Stage,
         fault: Fault,
-        evidence: Box<Evidence>,
+        evidence: String,
     },
     #[error(
         "the 1:1 motion, held at {held:.4e} m (C = {:.4}), is {regime} at {level:.4e} m (C = {:.4}): the backbone ends between the two, or the \
@@ -165,7 +176,7 @@ pub fn run(
     run_into(&mut Vec::new(), rig, controller, plan, progress)
 }
 
-/// As [`run`]; if the experiment ends early, what was measured stays in `samples`.
+/// [`run`], which leaves what was measured in `samples` if the experiment ends early.
 pub fn run_into(
     samples: &mut Vec<Sample>,
     rig: &mut (impl Rig + ?Sized),
@@ -174,24 +185,22 @@ pub fn run_into(
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
     holds_a_phase(plan.scene)?;
-    let mut bench = ControlLoop::new(rig, controller, plan.scene, samples);
+    let mut report = |stage, taken| progress(stage, taken, plan.samples(stage));
+    let mut bench = ControlLoop::new(rig, controller, plan.scene, samples, plan.lock, &mut report);
     let held = if plan.scene.controller.is_at_phase_resonance() {
-        let mut searched = |taken| progress(Stage::Locking, taken, plan.lock);
-        Search::new(&mut bench, plan.scene, plan.lock, &mut searched).lock()?
+        Search::new(&mut bench, plan.scene).lock()?
     } else {
         None
     };
-    if held.is_none() {
-        wait(&mut bench, plan, &mut progress)?;
+    // A controller that cannot control the response waits for the lock under the constant drive.
+    while held.is_none() && !bench.last.settled {
+        bench.sample(Stage::Locking)?;
     }
-    let (settled, held) = (bench.taken - 1, held == Some(true));
-    for n in 0..plan.hold {
-        bench.sample(Stage::Holding)?;
-        progress(Stage::Holding, n + 1, plan.hold);
-    }
-    for n in 0..plan.decay {
-        bench.sample(Stage::Decaying)?;
-        progress(Stage::Decaying, n + 1, plan.decay);
+    let settled = bench.taken - 1;
+    for stage in [Stage::Holding, Stage::Decaying] {
+        for _ in 0..plan.samples(stage) {
+            bench.sample(stage)?;
+        }
     }
     drop(bench);
     let samples = std::mem::take(samples);
@@ -200,7 +209,7 @@ pub fn run_into(
         released: samples.len() - plan.decay,
         samples,
         settled,
-        held,
+        held: held == Some(true),
     })
 }
 
@@ -212,25 +221,12 @@ pub(crate) fn holds_a_phase(scene: &Scene) -> Result<(), ExperimentError> {
     }
 }
 
-/// Waits for the lock under the constant drive, for a controller that cannot control the response.
-fn wait<R: Rig + ?Sized, C: Controller + ?Sized>(
-    bench: &mut ControlLoop<R, C>,
-    plan: &Plan,
-    progress: &mut impl FnMut(Stage, usize, usize),
-) -> Result<(), ExperimentError> {
-    loop {
-        let command = bench.sample(Stage::Locking)?;
-        progress(Stage::Locking, bench.taken, plan.lock);
-        if command.settled {
-            return Ok(());
-        }
-        if bench.taken >= plan.lock {
-            return Err(bench.no_lock(&command));
-        }
-    }
-}
-
 // Rig and controller, sample by sample. Whatever fails, the rig is left with a drive of zero as far as it still takes one.
+
+/// Periods within which the loops, whose slowest time constant is five periods, and the particle follow a change of their setpoint.
+pub(crate) const FOLLOWED: usize = 8;
+/// Observations in succession that are not taken for chance: periods, or legs of the search.
+pub(crate) const CONFIRMED: u32 = 3;
 
 /// Rig and controller, and the samples so far.
 pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
@@ -244,13 +240,31 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
     pub taken: usize,
     /// Phase of the drive since the start, turns.
     pub periods: f64,
+    /// Latest output of the controller.
+    pub last: Command,
+    /// Time limit for the lock, samples.
+    limit: usize,
+    /// Receives the stage and the samples taken in it.
+    progress: &'a mut dyn FnMut(Stage, usize),
+    /// The present stage, and the samples before it.
+    stage: (Stage, usize),
     /// Whether the rig was left with a drive.
     driven: bool,
 }
 
+/// A period of the drive in a record: its first sample, and the phase of the drive there, turns.
+pub(crate) type Period = (usize, f64);
+
 impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
-    /// Before the first sample.
-    pub fn new(rig: &'a mut R, controller: &'a mut C, scene: &'a Scene, samples: &'a mut Vec<Sample>) -> Self {
+    /// Before the first sample; a lock must have been found after `limit` samples.
+    pub fn new(
+        rig: &'a mut R,
+        controller: &'a mut C,
+        scene: &'a Scene,
+        samples: &'a mut Vec<Sample>,
+        limit: usize,
+        progress: &'a mut dyn FnMut(Stage, usize),
+    ) -> Self {
         Self {
             rig,
             controller,
@@ -259,12 +273,19 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             samples,
             taken: 0,
             periods: 0.0,
+            last: Command::default(),
+            limit,
+            progress,
+            stage: (Stage::Locking, 0),
             driven: false,
         }
     }
 
     /// One sample; in a stage other than the decay, a controller that switches the drive off is an error.
-    pub fn sample(&mut self, stage: Stage) -> Result<Command, ExperimentError> {
+    pub fn sample(&mut self, stage: Stage) -> Result<(), ExperimentError> {
+        if self.stage.0 != stage {
+            self.stage = (stage, self.taken);
+        }
         let active = stage != Stage::Decaying;
         let sensors = self.rig.sense()?;
         let command = checked(self.controller.sample(sensors, active)?)?;
@@ -275,13 +296,32 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             ground_truth: self.rig.ground_truth()?,
         });
         self.taken += 1;
+        self.last = command;
         self.advance(command.drive)?;
         self.periods += command.drive.omega * self.sample_time / TAU;
         if active && command.state.is_some_and(LoopState::is_latched) {
             self.ramp_down(command)?;
             return Err(self.tripped(stage, &command));
         }
-        Ok(command)
+        (self.progress)(stage, self.taken - self.stage.1);
+        if stage == Stage::Locking && self.taken >= self.limit {
+            return Err(self.no_lock(&command));
+        }
+        Ok(())
+    }
+
+    /// Samples to the end of the present period of the drive.
+    pub fn period(&mut self, stage: Stage) -> Result<Period, ExperimentError> {
+        let begin = (self.samples.len(), self.periods);
+        while self.periods < begin.1.floor() + 1.0 {
+            self.sample(stage)?;
+        }
+        Ok(begin)
+    }
+
+    /// The fit of the samples since the beginning of the last period; `None` without a motion. `target`: phase target, rad.
+    pub fn cycle(&self, (begin, turns): Period, target: f64) -> Option<Cycle> {
+        Cycle::of(&self.samples[begin..], self.sample_time, turns * TAU, target)
     }
 
     fn advance(&mut self, drive: Drive) -> Result<(), ExperimentError> {
@@ -314,8 +354,55 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
                 periods: self.periods,
                 stage,
                 fault: fault.unwrap_or(Fault::LockLost),
-                evidence: Box::new(Evidence::of(self.samples, self.scene, |error| self.phase_error(error))),
+                evidence: self.evidence(fault.unwrap_or(Fault::LockLost)),
             },
+        }
+    }
+
+    /// What the sensors read in the last period before a fault, what the scene allows, and what to do next.
+    fn evidence(&self, fault: Fault) -> String {
+        let config = self.scene.controller_config();
+        let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
+        let samples = &self.samples[self.samples.len().saturating_sub(period)..];
+        let largest = samples.iter().map(|one| one.sensors.response.abs()).fold(0.0, f64::max);
+        let sensors = samples.last().map(|one| one.sensors).unwrap_or_default();
+        let base = sensors
+            .reference
+            .map_or_else(String::new, |base| format!(", and the base {} m", short(base)));
+        let read = format!(
+            "the response read {} m{base}; in the last period at most {} m",
+            short(sensors.response),
+            short(largest)
+        );
+        match fault {
+            Fault::ResponseTooLarge => format!(
+                "it read {} m, and {}. Lower excitation.G or the levels of [backbone], or raise the limit if the rig bears it",
+                short(largest),
+                limit("response_max", config.response_max, " m")
+            ),
+            Fault::LockLost => {
+                let errors: Option<Vec<f64>> = samples.iter().map(|one| one.command.phase_error).collect();
+                let error = self.phase_error(errors.map(mean));
+                let allowed = limit(
+                    "lock.unlock_tolerance",
+                    Some(config.lock.unlock_tolerance.to_degrees()),
+                    " degrees",
+                );
+                format!("over the last period {error}, and {allowed}; {read}")
+            }
+            Fault::NoSignal => format!(
+                "{read}. An amplitude of {} m ({}) with a share of {} of the power ({}) is needed, and {} without it. {CHECK}",
+                short(config.lock.response_min * config.amplitude),
+                key("lock.response_min"),
+                config.lock.coherence_min,
+                key("lock.coherence_min"),
+                limit("signal_timeout", config.signal_timeout, " s")
+            ),
+            Fault::Implausible => {
+                let unit = " of the amplitude as the difference";
+                format!("{read}; {}. {CHECK}", limit("residual_max", config.residual_max, unit))
+            }
+            Fault::Sensor | Fault::TimedOut => format!("{read}. {CHECK}"),
         }
     }
 
@@ -329,7 +416,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     }
 
     /// The error of a search without a result.
-    pub fn no_lock(&self, command: &Command) -> ExperimentError {
+    fn no_lock(&self, command: &Command) -> ExperimentError {
         ExperimentError::NoLock {
             periods: self.periods,
             phase_error: self.phase_error(command.phase_error),
@@ -358,97 +445,6 @@ fn checked(command: Command) -> Result<Command, ExperimentError> {
     }
 }
 
-// What the sensors read when the controller switched the drive off, beside the limits of the scene.
-
-/// The last readings before a fault, and the limits that the scene gives the controller.
-#[derive(Debug, Clone, Copy)]
-pub struct Evidence {
-    last: Sensors,
-    /// Largest absolute readings of the last period: response and base, m.
-    largest: [f64; 2],
-    /// Mean of the phase error over the last period, if it could be measured throughout.
-    phase_error: PhaseError,
-    config: Config,
-}
-
-impl Evidence {
-    /// The evidence in the last of these samples; `phase_error` makes an error of radians, or of none.
-    pub(super) fn of(samples: &[Sample], scene: &Scene, phase_error: impl Fn(Option<f64>) -> PhaseError) -> Self {
-        let config = scene.controller_config();
-        let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
-        let samples = &samples[samples.len().saturating_sub(period)..];
-        let largest = |reading: fn(&Sensors) -> f64| {
-            let readings = samples.iter().map(|sample| reading(&sample.sensors).abs());
-            readings.fold(0.0, f64::max)
-        };
-        let errors: Option<Vec<f64>> = samples.iter().map(|sample| sample.command.phase_error).collect();
-        Self {
-            last: samples.last().map(|sample| sample.sensors).unwrap_or_default(),
-            largest: [
-                largest(|sensors| sensors.response),
-                largest(|sensors| sensors.reference.unwrap_or_default()),
-            ],
-            phase_error: phase_error(errors.map(|errors| errors.iter().sum::<f64>() / errors.len() as f64)),
-            config,
-        }
-    }
-
-    /// The values that led to `fault`, what the scene allows, and what to do next.
-    pub fn text(&self, fault: Fault) -> String {
-        let Self { last, largest, phase_error, config } = self;
-        let now = self.readings([last.response, last.reference.unwrap_or_default()]);
-        let most = self.readings(*largest);
-        match fault {
-            Fault::Sensor => format!("the response read {now}. {CHECK}"),
-            Fault::ResponseTooLarge => {
-                let limit = limit("response_max", config.response_max, " m");
-                let read = short(largest[0]);
-                format!(
-                    "it read {read} m, and {limit}. Lower excitation.G or the levels of [backbone], or raise the limit if the rig bears it"
-                )
-            }
-            Fault::LockLost => {
-                let error = match phase_error {
-                    PhaseError::Degrees(degrees) => format!("was {} degrees", short(*degrees)),
-                    PhaseError::NotMeasured => "could not be measured".into(),
-                    PhaseError::NotReported => "was not reported by the controller".into(),
-                };
-                let tolerance = config.lock.unlock_tolerance.to_degrees();
-                let limit = limit("lock.unlock_tolerance", Some(tolerance), " degrees");
-                format!("in the last period the phase error {error}, and {limit}; the response read at most {most}")
-            }
-            Fault::NoSignal => {
-                let needed = short(config.lock.response_min * config.amplitude);
-                let [amplitude, share] = ["lock.response_min", "lock.coherence_min"].map(key);
-                let limit = limit("signal_timeout", config.signal_timeout, " s");
-                let power = config.lock.coherence_min;
-                format!(
-                    "in the last period the response read at most {most}. An amplitude of {needed} m ({amplitude}) with a share of {power} of \
-                     the power ({share}) is needed, and {limit} without it. {CHECK}"
-                )
-            }
-            Fault::Implausible => {
-                let limit = limit(
-                    "residual_max",
-                    config.residual_max,
-                    " of the amplitude as the difference",
-                );
-                format!("the response read {now}; in the last period at most {most}; {limit}. {CHECK}")
-            }
-            Fault::TimedOut => limit("acquire_timeout", config.acquire_timeout, " s"),
-        }
-    }
-
-    /// Readings of both sensors, or of the only one.
-    fn readings(&self, [response, base]: [f64; 2]) -> String {
-        let (response, base) = (short(response), short(base));
-        match self.last.reference {
-            Some(_) => format!("{response} m, the base {base} m"),
-            None => format!("{response} m"),
-        }
-    }
-}
-
 /// What to do about sensors.
 const CHECK: &str = "`vines check` looks for the cause";
 
@@ -469,77 +465,96 @@ fn short(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::Command;
+    use crate::rig::Sensors;
 
-    /// A period of readings of both sensors, m, and of phase errors, rad, in the dimensionless default scene.
-    fn evidence(settings: &[&str], reading: impl Fn(usize) -> (f64, Option<f64>, Option<f64>)) -> Evidence {
-        let settings: Vec<_> = settings.iter().map(|setting| setting.parse().unwrap()).collect();
+    /// A rig and a controller that do nothing.
+    struct Idle;
+
+    impl Rig for Idle {
+        fn sense(&mut self) -> Result<Sensors, RigError> {
+            Ok(Sensors::default())
+        }
+
+        fn advance(&mut self, _: Drive, _: f64) -> Result<(), RigError> {
+            Ok(())
+        }
+    }
+
+    impl Controller for Idle {
+        fn sample(&mut self, _: Sensors, _: bool) -> Result<Command, ControllerError> {
+            Ok(Command::default())
+        }
+    }
+
+    /// The text for a fault after a period of readings of the response, m, and of phase errors, rad, on the dimensionless default scene.
+    fn evidence(setting: &str, fault: Fault, reading: impl Fn(usize) -> (f64, Option<f64>)) -> String {
         let text = include_str!("../../../scenes/dimensionless.toml");
-        let scene = Scene::parse("dimensionless.toml", text, &settings).unwrap();
+        let scene = Scene::parse("dimensionless.toml", text, &[setting.parse().unwrap()]).unwrap();
         let sample = |n: usize| {
-            let (response, reference, phase_error) = reading(n);
+            let (response, phase_error) = reading(n);
             Sample {
                 time: n as f64 * scene.sample_time(),
-                sensors: Sensors { response, reference },
+                sensors: Sensors { response, reference: Some(0.01) },
                 command: Command { phase_error, ..Command::default() },
                 ground_truth: None,
             }
         };
-        let phase_error =
-            |error: Option<f64>| error.map_or(PhaseError::NotMeasured, |error| PhaseError::Degrees(error.to_degrees()));
-        Evidence::of(&(0..150).map(sample).collect::<Vec<_>>(), &scene, phase_error)
+        let mut samples = (0..150).map(sample).collect();
+        ControlLoop::new(&mut Idle, &mut Idle, &scene, &mut samples, 0, &mut |_, _| {}).evidence(fault)
     }
 
     #[test]
-    fn a_response_above_its_limit_is_stated_beside_the_limit() {
-        // The largest reading of the last period, also if the controller switched the drive off a few samples later.
-        let found = evidence(&["controller.C_max=0.3"], |n| {
-            (if n == 140 { -0.301_234_9 } else { 0.2 }, Some(0.01), None)
-        });
-        let text = found.text(Fault::ResponseTooLarge);
-        assert!(
-            text.starts_with("it read 0.30123 m, and controller.C_max allows 0.3 m. Lower"),
-            "{text}"
-        );
-        let without = evidence(&["controller.C_max='none'"], |_| (0.2, None, None));
-        let text = without.text(Fault::ResponseTooLarge);
-        assert!(text.contains("controller.C_max sets no limit"), "{text}");
-    }
-
-    #[test]
-    fn a_lost_lock_is_stated_with_its_mean_phase_error_in_degrees() {
-        let found = evidence(&[], |n| (0.4, Some(0.01), Some(if n < 50 { 9.0 } else { 0.25 })));
-        let text = found.text(Fault::LockLost);
-        let expected = "phase error was 14.324 degrees, and phase_lock.lock.unlock_tolerance allows 11.459 degrees; the response read at most 0.4 m, \
-                        the base 0.01 m";
-        assert!(text.contains(expected), "{text}");
-        let text = evidence(&[], |_| (0.4, None, None)).text(Fault::LockLost);
-        assert!(text.contains("phase error could not be measured"), "{text}");
-    }
-
-    #[test]
-    fn a_signal_that_is_missing_is_stated_with_what_a_signal_needs() {
-        let found = evidence(&["excitation.G=1"], |_| (1e-7, Some(0.0), None));
-        let text = found.text(Fault::NoSignal);
-        for part in [
-            "read at most 1e-7 m, the base 0 m",
-            "0.00084 m (phase_lock.lock.response_min) with a share of 0.5",
-            "phase_lock.signal_timeout allows 125.66 s without it",
-            "`vines check`",
-        ] {
-            assert!(text.contains(part), "{part} is not in: {text}");
+    fn a_fault_is_stated_with_the_readings_and_the_limit_of_the_scene() {
+        type Reading = fn(usize) -> (f64, Option<f64>);
+        let cases: [(&str, Fault, Reading, &str); 7] = [
+            // The largest reading of the last period, also if the controller switched the drive off a few samples later.
+            (
+                "controller.C_max=0.3",
+                Fault::ResponseTooLarge,
+                |n| (if n == 140 { -0.301_234_9 } else { 0.2 }, None),
+                "it read 0.30123 m, and controller.C_max allows 0.3 m. Lower",
+            ),
+            (
+                "controller.C_max='none'",
+                Fault::ResponseTooLarge,
+                |_| (0.2, None),
+                "controller.C_max sets no limit",
+            ),
+            (
+                "excitation.G=1",
+                Fault::LockLost,
+                |n| (0.4, Some(if n < 50 { 9.0 } else { 0.25 })),
+                "the phase error is 14.324 degrees, and phase_lock.lock.unlock_tolerance allows 11.459 degrees; the response read 0.4 m, \
+                 and the base 0.01 m; in the last period at most 0.4 m",
+            ),
+            (
+                "excitation.G=1",
+                Fault::LockLost,
+                |_| (0.4, None),
+                "the phase cannot be measured",
+            ),
+            (
+                "excitation.G=1",
+                Fault::NoSignal,
+                |_| (1e-7, None),
+                "at most 1e-7 m. An amplitude of 0.00084 m (phase_lock.lock.response_min) with a share of 0.5",
+            ),
+            (
+                "phase_lock.residual_max=0.2",
+                Fault::Sensor,
+                |n| (if n == 149 { f64::NAN } else { 0.4 }, None),
+                "the response read NaN m, and the base 0.01 m; in the last period at most 0.4 m",
+            ),
+            (
+                "phase_lock.residual_max=0.2",
+                Fault::Implausible,
+                |_| (0.4, None),
+                "phase_lock.residual_max allows 0.2 of the amplitude as the difference. `vines check`",
+            ),
+        ];
+        for (setting, fault, reading, expected) in cases {
+            let text = evidence(setting, fault, reading);
+            assert!(text.contains(expected), "`{expected}` is not in: {text}");
         }
-    }
-
-    #[test]
-    fn readings_that_are_refused_are_stated() {
-        let found = evidence(&["phase_lock.residual_max=0.2"], |n| {
-            (if n == 149 { f64::NAN } else { 0.4 }, None, None)
-        });
-        let text = found.text(Fault::Sensor);
-        assert!(text.starts_with("the response read NaN m. "), "{text}");
-        let text = found.text(Fault::Implausible);
-        let expected = "read NaN m; in the last period at most 0.4 m; phase_lock.residual_max allows 0.2 of the amplitude as the difference";
-        assert!(text.contains(expected), "{text}");
     }
 }

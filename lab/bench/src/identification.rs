@@ -2,18 +2,19 @@
 
 mod balance;
 mod decay;
-mod lock;
 mod response;
 
-use thiserror::Error;
+use std::f64::consts::TAU;
 
-use crate::record::Record;
-use crate::scene::{Dimensionless, Scene};
+use serde::Serialize;
+use thiserror::Error;
+use vines_model::numerics::{Estimate, RANDOM, SIGNIFICANT, mean, standard_deviation};
+
+use crate::record::{Record, Sample};
+use crate::scene::{Dimensionless, LinearResponse, Scene};
 
 pub use balance::{Balance, Cycle, Slopes};
-pub use decay::{DecayEnd, DecayPoint, DecayPoints, Harmonic, decay_points, harmonic};
-pub use lock::{Lock, Measured};
-use lock::{measure, on_target, sensors_after_release};
+pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, decay_points, harmonic};
 use response::longer_after;
 pub(crate) use response::{ASYMMETRIC, without_tones};
 pub use response::{Tone, classify, foreign_tone, impacts, regime_by_response};
@@ -81,7 +82,7 @@ fn mirrored(longer: Option<i8>) -> String {
 /// What a record says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
-    /// The numbers all of this belongs to.
+    /// The numbers of the scene.
     pub parameters: Dimensionless,
     /// The locked point as measured.
     pub lock: Lock,
@@ -94,9 +95,15 @@ pub struct Identification {
 /// # Errors
 /// A lock in another regime than the symmetric 1:1 one, or no motion.
 pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, IdentificationError> {
-    let lock = measure(record, scene).ok_or(IdentificationError::NoMotion)?;
+    let parameters = scene.dimensionless();
+    let lock = measure(record, scene, &parameters).ok_or(IdentificationError::NoMotion)?;
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
-    if !matches!(lock.regime, Regime::Symmetric | Regime::Unresolved) {
+    let is_expected = match lock.regime {
+        Regime::Symmetric | Regime::Unresolved => true,
+        Regime::Asymmetric => !scene.has_mirror_images(),
+        _ => false,
+    };
+    if !is_expected {
         return Err(IdentificationError::Regime {
             regime: lock.regime,
             sigma: lock.at.sigma,
@@ -109,5 +116,296 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
     on_target(&lock, scene)?;
     sensors_after_release(record, scene)?;
     let decay = decay_points(record, scene);
-    Ok(Identification { parameters: scene.dimensionless(), lock, decay })
+    Ok(Identification { parameters, lock, decay })
+}
+
+// The locked point.
+
+/// The locked point as measured over the hold.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Lock {
+    /// The point.
+    #[serde(flatten)]
+    pub at: ResonancePoint,
+    /// Mean particle speed over `b omega0`; absent if the rig does not report it.
+    #[serde(rename = "B")]
+    pub b: Option<f64>,
+    /// Standard uncertainty of B; absent where B is.
+    #[serde(rename = "u_B")]
+    pub u_b: Option<f64>,
+    /// Number of periods that sigma and C are estimated from: the hold, and the periods before it with about the same amplitude.
+    pub averaged: usize,
+    /// From the start to the settled lock, in periods of the locked motion.
+    pub periods_to_lock: f64,
+    /// Whether control holds the response, because a constant drive would not.
+    pub held: bool,
+    /// Impacts per period; NaN if the rig does not report them.
+    pub impacts_per_period: f64,
+    /// The regime: from the impacts, or from the response alone if the rig does not report them.
+    pub regime: Regime,
+    /// What friction did over the hold; absent without friction, or if the rig does not report it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction: Option<Friction>,
+    /// A tone in the response that is not part of the motion; not looked for in a simulation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tone: Option<Tone>,
+}
+
+/// What friction in the cavity did over the hold, per period of the motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Friction {
+    /// How often the particle stuck to the floor inside the cavity.
+    pub sticks_per_period: f64,
+    /// How long it stuck there, s.
+    #[serde(rename = "stuck_s_per_period")]
+    pub stuck_time: f64,
+    /// Energy lost to friction, J.
+    #[serde(rename = "friction_J_per_period")]
+    pub loss: f64,
+}
+
+impl Friction {
+    fn of(hold: &[Sample], periods: f64) -> Option<Self> {
+        let totals = |sample: &Sample| sample.ground_truth?.friction;
+        let (first, last) = (totals(hold.first()?)?, totals(hold.last()?)?);
+        Some(Self {
+            sticks_per_period: (last.sticks - first.sticks) as f64 / periods,
+            stuck_time: (last.stuck_time - first.stuck_time) / periods,
+            loss: (last.loss - first.loss) / periods,
+        })
+    }
+}
+
+impl Lock {
+    /// The number of impacts per period, or the note that the regime was determined without it.
+    #[must_use]
+    pub fn impacts(&self) -> String {
+        if self.impacts_per_period.is_nan() {
+            "determined from the response alone".into()
+        } else {
+            format!("{:.3} impacts per period", self.impacts_per_period)
+        }
+    }
+}
+
+/// Largest number of periods before the release that are evaluated.
+const MOST: f64 = 240.0;
+/// Relative deviations from the amplitude of the hold, beside noise: up to the first, periods give the lock, and up to the second the slopes of
+/// drive and frequency over the amplitude.
+const SPREADS: [f64; 2] = [0.008, 0.1];
+/// Relative uncertainty of these slopes, because the backbone is curved within the second deviation.
+const BENT: f64 = 0.3;
+/// Largest phase error of a period that is evaluated, rad: the balances are of the first order in it.
+const PHASE_RANGE: f64 = 0.1;
+
+/// The locked point of a record; `None` without a motion.
+fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
+    let (dt, hold) = (record.sample_time, record.hold());
+    let target = scene.controller.phase_target_radians();
+    let held = Cycle::all(hold, dt, target);
+    let [approach, wide] = SPREADS.map(|spread| approached(record, scene, target, &held, spread));
+    // The drive of the hold decides where the approach ends.
+    let [base, phase_error, response] = means(&held);
+    let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
+    let [omega, limit] = limits(&approach, &wide, &scene.linear(), command)?;
+    let speeds: Option<Vec<f64>> = hold
+        .iter()
+        .map(|s| s.ground_truth.map(|w| d.speed(w.particle_velocity.abs())))
+        .collect();
+    // The speed belongs to the amplitude of the hold, and changes about as it does.
+    let aside = ((limit.value - response.value).abs() + limit.uncertainty) / limit.value;
+    let b = speeds.map(|speeds| {
+        let per_period = speeds
+            .chunks(hold.len().div_ceil(held.len()))
+            .map(|c| mean(c.iter().copied()));
+        let speed = Estimate::mean(&per_period.collect::<Vec<f64>>());
+        Estimate::new(speed.value, &[speed.uncertainty, speed.value * aside])
+    });
+    let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
+        (count, Regime::Unknown) => (count, regime_by_response(hold, scene, base.value, target, omega.value)),
+        told => told,
+    };
+    let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
+    let tone = (!is_simulated)
+        .then(|| foreign_tone(hold, scene, omega.value))
+        .flatten();
+    Some(Lock {
+        at: ResonancePoint::new([limit, base, omega, phase_error], d),
+        b: b.map(|b| b.value),
+        u_b: b.map(|b| b.uncertainty),
+        averaged: approach.len(),
+        periods_to_lock: record.settled as f64 * dt * omega.value / TAU,
+        held: record.held,
+        impacts_per_period,
+        regime,
+        friction: Friction::of(hold, (hold.len() - 1) as f64 * dt * omega.value / TAU),
+        tone,
+    })
+}
+
+/// Frequency, rad/s, and amplitude, m, at the end of the approach: from the longest window that its own second half agrees with.
+///
+/// A long window has less noise, a late one is nearer to the end. Where even the shortest disagrees, the difference is a part of the
+/// uncertainty.
+fn limits(approach: &[Cycle], wide: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[Estimate; 2]> {
+    let slopes = Balance::of(wide, linear, Slopes::Rising)?.slopes();
+    let slopes = slopes.map(|one| Estimate::new(one.value, &[one.uncertainty, BENT * one.value]));
+    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, linear, Slopes::Known(slopes))?.limit(command));
+    let mut cycles = approach;
+    let mut whole = limit(cycles)?;
+    while cycles.len() >= 4 * Balance::FEWEST {
+        cycles = &cycles[cycles.len() / 2..];
+        let late = limit(cycles)?;
+        let beyond = [0, 1].map(|i| ((whole[i].value - late[i].value).abs() - RANDOM * late[i].uncertainty).max(0.0));
+        if beyond == [0.0; 2] {
+            break;
+        }
+        whole = [0, 1].map(|i| Estimate::new(late[i].value, &[late[i].uncertainty, beyond[i]]));
+    }
+    Some(whole)
+}
+
+/// The last periods before the release whose amplitude deviates from the hold by the share `spread` at most; at least as many as the hold has.
+fn approached(record: &Record, scene: &Scene, target: f64, held: &[Cycle], spread: f64) -> Vec<Cycle> {
+    let most = (MOST * scene.controller.samples_per_period) as usize;
+    let samples = &record.samples[record.released.saturating_sub(most.max(record.hold().len()))..record.released];
+    let mut cycles = Cycle::all(samples, record.sample_time, target);
+    let level = mean(held.iter().map(Cycle::amplitude));
+    let noise = 4.0 * mean(held.iter().map(|cycle| cycle.noise[0])).sqrt();
+    let is_near = |cycle: &&Cycle| {
+        let deviation = (cycle.amplitude() - level).abs();
+        deviation <= (spread * level).max(noise) && cycle.phase_error.abs() <= PHASE_RANGE
+    };
+    let near = cycles.iter().rev().take_while(is_near).count();
+    cycles.drain(..cycles.len() - near.max(held.len()).min(cycles.len()));
+    cycles
+}
+
+/// Means over the hold: base amplitude, m, phase error, rad, and response amplitude, m.
+fn means(held: &[Cycle]) -> [Estimate; 3] {
+    let values = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&held.iter().map(value).collect::<Vec<f64>>()).value;
+    let [response, base] = [values(&Cycle::amplitude), values(&|cycle| cycle.base.norm())];
+    let [noise, base_noise] =
+        [0, 1].map(|i| mean(held.iter().map(|cycle| cycle.noise[i])).sqrt() / (held.len() as f64).sqrt());
+    let phase_noise = (noise / response).hypot(base_noise / base);
+    let phase_error = values(&|cycle| cycle.phase_error);
+    [
+        // Rounding and the steps of the command.
+        (base, base_noise.max(1e-8 * base)),
+        (phase_error, phase_noise),
+        (response, noise),
+    ]
+    .map(|(value, uncertainty)| Estimate { value, uncertainty })
+}
+
+// A measured point of phase resonance.
+
+/// A point of phase resonance as measured, in hertz and metres, and dimensionless with the parameters of the scene.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ResonancePoint {
+    /// Frequency, Hz.
+    #[serde(rename = "f_Hz")]
+    pub f_hz: f64,
+    /// Amplitude of the fundamental of the response, m.
+    #[serde(rename = "A_m")]
+    pub a_m: f64,
+    /// Base amplitude, m, measured if a sensor reads the base, otherwise commanded.
+    #[serde(rename = "E_m")]
+    pub e_m: f64,
+    /// Standard uncertainty of the frequency, Hz.
+    #[serde(rename = "u_f_Hz")]
+    pub u_f_hz: f64,
+    /// Standard uncertainty of the response, m.
+    #[serde(rename = "u_A_m")]
+    pub u_a_m: f64,
+    /// Standard uncertainty of the base amplitude, m.
+    #[serde(rename = "u_E_m")]
+    pub u_e_m: f64,
+    /// Detuning.
+    pub sigma: f64,
+    /// Amplitude of the fundamental of the response over b.
+    #[serde(rename = "C")]
+    pub c: f64,
+    /// Base amplitude over `b epsilon`.
+    #[serde(rename = "G")]
+    pub g: f64,
+    /// Phase of the response relative to the base, minus the target, degrees.
+    pub phase_error_deg: f64,
+    /// Standard uncertainty of sigma.
+    pub u_sigma: f64,
+    /// Standard uncertainty of C.
+    #[serde(rename = "u_C")]
+    pub u_c: f64,
+    /// Standard uncertainty of G.
+    #[serde(rename = "u_G")]
+    pub u_g: f64,
+    /// Standard uncertainty of the phase error, degrees.
+    pub u_phase_deg: f64,
+}
+
+impl ResonancePoint {
+    /// From the amplitudes of response and base, m, the frequency, rad/s, and the phase error, rad.
+    pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], d: &Dimensionless) -> Self {
+        Self {
+            f_hz: omega.value / TAU,
+            a_m: response.value,
+            e_m: base.value,
+            u_f_hz: omega.uncertainty / TAU,
+            u_a_m: response.uncertainty,
+            u_e_m: base.uncertainty,
+            sigma: d.sigma(omega.value),
+            c: response.value / d.b,
+            g: d.excitation(base.value),
+            phase_error_deg: phase_error.value.to_degrees(),
+            u_sigma: omega.uncertainty / d.omega_change(1.0),
+            u_c: response.uncertainty / d.b,
+            u_g: d.excitation(base.uncertainty),
+            u_phase_deg: phase_error.uncertainty.to_degrees(),
+        }
+    }
+}
+
+// What makes a record useless: a phase off its target while the lock was held, and a sensor that fails after the release.
+
+/// Share of a free response that impacts leave in two periods at least. They take the share pi epsilon G_imp/C in each, with
+/// G_imp = (4/pi) R B^2/C: 0.14 at epsilon = 0.05, r = 0.65, C = 0.5.
+const LEFT: f64 = 0.1;
+/// Steps of a converter below which the scatter of a response says nothing.
+const STEPS: f64 = 8.0;
+
+/// Refuses a lock whose phase is farther from its target than the tolerance of the lock.
+fn on_target(lock: &Lock, scene: &Scene) -> Result<(), IdentificationError> {
+    let (error, tolerance) = (lock.at.phase_error_deg, scene.controller.phase_tolerance);
+    if error.abs() <= tolerance + SIGNIFICANT * lock.at.u_phase_deg {
+        return Ok(());
+    }
+    Err(IdentificationError::OffTarget { error, uncertainty: lock.at.u_phase_deg, tolerance })
+}
+
+/// Refuses a decay in which a sensor reads no number, or in which the response is lost within two periods.
+fn sensors_after_release(record: &Record, scene: &Scene) -> Result<(), IdentificationError> {
+    let decay = record.decay();
+    let failed = |n: usize, what| {
+        let seconds = n as f64 * record.sample_time;
+        Err(IdentificationError::SensorAfterRelease { seconds, what })
+    };
+    let reads_numbers = |sample: &Sample| {
+        let sensors = sample.sensors;
+        (sensors.response + sensors.reference.unwrap_or_default()).is_finite()
+    };
+    if let Some(n) = decay.iter().position(|sample| !reads_numbers(sample)) {
+        return failed(n, "reads no number");
+    }
+    let period = scene.controller.samples_per_period.round() as usize;
+    let response: Vec<f64> = decay.iter().map(|sample| sample.sensors.response).collect();
+    let changes = response.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let step = changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min);
+    let scatters: Vec<f64> = response.chunks_exact(period).map(standard_deviation).collect();
+    let linear = scene.linear();
+    let left = LEFT * (-2.0 * TAU * linear.damping_rate / linear.omega0).exp();
+    let is_lost = |three: &[f64]| three[0] > STEPS * step && three[2] < left * three[0];
+    match scatters.windows(3).position(is_lost) {
+        Some(n) => failed((n + 1) * period, "stops reading the response"),
+        None => Ok(()),
+    }
 }

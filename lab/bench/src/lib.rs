@@ -10,6 +10,7 @@ pub mod comparison;
 pub mod experiment;
 pub mod fit;
 pub mod identification;
+pub mod live;
 pub mod loop_check;
 pub mod record;
 pub mod rig;

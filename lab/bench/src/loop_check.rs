@@ -3,22 +3,20 @@
 //! A linear resonator at rest that is driven at its natural frequency with the amplitude E responds with `-i g E (1 - exp(-d t))/d`
 //! (`g`: half the frequency, `d`: damping rate). Response and base are compared with this and with E, by amplitude and phase.
 
-mod linear;
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use nalgebra::{Matrix3, RowVector3, Vector3};
 use num_complex::Complex64;
+use phase_lock::Gains;
 use serde::Serialize;
 use vines_model::numerics::{SIGNIFICANT, mean, mean_square, standard_deviation};
 
 use crate::rig::{Drive, Rig, RigError};
-use crate::scene::{LinearResponse, Scene};
+use crate::scene::{LinearResponse, Reference, Scene};
 
-pub use linear::Linear;
-
-/// Drive, as a share of that of the scene.
+/// Drive of the check, over the scene's drive: too small for impacts.
 const SHARE: f64 = 0.01;
-/// Periods without a drive, with it, and at their end those that are evaluated.
+/// Numbers of periods: without a drive, with it, and evaluated at the end of it.
 const PERIODS: [usize; 3] = [2, 24, 4];
 
 /// Result of the check.
@@ -29,21 +27,20 @@ pub struct LoopCheck {
     /// Amplitude of the drive, m.
     pub amplitude: f64,
     /// The response.
-    pub response: Channel,
+    pub response: CheckedChannel,
     /// The base, if a sensor measures it.
-    pub base: Option<Channel>,
+    pub base: Option<CheckedChannel>,
     /// The linear response and the gains for it, if the loop is healthy.
     pub linear: Option<Linear>,
     /// What was measured, beside what the scene says.
-    pub quantities: Vec<Quantity>,
+    pub quantities: Vec<CheckedQuantity>,
 }
 
 /// Checks a rig at a hundredth of the drive, after a response that is still falling has come to rest. The phase of the rig's oscillator is
 /// a multiple of 2 pi before and after.
 pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, RigError> {
-    let (d, step) = (scene.dimensionless(), scene.sample_time());
-    let omega = scene.controller.omega_start * d.omega0;
-    let amplitude = SHARE * scene.amplitude;
+    let (omega, amplitude) = drive(scene);
+    let step = scene.sample_time();
     let samples = |periods: usize| (periods as f64 * TAU / (omega * step)).round() as usize;
     let [quiet, driven, window] = PERIODS.map(samples);
     let mut rig = OpenLoop {
@@ -55,7 +52,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
         has_base: false,
     };
     let expected = expected(scene);
-    rig.rest(quiet, samples(DECAY), NOISE * expected[0].norm())?;
+    rig.rest(quiet, samples(WAITS[1]), NOISE * expected[0].norm())?;
     let begins = rig.readings.len();
     rig.drive(driven, amplitude)?;
     rig.end(samples(1))?;
@@ -65,7 +62,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
         let signal = SineFit::of(&readings[begins + driven - window..], n + 1);
         let ratio = signal.phasor / expected[n];
         let floor = scatter(&readings[begins - quiet..begins], n + 1);
-        let channel = Channel { noise: signal.noise, floor, ..Channel::default() };
+        let channel = CheckedChannel { noise: signal.noise, floor, ..CheckedChannel::default() };
         channel.at(ratio, omega * step)
     });
     let amplitudes = expected.map(|one| one.norm());
@@ -74,19 +71,14 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
     let begin = &readings[begins..begins + first];
     let rest = mean(readings[begins - quiet..begins].iter().map(|reading| reading[2]));
     let moved = mean_square(begin.iter().map(|reading| reading[2] - rest));
-    let expected_move = mean_square(
-        begin
-            .iter()
-            .map(|reading| channels[1].gain * amplitude * reading[0].sin()),
-    );
-    let waits = moved < 0.5 * expected_move;
+    let moves = begin
+        .iter()
+        .map(|[phase, ..]| channels[1].gain * amplitude * phase.sin());
+    let waits = moved < 0.5 * mean_square(moves);
     // Without a sensor, the base moves as expected.
+    let SineFit { phasor, noise } = SineFit::of(&readings[begins + driven - window..], 2);
     let base = if has_base {
-        let signal = SineFit::of(&readings[begins + driven - window..], 2);
-        (
-            signal.phasor,
-            signal.noise / signal.phasor.norm() * (2.0 / window as f64).sqrt(),
-        )
+        (phasor, noise / phasor.norm() * (2.0 / window as f64).sqrt())
     } else {
         (expected[1], 0.0)
     };
@@ -105,10 +97,10 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
         let gain = Complex64::from_polar(linear.response_gain, linear.phase.to_radians());
         let ratio = gain / linear.expected_gain(omega, scene.resonance.reference);
         channels[0] = channels[0].at(ratio * base.0 / expected[1], omega * step);
-        quantities.extend(measured(linear, ratio, scene));
+        quantities.extend(of_response(linear, ratio, scene));
     }
     let verdict = verdict(&channels, &amplitudes, has_base, waits);
-    let refused = quantities.iter().find_map(Quantity::refusal);
+    let refused = quantities.iter().find_map(CheckedQuantity::refusal);
     let verdict = refused.filter(|refusal| verdict.may_be(*refusal)).unwrap_or(verdict);
     Ok(LoopCheck {
         verdict,
@@ -131,14 +123,21 @@ fn without_drift(readings: &mut [[f64; 3]]) {
     }
 }
 
+/// Frequency, rad/s, and amplitude, m, of the drive.
+fn drive(scene: &Scene) -> (f64, f64) {
+    (
+        scene.controller.omega_start * scene.linear().omega0,
+        SHARE * scene.amplitude,
+    )
+}
+
 /// Phasors of response and base, m, at the end of a check of the scene's linear resonator.
 fn expected(scene: &Scene) -> [Complex64; 2] {
-    let d = scene.dimensionless();
-    let omega = scene.controller.omega_start * d.omega0;
-    let amplitude = SHARE * scene.amplitude;
+    let (omega, amplitude) = drive(scene);
+    let LinearResponse { omega0, damping_rate, .. } = scene.linear();
     let time = (PERIODS[1] as f64 - 0.5 * PERIODS[2] as f64) * TAU / omega;
-    let rate = Complex64::new(scene.linear().damping_rate, omega - d.omega0);
-    let growth = Complex64::new(0.0, -0.5 * d.omega0) * (1.0 - (-rate * time).exp()) / rate;
+    let rate = Complex64::new(damping_rate, omega - omega0);
+    let growth = Complex64::new(0.0, -0.5 * omega0) * (1.0 - (-rate * time).exp()) / rate;
     // A delay that the chain states is expected.
     let stated = Complex64::from_polar(1.0, -scene.controller_config().delay * omega);
     [growth * amplitude * stated, stated * amplitude]
@@ -165,14 +164,8 @@ impl SineFit {
 
 // A rig that is driven with its loop open.
 
-/// Periods between looks at a response that falls.
-const DECAY: usize = 10;
-/// Most looks.
-const PAUSES: usize = 40;
-/// Share of the response that is left at most from look to look.
-const FALLS: f64 = 0.98;
-/// Looks in succession at which the response has not fallen: a particle that still hits the walls now and then makes it rise for a while.
-const PATIENCE: usize = 4;
+/// Largest number of waits for the rig to come to rest, and the duration of each, periods.
+const WAITS: [usize; 2] = [40, 10];
 
 /// A rig whose loop is open, and what it has read: the phase of its oscillator, rad, response and base.
 struct OpenLoop<'a, R: ?Sized> {
@@ -200,19 +193,16 @@ impl<R: Rig + ?Sized> OpenLoop<'_, R> {
         Ok(())
     }
 
-    /// Listens for `quiet` samples, and as long as a response above `enough` (RMS, m) falls from one `pause` to the next.
+    /// Waits until the response is at most `enough` (RMS, m) over the last `quiet` samples; looks after every `pause`.
     pub fn rest(&mut self, quiet: usize, pause: usize, enough: f64) -> Result<(), RigError> {
-        let (mut least, mut since) = (f64::INFINITY, 0);
-        for n in 0..=PAUSES {
-            self.drive(if n == 0 { quiet } else { pause }, 0.0)?;
-            let last = &self.readings[self.readings.len() - quiet..];
-            let response = scatter(last, 1);
-            // Noise does not fall.
-            since = if response < FALLS * least { 0 } else { since + 1 };
-            least = least.min(response);
-            if response <= enough || since >= PATIENCE {
+        self.drive(quiet, 0.0)?;
+        for _ in 0..WAITS[0] {
+            let response = scatter(&self.readings[self.readings.len() - quiet..], 1);
+            // A sensor that reads no number never rests.
+            if response <= enough || response.is_nan() {
                 break;
             }
+            self.drive(pause, 0.0)?;
         }
         Ok(())
     }
@@ -235,27 +225,27 @@ fn scatter(readings: &[[f64; 3]], of: usize) -> f64 {
 
 // What the check of a loop measures, beside what the scene says.
 
-/// Largest relative error of a factor: amplitudes and drives that are measured later have the same.
+/// Largest relative error of an amplitude: later measurements of response and drive would be wrong by it.
 const FACTOR: f64 = 0.05;
-/// Largest phase of the response relative to the base that is not explained, degrees. On the default scene 1 degree shifts sigma by 0.026.
+/// Largest unexplained phase of the response relative to the base, degrees. On the default scene 1 degree shifts sigma by 0.026.
 const PHASE: f64 = 1.0;
-/// Largest relative difference of the clocks: frequencies in hertz that are measured later have the same.
+/// Largest relative difference of the clocks: later measurements of frequencies in hertz would be wrong by it.
 const CLOCK: f64 = 1e-3;
-/// Relative differences of natural frequency and damping below which nothing is said, whatever the uncertainty.
+/// Relative differences of natural frequency and damping from which they are reported, beyond their uncertainty.
 const NOTED: [f64; 2] = [1e-4, 0.02];
 
 /// A measured quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Quantity {
+pub struct CheckedQuantity {
     /// What it is.
     pub name: &'static str,
     /// Its unit; empty for a pure number.
     pub unit: &'static str,
-    /// As measured.
+    /// Measured value.
     pub measured: f64,
     /// Standard uncertainty.
     pub uncertainty: f64,
-    /// As the scene says.
+    /// Value of the scene.
     pub expected: f64,
     /// Largest difference beyond the uncertainty.
     pub tolerance: f64,
@@ -263,7 +253,7 @@ pub struct Quantity {
     pub verdict: Option<Verdict>,
 }
 
-impl Quantity {
+impl CheckedQuantity {
     /// Whether it differs from the scene.
     pub fn differs(&self) -> bool {
         let difference = (self.measured - self.expected).abs();
@@ -276,55 +266,42 @@ impl Quantity {
     }
 }
 
-/// Natural frequency, damping, and the response relative to that of such an oscillator (`ratio`).
-fn measured(linear: &Linear, ratio: Complex64, scene: &Scene) -> Vec<Quantity> {
+/// Natural frequency, damping, and the response over the expected response (`ratio`) of an oscillator that has both.
+fn of_response(linear: &Linear, ratio: Complex64, scene: &Scene) -> [CheckedQuantity; 4] {
     let stated = LinearResponse::of(scene);
     let u = linear.u_damping_rate;
-    let replaced = |name, unit, [measured, uncertainty, expected]: [f64; 3], noted: f64| Quantity {
-        name,
-        unit,
-        measured,
-        uncertainty,
-        expected,
-        tolerance: noted * expected,
-        verdict: None,
-    };
     let hertz = [linear.omega_0, u, stated.omega0].map(|omega| omega / TAU);
+    let damping = [linear.damping_rate, u, stated.damping_rate];
+    let phase = [ratio.arg().to_degrees(), linear.u_gain.to_degrees(), 0.0];
     let late = if ratio.arg() > 0.0 {
         Verdict::BaseLate
     } else {
         Verdict::ResponseLate
     };
-    vec![
-        replaced("natural frequency", "Hz", hertz, NOTED[0]),
-        replaced(
-            "damping rate",
-            "1/s",
-            [linear.damping_rate, u, stated.damping_rate],
-            NOTED[1],
+    let gain = [ratio.norm(), linear.u_gain, 1.0];
+    [
+        quantity("natural frequency", "Hz", hertz, NOTED[0] * hertz[2], None),
+        quantity("damping rate", "1/s", damping, NOTED[1] * damping[2], None),
+        quantity(
+            "phase of the response to the base, less the expected one",
+            "degrees",
+            phase,
+            PHASE,
+            Some(late),
         ),
-        Quantity {
-            name: "phase of the response to the base, less the expected one",
-            unit: "degrees",
-            measured: ratio.arg().to_degrees(),
-            uncertainty: linear.u_gain.to_degrees(),
-            expected: 0.0,
-            tolerance: PHASE,
-            verdict: Some(late),
-        },
-        factor(
+        quantity(
             "response over base, over the expected one",
-            ratio.norm(),
-            linear.u_gain,
-            Verdict::ResponseGain,
+            "",
+            gain,
             FACTOR,
+            Some(Verdict::ResponseGain),
         ),
     ]
 }
 
-/// Amplitude of the base, whose phasor, m, and its relative uncertainty are given, over that of the drive, and its frequency from its
+/// Amplitude of the base, whose phasor, m, and its relative uncertainty are given, over the amplitude of the drive, and its frequency from its
 /// phasors, period by period.
-fn of_base((phasor, u): (Complex64, f64), drive: f64, periods: &[Complex64], scene: &Scene) -> [Quantity; 2] {
+fn of_base((phasor, u): (Complex64, f64), drive: f64, periods: &[Complex64], scene: &Scene) -> [CheckedQuantity; 2] {
     // A delay may shift the beginning by some periods.
     let last = &periods[periods.len() / 2..];
     let turned: Complex64 = last.windows(2).map(|pair| pair[0].conj() * pair[1]).sum();
@@ -334,51 +311,60 @@ fn of_base((phasor, u): (Complex64, f64), drive: f64, periods: &[Complex64], sce
     let tolerance = if controlled { GAIN - 1.0 } else { FACTOR };
     // The phases of a window's ends.
     let u_clock = u * (periods.len() as f64).sqrt() / (TAU * (last.len() as f64 - 1.0));
+    let clock = [1.0 + turned.arg() / TAU, u_clock, 1.0];
+    let name = "frequency of the base over that of the drive";
     [
-        factor(
-            "frequency of the base over that of the drive",
-            1.0 + turned.arg() / TAU,
-            u_clock,
-            Verdict::Clock,
-            CLOCK,
+        quantity(name, "", clock, CLOCK, Some(Verdict::Clock)),
+        quantity(
+            "base over drive",
+            "",
+            [ratio, u * ratio, 1.0],
+            tolerance,
+            Some(Verdict::BaseGain),
         ),
-        factor("base over drive", ratio, u * ratio, Verdict::BaseGain, tolerance),
     ]
 }
 
-fn factor(name: &'static str, measured: f64, uncertainty: f64, verdict: Verdict, tolerance: f64) -> Quantity {
-    Quantity {
+/// A quantity: measured, standard uncertainty, and as the scene says.
+fn quantity(
+    name: &'static str,
+    unit: &'static str,
+    [measured, uncertainty, expected]: [f64; 3],
+    tolerance: f64,
+    verdict: Option<Verdict>,
+) -> CheckedQuantity {
+    CheckedQuantity {
         name,
-        unit: "",
+        unit,
         measured,
         uncertainty,
-        expected: 1.0,
+        expected,
         tolerance,
-        verdict: Some(verdict),
+        verdict,
     }
 }
 
 // What the check of a loop says of its channels.
 
-/// Largest RMS of what is not the drive's frequency, as a share of the amplitude.
+/// Largest RMS of the residual of the fit at the drive's frequency, over the amplitude.
 const NOISE: f64 = 0.15;
 /// Share of the expected amplitude below which a sensor is dead.
 const DEAD: f64 = 0.01;
 /// Factor by which an amplitude may differ from the expected one, or its inverse: the damping is known roughly.
 const GAIN: f64 = 2.0;
-/// RMS of the response without a drive over that of its noise with it, from which the rig moves.
+/// Smallest RMS of the response without a drive, over its noise with the drive, of a rig that moves.
 const AT_REST: f64 = 3.0;
 /// Deviation of the phase, rad, up to which a channel is in time, or reversed.
 const IN_TIME: f64 = 0.7;
 
 /// A channel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Channel {
+pub struct CheckedChannel {
     /// Amplitude at the frequency of the drive over the expected one.
     pub gain: f64,
     /// Phase less the expected one, degrees; a delay is negative.
     pub phase: f64,
-    /// The same as a delay, samples.
+    /// This phase as a delay, samples.
     pub delay: f64,
     /// RMS of everything else, m.
     pub noise: f64,
@@ -386,8 +372,8 @@ pub struct Channel {
     pub floor: f64,
 }
 
-impl Channel {
-    /// The same with another ratio to what is expected; `turn`: phase of a sample, rad.
+impl CheckedChannel {
+    /// With another ratio to the expected phasor; `turn`: phase of a sample, rad.
     fn at(self, ratio: Complex64, turn: f64) -> Self {
         Self {
             gain: ratio.norm(),
@@ -458,7 +444,7 @@ impl Verdict {
 
 /// Judges response and base, whose expected amplitudes are `expected`, m. `waits`: the base moves later than the drive, so that its phase is that
 /// of a delay.
-fn verdict(channels: &[Channel; 2], expected: &[f64; 2], has_base: bool, waits: bool) -> Verdict {
+fn verdict(channels: &[CheckedChannel; 2], expected: &[f64; 2], has_base: bool, waits: bool) -> Verdict {
     let [response, base] = channels;
     if !(response.gain + base.gain + response.noise + base.noise).is_finite() {
         return Verdict::NotANumber;
@@ -472,8 +458,8 @@ fn verdict(channels: &[Channel; 2], expected: &[f64; 2], has_base: bool, waits: 
     let is_off = |phase: f64, from: f64| (phase.to_radians() - from + PI).rem_euclid(TAU) - PI;
     let crossed_phases = [is_off(response.phase, FRAC_PI_2), is_off(base.phase, -FRAC_PI_2)];
     let in_time = |phase: f64| phase.abs() < IN_TIME;
-    let reversed = |channel: &Channel| in_time(is_off(channel.phase, PI));
-    let noisy = |channel: &Channel, expected: f64| channel.noise > NOISE * channel.gain * expected;
+    let reversed = |channel: &CheckedChannel| in_time(is_off(channel.phase, PI));
+    let noisy = |channel: &CheckedChannel, expected: f64| channel.noise > NOISE * channel.gain * expected;
     let dead = channels.map(|channel| channel.gain < DEAD);
     // The response's converter may be too coarse for the motion of the base.
     let as_base = dead[0] || near(crossed[0]) && in_time(crossed_phases[0]);
@@ -499,4 +485,139 @@ fn verdict(channels: &[Channel; 2], expected: &[f64; 2], has_base: bool, waits: 
         () if has_base && !in_time(base.phase.to_radians()) => Verdict::BaseLate,
         () => Verdict::ResponseLate,
     }
+}
+
+// The linear response of a rig from its growth in the loop check, and the gains that follow from it.
+//
+// In the n-th period the phasor of the response is `z = s + a q^n` with `q = exp(-r T)`, `r = delta + i (omega - omega_d)` and
+// `s = -i g E/r`, less what the growth within a period adds at twice the frequency, `conj(a q^n) (1 - p)/(1 - p exp(-4 pi i/N))` with
+// `p = exp(-conj(r) T/N)` and N samples per period.
+// Least squares over all periods (Gauss and Newton) give `s`, `a` and `q`; `a` is free because of delays and of what was left of an
+// earlier motion. The covariance of the fit gives the uncertainties. The natural frequency is `omega_0 = |omega_d + i delta|`.
+
+/// The linear response, and the tuning of the loop for it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Linear {
+    /// Natural frequency, rad/s.
+    pub omega_0: f64,
+    /// Damping rate, rad/s.
+    pub damping_rate: f64,
+    /// Standard uncertainty of each of the two, rad/s.
+    pub u_damping_rate: f64,
+    /// Growth rate of the response at resonance per amplitude of the base, 1/s.
+    pub response_gain: f64,
+    /// Standard uncertainty of the gain, relative, and of its phase, rad.
+    pub u_gain: f64,
+    /// Phase of the response at resonance relative to the base, degrees: -90, less what is late.
+    pub phase: f64,
+    /// Bandwidth of the detector, rad/s, from which the gains follow.
+    pub bandwidth: f64,
+    /// Proportional gain, rad/s per rad, and integral gain, rad/s² per rad.
+    pub gains: [f64; 2],
+    /// Phase margin of the loop with a delay of one sample, degrees.
+    pub phase_margin: f64,
+}
+
+impl Linear {
+    /// The response whose phasors, m, are given period by period, each of `samples` samples; `base` is the phasor of the base, m, and `u_base`
+    /// its relative standard uncertainty. `None` without a growth from rest that is more than noise.
+    fn of(
+        phasors: &[Complex64],
+        (base, u_base): (Complex64, f64),
+        omega: f64,
+        samples: usize,
+        scene: &Scene,
+    ) -> Option<Self> {
+        let period = samples as f64 * scene.sample_time();
+        let (mut q, [mut steady, mut initial]) = start(phasors)?;
+        let [mut u_q, mut u_gain] = [f64::NAN; 2];
+        for _ in 0..ROUNDS {
+            let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+            let (mut power, mut rest) = (Complex64::ONE, 0.0);
+            let p = q.conj().powf(1.0 / samples as f64);
+            let within = (1.0 - p) / (1.0 - p * Complex64::cis(-4.0 * PI / samples as f64));
+            for (n, z) in phasors.iter().enumerate() {
+                let row = RowVector3::new(Complex64::ONE, power, initial * power / q * n as f64);
+                let residual = z - steady - initial * power + (initial * power).conj() * within;
+                normal += row.adjoint() * row;
+                right += row.adjoint() * residual;
+                rest += residual.norm_sqr();
+                power *= q;
+            }
+            let inverse = normal.try_inverse()?;
+            let change = inverse * right;
+            // Two components of each phasor, and of each of three unknowns.
+            let variance = rest / (2.0 * phasors.len() as f64 - 6.0);
+            u_q = (variance * inverse[(2, 2)].re).sqrt();
+            // Relative change of the gain, which is proportional to `s r`.
+            let slope = RowVector3::new(1.0 / steady, Complex64::ZERO, 1.0 / (q * q.ln()));
+            u_gain = (variance * (slope * inverse * slope.adjoint())[0].re).sqrt();
+            (steady, initial, q) = (steady + change[0], initial + change[1], q + change[2]);
+        }
+        let rate = -q.ln() / period;
+        let gain = steady * rate / base;
+        let is_growth = (steady + initial).norm() < FROM_REST * steady.norm();
+        if !(gain.norm().is_finite() && u_gain < DETERMINED && q.norm() > 0.0 && is_growth) {
+            return None;
+        }
+        let bandwidth = scene.controller.bandwidth * scene.linear().omega0;
+        let gains = Gains::from_bandwidth(bandwidth, rate.re.max(0.0));
+        Some(Self {
+            omega_0: (omega - rate.im).hypot(rate.re),
+            damping_rate: rate.re,
+            u_damping_rate: u_q / (q.norm() * period),
+            response_gain: gain.norm(),
+            u_gain: u_gain.hypot(u_base),
+            phase: gain.arg().to_degrees(),
+            bandwidth,
+            gains: [gains.proportional, gains.integral],
+            phase_margin: gains
+                .phase_margin(bandwidth, rate.re.max(0.0), scene.sample_time())
+                .to_degrees(),
+        })
+    }
+
+    /// The gain of an oscillator of this natural frequency and damping that is moved through its spring and damper, or by the force in them,
+    /// at the frequency `omega`, rad/s.
+    fn expected_gain(&self, omega: f64, reference: Reference) -> Complex64 {
+        let damper = match reference {
+            Reference::Base => 2.0 * self.damping_rate * omega,
+            Reference::Force => 0.0,
+        };
+        let free = (self.omega_0.powi(2) - self.damping_rate.powi(2)).max(0.0).sqrt();
+        Complex64::new(self.omega_0.powi(2), damper) / Complex64::new(self.damping_rate, omega + free)
+    }
+
+    /// The frequency response.
+    pub fn response(&self) -> LinearResponse {
+        LinearResponse {
+            omega0: self.omega_0,
+            damping_rate: self.damping_rate,
+            uncertainty: self.u_damping_rate,
+            gain: Complex64::from_polar(self.response_gain, self.phase.to_radians()),
+        }
+    }
+}
+
+/// Largest response at the start, as a share of the steady one, of a growth from rest.
+const FROM_REST: f64 = 0.5;
+/// Largest relative standard uncertainty of the gain of a response that is more than noise.
+const DETERMINED: f64 = 0.1;
+/// Number of steps of Newton's method; each squares the relative error.
+const ROUNDS: usize = 8;
+
+/// First values of `q`, and of `s` and `a`, by the recursion `z' = q z + (1 - q) s` from period to period. `None` without a growth.
+fn start(phasors: &[Complex64]) -> Option<(Complex64, [Complex64; 2])> {
+    let steps = phasors.len().checked_sub(4)? as f64 + 3.0;
+    let (before, after) = (&phasors[..phasors.len() - 1], &phasors[1..]);
+    let mean = |values: &[Complex64]| values.iter().sum::<Complex64>() / steps;
+    let (mean_before, mean_after) = (mean(before), mean(after));
+    let power: f64 = before.iter().map(|z| (z - mean_before).norm_sqr()).sum();
+    let products = before.iter().zip(after);
+    let q = products
+        .map(|(z, next)| (z - mean_before).conj() * next)
+        .sum::<Complex64>()
+        / power;
+    let steady = (mean_after - q * mean_before) / (1.0 - q);
+    (steady.norm().is_finite() && q.norm() > 0.0).then(|| (q, [steady, phasors[0] - steady]))
 }

@@ -3,6 +3,7 @@
 
 mod chain;
 mod faulty;
+mod settling;
 mod stages;
 
 use std::error::Error;
@@ -14,9 +15,11 @@ use thiserror::Error;
 use vines_model::{Definition, Sensor};
 
 use crate::scene::Scene;
+pub use crate::scene::has_friction;
 
 pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
+pub use settling::Settling;
 pub use stages::{Interrupted, Measured, SensorsOnly, Stoppable};
 
 /// What the controller asks of the rig for the coming sample period.
@@ -50,6 +53,19 @@ pub struct GroundTruth {
     pub impact_velocity: f64,
     /// Velocity of the particle, m/s.
     pub particle_velocity: f64,
+    /// What friction has done, where there is friction and the rig reports it.
+    pub friction: Option<FrictionTotals>,
+}
+
+/// What friction in the cavity has done since the start.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct FrictionTotals {
+    /// How often the particle stuck to the floor inside the cavity.
+    pub sticks: i64,
+    /// How long it stuck there, s.
+    pub stuck_time: f64,
+    /// Energy lost to friction, J.
+    pub loss: f64,
 }
 
 /// A rig: anything that can be driven and measured.
@@ -295,6 +311,11 @@ impl Rig for Simulated {
             impact_time: totals.impact_time,
             impact_velocity: totals.impact_velocity,
             particle_velocity: self.plant.state().dq2,
+            friction: has_friction(self.plant.parameters()).then(|| FrictionTotals {
+                sticks: i64::try_from(totals.sticks).unwrap_or(i64::MAX),
+                stuck_time: totals.stuck_time,
+                loss: totals.friction,
+            }),
         }))
     }
 }

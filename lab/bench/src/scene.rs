@@ -9,8 +9,8 @@ mod overrides;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use lovines::{InvalidValue, State};
-use phase_lock::{ConfigError, Number};
+use lovines::{Cavity, InvalidValue, Restitution, State};
+use phase_lock::{ConfigError, Number, Value};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error, ser::SerializeMap};
 
 pub use backbone::BackboneSettings;
@@ -87,10 +87,51 @@ impl Scene {
         self.dimensionless().state(&self.start)
     }
 
+    /// What theory, exact orbits and regime maps leave out of the scene's cavity, as a list; `None` if the cavity is ideal.
+    pub fn left_out(&self) -> Option<String> {
+        let Cavity { restitution, least_restitution, scatter, tilt, .. } = self.plant.cavity;
+        let [plus, minus] = self.plant.gaps();
+        let b = self.plant.half_width;
+        let r = self.plant.restitution;
+        let is_r = |law: Option<Restitution>| law.is_none_or(|law| law == Restitution::Constant(r));
+        let effects = [
+            (has_friction(&self.plant), "friction"),
+            (plus != b || minus != b, "the gaps b_plus and b_minus"),
+            (tilt != 0.0, "tilt"),
+            (
+                !restitution.into_iter().all(is_r) || least_restitution > r,
+                "the restitution of r_law, r_plus, r_minus and r_min",
+            ),
+            (scatter != 0.0, "the scatter of the restitution"),
+        ];
+        let effects: Vec<&str> = effects
+            .into_iter()
+            .filter_map(|(is, name)| is.then_some(name))
+            .collect();
+        let (last, others) = effects.split_last()?;
+        Some(match others {
+            [] => (*last).to_string(),
+            others => format!("{} and {last}", others.join(", ")),
+        })
+    }
+
+    /// Whether a motion of the scene's plant has a mirror image, half a period later, as in an ideal cavity: neither tilt nor walls of
+    /// different restitution. Where it has none, the 1:1 motion is asymmetric. (Unequal gaps move the middle of the cavity only.)
+    pub fn has_mirror_images(&self) -> bool {
+        let r = Restitution::Constant(self.plant.restitution);
+        let [plus, minus] = self.plant.cavity.restitution.map(|law| law.unwrap_or(r));
+        self.plant.cavity.tilt == 0.0 && plus == minus
+    }
+
     /// The controller's sample time, s: rig and controller agree on it before anything is measured.
     pub fn sample_time(&self) -> f64 {
         Dimensionless::of(&self.plant, self.amplitude).natural_period() / self.controller.samples_per_period
     }
+}
+
+/// Whether there is friction in the cavity.
+pub fn has_friction(plant: &Parameters) -> bool {
+    plant.cavity.kinetic_friction > 0.0 || plant.cavity.static_friction.is_some_and(|held| held > 0.0)
 }
 
 // The sections of a scene as written, before they are completed and checked.
@@ -285,6 +326,56 @@ struct PlantSection {
     r: Option<f64>,
     epsilon: Option<f64>,
     lambda: Option<f64>,
+    // The real cavity, in SI units.
+    b_plus: Option<f64>,
+    b_minus: Option<f64>,
+    #[serde(default)]
+    theta: f64,
+    #[serde(default)]
+    mu_k: f64,
+    mu_s: Option<f64>,
+    #[serde(default)]
+    r_law: Law,
+    r_plus: Option<f64>,
+    r_minus: Option<f64>,
+    #[serde(default)]
+    r_min: f64,
+    #[serde(default)]
+    r_scatter: f64,
+    #[serde(default)]
+    seed: u32,
+}
+
+/// A law of restitution; `r_plus` and `r_minus` are its parameters at the two walls.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Law {
+    #[default]
+    Constant,
+    Viscoelastic,
+    Plastic,
+}
+
+impl Law {
+    /// In the order of their codes in `LoViNes.fmu`.
+    const ALL: [Self; 3] = [Self::Constant, Self::Viscoelastic, Self::Plastic];
+
+    /// The law and its parameter.
+    fn of(law: Restitution) -> (Self, f64) {
+        match law {
+            Restitution::Constant(r) => (Self::Constant, r),
+            Restitution::Viscoelastic(k) => (Self::Viscoelastic, k),
+            Restitution::Plastic(speed) => (Self::Plastic, speed),
+        }
+    }
+
+    fn with(self, parameter: f64) -> Restitution {
+        match self {
+            Self::Constant => Restitution::Constant(parameter),
+            Self::Viscoelastic => Restitution::Viscoelastic(parameter),
+            Self::Plastic => Restitution::Plastic(parameter),
+        }
+    }
 }
 
 impl PlantSection {
@@ -306,6 +397,16 @@ impl PlantSection {
                 ))
             })
         };
+        if self.r_law != Law::Constant && self.r_plus.is_none() {
+            return Err(keys(
+                "[plant] has an `r_law` without its parameter: give r_plus, which is k in (s/m)^(1/5) of \"viscoelastic\", or the yield speed in \
+                 m/s of \"plastic\"",
+            ));
+        }
+        // The FMU has a signed seed of 32 bits.
+        Checked::new("plant.seed", self.seed.into(), "")
+            .check(self.seed <= i32::MAX as u32, "must be from 0 to 2147483647")?;
+        let cavity = self.cavity();
         let plant = if is_si {
             Parameters {
                 primary_mass: need(self.mass, "M")?,
@@ -314,16 +415,34 @@ impl PlantSection {
                 particle_mass: need(self.m, "m")?,
                 half_width: need(self.b, "b")?,
                 restitution: need(self.r, "r")?,
-                cavity: lovines::Cavity::IDEAL,
+                cavity,
             }
         } else {
             let (epsilon, lambda) = (need(self.epsilon, "epsilon")?, need(self.lambda, "lambda")?);
             Checked::new("plant.epsilon", epsilon, "(dimensionless)").positive()?;
             Checked::new("plant.lambda", lambda, "(dimensionless)").not_negative()?;
-            Parameters::dimensionless(epsilon, lambda, need(self.r, "r")?)
+            Parameters {
+                cavity,
+                ..Parameters::dimensionless(epsilon, lambda, need(self.r, "r")?)
+            }
         };
         plant.validate()?;
         Ok(plant)
+    }
+
+    fn cavity(&self) -> Cavity {
+        let law = |parameter: Option<f64>| parameter.map(|parameter| self.r_law.with(parameter));
+        Cavity {
+            b_plus: self.b_plus,
+            b_minus: self.b_minus,
+            tilt: self.theta,
+            kinetic_friction: self.mu_k,
+            static_friction: self.mu_s,
+            restitution: [law(self.r_plus), law(self.r_minus.or(self.r_plus))],
+            least_restitution: self.r_min,
+            scatter: self.r_scatter,
+            seed: self.seed.into(),
+        }
     }
 }
 
@@ -347,23 +466,69 @@ impl StartSection {
     }
 }
 
-/// The parameters under their symbols, which are the names of the FMU's variables.
-fn symbols(plant: &Parameters) -> [(&'static str, f64); 6] {
-    [
+/// The parameters under their symbols, which are the names of the FMU's variables; of the cavity those that are not ideal.
+fn symbols(plant: &Parameters) -> Vec<(&'static str, Value)> {
+    let Cavity { restitution, seed, .. } = plant.cavity;
+    let [plus, minus] = restitution.map(|law| law.map(Law::of));
+    let law = plus.or(minus).map_or(Law::Constant, |(law, _)| law);
+    let real = |(symbol, value)| (symbol, Value::Real(value));
+    let given =
+        |(symbol, value): (_, Option<f64>)| value.filter(|value| *value != 0.0).map(|value| real((symbol, value)));
+    let plants = [
         ("M", plant.primary_mass),
         ("k", plant.stiffness),
         ("c", plant.damping),
         ("m", plant.particle_mass),
         ("b", plant.half_width),
         ("r", plant.restitution),
-    ]
+    ];
+    let cavity = [
+        ("b_plus", plant.cavity.b_plus),
+        ("b_minus", plant.cavity.b_minus),
+        ("theta", Some(plant.cavity.tilt)),
+        ("mu_k", Some(plant.cavity.kinetic_friction)),
+        ("mu_s", plant.cavity.static_friction),
+        ("r_plus", plus.map(|(_, parameter)| parameter)),
+        ("r_minus", minus.map(|(_, parameter)| parameter)),
+        ("r_min", Some(plant.cavity.least_restitution)),
+        ("r_scatter", Some(plant.cavity.scatter)),
+    ];
+    let codes = [("r_law", law as i32), ("seed", seed as i32)];
+    let codes = codes.into_iter().filter(|(_, code)| *code != 0);
+    let mut symbols: Vec<_> = plants
+        .map(real)
+        .into_iter()
+        .chain(cavity.into_iter().filter_map(given))
+        .collect();
+    symbols.extend(codes.map(|(symbol, code)| (symbol, Value::Integer(code))));
+    symbols
 }
 
-/// Writes the parameters under their symbols.
+/// The keys of the section `[plant]` and their values, as a scene in SI units has them.
+pub fn plant_keys(plant: &Parameters) -> Vec<(&'static str, String)> {
+    let keys = symbols(plant).into_iter().map(|(symbol, value)| {
+        let text = match value {
+            Value::Integer(code) if symbol == "r_law" => format!("\"{:?}\"", Law::ALL[code as usize]).to_lowercase(),
+            Value::Integer(number) => number.to_string(),
+            Value::Real(number) => format!("{number:?}"),
+            Value::Boolean(is_on) => is_on.to_string(),
+        };
+        (symbol, text)
+    });
+    keys.collect()
+}
+
+/// Writes the parameters under their symbols, as a scene has them.
 fn serialize<S: Serializer>(plant: &Parameters, serializer: S) -> Result<S::Ok, S::Error> {
-    let mut map = serializer.serialize_map(Some(6))?;
-    for (symbol, value) in symbols(plant) {
-        map.serialize_entry(symbol, &value)?;
+    let symbols = symbols(plant);
+    let mut map = serializer.serialize_map(Some(symbols.len()))?;
+    for (symbol, value) in symbols {
+        match value {
+            Value::Integer(code) if symbol == "r_law" => map.serialize_entry(symbol, &Law::ALL[code as usize])?,
+            Value::Integer(_) => map.serialize_entry(symbol, &plant.cavity.seed)?,
+            Value::Real(number) => map.serialize_entry(symbol, &number)?,
+            Value::Boolean(_) => {}
+        }
     }
     map.end()
 }
@@ -395,7 +560,7 @@ impl Default for RecordSettings {
     }
 }
 
-/// Most samples of one record: about 2 GiB in memory.
+/// Most samples of one record: about 3 GiB in memory.
 const MOST_SAMPLES: f64 = 2e7;
 
 impl RecordSettings {

@@ -1,38 +1,40 @@
-//! Guards that every fault of a rig, of its connection and of a controller ends the run with a drive of zero, and how soon;
-//! `studies/faults.rs` takes more instants.
+//! Guards that every fault of a rig, of its connection and of a controller ends the run with a drive of zero, and how soon, and that a record with
+//! a fault which no longer matters to the drive is refused; `studies/faults.rs` takes more instants.
+
+#[path = "../../../studies/common.rs"]
+mod common;
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 
-use vines_testbench::backbone::track;
+use vines_testbench::backbone::{Tracked, track};
 use vines_testbench::experiment::{self, ExperimentError, Plan};
+use vines_testbench::identification::{IdentificationError, identify};
+use vines_testbench::record::Record;
 use vines_testbench::rig::{
     BuiltIn, Command, Controller, ControllerError, Drive, Rig, RigError, RigFault, SensorFault, Sensors, Simulated,
     faulty,
 };
-use vines_testbench::scene::{LinearResponse, Override, PAPER, Scene};
+use vines_testbench::scene::{LinearResponse, Scene};
 
+/// The default scene with these settings, and a linear response as a loop check finds it.
 fn scene(settings: &[&str]) -> Scene {
-    let overrides: Vec<Override> = settings.iter().map(|one| one.parse().unwrap()).collect();
-    let mut scene = Scene::parse("paper.toml", PAPER, &overrides).unwrap();
+    let mut scene = common::scene("", settings).unwrap();
     scene.measured = Some(LinearResponse::of(&scene));
     scene
 }
 
-/// Runs an experiment, or tracks the backbone. Returns whether it ended early.
-fn ends_early(rig: &mut dyn Rig, scene: &Scene, tracks: bool) -> bool {
-    let config = if tracks {
-        scene.backbone_config()
-    } else {
-        scene.controller_config()
-    };
-    let mut controller = BuiltIn::new(&config).unwrap();
-    if tracks {
-        track(rig, &mut controller, scene, |_, _| {}).map_or(true, |tracked| tracked.ended.is_some())
-    } else {
-        experiment::run(rig, &mut controller, &Plan::of(scene), |_, _, _| {}).is_err()
-    }
+/// The record of an experiment.
+fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    experiment::run(rig, &mut controller, &Plan::of(scene), |_, _, _| {})
+}
+
+/// The tracked backbone.
+fn tracked(rig: &mut dyn Rig, scene: &Scene) -> Result<Tracked, ExperimentError> {
+    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
+    track(rig, &mut controller, scene, |_, _| {})
 }
 
 /// Time from a fault to a drive of zero, s, and whether the run ended early.
@@ -40,7 +42,11 @@ fn injected(scene: &Scene, fault: RigFault, seconds: f64, tracks: bool) -> (Opti
     let zero = Rc::new(Cell::new(None));
     let told = Rc::clone(&zero);
     let mut rig = faulty(scene, fault, seconds, move |time| told.set(time)).unwrap();
-    let ended = ends_early(&mut rig, scene, tracks);
+    let ended = if tracks {
+        tracked(&mut rig, scene).map_or(true, |tracked| tracked.ended.is_some())
+    } else {
+        record(&mut rig, scene).is_err()
+    };
     drop(rig);
     (zero.get(), ended)
 }
@@ -50,12 +56,10 @@ fn injected(scene: &Scene, fault: RigFault, seconds: f64, tracks: bool) -> (Opti
 fn inject(settings: &[&str], instants: usize, limit: f64) {
     let scene = scene(&[settings, &["controller.release_periods=2", "record.decay_periods=6"]].concat());
     let healthy = || Simulated::of(&scene).unwrap();
-    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-    let record = experiment::run(&mut *healthy(), &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap();
+    let record = record(&mut *healthy(), &scene).unwrap();
     let (step, period) = (record.sample_time, scene.dimensionless().natural_period());
     let [settled, released] = [record.settled, record.released].map(|sample| sample as f64 * step);
-    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
-    let tracked = track(&mut *healthy(), &mut controller, &scene, |_, _| {}).unwrap();
+    let tracked = tracked(&mut *healthy(), &scene).unwrap();
     let tracking = (tracked.periods_to_lock + 40.0) * period;
     let config = scene.controller_config();
     let ramp = config
@@ -195,4 +199,41 @@ fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() 
         })
     };
     assert!(matches!(ends(|| Ok(()), nan), Ok(Err(ExperimentError::NotANumber(_)))));
+}
+
+/// The record of a rig with a fault after some seconds.
+fn with(scene: &Scene, fault: RigFault, seconds: f64) -> Record {
+    record(&mut faulty(scene, fault, seconds, |_| {}).unwrap(), scene).unwrap()
+}
+
+#[test]
+fn a_sensor_that_dies_after_the_release_is_an_error() {
+    for settings in [&[][..], &["chain.adc_bits=14"], &["chain.snr=40"]] {
+        let scene = scene(settings);
+        let healthy = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+        identify(&healthy, &scene).unwrap();
+        let release = healthy.released as f64 * healthy.sample_time;
+        for fault in [
+            RigFault::Response(SensorFault::Dead),
+            RigFault::Response(SensorFault::Frozen),
+            RigFault::Response(SensorFault::Value(f64::NAN)),
+            RigFault::Base(SensorFault::Value(f64::NAN)),
+        ] {
+            let failed = with(&scene, fault, release + 0.5);
+            let refused = identify(&failed, &scene);
+            let is_named = matches!(refused, Err(IdentificationError::SensorAfterRelease { seconds, .. }) if (seconds - 0.5).abs() < 0.25);
+            assert!(is_named, "{settings:?}, {fault:?}");
+        }
+    }
+}
+
+#[test]
+fn a_base_that_becomes_late_while_the_lock_is_held_is_an_error() {
+    let scene = scene(&[]);
+    let healthy = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+    let settled = (healthy.settled + 2) as f64 * healthy.sample_time;
+    let late = with(&scene, RigFault::Base(SensorFault::Late(3)), settled);
+    let refused = identify(&late, &scene).unwrap_err();
+    assert!(matches!(refused, IdentificationError::OffTarget { .. }), "{refused}");
+    println!("{refused}");
 }

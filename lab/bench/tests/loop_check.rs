@@ -1,143 +1,132 @@
 //! Guards the verdicts of the loop check, on random rigs, healthy and with faults, and what it measures; `studies/check.rs` takes more rigs.
 
-use lovines::State;
-use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
-use rand_distr::{Distribution, Uniform};
-use vines_testbench::loop_check::{Verdict, check};
-use vines_testbench::rig::{Chain, Drive, Rig, RigError, RigFault, SensorFault, Sensors, Simulated, faulty};
-use vines_testbench::scene::{PAPER, Scene};
+#[path = "../../../studies/common.rs"]
+mod common;
 
-fn scene() -> Scene {
-    Scene::parse("paper.toml", PAPER, &["start.dq2=0".parse().unwrap()]).unwrap()
+use common::{checked_faults, checked_rig, uniform};
+use lovines::State;
+use vines_testbench::loop_check::{Verdict, check};
+use vines_testbench::rig::{Chain, Drive, Rig, RigError, Sensors, Simulated, faulty};
+use vines_testbench::scene::Scene;
+
+/// The default scene with these settings, at rest.
+fn at_rest(settings: &[&str]) -> Scene {
+    common::scene("", &[settings, &["start.dq2=0"]].concat()).unwrap()
 }
 
 #[test]
 fn healthy_rigs_pass_and_faults_are_named() {
-    let mut random = ChaCha8Rng::seed_from_u64(5);
-    let mut between = move |low: f64, high: f64| Uniform::new(low, high).unwrap().sample(&mut random);
+    let mut between = uniform(5);
     for n in 0..60 {
-        let mut scene = scene();
-        let epsilon = between(0.001_f64.ln(), 0.05_f64.ln()).exp();
-        let lambda = between(0.1_f64.ln(), 3_f64.ln()).exp();
-        scene.plant.particle_mass = epsilon * scene.plant.primary_mass;
-        scene.plant.damping = lambda * scene.plant.particle_mass * scene.plant.natural_frequency();
-        scene.plant.restitution = between(0.2, 0.97);
-        scene.amplitude = epsilon * scene.plant.half_width * between(0.3, 3.0);
-        scene.chain.snr = Some(between(30.0, 80.0));
-        scene.chain.seed = n;
-        scene.chain.delay = between(0.0, 4.0) as u32;
-        scene.chain.filter = Some(between(8.0, 40.0));
-        scene.chain.adc_bits = Some(between(16.0, 25.0) as u32);
-        let mut rig = scene.clone();
-        rig.plant.stiffness *= between(0.99, 1.01);
-        rig.plant.damping *= between(0.8, 1.2);
+        let [scene, rig] = checked_rig(&mut between).unwrap();
         let found = check(&mut *Simulated::of(&rig).unwrap(), &scene).unwrap();
         assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
         let linear = found.linear.unwrap();
-        let damping = 0.5 * rig.plant.damping / rig.plant.primary_mass;
+        let rig_damping = 0.5 * rig.plant.damping / rig.plant.primary_mass;
+        let gain = 0.5 * rig.plant.natural_frequency();
+        // Four standard uncertainties; 3 % where noise is small.
+        let limit = (4.0 * linear.u_gain).max(0.03);
+        assert!((linear.response_gain / gain - 1.0).abs() < limit, "{linear:?}");
         assert!(
-            (linear.response_gain / (0.5 * rig.plant.natural_frequency()) - 1.0).abs() < 0.03,
+            (linear.damping_rate - rig_damping).abs() < 4.0 * linear.u_damping_rate,
             "{linear:?}"
         );
-        assert!(
-            (linear.damping_rate - damping).abs() < 4.0 * linear.u_damping_rate,
-            "{linear:?}"
-        );
-        let gains = phase_lock::Gains::from_bandwidth(linear.bandwidth, damping);
-        assert!((linear.gains[1] / gains.integral - 1.0).abs() < 0.01, "{linear:?}");
-        let (gain, late) = (between(1.15_f64.ln(), 1000_f64.ln()).exp(), between(2.0, 33.0) as usize);
-        let faults = [
-            (Verdict::NotANumber, RigFault::Response(SensorFault::Value(f64::NAN))),
-            (Verdict::NotANumber, RigFault::Base(SensorFault::Value(f64::INFINITY))),
-            (Verdict::ShakerOff, RigFault::Shaker(0.0)),
-            (Verdict::ResponseDead, RigFault::Response(SensorFault::Dead)),
-            (Verdict::BaseDead, RigFault::Base(SensorFault::Dead)),
-            (Verdict::Swapped, RigFault::Swapped),
-            (Verdict::ResponseReversed, RigFault::Response(SensorFault::Reversed)),
-            (Verdict::BaseReversed, RigFault::Base(SensorFault::Reversed)),
-            (Verdict::BothReversed, RigFault::Both(SensorFault::Reversed)),
-            (Verdict::ResponseGain, RigFault::Response(SensorFault::Gain(gain))),
-            (Verdict::BaseGain, RigFault::Base(SensorFault::Gain(gain))),
-            (Verdict::ResponseGain, RigFault::Response(SensorFault::Gain(0.8))),
-            (Verdict::ResponseLate, RigFault::Response(SensorFault::Late(late))),
-            (Verdict::BaseLate, RigFault::Base(SensorFault::Late(late))),
-            (Verdict::ResponseNoisy, RigFault::Response(SensorFault::Noisy)),
-            (Verdict::BaseNoisy, RigFault::Base(SensorFault::Noisy)),
-        ];
-        let (expected, fault) = faults[n as usize % faults.len()];
+        let integral = |damping: f64| phase_lock::Gains::from_bandwidth(linear.bandwidth, damping).integral;
+        let ratio = |damping: f64| (integral(damping) / integral(rig_damping) - 1.0).abs();
+        let limit = ratio(rig_damping + 4.0 * linear.u_damping_rate).max(0.01);
+        assert!(ratio(linear.damping_rate) < limit, "{linear:?}");
+        assert_eq!(linear.gains[1], integral(linear.damping_rate));
+        let faults = checked_faults(&mut between);
+        let (expected, fault) = faults[n % faults.len()];
         let found = check(&mut faulty(&rig, fault, 0.0, |_| {}).unwrap(), &scene).unwrap();
         assert_eq!(found.verdict, expected, "{fault:?}: {found:?}");
     }
 }
 
-/// A rig that records its largest drive and the phase of its oscillator.
-struct Recorded(Simulated, f64, f64);
+/// A rig between whose sensors, drive and clock and the bench something is wrong.
+struct Altered {
+    plant: Box<dyn Rig>,
+    factors: [f64; 2],
+    /// Delays of the channels, samples, and their readings, the latest last.
+    late: [usize; 2],
+    past: Vec<Sensors>,
+    clock: f64,
+    /// Drive from elsewhere, m.
+    hum: f64,
+    /// Largest drive, m, and phase of the drive, turns.
+    largest: f64,
+    turns: f64,
+}
 
-impl Rig for Recorded {
+impl Altered {
+    fn new(plant: Box<dyn Rig>) -> Self {
+        Self {
+            plant,
+            factors: [1.0; 2],
+            late: [0; 2],
+            past: Vec::new(),
+            clock: 1.0,
+            hum: 0.0,
+            largest: 0.0,
+            turns: 0.0,
+        }
+    }
+}
+
+impl Rig for Altered {
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.0.sense()
+        self.past.push(self.plant.sense()?);
+        // Before the first reading, the rig rests.
+        let still = Sensors { response: 0.0, reference: Some(0.0) };
+        let ago = |samples: usize| {
+            let index = self.past.len().checked_sub(samples + 1);
+            index.map_or(still, |index| self.past[index])
+        };
+        Ok(Sensors {
+            response: self.factors[0] * ago(self.late[0]).response,
+            reference: ago(self.late[1]).reference.map(|base| self.factors[1] * base),
+        })
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.1 = self.1.max(drive.amplitude).max(drive.displacement.abs());
-        self.2 += drive.omega * step;
-        self.0.advance(drive, step)
+        self.largest = self.largest.max(drive.amplitude).max(drive.displacement.abs());
+        self.turns += drive.omega * step / std::f64::consts::TAU;
+        let amplitude = drive.amplitude + self.hum;
+        self.plant.advance(Drive { amplitude, ..drive }, self.clock * step)
     }
 }
 
 #[test]
 fn the_check_drives_at_a_hundredth_and_ends_at_the_phase_where_it_began() {
-    let scene = scene();
-    let mut rig = Recorded(Simulated::new(scene.plant, scene.start).unwrap(), 0.0, 0.0);
+    let scene = at_rest(&[]);
+    let mut rig = Altered::new(Simulated::of(&scene).unwrap());
     let found = check(&mut rig, &scene).unwrap();
     assert_eq!(found.verdict, Verdict::Healthy);
-    assert!(rig.1 <= 0.01 * scene.amplitude * (1.0 + 1e-12));
-    let turns = rig.2 / std::f64::consts::TAU;
-    assert!((turns - turns.round()).abs() < 1e-9, "{turns}");
+    assert!(rig.largest <= 0.01 * scene.amplitude * (1.0 + 1e-12));
+    assert!((rig.turns - rig.turns.round()).abs() < 1e-9, "{}", rig.turns);
     assert!((found.response.gain - 1.0).abs() < 0.01 && found.response.phase.abs() < 3.0);
 }
 
 #[test]
 fn a_rig_that_moves_before_the_drive_comes_to_rest_first_or_is_named() {
-    let scene = scene();
-    for (driven, expected) in [(false, Verdict::Healthy), (true, Verdict::NotAtRest)] {
-        let start = State { dq1: 0.05, ..State::default() };
-        let mut rig = Moving(Simulated::new(scene.plant, start).unwrap(), driven);
+    let mut scene = at_rest(&[]);
+    let b = scene.plant.half_width;
+    for (start, hum, expected) in [
+        (State { dq1: 0.05, ..State::default() }, 0.0, Verdict::Healthy),
+        (State { dq1: 0.05, ..State::default() }, 1e-5, Verdict::NotAtRest),
+        // A particle beside the middle is an offset.
+        (State { q2: 0.95 * b, ..State::default() }, 0.0, Verdict::Healthy),
+        (
+            State { q2: -0.5 * b, dq2: 0.005, ..State::default() },
+            0.0,
+            Verdict::Healthy,
+        ),
+    ] {
+        scene.start = start;
+        let mut rig = Altered { hum, ..Altered::new(Simulated::of(&scene).unwrap()) };
         let found = check(&mut rig, &scene).unwrap();
-        assert_eq!(found.verdict, expected, "{found:?}");
+        assert_eq!(found.verdict, expected, "{start:?}, {hum}: {found:?}");
     }
-}
-
-#[test]
-fn a_particle_that_lies_beside_the_middle_is_an_offset_and_no_motion() {
-    let scene = scene();
-    for (q2, dq2) in [(0.95, 0.0), (-0.5, 0.005)] {
-        let start = State { q2: q2 * scene.plant.half_width, dq2, ..State::default() };
-        let mut rig = Simulated::new(scene.plant, start).unwrap();
-        let found = check(&mut rig, &scene).unwrap();
-        assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
-    }
-}
-
-/// A rig that moves at first, or that something else drives all the time.
-struct Moving(Simulated, bool);
-
-impl Rig for Moving {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.0.sense()
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let amplitude = drive.amplitude + if self.1 { 1e-5 } else { 0.0 };
-        self.0.advance(Drive { amplitude, ..drive }, step)
-    }
-}
-
-/// The default scene with these settings, at rest.
-fn at_rest(settings: &[&str]) -> Scene {
-    let settings = settings.iter().chain(&["start.dq2=0"]);
-    let overrides: Vec<_> = settings.map(|one| one.parse().unwrap()).collect();
-    Scene::parse("paper.toml", PAPER, &overrides).unwrap()
 }
 
 #[test]
@@ -151,9 +140,10 @@ fn the_check_measures_the_linear_response_and_states_gains_with_a_phase_margin()
     ] {
         let scene = at_rest(settings);
         let d = scene.dimensionless();
-        let plant = Simulated::new(scene.plant, scene.start).unwrap();
-        let mut rig = Chain::around(Box::new(plant), &scene);
-        let found = check(&mut *rig, &scene).unwrap().linear.unwrap();
+        let found = check(&mut *Simulated::of(&scene).unwrap(), &scene)
+            .unwrap()
+            .linear
+            .unwrap();
         println!("{found:?}");
         let damping = 0.5 * d.epsilon * d.lambda * d.omega0;
         assert!((found.damping_rate / damping - 1.0).abs() < tolerance);
@@ -163,67 +153,18 @@ fn the_check_measures_the_linear_response_and_states_gains_with_a_phase_margin()
     }
 }
 
-/// A rig behind a connection: both channels are this many samples late.
-struct Delayed(Simulated, Vec<Sensors>);
-
-impl Rig for Delayed {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.1.push(self.0.sense()?);
-        Ok(self.1.remove(0))
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.0.advance(drive, step)
-    }
-}
-
 #[test]
 fn a_delay_of_both_channels_cancels_and_is_healthy() {
-    let scene = scene();
-    let still = Sensors { response: 0.0, reference: Some(0.0) };
+    let scene = at_rest(&[]);
     // From 40 on, the phase alone is that of the opposite sign.
     for delay in [16, 30, 40, 44, 48] {
-        let mut rig = Delayed(Simulated::new(scene.plant, scene.start).unwrap(), vec![still; delay]);
+        let mut rig = Altered {
+            late: [delay; 2],
+            ..Altered::new(Simulated::of(&scene).unwrap())
+        };
         let found = check(&mut rig, &scene).unwrap();
         assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
         assert!((found.base.unwrap().delay - delay as f64).abs() < 0.5, "{found:?}");
-    }
-}
-
-/// A rig between whose sensors, drive and clock and the bench something is wrong.
-struct Altered {
-    plant: Box<dyn Rig>,
-    factors: [f64; 2],
-    /// Delays of the channels, samples, and their readings, the latest last.
-    late: [usize; 2],
-    past: Vec<Sensors>,
-    clock: f64,
-}
-
-impl Altered {
-    fn new(plant: Box<dyn Rig>) -> Self {
-        Self {
-            plant,
-            factors: [1.0; 2],
-            late: [0; 2],
-            past: Vec::new(),
-            clock: 1.0,
-        }
-    }
-}
-
-impl Rig for Altered {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.past.push(self.plant.sense()?);
-        let ago = |samples: usize| self.past[(self.past.len() - 1).saturating_sub(samples)];
-        Ok(Sensors {
-            response: self.factors[0] * ago(self.late[0]).response,
-            reference: ago(self.late[1]).reference.map(|base| self.factors[1] * base),
-        })
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.plant.advance(drive, self.clock * step)
     }
 }
 
@@ -261,9 +202,8 @@ fn what_would_falsify_a_measurement_is_refused_with_and_without_noise() {
 
 #[test]
 fn natural_frequency_and_damping_of_the_rig_replace_those_of_the_scene() {
-    for settings in [&["start.dq2=0"][..], &["start.dq2=0", "chain.snr=40"]] {
-        let overrides: Vec<_> = settings.iter().map(|one| one.parse().unwrap()).collect();
-        let mut scene = Scene::parse("paper.toml", PAPER, &overrides).unwrap();
+    for settings in [&[][..], &["chain.snr=40"]] {
+        let mut scene = at_rest(settings);
         let stated = scene.dimensionless();
         let mut plant = scene.plant;
         plant.stiffness *= 1.01;

@@ -1,8 +1,12 @@
-//! Scenes: their values, and the messages for mistakes.
+//! Guards the values of scenes, the keys of the controller's settings, and the messages for mistakes.
 
 use std::path::Path;
 
-use vines_testbench::scene::{Override, Reference, Scene, SceneError, Sensor};
+use phase_lock::{Config, NONE, PARAMETERS, Parameter, Range, Value};
+use vines_testbench::scene::{
+    ControllerSettings, Definition, KEYS, Override, RecordSettings, Reference, Resonance, Scene, SceneError, Sensor,
+    refusal,
+};
 
 fn set(arguments: &[&str]) -> Vec<Override> {
     arguments.iter().map(|one| one.parse().unwrap()).collect()
@@ -34,6 +38,8 @@ fn the_default_scene_is_the_paper_file() {
     assert!((numbers.epsilon - 0.0084).abs() < 1e-5, "{numbers:?}");
     assert!((numbers.lambda - 1.43).abs() < 5e-3, "{numbers:?}");
     assert!((numbers.g - 1.1).abs() < 1e-14, "{numbers:?}");
+    assert_eq!(embedded.controller, ControllerSettings::default());
+    assert_eq!(embedded.record, RecordSettings::default());
 }
 
 #[test]
@@ -43,13 +49,6 @@ fn a_dimensionless_scene_is_its_own_model() {
     assert_eq!((numbers.omega0, numbers.b), (1.0, 1.0));
     assert_eq!((numbers.epsilon, scene.plant.damping), (0.0084, 0.0084 * 1.43));
     assert!((numbers.lambda - 1.43).abs() < 1e-14 && (numbers.g - 1.1).abs() < 1e-14);
-}
-
-#[test]
-fn every_key_of_the_paper_file_has_its_default() {
-    let scene = paper(&[]).unwrap();
-    assert_eq!(scene.controller, vines_testbench::scene::ControllerSettings::default());
-    assert_eq!(scene.record, vines_testbench::scene::RecordSettings::default());
 }
 
 #[test]
@@ -101,7 +100,6 @@ fn a_value_of_the_wrong_type_is_named_with_its_line() {
 
 #[test]
 fn what_is_measured_reaches_theory_and_exact_orbits() {
-    use vines_testbench::scene::{Definition, Reference, Resonance, Sensor};
     assert_eq!(paper(&[]).unwrap().dimensionless().definition, Definition::default());
     let set = [
         "resonance.definition='peak'",
@@ -154,18 +152,24 @@ fn values_that_make_no_sense_are_named_with_unit_and_range() {
             "record.decay_periods=-1",
             ["record.decay_periods = -1 (natural periods)", "must be positive"],
         ),
+        ("chain.adc_bits=40", ["chain.adc_bits", "40"]),
+        ("chain.dac_bits=12", ["chain.dac_bits", "chain.hold"]),
+        ("chain.filter=80.0", ["chain.filter", "80"]),
+        ("chain.jitter=0.5", ["chain.jitter", "0.5"]),
+        ("chain.snr=-100", ["chain.snr", "-100"]),
+        ("chain.response_range=0", ["chain.response_range", "0"]),
+        ("phase_lock.harmonics=99", ["harmonics", "99"]),
+        ("controller.G_max=0.5", ["controller.G_max", "amplitude"]),
+        ("start.dq2=1e300", ["der(q2)", "= 1e300 m/s"]),
     ] {
         says(&complaint(paper(&[argument])), &parts);
     }
 }
 
 #[test]
-fn a_start_on_the_wall_is_allowed() {
-    assert!(paper(&["start.q2=0.01"]).is_ok() && paper(&["start.q2=-0.01"]).is_ok());
-}
-
-#[test]
-fn missing_and_mixed_keys_are_reported() {
+fn a_missing_file_and_missing_and_mixed_keys_are_reported() {
+    let result = Scene::load(Some(Path::new("nowhere/at-all.toml")), &[]);
+    says(&complaint(result), &["nowhere/at-all.toml"]);
     let parse = |text| complaint(Scene::parse("my.toml", text, &[]));
     says(&parse(""), &["my.toml", "[plant] has no", "epsilon"]);
     says(&parse("[plant]\nM = 1\nr = 0.5"), &["[plant] has no `k`"]);
@@ -173,12 +177,6 @@ fn missing_and_mixed_keys_are_reported() {
     let plant = "[plant]\nepsilon = 0.01\nlambda = 1\nr = 0.5\n";
     says(&parse(plant), &["neither of G"]);
     says(&parse(&format!("{plant}[excitation]\nG = 1\nE = 1")), &["both of G"]);
-}
-
-#[test]
-fn a_missing_file_is_named() {
-    let result = Scene::load(Some(Path::new("nowhere/at-all.toml")), &[]);
-    says(&complaint(result), &["nowhere/at-all.toml"]);
 }
 
 #[test]
@@ -212,19 +210,13 @@ fn text_on_the_command_line_needs_no_quotes() {
 }
 
 #[test]
-fn a_scene_is_checked_completely_when_it_is_read() {
-    for (settings, part) in [
-        (&["phase_lock.harmonics=99"][..], "harmonics"),
-        (&["controller.G_max=0.5"], "controller.G_max"),
-        (&["start.dq2=1e300"], "= 1e300 m/s"),
+fn no_damping_no_loss_and_a_start_on_the_wall_are_accepted() {
+    for settings in [
+        &["plant.c=0"][..],
+        &["plant.c=0", "plant.r=1", "excitation.G=0"],
+        &["start.q2=0.01"],
+        &["start.q2=-0.01"],
     ] {
-        says(&complaint(paper(settings)), &[part]);
-    }
-}
-
-#[test]
-fn a_plant_without_damping_is_accepted() {
-    for settings in [&["plant.c=0"][..], &["plant.c=0", "plant.r=1", "excitation.G=0"]] {
         assert!(paper(settings).is_ok(), "{settings:?}");
     }
 }
@@ -289,4 +281,133 @@ fn a_record_too_long_for_the_memory_counts_the_default_time_limit_of_the_lock() 
         &message,
         &["samples_per_period times all periods", "at most 20 million"],
     );
+}
+
+// The settings of the controller: every parameter of its table has a key, and its options are absent, `false` or "none", never 0.
+
+fn config(settings: &[String]) -> Result<Config, String> {
+    let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
+    let scene = paper(&settings).map_err(|error| error.to_string())?;
+    let config = scene.controller_config();
+    config.build().map_err(|error| refusal(&error))?;
+    Ok(config)
+}
+
+/// The parameters whose values differ.
+fn changed(setting: &str) -> Vec<&'static str> {
+    let (before, after) = (config(&[]).unwrap(), config(&[setting.into()]).unwrap());
+    let differ = PARAMETERS.iter().filter(|one| one.get(&before) != one.get(&after));
+    differ.map(|one| one.name).collect()
+}
+
+#[test]
+fn every_parameter_of_the_controller_has_exactly_one_key_of_the_scene() {
+    for parameter in &PARAMETERS {
+        let name = parameter.name;
+        let key = KEYS
+            .iter()
+            .find(|(parameter, _)| *parameter == name)
+            .map(|(_, key)| *key);
+        let value = match (name, parameter.get(&config(&[]).unwrap())) {
+            ("reference_connected", _) => "false".into(),
+            ("phase_target", _) => "-80.0".into(),
+            ("detector", _) => "2".into(),
+            (_, Value::Boolean(one)) => (!one).to_string(),
+            (_, Value::Integer(_)) => "5".into(),
+            ("sample_time", _) => "120.0".into(),
+            ("omega_max", _) => "1.2".into(),
+            ("omega_start", _) => "1.01".into(),
+            ("omega_min", _) => "0.8".into(),
+            ("bandwidth", _) => "0.12".into(),
+            ("amplitude", _) => "1.2".into(),
+            ("amplitude_max", _) => "7.0".into(),
+            ("acquire_timeout", _) => "2500".into(),
+            ("lock.unlock_tolerance" | "lock.coherence_min" | "lock.response_min", _) => "0.3".into(),
+            _ => "3.5".to_owned(),
+        };
+        let setting = key.map_or_else(|| format!("phase_lock.{name}={value}"), |key| format!("{key}={value}"));
+        assert!(changed(&setting).contains(&name), "{setting}: {:?}", changed(&setting));
+        let twice = config(&[format!("phase_lock.{name}={value}")]);
+        assert_eq!(twice.is_err(), key.is_some(), "{name}: {twice:?}");
+    }
+    // Two parameters of one group are set one after the other.
+    let group = [
+        "phase_lock.lock.coherence_min=0.25",
+        "phase_lock.lock.response_min=0.125",
+    ];
+    let config = config(&group.map(String::from)).unwrap();
+    assert_eq!((config.lock.coherence_min, config.lock.response_min), (0.25, 0.125));
+}
+
+#[test]
+fn an_option_of_the_controller_is_switched_off_by_none_or_false_and_not_by_zero() {
+    for (key, name) in [
+        ("controller.C_max", "response_max"),
+        ("phase_lock.base_bandwidth", "base_bandwidth"),
+        ("phase_lock.damping_rate", "damping_rate"),
+    ] {
+        let parameter = Parameter::find(name).unwrap();
+        assert_eq!(parameter.range, Range::Optional);
+        for off in ["'none'", "false"] {
+            let config = config(&[format!("{key}={off}")]).unwrap();
+            assert_eq!(parameter.get(&config), Value::Real(NONE), "{key}={off}");
+        }
+        let refused = config(&[format!("{key}=0")]).unwrap_err();
+        assert!(refused.contains(key.rsplit('.').next().unwrap()), "{refused}");
+        assert!(config(&[format!("{key}=true")]).is_err() && config(&[format!("{key}='off'")]).is_err());
+    }
+}
+
+#[test]
+fn a_stage_of_the_chain_is_switched_off_by_none_or_false_and_not_by_zero() {
+    let chain = |setting: &str| paper(&["chain.hold=true", setting]).map(|scene| scene.chain);
+    for (key, on) in [
+        ("adc_bits", "12"),
+        ("dac_bits", "12"),
+        ("filter", "10.0"),
+        ("snr", "40"),
+    ] {
+        let with = chain(&format!("chain.{key}={on}")).unwrap();
+        for off in ["'none'", "false"] {
+            assert_ne!(chain(&format!("chain.{key}={off}")).unwrap(), with);
+            assert_eq!(
+                chain(&format!("chain.{key}={off}")).unwrap(),
+                chain("chain.delay=0").unwrap()
+            );
+        }
+        // 0 dB is a ratio, 0 bits or a cut-off of 0 are none.
+        let zero = chain(&format!("chain.{key}=0"));
+        assert_eq!(zero.is_err(), key != "snr", "{key}");
+    }
+}
+
+#[test]
+fn a_mistake_in_the_section_of_the_controller_names_the_parameter_and_what_is_allowed() {
+    for (setting, words) in [
+        (
+            "controller.G_max=1.0",
+            ["excitation.G: amplitude = 9.", "amplitude_max is controller.G_max"],
+        ),
+        (
+            "controller.bandwidth=1e300",
+            ["controller.bandwidth = 1e300 (omega0)", "at most 2.274"],
+        ),
+        ("phase_lock.harmonics=9", ["harmonics = 9", "1 to 8"]),
+        ("phase_lock.harmonics=2.5", ["harmonics is a float", "1 to 8"]),
+        ("phase_lock.nothing=1", ["no parameter `nothing`", "base_bandwidth"]),
+        (
+            "phase_lock.omega_min=1.0",
+            ["phase_lock.omega_min", "controller.omega_min"],
+        ),
+        (
+            "phase_lock.base_bandwidth=99.0",
+            [
+                "phase_lock.base_bandwidth: base_bandwidth = 99 rad/s",
+                "bandwidth is controller.bandwidth",
+            ],
+        ),
+    ] {
+        let refused = config(&[setting.into()]).unwrap_err();
+        assert!(words.iter().all(|word| refused.contains(word)), "{setting}: {refused}");
+    }
 }

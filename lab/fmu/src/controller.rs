@@ -1,14 +1,13 @@
 //! A controller that is an FMU: ours, or anybody's with the same variable names.
 
-use std::f64::consts::TAU;
 use std::path::Path;
 
 use fmi::fmi2::instance::Common;
 use phase_lock::{Config, MOVE, PARAMETERS};
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Sensors};
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Sensors, Settling};
 use vines_testbench::scene::Names;
 
-use crate::instance::{Fmu, FmuError, Kind, Named, Reference, names_are_known};
+use crate::instance::{FmiType, Fmu, FmuError, Named, Reference, names_exist};
 
 /// The names of this bench that a scene may map, beside those of the parameters.
 const NAMES: &str = "response, reference, active, omega, E, drive, phase_error, phase_measured, hold_response, \
@@ -16,10 +15,10 @@ const NAMES: &str = "response, reference, active, omega, E, drive, phase_error, 
 
 /// How it is known that the lock has settled.
 enum Settled {
-    /// The controller says so: `settled`.
-    Told(Reference),
-    /// The lab judges, while `locked` is true where the controller has it.
-    Judged(Option<Reference>, Judge),
+    /// The controller reports it: `settled`.
+    Reported(Reference),
+    /// The bench judges, while `locked` is true where the controller has it.
+    Judged(Option<Reference>, Settling),
 }
 
 /// A controller FMU, stepped sample by sample.
@@ -57,9 +56,9 @@ struct ResponseLoop {
 impl ResponseLoop {
     fn of(fmu: &Fmu, names: &Names) -> Result<Option<Self>, FmuError> {
         let reals = std::iter::once("phase_target".to_owned()).chain(moves());
-        let reals = reals.map(|ours| fmu.named(Kind::Real, names, &ours));
+        let reals = reals.map(|ours| fmu.named(FmiType::Real, names, &ours));
         let reals: Option<Vec<Named>> = reals.collect::<Result<_, _>>()?;
-        let hold = fmu.switch(Kind::Boolean, names, "hold_response")?;
+        let hold = fmu.switch(FmiType::Boolean, names, "hold_response")?;
         Ok(reals.zip(hold).map(|(reals, hold)| Self { reals, hold }))
     }
 }
@@ -67,24 +66,24 @@ impl ResponseLoop {
 impl FmuController {
     /// Loads the controller at `path` and initialises it with a configuration.
     pub fn load(path: &Path, config: &Config, names: &Names) -> Result<Self, FmuError> {
-        let parameters = PARAMETERS.iter().map(|one| one.name.to_owned());
-        let known: Vec<String> = std::iter::once(NAMES.to_owned())
+        let parameters = PARAMETERS.iter().map(|parameter| parameter.name.to_owned());
+        let all: Vec<String> = std::iter::once(NAMES.to_owned())
             .chain(parameters)
             .chain(moves())
             .collect();
-        names_are_known(names, &known.join(", "))?;
+        names_exist(names, &all.join(", "))?;
         let mut fmu = Fmu::load(path, "controller")?;
-        let mut sensors = vec![fmu.need_named(Kind::Real, names, "response")?];
-        sensors.extend(fmu.named(Kind::Real, names, "reference")?);
-        let (active, _) = fmu.need_named(Kind::Boolean, names, "active")?;
+        let mut sensors = vec![fmu.need(FmiType::Real, names, "response")?];
+        sensors.extend(fmu.named(FmiType::Real, names, "reference")?);
+        let (active, _) = fmu.need(FmiType::Boolean, names, "active")?;
         let drive = [
-            fmu.need_named(Kind::Real, names, "omega")?,
-            fmu.need_named(Kind::Real, names, "E")?,
+            fmu.need(FmiType::Real, names, "omega")?,
+            fmu.need(FmiType::Real, names, "E")?,
         ];
-        let phase_error = fmu.named(Kind::Real, names, "phase_error")?;
-        let switch = |ours| fmu.switch(Kind::Boolean, names, ours);
+        let phase_error = fmu.named(FmiType::Real, names, "phase_error")?;
+        let switch = |ours| fmu.switch(FmiType::Boolean, names, ours);
         let settled = match (switch("settled")?, switch("locked")?) {
-            (Some(settled), _) => Settled::Told(settled),
+            (Some(settled), _) => Settled::Reported(settled),
             (None, locked) => {
                 if locked.is_none() && phase_error.is_none() {
                     log::warn!(
@@ -92,15 +91,18 @@ impl FmuController {
                         path.display()
                     );
                 }
-                Settled::Judged(locked, Judge::new(config))
+                Settled::Judged(locked, Settling::new(config))
             }
         };
-        let integer = |ours| fmu.switch(Kind::Integer, names, ours);
+        let integer = |ours| fmu.switch(FmiType::Integer, names, ours);
         let states = [integer("state")?, integer("fault")?];
-        let displacement = fmu.named(Kind::Real, names, "drive")?;
+        let displacement = fmu.named(FmiType::Real, names, "drive")?;
         let phase_measured = switch("phase_measured")?;
         let response_loop = ResponseLoop::of(&fmu, names)?;
-        let values: Vec<_> = PARAMETERS.iter().map(|one| (one.name, one.get(config))).collect();
+        let values: Vec<_> = PARAMETERS
+            .iter()
+            .map(|parameter| (parameter.name, parameter.get(config)))
+            .collect();
         fmu.start(names, &values)?;
         Ok(Self {
             sample_time: config.sample_time,
@@ -118,7 +120,7 @@ impl FmuController {
     }
 
     fn optional(&mut self, variable: Option<Named>) -> Result<Option<f64>, FmuError> {
-        let value = variable.map(|one| self.fmu.read("give its outputs", [one]).map(|[x]| x));
+        let value = variable.map(|variable| self.fmu.read("give its outputs", [variable]).map(|[x]| x));
         value.transpose()
     }
 
@@ -130,7 +132,7 @@ impl FmuController {
     }
 
     fn integer(&mut self, reference: Option<Reference>) -> Result<Option<i32>, FmuError> {
-        let value = reference.map(|one| self.fmu.integer("give its outputs", one));
+        let value = reference.map(|variable| self.fmu.integer("give its outputs", variable));
         value.transpose()
     }
 
@@ -142,20 +144,19 @@ impl FmuController {
             .ask("take its inputs", |i| i.set_boolean(&reference, &[active.into()]))?;
         self.fmu.step(self.sample_time)?;
         let [omega, amplitude] = self.fmu.read("give its outputs", self.drive)?;
-        let told = match self.settled {
-            Settled::Told(told) => Some(told),
+        let flag = match self.settled {
+            Settled::Reported(settled) => Some(settled),
             Settled::Judged(locked, _) => locked,
         };
-        let told = told.map(|told| self.boolean(told)).transpose()?;
-        let measured = self.phase_measured.map_or(Ok(true), |one| self.boolean(one))?;
+        let flag = flag.map(|flag| self.boolean(flag)).transpose()?;
+        let measured = self.phase_measured.map_or(Ok(true), |flag| self.boolean(flag))?;
         let phase_error = self.optional(self.phase_error.filter(|_| measured))?;
         let settled = match &mut self.settled {
-            Settled::Told(_) => told == Some(true),
+            Settled::Reported(_) => flag == Some(true),
             Settled::Judged(..) if !active => false,
-            Settled::Judged(_, judge) => {
-                // A phase that cannot be measured now is none to judge by.
-                let locked = told.unwrap_or(true) && measured;
-                judge.sample(omega, phase_error.unwrap_or(0.0), locked)
+            // A phase that cannot be measured now is none to judge by.
+            Settled::Judged(_, settling) => {
+                settling.sample(omega, phase_error.unwrap_or(0.0), flag.unwrap_or(true) && measured)
             }
         };
         Ok(Command {
@@ -205,54 +206,3 @@ impl Controller for FmuController {
 fn moves() -> impl Iterator<Item = String> {
     MOVE.iter().map(|(name, _)| format!("move.{name}"))
 }
-
-/// Frequency and phase error must stay within the criterion of the configuration for its dwell.
-pub(super) struct Judge {
-    /// Largest phase error, rad.
-    phase: f64,
-    /// Largest relative change of the frequency during the dwell.
-    drift: f64,
-    /// Periods.
-    dwell: f64,
-    sample_time: f64,
-    /// Periods for which the conditions have held, and the range of the frequency in them, rad/s.
-    held: f64,
-    range: [f64; 2],
-}
-
-impl Judge {
-    /// By the lock criterion of `config`.
-    pub fn new(config: &Config) -> Self {
-        let dwell = f64::from(config.lock.dwell);
-        Self {
-            phase: config.lock.phase_tolerance,
-            drift: config.lock.frequency_drift * dwell,
-            dwell,
-            sample_time: config.sample_time,
-            held: 0.0,
-            range: [0.0; 2],
-        }
-    }
-
-    /// One sample; `locked` as the controller says, `phase_error` in rad.
-    pub fn sample(&mut self, omega: f64, phase_error: f64, locked: bool) -> bool {
-        let [low, high] = [self.range[0].min(omega), self.range[1].max(omega)];
-        let steady = high - low <= self.drift * omega && phase_error.abs() <= self.phase;
-        if locked && steady && self.held > 0.0 {
-            self.range = [low, high];
-            self.held += omega * self.sample_time / TAU;
-        } else {
-            self.range = [omega; 2];
-            self.held = if locked && phase_error.abs() <= self.phase {
-                f64::MIN_POSITIVE
-            } else {
-                0.0
-            };
-        }
-        self.held >= self.dwell
-    }
-}
-
-#[cfg(test)]
-#[path = "../tests/unit/controller.rs"]
-mod tests;

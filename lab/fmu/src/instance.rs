@@ -13,88 +13,58 @@ use thiserror::Error;
 use vines_testbench::rig::{ControllerError, RigError};
 use vines_testbench::scene::{Name, Names};
 
-/// Reason why a file cannot be loaded as an FMU.
-#[derive(Debug, Error)]
-#[expect(missing_docs, reason = "the messages explain the variants")]
-pub enum LoadError {
-    #[error("the file is not an FMU, which is a zip archive: {0}")]
-    Archive(String),
-    #[error("modelDescription.xml: {0}")]
-    Description(fmi::schema::Error),
-    #[error("the FMU has FMI version {0}; version 2.0 is needed")]
-    Version(String),
-    #[error("the FMU does not support co-simulation")]
-    NoCoSimulation,
-    #[error("FMUs of FMI 2.0 cannot be loaded on {os} with the processor {architecture}")]
-    Platform { os: String, architecture: String },
-    #[error("the FMU has no library for this platform ({})", .0.display())]
-    NoLibrary(PathBuf),
-    #[error("the FMU cannot be instantiated; its own message has been logged")]
-    Instantiate,
-    #[error("the library of the FMU cannot be loaded: {0}")]
-    Library(fmi::Error),
-    #[error(transparent)]
-    Fmi(fmi::Error),
-}
-
-impl From<fmi::Error> for LoadError {
-    fn from(error: fmi::Error) -> Self {
-        use fmi::Error;
-        match error {
-            Error::Zip(source) => Self::Archive(source.to_string()),
-            Error::ArchiveStructure(text) => Self::Archive(text),
-            Error::Schema(source) => Self::Description(source),
-            Error::UnsupportedFmuType(_) => Self::NoCoSimulation,
-            Error::UnsupportedPlatform { os, arch } => Self::Platform { os, architecture: arch },
-            Error::Instantiation => Self::Instantiate,
-            Error::LibLoading { .. } => Self::Library(error),
-            _ => Self::Fmi(error),
-        }
-    }
-}
-
-/// Status of a call that failed (FMI 2.0, clause 2.1.3).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[expect(missing_docs, reason = "the messages explain the variants")]
-pub enum CallError {
-    #[error("the FMU discarded the call (fmi2Discard)")]
-    Discard,
-    #[error("the FMU reported an error (fmi2Error)")]
-    Error,
-    #[error("the FMU reported a fatal error (fmi2Fatal)")]
-    Fatal,
-}
-
-impl From<Fmi2Error> for CallError {
-    fn from(error: Fmi2Error) -> Self {
-        match error {
-            Fmi2Error::Discard => Self::Discard,
-            Fmi2Error::Error => Self::Error,
-            // The other one, a wrong `fmi2GetTypesPlatform`, is not a status: the bench does not call that function.
-            Fmi2Error::Fatal | Fmi2Error::TypesPlatformMismatch(_) => Self::Fatal,
-        }
-    }
-}
-
 /// Reason why an FMU cannot be used, or cannot continue.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum FmuError {
-    #[error("cannot load {}: {source}", path.display())]
-    Load { path: PathBuf, source: LoadError },
+    #[error("cannot load {}: {reason}", path.display())]
+    Load { path: PathBuf, reason: String },
     #[error("{} has no {kind:?} variable `{name}`, which the bench needs; [rig.names] and [controller_names] of the scene map names", path.display())]
-    Variable { path: PathBuf, kind: Kind, name: String },
+    Variable { path: PathBuf, kind: FmiType, name: String },
     #[error(
-        "[rig.names] or [controller_names] of the scene maps `{name}`, which this bench does not have; it has: {known}"
+        "[rig.names] or [controller_names] of the scene maps `{name}`, which this bench does not have; it has: {names}"
     )]
-    Name { name: String, known: String },
-    #[error("{} refused to {action} at t = {time} s: {source}", path.display())]
+    Name { name: String, names: String },
+    #[error("{} refused to {action} at t = {time} s: the FMU {reason}", path.display())]
     Refused {
         path: PathBuf,
         action: &'static str,
         time: f64,
-        source: CallError,
+        reason: &'static str,
     },
+}
+
+/// Why a file cannot be loaded, in words.
+fn reason(error: fmi::Error) -> String {
+    use fmi::Error;
+    match error {
+        Error::Zip(source) => not_an_archive(&source.to_string()),
+        Error::ArchiveStructure(text) => not_an_archive(&text),
+        Error::Schema(source) => format!("modelDescription.xml: {source}"),
+        Error::UnsupportedFmuType(_) => NO_CO_SIMULATION.into(),
+        Error::UnsupportedPlatform { os, arch } => {
+            format!("FMUs of FMI 2.0 cannot be loaded on {os} with the processor {arch}")
+        }
+        Error::Instantiation => "the FMU cannot be instantiated; its own message has been logged".into(),
+        Error::LibLoading { .. } => format!("the library of the FMU cannot be loaded: {error}"),
+        _ => error.to_string(),
+    }
+}
+
+const NO_CO_SIMULATION: &str = "the FMU does not support co-simulation";
+
+fn not_an_archive(text: &str) -> String {
+    format!("the file is not an FMU, which is a zip archive: {text}")
+}
+
+/// What the status of a call that failed means (FMI 2.0, clause 2.1.3).
+fn status(error: &Fmi2Error) -> &'static str {
+    match error {
+        Fmi2Error::Discard => "discarded the call (fmi2Discard)",
+        Fmi2Error::Error => "reported an error (fmi2Error)",
+        // The other one, a wrong `fmi2GetTypesPlatform`, is not a status: the bench does not call that function.
+        Fmi2Error::Fatal | Fmi2Error::TypesPlatformMismatch(_) => "reported a fatal error (fmi2Fatal)",
+    }
 }
 
 impl From<FmuError> for RigError {
@@ -112,13 +82,13 @@ impl From<FmuError> for ControllerError {
 /// Type of a variable in FMI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[expect(missing_docs, reason = "the names are those of the standard")]
-pub enum Kind {
+pub enum FmiType {
     Real,
     Integer,
     Boolean,
 }
 
-impl Kind {
+impl FmiType {
     /// The type of a variable, if it is one of the three.
     fn of(element: &ScalarVariableElement) -> Option<Self> {
         match element {
@@ -130,7 +100,7 @@ impl Kind {
     }
 }
 
-impl From<Value> for Kind {
+impl From<Value> for FmiType {
     fn from(value: Value) -> Self {
         match value {
             Value::Real(_) => Self::Real,
@@ -159,41 +129,35 @@ pub(super) struct Fmu {
 impl Fmu {
     /// Loads the FMU at `path`; `name` is its name in log messages.
     pub fn load(path: &Path, name: &str) -> Result<Self, FmuError> {
-        let (import, instance) = open(path, name).map_err(|source| FmuError::Load { path: path.into(), source })?;
+        let (import, instance) = open(path, name).map_err(|reason| FmuError::Load { path: path.into(), reason })?;
         Ok(Self { instance, import, path: path.into(), time: 0.0 })
     }
 
-    /// The variable of that name and kind, if there is one.
-    pub fn find(&self, kind: Kind, name: &str) -> Option<Reference> {
-        let variables = &self.import.model_description().model_variables.variables;
-        let variable = variables.iter().find(|variable| variable.name == name)?;
-        (Kind::of(&variable.elem) == Some(kind)).then_some(variable.value_reference)
-    }
-
-    /// The variable of that name and kind.
-    pub fn need(&self, kind: Kind, name: &str) -> Result<Reference, FmuError> {
-        self.find(kind, name)
-            .ok_or_else(|| FmuError::Variable { path: self.path.clone(), kind, name: name.into() })
-    }
-
-    /// The variable that `names` has for `ours`, and its factor. A name that the user gave must exist.
-    pub fn named(&self, kind: Kind, names: &Names, ours: &str) -> Result<Option<Named>, FmuError> {
+    /// The variable of this type that `names` has for `ours`, and its factor. A name that the user gave must exist.
+    pub fn named(&self, kind: FmiType, names: &Names, ours: &str) -> Result<Option<Named>, FmuError> {
         let Name { name, factor } = names.of(ours);
-        match names.mapped(ours) {
-            Some(_) => self.need(kind, &name).map(|reference| Some((reference, factor))),
-            None => Ok(self.find(kind, &name).map(|reference| (reference, factor))),
+        let variables = &self.import.model_description().model_variables.variables;
+        let variable = variables
+            .iter()
+            .find(|variable| variable.name == name && FmiType::of(&variable.elem) == Some(kind));
+        match variable {
+            None if names.mapped(ours).is_some() => Err(self.missing(kind, &name)),
+            variable => Ok(variable.map(|variable| (variable.value_reference, factor))),
         }
     }
 
-    /// The same for a variable without a unit.
-    pub fn switch(&self, kind: Kind, names: &Names, ours: &str) -> Result<Option<Reference>, FmuError> {
+    /// The reference of a variable without a unit, if there is one.
+    pub fn switch(&self, kind: FmiType, names: &Names, ours: &str) -> Result<Option<Reference>, FmuError> {
         Ok(self.named(kind, names, ours)?.map(|(reference, _)| reference))
     }
 
-    /// The same for a variable that the bench needs.
-    pub fn need_named(&self, kind: Kind, names: &Names, ours: &str) -> Result<Named, FmuError> {
-        let missing = || FmuError::Variable { path: self.path.clone(), kind, name: ours.into() };
-        self.named(kind, names, ours)?.ok_or_else(missing)
+    /// A variable that the bench needs.
+    pub fn need(&self, kind: FmiType, names: &Names, ours: &str) -> Result<Named, FmuError> {
+        self.named(kind, names, ours)?.ok_or_else(|| self.missing(kind, ours))
+    }
+
+    fn missing(&self, kind: FmiType, name: &str) -> FmuError {
+        FmuError::Variable { path: self.path.clone(), kind, name: name.into() }
     }
 
     /// Sets the values that the FMU has variables for, and initialises it at time 0. A warning in the log names the
@@ -267,34 +231,35 @@ impl Fmu {
             path: self.path.clone(),
             action,
             time: self.time,
-            source: error.into(),
+            reason: status(&error),
         })
     }
 }
 
-/// Refuses names in the scene that are not among `known`, separated by commas.
-pub(super) fn names_are_known(names: &Names, known: &str) -> Result<(), FmuError> {
-    let list: Vec<&str> = known.split(", ").collect();
-    names.unknown(&list).map_or(Ok(()), |name| {
-        Err(FmuError::Name { name: name.into(), known: known.into() })
+/// Refuses names in the scene that are not among `names`, separated by commas.
+pub(super) fn names_exist(mapped: &Names, names: &str) -> Result<(), FmuError> {
+    let list: Vec<&str> = names.split(", ").collect();
+    mapped.unknown(&list).map_or(Ok(()), |name| {
+        Err(FmuError::Name { name: name.into(), names: names.into() })
     })
 }
 
 /// Unpacks the FMU at `path` and instantiates it for co-simulation, with logging on.
-fn open(path: &Path, name: &str) -> Result<(Fmi2Import, InstanceCS), LoadError> {
+fn open(path: &Path, name: &str) -> Result<(Fmi2Import, InstanceCS), String> {
     // The crate would report another version as an error of the XML.
-    let version = fmi::import::peek_descr_path(path)?.fmi_version;
+    let version = fmi::import::peek_descr_path(path).map_err(reason)?.fmi_version;
     if version != "2.0" {
-        return Err(LoadError::Version(version));
+        return Err(format!("the FMU has FMI version {version}; version 2.0 is needed"));
     }
-    let import: Fmi2Import = fmi::import::from_path(path)?;
+    let import: Fmi2Import = fmi::import::from_path(path).map_err(reason)?;
     let co_simulation = import.model_description().co_simulation.as_ref();
-    let identifier = &co_simulation.ok_or(LoadError::NoCoSimulation)?.model_identifier;
-    let library = import.shared_lib_path(identifier)?;
+    let identifier = &co_simulation.ok_or(NO_CO_SIMULATION)?.model_identifier;
+    let library = import.shared_lib_path(identifier).map_err(reason)?;
     if !import.archive_path().join(&library).is_file() {
-        return Err(LoadError::NoLibrary(library));
+        let library = library.display();
+        return Err(format!("the FMU has no library for this platform ({library})"));
     }
-    let instance = import.instantiate_cs(name, false, true)?;
+    let instance = import.instantiate_cs(name, false, true).map_err(reason)?;
     Ok((import, instance))
 }
 
@@ -315,5 +280,16 @@ pub fn check(path: &Path) -> Result<(), String> {
 }
 
 #[cfg(test)]
-#[path = "../tests/unit/instance.rs"]
-mod tests;
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_not_an_archive_is_refused() {
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"));
+        let message = Fmu::load(path, "rig").err().unwrap().to_string();
+        assert!(
+            message.contains("Cargo.toml") && message.contains("zip archive"),
+            "{message}"
+        );
+    }
+}

@@ -8,5 +8,5 @@ mod instance;
 mod rig;
 
 pub use controller::FmuController;
-pub use instance::{CallError, FmuError, Kind, LoadError, check};
+pub use instance::{FmiType, FmuError, check};
 pub use rig::FmuRig;

@@ -14,9 +14,9 @@ const MAX_PACKET: usize = 1472;
 pub(crate) const HARMONICS: usize = 16;
 /// Number of coefficients of a Fourier series: mean, cosines, sines.
 pub(crate) const COEFFICIENTS: usize = 2 * HARMONICS + 1;
-
-/// Length of magic, type, sequence and length.
+/// Length of magic, type, sequence and length of a frame, bytes.
 const HEADER: usize = 6;
+/// Length of everything before the records of a packet, bytes.
 const PACKET_HEADER: usize = 20;
 /// "CCITT-FALSE": polynomial 0x1021, initial value 0xffff.
 const CHECKSUM: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
@@ -37,33 +37,25 @@ pub mod message {
     pub const ERROR: u8 = 255;
 }
 
-/// Why a device refuses a request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[expect(missing_docs, reason = "the messages explain the variants")]
+/// Why a device refuses a request, with the numbers of the protocol.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names of the protocol")]
 pub enum ErrorCode {
-    #[error("bad frame")]
     BadFrame = 1,
-    #[error("unknown type of request")]
-    UnknownType = 2,
-    #[error("bad index of a parameter")]
-    BadIndex = 3,
-    #[error("bad length")]
-    BadLength = 4,
-    #[error("the parameter is read-only")]
-    ReadOnly = 5,
-    #[error("bad value")]
-    BadValue = 6,
-    #[error("the device is busy")]
-    Busy = 7,
+    UnknownType,
+    BadIndex,
+    BadLength,
+    ReadOnly,
+    BadValue,
+    Busy,
 }
 
 impl ErrorCode {
     /// The error with a number.
     pub fn of_number(number: u8) -> Option<Self> {
         use ErrorCode::{BadFrame, BadIndex, BadLength, BadValue, Busy, ReadOnly, UnknownType};
-        [BadFrame, UnknownType, BadIndex, BadLength, ReadOnly, BadValue, Busy]
-            .into_iter()
-            .find(|code| *code as u8 == number)
+        let all = [BadFrame, UnknownType, BadIndex, BadLength, ReadOnly, BadValue, Busy];
+        all.into_iter().find(|code| *code as u8 == number)
     }
 }
 
@@ -79,10 +71,7 @@ pub(crate) fn take<const N: usize>(bytes: &mut &[u8]) -> Result<[u8; N], Malform
     Ok(*first)
 }
 
-/// Takes the text up to its NUL.
-///
-/// # Errors
-/// Text without an end, or not ASCII.
+/// Takes the ASCII text up to its NUL.
 pub fn take_text(bytes: &mut &[u8]) -> Result<String, Malformed> {
     let end = bytes.iter().position(|byte| *byte == 0).ok_or(Malformed)?;
     let (text, rest) = bytes.split_at(end);
@@ -144,8 +133,8 @@ impl Frame {
         bytes
     }
 
-    /// The frame at the beginning of `bytes` and its length, or None if more bytes are needed.
-    pub fn decode(bytes: &[u8]) -> Result<Option<(Self, usize)>, Malformed> {
+    /// Takes the first frame from the bytes that a connection has received; None if more bytes are needed.
+    pub fn take(bytes: &mut Vec<u8>) -> Result<Option<Self>, Malformed> {
         if !MAGIC.starts_with(&bytes[..bytes.len().min(2)]) {
             return Err(Malformed);
         }
@@ -162,17 +151,9 @@ impl Frame {
         if crc16(&bytes[2..HEADER + length]).to_le_bytes() != checksum {
             return Err(Malformed);
         }
-        let payload = rest[..length].to_vec();
-        let frame = Self { kind: header[2], sequence: header[3], payload };
-        Ok(Some((frame, HEADER + length + 2)))
-    }
-
-    /// Takes the first frame from the bytes that a connection has received; None if more bytes are needed.
-    pub(crate) fn take(bytes: &mut Vec<u8>) -> Result<Option<Self>, Malformed> {
-        Ok(Self::decode(bytes)?.map(|(frame, length)| {
-            bytes.drain(..length);
-            frame
-        }))
+        let (kind, sequence, payload) = (header[2], header[3], rest[..length].to_vec());
+        bytes.drain(..HEADER + length + 2);
+        Ok(Some(Self { kind, sequence, payload }))
     }
 }
 
@@ -208,13 +189,9 @@ impl Packet {
     pub fn encode(&self) -> Vec<u8> {
         let Self { sequence, first, dropped, decimation, width, values } = self;
         let records = (values.len() / usize::from(*width).max(1)) as u16;
-        let mut bytes = [&MAGIC[..], &[VERSION, *width]].concat();
-        bytes.extend(
-            [sequence, first, dropped]
-                .into_iter()
-                .flat_map(|word| word.to_le_bytes()),
-        );
-        bytes.extend([*decimation, records].into_iter().flat_map(u16::to_le_bytes));
+        let words = [sequence, first, dropped].map(|word| word.to_le_bytes()).concat();
+        let halves = [*decimation, records].map(u16::to_le_bytes).concat();
+        let mut bytes = [&MAGIC[..], &[VERSION, *width], &words, &halves].concat();
         bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
         bytes
     }
@@ -250,21 +227,19 @@ pub struct Status {
 impl Status {
     /// The payload.
     pub fn encode(&self) -> Vec<u8> {
-        let Self { version, parameters, sources, sample_rate, uptime } = self;
-        let mut bytes = vec![*version];
-        bytes.extend(parameters.to_le_bytes());
-        bytes.push(*sources);
-        bytes.extend([sample_rate.to_le_bytes(), uptime.to_le_bytes()].concat());
-        bytes
+        let [low, high] = self.parameters.to_le_bytes();
+        let head = [self.version, low, high, self.sources];
+        [head, self.sample_rate.to_le_bytes(), self.uptime.to_le_bytes()].concat()
     }
 
     /// Reads a payload.
     pub fn decode(mut payload: &[u8]) -> Result<Self, Malformed> {
         let bytes = &mut payload;
+        let [version, low, high, sources] = take(bytes)?;
         let status = Self {
-            version: take::<1>(bytes)?[0],
-            parameters: u16::from_le_bytes(take(bytes)?),
-            sources: take::<1>(bytes)?[0],
+            version,
+            parameters: u16::from_le_bytes([low, high]),
+            sources,
             sample_rate: f32::from_le_bytes(take(bytes)?),
             uptime: u32::from_le_bytes(take(bytes)?),
         };

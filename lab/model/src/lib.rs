@@ -6,6 +6,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod curves;
 mod definition;
 mod dimensionless;
 pub mod map;

@@ -3,13 +3,10 @@
 //! A plant is driven at a fixed frequency from a start until its regime is decided: by a motion that repeats itself or, after the largest
 //! number of periods, by its largest Lyapunov exponent. Where several regimes are stable, another start may lead to another regime.
 //!
-//! States are compared at half periods of the base, because a symmetric motion is its own mirror image half a period later. A motion
-//! repeats if all states of a window at its end agree with the states one repetition before.
+//! States are compared at the beginning of every period of the base. A motion repeats if all states of a window at its end agree with the states
+//! one repetition before.
 
-mod disturbance;
-
-use std::cell::OnceCell;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::sync::{
     Arc,
     atomic::{AtomicBool, Ordering::Relaxed},
@@ -18,9 +15,9 @@ use std::sync::{
 use lovines::{Drive, Event, InvalidValue, Plant, State};
 use serde::Serialize;
 
-use self::disturbance::{Disturbance, Driven, Moment};
 use crate::Dimensionless;
 use crate::numerics::{SIGNIFICANT, mean, standard_deviation};
+use crate::orbit::oscillator::ForcedOscillator;
 use crate::orbit::{Periodic, periodic_near};
 use crate::regime::{Impact, Regime, synchrony};
 
@@ -42,8 +39,8 @@ pub fn observe(scene: &Dimensionless, sigma: f64, start: [f64; 4], limit: usize)
     Run::new(scene, sigma, start)?.decided(0, limit)
 }
 
-/// Difference of the starts of motions that must agree: far above rounding, and chaos
-/// magnifies it to order one in ln(1e9) = 21 Lyapunov times.
+/// Distance between the starts of motions that must agree: far above rounding, and magnified by chaos to order one in ln(1e9) = 21 Lyapunov
+/// times.
 const APART: f64 = 1e-9;
 /// Transient, periods, from which on it may be chaos that ends at random: on the default scene,
 /// the free motion of the primary mass decays by exp(pi epsilon lambda 500) = e^19 within it.
@@ -99,7 +96,7 @@ pub struct RegimeResult {
     pub impacts_per_period: f64,
     /// Impacts of one repetition; 0 if nothing repeats.
     pub impacts: usize,
-    /// Periods of the base that it takes; 0 likewise.
+    /// Periods of the base that one repetition takes; 0 if nothing repeats.
     pub periods: u32,
     /// How often the particle comes to rest on a wall, per period of the base.
     pub sticks_per_period: f64,
@@ -118,19 +115,8 @@ pub struct Run {
     /// Its caches are large.
     plant: Box<Plant>,
     drive: Drive,
-    driven: Driven,
-    /// Periods so far.
-    periods: usize,
-    /// The motion at the start, after every event, and wherever it was examined.
-    moments: Vec<Moment>,
-    /// States at the beginning of every half period and now, as far as they were needed.
-    states: Vec<OnceCell<[f64; 4]>>,
-    disturbance: Disturbance,
-    /// Period in which the disturbance begins, and the number of moments that it has passed.
-    begun: usize,
-    passed: usize,
-    /// Growth of the disturbance over each period, as a natural logarithm; a period without impacts may belong to the next one.
-    growth: Vec<f64>,
+    /// (q1, q1', q2, q2') at the beginning of every period, and now.
+    states: Vec<[f64; 4]>,
     impacts: Vec<Impact>,
     /// Phases of the base at which the particle came to rest, rad.
     sticks: Vec<f64>,
@@ -143,23 +129,12 @@ impl Run {
     /// # Errors
     /// Invalid parameters or an invalid start.
     pub fn new(scene: &Dimensionless, sigma: f64, start: [f64; 4]) -> Result<Self, InvalidValue> {
-        let drive = scene.drive(sigma);
-        let plant = Box::new(scene.plant(start)?);
-        let driven = Driven::new(scene, drive.omega);
-        let moments = vec![driven.moment(0.0, plant.state(), plant.contact())];
         Ok(Self {
             scene: *scene,
             sigma,
-            plant,
-            drive,
-            driven,
-            periods: 0,
-            moments,
-            states: vec![OnceCell::from(start)],
-            disturbance: Disturbance::default(),
-            begun: usize::MAX,
-            passed: 0,
-            growth: Vec::new(),
+            plant: Box::new(scene.plant(start)?),
+            drive: scene.drive(sigma),
+            states: vec![start],
             impacts: Vec::new(),
             sticks: Vec::new(),
             stop: Arc::default(),
@@ -180,130 +155,110 @@ impl Run {
         let mut periods = first.max(FIRST).min(limit);
         loop {
             self.follow(periods)?;
-            if let Some(result) = self.lasting() {
+            if let Some(result) = self.lasting()? {
                 return Ok(result);
             }
             if periods >= limit {
-                return Ok(self.irregular());
+                return self.irregular();
             }
             periods = (periods + periods / 4).min(limit);
         }
     }
 
-    /// Half periods so far.
-    fn halves(&self) -> usize {
-        2 * self.periods
+    /// Periods so far.
+    fn periods(&self) -> usize {
+        self.states.len() - 1
     }
 
-    /// (q1, q1', q2, q2') at the beginning of half period `n`.
-    fn state(&self, n: usize) -> [f64; 4] {
-        *self.states[n].get_or_init(|| {
-            let phase = PI * n as f64;
-            let after = self.moments.partition_point(|one| one.phase <= phase);
-            self.driven.state(&self.moments[after - 1], phase)
-        })
-    }
-
-    /// Number of impacts before half period `n`, and of times that the particle came to rest.
+    /// Number of impacts before period `n`, and of times that the particle came to rest.
     fn counts(&self, n: usize) -> [usize; 2] {
-        let phase = PI * n as f64;
+        let phase = TAU * n as f64;
         [
             self.impacts.partition_point(|one| one.time < phase),
             self.sticks.partition_point(|one| *one < phase),
         ]
     }
 
-    /// Follows the motion to the end of period `periods`, in steps of the plant of at most [`STRETCH`].
+    /// Follows the motion to the end of period `periods`.
     fn follow(&mut self, periods: usize) -> Result<(), InvalidValue> {
-        if periods <= self.periods {
-            return Ok(());
-        }
-        let (start, end) = (TAU * self.periods as f64, TAU * periods as f64);
         let omega = self.drive.omega;
-        let Self { driven, moments, impacts, sticks, stop, .. } = self;
+        let Self { plant, states, impacts, sticks, stop, .. } = self;
         let stopped = || {
             if stop.load(Relaxed) {
                 std::panic::resume_unwind(Box::new("the motion was stopped"));
             }
         };
-        let mut now = moments[moments.len() - 1];
-        let duration = (end - start) / omega;
-        let stretches = (duration / STRETCH).ceil().max(1.0);
-        for stretch in 0..stretches as u64 {
-            stopped();
-            let from = start + (end - start) * (stretch as f64 / stretches);
-            self.plant.advance_with(self.drive, duration / stretches, |event| {
+        let steps = (TAU / (omega * STRETCH)).ceil() as u64;
+        while states.len() <= periods {
+            for step in 0..steps {
                 stopped();
-                let phase = from + omega * event.time();
-                now = driven.after(&now, phase, &event);
-                moments.push(now);
-                match event {
-                    Event::Impact { velocity, .. } => impacts.push(Impact { time: phase, velocity }),
-                    Event::Stuck { .. } => sticks.push(phase),
-                    _ => {}
-                }
-            })?;
+                let from = TAU * ((states.len() - 1) as f64 + step as f64 / steps as f64);
+                plant.advance_with(self.drive, TAU / (omega * steps as f64), |event| {
+                    stopped();
+                    let time = from + omega * event.time();
+                    match event {
+                        Event::Impact { velocity, .. } => impacts.push(Impact { time, velocity }),
+                        Event::Stuck { .. } => sticks.push(time),
+                        _ => {}
+                    }
+                })?;
+            }
+            states.push(numbers(&plant.state()));
         }
-        moments.push(driven.moment(end, self.plant.state(), self.plant.contact()));
-        let State { q1, dq1, q2, dq2 } = self.plant.state();
-        self.periods = periods;
-        self.states.resize_with(2 * periods, OnceCell::new);
-        self.states.push(OnceCell::from([q1, dq1, q2, dq2]));
         Ok(())
     }
 
-    /// Growth of the disturbance over each period from the period `from` on. It begins before that, to find its direction.
-    fn growth(&mut self, from: usize) -> &[f64] {
-        if from < self.begun {
-            let phase = TAU * (0.75 * from as f64);
-            self.passed = self.moments.partition_point(|one| one.phase < phase);
-            (self.begun, self.disturbance) = (from, Disturbance::default());
-        }
-        self.growth.resize(self.periods, 0.0);
-        let mut period = ((self.moments[self.passed].phase / TAU) as usize).min(self.periods - 1);
-        for pair in self.moments[self.passed..].windows(2) {
-            self.disturbance.flow(&self.driven, &pair[0], &pair[1]);
-            let now = ((pair[1].phase / TAU) as usize).min(self.periods);
-            if now > period {
-                self.growth[period] = self.disturbance.growth();
-                period = now;
-            }
-            self.disturbance.jump(&self.driven, &pair[1]);
-        }
-        self.passed = self.moments.len() - 1;
-        &self.growth[from..]
-    }
-
-    /// Distance between the state at half period `n` and the one `count` half periods earlier, or its mirror image.
+    /// Distance between the state at the beginning of period `n` and the one `count` periods earlier.
     fn distance(&self, n: usize, count: usize) -> f64 {
-        let sign = if count % 2 == 1 { -1.0 } else { 1.0 };
-        let (now, then) = (self.state(n), self.state(n - count));
-        let differences = now.iter().zip(then).map(|(a, b)| (sign * a - b).abs());
-        // Nothing is near a value that cannot be computed: the steady response at an undamped resonance.
-        differences.fold(0.0, |largest, one| if one <= largest { largest } else { one })
+        let differences = self.states[n]
+            .iter()
+            .zip(&self.states[n - count])
+            .map(|(a, b)| (a - b).abs());
+        differences.fold(0.0, f64::max)
     }
 
-    /// Largest Lyapunov exponent per period from half period `from` on, and its standard error by batch means: as many batches as each
-    /// has periods.
-    fn exponent(&mut self, from: usize) -> (f64, f64) {
-        let growth = self.growth(from / 2);
+    /// Number of the last periods that show whether disturbances grow: all but the first third, as far as they are needed.
+    fn observed(&self) -> usize {
+        (self.periods() - self.periods() / 3).min(OBSERVED)
+    }
+
+    /// Largest Lyapunov exponent per period, and its standard error by batch means: as many batches as each has periods. A second plant begins
+    /// every period next to the first one, in the direction in which the last period has left it.
+    fn exponent(&self) -> Result<(f64, f64), InvalidValue> {
+        let states = &self.states[self.periods() - self.observed()..];
+        let (mut plant, mut apart) = (self.scene.plant(states[0])?, [0.5 * BESIDE; 4]);
+        plant.begin(self.drive)?;
+        let mut growth = Vec::with_capacity(states.len());
+        for pair in states.windows(2) {
+            // Next to a wall, one side is outside the cavity.
+            let beside = |sign: f64| state(std::array::from_fn(|n| pair[0][n] + sign * apart[n]));
+            if plant.set_state(beside(1.0)).is_err() {
+                plant.set_state(beside(-1.0))?;
+            }
+            plant.advance(self.drive, TAU / self.drive.omega)?;
+            let there = numbers(&plant.state());
+            let after: [f64; 4] = std::array::from_fn(|n| there[n] - pair[1][n]);
+            let size = after.iter().map(|one| one * one).sum::<f64>().sqrt().max(f64::EPSILON);
+            growth.push((size / BESIDE).ln());
+            apart = after.map(|one| one * (BESIDE / size));
+        }
         let length = ((growth.len() as f64).sqrt() as usize).max(1);
         let batches: Vec<f64> = growth
             .chunks_exact(length)
             .map(|batch| mean(batch.iter().copied()))
             .collect();
         let error = standard_deviation(&batches) / (batches.len() as f64).sqrt();
-        (mean(batches.iter().copied()), error)
+        Ok((mean(batches.iter().copied()), error))
     }
 
-    /// The result without recurrence and exponent, averaged over the half periods from `from` on.
+    /// The result without recurrence and exponent, averaged over the periods from `from` on.
     fn result(&self, regime: Regime, from: usize) -> RegimeResult {
-        let periods = 0.5 * (self.halves() - from) as f64;
-        let [[before, rested], [all, rests]] = [self.counts(from), self.counts(self.halves())];
+        let periods = (self.periods() - from) as f64;
+        let [[before, rested], [all, rests]] = [self.counts(from), self.counts(self.periods())];
         RegimeResult {
             regime,
-            followed: self.halves() / 2,
-            transient: 0.5 * from as f64,
+            followed: self.periods(),
+            transient: from as f64,
             recurrence: None,
             exponent: None,
             exponent_error: None,
@@ -312,17 +267,29 @@ impl Run {
             impacts: 0,
             periods: 0,
             sticks_per_period: (rests - rested) as f64 / periods,
-            state: self.state(self.halves()),
+            state: self.states[self.periods()],
         }
     }
 }
 
+fn numbers(state: &State) -> [f64; 4] {
+    [state.q1, state.dq1, state.q2, state.dq2]
+}
+
+fn state([q1, dq1, q2, dq2]: [f64; 4]) -> State {
+    State { q1, dq1, q2, dq2 }
+}
+
+/// Distance of the second plant that shows the Lyapunov exponent: far above rounding, far below what separates two motions.
+const BESIDE: f64 = 1e-8;
+/// Largest number of periods over which it is followed: an exponent of zero is then known to [`ZERO`].
+const OBSERVED: usize = 5000;
 /// Differences of states (q1/b, q1'/(b omega0), ...) below which a motion may be on its way to a periodic one.
 const NEAR: f64 = 1e-2;
 /// Differences below which it repeats: far above rounding, far below what separates two motions.
 const SAME: f64 = 1e-6;
-/// Longest repetition in the search, half periods. The window is a third of it, and at least two repetitions.
-const REPETITION: usize = 192;
+/// Longest repetition in the search, periods. The window is a third of it, and at least two repetitions.
+const REPETITION: usize = 96;
 /// Largest uncertainty of an exponent that is called zero, per period.
 const ZERO: f64 = 2e-3;
 /// Share of captured impacts from which a chaotic motion is called modulated.
@@ -330,46 +297,49 @@ const CAPTURES: f64 = 0.2;
 
 impl Run {
     /// The regime, if the motion so far shows one that lasts: no impacts, or a stable periodic motion.
-    fn lasting(&mut self) -> Option<RegimeResult> {
-        self.without_impacts().or_else(|| self.periodic())
+    fn lasting(&self) -> Result<Option<RegimeResult>, InvalidValue> {
+        match self.without_impacts() {
+            None => self.periodic(),
+            result => Ok(result),
+        }
     }
 
     /// The particle rests, and the primary mass cannot reach it: the free part of its motion only decays.
     fn without_impacts(&self) -> Option<RegimeResult> {
-        let n = self.halves();
-        let [q1, dq1, q2, dq2] = self.state(n);
-        let reach = self.driven.reach(PI * n as f64, [q1, dq1]);
+        let n = self.periods();
+        let [q1, dq1, q2, dq2] = self.states[n];
+        let oscillator = ForcedOscillator::new(&self.scene, self.drive.omega, self.scene.g);
+        let [steady, velocity] = oscillator.harmonic(0.0).into();
+        let reach = (q1 - steady).hypot(dq1 - velocity) + oscillator.acceleration() / self.drive.omega.powi(2);
         (dq2 == 0.0 && reach + q2.abs() < 1.0).then(|| {
-            let last = self.impacts.last().map_or(0.0, |impact| impact.time / PI);
+            let last = self.impacts.last().map_or(0.0, |impact| impact.time / TAU);
             self.result(Regime::NoImpacts, (last.ceil() as usize).min(n - 1))
         })
     }
 
     /// The motion repeats and its exponent is negative. The multipliers of an exact orbit close by give the exponent before the motion
-    /// has settled; without such an orbit (the particle sticks, or there are very many impacts), the linearised disturbance gives it.
-    fn periodic(&mut self) -> Option<RegimeResult> {
-        let n = self.halves();
-        let (count, recurrence) = self.recurrence()?;
-        let orbit = periodic_near(&self.scene, self.sigma, 0.0, self.state(n));
+    /// has settled; without such an orbit (the particle sticks, or there are very many impacts), a second plant gives it.
+    fn periodic(&self) -> Result<Option<RegimeResult>, InvalidValue> {
+        let n = self.periods();
+        let Some((count, recurrence)) = self.recurrence() else {
+            return Ok(None);
+        };
+        let orbit = periodic_near(&self.scene, self.sigma, 0.0, self.states[n]);
         let (regime, impacts, periods, exponent) = if let Some(orbit) = &orbit {
             let pattern = &orbit.pattern;
             let exponent = (orbit.exponent(), 0.0);
             (regime(orbit), pattern.impacts(), pattern.periods(), exponent)
         } else if recurrence < SAME {
-            // A repetition of an odd number of half periods is followed by its mirror image.
-            let whole = 1 + count % 2;
-            let impacts = whole * (self.counts(n)[0] - self.counts(n - count)[0]);
-            let exponent = self.exponent(n / 3);
-            (Regime::Several, impacts, (whole * count / 2) as u32, exponent)
+            let impacts = self.counts(n)[0] - self.counts(n - count)[0];
+            (Regime::Several, impacts, count as u32, self.exponent()?)
         } else {
-            return None;
+            return Ok(None);
         };
-        let stable = impacts > 0 && exponent.0 < 0.0;
-        let begun = |half: &usize| self.distance(*half, count) > NEAR;
-        stable.then(|| {
+        let begun = |n: &usize| self.distance(*n, count) > NEAR;
+        Ok((impacts > 0 && exponent.0 < 0.0).then(|| {
             let transient = (count..=n).rev().find(begun).unwrap_or(0);
             RegimeResult {
-                transient: 0.5 * transient as f64,
+                transient: transient as f64,
                 recurrence: Some(recurrence),
                 exponent: Some(exponent.0),
                 exponent_error: Some(exponent.1),
@@ -377,42 +347,42 @@ impl Run {
                 periods,
                 ..self.result(regime, transient.min(n - count))
             }
-        })
+        }))
     }
 
-    /// Nothing repeats: the Lyapunov exponent decides, over all but the first third.
-    fn irregular(&mut self) -> RegimeResult {
-        let n = self.halves();
-        let (exponent, error) = self.exponent(n / 3);
-        let periods = n as f64 / 3.0;
+    /// Nothing repeats: the Lyapunov exponent decides.
+    fn irregular(&self) -> Result<RegimeResult, InvalidValue> {
+        let (exponent, error) = self.exponent()?;
+        let periods = self.observed() as f64;
         // A disturbance that grows as its time, as on a torus, has this exponent.
         let linear = periods.ln() / periods;
         let zero = linear.max(SIGNIFICANT * error);
-        let mut result = self.result(Regime::Undecided, n / 3);
+        let result = self.result(Regime::Undecided, self.periods() / 3);
         // With less than one impact per block of periods, the exponent is not measured: a particle that is almost at rest.
         let measured = result.impacts_per_period * periods > 2.0 * periods.sqrt();
-        result.regime = match exponent {
+        let regime = match exponent {
             _ if !measured => Regime::Undecided,
             exponent if exponent > zero && result.synchrony < CAPTURES => Regime::Chaotic,
             exponent if exponent > zero => Regime::Modulated,
             exponent if exponent > -zero && zero < ZERO => Regime::QuasiPeriodic,
             _ => Regime::Undecided,
         };
-        RegimeResult {
+        Ok(RegimeResult {
+            regime,
             exponent: Some(exponent),
             exponent_error: Some(error),
             ..result
-        }
+        })
     }
 
-    /// Shortest repetition, half periods, and the largest difference between the states of the window and those one repetition before.
-    /// They do not grow from one half of the window to the other.
+    /// Shortest repetition, periods, and the largest difference between the states of the window and those one repetition before. They do
+    /// not grow from one half of the window to the other.
     fn recurrence(&self) -> Option<(usize, f64)> {
-        let n = self.halves();
+        let n = self.periods();
         // From the end: most motions that do not repeat are far off there.
         let largest = |count: usize, from: usize, to: usize| {
-            (from..=to).rev().try_fold(0.0_f64, |largest, half| {
-                let distance = self.distance(half, count);
+            (from..=to).rev().try_fold(0.0_f64, |largest, n| {
+                let distance = self.distance(n, count);
                 (distance < NEAR).then(|| largest.max(distance))
             })
         };
@@ -463,14 +433,14 @@ impl Run {
     pub fn response(&mut self, result: &RegimeResult) -> Result<SteadyResponse, InvalidValue> {
         let repeats = result.periods > 0;
         if let Some(exponent) = result.exponent.filter(|exponent| repeats && *exponent < 0.0) {
-            self.follow(self.halves() / 2 + (-SHRUNK / exponent).min(WAITED) as usize + 1)?;
+            self.follow(self.periods() + (-SHRUNK / exponent).min(WAITED) as usize + 1)?;
         }
         let unit = if repeats { result.periods as usize } else { 1 };
         let periods = unit * AVERAGED.div_ceil(unit);
         let plant = &mut self.plant;
         let (omega, e) = (self.drive.omega, self.drive.amplitude);
         let damping = plant.parameters().damping;
-        let phase = |n: usize| 2.0 * PI * n as f64 / STEPS as f64;
+        let phase = |n: usize| TAU * n as f64 / STEPS as f64;
         let energy = |plant: &lovines::Plant, n: usize| plant.energy(e * phase(n).sin());
         let before = (energy(plant, 0), plant.totals().dissipated, plant.state().q1);
         let count = periods * STEPS;
@@ -482,9 +452,9 @@ impl Run {
             // Power of the base, (k (e - q1) + c (e' - q1')) e', with the jumps of q1' integrated by parts.
             let (slope, curvature) = (e * omega * cos, -e * omega * omega * sin);
             work += (e * sin - q1) * slope + damping * (slope * slope + q1 * curvature);
-            plant.advance(self.drive, 2.0 * PI / (omega * STEPS as f64))?;
+            plant.advance(self.drive, TAU / (omega * STEPS as f64))?;
         }
-        let duration = periods as f64 * 2.0 * PI / omega;
+        let duration = periods as f64 * TAU / omega;
         let ends = damping * (plant.state().q1 - before.2) * e * omega * phase(0).cos();
         let impacts = (plant.totals().dissipated - before.1) / duration;
         let input = work / count as f64 - (ends + energy(plant, count) - before.0) / duration;

@@ -78,12 +78,14 @@ impl Address {
 /// The address of `HOST:PORT`. If the name has several, an IPv4 address.
 pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
     let failed = |message: String| LinkError::Address { address: text.into(), message };
-    let mut found: Vec<_> = text
+    let mut addresses: Vec<_> = text
         .to_socket_addrs()
         .map_err(|error| failed(format!("{error}; expected HOST:PORT")))?
         .collect();
-    found.sort_by_key(SocketAddr::is_ipv6);
-    let address = *found.first().ok_or_else(|| failed("the name has no address".into()))?;
+    addresses.sort_by_key(SocketAddr::is_ipv6);
+    let address = *addresses
+        .first()
+        .ok_or_else(|| failed("the name has no address".into()))?;
     if scope == BindScope::Loopback && !is_loopback(address.ip()) {
         return Err(LinkError::Remote { address });
     }
@@ -152,8 +154,6 @@ pub enum LinkError {
         "{peer} sent a frame that is damaged, has a value that is not allowed, or is not the answer, at t = {time} s of the experiment"
     )]
     Invalid { peer: Address, time: f64 },
-    #[error("the step of {step} s is not the sample time of the session with {peer}, {sample_time} s")]
-    Step { peer: Address, step: f64, sample_time: f64 },
     #[error("the network: {0}")]
     System(#[from] io::Error),
 }

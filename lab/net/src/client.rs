@@ -7,57 +7,69 @@ use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use phase_lock::Config;
+use vines_testbench::rig::{
+    Command, Controller, ControllerError, Drive, GroundTruth, Move, Rig, RigError, Sensors, Settling,
+};
+use vines_testbench::scene::Definition;
+
 use super::address::{Address, LinkError};
 use super::bridge::Bridge;
 use super::frame::{
-    Frame, FrameError, Kind, Reading, Refusal, flag, read_command, read_reading, write_command, write_move,
+    Frame, FrameError, Kind, Reading, Refusal, bit, flag, read_command, read_reading, write_command, write_move,
     write_reading,
 };
 use super::link::{Key, Link};
-use super::server::SAME_TIME;
 use super::timing::{Counters, ReportLost, Timing};
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, GroundTruth, Move, Rig, RigError, Sensors};
-use vines_testbench::scene::Definition;
 
-/// Longest time until the server opens the session.
-const CONNECT: Duration = Duration::from_secs(2);
-/// Time without an answer after which the last datagram is sent again: Hello, the first drive, or the farewell. Also the
-/// interval at which a server is asked again that has another client.
+/// Longest time until a server answers that has nothing to drive yet: forty repetitions of Hello.
+pub const CONNECT: Duration = Duration::from_secs(2);
+/// Time without an answer after which the last datagram is sent again: Hello, the first drive, or the farewell (protocol, "A session"). Also
+/// the interval at which a server is asked again that has another client.
 const RESEND: Duration = Duration::from_millis(50);
+/// Longest time for the report of a rig in real time (protocol, "A session"): twenty repetitions of the farewell.
+const REPORT: Duration = Duration::from_secs(1);
 
 /// A session.
 #[derive(Debug)]
-pub(crate) struct Client {
+struct Client {
     link: Link,
-    pub peer: Address,
+    peer: Address,
     session: u64,
     sample_time: f64,
     /// Longest silence of the server.
-    pub silence: Duration,
-    /// What the sensors of a rig read ([`Definition::channels`](vines_testbench::scene::Definition::channels)).
-    pub channels: u8,
-    pub counters: Counters,
+    silence: Duration,
+    /// What the sensors of a rig read ([`Definition::channels`]).
+    channels: u8,
+    counters: Counters,
     /// Number of the present sample.
-    pub at: u64,
+    at: u64,
     last: Frame,
 }
 
 impl Client {
-    /// Opens a session; `flags` are those of Hello. If the server has another client, which may be about to leave, it is asked again for a while.
-    pub fn connect(peer: Address, flags: u8, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
+    /// Opens a session. If the server has another client, which may be about to leave, it is asked again for a while.
+    fn connect(peer: Address, controller: bool, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
         let end = Instant::now() + CONNECT;
         loop {
-            match Self::open(peer, flags, sample_time, key) {
+            match Self::open(peer, controller, sample_time, key) {
                 Err(LinkError::Refused { reason: Refusal::Busy, .. }) if Instant::now() < end => thread::sleep(RESEND),
                 outcome => return outcome,
             }
         }
     }
 
-    fn open(peer: Address, flags: u8, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
-        let unreachable = || unreachable(peer, flags & flag::CONTROLLER != 0);
+    fn open(peer: Address, controller: bool, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
+        let unreachable = || {
+            let command = match peer {
+                Address::Tcp(place) if controller => format!("vines controller --listen {place}"),
+                Address::Tcp(place) => format!("vines rig --lock-step --listen {place}"),
+                Address::Udp(place) => format!("vines rig --listen {place}"),
+            };
+            LinkError::Unreachable { peer, command, seconds: CONNECT.as_secs_f64() }
+        };
         let mut hello = Frame::new(Kind::Hello, RandomState::new().build_hasher().finish());
-        hello.flags = flags;
+        hello.flags = bit(flag::CONTROLLER, controller);
         hello.values[0] = sample_time;
         let mut client = Self {
             link: Link::connect(peer, CONNECT, key).map_err(|_| unreachable())?,
@@ -74,13 +86,11 @@ impl Client {
         let end = Instant::now() + CONNECT;
         while let Some(answer) = client.receive(end)? {
             if answer.kind == Kind::Welcome {
+                let [_, silence, channels, a, b, _] = answer.values;
                 // Client and server use the same limit.
-                client.silence = Duration::try_from_secs_f64(answer.values[1]).unwrap_or(CONNECT);
-                client.channels = answer.values[2] as u8;
-                client
-                    .link
-                    .seal
-                    .begin(answer.session, [answer.values[3], answer.values[4]]);
+                client.silence = Duration::try_from_secs_f64(silence).unwrap_or(CONNECT);
+                client.channels = channels as u8;
+                client.link.seal.begin(answer.session, [a, b]);
                 return Ok(client);
             }
         }
@@ -88,26 +98,23 @@ impl Client {
     }
 
     /// A frame of the present sample without content.
-    pub fn frame(&self, kind: Kind) -> Frame {
+    fn frame(&self, kind: Kind) -> Frame {
         let (sequence, time) = (self.at, self.time());
         Frame { sequence, time, ..Frame::new(kind, self.session) }
     }
 
     /// Sends a frame, and keeps it for a repetition.
-    pub fn send(&mut self, frame: Frame) -> Result<(), LinkError> {
+    fn send(&mut self, frame: Frame) -> Result<(), LinkError> {
         self.last = frame;
         Ok(self.link.send(&frame, self.peer.socket())?)
     }
 
     /// The next valid frame of this session, or None at `end`.
-    pub fn receive(&mut self, end: Instant) -> Result<Option<Frame>, LinkError> {
+    fn receive(&mut self, end: Instant) -> Result<Option<Frame>, LinkError> {
         let (peer, time) = (self.peer, self.time());
         loop {
-            let until = if self.is_real_time() {
-                end.min(Instant::now() + RESEND)
-            } else {
-                end
-            };
+            let again = Instant::now() + RESEND;
+            let until = if self.link.is_real_time() { end.min(again) } else { end };
             match self.link.receive(until)?.map(|(received, _)| received) {
                 Some(Err(FrameError::Version(theirs))) => return Err(LinkError::Version { peer, theirs }),
                 Some(Err(FrameError::Closed)) => return Err(LinkError::Closed { peer, time }),
@@ -130,47 +137,14 @@ impl Client {
         }
     }
 
-    /// Whether the rig runs in real time.
-    pub fn is_real_time(&self) -> bool {
-        self.link.is_real_time()
-    }
-
     /// Time of the present sample, s.
     fn time(&self) -> f64 {
         self.at as f64 * self.sample_time
     }
 
-    /// Number of samples in the longest silence.
-    pub fn patience(&self) -> u64 {
-        (self.silence.as_secs_f64() / self.sample_time) as u64
-    }
-
-    /// Checks that a step has the length agreed on.
-    pub fn check_step(&self, step: f64) -> Result<(), LinkError> {
-        let (peer, sample_time) = (self.peer, self.sample_time);
-        let agreed = (step / sample_time - 1.0).abs() <= SAME_TIME;
-        agreed.then_some(()).ok_or(LinkError::Step { peer, step, sample_time })
-    }
-
-    pub fn silent(&self) -> LinkError {
+    fn silent(&self) -> LinkError {
         let (peer, seconds) = (self.peer, self.silence.as_secs_f64());
         LinkError::Silent { peer, seconds, time: self.time() }
-    }
-
-    /// Number of consecutive readings of a rig that were lost.
-    pub fn blackout(&self, samples: u64) -> LinkError {
-        let (peer, allowed) = (self.peer, self.silence.as_secs_f64());
-        LinkError::Blackout {
-            peer,
-            samples,
-            seconds: samples as f64 * self.sample_time,
-            allowed,
-            time: self.time(),
-        }
-    }
-
-    pub fn invalid(&self) -> LinkError {
-        LinkError::Invalid { peer: self.peer, time: self.time() }
     }
 }
 
@@ -181,19 +155,6 @@ impl Drop for Client {
         }
     }
 }
-
-/// The error for a server that does not answer.
-fn unreachable(peer: Address, controller: bool) -> LinkError {
-    let command = match peer {
-        Address::Tcp(place) if controller => format!("vines controller --listen {place}"),
-        Address::Tcp(place) => format!("vines rig --lock-step --listen {place}"),
-        Address::Udp(place) => format!("vines rig --listen {place}"),
-    };
-    LinkError::Unreachable { peer, command, seconds: CONNECT.as_secs_f64() }
-}
-
-/// Longest time for the report of a rig in real time: twenty repetitions of the farewell.
-const REPORT: Duration = Duration::from_secs(1);
 
 /// A rig at a network address: in lock-step over TCP, in real time over UDP.
 ///
@@ -218,7 +179,7 @@ impl NetRig {
     /// Opens a session with the rig server at `peer`; `sample_time` in s. A server with another key does not answer.
     pub fn connect(peer: Address, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
         Ok(Self {
-            client: Client::connect(peer, 0, sample_time, key)?,
+            client: Client::connect(peer, false, sample_time, key)?,
             now: None,
             good: Reading::default(),
             newest: None,
@@ -231,19 +192,21 @@ impl NetRig {
 
     /// Refuses a rig whose sensors are not those of `expected`.
     pub fn with_sensors(self, expected: Definition) -> Result<Self, LinkError> {
-        let is_theirs = |one: &Definition| one.channels() == self.client.channels;
-        if is_theirs(&expected) {
+        let (peer, channels, ours) = (self.client.peer, self.client.channels, expected.channel_names());
+        if expected.channels() == channels {
             return Ok(self);
         }
-        let theirs = Definition::all().into_iter().find(is_theirs);
-        let theirs = theirs.map_or("unknown".into(), |one| one.channel_names());
-        let (peer, ours) = (self.client.peer, expected.channel_names());
+        let theirs = Definition::all()
+            .into_iter()
+            .find(|sensors| sensors.channels() == channels);
+        let theirs = theirs.map_or("unknown".into(), |sensors| sensors.channel_names());
         Err(LinkError::Sensors { peer, theirs, ours })
     }
 
     /// The longest silence, s, of a rig in real time; None for a rig in lock-step.
     pub fn pace(&self) -> Option<f64> {
-        self.client.is_real_time().then_some(self.client.silence.as_secs_f64())
+        let silence = self.client.silence.as_secs_f64();
+        self.client.link.is_real_time().then_some(silence)
     }
 
     /// The counters of the session.
@@ -258,26 +221,27 @@ impl NetRig {
 
     /// The reading of the present sample.
     fn reading(&mut self) -> Result<Reading, LinkError> {
-        let end = Instant::now() + self.client.silence;
-        loop {
-            let reading = match (self.now, self.newest) {
-                (Some(reading), _) => return Ok(reading),
-                (None, Some(frame)) if frame.sequence == self.client.at => read_reading(&frame),
-                (None, Some(frame)) if frame.sequence > self.client.at => {
-                    let (next, ahead) = (read_reading(&frame), frame.sequence - self.client.at);
-                    self.client.counters.hold(ahead);
-                    let sensors = self.bridge.fill(self.phase, &next.sensors, ahead, self.turn);
-                    Reading { sensors, ..self.good }
-                }
-                _ => {
-                    self.wait(end)?;
-                    continue;
-                }
-            };
-            self.bridge.keep(self.phase, reading.sensors);
-            self.good = reading;
-            self.now = Some(reading);
+        if let Some(reading) = self.now {
+            return Ok(reading);
         }
+        let end = Instant::now() + self.client.silence;
+        let (next, ahead) = loop {
+            match self.newest {
+                Some(frame) if frame.sequence >= self.client.at => {
+                    break (read_reading(&frame), frame.sequence - self.client.at);
+                }
+                _ => self.wait(end)?,
+            }
+        };
+        let mut reading = next;
+        if ahead > 0 {
+            self.client.counters.hold(ahead);
+            let sensors = self.bridge.fill(self.phase, &next.sensors, ahead, self.turn);
+            reading = Reading { sensors, ..self.good };
+        }
+        self.bridge.keep(self.phase, reading.sensors);
+        (self.good, self.now) = (reading, Some(reading));
+        Ok(reading)
     }
 
     /// Waits for a later reading.
@@ -290,19 +254,22 @@ impl NetRig {
             self.client.counters.late += 1;
             return Ok(());
         }
-        let lost = frame.sequence.saturating_sub(self.client.at);
-        if lost > self.client.patience() {
-            return Err(self.client.blackout(lost));
+        let samples = frame.sequence.saturating_sub(self.client.at);
+        let Client { peer, sample_time, silence, .. } = self.client;
+        let (seconds, allowed) = (samples as f64 * sample_time, silence.as_secs_f64());
+        if samples > (allowed / sample_time) as u64 {
+            let time = self.client.time();
+            return Err(LinkError::Blackout { peer, samples, seconds, allowed, time });
         }
         self.newest = Some(frame);
         Ok(())
     }
 
-    fn drive(&mut self, drive: Drive, flags: u8, step: f64) -> Result<(), LinkError> {
-        self.client.check_step(step)?;
+    fn drive(&mut self, drive: Drive, holds: bool, step: f64) -> Result<(), LinkError> {
         let command = Command { drive, ..Command::default() };
-        let frame = write_command(self.client.frame(Kind::Drive), &command);
-        self.client.send(Frame { flags: frame.flags | flags, ..frame })?;
+        let mut frame = write_command(self.client.frame(Kind::Drive), &command);
+        frame.flags |= bit(flag::HOLD, holds);
+        self.client.send(frame)?;
         self.client.at += 1;
         self.now = None;
         // A rig that plays samples has no frequency: then a line is all that bridges a gap.
@@ -336,11 +303,11 @@ impl Rig for NetRig {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        Ok(self.drive(drive, 0, step)?)
+        Ok(self.drive(drive, false, step)?)
     }
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        Ok(self.drive(drive, flag::HOLD, step)?)
+        Ok(self.drive(drive, true, step)?)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
@@ -350,7 +317,7 @@ impl Rig for NetRig {
 
 impl Drop for NetRig {
     fn drop(&mut self) {
-        if self.client.is_real_time() {
+        if self.client.link.is_real_time() {
             let _ = self.farewell();
             // Without effect if the report has arrived.
             let _ = self.timing.set(Err(ReportLost));
@@ -369,25 +336,29 @@ pub struct NetController {
     /// The last answer, and the number of samples until then.
     good: Command,
     answered: u64,
+    /// Judges the lock of a controller that does not report the state of its loop.
+    settling: Settling,
     failed: bool,
 }
 
 impl NetController {
-    /// Opens a session with the controller server at `peer`; `sample_time` in s.
+    /// Opens a session with the controller server at `peer`, which has a configuration of its own: `config` has the sample time, and the lock
+    /// criterion for a controller that does not report the state of its loop.
     ///
     /// Beside a rig in real time the client waits for an answer for half a sample period, and then holds the last one.
     /// `pace` is the longest silence of such a rig, s; it also limits the silence of the controller. For a rig that waits,
     /// `pace` is None. A server with another key does not answer.
-    pub fn connect(peer: SocketAddr, sample_time: f64, pace: Option<f64>, key: Option<Key>) -> Result<Self, LinkError> {
-        let mut client = Client::connect(Address::Tcp(peer), flag::CONTROLLER, sample_time, key)?;
+    pub fn connect(peer: SocketAddr, config: &Config, pace: Option<f64>, key: Option<Key>) -> Result<Self, LinkError> {
+        let mut client = Client::connect(Address::Tcp(peer), true, config.sample_time, key)?;
         let limit = pace.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
         client.silence = limit.map_or(client.silence, |limit| limit.min(client.silence));
         Ok(Self {
             client,
-            patience: pace.map(|_| Duration::from_secs_f64(0.5 * sample_time)),
+            patience: pace.map(|_| Duration::from_secs_f64(0.5 * config.sample_time)),
             waiting: None,
             good: Command::default(),
             answered: 0,
+            settling: Settling::new(config),
             failed: false,
         })
     }
@@ -400,7 +371,7 @@ impl NetController {
     fn ask(&mut self, sensors: Sensors, active: bool) -> Result<Command, LinkError> {
         let reading = Reading { sensors, ground_truth: None };
         let mut frame = write_reading(self.client.frame(Kind::Sensors), &reading);
-        frame.flags |= if active { flag::ACTIVE } else { 0 };
+        frame.flags |= bit(flag::ACTIVE, active);
         self.client.send(frame)?;
         let now = Instant::now();
         let end = *self.waiting.get_or_insert(now) + self.client.silence;
@@ -413,7 +384,7 @@ impl NetController {
                 self.client.counters.hold(self.client.at + 1 - self.answered);
                 break self.held(active);
             };
-            self.good = self.read(&frame)?;
+            self.good = self.read(&frame, active)?;
             self.waiting = None;
             self.answered = frame.sequence + 1;
             if frame.sequence == self.client.at {
@@ -427,21 +398,29 @@ impl NetController {
 
     /// The last answer, for a sample without one.
     fn held(&self, active: bool) -> Command {
+        let last = self.good.drive;
         let drive = if active {
-            self.good.drive
+            last
         } else {
-            Drive { omega: self.good.drive.omega, ..Drive::default() }
+            Drive { omega: last.omega, ..Drive::default() }
         };
         Command { drive, settled: false, ..self.good }
     }
 
     /// The answer to this sample or an earlier one.
-    fn read(&self, frame: &Frame) -> Result<Command, LinkError> {
-        let command = read_command(frame);
+    fn read(&mut self, frame: &Frame, active: bool) -> Result<Command, LinkError> {
+        let mut command = read_command(frame);
         let Drive { omega, amplitude, .. } = command.drive;
         let valid = frame.values.iter().all(|x| x.is_finite()) && omega >= 0.0 && amplitude >= 0.0;
-        let due = frame.kind == Kind::Drive && frame.sequence <= self.client.at;
-        (valid && due).then_some(command).ok_or_else(|| self.client.invalid())
+        if !valid || frame.kind != Kind::Drive || frame.sequence > self.client.at {
+            let (peer, time) = (self.client.peer, self.client.time());
+            return Err(LinkError::Invalid { peer, time });
+        }
+        if active && command.state.is_none() {
+            let phase_error = command.phase_error.unwrap_or(0.0);
+            command.settled |= self.settling.sample(omega, phase_error, command.phase_error.is_some());
+        }
+        Ok(command)
     }
 }
 

@@ -36,14 +36,11 @@ pub enum Kind {
     Move = 8,
 }
 
-impl Kind {
-    fn from_code(code: u8) -> Option<Self> {
-        use Kind::{Drive, Farewell, Hello, Move, Refusal, Report, Sensors, Welcome};
-        [Hello, Welcome, Refusal, Sensors, Drive, Farewell, Report, Move]
-            .into_iter()
-            .find(|kind| *kind as u8 == code)
-    }
-}
+/// All kinds, in the order of their codes, from 1.
+const KINDS: [Kind; 8] = {
+    use Kind::{Drive, Farewell, Hello, Move, Refusal, Report, Sensors, Welcome};
+    [Hello, Welcome, Refusal, Sensors, Drive, Farewell, Report, Move]
+};
 
 /// Booleans of a frame. A bit without a meaning in a kind is 0.
 pub mod flag {
@@ -125,13 +122,11 @@ impl Frame {
         let mut bytes = [0; SIZE];
         bytes[..4].copy_from_slice(&MAGIC);
         bytes[4..6].copy_from_slice(&VERSION.to_le_bytes());
-        bytes[6] = self.kind as u8;
-        bytes[7] = self.flags;
-        bytes[8..16].copy_from_slice(&self.session.to_le_bytes());
-        bytes[16..24].copy_from_slice(&self.sequence.to_le_bytes());
-        bytes[24..32].copy_from_slice(&self.time.to_le_bytes());
-        for (slot, value) in bytes[32..CHECKSUM_AT].chunks_exact_mut(8).zip(self.values) {
-            slot.copy_from_slice(&value.to_le_bytes());
+        (bytes[6], bytes[7]) = (self.kind as u8, self.flags);
+        let words = [self.session, self.sequence, self.time.to_bits()];
+        let words = words.into_iter().chain(self.values.map(f64::to_bits));
+        for (slot, word) in bytes[8..CHECKSUM_AT].chunks_exact_mut(8).zip(words) {
+            slot.copy_from_slice(&word.to_le_bytes());
         }
         let checksum = crc32fast::hash(&bytes[..CHECKSUM_AT]);
         bytes[CHECKSUM_AT..].copy_from_slice(&checksum.to_le_bytes());
@@ -147,24 +142,26 @@ impl Frame {
         if version != VERSION {
             return Err(FrameError::Version(version));
         }
-        let bytes: &[u8; SIZE] = bytes.try_into().map_err(|_| FrameError::Size(bytes.len()))?;
-        let word = |at: usize| {
-            let mut eight = [0; 8];
-            eight.copy_from_slice(&bytes[at..at + 8]);
-            u64::from_le_bytes(eight)
-        };
-        let mut checksum = [0; 4];
-        checksum.copy_from_slice(&bytes[CHECKSUM_AT..]);
-        if crc32fast::hash(&bytes[..CHECKSUM_AT]) != u32::from_le_bytes(checksum) {
+        if bytes.len() != SIZE {
+            return Err(FrameError::Size(bytes.len()));
+        }
+        if crc32fast::hash(&bytes[..CHECKSUM_AT]).to_le_bytes() != bytes[CHECKSUM_AT..] {
             return Err(FrameError::Checksum);
         }
+        let mut words = bytes[8..CHECKSUM_AT].chunks_exact(8).map(|word| {
+            let word = word.try_into().expect("eight bytes");
+            u64::from_le_bytes(word)
+        });
+        let mut word = || words.next().expect("nine words");
         Ok(Self {
-            kind: Kind::from_code(bytes[6]).ok_or(FrameError::Kind(bytes[6]))?,
+            kind: *KINDS
+                .get(usize::from(bytes[6]).wrapping_sub(1))
+                .ok_or(FrameError::Kind(bytes[6]))?,
             flags: bytes[7],
-            session: word(8),
-            sequence: word(16),
-            time: f64::from_bits(word(24)),
-            values: std::array::from_fn(|n| f64::from_bits(word(32 + 8 * n))),
+            session: word(),
+            sequence: word(),
+            time: f64::from_bits(word()),
+            values: std::array::from_fn(|_| f64::from_bits(word())),
         })
     }
 }
@@ -176,25 +173,16 @@ pub(crate) struct Reading {
     pub ground_truth: Option<GroundTruth>,
 }
 
-pub(crate) fn write_reading(mut frame: Frame, reading: &Reading) -> Frame {
-    let Reading { sensors, ground_truth } = reading;
-    frame.kind = Kind::Sensors;
-    if sensors.reference.is_some() {
-        frame.flags |= flag::REFERENCE;
-    }
-    if ground_truth.is_some() {
-        frame.flags |= flag::GROUND_TRUTH;
-    }
-    let inside = ground_truth.unwrap_or_default();
-    frame.values = [
-        sensors.response,
-        sensors.reference.unwrap_or(0.0),
-        inside.impacts as f64,
-        inside.impact_time,
-        inside.impact_velocity,
-        inside.particle_velocity,
-    ];
-    frame
+pub(crate) fn write_reading(frame: Frame, reading: &Reading) -> Frame {
+    let Sensors { response, reference } = reading.sensors;
+    let motion = reading.ground_truth;
+    let flags = bit(flag::REFERENCE, reference.is_some()) | bit(flag::GROUND_TRUTH, motion.is_some());
+    let [count, time, impact, particle] = motion.map_or([0.0; 4], |motion| {
+        let GroundTruth { impacts, impact_time, impact_velocity, particle_velocity, .. } = motion;
+        [impacts as f64, impact_time, impact_velocity, particle_velocity]
+    });
+    let values = [response, reference.unwrap_or(0.0), count, time, impact, particle];
+    Frame { kind: Kind::Sensors, flags, values, ..frame }
 }
 
 pub(crate) fn read_reading(frame: &Frame) -> Reading {
@@ -206,35 +194,27 @@ pub(crate) fn read_reading(frame: &Frame) -> Reading {
         impact_velocity,
         particle_velocity,
     ] = frame.values;
-    Reading {
-        sensors: Sensors {
-            response,
-            reference: frame.has(flag::REFERENCE).then_some(reference),
-        },
-        ground_truth: frame.has(flag::GROUND_TRUTH).then_some(GroundTruth {
-            impacts: impacts as i64,
-            impact_time,
-            impact_velocity,
-            particle_velocity,
-        }),
-    }
+    let (reference, impacts) = (frame.has(flag::REFERENCE).then_some(reference), impacts as i64);
+    let motion = GroundTruth {
+        impacts,
+        impact_time,
+        impact_velocity,
+        particle_velocity,
+        friction: None,
+    };
+    let ground_truth = frame.has(flag::GROUND_TRUTH).then_some(motion);
+    Reading { sensors: Sensors { response, reference }, ground_truth }
 }
 
-pub(crate) fn write_command(mut frame: Frame, command: &Command) -> Frame {
-    frame.kind = Kind::Drive;
-    if command.settled {
-        frame.flags |= flag::SETTLED;
-    }
-    if command.phase_error.is_none() {
-        frame.flags |= flag::NO_PHASE;
-    }
+pub(crate) fn write_command(frame: Frame, command: &Command) -> Frame {
+    let flags = bit(flag::SETTLED, command.settled) | bit(flag::NO_PHASE, command.phase_error.is_none());
     let Drive { omega, amplitude, displacement } = command.drive;
     // The state is counted from 1, so that 0 means that it is not reported.
     let state = command.state.map_or(0.0, |state| f64::from(state as u8) + 1.0);
     let fault = command.fault.map_or(0.0, |fault| f64::from(fault as u8));
     let phase_error = command.phase_error.unwrap_or(0.0);
-    frame.values = [omega, amplitude, displacement, phase_error, state, fault];
-    frame
+    let values = [omega, amplitude, displacement, phase_error, state, fault];
+    Frame { kind: Kind::Drive, flags, values, ..frame }
 }
 
 pub(crate) fn read_command(frame: &Frame) -> Command {
@@ -248,25 +228,22 @@ pub(crate) fn read_command(frame: &Frame) -> Command {
     }
 }
 
-/// Writes a move of the response and its phase target, rad, into a frame. A response of 0 ends the control of the response.
-pub(crate) fn write_move(mut frame: Frame, to: Move, phase_target: f64) -> Frame {
-    frame.kind = Kind::Move;
-    frame.values = [
-        to.response,
-        to.duration,
-        to.amplitude,
-        to.omega,
-        phase_target,
-        to.growth,
-    ];
-    frame
+/// Writes a move of the response and its phase target, rad.
+pub(crate) fn write_move(frame: Frame, to: Move, phase_target: f64) -> Frame {
+    let Move { response, duration, amplitude, omega, growth } = to;
+    let values = [response, duration, amplitude, omega, phase_target, growth];
+    Frame { kind: Kind::Move, values, ..frame }
 }
 
 /// The move and the phase target in a frame.
 pub(crate) fn read_move(frame: &Frame) -> (Move, f64) {
     let [response, duration, amplitude, omega, phase_target, growth] = frame.values;
-    let to = Move { response, duration, amplitude, omega, growth };
-    (to, phase_target)
+    (Move { response, duration, amplitude, omega, growth }, phase_target)
+}
+
+/// A bit of the flags, if it is set.
+pub(crate) fn bit(flag: u8, set: bool) -> u8 {
+    if set { flag } else { 0 }
 }
 
 /// Reason of a server to refuse a session, or to end it, with its code.
@@ -300,7 +277,7 @@ pub enum Refusal {
 
 impl Refusal {
     pub(crate) fn answer(self, cause: &Frame) -> Frame {
-        let values = match self {
+        let [code, first, value, limit] = match self {
             Self::Busy => [1.0, 0.0, 0.0, 0.0],
             Self::SampleTime(seconds) => [2.0, seconds, 0.0, 0.0],
             Self::Role => [3.0, 0.0, 0.0, 0.0],
@@ -310,9 +287,8 @@ impl Refusal {
             Self::Move { index, value } => [7.0, index as f64, value, 0.0],
             Self::Other(code) => [code, 0.0, 0.0, 0.0],
         };
-        let [code, first, value, limit] = values;
-        let values = [code, first, value, limit, 0.0, 0.0];
-        Frame { flags: 0, kind: Kind::Refusal, values, ..*cause }
+        let (kind, values) = (Kind::Refusal, [code, first, value, limit, 0.0, 0.0]);
+        Frame { flags: 0, kind, values, ..*cause }
     }
 
     pub(crate) fn read(frame: &Frame) -> Self {

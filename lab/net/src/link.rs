@@ -13,9 +13,9 @@ use sha2::{Digest, Sha256};
 use super::address::{Address, is_loopback};
 use super::frame::{Frame, FrameError, Kind, SIZE};
 
-/// Length of the authentication code, bytes.
+/// Length of the authentication code, HMAC-SHA-256, bytes.
 const TAG: usize = 32;
-/// Shortest secret, bytes.
+/// Shortest secret, bytes: 128 bits, which cannot be guessed.
 const SECRET: usize = 16;
 
 /// A shared key.
@@ -93,11 +93,12 @@ impl Seal {
         }
         let (bytes, tag) = bytes.split_at(bytes.len().min(SIZE));
         let frame = Frame::decode(bytes)?;
-        let other = match self.side {
-            Side::Client => Side::Server,
-            Side::Server => Side::Client,
+        let from = if self.side == Side::Client {
+            Side::Server
+        } else {
+            Side::Client
         };
-        let mac = self.mac(&frame, bytes, other).ok_or(FrameError::Tag)?;
+        let mac = self.mac(&frame, bytes, from).ok_or(FrameError::Tag)?;
         // In constant time.
         mac.verify_slice(tag).map_err(|_| FrameError::Tag)?;
         Ok(frame)
@@ -122,15 +123,15 @@ impl Seal {
 
 /// Shorter waits use polling: the time-outs of the system may be as coarse as 16 ms, which is several samples.
 const FINE: Duration = Duration::from_millis(20);
-/// Polling interval.
-const POLL: Duration = Duration::from_micros(50);
+/// Polling interval: a twentieth of a sample at 1000 samples a second.
+pub const POLL: Duration = Duration::from_micros(50);
 /// Shorter waits do not sleep: the system wakes a program up later than it asks for, by about this.
 const SPIN: Duration = Duration::from_micros(100);
-/// Interval at which a server without a session looks for connections and their frames.
+/// Interval at which a server without a session looks for connections and their frames: short against the time for loading a rig.
 const ACCEPT: Duration = Duration::from_millis(5);
-/// Longest time for sending a frame over TCP to a peer that does not read.
+/// Longest time for sending a frame over TCP to a peer that does not read: the longest silence in lock-step (protocol, "Faults").
 const SEND: Duration = Duration::from_secs(5);
-/// Longest time for a TCP client to say Hello.
+/// Longest time for a TCP client to say Hello: half of the time after which a client gives up.
 const HELLO: Duration = Duration::from_secs(1);
 
 /// A frame, or why the bytes are none.

@@ -7,16 +7,17 @@ use std::time::{Duration, Instant};
 
 use super::address::{Address, LinkError, ServerError};
 use super::frame::{
-    Frame, FrameError, Kind, Reading, Refusal, VERSION, flag, read_command, read_move, read_reading, write_command,
-    write_reading,
+    Frame, FrameError, Kind, Reading, Refusal, VERSION, bit, flag, read_command, read_move, read_reading,
+    write_command, write_reading,
 };
 use super::link::{Key, Link, Received};
-use super::timing::{Counters, Ended, Punctuality, RealTimeClock, Session, Timing};
+use super::timing::{Counters, Ended, RealTimeClock, Session, Timing};
 use vines_testbench::rig::{Controller, Drive, Rig, RigError};
 use vines_testbench::scene::Definition;
 
-/// Largest relative difference of two sample times that count as equal.
-pub(crate) const SAME_TIME: f64 = 1e-9;
+/// Largest relative difference of two sample times that count as equal: far above the rounding error of another program, and one sample in
+/// 10⁹, which is two weeks at 882 samples a second.
+const SAME_TIME: f64 = 1e-9;
 
 /// What a server offers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,7 +46,7 @@ pub struct Service {
 
 impl Service {
     /// The answer to Hello.
-    pub(crate) fn welcome(&self, hello: &Frame) -> Result<Frame, Refusal> {
+    fn welcome(&self, hello: &Frame) -> Result<Frame, Refusal> {
         let (flags, channels) = match self.role {
             Role::Rig { sensors, .. } => (0, sensors.channels()),
             Role::Controller => (flag::CONTROLLER, 0),
@@ -53,9 +54,8 @@ impl Service {
         if hello.flags & flag::CONTROLLER != flags {
             return Err(Refusal::Role);
         }
-        // Not a number is not the same, either.
-        let same = (hello.values[0] / self.sample_time - 1.0).abs() <= SAME_TIME;
-        if !same {
+        let difference = (hello.values[0] / self.sample_time - 1.0).abs();
+        if difference.is_nan() || difference > SAME_TIME {
             return Err(Refusal::SampleTime(self.sample_time));
         }
         let mut welcome = Frame { flags, ..Frame::new(Kind::Welcome, hello.session) };
@@ -64,27 +64,25 @@ impl Service {
     }
 
     /// The drive in a frame. What is not finite or above a limit must not reach a shaker.
-    pub(crate) fn drive(&self, frame: &Frame) -> Result<Drive, Refusal> {
+    fn drive(&self, frame: &Frame) -> Result<Drive, Refusal> {
         let largest = match self.role {
             Role::Rig { max_amplitude, .. } => max_amplitude,
             Role::Controller => 0.0,
         };
+        let Drive { omega, amplitude, displacement } = read_command(frame).drive;
         let limits = [PI / self.sample_time, largest, largest];
-        for (index, limit) in limits.into_iter().enumerate() {
-            let value = frame.values[index];
-            // The displacement has a sign.
-            let size = if index == 2 { value.abs() } else { value };
-            if !(0.0..=limit).contains(&size) {
-                return Err(Refusal::Drive { index, value, limit });
-            }
+        // The displacement has a sign.
+        let sizes = [omega, amplitude, displacement.abs()];
+        match (0..3).find(|&index| !(0.0..=limits[index]).contains(&sizes[index])) {
+            Some(index) => Err(Refusal::Drive { index, value: frame.values[index], limit: limits[index] }),
+            None => Ok(Drive { omega, amplitude, displacement }),
         }
-        Ok(read_command(frame).drive)
     }
 }
 
-/// Interval at which a server without a running clock checks whether it should stop.
+/// Interval at which a server without a running clock checks whether it should stop: Ctrl-C acts without a noticeable delay.
 const IDLE: Duration = Duration::from_millis(50);
-/// Largest number of frames that are read after the deadline has passed: a flood of them must not stop the clock.
+/// Largest number of frames that are read after the deadline has passed. Bounds the delay of a sample by a flood of frames.
 const BURST: u32 = 256;
 
 /// A server, one session at a time. Over UDP a rig runs in real time; over TCP it is in lock-step with the drives.
@@ -108,28 +106,22 @@ impl Server {
     }
 
     /// Serves sessions until `stop` returns true. `make` creates the rig, or the controller, of a session;
-    /// `tell` receives its report.
+    /// `report` receives the report on it.
     pub fn serve(
         &mut self,
         mut make: impl FnMut() -> Result<Served, ServerError>,
         mut stop: impl FnMut() -> bool,
-        mut tell: impl FnMut(&Session),
+        mut report: impl FnMut(&Session),
     ) -> Result<(), ServerError> {
         let mut run: Option<Run> = None;
         let mut burst = 0;
         loop {
             let (due, idle) = (run.as_ref().and_then(Run::due), Instant::now() + IDLE);
             let deadline = due.map_or(idle, |due| due.min(idle));
-            let received = if burst < BURST {
-                self.link.receive(deadline)?
-            } else {
-                None
-            };
-            burst = if received.is_some() {
-                burst + u32::from(Instant::now() >= deadline)
-            } else {
-                0
-            };
+            let may_read = burst < BURST;
+            let received = if may_read { self.link.receive(deadline)? } else { None };
+            let late = u32::from(Instant::now() >= deadline);
+            burst = received.as_ref().map_or(0, |_| burst + late);
             match (received, &mut run) {
                 (Some((Ok(frame), from)), None) if frame.kind == Kind::Hello => {
                     run = self.open(&frame, from, &mut make)?
@@ -145,7 +137,7 @@ impl Server {
             if let Some(over) = run.take_if(|run| run.is_over()) {
                 self.link.close(over.peer);
                 self.last = Some((over.peer, over.report()));
-                tell(&over.finish());
+                report(&over.finish());
             }
             if stopped && run.is_none() {
                 return Ok(());
@@ -171,8 +163,22 @@ impl Server {
         let drawn = self.link.seal.draw().map_err(io::Error::other)?;
         welcome.values[3..5].copy_from_slice(&drawn);
         self.link.seal.begin(hello.session, drawn);
-        let real_time = self.link.is_real_time();
-        let mut run = Run::new(make()?, self.service, real_time, from, welcome);
+        let opened = Instant::now();
+        let mut run = Run {
+            served: make()?,
+            service: self.service,
+            real_time: self.link.is_real_time(),
+            peer: from,
+            welcome,
+            opened,
+            heard: opened,
+            counters: Counters::default(),
+            at: 0,
+            newest: 0,
+            drive: Ramp::default(),
+            clock: None,
+            ended: None,
+        };
         run.welcome(&mut self.link)?;
         Ok(Some(run))
     }
@@ -195,7 +201,9 @@ impl Server {
                     self.refuse(Refusal::Version(VERSION), &Frame::new(Kind::Hello, 0), from)?;
                 }
             }
-            (Ok(frame), Some(run)) if run.is_client(from, frame.session) => run.handle(&frame, &mut self.link)?,
+            (Ok(frame), Some(run)) if (run.peer, run.welcome.session) == (from, frame.session) => {
+                run.handle(&frame, &mut self.link)?;
+            }
             (Ok(frame), Some(run)) => {
                 run.counters.foreign += 1;
                 if frame.kind == Kind::Hello {
@@ -206,10 +214,8 @@ impl Server {
             }
             // The report was lost, and the session has ended in the meantime.
             (Ok(frame), None) if frame.kind == Kind::Farewell => {
-                let report = self
-                    .last
-                    .filter(|(to, last)| (*to, last.session) == (from, frame.session));
-                if let Some((to, report)) = report {
+                let is_its = |(to, last): &(_, Frame)| (*to, last.session) == (from, frame.session);
+                if let Some((to, report)) = self.last.filter(is_its) {
                     self.link.send(&report, to)?;
                 }
             }
@@ -231,7 +237,7 @@ impl Server {
     }
 }
 
-/// Longest time from Hello to the first drive of a rig in real time.
+/// Longest time from Hello to the first drive of a rig in real time (protocol, "Security").
 const FIRST_DRIVE: Duration = Duration::from_secs(5);
 
 /// What a server offers in a session.
@@ -243,16 +249,16 @@ pub enum Served {
 }
 
 /// A session.
-pub(crate) struct Run {
+struct Run {
     served: Served,
     service: Service,
     real_time: bool,
-    pub peer: SocketAddr,
+    peer: SocketAddr,
     welcome: Frame,
     opened: Instant,
     /// Time of the last frame.
     heard: Instant,
-    pub counters: Counters,
+    counters: Counters,
     /// Number of the present sample.
     at: u64,
     /// Number of the newest drive of a rig in real time.
@@ -264,90 +270,66 @@ pub(crate) struct Run {
 }
 
 impl Run {
-    pub fn new(served: Served, service: Service, real_time: bool, peer: SocketAddr, welcome: Frame) -> Self {
-        let opened = Instant::now();
-        Self {
-            served,
-            service,
-            real_time,
-            peer,
-            welcome,
-            opened,
-            heard: opened,
-            counters: Counters::default(),
-            at: 0,
-            newest: 0,
-            drive: Ramp::default(),
-            clock: None,
-            ended: None,
-        }
-    }
-
-    pub fn is_client(&self, from: SocketAddr, session: u64) -> bool {
-        (self.peer, self.welcome.session) == (from, session)
-    }
-
     /// When the next sample is due in real time, or the client has been silent for too long.
-    pub fn due(&self) -> Option<Instant> {
+    fn due(&self) -> Option<Instant> {
         match &self.clock {
             Some(clock) => Some(clock.due(self.at + 1)),
             // A repeated Hello is not a sign of life: anyone can send a copy.
             None if self.real_time => Some(self.opened + FIRST_DRIVE),
-            None => self
-                .heard
-                .checked_add(Duration::try_from_secs_f64(self.service.silence).ok()?),
+            None => {
+                let silence = Duration::try_from_secs_f64(self.service.silence).ok()?;
+                self.heard.checked_add(silence)
+            }
         }
     }
 
     /// Shuts the drive down. In real time the clock continues until the drive is zero.
-    pub fn end(&mut self, ended: Ended) {
+    fn end(&mut self, ended: Ended) {
         self.drive.shut_down();
         self.ended.get_or_insert(ended);
     }
 
-    pub fn is_over(&self) -> bool {
+    fn is_over(&self) -> bool {
         self.ended.is_some() && (self.clock.is_none() || self.drive.is_down())
     }
 
     /// Sends Welcome, and the first reading of a rig.
-    pub fn welcome(&mut self, link: &mut Link) -> Result<(), ServerError> {
+    fn welcome(&mut self, link: &mut Link) -> Result<(), ServerError> {
         link.send(&self.welcome, self.peer)?;
-        self.tell_reading(link)
+        self.send_reading(link)
     }
 
-    pub fn handle(&mut self, frame: &Frame, link: &mut Link) -> Result<(), ServerError> {
+    fn handle(&mut self, frame: &Frame, link: &mut Link) -> Result<(), ServerError> {
         self.heard = Instant::now();
         self.counters.received += 1;
-        match (frame.kind, &self.served) {
-            (Kind::Drive, Served::Rig(_)) if self.real_time => self.take_drive(frame),
-            (Kind::Hello, _) if self.real_time && self.clock.is_none() => self.welcome(link)?,
-            (Kind::Hello, _) if self.real_time => {}
-            (Kind::Farewell, _) if self.real_time => {
-                self.end(Ended::Farewell);
-                link.send(&self.report(), self.peer)?;
-            }
-            _ if self.real_time => self.counters.malformed += 1,
-            _ => {
-                if let Err(refusal) = self.step(frame, link)? {
+        match frame.kind {
+            _ if !self.real_time => {
+                if let Err(refusal) = self.answer(frame, link)? {
                     let cause = Frame { sequence: self.at, ..*frame };
                     link.send(&refusal.answer(&cause), self.peer)?;
                     self.end(Ended::Refused);
                 }
             }
+            Kind::Drive => self.take_drive(frame),
+            Kind::Hello if self.clock.is_none() => self.welcome(link)?,
+            Kind::Hello => {}
+            Kind::Farewell => {
+                self.end(Ended::Farewell);
+                link.send(&self.report(), self.peer)?;
+            }
+            _ => self.counters.malformed += 1,
         }
         Ok(())
     }
 
     /// Answers a frame in lock-step.
-    fn step(&mut self, frame: &Frame, link: &mut Link) -> Result<Result<(), Refusal>, ServerError> {
+    fn answer(&mut self, frame: &Frame, link: &mut Link) -> Result<Result<(), Refusal>, ServerError> {
         match (&mut self.served, frame.kind) {
-            _ if frame.sequence != self.at => Ok(Err(Refusal::Unexpected)),
+            _ if frame.sequence != self.at => return Ok(Err(Refusal::Unexpected)),
             (Served::Controller(controller), Kind::Sensors) => {
                 let command = controller.sample(read_reading(frame).sensors, frame.has(flag::ACTIVE))?;
-                let answer = write_command(Frame { flags: 0, ..*frame }, &command);
                 self.at += 1;
-                link.send(&answer, self.peer)?;
-                Ok(Ok(()))
+                link.send(&write_command(*frame, &command), self.peer)?;
             }
             (Served::Controller(controller), Kind::Move) => {
                 let (to, phase_target) = read_move(frame);
@@ -357,37 +339,36 @@ impl Run {
                 } else {
                     controller.hold_response(to, phase_target)
                 };
-                Ok(held.map_err(Refusal::from))
+                return Ok(held.map_err(Refusal::from));
             }
             (Served::Rig(_), Kind::Drive) => match self.service.drive(frame) {
-                Err(refusal) => Ok(Err(refusal)),
+                Err(refusal) => return Ok(Err(refusal)),
                 Ok(drive) => {
                     self.drive.set(drive, frame.has(flag::HOLD));
-                    self.advance()?;
-                    self.tell_reading(link)?;
-                    Ok(Ok(()))
+                    self.advance(link)?;
                 }
             },
-            _ => Ok(Err(Refusal::Unexpected)),
+            _ => return Ok(Err(Refusal::Unexpected)),
         }
+        Ok(Ok(()))
     }
 
     /// Takes a drive in real time, if it is valid and newer than the last one.
     fn take_drive(&mut self, frame: &Frame) {
-        let known = self.clock.is_some() && frame.sequence <= self.newest;
+        let is_old = self.clock.is_some() && frame.sequence <= self.newest;
         let drive = self.service.drive(frame).ok().filter(|_| frame.sequence <= self.at);
-        self.counters.late += u64::from(known || frame.sequence < self.at);
+        self.counters.late += u64::from(is_old || frame.sequence < self.at);
         self.counters.malformed += u64::from(drive.is_none());
-        if let Some(drive) = drive.filter(|_| !known) {
+        if let Some(drive) = drive.filter(|_| !is_old) {
             self.drive.set(drive, frame.has(flag::HOLD));
             self.newest = frame.sequence;
-            self.clock
-                .get_or_insert_with(|| RealTimeClock::start(self.service.sample_time));
+            let start = || RealTimeClock::start(self.service.sample_time);
+            self.clock.get_or_insert_with(start);
         }
     }
 
     /// The deadline has passed: a sample is due, or the client is silent.
-    pub fn pass(&mut self, link: &mut Link) -> Result<(), ServerError> {
+    fn pass(&mut self, link: &mut Link) -> Result<(), ServerError> {
         let Some(clock) = &mut self.clock else {
             self.end(Ended::Silence);
             return Ok(());
@@ -401,50 +382,46 @@ impl Run {
                 self.end(Ended::Silence);
             }
         }
-        self.advance()?;
-        self.tell_reading(link)
+        self.advance(link)
     }
 
-    fn advance(&mut self) -> Result<(), ServerError> {
+    /// Drives a rig for a sample, and sends the reading after it.
+    fn advance(&mut self, link: &mut Link) -> Result<(), ServerError> {
         if let Served::Rig(rig) = &mut self.served {
             self.drive.apply(rig.as_mut(), self.service.sample_time)?;
             self.at += 1;
         }
-        Ok(())
+        self.send_reading(link)
     }
 
     /// Sends the present reading of a rig.
-    fn tell_reading(&mut self, link: &mut Link) -> Result<(), ServerError> {
+    fn send_reading(&mut self, link: &mut Link) -> Result<(), ServerError> {
         let Served::Rig(rig) = &mut self.served else {
             return Ok(());
         };
         let reading = Reading { sensors: rig.sense()?, ground_truth: rig.ground_truth()? };
-        let mut frame = write_reading(Frame::new(Kind::Sensors, self.welcome.session), &reading);
-        frame.sequence = self.at;
-        frame.time = self.at as f64 * self.service.sample_time;
-        if self.drive.is_shut_down() {
-            frame.flags |= flag::SHUT_DOWN;
-        }
+        let (sequence, time) = (self.at, self.at as f64 * self.service.sample_time);
+        let frame = Frame {
+            sequence,
+            time,
+            ..Frame::new(Kind::Sensors, self.welcome.session)
+        };
+        let mut frame = write_reading(frame, &reading);
+        frame.flags |= bit(flag::SHUT_DOWN, self.drive.is_shut_down());
         Ok(link.send(&frame, self.peer)?)
     }
 
+    fn timing(&self) -> Option<Timing> {
+        self.clock.as_ref().map(|clock| clock.timing(self.counters.held))
+    }
+
     /// The report to the client of a rig in real time.
-    pub fn report(&self) -> Frame {
-        let none = Punctuality::default();
-        let all = self.clock.as_ref().map_or(&none, |clock| &clock.punctuality);
-        let timing = Timing {
-            samples: self.at,
-            missed: all.missed,
-            worst: all.worst,
-            held: self.counters.held,
-            quantiles: [0.99, 0.9999].map(|share| all.quantile(share)),
-        };
-        timing.write(self.welcome.session)
+    fn report(&self) -> Frame {
+        self.timing().unwrap_or_default().write(self.welcome.session)
     }
 
     /// Ends the ramp of a rig in lock-step, and reports.
-    pub fn finish(mut self) -> Session {
-        let samples = self.at;
+    fn finish(mut self) -> Session {
         if let Served::Rig(rig) = &mut self.served {
             while !self.drive.is_down() {
                 // An error of the rig changes nothing now: the session ends.
@@ -455,10 +432,11 @@ impl Run {
         Session {
             peer: self.peer,
             ended: self.ended.unwrap_or(Ended::Stopped),
-            samples,
+            samples: self.at,
             sample_time: self.service.sample_time,
             seconds: began.elapsed().as_secs_f64(),
-            punctuality: self.clock.map(|clock| clock.punctuality),
+            timing: self.timing(),
+            histogram: self.clock.as_ref().map(RealTimeClock::classes).unwrap_or_default(),
             counters: self.real_time.then_some(self.counters),
         }
     }
@@ -469,10 +447,10 @@ pub const RAMP_SAMPLES: u32 = 100;
 
 /// A drive that can be shut down for the rest of a session.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Ramp {
+struct Ramp {
     drive: Drive,
     /// Whether the rig holds the displacement of the drive.
-    pub holds: bool,
+    holds: bool,
     /// The displacement before that of the drive, m, and whether the drive has arrived since the last sample.
     before: f64,
     is_new: bool,
@@ -482,7 +460,7 @@ pub(crate) struct Ramp {
 
 impl Ramp {
     /// Sets a new drive; without effect after the shutdown.
-    pub fn set(&mut self, drive: Drive, holds: bool) {
+    fn set(&mut self, drive: Drive, holds: bool) {
         if self.left.is_none() {
             self.before = self.drive.displacement;
             (self.drive, self.holds, self.is_new) = (drive, holds, true);
@@ -490,7 +468,7 @@ impl Ramp {
     }
 
     /// Drives the rig for the next sample period of `step` seconds.
-    pub fn apply(&mut self, rig: &mut dyn Rig, step: f64) -> Result<(), RigError> {
+    fn apply(&mut self, rig: &mut dyn Rig, step: f64) -> Result<(), RigError> {
         if self.holds && !self.is_new && self.left.is_none() {
             self.extrapolate(step);
         }
@@ -515,17 +493,17 @@ impl Ramp {
     }
 
     /// Shuts the drive down for the rest of the session.
-    pub fn shut_down(&mut self) {
+    fn shut_down(&mut self) {
         self.left.get_or_insert(RAMP_SAMPLES);
     }
 
     /// Whether the drive has been shut down.
-    pub fn is_shut_down(&self) -> bool {
+    fn is_shut_down(&self) -> bool {
         self.left.is_some()
     }
 
     /// Whether the drive has been shut down and is zero.
-    pub fn is_down(&self) -> bool {
+    fn is_down(&self) -> bool {
         self.left == Some(0)
     }
 

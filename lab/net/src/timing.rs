@@ -5,114 +5,42 @@ use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use hdrhistogram::Histogram;
-use serde::ser::SerializeStruct;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 use thiserror::Error;
 
 use super::frame::{Frame, Kind};
 
-/// Largest lateness that the histogram resolves, ns.
+/// Largest lateness that the histogram resolves, ns: a minute. A later sample counts as that late.
 const LONGEST: u64 = 60_000_000_000;
-/// Digits of a lateness.
+/// Significant digits of a lateness in the histogram.
 const DIGITS: u8 = 3;
 /// s per ns.
 const NANO: f64 = 1e-9;
-/// The quantiles that are reported, and their names.
-const QUANTILES: [(&str, f64); 3] = [("p50", 0.5), ("p99", 0.99), ("p99_99", 0.9999)];
 
-/// Statistics of the lateness of the samples.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Punctuality {
-    /// Lateness, ns.
-    histogram: Histogram<u64>,
-    /// Number of samples that were late by a whole period or more.
-    pub missed: u64,
-    /// Largest lateness, s.
-    pub worst: f64,
-}
-
-impl Default for Punctuality {
-    fn default() -> Self {
-        let histogram = Histogram::new_with_bounds(1, LONGEST, DIGITS).expect("the bounds are valid");
-        Self { histogram, missed: 0, worst: 0.0 }
-    }
-}
-
-impl Punctuality {
-    /// Counts a sample that was late by `lateness`, s, of a sample period, s.
-    pub fn record(&mut self, lateness: f64, period: f64) {
-        self.histogram.saturating_record((lateness / NANO) as u64);
-        self.missed += u64::from(lateness >= period);
-        self.worst = self.worst.max(lateness);
-    }
-
-    /// Number of samples.
-    pub fn samples(&self) -> u64 {
-        self.histogram.len()
-    }
-
-    /// Lateness, s, that this share of the samples does not exceed.
-    pub fn quantile(&self, share: f64) -> f64 {
-        // The upper limit of a class may be above the largest value in it.
-        (self.histogram.value_at_quantile(share) as f64 * NANO).min(self.worst)
-    }
-
-    /// The classes that samples are in: upper limit of the lateness, s, and number of samples.
-    pub fn classes(&self) -> Vec<(f64, u64)> {
-        self.histogram
-            .iter_recorded()
-            .map(|one| (one.value_iterated_to() as f64 * NANO, one.count_at_value()))
-            .collect()
-    }
-}
-
-impl Serialize for Punctuality {
-    /// Seconds.
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut all = serializer.serialize_struct("Punctuality", QUANTILES.len() + 4)?;
-        all.serialize_field("samples", &self.samples())?;
-        for (name, share) in QUANTILES {
-            all.serialize_field(name, &self.quantile(share))?;
-        }
-        all.serialize_field("worst", &self.worst)?;
-        all.serialize_field("missed", &self.missed)?;
-        all.serialize_field("histogram", &self.classes())?;
-        all.end()
-    }
-}
-
-impl Display for Punctuality {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        write!(f, "  lateness of {} samples:", self.samples())?;
-        for (name, share) in QUANTILES {
-            write!(f, " {} {:.1} us,", name.replace('_', "."), 1e6 * self.quantile(share))?;
-        }
-        writeln!(
-            f,
-            " maximum {:.1} us; {} deadlines missed",
-            1e6 * self.worst,
-            self.missed
-        )
-    }
-}
-
-/// The clock of a rig in real time.
+/// The clock of a rig in real time, and the lateness of its samples.
 #[derive(Debug, Clone)]
 pub struct RealTimeClock {
     start: Instant,
     /// s
     period: f64,
-    /// Lateness of the samples.
-    pub punctuality: Punctuality,
+    /// Lateness, ns.
+    lateness: Histogram<u64>,
+    /// Number of samples that were late by a whole period or more.
+    missed: u64,
+    /// Largest lateness, s.
+    worst: f64,
 }
 
 impl RealTimeClock {
     /// A clock that starts now; `period` in s.
     pub fn start(period: f64) -> Self {
+        let lateness = Histogram::new_with_bounds(1, LONGEST, DIGITS).expect("the bounds are valid");
         Self {
             start: Instant::now(),
             period,
-            punctuality: Punctuality::default(),
+            lateness,
+            missed: 0,
+            worst: 0.0,
         }
     }
 
@@ -123,8 +51,105 @@ impl RealTimeClock {
 
     /// Counts sample `n`, which is served now.
     pub fn serve(&mut self, n: u64) {
-        let lateness = self.due(n).elapsed().as_secs_f64();
-        self.punctuality.record(lateness, self.period);
+        self.record(self.due(n).elapsed().as_secs_f64());
+    }
+
+    fn record(&mut self, lateness: f64) {
+        self.lateness.saturating_record((lateness / NANO) as u64);
+        self.missed += u64::from(lateness >= self.period);
+        self.worst = self.worst.max(lateness);
+    }
+
+    /// The figures of all samples since the start or [`RealTimeClock::forget`]; of them, `held` had no drive in time.
+    pub fn timing(&self, held: u64) -> Timing {
+        // The upper limit of a class may be above the largest value in it.
+        let quantile = |share| (self.lateness.value_at_quantile(share) as f64 * NANO).min(self.worst);
+        Timing {
+            samples: self.lateness.len(),
+            missed: self.missed,
+            worst: self.worst,
+            held,
+            p99: quantile(0.99),
+            p99_99: quantile(0.9999),
+        }
+    }
+
+    /// The classes of lateness with samples: upper limit, s, and number of samples.
+    pub fn classes(&self) -> Vec<(f64, u64)> {
+        let classes = self.lateness.iter_recorded();
+        classes
+            .map(|class| (class.value_iterated_to() as f64 * NANO, class.count_at_value()))
+            .collect()
+    }
+
+    /// Forgets the lateness of the samples until now.
+    pub fn forget(&mut self) {
+        self.lateness.reset();
+        (self.missed, self.worst) = (0, 0.0);
+    }
+}
+
+/// The report of a rig in real time did not arrive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("the rig's report was lost in the network: whether it got its drives in time is not known")]
+pub struct ReportLost;
+
+/// What a rig in real time reports to its client at the end.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Timing {
+    /// Samples served.
+    pub samples: u64,
+    /// Samples that were late by a whole period or more.
+    pub missed: u64,
+    /// Largest lateness, s.
+    pub worst: f64,
+    /// Samples without a drive in time.
+    pub held: u64,
+    /// Lateness that 99 % of the samples do not exceed, s.
+    pub p99: f64,
+    /// Lateness that 99.99 % of the samples do not exceed, s.
+    pub p99_99: f64,
+}
+
+impl Timing {
+    /// What makes results doubtful: more than this share of the samples came too late, or had no drive in time.
+    pub fn doubt(&self, tolerated: f64) -> Option<String> {
+        let exceeds = |count: u64| count as f64 > tolerated * self.samples.max(1) as f64;
+        let reason = match (exceeds(self.missed), exceeds(self.held)) {
+            (false, false) => return None,
+            (true, false) => "the rig missed deadlines: its machine is too slow or too busy",
+            (false, true) => {
+                "drives did not reach the rig in time: the network lost or delayed frames, or the controller or this machine is too slow"
+            }
+            (true, true) => {
+                "the rig missed deadlines, and drives did not reach it in time: a machine is too busy, or the network too slow"
+            }
+        };
+        Some(format!("{reason}; {self}"))
+    }
+
+    pub(crate) fn write(&self, session: u64) -> Frame {
+        let Self { samples, missed, worst, held, p99, p99_99 } = *self;
+        let values = [samples as f64, missed as f64, worst, held as f64, p99, p99_99];
+        Frame { values, ..Frame::new(Kind::Report, session) }
+    }
+
+    pub(crate) fn read(frame: &Frame) -> Self {
+        let [samples, missed, worst, held, p99, p99_99] = frame.values;
+        let [samples, missed, held] = [samples, missed, held].map(|count| count as u64);
+        Self { samples, missed, worst, held, p99, p99_99 }
+    }
+}
+
+impl Display for Timing {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { samples, missed, held, .. } = self;
+        let [p99, p99_99, worst] = [self.p99, self.p99_99, self.worst].map(|lateness| 1e3 * lateness);
+        write!(
+            f,
+            "of {samples} samples, {missed} missed their deadline (99 % were at most {p99:.3} ms late, 99.99 % {p99_99:.3} ms, the worst \
+             {worst:.3} ms), and {held} had no drive in time"
+        )
     }
 }
 
@@ -196,116 +221,89 @@ pub struct Session {
     /// Duration from the first drive or reading to the end, s.
     pub seconds: f64,
     /// Lateness of the samples, for a rig in real time.
-    pub punctuality: Option<Punctuality>,
+    pub timing: Option<Timing>,
+    /// Classes of the lateness with samples, for a rig in real time: upper limit, s, and number of samples.
+    pub histogram: Vec<(f64, u64)>,
     /// Counters, for a rig in real time.
     pub counters: Option<Counters>,
 }
 
-impl Session {
-    /// Samples per second of the wall clock.
-    pub fn rate(&self) -> f64 {
-        if self.seconds > 0.0 {
-            self.samples as f64 / self.seconds
-        } else {
-            0.0
-        }
-    }
-}
-
 impl Display for Session {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { peer, samples, seconds, .. } = self;
         let ended = match self.ended {
             Ended::Farewell => "ended by the client",
             Ended::Silence => "SHUT DOWN: the client was silent, or behind, for too long",
             Ended::Refused => "SHUT DOWN: the client sent a drive or a frame that is not allowed",
             Ended::Stopped => "stopped by the server",
         };
-        writeln!(f, "session of {}: {ended}", self.peer)?;
+        let rate = if *seconds > 0.0 { *samples as f64 / seconds } else { 0.0 };
+        let nominal = 1.0 / self.sample_time;
+        writeln!(f, "session of {peer}: {ended}")?;
         writeln!(
             f,
-            "  {} samples in {:.3} s: {:.1} per second, nominal {:.1}",
-            self.samples,
-            self.seconds,
-            self.rate(),
-            1.0 / self.sample_time
+            "  {samples} samples in {seconds:.3} s: {rate:.1} per second, nominal {nominal:.1}"
         )?;
-        if let Some(punctuality) = &self.punctuality {
-            write!(f, "{punctuality}")?;
+        if let Some(timing) = &self.timing {
+            writeln!(f, "  {timing}")?;
         }
         self.counters.map_or(Ok(()), |counters| writeln!(f, "  {counters}"))
     }
 }
 
-/// The report of a rig in real time did not arrive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("the rig's report was lost in the network: whether it got its drives in time is not known")]
-pub struct ReportLost;
-
-/// What a rig in real time reports to its client at the end.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Timing {
-    /// Samples served.
-    pub samples: u64,
-    /// Samples that were late by a whole period or more.
-    pub missed: u64,
-    /// Largest lateness, s.
-    pub worst: f64,
-    /// Samples without a drive in time.
-    pub held: u64,
-    /// Lateness that 99 % and 99.99 % of the samples do not exceed, s.
-    pub quantiles: [f64; 2],
-}
-
-impl Timing {
-    /// What makes results doubtful: more than this share of the samples came too late, or had no drive in time.
-    pub fn doubt(&self, tolerated: f64) -> Option<String> {
-        let exceeds = |count: u64| count as f64 > tolerated * self.samples.max(1) as f64;
-        let reason = match (exceeds(self.missed), exceeds(self.held)) {
-            (false, false) => return None,
-            (true, false) => "the rig missed deadlines: its machine is too slow or too busy",
-            (false, true) => {
-                "drives did not reach the rig in time: the network lost or delayed frames, or the controller or this machine is too slow"
-            }
-            (true, true) => {
-                "the rig missed deadlines, and drives did not reach it in time: a machine is too busy, or the network too slow"
-            }
-        };
-        Some(format!("{reason}; {self}"))
-    }
-
-    pub(crate) fn write(&self, session: u64) -> Frame {
-        let Self { samples, missed, worst, held, quantiles: [p99, p9999] } = *self;
-        Frame {
-            values: [samples as f64, missed as f64, worst, held as f64, p99, p9999],
-            ..Frame::new(Kind::Report, session)
-        }
-    }
-
-    pub(crate) fn read(frame: &Frame) -> Self {
-        let [samples, missed, worst, held, p99, p9999] = frame.values;
-        Self {
-            samples: samples as u64,
-            missed: missed as u64,
-            worst,
-            held: held as u64,
-            quantiles: [p99, p9999],
-        }
-    }
-}
-
-impl Display for Timing {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { samples, missed, worst, held, quantiles } = self;
-        let [p99, p9999] = quantiles.map(|lateness| 1e3 * lateness);
-        write!(
-            f,
-            "of {samples} samples, {missed} missed their deadline (99 % were at most {p99:.3} ms late, 99.99 % {p9999:.3} ms, the worst \
-             {:.3} ms), and {held} had no drive in time",
-            1e3 * worst
-        )
-    }
-}
-
 #[cfg(test)]
-#[path = "../tests/unit/timing.rs"]
-mod tests;
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_and_missed_deadlines_are_those_of_the_samples() {
+        let mut clock = RealTimeClock::start(9.9995e-3);
+        for n in 1..=10_000 {
+            clock.record(f64::from(n) * 1e-6);
+        }
+        let timing = clock.timing(3);
+        for (quantile, expected) in [(timing.p99, 9.9e-3), (timing.p99_99, 9.999e-3)] {
+            assert!((quantile / expected - 1.0).abs() < 1e-3, "{timing}");
+        }
+        assert_eq!(
+            (timing.samples, timing.missed, timing.worst, timing.held),
+            (10_000, 1, 1e-2, 3)
+        );
+        assert_eq!(clock.classes().iter().map(|(_, count)| count).sum::<u64>(), 10_000);
+        clock.forget();
+        assert_eq!(clock.timing(0), Timing::default());
+        let session = Session {
+            peer: ([127, 0, 0, 1], 1).into(),
+            ended: Ended::Silence,
+            samples: 0,
+            sample_time: 1e-3,
+            seconds: 0.0,
+            timing: Some(clock.timing(0)),
+            histogram: clock.classes(),
+            counters: None,
+        };
+        let text = session.to_string();
+        assert!(
+            text.contains("0 samples in 0.000 s: 0.0 per second") && !text.contains("NaN"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn missed_deadlines_and_drives_that_came_too_late_are_distinguished() {
+        let timing = |missed, held| Timing { samples: 1000, missed, held, ..Timing::default() };
+        assert_eq!(timing(10, 10).doubt(0.01), None);
+        for (missed, held, parts) in [
+            (11, 0, ["the rig missed deadlines: its machine", "11 missed"]),
+            (
+                0,
+                999,
+                ["drives did not reach the rig in time: the network", "999 had no drive"],
+            ),
+            (11, 11, ["the rig missed deadlines, and drives", "11 had no drive"]),
+        ] {
+            let doubt = timing(missed, held).doubt(0.01).unwrap();
+            assert!(doubt.starts_with(parts[0]) && doubt.contains(parts[1]), "{doubt}");
+        }
+    }
+}

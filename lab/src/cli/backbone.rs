@@ -43,16 +43,20 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let experiment = &arguments.experiment;
-    let (scene, mut session) = experiment.start(Some(&arguments.rig), |scene| scene.backbone_config())?;
+    let (scene, mut session) =
+        experiment.start("vines backbone", Some(&arguments.rig), |scene| scene.backbone_config())?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let mut samples = Vec::new();
-    let (mut rig, controller) = (experiment.recorded(&mut session.open.rig), session.controller.as_mut());
+    let (mut rig, controller) = (
+        experiment.recorded(session.open.rig.as_mut()),
+        session.controller.as_mut(),
+    );
     let tracked = track_into(&mut samples, &mut rig, controller, &scene, |done, _| {
         bar.set_position(done as u64);
     });
     bar.finish_and_clear();
     rig.finish()?;
-    let timing = session.close();
+    let timing = session.close(&tracked);
     let tracked = tracked.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let result = TrackedComparison::of(&tracked, &scene);
     let summary = report::summary::tracked(&result);
@@ -73,7 +77,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut text = experiment.result(&result, &summary, &files, timing)?;
     let settled = result.points.iter().filter(|one| one.point.settled);
     let points: Vec<_> = settled.map(|one| (&one.point.at).into()).collect();
-    if let Some(line) = contradiction(&points, scene.resonance, &scene.plant).filter(|_| !experiment.json) {
+    if let Some(line) =
+        contradiction(&points, scene.resonance, &scene.plant).filter(|_| !experiment.json && result.left_out.is_none())
+    {
         text += &format!("{line}\n");
     }
     match result.doubt() {

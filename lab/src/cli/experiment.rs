@@ -13,6 +13,7 @@ use vines::{advice, loop_check, report, scene::Scene};
 
 use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
 use super::output::{log_warnings, output, print, writable, written};
+use super::watch::{Watch, WatchArguments};
 use super::{check, failure::Failure, pack::fmus};
 
 /// Share of late samples of a rig in real time above which its results are doubtful. A late sample holds the drive for one more sample: at
@@ -37,6 +38,9 @@ pub(super) struct ExperimentArguments {
 
     #[command(flatten)]
     reach: ReachArguments,
+
+    #[command(flatten)]
+    watch: WatchArguments,
 
     /// Do not check the loop of a rig that is not a simulation first; see `vines check`
     #[arg(long)]
@@ -103,6 +107,7 @@ impl RigStage for Recorder<'_> {
 pub(super) struct Session {
     pub controller: Box<dyn Controller>,
     pub open: OpenRig,
+    watch: Option<Watch>,
 }
 
 impl ExperimentArguments {
@@ -121,11 +126,13 @@ impl ExperimentArguments {
     /// cannot be written to are refused before anything is driven.
     pub(super) fn start(
         &self,
+        command: &str,
         rig: Option<&Endpoint>,
         config: impl Fn(&Scene) -> Config,
     ) -> Result<(Scene, Session), Failure> {
         let mut scene = self.scene.load()?;
         log_warnings();
+        let watch = self.watch.start(command, &scene)?;
         let scope = self.reach.reach()?;
         BuiltIn::new(&config(&scene))?;
         writable(&self.out)?;
@@ -136,15 +143,18 @@ impl ExperimentArguments {
                 Endpoint::Fmu(fmus(folder.path())?.swap_remove(0)).rig(&scene, scope)?
             }
         };
-        self.check_loop(&mut open.rig, &mut scene)?;
-        let controller = self
+        self.check_loop(open.rig.as_mut(), &mut scene)?;
+        let mut controller = self
             .controller
             .controller(&config(&scene), &scene.controller_names, scope, open.pace)?;
-        Ok((scene, Session { controller, open }))
+        if let Some(watch) = &watch {
+            (open.rig, controller) = (watch.rig(open.rig), watch.controller(controller));
+        }
+        Ok((scene, Session { controller, open, watch }))
     }
 
     /// Checks a rig that is not a simulation, and refuses one that is not as expected. Such a rig starts at rest.
-    fn check_loop(&self, rig: &mut impl Rig, scene: &mut Scene) -> Result<(), Failure> {
+    fn check_loop(&self, rig: &mut dyn Rig, scene: &mut Scene) -> Result<(), Failure> {
         rig.sense().map_err(ExperimentError::from)?;
         if rig.ground_truth().map_err(ExperimentError::from)?.is_some() {
             return Ok(());
@@ -197,10 +207,14 @@ impl ExperimentArguments {
 }
 
 impl Session {
-    /// Ends the session; a rig in real time reports its missed deadlines.
-    pub(super) fn close(self) -> Option<Result<Timing, ReportLost>> {
+    /// Ends the session after `result`; a rig in real time reports its missed deadlines.
+    pub(super) fn close<T>(self, result: &Result<T, ExperimentError>) -> Option<Result<Timing, ReportLost>> {
         drop(self.controller);
-        self.open.close()
+        let timing = self.open.close();
+        if let (Some(watch), Err(error)) = (&self.watch, result) {
+            watch.failed(error);
+        }
+        timing
     }
 }
 

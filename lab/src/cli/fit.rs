@@ -243,18 +243,16 @@ fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> Stri
 
 /// The section `[plant]` of a scene, with the standard uncertainties in comments.
 fn plant_section(report: &FitReport, plant: &vines::scene::Parameters, verdict: Option<&str>) -> String {
-    let values = [
-        ("M", plant.primary_mass),
-        ("k", plant.stiffness),
-        ("c", plant.damping),
-        ("m", plant.particle_mass),
-        ("b", plant.half_width),
-        ("r", plant.restitution),
-    ];
-    let lines = values.map(|(symbol, value)| {
+    let lines = vines::scene::plant_keys(plant).into_iter().map(|(symbol, value)| {
         let fitted = report.parameters.iter().find(|one| one.symbol == symbol);
         let u = fitted.map_or_else(String::new, |one| format!(" ± {:.2e}", one.uncertainty));
-        format!("{symbol} = {value:?}  # fitted{u}\n")
+        let is_ideal = ["M", "k", "c", "m", "b", "r"].contains(&symbol);
+        let note = if is_ideal {
+            format!("  # fitted{u}")
+        } else {
+            String::new()
+        };
+        format!("{symbol} = {value}{note}\n")
     });
     let verdict = verdict.map_or_else(String::new, |verdict| format!("# {verdict}\n"));
     let doubt = if report.describes {
@@ -262,5 +260,5 @@ fn plant_section(report: &FitReport, plant: &vines::scene::Parameters, verdict: 
     } else {
         "# Rejected: the model does not describe the points.\n"
     };
-    format!("[plant]\n{verdict}{doubt}{}", lines.concat())
+    format!("[plant]\n{verdict}{doubt}{}", lines.collect::<String>())
 }

@@ -20,6 +20,7 @@ Examples:
   vines identify --controller mine.fmu             another controller on the same plant
   vines identify --rig udp://127.0.0.1:5510        a rig in real time across the network; see `vines rig`
   vines identify --record run.csv                  what the sensors read as well, for `vines fit run.csv`
+  vines identify --rig udp://127.0.0.1:5510 --watch    the same, shown in a browser while it runs
 
 Writes identification.json, backbone.csv, backbone.svg and sim.svg. Without --rig, the rig is this program's LoViNes.fmu; it is
 written as well, with PhaseLock.fmu.";
@@ -39,17 +40,22 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let experiment = &arguments.experiment;
-    let (scene, mut session) = experiment.start(arguments.rig.as_ref(), |scene| scene.controller_config())?;
+    let (scene, mut session) = experiment.start("vines identify", arguments.rig.as_ref(), |scene| {
+        scene.controller_config()
+    })?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(plan.lock as u64, "{msg:29} [{wide_bar}] {pos}/{len} samples");
     let mut samples = Vec::new();
-    let (mut rig, controller) = (experiment.recorded(&mut session.open.rig), session.controller.as_mut());
+    let (mut rig, controller) = (
+        experiment.recorded(session.open.rig.as_mut()),
+        session.controller.as_mut(),
+    );
     let record = run_into(&mut samples, &mut rig, controller, &plan, |stage, done, of| {
         show(&bar, stage, done, of)
     });
     bar.finish_and_clear();
     rig.finish()?;
-    let timing = session.close();
+    let timing = session.close(&record);
     let record = record.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let identification = identify(&record, &scene).map_err(|error| {
         let reason = match error {

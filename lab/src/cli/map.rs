@@ -11,7 +11,7 @@ use vines::report::summary::{parameters, regimes};
 use vines::sweep::{Axis, Map};
 
 use super::failure::Failure;
-use super::options::SceneArguments;
+use super::options::{SceneArguments, warn_left_out};
 use super::output::{progress_bar, saved, writable, written};
 
 const HELP: &str = "\
@@ -79,6 +79,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let Arguments { x, y, sigma, periods, confirmations, out, .. } = arguments;
     let map = Map::new(arguments.scene.family()?, x, y, *sigma, *periods).map_err(Failure::input)?;
+    warn_left_out(map.sweep.scene(), "a regime map is");
     writable(out)?;
     let bar = progress_bar(map.sweep.cells(), "mapping regimes [{wide_bar}] {pos}/{len} cells");
     let map = map.run(*confirmations, || bar.inc(1)).map_err(Failure::input)?;

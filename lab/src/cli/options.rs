@@ -11,6 +11,7 @@ use vines::ArgumentError;
 use vines::fmu::{FmuController, FmuError, FmuRig};
 use vines::helic::{Channels, DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
+use vines::report::summary::ideal;
 use vines::rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable};
 use vines::scene::{Family, Name, Names, Override, PAPER, Scene, SceneError};
 
@@ -30,6 +31,13 @@ pub(super) struct SceneArguments {
 impl SceneArguments {
     pub(super) fn load(&self) -> Result<Scene, SceneError> {
         Scene::load(self.scene.as_deref(), &self.set)
+    }
+
+    /// The scene, for results of the ideal cavity: a warning says what they leave out.
+    pub(super) fn load_for(&self, results: &str) -> Result<Scene, SceneError> {
+        let scene = self.load()?;
+        warn_left_out(&scene, results);
+        Ok(scene)
     }
 
     /// The text of the scene's file with another section `[plant]`.
@@ -62,6 +70,13 @@ impl SceneArguments {
         };
         let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.clone(), source })?;
         Family::parse(&path.display().to_string(), Some(&text), &self.set)
+    }
+}
+
+/// Warns that `results` are of the ideal cavity, if that of the scene is another.
+pub(super) fn warn_left_out(scene: &Scene, results: &str) {
+    if let Some(left_out) = scene.left_out() {
+        log::warn!("{}", ideal(results, &left_out));
     }
 }
 
@@ -99,7 +114,7 @@ impl FromStr for Endpoint {
 }
 
 pub(super) struct OpenRig {
-    pub rig: Stoppable,
+    pub rig: Box<dyn Rig>,
     /// In real time, the longest silence that it tolerates, s.
     pub pace: Option<f64>,
     /// In real time, what it reports when the session has ended.
@@ -134,7 +149,7 @@ impl Endpoint {
             }
         };
         let rig = Chain::around(rig, scene);
-        let rig = Stoppable::around(rig, scene.sample_time(), &stop_flag()?);
+        let rig = Box::new(Stoppable::around(rig, scene.sample_time(), &stop_flag()?));
         Ok(OpenRig { rig, pace, timing })
     }
 
@@ -154,7 +169,7 @@ impl Endpoint {
                     let rule = "a controller has an address tcp://HOST:PORT";
                     return Err(Failure::input(format!("{address}: {rule}")));
                 };
-                Box::new(NetController::connect(peer, config.sample_time, pace, scope.key())?)
+                Box::new(NetController::connect(peer, config, pace, scope.key())?)
             }
         })
     }

@@ -13,6 +13,7 @@ use vines::{ArgumentError, report};
 use super::failure::{Failure, stop_flag};
 use super::options::{Endpoint, ReachArguments, SceneArguments, count, fmu, no_key, positive};
 use super::output::print;
+use super::watch::WatchArguments;
 
 const RIG_HELP: &str = "\
 Examples:
@@ -47,6 +48,9 @@ pub(super) struct RigArguments {
 
     #[command(flatten)]
     serving: ServingArguments,
+
+    #[command(flatten)]
+    watch: WatchArguments,
 
     /// Write the histogram of the lateness of each session to this file (CSV); each session overwrites it
     #[arg(long, value_name = "FILE")]
@@ -91,7 +95,7 @@ pub(super) struct RigArguments {
 }
 
 /// Prints the time from the fault to a drive of zero, s.
-fn tell(zero: Option<f64>, json: bool) {
+fn print_reaction(zero: Option<f64>, json: bool) {
     let text = match zero {
         _ if json => format!("{}\n", serde_json::json!({ "drive_zero_after_fault": zero })),
         Some(seconds) => format!("the drive was zero {:.1} ms after the fault\n", 1e3 * seconds),
@@ -160,21 +164,25 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
         Endpoint::BuiltIn => {}
     }
     let (serving, json) = (&arguments.serving, arguments.serving.json);
+    let watch = arguments.watch.start("vines rig", &scene)?;
     let make = || -> Result<Box<dyn Rig>, RigError> {
-        Ok(match (&arguments.rig, arguments.fault) {
+        let rig: Box<dyn Rig> = match (&arguments.rig, arguments.fault) {
             (Endpoint::Fmu(file), _) => Box::new(fmu(file, &scene)?),
             (_, Some(Fault { kind, seconds })) => {
-                Box::new(faulty(&scene, kind, seconds, move |zero| tell(zero, json))?)
+                Box::new(faulty(&scene, kind, seconds, move |zero| print_reaction(zero, json))?)
             }
             _ if arguments.sensors_only => Box::new(SensorsOnly::around(Simulated::of(&scene)?)),
             _ => Box::new(plant.clone()),
+        };
+        Ok(match &watch {
+            Some(watch) => watch.rig(rig),
+            None => rig,
         })
     };
     let keep = |session: &Session| {
-        let (Some(file), Some(all)) = (&arguments.histogram, &session.punctuality) else {
-            return;
-        };
-        if let Err(error) = report::write_lateness(&all.classes(), file) {
+        if let Some(file) = &arguments.histogram
+            && let Err(error) = report::write_lateness(&session.histogram, file)
+        {
             eprintln!("warning: {error}");
         }
     };
@@ -266,8 +274,8 @@ impl ServingArguments {
         let scope = self.reach.reach()?;
         let mut server = Server::listen(transport(resolve(&self.listen, scope)?), service, scope.key())?;
         let address = server.address().map_err(Failure::run)?;
-        self.run(&format!("{what} on {address}"), keep, |stop, tell| {
-            server.serve(make, stop, tell)
+        self.run(&format!("{what} on {address}"), keep, |stop, report_session| {
+            server.serve(make, stop, report_session)
         })
     }
 
@@ -280,8 +288,8 @@ impl ServingArguments {
         let mut server = HelicServer::listen(address, device, sample_time).map_err(listen)?;
         let what = format!("helic device, {:.1} samples per second, on", 1.0 / sample_time);
         let address = server.address().map_err(Failure::run)?;
-        self.run(&format!("{what} helic://{address}"), keep, |stop, tell| {
-            server.serve(stop, tell)
+        self.run(&format!("{what} helic://{address}"), keep, |stop, report_session| {
+            server.serve(stop, report_session)
         })
     }
 
@@ -300,7 +308,7 @@ impl ServingArguments {
             .map(|seconds| Instant::now() + Duration::from_secs_f64(seconds));
         let mut stop = move || stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end);
         let (json, sessions, mut served) = (self.json, self.sessions, 0);
-        let mut tell = move |session: &Session| {
+        let mut report_session = move |session: &Session| {
             let text = match json {
                 true => serde_json::to_string(session).map_or_else(|error| error.to_string(), |line| line + "\n"),
                 false => session.to_string(),
@@ -313,7 +321,7 @@ impl ServingArguments {
                 enough.store(true, Ordering::Relaxed);
             }
         };
-        serve(&mut stop, &mut tell).map_err(Failure::run)?;
+        serve(&mut stop, &mut report_session).map_err(Failure::run)?;
         Ok(String::new())
     }
 }

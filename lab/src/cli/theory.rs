@@ -68,7 +68,7 @@ struct Constants {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let scene = arguments.scene.load()?.dimensionless();
+    let scene = arguments.scene.load_for("theory is")?.dimensionless();
     let flow = SlowFlow::new(scene.lambda, scene.r);
     if let Some(sigma) = arguments.sigma.filter(|sigma| !sigma.is_finite()) {
         return Err(Failure::input(format!(

@@ -2,7 +2,7 @@
 
 use super::table::{Table, row, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
-use crate::identification::{DecayEnd, Measured, Regime};
+use crate::identification::{DecayEnd, Friction, Regime, ResonancePoint};
 use crate::scene::{Definition, Dimensionless, Sensor};
 use crate::sweep::Map;
 
@@ -21,7 +21,7 @@ fn rig(p: &Dimensionless) -> String {
 }
 
 /// Frequency in hertz, amplitude of the response and of the base in metres, with their uncertainties.
-fn in_si(at: &Measured) -> [String; 3] {
+fn in_si(at: &ResonancePoint) -> [String; 3] {
     let metres = |value: f64, u: f64| format!("{value:.5e} ± {u:.1e}");
     [
         with_uncertainty(at.f_hz, at.u_f_hz),
@@ -44,6 +44,10 @@ pub fn regimes(map: &Map) -> Table {
     });
     Table::new("regime | cells | share | inside the theory's stable island").rows(rows)
 }
+
+/// What the symbols of an identification mean.
+const SYMBOLS: &str = "  sigma: detuning (omega/omega0 - 1)/epsilon; C: amplitude of the response over b; B: particle speed over b omega0; G: base amplitude \
+                       over b epsilon\n";
 
 /// An identification: the locked point beside theory and exact orbit, then the decay.
 pub fn identification(result: &Comparison) -> String {
@@ -76,7 +80,14 @@ pub fn identification(result: &Comparison) -> String {
         at.u_phase_deg,
         table.text(),
     );
+    text += SYMBOLS;
     let mut note = |note: &str| text += &format!("  ({note})\n");
+    if let Some(friction) = lock.friction {
+        note(&friction_text(&friction));
+    }
+    if let Some(left_out) = &result.left_out {
+        note(&ideal("theory and exact orbits are", left_out));
+    }
     if result.exact.is_none() && result.theory.is_none() {
         note("theory and exact orbits are for phase resonance, -90 degrees; there is none to compare with");
     }
@@ -100,6 +111,20 @@ pub fn identification(result: &Comparison) -> String {
         note("the nearest exact orbit is unstable under a constant drive and frequency; the loop holds it");
     }
     format!("{text}\n{}\n{}\n", decay(result), agreement(result))
+}
+
+/// That `results` of the ideal cavity leave something out.
+pub fn ideal(results: &str, left_out: &str) -> String {
+    format!("{results} of the ideal cavity, without {left_out}")
+}
+
+/// What friction did, as a sentence.
+pub fn friction_text(friction: &Friction) -> String {
+    let Friction { sticks_per_period, stuck_time, loss } = friction;
+    format!(
+        "per period of the hold, the particle stuck to the floor {sticks_per_period:.3} times, for {stuck_time:.3e} s in all, and friction \
+         took {loss:.3e} J"
+    )
 }
 
 fn decay(result: &Comparison) -> String {
@@ -184,6 +209,10 @@ pub fn tracked(result: &TrackedComparison) -> String {
             worst.at_equal_c, worst.nearest
         )
     });
+    let worst = match &result.left_out {
+        Some(left_out) => format!("{worst}({})\n", ideal("the exact backbone is", left_out)),
+        None => worst,
+    };
     format!(
         "{}\n\n{}\n{} points in {:.0} periods, {:.1} of which before the loop held the response: {:.1} periods per point\n{worst}",
         rig(&result.parameters),

@@ -14,7 +14,7 @@ use crate::{
 pub struct Settings {
     /// The axes; those with one value per sample share one dimension, the last.
     pub axes: Vec<Axis>,
-    /// Detuning, if it is not an axis. Without it: that of the scene's stable phase-resonant orbit, or 0.
+    /// Detuning, if it is not an axis. Default: the detuning of the scene's stable phase-resonant orbit, or 0.
     pub sigma: Option<f64>,
     /// Number of samples of random axes; paired values have their own.
     pub samples: Option<u64>,
@@ -384,7 +384,7 @@ impl Sweep {
     pub(crate) fn description(&self) -> Value {
         let axes: Vec<String> = self.settings.axes.iter().map(Axis::to_string).collect();
         let scene = serde_json::to_value(&self.scene).unwrap_or_default();
-        json!({
+        let mut description = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "scene": scene,
             "sigma": self.sigma(),
@@ -395,7 +395,11 @@ impl Sweep {
             "results": self.settings.results.names(),
             "chunk": self.chunk,
             "adaptive": self.settings.adaptive,
-        })
+        });
+        if let Some(left_out) = self.scene.left_out() {
+            description["left_out_of_regime_response_orbits"] = left_out.into();
+        }
+        description
     }
 }
 

@@ -1,14 +1,12 @@
 //! Plant and controller, coupled sample by sample as `vines identify` couples them.
 
-use std::f64::consts::TAU;
-
 use lovines::{Event, Plant, Wall};
 use phase_lock::{Input, Move, Output, PhaseLock, State};
-use vines_model::regime::Impact;
+use vines_model::regime::{Impact, Regime};
+use vines_testbench::live::{Decay, LastImpacts, Motion};
 use vines_testbench::rig::{Command, Drive};
 use vines_testbench::scene::Scene;
 
-use crate::decay::Decay;
 use crate::message::Message;
 use crate::rig::NoisyRig;
 use crate::settings::{COUNT, Settings, changed, default_scene, index, settings_of};
@@ -29,18 +27,11 @@ pub struct Row {
     pub output: Output,
     /// The drive from this sample on: the controller's, or that of the open loop.
     pub drive: Drive,
-    /// Frequency of the motion, rad/s: of the drive or, along a free decay, of the fit.
-    pub omega: f64,
-    /// Amplitude of the response, m: the controller's or, along a free decay, of the fit.
-    pub amplitude: f64,
-    /// Speed of the particle, m/s: along a free decay, the mean over the window of the fit.
-    pub speed: f64,
+    /// Frequency of the drive, amplitude by the controller and present speed of the particle; along a free decay, those of the fit.
+    pub motion: Motion,
     /// Whether this is a free decay with two impacts per period, along the backbone.
     pub decays: bool,
 }
-
-/// Impacts that are kept to determine the regime from.
-const KEPT: usize = 40;
 
 /// The bench: rig, controller and clock.
 pub struct Bench {
@@ -58,10 +49,10 @@ pub struct Bench {
     pub active: bool,
     /// Output of the controller at the last sample.
     pub output: Output,
-    /// Frequency (rad/s) and amplitude (m) of the motion at the last sample, as in [`Row`].
-    pub motion: (f64, f64),
-    /// The last impacts; times are phases of the drive, rad.
-    pub impacts: Vec<Impact>,
+    /// The motion at the last sample, as in [`Row`].
+    pub motion: Motion,
+    /// The last impacts.
+    pub impacts: LastImpacts,
     /// Phase of the drive since the start, rad.
     pub phase: f64,
     /// The tracking of the backbone, while it runs, and the points of one that was ended.
@@ -88,8 +79,8 @@ impl Bench {
             samples: 0,
             active: true,
             output: lock.idle(),
-            motion: (0.0, 0.0),
-            impacts: Vec::new(),
+            motion: Motion::default(),
+            impacts: LastImpacts::default(),
             phase: 0.0,
             tracking: None,
             decay: Decay::default(),
@@ -106,13 +97,16 @@ impl Bench {
         settings_of(&default_scene())
     }
 
-    /// Applies changed settings to the running bench. A change of the half-gap or of the mass ratio restarts it.
+    /// Applies changed settings to the running bench. A change of a gap or of the mass ratio restarts it.
     ///
     /// # Errors
     /// The message for a value that is refused; then nothing changes.
     pub fn apply(&mut self, settings: Settings) -> Result<(), Message> {
         let differs = |one: usize| settings[one] != self.settings[one];
-        if differs(index::GAP) || differs(index::MASS_RATIO) {
+        if [index::GAP, index::GAP_DIFFERENCE, index::MASS_RATIO]
+            .into_iter()
+            .any(differs)
+        {
             *self = Self::new(settings)?;
             return Ok(());
         }
@@ -174,18 +168,19 @@ impl Bench {
         let output = self.lock.process(&mut self.state, input);
         let drive = self.requested(&output);
         let step = self.lock.config().sample_time;
-        let speed = self.rig.plant.state().dq2.abs();
+        let mut motion = Motion {
+            omega: drive.omega,
+            amplitude: output.response_amplitude,
+            speed: self.rig.plant.state().dq2.abs(),
+        };
         if drive.amplitude == 0.0 {
             self.decay
-                .sample(sensors.response, speed, step, self.scene.record.window_periods);
+                .sample(sensors.response, motion.speed, step, self.scene.record.window_periods);
             self.decay.watch(&self.impacts, self.phase);
+            motion = self.decay.motion;
         } else {
-            self.decay.drive(drive.omega);
+            self.decay.drive(motion);
         }
-        let fit = self.decay.fit.as_ref();
-        let (omega, amplitude) = fit.map_or((drive.omega, output.response_amplitude), |fit| {
-            (fit.omega, fit.amplitude)
-        });
         let row = Row {
             time,
             base: sensors.reference.unwrap_or_default(),
@@ -193,15 +188,13 @@ impl Bench {
             relative: self.rig.plant.relative_displacement(),
             output,
             drive,
-            omega,
-            amplitude,
-            speed: fit.map_or(speed, |_| self.decay.speed),
+            motion,
             decays: drive.amplitude == 0.0 && self.decay.synchronous,
         };
         if is_last {
             self.before = (self.rig.plant, drive);
             self.output = output;
-            self.motion = (omega, amplitude);
+            self.motion = motion;
         }
         self.step(drive)?;
         self.samples += 1;
@@ -222,13 +215,12 @@ impl Bench {
         let (impacts, phase) = (&mut self.impacts, self.phase);
         let mut count = |event: Event| {
             if let Event::Impact { t, velocity, .. } = event {
-                impacts.push(Impact { time: phase + drive.omega * t, velocity });
+                impacts.0.push(Impact { time: phase + drive.omega * t, velocity });
             }
         };
         let step = self.lock.config().sample_time;
         self.rig.step(drive, step, &mut count)?;
-        let surplus = self.impacts.len().saturating_sub(KEPT);
-        self.impacts.drain(..surplus);
+        self.impacts.trim();
         self.phase += drive.omega * step;
         Ok(())
     }
@@ -285,15 +277,10 @@ impl Bench {
         self.scene.dimensionless().speed(self.rig.plant.state().dq2.abs())
     }
 
-    /// Impacts per period of the drive over those that are kept.
+    /// The regime of the last impacts.
     #[must_use]
-    pub fn impacts_per_period(&self) -> f64 {
-        match (self.impacts.first(), self.impacts.last()) {
-            (Some(first), Some(last)) if last.time > first.time => {
-                (self.impacts.len() - 1) as f64 * TAU / (last.time - first.time)
-            }
-            _ => 0.0,
-        }
+    pub fn regime(&self) -> Regime {
+        self.impacts.regime(self.phase)
     }
 
     /// Amplitude of the drive, m.
@@ -318,8 +305,9 @@ impl Bench {
             from_mass = to * b;
         }
         // Rounding of the sum must not put the particle beyond a wall.
-        let inside = b * (1.0 - 4.0 * f64::EPSILON) - f64::EPSILON * state.q1.abs();
-        (state.q2, state.dq2) = (state.q1 + from_mass.clamp(-inside, inside), 0.0);
+        let inside = |gap: f64| gap * (1.0 - 4.0 * f64::EPSILON) - f64::EPSILON * state.q1.abs();
+        let [plus, minus] = plant.parameters().gaps().map(inside);
+        (state.q2, state.dq2) = (state.q1 + from_mass.clamp(-plus, minus), 0.0);
         plant.set_state(state)?;
         Ok(())
     }

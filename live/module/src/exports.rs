@@ -12,8 +12,10 @@
 
 use std::cell::RefCell;
 
+use vines_model::curves;
+use vines_testbench::live::Motion;
+
 use crate::bench::Bench;
-use crate::curves;
 use crate::message::Message;
 use crate::settings::{COUNT, Settings};
 
@@ -151,9 +153,9 @@ pub extern "C" fn run(samples: u32) -> i32 {
                 controller.phase_error.unwrap_or(0.0).to_degrees(),
                 row.drive.omega,
                 row.drive.amplitude,
-                row.amplitude,
-                row.omega,
-                row.speed,
+                row.motion.amplitude,
+                row.motion.omega,
+                row.motion.speed,
                 f64::from(u8::from(row.decays)),
             ]);
         })
@@ -200,7 +202,7 @@ pub extern "C" fn status() -> i32 {
     values(|bench, output| {
         let (d, out) = (bench.scene.dimensionless(), bench.output);
         let closed = bench.settings[crate::settings::index::CLOSED] != 0.0;
-        let (omega, amplitude) = bench.motion;
+        let Motion { omega, amplitude, .. } = bench.motion;
         let totals = bench.plant().totals();
         let lock = bench.lock.config().lock;
         let yes = |condition: bool| f64::from(u8::from(condition));
@@ -218,7 +220,7 @@ pub extern "C" fn status() -> i32 {
             f64::from(out.state as u8),
             out.fault.map_or(0.0, |fault| f64::from(fault as u8)),
             totals.impacts as f64,
-            bench.impacts_per_period(),
+            bench.impacts.per_period(),
             totals.dissipated,
             lock.phase_tolerance.to_degrees(),
             lock.unlock_tolerance.to_degrees(),

@@ -5,15 +5,12 @@
 //! `vines-model` and `vines-testbench`: this crate only runs them sample by sample.
 
 pub mod bench;
-mod curves;
-mod decay;
 pub mod exports;
 #[cfg(target_arch = "wasm32")]
 mod mathematics;
 pub mod message;
 mod rig;
 pub mod settings;
-mod status;
 mod tracking;
 
 #[cfg(target_arch = "wasm32")]

@@ -58,6 +58,10 @@ pub fn settings_of(scene: &Scene) -> Settings {
     values[index::DAMPING] = d.lambda;
     values[index::MASS_RATIO] = d.epsilon;
     values[index::GAP] = d.b * 1e3;
+    let [plus, minus] = scene.plant.gaps();
+    values[index::GAP_DIFFERENCE] = 50.0 * (plus - minus) / d.b;
+    values[index::FRICTION] = scene.plant.cavity.kinetic_friction;
+    values[index::TILT] = scene.plant.cavity.tilt.to_degrees();
     values[index::PHASE_TARGET] = scene.controller.phase_target;
     values[index::BANDWIDTH] = scene.controller.bandwidth;
     values[index::START_SPEED] = d.speed(scene.start.dq2);
@@ -83,6 +87,21 @@ pub fn changed(mut scene: Scene, values: &Settings) -> Scene {
     }
     if differs(index::GAP) {
         plant.half_width = values[index::GAP] * 1e-3;
+    }
+    let (b, difference, cavity) = (
+        plant.half_width,
+        0.01 * values[index::GAP_DIFFERENCE],
+        &mut plant.cavity,
+    );
+    if differs(index::GAP_DIFFERENCE) || differs(index::GAP) && cavity.b_plus.or(cavity.b_minus).is_some() {
+        let gap = |side: f64| (difference != 0.0).then_some(b * (1.0 + side * difference));
+        (cavity.b_plus, cavity.b_minus) = (gap(1.0), gap(-1.0));
+    }
+    if differs(index::FRICTION) {
+        (cavity.kinetic_friction, cavity.static_friction) = (values[index::FRICTION], None);
+    }
+    if differs(index::TILT) {
+        cavity.tilt = values[index::TILT].to_radians();
     }
     let d = Dimensionless::of(plant, 0.0);
     if [index::EXCITATION, index::MASS_RATIO, index::GAP]

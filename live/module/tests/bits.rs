@@ -3,9 +3,10 @@
 use std::f64::consts::TAU;
 
 use vines_live::bench::Bench;
-use vines_live::settings::{default_scene, index};
+use vines_live::settings::{default_scene, index, settings_of};
 use vines_testbench::experiment::{Plan, run};
 use vines_testbench::identification::decay_points;
+use vines_testbench::live::Motion;
 use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
 
@@ -58,21 +59,23 @@ fn the_free_decay_has_the_bits_of_the_lab() {
     assert!(points.len() > 50, "{} points", points.len());
     let mut bench = Bench::new(Bench::default_settings()).unwrap();
     bench.run(record.released, |_| {}).unwrap();
+    let released = bench.motion;
     bench.drive(false);
-    let mut fits: Vec<(f64, f64, f64)> = Vec::new();
+    let mut fits: Vec<Motion> = Vec::new();
     let mut lost = None;
     bench
         .run(record.decay().len(), |row| {
-            let fit = (row.omega, row.amplitude, row.speed);
-            if row.omega != row.drive.omega && fits.last() != Some(&fit) {
-                fits.push(fit);
+            if fits.last() != Some(&row.motion) {
+                fits.push(row.motion);
             }
             if !row.decays {
                 lost.get_or_insert(row.time - record.decay()[0].time);
             }
         })
         .unwrap();
-    for (point, (omega, amplitude, speed)) in points.iter().zip(&fits) {
+    // Until the first fit, the motion is that of the release.
+    assert_eq!(fits.remove(0), released);
+    for (point, Motion { omega, amplitude, speed }) in points.iter().zip(&fits) {
         assert_eq!(
             (point.f_hz, point.a_m),
             (omega / TAU, *amplitude),
@@ -111,6 +114,42 @@ fn a_mass_that_is_put_somewhere_starts_from_rest_there() {
         );
         bench.run(10, |_| {}).unwrap();
     }
+}
+
+#[test]
+fn gap_difference_friction_and_tilt_reach_the_plant() {
+    let mut settings = Bench::default_settings();
+    settings[index::GAP_DIFFERENCE] = 10.0;
+    settings[index::FRICTION] = 0.05;
+    settings[index::TILT] = 30.0;
+    let mut bench = Bench::new(settings).unwrap();
+    let (plant, b) = (bench.scene.plant, bench.scene.plant.half_width);
+    assert_eq!(plant.gaps(), [1.1 * b, 0.9 * b]);
+    assert_eq!(plant.cavity.kinetic_friction, 0.05);
+    assert_eq!(plant.cavity.tilt, 30f64.to_radians());
+    bench.run(500, |_| {}).unwrap();
+    assert!(bench.plant().totals().friction > 0.0);
+    for (to, w) in [(-2.0, 1.1), (2.0, -0.9)] {
+        bench.place(false, to).unwrap();
+        assert!(
+            (bench.plant().relative_displacement() - w * b).abs() < 1e-14,
+            "particle at {to}"
+        );
+    }
+    // Friction and tilt change while the bench runs, and can be switched off.
+    let time = bench.time();
+    (settings[index::FRICTION], settings[index::TILT]) = (0.0, 0.0);
+    bench.apply(settings).unwrap();
+    let ideal = lovines::Cavity {
+        b_plus: plant.cavity.b_plus,
+        b_minus: plant.cavity.b_minus,
+        ..lovines::Cavity::IDEAL
+    };
+    assert_eq!((bench.time(), bench.plant().parameters().cavity), (time, ideal));
+    assert_eq!(settings_of(&bench.scene), settings);
+    settings[index::GAP_DIFFERENCE] = 0.0;
+    bench.apply(settings).unwrap();
+    assert_eq!(bench.scene, paper());
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Plant and controller coupled as a master couples them: the default scene, a digest of every output bit, and the lock.
 
 use fmi2_component::Status;
-use fmi2_description::{Causality, Description, Kind};
+use fmi2_description::{Causality, Description, FmiType};
 use sha2::{Digest, Sha256};
 
 use crate::fuzz::RandomSource;
@@ -33,7 +33,7 @@ impl References {
     fn of(fmu: &Fmu, inputs: [&str; 2], sensors: [&str; 2], start: &str) -> Self {
         let description = description(fmu);
         let one = |name: &str| reference(fmu, name);
-        let all = |kinds: &[Kind]| {
+        let all = |kinds: &[FmiType]| {
             let put_out = description
                 .variables
                 .iter()
@@ -47,9 +47,9 @@ impl References {
             inputs: inputs.map(one),
             sensors: sensors.map(one),
             start: one(start),
-            reals: all(&[Kind::Real]),
-            integers: all(&[Kind::Integer, Kind::Enumeration]),
-            booleans: all(&[Kind::Boolean]),
+            reals: all(&[FmiType::Real]),
+            integers: all(&[FmiType::Integer, FmiType::Enumeration]),
+            booleans: all(&[FmiType::Boolean]),
         }
     }
 }

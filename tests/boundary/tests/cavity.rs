@@ -1,4 +1,4 @@
-//! The parameters of a real cavity: that they reach the plant, that a state can be saved, and what model exchange says.
+//! The parameters of a real cavity: that they reach the plant, that a state can be saved, and the same in model exchange.
 
 use fmi2_boundary::{Fmu, Interface, Master};
 use fmi2_component::Status;
@@ -105,8 +105,8 @@ fn output_derivatives_and_energy_know_friction_and_tilt() {
         m.well(m.step(f64::from(n) * STEP, STEP));
     }
     let t = 400.0 * STEP;
-    // q1, der(q1), q2, der(q2), energy.
-    let variables = [9u32, 10, 11, 12, 22];
+    // q1, der(q1), q2, der(q2), energy, stuck_time, friction_loss.
+    let variables = [9u32, 10, 11, 12, 22, 45, 46];
     let before = variables.map(|vr| m.real(vr));
     let slopes = variables.map(|vr| {
         let mut slope = 0.0;
@@ -127,18 +127,58 @@ fn output_derivatives_and_energy_know_friction_and_tilt() {
 }
 
 #[test]
-fn model_exchange_refuses_a_real_cavity() {
+fn model_exchange_takes_the_parameters_and_slides_sticks_and_slips() {
     let m = Master::new(&Fmu::plant(), Interface::ModelExchange);
     for (vr, value) in REALS {
-        // r_plus alone is a constant coefficient of restitution, and refused too.
-        assert_eq!(m.set_real(vr, value), Status::Error, "{vr}");
-        m.well(m.set_real(vr, 0.0));
+        m.well(m.set_real(vr, value));
     }
     for (vr, value) in INTEGERS {
-        assert_eq!(set_integer(&m, vr, value), Status::Error, "{vr}");
-        m.well(set_integer(&m, vr, 0));
+        m.well(set_integer(&m, vr, value));
     }
+    // A particle at rest, which friction holds.
+    m.well(m.set_real(12, 0.0));
     m.start();
+    let resolve = || {
+        // SAFETY: one place; so below: arrays of five.
+        m.well(unsafe { (m.f.fmi2NewDiscreteStates)(m.c, &mut Default::default()) });
+    };
+    let at = |t: f64| unsafe {
+        m.well((m.f.fmi2EnterContinuousTimeMode)(m.c));
+        m.well((m.f.fmi2SetTime)(m.c, t));
+        m.well((m.f.fmi2EnterEventMode)(m.c));
+    };
+    resolve();
+    assert_eq!(integer(&m, 44), 1);
+    at(0.25);
+    assert_eq!(m.real(45), 0.25, "time stuck");
+    // A steeper slope lets it slip: der(w) < 0, because gravity pulls towards +q2.
+    m.well(m.set_real(35, 0.3));
+    resolve();
+    // SAFETY: as above.
+    let indicators = || unsafe {
+        let mut z = [0.0; 5];
+        m.well((m.f.fmi2GetEventIndicators)(m.c, z.as_mut_ptr(), 5));
+        z
+    };
+    assert!(indicators()[4] < 1e-11 && indicators()[2..4] == [1.0; 2]);
+    let pull = 9.80665 * (0.3f64.sin() - 0.1 * 0.3f64.cos());
+    assert!((m.real(27) - pull).abs() < 1e-14, "der(u2)");
+    let way = 1e-3;
+    let mut x = [0.0, way, 0.0, 0.1, 0.0];
+    unsafe {
+        m.well((m.f.fmi2EnterContinuousTimeMode)(m.c));
+        m.well((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5));
+    }
+    let loss = 0.032 * 9.80665 * 0.1 * 0.3f64.cos() * way;
+    assert!((m.real(46) / loss - 1.0).abs() < 1e-12, "energy lost to friction");
+    // The particle has turned round: it sticks or slides the other way, at the next event.
+    x[3] = -1e-6;
+    unsafe { m.well((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5)) };
+    assert!(indicators()[4] < 0.0);
+    unsafe { m.well((m.f.fmi2EnterEventMode)(m.c)) };
+    resolve();
+    assert!(indicators().iter().all(|&z| z > 0.0));
+    assert_eq!((integer(&m, 44), m.real(15)), (1, 0.0), "it slides on from rest");
 }
 
 #[test]

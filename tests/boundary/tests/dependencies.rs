@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use fmi2_boundary::{Fmu, Interface, Master};
 use fmi2_component::abi::EventInfo;
-use fmi2_description::{Causality, Initial, Kind, ScalarVariable, Unknown};
+use fmi2_description::{Causality, FmiType, Initial, ScalarVariable, Unknown};
 
 /// Unknowns and what they depend on, by place in the list of variables; with each dependency its kind.
 type Structure = BTreeMap<(usize, usize), String>;
@@ -65,7 +65,7 @@ fn read(xml: &str) -> Description {
 
 impl Description {
     /// Type and value reference.
-    fn variable(&self, place: usize) -> (Kind, &u32) {
+    fn variable(&self, place: usize) -> (FmiType, &u32) {
         let variable = &self.variables[place - 1];
         (variable.content().unwrap().0, &variable.value_reference)
     }
@@ -81,8 +81,8 @@ impl Description {
         let mut whole = 0;
         // SAFETY: one reference, one place; so below.
         match kind {
-            Kind::Real => return m.real(*vr),
-            Kind::Integer | Kind::Enumeration => m.well(unsafe { (m.f.fmi2GetInteger)(m.c, vr, 1, &mut whole) }),
+            FmiType::Real => return m.real(*vr),
+            FmiType::Integer | FmiType::Enumeration => m.well(unsafe { (m.f.fmi2GetInteger)(m.c, vr, 1, &mut whole) }),
             _ => m.well(unsafe { (m.f.fmi2GetBoolean)(m.c, vr, 1, &mut whole) }),
         }
         f64::from(whole)
@@ -92,8 +92,8 @@ impl Description {
         let (kind, vr) = self.variable(place);
         let whole = value as i32;
         m.well(match kind {
-            Kind::Real => m.set_real(*vr, value),
-            Kind::Integer | Kind::Enumeration => unsafe { (m.f.fmi2SetInteger)(m.c, vr, 1, &whole) },
+            FmiType::Real => m.set_real(*vr, value),
+            FmiType::Integer | FmiType::Enumeration => unsafe { (m.f.fmi2SetInteger)(m.c, vr, 1, &whole) },
             _ => unsafe { (m.f.fmi2SetBoolean)(m.c, vr, 1, &whole) },
         });
     }
@@ -152,11 +152,8 @@ fn plant(interface: Interface, rig: &[f64; 13], stuck: bool) -> Master {
     for (vr, &value) in (0..).zip(rig).chain(rest.iter().map(|(vr, value)| (*vr, value))) {
         m.well(m.set_real(vr, value));
     }
-    if interface == Interface::CoSimulation {
-        // Model exchange knows the ideal cavity only.
-        m.well(m.set_real(THETA, 0.1));
-        m.well(m.set_real(MU_K, 0.2));
-    }
+    m.well(m.set_real(THETA, 0.1));
+    m.well(m.set_real(MU_K, 0.2));
     m
 }
 
@@ -265,11 +262,11 @@ fn unknowns_of_the_controller() {
         for &known in knowns {
             let ((kind, _), value) = (d.variable(known), d.start(known));
             let change = match kind {
-                Kind::Real if value == 0.0 => 1e-2,
+                FmiType::Real if value == 0.0 => 1e-2,
                 // -1 is "none": the next value that is allowed.
-                Kind::Real if value == -1.0 => 2.0,
-                Kind::Real => 1e-3 * value.abs(),
-                Kind::Boolean => 1.0 - 2.0 * value,
+                FmiType::Real if value == -1.0 => 2.0,
+                FmiType::Real => 1e-3 * value.abs(),
+                FmiType::Boolean => 1.0 - 2.0 * value,
                 _ => 1.0,
             };
             let set = |value| d.set(&m, known, value);

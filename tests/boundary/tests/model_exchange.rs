@@ -34,9 +34,9 @@ fn integer(m: &Master, vr: u32) -> i32 {
     value
 }
 
-fn indicators(m: &Master) -> [f64; 3] {
-    let mut z = [0.0; 3];
-    m.well(unsafe { (m.f.fmi2GetEventIndicators)(m.c, z.as_mut_ptr(), 3) });
+fn indicators(m: &Master) -> [f64; 5] {
+    let mut z = [0.0; 5];
+    m.well(unsafe { (m.f.fmi2GetEventIndicators)(m.c, z.as_mut_ptr(), 5) });
     z
 }
 

@@ -15,43 +15,40 @@
 use std::f64::consts::TAU;
 
 use nalgebra::DVector;
-use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, noise};
+use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, noise, range};
 
-use super::{ControlLoop, ExperimentError, Sample, Stage};
+use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, Stage};
 use crate::identification::{ASYMMETRIC, Balance, Cycle, Slopes, without_tones};
-use crate::rig::{Command, Controller, ControllerError, LoopState, Move, Rig};
+use crate::rig::{Controller, ControllerError, LoopState, Move, Rig};
 use crate::scene::{LinearResponse, Scene};
 
-/// Phase error, rad, below which the control of the response begins: the drive then does 94 % of its largest work. Periods for which.
+/// Phase error, rad, below which the control of the response begins: the drive then does 94 % of its largest work.
 const NEAR: f64 = 0.35;
-const NEAR_FOR: usize = 3;
-/// Periods of a leg at least. The loops, whose slowest time constant is five periods, follow within it.
-const LEG: usize = 8;
 /// Largest relative change of the response in a leg: the stable orbits above the fold span a few percent.
 const STEP: f64 = 0.04;
 /// Largest share of the drive that changes the response.
 const SHARE: f64 = 0.3;
-/// Periods in which the response rises by the half-width.
+/// Duration of a rise of the response by the half-width, periods.
 const RISE: f64 = 60.0;
-/// Relative error of the half-width in the drawing, and the response over it at which the particle is not reached, as it seems.
+/// Largest relative error of the half-width in the drawing.
 const DRAWING: f64 = 0.1;
+/// Response over the half-width from which impacts are no longer expected: the particle does not move freely.
 const UNREACHED: f64 = 1.5;
-/// Response over the half-width below which no motion is searched for: the fold is above, up to r = 0.9.
+/// Smallest response over the half-width of the search: up to r = 0.9, the fold has a larger one.
 const LOWEST: f64 = 0.05;
-/// Change of the response, from where the symmetry was lost or the lock was found, after which the motion is lost: its stable range is wider.
+/// Response, over the response where the symmetry was lost or the lock was found, below which the motion is another one; also its inverse. The
+/// stable range of the symmetric motion is wider.
 const LOST: f64 = 0.8;
-/// Departure from the linear response that shows impacts, as a share of the drive: twice the uncertainty of damping and stiffness.
+/// Smallest departure from the linear response that shows impacts, as a share of the drive: twice the uncertainty of damping and stiffness.
 const DEPARTURE: f64 = 0.2;
-/// Legs in which this ratio grows one after the other: beside symmetry breaking the symmetry is lost slowly, and noise does this in one of 24 cases.
-const GROWN: u32 = 3;
-/// Smallest slope of the holding drive under a constant drive, over that of the linear response: with less, it takes ten times as long
-/// to settle.
+/// Smallest slope of the holding drive over the response under a constant drive, over the slope of the linear response: with less, the motion
+/// takes ten times as long to settle.
 const FIRM: f64 = 0.1;
 /// Relative error of the drive, or of the response if that is larger, at which the response that the requested drive holds has been found.
 const FOUND: f64 = 1e-4;
-/// Steps of the interpolation after which the motion is left to settle where it is.
+/// Largest number of steps of the interpolation; then the motion is left to settle where it is.
 const LEGS: u32 = 20;
-/// Searches, each twice as slow as the one before.
+/// Number of searches, each twice as slow as the one before.
 const SEARCHES: u32 = 4;
 
 /// What a leg measured.
@@ -66,8 +63,6 @@ struct Leg {
     /// Whether impacts change drive or frequency.
     departed: bool,
     symmetric: bool,
-    /// Second harmonic over the third, as far as noise does not explain it.
-    asymmetry: f64,
 }
 
 /// The search.
@@ -75,9 +70,6 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     bench: &'b mut ControlLoop<'a, R, C>,
     scene: &'b Scene,
     linear: LinearResponse,
-    /// Time limit, samples.
-    limit: usize,
-    progress: &'b mut dyn FnMut(usize),
     /// Half-width of the cavity, and requested drive, m.
     b: f64,
     requested: f64,
@@ -87,33 +79,23 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     period: f64,
     /// Setpoint of the response, m.
     setpoint: f64,
-    last: Command,
-    /// The symmetric motions of the smallest and the largest holding drive: response and drive, m.
-    extremes: Option<[[f64; 2]; 2]>,
+    /// Smallest and largest drive that held a symmetric motion, m; infinite before the first.
+    held: (f64, f64),
 }
 
 impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
-    /// The search on a bench, for at most `limit` samples; `progress` receives their number.
-    pub fn new(
-        bench: &'b mut ControlLoop<'a, R, C>,
-        scene: &'b Scene,
-        limit: usize,
-        progress: &'b mut dyn FnMut(usize),
-    ) -> Self {
-        let d = scene.dimensionless();
+    /// The search on a bench.
+    pub fn new(bench: &'b mut ControlLoop<'a, R, C>, scene: &'b Scene) -> Self {
         Self {
             bench,
             scene,
             linear: scene.linear(),
-            limit,
-            progress,
-            b: d.b,
+            b: scene.plant.half_width,
             requested: scene.amplitude,
             target: scene.controller.phase_target_radians(),
-            period: d.natural_period(),
+            period: TAU / scene.linear().omega0,
             setpoint: 0.0,
-            last: Command::default(),
-            extremes: None,
+            held: (f64::INFINITY, 0.0),
         }
     }
 
@@ -144,19 +126,17 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Closes the loop and begins to control the response.
     fn begin(&mut self) -> Result<Leg, ExperimentError> {
         let mut near = 0;
-        while near < NEAR_FOR {
-            let period = self.one_period()?;
-            let closed = self
-                .last
-                .state
-                .is_none_or(|state| matches!(state, LoopState::Acquiring | LoopState::Locked));
-            let is_near = period.is_some_and(|one| {
+        while near < CONFIRMED {
+            let period = self.bench.period(Stage::Locking)?;
+            let state = self.bench.last.state;
+            let closed = state.is_none_or(|state| matches!(state, LoopState::Acquiring | LoopState::Locked));
+            let is_near = self.bench.cycle(period, self.target).is_some_and(|one| {
                 self.setpoint = one.amplitude();
                 one.phase_error.abs() < NEAR
             });
             near = if closed && is_near { near + 1 } else { 0 };
         }
-        self.leg(0.0, LEG, 0.0)
+        self.leg(0.0, FOLLOWED, 0.0)
     }
 
     /// Goes to a symmetric motion with impacts: raises the response until they have begun, and lowers it until the motion is symmetric.
@@ -167,16 +147,16 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         while !leg.departed || leg.response < (1.0 - DRAWING) * self.b {
             if leg.symmetric {
                 // A rise may resemble impacts; at rest the setpoint tells them apart.
-                leg = self.leg(0.0, LEG, 0.0)?;
+                leg = self.leg(0.0, FOLLOWED, 0.0)?;
                 if leg.symmetric {
                     return Ok(leg);
                 }
             }
-            let change = rate * LEG as f64 * self.period;
+            let change = rate * FOLLOWED as f64 * self.period;
             if leg.last + change > UNREACHED * self.b || rate <= 0.0 {
                 return Ok(leg);
             }
-            leg = self.leg(leg.last + change - self.setpoint, LEG, rate)?;
+            leg = self.leg(leg.last + change - self.setpoint, FOLLOWED, rate)?;
         }
         self.fall(leg, step, LOWEST * self.b)
     }
@@ -206,13 +186,13 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                     legs += 1;
                     let to = leg.last + change - self.setpoint;
                     self.leg(to, self.periods(change, leg) / 2, 0.0)?;
-                    self.leg(0.0, LEG, 0.0)?
+                    self.leg(0.0, FOLLOWED, 0.0)?
                 }
                 change => self.sweep(leg, change.map_or(way, |change| change.clamp(-most, most)))?,
             };
             if !leg.symmetric {
                 // A change may disturb the symmetry for a while.
-                *leg = self.leg(0.0, LEG, 0.0)?;
+                *leg = self.leg(0.0, FOLLOWED, 0.0)?;
             }
             if !leg.symmetric {
                 (points, passed, upwards) = (self.below(leg, step)?, false, false);
@@ -249,12 +229,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Waits until the lock has settled. Returns whether it has; if not, the motion has lost its symmetry.
     fn settle(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
-        let (mut other, mut grown, first) = (0, 0, leg.response);
+        let (mut other, first) = (0, leg.response);
         while other < 2 {
-            let before = leg.asymmetry;
-            *leg = self.measure(LEG)?;
-            grown = if leg.asymmetry > before { grown + 1 } else { 0 };
-            if self.last.settled && grown < GROWN {
+            *leg = self.measure(FOLLOWED)?;
+            if self.bench.last.settled {
                 return Ok(true);
             }
             // Noise may hide an asymmetry, but not where the motion goes.
@@ -271,8 +249,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         self.leg(change, periods, change / (periods as f64 * self.period))
     }
 
-    /// Moves the setpoint by `change`, m, in so many periods and measures meanwhile. The setpoint ends, and goes on, with the growth `onward`,
-    /// m/s.
+    /// Moves the setpoint by `change`, m, within `periods` and measures meanwhile. The setpoint ends, and goes on, with the growth `onward`, m/s.
     fn leg(&mut self, change: f64, periods: usize, onward: f64) -> Result<Leg, ExperimentError> {
         let to = Move {
             response: (self.setpoint + change).max(LOWEST * self.b),
@@ -288,7 +265,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Periods for a change of the response, m, so that a share of the holding drive makes it.
     fn periods(&self, change: f64, leg: &Leg) -> usize {
         let rate = SHARE * self.gain() * leg.drive.max(FIRM * self.requested);
-        LEG.max((change.abs() / (rate * self.period)).ceil() as usize)
+        FOLLOWED.max((change.abs() / (rate * self.period)).ceil() as usize)
     }
 
     /// Growth rate of the response per drive, 1/s, at the natural frequency.
@@ -301,12 +278,13 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         self.linear.damping_rate / self.gain()
     }
 
-    /// Measures over so many periods, or until the lock has settled.
+    /// Measures over `periods`, or until the lock has settled.
     fn measure(&mut self, periods: usize) -> Result<Leg, ExperimentError> {
         let mut begins = Vec::new();
-        while begins.len() < periods.max(Balance::FEWEST) && !(self.last.settled && begins.len() >= Balance::FEWEST) {
-            begins.push((self.bench.samples.len(), self.bench.periods));
-            self.one_period()?;
+        while begins.len() < periods.max(Balance::FEWEST)
+            && !(self.bench.last.settled && begins.len() >= Balance::FEWEST)
+        {
+            begins.push(self.bench.period(Stage::Locking)?);
         }
         // Two periods tell the harmonics from a drift of the fundamental.
         let from = (begins[0].0 + begins[0].0).saturating_sub(begins[1].0);
@@ -342,12 +320,11 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let (even, odd) = (even - noise, odd - noise);
         let doubtful = SIGNIFICANT * noise / (0.5 * all.len() as f64).sqrt();
         let possible = self.setpoint > LOWEST * self.b && response < UNREACHED * self.b;
-        let symmetric = departed && possible && even <= (ASYMMETRIC * ASYMMETRIC * odd).max(doubtful);
+        // Without mirror images there is no symmetric motion to tell from others.
+        let is_even_small = !self.scene.has_mirror_images() || even <= (ASYMMETRIC * ASYMMETRIC * odd).max(doubtful);
+        let symmetric = departed && possible && is_even_small;
         if symmetric {
-            let point = [response, drive.value];
-            let [least, most] = self.extremes.unwrap_or([point, point]);
-            let least = if point[1] < least[1] { point } else { least };
-            self.extremes = Some([least, if point[1] > most[1] { point } else { most }]);
+            self.held = range(self.held, [drive.value]);
         }
         Ok(Leg {
             response,
@@ -356,40 +333,22 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             noise: scatter * drive.uncertainty,
             departed,
             symmetric,
-            asymmetry: ((even - doubtful).max(0.0) / odd.max(doubtful)).sqrt(),
         })
-    }
-
-    /// One period of the drive; `None` without a motion.
-    fn one_period(&mut self) -> Result<Option<Cycle>, ExperimentError> {
-        let begin = self.bench.samples.len();
-        let first = self.bench.periods;
-        while self.bench.periods < first.floor() + 1.0 {
-            self.last = self.bench.sample(Stage::Locking)?;
-            (self.progress)(self.bench.taken);
-            if self.bench.taken >= self.limit {
-                return Err(self.bench.no_lock(&self.last));
-            }
-        }
-        let samples = &self.bench.samples[begin..];
-        Ok(Cycle::of(samples, self.bench.sample_time, first * TAU, self.target))
     }
 
     /// Why the requested drive was not reached.
     fn not_reached(&self) -> ExperimentError {
         let d = self.scene.dimensionless();
-        let why = match self.extremes {
-            None => format!(
+        let why = match self.held {
+            (low, high) if low <= high => format!(
+                "the symmetric 1:1 motions that were found need from G = {:.4} to {:.4}, and were lost {SEARCHES} times on the way",
+                d.excitation(low),
+                d.excitation(high)
+            ),
+            _ => format!(
                 "no symmetric 1:1 motion was found at responses up to C = {:.3}",
                 self.setpoint / self.b
             ),
-            Some(extremes) => {
-                let [least, most] =
-                    extremes.map(|[c, g]| format!("G = {:.4} (C = {:.4})", d.excitation(g), c / self.b));
-                format!(
-                    "the symmetric 1:1 motions that were found need from {least} to {most}, and were lost {SEARCHES} times on the way"
-                )
-            }
         };
         ExperimentError::NotReached { periods: self.bench.periods, g: d.g, why }
     }

@@ -15,8 +15,8 @@
 //! ```
 //!
 //! Both are linear least squares, weighted by the noise that the fits of the periods find. Nothing in them is known of the rig but
-//! `omega0` and the damping. A slope is measured where the amplitude varies and has no influence where it does not; a wide prior, or
-//! that of the points next to it, bounds what noise may make of it.
+//! `omega0` and the damping. A slope is measured where the amplitude varies and has no influence where it does not; a prior, wide or from
+//! the neighbouring points of the backbone, bounds what noise may make of it.
 
 use std::f64::consts::TAU;
 
@@ -26,14 +26,14 @@ use vines_model::numerics::{Estimate, HarmonicBasis, Prior, Regression, mean, sl
 use crate::record::{Sample, drive_phases};
 use crate::scene::LinearResponse;
 
-/// What is known in advance of the slopes of `E_R` and `omega_R` over the amplitude.
+/// Prior knowledge of the slopes of `E_R` and `omega_R` over the amplitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Slopes {
     /// Nothing.
     Unknown,
-    /// The motion is stable under a constant drive: `E_R` rises, and that by the order of E/A.
+    /// The motion is stable under a constant drive: `E_R` rises with the amplitude, by about E/A.
     Rising,
-    /// The values between the points next to it.
+    /// Estimates from neighbouring points of the backbone.
     Known([Estimate; 2]),
 }
 
@@ -63,19 +63,19 @@ pub struct Balance {
     within: [f64; 2],
 }
 
-/// Largest factor of the neglected terms of the second order: those that are kept have the same form with the factor 1.
+/// Bound of the factor of the neglected terms of the second order; the terms that are kept have the same form and the factor 1.
 const REMAINDER: f64 = 0.7;
-/// A slope weighs integrated noise by a parabola, whose variance is 6/5 of that of a mean.
+/// Variance of integrated white noise in a slope, which weighs it by a parabola, over its variance in a mean: 6/5.
 const PARABOLA: f64 = 1.2;
-/// Standard deviation of a slope of which nothing is known, in units of its natural scale: `E/A`, and `g E/A²`. The slopes of vibro-impact rigs are
-/// from -1 to 3 of them.
+/// Prior standard deviation of an unknown slope, in units of its natural scale: `E/A`, and `g E/A²`. Vibro-impact rigs have slopes from -1 to 3
+/// of these units.
 const WIDE: f64 = 3.0;
 
 impl Balance {
     /// Fewest periods: one more than the coefficients.
     pub const FEWEST: usize = 4;
 
-    /// From at least four periods of a rig whose linear response is `linear`. `slopes`: what is known of the slopes of `E_R` and `omega_R` over the amplitude.
+    /// From at least four periods of a rig whose linear response is `linear`.
     #[must_use]
     pub fn of(cycles: &[Cycle], linear: &LinearResponse, slopes: Slopes) -> Option<Self> {
         let n = cycles.len() as f64;
@@ -95,7 +95,8 @@ impl Balance {
         let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
         let deviation = integral(&time, motion.iter().map(|one| one.amplitude - response));
         let columns = [vec![1.0; cycles.len()], time, deviation];
-        let calibration = total(cycles, |cycle| cycle.base.norm()) / total(cycles, |cycle| cycle.commanded[0].norm());
+        let total = |value: fn(&Cycle) -> f64| cycles.iter().map(value).sum::<f64>();
+        let calibration = total(|cycle| cycle.base.norm()) / total(|cycle| cycle.commanded[0].norm());
         let drives = drives(cycles, &motion, calibration);
         // The damper's force on the base leads it by twice the damping ratio.
         let lead = 2.0 * linear.damping_rate / omega0;
@@ -120,8 +121,9 @@ impl Balance {
         let prior = |Estimate { value, uncertainty }| [Prior { coefficient: 2, value, uncertainty }];
         let drive = Regression::fit(&columns, &amplitudes, &prior(by_base.scaled(-gain)), noise)?;
         let turning = Regression::fit(&columns, &phases, &prior(by_omega), noise / response)?;
-        let mut force = drives.iter().map(|drive| drive.force.re);
-        let neglected = REMAINDER * inertia * growth(cycles, |_| force.next().unwrap_or_default());
+        let duration = cycles[cycles.len() - 1].time - cycles[0].time;
+        let forces: Vec<f64> = drives.iter().map(|drive| drive.force.re).collect();
+        let neglected = REMAINDER * inertia * (slope(&forces) * n / duration);
         let phase_noise = (noise / response).hypot(base_noise / base);
         let of = |value, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
         Some(Self {
@@ -169,13 +171,9 @@ impl Balance {
     pub fn limit(&self, command: f64) -> [Estimate; 2] {
         let [by_base, by_omega] = self.slopes().map(|slope| slope.value);
         let ahead = (command * self.calibration - self.at(0.0)[0].value) / by_base;
-        // The uncertainty of the slope is in that of the drive at the limit.
-        let aside = self
-            .drive
-            .estimate(&[0.0, 1.0, ahead])
-            .scaled(1.0 / self.gain)
-            .uncertainty
-            / by_base;
+        // The uncertainty of the drive at the limit contains the uncertainty of the slope.
+        let at_limit = self.drive.estimate(&[0.0, 1.0, ahead]);
+        let aside = at_limit.scaled(1.0 / self.gain).uncertainty / by_base;
         let turning = self.at(ahead)[1];
         // The noise within the integrals moves the amplitude that the frequency belongs to as it moves the limit: it cancels.
         [
@@ -191,7 +189,7 @@ struct PeriodResponse {
     amplitude: f64,
     /// rad
     phase: f64,
-    /// Phase less that of the fit, rad.
+    /// Correction of the phase by the drift of the amplitude, rad.
     correction: f64,
 }
 
@@ -217,7 +215,7 @@ fn motion(cycles: &[Cycle]) -> Vec<PeriodResponse> {
             let time = (cycles[to].time - cycles[from].time) * cycles[n].omega;
             let growth = (cycles[to].amplitude() - cycles[from].amplitude()) / time;
             let amplitude = cycles[n].amplitude();
-            // The frequency of the drive may jump from period to period; that of the response does not.
+            // The frequency of the drive may jump from period to period, but the frequency of the response does not.
             let turning = amplitude * ((phases[to] - phases[from]) / time - 1.0);
             let z = cycles[n].response;
             let drift = Complex::new(growth, turning) * z / amplitude;
@@ -231,25 +229,16 @@ fn motion(cycles: &[Cycle]) -> Vec<PeriodResponse> {
         .collect()
 }
 
-/// Slope of a value over time.
-fn growth(cycles: &[Cycle], value: impl FnMut(&Cycle) -> f64) -> f64 {
-    let duration = cycles[cycles.len() - 1].time - cycles[0].time;
-    slope(&cycles.iter().map(value).collect::<Vec<f64>>()) * cycles.len() as f64 / duration
-}
-
 /// Integral over time from the first value on, by the trapezoidal rule.
 fn integral(time: &[f64], rates: impl Iterator<Item = f64>) -> Vec<f64> {
     let (mut sum, mut before) = (0.0, None);
-    time.iter()
-        .zip(rates)
-        .map(|(time, rate)| {
-            sum += before.map_or(0.0, |(earlier, slower): (f64, f64)| {
-                0.5 * (rate + slower) * (time - earlier)
-            });
-            before = Some((*time, rate));
-            sum
-        })
-        .collect()
+    let steps = time.iter().zip(rates).map(|(&time, rate)| {
+        let step = before.map_or(0.0, |(earlier, slower)| 0.5 * (rate + slower) * (time - earlier));
+        before = Some((time, rate));
+        sum += step;
+        sum
+    });
+    steps.collect()
 }
 
 /// The drive of a period, from the command, which has no noise; the sensor calibrates it.
@@ -260,10 +249,7 @@ struct DriveIntegrals {
     work: Complex<f64>,
 }
 
-fn total(cycles: &[Cycle], value: fn(&Cycle) -> f64) -> f64 {
-    cycles.iter().map(value).sum()
-}
-
+/// The drive of each period; `calibration`: measured over commanded amplitude of the base.
 fn drives(cycles: &[Cycle], motion: &[PeriodResponse], calibration: f64) -> Vec<DriveIntegrals> {
     let relative = |cycle: &Cycle| {
         let turned = cycle.response * cycle.commanded[0].conj();
@@ -324,8 +310,8 @@ pub struct Cycle {
 const TERMS: usize = 9;
 
 impl Cycle {
-    /// The samples of one period; `phase` (rad) is that of the drive at the first, `target` (rad) that of the response to the
-    /// base. `None` for too few samples.
+    /// The samples of one period; `phase` (rad): phase of the drive at the first, `target` (rad): phase target of the response relative to
+    /// the base. `None` for too few samples.
     #[must_use]
     pub fn of(samples: &[Sample], sample_time: f64, phase: f64, target: f64) -> Option<Self> {
         if samples.len() <= TERMS {
@@ -334,7 +320,7 @@ impl Cycle {
         let phases = drive_phases(samples, sample_time, phase);
         let mean_omega = mean(samples.iter().map(|s| s.command.drive.omega));
         let drive_phase = mean(phases.iter().copied());
-        // The response does not follow every change of the drive's frequency: its phase is that of a uniform motion.
+        // The response does not follow every change of the drive's frequency: its phase grows uniformly.
         let middle = 0.5 * (samples.len() - 1) as f64;
         let uniform: Vec<f64> = (0..samples.len())
             .map(|n| drive_phase + (n as f64 - middle) * sample_time * mean_omega)

@@ -14,7 +14,7 @@ use crate::scene::{Dimensionless, Scene};
 
 /// One point along the decay, in SI units, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct DecayPoint {
+pub struct FreeDecayPoint {
     /// Time since the release, s.
     pub t_s: f64,
     /// Frequency, Hz.
@@ -66,15 +66,15 @@ pub enum DecayEnd {
 #[derive(Debug, Clone, PartialEq)]
 pub struct DecayPoints {
     /// The points.
-    pub points: Vec<DecayPoint>,
+    pub points: Vec<FreeDecayPoint>,
     /// Why there are no further ones.
     pub end: DecayEnd,
 }
 
 /// Points per period along the decay.
 const PER_PERIOD: f64 = 8.0;
-/// What the impacts take away, over that at the release, below which they are no longer those of a 1:1 motion: the speed of the particle, and so
-/// this, changes by a third down to the fold.
+/// Smallest loss of amplitude by the impacts of a 1:1 motion, over the loss at the release: with the speed of the particle, it changes by a third
+/// down to the fold.
 const KEPT: f64 = 0.5;
 
 /// The points along the decay of a record, up to the loss of synchrony where the rig reports impacts, otherwise to
@@ -97,86 +97,71 @@ pub fn decay_points(record: &Record, scene: &Scene) -> DecayPoints {
         f64::INFINITY
     };
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
-    let pieces = fitted(&values, dt, omega, scene.record.window_periods);
-    // What the impacts alone take away, m/s; the mean over the first period is that of the 1:1 motion.
+    let windows = fitted(&values, dt, omega, scene.record.window_periods);
+    // Loss of amplitude by the impacts alone, m/s; the mean over the first period belongs to the 1:1 motion.
     let damping = scene.linear().damping_rate;
-    let taken = |piece: &Piece| -piece.rate - damping * piece.amplitude;
-    let at_release = mean(pieces.iter().take(PER_PERIOD as usize).map(taken));
-    let is_linear = |piece: &Piece| !has_impacts && taken(piece) < KEPT * at_release;
-    let end = if pieces.iter().any(is_linear) {
+    let taken = |window: &Window| -window.fit.rate - damping * window.fit.amplitude;
+    let at_release = mean(windows.iter().take(PER_PERIOD as usize).map(taken));
+    let is_linear = |window: &Window| !has_impacts && taken(window) < KEPT * at_release;
+    let end = if windows.iter().any(is_linear) {
         DecayEnd::Linear
     } else if has_impacts && until + 2.0 * half_period < last.time {
         DecayEnd::Synchrony
     } else {
         DecayEnd::Record
     };
-    let points = pieces
+    let points = windows
         .iter()
-        .take_while(|piece| decay[piece.samples.end - 1].time <= until && !is_linear(piece))
-        .map(|piece| piece.point(decay, &d))
+        .take_while(|window| decay[window.samples.end - 1].time <= until && !is_linear(window))
+        .map(|window| window.point(decay, &d))
         .collect();
     DecayPoints { points, end }
 }
 
-/// An estimate from some samples at a time (s) since the release.
-struct Piece {
+/// A fit of some samples; `time`: its middle since the release, s.
+struct Window {
     samples: Range<usize>,
     time: f64,
-    /// m
-    amplitude: f64,
-    /// rad/s
-    omega: f64,
-    /// Rate of change of the amplitude, m/s.
-    rate: f64,
-    /// Standard uncertainties of amplitude and frequency by noise.
-    uncertainties: [f64; 2],
+    fit: Harmonic,
 }
 
-impl Piece {
-    fn point(&self, decay: &[Sample], d: &Dimensionless) -> DecayPoint {
-        let speeds: Option<Vec<f64>> = decay[self.samples.clone()]
+impl Window {
+    fn point(&self, decay: &[Sample], d: &Dimensionless) -> FreeDecayPoint {
+        let Harmonic { amplitude, omega, rate, uncertainties, .. } = self.fit;
+        let speeds = decay[self.samples.clone()]
             .iter()
-            .map(|s| s.ground_truth.map(|w| w.particle_velocity.abs()))
-            .collect();
-        DecayPoint {
+            .map(|s| s.ground_truth.map(|w| w.particle_velocity.abs()));
+        FreeDecayPoint {
             t_s: self.time,
-            f_hz: self.omega / TAU,
-            a_m: self.amplitude,
-            u_f_hz: self.uncertainties[1] / TAU,
-            u_a_m: self.uncertainties[0],
+            f_hz: omega / TAU,
+            a_m: amplitude,
+            u_f_hz: uncertainties[1] / TAU,
+            u_a_m: uncertainties[0],
             tau: d.omega0 * self.time,
-            c: self.amplitude / d.b,
+            c: amplitude / d.b,
             // The mean is the value at the middle of the straight line that fits best.
-            b: speeds.map(|speeds| d.speed(mean(speeds))),
-            sigma: d.sigma(self.omega),
-            rate: self.rate / (d.b * d.omega0),
-            u_c: self.uncertainties[0] / d.b,
-            u_sigma: self.uncertainties[1] / d.omega_change(1.0),
+            b: speeds.collect::<Option<Vec<f64>>>().map(|speeds| d.speed(mean(speeds))),
+            sigma: d.sigma(omega),
+            rate: rate / (d.b * d.omega0),
+            u_c: uncertainties[0] / d.b,
+            u_sigma: uncertainties[1] / d.omega_change(1.0),
         }
     }
 }
 
 /// Fits in a sliding window of `periods`. Each fit starts from the frequency of the one before, the first from `omega`.
-fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<Piece> {
+fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<Window> {
     let period = TAU / omega / dt;
     let window = (periods * period).round() as usize + 1;
     let step = ((period / PER_PERIOD).round() as usize).max(1);
-    let mut pieces = Vec::new();
-    for (n, values) in values.windows(window).enumerate().step_by(step) {
-        let Some(v) = harmonic(values, dt, omega) else {
-            break;
-        };
-        omega = v.omega;
-        pieces.push(Piece {
-            samples: n..n + window,
-            time: (n as f64 + 0.5 * (window - 1) as f64) * dt,
-            amplitude: v.amplitude,
-            omega,
-            rate: v.rate,
-            uncertainties: v.uncertainties,
-        });
-    }
-    pieces
+    let fits = values.windows(window).enumerate().step_by(step);
+    fits.map_while(|(n, values)| {
+        let fit = harmonic(values, dt, omega)?;
+        omega = fit.omega;
+        let time = (n as f64 + 0.5 * (window - 1) as f64) * dt;
+        Some(Window { samples: n..n + window, time, fit })
+    })
+    .collect()
 }
 
 // Least squares of a harmonic whose amplitude and phase drift linearly across the window.
@@ -196,11 +181,9 @@ pub struct Harmonic {
     pub uncertainties: [f64; 2],
 }
 
-/// Rounds of refitting about the frequency found; each reduces the error by orders of magnitude.
+/// Number of fits, each about the frequency that the fit before found; each reduces the error by orders of magnitude.
 const ROUNDS: usize = 6;
-/// Fewest samples of a window.
-const FEWEST: usize = 16;
-/// Largest relative distance of the frequency from the guess: beyond that, the rounds diverge.
+/// Largest relative distance of the frequency from the guess: beyond it, the fits diverge.
 const FARTHEST: f64 = 0.5;
 
 /// Fits `values`, sampled every `sample_time` seconds, by a fundamental near `omega` (rad/s) and its third harmonic, both
@@ -209,9 +192,6 @@ const FARTHEST: f64 = 0.5;
 /// The drift of the fitted phase corrects the frequency, and the fit is repeated about that. `None` for a window that is too
 /// short or contains no motion of about that frequency.
 pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic> {
-    if values.len() < FEWEST {
-        return None;
-    }
     let middle = 0.5 * (values.len() - 1) as f64;
     let right = DVector::from_column_slice(values);
     // Half a window, s.
@@ -222,6 +202,9 @@ pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic
             .map(|n| (n as f64 - middle) * sample_time * omega)
             .collect();
         let basis = HarmonicBasis::new(&phases, 0, &[Some(2), None, Some(1)]);
+        if values.len() <= basis.terms() {
+            return None;
+        }
         let fit = basis.fit(&right)?;
         let a = fit.harmonic(1);
         let square = a.norm_sqr();

@@ -18,14 +18,13 @@ use crate::scene::{Dimensionless, LinearResponse, Scene, Sensor};
 
 /// Largest residual of a steady motion, relative to the amplitude, unless it is noise.
 const STEADY: f64 = 3e-3;
-/// A residual counts as noise if third differences find at least this share of it.
+/// Smallest standard deviation of third differences, scaled to white noise, over the residual of a motion with noise alone: white noise has 1.
 const NOISE_SHARE: f64 = 0.5;
-/// Largest number of lines that are subtracted as foreign tones.
+/// Largest number of foreign tones that are subtracted: mains hum and its harmonics.
 const LINES: usize = 8;
 /// Smallest significant harmonic, in standard errors.
 const SIGNIFICANT: f64 = 4.0;
-/// Smallest amplitude of the second harmonic over the third of an asymmetric motion: about 0.01 where it is symmetric, from 2 on where it is
-/// irregular.
+/// Smallest second harmonic of an asymmetric motion, over the third: symmetric motions have about 0.01, irregular ones 2 and more.
 pub(crate) const ASYMMETRIC: f64 = 0.5;
 /// Relative distance from the linear response within which a motion counts as the linear mode, beside the uncertainty of that response.
 const LINEAR: f64 = 0.1;
@@ -53,17 +52,13 @@ struct Content {
 impl Content {
     /// Whether a residual is left that is not noise.
     fn is_irregular(&self) -> bool {
-        self.rest > STEADY && !self.is_noise()
-    }
-
-    fn is_noise(&self) -> bool {
-        self.noise >= NOISE_SHARE * self.rest
+        self.rest > STEADY && self.noise < NOISE_SHARE * self.rest
     }
 
     /// Fits the samples; `None` for too few samples or no motion.
-    fn of(samples: &[Sample], sample_time: f64, omega: f64, d: &Dimensionless) -> Option<Self> {
-        let n = samples.len();
-        // The phase of the response is more uniform than that of a drive that a loop still corrects.
+    fn of(samples: &[Sample], scene: &Scene, omega: f64) -> Option<Self> {
+        let (n, sample_time, d) = (samples.len(), scene.sample_time(), scene.dimensionless());
+        // The phase of the response is more uniform than the phase of a drive that a loop still corrects.
         let phases: Vec<f64> = (0..n).map(|n| n as f64 * sample_time * omega).collect();
         let basis = HarmonicBasis::new(&phases, 1, &HARMONICS);
         if n < 2 * basis.terms() {
@@ -76,7 +71,7 @@ impl Content {
         while content.is_irregular() && lines.len() < LINES {
             let line = Line::strongest(rest.as_slice());
             let is_known = |one: &Line| (one.turn - line.turn).abs() < TAU / n as f64;
-            if !line.is_foreign(d, sample_time) && !lines.iter().any(is_known) {
+            if !line.is_foreign(&d, sample_time) && !lines.iter().any(is_known) {
                 break;
             }
             values -= DVector::from_fn(n, |n, _| line.at(n));
@@ -112,17 +107,18 @@ impl Content {
 /// The largest foreign tone in the response of these samples, if they would be irregular with it. `omega` (rad/s) is the frequency of the motion.
 #[must_use]
 pub fn foreign_tone(samples: &[Sample], scene: &Scene, omega: f64) -> Option<Tone> {
-    let content = Content::of(samples, scene.sample_time(), omega, &scene.dimensionless())?;
-    let largest = content
-        .tones
-        .iter()
-        .max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
-    Some(largest.tone(scene.sample_time(), content.amplitude))
+    let content = Content::of(samples, scene, omega)?;
+    let tones = content.tones.iter();
+    let largest = tones.max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
+    Some(Tone {
+        hertz: largest.turn / (TAU * scene.sample_time()),
+        share: largest.amplitude() / content.amplitude,
+    })
 }
 
 /// These samples without the foreign tones in their response; `None` if there are none.
 pub(crate) fn without_tones(samples: &[Sample], scene: &Scene, omega: f64) -> Option<Vec<Sample>> {
-    let tones = Content::of(samples, scene.sample_time(), omega, &scene.dimensionless())?.tones;
+    let tones = Content::of(samples, scene, omega)?.tones;
     let mut cleaned = samples.to_vec();
     for (n, sample) in cleaned.iter_mut().enumerate() {
         sample.sensors.response -= tones.iter().map(|line| line.at(n)).sum::<f64>();
@@ -134,10 +130,10 @@ pub(crate) fn without_tones(samples: &[Sample], scene: &Scene, omega: f64) -> Op
 /// of the response to the base, and `omega` (rad/s) its frequency.
 ///
 /// Impacts need evidence: response over base departs from the linear response. Of a linear response that was measured on the rig, this is
-/// sufficient; where that of the scene stands for it, the third harmonic must be significant as well.
+/// sufficient; with the linear response of the scene in its place, the third harmonic must be significant as well.
 #[must_use]
 pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, phase: f64, omega: f64) -> Regime {
-    let Some(content) = Content::of(samples, scene.sample_time(), omega, &scene.dimensionless()) else {
+    let Some(content) = Content::of(samples, scene, omega) else {
         return Regime::Unknown;
     };
     if content.is_irregular() {
@@ -158,7 +154,7 @@ pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, phase: f
     }
 }
 
-/// Whether response over base, `measured`, at the frequency `omega` (rad/s) is that of the linear response.
+/// Whether response over base, `measured`, at the frequency `omega` (rad/s) belongs to the linear response.
 fn is_linear(linear: &LinearResponse, measured: Complex64, omega: f64) -> bool {
     let tolerance = LINEAR + SIGNIFICANT * linear.uncertainty / linear.damping_rate.abs();
     (linear.at(omega) / measured - 1.0).norm() <= tolerance
@@ -166,15 +162,15 @@ fn is_linear(linear: &LinearResponse, measured: Complex64, omega: f64) -> bool {
 
 // Foreign tones: lines in the response that no motion of the particle produces.
 //
-// The response is that of a linear oscillator, which only its base and the particle excite. The particle stays in its cavity: a line of its
+// The response belongs to a linear oscillator, which only its base and the particle excite. The particle stays in its cavity: a line of its
 // relative position has at most the amplitude 4b/π, that of a square wave. With x = ω/ω0, a line of the response v therefore has at most
 // the amplitude `4 epsilon b/(π |x² - 1|)`, of q1 x² times as much, and of the acceleration x⁴ times as much, whatever the motion: irregular,
 // period-doubled or quasi-periodic. A larger line comes from a sensor or a cable, for instance from the mains.
 
-/// Factor above the largest line of a motion: epsilon and b are known within a factor of two.
+/// Smallest foreign tone, over the largest line of a motion: epsilon and b are known within a factor of two.
 const ABOVE: f64 = 2.0;
 
-/// Largest number of values in which a line is searched for: the work grows with its square.
+/// Largest number of values in which a line is searched for: the work grows with the square of it.
 const SEARCHED: usize = 2048;
 
 /// A sine in the response that is not part of the motion.
@@ -199,7 +195,7 @@ impl Display for Tone {
 
 /// A line of a signal.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Line {
+struct Line {
     /// Frequency, rad per sample.
     pub turn: f64,
     /// Amplitudes of the cosine and the sine.
@@ -215,8 +211,9 @@ impl Line {
         };
         let last = &values[values.len().saturating_sub(SEARCHED)..];
         let [bin, fine] = [last.len(), values.len()].map(|count| PI / count as f64);
-        let (coarse, _) = (1..last.len())
-            .map(|k| (k as f64 * bin, power(last, k as f64 * bin)))
+        let bins = (1..last.len()).map(|k| k as f64 * bin);
+        let (coarse, _) = bins
+            .map(|turn| (turn, power(last, turn)))
             .fold((bin, 0.0), |best, next| if next.1 > best.1 { next } else { best });
         let turn = highest(values, highest(last, coarse, bin), fine);
         let scale = 2.0 / values.len() as f64;
@@ -247,14 +244,6 @@ impl Line {
         let largest = 4.0 / PI * d.epsilon * d.b * factor / (square - 1.0).abs();
         self.amplitude() > ABOVE * largest
     }
-
-    /// As a share of a response of the amplitude `response`, m.
-    pub fn tone(&self, sample_time: f64, response: f64) -> Tone {
-        Tone {
-            hertz: self.turn / (TAU * sample_time),
-            share: self.amplitude() / response,
-        }
-    }
 }
 
 /// Sums of the values times cosine and sine.
@@ -282,7 +271,7 @@ pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
 }
 
 /// The wall, -1 or 1, after which the longer flights begin, on average; `None` without impacts.
-pub(super) fn longer_after(samples: &[Sample]) -> Option<i8> {
+pub(crate) fn longer_after(samples: &[Sample]) -> Option<i8> {
     let impacts = impacts(samples);
     let after = |wall: f64| {
         let flights = impacts.windows(2).filter(move |pair| pair[0].velocity * wall > 0.0);

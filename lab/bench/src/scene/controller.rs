@@ -228,11 +228,11 @@ impl LinearResponse {
 
 impl Scene {
     /// Parameters and start of the plant, under the names of the FMU's variables.
-    pub fn start_values(&self) -> [(&'static str, f64); 10] {
-        let [mass, k, c, m, b, r] = symbols(&self.plant);
+    pub fn start_values(&self) -> Vec<(&'static str, Setting)> {
         let State { q1, dq1, q2, dq2 } = self.start;
-        let [q1, dq1] = [("q1", q1), ("der(q1)", dq1)];
-        [mass, k, c, m, b, r, q1, dq1, ("q2", q2), ("der(q2)", dq2)]
+        let start = [("q1", q1), ("der(q1)", dq1), ("q2", q2), ("der(q2)", dq2)];
+        let start = start.map(|(name, value)| (name, Setting::Real(value)));
+        [symbols(&self.plant), start.into()].concat()
     }
 
     /// Configuration of the controller for the scene's excitation.

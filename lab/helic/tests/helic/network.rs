@@ -1,4 +1,4 @@
-//! The device on loopback: sessions, and the drive that stops when the stream, the host or the control channel hangs.
+//! Guards the device on loopback: sessions, and the drive that stops when the stream, the host or the control channel hangs.
 //! Nothing here depends on how fast the machine is.
 
 use std::io::{Read, Write};
@@ -68,9 +68,9 @@ fn a_device_on_the_network_is_driven_and_disarmed_when_its_host_leaves() {
     let mut host = TcpStream::connect(server.address).unwrap();
     let status = Frame { kind: message::STATUS, sequence: 9, payload: vec![] };
     host.write_all(&status.encode()).unwrap();
-    let mut answer = [0; 20];
+    let mut answer = vec![0; 20];
     host.read_exact(&mut answer).unwrap();
-    assert_eq!(Frame::decode(&answer).unwrap().unwrap().0.sequence, 9);
+    assert_eq!(Frame::take(&mut answer).unwrap().unwrap().sequence, 9);
     drop(host);
     let sessions = server.end();
     assert!(

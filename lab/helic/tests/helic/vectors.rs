@@ -1,4 +1,4 @@
-//! The vectors of the protocol, version 3 (`docs/protocol.md` of helic-daq, "Known-answer vectors").
+//! Guards the codec: the vectors of the protocol, version 3 (`docs/protocol.md` of helic-daq, "Known-answer vectors").
 
 use vines_helic::codec::{Frame, Packet, Status, crc16, message, take_text};
 
@@ -44,14 +44,13 @@ fn every_frame_of_the_published_vectors_is_encoded_and_decoded() {
     for (kind, sequence, payload, expected) in vectors {
         let frame = Frame { kind, sequence, payload: bytes(payload) };
         assert_eq!(frame.encode(), bytes(expected), "{expected}");
-        let length = bytes(expected).len();
-        assert_eq!(Frame::decode(&bytes(expected)), Ok(Some((frame, length))));
-        for cut in 0..length {
-            assert_eq!(
-                Frame::decode(&bytes(expected)[..cut]),
-                Ok(None),
-                "{cut} bytes of {expected}"
-            );
+        let whole = bytes(expected);
+        let mut followed = [&whole[..], b"HL"].concat();
+        assert_eq!(Frame::take(&mut followed), Ok(Some(frame)));
+        assert_eq!(followed, b"HL");
+        for cut in 0..whole.len() {
+            let taken = Frame::take(&mut whole[..cut].to_vec());
+            assert_eq!(taken, Ok(None), "{cut} bytes of {expected}");
         }
     }
     let status = Status {

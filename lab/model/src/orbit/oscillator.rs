@@ -43,20 +43,6 @@ impl Oscillator {
         ((slow + fast) / 2.0, (slow - fast) / (2.0 * d))
     }
 
-    /// As [`Self::propagator`], with functions of single precision.
-    pub(crate) fn rough_propagator(&self, t: f64) -> Matrix2<f64> {
-        let square = 1.0 - self.zeta * self.zeta;
-        if square < 1e-4 {
-            return self.propagator(t);
-        }
-        let d = square.sqrt();
-        let (sine, cosine) = rough_sin_cos(d * t);
-        let decay = f64::from(((-self.zeta * t) as f32).exp());
-        let (cosine, sine) = (decay * cosine, decay * sine / d);
-        let zeta = self.zeta;
-        Matrix2::new(cosine + zeta * sine, sine, -sine, cosine - zeta * sine)
-    }
-
     /// Response to the force `exp(i omega t)`: `1/(1 - omega^2 + 2 i zeta omega)`.
     pub(crate) fn compliance(&self, omega: f64) -> Complex<f64> {
         self.stiffness(omega).inv()
@@ -78,15 +64,9 @@ impl Oscillator {
     }
 }
 
-/// Sine and cosine in single precision.
-pub(crate) fn rough_sin_cos(angle: f64) -> (f64, f64) {
-    let (sine, cosine) = (angle as f32).sin_cos();
-    (f64::from(sine), f64::from(cosine))
-}
-
 /// The oscillator at one frequency and excitation.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ForcedOscillator {
+pub(crate) struct ForcedOscillator {
     pub(super) free: Oscillator,
     pub(super) zeta: f64,
     pub(super) omega: f64,
@@ -98,7 +78,7 @@ pub(super) struct ForcedOscillator {
 
 impl ForcedOscillator {
     /// The oscillator of `scene` (except its G) at the frequency `omega` over omega0 and the excitation `g`.
-    pub(super) fn new(scene: &Dimensionless, omega: f64, g: f64) -> Self {
+    pub(crate) fn new(scene: &Dimensionless, omega: f64, g: f64) -> Self {
         let zeta = scene.epsilon * scene.lambda / 2.0;
         let free = Oscillator::new(zeta);
         let (force, compliance) = (free.base_force(omega), free.compliance(omega));
@@ -116,7 +96,7 @@ impl ForcedOscillator {
     }
 
     /// Bound of the acceleration of the steady response.
-    pub(super) fn acceleration(&self) -> f64 {
+    pub(crate) fn acceleration(&self) -> f64 {
         if self.g == 0.0 {
             0.0
         } else {
@@ -131,7 +111,7 @@ impl ForcedOscillator {
     }
 
     /// Harmonic response (q, q') at a phase of the base.
-    pub(super) fn harmonic(&self, phase: f64) -> Vector2<f64> {
+    pub(crate) fn harmonic(&self, phase: f64) -> Vector2<f64> {
         let z = self.turned(self.unit[0] * self.g, phase);
         Vector2::new(z.im, self.omega * z.re)
     }

@@ -32,7 +32,7 @@ const LARGEST: f64 = 1e-3;
 /// Drives that were sent: amplitude by the bits of the frequency, which is another one in every drive.
 type Sent = Arc<Mutex<HashMap<u64, f64>>>;
 
-/// A rig that knows what was sent.
+/// A rig that refuses what was not sent.
 struct Oracle(Sent);
 
 impl Rig for Oracle {
@@ -215,7 +215,6 @@ const HEARD: usize = 4096;
 struct Relay {
     front: UdpSocket,
     back: UdpSocket,
-    server: SocketAddr,
     client: Option<SocketAddr>,
     heard: Vec<Vec<u8>>,
     noise: Noise,
@@ -224,16 +223,11 @@ struct Relay {
 impl Relay {
     fn new(server: SocketAddr, seed: u64) -> Self {
         let [front, back] = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
+        back.connect(server).unwrap();
         front.set_nonblocking(true).unwrap();
         back.set_nonblocking(true).unwrap();
-        Self {
-            front,
-            back,
-            server,
-            client: None,
-            heard: Vec::new(),
-            noise: Noise(seed),
-        }
+        let (client, heard, noise) = (None, Vec::new(), Noise(seed));
+        Self { front, back, client, heard, noise }
     }
 
     /// Passes what has arrived; whether there was anything.
@@ -241,13 +235,11 @@ impl Relay {
         let (mut bytes, mut any) = ([0; 256], false);
         while let Ok((length, from)) = self.front.recv_from(&mut bytes) {
             (self.client, any) = (Some(from), true);
-            let _ = self.back.send_to(&bytes[..length], self.server);
-            let frame = bytes[..length].to_vec();
-            if self.heard.len() < HEARD {
-                self.heard.push(frame);
-            } else {
-                self.heard[self.noise.below(HEARD)] = frame;
+            let _ = self.back.send(&bytes[..length]);
+            if self.heard.len() == HEARD {
+                self.heard.swap_remove(self.noise.below(HEARD));
             }
+            self.heard.push(bytes[..length].to_vec());
         }
         while let (Ok(length), Some(client)) = (self.back.recv(&mut bytes), self.client) {
             any = true;
@@ -279,20 +271,19 @@ impl Relay {
                 }
             }
         }
-        let _ = self.back.send_to(&forged, self.server);
+        let _ = self.back.send(&forged);
         true
     }
 
     /// Forges `frames` frames, sets `finished`, and serves the genuine client until it is `over`.
     fn run(mut self, frames: u64, finished: &AtomicBool, over: &AtomicBool) -> u64 {
         let mut done = 0;
-        while done < frames && !over.load(Ordering::Relaxed) {
-            self.pass();
-            done += (0..16).filter(|_| self.forge()).count() as u64;
-        }
-        finished.store(true, Ordering::Relaxed);
         while !over.load(Ordering::Relaxed) {
-            if !self.pass() {
+            if done < frames {
+                self.pass();
+                done += (0..16).filter(|_| self.forge()).count() as u64;
+            } else if !self.pass() {
+                finished.store(true, Ordering::Relaxed);
                 thread::sleep(Duration::from_micros(50));
             }
         }

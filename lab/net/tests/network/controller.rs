@@ -1,23 +1,20 @@
-//! A controller across the network.
+//! A controller across the network: late, missing and invalid answers, moves of the response, and a lock that the bench judges.
 
 use std::sync::{Arc, Mutex};
 use std::thread::sleep;
 use std::time::Duration;
 
-use vines_net::{Ended, LinkError, NetController};
+use vines_net::{Ended, LinkError};
 use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Move, Rig, Sensors, Simulated};
 use vines_testbench::scene::Scene;
 
-use crate::bench::{drive, scene, serve_controller, socket};
-
-/// A silence, s, longer than the pauses of a busy machine.
-const PATIENT: f64 = 2.0;
+use crate::{PATIENT, drive, scene, serve_built_in, serve_controller};
 
 fn reading(n: usize) -> Sensors {
     Sensors { response: n as f64, reference: None }
 }
 
-/// A controller that logs its readings, and answers with their number; every tenth answer takes that long.
+/// A controller that logs its readings, and answers with their number; every tenth answer takes the stated time.
 struct Echo(Arc<Mutex<Vec<f64>>>, Duration);
 
 impl Controller for Echo {
@@ -27,11 +24,8 @@ impl Controller for Echo {
         if asked.len() % 10 == 5 {
             sleep(self.1);
         }
-        Ok(Command {
-            drive: drive(asked.len() - 1),
-            settled: true,
-            ..Command::default()
-        })
+        let drive = drive(asked.len() - 1);
+        Ok(Command { drive, settled: true, ..Command::default() })
     }
 }
 
@@ -39,8 +33,8 @@ impl Controller for Echo {
 fn beside_a_rig_in_real_time_the_last_answer_replaces_a_late_one_and_no_reading_is_missing() {
     let (scene, asked) = (scene(&[]), Arc::default());
     let (log, late) = (Arc::clone(&asked), Duration::from_millis(5));
-    let server = serve_controller(&scene, PATIENT, move || Box::new(Echo(Arc::clone(&log), late)));
-    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), Some(PATIENT), None).unwrap();
+    let server = serve_controller(&scene, PATIENT, move || Echo(Arc::clone(&log), late));
+    let mut peer = server.controller(&scene, Some(PATIENT));
     let answers: Vec<Command> = (0..200).map(|n| peer.sample(reading(n), true).unwrap()).collect();
     println!("{}", peer.counters());
     assert!(peer.counters().held >= 15);
@@ -55,7 +49,7 @@ fn beside_a_rig_in_real_time_the_last_answer_replaces_a_late_one_and_no_reading_
         "a held drive is zero when the drive is not requested"
     );
     drop(peer);
-    server.sessions(1);
+    server.session(1);
     let asked = asked.lock().unwrap();
     assert!(asked.iter().enumerate().all(|(n, reading)| n as f64 == *reading));
 }
@@ -65,77 +59,98 @@ fn a_controller_that_stops_answering_is_a_permanent_error() {
     let scene = scene(&[]);
     for pace in [None, Some(0.2)] {
         let stuck = Duration::from_secs(1);
-        let server = serve_controller(&scene, 0.3, move || Box::new(Echo(Arc::default(), stuck)));
-        let mut peer = NetController::connect(socket(server.address), scene.sample_time(), pace, None).unwrap();
+        let server = serve_controller(&scene, 0.3, move || Echo(Arc::default(), stuck));
+        let mut peer = server.controller(&scene, pace);
         let error = (0..5000).find_map(|n| peer.sample(reading(n), true).err()).unwrap();
-        let Some(LinkError::Silent { .. }) = error.cause::<LinkError>() else {
-            panic!("{error}");
-        };
+        assert!(matches!(error.cause(), Some(LinkError::Silent { .. })), "{error}");
         assert!(peer.sample(reading(0), true).is_err());
     }
 }
 
-/// A controller whose answer is not a number.
-struct Broken;
+/// A controller that answers always the same.
+#[derive(Clone, Copy)]
+struct Constant(Command);
 
-impl Controller for Broken {
+impl Controller for Constant {
     fn sample(&mut self, _: Sensors, _: bool) -> Result<Command, ControllerError> {
-        Ok(Command { phase_error: Some(f64::NAN), ..Command::default() })
+        Ok(self.0)
     }
 }
 
 #[test]
 fn an_answer_that_is_not_finite_is_an_error() {
     let scene = scene(&[]);
-    let server = serve_controller(&scene, PATIENT, || Box::new(Broken));
-    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, None).unwrap();
-    let error = peer.sample(reading(0), true).unwrap_err();
+    let broken = Command { phase_error: Some(f64::NAN), ..Command::default() };
+    let server = serve_controller(&scene, PATIENT, move || Constant(broken));
+    let error = server.controller(&scene, None).sample(reading(0), true).unwrap_err();
     assert!(matches!(error.cause(), Some(LinkError::Invalid { .. })), "{error}");
+}
+
+#[test]
+fn the_bench_judges_the_lock_of_a_controller_that_reports_no_state() {
+    let scene = scene(&[]);
+    let locked = Command {
+        drive: drive(0),
+        phase_error: Some(1e-4),
+        ..Command::default()
+    };
+    let state = vines_testbench::rig::LoopState::of_number(2);
+    let silent = Command { phase_error: None, ..locked };
+    let samples = (f64::from(scene.controller_config().lock.dwell) + 1.0) * scene.controller.samples_per_period;
+    for (command, expected) in [(locked, true), (Command { state, ..locked }, false), (silent, false)] {
+        let server = serve_controller(&scene, PATIENT, move || Constant(command));
+        let mut peer = server.controller(&scene, None);
+        let mut settled = |active| {
+            let samples = 0..(1.2 * samples) as usize;
+            samples
+                .map(|n| peer.sample(reading(n), active).unwrap().settled)
+                .filter(|settled| *settled)
+                .count()
+        };
+        assert_eq!(settled(false), 0);
+        let settled = settled(true) as f64;
+        assert_eq!(settled > 0.0, expected, "{command:?}");
+        assert!(settled < 0.5 * samples, "{settled} of {samples} samples settled");
+    }
 }
 
 #[test]
 fn a_client_that_was_silent_for_too_long_gets_no_drive() {
     let scene = scene(&[]);
-    let server = serve_controller(&scene, 0.2, || Box::new(Echo(Arc::default(), Duration::ZERO)));
-    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, None).unwrap();
+    let server = serve_controller(&scene, 0.2, || Echo(Arc::default(), Duration::ZERO));
+    let mut peer = server.controller(&scene, None);
     peer.sample(reading(0), true).unwrap();
-    assert_eq!(server.sessions(1)[0].ended, Ended::Silence);
+    assert_eq!(server.session(1).ended, Ended::Silence);
     let error = peer.sample(reading(1), true).unwrap_err();
-    let Some(LinkError::Closed { .. }) = error.cause::<LinkError>() else {
-        panic!("{error}");
-    };
+    assert!(matches!(error.cause(), Some(LinkError::Closed { .. })), "{error}");
 }
 
 /// Drives the plant with a controller, moves the response at half the samples, and returns the commands.
 fn moved(scene: &Scene, controller: &mut dyn Controller, samples: usize) -> Vec<Command> {
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
-    let mut commands = Vec::new();
-    for n in 0..samples {
+    let to = Move {
+        response: 0.6 * scene.plant.half_width,
+        duration: 2.0,
+        amplitude: -1e-6,
+        omega: 0.01,
+        growth: 0.0,
+    };
+    let mut sample = |n| {
         if n == samples / 2 {
-            let to = Move {
-                response: 0.6 * scene.plant.half_width,
-                duration: 2.0,
-                amplitude: -1e-6,
-                omega: 0.01,
-                growth: 0.0,
-            };
             controller.hold_response(to, -1.5).unwrap();
         }
         let command = controller.sample(rig.sense().unwrap(), true).unwrap();
         rig.advance(command.drive, scene.sample_time()).unwrap();
-        commands.push(command);
-    }
-    commands
+        command
+    };
+    (0..samples).map(&mut sample).collect()
 }
 
 #[test]
 fn the_response_is_controlled_across_the_network_with_the_same_bits() {
     let scene = scene(&["phase_lock.harmonics=4", "phase_lock.base_bandwidth=0.5"]);
-    let config = scene.controller_config();
-    let server = serve_controller(&scene, PATIENT, move || Box::new(BuiltIn::new(&config).unwrap()));
-    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, None).unwrap();
-    let far = moved(&scene, &mut peer, 4000);
-    let near = moved(&scene, &mut BuiltIn::new(&config).unwrap(), 4000);
+    let far = moved(&scene, &mut serve_built_in(&scene).controller(&scene, None), 4000);
+    let near = moved(&scene, &mut BuiltIn::new(&scene.controller_config()).unwrap(), 4000);
     assert_eq!(far, near);
     // The move did something.
     assert!(far[3999].drive.amplitude != far[1999].drive.amplitude);
@@ -144,21 +159,13 @@ fn the_response_is_controlled_across_the_network_with_the_same_bits() {
 #[test]
 fn a_move_that_the_controller_cannot_make_ends_the_session_with_the_reason() {
     let scene = scene(&[]);
-    let config = scene.controller_config();
-    let server = serve_controller(&scene, PATIENT, move || Box::new(BuiltIn::new(&config).unwrap()));
-    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, None).unwrap();
-    peer.sample(reading(0), false).unwrap();
-    peer.hold_response(Move::default(), 0.0).unwrap();
-    let error = peer.sample(reading(1), false).unwrap_err();
-    assert!(
-        error.to_string().contains("response = 0 m: allowed is above 0"),
-        "{error}"
-    );
+    let server = serve_built_in(&scene);
     // The loop is open.
-    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, None).unwrap();
-    peer.sample(reading(0), false).unwrap();
-    peer.hold_response(Move { response: 0.1, ..Move::default() }, 0.0)
-        .unwrap();
-    let error = peer.sample(reading(1), false).unwrap_err();
-    assert!(error.to_string().contains("is in state 0: "), "{error}");
+    for (response, reason) in [(0.0, "response = 0 m: allowed is above 0"), (0.1, "is in state 0: ")] {
+        let mut peer = server.controller(&scene, None);
+        peer.sample(reading(0), false).unwrap();
+        peer.hold_response(Move { response, ..Move::default() }, 0.0).unwrap();
+        let error = peer.sample(reading(1), false).unwrap_err();
+        assert!(error.to_string().contains(reason), "{error}");
+    }
 }

@@ -1,80 +1,63 @@
-//! In lock-step, every bit equals that of the built-in plant, and a frame that is not allowed is answered at once.
+//! In lock-step, every bit equals that of the built-in plant, and a frame that is not allowed is answered at once. Refused sessions say
+//! what to do.
 
+use std::net::{TcpStream, UdpSocket};
 use std::time::{Duration, Instant};
 
-use vines_net::{Ended, LinkError, NetController, NetRig, RAMP_SAMPLES, Refusal};
+use vines_net::frame::{Frame, Kind};
+use vines_net::{Address, Ended, LinkError, NetController, NetRig, RAMP_SAMPLES, Refusal, Server};
 use vines_testbench::experiment::{self, Plan};
-use vines_testbench::record::Record;
 use vines_testbench::rig::{BuiltIn, Chain, Controller, Drive, Rig, RigError, Simulated};
-use vines_testbench::scene::Scene;
+use vines_testbench::scene::Definition;
 
-use crate::bench::{controller, drive, lock_step_rig, scene, shake, socket};
-
-fn measure(scene: &Scene, rig: &mut dyn Rig, controller: &mut dyn Controller) -> Record {
-    experiment::run(rig, controller, &Plan::of(scene), |_, _, _| {}).unwrap()
-}
+use crate::{drive, scene, serve_built_in, serve_rig, service, shake};
 
 #[test]
-fn an_experiment_across_the_network_gives_the_same_bits() {
-    let scene = scene(&["controller.amplitude_tolerance=8e-3", "controller.bandwidth=0.3"]);
-    let direct = measure(
-        &scene,
-        &mut Simulated::new(scene.plant, scene.start).unwrap(),
-        &mut BuiltIn::new(&scene.controller_config()).unwrap(),
-    );
-    let (rig_server, _) = lock_step_rig(&scene, 5.0);
-    let controller_server = controller(&scene, 5.0);
-    let sample_time = scene.sample_time();
-    {
-        let mut rig = NetRig::connect(rig_server.address, sample_time, None).unwrap();
-        let mut peer = NetController::connect(socket(controller_server.address), sample_time, None, None).unwrap();
-        assert_eq!(rig.pace(), None);
-        assert_eq!(measure(&scene, &mut rig, &mut peer), direct);
+fn an_experiment_across_the_network_gives_the_same_bits_also_with_held_samples() {
+    for settings in [
+        &["controller.amplitude_tolerance=8e-3", "controller.bandwidth=0.3"],
+        &["chain.hold=true", "chain.dac_bits=12"],
+    ] {
+        let scene = scene(&[&settings[..], &["record.decay_periods=150"]].concat());
+        let measure = |rig: Box<dyn Rig>, controller: &mut dyn Controller| {
+            let mut rig = Chain::around(rig, &scene);
+            experiment::run(rig.as_mut(), controller, &Plan::of(&scene), |_, _, _| {}).unwrap()
+        };
+        let plant = Simulated::new(scene.plant, scene.start).unwrap();
+        let direct = measure(Box::new(plant), &mut BuiltIn::new(&scene.controller_config()).unwrap());
+        let ((rig, _), peer) = (serve_rig(Address::Tcp, &scene, 5.0), serve_built_in(&scene));
+        let client = rig.rig(&scene);
+        assert_eq!(client.pace(), None);
+        assert_eq!(measure(Box::new(client), &mut peer.controller(&scene, None)), direct);
+        for session in [rig.session(1), peer.session(1)] {
+            assert_eq!(session.ended, Ended::Farewell);
+            assert_eq!(session.samples, direct.samples.len() as u64);
+        }
     }
-    for session in [rig_server.sessions(1), controller_server.sessions(1)] {
-        assert_eq!(session[0].ended, Ended::Farewell);
-        assert_eq!(session[0].samples, direct.samples.len() as u64);
-    }
-}
-
-#[test]
-fn held_samples_cross_the_network_with_the_same_bits_and_ramp_to_zero() {
-    let scene = scene(&["chain.hold=true", "chain.dac_bits=12", "record.decay_periods=150"]);
-    let chain = |rig: Box<dyn Rig>| Chain::around(rig, &scene);
-    let controller = || BuiltIn::new(&scene.controller_config()).unwrap();
-    let plant = Simulated::new(scene.plant, scene.start).unwrap();
-    let direct = measure(&scene, chain(Box::new(plant)).as_mut(), &mut controller());
-    let (server, log) = lock_step_rig(&scene, 5.0);
-    let rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
-    assert_eq!(
-        measure(&scene, chain(Box::new(rig)).as_mut(), &mut controller()),
-        direct
-    );
-    server.sessions(1);
-    let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
-    rig.sense().unwrap();
-    rig.hold(Drive { displacement: 1e-3, ..Drive::default() }, scene.sample_time())
-        .unwrap();
-    rig.sense().unwrap();
-    drop(rig);
-    server.sessions(2);
-    let log = log.lock().unwrap();
-    let ramp = &log[log.len() - RAMP_SAMPLES as usize - 1..];
-    assert!(ramp.windows(2).all(|pair| pair[1].displacement < pair[0].displacement));
-    assert_eq!((ramp[0].displacement, ramp[ramp.len() - 1].displacement), (1e-3, 0.0));
 }
 
 #[test]
 fn the_drive_of_a_client_that_has_left_ramps_to_zero() {
     let scene = scene(&[]);
-    let (server, log) = lock_step_rig(&scene, 5.0);
-    let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
+    let (server, log) = serve_rig(Address::Tcp, &scene, 5.0);
+    let mut rig = server.rig(&scene);
     shake(&mut rig, &scene, 20).unwrap();
     drop(rig);
-    assert_eq!(server.sessions(1)[0].samples, 20);
-    let drives = log.lock().unwrap();
-    assert_eq!(drives.len(), 20 + RAMP_SAMPLES as usize);
-    assert_eq!(drives.last().unwrap().amplitude, 0.0);
+    assert_eq!(server.session(1).samples, 20);
+    assert_eq!(log.lock().unwrap().len(), 20 + RAMP_SAMPLES as usize);
+    assert_eq!(log.lock().unwrap().last().unwrap().amplitude, 0.0);
+    // A base of held samples, too.
+    let mut rig = server.rig(&scene);
+    rig.sense().unwrap();
+    rig.hold(Drive { displacement: 1e-3, ..Drive::default() }, scene.sample_time())
+        .unwrap();
+    rig.sense().unwrap();
+    drop(rig);
+    server.session(2);
+    let log = log.lock().unwrap();
+    let ramp = &log[log.len() - RAMP_SAMPLES as usize - 1..];
+    assert!(ramp.windows(2).all(|pair| pair[1].displacement < pair[0].displacement));
+    assert_eq!((ramp[0].displacement, ramp[ramp.len() - 1].displacement), (1e-3, 0.0));
 }
 
 fn link_error(error: &RigError) -> &LinkError {
@@ -92,43 +75,151 @@ fn a_drive_above_a_limit_is_refused_at_once_with_the_value_and_the_limit() {
         (1, Drive { amplitude: -1e-9, ..drive(3) }),
         (2, Drive { displacement: -1e3, ..drive(3) }),
     ] {
-        let (server, log) = lock_step_rig(&scene, 5.0);
-        let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
+        let (server, log) = serve_rig(Address::Tcp, &scene, 5.0);
+        let mut rig = server.rig(&scene);
         shake(&mut rig, &scene, 3).unwrap();
         let start = Instant::now();
-        let error = rig
-            .sense()
-            .and_then(|_| rig.advance(bad, scene.sample_time()))
-            .and_then(|()| rig.sense())
-            .unwrap_err();
+        rig.sense().unwrap();
+        let refused = rig.advance(bad, scene.sample_time()).and_then(|()| rig.sense());
+        let error = refused.unwrap_err();
         assert!(start.elapsed() < Duration::from_secs(1));
         let LinkError::Refused { reason: Refusal::Drive { index: named, .. }, .. } = link_error(&error) else {
             panic!("{error}");
         };
         assert_eq!(*named, index, "{error}");
         assert!(error.to_string().contains("allowed is up to"), "{error}");
-        assert_eq!(server.sessions(1)[0].ended, Ended::Refused);
+        assert_eq!(server.session(1).ended, Ended::Refused);
         // The rig never had it.
-        assert!(
-            log.lock()
-                .unwrap()
-                .iter()
-                .all(|had| had.amplitude <= 1e-4 && had.omega < 51.0)
-        );
+        let log = log.lock().unwrap();
+        assert!(log.iter().all(|had| had.amplitude <= 1e-4 && had.omega < 51.0));
     }
 }
 
 #[test]
 fn a_silence_ramps_the_drive_down_and_a_client_that_returns_is_informed() {
     let scene = scene(&[]);
-    let (server, log) = lock_step_rig(&scene, 0.2);
-    let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
+    let (server, log) = serve_rig(Address::Tcp, &scene, 0.2);
+    let mut rig = server.rig(&scene);
     shake(&mut rig, &scene, 20).unwrap();
-    assert_eq!(server.sessions(1)[0].ended, Ended::Silence);
+    assert_eq!(server.session(1).ended, Ended::Silence);
     assert_eq!(log.lock().unwrap().last().unwrap().amplitude, 0.0);
     let error = shake(&mut rig, &scene, 2).unwrap_err();
     assert!(matches!(link_error(&error), LinkError::Closed { .. }), "{error}");
     // Only another session arms the rig again.
-    let mut next = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
-    shake(&mut next, &scene, 20).unwrap();
+    shake(&mut server.rig(&scene), &scene, 20).unwrap();
+}
+
+#[test]
+fn a_missing_server_is_reported_with_the_command_that_starts_it() {
+    let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let (start, place) = (Instant::now(), silent.local_addr().unwrap());
+    let rig = |address| NetRig::connect(address, 1e-3, None).unwrap_err();
+    let config = scene(&[]).controller_config();
+    let controller = NetController::connect(place, &config, None, None).unwrap_err();
+    for (error, command) in [
+        (rig(Address::Udp(place)), "vines rig --listen"),
+        (rig(Address::Tcp(place)), "vines rig --lock-step --listen"),
+        (controller, "vines controller --listen"),
+    ] {
+        assert!(matches!(error, LinkError::Unreachable { .. }));
+        assert!(error.to_string().contains(command), "{error}");
+    }
+    assert!(start.elapsed() < Duration::from_secs(5));
+}
+
+#[test]
+fn another_version_is_named_with_both_numbers() {
+    let other = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let address = Address::Udp(other.local_addr().unwrap());
+    let newer = std::thread::spawn(move || {
+        other.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+        let (_, from) = other.recv_from(&mut [0; 256]).unwrap();
+        let answer = b"VINE\x03\x00 and what follows in version 3";
+        other.send_to(answer, from).unwrap();
+    });
+    let error = NetRig::connect(address, 1e-3, None).unwrap_err();
+    newer.join().unwrap();
+    assert!(matches!(error, LinkError::Version { theirs: 3, .. }));
+    let text = error.to_string();
+    assert!(text.contains("version 3") && text.contains("version 2"), "{text}");
+}
+
+#[test]
+fn a_client_of_another_version_or_without_a_sample_time_is_refused() {
+    let (server, _) = serve_rig(Address::Udp, &scene(&[]), 1.0);
+    let client = UdpSocket::bind("127.0.0.1:0").unwrap();
+    client.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+    let mut hello = Frame::new(Kind::Hello, 1);
+    hello.values[0] = f64::NAN;
+    for (bytes, code) in [
+        (&b"VINE\x09\x00 hello from the future"[..], 4.0),
+        (&hello.encode(), 2.0),
+    ] {
+        client.send_to(bytes, server.address.socket()).unwrap();
+        let mut answer = [0; 256];
+        let size = client.recv(&mut answer).unwrap();
+        let refusal = Frame::decode(&answer[..size]).unwrap();
+        assert_eq!((refusal.kind, refusal.values[0]), (Kind::Refusal, code));
+    }
+}
+
+fn refused(error: &LinkError) -> Refusal {
+    let LinkError::Refused { reason, .. } = error else {
+        panic!("{error}");
+    };
+    *reason
+}
+
+#[test]
+fn another_role_another_sample_time_and_other_sensors_are_refused() {
+    let scene = scene(&["resonance.sensor='q1'"]);
+    let ((rig, _), peer) = (serve_rig(Address::Tcp, &scene, 5.0), serve_built_in(&scene));
+    let (sample_time, config) = (scene.sample_time(), scene.controller_config());
+    let error = NetRig::connect(peer.address, sample_time, None).unwrap_err();
+    assert_eq!(refused(&error), Refusal::Role);
+    let error = NetController::connect(rig.address.socket(), &config, None, None).unwrap_err();
+    assert_eq!(refused(&error), Refusal::Role);
+    let error = NetRig::connect(rig.address, 2.0 * sample_time, None).unwrap_err();
+    assert_eq!(refused(&error), Refusal::SampleTime(sample_time));
+    assert!(error.to_string().contains("same scene"), "{error}");
+    assert!(rig.rig(&scene).with_sensors(scene.resonance).is_ok());
+    let error = rig.rig(&scene).with_sensors(Definition::default()).unwrap_err();
+    let message = "measures q1 and e, the [resonance] section of the scene needs v and e";
+    assert!(error.to_string().contains(message), "{error}");
+}
+
+#[test]
+fn a_second_client_is_refused_and_silent_connections_keep_nobody_waiting() {
+    let scene = scene(&[]);
+    for address in [Address::Tcp, Address::Udp] {
+        let (server, _) = serve_rig(address, &scene, 10.0);
+        // A client gives up after 2 s.
+        let connections = if server.address == Address::Tcp(server.address.socket()) {
+            130
+        } else {
+            0
+        };
+        let _silent: Vec<_> = (0..connections)
+            .map(|_| TcpStream::connect(server.address.socket()).unwrap())
+            .collect();
+        let mut first = server.rig(&scene);
+        let error = NetRig::connect(server.address, scene.sample_time(), None).unwrap_err();
+        assert_eq!(refused(&error), Refusal::Busy);
+        shake(&mut first, &scene, 10).unwrap();
+    }
+}
+
+#[test]
+fn a_port_in_use_is_named_and_a_server_that_is_stopped_reports_its_session() {
+    let scene = scene(&[]);
+    let (server, _) = serve_rig(Address::Tcp, &scene, 5.0);
+    let error = Server::listen(server.address, service(&scene, 1.0), None)
+        .err()
+        .unwrap();
+    assert!(matches!(error, LinkError::Listen { .. }));
+    assert!(error.to_string().contains(&server.address.to_string()), "{error}");
+    let mut rig = server.rig(&scene);
+    shake(&mut rig, &scene, 10).unwrap();
+    let sessions = server.stop();
+    assert_eq!((sessions.len(), sessions[0].ended), (1, Ended::Stopped));
 }

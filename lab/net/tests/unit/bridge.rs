@@ -65,21 +65,21 @@ struct Interrupted {
 impl Interrupted {
     fn apply(&mut self) -> Result<(), RigError> {
         let (drive, holds, step) = self.drive;
-        if holds {
-            self.rig.hold(drive, step)
-        } else {
-            self.rig.advance(drive, step)
+        match holds {
+            true => self.rig.hold(drive, step),
+            false => self.rig.advance(drive, step),
         }
     }
 
     fn step(&mut self, drive: Drive, holds: bool, step: f64) -> Result<(), RigError> {
         self.drive = (drive, holds, step);
         self.phase += drive.omega * step / TAU;
-        if !self.gap.contains(&self.at) {
-            self.apply()?;
-        }
         self.at += 1;
-        Ok(())
+        if self.gap.contains(&(self.at - 1)) {
+            Ok(())
+        } else {
+            self.apply()
+        }
     }
 }
 
@@ -92,11 +92,10 @@ impl Rig for Interrupted {
             }
             self.next = self.rig.sense()?;
         }
-        let reading = if self.gap.contains(&self.at) {
-            let turn = self.drive.0.omega * self.drive.2 / TAU;
-            self.bridge.fill(self.phase, &self.next, self.gap.end - self.at, turn)
-        } else {
-            self.rig.sense()?
+        let turn = self.drive.0.omega * self.drive.2 / TAU;
+        let reading = match self.gap.contains(&self.at) {
+            true => self.bridge.fill(self.phase, &self.next, self.gap.end - self.at, turn),
+            false => self.rig.sense()?,
         };
         self.bridge.keep(self.phase, reading);
         Ok(reading)
@@ -115,11 +114,10 @@ impl Rig for Interrupted {
 fn a_run_rides_through_a_gap_of_30_ms_at_any_phase_whoever_makes_the_sine_of_the_base() {
     for settings in [
         &[][..],
-        &["chain.hold=true"],
         &["chain.hold=true", "chain.dac_bits=16", "chain.snr=40"],
         &["resonance.sensor=acceleration", "record.hold_periods=5"],
     ] {
-        let overrides: Vec<Override> = settings.iter().map(|one| one.parse().unwrap()).collect();
+        let overrides: Vec<Override> = settings.iter().map(|setting| setting.parse().unwrap()).collect();
         let scene = Scene::parse("paper.toml", PAPER, &overrides).unwrap();
         let lost = (0.03 / scene.sample_time()).ceil() as u64;
         let run = |from: u64| {
@@ -141,9 +139,7 @@ fn a_run_rides_through_a_gap_of_30_ms_at_any_phase_whoever_makes_the_sine_of_the
         let whole = run(u64::MAX / 2);
         for [from, to] in [[0, whole.settled], [whole.settled, whole.released]] {
             // Phases that fill the period evenly.
-            for n in 0..8 {
-                run((from + (to - from) * n / 8 + 37 * n % 100) as u64);
-            }
+            (0..8).for_each(|n| drop(run((from + (to - from) * n / 8 + 37 * n % 100) as u64)));
         }
     }
 }

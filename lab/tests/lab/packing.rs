@@ -1,0 +1,183 @@
+//! Guards packing: FMUs from libraries built here, and the refusal of everything else.
+
+use std::{
+    env::consts::{DLL_PREFIX, DLL_SUFFIX},
+    fs,
+    io::Read,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use vines::pack::{Binary, Component, Libraries, pack};
+
+const GUID: &str = "0f2e5d6c-3b1a-4a7e-9c58-d40f1e2b7a96";
+
+fn component() -> Component {
+    Component {
+        identifier: "Tiny",
+        package: "tiny-fmu",
+        xml: format!(
+            "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"Tiny\" guid=\"{GUID}\"><ModelVariables/></fmiModelDescription>"
+        ),
+        svg: "",
+        png: b"",
+        text: "",
+    }
+}
+
+/// The folder for this machine below `binaries/`.
+fn running() -> &'static str {
+    match (std::env::consts::OS, std::env::consts::ARCH) {
+        ("windows", _) => "win64",
+        ("macos", "aarch64") => "aarch64-darwin",
+        ("macos", _) => "darwin64",
+        (_, "aarch64") => "aarch64-linux",
+        _ => "linux64",
+    }
+}
+
+fn library(folder: &Path) -> PathBuf {
+    folder.join(format!("{DLL_PREFIX}tiny_fmu{DLL_SUFFIX}"))
+}
+
+/// Builds a shared library that exports one function and holds a guid.
+fn build(folder: &Path, function: &str, guid: &str) {
+    let source = folder.join("tiny.rs");
+    let code = format!("#[unsafe(no_mangle)] pub extern \"C\" fn {function}() -> *const u8 {{ \"{guid}\".as_ptr() }}");
+    fs::write(&source, code).unwrap();
+    let rustc = std::env::var_os("RUSTC").unwrap_or("rustc".into());
+    let status = Command::new(rustc)
+        .args(["--edition", "2024", "--crate-type", "cdylib", "-o"])
+        .arg(library(folder))
+        .arg(&source)
+        .status()
+        .expect("rustc runs");
+    assert!(status.success());
+}
+
+fn complaint(folder: &Path) -> String {
+    complaint_of(folder, &folder.into())
+}
+
+fn complaint_of(folder: &Path, libraries: &Libraries) -> String {
+    let out = folder.join("out");
+    let error = pack(&[component()], libraries, &out).expect_err("a mistake");
+    assert!(!out.exists(), "nothing is written");
+    error.to_string()
+}
+
+#[test]
+fn a_component_is_packed_with_its_library_in_its_platforms_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    build(folder.path(), "fmi2Instantiate", GUID);
+    let out = folder.path().join("new/out");
+    let written = pack(&[component()], &folder.path().into(), &out).unwrap();
+    assert_eq!(written, [out.join("Tiny.fmu")]);
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 1, "no temporary file is left");
+
+    let mut zip = zip::ZipArchive::new(fs::File::open(&written[0]).unwrap()).unwrap();
+    let mut description = String::new();
+    let mut entry = zip.by_name("modelDescription.xml").unwrap();
+    entry.read_to_string(&mut description).unwrap();
+    assert_eq!(description, component().xml);
+    drop(entry);
+    let inside = format!("binaries/{}/Tiny{DLL_SUFFIX}", running());
+    let size = fs::metadata(library(folder.path())).unwrap().len();
+    assert_eq!(zip.by_name(&inside).unwrap().size(), size);
+}
+
+#[test]
+fn a_library_that_is_missing_or_of_another_kind_is_named_with_the_way_to_build_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = library(folder.path());
+    let refused = |part: &str| {
+        let message = complaint(folder.path());
+        let named = path.display().to_string();
+        for part in [part, named.as_str(), "cargo build --release -p tiny-fmu", "--libraries"] {
+            assert!(message.contains(part), "{message}");
+        }
+    };
+    refused("not the library of Tiny for this machine");
+    // The header of a library of the other world: a PE file for x86-64 here, or an ELF file on Windows.
+    let mut other = vec![0u8; 1024];
+    if cfg!(windows) {
+        other[..6].copy_from_slice(b"\x7fELF\x02\x01");
+    } else {
+        other[..2].copy_from_slice(b"MZ");
+        other[0x3c] = 0x40;
+        other[0x40..0x44].copy_from_slice(b"PE\0\0");
+    }
+    for content in [&other[..], b"", b"hello", b"\x7fELF"] {
+        fs::write(&path, content).unwrap();
+        refused("not the library of Tiny for this machine");
+    }
+    fs::remove_file(&path).unwrap();
+    build(folder.path(), "something_else", GUID);
+    refused("fmi2Instantiate");
+    build(folder.path(), "fmi2Instantiate", "of an older table");
+    refused("other variables than Tiny has now");
+}
+
+/// The same library once more, as one for the platform of a folder.
+fn with_other(folder: &Path, argument: &str) -> Libraries {
+    let path = library(folder).display().to_string();
+    let other: Binary = format!("{argument}={path}").parse().unwrap();
+    Libraries { folder: Some(folder.into()), others: vec![other] }
+}
+
+#[test]
+fn only_the_libraries_given_are_packed_where_this_platform_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    build(folder.path(), "fmi2Instantiate", GUID);
+    let running = running();
+    let mut libraries = with_other(folder.path(), running);
+    libraries.folder = None;
+    let out = folder.path().join("out");
+    let written = pack(&[component()], &libraries, &out).unwrap();
+    let zip = zip::ZipArchive::new(fs::File::open(&written[0]).unwrap()).unwrap();
+    let names = zip.file_names().map(|name| name.unwrap().into_owned());
+    let served = names.filter(|name| name.starts_with("binaries/"));
+    assert_eq!(
+        served.collect::<Vec<_>>(),
+        [format!("binaries/{running}/Tiny{DLL_SUFFIX}")]
+    );
+}
+
+#[test]
+fn a_platform_is_served_exactly_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = complaint_of(folder.path(), &Libraries { folder: None, others: Vec::new() });
+    for part in ["no library of Tiny", "--binary PLATFORM=FILE"] {
+        assert!(message.contains(part), "{message}");
+    }
+    build(folder.path(), "fmi2Instantiate", GUID);
+    let mut libraries = with_other(folder.path(), "win32");
+    libraries.others.push(libraries.others[0].clone());
+    let message = complaint_of(folder.path(), &libraries);
+    assert!(message.contains("the second win32 library of Tiny"), "{message}");
+}
+
+#[test]
+fn a_library_given_for_this_machine_takes_the_place_of_that_in_the_folder() {
+    let (folder, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    build(folder.path(), "fmi2Instantiate", GUID);
+    fs::write(library(other.path()), format!("a library with {GUID}")).unwrap();
+    let mut libraries = with_other(other.path(), running());
+    libraries.folder = Some(folder.path().into());
+    let written = pack(&[component()], &libraries, &folder.path().join("out")).unwrap();
+    let mut zip = zip::ZipArchive::new(fs::File::open(&written[0]).unwrap()).unwrap();
+    let inside = format!("binaries/{}/Tiny{DLL_SUFFIX}", running());
+    let size = fs::metadata(library(other.path())).unwrap().len();
+    assert_eq!(zip.by_name(&inside).unwrap().size(), size);
+}
+
+#[test]
+fn a_library_that_belongs_to_no_component_is_refused() {
+    let (folder, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    build(folder.path(), "fmi2Instantiate", GUID);
+    build(other.path(), "fmi2Instantiate", "of a stranger");
+    let mut libraries = with_other(other.path(), running());
+    libraries.folder = Some(folder.path().into());
+    let message = complaint_of(folder.path(), &libraries);
+    assert!(message.contains("belongs to none of Tiny"), "{message}");
+}
