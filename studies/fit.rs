@@ -17,8 +17,6 @@
 
 mod common;
 
-use std::f64::consts::TAU;
-
 use common::{Failure, arguments, client, is_kept, quantile, share, tracked, uniform, write};
 use rayon::prelude::*;
 use vines_model::numerics::{Estimate, mean_square};
@@ -30,12 +28,14 @@ use vines_testbench::scene::{Parameters, Scene};
 
 /// A rig (epsilon, lambda, r), the seed of its noise, and the relative errors of the client's k, c, m, b and r.
 type Case = ([f64; 3], u64, [f64; 5]);
+/// Measured points, and the scene of the client.
+type Points = (Vec<MeasuredPoint>, Scene);
 
 fn main() -> Result<(), Failure> {
     let [source, count, seed, snr] = &arguments()[..] else {
         return Err("arguments: points|recordings RIGS SEED SNR|none".into());
     };
-    let measure: fn(&Case, &str) -> Result<(Vec<MeasuredPoint>, Scene), Failure> = match &**source {
+    let measure: fn(&Case, &str) -> Result<Points, Failure> = match &**source {
         "points" => points,
         "recordings" => recorded,
         "effects" => return effects(count.parse()?, seed, snr),
@@ -284,14 +284,14 @@ fn named((ratios, noise, scales, effect, size): &Hidden, snr: &str) -> Result<Na
 }
 
 /// The points of a tracked backbone.
-fn points((rig, noise, scales): &Case, snr: &str) -> Result<(Vec<MeasuredPoint>, Scene), Failure> {
+fn points((rig, noise, scales): &Case, snr: &str) -> Result<Points, Failure> {
     let (tracked, scene) = tracked(*rig, *noise, snr, *scales)?;
     let kept = tracked.points.iter().filter(is_kept);
     Ok((kept.map(|point| (&point.at).into()).collect(), scene))
 }
 
 /// The points of a recording.
-fn recorded((rig, noise, scales): &Case, snr: &str) -> Result<(Vec<MeasuredPoint>, Scene), Failure> {
+fn recorded((rig, noise, scales): &Case, snr: &str) -> Result<Points, Failure> {
     let (truth, mut scene) = client(*rig, *noise, snr, *scales)?;
     scene.start = lovines::State::default();
     let rig = Simulated::new(truth, scene.start)?;

@@ -200,6 +200,8 @@ const STEP: f64 = 1e-6;
 const ROUNDS: usize = 200;
 /// Restitution coefficients from which the minimisation begins, besides the expected one: chi-square may have several minima.
 const STARTS: [f64; 4] = [0.4, 0.55, 0.7, 0.85];
+/// Particle speeds from which the nearest place on the curve is searched for, if that of theory is not on it.
+const SPEEDS: [f64; 4] = [0.8, 0.9, 0.7, 1.0];
 /// Relative uncertainty of a value that is known exactly: above rounding.
 const EXACT: f64 = 1e-9;
 /// Fewest points: two equations each for five parameters, and one to spare.
@@ -621,7 +623,9 @@ impl<'a> Problem<'a> {
             let c = self.points[point].response.value / b;
             manifold.b(c, BranchSide::Right).unwrap_or(1.02 * manifold.b_min())
         };
-        let mut speed = start.unwrap_or_else(by_theory);
+        // Theory may put a speed where the exact curve has none.
+        let mut starts = [start.unwrap_or_else(by_theory)].into_iter().chain(SPEEDS);
+        let mut speed = starts.find(|speed| self.residual(x, point, *speed).is_some())?;
         let slope = |speed: f64| {
             let [below, above] = [-STEP, STEP].map(|step| self.residual(x, point, speed + step));
             Some((above? - below?) / (2.0 * STEP))
