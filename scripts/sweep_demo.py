@@ -1,5 +1,6 @@
 """Adaptive maps, a basin of attraction and 20 kills, with the program `vines`; scripts/sweep-demo runs it."""
 
+import csv
 import os
 import random
 import re
@@ -13,8 +14,9 @@ import matplotlib.pyplot as plt
 import xarray
 from matplotlib.colors import ListedColormap
 
-# The colours of the regime map in docs/regimes.md.
-COLOURS = ["#f6f6f4", "#b2d9f1", "#f0b446", "#5aae6e", "#3c82a0", "#be462d", "#6a3480", "#1e2028"]
+# The regimes in the order of their numbers in a store, with the colours of all figures.
+with Path("lab/src/report/styles.csv").open() as styles:
+    COLOURS = {row["name"]: row["light"] for row in csv.DictReader(styles)}
 # SHRINK=20 tries all of it at a twentieth of the size.
 POINTS = 1000 // int(os.environ.get("SHRINK", "1"))
 
@@ -73,7 +75,7 @@ def draw(cells, labels, path):
     figure, plot = plt.subplots(figsize=(7, 4.6), layout="constrained")
     extent = [float(cells[x][0]), float(cells[x][-1]), float(cells[y][0]), float(cells[y][-1])]
     style = {"origin": "lower", "extent": extent, "aspect": "auto", "interpolation": "nearest"}
-    image = plot.imshow(cells.regime.values.T, cmap=ListedColormap(COLOURS), vmin=-0.5, vmax=7.5, **style)
+    image = plot.imshow(cells.regime.values.T, cmap=ListedColormap([COLOURS[name] for name in names]), vmin=-0.5, vmax=7.5, **style)
     figure.colorbar(image, ticks=range(len(names))).set_ticklabels(names)
     plot.set(xlabel=labels[0], ylabel=labels[1])
     figure.savefig(path, dpi=110)

@@ -1,10 +1,13 @@
-"""Figures of the tutorials, from what the program `vines` prints.
+"""Figures of the book, from what the program `vines` prints and writes.
 
-python studies/book_figures.py PROGRAM [FIGURE ...]    writes docs/FIGURE.svg: manifold, window, responses, cavities; all by default
+python studies/book_figures.py PROGRAM [FIGURE ...]    writes docs/FIGURE.svg, all by default: own (backbone, manifold,
+                                                       regimes), window, responses, coverage, cavities
 """
 
+import csv
 import json
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -15,10 +18,10 @@ import matplotlib as mpl
 
 mpl.use("svg")
 import matplotlib.pyplot as plt
+from styles import COLOURS, EXACT, EXACT_UNSTABLE, MEASURED, THEORY
 
 DOCS = Path(__file__).parent.parent / "docs"
 PROGRAM = sys.argv[1]
-STABLE, OTHER, MEASURED = "#0072b2", "#999999", "#d55e00"
 plt.rcParams.update({"font.size": 9, "svg.fonttype": "none", "font.family": "sans-serif", "svg.hashsalt": "vines"})
 
 
@@ -46,26 +49,13 @@ def pieces(points):
     yield points[-1]["stable"], part
 
 
-def manifold():
-    """C over B: the manifold of the theory with its stable part, and the measured free decay."""
-    theory = printed("theory", "--points", "400")
-    bounds = theory["manifold"]["B_min"], theory["manifold"]["B_symmetry_breaking"]
+def own():
+    """Copy the figures that the commands write."""
     with tempfile.TemporaryDirectory() as folder:
-        found = printed("identify", "--rig", "built-in", "--out", folder)
-    R = theory["manifold"]["R"]
-    speeds = [0.001 * n for n in range(1301)]
-    amplitudes = [((R * B) ** 2 + (1 - 1.5707963267948966 * B) ** 2) ** 0.5 for B in speeds]
-    figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
-    axes.plot(speeds, amplitudes, color=OTHER, ls="--", lw=1, label="manifold, unstable")
-    on = [(B, C) for B, C in zip(speeds, amplitudes, strict=True) if bounds[0] <= B <= bounds[1]]
-    axes.plot(*zip(*on, strict=True), color=STABLE, lw=2, label="manifold, stable")
-    decay = [(point["B"], point["C"]) for point in found["decay"]]
-    axes.plot(*zip(*decay, strict=True), ".", color=MEASURED, ms=4, label="free decay, measured")
-    lock = found["lock"]
-    axes.plot(lock["B"], lock["C"], "o", mfc="white", mec=MEASURED, ms=8, label="lock, G = 1.1")
-    axes.set(xlabel="speed of the particle B", ylabel="amplitude of the response C", xlim=(0, 1.3), ylim=(0, 1))
-    axes.legend(frameon=False)
-    save(figure, "manifold.svg")
+        for words in (["identify", "--rig", "built-in"], ["map"]):
+            subprocess.run([PROGRAM, *words, "--out", folder], check=True, capture_output=True)
+        for written, name in (("backbone", "backbone"), ("sim", "manifold"), ("map", "regimes")):
+            shutil.copy(f"{folder}/{written}.svg", DOCS / f"{name}.svg")
 
 
 def window():
@@ -77,7 +67,9 @@ def window():
         for stable, part in pieces(points):
             if stable:
                 drives = [point["G"] for point in part]
-                axes.plot([r, r], [min(drives), max(drives)], color="#a7cfe6", lw=5, solid_capstyle="butt")
+                axes.plot(
+                    [r, r], [min(drives), max(drives)], color=COLOURS["symmetric 1:1"], lw=5, solid_capstyle="butt"
+                )
     marks = {"lock and decay": "o", "lock, no decay": "s", "held by control": "D", "refused": "x"}
     shown = set()
     for r in (0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 1.0):
@@ -92,7 +84,9 @@ def window():
         label = None if kind in shown else kind
         shown.add(kind)
         axes.plot(r, 1.1, marks[kind], color=MEASURED if kind != "refused" else "black", mfc="white", ms=7, label=label)
-    axes.set(xlabel="coefficient of restitution r", ylabel="base amplitude G", xlim=(0.27, 1.03), ylim=(0, 2.6))
+    axes.set(
+        xlabel="coefficient of restitution r", ylabel="base amplitude G = E/(b ε)", xlim=(0.27, 1.03), ylim=(0, 2.6)
+    )
     axes.legend(frameon=False, title="vines identify at G = 1.1")
     save(figure, "window.svg")
 
@@ -100,24 +94,25 @@ def window():
 def responses():
     """Exact frequency responses at three drives, and the backbone at phase resonance through their peaks."""
     figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
-    back = printed("orbit", "--backbone")["points"]
-    axes.plot(
-        [p["sigma"] for p in back], [p["C"] for p in back], color="black", lw=1, label="backbone (phase resonance)"
-    )
-    for number, G in enumerate((1.0, 1.1, 1.3)):
+
+    def curve(points, width):
+        for stable, part in pieces(points):
+            style = {"color": EXACT} if stable else {"color": EXACT_UNSTABLE, "ls": "--"}
+            axes.plot([p["sigma"] for p in part], [p["C"] for p in part], lw=width, **style)
+
+    curve(printed("orbit", "--backbone")["points"], 2)
+    for G in (1.0, 1.1, 1.3):
         branches = printed("orbit", "--response", "--range=-3:1", "--set", f"excitation.G={G}")
-        if not isinstance(branches, list):
-            branches = branches.get("components", branches.get("branches"))
-        for branch in branches:
-            if not branch["shape"]["mirrored"]:
-                continue
-            colour = ("#009e73", STABLE, MEASURED)[number]
-            for stable, part in pieces(branch["points"]):
-                style = {"ls": "-", "lw": 1.6} if stable else {"ls": ":", "lw": 0.9}
-                axes.plot([one["sigma"] for one in part], [one["C"] for one in part], color=colour, **style)
-        axes.plot([], [], color=colour, label=f"G = {G}")
-    axes.set(xlabel="detuning sigma", ylabel="amplitude of the response C", xlim=(-2.5, 0.5), ylim=(0, 0.9))
-    axes.legend(frameon=False, loc="upper left")
+        mirrored = [branch["points"] for branch in branches["components"] if branch["shape"]["mirrored"]]
+        for points in mirrored:
+            curve(points, 1.0)
+        peak = max((p for points in mirrored for p in points if p["stable"]), key=lambda p: p["C"])
+        axes.annotate(f"G = {G}", (peak["sigma"] + 0.08, peak["C"]), va="bottom")
+    axes.plot([], [], color=EXACT, lw=2, label="backbone (phase resonance)")
+    axes.plot([], [], color=EXACT, lw=1, label="frequency response")
+    axes.plot([], [], color=EXACT_UNSTABLE, lw=1, ls="--", label="unstable")
+    axes.set(xlabel="detuning sigma", ylabel="amplitude of the response C, over b", xlim=(-2.5, 0.5), ylim=(0, 0.9))
+    axes.legend(frameon=False, loc="upper left", fontsize=8)
     save(figure, "responses.svg")
 
 
@@ -125,16 +120,16 @@ def cavities():
     """Backbones of four real cavities, tracked by `vines backbone`, and that of the ideal cavity by exact orbits."""
     scenes = {
         "rough": ("friction, mu = 0.05", MEASURED, "o"),
-        "skewed": ("gaps 1.1 : 0.9", STABLE, "s"),
-        "vertical": ("vertical, gravity 0.08 b omega0²", "#009e73", "^"),
-        "viscoelastic": ("viscoelastic, r falls with the speed", "#cc79a7", "D"),
+        "skewed": ("gaps 1.1 : 0.9", COLOURS["symmetric 1:1"], "s"),
+        "vertical": ("vertical", "#009e73", "^"),
+        "viscoelastic": ("viscoelastic", "#cc79a7", "D"),
     }
     figure, both = plt.subplots(1, 2, figsize=(7.5, 4), layout="constrained", sharey=True)
-    ideal = [point for point in printed("orbit", "--backbone")["points"] if point["B"] < 1.3]
+    orbits = printed("orbit", "--backbone")["points"]
+    fold = min(orbits, key=lambda point: point["C"])["B"]
+    ideal = [point for point in orbits if fold <= point["B"] < 1.3]
     for axes, name in zip(both, ("sigma", "G"), strict=True):
-        axes.plot(
-            [p[name] for p in ideal], [p["C"] for p in ideal], color="black", lw=1, label="ideal cavity, exact orbits"
-        )
+        axes.plot([p[name] for p in ideal], [p["C"] for p in ideal], color="black", lw=1, label="ideal (exact orbits)")
     for name, (label, colour, mark) in scenes.items():
         with tempfile.TemporaryDirectory() as folder:
             points = printed("backbone", "--scene", f"scenes/{name}.toml", "--out", folder)["points"]
@@ -143,11 +138,31 @@ def cavities():
             place = [p[key] for p in points], [p["C"] for p in points]
             axes.plot(*place, mark, color=colour, mfc="none", ms=4, lw=0, label=label)
     both[0].set(xlabel="detuning sigma", ylabel="amplitude of the response C", xlim=(-2.2, 0.4), ylim=(0, 0.75))
-    both[1].set(xlabel="base amplitude G", xlim=(0.8, 1.6))
-    both[1].legend(frameon=False, loc="lower right", fontsize=8)
+    both[1].set(xlabel="base amplitude G", xlim=(0.8, 1.7))
+    both[1].legend(frameon=False, loc="lower right")
     save(figure, "cavities.svg")
 
 
-FIGURES = {"manifold": manifold, "window": window, "responses": responses, "cavities": cavities}
-for figure in sys.argv[2:] or FIGURES:
-    FIGURES[figure]()
+def coverage():
+    """How much the share of errors within the stated 95 % differs from it, from the results in validation/."""
+    figure, axes = plt.subplots(figsize=(6, 2.6), layout="constrained")
+    names = []
+    for study, count, name in (("tracking", "settled", "tracked"), ("locks", "correct", "locks")):
+        with (DOCS.parent / f"validation/{study}.csv").open() as table:
+            for row in csv.DictReader(table):
+                noise = "clean" if row["snr_dB"] == "none" else f"{row['snr_dB']} dB"
+                deviation, number = 100 * (float(row["within_1.96u"]) - 0.95), int(row[count])
+                axes.plot(deviation, len(names), "o", color=MEASURED, ms=5)
+                band = 100 * 1.96 * (0.95 * 0.05 / number) ** 0.5
+                axes.barh(len(names), 2 * band, left=-band, height=0.7, color=COLOURS["symmetric 1:1"], zorder=0)
+                names.append(f"{name}, {noise}, {row.get('scene', 'the rig').replace('another', 'wrong scene')}")
+    axes.axvline(0, color=THEORY, lw=0.8)
+    axes.set_yticks(range(len(names)), names)
+    axes.invert_yaxis()
+    axes.set(xlabel="share of errors within 1.96 u, less 95 %, in percentage points")
+    save(figure, "coverage.svg")
+
+
+FIGURES = {"own": own, "window": window, "responses": responses, "coverage": coverage, "cavities": cavities}
+for name in sys.argv[2:] or FIGURES:
+    FIGURES[name]()

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from styles import EXACT, MEASURED, THEORY
 
 import vines
 
@@ -55,12 +56,12 @@ columns = np.column_stack([np.ones_like(time), integral(rate), deviation])
 coefficients = np.linalg.lstsq(columns, balance, rcond=None)[0]
 residual = balance - columns @ coefficients
 figure, axes = plt.subplots(3, sharex=True, figsize=(6.4, 5), layout="constrained")
-axes[0].plot(time, amplitude / b, ".")
+axes[0].plot(time, amplitude / b, ".", color=MEASURED)
 axes[0].set(ylabel="A / b", title="A varies …")
-axes[1].plot(time, (balance - coefficients[2] * deviation) / b, ".")
-axes[1].plot(time, (columns[:, :2] @ coefficients[:2]) / b)
+axes[1].plot(time, (balance - coefficients[2] * deviation) / b, ".", color=MEASURED)
+axes[1].plot(time, (columns[:, :2] @ coefficients[:2]) / b, color=THEORY, lw=1)
 axes[1].set(ylabel="balance / b", title=f"… its balance is a line: $E_R$ = {-coefficients[1]:.3e} m")
-axes[2].plot(time, 1e3 * residual / b, ".")
+axes[2].plot(time, 1e3 * residual / b, ".", color=MEASURED)
 axes[2].set(ylabel="rest / (b/1000)", xlabel="periods")
 figure.savefig(DOCS / "measuring-balance.svg", metadata={"Date": None})
 
@@ -72,8 +73,8 @@ expected = np.interp(mean, exact[::-1, 0], exact[::-1, 2])
 print(f"G = {measured:.5f} at C = {mean:.4f}, exact orbit {expected:.5f}; rest at most {abs(residual).max() / b:.1e} b")
 figure, axes = plt.subplots(1, 2, figsize=(6.4, 3), layout="constrained")
 for axis, column, label in zip(axes, (2, 1), ("drive $E_R$ / (ε b)", "detuning of $ω_R$"), strict=True):
-    axis.plot(exact[:, 0], exact[:, column], label="exact orbits")
-    axis.plot(levels[:, 0], levels[:, column], "k.", label="held levels")
+    axis.plot(exact[:, 0], exact[:, column], color=EXACT, label="exact orbits")
+    axis.plot(levels[:, 0], levels[:, column], ".", color=MEASURED, label="held levels")
     axis.set(xlabel="A / b", ylabel=label)
 axes[0].legend()
 figure.savefig(DOCS / "measuring-backbone.svg", metadata={"Date": None})

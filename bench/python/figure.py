@@ -83,6 +83,7 @@ def panel(ax, bench, scene):
     ax.text(0.02, 0.975, "time limit", transform=ax.transAxes, ha="left", va="top", fontsize=6.5, color="#555555")
     ax.grid(True, color="#e3e3e3", linewidth=0.5)
     ax.set_xlabel("ns per impact")
+    ax.tick_params(labelbottom=True)
 
 
 def broken(text, width):
@@ -102,7 +103,7 @@ def write(bench, file):
     lines = -(-len(scenes) // columns)
     foot = 1.0
     height = 2.9 * lines + foot
-    figure, axes = plt.subplots(lines, columns, figsize=(3.2 * columns, height), squeeze=False)
+    figure, axes = plt.subplots(lines, columns, figsize=(3.2 * columns, height), squeeze=False, sharex=True)
     for ax, scene in zip(axes.flat, scenes, strict=False):
         panel(ax, bench, scene)
     for ax in list(axes.flat)[len(scenes) :]:

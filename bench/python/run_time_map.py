@@ -2,6 +2,7 @@
 
 import csv
 import io
+from pathlib import Path
 from statistics import median
 
 from tables import number, replace, text_table
@@ -13,17 +14,11 @@ EFFORT = {"methods": "both", "periods": 200, "brent_periods": 50, "runs": 7}
 # Largest ratios to the default lock that are accepted, as a median and in the worst cell.
 ACCEPTED = {"symmetric 1:1": (1.5, 1.5)}
 ACCEPTED_ELSEWHERE = (4.0, 8.0)
-REGIMES = {
-    "no impacts": "#e8e8e8",
-    "rare impacts": "#b9b9b9",
-    "symmetric 1:1": "#0072b2",
-    "asymmetric 1:1": "#56b4e9",
-    "n impacts": "#009e73",
-    "modulated": "#f0e442",
-    "chaotic": "#d55e00",
-    "quasi-periodic": "#cc79a7",
-    "undecided": "#333333",
-}
+# Regimes in the order of the legend, with their colours in all figures. Rare impacts: fewer than one per period.
+with (Path(__file__).parents[2] / "lab/src/report/styles.csv").open() as styles:
+    COLOURS = {row["name"]: row["light"] for row in csv.DictReader(styles)} | {"rare impacts": "#b9b9b9"}
+NAMES = "symmetric 1:1,asymmetric 1:1,n impacts,quasi-periodic,modulated,chaotic,undecided".split(",")
+REGIMES = {name: COLOURS[name] for name in ["no impacts", "rare impacts", *NAMES]}
 NOTE = (
     "Each cell is the default rig after 400 periods or more at that drive. One step of 200 periods is timed (50 with "
     "Brent's method), in turns with the same step at the default lock (sigma = -1.14, G = 1.1); costs are medians of 7 "

@@ -12,7 +12,6 @@ use std::path::{Path, PathBuf};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-pub use figure::FigureError;
 pub use files::{ReportError, decay_csv, map_csv, write, write_interrupted, write_lateness, write_map, write_tracked};
 pub use table::{Table, number, row, with_uncertainty};
 
@@ -153,9 +152,17 @@ fn page(scene: &Scene, sections: &[Section]) -> String {
     page.into_string()
 }
 
+/// Titles of the last two sections.
+const BUDGET: &str = "Error budget";
+const VERSIONS: &str = "Scene and versions";
+
 fn body(scene: &Scene, sections: &[Section]) -> Markup {
     let p = scene.dimensionless();
     let mut figures = 0;
+    let titles = sections
+        .iter()
+        .map(|section| section.title.as_str())
+        .chain([BUDGET, VERSIONS]);
     let json = serde_json::to_string_pretty(scene).unwrap_or_default();
     html! {
         h1 { "Nonlinear modal test of an oscillator with a vibro-impact nonlinear energy sink" }
@@ -174,16 +181,24 @@ fn body(scene: &Scene, sections: &[Section]) -> Markup {
             ul { "\n" @for section in sections { li { (section.finding) } "\n" } }
         }
         "\n"
-        @for section in sections {
-            section {
-                h2 { (section.title) } "\n"
+        nav {
+            h2 { "Contents" } "\n"
+            ol {
+                "\n"
+                @for (n, title) in (1..).zip(titles) { li { a href=(format!("#s{n}")) { (title) } } "\n" }
+            }
+        }
+        "\n"
+        @for (n, section) in (1..).zip(sections) {
+            section id=(format!("s{n}")) {
+                h2 { (n) " " (section.title) } "\n"
                 @for block in &section.blocks { (rendered(block, &mut figures)) }
             }
             "\n"
         }
         (budget(sections))
-        section {
-            h2 { "Scene and versions" } "\n"
+        section id=(format!("s{}", sections.len() + 2)) {
+            h2 { (sections.len() + 2) " " (VERSIONS) } "\n"
             p {
                 "vines " (env!("CARGO_PKG_VERSION")) ", " (std::env::consts::ARCH) " on " (std::env::consts::OS)
                 ". Everything here follows from the scene and the version; the page carries no date, so that the same input \
@@ -221,8 +236,8 @@ fn budget(sections: &[Section]) -> Markup {
     let rows = sections.iter().flat_map(|section| section.budget.clone());
     let table = Table::new("quantity | difference | cause").rows(rows);
     html! {
-        section.budget {
-            h2 { "Error budget" } "\n"
+        section.budget id=(format!("s{}", sections.len() + 1)) {
+            h2 { (sections.len() + 1) " " (BUDGET) } "\n"
             (table.html("Differences between results and references, with their causes."))
             p {
                 "M, k, c and m of the default scene are those of a published rig of this kind, because the study that it follows \

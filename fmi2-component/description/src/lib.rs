@@ -119,6 +119,8 @@ elements! {
         index: usize = "@index",
         /// Indices of variables, separated by spaces.
         dependencies: Option<String> = "@dependencies",
+        /// How it depends on each of them, separated by spaces.
+        dependencies_kind: Option<String> = "@dependenciesKind",
     }
 }
 

@@ -1,12 +1,7 @@
-//! Figures as data: panels with axes, series and labels, drawn as SVG. Colours are in [`super::theme`].
+//! Figures as data: panels with axes and series. [`Figure::svg`] draws all of them, with the colours of [`super::theme`]. The same input
+//! gives the same bytes.
 
-mod draw;
-
-pub use plotters::chart::SeriesLabelPosition as Legend;
-use plotters::style::ShapeStyle;
-pub use plotters::style::{BLACK, Color, RGBColor, WHITE};
-use thiserror::Error;
-
+use super::theme::{CAPTION, GRID, HALO, INK, PAPER, colour, unstable};
 use crate::scene::{Dimensionless, Sensor};
 
 /// A place in a panel, in the units of its axes.
@@ -15,91 +10,110 @@ pub type Place = (f64, f64);
 /// A place, and whether the motion there is stable.
 pub type Marked = (Place, bool);
 
+/// Range and label of an axis.
+pub type Axis<'a> = ((f64, f64), &'a str);
+
 /// Axis labels that several figures share.
 pub const DETUNING: &str = "detuning σ = (ω/ω₀ − 1)/ε";
 pub const AMPLITUDE_OF_V: &str = "amplitude C of v, over b";
 pub const SPEED: &str = "particle speed B, over b ω₀";
 
-/// Usual size of a figure, px.
-pub const SIZE: (u32, u32) = (860, 600);
-/// plotters rounds to whole units: drawn this many times larger, curves are smooth.
-const FINE: u32 = 8;
+/// Usual size of a figure, px: at a width of 390 px, its labels are 8 px high.
+pub const SIZE: (f64, f64) = (720.0, 500.0);
 
-/// Why a figure cannot be drawn.
-#[derive(Debug, Error)]
-#[error("the figure cannot be drawn: {0}")]
-pub struct FigureError(String);
+const FONT: &str = "Helvetica, Arial, sans-serif";
+/// Font sizes, px: titles, labels of axes and legends, ticks and captions.
+const TITLE: f64 = 19.0;
+const LABEL: f64 = 15.0;
+const SMALL: f64 = 13.0;
+/// Room around the axes, px: left for ticks and label, below likewise, and right.
+const MARGINS: [f64; 3] = [66.0, 54.0, 16.0];
+/// An entry of a legend, px: height, and width of the sample.
+const ENTRY: (f64, f64) = (21.0, 32.0);
+/// Points of a curve that are closer than this, px, are drawn as one.
+const APART: f64 = 0.4;
 
-/// A line of that colour, `tenths` of a pixel wide.
-pub fn line(colour: RGBColor, tenths: u32) -> ShapeStyle {
-    colour.stroke_width(tenths * FINE / 10)
+/// A figure: panels side by side or one above the other.
+pub struct Figure {
+    pub size: (f64, f64),
+    pub panels: Vec<Panel>,
 }
 
-/// A figure: panels, and a key beside them if it has one.
-pub struct Figure {
-    size: (u32, u32),
-    panels: Vec<Panel>,
-    /// Names, and what they explain.
-    key: Vec<(&'static str, Mark)>,
+/// Place of a legend.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Legend {
+    None,
+    UpperRight,
+    LowerRight,
+    /// Right of the axes, with a width in px.
+    Beside(f64),
 }
 
 /// One panel with its axes.
 pub struct Panel {
     /// Left, top, width and height, px.
-    area: [u32; 4],
-    /// Title and caption.
-    heading: Option<(String, String)>,
+    area: [f64; 4],
+    title: String,
+    /// Lines below the title.
+    captions: Vec<String>,
     ranges: [(f64, f64); 2],
     labels: [String; 2],
     series: Vec<Series>,
-    legend: Option<Legend>,
+    legend: Legend,
 }
-
-/// Range and label of an axis.
-pub type Axis<'a> = ((f64, f64), &'a str);
 
 /// Something drawn in a panel; the first of each label is in the legend.
 struct Series {
-    kind: Kind,
-    style: ShapeStyle,
-    label: Option<String>,
+    shape: Shape,
+    places: Vec<Place>,
+    /// The name of the colour, in the table of styles.
+    colour: &'static str,
+    label: String,
 }
 
-enum Kind {
-    Curve(Vec<Place>),
-    Dashed(Vec<Place>),
-    /// Radius, px.
-    Circles(Vec<Place>, u32),
-    Crosses(Vec<Place>),
-    Square(Place),
-    Segments(Vec<[Place; 2]>),
-    Rectangles(Vec<[Place; 2]>),
-    /// Text, size in px, and whether its centre is at the place or its left upper corner.
-    Text(String, Place, u32, bool),
-}
-
-/// What an entry of the key explains.
-pub enum Mark {
-    /// Colour, letter, and colour of the letter.
-    Swatch((RGBColor, &'static str, RGBColor)),
-    Line(RGBColor),
-    Dot,
+/// How a series is drawn; widths, radii and sizes in px.
+#[derive(Clone, Copy)]
+pub enum Shape {
+    /// A solid line through the places: measured values, and stable motions.
+    Line(f64),
+    /// A line on a map, with a halo.
+    OnMap(f64),
+    Dashed(f64),
+    DashedOnMap(f64),
+    /// Segments, such as error bars: two places each.
+    Bars(f64),
+    /// The border of an area of a map: two places each.
+    Border(f64),
+    /// Cells of a map: two opposite corners each. Letter in the legend, and the name of its colour.
+    Cells(&'static str, &'static str),
+    Circle(f64),
+    Dot(f64),
+    Square,
+    Cross,
+    /// Text with its middle at the place.
+    Text(f64),
+    /// Text that interrupts a curve.
+    TextOnCurve(f64),
 }
 
 impl Figure {
     /// A figure of one panel of the usual size.
     pub fn single(panel: Panel) -> Self {
-        Self::new(SIZE, vec![panel])
+        Self { size: SIZE, panels: vec![panel] }
     }
 
-    /// A figure of that size, px.
-    pub fn new(size: (u32, u32), panels: Vec<Panel>) -> Self {
-        Self { size, panels, key: Vec::new() }
-    }
-
-    /// With a key at the right of the panel.
-    pub fn with_key(self, key: Vec<(&'static str, Mark)>) -> Self {
-        Self { key, ..self }
+    /// The figure as SVG, for white paper.
+    pub fn svg(&self) -> String {
+        let (width, height) = self.size;
+        let mut svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+             font-family=\"{FONT}\">\n"
+        );
+        rectangle(&mut svg, [0.0, 0.0, width, height], PAPER, "");
+        for panel in &self.panels {
+            panel.draw(&mut svg);
+        }
+        svg + "</svg>\n"
     }
 }
 
@@ -107,106 +121,359 @@ impl Panel {
     /// An empty panel over the whole of a figure of the usual size.
     pub fn new(x: Axis, y: Axis) -> Self {
         Self {
-            area: [0, 0, SIZE.0, SIZE.1],
-            heading: None,
+            area: [0.0, 0.0, SIZE.0, SIZE.1],
+            title: String::new(),
+            captions: Vec::new(),
             ranges: [x.0, y.0],
             labels: [x.1, y.1].map(String::from),
             series: Vec::new(),
-            legend: None,
+            legend: Legend::None,
         }
     }
 
     /// At this place of the figure: left, top, width and height, px.
-    pub fn at(self, area: [u32; 4]) -> Self {
+    pub fn at(self, area: [f64; 4]) -> Self {
         Self { area, ..self }
     }
 
     pub fn heading(mut self, title: &str, caption: &str) -> Self {
-        self.heading = Some((title.into(), caption.into()));
+        self.title = title.into();
+        self.captions = caption.lines().map(String::from).collect();
         self
     }
 
-    pub fn legend(mut self, position: Legend) -> Self {
-        self.legend = Some(position);
-        self
+    pub fn legend(self, legend: Legend) -> Self {
+        Self { legend, ..self }
     }
 
     /// Adds a series, unless it has nothing to draw: the legend does not name what is not there.
-    fn add(&mut self, kind: Kind, style: ShapeStyle, label: &str) {
-        if let Kind::Curve(points) | Kind::Dashed(points) | Kind::Circles(points, _) | Kind::Crosses(points) = &kind
-            && points.is_empty()
-        {
+    pub fn add(&mut self, shape: Shape, places: Vec<Place>, colour: &'static str, label: &str) {
+        if !places.is_empty() {
+            let label = label.into();
+            self.series.push(Series { shape, places, colour, label });
+        }
+    }
+
+    /// A curve of motions, solid where they are stable and dashed where they are not.
+    pub fn curve(&mut self, points: &[Marked], width: f64, colour: &'static str, name: &str) {
+        let label = |stable| match (name, stable) {
+            ("", _) => String::new(),
+            (name, true) => format!("{name}, stable"),
+            (name, false) => format!("{name}, unstable"),
+        };
+        // The stable pieces first, and so in the legend.
+        for run in runs(points, true) {
+            self.add(Shape::Line(width), run, colour, &label(true));
+        }
+        for run in runs(points, false) {
+            self.add(Shape::Dashed(width), run, unstable(colour), &label(false));
+        }
+    }
+
+    /// A curve of motions on a map.
+    pub fn curve_on_map(&mut self, points: &[Marked], colour: &'static str, label: &str) {
+        for run in runs(points, true) {
+            self.add(Shape::OnMap(2.2), run, colour, label);
+        }
+        for run in runs(points, false) {
+            self.add(Shape::DashedOnMap(2.2), run, colour, label);
+        }
+    }
+
+    /// The series of the legend.
+    fn entries(&self) -> Vec<&Series> {
+        let mut entries: Vec<&Series> = Vec::new();
+        for series in &self.series {
+            let named = !series.label.is_empty() && !matches!(series.shape, Shape::Text(_) | Shape::TextOnCurve(_));
+            if named && entries.iter().all(|entry| entry.label != series.label) {
+                entries.push(series);
+            }
+        }
+        entries
+    }
+
+    fn draw(&self, svg: &mut String) {
+        let [left, top, width, height] = self.area;
+        let entries = self.entries();
+        let longest = entries
+            .iter()
+            .map(|entry| text_width(&entry.label, SMALL + 1.0))
+            .fold(0.0, f64::max);
+        let key = [ENTRY.1 + 26.0 + longest, ENTRY.0 * entries.len() as f64 + 10.0];
+        let beside = if let Legend::Beside(width) = self.legend {
+            width
+        } else {
+            0.0
+        };
+        let head = match self.title.is_empty() {
+            true => 14.0,
+            false => 42.0 + 18.0 * self.captions.len() as f64,
+        };
+        let frame = Frame {
+            place: [left + MARGINS[0], top + head],
+            size: [width - MARGINS[0] - MARGINS[2] - beside, height - head - MARGINS[1]],
+            ranges: self.ranges,
+        };
+        let [x, y] = frame.place;
+        if !self.title.is_empty() {
+            text(svg, &self.title, [x, top + 28.0], TITLE, INK, "start");
+        }
+        for (n, line) in (0..).zip(&self.captions) {
+            text(
+                svg,
+                line,
+                [x, top + 48.0 + 18.0 * f64::from(n)],
+                SMALL,
+                CAPTION,
+                "start",
+            );
+        }
+        frame.draw(svg, &self.labels);
+        // Curves end at the axes; marks are whole.
+        let [w, h] = frame.size;
+        *svg += &format!(
+            "<svg x=\"{x:.2}\" y=\"{y:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" viewBox=\"{x:.2} {y:.2} {w:.2} {h:.2}\">\n"
+        );
+        for series in &self.series {
+            series.draw(svg, &frame, false);
+        }
+        svg.push_str("</svg>\n");
+        for series in &self.series {
+            series.draw(svg, &frame, true);
+        }
+        if entries.is_empty() || self.legend == Legend::None {
             return;
         }
-        let label = (!label.is_empty()).then(|| label.to_string());
-        self.series.push(Series { kind, style, label });
-    }
-
-    pub fn curve(&mut self, points: Vec<Place>, style: ShapeStyle, label: &str) {
-        self.add(Kind::Curve(points), style, label);
-    }
-
-    pub fn dashed(&mut self, points: Vec<Place>, style: ShapeStyle, label: &str) {
-        self.add(Kind::Dashed(points), style, label);
-    }
-
-    /// Circles of a radius in px, filled or hollow as the style says.
-    pub fn circles(&mut self, points: Vec<Place>, radius: u32, style: ShapeStyle, label: &str) {
-        self.add(Kind::Circles(points, radius), style, label);
-    }
-
-    pub fn crosses(&mut self, points: Vec<Place>, style: ShapeStyle, label: &str) {
-        self.add(Kind::Crosses(points), style, label);
-    }
-
-    pub fn square(&mut self, place: Place, colour: RGBColor, label: &str) {
-        self.add(Kind::Square(place), colour.filled(), label);
-    }
-
-    pub fn segments(&mut self, pairs: Vec<[Place; 2]>, style: ShapeStyle) {
-        self.add(Kind::Segments(pairs), style, "");
-    }
-
-    pub fn rectangles(&mut self, corners: Vec<[Place; 2]>, colour: RGBColor) {
-        self.add(Kind::Rectangles(corners), colour.filled(), "");
-    }
-
-    /// Text of that size, px, with its left upper corner at the place.
-    pub fn text(&mut self, text: String, place: Place, size: u32) {
-        let black = RGBColor(0, 0, 0).filled();
-        self.add(Kind::Text(text, place, size, false), black, "");
-    }
-
-    /// Text of that size, px, centred at the place.
-    pub fn centred_text(&mut self, text: String, place: Place, size: u32, colour: RGBColor) {
-        self.add(Kind::Text(text, place, size, true), colour.filled(), "");
-    }
-
-    /// A curve, dashed where it is unstable, with a style and a label for each of its two kinds of pieces.
-    pub fn pieces(&mut self, points: &[Marked], styles: [ShapeStyle; 2], labels: [&str; 2]) {
-        for run in runs(points, false) {
-            self.dashed(run, styles[1], labels[1]);
+        let right = x + w - key[0] - 8.0;
+        let corner = match self.legend {
+            Legend::LowerRight => [right, y + h - key[1] - 8.0],
+            Legend::Beside(_) => [x + w + 10.0, y],
+            _ => [right, y + 8.0],
+        };
+        if beside == 0.0 {
+            rectangle(
+                svg,
+                [corner[0], corner[1], key[0], key[1]],
+                PAPER,
+                " fill-opacity=\"0.9\"",
+            );
         }
-        for run in runs(points, true) {
-            self.curve(run, styles[0], labels[0]);
+        for (n, entry) in (0..).zip(entries) {
+            let line = corner[1] + 5.0 + ENTRY.0 * (f64::from(n) + 0.5);
+            entry.sample(svg, [corner[0] + 8.0, line]);
+            text(
+                svg,
+                &entry.label,
+                [corner[0] + ENTRY.1 + 16.0, line + 4.5],
+                SMALL + 1.0,
+                INK,
+                "start",
+            );
         }
     }
+}
 
-    /// A curve as by [`Panel::pieces`], cut where it leaves the panel.
-    pub fn clipped_pieces(&mut self, points: &[Marked], styles: [ShapeStyle; 2], labels: [&str; 2]) {
+/// The rectangle between the axes of a panel: left upper corner and size, px, and ranges.
+struct Frame {
+    place: [f64; 2],
+    size: [f64; 2],
+    ranges: [(f64, f64); 2],
+}
+
+impl Frame {
+    /// Where a place of the panel is drawn, px.
+    fn at(&self, (a, b): Place) -> [f64; 2] {
+        let part = |value: f64, (from, to): (f64, f64)| (value - from) / (to - from);
         let [x, y] = self.ranges;
-        for piece in clipped(points, x, y) {
-            self.pieces(&piece, styles, labels);
+        [
+            self.place[0] + self.size[0] * part(a, x),
+            self.place[1] + self.size[1] * (1.0 - part(b, y)),
+        ]
+    }
+
+    fn contains(&self, (a, b): Place) -> bool {
+        let [x, y] = self.ranges;
+        (x.0..=x.1).contains(&a) && (y.0..=y.1).contains(&b)
+    }
+
+    /// Grid, ticks, axes and their labels.
+    fn draw(&self, svg: &mut String, labels: &[String; 2]) {
+        let ([left, top], [width, height]) = (self.place, self.size);
+        let (right, bottom) = (left + width, top + height);
+        let [(x, _), (y, _)] = self.ranges;
+        for (value, label) in ticks(self.ranges[0], width / 75.0) {
+            let [at, _] = self.at((value, y));
+            path(svg, &[[at, top], [at, bottom]], 1.0, GRID, "");
+            text(svg, &label, [at, bottom + 18.0], SMALL, INK, "middle");
+        }
+        for (value, label) in ticks(self.ranges[1], height / 45.0) {
+            let [_, at] = self.at((x, value));
+            path(svg, &[[left, at], [right, at]], 1.0, GRID, "");
+            text(svg, &label, [left - 7.0, at + 4.5], SMALL, INK, "end");
+        }
+        path(svg, &[[left, top], [left, bottom], [right, bottom]], 1.0, INK, "");
+        text(
+            svg,
+            &labels[0],
+            [left + width / 2.0, bottom + 42.0],
+            LABEL,
+            INK,
+            "middle",
+        );
+        let [x, y] = [left - 46.0, top + height / 2.0];
+        *svg += &format!("<g transform=\"rotate(-90 {x:.2} {y:.2})\">");
+        text(svg, &labels[1], [x, y], LABEL, INK, "middle");
+        svg.push_str("</g>\n");
+    }
+}
+
+/// At most this many round numbers of a range, with their labels.
+fn ticks((from, to): (f64, f64), most: f64) -> Vec<(f64, String)> {
+    let least = (to - from) / most.max(1.0);
+    let power = 10f64.powf(least.log10().floor());
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= least);
+    let step = factor.unwrap_or(10.0) * power;
+    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    let (first, last) = ((from / step - 1e-9).ceil() as i64, (to / step + 1e-9).floor() as i64);
+    let label = |value: f64| format!("{:.decimals$}", value + 0.0).replace('-', "−");
+    (first..=last)
+        .map(|n| (n as f64 * step, label(n as f64 * step)))
+        .collect()
+}
+
+impl Series {
+    /// Draws the series, if it is one of the marks and texts, or one of the others.
+    fn draw(&self, svg: &mut String, frame: &Frame, marks: bool) {
+        let places: Vec<[f64; 2]> = self.places.iter().map(|place| frame.at(*place)).collect();
+        match self.shape {
+            Shape::Line(_) | Shape::OnMap(_) | Shape::Dashed(_) | Shape::DashedOnMap(_) if !marks => {
+                let mut points: Vec<[f64; 2]> = Vec::new();
+                for (n, [x, y]) in places.iter().copied().enumerate() {
+                    let far = points.last().is_none_or(|[a, b]| (x - a).hypot(y - b) >= APART);
+                    if far || n + 1 == places.len() {
+                        points.push([x, y]);
+                    }
+                }
+                self.stroke(svg, &points);
+            }
+            Shape::Bars(_) | Shape::Border(_) if !marks => {
+                // The halo of one segment must not hide its neighbour.
+                places.chunks_exact(2).for_each(|pair| self.halo(svg, pair));
+                places.chunks_exact(2).for_each(|pair| self.line(svg, pair));
+            }
+            Shape::Cells(..) if !marks => {
+                for pair in places.chunks_exact(2) {
+                    let [[a, b], [c, d]] = [pair[0], pair[1]];
+                    let area = [a.min(c), b.min(d), (a - c).abs(), (b - d).abs()];
+                    // Cells lie side by side without a seam.
+                    rectangle(svg, area, self.colour, " shape-rendering=\"crispEdges\"");
+                }
+            }
+            Shape::Circle(_) | Shape::Dot(_) | Shape::Square | Shape::Cross if marks => {
+                for place in self.places.iter().filter(|place| frame.contains(**place)) {
+                    self.mark(svg, frame.at(*place));
+                }
+            }
+            Shape::Text(size) | Shape::TextOnCurve(size) if marks => {
+                for [x, y] in places {
+                    let width = text_width(&self.label, size);
+                    if matches!(self.shape, Shape::TextOnCurve(_)) {
+                        let area = [x - width / 2.0, y - 0.6 * size, width, 1.2 * size];
+                        rectangle(svg, area, PAPER, " fill-opacity=\"0.85\"");
+                    }
+                    text(svg, &self.label, [x, y + 0.35 * size], size, self.colour, "middle");
+                }
+            }
+            _ => {}
         }
     }
 
-    /// A curve as by [`Panel::clipped_pieces`], with points far enough apart that dashes stay dashes.
-    pub fn thinned_pieces(&mut self, points: &[Marked], styles: [ShapeStyle; 2], labels: [&str; 2]) {
-        let [x, y] = self.ranges;
-        for piece in clipped(points, x, y) {
-            self.pieces(&thinned(&piece, x, y), styles, labels);
+    /// The sample in a legend.
+    fn sample(&self, svg: &mut String, [x, y]: [f64; 2]) {
+        let middle = [x + ENTRY.1 / 2.0, y];
+        match self.shape {
+            Shape::Circle(_) | Shape::Dot(_) | Shape::Square | Shape::Cross => self.mark(svg, middle),
+            Shape::Cells(letter, ink) => {
+                let edge = format!(" stroke=\"{}\"", colour(INK));
+                rectangle(svg, [x, y - 8.5, ENTRY.1, 17.0], self.colour, &edge);
+                text(svg, letter, [middle[0], y + 4.5], SMALL, ink, "middle");
+            }
+            _ => self.stroke(svg, &[[x, y], [x + ENTRY.1, y]]),
         }
     }
+
+    fn stroke(&self, svg: &mut String, points: &[[f64; 2]]) {
+        self.halo(svg, points);
+        self.line(svg, points);
+    }
+
+    fn halo(&self, svg: &mut String, points: &[[f64; 2]]) {
+        if let Shape::OnMap(width) | Shape::DashedOnMap(width) | Shape::Border(width) = self.shape {
+            path(svg, points, width + 2.8, HALO, "");
+        }
+    }
+
+    fn line(&self, svg: &mut String, points: &[[f64; 2]]) {
+        let (width, dashes) = match self.shape {
+            Shape::Dashed(width) | Shape::DashedOnMap(width) => (width, " stroke-dasharray=\"7 5\""),
+            Shape::Line(width) | Shape::OnMap(width) | Shape::Bars(width) | Shape::Border(width) => (width, ""),
+            _ => return,
+        };
+        path(svg, points, width, self.colour, dashes);
+    }
+
+    fn mark(&self, svg: &mut String, [x, y]: [f64; 2]) {
+        let shade = colour(self.colour);
+        let circle = |radius, style: &str| format!("<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius}\" {style}/>\n");
+        match self.shape {
+            Shape::Circle(r) => {
+                *svg += &circle(r, &format!("fill=\"none\" stroke=\"{shade}\" stroke-width=\"1.5\""));
+            }
+            Shape::Dot(r) => *svg += &circle(r, &format!("fill=\"{shade}\"")),
+            Shape::Square => rectangle(svg, [x - 4.5, y - 4.5, 9.0, 9.0], self.colour, ""),
+            _ => {
+                for d in [4.0, -4.0] {
+                    path(svg, &[[x - 4.0, y - d], [x + 4.0, y + d]], 1.2, self.colour, "");
+                }
+            }
+        }
+    }
+}
+
+/// Runs of consecutive motions that are stable, or unstable, as wanted; each with the point after it, so that the curve has no holes.
+fn runs(points: &[Marked], wanted: bool) -> Vec<Vec<Place>> {
+    let mut start = 0;
+    let runs = points.chunk_by(|point, next| point.1 == next.1);
+    let runs = runs.filter_map(|run| {
+        let from = start;
+        start += run.len();
+        let to = (start + 1).min(points.len());
+        (run[0].1 == wanted).then(|| points[from..to].iter().map(|point| point.0).collect())
+    });
+    runs.collect()
+}
+
+fn path(svg: &mut String, points: &[[f64; 2]], width: f64, name: &str, more: &str) {
+    let points: Vec<String> = points.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
+    let (points, colour) = (points.join(" "), colour(name));
+    *svg +=
+        &format!("<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"{more}/>\n");
+}
+
+fn rectangle(svg: &mut String, [x, y, width, height]: [f64; 4], name: &str, more: &str) {
+    let (place, colour) = (format!("x=\"{x:.2}\" y=\"{y:.2}\""), colour(name));
+    *svg += &format!("<rect {place} width=\"{width:.2}\" height=\"{height:.2}\" fill=\"{colour}\"{more}/>\n");
+}
+
+fn text(svg: &mut String, words: &str, [x, y]: [f64; 2], size: f64, name: &str, anchor: &str) {
+    let (words, colour) = (maud::html! { (words) }.into_string(), colour(name));
+    let place = format!("x=\"{x:.2}\" y=\"{y:.2}\" text-anchor=\"{anchor}\"");
+    *svg += &format!("<text {place} font-size=\"{size}\" fill=\"{colour}\">{words}</text>\n");
+}
+
+/// Width of a text in a usual font, px.
+fn text_width(text: &str, size: f64) -> f64 {
+    0.56 * size * text.chars().count() as f64
 }
 
 /// The label of an axis of amplitudes as the scene's sensor reads them.
@@ -228,45 +495,36 @@ pub fn rig(p: &Dimensionless) -> String {
     format!("ε = {:.5}, λ = {:.3}, r = {}", p.epsilon, p.lambda, p.r)
 }
 
-/// Runs of consecutive points that are stable, or unstable, as wanted; each with the point after it, so that the curve has no holes.
-fn runs(points: &[Marked], wanted: bool) -> Vec<Vec<Place>> {
-    let mut start = 0;
-    points
-        .chunk_by(|point, next| point.1 == next.1)
-        .filter_map(|run| {
-            let from = start;
-            start += run.len();
-            let to = (start + 1).min(points.len());
-            (run[0].1 == wanted).then(|| points[from..to].iter().map(|point| point.0).collect())
-        })
-        .collect()
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::theme::EXACT;
 
-/// Points inside the ranges; where a curve leaves them it is cut into pieces.
-pub fn clipped(points: &[Marked], x: (f64, f64), y: (f64, f64)) -> Vec<Vec<Marked>> {
-    let inside = |((a, b), _): &Marked| (x.0..=x.1).contains(a) && (y.0..=y.1).contains(b);
-    points
-        .chunk_by(|point, next| inside(point) == inside(next))
-        .filter(|run| inside(&run[0]))
-        .map(<[Marked]>::to_vec)
-        .collect()
-}
-
-/// Smallest distance of thinned points, as a fraction of the ranges: two pixels of a usual figure.
-const APART: f64 = 0.004;
-
-/// Points at least [`APART`] from each other, with the last and every change of stability.
-pub fn thinned(points: &[Marked], x: (f64, f64), y: (f64, f64)) -> Vec<Marked> {
-    let mut kept: Vec<Marked> = Vec::new();
-    for (n, point) in points.iter().enumerate() {
-        let far = kept.last().is_none_or(|last| {
-            let dx = (point.0.0 - last.0.0) / (x.1 - x.0);
-            let dy = (point.0.1 - last.0.1) / (y.1 - y.0);
-            dx.hypot(dy) >= APART || point.1 != last.1
-        });
-        if far || n + 1 == points.len() {
-            kept.push(*point);
-        }
+    #[test]
+    fn ticks_are_round_numbers_inside_the_range() {
+        let labels = |range, most| ticks(range, most).into_iter().map(|tick| tick.1).collect::<Vec<_>>();
+        assert_eq!(labels((-1.6, 0.6), 5.0), ["−1.5", "−1.0", "−0.5", "0.0", "0.5"]);
+        assert_eq!(labels((0.0, 140.0), 4.0), ["0", "50", "100"]);
+        assert_eq!(labels((0.3, 0.31), 2.5), ["0.300", "0.305", "0.310"]);
     }
-    kept
+
+    #[test]
+    fn a_curve_is_dashed_exactly_where_it_is_unstable_and_has_no_holes() {
+        let mut panel = Panel::new(((0.0, 4.0), ""), ((0.0, 1.0), "")).legend(Legend::UpperRight);
+        let points = [true, true, false, true].into_iter().enumerate();
+        let points: Vec<Marked> = points.map(|(n, stable)| ((n as f64, 0.5), stable)).collect();
+        panel.curve(&points, 2.0, EXACT, "orbits");
+        let spans: Vec<(f64, f64, &str)> = panel
+            .series
+            .iter()
+            .map(|one| (one.places[0].0, one.places.last().unwrap().0, one.label.as_str()))
+            .collect();
+        let stable = [(0.0, 2.0, "orbits, stable"), (3.0, 3.0, "orbits, stable")];
+        assert_eq!(spans[..2], stable);
+        assert_eq!(spans[2..], [(2.0, 3.0, "orbits, unstable")]);
+        let svg = Figure::single(panel).svg();
+        // The piece and its sample in the legend.
+        assert_eq!(svg.matches("stroke-dasharray").count(), 2);
+        assert_eq!(svg.matches("orbits, unstable</text>").count(), 1);
+    }
 }

@@ -1,16 +1,17 @@
 //! The figures of the report: what they show, and with which axes, colours and labels.
 
-pub mod regimes;
+mod regimes;
+
+pub use regimes::regimes;
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::DVector;
 
 use super::figure::{
-    AMPLITUDE_OF_V, BLACK, Color, DETUNING, Figure, Legend, Marked, Panel, Place, SIZE, SPEED, amplitude, caption,
-    line, rig,
+    AMPLITUDE_OF_V, DETUNING, Figure, Legend, Marked, Panel, Place, SIZE, SPEED, Shape, amplitude, caption, rig,
 };
-use super::theme::{DECAY, EXACT, FAINT, LOCK, THEORY, UNSTABLE};
+use super::theme::{EXACT, INK, MEASURED, MODULATION, PARTICLE, THEORY};
 use crate::comparison::{Comparison, TrackedComparison};
 use crate::numerics::{HarmonicBasis, equally_spaced, range};
 use crate::orbit::{self, ContinuationLimits, FrequencyResponse, Periodic};
@@ -23,25 +24,25 @@ const POINTS: usize = 400;
 /// Only every fourth point along the decay is drawn, so that the circles do not overlap.
 const THINNED: usize = 4;
 
+/// Width of figures with panels or a legend beside the axes, px.
+const WIDE: f64 = 860.0;
 const IDENTIFIED: &str = "free decay, identified";
 const FIRST_ORDER: &str = "first-order theory";
-const ON_MANIFOLD: &str = "manifold, 1:1 impacts stable";
-const OFF_MANIFOLD: &str = "manifold, unstable";
+/// Error bars shorter than this fraction of an axis are hidden by the mark at their place.
+const VISIBLE: f64 = 0.02;
 
-fn decay_points(panel: &mut Panel, points: impl Iterator<Item = Place>, label: &str) {
-    panel.circles(points.collect(), 4, line(DECAY, 16), label);
+fn circles(panel: &mut Panel, points: impl Iterator<Item = Place>, label: &str) {
+    panel.add(Shape::Circle(3.5), points.collect(), MEASURED, label);
 }
 
-/// Error bars of 95 %: places with their standard uncertainties, vertical or horizontal.
-fn error_bars(panel: &mut Panel, bars: impl Iterator<Item = (Place, f64)>, vertical: bool) {
-    let ends = |((x, y), uncertainty): (Place, f64)| {
-        let half = 1.96 * uncertainty;
-        match vertical {
-            true => [(x, y - half), (x, y + half)],
-            false => [(x - half, y), (x + half, y)],
-        }
-    };
-    panel.segments(bars.map(ends).collect(), line(DECAY, 12));
+/// Error bars of 95 %: places with their standard uncertainties, vertical or horizontal, on an axis of that range.
+fn error_bars(panel: &mut Panel, bars: impl Iterator<Item = (Place, f64)>, vertical: bool, range: f64) {
+    let visible = bars.filter(|(_, u)| 2.0 * 1.96 * u > VISIBLE * range);
+    let ends = visible.flat_map(|((x, y), u)| {
+        let (dx, dy) = if vertical { (0.0, 1.96 * u) } else { (1.96 * u, 0.0) };
+        [(x - dx, y - dy), (x + dx, y + dy)]
+    });
+    panel.add(Shape::Bars(1.2), ends.collect(), MEASURED, "95 % of the measurement");
 }
 
 /// The right branch of first-order theory's backbone, from the fold up to an amplitude.
@@ -63,10 +64,8 @@ fn add_backbones(panel: &mut Panel, p: &Dimensionless, theory: &[Marked]) {
         .filter(|motion| motion.b >= fold)
         .map(|motion| ((motion.sigma, motion.c), motion.stable))
         .collect();
-    let labels = ["first-order theory, stable", "first-order theory, unstable"];
-    panel.clipped_pieces(theory, [line(THEORY, 20), line(UNSTABLE, 20)], labels);
-    let labels = ["exact orbits, stable", "exact orbits, unstable"];
-    panel.thinned_pieces(&exact, [line(EXACT, 16), line(FAINT, 16)], labels);
+    panel.curve(theory, 2.0, THEORY, FIRST_ORDER);
+    panel.curve(&exact, 1.6, EXACT, "exact orbits");
 }
 
 /// The identified backbone beside theory and exact orbits: amplitude over detuning.
@@ -91,51 +90,62 @@ pub fn backbone(result: &Comparison) -> Figure {
         .heading(&title, &caption(p, lock.g))
         .legend(Legend::UpperRight);
     add_backbones(&mut panel, p, &theory);
-    let inside = |(sigma, _): &Place| (low..=high).contains(sigma);
-    let identified = decay().step_by(THINNED).map(|point| (point.sigma, point.c));
-    decay_points(&mut panel, identified.filter(inside), IDENTIFIED);
     let predicted = result.decay.iter();
     let predicted = predicted.filter_map(|compared| Some((compared.sigma_predicted?, compared.point.c)));
-    let predicted = predicted.filter(|place| inside(place) && place.1 > fold).collect();
-    panel.curve(predicted, line(LOCK, 12), "free decay, predicted by the exact plant");
+    let predicted = predicted.filter(|(_, c)| *c > fold).collect();
+    panel.add(
+        Shape::Line(1.0),
+        predicted,
+        EXACT,
+        "free decay, predicted by the exact plant",
+    );
+    let identified = decay().step_by(THINNED).map(|point| (point.sigma, point.c));
+    circles(&mut panel, identified, IDENTIFIED);
     let place = (lock.sigma, lock.c);
-    for (uncertainty, vertical) in [(lock.u_sigma, false), (lock.u_c, true)] {
-        error_bars(&mut panel, std::iter::once((place, uncertainty)), vertical);
+    for (uncertainty, vertical, range) in [(lock.u_sigma, false, high - low), (lock.u_c, true, top)] {
+        error_bars(&mut panel, std::iter::once((place, uncertainty)), vertical, range);
     }
-    panel.square(place, LOCK, "locked, measured");
+    panel.add(Shape::Square, vec![place], MEASURED, "locked, measured");
     Figure::single(panel)
 }
 
-/// The slow invariant manifold with the decay on it: particle speed over amplitude.
+/// Range of the particle speed on figures of the manifold: beyond the stable range.
+const FASTEST: f64 = 1.4;
+
+/// The slow invariant manifold from speed 0 on, as a function of the particle speed: amplitude as `read`, and stability.
+fn manifold_curve(flow: &SlowFlow, read: impl Fn(f64, f64) -> f64) -> Vec<Marked> {
+    let speeds = equally_spaced(0.0, FASTEST, 401);
+    speeds
+        .map(|b| {
+            (
+                (b, read(b, flow.manifold.c(b))),
+                theory::impacts_stable(&flow.manifold, b),
+            )
+        })
+        .collect()
+}
+
+/// The slow invariant manifold with the decay on it: amplitude over particle speed, the axes of the study.
 pub fn manifold(result: &Comparison) -> Figure {
-    let p = &result.parameters;
+    let (p, lock) = (&result.parameters, &result.lock);
     let flow = SlowFlow::new(p.lambda, p.r);
-    let manifold = flow.manifold;
-    // Of the particle speed, beyond the stable range.
-    let top = 1.4;
-    let right = (1.25 * result.lock.at.c).max(0.8);
-    let between = |from: f64, to: f64| -> Vec<Place> {
-        equally_spaced(from, to, 301)
-            .map(|b| (manifold.c(b) * reading(p, b, flow.free_detuning(b)), b))
-            .filter(|(c, _)| *c <= right)
-            .collect()
-    };
-    let mut panel = Panel::new(((0.0, right), amplitude(p)), ((0.0, top), SPEED))
+    let top = (1.25 * lock.at.c).max(1.0);
+    let mut panel = Panel::new(((0.0, FASTEST), SPEED), ((0.0, top), amplitude(p)))
         .heading(
             "Slow invariant manifold and the free decay on it",
-            &caption(p, result.lock.at.g),
+            &caption(p, lock.at.g),
         )
-        .legend(Legend::UpperLeft);
-    let stable = between(manifold.b_min(), B_SYMMETRY_BREAKING);
-    panel.curve(stable, line(THEORY, 20), ON_MANIFOLD);
-    for unstable in [between(0.0, manifold.b_min()), between(B_SYMMETRY_BREAKING, top)] {
-        panel.dashed(unstable, line(UNSTABLE, 20), OFF_MANIFOLD);
-    }
+        .legend(Legend::LowerRight);
+    let curve = manifold_curve(&flow, |b, c| c * reading(p, b, flow.free_detuning(b)));
+    panel.curve(&curve, 2.0, THEORY, "manifold");
     let decay = result.decay.iter().map(|compared| compared.point).step_by(THINNED);
-    let decay = decay.filter_map(|point| point.b.map(|b| (point.c, b)));
-    decay_points(&mut panel, decay, IDENTIFIED);
-    if let Some(b) = result.lock.b {
-        panel.square((result.lock.at.c, b), LOCK, "locked, measured");
+    circles(
+        &mut panel,
+        decay.filter_map(|point| point.b.map(|b| (b, point.c))),
+        IDENTIFIED,
+    );
+    if let Some(b) = lock.b {
+        panel.add(Shape::Square, vec![(b, lock.at.c)], MEASURED, "locked, measured");
     }
     Figure::single(panel)
 }
@@ -148,8 +158,11 @@ pub fn tracked(tracked: &TrackedComparison) -> Figure {
 /// The tracked backbone, and beside it the drive over amplitude.
 pub fn tracked_with_drive(tracked: &TrackedComparison) -> Figure {
     let (width, height) = SIZE;
-    let drive = tracked_drive(tracked).at([width, 0, width, height]);
-    Figure::new((2 * width, height), vec![tracked_amplitude(tracked), drive])
+    let drive = tracked_drive(tracked).at([width, 0.0, width, height]);
+    Figure {
+        size: (2.0 * width, height),
+        panels: vec![tracked_amplitude(tracked), drive],
+    }
 }
 
 /// The top of the axis of the tracked amplitudes.
@@ -170,11 +183,12 @@ fn tracked_amplitude(tracked: &TrackedComparison) -> Panel {
         .legend(Legend::UpperRight);
     add_backbones(&mut panel, p, &theory_backbone(p, top));
     let places = || points().map(|point| (point.at.sigma, point.at.c));
-    decay_points(&mut panel, places(), "tracked");
-    error_bars(&mut panel, places().zip(points().map(|point| point.at.u_sigma)), false);
+    circles(&mut panel, places(), "tracked");
+    let bars = places().zip(points().map(|point| point.at.u_sigma));
+    error_bars(&mut panel, bars, false, x.1 - x.0);
     let unsettled = places().zip(points()).filter(|(_, point)| !point.settled);
     let unsettled = unsettled.map(|(place, _)| place).collect();
-    panel.crosses(unsettled, line(DECAY, 20), "not settled in time");
+    panel.add(Shape::Cross, unsettled, MEASURED, "not settled in time");
     panel
 }
 
@@ -183,7 +197,6 @@ fn tracked_drive(tracked: &TrackedComparison) -> Panel {
     let points = || tracked.points.iter().map(|compared| compared.point);
     let (_, most) = range((0.0, 0.1), points().map(|point| point.at.g));
     let high = 1.3 * most;
-    let inside = |place: &Place| place.0 <= top && place.1 <= high;
     let mut panel = Panel::new(
         ((0.0, top), amplitude(p)),
         ((0.0, high), "drive G, base amplitude over b ε"),
@@ -191,13 +204,17 @@ fn tracked_drive(tracked: &TrackedComparison) -> Panel {
     .heading("The drive that holds each level", "")
     .legend(Legend::LowerRight);
     let theory = theory::backbone(p, SlowFlow::new(p.lambda, p.r).manifold.b_min(), 1.3, 600);
-    let theory = theory.iter().map(|point| (point.c, point.g)).filter(inside).collect();
-    panel.dashed(theory, line(THEORY, 20), FIRST_ORDER);
+    let theory: Vec<Marked> = theory
+        .iter()
+        .map(|point| ((point.c, point.g), point.stable()))
+        .collect();
+    panel.curve(&theory, 2.0, THEORY, FIRST_ORDER);
     let exact = tracked.exact.places().iter().map(|place| (place[0], place[2]));
-    panel.curve(exact.filter(inside).collect(), line(EXACT, 16), "exact orbits");
+    panel.add(Shape::Line(1.6), exact.collect(), EXACT, "exact orbits");
     let places = || points().map(|point| (point.at.c, point.at.g));
-    decay_points(&mut panel, places(), "tracked");
-    error_bars(&mut panel, places().zip(points().map(|point| point.at.u_g)), true);
+    circles(&mut panel, places(), "tracked");
+    let bars = places().zip(points().map(|point| point.at.u_g));
+    error_bars(&mut panel, bars, true, high);
     panel
 }
 
@@ -220,18 +237,18 @@ pub fn history(record: &Record, scene: &Scene, result: &Comparison) -> Figure {
     let (_, top) = range((0.0, lock.at.c), driven.iter().map(|triple| triple[1]));
     let (low, high) = range((-1.5, 0.5), driven.iter().chain(&points).map(|triple| triple[2]));
     let margin = 0.1 * (high - low);
-    let (width, upper, lower, left) = (980, 400, 360, 520);
+    let (width, upper, lower, left) = (WIDE, 350.0, 290.0, 450.0);
     let rows = [
-        (1, (0.0, top * 1.35), amplitude(p), [0, upper]),
+        (1, (0.0, top * 1.35), amplitude(p), [0.0, upper]),
         (2, (low - margin, high + margin), "detuning σ", [upper, lower]),
     ];
     let panels = rows.into_iter().flat_map(|(row, range, label, [y, height])| {
         [
-            driven_panel(result, &driven, row, (range, label)).at([0, y, left, height]),
+            driven_panel(result, &driven, row, (range, label)).at([0.0, y, left, height]),
             decay_panel(&theory, &points, row, range).at([left, y, width - left, height]),
         ]
     });
-    Figure::new((width, upper + lower), panels.collect())
+    Figure { size: (width, upper + lower), panels: panels.collect() }
 }
 
 /// The decay along the manifold by first-order theory, from an amplitude.
@@ -248,40 +265,39 @@ fn backbone_decay(p: &Dimensionless, from: f64) -> Vec<Triple> {
 
 fn driven_panel(result: &Comparison, driven: &[Triple], row: usize, y: ((f64, f64), &str)) -> Panel {
     let end = 1.02 * driven.last().map_or(1.0, |triple| triple[0]);
-    let mut panel = Panel::new(((0.0, end), "time, in periods of the oscillator alone"), y);
+    let mut panel = Panel::new(((0.0, end), "time, periods"), y);
     if row == 1 {
-        let caption = caption(&result.parameters, result.lock.at.g);
+        let caption = format!("{}, G = {:.3}", rig(&result.parameters), result.lock.at.g);
         panel = panel.heading("Seeking and holding resonance", &caption);
     }
     let measured = driven.iter().map(|triple| (triple[0], triple[row])).collect();
-    panel.curve(measured, line(DECAY, 16), "measured");
+    panel.add(Shape::Line(1.6), measured, MEASURED, "measured");
     let level = |value: [f64; 2]| vec![(0.0, value[row - 1]), (end, value[row - 1])];
     if let Some(exact) = &result.exact {
-        panel.curve(level([exact.c, exact.sigma]), line(EXACT, 14), "exact orbit");
+        panel.add(Shape::Line(1.6), level([exact.c, exact.sigma]), EXACT, "exact orbit");
     }
     if let Some(theory) = &result.theory {
-        panel.dashed(level([theory.c, theory.sigma]), line(THEORY, 14), FIRST_ORDER);
+        panel.add(Shape::Line(1.2), level([theory.c, theory.sigma]), THEORY, FIRST_ORDER);
     }
-    panel.legend(if row == 1 {
-        Legend::LowerRight
-    } else {
-        Legend::UpperRight
-    })
+    panel.legend(if row == 1 { Legend::LowerRight } else { Legend::None })
 }
 
 fn decay_panel(theory: &[Triple], points: &[Triple], row: usize, y: (f64, f64)) -> Panel {
     let last = points.last().map_or(1.0, |triple| triple[0]);
     let end = theory.last().map_or(last, |triple| last.max(triple[0]));
-    let mut panel = Panel::new(((0.0, 1.02 * end), "time since the release, likewise"), (y, ""));
+    let mut panel = Panel::new(((0.0, 1.02 * end), "time since the release, periods"), (y, ""));
     if row == 1 {
         panel = panel.heading("Free decay", "the drive is off from 0 on");
     }
     let place = |triple: &Triple| (triple[0], triple[row]);
-    let inside = |place: &Place| (y.0..=y.1).contains(&place.1);
-    let theory = theory.iter().map(place).filter(inside).collect();
-    panel.dashed(theory, line(THEORY, 16), FIRST_ORDER);
-    decay_points(&mut panel, points.iter().map(place), IDENTIFIED);
-    panel.legend(Legend::UpperRight)
+    panel.add(
+        Shape::Line(1.2),
+        theory.iter().map(place).collect(),
+        THEORY,
+        FIRST_ORDER,
+    );
+    circles(&mut panel, points.iter().map(place), IDENTIFIED);
+    panel.legend(if row == 1 { Legend::UpperRight } else { Legend::None })
 }
 
 /// Amplitude and commanded frequency up to the release, from windows of two periods: least squares of the response by the commanded
@@ -313,40 +329,30 @@ pub fn approach(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
     let flow = SlowFlow::new(p.lambda, p.r);
     let lock = &flow.backbone_at(lock.b);
     let gamma = -FRAC_PI_2;
-    // The legend is above the manifold.
-    let (x, y) = ((0.0, 1.6 * lock.c), (0.0, 1.75 * lock.b));
-    let inside = |place: &Place| place.0 <= x.1 && (y.0..=y.1).contains(&place.1);
-    let sequence = |g: f64, (c, b): Place| -> Vec<Place> {
+    let top = 2.0 * lock.c;
+    let inside = |(b, c): &Place| (0.0..=FASTEST).contains(b) && *c <= top;
+    let sequence = |g: f64, (b, c): Place| -> Vec<Place> {
         let phases = (b, flow.psi(lock.b, gamma));
         let impacts = flow.modulation(p.epsilon, (g, lock.sigma), (c, gamma), phases);
-        let places = impacts.take(POINTS).map(|impact| (impact.c, impact.b));
-        std::iter::once((c, b)).chain(places).take_while(inside).collect()
+        let places = impacts.take(POINTS).map(|impact| (impact.b, impact.c));
+        std::iter::once((b, c)).chain(places).take_while(inside).collect()
     };
-    let mut panel = Panel::new((x, AMPLITUDE_OF_V), (y, SPEED))
+    let mut panel = Panel::new(((0.0, FASTEST), SPEED), ((0.0, top), AMPLITUDE_OF_V))
         .heading(
             "Approach to the slow invariant manifold, impact by impact",
             &caption(p, lock.g),
         )
-        .legend(Legend::UpperLeft);
-    let manifold: Vec<Marked> = equally_spaced(0.0, y.1, 301)
-        .map(|b| {
-            let stable = theory::impacts_stable(&flow.manifold, b);
-            ((flow.manifold.c(b), b), stable)
-        })
-        .filter(|(place, _)| inside(place))
-        .collect();
-    let styles = [line(THEORY, 30), line(UNSTABLE, 20)];
-    panel.pieces(&manifold, styles, [ON_MANIFOLD, OFF_MANIFOLD]);
-    // Starts on all sides of the manifold: C and B in parts of those at the locked point.
-    for (c, b) in [(1.35, 0.93), (0.65, 1.07), (0.75, 0.8), (1.2, 1.14)] {
-        let places = sequence(lock.g, (c * lock.c, b * lock.b));
-        panel.curve(places.clone(), line(EXACT, 6), "");
-        let label = "driven at phase resonance, from off the manifold";
-        panel.circles(places, 3, EXACT.filled(), label);
+        .legend(Legend::LowerRight);
+    panel.curve(&manifold_curve(&flow, |_, c| c), 2.4, THEORY, "manifold");
+    // Starts on all sides of the manifold: B and C in parts of those at the locked point.
+    for (b, c) in [(0.93, 1.35), (1.07, 0.65), (0.8, 0.75), (1.14, 1.2)] {
+        let places = sequence(lock.g, (b * lock.b, c * lock.c));
+        panel.add(Shape::Line(0.6), places.clone(), MODULATION, "");
+        panel.add(Shape::Dot(2.2), places, MODULATION, "with drive");
     }
-    let free = sequence(0.0, (lock.c, lock.b));
-    panel.circles(free, 4, line(DECAY, 16), "without drive, until synchrony is lost");
-    panel.square((lock.c, lock.b), LOCK, "phase resonance");
+    let free = sequence(0.0, (lock.b, lock.c));
+    panel.add(Shape::Circle(3.5), free, MODULATION, "without drive");
+    panel.add(Shape::Square, vec![(lock.b, lock.c)], INK, "phase resonance");
     Figure::single(panel)
 }
 
@@ -366,7 +372,7 @@ pub fn backbones(p: &Dimensionless) -> Figure {
         .heading("Backbones for several coefficients of restitution r", &caption)
         .legend(Legend::UpperRight);
     for r in values {
-        let (colour, width, size) = if r == p.r { (EXACT, 34, 17) } else { (THEORY, 18, 14) };
+        let (width, size) = if r == p.r { (3.2, 17.0) } else { (1.5, 14.0) };
         let points: Vec<Marked> = theory::backbone(&Dimensionless { r, ..*p }, 1e-3, 1.5 * B_SYMMETRY_BREAKING, 500)
             .into_iter()
             .filter(|point| point.c <= top && (x.0..=x.1).contains(&point.sigma))
@@ -374,7 +380,7 @@ pub fn backbones(p: &Dimensionless) -> Figure {
             .collect();
         // Without loss at the impacts C vanishes at the fold, and sigma jumps from one side to the other there.
         for piece in points.chunk_by(|place, next| (place.0.0 - next.0.0).abs() < 1.0) {
-            panel.pieces(piece, [line(colour, width), line(UNSTABLE, 14)], ["stable", "unstable"]);
+            panel.curve(piece, width, THEORY, FIRST_ORDER);
         }
         // The label is beside the fold, where the curves are distinct; for a fold near the axis, where its curve enters from the left.
         let flow = SlowFlow::new(p.lambda, r);
@@ -382,11 +388,11 @@ pub fn backbones(p: &Dimensionless) -> Figure {
         let entry = points.iter().map(|(place, _)| *place);
         let entry = entry.filter(|(sigma, _)| *sigma > x.0 + 0.2 && *sigma < 0.0);
         let place = match entry.min_by(|place, next| place.0.total_cmp(&next.0)) {
-            _ if fold.c > 0.05 => (fold.sigma.max(0.1) - 0.2, fold.c + 0.045),
-            Some((sigma, c)) => (sigma, c + 0.045),
+            _ if fold.c > 0.05 => (fold.sigma.max(0.1) - 0.3, fold.c),
+            Some((sigma, c)) => (sigma + 0.4, c),
             None => (0.0, 0.1),
         };
-        panel.text(format!("r = {r}"), place, size);
+        panel.add(Shape::TextOnCurve(size), vec![place], INK, &format!("r = {r}"));
     }
     Figure::single(panel)
 }
@@ -404,45 +410,51 @@ pub fn responses(p: &Dimensionless, responses: &[FrequencyResponse]) -> Figure {
     let caption = format!("{}; G = {}; amplitudes over b", rig(p), list.join(", "));
     let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
         .heading("Frequency responses and backbone", &caption)
-        .legend(Legend::UpperRight);
+        .at([0.0, 0.0, WIDE, SIZE.1])
+        .legend(Legend::Beside(205.0));
     for response in responses {
         add_response(&mut panel, p, response);
-        // The label is beside the left end of the curve, or above its end at the axis.
+    }
+    for response in responses {
+        // The label is on the left flank, below the peak.
         let stable = response.symmetric().flat_map(|branch| &branch.points);
-        let stable = stable.filter(|point| point.stable);
-        if let Some(end) = stable.min_by(|motion, next| motion.sigma.total_cmp(&next.sigma)) {
-            let place = match end.sigma > x.0 + 0.9 {
-                true => (end.sigma - 0.45, end.c),
-                false => (end.sigma.max(x.0) + 0.5, end.c + 0.14 * top),
-            };
-            panel.centred_text(format!("G = {:.3}", response.g), place, 14, BLACK);
+        let stable: Vec<Place> = stable
+            .filter(|point| point.stable)
+            .map(|point| (point.sigma, point.c))
+            .collect();
+        let Some(peak) = stable.iter().copied().max_by(|place, next| place.1.total_cmp(&next.1)) else {
+            continue;
+        };
+        let off = |place: &Place| (place.1 - 0.75 * peak.1).abs();
+        let flank = stable.into_iter().filter(|place| place.0 < peak.0);
+        if let Some((sigma, c)) = flank.min_by(|place, next| off(place).total_cmp(&off(next))) {
+            let label = format!("G = {:.3}", response.g);
+            panel.add(Shape::TextOnCurve(13.0), vec![(sigma, c)], INK, &label);
         }
     }
     let backbone = theory::backbone(p, fold, 1.4 * B_SYMMETRY_BREAKING, 600);
-    let backbone: Vec<Marked> = backbone.iter().map(|point| ((point.sigma, point.c), true)).collect();
-    panel.clipped_pieces(&backbone, [line(BLACK, 24); 2], ["backbone, theory", ""]);
-    Figure::single(panel)
+    let backbone: Vec<Marked> = backbone
+        .iter()
+        .map(|point| ((point.sigma, point.c), point.stable()))
+        .collect();
+    panel.curve(&backbone, 2.6, THEORY, "backbone");
+    Figure { size: (WIDE, SIZE.1), panels: vec![panel] }
 }
 
 /// One frequency response, by theory and exact.
 fn add_response(panel: &mut Panel, p: &Dimensionless, response: &FrequencyResponse) {
-    let (styles, labels) = (
-        [line(THEORY, 12), line(UNSTABLE, 8)],
-        ["theory, stable", "theory, unstable"],
-    );
     for curve in SlowFlow::new(p.lambda, p.r).frequency_responses(response.g, 600) {
         let points = curve.iter().map(|point| {
             let stable = point.motion.impacts_stable && point.motion.slow_flow_stable;
             let c = point.motion.c * reading(p, point.motion.b, point.sigma);
             ((point.sigma, c), stable)
         });
-        panel.thinned_pieces(&points.collect::<Vec<_>>(), styles, labels);
+        panel.curve(&points.collect::<Vec<_>>(), 1.0, THEORY, "theory");
     }
-    let (styles, labels) = ([line(EXACT, 30), line(FAINT, 14)], ["exact, stable", "exact, unstable"]);
     for component in &response.components {
         let points = component.branch.points.iter();
         let points: Vec<Marked> = points.map(|point| ((point.sigma, point.c), point.stable)).collect();
-        panel.thinned_pieces(&points, styles, labels);
+        panel.curve(&points, 2.0, EXACT, "exact");
     }
 }
 
@@ -453,12 +465,12 @@ type Impact = (f64, f64, f64);
 pub fn period(p: &Dimensionless, motion: &Periodic, theory: Option<&BackbonePoint>) -> Figure {
     let rows = motion.motion(p, POINTS);
     let impacts = impacts(motion);
-    let (width, upper, lower) = (SIZE.0, 390, 370);
+    let (width, upper, lower) = (SIZE.0, 290.0, 270.0);
     let panels = vec![
-        displacements(p, motion, &rows, &impacts).at([0, 0, width, upper]),
-        coordinates(p, &rows, &impacts, theory).at([0, upper, width, lower]),
+        displacements(p, motion, &rows, &impacts).at([0.0, 0.0, width, upper]),
+        coordinates(p, &rows, &impacts, theory).at([0.0, upper, width, lower]),
     ];
-    Figure::new((width, upper + lower), panels)
+    Figure { size: (width, upper + lower), panels }
 }
 
 fn part(n: usize) -> f64 {
@@ -482,17 +494,21 @@ fn displacements(p: &Dimensionless, motion: &Periodic, rows: &[[f64; 5]], impact
     let (q1, q2) = (over_period(rows, |row| row[1]), over_period(rows, |row| row[3]));
     let farthest = q1.iter().chain(&q2).map(|(_, value)| value.abs() + 1.0);
     let (_, most) = range((0.0, 1.0), farthest);
-    let mut panel = Panel::new(((0.0, 1.0), ""), ((-1.05 * most, 1.7 * most), "displacements, over b"))
+    let mut panel = Panel::new(((0.0, 1.0), ""), ((-1.05 * most, 1.05 * most), "displacements, over b"))
         .heading("One period of the locked motion", &caption)
-        .legend(Legend::UpperRight);
+        .legend(Legend::Beside(182.0));
     for side in [1.0, -1.0] {
-        let wall = over_period(rows, |row| row[1] + side);
-        panel.curve(wall, line(LOCK, 24), "walls, q₁ ± 1");
+        panel.add(
+            Shape::Line(2.0),
+            over_period(rows, |row| row[1] + side),
+            INK,
+            "walls, q₁ ± 1",
+        );
     }
-    panel.curve(q1, line(EXACT, 24), "primary mass q₁");
-    panel.dashed(q2, line(DECAY, 24), "particle q₂");
+    panel.add(Shape::Line(2.4), q1, EXACT, "mass q₁");
+    panel.add(Shape::Line(2.0), q2, PARTICLE, "particle q₂");
     let marks = impacts.iter().map(|(t, q2, _)| (*t, *q2)).collect();
-    panel.circles(marks, 6, line(LOCK, 20), "impacts");
+    panel.add(Shape::Circle(6.0), marks, INK, "impacts");
     panel
 }
 
@@ -502,25 +518,24 @@ fn coordinates(p: &Dimensionless, rows: &[[f64; 5]], impacts: &[Impact], theory:
     let v = over_period(rows, |row| row[1] + p.epsilon * row[3]);
     let (_, high) = range((0.0, 1.0), v.iter().map(|(_, value)| value.abs()));
     let mut panel = Panel::new(
-        ((0.0, 1.0), "time since the base passed zero upwards, in periods"),
-        ((-1.15 * high, 1.9 * high), "v and w, over b"),
+        ((0.0, 1.0), "time since the base passed zero upwards, periods"),
+        ((-1.15 * high, 1.15 * high), "v and w, over b"),
     )
-    .legend(Legend::UpperRight);
-    for side in [-1.0, 1.0] {
-        panel.curve(vec![(0.0, side), (1.0, side)], line(LOCK, 10), "");
-    }
-    panel.curve(w, line(EXACT, 30), "w = q₁ − q₂, exact");
-    panel.curve(v, line(DECAY, 30), "v = q₁ + ε q₂, exact");
+    .legend(Legend::Beside(182.0));
+    panel.add(Shape::Line(1.0), vec![(0.0, 1.0), (1.0, 1.0)], INK, "walls, w = ± 1");
+    panel.add(Shape::Line(1.0), vec![(0.0, -1.0), (1.0, -1.0)], INK, "");
+    panel.add(Shape::Line(2.6), w, PARTICLE, "w = q₁ − q₂");
+    panel.add(Shape::Line(2.6), v, EXACT, "v = q₁ + ε q₂");
     if let Some(point) = theory {
         let scene = Dimensionless { omega0: 1.0, b: 1.0, ..*p };
         let wave = Waveform::new(&scene, point.sigma, point.b, -FRAC_PI_2);
         for value in [Waveform::w, Waveform::v] {
             let places = (0..=POINTS).map(|n| (part(n), value(&wave, part(n) * TAU / wave.omega)));
-            panel.dashed(places.collect(), line(THEORY, 12), FIRST_ORDER);
+            panel.add(Shape::Line(0.9), places.collect(), THEORY, FIRST_ORDER);
         }
     }
     let marks = impacts.iter().map(|(t, _, wall)| (*t, *wall)).collect();
-    panel.circles(marks, 6, line(LOCK, 20), "");
+    panel.add(Shape::Circle(6.0), marks, INK, "");
     panel
 }
 

@@ -7,7 +7,6 @@ use phase_lock::ConfigError;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::figure::FigureError;
 use super::figures::{backbone, manifold, regimes, tracked_with_drive};
 use super::theme::dark;
 use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
@@ -29,56 +28,42 @@ pub enum ReportError {
     Map(#[from] SweepError),
     #[error(transparent)]
     File(#[from] FileError),
-    #[error(transparent)]
-    Figure(#[from] FigureError),
     #[error("cannot write a table as CSV: {0}")]
     Csv(#[from] csv::Error),
     #[error("cannot write JSON: {0}")]
     Json(#[from] serde_json::Error),
 }
 
-/// Writes tables and figures into a folder and returns their paths. The tables are written before a figure is made, and each file is
-/// complete or absent.
-fn write_all<const N: usize>(
-    out: &Path,
-    tables: Vec<(&str, String)>,
-    figures: impl FnOnce() -> Result<[(&'static str, String); N], FigureError>,
-) -> Result<Vec<PathBuf>, ReportError> {
-    let mut paths = files::write(out, tables)?;
-    paths.extend(files::write(out, figures()?)?);
-    Ok(paths)
-}
-
 /// Writes `identification.json`, `backbone.csv`, `backbone.svg` and `sim.svg` into `out` and returns their paths.
 pub fn write(result: &Comparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let tables = vec![
+    let files = [
         ("identification.json", json(result)?),
         ("backbone.csv", decay_csv(result)?),
+        ("backbone.svg", backbone(result).svg()),
+        ("sim.svg", manifold(result).svg()),
     ];
-    write_all(out, tables, || {
-        Ok([
-            ("backbone.svg", backbone(result).svg()?),
-            ("sim.svg", manifold(result).svg()?),
-        ])
-    })
+    Ok(files::write(out, files)?)
 }
 
 /// Writes `map.csv`, `map.svg`, `map-dark.svg` and, over sigma and G, `bifurcations.csv` into `out` and returns their paths.
 pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let mut tables = vec![("map.csv", map_csv(map)?)];
+    let figure = regimes(map).svg();
+    let mut files = vec![("map.csv", map_csv(map)?)];
     if !map.curves.is_empty() {
-        tables.push(("bifurcations.csv", bifurcations_csv(map)?));
+        files.push(("bifurcations.csv", bifurcations_csv(map)?));
     }
-    write_all(out, tables, || {
-        let figure = regimes::svg(map)?;
-        Ok([("map-dark.svg", dark(&figure)), ("map.svg", figure)])
-    })
+    files.extend([("map-dark.svg", dark(&figure)), ("map.svg", figure)]);
+    Ok(files::write(out, files)?)
 }
 
 /// Writes `tracked.json`, `tracked.csv` and `tracked.svg` into `out` and returns their paths.
 pub fn write_tracked(result: &TrackedComparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let tables = vec![("tracked.json", json(result)?), ("tracked.csv", tracked_csv(result)?)];
-    write_all(out, tables, || Ok([("tracked.svg", tracked_with_drive(result).svg()?)]))
+    let files = [
+        ("tracked.json", json(result)?),
+        ("tracked.csv", tracked_csv(result)?),
+        ("tracked.svg", tracked_with_drive(result).svg()),
+    ];
+    Ok(files::write(out, files)?)
 }
 
 /// Writes `interrupted.csv`: the samples of an experiment that ended early, or without a motion that can be identified.
@@ -90,9 +75,7 @@ pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>,
 pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let lines = classes.iter().map(|(limit, count)| format!("{limit:e},{count}\n"));
     let text = String::from("lateness_s,samples\n") + &lines.collect::<String>();
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let name = file.file_name().unwrap_or_default();
-    Ok(files::write(folder.unwrap_or(Path::new(".")), [(name, text)])?)
+    Ok(vec![files::write_file(file, &text)?])
 }
 
 pub(super) fn json(result: &impl Serialize) -> Result<String, ReportError> {

@@ -1,10 +1,11 @@
 //! The sections of the report: each computes its results, describes them, and adds its figures, tables and lines of the error budget.
 
+use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::figures;
 use super::files::{ReportError, bifurcations_csv, csv, decay_csv, json, map_csv, tracked_csv};
-use super::table::{Table, number, row};
+use super::table::{Table, number, with_uncertainty};
 use super::{Section, Subject, summary};
 use crate::backbone::track;
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
@@ -57,17 +58,19 @@ fn experiment(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
         "Amplitude and frequency over time. Left: the loop searches for phase resonance and holds it; measured once per period. Right: \
          the drive is off, and the motion decays along the backbone until the impacts lose synchrony at the fold. \
          Times are in periods 2π/ω₀ of the oscillator alone.",
-        figures::history(&record, scene, &result).svg()?,
+        figures::history(&record, scene, &result).svg(),
     );
     section.figure(
         "decay-on-sim",
-        "The decay on the slow invariant manifold, from the locked point (square) down the right branch to its fold.",
-        figures::manifold(&result).svg()?,
+        "The decay on the slow invariant manifold (axes of the study: amplitude over particle speed), from the locked point (square) down \
+         the right branch to its fold.",
+        figures::manifold(&result).svg(),
     );
     section.figure(
         "identified-backbone",
-        "The identified backbone: points along the decay (circles), the locked point (square), the exact curve and first-order theory.",
-        figures::backbone(&result).svg()?,
+        "The identified backbone: points along the decay (circles), the locked point (square), the exact curve and first-order theory. \
+         Uncertainties of the locked point are drawn where they are longer than its mark.",
+        figures::backbone(&result).svg(),
     );
     section.attach("backbone.csv", decay_csv(&result)?);
     section.attach("identification.json", json(&result)?);
@@ -133,36 +136,40 @@ fn describe(section: &mut Section, result: &Comparison) {
     );
 }
 
-/// The locked point beside exact orbit and theory.
+/// The locked point beside exact orbit and theory: a row for each quantity, dimensionless and in SI units.
 fn describe_lock(section: &mut Section, result: &Comparison) {
-    let lock = &result.lock;
+    let (p, lock, at) = (&result.parameters, &result.lock, &result.lock.at);
+    let b = lock.b.zip(lock.u_b);
     let measured = [
-        number(lock.at.sigma),
-        number(lock.at.c),
-        lock.b.map_or("–".into(), number),
+        with_uncertainty(at.sigma, at.u_sigma),
+        with_uncertainty(at.f_hz, at.u_f_hz),
+        with_uncertainty(at.c, at.u_c),
+        with_uncertainty(1e3 * at.a_m, 1e3 * at.u_a_m),
+        b.map_or("–".into(), |(b, u)| with_uncertainty(b, u)),
     ];
-    let mut rows = vec![[vec!["measured at the lock".into()], measured.into()].concat()];
+    let millimetres = 1e3 * at.a_m / at.c;
+    let computed = |sigma: f64, c: f64, b: f64| [sigma, p.omega(sigma) / TAU, c, millimetres * c, b].map(number);
+    let mut columns = vec![("measured".to_string(), measured)];
     let percent = |c: f64, reference: f64| 100.0 * (c / reference - 1.0).abs();
     if let Some(exact) = &result.exact {
-        rows.push(row("exact orbit", [exact.sigma, exact.c, exact.b]));
-        for orbit in result.others() {
-            rows.push(row(
-                "another stable orbit, not followed",
-                [orbit.sigma, orbit.c, orbit.b],
-            ));
-        }
-        let sigma = (lock.at.sigma - exact.sigma).abs();
+        columns.push(("exact orbit".into(), computed(exact.sigma, exact.c, exact.b)));
+        let others = result.others();
+        columns.extend(others.map(|orbit| {
+            let name = "another stable orbit, not followed".to_string();
+            (name, computed(orbit.sigma, orbit.c, orbit.b))
+        }));
+        let sigma = (at.sigma - exact.sigma).abs();
         section.budget(
             "lock, measured against the exact orbit",
-            format!("{sigma:.1e} in σ, {:.3} % in C", percent(lock.at.c, exact.c)),
+            format!("{sigma:.1e} in σ, {:.3} % in C", percent(at.c, exact.c)),
             &format!(
                 "Standard uncertainties: {:.1e} in σ, {:.1e} in C. The rest of the approach is extrapolated.",
-                lock.at.u_sigma, lock.at.u_c
+                at.u_sigma, at.u_c
             ),
         );
     }
     if let Some(theory) = &result.theory {
-        rows.push(row("first-order theory", [theory.sigma, theory.c, theory.b]));
+        columns.push(("first-order theory".into(), computed(theory.sigma, theory.c, theory.b)));
         if let Some(exact) = &result.exact {
             let sigma = (theory.sigma - exact.sigma).abs();
             section.budget(
@@ -172,9 +179,24 @@ fn describe_lock(section: &mut Section, result: &Comparison) {
             );
         }
     }
+    let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+    let quantities = [
+        "detuning σ",
+        "frequency, Hz",
+        "amplitude C",
+        "amplitude, mm",
+        "particle speed B",
+    ];
+    let rows = (0..).zip(quantities).map(|(n, quantity)| {
+        let cells = columns
+            .iter()
+            .map(|(_, cells): &(String, [String; 5])| cells[n].clone());
+        std::iter::once(quantity.to_string()).chain(cells).collect::<Vec<_>>()
+    });
     section.table(
-        "The locked point. σ: detuning, C: amplitude of v over b, B: particle speed over b ω₀.",
-        Table::new(" | σ | C | B").rows(rows),
+        "The locked point. σ = (ω/ω₀ − 1)/ε; C: amplitude of the response over b; B: particle speed over b ω₀. Numbers after ± are \
+         standard uncertainties.",
+        Table::new(&format!(" | {}", names.join(" | "))).rows(rows),
     );
     if let Some(friction) = &lock.friction {
         section.words(format!("Friction: {}.", summary::friction_text(friction)));
@@ -211,7 +233,7 @@ fn tracking(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
     section.figure(
         "tracked-backbone",
         "The backbone tracked with the loop closed, the exact curve and first-order theory.",
-        figures::tracked(&tracked).svg()?,
+        figures::tracked(&tracked).svg(),
     );
     if let Some(worst) = tracked.worst() {
         section.budget(
@@ -245,14 +267,14 @@ fn theory(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
              manifold reach it within a few impacts and move along it to the locked point (square). Without drive, the motion moves \
              down to the fold and loses its synchrony there. It lies a little below the manifold, as the measured decay does: the \
              drift along the manifold is not infinitely slow compared with the approach to it.",
-            figures::approach(&p, point).svg()?,
+            figures::approach(&p, point).svg(),
         );
     }
     section.figure(
         "backbones",
         "Backbones of first-order theory. Their shape does not depend on λ, but their stability does. The smaller the loss at the \
          impacts, the lower the amplitude at the fold.",
-        figures::backbones(&p).svg()?,
+        figures::backbones(&p).svg(),
     );
     match convergence(&p, 6) {
         Some(study) => {
@@ -311,7 +333,7 @@ fn curves(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
             "responses",
             "Frequency responses at several excitations: exact, first-order, and the backbone of the theory near their maxima. \
              Where a response loses its symmetry, the asymmetric motions (blue, beside the dashed curve) take over.",
-            figures::responses(&p, &responses).svg()?,
+            figures::responses(&p, &responses).svg(),
         );
     }
     let changes = changes(&responses);
@@ -329,7 +351,7 @@ fn curves(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
             "period",
             "One period of the locked motion. Above: the primary mass with its walls, and the particle between them; circles \
              mark the impacts. Below: centre of mass and relative displacement, exact and by first-order theory.",
-            figures::period(&p, &motion, theory).svg()?,
+            figures::period(&p, &motion, theory).svg(),
         );
     }
     section.attach("curves.csv", curves_csv(&curve, &responses)?);
@@ -430,7 +452,7 @@ fn regimes(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
         "regimes",
         "The regime map. The black line is the border of the island in which first-order theory has a stable symmetric 1:1 motion. The \
          coloured curves are exact bifurcations of the 1:1 motions, solid where they bound the stability of one.",
-        figures::regimes::svg(&map)?,
+        figures::regimes(&map).svg(),
     );
     section.budget(
         "regime map",

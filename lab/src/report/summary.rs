@@ -2,7 +2,7 @@
 
 use super::table::{Table, row, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
-use crate::identification::{DecayEnd, Friction, Measured, Regime};
+use crate::identification::{DecayEnd, Friction, ResonancePoint, Regime};
 use crate::scene::{Definition, Dimensionless, Sensor};
 use crate::sweep::Map;
 
@@ -21,7 +21,7 @@ fn rig(p: &Dimensionless) -> String {
 }
 
 /// Frequency in hertz, amplitude of the response and of the base in metres, with their uncertainties.
-fn in_si(at: &Measured) -> [String; 3] {
+fn in_si(at: &ResonancePoint) -> [String; 3] {
     let metres = |value: f64, u: f64| format!("{value:.5e} ± {u:.1e}");
     [
         with_uncertainty(at.f_hz, at.u_f_hz),
@@ -44,6 +44,10 @@ pub fn regimes(map: &Map) -> Table {
     });
     Table::new("regime | cells | share | inside the theory's stable island").rows(rows)
 }
+
+/// What the symbols of an identification mean.
+const SYMBOLS: &str = "  sigma: detuning (omega/omega0 - 1)/epsilon; C: amplitude of the response over b; B: particle speed over b omega0; G: base amplitude \
+                       over b epsilon\n";
 
 /// An identification: the locked point beside theory and exact orbit, then the decay.
 pub fn identification(result: &Comparison) -> String {
@@ -76,6 +80,7 @@ pub fn identification(result: &Comparison) -> String {
         at.u_phase_deg,
         table.text(),
     );
+    text += SYMBOLS;
     let mut note = |note: &str| text += &format!("  ({note})\n");
     if let Some(friction) = lock.friction {
         note(&friction_text(&friction));

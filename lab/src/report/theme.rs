@@ -1,96 +1,149 @@
-//! Colours on white paper and on a dark screen.
+//! Colours on white paper and on a dark screen, from the table `styles.csv`. The figures of the book are drawn with the same table.
 //!
-//! Neighbouring colours differ in lightness, so that they remain distinct in grey; lines and marks also differ in shape.
+//! A line is dashed where its motion is unstable. Regimes differ in lightness, so that they remain distinct in grey.
 
-use plotters::style::RGBColor;
+use std::sync::LazyLock;
 
-use crate::orbit::Bifurcation;
 use crate::regime::Regime;
 
-pub const THEORY: RGBColor = RGBColor(40, 40, 40);
-pub const UNSTABLE: RGBColor = RGBColor(150, 150, 150);
-pub const EXACT: RGBColor = RGBColor(0, 114, 178);
-/// Unstable parts of curves in [`EXACT`].
-pub const FAINT: RGBColor = RGBColor(120, 170, 210);
-pub const DECAY: RGBColor = RGBColor(213, 94, 0);
-pub const LOCK: RGBColor = RGBColor(0, 0, 0);
+pub const PAPER: &str = "paper";
+pub const INK: &str = "ink";
+pub const CAPTION: &str = "caption";
+pub const GRID: &str = "grid";
+pub const THEORY: &str = "theory";
+pub const EXACT: &str = "exact";
+pub const MEASURED: &str = "measured";
+pub const PARTICLE: &str = "particle";
+pub const MODULATION: &str = "modulation";
+/// Beside lines and below letters on a map, which has the same colours on dark screens.
+pub const HALO: &str = "halo";
+pub const BORDER: &str = "theory border";
 
-/// A regime in the map: its colour (the darker, the less orderly its impacts), its letter, and the colour of the letter. The letter changes
-/// its colour on dark screens only if the cell does.
-pub fn regime(regime: Regime) -> (RGBColor, &'static str, RGBColor) {
-    const DARK: RGBColor = RGBColor(10, 10, 10);
-    const LIGHT: RGBColor = RGBColor(254, 254, 254);
-    match regime {
-        Regime::NoImpacts => (RGBColor(246, 246, 244), "O", RGBColor(0, 0, 0)),
-        Regime::Symmetric => (RGBColor(178, 217, 241), "S", DARK),
-        Regime::Asymmetric => (RGBColor(240, 180, 70), "A", DARK),
-        Regime::Several => (RGBColor(90, 174, 110), "n", DARK),
-        Regime::QuasiPeriodic => (RGBColor(60, 130, 160), "Q", LIGHT),
-        Regime::Modulated => (RGBColor(190, 70, 45), "M", LIGHT),
-        Regime::Chaotic => (RGBColor(106, 52, 128), "C", LIGHT),
-        Regime::Undecided => (RGBColor(30, 32, 40), "U", RGBColor(255, 255, 255)),
-        // The map shows none of these.
-        Regime::Other | Regime::Unresolved | Regime::NotEstablished | Regime::Unknown => (UNSTABLE, "?", DARK),
+/// Rows of the table: name, colour on white paper, colour on a dark screen.
+static STYLES: LazyLock<Vec<[&str; 3]>> = LazyLock::new(|| {
+    let rows = include_str!("styles.csv").lines().skip(1);
+    rows.map(|row| {
+        let mut cells = row.split(',');
+        [(); 3].map(|()| cells.next().unwrap_or_default())
+    })
+    .collect()
+});
+
+/// The row of a name; the names are those of this file, of regimes and of bifurcations.
+fn row(name: &str) -> [&'static str; 3] {
+    let found = STYLES.iter().find(|row| row[0] == name);
+    *found.unwrap_or_else(|| panic!("styles.csv has no row `{name}`"))
+}
+
+/// The colour of a name on white paper, as `#RRGGBB`.
+pub fn colour(name: &str) -> &'static str {
+    row(name)[1]
+}
+
+/// The name of the colour of unstable motions.
+pub fn unstable(name: &'static str) -> &'static str {
+    match name {
+        THEORY => "theory unstable",
+        EXACT => "exact unstable",
+        other => other,
     }
 }
 
-/// The colours of the bifurcation curves on the map.
-pub const BIFURCATIONS: [(Bifurcation, RGBColor); 4] = [
-    (Bifurcation::Fold, RGBColor(20, 60, 160)),
-    (Bifurcation::SymmetryBreaking, RGBColor(170, 90, 0)),
-    (Bifurcation::PeriodDoubling, RGBColor(0, 95, 50)),
-    (Bifurcation::Torus, RGBColor(200, 0, 60)),
-];
+/// The letter of a regime on the map, and the name of the letter's colour.
+pub fn letter(regime: Regime) -> (&'static str, &'static str) {
+    let letter = match regime {
+        Regime::NoImpacts => "O",
+        Regime::Symmetric => "S",
+        Regime::Asymmetric => "A",
+        Regime::Several => "n",
+        Regime::QuasiPeriodic => "Q",
+        Regime::Modulated => "M",
+        Regime::Chaotic => "C",
+        Regime::Undecided => "U",
+        // The map shows none of these.
+        Regime::Other | Regime::Unresolved | Regime::NotEstablished | Regime::Unknown => "?",
+    };
+    let [_, light, dark] = row(regime.name());
+    let ink = match (luminance(light) > 0.25, light == dark) {
+        (true, true) => BORDER,
+        (false, true) => HALO,
+        (true, false) => INK,
+        (false, false) => PAPER,
+    };
+    (letter, ink)
+}
 
-/// Colours on white paper, and on a dark screen.
-const DARK: [(&str, &str); 9] = [
-    ("#FFFFFF", "#14171A"),
-    ("#000000", "#ECECEC"),
-    ("#282828", "#DADADA"),
-    ("#969696", "#868C93"),
-    ("#0072B2", "#56B4E9"),
-    ("#78AAD2", "#3F7099"),
-    ("#D55E00", "#F28C40"),
-    // No impacts is like the paper in both, undecided like the ink.
-    ("#F6F6F4", "#23272B"),
-    ("#1E2028", "#F2F2EE"),
-];
+/// Relative luminance of a colour `#RRGGBB`, from 0 to 1 (WCAG 2.2).
+fn luminance(colour: &str) -> f64 {
+    let channel = |from: usize| {
+        let value = u8::from_str_radix(&colour[from..from + 2], 16).unwrap_or_default();
+        let value = f64::from(value) / 255.0;
+        match value <= 0.04045 {
+            true => value / 12.92,
+            false => ((value + 0.055) / 1.055).powf(2.4),
+        }
+    };
+    0.2126 * channel(1) + 0.7152 * channel(3) + 0.0722 * channel(5)
+}
 
 /// A figure for dark screens.
 pub fn dark(svg: &str) -> String {
     // Every colour is in quotes, and each is replaced once.
-    svg.split('"')
-        .map(|part| {
-            let pair = DARK.iter().find(|(light, _)| *light == part);
-            pair.map_or(part, |(_, dark)| dark)
-        })
-        .collect::<Vec<_>>()
-        .join("\"")
+    let replaced = |part| STYLES.iter().find(|row| row[1] == part).map_or(part, |row| row[2]);
+    svg.split('"').map(replaced).collect::<Vec<_>>().join("\"")
 }
 
 /// Style rules that give figures inside a page their dark colours.
 pub fn dark_rules() -> String {
-    DARK.iter()
-        .flat_map(|(light, dark)| ["fill", "stroke"].map(|what| format!("svg [{what}=\"{light}\"]{{{what}:{dark}}}")))
+    let changed = STYLES.iter().filter(|[_, light, dark]| light != dark);
+    changed
+        .flat_map(|[_, light, dark]| {
+            ["fill", "stroke"].map(|what| format!("svg [{what}=\"{light}\"]{{{what}:{dark}}}"))
+        })
         .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::orbit::Bifurcation;
 
     #[test]
     fn regimes_differ_in_lightness() {
-        let mut lightness: Vec<f64> = Regime::SIMULATED
-            .iter()
-            .map(|shown| {
-                let (RGBColor(r, g, b), ..) = regime(*shown);
-                0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
-            })
-            .collect();
+        let mut lightness = Regime::SIMULATED.map(|regime| luminance(colour(regime.name())));
         lightness.sort_by(f64::total_cmp);
         for pair in lightness.windows(2) {
-            assert!(pair[1] - pair[0] > 15.0, "{lightness:?}");
+            assert!(pair[1] / pair[0] > 1.15, "{lightness:?}");
+        }
+    }
+
+    #[test]
+    fn lines_and_letters_stand_out_from_their_background_in_light_and_dark() {
+        let contrast = |one: &str, other: &str| {
+            let [one, other] = [one, other].map(|colour| luminance(colour) + 0.05);
+            one.max(other) / one.min(other)
+        };
+        for name in [INK, CAPTION, THEORY, EXACT, MEASURED, PARTICLE, MODULATION] {
+            for line in [name, unstable(name)] {
+                for shade in [1, 2] {
+                    let ratio = contrast(row(line)[shade], row(PAPER)[shade]);
+                    assert!(ratio > 3.0, "{line}: {ratio}");
+                }
+            }
+        }
+        use Bifurcation::{Fold, PeriodDoubling, SymmetryBreaking, Torus};
+        for curve in [Fold, SymmetryBreaking, PeriodDoubling, Torus]
+            .map(|kind| kind.name())
+            .into_iter()
+            .chain([BORDER])
+        {
+            assert!(contrast(colour(curve), colour(HALO)) > 4.5, "{curve}");
+        }
+        for regime in Regime::SIMULATED {
+            for shade in [1, 2] {
+                let ratio = contrast(row(letter(regime).1)[shade], row(regime.name())[shade]);
+                assert!(ratio > 4.2, "{regime:?}: {ratio}");
+            }
         }
     }
 

@@ -2,70 +2,56 @@
 
 use std::convert::Infallible;
 
+use super::WIDE;
 use crate::numerics::try_bisection;
-use crate::orbit::{BifurcationCurve, Periodic};
+use crate::orbit::Periodic;
 use crate::regime::Regime;
-use crate::report::figure::{
-    BLACK, Color, DETUNING, Figure, FigureError, Mark, Marked, Panel, Place, WHITE, clipped, line, thinned,
-};
-use crate::report::theme;
+use crate::report::figure::{DETUNING, Figure, Legend, Marked, Panel, Place, SIZE, Shape};
+use crate::report::theme::{BORDER, letter};
 use crate::scene::Dimensionless;
 use crate::sweep::{Grid, Map, SIGMA};
 
-/// Size of the figure, px, and how much of its width belongs to the axes; the key stands beside them.
-const SIZE: (u32, u32) = (980, 600);
-const WIDTH: u32 = 770;
 /// Regions in which no square of 2 n + 1 cells fits, with this n, get no letter.
 const NARROW: usize = 1;
 
-pub fn svg(map: &Map) -> Result<String, FigureError> {
-    // Cells lie side by side without a seam.
-    let text = figure(map).svg()?;
-    Ok(text.replace("<rect ", "<rect shape-rendering=\"crispEdges\" "))
-}
-
-fn figure(map: &Map) -> Figure {
+pub fn regimes(map: &Map) -> Figure {
     let (Map { x, y, .. }, [x_name, y_name]) = (map, map.names());
     let axis = |grid: &Grid, name| {
         let half = grid.step() / 2.0;
         ((grid.from - half, grid.to + half), label(name))
     };
+    let size = (WIDE, SIZE.1);
     let mut panel = Panel::new(axis(x, x_name), axis(y, y_name))
-        .at([0, 0, WIDTH, SIZE.1])
-        .heading("Regimes of the driven response", &caption(map));
+        .at([0.0, 0.0, size.0, size.1])
+        .heading("Regimes of the driven response", &caption(map))
+        .legend(Legend::Beside(205.0));
     for regime in Regime::SIMULATED {
-        panel.rectangles(stripes(map, regime), theme::regime(regime).0);
+        let (letter, ink) = letter(regime);
+        panel.add(
+            Shape::Cells(letter, ink),
+            stripes(map, regime),
+            regime.name(),
+            regime.name(),
+        );
     }
-    let segments = outline(map);
-    panel.segments(segments.clone(), line(WHITE, 50));
-    panel.segments(segments, line(BLACK, 22));
+    panel.add(Shape::Border(2.2), outline(map), BORDER, "stable 1:1, theory");
+    let place = place_on(map);
     for curve in &map.curves {
-        draw_curve(&mut panel, map, curve);
+        // Solid where it bounds the stability of a motion.
+        let motions = curve.branch.points.iter();
+        let points: Vec<Marked> = motions
+            .map(|motion| (place(motion), motion.bounds_stability()))
+            .collect();
+        panel.curve_on_map(&points, curve.kind.name(), curve.kind.name());
     }
     let several = (0..).zip(&map.cells).filter(|(_, cell)| !cell.coexisting.is_empty());
     let dots: Vec<Place> = several.map(|(n, _)| (x.at(n % x.points), y.at(n / x.points))).collect();
-    let dotted = !dots.is_empty();
-    panel.circles(dots, 1, BLACK.filled(), "");
+    panel.add(Shape::Dot(1.0), dots, BORDER, "several regimes");
     for (regime, place) in letters(map) {
-        let (_, letter, ink) = theme::regime(regime);
-        panel.centred_text(letter.into(), place, 17, ink);
+        let (letter, ink) = letter(regime);
+        panel.add(Shape::Text(16.0), vec![place], ink, letter);
     }
-    Figure::new(SIZE, vec![panel]).with_key(key(map, dotted))
-}
-
-fn key(map: &Map, dotted: bool) -> Vec<(&'static str, Mark)> {
-    let shown = Regime::SIMULATED.into_iter().filter(|one| map.count(*one).0 > 0);
-    let mut key: Vec<_> = shown
-        .map(|one| (one.name(), Mark::Swatch(theme::regime(one))))
-        .collect();
-    key.push(("stable 1:1, theory", Mark::Line(BLACK)));
-    let drawn = |kind| map.curves.iter().any(|curve| curve.kind == kind);
-    let curves = theme::BIFURCATIONS.into_iter().filter(|(kind, _)| drawn(*kind));
-    key.extend(curves.map(|(kind, colour)| (kind.name(), Mark::Line(colour))));
-    if dotted {
-        key.push(("several regimes", Mark::Dot));
-    }
-    key
+    Figure { size, panels: vec![panel] }
 }
 
 /// Where a motion lies on a map over sigma and G.
@@ -77,30 +63,6 @@ fn place_on(map: &Map) -> impl Fn(&Periodic) -> Place {
         } else {
             (one.sigma, one.g)
         }
-    }
-}
-
-/// A bifurcation curve, solid where it bounds the stability of a motion.
-fn draw_curve(panel: &mut Panel, map: &Map, curve: &BifurcationCurve) {
-    let place = place_on(map);
-    let points: Vec<Marked> = curve
-        .branch
-        .points
-        .iter()
-        .map(|one| (place(one), one.bounds_stability()))
-        .collect();
-    let (x, y) = (map.x, map.y);
-    let mut colours = theme::BIFURCATIONS.into_iter();
-    let colour = colours
-        .find(|(kind, _)| *kind == curve.kind)
-        .map_or(BLACK, |(_, colour)| colour);
-    for piece in clipped(&points, (x.from, x.to), (y.from, y.to)) {
-        panel.curve(piece.iter().map(|one| one.0).collect(), line(WHITE, 36), "");
-        panel.pieces(
-            &thinned(&piece, (x.from, x.to), (y.from, y.to)),
-            [line(colour, 22), line(colour, 12)],
-            ["", ""],
-        );
     }
 }
 
@@ -118,7 +80,7 @@ fn caption(map: &Map) -> String {
         "; dashed: of unstable motions"
     };
     format!(
-        "ε = {epsilon:.5}, λ = {lambda:.3}{held}; each cell from the same start, followed until it repeats, at most {} periods{dashed}",
+        "ε = {epsilon:.5}, λ = {lambda:.3}{held}\neach cell from the same start, followed until it repeats, at most {} periods{dashed}",
         map.sweep.settings().periods
     )
 }
@@ -133,7 +95,7 @@ fn label(name: &str) -> &str {
 }
 
 /// The cells of a regime, with neighbours in a row merged.
-fn stripes(map: &Map, regime: Regime) -> Vec<[Place; 2]> {
+fn stripes(map: &Map, regime: Regime) -> Vec<Place> {
     let (x, y) = (map.x, map.y);
     let mut found = Vec::new();
     for (row, cells) in (0..).zip(map.cells.chunks(x.points as usize)) {
@@ -143,7 +105,7 @@ fn stripes(map: &Map, regime: Regime) -> Vec<[Place; 2]> {
                 let left = x.at(column) - x.step() / 2.0;
                 let right = x.at(column + run.len() as u64 - 1) + x.step() / 2.0;
                 let low = y.at(row) - y.step() / 2.0;
-                found.push([(left, low), (right, low + y.step())]);
+                found.extend([(left, low), (right, low + y.step())]);
             }
             column += run.len() as u64;
         }
@@ -201,7 +163,7 @@ fn without_curves(map: &Map) -> Vec<Option<Regime>> {
         let n = ((value - grid.from) / grid.step()).round();
         (n >= 0.0 && n < grid.points as f64).then_some(n as usize)
     };
-    for place in bifurcations.chain(outline(map).into_iter().flatten()) {
+    for place in bifurcations.chain(outline(map)) {
         if let (Some(column), Some(row)) = (index(x, place.0), index(y, place.1)) {
             free[row * x.points as usize + column] = None;
         }
@@ -214,8 +176,8 @@ const PARTS: usize = 100;
 /// Fraction of such a part to which the border is located: far below a pixel.
 const LOCATED: f64 = 1.0 / 4096.0;
 
-/// Segments of the border of the region where first-order theory has a stable symmetric 1:1 motion, by marching squares.
-fn outline(map: &Map) -> Vec<[Place; 2]> {
+/// The border of the region where first-order theory has a stable symmetric 1:1 motion, by marching squares: pairs of ends.
+fn outline(map: &Map) -> Vec<Place> {
     let along = |grid: Grid, n: usize| grid.from + (grid.to - grid.from) * n as f64 / PARTS as f64;
     let place = |column: usize, row: usize| (along(map.x, column), along(map.y, row));
     let inside = |(x, y): Place| map.theory_stable(x, y);
@@ -238,7 +200,7 @@ fn outline(map: &Map) -> Vec<[Place; 2]> {
             .filter(|(from, to)| from.1 != to.1)
             .map(|(from, to)| border(from, to))
             .collect();
-        segments.extend(crossings.chunks_exact(2).map(|pair| [pair[0], pair[1]]));
+        segments.extend(crossings);
     }
     segments
 }
