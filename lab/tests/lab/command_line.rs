@@ -1,33 +1,15 @@
 //! Guards the program as its users meet it: output, exit codes and messages.
 
-use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-fn vines(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_vines"))
-        .args(arguments)
-        .current_dir(std::env::temp_dir())
-        .output()
-        .expect("the program runs")
-}
+use crate::{fails, vines};
 
 fn json(arguments: &[&str]) -> Value {
     let output = vines(arguments);
     assert!(output.status.success(), "{output:?}");
     serde_json::from_slice(&output.stdout).expect("JSON")
-}
-
-/// The error must be one message on stderr, with nothing on stdout.
-fn fails(arguments: &[&str], code: i32, part: &str) {
-    let output = vines(arguments);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
-    assert!(message.starts_with("error: "), "{message}");
-    assert!(message.contains(part), "`{part}` is not in: {message}");
-    assert!(!message.contains("panicked"), "{message}");
-    assert!(output.stdout.is_empty());
 }
 
 #[test]
