@@ -23,7 +23,7 @@ use vines_model::{
 };
 use vines_testbench::{
     advice,
-    backbone::{Point, track},
+    backbone::{LevelPoint, track},
     comparison::ExactCurve,
     identification::Regime,
     rig::{BuiltIn, Chain, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated},
@@ -281,9 +281,9 @@ fn run(d: Dimensionless, effects: [f64; 6], snr: &str, noise: u64) -> Result<Fou
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let tracked = track(chain.as_mut(), &mut controller, &scene, |_, _| {})?;
     let is_backbone = |regime| matches!(regime, Regime::Symmetric | Regime::Unresolved);
-    let kept = |point: &&Point| point.settled && is_backbone(point.regime);
+    let kept = |point: &&LevelPoint| point.settled && is_backbone(point.regime);
     let (mut found, mut settled, mut without) = (Found::default(), 0, 0);
-    for Point { at, .. } in tracked.points.iter().filter(kept) {
+    for LevelPoint { at, .. } in tracked.points.iter().filter(kept) {
         settled += 1;
         let Some([sigma, g]) = truth(at.c, at.sigma) else {
             without += 1;
