@@ -51,7 +51,11 @@ impl HelicServer {
     }
 
     /// Serves until `stop` returns true. `report` receives the report when a host has left.
-    pub fn serve(&mut self, mut stop: impl FnMut() -> bool, mut report: impl FnMut(&Session)) -> Result<(), ServerError> {
+    pub fn serve(
+        &mut self,
+        mut stop: impl FnMut() -> bool,
+        mut report: impl FnMut(&Session),
+    ) -> Result<(), ServerError> {
         let mut clock = RealTimeClock::start(self.sample_time);
         let mut host: Option<Connection> = None;
         let mut tick = 0;
