@@ -57,7 +57,7 @@ export class RegimeMap {
     }
     plot.begin(SIGMA, G);
     cells.forEach((regime, cell) => plot.cell(this.#point(cell, 0, 0), this.#point(cell, 1, 1), name(regime)));
-    if (point.G > 0) plot.points([[point.sigma, point.G]], "ink", { label: "now", radius: 5, open: true });
+    if (point.G > 0) plot.points([[point.sigma, point.G]], "particle", { label: "now", radius: 5 });
     plot.end();
   }
 

@@ -651,9 +651,10 @@ for (const { name, options } of BROWSERS) {
           const { frames } = window.live;
           while (window.live.frames < frames + 2) await new Promise((done) => requestAnimationFrame(done));
           const at = canvas.getBoundingClientRect();
-          // A point with the same regime around it.
-          const points = Array.from({ length: 2400 }, (_, i) => [-2.95 + 0.1 * (i % 60), 0.1 + 0.1 * Math.floor(i / 60)]);
-          const place = points.find(([sigma, g]) => [-0.2, -0.1, 0, 0.1, 0.2].every((step) => map.at(sigma + step, g) === regime));
+          // The middle of a cell with the same regime around it, off the boundaries.
+          const points = Array.from({ length: 1200 }, (_, i) => [-2.95 + 0.1 * (i % 60), 0.1 + 0.2 * Math.floor(i / 60)]);
+          const near = [-0.2, 0, 0.2].flatMap((up) => [-0.1, 0, 0.1].map((along) => [along, up]));
+          const place = points.find(([sigma, g]) => near.every(([along, up]) => map.at(sigma + along, g + up) === regime));
           return [at.left + box[0] + (box[2] * (place[0] - x[0])) / (x[1] - x[0]), at.top + box[1] + box[3] * (1 - (place[1] - y[0]) / (y[1] - y[0]))];
         }, regime);
         await page.mouse.click(...aim);

@@ -346,5 +346,10 @@ pub fn regime_at(scene: &Scene, sigma: f64, g: f64) -> Result<Regime, Message> {
         plant.advance_with(drive, TAU / omega, &mut count as &mut dyn FnMut(Event))?;
         impacts.trim();
     }
-    Ok(impacts.regime(TAU * periods as f64))
+    // A slow particle may be silent for a while.
+    let last = impacts.0.last().map_or(0.0, |last| last.time);
+    Ok(match last < 0.5 * TAU * periods as f64 {
+        true => Regime::NoImpacts,
+        false => impacts.regime(last),
+    })
 }
