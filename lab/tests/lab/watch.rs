@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_vines");
+use crate::PROGRAM;
 
 /// A program with its server, and the server's address.
 struct Watched(Child, String);
@@ -246,10 +246,10 @@ fn the_page_has_all_its_files_and_answers_at_its_own_address_only() {
 
 #[test]
 fn the_page_has_the_colours_of_the_figures() {
-    let style = include_str!("../../live/page/style.css").to_uppercase();
+    let style = include_str!("../../../live/page/style.css").to_uppercase();
     let (light, dark) = style.split_once("@MEDIA (PREFERS-COLOR-SCHEME: DARK)").unwrap();
     let mut found = 0;
-    for row in include_str!("../src/report/styles.csv").lines().skip(1) {
+    for row in include_str!("../../src/report/styles.csv").lines().skip(1) {
         let [name, on_paper, on_screen] = row.split(',').collect::<Vec<_>>().try_into().unwrap();
         let property = format!("--{}: ", name.replace([' ', ':'], "-").to_uppercase());
         let value = |sheet: &str| Some(sheet.split_once(&property)?.1[..7].to_string());
