@@ -29,6 +29,29 @@ fn orbits_come_as_a_json_array() {
 }
 
 #[test]
+fn the_plants_own_motion_has_the_friction_that_exact_orbits_leave_out() {
+    let friction = ["orbit", "--periodic", "--json", "--set=plant.mu_k=0.05"];
+    let motion = json(&friction);
+    assert_eq!(
+        (motion["impacts"].as_u64(), motion["stable"].as_bool()),
+        (Some(2), Some(true))
+    );
+    assert!((motion["phase_deg"].as_f64().unwrap() + 90.0).abs() < 1e-6, "{motion}");
+    assert_eq!(motion["ideal"][0], "friction");
+    let smaller = motion["a_m"].as_f64() < motion["ideal"][2].as_f64();
+    assert!(smaller, "friction takes energy: {motion}");
+    // The motion from rest at the same frequency.
+    let sigma = format!("--sigma={}", motion["sigma"]);
+    let start = "--set=start.dq2=0.2";
+    let settled = json(&[&friction[..], &[&sigma, start]].concat());
+    assert!(
+        (settled["a_m"].as_f64().unwrap() / motion["a_m"].as_f64().unwrap() - 1.0).abs() < 1e-8,
+        "{settled}"
+    );
+    fails(&["orbit", "--periodic", "--set=plant.r_scatter=0.1"], 1, "set it to 0");
+}
+
+#[test]
 fn theory_comes_as_json_with_as_many_samples_as_asked_for() {
     let theory = json(&["theory", "--json", "--points", "50"]);
     assert_eq!(theory["backbone"].as_array().map(Vec::len), Some(50));

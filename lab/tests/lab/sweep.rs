@@ -145,7 +145,7 @@ fn a_verification_names_damaged_and_missing_files_and_the_same_sweep_replaces_th
         &[
             named,
             "impacts/c/1 is empty",
-            "replaced",
+            "computed again",
             "12 already complete, 8 computed",
         ],
     );
@@ -156,7 +156,7 @@ fn a_verification_names_damaged_and_missing_files_and_the_same_sweep_replaces_th
         &[&merge],
         &merged,
         0,
-        &[named, "impacts/c/1 is empty", "20 cells, complete; 8 of them computed"],
+        &[named, "impacts/c/1 is empty", "12 already complete, 8 computed"],
     );
     assert!(content(&merged) == whole);
 }
