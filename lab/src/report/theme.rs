@@ -151,7 +151,8 @@ mod tests {
     fn the_live_page_has_the_colours_of_the_table() {
         let style = include_str!("../../../live/page/style.css");
         for (name, variable) in [(EXACT, "--blue"), (MEASURED, "--decay"), (PARTICLE, "--red")] {
-            let values = style.match_indices(&format!("{variable}: ")).map(|(at, found)| at + found.len());
+            let start = format!("{variable}: ");
+            let values = style.match_indices(&start).map(|(at, _)| at + start.len());
             let values: Vec<String> = values.map(|from| style[from..from + 7].to_uppercase()).collect();
             assert_eq!(values, row(name)[1..], "{variable}");
         }
