@@ -11,7 +11,7 @@ mod common;
 
 use common::{Failure, arguments, scene, write};
 use vines_testbench::experiment::{ExperimentError, Plan, run};
-use vines_testbench::identification::{Measured, identify};
+use vines_testbench::identification::{ResonancePoint, identify};
 use vines_testbench::rig::{BuiltIn, Simulated};
 
 /// Settings of `[chain]`; the first is the ideal chain.
@@ -37,7 +37,7 @@ const STAGES: [&str; 18] = [
 ];
 
 /// The lock behind a stage, held for 200 periods.
-fn lock(stage: &str) -> Result<Measured, Failure> {
+fn lock(stage: &str) -> Result<ResonancePoint, Failure> {
     let stage = stage.split_whitespace().map(|one| format!("chain.{one}"));
     let hold = "record.hold_periods=200".into();
     let scene = scene(

@@ -13,7 +13,7 @@ use vines_model::Dimensionless;
 use vines_model::numerics::{bisection, mean_square};
 use vines_model::orbit::{Orbit, exact_backbone, phase_resonant};
 use vines_testbench::advice;
-use vines_testbench::backbone::{Point, Tracked, track};
+use vines_testbench::backbone::{LevelPoint, Tracked, track};
 use vines_testbench::comparison::ExactCurve;
 use vines_testbench::identification::Regime;
 use vines_testbench::loop_check::Verdict;
@@ -183,7 +183,7 @@ pub fn largest_stable(d: &Dimensionless) -> Option<f64> {
 }
 
 /// Whether a point counts as one of the backbone.
-pub fn is_kept(point: &&Point) -> bool {
+pub fn is_kept(point: &&LevelPoint) -> bool {
     point.settled && matches!(point.regime, Regime::Symmetric | Regime::Unresolved)
 }
 

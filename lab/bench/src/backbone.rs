@@ -12,7 +12,7 @@ use vines_model::numerics::{Estimate, RANDOM};
 
 use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stage};
 use crate::identification::{
-    Balance, Cycle, Measured, Regime, Slopes, Tone, classify, foreign_tone, regime_by_response,
+    Balance, Cycle, Regime, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
 };
 use crate::record::Sample;
 use crate::rig::{Controller, Move, Rig};
@@ -57,12 +57,13 @@ pub struct LevelEstimate {
 /// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 beside the
 /// fold, 0.03 rad change sigma at equal C by 1.1e-3.
 const BESIDE: f64 = 0.02;
-/// Periods by which the impacts follow a change of the amplitude late: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
+/// Delay of the impacts behind a change of the amplitude, periods: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
 /// (studies/off_scene.rs).
 const LAG: f64 = 1.6;
 /// Largest scatter of the periods about the fit, over the noise of the sensors: chi-square per degree of freedom is then at most 4.
 const EXCESS: f64 = 2.0;
-/// Relative standard uncertainty of the slope of a straight line through two points: away from the fold it changes by less from level to level.
+/// Relative standard uncertainty of the slope of a straight line through two points: away from the fold the slope changes by less from level to
+/// level.
 const SLOPE: f64 = 0.5;
 /// Shares of the periods that are considered, from the last one backwards.
 const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
@@ -180,10 +181,10 @@ impl LevelEstimate {
 
 /// One point of the backbone.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Point {
-    /// Where it is; frequency and base amplitude are those of phase resonance at this response amplitude.
+pub struct LevelPoint {
+    /// The point: frequency and base amplitude of phase resonance at this amplitude of the response.
     #[serde(flatten)]
-    pub at: Measured,
+    pub at: ResonancePoint,
     /// Target level, over b.
     pub level: f64,
     /// Periods of the move to this level and at this level.
@@ -208,7 +209,7 @@ pub struct Point {
 #[derive(Debug)]
 pub struct Tracked {
     /// The points, in the order in which they were taken.
-    pub points: Vec<Point>,
+    pub points: Vec<LevelPoint>,
     /// Periods from the start to the closed loop.
     pub periods_to_lock: f64,
     /// All periods, from the start to the last point.
@@ -240,7 +241,7 @@ struct Tracker<'a, R: Rig + ?Sized, C: ?Sized> {
     closed: Held,
     /// The points so far.
     states: Vec<Held>,
-    points: Vec<Point>,
+    points: Vec<LevelPoint>,
 }
 
 /// Tracks the backbone of `scene`.
@@ -256,7 +257,7 @@ pub fn track(
     track_into(&mut Vec::new(), rig, controller, scene, progress)
 }
 
-/// As [`track`]; if it ends before the first point, what was measured last stays in `samples`.
+/// [`track`], which leaves what was measured last in `samples` if it ends before the first point.
 ///
 /// # Errors
 /// As [`track`].
@@ -331,7 +332,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     }
 
     /// Goes to a level, m, and holds it until the point has settled, or for the longest time allowed.
-    fn hold(&mut self, level: f64) -> Result<Point, ExperimentError> {
+    fn hold(&mut self, level: f64) -> Result<LevelPoint, ExperimentError> {
         let (start, settings) = (self.run.periods, &self.scene.backbone);
         let (to, periods) = self.step(level);
         self.run.controller.hold_response(to, self.target)?;
@@ -366,7 +367,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         Ok(self.point(level, start, &estimate, &cycles, &criterion))
     }
 
-    /// The move to a level, m, and its periods: those of the scene, or as many as the drive needs to change the response that much.
+    /// The move to a level, m, and its periods: [`MOVE`], or as many as the drive needs for this change of the response.
     fn step(&self, level: f64) -> (Move, f64) {
         let omega0 = self.scene.linear().omega0;
         let [response, drive, omega] = *self.states.last().unwrap_or(&self.closed);
@@ -393,7 +394,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         estimate: &LevelEstimate,
         cycles: &[Cycle],
         criterion: &Criterion,
-    ) -> Point {
+    ) -> LevelPoint {
         let d = self.scene.dimensionless();
         let samples = cycles[cycles.len() - estimate.periods..]
             .iter()
@@ -402,8 +403,8 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let [base, omega] = estimate.at;
         let regime = regime_by_response(averaged, self.scene, base.value, self.target, omega.value);
         let reached = is_reached(estimate.response, level);
-        Point {
-            at: Measured::new([estimate.response, base, omega, estimate.phase_error], &d),
+        LevelPoint {
+            at: ResonancePoint::new([estimate.response, base, omega, estimate.phase_error], &d),
             // The level as a person would write it.
             level: (1e9 * level / d.b).round() / 1e9,
             periods: self.run.periods - start,

@@ -6,9 +6,9 @@ use vines_model::numerics::{golden_section, mean_square};
 use vines_model::orbit::{self, ContinuationLimits, Orbit, backbone};
 use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow, free_sigma, resonant};
 
-use crate::backbone::{Point, Tracked};
+use crate::backbone::{LevelPoint, Tracked};
 use crate::experiment::Plan;
-use crate::identification::{DecayEnd, DecayPoint, Identification, Lock, Regime, decay_points};
+use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime, decay_points};
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Drive, Rig, Simulated};
 use crate::scene::{Dimensionless, Scene};
@@ -21,7 +21,7 @@ pub const COMPARED_ABOVE: f64 = 0.2;
 /// An identified system beside theory and exact orbits; dimensionless throughout.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// The numbers all of this belongs to.
+    /// The numbers of the scene.
     pub parameters: Dimensionless,
     /// What theory and exact orbits leave out of the scene's cavity; absent if it is ideal.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -54,7 +54,7 @@ pub struct Comparison {
 pub struct ComparedPoint {
     /// The point.
     #[serde(flatten)]
-    pub point: DecayPoint,
+    pub point: FreeDecayPoint,
     /// Detuning of the backbone at this C, to first order; absent below the fold.
     pub sigma_theory: Option<f64>,
     /// Detuning of the exact backbone at this C; absent outside it.
@@ -231,7 +231,7 @@ fn to_segment(point: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
 /// A tracked backbone beside the exact one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TrackedComparison {
-    /// The numbers all of this belongs to.
+    /// The numbers of the scene.
     pub parameters: Dimensionless,
     /// What exact orbits leave out of the scene's cavity; absent if it is ideal.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -252,18 +252,18 @@ pub struct TrackedComparison {
 pub struct TrackedPoint {
     /// The point.
     #[serde(flatten)]
-    pub point: Point,
+    pub point: LevelPoint,
     /// Its distance.
     pub exact: Option<Distance>,
 }
 
 impl TrackedComparison {
-    /// Compares the points with the exact backbone of the scene; not where the loop holds another phase than that of resonance.
+    /// Compares the points with the exact backbone of the scene; not where the loop holds another phase than resonance.
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
         let parameters = scene.dimensionless();
         let curve = ExactCurve::of(&parameters);
-        let exact = |point: &Point| curve.distance(point.at.c, point.at.sigma, point.at.g);
-        let compare = |point: &Point| TrackedPoint {
+        let exact = |point: &LevelPoint| curve.distance(point.at.c, point.at.sigma, point.at.g);
+        let compare = |point: &LevelPoint| TrackedPoint {
             point: *point,
             exact: Some(point)
                 .filter(|_| scene.controller.is_at_phase_resonance())
@@ -307,13 +307,13 @@ impl TrackedComparison {
     }
 
     /// Largest error at equal C, in sigma or G, and largest distance from the exact backbone, of the settled points.
-    pub fn worst(&self) -> Option<Worst> {
+    pub fn worst(&self) -> Option<LargestErrors> {
         let errors = self.points.iter().filter(|one| one.point.settled).filter_map(|one| {
             let Distance { nearest, sigma, g } = one.exact?;
             let at_equal_c = sigma?.abs().max(g?.abs());
-            Some(Worst { at_equal_c, nearest })
+            Some(LargestErrors { at_equal_c, nearest })
         });
-        errors.reduce(|one, other| Worst {
+        errors.reduce(|one, other| LargestErrors {
             at_equal_c: one.at_equal_c.max(other.at_equal_c),
             nearest: one.nearest.max(other.nearest),
         })
@@ -322,7 +322,7 @@ impl TrackedComparison {
 
 /// Largest errors of the points of a tracked backbone.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Worst {
+pub struct LargestErrors {
     /// Largest difference in sigma or G from the exact backbone at the same C.
     pub at_equal_c: f64,
     /// Largest distance from the nearest place of the exact backbone: the largest of the differences in C, sigma and G there.

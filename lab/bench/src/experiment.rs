@@ -58,13 +58,13 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// Share of its amplitude to which the response of the linear rig falls in the recorded decay: the range of the 1:1 motion, from
-/// symmetry breaking to the fold, is smaller, and impacts make the decay faster.
+/// Share of its amplitude to which the response of the linear rig falls in the recorded decay. The 1:1 motion has a smaller range, from symmetry
+/// breaking to the fold, and impacts make the decay faster.
 const DECAYED: f64 = 0.05;
-/// Longest recorded decay, natural periods, that is not asked for.
+/// Longest recorded decay, natural periods, unless the scene asks for a longer one: a bound for rigs with little damping.
 const LONGEST_DECAY: f64 = 5000.0;
 
-/// Length of the recorded decay, natural periods: that of the scene, or as long as the linear rig takes to fall to [`DECAYED`].
+/// Length of the recorded decay, natural periods: `record.decay_periods`, or as long as the linear rig takes to fall to [`DECAYED`].
 fn decay_periods(scene: &Scene) -> f64 {
     let relaxations = -DECAYED.ln();
     let periods = scene.record.decay_periods;
@@ -176,7 +176,7 @@ pub fn run(
     run_into(&mut Vec::new(), rig, controller, plan, progress)
 }
 
-/// As [`run`]; if the experiment ends early, what was measured stays in `samples`.
+/// [`run`], which leaves what was measured in `samples` if the experiment ends early.
 pub fn run_into(
     samples: &mut Vec<Sample>,
     rig: &mut (impl Rig + ?Sized),
@@ -505,7 +505,8 @@ mod tests {
 
     #[test]
     fn a_fault_is_stated_with_the_readings_and_the_limit_of_the_scene() {
-        let cases: [(&str, Fault, fn(usize) -> (f64, Option<f64>), &str); 7] = [
+        type Reading = fn(usize) -> (f64, Option<f64>);
+        let cases: [(&str, Fault, Reading, &str); 7] = [
             // The largest reading of the last period, also if the controller switched the drive off a few samples later.
             (
                 "controller.C_max=0.3",

@@ -23,7 +23,7 @@ use vines_model::orbit::backbone_at_speed;
 use vines_model::theory::{BranchSide, SlowFlow};
 use vines_model::{ArgumentError, Definition};
 
-use crate::identification::Measured;
+use crate::identification::ResonancePoint;
 use crate::scene::{Dimensionless, Parameters};
 
 pub use effects::{Candidate, Effect, Explanation, decimals, explain};
@@ -40,8 +40,8 @@ pub struct MeasuredPoint {
     pub drive: Estimate,
 }
 
-impl From<&Measured> for MeasuredPoint {
-    fn from(at: &Measured) -> Self {
+impl From<&ResonancePoint> for MeasuredPoint {
+    fn from(at: &ResonancePoint) -> Self {
         let estimate = |value, uncertainty| Estimate { value, uncertainty };
         Self {
             response: estimate(at.a_m, at.u_a_m),

@@ -14,7 +14,7 @@ use crate::record::{Record, Sample};
 use crate::scene::{Dimensionless, LinearResponse, Scene};
 
 pub use balance::{Balance, Cycle, Slopes};
-pub use decay::{DecayEnd, DecayPoint, DecayPoints, Harmonic, decay_points, harmonic};
+pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, decay_points, harmonic};
 use response::longer_after;
 pub(crate) use response::{ASYMMETRIC, without_tones};
 pub use response::{Tone, classify, foreign_tone, impacts, regime_by_response};
@@ -82,7 +82,7 @@ fn mirrored(longer: Option<i8>) -> String {
 /// What a record says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
-    /// The numbers all of this belongs to.
+    /// The numbers of the scene.
     pub parameters: Dimensionless,
     /// The locked point as measured.
     pub lock: Lock,
@@ -124,9 +124,9 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
 /// The locked point as measured over the hold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lock {
-    /// Where it is.
+    /// The point.
     #[serde(flatten)]
-    pub at: Measured,
+    pub at: ResonancePoint,
     /// Mean particle speed over `b omega0`; absent if the rig does not report it.
     #[serde(rename = "B")]
     pub b: Option<f64>,
@@ -230,7 +230,7 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
         .then(|| foreign_tone(hold, scene, omega.value))
         .flatten();
     Some(Lock {
-        at: Measured::new([limit, base, omega, phase_error], d),
+        at: ResonancePoint::new([limit, base, omega, phase_error], d),
         b: b.map(|b| b.value),
         u_b: b.map(|b| b.uncertainty),
         averaged: approach.len(),
@@ -302,7 +302,7 @@ fn means(held: &[Cycle]) -> [Estimate; 3] {
 
 /// A point of phase resonance as measured, in hertz and metres, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Measured {
+pub struct ResonancePoint {
     /// Frequency, Hz.
     #[serde(rename = "f_Hz")]
     pub f_hz: f64,
@@ -343,8 +343,8 @@ pub struct Measured {
     pub u_phase_deg: f64,
 }
 
-impl Measured {
-    /// From the amplitude of the response, m, that of the base, m, the frequency, rad/s, and the phase error, rad.
+impl ResonancePoint {
+    /// From the amplitudes of response and base, m, the frequency, rad/s, and the phase error, rad.
     pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], d: &Dimensionless) -> Self {
         Self {
             f_hz: omega.value / TAU,

@@ -14,9 +14,9 @@ use vines_model::numerics::{SIGNIFICANT, mean, mean_square, standard_deviation};
 use crate::rig::{Drive, Rig, RigError};
 use crate::scene::{LinearResponse, Reference, Scene};
 
-/// Drive, as a share of that of the scene.
+/// Drive of the check, over the scene's drive: too small for impacts.
 const SHARE: f64 = 0.01;
-/// Periods without a drive, with it, and at their end those that are evaluated.
+/// Numbers of periods: without a drive, with it, and evaluated at the end of it.
 const PERIODS: [usize; 3] = [2, 24, 4];
 
 /// Result of the check.
@@ -27,13 +27,13 @@ pub struct LoopCheck {
     /// Amplitude of the drive, m.
     pub amplitude: f64,
     /// The response.
-    pub response: Channel,
+    pub response: CheckedChannel,
     /// The base, if a sensor measures it.
-    pub base: Option<Channel>,
+    pub base: Option<CheckedChannel>,
     /// The linear response and the gains for it, if the loop is healthy.
     pub linear: Option<Linear>,
     /// What was measured, beside what the scene says.
-    pub quantities: Vec<Quantity>,
+    pub quantities: Vec<CheckedQuantity>,
 }
 
 /// Checks a rig at a hundredth of the drive, after a response that is still falling has come to rest. The phase of the rig's oscillator is
@@ -62,7 +62,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
         let signal = SineFit::of(&readings[begins + driven - window..], n + 1);
         let ratio = signal.phasor / expected[n];
         let floor = scatter(&readings[begins - quiet..begins], n + 1);
-        let channel = Channel { noise: signal.noise, floor, ..Channel::default() };
+        let channel = CheckedChannel { noise: signal.noise, floor, ..CheckedChannel::default() };
         channel.at(ratio, omega * step)
     });
     let amplitudes = expected.map(|one| one.norm());
@@ -100,7 +100,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
         quantities.extend(of_response(linear, ratio, scene));
     }
     let verdict = verdict(&channels, &amplitudes, has_base, waits);
-    let refused = quantities.iter().find_map(Quantity::refusal);
+    let refused = quantities.iter().find_map(CheckedQuantity::refusal);
     let verdict = refused.filter(|refusal| verdict.may_be(*refusal)).unwrap_or(verdict);
     Ok(LoopCheck {
         verdict,
@@ -225,27 +225,27 @@ fn scatter(readings: &[[f64; 3]], of: usize) -> f64 {
 
 // What the check of a loop measures, beside what the scene says.
 
-/// Largest relative error of a factor: amplitudes and drives that are measured later have the same.
+/// Largest relative error of an amplitude: later measurements of response and drive would be wrong by it.
 const FACTOR: f64 = 0.05;
-/// Largest phase of the response relative to the base that is not explained, degrees. On the default scene 1 degree shifts sigma by 0.026.
+/// Largest unexplained phase of the response relative to the base, degrees. On the default scene 1 degree shifts sigma by 0.026.
 const PHASE: f64 = 1.0;
-/// Largest relative difference of the clocks: frequencies in hertz that are measured later have the same.
+/// Largest relative difference of the clocks: later measurements of frequencies in hertz would be wrong by it.
 const CLOCK: f64 = 1e-3;
-/// Relative differences of natural frequency and damping below which nothing is said, whatever the uncertainty.
+/// Relative differences of natural frequency and damping from which they are reported, beyond their uncertainty.
 const NOTED: [f64; 2] = [1e-4, 0.02];
 
 /// A measured quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Quantity {
+pub struct CheckedQuantity {
     /// What it is.
     pub name: &'static str,
     /// Its unit; empty for a pure number.
     pub unit: &'static str,
-    /// As measured.
+    /// Measured value.
     pub measured: f64,
     /// Standard uncertainty.
     pub uncertainty: f64,
-    /// As the scene says.
+    /// Value of the scene.
     pub expected: f64,
     /// Largest difference beyond the uncertainty.
     pub tolerance: f64,
@@ -253,7 +253,7 @@ pub struct Quantity {
     pub verdict: Option<Verdict>,
 }
 
-impl Quantity {
+impl CheckedQuantity {
     /// Whether it differs from the scene.
     pub fn differs(&self) -> bool {
         let difference = (self.measured - self.expected).abs();
@@ -267,7 +267,7 @@ impl Quantity {
 }
 
 /// Natural frequency, damping, and the response over the expected response (`ratio`) of an oscillator that has both.
-fn of_response(linear: &Linear, ratio: Complex64, scene: &Scene) -> [Quantity; 4] {
+fn of_response(linear: &Linear, ratio: Complex64, scene: &Scene) -> [CheckedQuantity; 4] {
     let stated = LinearResponse::of(scene);
     let u = linear.u_damping_rate;
     let hertz = [linear.omega_0, u, stated.omega0].map(|omega| omega / TAU);
@@ -301,7 +301,7 @@ fn of_response(linear: &Linear, ratio: Complex64, scene: &Scene) -> [Quantity; 4
 
 /// Amplitude of the base, whose phasor, m, and its relative uncertainty are given, over the amplitude of the drive, and its frequency from its
 /// phasors, period by period.
-fn of_base((phasor, u): (Complex64, f64), drive: f64, periods: &[Complex64], scene: &Scene) -> [Quantity; 2] {
+fn of_base((phasor, u): (Complex64, f64), drive: f64, periods: &[Complex64], scene: &Scene) -> [CheckedQuantity; 2] {
     // A delay may shift the beginning by some periods.
     let last = &periods[periods.len() / 2..];
     let turned: Complex64 = last.windows(2).map(|pair| pair[0].conj() * pair[1]).sum();
@@ -332,8 +332,8 @@ fn quantity(
     [measured, uncertainty, expected]: [f64; 3],
     tolerance: f64,
     verdict: Option<Verdict>,
-) -> Quantity {
-    Quantity {
+) -> CheckedQuantity {
+    CheckedQuantity {
         name,
         unit,
         measured,
@@ -346,25 +346,25 @@ fn quantity(
 
 // What the check of a loop says of its channels.
 
-/// Largest RMS of what is not the drive's frequency, as a share of the amplitude.
+/// Largest RMS of the residual of the fit at the drive's frequency, over the amplitude.
 const NOISE: f64 = 0.15;
 /// Share of the expected amplitude below which a sensor is dead.
 const DEAD: f64 = 0.01;
 /// Factor by which an amplitude may differ from the expected one, or its inverse: the damping is known roughly.
 const GAIN: f64 = 2.0;
-/// RMS of the response without a drive over that of its noise with it, from which the rig moves.
+/// Smallest RMS of the response without a drive, over its noise with the drive, of a rig that moves.
 const AT_REST: f64 = 3.0;
 /// Deviation of the phase, rad, up to which a channel is in time, or reversed.
 const IN_TIME: f64 = 0.7;
 
 /// A channel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Channel {
+pub struct CheckedChannel {
     /// Amplitude at the frequency of the drive over the expected one.
     pub gain: f64,
     /// Phase less the expected one, degrees; a delay is negative.
     pub phase: f64,
-    /// The same as a delay, samples.
+    /// This phase as a delay, samples.
     pub delay: f64,
     /// RMS of everything else, m.
     pub noise: f64,
@@ -372,8 +372,8 @@ pub struct Channel {
     pub floor: f64,
 }
 
-impl Channel {
-    /// The same with another ratio to what is expected; `turn`: phase of a sample, rad.
+impl CheckedChannel {
+    /// With another ratio to the expected phasor; `turn`: phase of a sample, rad.
     fn at(self, ratio: Complex64, turn: f64) -> Self {
         Self {
             gain: ratio.norm(),
@@ -444,7 +444,7 @@ impl Verdict {
 
 /// Judges response and base, whose expected amplitudes are `expected`, m. `waits`: the base moves later than the drive, so that its phase is that
 /// of a delay.
-fn verdict(channels: &[Channel; 2], expected: &[f64; 2], has_base: bool, waits: bool) -> Verdict {
+fn verdict(channels: &[CheckedChannel; 2], expected: &[f64; 2], has_base: bool, waits: bool) -> Verdict {
     let [response, base] = channels;
     if !(response.gain + base.gain + response.noise + base.noise).is_finite() {
         return Verdict::NotANumber;
@@ -458,8 +458,8 @@ fn verdict(channels: &[Channel; 2], expected: &[f64; 2], has_base: bool, waits: 
     let is_off = |phase: f64, from: f64| (phase.to_radians() - from + PI).rem_euclid(TAU) - PI;
     let crossed_phases = [is_off(response.phase, FRAC_PI_2), is_off(base.phase, -FRAC_PI_2)];
     let in_time = |phase: f64| phase.abs() < IN_TIME;
-    let reversed = |channel: &Channel| in_time(is_off(channel.phase, PI));
-    let noisy = |channel: &Channel, expected: f64| channel.noise > NOISE * channel.gain * expected;
+    let reversed = |channel: &CheckedChannel| in_time(is_off(channel.phase, PI));
+    let noisy = |channel: &CheckedChannel, expected: f64| channel.noise > NOISE * channel.gain * expected;
     let dead = channels.map(|channel| channel.gain < DEAD);
     // The response's converter may be too coarse for the motion of the base.
     let as_base = dead[0] || near(crossed[0]) && in_time(crossed_phases[0]);
@@ -603,7 +603,7 @@ impl Linear {
 const FROM_REST: f64 = 0.5;
 /// Largest relative standard uncertainty of the gain of a response that is more than noise.
 const DETERMINED: f64 = 0.1;
-/// Rounds of the fit; each squares the relative error.
+/// Number of steps of Newton's method; each squares the relative error.
 const ROUNDS: usize = 8;
 
 /// First values of `q`, and of `s` and `a`, by the recursion `z' = q z + (1 - q) s` from period to period. `None` without a growth.

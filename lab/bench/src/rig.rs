@@ -15,6 +15,7 @@ use thiserror::Error;
 use vines_model::{Definition, Sensor};
 
 use crate::scene::Scene;
+pub use crate::scene::has_friction;
 
 pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
@@ -251,11 +252,6 @@ impl ControllerError {
             Self::NoResponseLoop | Self::Refused(_) => None,
         }
     }
-}
-
-/// Whether there is friction in the cavity.
-pub fn has_friction(plant: &Parameters) -> bool {
-    plant.cavity.kinetic_friction > 0.0 || plant.cavity.static_friction.is_some_and(|held| held > 0.0)
 }
 
 // The simulated plant as a rig, without an FMU.

@@ -95,7 +95,7 @@ impl Scene {
         let r = self.plant.restitution;
         let is_r = |law: Option<Restitution>| law.is_none_or(|law| law == Restitution::Constant(r));
         let effects = [
-            (crate::rig::has_friction(&self.plant), "friction"),
+            (has_friction(&self.plant), "friction"),
             (plus != b || minus != b, "the gaps b_plus and b_minus"),
             (tilt != 0.0, "tilt"),
             (
@@ -127,6 +127,11 @@ impl Scene {
     pub fn sample_time(&self) -> f64 {
         Dimensionless::of(&self.plant, self.amplitude).natural_period() / self.controller.samples_per_period
     }
+}
+
+/// Whether there is friction in the cavity.
+pub fn has_friction(plant: &Parameters) -> bool {
+    plant.cavity.kinetic_friction > 0.0 || plant.cavity.static_friction.is_some_and(|held| held > 0.0)
 }
 
 // The sections of a scene as written, before they are completed and checked.
@@ -497,6 +502,20 @@ fn symbols(plant: &Parameters) -> Vec<(&'static str, Value)> {
         .collect();
     symbols.extend(codes.map(|(symbol, code)| (symbol, Value::Integer(code))));
     symbols
+}
+
+/// The keys of the section `[plant]` and their values, as a scene in SI units has them.
+pub fn plant_keys(plant: &Parameters) -> Vec<(&'static str, String)> {
+    let keys = symbols(plant).into_iter().map(|(symbol, value)| {
+        let text = match value {
+            Value::Integer(code) if symbol == "r_law" => format!("\"{:?}\"", Law::ALL[code as usize]).to_lowercase(),
+            Value::Integer(number) => number.to_string(),
+            Value::Real(number) => format!("{number:?}"),
+            Value::Boolean(is_on) => is_on.to_string(),
+        };
+        (symbol, text)
+    });
+    keys.collect()
 }
 
 /// Writes the parameters under their symbols, as a scene has them.

@@ -10,11 +10,11 @@ use common::{LOCK_TIME_SETTINGS, crossings, noisy, periods_to_settle, rig_with_s
 use phase_lock_f32 as single;
 use vines_model::numerics::mean_square;
 use vines_model::orbit::phase_resonant;
-use vines_testbench::backbone::{Point, track};
+use vines_testbench::backbone::{LevelPoint, track};
 use vines_testbench::comparison::COMPARED_ABOVE;
 use vines_testbench::experiment::{ExperimentError, Plan, run};
 use vines_testbench::identification::{
-    Lock, Measured, Regime, decay_points, foreign_tone, identify, regime_by_response,
+    Lock, Regime, ResonancePoint, decay_points, foreign_tone, identify, regime_by_response,
 };
 use vines_testbench::loop_check::check;
 use vines_testbench::record::{Record, Sample};
@@ -40,7 +40,7 @@ fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
 }
 
 /// The points of a tracked backbone.
-fn tracked(rig: &mut dyn Rig, scene: &Scene) -> Vec<Point> {
+fn tracked(rig: &mut dyn Rig, scene: &Scene) -> Vec<LevelPoint> {
     let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
     let tracked = track(rig, &mut controller, scene, |_, _| {}).unwrap();
     assert!(tracked.ended.is_none());
@@ -50,7 +50,7 @@ fn tracked(rig: &mut dyn Rig, scene: &Scene) -> Vec<Point> {
 // The measurement chain.
 
 /// The lock behind the chain of a scene, held for 200 periods.
-fn at(settings: &[&str]) -> Result<Measured, ExperimentError> {
+fn at(settings: &[&str]) -> Result<ResonancePoint, ExperimentError> {
     let scene = dimensionless(&[settings, &["record.hold_periods=200"]].concat());
     let record = record(&mut *Simulated::of(&scene).unwrap(), &scene)?;
     Ok(identify(&record, &scene).unwrap().lock.at)
@@ -181,7 +181,7 @@ fn falsified(settings: &[&str], wrong: &[&str]) -> (SensorsOnly, Scene) {
 }
 
 /// The values in SI units, bit by bit.
-fn bits(at: &Measured) -> Vec<u64> {
+fn bits(at: &ResonancePoint) -> Vec<u64> {
     let values = [
         at.f_hz,
         at.a_m,

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use vines::experiment::ExperimentError;
-use vines::loop_check::{Channel, LoopCheck, Verdict, check};
+use vines::loop_check::{CheckedChannel, LoopCheck, Verdict, check};
 use vines::report::{Table, number, with_uncertainty};
 
 use super::failure::Failure;
@@ -63,7 +63,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 pub(super) fn described(checked: &LoopCheck) -> String {
     let channels = [("response", Some(&checked.response)), ("base", checked.base.as_ref())];
     let rows = channels.into_iter().filter_map(|(name, channel)| {
-        let Channel { gain, phase, delay, noise, floor, .. } = channel?;
+        let CheckedChannel { gain, phase, delay, noise, floor, .. } = channel?;
         Some([
             name.to_string(),
             format!("{gain:.3}"),

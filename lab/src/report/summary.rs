@@ -2,7 +2,7 @@
 
 use super::table::{Table, row, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
-use crate::identification::{DecayEnd, Friction, Measured, Regime};
+use crate::identification::{DecayEnd, Friction, ResonancePoint, Regime};
 use crate::scene::{Definition, Dimensionless, Sensor};
 use crate::sweep::Map;
 
@@ -21,7 +21,7 @@ fn rig(p: &Dimensionless) -> String {
 }
 
 /// Frequency in hertz, amplitude of the response and of the base in metres, with their uncertainties.
-fn in_si(at: &Measured) -> [String; 3] {
+fn in_si(at: &ResonancePoint) -> [String; 3] {
     let metres = |value: f64, u: f64| format!("{value:.5e} ± {u:.1e}");
     [
         with_uncertainty(at.f_hz, at.u_f_hz),

@@ -215,7 +215,7 @@ fn motion(cycles: &[Cycle]) -> Vec<PeriodResponse> {
             let time = (cycles[to].time - cycles[from].time) * cycles[n].omega;
             let growth = (cycles[to].amplitude() - cycles[from].amplitude()) / time;
             let amplitude = cycles[n].amplitude();
-            // The frequency of the drive may jump from period to period; that of the response does not.
+            // The frequency of the drive may jump from period to period, but the frequency of the response does not.
             let turning = amplitude * ((phases[to] - phases[from]) / time - 1.0);
             let z = cycles[n].response;
             let drift = Complex::new(growth, turning) * z / amplitude;
@@ -320,7 +320,7 @@ impl Cycle {
         let phases = drive_phases(samples, sample_time, phase);
         let mean_omega = mean(samples.iter().map(|s| s.command.drive.omega));
         let drive_phase = mean(phases.iter().copied());
-        // The response does not follow every change of the drive's frequency: its phase is that of a uniform motion.
+        // The response does not follow every change of the drive's frequency: its phase grows uniformly.
         let middle = 0.5 * (samples.len() - 1) as f64;
         let uniform: Vec<f64> = (0..samples.len())
             .map(|n| drive_phase + (n as f64 - middle) * sample_time * mean_omega)

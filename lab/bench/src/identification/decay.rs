@@ -14,7 +14,7 @@ use crate::scene::{Dimensionless, Scene};
 
 /// One point along the decay, in SI units, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct DecayPoint {
+pub struct FreeDecayPoint {
     /// Time since the release, s.
     pub t_s: f64,
     /// Frequency, Hz.
@@ -66,7 +66,7 @@ pub enum DecayEnd {
 #[derive(Debug, Clone, PartialEq)]
 pub struct DecayPoints {
     /// The points.
-    pub points: Vec<DecayPoint>,
+    pub points: Vec<FreeDecayPoint>,
     /// Why there are no further ones.
     pub end: DecayEnd,
 }
@@ -98,7 +98,7 @@ pub fn decay_points(record: &Record, scene: &Scene) -> DecayPoints {
     };
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
     let windows = fitted(&values, dt, omega, scene.record.window_periods);
-    // What the impacts alone take away, m/s; the mean over the first period is that of the 1:1 motion.
+    // Loss of amplitude by the impacts alone, m/s; the mean over the first period belongs to the 1:1 motion.
     let damping = scene.linear().damping_rate;
     let taken = |window: &Window| -window.fit.rate - damping * window.fit.amplitude;
     let at_release = mean(windows.iter().take(PER_PERIOD as usize).map(taken));
@@ -126,12 +126,12 @@ struct Window {
 }
 
 impl Window {
-    fn point(&self, decay: &[Sample], d: &Dimensionless) -> DecayPoint {
+    fn point(&self, decay: &[Sample], d: &Dimensionless) -> FreeDecayPoint {
         let Harmonic { amplitude, omega, rate, uncertainties, .. } = self.fit;
         let speeds = decay[self.samples.clone()]
             .iter()
             .map(|s| s.ground_truth.map(|w| w.particle_velocity.abs()));
-        DecayPoint {
+        FreeDecayPoint {
             t_s: self.time,
             f_hz: omega / TAU,
             a_m: amplitude,

@@ -18,14 +18,13 @@ use crate::scene::{Dimensionless, LinearResponse, Scene, Sensor};
 
 /// Largest residual of a steady motion, relative to the amplitude, unless it is noise.
 const STEADY: f64 = 3e-3;
-/// A residual counts as noise if third differences find at least this share of it.
+/// Smallest standard deviation of third differences, scaled to white noise, over the residual of a motion with noise alone: white noise has 1.
 const NOISE_SHARE: f64 = 0.5;
-/// Largest number of lines that are subtracted as foreign tones.
+/// Largest number of foreign tones that are subtracted: mains hum and its harmonics.
 const LINES: usize = 8;
 /// Smallest significant harmonic, in standard errors.
 const SIGNIFICANT: f64 = 4.0;
-/// Smallest amplitude of the second harmonic over the third of an asymmetric motion: about 0.01 where it is symmetric, from 2 on where it is
-/// irregular.
+/// Smallest second harmonic of an asymmetric motion, over the third: symmetric motions have about 0.01, irregular ones 2 and more.
 pub(crate) const ASYMMETRIC: f64 = 0.5;
 /// Relative distance from the linear response within which a motion counts as the linear mode, beside the uncertainty of that response.
 const LINEAR: f64 = 0.1;
@@ -59,7 +58,7 @@ impl Content {
     /// Fits the samples; `None` for too few samples or no motion.
     fn of(samples: &[Sample], scene: &Scene, omega: f64) -> Option<Self> {
         let (n, sample_time, d) = (samples.len(), scene.sample_time(), scene.dimensionless());
-        // The phase of the response is more uniform than that of a drive that a loop still corrects.
+        // The phase of the response is more uniform than the phase of a drive that a loop still corrects.
         let phases: Vec<f64> = (0..n).map(|n| n as f64 * sample_time * omega).collect();
         let basis = HarmonicBasis::new(&phases, 1, &HARMONICS);
         if n < 2 * basis.terms() {
@@ -131,7 +130,7 @@ pub(crate) fn without_tones(samples: &[Sample], scene: &Scene, omega: f64) -> Op
 /// of the response to the base, and `omega` (rad/s) its frequency.
 ///
 /// Impacts need evidence: response over base departs from the linear response. Of a linear response that was measured on the rig, this is
-/// sufficient; where that of the scene stands for it, the third harmonic must be significant as well.
+/// sufficient; with the linear response of the scene in its place, the third harmonic must be significant as well.
 #[must_use]
 pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, phase: f64, omega: f64) -> Regime {
     let Some(content) = Content::of(samples, scene, omega) else {
@@ -155,7 +154,7 @@ pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, phase: f
     }
 }
 
-/// Whether response over base, `measured`, at the frequency `omega` (rad/s) is that of the linear response.
+/// Whether response over base, `measured`, at the frequency `omega` (rad/s) belongs to the linear response.
 fn is_linear(linear: &LinearResponse, measured: Complex64, omega: f64) -> bool {
     let tolerance = LINEAR + SIGNIFICANT * linear.uncertainty / linear.damping_rate.abs();
     (linear.at(omega) / measured - 1.0).norm() <= tolerance
@@ -163,15 +162,15 @@ fn is_linear(linear: &LinearResponse, measured: Complex64, omega: f64) -> bool {
 
 // Foreign tones: lines in the response that no motion of the particle produces.
 //
-// The response is that of a linear oscillator, which only its base and the particle excite. The particle stays in its cavity: a line of its
+// The response belongs to a linear oscillator, which only its base and the particle excite. The particle stays in its cavity: a line of its
 // relative position has at most the amplitude 4b/π, that of a square wave. With x = ω/ω0, a line of the response v therefore has at most
 // the amplitude `4 epsilon b/(π |x² - 1|)`, of q1 x² times as much, and of the acceleration x⁴ times as much, whatever the motion: irregular,
 // period-doubled or quasi-periodic. A larger line comes from a sensor or a cable, for instance from the mains.
 
-/// Factor above the largest line of a motion: epsilon and b are known within a factor of two.
+/// Smallest foreign tone, over the largest line of a motion: epsilon and b are known within a factor of two.
 const ABOVE: f64 = 2.0;
 
-/// Largest number of values in which a line is searched for: the work grows with its square.
+/// Largest number of values in which a line is searched for: the work grows with the square of it.
 const SEARCHED: usize = 2048;
 
 /// A sine in the response that is not part of the motion.
