@@ -27,31 +27,31 @@ use crate::scene::{LinearResponse, Scene};
 
 /// What is asked of a level.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Criterion {
+struct Criterion {
     /// Linear response of the rig.
-    pub linear: LinearResponse,
+    linear: LinearResponse,
     /// Largest standard uncertainty of the drive E, as a share of it, and of the frequency, as a share of `omega0 E/A` at the largest level A.
-    pub precision: f64,
+    precision: f64,
     /// The largest level, m.
-    pub largest: f64,
+    largest: f64,
     /// The last two points before, the nearest last: amplitude of the response, m, drive, m, and frequency, rad/s.
-    pub before: [Option<[f64; 3]>; 2],
+    before: [Option<[f64; 3]>; 2],
 }
 
 /// A point of the backbone from a window of periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LevelEstimate {
+struct LevelEstimate {
     /// Number of periods.
-    pub periods: usize,
+    periods: usize,
     /// Mean amplitude of the response, m.
-    pub response: Estimate,
+    response: Estimate,
     /// Mean phase error, rad.
-    pub phase_error: Estimate,
+    phase_error: Estimate,
     /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
-    pub at: [Estimate; 2],
+    at: [Estimate; 2],
     /// Whether only noise is larger than the precision: the fit describes the window, and the systematic part of the uncertainty is small
     /// enough.
-    pub steady: bool,
+    steady: bool,
 }
 
 /// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 beside the
@@ -70,8 +70,7 @@ const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
 
 impl Criterion {
     /// The window with the smallest uncertainties, from the last of these periods backwards; `None` for too few.
-    #[must_use]
-    pub fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
+    fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
         let n = cycles.len();
         let counts = WINDOWS.map(|share| (share * n as f64).round() as usize);
         let considered = counts.into_iter().filter(|count| *count >= 2 * Balance::FEWEST);
@@ -82,8 +81,7 @@ impl Criterion {
     }
 
     /// Whether the uncertainties are small enough, and the phase is near its target.
-    #[must_use]
-    pub fn is_met(&self, estimate: &LevelEstimate) -> bool {
+    fn is_met(&self, estimate: &LevelEstimate) -> bool {
         let Estimate { value, uncertainty } = estimate.phase_error;
         self.size(estimate) <= 1.0 && value.abs() <= BESIDE + RANDOM * uncertainty
     }
@@ -164,8 +162,7 @@ impl Criterion {
 
 impl LevelEstimate {
     /// Means over the periods, of a motion that no balance describes.
-    #[must_use]
-    pub fn means(cycles: &[Cycle]) -> Self {
+    fn means(cycles: &[Cycle]) -> Self {
         let mean = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&cycles.iter().map(value).collect::<Vec<f64>>());
         Self {
             periods: cycles.len(),
