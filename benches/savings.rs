@@ -1,18 +1,20 @@
-//! What each skip saves, in instructions: the plant as it is, and the same work with the skip kept from happening.
+//! What each skip saves, in instructions: the plant as it is, and the same work with the skip kept from happening. And what each effect
+//! of a real cavity costs, per impact of the default lock.
 //!
 //! ```text
 //! cargo bench --bench savings
 //! ```
 //!
 //! Every case is run under valgrind for two lengths; the difference tells what one unit of work costs, without the start of
-//! the program. Instruction counts are the same in every run, however busy the machine is. docs/savings.md keeps the table.
+//! the program. Instruction counts are the same in every run, however busy the machine is. validation/savings.csv and
+//! validation/cavity_costs.csv keep the tables.
 
 use core::f64::consts::TAU;
 use std::env::{args, current_exe};
 use std::hint::black_box;
 use std::process::{Command, ExitCode};
 
-use lovines::{Drive, Event, Parameters, Plant, State};
+use lovines::{Cavity, Drive, Event, Parameters, Plant, Restitution, State};
 
 const OMEGA: f64 = 0.990_417;
 const PERIOD: f64 = TAU / OMEGA;
@@ -37,14 +39,63 @@ fn quiet() -> Plant {
 
 /// The same rig in its steady 1:1 motion.
 fn steady() -> Plant {
+    steady_in(Cavity::IDEAL)
+}
+
+/// The same in another cavity.
+fn steady_in(cavity: Cavity) -> Plant {
     let start = State {
         q1: -0.438_371_55,
         dq1: 0.007_696_65,
         q2: -1.003_854_15,
         dq2: -0.878_123_25,
     };
-    Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.65), start).expect("a scene")
+    let parameters = Parameters { cavity, ..Parameters::dimensionless(0.0084, 1.43, 0.65) };
+    Plant::new(parameters, start).expect("a scene")
 }
+
+/// The lock in a cavity for so many impacts, in one step.
+fn locked_in(cavity: Cavity, impacts: u32) {
+    let duration = f64::from(impacts / 2) * PERIOD;
+    steps(
+        steady_in(cavity),
+        1,
+        |_| (Drive::harmonic(0.0084 * 1.1, OMEGA), duration),
+        nothing,
+    );
+}
+
+const fn walls(law: Restitution) -> Cavity {
+    Cavity { restitution: [Some(law); 2], ..Cavity::IDEAL }
+}
+
+/// An effect, a cavity that has it, and how much an impact may cost, as a multiple of the ideal lock.
+const EFFECTS: &[(&str, Cavity, f64)] = &[
+    ("none", Cavity::IDEAL, 1.0),
+    (
+        "unequal gaps",
+        Cavity { b_plus: Some(1.01), b_minus: Some(0.99), ..Cavity::IDEAL },
+        1.2,
+    ),
+    ("tilt", Cavity { tilt: 3e-4, ..Cavity::IDEAL }, 1.2),
+    ("friction", Cavity { kinetic_friction: 3e-4, ..Cavity::IDEAL }, 2.0),
+    (
+        "unequal walls",
+        Cavity {
+            restitution: [None, Some(Restitution::Constant(0.66))],
+            ..Cavity::IDEAL
+        },
+        1.2,
+    ),
+    ("viscoelastic restitution", walls(Restitution::Viscoelastic(0.33)), 1.2),
+    ("plastic restitution", walls(Restitution::Plastic(0.33)), 1.2),
+    // No two flights are alike, so that none can be predicted from another: the cost is that of an irregular motion.
+    (
+        "scatter of the restitution, irregular flights",
+        Cavity { scatter: 0.01, ..Cavity::IDEAL },
+        4.0,
+    ),
+];
 
 /// So many steps of a plant under what `drive` tells for each, each followed by `read`.
 fn steps(mut plant: Plant, n: u32, step: impl Fn(u32) -> (Drive, f64), read: impl Fn(&Plant)) {
@@ -174,14 +225,7 @@ const ROWS: &[(&str, &str, Run, Run)] = &[
     (
         "impact records when wanted",
         "impact",
-        |n| {
-            steps(
-                steady(),
-                1,
-                |_| (Drive::harmonic(0.0084 * 1.1, OMEGA), f64::from(n / 2) * PERIOD),
-                nothing,
-            )
-        },
+        |n| locked_in(Cavity::IDEAL, n),
         |n| {
             let mut impacts: Vec<Event> = Vec::new();
             let duration = f64::from(n / 2) * PERIOD;
@@ -205,12 +249,13 @@ fn all(plant: &Plant) {
     black_box(plant.energy(plant.base_displacement()));
 }
 
-/// Instructions of a run, as valgrind counts them.
-fn counted(row: usize, without: bool, n: u32) -> Result<u64, String> {
+/// Instructions of a run of this program with these arguments, as valgrind counts them.
+fn counted(arguments: &[&str], n: u32) -> Result<u64, String> {
     let output = Command::new("valgrind")
         .args(["--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null"])
         .arg(current_exe().map_err(|e| e.to_string())?)
-        .args(["run", &row.to_string(), &without.to_string(), &n.to_string()])
+        .args(arguments)
+        .arg(n.to_string())
         .output()
         .map_err(|e| format!("valgrind: {e}; install it"))?;
     let text = String::from_utf8_lossy(&output.stderr);
@@ -220,31 +265,47 @@ fn counted(row: usize, without: bool, n: u32) -> Result<u64, String> {
         .ok_or_else(|| format!("valgrind said no count of instructions but: {text}"))
 }
 
-fn per_unit(row: usize, without: bool) -> Result<f64, String> {
-    let few = if ROWS[row].1 == LONG { 20 } else { 2000 };
+/// Instructions per unit of work; `few` units are enough to leave the start behind.
+fn per_unit(arguments: &[&str], few: u32) -> Result<f64, String> {
     let many = 6 * few;
-    let difference = counted(row, without, many)? - counted(row, without, few)?;
+    let difference = counted(arguments, many)? - counted(arguments, few)?;
     Ok(difference as f64 / f64::from(many - few))
 }
 
 fn table() -> Result<(), String> {
     println!("| shortcut | unit of work | instructions | without it | saved |\n|---|---|---|---|---|");
     for (row, (skip, unit, ..)) in ROWS.iter().enumerate() {
-        let (with, without) = (per_unit(row, false)?, per_unit(row, true)?);
+        let few = if *unit == LONG { 20 } else { 2000 };
+        let cost = |how| per_unit(&[how, &row.to_string()], few);
+        let (with, without) = (cost("with")?, cost("without")?);
         let saved = 100.0 * (1.0 - with / without);
         println!("| {skip} | {unit} | {with:.0} | {without:.0} | {saved:.0} % |");
+    }
+    println!("\n| effect of the cavity | instructions per impact | ideal locks | accepted |\n|---|---|---|---|");
+    let mut ideal = None;
+    for (row, (effect, _, accepted)) in EFFECTS.iter().enumerate() {
+        let cost = per_unit(&["effect", &row.to_string()], 4000)?;
+        let ratio = cost / *ideal.get_or_insert(cost);
+        println!("| {effect} | {cost:.0} | {ratio:.2} | {accepted:.1} |");
+        if ratio > *accepted {
+            return Err(format!(
+                "{effect}: {ratio:.3} ideal locks per impact; accepted are {accepted}"
+            ));
+        }
     }
     Ok(())
 }
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = args().collect();
-    if let [_, run, row, without, n] = &arguments[..]
-        && run == "run"
+    if let [_, what, row, n] = &arguments[..]
+        && let (Ok(row), Ok(n)) = (row.parse::<usize>(), n.parse())
     {
-        let number = |text: &str| text.parse().expect("a number");
-        let (_, _, with, skipless) = ROWS[number(row) as usize];
-        (if without == "true" { skipless } else { with })(number(n));
+        match what.as_str() {
+            "with" => (ROWS[row].2)(n),
+            "without" => (ROWS[row].3)(n),
+            _ => locked_in(EFFECTS[row].1, n),
+        }
         return ExitCode::SUCCESS;
     }
     // `cargo test --benches` only wants to see each run once.
@@ -252,6 +313,9 @@ fn main() -> ExitCode {
         for (_, _, with, without) in ROWS {
             with(100);
             without(100);
+        }
+        for (_, cavity, _) in EFFECTS {
+            locked_in(*cavity, 100);
         }
         return ExitCode::SUCCESS;
     }

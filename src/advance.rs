@@ -2,7 +2,7 @@
 
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::Drive;
-use crate::contact::{Resolution, Wall};
+use crate::contact::{Resolution, Touch, Wall};
 use crate::fast::Next;
 use crate::flight::{Flight, FlightEnd, Grip, until_released};
 use crate::oscillator::Oscillator;
@@ -60,7 +60,7 @@ impl Plant {
         duration: f64,
         on_event: impl FnMut(Event),
     ) -> Result<Outcome, InvalidValue> {
-        if !self.begun {
+        if !self.record.begun {
             check_duration(duration)?;
             self.begin(drive)?;
         }
@@ -78,13 +78,13 @@ impl Plant {
             self.moving.base.drive.omega = drive.omega;
             self.fast.drive_changed(&self.moving.rig.free, &self.moving.base.drive);
         }
-        if self.contact.is_none() && self.fast.step(&mut self.moving, duration) {
-            self.time += duration;
+        if self.record.contact.is_none() && self.fast.step(&mut self.moving, duration) {
+            self.record.time += duration;
             return Ok(Outcome { elapsed: duration, evaluations: 1, ..Outcome::default() });
         }
         check_duration(duration)?;
         let outcome = self.follow(duration, on_event);
-        self.time += outcome.elapsed;
+        self.record.time += outcome.elapsed;
         Ok(outcome)
     }
 
@@ -92,16 +92,17 @@ impl Plant {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn jump(&mut self, drive: &Drive) {
         let before = core::mem::replace(&mut self.moving.base.drive, *drive);
-        let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * self.fast.phasor.1;
+        let jump =
+            (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * self.fast.state.phasor.1;
         let oscillator = &self.moving.rig.free;
         let kick = 2.0 * oscillator.delta * jump;
         if jump != 0.0 {
             self.moving.masses.primary = self.moving.masses.primary.plus([0.0, kick]);
             self.moving.masses.dw += kick;
             // The impulse acts on the primary mass alone; contact is decided anew.
-            self.contact = None;
+            self.record.contact = None;
         }
-        self.fast.contact_free.jump(oscillator, &before, drive, kick);
+        self.fast.state.contact_free.jump(oscillator, &before, drive, kick);
     }
 
     /// Follows the motion from event to event to the end of the step. (A call: most steps do not need it, and its code is long.)
@@ -114,17 +115,15 @@ impl Plant {
             outcome: Outcome::default(),
             on_event,
         };
-        if self.contact.is_none()
+        if self.record.contact.is_none()
             && let Some(wall) = self.wall_touched()
         {
             self.touch(wall, &mut step);
         }
         while step.goes_on() {
             let left = step.left.value();
-            if let Some(contact) = self.contact {
+            if let Some(contact) = self.record.contact {
                 self.stay(contact, left, &mut step);
-            } else if self.moving.rig.forces.holding > 0.0 {
-                self.slide(left, None, &mut step);
             } else {
                 match self.fast.next(&mut self.moving, left, duration) {
                     Next::ContactFree(t) if t == left => step.left = Sum::default(),
@@ -134,6 +133,7 @@ impl Plant {
                         self.touch(wall, &mut step);
                         continue;
                     }
+                    Next::Search(_) if self.moving.rig.forces.holding > 0.0 => self.slide(left, None, &mut step),
                     Next::Search(limit) => self.search(limit, None, &mut step),
                 }
             }
@@ -172,8 +172,8 @@ impl Plant {
             None => self.direction(),
         };
         if direction == 0.0 {
-            self.contact = Some(Contact::Floor);
-            self.totals.sticks += 1;
+            self.record.contact = Some(Contact::Floor);
+            self.record.totals.sticks += 1;
             let t = step.now();
             (step.on_event)(Event::Sticking { t });
             return;
@@ -193,7 +193,7 @@ impl Plant {
             Some(wall) => (wall.sign() * rig.half_width - masses.w.value()) - masses.w.error(),
             None => end.drifted,
         };
-        self.totals.friction += rig.parameters.particle_mass * rig.forces.kinetic * moved.abs();
+        self.record.totals.friction += rig.parameters.particle_mass * rig.forces.kinetic * moved.abs();
         self.fly(&end, pull, step);
         if end.reversed {
             let masses = &mut self.moving.masses;
@@ -209,7 +209,7 @@ impl Plant {
 
     /// Moves on to the wall ahead, if constant forces act and the fast path finds the contact within `limit` seconds.
     fn arrives(&mut self, limit: f64, direction: f64, step: &mut Step<impl FnMut(Event)>) -> bool {
-        if !self.moving.rig.is_forced() {
+        if !self.moving.rig.forces.act() {
             return false;
         }
         let w = self.moving.masses.w;
@@ -218,7 +218,7 @@ impl Plant {
         };
         let rig = &self.moving.rig;
         let moved = (wall.sign() * rig.half_width - w.value()) - w.error();
-        self.totals.friction += rig.parameters.particle_mass * rig.forces.kinetic * moved.abs();
+        self.record.totals.friction += rig.parameters.particle_mass * rig.forces.kinetic * moved.abs();
         step.left = step.left.minus(t);
         self.touch(wall, step);
         true
@@ -279,10 +279,10 @@ impl Plant {
         self.base_moves(stay.t);
         step.left = step.left.plus(-stay.t);
         if wall.is_none() {
-            self.totals.stuck_time += stay.t;
+            self.record.totals.stuck_time += stay.t;
         }
         if let Some(direction) = stay.released {
-            self.contact = None;
+            self.record.contact = None;
             step.outcome.released += 1;
             let (t, left) = (step.now(), step.left.value());
             (step.on_event)(match wall {
@@ -318,9 +318,7 @@ fn refuse_duration(duration: f64) -> Result<(), InvalidValue> {
     InvalidValue::unless(false, name, duration, "s", "a number from 0 to 1e100")
 }
 
-// At a wall
-//
-// The particle at a wall: impact, then rest if it cannot leave.
+// At a wall: impact, then rest if the particle cannot leave.
 
 /// A hop lower than this fraction of the half-width cannot be told from contact in double precision.
 const LOWEST_HOP: f64 = 1.0 / (1u64 << 56) as f64;
@@ -339,31 +337,15 @@ impl Plant {
 
     /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave.
     #[inline]
-    pub(crate) fn touch(&mut self, wall: Wall, step: &mut Step<impl FnMut(Event)>) {
-        let half_width = self.moving.rig.half_width;
-        self.moving.masses.w = Sum::from(wall.sign() * half_width);
-        let resolution = Resolution {
-            lowest_hop: LOWEST_HOP * half_width,
-            longest_chatter: step.left.value(),
-            fastest: self.moving.rig.free.fastest,
-            elastic: !self.moving.rig.varies,
-        };
-        let Masses { primary, particle, dw, .. } = self.moving.masses;
-        let velocities = (primary.values[1], particle, dw);
+    fn touch(&mut self, wall: Wall, step: &mut Step<impl FnMut(Event)>) {
         let rig = &self.moving.rig;
-        let touch = if rig.varies || rig.is_forced() {
-            let law = if rig.varies {
-                let r = rig.rebound.of_impact(wall, dw.abs(), self.totals.impacts);
-                rig.law.with_restitution(r)
-            } else {
-                rig.law
-            };
-            law.touch(wall, velocities, |primary, speed| {
-                self.rests(wall, primary, speed, &resolution)
-            })
+        self.moving.masses.w = Sum::from(wall.sign() * rig.half_width);
+        let left = step.left.value();
+        let touch = if rig.is_real {
+            self.real_touch(wall, left)
         } else {
-            rig.law.touch(wall, velocities, |primary, speed| {
-                let largest = self.acceleration_bound(primary);
+            rig.law.touch(wall, self.velocities(), |primary, speed| {
+                let (largest, resolution) = (self.acceleration_bound(primary), self.resolution(left));
                 !rig.law.certainly_leaves(speed, largest, &resolution)
                     && rig.law.rests(speed, self.pressing(wall, primary), &resolution)
             })
@@ -372,27 +354,56 @@ impl Plant {
         self.moving.masses.particle = touch.particle;
         self.moving.masses.dw = touch.relative;
         let t = step.now();
-        self.totals.add(&touch, self.time + t);
+        self.record.totals.add(&touch, self.record.time + t);
         if let Some(velocity) = touch.impact {
             step.outcome.impacts += 1;
             (step.on_event)(Event::Impact { t, wall, velocity });
         }
         if touch.stuck {
-            self.contact = Some(Contact::Wall(wall));
+            self.record.contact = Some(Contact::Wall(wall));
             step.outcome.stuck += 1;
             (step.on_event)(Event::Stuck { t, wall });
         }
     }
 
-    /// Whether a particle that leaves `wall` at `speed` is in truth at rest on it, with constant forces and a restitution that varies.
-    fn rests(&self, wall: Wall, primary: f64, speed: f64, resolution: &Resolution) -> bool {
-        let rig = &self.moving.rig;
-        let largest = self.acceleration_bound(primary) + rig.forces.joint * rig.forces.size();
-        if rig.law.resting_with(1.0).certainly_leaves(speed, largest, resolution) {
-            return false;
+    /// The same in a cavity with constant forces or a restitution that varies.
+    #[inline(never)]
+    fn real_touch(&self, wall: Wall, left: f64) -> Touch {
+        let (rig, velocities) = (&self.moving.rig, self.velocities());
+        let mut law = rig.law;
+        if rig.varies {
+            law = law.with_restitution((rig.rebound).of_impact(wall, velocities.2.abs(), self.record.totals.impacts));
         }
-        let pressing = self.pressing(wall, primary);
-        (rig.rebound).rests(&rig.law, &rig.forces, (wall, speed), pressing, resolution)
+        let resolution = Resolution { elastic: !rig.varies, ..self.resolution(left) };
+        law.touch(wall, velocities, |primary, speed| {
+            let largest = self.acceleration_bound(primary) + rig.forces.joint * rig.forces.size();
+            !law.resting_with(1.0).certainly_leaves(speed, largest, &resolution)
+                && (rig.rebound).rests(
+                    &law,
+                    &rig.forces,
+                    (wall, speed),
+                    self.pressing(wall, primary),
+                    &resolution,
+                )
+        })
+    }
+
+    /// Velocities of primary mass and particle, and the relative velocity.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn velocities(&self) -> (f64, f64, f64) {
+        let Masses { primary, particle, dw, .. } = &self.moving.masses;
+        (primary.values[1], *particle, *dw)
+    }
+
+    /// What hops can be told from rest, with `left` seconds of the step to come.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn resolution(&self, left: f64) -> Resolution {
+        Resolution {
+            lowest_hop: LOWEST_HOP * self.moving.rig.half_width,
+            longest_chatter: left,
+            fastest: self.moving.rig.free.fastest,
+            elastic: true,
+        }
     }
 
     /// Acceleration of `wall` towards a particle without acceleration while the primary mass moves alone, and its rounding error, m/s².

@@ -5,8 +5,9 @@
 //! Taylor bounds from both ends of a stretch keep the gaps to both walls open. What cannot be verified is left to the plain
 //! solver's search. Results therefore never depend on a guess, only the cost does.
 //!
-//! Everything kept between steps lives in [`Cache`], and each entry carries its key: the time it belongs to and
-//! the frequency of the base. An entry whose key differs is not used; nothing else invalidates it.
+//! [`Predictions`] are state: results depend on them in their last digits, so that they are saved and restored. All else in [`FastPath`]
+//! is the workspace, which may be dropped at any time without changing a bit. One rule makes its entries invalid: an entry is used only
+//! if its keys (a time, a frequency of the base) are the ones asked for; it is computed anew otherwise.
 
 mod flight;
 mod propagator;
@@ -37,36 +38,36 @@ pub(crate) enum Next {
     Search(f64),
 }
 
-/// Predictions, and what they are made from.
+/// What is predicted of the motion, and from what.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct FastPath {
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Predictions {
     pub disabled: bool,
-    /// Whether it serves: it is not disabled, and the particle flies straight.
-    serves: bool,
     /// How long there is no contact from now on.
     pub contact_free: Horizon,
     /// `e^{i phase}` of the base: cosine and sine.
     pub phasor: (f64, f64),
     /// Rotations since it was computed from the phase.
     rotations: u32,
-    coefficients: Coefficients,
-    cache: Cache,
     /// What comes next could not be verified: the plain solver is to search for so long, s.
     to_search: f64,
-    /// Evaluations of the motion in the present step, by the plain solver too.
-    pub evaluations: u64,
+    /// Length of the step that repeats, s; up to date in a saved state.
+    step: f64,
+    /// Length of the last whole step without contact, s.
+    last_duration: f64,
+    sequence: Sequence,
 }
 
-/// What is saved of the fast path: all that results depend on.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct SavedPath {
-    disabled: bool,
-    contact_free: Horizon,
-    phasor: (f64, f64),
-    rotations: u32,
-    to_search: f64,
-    keys: Keys,
+/// The fast path: its state and its workspace.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct FastPath {
+    pub state: Predictions,
+    /// Whether it serves: it is not disabled, and the particle flies straight.
+    serves: bool,
+    coefficients: Coefficients,
+    cache: Cache,
+    /// Evaluations of the motion in the present step, by the plain solver too.
+    pub evaluations: u64,
 }
 
 impl FastPath {
@@ -79,64 +80,48 @@ impl FastPath {
 
     /// Decides whether it serves.
     pub fn choose(&mut self, rig: &Rig) {
-        self.serves = !self.disabled && !rig.is_forced();
+        self.serves = !self.state.disabled && !rig.forces.act();
     }
 
-    /// What is saved of it.
-    pub fn save(&self) -> SavedPath {
-        let Self {
-            disabled,
-            serves: _,
-            contact_free,
-            phasor,
-            rotations,
-            coefficients: _,
-            cache,
-            to_search,
-            evaluations: _,
-        } = *self;
-        SavedPath {
-            disabled,
-            contact_free,
-            phasor,
-            rotations,
-            to_search,
-            keys: cache.keys(),
+    /// Its state.
+    pub fn save(&self) -> Predictions {
+        Predictions { step: self.cache.step.t, ..self.state }
+    }
+
+    /// Takes over a state of the same oscillator. The workspace stays.
+    pub fn restore(&mut self, state: &Predictions, rig: &Rig) {
+        self.state = *state;
+        if self.cache.step.t.to_bits() != state.step.to_bits() {
+            self.cache.step = ShortStep::from(state.step);
         }
-    }
-
-    /// Restores what was saved. What is cached for the same oscillator and keys stays: it has the same bits as if it were computed again.
-    pub fn restore(&mut self, saved: &SavedPath) {
-        let SavedPath { disabled, contact_free, phasor, rotations, to_search, keys } = *saved;
-        (self.disabled, self.contact_free, self.phasor) = (disabled, contact_free, phasor);
-        (self.rotations, self.to_search) = (rotations, to_search);
-        self.cache.restore(&keys);
+        self.choose(rig);
     }
 
     /// The state was changed from outside.
     pub fn state_changed(&mut self, base: &BaseMotion) {
-        self.contact_free = Horizon::default();
+        self.state.contact_free = Horizon::default();
         self.resynchronise(base.phase);
     }
 
     /// The parameters were changed.
     pub fn parameters_changed(&mut self, base: &BaseMotion) {
-        *self = Self { disabled: self.disabled, ..Self::default() };
+        let state = Predictions { disabled: self.state.disabled, ..Predictions::default() };
+        *self = Self { state, ..Self::default() };
         self.state_changed(base);
     }
 
     /// The drive changes.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn drive_changed(&mut self, oscillator: &Oscillator, drive: &Drive) {
-        self.contact_free.drive_changed(oscillator, drive);
+        self.state.contact_free.drive_changed(oscillator, drive);
         self.cache.step.drive_changed(drive);
     }
 
     #[inline(never)]
     fn resynchronise(&mut self, phase: Phase) {
         let (sin, cos) = libm::sincos(phase.radians());
-        self.phasor = (cos, sin);
-        self.rotations = 0;
+        self.state.phasor = (cos, sin);
+        self.state.rotations = 0;
     }
 
     /// Where the motion stands, relative to the line that follows the base signal.
@@ -144,7 +129,7 @@ impl FastPath {
     fn point(&self, moving: &Moving) -> Point {
         let [offset, slope, ..] = moving.base.drive.signal;
         let [x, v] = moving.masses.primary.values;
-        Point { y: x - offset, dy: v - slope, phasor: self.phasor }
+        Point { y: x - offset, dy: v - slope, phasor: self.state.phasor }
     }
 
     /// Takes a step whose propagator is cached, if it meets no contact. Returns whether it was taken.
@@ -157,7 +142,7 @@ impl FastPath {
             let late = duration - self.cache.step.t;
             return self.cache.step.serves(&moving.base.drive, late) && self.late_step(moving, duration, late);
         }
-        let free = duration < self.contact_free.t || self.is_contact_free(moving, duration);
+        let free = duration < self.state.contact_free.t || self.is_contact_free(moving, duration);
         if free {
             self.take_step(moving, 0.0);
         }
@@ -167,7 +152,7 @@ impl FastPath {
     /// The same for a step that is a little longer or shorter than the cached one.
     #[inline(never)]
     fn late_step(&mut self, moving: &mut Moving, duration: f64, late: f64) -> bool {
-        let free = duration < self.contact_free.t || self.is_contact_free(moving, duration);
+        let free = duration < self.state.contact_free.t || self.is_contact_free(moving, duration);
         if free {
             self.take_step(moving, late);
         }
@@ -206,9 +191,9 @@ impl FastPath {
         masses.primary = masses.primary.plus([dx, increment.dy]);
         masses.dw += increment.dy;
         base.phase = base.phase.rotated(angle);
-        self.phasor = increment.phasor;
-        self.rotations += 1;
-        if self.rotations >= ROTATIONS {
+        self.state.phasor = increment.phasor;
+        self.state.rotations += 1;
+        if self.state.rotations >= ROTATIONS {
             self.resynchronise(base.phase);
         }
         dx
@@ -219,14 +204,14 @@ impl FastPath {
     fn drift(&mut self, moving: &mut Moving, dx: f64, t: f64) {
         let Moving { rig, masses, .. } = moving;
         masses.drift(dx - masses.particle * t, rig.half_width);
-        self.contact_free.t -= t;
+        self.state.contact_free.t -= t;
     }
 
     /// Whether a bound from the start alone shows that no wall is met within `t`; it may reach further.
     #[inline(never)]
     fn is_contact_free(&mut self, moving: &Moving, t: f64) -> bool {
-        self.contact_free = Horizon::ahead(moving, &self.point(moving), t);
-        self.contact_free.t >= t
+        self.state.contact_free = Horizon::ahead(moving, &self.point(moving), t);
+        self.state.contact_free.t >= t
     }
 
     /// Moves on by `t` seconds, in which no wall is met; `duration` is the length of the whole step.
@@ -234,23 +219,23 @@ impl FastPath {
         let (oscillator, drive) = (&moving.rig.free, moving.base.drive);
         let fastest = oscillator.fastest.max(drive.omega.abs());
         self.evaluations += 1;
-        if t == duration && self.cache.repeats(oscillator, &drive, duration) {
+        if t == duration && self.repeats(oscillator, &drive, duration) {
             self.take_step(moving, duration - self.cache.step.t);
             return Next::ContactFree(t);
         }
         let increment = if !drive.is_straight() || drive.omega < 0.0 || t * fastest > LONGEST_COAST {
-            self.rotations = ROTATIONS;
+            self.state.rotations = ROTATIONS;
             let motion = Segment::new(oscillator, moving.base, moving.masses.primary.values.into());
             let there = motion.at(&motion.series(), t);
             Increment {
                 y: there.moved - drive.signal[1] * t,
                 dy: there.departure.1,
-                phasor: self.phasor,
+                phasor: self.state.phasor,
             }
         } else {
             self.coefficients.prepare(oscillator, drive.omega);
             if t * fastest > propagator::LONGEST {
-                self.cache.learn(&self.coefficients, t);
+                self.state.sequence.learn(&self.coefficients, t);
             }
             self.after(&Start::new(moving, *start), t)
         };
@@ -258,126 +243,103 @@ impl FastPath {
         self.drift(moving, dx, t);
         Next::ContactFree(t)
     }
+
+    /// Whether a whole step without contact can be taken with the cached one: it is short, and has been taken before.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn repeats(&mut self, oscillator: &Oscillator, drive: &Drive, duration: f64) -> bool {
+        if self.cache.step.serves(drive, duration - self.cache.step.t) {
+            return true;
+        }
+        let again = (duration - self.state.last_duration).abs() <= SAME * duration;
+        self.state.last_duration = duration;
+        if again && ShortStep::is_short(oscillator, drive.omega, duration) {
+            self.cache.step = ShortStep::from(duration);
+        }
+        duration == self.cache.step.t
+    }
 }
 
-// Cache
-//
-// What is kept between steps. Each entry is used only if its key matches.
+// Workspace: propagators, which are computed again where they are missing.
 
-/// Flights kept: a motion of so many different flights per period, or flights and parts of them, is predicted.
+/// Number of flights in the cache. A motion with at most this many distinct flights per period is predicted.
 const FLIGHTS: usize = 8;
 
-/// Propagators. What is saved of one is its key.
+/// The propagators.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cache {
     /// Of a step that repeats.
     step: ShortStep,
-    /// Of flights, and of what is left of a step after one. Until it is needed a propagator has only its key.
+    /// Of flights, and of what is left of a step after one.
     flights: [Propagator; FLIGHTS],
-    sequence: Sequence,
     /// Of points of a march.
     grid: Grid,
-    /// Length of the last whole step without contact, s.
-    last_duration: f64,
 }
 
 /// Which flight follows which.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Sequence {
+    /// How long they last, s; 0 for none.
+    times: [f64; FLIGHTS],
     /// Which followed which when they were last used.
     followers: [u8; FLIGHTS],
     last: u8,
+    /// The follower of the last one, and its time, s.
+    next: u8,
+    next_time: f64,
     /// Whether the last one was the follower of the one before.
     regular: bool,
     /// The one to be replaced next.
     oldest: u8,
 }
 
-/// What is saved of the propagators: the times they belong to, s. All else is computed again when it is needed.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Keys {
-    step: f64,
-    flights: [f64; FLIGHTS],
-    sequence: Sequence,
-    last_duration: f64,
+impl Sequence {
+    /// A flight to a contact, or what was left of a step, took `t` seconds.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn learn(&mut self, coefficients: &Coefficients, t: f64) {
+        // Nearer than an unused time, which is 0.
+        let near = coefficients.near.min(t);
+        self.regular = (self.next_time - t).abs() < near;
+        if !self.regular {
+            self.next = (self.times.iter().position(|time| (time - t).abs() < near)).map_or_else(
+                || {
+                    self.oldest = (self.oldest + 1) % FLIGHTS as u8;
+                    self.times[usize::from(self.oldest)] = t;
+                    self.oldest
+                },
+                |n| n as u8,
+            );
+            self.followers[usize::from(self.last) % FLIGHTS] = self.next;
+        }
+        self.last = self.next;
+        self.next = self.followers[usize::from(self.last) % FLIGHTS];
+        self.next_time = self.times[usize::from(self.next) % FLIGHTS];
+    }
 }
 
 impl Cache {
-    fn keys(&self) -> Keys {
-        let Self { step, flights, sequence, grid: _, last_duration } = self;
-        Keys {
-            step: step.t,
-            flights: flights.map(|flight| flight.t),
-            sequence: *sequence,
-            last_duration: *last_duration,
-        }
-    }
-
-    /// Makes these the keys. Propagators that have theirs already stay.
-    fn restore(&mut self, keys: &Keys) {
-        if self.step.t.to_bits() != keys.step.to_bits() {
-            self.step = ShortStep::from(keys.step);
-        }
-        for (flight, t) in self.flights.iter_mut().zip(keys.flights) {
-            if flight.t != t {
-                flight.reset(t);
-            }
-        }
-        (self.sequence, self.last_duration) = (keys.sequence, keys.last_duration);
-    }
-
-    /// Whether a whole step without contact can be taken with [`Self::step`]: it is short, and has been taken before.
+    /// The propagator of the flight that followed the last one before, if flights have been regular.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    fn repeats(&mut self, oscillator: &Oscillator, drive: &Drive, duration: f64) -> bool {
-        if self.step.serves(drive, duration - self.step.t) {
-            return true;
-        }
-        let again = (duration - self.last_duration).abs() <= SAME * duration;
-        self.last_duration = duration;
-        if again && ShortStep::is_short(oscillator, drive.omega, duration) {
-            self.step = ShortStep::from(duration);
-        }
-        duration == self.step.t
-    }
-
-    /// The propagator that followed the last one before, if flights have been regular.
-    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    fn expected(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) -> Option<&Propagator> {
-        let Sequence { followers, last, regular, .. } = self.sequence;
-        if !regular {
+    fn expected(
+        &mut self,
+        sequence: &Sequence,
+        oscillator: &Oscillator,
+        coefficients: &Coefficients,
+    ) -> Option<&Propagator> {
+        if !sequence.regular {
             return None;
         }
-        let propagator = &mut self.flights[usize::from(followers[usize::from(last)]) % FLIGHTS];
-        if propagator.omega != coefficients.omega {
-            if propagator.free_t != propagator.t {
-                let increment = self.grid.increment(oscillator, coefficients.spacing, propagator.t);
-                propagator.set(propagator.t, oscillator.split(&increment));
+        let (propagator, t) = (
+            &mut self.flights[usize::from(sequence.next) % FLIGHTS],
+            sequence.next_time,
+        );
+        if propagator.omega != coefficients.omega || propagator.t != t {
+            if propagator.t != t {
+                let increment = self.grid.increment(oscillator, coefficients.spacing, t);
+                propagator.set(t, oscillator.split(&increment));
             }
             propagator.respond(oscillator, coefficients);
         }
         Some(propagator)
-    }
-
-    /// A flight to a contact, or what was left of a step, took `t` seconds.
-    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    fn learn(&mut self, coefficients: &Coefficients, t: f64) {
-        // Nearer than an unused propagator, which has a time of 0.
-        let is_near = |n: u8| (self.flights[usize::from(n) % FLIGHTS].t - t).abs() < coefficients.near.min(t);
-        let sequence = &mut self.sequence;
-        let expected = sequence.followers[usize::from(sequence.last)];
-        sequence.regular = is_near(expected);
-        let n = if sequence.regular {
-            expected
-        } else {
-            (0..FLIGHTS as u8).find(|&n| is_near(n)).unwrap_or_else(|| {
-                sequence.oldest = (sequence.oldest + 1) % FLIGHTS as u8;
-                self.flights[usize::from(sequence.oldest)].reset(t);
-                sequence.oldest
-            })
-        };
-        sequence.followers[usize::from(sequence.last)] = n;
-        sequence.last = n;
     }
 }

@@ -204,9 +204,7 @@ impl Bounds for Sliding<'_> {
     }
 }
 
-// Sticking and resting
-//
-// Both masses move as one while wall and friction can transmit the force that this needs, and part at the instant they cannot.
+// Sticking and resting: both masses move as one while wall and friction can transmit the force that this needs, and part at the instant they cannot.
 
 /// How a stretch of sticking or resting ended.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -166,9 +166,7 @@ impl Oscillator {
     }
 }
 
-// A constant or growing force on an overdamped oscillator
-//
-// What a steady push does to an oscillator that is overdamped, from rest.
+// A constant or growing force on an overdamped oscillator, from rest
 //
 // `x'' + 2 delta x' + omega0² x = 1` and `= t`: the integrals of `(e^{slow t} - e^{fast t})/(slow - fast)`, once and twice.
 // With damping far above critical the position at which such a motion comes to rest at last lies far off, and taking it off
@@ -206,9 +204,7 @@ fn integrals(rate: f64, t: f64) -> (f64, f64) {
     }
 }
 
-// The free motion in double-double arithmetic
-//
-// What the free motion adds, in double-double arithmetic: for a propagator that is used many times.
+// The free motion in double-double arithmetic, for a propagator that is used many times
 
 /// `1/n!` with its rounding error.
 const PER_FACTORIAL: [(f64, f64); 18] = {

@@ -7,7 +7,7 @@ use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::{BaseMotion, Drive};
 use crate::cavity::{Forces, Rebound};
 use crate::contact::{ImpactLaw, Touch, Wall};
-use crate::fast::{FastPath, SavedPath};
+use crate::fast::{FastPath, Predictions};
 use crate::oscillator::Oscillator;
 use crate::parameters::{InvalidValue, Parameters};
 
@@ -16,7 +16,8 @@ pub const MOST_IMPACTS: u64 = 10_000_000;
 /// Largest number of evaluations of the motion per step: bounds the work of any input. [`MOST_IMPACTS`] impacts need fewer.
 pub const MOST_EVALUATIONS: u64 = 500_000_000;
 
-/// The plant: parameters, what follows from them, and the state.
+/// The plant. Its coefficients follow from the parameters; its state is what [`Plant::save`] saves, 0.6 kB; the rest of its 8 kB is a
+/// workspace.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(
     feature = "serde",
@@ -25,13 +26,20 @@ pub const MOST_EVALUATIONS: u64 = 500_000_000;
 )]
 pub struct Plant {
     pub(crate) moving: Moving,
-    /// What the particle is at rest on.
-    pub(crate) contact: Option<Contact>,
-    /// Whether the base has a position: the first drive sets it, later ones may make it jump.
-    pub(crate) begun: bool,
-    pub(crate) time: f64,
-    pub(crate) totals: Totals,
+    pub(crate) record: Record,
     pub(crate) fast: FastPath,
+}
+
+/// State beside what moves.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Record {
+    /// What the particle is at rest on.
+    pub contact: Option<Contact>,
+    /// Whether the base has a position: the first drive sets it, later ones may make it jump.
+    pub begun: bool,
+    pub time: f64,
+    pub totals: Totals,
 }
 
 impl Plant {
@@ -48,10 +56,7 @@ impl Plant {
                 masses: masses(&rig, start)?,
                 base: BaseMotion::default(),
             },
-            contact: None,
-            begun: false,
-            time: 0.0,
-            totals: Totals::default(),
+            record: Record::default(),
             fast: FastPath::new(&rig),
         })
     }
@@ -62,7 +67,7 @@ impl Plant {
     /// A state that is not finite, a particle outside its cavity; the plant stays as it is.
     pub fn set_state(&mut self, state: State) -> Result<(), InvalidValue> {
         self.moving.masses = masses(&self.moving.rig, state)?;
-        self.contact = None;
+        self.record.contact = None;
         self.fast.state_changed(&self.moving.base);
         Ok(())
     }
@@ -74,7 +79,7 @@ impl Plant {
     pub fn begin(&mut self, drive: Drive) -> Result<(), InvalidValue> {
         drive.validate()?;
         self.moving.base.drive = drive;
-        self.begun = true;
+        self.record.begun = true;
         self.fast.state_changed(&self.moving.base);
         Ok(())
     }
@@ -82,7 +87,7 @@ impl Plant {
     /// Switches the fast path on (default) or off. Without it every contact is found by the plain solver's certified search:
     /// the test oracle of the fast path.
     pub fn set_fast_path(&mut self, on: bool) {
-        self.fast.disabled = !on;
+        self.fast.state.disabled = !on;
         self.fast.choose(&self.moving.rig);
     }
 
@@ -106,12 +111,12 @@ impl Plant {
 
     /// Time since the start, s, or as [`Self::set_time`] set it. Only impact times depend on it.
     pub fn time(&self) -> f64 {
-        self.time
+        self.record.time
     }
 
     /// Sets the clock, s: impact times refer to it.
     pub fn set_time(&mut self, time: f64) {
-        self.time = time;
+        self.record.time = time;
     }
 
     /// Positions and velocities now.
@@ -155,29 +160,33 @@ impl Plant {
     /// Displacement of the base now, m.
     #[inline]
     pub fn base_displacement(&self) -> f64 {
-        self.moving.base.drive.signal[0] + self.moving.base.drive.amplitude * self.fast.phasor.1
+        self.moving.base.drive.signal[0] + self.moving.base.drive.amplitude * self.fast.state.phasor.1
     }
 
     /// The wall the particle is stuck to, if it is.
     pub fn contact(&self) -> Option<Wall> {
-        self.contact.and_then(Contact::wall)
+        self.record.contact.and_then(Contact::wall)
     }
 
     /// Whether the particle sticks to the floor inside the cavity.
     pub fn sticks(&self) -> bool {
-        self.contact == Some(Contact::Floor)
+        self.record.contact == Some(Contact::Floor)
     }
 
     /// Constant accelerations of the particle now, m/s²: by gravity along the axis, and by kinetic friction while it slides.
     pub fn constant_accelerations(&self) -> (f64, f64) {
         let forces = &self.moving.rig.forces;
-        let direction = if self.contact.is_some() { 0.0 } else { self.direction() };
+        let direction = if self.record.contact.is_some() {
+            0.0
+        } else {
+            self.direction()
+        };
         (forces.gravity, forces.kinetic * direction)
     }
 
     /// Totals since the start.
     pub fn totals(&self) -> &Totals {
-        &self.totals
+        &self.record.totals
     }
 
     /// Mechanical energy, J: of both masses' motion, of the spring between the primary mass and a base at `displacement`, m, and of the
@@ -216,9 +225,7 @@ fn masses(rig: &Rig, start: State) -> Result<Masses, InvalidValue> {
     })
 }
 
-// State
-//
-// What moves: the rig, its two masses, and its base.
+// Coefficients and state
 
 /// The parameters and what follows from them.
 #[derive(Clone, Copy, Debug)]
@@ -235,6 +242,8 @@ pub(crate) struct Rig {
     pub rebound: Rebound,
     pub varies: bool,
     pub forces: Forces,
+    /// Whether it varies or forces act.
+    pub is_real: bool,
     /// The primary mass while the particle is free, and both masses while it is stuck.
     pub free: Oscillator,
     pub stuck: Oscillator,
@@ -243,13 +252,15 @@ pub(crate) struct Rig {
 impl From<Parameters> for Rig {
     fn from(p: Parameters) -> Self {
         let total = p.primary_mass + p.particle_mass;
-        let ([plus, minus], rebound) = (p.gaps(), Rebound::new(&p));
+        let ([plus, minus], rebound, forces) = (p.gaps(), Rebound::new(&p), Forces::new(&p));
+        let varies = !rebound.is_constant(p.restitution);
         Self {
             half_width: 0.5 * plus + 0.5 * minus,
             middle: 0.5 * (plus - minus),
-            varies: !rebound.is_constant(p.restitution),
+            varies,
             rebound,
-            forces: Forces::new(&p),
+            forces,
+            is_real: varies || forces.act(),
             parameters: p,
             mass_ratio: p.mass_ratio(),
             law: ImpactLaw::new(&p),
@@ -260,11 +271,6 @@ impl From<Parameters> for Rig {
 }
 
 impl Rig {
-    /// Whether constant forces act: then the particle does not fly straight.
-    pub fn is_forced(&self) -> bool {
-        self.forces.act()
-    }
-
     /// Acceleration of the particle by kinetic friction while `w'` has the sign `direction`, m/s².
     pub fn friction(&self, direction: f64) -> f64 {
         self.forces.kinetic * direction
@@ -340,9 +346,7 @@ pub(crate) struct Moving {
     pub base: BaseMotion,
 }
 
-// Events and totals
-//
-// What a plant tells: state, events, totals.
+// What a plant tells: state, events, totals
 
 /// Positions (m) and velocities (m/s) of both masses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -470,71 +474,38 @@ impl Totals {
 }
 
 // Saving
-//
-// A plant without what can be computed again.
 
-/// A plant without what can be computed again: 0.4 kB instead of 8. The motion continues with the same bits.
+/// The state of a plant and its parameters. The motion continues with the same bits, whatever workspace it continues in.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Saved {
     parameters: Parameters,
     masses: Masses,
     base: BaseMotion,
-    contact: Option<Contact>,
-    begun: bool,
-    time: f64,
-    totals: Totals,
-    fast: SavedPath,
+    record: Record,
+    fast: Predictions,
 }
 
 impl Plant {
     /// The plant without what can be computed again.
     pub fn save(&self) -> Saved {
-        let Self {
-            moving: Moving { rig, masses, base },
-            contact,
-            begun,
-            time,
-            totals,
-            fast,
-        } = *self;
-        let parameters = rig.parameters;
-        Saved {
-            parameters,
-            masses,
-            base,
-            contact,
-            begun,
-            time,
-            totals,
-            fast: fast.save(),
-        }
+        let Moving { rig, masses, base } = self.moving;
+        let (parameters, fast) = (rig.parameters, self.fast.save());
+        Saved { parameters, masses, base, record: self.record, fast }
     }
 
     /// Makes this plant the one that was saved. One plant can take the place of many in turn: what it has computed for the last one is
     /// used again as far as it serves.
     pub fn restore(&mut self, saved: &Saved) {
-        let Saved {
-            parameters,
-            masses,
-            base,
-            contact,
-            begun,
-            time,
-            totals,
-            ref fast,
-        } = *saved;
-        if self.moving.rig.parameters != parameters {
-            let rig = Rig::from(parameters);
+        if self.moving.rig.parameters != saved.parameters {
+            let rig = Rig::from(saved.parameters);
             if self.moving.rig.free != rig.free {
                 self.fast = FastPath::default();
             }
             self.moving.rig = rig;
         }
-        (self.moving.masses, self.moving.base, self.contact) = (masses, base, contact);
-        (self.begun, self.time, self.totals) = (begun, time, totals);
-        self.fast.restore(fast);
-        self.fast.choose(&self.moving.rig);
+        (self.moving.masses, self.moving.base, self.record) = (saved.masses, saved.base, saved.record);
+        self.fast.restore(&saved.fast, &self.moving.rig);
     }
 }
 
@@ -546,28 +517,11 @@ impl From<Plant> for Saved {
 
 impl From<&Saved> for Plant {
     fn from(saved: &Saved) -> Self {
-        let Saved {
-            parameters,
-            masses,
-            base,
-            contact,
-            begun,
-            time,
-            totals,
-            ref fast,
-        } = *saved;
-        let rig = Rig::from(parameters);
-        let mut path = FastPath::default();
-        path.restore(fast);
-        path.choose(&rig);
-        Self {
-            moving: Moving { rig, masses, base },
-            contact,
-            begun,
-            time,
-            totals,
-            fast: path,
-        }
+        let rig = Rig::from(saved.parameters);
+        let mut fast = FastPath::default();
+        fast.restore(&saved.fast, &rig);
+        let Saved { masses, base, record, .. } = *saved;
+        Self { moving: Moving { rig, masses, base }, record, fast }
     }
 }
 

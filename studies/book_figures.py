@@ -121,15 +121,15 @@ def cavities():
     scenes = {
         "rough": ("friction, mu = 0.05", MEASURED, "o"),
         "skewed": ("gaps 1.1 : 0.9", COLOURS["symmetric 1:1"], "s"),
-        "vertical": ("vertical, gravity 0.08 b omega0²", "#009e73", "^"),
-        "viscoelastic": ("viscoelastic, r falls with the speed", "#cc79a7", "D"),
+        "vertical": ("vertical", "#009e73", "^"),
+        "viscoelastic": ("viscoelastic", "#cc79a7", "D"),
     }
     figure, both = plt.subplots(1, 2, figsize=(7.5, 4), layout="constrained", sharey=True)
-    ideal = [point for point in printed("orbit", "--backbone")["points"] if point["B"] < 1.3]
+    orbits = printed("orbit", "--backbone")["points"]
+    fold = min(orbits, key=lambda point: point["C"])["B"]
+    ideal = [point for point in orbits if fold <= point["B"] < 1.3]
     for axes, name in zip(both, ("sigma", "G"), strict=True):
-        axes.plot(
-            [p[name] for p in ideal], [p["C"] for p in ideal], color="black", lw=1, label="ideal cavity, exact orbits"
-        )
+        axes.plot([p[name] for p in ideal], [p["C"] for p in ideal], color="black", lw=1, label="ideal (exact orbits)")
     for name, (label, colour, mark) in scenes.items():
         with tempfile.TemporaryDirectory() as folder:
             points = printed("backbone", "--scene", f"scenes/{name}.toml", "--out", folder)["points"]
@@ -138,8 +138,8 @@ def cavities():
             place = [p[key] for p in points], [p["C"] for p in points]
             axes.plot(*place, mark, color=colour, mfc="none", ms=4, lw=0, label=label)
     both[0].set(xlabel="detuning sigma", ylabel="amplitude of the response C", xlim=(-2.2, 0.4), ylim=(0, 0.75))
-    both[1].set(xlabel="base amplitude G", xlim=(0.8, 1.6))
-    both[1].legend(frameon=False, loc="lower right", fontsize=8)
+    both[1].set(xlabel="base amplitude G", xlim=(0.8, 1.7))
+    both[1].legend(frameon=False, loc="lower right")
     save(figure, "cavities.svg")
 
 

@@ -1,9 +1,9 @@
 //! Are tracked points right on rigs with effects that no part of the bench models?
 //!
-//! The rig is a simulation of its own (Runge-Kutta of the fourth order, impacts located by bisection) with one effect at a time, or all of
-//! them: friction of the particle, unequal gaps, tilt, a restitution that falls with the speed, a shaker that lags and distorts, and a
-//! structure whose spring hardens. The client has the scene of the ideal rig, and reads its sensors only. The truth is the periodic motion of
-//! the same simulation at phase resonance and the measured amplitude, by Newton's method. Rigs are drawn as in `off_scene.rs`.
+//! The rig has one effect at a time, or all of a real cavity: friction of the particle, unequal gaps, tilt and a restitution that falls with the
+//! speed, which the plant has; a shaker that lags and distorts, and a structure whose spring hardens, which are simulated here (Runge-Kutta of
+//! the fourth order, impacts located by bisection). The client has the scene of the ideal rig, and reads its sensors only. The truth is the
+//! periodic motion of the same rig at phase resonance and the measured amplitude, by Newton's method. Rigs are drawn as in `off_scene.rs`.
 //!
 //! ```sh
 //! cargo run --release -p vines-testbench --example unmodelled -- RIGS SEED SNR    # SNR: dB, or none; writes validation/unmodelled.csv
@@ -14,50 +14,68 @@ mod common;
 use std::f64::consts::TAU;
 
 use common::{Failure, Found, STATISTICS, arguments, largest_stable, quantile, scene, statistics, uniform, write};
+use lovines::{Cavity, Parameters, Restitution, cavity::GRAVITY};
 use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 use vines_model::{
     Dimensionless,
-    orbit::{ContinuationLimits, Periodic, backbone},
+    orbit::{ContinuationLimits, Periodic, backbone, resonant_motion},
 };
 use vines_testbench::{
     advice,
     backbone::{LevelPoint, track},
     comparison::ExactCurve,
     identification::Regime,
-    rig::{BuiltIn, Chain, Drive, Rig, RigError, Sensors},
+    rig::{BuiltIn, Chain, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated},
     scene::LinearResponse,
 };
 
-/// Names of the effects; the last one is all of them.
+/// Names of the effects; "real cavity" is all of the first four.
 const EFFECTS: [&str; 7] = [
     "friction",
     "unequal gaps",
     "tilt",
     "r of the speed",
+    "real cavity",
     "shaker",
     "hardening spring",
-    "all",
 ];
-/// Largest sizes of the effects: friction and tilt over `b omega0²` (0.05 and 3 degrees on the default rig), half of the difference of the
-/// gaps over b, share of `(1 - r) |v|^(1/5)`, lag of the base, rad, and share of its harmonics, and the cubic part of the spring at b.
+/// Number of effects of the cavity.
+const CAVITY: usize = 4;
+/// Largest sizes: friction and tilt over `b omega0²` (0.05 and 3 degrees on the default rig), half of the difference of the gaps over b, a switch
+/// (r = 1 - k |v|^(1/5), with the r of the scene at the relative speed 2, the usual one of a 1:1 motion); lag of the base, rad, and share of its
+/// harmonics, and the cubic part of the spring at b.
 const SIZES: [f64; 6] = [0.015, 0.05, 0.015, 1.0, 0.05, 0.003];
 /// Steps of the simulation per period of the base, about.
 const STEPS: f64 = 400.0;
 /// Shortest time between two impacts, over 1/omega0.
 const CHATTER: f64 = 1e-5;
-/// Speed below which friction falls to zero, over `b omega0`.
-const SMOOTH: f64 = 1e-3;
 
 /// (q1, q1', q2, q2'), with M = k = b = 1.
 type State = [f64; 4];
 
-/// A rig with effects.
+/// The plant with effects of the cavity, in the units of [`SIZES`].
+fn real_cavity(scene: &Dimensionless, [friction, gaps, tilt, speed]: [f64; CAVITY]) -> Parameters {
+    let viscoelastic = Restitution::Viscoelastic((1.0 - scene.r) / 2_f64.powf(0.2));
+    let cavity = Cavity {
+        b_plus: Some(1.0 + gaps),
+        b_minus: Some(1.0 - gaps),
+        // Gravity is 9.8 b omega0² here.
+        tilt: (tilt / GRAVITY).asin(),
+        kinetic_friction: friction / GRAVITY,
+        restitution: [(speed != 0.0).then_some(viscoelastic); 2],
+        ..Cavity::IDEAL
+    };
+    let ideal = Parameters::dimensionless(scene.epsilon, scene.lambda, scene.r);
+    Parameters { cavity, ..ideal }
+}
+
+/// A rig with another shaker and another spring.
 #[derive(Clone, Copy)]
 struct Imperfect {
     scene: Dimensionless,
-    /// In the units of [`SIZES`].
-    effects: [f64; 6],
+    /// Of the shaker and of the spring, in the units of [`SIZES`].
+    effects: [f64; 2],
     state: State,
     /// Phase of the command, rad.
     phase: f64,
@@ -67,7 +85,7 @@ struct Imperfect {
 impl Imperfect {
     /// Displacement and velocity of the base at a phase of the command.
     fn base(&self, phase: f64) -> [f64; 2] {
-        let (lag, Drive { omega, amplitude, .. }) = (self.effects[4], self.drive);
+        let (lag, Drive { omega, amplitude, .. }) = (self.effects[0], self.drive);
         let parts = [(1.0, 1.0), (2.0, 0.5 * lag), (3.0, 0.5 * lag)].map(|(n, share)| {
             let (sine, cosine) = (n * (phase - lag)).sin_cos();
             [share * sine, n * omega * share * cosine]
@@ -76,14 +94,10 @@ impl Imperfect {
     }
 
     fn derivative(&self, [q1, dq1, _, dq2]: State, phase: f64) -> State {
-        let [friction, _, tilt, _, _, cubic] = self.effects;
         let Dimensionless { epsilon, lambda, .. } = self.scene;
         let [e, de] = self.base(phase);
-        let force = friction * ((dq1 - dq2) / SMOOTH).tanh();
-        let spring = (q1 - e) + cubic * (q1 - e).powi(3);
-        let damper = epsilon * lambda * (dq1 - de);
-        // The static deflection by tilt is not part of q1.
-        [dq1, -spring - damper - epsilon * force, dq2, force + tilt]
+        let spring = (q1 - e) + self.effects[1] * (q1 - e).powi(3);
+        [dq1, -spring - epsilon * lambda * (dq1 - de), dq2, 0.0]
     }
 
     fn step(&self, state: State, phase: f64, h: f64) -> State {
@@ -98,17 +112,12 @@ impl Imperfect {
 
     /// How far the particle is inside the wall that it moves to; above 0 behind it.
     fn depth(&self, [q1, dq1, q2, dq2]: State) -> f64 {
-        let (w, wall) = (q1 - q2, (dq1 - dq2).signum());
-        wall * w - (1.0 + wall * self.effects[1])
+        (dq1 - dq2).signum() * (q1 - q2) - 1.0
     }
 
     fn rebound(&self, [q1, dq1, q2, dq2]: State) -> State {
         let Dimensionless { epsilon, r, .. } = self.scene;
-        let speed = dq1 - dq2;
-        // The usual speed of a 1:1 motion is about 2.
-        let share = (0.5 * speed.abs()).powf(0.2) - 1.0;
-        let r = (r - self.effects[3] * (1.0 - r) * share).clamp(0.05, 1.0);
-        let kick = (1.0 + r) * speed / (1.0 + epsilon);
+        let kick = (1.0 + r) * (dq1 - dq2) / (1.0 + epsilon);
         [q1, dq1 - epsilon * kick, q2, dq2 + kick]
     }
 
@@ -245,14 +254,30 @@ fn run(d: Dimensionless, effects: [f64; 6], snr: &str, noise: u64) -> Result<Fou
     let mut scene = scene("[plant]\n[start]\n[excitation]\n", &settings)?;
     // As a loop check measures it.
     scene.measured = Some(LinearResponse::of(&scene));
-    let rig = Imperfect {
+    let [friction, gaps, tilt, speed, shaker, spring] = effects;
+    let parameters = real_cavity(&d, [friction, gaps, tilt, speed]);
+    let imperfect = Imperfect {
         scene: d,
-        effects,
+        effects: [shaker, spring],
         state: [0.0, 0.0, 0.0, 0.9],
         phase: 0.0,
         drive: Drive { omega: 1.0, ..Drive::default() },
     };
-    let mut chain = Chain::around(Box::new(rig), &scene);
+    let is_simulated_here = imperfect.effects != [0.0; 2];
+    let rig: Box<dyn Rig> = if is_simulated_here {
+        Box::new(imperfect)
+    } else {
+        let start = lovines::State { dq2: 0.9, ..Default::default() };
+        Box::new(SensorsOnly::around(Box::new(Simulated::new(parameters, start)?)))
+    };
+    let truth = |c: f64, sigma: f64| {
+        if is_simulated_here {
+            return imperfect.truth(&orbits, c, sigma);
+        }
+        let motion = resonant_motion(&parameters, d.definition, c, None).ok()?;
+        Some([d.sigma(motion.omega), d.excitation(motion.amplitude)])
+    };
+    let mut chain = Chain::around(rig, &scene);
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let tracked = track(chain.as_mut(), &mut controller, &scene, |_, _| {})?;
     let is_backbone = |regime| matches!(regime, Regime::Symmetric | Regime::Unresolved);
@@ -260,7 +285,7 @@ fn run(d: Dimensionless, effects: [f64; 6], snr: &str, noise: u64) -> Result<Fou
     let (mut found, mut settled, mut without) = (Found::default(), 0, 0);
     for LevelPoint { at, .. } in tracked.points.iter().filter(kept) {
         settled += 1;
-        let Some([sigma, g]) = rig.truth(&orbits, at.c, at.sigma) else {
+        let Some([sigma, g]) = truth(at.c, at.sigma) else {
             without += 1;
             continue;
         };
@@ -287,10 +312,15 @@ fn main() -> Result<(), Failure> {
             .map(|noise| {
                 let epsilon = uniform(1e-3_f64.ln(), 0.02_f64.ln()).exp();
                 let d = Dimensionless::new(epsilon, uniform(0.7, 2.5), uniform(0.5, 0.8), 0.0);
-                let effects: [f64; 6] = std::array::from_fn(|m| {
+                let effects = std::array::from_fn(|m| {
                     let lowest = if [0, 3].contains(&m) { 0.0 } else { -SIZES[m] };
                     let size = uniform(lowest, SIZES[m]);
-                    if n == m || n == SIZES.len() { size } else { 0.0 }
+                    let is_on = match n {
+                        CAVITY => m < CAVITY,
+                        n if n < CAVITY => m == n,
+                        n => m == n - 1,
+                    };
+                    if is_on { size } else { 0.0 }
                 });
                 (d, effects, noise)
             })

@@ -1,4 +1,4 @@
-//! A component that panics and refuses at every opportunity, and a logger that calls back. Its table is written by hand.
+//! Guards the shell against a component that panics and refuses at every opportunity, and a logger that calls back. Its table is written by hand.
 
 use std::ffi::c_void;
 use std::ptr::null_mut;

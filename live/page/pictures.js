@@ -197,9 +197,9 @@ export class Pictures {
     const begin = motion[0].time;
     const column = (key) => motion.map((one) => [one.time, one[key]]);
     scope.begin([begin, Math.max(motion.at(-1).time, begin + (2 * Math.PI) / status.omega0)], [-top, top]);
-    scope.line(column("base"), "blue", { label: "base/(ε b)" });
+    scope.line(column("base"), "base", { label: "base/(ε b)" });
     scope.line(column("v"), "ink", { label: "response v" });
-    scope.line(column("w"), "red", { label: "relative w" });
+    scope.line(column("w"), "particle", { label: "relative w" });
     scope.cursor(cursor);
     scope.end();
   }
@@ -209,7 +209,7 @@ export class Pictures {
     const { past, ghost, plots: { phase, detuning } } = this;
     const x = [past[0].time, Math.max(past.at(-1).time, past[0].time + 1)];
     const old = ghost.filter((one) => one.time >= x[0] && one.time <= x[1]);
-    for (const [plot, key, name, shade] of [[phase, "error", "phase error", "violet"], [detuning, "sigma", "detuning", "green"]]) {
+    for (const [plot, key, name, shade] of [[phase, "error", "phase error", "modulation"], [detuning, "sigma", "detuning", "green"]]) {
       const shows = (one) => (key === "error" ? one.G > 0 : onBackbone(one));
       plot.begin(x, extent([...past, ...old].filter(shows).map((one) => one[key]), key === "error" ? 1 : 0.5));
       const values = (run) => run.map((one) => (shows(one) ? [one.time, one[key]] : null));
@@ -230,7 +230,7 @@ export class Pictures {
       plot.points([place(this.ghost.findLast(onBackbone) ?? this.ghost[0])], "ghost", { label: "run before", radius: 5, open: true });
     }
     plot.line(seen.filter((one) => one.time > from).map(some((one) => one.G > 0)), "trail", { width: 1 });
-    plot.line(seen.map(some(decays)), "decay", { width: 3, label: seen.some(decays) ? "free decay" : "" });
+    plot.line(seen.map(some(decays)), "measured", { width: 3, label: seen.some(decays) ? "free decay" : "" });
   }
 
   #manifold(top, seen, point, linked) {
@@ -238,9 +238,9 @@ export class Pictures {
     const right = end(2.2, largest(seen.map((one) => one.B), point.B));
     if (this.manifoldEnd !== right) this.lines.manifold = page.bench.manifold((this.manifoldEnd = right), 240);
     manifold.begin([0, right], [0, top]);
-    manifold.curve(this.lines.manifold, "ink", { label: `first-order theory${this.ideal}` });
+    manifold.curve(this.lines.manifold, "theory", { label: `first-order theory${this.ideal}` });
     this.#tracks(manifold, seen, (one) => [one.B, one.C]);
-    manifold.points([[point.B, point.C]], "red", { label: "now", radius: 5 });
+    manifold.points([[point.B, point.C]], "particle", { label: "now", radius: 5 });
     if (linked) manifold.points([[linked.B, linked.C]], "ink", { radius: 7, open: true });
     manifold.end();
   }
@@ -250,11 +250,11 @@ export class Pictures {
     const curves = [...lines.exact, ...lines.theory].filter((one) => one[1] <= top).map((one) => one[0]);
     const sigmas = [...curves, ...[...seen.filter((one) => one.time > point.time - TRAIL || one.decays), ...this.ghost.filter((one) => one.decays), point].filter(onBackbone).map((one) => one.sigma)];
     backbone.begin(extent(sigmas, 0.5), [0, top]);
-    backbone.curve(lines.theory, "ink", { label: `theory${this.ideal}`, width: 1.2 });
-    backbone.curve(lines.exact, "blue", { label: `exact${this.ideal}`, width: 2.4 });
+    backbone.curve(lines.theory, "theory", { label: `theory${this.ideal}`, width: 1.2 });
+    backbone.curve(lines.exact, "exact", { label: `exact${this.ideal}`, width: 2.4 });
     this.#tracks(backbone, seen, (one) => [one.sigma, one.C]);
-    backbone.points(tracked.map((one) => [one[1], one[2]]), "violet", { label: "tracked", open: true });
-    if (onBackbone(point)) backbone.points([[point.sigma, point.C]], "red", { label: "now", radius: 5 });
+    backbone.points(tracked.map((one) => [one[1], one[2]]), "measured", { label: "tracked", open: true });
+    if (onBackbone(point)) backbone.points([[point.sigma, point.C]], "particle", { label: "now", radius: 5 });
     if (linked && onBackbone(linked)) backbone.points([[linked.sigma, linked.C]], "ink", { radius: 7, open: true });
     backbone.end();
   }

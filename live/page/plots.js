@@ -85,7 +85,7 @@ export class Plot {
   curve(points, colour, { label, width = 2 }) {
     // Unstable pieces begin and end at the stable neighbour.
     const unstable = points.map((point, i) => ([points[i - 1], point, points[i + 1]].some((near) => near && !near[2]) ? point : null));
-    this.line(unstable, colour, { dash: [4, 4], width: 0.7 * width });
+    this.line(unstable, `${colour}-unstable`, { dash: [4, 4], width: 0.7 * width });
     this.line(points.map((point) => (point[2] ? point : null)), colour, { label, width });
   }
 
@@ -101,14 +101,14 @@ export class Plot {
       if (open) c.stroke(); else c.fill();
     }
     this.#clip();
-    if (label && points.length) this.#legend(label, colour, null);
+    if (label && points.length) this.#legend(label, colour, null, open);
   }
 
   // A vertical line at x.
   cursor(x) { if (x !== undefined) this.line([[x, this.y[0]], [x, this.y[1]]], "ink", { width: 1 }); }
 
   // One row above the axes, outside the clipped area.
-  #legend(label, colour, dash) {
+  #legend(label, colour, dash, open) {
     const { c } = this;
     const x = this.legend, y = this.box[1] - 9;
     c.restore();
@@ -116,7 +116,7 @@ export class Plot {
     c.setLineDash(dash ?? []);
     c.lineWidth = 2;
     c.beginPath();
-    if (dash) { c.moveTo(x, y - 4); c.lineTo(x + 18, y - 4); c.stroke(); } else { c.arc(x + 9, y - 4, 3.5, 0, 7); c.fill(); }
+    if (dash) { c.moveTo(x, y - 4); c.lineTo(x + 18, y - 4); c.stroke(); } else { c.arc(x + 9, y - 4, 3.5, 0, 7); if (open) c.stroke(); else c.fill(); }
     c.setLineDash([]);
     c.fillStyle = this.colour("ink");
     c.fillText(label, x + 23, y);

@@ -5,6 +5,8 @@
 const BODY = 0.5, SPRING = 1.5, RADIUS = 0.28, BASE = 0.35;
 // Smallest margins, pixels.
 const SIDE = 16, LABELS = 40;
+// Height of the line of words below a tilted rig, pixels.
+const WORDS = 18;
 
 export class Rig {
   constructor(canvas, colour) {
@@ -15,9 +17,10 @@ export class Rig {
   // of mass and base, which fit into the canvas. `gaps`: left and right of the particle, over b. `tilt`, degrees: gravity pulls the particle to
   // the right if it is positive, so that the right end is the lower one.
   draw(look, reach, gaps, tilt, now, calm) {
-    const { context: c, width: wide, height: high } = surface(this.canvas);
+    const { context: c, width: wide, height } = surface(this.canvas);
+    const high = tilt ? height - WORDS : height;
     const { colour } = this;
-    c.clearRect(0, 0, wide, high);
+    c.clearRect(0, 0, wide, height);
     const lengths = 2 * BASE * reach.base + SPRING + gaps[0] + gaps[1] + 2 * BODY + 2 * reach.mass;
     // The tilted rectangle of the rig fits into the canvas. Before the page has its layout, the canvas has no size.
     const angle = (tilt * Math.PI) / 180, cos = Math.cos(angle), sin = Math.abs(Math.sin(angle));
@@ -25,12 +28,12 @@ export class Rig {
       (wide - 2 * SIDE * cos - LABELS * sin) / (lengths * cos + 2 * sin),
       (high - 2 * SIDE * sin - LABELS * cos) / (lengths * sin + 2 * cos),
     ));
-    const [width, height] = tilt ? [lengths * b + 2 * SIDE, 2 * b + LABELS] : [wide, high];
+    const [along, across] = tilt ? [lengths * b + 2 * SIDE, 2 * b + LABELS] : [wide, high];
     c.translate(wide / 2, high / 2);
     c.rotate(angle);
-    c.translate(-width / 2, -height / 2);
-    const floor = 0.5 * (height - LABELS) + 0.875 * b + 16;
-    const slack = width - 2 * SIDE - lengths * b;
+    c.translate(-along / 2, -across / 2);
+    const floor = 0.5 * (across - LABELS) + 0.875 * b + 16;
+    const slack = along - 2 * SIDE - lengths * b;
     const wall = SIDE + 0.2 * slack + BASE * (reach.base + look.base) * b;
     const rest = SIDE + 0.6 * slack + (2 * BASE * reach.base + SPRING + reach.mass + gaps[0] + BODY) * b;
     const centre = rest + look.q1 * b;
@@ -40,9 +43,9 @@ export class Rig {
     const particle = centre + (look.q2 - look.q1) * b;
     c.lineWidth = 2;
     c.strokeStyle = c.fillStyle = colour("faint");
-    c.beginPath(); c.moveTo(0, floor + 1); c.lineTo(width, floor + 1); c.stroke();
+    c.beginPath(); c.moveTo(0, floor + 1); c.lineTo(along, floor + 1); c.stroke();
     // Base
-    c.fillStyle = colour("blue");
+    c.fillStyle = colour("base");
     c.fillRect(wall - 10, floor - 1.75 * b, 10, 1.75 * b);
     // Spring and damper
     c.strokeStyle = colour("ink");
@@ -66,12 +69,12 @@ export class Rig {
       const lit = look.wall === -side ? 1 : side === -this.flash.wall && !calm ? Math.max(0, 1 - age / 180) : 0;
       if (lit > 0) {
         c.globalAlpha = lit;
-        c.fillStyle = colour("red");
+        c.fillStyle = colour("particle");
         c.fillRect(side < 0 ? inside[0] - 0.12 * b : inside[1], floor - 1.12 * b, 0.12 * b, 0.66 * b);
         c.globalAlpha = 1;
       }
     }
-    c.fillStyle = colour("red");
+    c.fillStyle = colour("particle");
     const seen = !Number.isNaN(particle);
     if (seen) { c.beginPath(); c.arc(particle, floor - 0.79 * b, radius, 0, 7); c.fill(); }
     c.fillStyle = colour("faint");
@@ -82,7 +85,7 @@ export class Rig {
       // Words stay horizontal.
       surface(this.canvas);
       c.textAlign = tilt > 0 ? "left" : "right";
-      c.fillText(`${words}; base not to scale`, tilt > 0 ? 4 : wide - 4, high - 4);
+      c.fillText(`${words}; base not to scale`, tilt > 0 ? 4 : wide - 4, height - 4);
       c.textAlign = tilt > 0 ? "right" : "left";
       c.fillText("gravity ↓", tilt > 0 ? wide - 4 : 4, 14);
     } else {

@@ -66,9 +66,9 @@ export class Strip {
     const x = (degrees) => 8 + (0.5 + Math.max(-0.5, Math.min(0.5, degrees / (2 * range)))) * (width - 16);
     c.clearRect(0, 0, width, height);
     const bar = (low, high, shade) => { c.fillStyle = this.colour(shade); c.fillRect(x(low), y - thick / 2, Math.max(2, x(high) - x(low)), thick); };
-    bar(-range, -unlock, "red");
+    bar(-range, -unlock, "bad");
     bar(-unlock, unlock, "line");
-    bar(unlock, range, "red");
+    bar(unlock, range, "bad");
     bar(-tolerance, tolerance, "green");
     c.font = "12px system-ui, sans-serif";
     c.textAlign = "center";

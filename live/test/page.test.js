@@ -1,16 +1,20 @@
 // The page in real browsers: VINES_PAGE is its folder, VINES_LOCK the sample and the bits of the native lock, and the
-// native program's least time for a sample, ns.
+// native program's least time for a sample, ns. VINES_PROGRAM is `vines`, which serves the page for a running experiment.
 
 import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
 import { createServer } from "node:http";
-import { mkdir, readFile, stat } from "node:fs/promises";
+import { mkdir, readFile, rm, stat } from "node:fs/promises";
+import { tmpdir } from "node:os";
 import { extname, join } from "node:path";
+import { createInterface } from "node:readline";
 import { after, before, describe, test } from "node:test";
 import puppeteer from "puppeteer-core";
 
 const FOLDER = process.env.VINES_PAGE;
 const SCREENS = process.env.VINES_SCREENS;
 const [SAMPLE, BITS, NATIVE] = process.env.VINES_LOCK.split(" ");
+const PROGRAM = process.env.VINES_PROGRAM;
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".json": "application/json", ".wasm": "application/wasm" };
 // An isolated page has a finer clock: otherwise that of Firefox shows whole milliseconds.
 const ISOLATED = { "cross-origin-opener-policy": "same-origin", "cross-origin-embedder-policy": "require-corp" };
@@ -36,6 +40,17 @@ before(async () => {
   address = `http://127.0.0.1:${server.address().port}/`;
 });
 after(() => server.close());
+
+// The program with `args`, and what matches `first` in the lines that it prints.
+async function started(args, output, first) {
+  const child = spawn(PROGRAM, args);
+  child[output === "stdout" ? "stderr" : "stdout"].resume();
+  for await (const line of createInterface(child[output])) {
+    const found = line.match(first);
+    if (found) return { child, found: found[0] };
+  }
+  throw new Error(`vines ${args[0]} has ended without ${first}`);
+}
 
 test("the module has at most 200 KB", async () => {
   const { size } = await stat(join(FOLDER, "vines_live.wasm"));
@@ -159,6 +174,7 @@ for (const { name, options } of BROWSERS) {
       const captured = (captures["symmetric 1:1"] ?? 0) + (captures["asymmetric 1:1"] ?? 0);
       assert.ok(captured > 100 && captured < 1900, JSON.stringify(captures));
       assert.ok(scene("Chatter").stuck > 100, JSON.stringify(scene("Chatter")));
+      assert.deepEqual(Object.keys(scene("Real cavity").regimes), ["asymmetric 1:1"]);
       assert.deepEqual(scene("Chaos").regimes, { irregular: 2000 });
       assert.deepEqual(errors, []);
       await page.close();
@@ -518,6 +534,102 @@ for (const { name, options } of BROWSERS) {
       assert.deepEqual(await page.evaluate(() => window.live.page.changes.at(-1).slice(1)), ["particle", -1]);
       assert.deepEqual(errors, []);
       await page.close();
+    });
+
+    test("friction, gap difference and tilt are in the motion and in the picture of the rig, and the curves say that they are not in them", async () => {
+      const { page, errors } = await open();
+      await ready(page);
+      const found = await page.evaluate(() => {
+        const one = window.live.page;
+        one.play(false);
+        const { rig } = one.pictures;
+        // The corners of the rig on its canvas, CSS pixels.
+        const outside = () => [[rig.left, rig.top], [rig.right, rig.top], [rig.left, rig.floor], [rig.right, rig.floor]].some(([x, y]) => {
+          const at = new DOMPoint(x, y).matrixTransform(rig.transform);
+          return at.x < 0 || at.y < 0 || at.x > rig.canvas.width || at.y > rig.canvas.height;
+        });
+        const run = (values) => {
+          one.start(values);
+          let [least, most, off] = [0, 0, false];
+          for (let look = 0; look < 100; look++) {
+            one.goTo(one.shown + 0.1, 1e6);
+            one.pictures.draw(performance.now());
+            off ||= outside();
+          }
+          for (let i = 0; i < one.rows.length; i++) { const w = one.rows.row(i)[3] / 0.01; least = Math.min(least, w); most = Math.max(most, w); }
+          const axis = rig.transform.transformPoint(new DOMPoint(1, 0, 0, 0));
+          return { least, most, off, gaps: rig.gaps, tilt: (Math.atan2(axis.y, axis.x) * 180) / Math.PI, notes: [...document.querySelectorAll(".ideal")].map((note) => note.hidden) };
+        };
+        return { ideal: run({}), gaps: run({ gap_difference: 30 }), tilted: run({ tilt: 60, excitation: 2 }), vertical: run({ tilt: -90, excitation: 2 }), rough: run({ friction: 0.1 }) };
+      });
+      const { ideal, gaps, tilted, vertical, rough } = found;
+      const near = (value, wanted) => assert.ok(Math.abs(value - wanted) < 0.01, `${value}, not ${wanted}: ${JSON.stringify(found)}`);
+      near(ideal.most, 1); near(ideal.least, -1);
+      // The particle meets the walls where the picture has them: w = q1 - q2 is the way to the left.
+      near(gaps.most, 1.3); near(gaps.least, -0.7);
+      near(gaps.gaps[0], 1.3); near(gaps.gaps[1], 0.7);
+      near(tilted.tilt, 60); near(vertical.tilt, -90);
+      assert.deepEqual(Object.values(found).map(({ off }) => off), [false, false, false, false, false]);
+      assert.deepEqual([ideal, gaps, tilted, rough].map(({ notes }) => notes), [[true, true], [false, false], [false, false], [false, false]]);
+      assert.deepEqual(errors, []);
+      await page.close();
+    });
+
+    test("a running experiment is shown to two browsers, read-only, and its end is told", async () => {
+      const rig = await started(["rig", "--listen", "127.0.0.1:0", "--silence", "20", "--duration", "120"], "stdout", /udp:\S+/);
+      const out = join(tmpdir(), `vines-watch-${process.pid}-${name}`);
+      const experiment = await started(["identify", "--rig", rig.found, "--watch", "--out", out], "stderr", /http:\S+/);
+      try {
+        const errors = [];
+        const pages = await Promise.all([1600, 390].map(async (width) => {
+          const page = await browser.newPage();
+          page.on("pageerror", (error) => errors.push(String(error)));
+          page.on("console", (line) => line.type() === "error" && errors.push(line.text()));
+          await page.setViewport({ width, height: 900 });
+          await page.goto(experiment.found);
+          return page;
+        }));
+        for (const page of pages) {
+          // A page in the background draws nothing.
+          await page.bringToFront();
+          await page.waitForFunction(() => window.live?.page.end > 3, { timeout: 60000 });
+          const found = await page.evaluate(async () => {
+            const one = window.live.page;
+            const text = (id) => document.getElementById(id).textContent;
+            const before = one.end;
+            one.change("excitation", 3);
+            const enabled = [...document.querySelectorAll("#settings input:not(:disabled)")].length;
+            await new Promise((done) => setTimeout(done, 1000));
+            const last = one.rows.row(-1);
+            return { grows: one.end > before, enabled, lamp: text("lamp"), advice: text("advice"), G: one.pictures.now.G, w: Math.abs(last[3]) <= 0.0101, wide: Math.max(0, document.documentElement.scrollWidth - innerWidth), buttons: [...document.querySelectorAll("button:not(:disabled)")].filter((one) => one.checkVisibility({ visibilityProperty: true })).map((one) => one.id) };
+          });
+          assert.match(found.lamp, /STARTING|SEARCHING|LOCKED|FREE DECAY/);
+          assert.match(found.advice, /vines identify is running/);
+          assert.deepEqual({ ...found, lamp: "", advice: "", G: 0 }, { grows: true, enabled: 0, lamp: "", advice: "", G: 0, w: true, wide: 0, buttons: ["play", "csv", "sound", "help"] });
+        }
+        // Pausing shows the past, and the experiment goes on.
+        await pages[1].close();
+        await pages[0].bringToFront();
+        await pages[0].click("#play");
+        const paused = await pages[0].evaluate(async () => {
+          const one = window.live.page, { shown, end } = one;
+          await new Promise((done) => setTimeout(done, 1000));
+          return one.shown === shown && one.end > end;
+        });
+        assert.ok(paused);
+        await mkdir(SCREENS, { recursive: true });
+        await pages[0].click("#play");
+        await pages[0].screenshot({ path: join(SCREENS, `${name}-watch.png`), fullPage: true });
+        experiment.child.kill("SIGINT");
+        await pages[0].waitForFunction(() => document.getElementById("lamp").textContent === "FAILED", { timeout: 20000 });
+        assert.match(await pages[0].$eval("#advice", (element) => element.textContent), /has failed: .*interrupted/);
+        assert.deepEqual(errors, []);
+        await pages[0].close();
+      } finally {
+        experiment.child.kill();
+        rig.child.kill();
+        await rm(out, { recursive: true, force: true });
+      }
     });
 
     test("in every scene, rig, axes and present point stay on their canvases", async () => {

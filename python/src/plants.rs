@@ -470,7 +470,7 @@ fn restored<'a>(workspace: &'a mut Option<OnePlant>, saved: &Saved) -> &'a mut O
 
 #[pymethods]
 impl Plants {
-    /// Rows of parameters and of q1, dq1, q2, dq2.
+    /// Rows of parameters, those of the cavity absent where it is ideal, and of q1, dq1, q2, dq2.
     #[new]
     fn new(values: PyReadonlyArray2<'_, f64>, starts: PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
         let (values, starts) = (values.as_array(), starts.as_array());
@@ -478,7 +478,7 @@ impl Plants {
         reserve(&mut plants, values.nrows())?;
         for (n, (p, s)) in values.rows().into_iter().zip(starts.rows()).enumerate() {
             let (parameters, start) = (
-                parameters(std::array::from_fn(|i| p[i])),
+                parameters(std::array::from_fn(|i| p.get(i).copied().unwrap_or(f64::NAN))),
                 state(std::array::from_fn(|i| s[i])),
             );
             let plant = OnePlant::new(parameters, start).map_err(|error| invalid(format!("plant {n}: {error}")))?;

@@ -24,7 +24,7 @@ import vines
 DRIVE = {"amplitude": 9.2e-5, "omega": 54.9}
 
 
-def fmu_states(start, steps, duration):
+def fmu_states(start, steps, duration, integers=()):
     """States of the plant's FMU after each of the steps."""
     path = vines.fmu("LoViNes")
     folder, description = extract(path), read_model_description(path)
@@ -33,6 +33,8 @@ def fmu_states(start, steps, duration):
     fmu.setupExperiment(startTime=0.0)
     values = start | {"E": DRIVE["amplitude"], "omega": DRIVE["omega"]}
     fmu.setReal([numbers[name] for name in values], list(values.values()))
+    for name in integers:
+        fmu.setInteger([numbers[name]], [integers[name]])
     fmu.enterInitializationMode()
     fmu.exitInitializationMode()
     outputs = [numbers[name] for name in ("q1", "der(q1)", "q2", "der(q2)")]
@@ -109,7 +111,7 @@ def test_a_state_that_is_set_is_that_of_a_start_and_a_refused_one_changes_nothin
     plant.state = {"dq2": np.asarray(-0.3)}
     assert plant.state == start | {"dq2": -0.3}
     for wrong, parts in [
-        ({"q2": 0.02}, ["w = q1 - q2", "-b to b"]),
+        ({"q2": 0.02}, ["w = q1 - q2", "-b_minus to b_plus"]),
         ({"q3": 0.0}, ["q3", "q1, dq1, q2, dq2"]),
         ({"q1": np.nan}, ["q1", "NaN"]),
     ]:
@@ -322,7 +324,7 @@ def test_plants_show_their_state():
             lambda: vines.Plant({**vines.Scene().settings["plant"], "k": -1.0}),
             ["k (stiffness)", "-1", "N/m", "1e-100 to 1e100"],
         ),
-        (lambda: vines.Plant(q2=0.02), ["0.02", "m", "-b to b"]),
+        (lambda: vines.Plant(q2=0.02), ["0.02", "m", "-b_minus to b_plus"]),
         (lambda: vines.Plant(q3=0.0), ["q3", "q1, dq1, q2, dq2"]),
         (lambda: vines.Batch(vines.Scene(), {"dq2": [0.1, np.nan]}), ["plant 1", "NaN", "m/s"]),
         (lambda: vines.Plant().advance(1.0, amplitude=np.inf), ["E (amplitude", "inf", "m"]),
@@ -542,3 +544,48 @@ def test_other_threads_run_while_plants_advance():
     stop.set()
     thread.join()
     assert during > 5
+
+
+CAVITY = {
+    "b_plus": 0.011, "b_minus": 0.009, "theta": 0.1, "mu_k": 0.2, "mu_s": 0.3, "r_plus": 0.7, "r_minus": 0.6,
+    "r_min": 0.1, "r_scatter": 0.1, "seed": 3,
+}  # fmt: skip
+
+
+def test_a_real_cavity_has_the_bits_of_the_fmu_in_a_scene_a_plant_and_a_batch():
+    scene = vines.Scene(plant=CAVITY)
+    values = scene.settings["plant"]
+    assert {name: values[name] for name in CAVITY} == CAVITY
+    reals = {name: value for name, value in values.items() if name != "seed"}
+    expected = fmu_states(reals | {"der(q2)": 0.5}, 512, 1.0 / 128, {"seed": 3})
+    for plant in (vines.Plant(scene, dq2=0.5), vines.Plant(values, q1=0, dq1=0, q2=0, dq2=0.5)):
+        states = []
+        for _ in range(512):
+            plant.advance(1.0 / 128, **DRIVE)
+            states.append([plant.q1, plant.dq1, plant.q2, plant.dq2])
+        assert np.array_equal(states, expected)
+        assert plant.sticks > 0
+        assert min(plant.stuck_time, plant.friction_loss) > 0
+    batch = vines.Batch(values | {"mu_k": [0.2, 0.0], "mu_s": [0.3, 0.0]}, {"dq2": 0.5, "q1": 0, "dq1": 0, "q2": 0})
+    events = batch.advance(1.0, **DRIVE)
+    assert list(batch.sticks > 0) == list(batch.stuck_time > 0) == list(batch.friction_loss > 0) == [True, False]
+    kinds = {vines.KINDS[kind] for kind in events.kind[events.plant == 0]}
+    assert {"impact", "sticking", "slip"} <= kinds
+
+
+def test_a_law_of_restitution_has_a_name_and_a_parameter():
+    values = vines.Scene().settings["plant"] | {"r_law": "viscoelastic", "r_plus": 0.343}
+    assert vines.Plant(vines.Scene(plant={"r_law": "viscoelastic", "r_plus": 0.343}), dq2=0.5) == vines.Plant(
+        values, q1=0, dq1=0, q2=0, dq2=0.5
+    )
+    start = {"q1": 0, "dq1": 0, "q2": 0, "dq2": 0}
+    for wrong, part in [
+        ({"r_law": "rubber"}, "plastic"),
+        ({"r_law": "plastic"}, "r_plus"),
+        ({"mu_k": float("nan")}, "nan"),
+        ({"mu_k": -1}, "0 to 100"),
+        ({"seed": 0.5}, "whole"),
+    ]:
+        plain = vines.Scene().settings["plant"]
+        with pytest.raises(ValueError, match=part):
+            vines.Plant(plain | wrong, **start)

@@ -46,8 +46,8 @@ class Events(Result):
     time : ndarray of float64, shape (n,)
         Time since the plant's start, s.
     kind : ndarray of uint8, shape (n,)
-        0: the particle hit a wall; 1: it came to rest on a wall; 2: the wall released it. With friction also 3: it stuck to the
-        floor inside the cavity; 4: it slid again; 5: it turned round without sticking.
+        0: the particle hit a wall; 1: it came to rest on a wall; 2: the wall released it. With friction also 3: it
+        stuck to the floor inside the cavity; 4: it slid again; 5: it turned round without sticking.
     wall : ndarray of int8, shape (n,)
         1 at w = q1 - q2 = b (or b_plus), -1 at w = -b (or -b_minus), 0 inside the cavity.
     velocity : ndarray of float64, shape (n,)
@@ -87,8 +87,8 @@ class Batch:
     Parameters
     ----------
     parameters : mapping of str to array_like, or Scene
-        M (kg), k (N/m), c (N s/m), m (kg), b (m) and r, each a number or an array; they are broadcast to shape (n,). Those
-        of a real cavity likewise: see `Plant`.
+        M (kg), k (N/m), c (N s/m), m (kg), b (m) and r, each a number or an array; they are broadcast to shape (n,).
+        Those of a real cavity likewise: see `Plant`.
     starts : mapping of str to array_like, optional
         q1, q2 (m), dq1 and dq2 (m/s) likewise. What is left out is zero, or that of the scene.
 
@@ -112,7 +112,8 @@ class Batch:
         try:
             rows = np.stack(np.broadcast_arrays(*np.atleast_1d(*columns)), axis=-1)
         except ValueError:
-            names = zip((*_PARAMETERS, *_CAVITY, *_START), columns, strict=True)
+            cavity = _CAVITY if len(columns) > len(_PARAMETERS) + len(_START) else ()
+            names = zip((*_PARAMETERS, *cavity, *_START), columns, strict=True)
             shapes = ", ".join(f"{name} {value.shape}" for name, value in names if value.ndim)
             raise ValueError(f"arrays of different shapes: {shapes}; numbers and equal lengths are allowed") from None
         if rows.ndim != 2:
@@ -294,8 +295,8 @@ class Plant(_native.Plant):
     - `base` (m) and `phase` (rad): displacement of the base, and phase of its oscillator;
     - `time` (s), `impacts`, `dissipated` (J): since the start; `wall`: 1 or -1 if the particle is stuck to the wall at
       w = b or -b, otherwise 0;
-    - with friction `sticking`, whether the particle sticks to the floor inside the cavity, and since the start `sticks`,
-      `stuck_time` (s) and `friction_loss` (J).
+    - with friction `sticking`, whether the particle sticks to the floor inside the cavity, and since the start
+      `sticks`, `stuck_time` (s) and `friction_loss` (J).
 
     Parameters
     ----------
@@ -305,9 +306,10 @@ class Plant(_native.Plant):
         - b_plus, b_minus (m): gaps to the walls at w = b_plus and w = -b_minus; default b;
         - theta (rad): tilt; gravity accelerates the particle by 9.80665 m/s² sin(theta) along the axis;
         - mu_k, mu_s: kinetic friction, and static friction, at least mu_k (default mu_k);
-        - r_law: "constant", "viscoelastic" (r = 1 - k v^(1/5)) or "plastic" (r = min(1, (v/v_y)^(-1/4))), with the speed of
-          approach v in m/s; r_plus, r_minus: r, k or v_y (m/s) at the two walls, r_minus by default r_plus;
-        - r_min: least coefficient of restitution; r_scatter: its relative standard deviation from impact to impact; seed.
+        - r_law: "constant", "viscoelastic" (r = 1 - k v^(1/5)) or "plastic" (r = min(1, (v/v_y)^(-1/4))), with the
+          speed of approach v in m/s; r_plus, r_minus: r, k or v_y (m/s) at the two walls, r_minus by default r_plus;
+        - r_min: least coefficient of restitution;
+        - r_scatter, seed: relative standard deviation of r from impact to impact, and the seed of this scatter.
     **start : float
         q1, q2 (m), dq1, dq2 (m/s).
 
@@ -338,7 +340,9 @@ class Plant(_native.Plant):
                 f"values for {max(sizes) if min(sizes) else 0} plants: one is allowed here; Batch has more"
             )
         numbers = [float(value.item()) for value in values]
-        return super().__new__(cls, numbers[: -len(_START)], numbers[-len(_START) :])
+        values, first = numbers[: -len(_START)], numbers[-len(_START) :]
+        ideal = [np.nan] * (len(_PARAMETERS) + len(_CAVITY) - len(values))
+        return super().__new__(cls, values + ideal, first)
 
     def __repr__(self) -> str:
         state = ", ".join(f"{name} = {value:.6g}" for name, value in self.state.items())
@@ -452,7 +456,7 @@ _ANY = dict.fromkeys(_PARAMETERS, 1.0)
 def _values(
     parameters: Scene | Mapping[str, ArrayLike], starts: Mapping[str, ArrayLike] | None
 ) -> list[NDArray[np.float64]]:
-    """Return parameters and starts, checked, in the order of `_PARAMETERS`, `_CAVITY` and `_START`; NaN for an ideal cavity."""
+    """Return parameters and starts, checked: `_PARAMETERS`, `_CAVITY` unless the cavity is ideal, and `_START`."""
     first: dict[str, ArrayLike] = dict.fromkeys(_START, 0.0)
     values: Mapping[str, ArrayLike] = {}
     if isinstance(parameters, Scene):
@@ -466,7 +470,9 @@ def _values(
     if values.get("r_law", "constant") != "constant" and "r_plus" not in values:
         raise ValueError(f"parameters: r_law = {values['r_law']!r} without r_plus, which is its parameter k or v_y")
     columns = [reals(name, values[name]) for name in _PARAMETERS]
-    columns += [_of_cavity(name, values[name]) if name in values else np.array(np.nan) for name in _CAVITY]
+    # Most batches have an ideal cavity: without its columns they need less memory.
+    if any(name in values for name in _CAVITY):
+        columns += [_of_cavity(name, values[name]) if name in values else np.array(np.nan) for name in _CAVITY]
     return columns + [reals(name, given[name]) for name in _START]
 
 

@@ -30,14 +30,14 @@ impl FastPath {
         if !self.serves {
             return Next::Search(left);
         }
-        let to_search = core::mem::take(&mut self.to_search);
+        let to_search = core::mem::take(&mut self.state.to_search);
         if to_search > 0.0 {
             return Next::Search(to_search.min(left));
         }
         let point = self.point(moving);
         let (rig, base) = (&moving.rig, &moving.base);
         let soon = left * rig.free.fastest.max(base.drive.omega.abs()) <= 1.0;
-        if left < self.contact_free.t || (soon && self.is_contact_free(moving, left)) {
+        if left < self.state.contact_free.t || (soon && self.is_contact_free(moving, left)) {
             return self.coast(moving, &point, left, duration);
         }
         if !applies(rig, base, &point) {
@@ -65,7 +65,7 @@ impl FastPath {
         let (rig, base) = (&moving.rig, &moving.base);
         let mut point = self.point(moving);
         point.y -= rig.shift(-rig.friction(direction));
-        if self.disabled || !applies(rig, base, &point) {
+        if self.state.disabled || !applies(rig, base, &point) {
             return None;
         }
         self.coefficients.prepare(&rig.free, base.drive.omega);
@@ -73,8 +73,8 @@ impl FastPath {
         let start = Start { pull, ..Start::new(moving, point) };
         self.evaluations += 1;
         let expected = (self.cache)
-            .expected(&rig.free, &self.coefficients)
-            .and_then(|propagator| arrive(&self.coefficients, propagator, &start))
+            .expected(&self.state.sequence, &rig.free, &self.coefficients)
+            .and_then(|propagator| arrive::<true>(&self.coefficients, propagator, &start))
             .filter(|arrival| start.is_monotone(&start.here, arrival.t.value()));
         let Arrival { t, wall, added, angle } = match expected {
             Some(arrival) => arrival,
@@ -83,7 +83,7 @@ impl FastPath {
         if t.value() > left {
             return None;
         }
-        self.cache.learn(&self.coefficients, t.value());
+        self.state.sequence.learn(&self.coefficients, t.value());
         self.apply(moving, &added, angle, t.value());
         moving.masses.dw -= pull * t.value();
         moving.masses.particle += pull * t.value();
@@ -96,7 +96,7 @@ impl FastPath {
         match found {
             Found::Contact(arrival) => self.meet(moving, point, arrival, left, duration),
             Found::Free(t) => {
-                self.contact_free = Horizon::unchanged(*t);
+                self.state.contact_free = Horizon::unchanged(*t);
                 self.coast(moving, point, t.min(left), duration)
             }
             Found::Nothing => Next::Search(left),
@@ -108,19 +108,19 @@ impl FastPath {
     fn meet(&mut self, moving: &mut Moving, point: &Point, arrival: &Arrival, left: f64, duration: f64) -> Next {
         let t = arrival.t.value();
         if t > left {
-            self.contact_free = Horizon::unchanged(t);
+            self.state.contact_free = Horizon::unchanged(t);
             return self.coast(moving, point, left, duration);
         }
-        self.cache.learn(&self.coefficients, t);
+        self.state.sequence.learn(&self.coefficients, t);
         self.apply(moving, &arrival.added, arrival.angle, t);
-        self.contact_free = Horizon::default();
+        self.state.contact_free = Horizon::default();
         Next::Contact(arrival.t, arrival.wall)
     }
 
     /// The flight that followed the last one before, or the end of a step that did, if it lies ahead again.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn as_before(&mut self, moving: &mut Moving, point: &Point, left: f64, duration: f64) -> Option<Next> {
-        let propagator = (self.cache).expected(&moving.rig.free, &self.coefficients)?;
+        let propagator = (self.cache).expected(&self.state.sequence, &moving.rig.free, &self.coefficients)?;
         self.evaluations += 1;
         let mut start = Start::new(moving, *point);
         let drive = &start.base.drive;
@@ -133,12 +133,12 @@ impl FastPath {
                 return None;
             }
             let angle = propagator.angle.plus(self.coefficients.omega * h);
-            self.cache.learn(&self.coefficients, left);
+            self.state.sequence.learn(&self.coefficients, left);
             let dx = self.apply(moving, &increment, angle, left);
             self.drift(moving, dx, left);
             return Some(Next::ContactFree(left));
         }
-        let arrival = arrive(&self.coefficients, propagator, &start)?;
+        let arrival = arrive::<false>(&self.coefficients, propagator, &start)?;
         if start.is_monotone(&start.here, arrival.t.value()) {
             return Some(self.meet(moving, point, &arrival, left, duration));
         }
@@ -182,9 +182,7 @@ fn out_of_reach(coefficients: &Coefficients, start: &Start) -> Option<f64> {
     (room > 0.0).then(|| room / start.drift.abs())
 }
 
-// Hop
-//
-// A hop: the particle has left the wall that presses on it, and comes back at once.
+// Hop: the particle has left the wall that presses on it, and comes back at once.
 //
 // Seen from the wall it falls with an acceleration `a` that hardly changes in so short a time: `u h - a h²/2 - j h³/6 - ...`
 // with `u` the rebound speed. Divided by `h` this falls steadily while `|w'''| h` stays below `a/8`, so that the return is
@@ -224,9 +222,7 @@ impl FastPath {
     }
 }
 
-// March
-//
-// A march over a flight in equal stretches, each verified by a bound, until the rest of the flight is verified at once.
+// March: over a flight in equal stretches, each verified by a bound, until the rest of the flight is verified at once.
 
 /// Longest flight that is marched over, in stretches.
 const MOST_STRETCHES: u32 = 64;
@@ -293,7 +289,7 @@ impl FastPath {
                 }
                 // What is verified is kept: the plain solver searches as little as possible.
                 None if from.t > 0.0 => {
-                    self.to_search = self.coefficients.stretch;
+                    self.state.to_search = self.coefficients.stretch;
                     break;
                 }
                 None => return Found::Nothing,
@@ -357,7 +353,7 @@ impl FastPath {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn mark(&mut self, start: &Start, from: &Mark, n: usize) -> Mark {
         self.evaluations += 1;
-        self.rotations += 1;
+        self.state.rotations += 1;
         let propagator = (self.cache.grid).over(&start.rig.free, &self.coefficients, n);
         let increment = propagator.increment(start.base.drive.amplitude, &from.point);
         start.mark(&self.coefficients, increment.to(&from.point), from.t + propagator.t)
@@ -404,9 +400,7 @@ fn crossing(target: f64, from: [f64; 3], to: [f64; 3]) -> Option<f64> {
     (s > 0.0 && s <= 1.0).then_some(s)
 }
 
-// Arrival
-//
-// The arrival at a wall, found from a point near it at which the motion is known.
+// Arrival: at a wall, found from a point near it at which the motion is known.
 
 /// Points of the grid that are tried.
 const MOST_POINTS: u32 = 4;
@@ -446,13 +440,19 @@ impl Arrival {
 
 /// The contact at the wall ahead, if it is so near the time of `propagator` that its digits can be trusted.
 #[inline(always)]
-pub(super) fn arrive(coefficients: &Coefficients, propagator: &Propagator, start: &Start) -> Option<Arrival> {
+pub(super) fn arrive<const FORCED: bool>(
+    coefficients: &Coefficients,
+    propagator: &Propagator,
+    start: &Start,
+) -> Option<Arrival> {
     let (amplitude, here) = (start.base.drive.amplitude, &start.here);
     let wall = Wall::ahead(here.sample.dw);
     let increment = propagator.increment(amplitude, &here.point);
-    let (t, half) = (propagator.t, 0.5 * start.pull);
-    let w = here.sample.w + (increment.y + (start.drift - half * t) * t);
-    let slowness = 1.0 / (here.point.dy + increment.dy + (start.drift - start.pull * t));
+    let (t, half) = (propagator.t, if FORCED { 0.5 * start.pull } else { 0.0 });
+    // Without forces these terms cost nothing.
+    let drift = |rate: f64| if FORCED { start.drift - rate * t } else { start.drift };
+    let w = here.sample.w + (increment.y + drift(half) * t);
+    let slowness = 1.0 / (here.point.dy + increment.dy + drift(start.pull));
     let first = (wall.sign() * start.rig.half_width - w) * slowness;
     // Not a number where the approach has no speed.
     let close = first.abs() < coefficients.near;

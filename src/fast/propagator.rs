@@ -41,14 +41,12 @@ impl Increment {
 /// The closed form at time `t`; what follows from that is computed when it is needed. By default it is that over no time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Propagator {
-    /// The key: time, s.
+    /// The key of the free motion: time, s.
     pub t: f64,
-    /// The key of the response, rad/s; NaN after a reset.
+    /// The key of the response beside it, rad/s; NaN where it has not been computed.
     pub omega: f64,
     /// What the free motion adds: the sum of both, because a propagator is used many times and the same rounding error would add up.
     pub free: (Transition, Transition),
-    /// The key of the free motion, s.
-    pub free_t: f64,
     response: Response,
     /// `omega t` from -2π to 2π.
     pub angle: Sum,
@@ -95,16 +93,9 @@ pub(super) fn angle(omega: f64, t: f64) -> Sum {
 }
 
 impl Propagator {
-    /// Makes it the propagator over `t` seconds.
-    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub fn reset(&mut self, t: f64) {
-        (self.t, self.omega) = (t, f64::NAN);
-    }
-
-    /// The same; `free` is what the free motion adds in that time.
+    /// Makes it the propagator over `t` seconds; `free` is what the free motion adds in that time.
     pub fn set(&mut self, t: f64, free: (Transition, Transition)) {
-        self.reset(t);
-        (self.free, self.free_t) = (free, t);
+        (self.t, self.omega, self.free) = (t, f64::NAN, free);
     }
 
     /// Makes the response that of these coefficients' frequency.
@@ -202,8 +193,6 @@ impl<const N: usize> Nearby<N> {
     }
 }
 
-// Coefficients
-//
 // Coefficients of the motion at one frequency of the base.
 
 /// Farthest distance of an instant from that of a propagator, in units of the fastest rate's time: Taylor polynomials of degree
@@ -305,9 +294,7 @@ fn leading_bits(x: f64, bits: u32) -> f64 {
     f64::from_bits(x.to_bits() & (u64::MAX << (52 - bits)))
 }
 
-// Short steps
-//
-// The propagator of a step that is short against every rate and repeated many times.
+// Short steps: the propagator of a step that is short against every rate and repeated many times.
 //
 // The base moves as a polynomial or a sine. Either is its Taylor series, so that the response from rest is
 // `sum b_n G_n(t)`: `b_n` the n-th derivative of the base displacement at the start, `G_n` the response to `t^n/n!`. The `G_n`

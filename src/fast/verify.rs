@@ -81,7 +81,7 @@ pub(super) struct Mark {
     pub sample: Sample,
 }
 
-/// The start of a flight.
+/// The start of a flight, while the base signal is a straight line.
 #[derive(Clone, Copy)]
 pub(super) struct Start<'a> {
     pub rig: &'a Rig,
@@ -132,7 +132,8 @@ impl<'a> Start<'a> {
     #[inline(always)]
     pub fn is_monotone(&self, from: &Mark, t: f64) -> bool {
         let (oscillator, drive, t) = (&self.rig.free, &self.base.drive, t - from.t);
-        let spare = self.drift.abs() - (forcing(oscillator, drive, t) + self.pull.abs()) * t;
+        let slowed = if self.pull == 0.0 { 0.0 } else { self.pull.abs() * t };
+        let spare = (self.drift.abs() - slowed) - harmonic_forcing(oscillator, drive) * t;
         spare > 0.0 && spare * spare * (1.0 - 1e-9) > speed_squared(oscillator, &from.point)
     }
 
@@ -141,7 +142,7 @@ impl<'a> Start<'a> {
     pub fn jerk(&self, from: &Mark, t: f64) -> f64 {
         let Oscillator { delta, omega0_squared, omega0, .. } = self.rig.free;
         let damping = 2.0 * delta;
-        let forcing = forcing(&self.rig.free, &self.base.drive, t);
+        let forcing = harmonic_forcing(&self.rig.free, &self.base.drive);
         let speed = speed_squared(&self.rig.free, &from.point).sqrt() + forcing * t;
         let acceleration = (omega0 + damping) * speed + forcing;
         damping * acceleration + omega0_squared * speed + self.base.drive.omega.abs() * forcing

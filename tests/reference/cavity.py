@@ -6,9 +6,6 @@ two scans.
 """
 
 import sys
-from math import cos as fcos
-from math import log as flog
-from math import pi as fpi
 from math import sqrt as fsqrt
 from pathlib import Path
 
@@ -74,7 +71,7 @@ DEFAULTS = {
 
 
 def deviate(seed, counter):
-    """A normal deviate in double precision: SplitMix64 with a counter, Box and Muller."""
+    """A deviate in double precision: the sum of eight numbers of 16 bits from SplitMix64 with a counter."""
     mask, gamma = (1 << 64) - 1, 0x9E3779B97F4A7C15
 
     def mix(z):
@@ -83,8 +80,9 @@ def deviate(seed, counter):
         return z ^ (z >> 31)
 
     start = mix((seed + gamma) & mask)
-    first, second = ((mix((start + gamma * (2 * counter + n)) & mask) >> 11) for n in (1, 2))
-    return fsqrt(-2.0 * flog((first + 1) / 2.0**53)) * fcos(2.0 * fpi * (second / 2.0**53))
+    outputs = [mix((start + gamma * (2 * counter + n)) & mask) for n in (1, 2)]
+    total = sum(z >> shift & 0xFFFF for z in outputs for shift in (0, 16, 32, 48))
+    return (total - 4 * 0xFFFF) / fsqrt(8 * (65536.0**2 - 1) / 12)
 
 
 class Oscillator:

@@ -1,36 +1,48 @@
 //! Tests of `plant`.
 
 use crate::plant::Saved;
-use crate::{Drive, Parameters, Plant, State};
+use crate::{Cavity, Drive, Parameters, Plant, State};
+use proptest::prelude::*;
 
-#[test]
-fn a_plant_saved_and_restored_at_any_step_goes_on_with_the_same_bits() {
-    let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
-    for (step, wobble, slope, g) in [
-        (0.063, 0.0, 0.0, 1.1),
-        (0.063, 1e-4, 0.0, 1.1),
-        (6.3, 0.0, 0.0, 1.1),
-        (1.7, 1e-4, 0.0, 1.1),
-        (0.3, 0.0, 1e-3, 1.1),
-        (0.063, 0.0, 0.0, 2.5),
-        (6.3, 1e-3, 0.0, 2.5),
-    ] {
-        let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Steps of few lengths, so that all caches are used, under a drive that stays, changes or has a slope, in an ideal or a real cavity.
+    #[test]
+    fn a_workspace_dropped_at_any_time_changes_no_bit(
+        steps in prop::collection::vec((0usize..5, any::<bool>()), 300),
+        wobble in prop_oneof![Just(0.0), 1e-6..1e-2f64],
+        slope in prop_oneof![3 => Just(0.0), 1 => 0.0..1e-3f64],
+        g in 0.5..3.0f64,
+        real in any::<bool>(),
+        (mu, tilt, scatter) in (0.0..0.003f64, -0.002..0.002f64, 0.0..0.1f64),
+    ) {
+        let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
+        let mut parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
+        if real {
+            parameters.cavity = Cavity { kinetic_friction: mu, tilt, scatter, ..Cavity::IDEAL };
+        }
         let mut plant = Plant::new(parameters, start).unwrap();
         let mut other = plant;
-        for n in 0..3000 {
-            let omega = 0.990_417 + wobble * f64::from(n % 7);
-            let drive = Drive {
-                signal: [0.0, slope, 0.0, 0.0],
-                ..Drive::harmonic(0.0084 * g, omega)
-            };
-            let saved = postcard::to_stdvec(&other).unwrap();
-            other = postcard::from_bytes(&saved).unwrap();
-            assert_eq!(plant.advance(drive, step), other.advance(drive, step));
-            assert_eq!(plant.state(), other.state(), "step {n} of {step} s");
+        let mut n = 0;
+        for (length, drop) in steps {
+            let step = [0.063, 0.3, 1.7, 6.3, 6.344][length];
+            // Equal steps in a row, as masters make them.
+            for _ in 0..3 {
+                n += 1;
+                let omega = 0.990_417 + wobble * f64::from(n % 7);
+                let drive = Drive { signal: [0.0, slope, 0.0, 0.0], ..Drive::harmonic(0.0084 * g, omega) };
+                if drop {
+                    // All that is not state is lost on the way.
+                    let saved = postcard::to_stdvec(&other).unwrap();
+                    other = postcard::from_bytes(&saved).unwrap();
+                }
+                prop_assert_eq!(plant.advance(drive, step), other.advance(drive, step));
+                prop_assert_eq!(plant.state(), other.state(), "step {}", n);
+            }
         }
-        assert!(plant.totals().impacts > 10);
-        assert_eq!(plant.totals(), other.totals());
+        prop_assert!(plant.totals().impacts > 10);
+        prop_assert_eq!(plant.totals(), other.totals());
     }
 }
 
@@ -59,7 +71,7 @@ fn plants_that_take_turns_in_one_workspace_have_the_bits_of_plants_of_their_own(
         }
     }
     assert!(plants.iter().all(|plant| plant.totals().impacts > 10));
-    assert!(size_of::<Saved>() <= 640, "{}", size_of::<Saved>());
+    assert!(size_of::<Saved>() <= 704, "{}", size_of::<Saved>());
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Calls in and out of order, through the C functions.
+//! Guards calls in and out of order, through the C functions.
 
 use crate::{new, ready};
 use fmi2_boundary::{Fmu, Functions, Master, Raw};

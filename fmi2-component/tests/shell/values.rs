@@ -1,9 +1,10 @@
-//! Setting and getting values, through the C functions.
+//! Guards setting and getting values through the C functions: when, what is refused, and that a refused call sets nothing.
 
 use std::ffi::CStr;
 use std::ptr::{null, null_mut};
 
 use crate::{new, ready};
+use fmi2_boundary::Master;
 use fmi2_component::Status::{Error, Ok};
 
 const AREA: u32 = 0;
@@ -77,97 +78,69 @@ fn a_number_that_is_not_finite_is_refused_by_name_and_unit() {
 }
 
 #[test]
-fn a_component_refuses_values_of_its_own() {
-    let master = new();
-    assert_eq!(master.set_real(AREA, -1.0), Error);
-    master.heard_one(&["fmi2SetReal: area = -1 m2 is refused; allowed is a number above 0"]);
-}
-
-#[test]
-fn nothing_is_set_where_one_of_several_is_wrong() {
-    let master = ready();
-    let before = master.bytes();
-    for (vr, values) in [
-        ([INFLOW, 99], [1.0, 1.0]),
-        ([INFLOW, AREA], [1.0, 1.0]),
-        ([INFLOW, INFLOW], [1.0, f64::NAN]),
-    ] {
-        assert_eq!(
-            unsafe { (master.f.fmi2SetReal)(master.c, vr.as_ptr(), 2, values.as_ptr()) },
-            Error
-        );
-        assert_eq!(master.bytes(), before);
-    }
-}
-
-#[test]
-fn nothing_is_set_where_the_component_refuses_a_later_value() {
-    let master = new();
-    let before = master.bytes();
-    let (vr, values) = ([HEIGHT, AREA], [5.0, -1.0]);
-    let status = unsafe { (master.f.fmi2SetReal)(master.c, vr.as_ptr(), 2, values.as_ptr()) };
-    assert_eq!(status, Error);
-    master.heard_one(&["area = -1 m2 is refused"]);
-    assert_eq!(master.bytes(), before);
-}
-
-#[test]
-fn all_truth_values_of_a_call_are_set_or_none() {
-    let master = ready();
-    let before = master.bytes();
-    for (vr, reason) in [
-        ([VALVE, 99], "value reference 99 is unknown"),
-        ([VALVE, FULL], "full cannot be set"),
-    ] {
-        let values = [0, 0];
-        let status = unsafe { (master.f.fmi2SetBoolean)(master.c, vr.as_ptr(), 2, values.as_ptr()) };
+fn all_values_of_a_call_are_set_or_none() {
+    let (fresh, started) = (new(), ready());
+    let reals = |master: &Master, references: [u32; 2], values: [f64; 2], reason: &str| {
+        let before = master.bytes();
+        let status = unsafe { (master.f.fmi2SetReal)(master.c, references.as_ptr(), 2, values.as_ptr()) };
         assert_eq!(status, Error);
         master.heard_one(&[reason]);
         assert_eq!(master.bytes(), before);
-    }
-    let (vr, values) = ([VALVE, VALVE], [1, 0]);
-    let status = unsafe { (master.f.fmi2SetBoolean)(master.c, vr.as_ptr(), 2, values.as_ptr()) };
-    assert_eq!(status, Ok);
-    assert_ne!(master.bytes(), before);
-}
+    };
+    let reason = "fmi2SetReal: area = -1 m2 is refused; allowed is a number above 0";
+    reals(&fresh, [HEIGHT, AREA], [5.0, -1.0], reason);
+    reals(&started, [INFLOW, 99], [1.0, 1.0], "value reference 99 is unknown");
+    reals(&started, [INFLOW, AREA], [1.0, 1.0], "area cannot be set");
+    reals(&started, [INFLOW, INFLOW], [1.0, f64::NAN], "finite");
 
-#[test]
-fn all_strings_of_a_call_are_set_or_none() {
-    let master = new();
-    let before = master.bytes();
-    let new = c"another".as_ptr();
-    for (vr, second, reason) in [
-        ([0, 99], new, "value reference 99 is unknown"),
+    let booleans = |references: [u32; 2], values: [i32; 2]| {
+        let f = started.f.fmi2SetBoolean;
+        unsafe { f(started.c, references.as_ptr(), 2, values.as_ptr()) }
+    };
+    let before = started.bytes();
+    for (second, reason) in [(99, "value reference 99 is unknown"), (FULL, "full cannot be set")] {
+        assert_eq!(booleans([VALVE, second], [0, 0]), Error);
+        started.heard_one(&[reason]);
+        assert_eq!(started.bytes(), before);
+    }
+    assert_eq!(booleans([VALVE, VALVE], [1, 0]), Ok);
+    assert_ne!(started.bytes(), before);
+
+    let strings = |references: [u32; 2], second| {
+        let (f, values) = (fresh.f.fmi2SetString, [c"another".as_ptr(), second]);
+        unsafe { f(fresh.c, references.as_ptr(), 2, values.as_ptr()) }
+    };
+    let (before, text) = (fresh.bytes(), c"\xff%s".as_ptr());
+    for (references, second, reason) in [
+        ([0, 99], text, "value reference 99 is unknown"),
         ([0, 0], null(), "label = NULL"),
         ([0, 0], c"".as_ptr(), "label = \"\" is refused"),
     ] {
-        let values = [new, second];
-        let status = unsafe { (master.f.fmi2SetString)(master.c, vr.as_ptr(), 2, values.as_ptr()) };
-        assert_eq!(status, Error);
-        master.heard_one(&[reason]);
-        assert_eq!(master.bytes(), before);
+        assert_eq!(strings(references, second), Error);
+        fresh.heard_one(&[reason]);
+        assert_eq!(fresh.bytes(), before);
     }
-    let status = unsafe { (master.f.fmi2SetString)(master.c, [0, 0].as_ptr(), 2, [new, new].as_ptr()) };
-    assert_eq!(status, Ok);
-    assert_ne!(master.bytes(), before);
+    // Anything that ends in NUL is a text.
+    assert_eq!(strings([0, 0], text), Ok);
+    let mut label = null();
+    unsafe {
+        (fresh.f.fmi2EnterInitializationMode)(fresh.c);
+        assert_eq!((fresh.f.fmi2GetString)(fresh.c, &0, 1, &mut label), Ok);
+        assert_eq!(CStr::from_ptr(label).to_str(), Result::Ok("\u{fffd}%s"));
+    }
 }
 
 #[test]
-fn an_unknown_value_reference_is_named() {
+fn an_unknown_value_reference_is_named_and_one_may_be_given_twice() {
     let master = ready();
     assert_eq!(master.set_real(4711, 1.0), Error);
     master.heard_one(&["value reference 4711 is unknown", "type Real; expected one of 0, 1, 2"]);
     assert_eq!(unsafe { (master.f.fmi2GetInteger)(master.c, &1, 1, &mut 0) }, Error);
     master.heard_one(&["value reference 1 is unknown", "type Integer; expected one of 0"]);
-}
-
-#[test]
-fn a_value_reference_may_be_given_twice() {
-    let master = ready();
-    let mut values = [0.0; 2];
-    let vr = [LEVEL, LEVEL];
+    let (references, mut values) = ([LEVEL, LEVEL], [0.0; 2]);
+    let get = master.f.fmi2GetReal;
     assert_eq!(
-        unsafe { (master.f.fmi2GetReal)(master.c, vr.as_ptr(), 2, values.as_mut_ptr()) },
+        unsafe { get(master.c, references.as_ptr(), 2, values.as_mut_ptr()) },
         Ok
     );
     assert_eq!(values, [0.5, 0.5]);
@@ -192,21 +165,6 @@ fn null_arrays_and_absurd_counts_are_refused() {
         assert_eq!((f.fmi2GetString)(c, &0, 1, null_mut()), Error);
         assert_eq!((f.fmi2GetInteger)(c, null(), 1, null_mut()), Error);
         assert_eq!((f.fmi2GetBoolean)(c, null(), 1, null_mut()), Error);
-    }
-}
-
-#[test]
-fn strings_may_be_anything_that_ends_in_nul() {
-    let master = new();
-    let (c, f) = (master.c, master.f);
-    unsafe {
-        assert_eq!((f.fmi2SetString)(c, &0, 1, &null()), Error);
-        master.heard_one(&["label = NULL"]);
-        assert_eq!((f.fmi2SetString)(c, &0, 1, &c"\xff%s".as_ptr()), Ok);
-        (f.fmi2EnterInitializationMode)(c);
-        let mut label = null();
-        assert_eq!((f.fmi2GetString)(c, &0, 1, &mut label), Ok);
-        assert_eq!(CStr::from_ptr(label).to_str(), Result::Ok("\u{fffd}%s"));
     }
 }
 

@@ -504,6 +504,20 @@ fn symbols(plant: &Parameters) -> Vec<(&'static str, Value)> {
     symbols
 }
 
+/// The keys of the section `[plant]` and their values, as a scene in SI units has them.
+pub fn plant_keys(plant: &Parameters) -> Vec<(&'static str, String)> {
+    let keys = symbols(plant).into_iter().map(|(symbol, value)| {
+        let text = match value {
+            Value::Integer(code) if symbol == "r_law" => format!("\"{:?}\"", Law::ALL[code as usize]).to_lowercase(),
+            Value::Integer(number) => number.to_string(),
+            Value::Real(number) => format!("{number:?}"),
+            Value::Boolean(is_on) => is_on.to_string(),
+        };
+        (symbol, text)
+    });
+    keys.collect()
+}
+
 /// Writes the parameters under their symbols, as a scene has them.
 fn serialize<S: Serializer>(plant: &Parameters, serializer: S) -> Result<S::Ok, S::Error> {
     let symbols = symbols(plant);

@@ -8,10 +8,6 @@
 mod client;
 pub mod codec;
 mod device;
-mod server;
-mod transport;
 
-pub use client::{Channels, HelicRig, HostError};
-pub use device::Device;
-pub use server::{DEFAULT_PORT, HelicServer};
-pub use transport::{LONGEST_SILENCE, Network, Transport};
+pub use client::{Channels, HelicRig, HostError, LONGEST_SILENCE, Network, Transport};
+pub use device::{DEFAULT_PORT, Device, HelicServer};

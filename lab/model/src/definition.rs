@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How resonance is defined, and what is measured. The default is that of the study.
+/// How resonance is defined, and what is measured. The default is the definition of the study.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Definition {

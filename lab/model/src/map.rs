@@ -39,8 +39,8 @@ pub fn observe(scene: &Dimensionless, sigma: f64, start: [f64; 4], limit: usize)
     Run::new(scene, sigma, start)?.decided(0, limit)
 }
 
-/// Difference of the starts of motions that must agree: far above rounding, and chaos
-/// magnifies it to order one in ln(1e9) = 21 Lyapunov times.
+/// Distance between the starts of motions that must agree: far above rounding, and magnified by chaos to order one in ln(1e9) = 21 Lyapunov
+/// times.
 const APART: f64 = 1e-9;
 /// Transient, periods, from which on it may be chaos that ends at random: on the default scene,
 /// the free motion of the primary mass decays by exp(pi epsilon lambda 500) = e^19 within it.
@@ -96,7 +96,7 @@ pub struct RegimeResult {
     pub impacts_per_period: f64,
     /// Impacts of one repetition; 0 if nothing repeats.
     pub impacts: usize,
-    /// Periods of the base that it takes; 0 likewise.
+    /// Periods of the base that one repetition takes; 0 if nothing repeats.
     pub periods: u32,
     /// How often the particle comes to rest on a wall, per period of the base.
     pub sticks_per_period: f64,

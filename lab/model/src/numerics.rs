@@ -256,7 +256,7 @@ impl Estimate {
     }
 }
 
-/// Half width of a 95 % interval of Student's distribution over that of the normal distribution (Cornish and Fisher's expansion;
+/// Half width of a 95 % interval of Student's distribution over the half width of a normal distribution's (Cornish and Fisher's expansion;
 /// within 1 % from 4 degrees of freedom on).
 pub fn student_factor(degrees: f64) -> f64 {
     let (z, n) = (NORMAL, degrees.max(1.0));
@@ -293,7 +293,7 @@ pub struct Prior {
 pub struct Regression {
     coefficients: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// Standard deviation of the residuals over that of the noise; 1 where the noise is not known.
+    /// Standard deviation of the residuals over the standard deviation of the noise; 1 where the noise is not known.
     pub excess: f64,
 }
 
@@ -336,7 +336,7 @@ impl Regression {
         let deviation = if is_noise {
             noise
         } else {
-            // Residuals far above the noise are those of the model, not a random process.
+            // Residuals far above the noise come from the model: they are not a random process.
             let colour = if scatter <= MISFIT * noise {
                 colour(&residual.as_slice()[..rows])
             } else {

@@ -149,7 +149,7 @@ pub fn synchrony(impacts: &[Impact]) -> f64 {
 const LOST: f64 = 0.25;
 
 /// Time of the last impact in synchrony with a motion whose half period starts as `half_period` and changes slowly: on the
-/// other wall than the one before, and about as long after it as that one after its own predecessor.
+/// other wall than the impact before, and after an interval about as long as the last one.
 pub fn end_of_synchrony(impacts: &[Impact], half_period: f64) -> Option<f64> {
     let mut expected = half_period;
     let mut end = impacts.first()?.time;

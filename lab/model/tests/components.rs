@@ -199,14 +199,6 @@ fn an_isola_between_two_detunings_of_the_search_is_found_with_its_folds() {
 }
 
 #[test]
-fn a_response_is_followed_at_any_excitation() {
-    let found = followed(11.0);
-    let ended: Vec<_> = found.symmetric().map(|one| one.ended).collect();
-    println!("{ended:?}");
-    assert!((1..=4).contains(&ended.len()));
-}
-
-#[test]
 fn continuation_does_not_step_from_one_branch_to_another_one_close_by() {
     // At G = 0.84278 two branches meet at sigma = -0.435; below, each of them has a fold there, and above none.
     for (g, folds) in [(0.84275, 2), (0.8428, 0), (0.84285, 0)] {

@@ -3,7 +3,6 @@
 use vines_model::{
     Definition, Dimensionless, Reference, Resonance, Sensor,
     orbit::{ContinuationLimits, Orbit, convergence, phase_resonant, response, symmetric_orbits},
-    theory::resonant,
 };
 
 // The default scene: M = 3.807 kg, k = 11.68e3 N/m, c = 2.53 N s/m, m = 0.032 kg.
@@ -78,14 +77,5 @@ fn theory_approaches_the_exact_orbit_of_every_definition() {
         );
         assert!(study.rows[0].sigma.abs() < 0.1 && study.rows[4].sigma.abs() < 0.1 * study.rows[0].sigma.abs() + 1e-4);
         assert!(study.rows[4].c.abs() < 0.1 * study.rows[0].c.abs() + 1e-4);
-    }
-}
-
-#[test]
-fn the_default_definition_is_that_of_the_study() {
-    let scene = scene(Definition::default());
-    let flow = vines_model::theory::SlowFlow::new(scene.lambda, scene.r);
-    for (one, other) in resonant(&scene).iter().zip(flow.phase_resonant(scene.g)) {
-        assert!((one.sigma - other.sigma).abs() < 1e-12 && (one.c - other.c).abs() < 1e-12);
     }
 }

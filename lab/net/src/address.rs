@@ -83,7 +83,9 @@ pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
         .map_err(|error| failed(format!("{error}; expected HOST:PORT")))?
         .collect();
     addresses.sort_by_key(SocketAddr::is_ipv6);
-    let address = *addresses.first().ok_or_else(|| failed("the name has no address".into()))?;
+    let address = *addresses
+        .first()
+        .ok_or_else(|| failed("the name has no address".into()))?;
     if scope == BindScope::Loopback && !is_loopback(address.ip()) {
         return Err(LinkError::Remote { address });
     }

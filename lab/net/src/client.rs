@@ -22,8 +22,8 @@ use super::frame::{
 use super::link::{Key, Link};
 use super::timing::{Counters, ReportLost, Timing};
 
-/// Longest time until the server opens the session: forty repetitions of Hello.
-const CONNECT: Duration = Duration::from_secs(2);
+/// Longest time until a server answers that has nothing to drive yet: forty repetitions of Hello.
+pub const CONNECT: Duration = Duration::from_secs(2);
 /// Time without an answer after which the last datagram is sent again: Hello, the first drive, or the farewell (protocol, "A session"). Also
 /// the interval at which a server is asked again that has another client.
 const RESEND: Duration = Duration::from_millis(50);

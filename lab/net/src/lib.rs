@@ -20,8 +20,8 @@ mod timing;
 
 pub use address::{Address, BindScope, LinkError, ServerError, is_loopback, resolve};
 pub use bridge::Bridge;
-pub use client::{NetController, NetRig};
+pub use client::{CONNECT, NetController, NetRig};
 pub use frame::Refusal;
-pub use link::Key;
+pub use link::{Key, POLL};
 pub use server::{RAMP_SAMPLES, Role, Served, Server, Service};
 pub use timing::{Counters, Ended, RealTimeClock, ReportLost, Session, Timing};

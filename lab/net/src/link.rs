@@ -124,7 +124,7 @@ impl Seal {
 /// Shorter waits use polling: the time-outs of the system may be as coarse as 16 ms, which is several samples.
 const FINE: Duration = Duration::from_millis(20);
 /// Polling interval: a twentieth of a sample at 1000 samples a second.
-const POLL: Duration = Duration::from_micros(50);
+pub const POLL: Duration = Duration::from_micros(50);
 /// Shorter waits do not sleep: the system wakes a program up later than it asks for, by about this.
 const SPIN: Duration = Duration::from_micros(100);
 /// Interval at which a server without a session looks for connections and their frames: short against the time for loading a rig.

@@ -160,18 +160,12 @@ fn digits(uncertainty: f64) -> usize {
 
 /// The section `[plant]` of a scene, with the standard uncertainties in comments.
 fn plant_section(report: &FitReport, plant: &vines::scene::Parameters) -> String {
-    let values = [
-        ("M", plant.primary_mass),
-        ("k", plant.stiffness),
-        ("c", plant.damping),
-        ("m", plant.particle_mass),
-        ("b", plant.half_width),
-        ("r", plant.restitution),
-    ];
-    let lines = values.map(|(symbol, value)| {
+    let lines = vines::scene::plant_keys(plant).into_iter().map(|(symbol, value)| {
         let fitted = report.parameters.iter().find(|one| one.symbol == symbol);
         let u = fitted.map_or_else(String::new, |one| format!(" ± {:.2e}", one.uncertainty));
-        format!("{symbol} = {value:?}  # fitted{u}\n")
+        let is_ideal = ["M", "k", "c", "m", "b", "r"].contains(&symbol);
+        let note = if is_ideal { format!("  # fitted{u}") } else { String::new() };
+        format!("{symbol} = {value}{note}\n")
     });
-    format!("[plant]\n{}", lines.concat())
+    format!("[plant]\n{}", lines.collect::<String>())
 }

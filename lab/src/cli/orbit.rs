@@ -6,9 +6,12 @@ use clap::Args;
 use lovines::{Event, State};
 use vines::orbit::{
     Branch, BranchEnd, Condition, ContinuationLimits, DOUBLINGS, Orbit, Periodic, backbone, continue_both_ways,
-    phase_resonant, resonant_motion_under, response, settle, settled_motion,
+    phase_resonant, resonant_motion_under, response, settle, settled_motion, stable_resonant,
 };
-use vines::report::{Table, number, row, summary::parameters};
+use vines::report::{
+    Table, number, row,
+    summary::{ideal, parameters},
+};
 use vines::{
     ArgumentError,
     numerics::range,
@@ -81,11 +84,11 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+    if arguments.periodic {
+        return of_the_plant(arguments, &arguments.scene.load()?);
+    }
     let loaded = arguments.scene.load_for("exact orbits are")?;
     let scene = loaded.dimensionless();
-    if arguments.periodic {
-        return of_the_plant(arguments, &loaded);
-    }
     if let Some(sigma) = arguments.sigma {
         return settled(arguments, &scene, sigma, loaded.dimensionless_start());
     }
@@ -201,6 +204,9 @@ struct PlantOrbit {
     /// (q1, q1', q2, q2') where the phase of the base is 0, m and m/s.
     state: [f64; 4],
     events: Vec<PlantEvent>,
+    /// What the ideal cavity leaves out, with detuning and amplitude (m) of its exact orbit at resonance under the same base.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ideal: Option<(String, f64, f64)>,
 }
 
 #[derive(serde::Serialize)]
@@ -257,6 +263,11 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
         stable: motion.is_stable(),
         state: [q1, dq1, q2, dq2],
         events: events.collect(),
+        ideal: match arguments.sigma {
+            None => scene.left_out().zip(stable_resonant(&numbers)),
+            Some(_) => None,
+        }
+        .map(|(left_out, orbit)| (left_out, orbit.sigma, orbit.c * numbers.b)),
     };
     let title = "Periodic motion of the plant with all effects of its cavity";
     shown(&numbers, title, &orbit, arguments.json, || plant_text(&orbit))
@@ -284,11 +295,16 @@ fn plant_text(orbit: &PlantOrbit) -> String {
         vec![number(one.phase_deg), one.event.to_string(), side, blank(one.velocity)]
     });
     let table = Table::new("phase, degrees | event | side | w' before, m/s").rows(rows);
+    let ideal = orbit.ideal.as_ref().map(|(left_out, sigma, a_m)| {
+        let results = format!("sigma = {sigma:.6} and response {a_m:.6e} m are");
+        format!("  ({})\n", ideal(&results, left_out))
+    });
     format!(
         "  {f_hz:.6} Hz, sigma = {sigma:.6}; base {e_m:.6e} m; response {a_m:.6e} m at {phase_deg:.4} degrees\n  in {periods} period{s}: impacts \
-         {impacts}, at rest on a wall {rests}, sticking to the floor {sticks}\n  multipliers {}: {}\n\n{}",
+         {impacts}, at rest on a wall {rests}, sticking to the floor {sticks}\n  multipliers {}: {}\n{}\n{}",
         multipliers.join(", "),
         if orbit.stable { "stable" } else { "unstable" },
+        ideal.unwrap_or_default(),
         table.text()
     )
 }

@@ -42,15 +42,12 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let folder = match &arguments.libraries {
-        Some(folder) => folder.clone(),
-        None => beside_this_program()?,
+    let folder = match (&arguments.libraries, arguments.only_binaries) {
+        (_, true) => None,
+        (Some(folder), _) => Some(folder.clone()),
+        (None, _) => Some(beside_this_program()?),
     };
-    let libraries = Libraries {
-        folder,
-        own: !arguments.only_binaries,
-        others: arguments.binaries.clone(),
-    };
+    let libraries = Libraries { folder, others: arguments.binaries.clone() };
     let written = pack_bench(&scene, &libraries, &arguments.out)?;
     Ok(written.iter().map(|path| format!("{}\n", path.display())).collect())
 }

@@ -83,7 +83,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<Shard>,
 
-    /// Collect the chunks of these stores of the same sweep; only damaged ones are computed
+    /// Take the chunks that these stores of the same sweep have, before the others are computed
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "shard")]
     merge: Vec<PathBuf>,
 
@@ -119,14 +119,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         sweep.scene(),
         "regimes, responses and exact orbits of a sweep (not its locked points) are",
     );
-    if !arguments.merge.is_empty() {
-        return merge(&sweep, arguments);
-    }
     if arguments.verify {
         return verify(&sweep, arguments);
     }
     let estimate = sweep::estimate(&sweep, &AtomicBool::new(false)).map_err(Failure::input)?;
-    if estimate.is_large() && !arguments.yes {
+    if estimate.is_large() && !arguments.yes && arguments.merge.is_empty() {
         let Estimate { cells, hours, bytes } = estimate;
         return Err(Failure::input(format!(
             "{cells} cells would take about {hours:.1} h on this machine and {:.1} GB before compression; confirm with --yes",
@@ -134,6 +131,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         )));
     }
     let monitor = Monitor::default();
+    if !arguments.merge.is_empty() {
+        sweep::collect(&sweep, &arguments.out, &arguments.merge, &monitor).map_err(Failure::input)?;
+    }
     let work = || sweep::run(&sweep, &arguments.out, arguments.part(), &monitor);
     let complete = watched(&sweep, "sweeping", &monitor, work)?;
     let (found, computed, failed) = (
@@ -151,7 +151,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         let share = 100.0 * inferred as f64 / sweep.cells() as f64;
         text += &format!("{inferred} cells ({share:.1} %) were inferred from their neighbours\n");
     }
-    let damage = damage(&monitor, "They were replaced");
+    let damage = damage(&monitor, "Their chunks were copied or computed again");
     text += &damage;
     if let Some(reason) = monitor.reason.lock().ok().and_then(|mut reason| reason.take()) {
         text += &format!("First failure: {reason}\n");
@@ -172,24 +172,6 @@ fn shard(text: &str) -> Result<Shard, ArgumentError> {
     match parts {
         Some((one, of)) if (1..=of).contains(&one) => Ok(Shard { number: one - 1, of }),
         _ => Err("expected I/N with I from 1 to N, for instance 3/8".into()),
-    }
-}
-
-fn merge(sweep: &Sweep, arguments: &Arguments) -> Result<String, Failure> {
-    let out = arguments.out.display();
-    let monitor = Monitor::default();
-    let missing = sweep::merge(sweep, &arguments.out, &arguments.merge, &monitor).map_err(Failure::input)?;
-    let computed = monitor.computed.load(Relaxed);
-    let damage = damage(&monitor, &format!("{out} does not have them"));
-    match missing {
-        0 => Ok(format!(
-            "{} cells, complete; {computed} of them computed\n{damage}Written: {out}\n",
-            sweep.cells()
-        )),
-        missing => Err(Failure::run(format!(
-            "{damage}{missing} of {} cells are in none of these stores; {out} has the others. Without --merge, the same command computes them",
-            sweep.cells()
-        ))),
     }
 }
 
@@ -244,7 +226,7 @@ fn watched(
             }
             let computed = monitor.computed.load(Relaxed);
             if computed > 0 && !started {
-                // The rate is that of the cells computed now.
+                // The rate counts only cells that are computed now.
                 started = true;
                 bar.set_position(monitor.found.load(Relaxed));
                 bar.reset_eta();

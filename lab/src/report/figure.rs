@@ -1,8 +1,6 @@
 //! Figures as data: panels with axes and series. [`Figure::svg`] draws all of them, with the colours of [`super::theme`]. The same input
 //! gives the same bytes.
 
-use std::fmt::Write;
-
 use super::theme::{CAPTION, GRID, HALO, INK, PAPER, colour, unstable};
 use crate::scene::{Dimensionless, Sensor};
 
@@ -67,41 +65,35 @@ pub struct Panel {
 /// Something drawn in a panel; the first of each label is in the legend.
 struct Series {
     shape: Shape,
-    /// Segments and cells take two each: their ends, or opposite corners.
     places: Vec<Place>,
     /// The name of the colour, in the table of styles.
     colour: &'static str,
     label: String,
 }
 
+/// How a series is drawn; widths, radii and sizes in px.
 #[derive(Clone, Copy)]
-enum Shape {
-    Line {
-        width: f64,
-        dashed: bool,
-        halo: bool,
-    },
-    Segments {
-        width: f64,
-        halo: bool,
-    },
-    /// Letter in the legend, and the name of its colour.
+pub enum Shape {
+    /// A solid line through the places: measured values, and stable motions.
+    Line(f64),
+    /// A line on a map, with a halo.
+    OnMap(f64),
+    Dashed(f64),
+    DashedOnMap(f64),
+    /// Segments, such as error bars: two places each.
+    Bars(f64),
+    /// The border of an area of a map: two places each.
+    Border(f64),
+    /// Cells of a map: two opposite corners each. Letter in the legend, and the name of its colour.
     Cells(&'static str, &'static str),
-    Marks(Glyph),
-    /// With a background of paper if it lies on a curve.
-    Text {
-        size: f64,
-        on_curve: bool,
-    },
-}
-
-/// A mark at a place; radius in px.
-#[derive(Clone, Copy)]
-pub enum Glyph {
     Circle(f64),
     Dot(f64),
     Square,
     Cross,
+    /// Text with its middle at the place.
+    Text(f64),
+    /// Text that interrupts a curve.
+    TextOnCurve(f64),
 }
 
 impl Figure {
@@ -155,85 +147,44 @@ impl Panel {
     }
 
     /// Adds a series, unless it has nothing to draw: the legend does not name what is not there.
-    fn add(&mut self, shape: Shape, places: Vec<Place>, colour: &'static str, label: &str) {
+    pub fn add(&mut self, shape: Shape, places: Vec<Place>, colour: &'static str, label: &str) {
         if !places.is_empty() {
-            self.series.push(Series { shape, places, colour, label: label.into() });
+            let label = label.into();
+            self.series.push(Series { shape, places, colour, label });
         }
-    }
-
-    /// A solid line: measured values, and stable motions.
-    pub fn line(&mut self, points: Vec<Place>, width: f64, colour: &'static str, label: &str) {
-        let shape = Shape::Line { width, dashed: false, halo: false };
-        self.add(shape, points, colour, label);
     }
 
     /// A curve of motions, solid where they are stable and dashed where they are not.
     pub fn curve(&mut self, points: &[Marked], width: f64, colour: &'static str, name: &str) {
-        self.pieces(points, (width, false), colour, name);
-    }
-
-    /// A curve of motions over the cells of a map.
-    pub fn curve_on_map(&mut self, points: &[Marked], colour: &'static str, label: &str) {
-        self.pieces(points, (2.2, true), colour, label);
-    }
-
-    fn pieces(&mut self, points: &[Marked], (width, halo): (f64, bool), colour: &'static str, name: &str) {
+        let label = |stable| match (name, stable) {
+            ("", _) => String::new(),
+            (name, true) => format!("{name}, stable"),
+            (name, false) => format!("{name}, unstable"),
+        };
         // The stable pieces first, and so in the legend.
-        for stable in [true, false] {
-            let label = match (name.is_empty() || halo, stable) {
-                (true, _) => name.to_string(),
-                (false, true) => format!("{name}, stable"),
-                (false, false) => format!("{name}, unstable"),
-            };
-            let colour = if stable { colour } else { unstable(colour) };
-            let mut start = 0;
-            for run in points.chunk_by(|point, next| point.1 == next.1) {
-                let from = start;
-                start += run.len();
-                if run[0].1 == stable {
-                    // With the point after it, so that the curve has no holes.
-                    let places = points[from..(start + 1).min(points.len())].iter().map(|point| point.0);
-                    self.add(
-                        Shape::Line { width, dashed: !stable, halo },
-                        places.collect(),
-                        colour,
-                        &label,
-                    );
-                }
-            }
+        for run in runs(points, true) {
+            self.add(Shape::Line(width), run, colour, &label(true));
+        }
+        for run in runs(points, false) {
+            self.add(Shape::Dashed(width), run, unstable(colour), &label(false));
         }
     }
 
-    /// Error bars: pairs of ends.
-    pub fn bars(&mut self, ends: Vec<Place>, colour: &'static str, label: &str) {
-        self.add(Shape::Segments { width: 1.2, halo: false }, ends, colour, label);
-    }
-
-    /// A border over the cells of a map: pairs of ends.
-    pub fn border(&mut self, ends: Vec<Place>, colour: &'static str, label: &str) {
-        self.add(Shape::Segments { width: 2.2, halo: true }, ends, colour, label);
-    }
-
-    /// Cells of a map: pairs of opposite corners.
-    pub fn cells(&mut self, corners: Vec<Place>, colour: &'static str, letter: (&'static str, &'static str)) {
-        self.add(Shape::Cells(letter.0, letter.1), corners, colour, colour);
-    }
-
-    pub fn marks(&mut self, points: Vec<Place>, glyph: Glyph, colour: &'static str, label: &str) {
-        self.add(Shape::Marks(glyph), points, colour, label);
-    }
-
-    /// Text of that size, px, with its middle at the place. Text on a curve has a background of paper.
-    pub fn text(&mut self, text: &str, place: Place, size: f64, colour: &'static str, on_curve: bool) {
-        let (shape, label) = (Shape::Text { size, on_curve }, text.into());
-        self.series.push(Series { shape, places: vec![place], colour, label });
+    /// A curve of motions on a map.
+    pub fn curve_on_map(&mut self, points: &[Marked], colour: &'static str, label: &str) {
+        for run in runs(points, true) {
+            self.add(Shape::OnMap(2.2), run, colour, label);
+        }
+        for run in runs(points, false) {
+            self.add(Shape::DashedOnMap(2.2), run, colour, label);
+        }
     }
 
     /// The series of the legend.
     fn entries(&self) -> Vec<&Series> {
         let mut entries: Vec<&Series> = Vec::new();
         for series in &self.series {
-            let named = !series.label.is_empty() && !matches!(series.shape, Shape::Text { .. });
+            let named = !series.label.is_empty() && !matches!(series.shape, Shape::Text(_) | Shape::TextOnCurve(_));
             if named && entries.iter().all(|entry| entry.label != series.label) {
                 entries.push(series);
             }
@@ -280,9 +231,8 @@ impl Panel {
         frame.draw(svg, &self.labels);
         // Curves end at the axes; marks are whole.
         let [w, h] = frame.size;
-        let _ = writeln!(
-            svg,
-            "<svg x=\"{x:.2}\" y=\"{y:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" viewBox=\"{x:.2} {y:.2} {w:.2} {h:.2}\">"
+        *svg += &format!(
+            "<svg x=\"{x:.2}\" y=\"{y:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" viewBox=\"{x:.2} {y:.2} {w:.2} {h:.2}\">\n"
         );
         for series in &self.series {
             series.draw(svg, &frame, false);
@@ -371,7 +321,7 @@ impl Frame {
             "middle",
         );
         let [x, y] = [left - 46.0, top + height / 2.0];
-        let _ = write!(svg, "<g transform=\"rotate(-90 {x:.2} {y:.2})\">");
+        *svg += &format!("<g transform=\"rotate(-90 {x:.2} {y:.2})\">");
         text(svg, &labels[1], [x, y], LABEL, INK, "middle");
         svg.push_str("</g>\n");
     }
@@ -394,51 +344,42 @@ fn ticks((from, to): (f64, f64), most: f64) -> Vec<(f64, String)> {
 impl Series {
     /// Draws the series, if it is one of the marks and texts, or one of the others.
     fn draw(&self, svg: &mut String, frame: &Frame, marks: bool) {
-        let places = || self.places.iter().map(|place| frame.at(*place));
+        let places: Vec<[f64; 2]> = self.places.iter().map(|place| frame.at(*place)).collect();
         match self.shape {
-            Shape::Line { width, dashed, halo } if !marks => {
+            Shape::Line(_) | Shape::OnMap(_) | Shape::Dashed(_) | Shape::DashedOnMap(_) if !marks => {
                 let mut points: Vec<[f64; 2]> = Vec::new();
-                for (n, [x, y]) in places().enumerate() {
+                for (n, [x, y]) in places.iter().copied().enumerate() {
                     let far = points.last().is_none_or(|[a, b]| (x - a).hypot(y - b) >= APART);
-                    if far || n + 1 == self.places.len() {
+                    if far || n + 1 == places.len() {
                         points.push([x, y]);
                     }
                 }
-                stroke(svg, &points, width, halo, dashed, self.colour);
+                self.stroke(svg, &points);
             }
-            Shape::Segments { width, halo } if !marks => {
-                let ends: Vec<[f64; 2]> = places().collect();
-                if halo {
-                    ends.chunks_exact(2)
-                        .for_each(|pair| path(svg, pair, width + 2.8, HALO, ""));
-                }
-                ends.chunks_exact(2)
-                    .for_each(|pair| path(svg, pair, width, self.colour, ""));
+            Shape::Bars(_) | Shape::Border(_) if !marks => {
+                // The halo of one segment must not hide its neighbour.
+                places.chunks_exact(2).for_each(|pair| self.halo(svg, pair));
+                places.chunks_exact(2).for_each(|pair| self.line(svg, pair));
             }
             Shape::Cells(..) if !marks => {
-                let corners: Vec<[f64; 2]> = places().collect();
-                for pair in corners.chunks_exact(2) {
+                for pair in places.chunks_exact(2) {
                     let [[a, b], [c, d]] = [pair[0], pair[1]];
                     let area = [a.min(c), b.min(d), (a - c).abs(), (b - d).abs()];
                     // Cells lie side by side without a seam.
                     rectangle(svg, area, self.colour, " shape-rendering=\"crispEdges\"");
                 }
             }
-            Shape::Marks(glyph) if marks => {
+            Shape::Circle(_) | Shape::Dot(_) | Shape::Square | Shape::Cross if marks => {
                 for place in self.places.iter().filter(|place| frame.contains(**place)) {
-                    mark(svg, frame.at(*place), glyph, self.colour);
+                    self.mark(svg, frame.at(*place));
                 }
             }
-            Shape::Text { size, on_curve } if marks => {
-                for [x, y] in places() {
+            Shape::Text(size) | Shape::TextOnCurve(size) if marks => {
+                for [x, y] in places {
                     let width = text_width(&self.label, size);
-                    if on_curve {
-                        rectangle(
-                            svg,
-                            [x - width / 2.0, y - 0.6 * size, width, 1.2 * size],
-                            PAPER,
-                            " fill-opacity=\"0.85\"",
-                        );
+                    if matches!(self.shape, Shape::TextOnCurve(_)) {
+                        let area = [x - width / 2.0, y - 0.6 * size, width, 1.2 * size];
+                        rectangle(svg, area, PAPER, " fill-opacity=\"0.85\"");
                     }
                     text(svg, &self.label, [x, y + 0.35 * size], size, self.colour, "middle");
                 }
@@ -451,76 +392,83 @@ impl Series {
     fn sample(&self, svg: &mut String, [x, y]: [f64; 2]) {
         let middle = [x + ENTRY.1 / 2.0, y];
         match self.shape {
-            Shape::Line { width, dashed, halo } => {
-                stroke(svg, &[[x, y], [x + ENTRY.1, y]], width, halo, dashed, self.colour)
-            }
-            Shape::Segments { width, halo } => {
-                stroke(svg, &[[x, y], [x + ENTRY.1, y]], width, halo, false, self.colour)
-            }
-            Shape::Marks(glyph) => mark(svg, middle, glyph, self.colour),
+            Shape::Circle(_) | Shape::Dot(_) | Shape::Square | Shape::Cross => self.mark(svg, middle),
             Shape::Cells(letter, ink) => {
                 let edge = format!(" stroke=\"{}\"", colour(INK));
                 rectangle(svg, [x, y - 8.5, ENTRY.1, 17.0], self.colour, &edge);
                 text(svg, letter, [middle[0], y + 4.5], SMALL, ink, "middle");
             }
-            Shape::Text { .. } => {}
+            _ => self.stroke(svg, &[[x, y], [x + ENTRY.1, y]]),
+        }
+    }
+
+    fn stroke(&self, svg: &mut String, points: &[[f64; 2]]) {
+        self.halo(svg, points);
+        self.line(svg, points);
+    }
+
+    fn halo(&self, svg: &mut String, points: &[[f64; 2]]) {
+        if let Shape::OnMap(width) | Shape::DashedOnMap(width) | Shape::Border(width) = self.shape {
+            path(svg, points, width + 2.8, HALO, "");
+        }
+    }
+
+    fn line(&self, svg: &mut String, points: &[[f64; 2]]) {
+        let (width, dashes) = match self.shape {
+            Shape::Dashed(width) | Shape::DashedOnMap(width) => (width, " stroke-dasharray=\"7 5\""),
+            Shape::Line(width) | Shape::OnMap(width) | Shape::Bars(width) | Shape::Border(width) => (width, ""),
+            _ => return,
+        };
+        path(svg, points, width, self.colour, dashes);
+    }
+
+    fn mark(&self, svg: &mut String, [x, y]: [f64; 2]) {
+        let shade = colour(self.colour);
+        let circle = |radius, style: &str| format!("<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius}\" {style}/>\n");
+        match self.shape {
+            Shape::Circle(r) => {
+                *svg += &circle(r, &format!("fill=\"none\" stroke=\"{shade}\" stroke-width=\"1.5\""));
+            }
+            Shape::Dot(r) => *svg += &circle(r, &format!("fill=\"{shade}\"")),
+            Shape::Square => rectangle(svg, [x - 4.5, y - 4.5, 9.0, 9.0], self.colour, ""),
+            _ => {
+                for d in [4.0, -4.0] {
+                    path(svg, &[[x - 4.0, y - d], [x + 4.0, y + d]], 1.2, self.colour, "");
+                }
+            }
         }
     }
 }
 
-fn stroke(svg: &mut String, points: &[[f64; 2]], width: f64, halo: bool, dashed: bool, colour: &str) {
-    if halo {
-        path(svg, points, width + 2.8, HALO, "");
-    }
-    path(
-        svg,
-        points,
-        width,
-        colour,
-        if dashed { " stroke-dasharray=\"7 5\"" } else { "" },
-    );
+/// Runs of consecutive motions that are stable, or unstable, as wanted; each with the point after it, so that the curve has no holes.
+fn runs(points: &[Marked], wanted: bool) -> Vec<Vec<Place>> {
+    let mut start = 0;
+    let runs = points.chunk_by(|point, next| point.1 == next.1);
+    let runs = runs.filter_map(|run| {
+        let from = start;
+        start += run.len();
+        let to = (start + 1).min(points.len());
+        (run[0].1 == wanted).then(|| points[from..to].iter().map(|point| point.0).collect())
+    });
+    runs.collect()
 }
 
 fn path(svg: &mut String, points: &[[f64; 2]], width: f64, name: &str, more: &str) {
     let points: Vec<String> = points.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
     let (points, colour) = (points.join(" "), colour(name));
-    let _ = writeln!(
-        svg,
-        "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"{more}/>"
-    );
+    *svg +=
+        &format!("<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"{more}/>\n");
 }
 
 fn rectangle(svg: &mut String, [x, y, width, height]: [f64; 4], name: &str, more: &str) {
-    let colour = colour(name);
-    let _ = writeln!(
-        svg,
-        "<rect x=\"{x:.2}\" y=\"{y:.2}\" width=\"{width:.2}\" height=\"{height:.2}\" fill=\"{colour}\"{more}/>"
-    );
-}
-
-fn mark(svg: &mut String, [x, y]: [f64; 2], glyph: Glyph, name: &str) {
-    let shade = colour(name);
-    let _ = match glyph {
-        Glyph::Circle(r) => writeln!(
-            svg,
-            "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{r}\" fill=\"none\" stroke=\"{shade}\" stroke-width=\"1.5\"/>"
-        ),
-        Glyph::Dot(r) => writeln!(svg, "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{r}\" fill=\"{shade}\"/>"),
-        Glyph::Square => return rectangle(svg, [x - 4.5, y - 4.5, 9.0, 9.0], name, ""),
-        Glyph::Cross => {
-            path(svg, &[[x - 4.0, y - 4.0], [x + 4.0, y + 4.0]], 1.2, name, "");
-            return path(svg, &[[x - 4.0, y + 4.0], [x + 4.0, y - 4.0]], 1.2, name, "");
-        }
-    };
+    let (place, colour) = (format!("x=\"{x:.2}\" y=\"{y:.2}\""), colour(name));
+    *svg += &format!("<rect {place} width=\"{width:.2}\" height=\"{height:.2}\" fill=\"{colour}\"{more}/>\n");
 }
 
 fn text(svg: &mut String, words: &str, [x, y]: [f64; 2], size: f64, name: &str, anchor: &str) {
-    let words = maud::html! { (words) }.into_string();
-    let colour = colour(name);
-    let _ = writeln!(
-        svg,
-        "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{size}\" fill=\"{colour}\" text-anchor=\"{anchor}\">{words}</text>"
-    );
+    let (words, colour) = (maud::html! { (words) }.into_string(), colour(name));
+    let place = format!("x=\"{x:.2}\" y=\"{y:.2}\" text-anchor=\"{anchor}\"");
+    *svg += &format!("<text {place} font-size=\"{size}\" fill=\"{colour}\">{words}</text>\n");
 }
 
 /// Width of a text in a usual font, px.

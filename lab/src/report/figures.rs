@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use nalgebra::DVector;
 
 use super::figure::{
-    AMPLITUDE_OF_V, DETUNING, Figure, Glyph, Legend, Marked, Panel, Place, SIZE, SPEED, amplitude, caption, rig,
+    AMPLITUDE_OF_V, DETUNING, Figure, Legend, Marked, Panel, Place, SIZE, SPEED, Shape, amplitude, caption, rig,
 };
 use super::theme::{EXACT, INK, MEASURED, MODULATION, PARTICLE, THEORY};
 use crate::comparison::{Comparison, TrackedComparison};
@@ -32,7 +32,7 @@ const FIRST_ORDER: &str = "first-order theory";
 const VISIBLE: f64 = 0.02;
 
 fn circles(panel: &mut Panel, points: impl Iterator<Item = Place>, label: &str) {
-    panel.marks(points.collect(), Glyph::Circle(3.5), MEASURED, label);
+    panel.add(Shape::Circle(3.5), points.collect(), MEASURED, label);
 }
 
 /// Error bars of 95 %: places with their standard uncertainties, vertical or horizontal, on an axis of that range.
@@ -42,7 +42,7 @@ fn error_bars(panel: &mut Panel, bars: impl Iterator<Item = (Place, f64)>, verti
         let (dx, dy) = if vertical { (0.0, 1.96 * u) } else { (1.96 * u, 0.0) };
         [(x - dx, y - dy), (x + dx, y + dy)]
     });
-    panel.bars(ends.collect(), MEASURED, "95 % of the measurement");
+    panel.add(Shape::Bars(1.2), ends.collect(), MEASURED, "95 % of the measurement");
 }
 
 /// The right branch of first-order theory's backbone, from the fold up to an amplitude.
@@ -93,14 +93,19 @@ pub fn backbone(result: &Comparison) -> Figure {
     let predicted = result.decay.iter();
     let predicted = predicted.filter_map(|compared| Some((compared.sigma_predicted?, compared.point.c)));
     let predicted = predicted.filter(|(_, c)| *c > fold).collect();
-    panel.line(predicted, 1.0, EXACT, "free decay, predicted by the exact plant");
+    panel.add(
+        Shape::Line(1.0),
+        predicted,
+        EXACT,
+        "free decay, predicted by the exact plant",
+    );
     let identified = decay().step_by(THINNED).map(|point| (point.sigma, point.c));
     circles(&mut panel, identified, IDENTIFIED);
     let place = (lock.sigma, lock.c);
     for (uncertainty, vertical, range) in [(lock.u_sigma, false, high - low), (lock.u_c, true, top)] {
         error_bars(&mut panel, std::iter::once((place, uncertainty)), vertical, range);
     }
-    panel.marks(vec![place], Glyph::Square, MEASURED, "locked, measured");
+    panel.add(Shape::Square, vec![place], MEASURED, "locked, measured");
     Figure::single(panel)
 }
 
@@ -140,7 +145,7 @@ pub fn manifold(result: &Comparison) -> Figure {
         IDENTIFIED,
     );
     if let Some(b) = lock.b {
-        panel.marks(vec![(b, lock.at.c)], Glyph::Square, MEASURED, "locked, measured");
+        panel.add(Shape::Square, vec![(b, lock.at.c)], MEASURED, "locked, measured");
     }
     Figure::single(panel)
 }
@@ -183,7 +188,7 @@ fn tracked_amplitude(tracked: &TrackedComparison) -> Panel {
     error_bars(&mut panel, bars, false, x.1 - x.0);
     let unsettled = places().zip(points()).filter(|(_, point)| !point.settled);
     let unsettled = unsettled.map(|(place, _)| place).collect();
-    panel.marks(unsettled, Glyph::Cross, MEASURED, "not settled in time");
+    panel.add(Shape::Cross, unsettled, MEASURED, "not settled in time");
     panel
 }
 
@@ -205,7 +210,7 @@ fn tracked_drive(tracked: &TrackedComparison) -> Panel {
         .collect();
     panel.curve(&theory, 2.0, THEORY, FIRST_ORDER);
     let exact = tracked.exact.places().iter().map(|place| (place[0], place[2]));
-    panel.line(exact.collect(), 1.6, EXACT, "exact orbits");
+    panel.add(Shape::Line(1.6), exact.collect(), EXACT, "exact orbits");
     let places = || points().map(|point| (point.at.c, point.at.g));
     circles(&mut panel, places(), "tracked");
     let bars = places().zip(points().map(|point| point.at.u_g));
@@ -266,13 +271,13 @@ fn driven_panel(result: &Comparison, driven: &[Triple], row: usize, y: ((f64, f6
         panel = panel.heading("Seeking and holding resonance", &caption);
     }
     let measured = driven.iter().map(|triple| (triple[0], triple[row])).collect();
-    panel.line(measured, 1.6, MEASURED, "measured");
+    panel.add(Shape::Line(1.6), measured, MEASURED, "measured");
     let level = |value: [f64; 2]| vec![(0.0, value[row - 1]), (end, value[row - 1])];
     if let Some(exact) = &result.exact {
-        panel.line(level([exact.c, exact.sigma]), 1.6, EXACT, "exact orbit");
+        panel.add(Shape::Line(1.6), level([exact.c, exact.sigma]), EXACT, "exact orbit");
     }
     if let Some(theory) = &result.theory {
-        panel.line(level([theory.c, theory.sigma]), 1.2, THEORY, FIRST_ORDER);
+        panel.add(Shape::Line(1.2), level([theory.c, theory.sigma]), THEORY, FIRST_ORDER);
     }
     panel.legend(if row == 1 { Legend::LowerRight } else { Legend::None })
 }
@@ -285,7 +290,12 @@ fn decay_panel(theory: &[Triple], points: &[Triple], row: usize, y: (f64, f64)) 
         panel = panel.heading("Free decay", "the drive is off from 0 on");
     }
     let place = |triple: &Triple| (triple[0], triple[row]);
-    panel.line(theory.iter().map(place).collect(), 1.2, THEORY, FIRST_ORDER);
+    panel.add(
+        Shape::Line(1.2),
+        theory.iter().map(place).collect(),
+        THEORY,
+        FIRST_ORDER,
+    );
     circles(&mut panel, points.iter().map(place), IDENTIFIED);
     panel.legend(if row == 1 { Legend::UpperRight } else { Legend::None })
 }
@@ -337,12 +347,12 @@ pub fn approach(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
     // Starts on all sides of the manifold: B and C in parts of those at the locked point.
     for (b, c) in [(0.93, 1.35), (1.07, 0.65), (0.8, 0.75), (1.14, 1.2)] {
         let places = sequence(lock.g, (b * lock.b, c * lock.c));
-        panel.line(places.clone(), 0.6, MODULATION, "");
-        panel.marks(places, Glyph::Dot(2.2), MODULATION, "with drive");
+        panel.add(Shape::Line(0.6), places.clone(), MODULATION, "");
+        panel.add(Shape::Dot(2.2), places, MODULATION, "with drive");
     }
     let free = sequence(0.0, (lock.b, lock.c));
-    panel.marks(free, Glyph::Circle(3.5), MODULATION, "without drive");
-    panel.marks(vec![(lock.b, lock.c)], Glyph::Square, INK, "phase resonance");
+    panel.add(Shape::Circle(3.5), free, MODULATION, "without drive");
+    panel.add(Shape::Square, vec![(lock.b, lock.c)], INK, "phase resonance");
     Figure::single(panel)
 }
 
@@ -382,7 +392,7 @@ pub fn backbones(p: &Dimensionless) -> Figure {
             Some((sigma, c)) => (sigma + 0.4, c),
             None => (0.0, 0.1),
         };
-        panel.text(&format!("r = {r}"), place, size, INK, true);
+        panel.add(Shape::TextOnCurve(size), vec![place], INK, &format!("r = {r}"));
     }
     Figure::single(panel)
 }
@@ -418,7 +428,8 @@ pub fn responses(p: &Dimensionless, responses: &[FrequencyResponse]) -> Figure {
         let off = |place: &Place| (place.1 - 0.75 * peak.1).abs();
         let flank = stable.into_iter().filter(|place| place.0 < peak.0);
         if let Some((sigma, c)) = flank.min_by(|place, next| off(place).total_cmp(&off(next))) {
-            panel.text(&format!("G = {:.3}", response.g), (sigma, c), 13.0, INK, true);
+            let label = format!("G = {:.3}", response.g);
+            panel.add(Shape::TextOnCurve(13.0), vec![(sigma, c)], INK, &label);
         }
     }
     let backbone = theory::backbone(p, fold, 1.4 * B_SYMMETRY_BREAKING, 600);
@@ -487,12 +498,17 @@ fn displacements(p: &Dimensionless, motion: &Periodic, rows: &[[f64; 5]], impact
         .heading("One period of the locked motion", &caption)
         .legend(Legend::Beside(182.0));
     for side in [1.0, -1.0] {
-        panel.line(over_period(rows, |row| row[1] + side), 2.0, INK, "walls, q₁ ± 1");
+        panel.add(
+            Shape::Line(2.0),
+            over_period(rows, |row| row[1] + side),
+            INK,
+            "walls, q₁ ± 1",
+        );
     }
-    panel.line(q1, 2.4, EXACT, "mass q₁");
-    panel.line(q2, 2.0, PARTICLE, "particle q₂");
+    panel.add(Shape::Line(2.4), q1, EXACT, "mass q₁");
+    panel.add(Shape::Line(2.0), q2, PARTICLE, "particle q₂");
     let marks = impacts.iter().map(|(t, q2, _)| (*t, *q2)).collect();
-    panel.marks(marks, Glyph::Circle(6.0), INK, "impacts");
+    panel.add(Shape::Circle(6.0), marks, INK, "impacts");
     panel
 }
 
@@ -506,20 +522,20 @@ fn coordinates(p: &Dimensionless, rows: &[[f64; 5]], impacts: &[Impact], theory:
         ((-1.15 * high, 1.15 * high), "v and w, over b"),
     )
     .legend(Legend::Beside(182.0));
-    panel.line(vec![(0.0, 1.0), (1.0, 1.0)], 1.0, INK, "walls, w = ± 1");
-    panel.line(vec![(0.0, -1.0), (1.0, -1.0)], 1.0, INK, "");
-    panel.line(w, 2.6, PARTICLE, "w = q₁ − q₂");
-    panel.line(v, 2.6, EXACT, "v = q₁ + ε q₂");
+    panel.add(Shape::Line(1.0), vec![(0.0, 1.0), (1.0, 1.0)], INK, "walls, w = ± 1");
+    panel.add(Shape::Line(1.0), vec![(0.0, -1.0), (1.0, -1.0)], INK, "");
+    panel.add(Shape::Line(2.6), w, PARTICLE, "w = q₁ − q₂");
+    panel.add(Shape::Line(2.6), v, EXACT, "v = q₁ + ε q₂");
     if let Some(point) = theory {
         let scene = Dimensionless { omega0: 1.0, b: 1.0, ..*p };
         let wave = Waveform::new(&scene, point.sigma, point.b, -FRAC_PI_2);
         for value in [Waveform::w, Waveform::v] {
             let places = (0..=POINTS).map(|n| (part(n), value(&wave, part(n) * TAU / wave.omega)));
-            panel.line(places.collect(), 0.9, THEORY, FIRST_ORDER);
+            panel.add(Shape::Line(0.9), places.collect(), THEORY, FIRST_ORDER);
         }
     }
     let marks = impacts.iter().map(|(t, _, wall)| (*t, *wall)).collect();
-    panel.marks(marks, Glyph::Circle(6.0), INK, "");
+    panel.add(Shape::Circle(6.0), marks, INK, "");
     panel
 }
 

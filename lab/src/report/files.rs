@@ -75,9 +75,7 @@ pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>,
 pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let lines = classes.iter().map(|(limit, count)| format!("{limit:e},{count}\n"));
     let text = String::from("lateness_s,samples\n") + &lines.collect::<String>();
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let name = file.file_name().unwrap_or_default();
-    Ok(files::write(folder.unwrap_or(Path::new(".")), [(name, text)])?)
+    Ok(vec![files::write_file(file, &text)?])
 }
 
 pub(super) fn json(result: &impl Serialize) -> Result<String, ReportError> {

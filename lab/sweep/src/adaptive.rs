@@ -20,166 +20,132 @@ use crate::{
 /// Smallest number of cells of the first grid along a side, roughly.
 const SIDE: usize = 4;
 
-/// The cells of an adaptive sweep, row by row.
-struct Cells {
-    rows: usize,
-    columns: usize,
-    codes: Vec<u8>,
-    computed: Vec<bool>,
-    failures: BTreeMap<usize, String>,
-}
+/// A cell as a round keeps it: its number, row by row, the code of its regime, and why it failed.
+type Computed = (usize, u8, String);
 
 /// Computes the store of an adaptive sweep. False if the monitor stopped it.
 pub(crate) fn run(sweep: &Sweep, store: &Store, stride: usize, monitor: &Monitor) -> Result<bool, StoreError> {
     let [rows, columns] = [sweep.shape[0] as usize, sweep.shape[1] as usize];
-    let mut cells = Cells {
-        rows,
-        columns,
-        codes: vec![ABSENT; rows * columns],
-        computed: vec![false; rows * columns],
-        failures: BTreeMap::new(),
+    let grid = |stride: usize| {
+        let rows = (0..rows).step_by(stride);
+        rows.flat_map(move |row| (0..columns).step_by(stride).map(move |column| row * columns + column))
     };
+    let neighbours = |n: usize, stride: usize| {
+        let (row, column) = (n / columns, n % columns);
+        let near = [
+            (row.checked_sub(stride), Some(column)),
+            (row.checked_add(stride), Some(column)),
+            (Some(row), column.checked_sub(stride)),
+            (Some(row), column.checked_add(stride)),
+        ];
+        let inside =
+            move |(row, column): (Option<usize>, Option<usize>)| Some((row.filter(|row| *row < rows)?, column?));
+        let cells = near.into_iter().filter_map(inside);
+        cells
+            .filter(move |cell| cell.1 < columns)
+            .map(move |(row, column)| row * columns + column)
+    };
+    let mut codes = vec![ABSENT; rows * columns];
+    let (mut computed, mut failures) = (vec![false; rows * columns], BTreeMap::new());
     let mut stride = stride.min((rows.min(columns) / SIDE).max(1).next_power_of_two());
-    let mut next = cells.grid(stride);
+    let mut next: Vec<usize> = grid(stride).collect();
     let mut round = 0;
     loop {
-        while !next.is_empty() {
-            for (batch, part) in next.chunks(sweep.chunk_size()).enumerate() {
-                if !cells.compute(sweep, store, &format!("{ROUNDS}/{round}-{batch}"), part, monitor)? {
-                    return Ok(false);
+        for (batch, cells) in next.chunks(sweep.chunk_size()).enumerate() {
+            let Some(results) = results(sweep, store, &format!("{ROUNDS}/{round}-{batch}"), cells, monitor)? else {
+                return Ok(false);
+            };
+            for (n, code, failure) in results {
+                (codes[n], computed[n]) = (code, true);
+                if !failure.is_empty() {
+                    failures.insert(n, failure);
                 }
             }
-            round += 1;
-            // Only a cell that was computed, or its neighbour, can differ now.
-            next = cells.differing(
-                next.iter().flat_map(|n| cells.neighbours(*n, stride).chain([*n])),
-                stride,
-            );
         }
-        if stride == 1 {
-            return cells.write(sweep, store, monitor);
+        round += 1;
+        // Only a cell that was computed, or its neighbour, can differ now; on a new grid, any.
+        let mut candidates: Vec<usize> = next.iter().flat_map(|n| neighbours(*n, stride).chain([*n])).collect();
+        loop {
+            candidates.sort_unstable();
+            candidates.dedup();
+            let differs = |n: &usize| neighbours(*n, stride).any(|other| codes[other] != codes[*n]);
+            candidates.retain(|n| !computed[*n] && differs(n));
+            if !candidates.is_empty() {
+                break;
+            }
+            if stride == 1 {
+                return write(sweep, store, &codes, &computed, &failures, monitor);
+            }
+            for n in grid(stride / 2) {
+                let (row, column) = (n / columns, n % columns);
+                if codes[n] == ABSENT {
+                    codes[n] = codes[(row - row % stride) * columns + column - column % stride];
+                }
+            }
+            stride /= 2;
+            candidates = grid(stride).collect();
         }
-        cells.infer(stride);
-        stride /= 2;
-        next = cells.differing(cells.grid(stride), stride);
+        next = candidates;
     }
 }
 
-impl Cells {
-    /// All cells of the grid with this distance.
-    fn grid(&self, stride: usize) -> Vec<usize> {
-        let row = |row: usize| {
-            (0..self.columns)
-                .step_by(stride)
-                .map(move |column| row * self.columns + column)
-        };
-        (0..self.rows).step_by(stride).flat_map(row).collect()
+/// Computes cells, or reads what was kept of them. `None` if the monitor stopped it.
+fn results(
+    sweep: &Sweep,
+    store: &Store,
+    key: &str,
+    cells: &[usize],
+    monitor: &Monitor,
+) -> Result<Option<Vec<Computed>>, StoreError> {
+    let kept = store.kept(key, monitor);
+    if let Some(results) = kept.and_then(|text| serde_json::from_slice(&text).ok()) {
+        monitor.found.fetch_add(cells.len() as u64, Relaxed);
+        return Ok(Some(results));
     }
-
-    /// The neighbours of a cell at this distance, up to four.
-    fn neighbours(&self, n: usize, stride: usize) -> impl Iterator<Item = usize> + use<> {
-        let (columns, row, column) = (self.columns, n / self.columns, n % self.columns);
-        let before = [
-            (row >= stride).then(|| n - stride * columns),
-            (column >= stride).then(|| n - stride),
-        ];
-        let after = [
-            (row + stride < self.rows).then(|| n + stride * columns),
-            (column + stride < columns).then(|| n + stride),
-        ];
-        before.into_iter().chain(after).flatten()
+    let compute = |n: &usize| {
+        (!monitor.stop.load(Relaxed)).then(|| {
+            let cell = sweep.cell_at(&[*n as u64 / sweep.shape[1], *n as u64 % sweep.shape[1]]);
+            monitor.note(&cell);
+            (*n, code(&cell), cell.failure)
+        })
+    };
+    let results: Option<Vec<Computed>> = cells.par_iter().map(compute).collect();
+    if let Some(results) = &results {
+        store.keep(key, &serde_json::to_vec(results).unwrap_or_default())?;
     }
+    Ok(results)
+}
 
-    /// Those of the cells that are not computed and differ from a neighbour, in order.
-    fn differing(&self, cells: impl IntoIterator<Item = usize>, stride: usize) -> Vec<usize> {
-        let differs = |n: &usize| {
-            self.neighbours(*n, stride)
-                .any(|other| self.codes[other] != self.codes[*n])
-        };
-        let mut cells: Vec<usize> = cells.into_iter().filter(|n| !self.computed[*n] && differs(n)).collect();
-        cells.sort_unstable();
-        cells.dedup();
-        cells
-    }
-
-    /// New cells of the grid with half this distance take the regime of the cell before them.
-    fn infer(&mut self, stride: usize) {
-        for n in self.grid(stride / 2) {
-            let (row, column) = (n / self.columns, n % self.columns);
-            if self.codes[n] == ABSENT {
-                self.codes[n] = self.codes[(row - row % stride) * self.columns + column - column % stride];
-            }
+/// Writes all chunks. False if the monitor stopped it.
+fn write(
+    sweep: &Sweep,
+    store: &Store,
+    codes: &[u8],
+    computed: &[bool],
+    failures: &BTreeMap<usize, String>,
+    monitor: &Monitor,
+) -> Result<bool, StoreError> {
+    let cell = |index: Vec<u64>| {
+        let n = (index[0] * sweep.shape[1] + index[1]) as usize;
+        let beside = (codes[n] == FAILED).then(|| "not computed, as a neighbouring cell failed".to_string());
+        Cell {
+            regime: Regime::SIMULATED.get(usize::from(codes[n])).copied(),
+            inferred: !computed[n],
+            failure: failures.get(&n).cloned().or(beside).unwrap_or_default(),
+            ..Cell::default()
         }
-    }
-
-    /// Computes cells, or reads their results. False if the monitor stopped it.
-    fn compute(
-        &mut self,
-        sweep: &Sweep,
-        store: &Store,
-        key: &str,
-        cells: &[usize],
-        monitor: &Monitor,
-    ) -> Result<bool, StoreError> {
-        type Results = Vec<(usize, u8, String)>;
-        let kept: Option<Results> = store
-            .kept(key, monitor)
-            .and_then(|text| serde_json::from_slice(&text).ok());
-        let results = if let Some(results) = kept {
-            monitor.found.fetch_add(cells.len() as u64, Relaxed);
-            results
-        } else {
-            let compute = |n: &usize| {
-                let index = [(n / self.columns) as u64, (n % self.columns) as u64];
-                (!monitor.stop.load(Relaxed)).then(|| {
-                    let cell = sweep.cell_at(&index);
-                    monitor.note(&cell);
-                    (*n, code(&cell), cell.failure)
-                })
-            };
-            let Some(results) = cells.par_iter().map(compute).collect::<Option<Results>>() else {
-                return Ok(false);
-            };
-            store.keep(key, &serde_json::to_vec(&results).unwrap_or_default())?;
-            results
-        };
-        for (n, code, failure) in results {
-            self.codes[n] = code;
-            self.computed[n] = true;
-            if !failure.is_empty() {
-                self.failures.insert(n, failure);
-            }
+    };
+    for index in (0..sweep.chunks()).map(|n| sweep.chunk_index(n)) {
+        if monitor.stop.load(Relaxed) {
+            return Ok(false);
         }
-        Ok(true)
+        let cells: Vec<Cell> = (0..sweep.chunk_size() as u64)
+            .map(|n| sweep.cell_index(&index, n).map_or_else(Cell::default, cell))
+            .collect();
+        store.write(&index, &cells)?;
     }
-
-    /// Writes all chunks.
-    fn write(&self, sweep: &Sweep, store: &Store, monitor: &Monitor) -> Result<bool, StoreError> {
-        let inferred = || "not computed, as a neighbouring cell failed".to_string();
-        let cell = |index: Vec<u64>| {
-            let n = index[0] as usize * self.columns + index[1] as usize;
-            let failure = self.failures.get(&n).cloned();
-            Cell {
-                regime: Regime::SIMULATED.get(usize::from(self.codes[n])).copied(),
-                inferred: !self.computed[n],
-                failure: failure
-                    .or_else(|| (self.codes[n] == FAILED).then(inferred))
-                    .unwrap_or_default(),
-                ..Cell::default()
-            }
-        };
-        for index in (0..sweep.chunks()).map(|n| sweep.chunk_index(n)) {
-            if monitor.stop.load(Relaxed) {
-                return Ok(false);
-            }
-            let cells: Vec<Cell> = (0..sweep.chunk_size() as u64)
-                .map(|n| sweep.cell_index(&index, n).map_or_else(Cell::default, cell))
-                .collect();
-            store.write(&index, &cells)?;
-        }
-        let inferred = self.computed.iter().filter(|computed| !**computed).count();
-        monitor.inferred.store(inferred as u64, Relaxed);
-        store.tidy()?;
-        Ok(true)
-    }
+    let inferred = computed.iter().filter(|computed| !**computed).count();
+    monitor.inferred.store(inferred as u64, Relaxed);
+    store.tidy()?;
+    Ok(true)
 }

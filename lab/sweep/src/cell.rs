@@ -70,7 +70,7 @@ impl Results {
 pub struct Cell {
     /// The regime, unless the cell failed.
     pub regime: Option<Regime>,
-    /// Whether the regime is that of the neighbours, not computed.
+    /// Whether the regime was inferred from the neighbours, not computed.
     pub inferred: bool,
     pub(crate) result: Option<RegimeResult>,
     pub(crate) response: Option<SteadyResponse>,
@@ -82,7 +82,7 @@ pub struct Cell {
     pub failure: String,
 }
 
-/// Computes a cell; `numbers` are those of the scene, with a G that is not rounded.
+/// Computes a cell; `numbers` are the scene's dimensionless numbers, with a G that is not rounded.
 pub(crate) fn compute(scene: &Scene, sigma: f64, numbers: &Dimensionless, settings: &Settings) -> Cell {
     let results = settings.results;
     let simulated = || {

@@ -28,6 +28,6 @@ pub use map::{Map, MapCell};
 pub use sweep::{Settings, Shard, Sweep, SweepError};
 
 #[cfg(feature = "store")]
-pub use run::{Estimate, EstimateError, Monitor, estimate, merge, run, verify};
+pub use run::{Estimate, EstimateError, Monitor, collect, estimate, run, verify};
 #[cfg(feature = "store")]
 pub use store::StoreError;

@@ -18,9 +18,6 @@ use crate::{
     sweep::{Shard, Sweep},
 };
 
-/// Chunks that are computed at the same time for every eight threads: the last cells of one and the first of the next.
-const AT_ONCE: usize = 2;
-
 /// Computes the chunks of a part of `sweep` that its store in `folder` does not have, or whose files are damaged. True if all are there at
 /// the end; false if the monitor stopped it.
 ///
@@ -43,45 +40,21 @@ pub fn run(sweep: &Sweep, folder: &Path, shard: Shard, monitor: &Monitor) -> Res
         monitor.found.store(0, Relaxed);
         return adaptive::run(sweep, &store, stride as usize, monitor);
     }
-    let next = Mutex::new(shard.chunks(sweep));
-    let error = Mutex::new(None);
-    let work = || {
-        loop {
-            let n = next.lock().ok().and_then(|mut chunks| chunks.next());
-            let Some(index) = n.filter(|_| !monitor.stop.load(Relaxed)).map(|n| sweep.chunk_index(n)) else {
-                return;
-            };
-            if let Chunk::Complete(_) = store.chunk(&index, monitor) {
-                monitor.found.fetch_add(sweep.chunk_cells(&index), Relaxed);
-                continue;
-            }
-            let Some(cells) = chunk(sweep, &index, monitor) else {
-                return;
-            };
-            if let Err(failure) = store.write(&index, &cells) {
-                monitor.stop.store(true, Relaxed);
-                if let Ok(mut error) = error.lock() {
-                    error.get_or_insert(failure);
-                }
-            }
+    for n in shard.chunks(sweep) {
+        let index = sweep.chunk_index(n);
+        if let Chunk::Complete(_) = store.chunk(&index, monitor) {
+            monitor.found.fetch_add(sweep.chunk_cells(&index), Relaxed);
+            continue;
         }
-    };
-    let at_once = AT_ONCE * rayon::current_num_threads().div_ceil(8);
-    std::thread::scope(|scope| {
-        for _ in 0..at_once {
-            scope.spawn(work);
-        }
-    });
-    match error.into_inner().unwrap_or_default() {
-        Some(error) => Err(error),
-        None if monitor.stop.load(Relaxed) => Ok(false),
-        None => {
-            if shard == Shard::ALL {
-                store.tidy()?;
-            }
-            Ok(true)
-        }
+        let Some(cells) = chunk(sweep, &index, monitor) else {
+            return Ok(false);
+        };
+        store.write(&index, &cells)?;
     }
+    if shard == Shard::ALL {
+        store.tidy()?;
+    }
+    Ok(true)
 }
 
 /// Verifies a part of the store of `sweep` in `folder`, and counts its undamaged cells; nothing is written. The monitor has the damage.
@@ -112,46 +85,30 @@ fn count(sweep: &Sweep, store: &Store, shard: Shard, monitor: &Monitor) -> u64 {
     monitor.found.load(Relaxed)
 }
 
-/// Collects the chunks of other stores of the same sweep, and computes those again that are damaged in all of them. Returns the number of
-/// cells that are still missing.
+/// Copies the chunks that the store in `folder` does not have, or whose files are damaged, from other stores of the same sweep; [`run`] computes
+/// those that none of them has.
 ///
 /// # Errors
 /// A folder that cannot be used, or a store of another sweep.
-pub fn merge(sweep: &Sweep, folder: &Path, from: &[PathBuf], monitor: &Monitor) -> Result<u64, StoreError> {
+pub fn collect(sweep: &Sweep, folder: &Path, from: &[PathBuf], monitor: &Monitor) -> Result<(), StoreError> {
     let sources = from
         .iter()
         .map(|one| Store::existing(sweep, one))
         .collect::<Result<Vec<_>, _>>()?;
     let store = Store::open(sweep, folder, Shard::ALL, monitor)?;
-    let mut missing = 0;
     for index in (0..sweep.chunks()).map(|n| sweep.chunk_index(n)) {
-        let mut damaged = match store.chunk(&index, monitor) {
-            Chunk::Complete(_) => continue,
-            Chunk::Damaged => true,
-            Chunk::Absent => false,
-        };
+        if matches!(store.chunk(&index, monitor), Chunk::Complete(_)) {
+            continue;
+        }
         let undamaged = sources.iter().find_map(|source| match source.chunk(&index, monitor) {
             Chunk::Complete(files) => Some(files),
-            Chunk::Damaged => {
-                damaged = true;
-                None
-            }
-            Chunk::Absent => None,
+            Chunk::Damaged | Chunk::Absent => None,
         });
-        match undamaged {
-            Some(files) => store.copy(&index, &files)?,
-            None if damaged => {
-                if let Some(cells) = chunk(sweep, &index, monitor) {
-                    store.write(&index, &cells)?;
-                }
-            }
-            None => missing += sweep.chunk_cells(&index),
+        if let Some(files) = undamaged {
+            store.copy(&index, &files)?;
         }
     }
-    if missing == 0 {
-        store.tidy()?;
-    }
-    Ok(missing)
+    Ok(())
 }
 
 /// All cells of a chunk; None if it was stopped.
@@ -188,7 +145,7 @@ impl Estimate {
     }
 }
 
-/// All cells that were tried fail; the reason is that of the first.
+/// All cells of a trial fail; the reason is the first cell's.
 #[derive(Debug, thiserror::Error)]
 #[error("all of {tried} cells that were tried fail: {reason}")]
 pub struct EstimateError {

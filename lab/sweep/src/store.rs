@@ -150,7 +150,7 @@ impl Store {
             let fault = match fs::read(self.folder.path(key)) {
                 Ok(text) => match serde_json::from_slice(&text) {
                     Ok(found) if contains(&found, metadata) => return Ok(()),
-                    _ => Fault::Content,
+                    _ => Fault::Damaged("is not what the sweep wrote"),
                 },
                 Err(error) => error.into(),
             };
@@ -179,7 +179,7 @@ impl Store {
                     Ok(found) if found == values.iter().flat_map(|one| one.to_le_bytes()).collect::<Vec<u8>>() => {
                         continue;
                     }
-                    Ok(_) => Fault::Content,
+                    Ok(_) => Fault::Damaged("is not what the sweep wrote"),
                     Err(fault) => fault,
                 };
                 note(key.as_str(), &fault);
@@ -351,7 +351,7 @@ fn axis(sweep: &Sweep, folder: &Arc<Folder>, axis: &Axis, dimension: usize) -> R
     )
 }
 
-/// The metadata of the group, with those of all arrays.
+/// The metadata of the group, which contain the metadata of all arrays.
 fn group(sweep: &Sweep, arrays: Map<String, Value>) -> Value {
     let sampled: Vec<&str> = sweep
         .coordinates()
@@ -569,18 +569,8 @@ const HEADER: [u8; 10] = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 0xff];
 pub(crate) enum Fault {
     #[error("is missing")]
     Missing,
-    #[error("is empty")]
-    Empty,
-    #[error("is truncated")]
-    Truncated,
-    #[error("has a damaged header")]
-    Header,
-    #[error("continues after its end")]
-    Trailing,
-    #[error("has a damaged content or checksum")]
-    Checksum,
-    #[error("is not what the sweep wrote")]
-    Content,
+    #[error("{0}")]
+    Damaged(&'static str),
     #[error("cannot be read ({0})")]
     Unreadable(io::Error),
 }
@@ -604,18 +594,18 @@ pub(crate) fn pack(content: &[u8]) -> io::Result<Vec<u8>> {
 /// The content of a file whose checksum is right.
 pub(crate) fn unpack(file: &[u8]) -> Result<Vec<u8>, Fault> {
     if file.is_empty() {
-        return Err(Fault::Empty);
+        return Err(Fault::Damaged("is empty"));
     }
     if !HEADER.starts_with(&file[..file.len().min(HEADER.len())]) {
-        return Err(Fault::Header);
+        return Err(Fault::Damaged("has a damaged header"));
     }
     let mut decoder = GzDecoder::new(file);
     let mut content = Vec::new();
     match decoder.read_to_end(&mut content) {
         Ok(_) if decoder.into_inner().is_empty() => Ok(content),
-        Ok(_) => Err(Fault::Trailing),
-        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Err(Fault::Truncated),
-        Err(_) => Err(Fault::Checksum),
+        Ok(_) => Err(Fault::Damaged("continues after its end")),
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Err(Fault::Damaged("is truncated")),
+        Err(_) => Err(Fault::Damaged("has a damaged content or checksum")),
     }
 }
 

@@ -14,7 +14,7 @@ use crate::{
 pub struct Settings {
     /// The axes; those with one value per sample share one dimension, the last.
     pub axes: Vec<Axis>,
-    /// Detuning, if it is not an axis. Without it: that of the scene's stable phase-resonant orbit, or 0.
+    /// Detuning, if it is not an axis. Default: the detuning of the scene's stable phase-resonant orbit, or 0.
     pub sigma: Option<f64>,
     /// Number of samples of random axes; paired values have their own.
     pub samples: Option<u64>,

@@ -5,7 +5,7 @@ mod common;
 use std::{fs, path::Path, sync::atomic::Ordering::Relaxed};
 
 use common::{array, files, plan, refused, settings};
-use vines_sweep::{FAILED, Monitor, Results, Settings, Shard, merge, run};
+use vines_sweep::{FAILED, Monitor, Results, Settings, Shard, collect, run};
 
 #[test]
 fn an_adaptive_map_computes_borders_infers_the_rest_and_resumes_to_the_same_bytes() {
@@ -66,7 +66,7 @@ fn damaged_rounds_and_chunks_of_an_adaptive_map_are_computed_again() {
     assert!(run(&plan, whole.path(), Shard::ALL, &Monitor::default()).unwrap());
     let whole = files(whole.path());
     // A folder with the name of a chunk stops it, after all rounds.
-    assert_eq!(merge(&plan, stopped.path(), &[], &Monitor::default()).unwrap(), 400);
+    collect(&plan, stopped.path(), &[], &Monitor::default()).unwrap();
     let chunk = stopped.path().join("inferred/c/0/0");
     fs::create_dir_all(&chunk).unwrap();
     assert!(run(&plan, stopped.path(), Shard::ALL, &Monitor::default()).is_err());

@@ -5,7 +5,7 @@ mod common;
 use std::{collections::BTreeMap, fs, io::Read, path::Path, sync::atomic::Ordering::Relaxed, thread, time::Duration};
 
 use common::{array, files, numbers, plan, refused, settings};
-use vines_sweep::{ABSENT, FAILED, Monitor, Settings, Shard, Sweep, UNCOUNTED, merge, run, verify};
+use vines_sweep::{ABSENT, FAILED, Monitor, Settings, Shard, Sweep, UNCOUNTED, collect, run, verify};
 
 #[test]
 fn a_folder_of_other_stores_does_not_become_a_store() {
@@ -147,33 +147,31 @@ fn content(file: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn a_damaged_chunk_is_not_merged_but_taken_from_elsewhere_or_computed() {
+fn a_damaged_chunk_is_not_collected_but_taken_from_elsewhere_or_computed() {
     let [one, other, merged] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
     let plan = three_chunks();
     let whole = computed(&plan, one.path());
     assert!(run(&plan, other.path(), Shard { number: 0, of: 2 }, &Monitor::default()).unwrap());
     let sources = [one.path().to_path_buf(), other.path().to_path_buf()];
+    let collected = |count: u64| {
+        let monitor = Monitor::default();
+        collect(&plan, merged.path(), &sources, &monitor).unwrap();
+        assert!(run(&plan, merged.path(), Shard::ALL, &monitor).unwrap());
+        assert_eq!(monitor.computed.load(Relaxed), count);
+        assert!(whole == files(merged.path()));
+        monitor.damage().unwrap()
+    };
     for (fault, damage) in DAMAGE {
         // The first chunk is in the other store, too; the second is not.
-        for (name, computed) in [("regime/c/0", 0), ("regime/c/1", 7)] {
+        for (name, count) in [("regime/c/0", 0), ("regime/c/1", 7)] {
             let file = one.path().join(name);
             damage(&file);
-            let monitor = Monitor::default();
-            assert_eq!(merge(&plan, merged.path(), &sources, &monitor).unwrap(), 0);
-            let text = monitor.damage().unwrap();
-            assert!(
-                text.contains(&format!("{} {fault}", file.display())) || text.contains(fault),
-                "{text}"
-            );
-            assert_eq!(monitor.computed.load(Relaxed), computed, "{name} {fault}");
-            assert!(whole == files(merged.path()), "{name} {fault}");
+            let text = collected(count);
+            assert!(text.contains(fault), "{text}");
             fs::write(&file, &whole[name]).unwrap();
             // What is damaged in the merged store comes from the sources again.
-            let monitor = Monitor::default();
             damage(&merged.path().join(name));
-            assert_eq!(merge(&plan, merged.path(), &sources, &monitor).unwrap(), 0);
-            assert!(monitor.damage().is_some() && monitor.computed.load(Relaxed) == 0);
-            assert!(whole == files(merged.path()), "{name} {fault}");
+            collected(0);
             fs::remove_dir_all(merged.path()).unwrap();
         }
     }

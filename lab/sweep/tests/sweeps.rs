@@ -10,7 +10,7 @@ use std::{
 use common::{files, numbers, plan, refused, settings};
 
 use vines_model::{map::LIMIT, regime::Regime};
-use vines_sweep::{Axis, Map, Monitor, Results, Settings, Shard, Sweep, estimate, merge, run};
+use vines_sweep::{Axis, Map, Monitor, Results, Settings, Shard, Sweep, collect, estimate, run};
 use vines_testbench::scene::Family;
 
 /// A map of the default scene.
@@ -162,39 +162,24 @@ fn shards_stops_and_resumptions_give_the_same_bytes() {
 }
 
 #[test]
-fn shards_in_stores_of_their_own_merge_to_the_same_bytes() {
+fn shards_in_stores_of_their_own_are_collected_to_the_same_bytes() {
     let [whole, first, second, merged] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
     let plan = plan(settings(&["start.dq2=0.1:0.6:9", "plant.r=0.5,0.65"])).unwrap();
     assert!(run(&plan, whole.path(), Shard::ALL, &Monitor::default()).unwrap());
-    for (number, folder) in [&first, &second].into_iter().enumerate() {
-        assert!(
-            run(
-                &plan,
-                folder.path(),
-                Shard { number: number as u64, of: 2 },
-                &Monitor::default()
-            )
-            .unwrap()
-        );
+    let parts = [&first, &second].map(|folder| folder.path().to_path_buf());
+    for (number, folder) in (0..).zip(&parts) {
+        assert!(run(&plan, folder, Shard { number, of: 2 }, &Monitor::default()).unwrap());
     }
-    assert_eq!(
-        merge(&plan, merged.path(), &[first.path().into()], &Monitor::default()).unwrap(),
-        6
-    );
-    assert_eq!(
-        merge(
-            &plan,
-            merged.path(),
-            &[first.path().into(), second.path().into()],
-            &Monitor::default()
-        )
-        .unwrap(),
-        0
-    );
-    assert!(files(whole.path()) == files(merged.path()));
-    let error = merge(&plan, merged.path(), &["missing".into()], &Monitor::default())
-        .unwrap_err()
-        .to_string();
+    for (sources, computed) in [(&parts[..1], 6), (&parts[..], 0)] {
+        let monitor = Monitor::default();
+        collect(&plan, merged.path(), sources, &monitor).unwrap();
+        assert!(run(&plan, merged.path(), Shard::ALL, &monitor).unwrap());
+        assert_eq!(monitor.computed.load(Relaxed), computed);
+        assert!(files(whole.path()) == files(merged.path()));
+        std::fs::remove_dir_all(merged.path()).unwrap();
+    }
+    let error = collect(&plan, merged.path(), &["missing".into()], &Monitor::default());
+    let error = error.unwrap_err().to_string();
     assert!(error.contains("missing is not the store"), "{error}");
 }
 

@@ -1,4 +1,4 @@
-//! The device alone: parameters, errors, oscillator, output gate, watchdog and stream.
+//! Guards the device alone: parameters, errors, oscillator, output gate, watchdog and stream.
 
 use vines_helic::codec::{ErrorCode, message};
 

@@ -1,4 +1,4 @@
-//! The device on loopback: sessions, and the drive that stops when the stream, the host or the control channel hangs.
+//! Guards the device on loopback: sessions, and the drive that stops when the stream, the host or the control channel hangs.
 //! Nothing here depends on how fast the machine is.
 
 use std::io::{Read, Write};

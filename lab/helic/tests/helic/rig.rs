@@ -1,4 +1,4 @@
-//! The device as a rig of the bench, sample by sample and without a clock: the same figures on any machine.
+//! Guards the device as a rig of the bench, sample by sample and without a clock: the same figures on any machine.
 
 use std::collections::VecDeque;
 use std::io;

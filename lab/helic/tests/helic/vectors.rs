@@ -1,4 +1,4 @@
-//! The vectors of the protocol, version 3 (`docs/protocol.md` of helic-daq, "Known-answer vectors").
+//! Guards the codec: the vectors of the protocol, version 3 (`docs/protocol.md` of helic-daq, "Known-answer vectors").
 
 use vines_helic::codec::{Frame, Packet, Status, crc16, message, take_text};
 

@@ -16,7 +16,7 @@ use super::periodic::{Bifurcation, Condition, Periodic, Returned, Unknowns, foll
 use crate::Dimensionless;
 use crate::numerics::{golden_section, try_bisection};
 
-/// ContinuationLimits of a continuation.
+/// Ranges, number of points and step of a continuation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContinuationLimits {
     /// Range of sigma.
@@ -327,13 +327,13 @@ impl Curve<'_> {
         Part(move |part: f64| self.motion(&self.correct(&from, &tangent, part * step)?))
     }
 
-    /// Whether a motion lies in the ranges; that of G does not limit a curve at constant G.
+    /// Whether a motion lies in the ranges; the range of G does not limit a curve at constant G.
     fn within(&self, limits: &ContinuationLimits, sigma: f64, g: f64) -> bool {
         let free = !matches!(self.condition, Condition::Excitation(_));
         limits.contain(sigma, if free { g } else { limits.g[0] })
     }
 
-    /// Whether the branch is back at its start after a step to `next`.
+    /// Whether a step to `next` closes the branch.
     fn closes(&self, branch: &mut Branch, next: &Unknowns, turned: &Unknowns, step: f64, first: &Unknowns) -> bool {
         // A phase difference of 2 pi is the same motion.
         let mut apart = next - self.start.unknowns();
@@ -469,7 +469,7 @@ pub fn continue_both_ways(
     Branch { points, special, ended: [down.ended[1], up.ended[1]] }
 }
 
-/// Distance at which the motions of another branch are searched for.
+/// Distance from a bifurcation at which a motion of the other branch is searched for.
 const ASIDE: f64 = 1e-3;
 
 /// The branch of motions that leaves a symmetry breaking or a period doubling, along the curve of `condition`. Its mirror image, or
@@ -497,9 +497,9 @@ pub fn branch_off(
     Some(branch)
 }
 
-/// Test functions below this are rounding: in conservative motions, some are zero everywhere.
+/// Largest rounding error of a test function: in conservative motions, some of these functions are zero everywhere.
 const ROUNDING: f64 = 1e-9;
-/// The same for folds where both halves of a motion differ by less than [`HALVES`], because the function is small there.
+/// Largest rounding error of the test function of folds where both halves of a motion differ by less than [`HALVES`]: the function is small there.
 const ROUNDING_OF_FOLDS: f64 = 1e-12;
 const HALVES: f64 = 0.1;
 /// Difference of the halves below which a fold cannot be told from rounding, which grows with its inverse.

@@ -411,7 +411,7 @@ pub struct Periodic {
     pub pattern: ImpactPattern,
     /// The states just after the impacts of the map.
     pub bounces: Vec<Bounce>,
-    /// Multipliers (real, imaginary) of the map, by rising modulus; those of a mirrored pattern are for half of its period.
+    /// Multipliers (real, imaginary) of the map, by rising modulus; a mirrored pattern has a map of half of its period.
     pub multipliers: [[f64; 2]; 4],
     /// All of them are inside the unit circle.
     pub stable: bool,
@@ -422,7 +422,7 @@ pub struct Periodic {
     pub(super) monodromy: Matrix4<f64>,
 }
 
-/// Size of the last Newton correction, and that from which on a correction that does not shrink is rounding: small isolas are nearly singular.
+/// Size of the last Newton correction, and the size below which a correction that does not shrink is rounding: small isolas are nearly singular.
 const CONVERGED: f64 = 1e-12;
 const ROUNDING: f64 = 1e-10;
 const ROUNDS: usize = 30;
@@ -599,9 +599,9 @@ pub(super) fn newton(
     None
 }
 
-/// States after one repetition that are closer than this belong to a motion that settles, if there is a stable one near.
+/// Largest distance of a settling motion from itself one repetition later.
 const NEAR: f64 = 1e-2;
-/// The same for an exact motion.
+/// Largest distance of an exact motion from itself one repetition later.
 const EXACT: f64 = 1e-8;
 /// Patterns that are tried, from the shortest: after a period doubling, only the second is stable.
 const MULTIPLES: usize = 3;
@@ -646,7 +646,7 @@ pub fn periodic_near(scene: &Dimensionless, sigma: f64, phase: f64, state: [f64;
     let Some(found) = found else {
         return unstable;
     };
-    // The pattern may be a multiple of that of the motion: near a period doubling the motion settles slowly, in alternation.
+    // The pattern may be a multiple of the motion's own pattern: near a period doubling the motion settles slowly, in alternation.
     let shortest = patterns(&map, found.bounces[0], EXACT)
         .take_while(|one| one.walls.len() < found.bounces.len())
         .next();

@@ -6,7 +6,7 @@
 //! sticks later: the map then loses rank, but the map minus the identity does not.
 //!
 //! The first harmonic of the particle is integrated by Gauss's rule from event to event, where the motion is analytic. With it, the balance of
-//! momentum gives that of the primary mass: `(k - M omega² + i c omega) Q1 = (k + i c omega) E + m omega² Q2`.
+//! momentum gives the harmonic of the primary mass: `(k - M omega² + i c omega) Q1 = (k + i c omega) E + m omega² Q2`.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -70,7 +70,7 @@ pub enum DriveCondition {
 pub enum NoMotion {
     #[error(transparent)]
     Invalid(#[from] InvalidValue),
-    #[error("with a scatter of the restitution (s = {0}) no motion is periodic: set s to 0")]
+    #[error("with a scatter of the restitution, here {0}, no motion is periodic: set it to 0 (r_scatter in a scene)")]
     Scatter(f64),
     #[error(
         "periodic motions with effects of the cavity are found at phase resonance, not at the peak of the response"

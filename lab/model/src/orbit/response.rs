@@ -20,7 +20,7 @@ pub struct FrequencyResponse {
     /// Base amplitude over `b epsilon`.
     #[serde(rename = "G")]
     pub g: f64,
-    /// Its components; those of one pattern are consecutive, symmetric 1:1 first.
+    /// Its components, ordered by pattern, symmetric 1:1 first.
     pub components: Vec<Component>,
 }
 
@@ -151,7 +151,7 @@ fn apart(one: &Periodic, other: &Periodic) -> f64 {
 }
 
 impl Branch {
-    /// The motion in the middle, and that in the middle of the stable ones: a branch that has these contains this one.
+    /// The middle motion of all, and the middle one of the stable motions: a branch that contains both contains this branch.
     fn typical(&self) -> impl Iterator<Item = &Periodic> {
         let stable: Vec<&Periodic> = self.points.iter().filter(|one| one.stable).collect();
         let middle = stable.get(stable.len() / 2).copied();

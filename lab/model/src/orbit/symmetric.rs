@@ -45,7 +45,7 @@ struct Family {
     epsilon: f64,
     alpha: f64,
     beta: f64,
-    /// First harmonic of v or q1, as the sensor says, less that of y, over B.
+    /// Difference of the first harmonics of the response (v or q1, by the sensor) and of y, over B.
     kappa: Complex<f64>,
     /// Factor of the sensor, and direction of the reference in the complex plane.
     scale: f64,
@@ -235,7 +235,7 @@ fn resonant(scene: &Dimensionless, candidates: &[Candidate]) -> Vec<Orbit> {
     orbits.filter_map(|candidate| accept(scene, candidate)).collect()
 }
 
-/// Keeps what is physical: the particle moves, and its next contact is that of the candidate, half a period later.
+/// The candidate as an orbit if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
 fn accept(scene: &Dimensionless, candidate: &Candidate) -> Option<Orbit> {
     let Candidate { omega, b, c, g, start, .. } = *candidate;
     let sizes = [b, c, g];
@@ -272,7 +272,7 @@ impl CandidateBranch<'_> {
             .map(|both| both[self.branch])
     }
 
-    /// G of the branch minus that of the scene.
+    /// G of the branch minus the scene's G.
     fn excess(&self, omega: f64) -> Option<f64> {
         let excess = self.at(omega)?.g - self.scene.g;
         (!excess.is_nan()).then_some(excess)

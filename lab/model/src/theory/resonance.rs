@@ -39,7 +39,7 @@ pub fn free_sigma(scene: &Dimensionless, c: f64) -> Option<f64> {
     theory.speed_at_level(c).map(|b| theory.flow.free_detuning(b))
 }
 
-/// The amplitude that the scene's sensor reads over that of v, at the particle speed `b` and the detuning `sigma`.
+/// The amplitude that the scene's sensor reads over the amplitude of v, at the particle speed `b` and the detuning `sigma`.
 pub fn reading(scene: &Dimensionless, b: f64, sigma: f64) -> f64 {
     Reading::of(scene).seen(b, sigma).norm()
 }
@@ -61,7 +61,7 @@ impl<'a> Reading<'a> {
         Self { scene, flow: SlowFlow::new(scene.lambda, scene.r) }
     }
 
-    /// The harmonic that the sensor reads over that of v, at the particle speed `b` and the detuning `sigma`.
+    /// The harmonic that the sensor reads over the harmonic of v, at the particle speed `b` and the detuning `sigma`.
     fn seen(&self, b: f64, sigma: f64) -> Complex<f64> {
         let Dimensionless { epsilon, definition, .. } = *self.scene;
         if definition.sensor == Sensor::V {
@@ -85,7 +85,7 @@ impl<'a> Reading<'a> {
         [g, self.flow.free_detuning(b) - g * gamma.cos() / (2.0 * c)]
     }
 
-    /// The speed near `from` at which the excitation for resonance is that of the scene, by the secant method.
+    /// The speed near `from` that is resonant under the scene's excitation, by the secant method.
     fn speed(&self, from: f64) -> Option<f64> {
         let excess = |b: f64| self.driven(b, self.phase(b))[0] - self.scene.g;
         let (mut last, mut b) = (from * (1.0 + 1e-4), from);

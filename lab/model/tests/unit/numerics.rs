@@ -25,34 +25,6 @@ fn bisection_ends_between_neighbouring_numbers() {
 }
 
 #[test]
-fn bisection_stops_at_the_width_or_at_an_error() {
-    let (a, b) = try_bisection(0.0, 1.0, 0.1, |x| Ok::<_, ()>(x < 0.3)).unwrap();
-    assert!(a < 0.3 && b >= 0.3 && b - a <= 0.1);
-    assert_eq!(try_bisection(0.0, 1.0, 0.1, |_| Err("no")), Err("no"));
-}
-
-#[test]
-fn the_minimum_of_a_parabola_is_found() {
-    assert!((golden_section(-1.0, 2.0, |x| (x - 0.3).powi(2)) - 0.3).abs() < 1e-7);
-}
-
-#[test]
-fn four_numbers_have_their_mean_and_deviation() {
-    let values = [1.0, 3.0, 5.0, 7.0];
-    assert_eq!(mean(values), 4.0);
-    assert_eq!(mean_square(values), 21.0);
-    assert!((standard_deviation(&values) - 5f64.sqrt()).abs() < 1e-15);
-    assert_eq!(range((2.0, 2.0), values), (1.0, 7.0));
-    assert!(mean([]).is_nan());
-}
-
-#[test]
-fn both_ends_are_included() {
-    assert!(equally_spaced(1.0, 2.0, 5).eq([1.0, 1.25, 1.5, 1.75, 2.0]));
-    assert!(equally_spaced(1.0, 2.0, 1).eq([1.0]));
-}
-
-#[test]
 fn third_differences_see_noise_and_no_cubic() {
     let cubic = |n: usize| 1e-3 * (n as f64).powi(2) - 2.0;
     let smooth: Vec<f64> = (0..200).map(cubic).collect();
@@ -63,12 +35,6 @@ fn third_differences_see_noise_and_no_cubic() {
         .collect();
     assert!((noise(&rough) - 0.8 / 20f64.sqrt()).abs() < 1e-9);
     assert_eq!(noise(&[1.0; 5]), 0.0);
-}
-
-#[test]
-fn a_line_has_its_slope() {
-    assert!((slope(&[1.0, 1.5, 2.0, 2.5]) - 0.5).abs() < 1e-15);
-    assert_eq!(slope(&[0.0, 1.0, 0.0]), 0.0);
 }
 
 fn signal(phases: &[f64]) -> DVector<f64> {

@@ -12,13 +12,6 @@ fn all_roots_of_a_product_are_found() {
 }
 
 #[test]
-fn a_double_root_is_found_once() {
-    let roots = real_roots(&[1.0, -2.0, 1.0]);
-    assert_eq!(roots.len(), 1);
-    assert!((roots[0] - 1.0).abs() < 1e-7);
-}
-
-#[test]
 fn a_polynomial_without_real_roots_has_none() {
     assert!(real_roots(&[1.0, 0.0, 1.0]).is_empty());
     assert!(real_roots(&[5.0]).is_empty());

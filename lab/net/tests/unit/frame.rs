@@ -89,3 +89,65 @@ fn another_version_is_recognised_in_a_datagram_of_any_size() {
     assert_eq!(Frame::decode(b"VINE"), Err(FrameError::Magic));
     assert_eq!(Frame::decode(b"VINE\x02\x00 short"), Err(FrameError::Size(12)));
 }
+
+#[test]
+fn frames_of_every_kind_have_the_recorded_bytes() {
+    let at = Frame {
+        sequence: 7,
+        time: 0.25,
+        ..Frame::new(Kind::Hello, 0x0102_0304_0506_0708)
+    };
+    let drive = Drive { omega: 55.5, amplitude: 9e-5, displacement: -1e-5 };
+    let (state, fault) = (LoopState::of_number(3), Fault::of_number(5));
+    let command = Command { drive, phase_error: Some(-1e-3), settled: true, state, fault };
+    let sensors = Sensors { response: 1e-3, reference: Some(2e-5) };
+    let motion = GroundTruth {
+        impacts: 12,
+        impact_time: 0.2,
+        impact_velocity: -0.3,
+        particle_velocity: 0.4,
+        friction: None,
+    };
+    let to = Move {
+        response: 1e-2,
+        duration: 2.0,
+        amplitude: -1e-6,
+        omega: 0.01,
+        growth: 1e-4,
+    };
+    let timing = crate::timing::Timing {
+        samples: 100,
+        missed: 3,
+        worst: 0.01,
+        held: 2,
+        p99: 1e-4,
+        p99_99: 2e-3,
+    };
+    let bare = Reading {
+        sensors: Sensors { reference: None, ..sensors },
+        ground_truth: None,
+    };
+    let frames = [
+        write_reading(at, &Reading { sensors, ground_truth: Some(motion) }),
+        write_reading(at, &bare),
+        write_command(at, &command),
+        write_command(at, &Command { drive, ..Command::default() }),
+        write_move(at, to, -1.5),
+        timing.write(at.session),
+        Refusal::Drive { index: 2, value: 1.0, limit: 0.01 }.answer(&at),
+        Refusal::SampleTime(1e-3).answer(&at),
+    ];
+    let checksums = frames.map(|frame| crc32fast::hash(&frame.encode()[..CHECKSUM_AT]));
+    // From Python's `struct` and `zlib`, by the specification.
+    let recorded = [
+        0x85c2_255d,
+        0xeace_b0e8,
+        0xaa91_d8c9,
+        0x93f5_78a2,
+        0xe432_a772,
+        0x348a_9c27,
+        0x02d2_922c,
+        0x0bb1_66c2,
+    ];
+    assert_eq!(checksums, recorded);
+}

@@ -6,7 +6,7 @@ use super::WIDE;
 use crate::numerics::try_bisection;
 use crate::orbit::Periodic;
 use crate::regime::Regime;
-use crate::report::figure::{DETUNING, Figure, Glyph, Legend, Marked, Panel, Place, SIZE};
+use crate::report::figure::{DETUNING, Figure, Legend, Marked, Panel, Place, SIZE, Shape};
 use crate::report::theme::{BORDER, letter};
 use crate::scene::Dimensionless;
 use crate::sweep::{Grid, Map, SIGMA};
@@ -26,9 +26,15 @@ pub fn regimes(map: &Map) -> Figure {
         .heading("Regimes of the driven response", &caption(map))
         .legend(Legend::Beside(205.0));
     for regime in Regime::SIMULATED {
-        panel.cells(stripes(map, regime), regime.name(), letter(regime));
+        let (letter, ink) = letter(regime);
+        panel.add(
+            Shape::Cells(letter, ink),
+            stripes(map, regime),
+            regime.name(),
+            regime.name(),
+        );
     }
-    panel.border(outline(map), BORDER, "stable 1:1, theory");
+    panel.add(Shape::Border(2.2), outline(map), BORDER, "stable 1:1, theory");
     let place = place_on(map);
     for curve in &map.curves {
         // Solid where it bounds the stability of a motion.
@@ -40,10 +46,10 @@ pub fn regimes(map: &Map) -> Figure {
     }
     let several = (0..).zip(&map.cells).filter(|(_, cell)| !cell.coexisting.is_empty());
     let dots: Vec<Place> = several.map(|(n, _)| (x.at(n % x.points), y.at(n / x.points))).collect();
-    panel.marks(dots, Glyph::Dot(1.0), BORDER, "several regimes");
+    panel.add(Shape::Dot(1.0), dots, BORDER, "several regimes");
     for (regime, place) in letters(map) {
         let (letter, ink) = letter(regime);
-        panel.text(letter, place, 16.0, ink, false);
+        panel.add(Shape::Text(16.0), vec![place], ink, letter);
     }
     Figure { size, panels: vec![panel] }
 }

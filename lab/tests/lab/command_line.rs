@@ -1,33 +1,15 @@
 //! Guards the program as its users meet it: output, exit codes and messages.
 
-use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-fn vines(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_vines"))
-        .args(arguments)
-        .current_dir(std::env::temp_dir())
-        .output()
-        .expect("the program runs")
-}
+use crate::{fails, vines};
 
 fn json(arguments: &[&str]) -> Value {
     let output = vines(arguments);
     assert!(output.status.success(), "{output:?}");
     serde_json::from_slice(&output.stdout).expect("JSON")
-}
-
-/// The error must be one message on stderr, with nothing on stdout.
-fn fails(arguments: &[&str], code: i32, part: &str) {
-    let output = vines(arguments);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
-    assert!(message.starts_with("error: "), "{message}");
-    assert!(message.contains(part), "`{part}` is not in: {message}");
-    assert!(!message.contains("panicked"), "{message}");
-    assert!(output.stdout.is_empty());
 }
 
 #[test]
@@ -44,6 +26,29 @@ fn orbits_come_as_a_json_array() {
         assert!(stable[0][key].is_f64(), "{key}: {}", stable[0]);
     }
     assert_eq!(stable[0]["multipliers"].as_array().map(Vec::len), Some(4));
+}
+
+#[test]
+fn the_plants_own_motion_has_the_friction_that_exact_orbits_leave_out() {
+    let friction = ["orbit", "--periodic", "--json", "--set=plant.mu_k=0.05"];
+    let motion = json(&friction);
+    assert_eq!(
+        (motion["impacts"].as_u64(), motion["stable"].as_bool()),
+        (Some(2), Some(true))
+    );
+    assert!((motion["phase_deg"].as_f64().unwrap() + 90.0).abs() < 1e-6, "{motion}");
+    assert_eq!(motion["ideal"][0], "friction");
+    let smaller = motion["a_m"].as_f64() < motion["ideal"][2].as_f64();
+    assert!(smaller, "friction takes energy: {motion}");
+    // The motion from rest at the same frequency.
+    let sigma = format!("--sigma={}", motion["sigma"]);
+    let start = "--set=start.dq2=0.2";
+    let settled = json(&[&friction[..], &[&sigma, start]].concat());
+    assert!(
+        (settled["a_m"].as_f64().unwrap() / motion["a_m"].as_f64().unwrap() - 1.0).abs() < 1e-8,
+        "{settled}"
+    );
+    fails(&["orbit", "--periodic", "--set=plant.r_scatter=0.1"], 1, "set it to 0");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_vines");
+use crate::PROGRAM;
 
 /// A program with its server, and the server's address.
 struct Watched(Child, String);

@@ -4,7 +4,7 @@
 use std::env::consts::DLL_SUFFIX;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock, Mutex};
 
@@ -14,14 +14,7 @@ use vines::net::{self, Address, Role, Served, Service};
 use vines::rig::{Drive, Rig, RigError, Sensors, Simulated};
 use vines::scene::Scene;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_vines");
-
-fn vines(arguments: &[&str]) -> Output {
-    Command::new(PROGRAM)
-        .args(arguments)
-        .output()
-        .expect("the program runs")
-}
+use crate::{PROGRAM, fails, vines};
 
 /// The two FMUs, packed once, with the libraries that cargo builds because this package depends on them.
 static FMUS: LazyLock<TempDir> = LazyLock::new(|| {
@@ -328,16 +321,6 @@ fn a_healthy_rig_is_driven_after_the_check() {
         message.contains("phase margin") && largest > 0.5,
         "{largest}: {message}"
     );
-}
-
-/// The error must be one message on stderr that names the part, with nothing on stdout.
-fn fails(arguments: &[&str], code: i32, part: &str) {
-    let output = vines(arguments);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
-    assert!(message.contains("error: "), "{message}");
-    assert!(message.contains(part), "`{part}` is not in: {message}");
-    assert!(output.stdout.is_empty());
 }
 
 #[test]

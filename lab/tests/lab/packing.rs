@@ -87,17 +87,17 @@ fn a_component_is_packed_with_its_library_in_its_platforms_folder() {
 }
 
 #[test]
-fn a_missing_library_is_named_with_the_way_to_build_it() {
+fn a_library_that_is_missing_or_of_another_kind_is_named_with_the_way_to_build_it() {
     let folder = tempfile::tempdir().unwrap();
-    let message = complaint(folder.path());
-    let path = library(folder.path()).display().to_string();
-    for part in [path.as_str(), "cargo build --release -p tiny-fmu", "--libraries"] {
-        assert!(message.contains(part), "{message}");
-    }
-}
-
-#[test]
-fn a_file_that_is_no_library_for_this_machine_is_refused() {
+    let path = library(folder.path());
+    let refused = |part: &str| {
+        let message = complaint(folder.path());
+        let named = path.display().to_string();
+        for part in [part, named.as_str(), "cargo build --release -p tiny-fmu", "--libraries"] {
+            assert!(message.contains(part), "{message}");
+        }
+    };
+    refused("not the library of Tiny for this machine");
     // The header of a library of the other world: a PE file for x86-64 here, or an ELF file on Windows.
     let mut other = vec![0u8; 1024];
     if cfg!(windows) {
@@ -107,38 +107,22 @@ fn a_file_that_is_no_library_for_this_machine_is_refused() {
         other[0x3c] = 0x40;
         other[0x40..0x44].copy_from_slice(b"PE\0\0");
     }
-    let folder = tempfile::tempdir().unwrap();
     for content in [&other[..], b"", b"hello", b"\x7fELF"] {
-        fs::write(library(folder.path()), content).unwrap();
-        let message = complaint(folder.path());
-        for part in [
-            "not the library of Tiny for this machine",
-            "cargo build --release -p tiny-fmu",
-        ] {
-            assert!(message.contains(part), "{message}");
-        }
+        fs::write(&path, content).unwrap();
+        refused("not the library of Tiny for this machine");
     }
-}
-
-#[test]
-fn a_library_without_fmi_functions_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    fs::remove_file(&path).unwrap();
     build(folder.path(), "something_else", GUID);
-    assert!(complaint(folder.path()).contains("fmi2Instantiate"));
-}
-
-#[test]
-fn a_library_of_another_version_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    refused("fmi2Instantiate");
     build(folder.path(), "fmi2Instantiate", "of an older table");
-    assert!(complaint(folder.path()).contains("other variables than Tiny has now"));
+    refused("other variables than Tiny has now");
 }
 
 /// The same library once more, as one for the platform of a folder.
 fn with_other(folder: &Path, argument: &str) -> Libraries {
     let path = library(folder).display().to_string();
     let other: Binary = format!("{argument}={path}").parse().unwrap();
-    Libraries { folder: folder.into(), own: true, others: vec![other] }
+    Libraries { folder: Some(folder.into()), others: vec![other] }
 }
 
 #[test]
@@ -147,8 +131,7 @@ fn only_the_libraries_given_are_packed_where_this_platform_is_left_out() {
     build(folder.path(), "fmi2Instantiate", GUID);
     let running = running();
     let mut libraries = with_other(folder.path(), running);
-    libraries.own = false;
-    libraries.folder = folder.path().join("missing");
+    libraries.folder = None;
     let out = folder.path().join("out");
     let written = pack(&[component()], &libraries, &out).unwrap();
     let zip = zip::ZipArchive::new(fs::File::open(&written[0]).unwrap()).unwrap();
@@ -161,18 +144,12 @@ fn only_the_libraries_given_are_packed_where_this_platform_is_left_out() {
 }
 
 #[test]
-fn a_component_that_no_platform_has_is_refused() {
+fn a_platform_is_served_exactly_once() {
     let folder = tempfile::tempdir().unwrap();
-    let libraries = Libraries { folder: folder.path().into(), own: false, others: Vec::new() };
-    let message = complaint_of(folder.path(), &libraries);
+    let message = complaint_of(folder.path(), &Libraries { folder: None, others: Vec::new() });
     for part in ["no library of Tiny", "--binary PLATFORM=FILE"] {
         assert!(message.contains(part), "{message}");
     }
-}
-
-#[test]
-fn a_platform_is_served_once() {
-    let folder = tempfile::tempdir().unwrap();
     build(folder.path(), "fmi2Instantiate", GUID);
     let mut libraries = with_other(folder.path(), "win32");
     libraries.others.push(libraries.others[0].clone());
@@ -186,7 +163,7 @@ fn a_library_given_for_this_machine_takes_the_place_of_that_in_the_folder() {
     build(folder.path(), "fmi2Instantiate", GUID);
     fs::write(library(other.path()), format!("a library with {GUID}")).unwrap();
     let mut libraries = with_other(other.path(), running());
-    libraries.folder = folder.path().into();
+    libraries.folder = Some(folder.path().into());
     let written = pack(&[component()], &libraries, &folder.path().join("out")).unwrap();
     let mut zip = zip::ZipArchive::new(fs::File::open(&written[0]).unwrap()).unwrap();
     let inside = format!("binaries/{}/Tiny{DLL_SUFFIX}", running());
@@ -200,7 +177,7 @@ fn a_library_that_belongs_to_no_component_is_refused() {
     build(folder.path(), "fmi2Instantiate", GUID);
     build(other.path(), "fmi2Instantiate", "of a stranger");
     let mut libraries = with_other(other.path(), running());
-    libraries.folder = folder.path().into();
+    libraries.folder = Some(folder.path().into());
     let message = complaint_of(folder.path(), &libraries);
     assert!(message.contains("belongs to none of Tiny"), "{message}");
 }

@@ -16,13 +16,15 @@ use vines::pack::{components, pack_bench};
 use vines::rig::{BuiltIn, Controller, Drive, GroundTruth, Move, Rig, RigError, Sensors, Simulated};
 use vines::scene::{Names, PAPER, Scene};
 
+use crate::{PROGRAM, built_in};
+
 /// The periods that are driven: the default scene locks after about 110.
 const PERIODS: f64 = 1000.0;
 const HOLD_PERIODS: f64 = 20.0;
 
 /// The folder of the libraries of this build: cargo makes them because this package depends on them.
 fn libraries() -> PathBuf {
-    Path::new(env!("CARGO_BIN_EXE_vines")).with_file_name("deps")
+    Path::new(PROGRAM).with_file_name("deps")
 }
 
 /// Plant and controller with the parameters of a scene, packed into a folder.
@@ -98,10 +100,10 @@ fn the_pair_in_co_simulation_locks_where_the_built_in_loop_does() {
 #[test]
 fn the_fmu_has_the_bits_of_the_plant_in_every_real_cavity() {
     let scenes = [
-        include_str!("../../scenes/rough.toml"),
-        include_str!("../../scenes/skewed.toml"),
-        include_str!("../../scenes/vertical.toml"),
-        include_str!("../../scenes/viscoelastic.toml"),
+        include_str!("../../../scenes/rough.toml"),
+        include_str!("../../../scenes/skewed.toml"),
+        include_str!("../../../scenes/vertical.toml"),
+        include_str!("../../../scenes/viscoelastic.toml"),
     ];
     let all = [
         "plant.mu_k=0.1",
@@ -219,10 +221,6 @@ impl Rig for NoBase {
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         self.0.ground_truth()
     }
-}
-
-fn built_in(scene: &Scene) -> BuiltIn {
-    BuiltIn::new(&scene.controller_config()).unwrap()
 }
 
 /// Detuning at which a run has locked.

@@ -7,25 +7,12 @@ use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
 use vines::net::LinkError;
 use vines::record::Record;
 use vines::rig::{
-    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Fault, GroundTruth, Measured, Rig, RigError, Sensors,
+    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Fault, GroundTruth, Rig, RigError, Sensors,
     SensorsOnly, Simulated,
 };
-use vines::scene::{LinearResponse, Override, Scene};
+use vines::scene::{LinearResponse, Scene};
 
-fn scene(settings: &[&str]) -> Scene {
-    let overrides: Vec<Override> = settings.iter().map(|s| s.parse().unwrap()).collect();
-    let text = include_str!("../../scenes/dimensionless.toml");
-    Scene::parse("dimensionless.toml", text, &overrides).unwrap()
-}
-
-fn plant(scene: &Scene) -> Measured<Simulated> {
-    let plant = Simulated::new(scene.plant, scene.start).unwrap();
-    plant.with_sensors(scene.resonance)
-}
-
-fn built_in(scene: &Scene) -> BuiltIn {
-    BuiltIn::new(&scene.controller_config()).unwrap()
-}
+use crate::{built_in, plant, scene};
 
 fn run(
     rig: &mut (impl Rig + ?Sized),

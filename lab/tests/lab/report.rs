@@ -12,7 +12,7 @@ use vines::{
 fn write(out: &Path) {
     let early = ["controller.amplitude_tolerance=8e-3", "controller.dwell_periods=5"];
     let overrides: Vec<Override> = early.iter().map(|s| s.parse().unwrap()).collect();
-    let text = include_str!("../../scenes/dimensionless.toml");
+    let text = include_str!("../../../scenes/dimensionless.toml");
     let subject = Subject {
         scene: Scene::parse("dimensionless.toml", text, &overrides).unwrap(),
         family: Family::parse("dimensionless.toml", Some(text), &overrides).unwrap(),

@@ -8,13 +8,9 @@ use vines::loop_check::check;
 use vines::rig::{
     BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated,
 };
-use vines::scene::{Override, Parameters, Scene};
+use vines::scene::Parameters;
 
-fn scene(settings: &[&str]) -> Scene {
-    let overrides: Vec<Override> = settings.iter().map(|s| s.parse().unwrap()).collect();
-    let text = include_str!("../../scenes/dimensionless.toml");
-    Scene::parse("dimensionless.toml", text, &overrides).unwrap()
-}
+use crate::scene;
 
 fn tracked(settings: &[&str]) -> TrackedComparison {
     let scene = scene(settings);
