@@ -27,31 +27,31 @@ use crate::scene::{LinearResponse, Scene};
 
 /// What is asked of a level.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Criterion {
+pub struct Criterion {
     /// Linear response of the rig.
-    linear: LinearResponse,
+    pub linear: LinearResponse,
     /// Largest standard uncertainty of the drive E, as a share of it, and of the frequency, as a share of `omega0 E/A` at the largest level A.
-    precision: f64,
+    pub precision: f64,
     /// The largest level, m.
-    largest: f64,
+    pub largest: f64,
     /// The last two points before, the nearest last: amplitude of the response, m, drive, m, and frequency, rad/s.
-    before: [Option<[f64; 3]>; 2],
+    pub before: [Option<[f64; 3]>; 2],
 }
 
 /// A point of the backbone from a window of periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct LevelEstimate {
+pub struct LevelEstimate {
     /// Number of periods.
-    periods: usize,
+    pub periods: usize,
     /// Mean amplitude of the response, m.
-    response: Estimate,
+    pub response: Estimate,
     /// Mean phase error, rad.
-    phase_error: Estimate,
+    pub phase_error: Estimate,
     /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
-    at: [Estimate; 2],
+    pub at: [Estimate; 2],
     /// Whether only noise is larger than the precision: the fit describes the window, and the systematic part of the uncertainty is small
     /// enough.
-    steady: bool,
+    pub steady: bool,
 }
 
 /// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 beside the
@@ -70,7 +70,7 @@ const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
 
 impl Criterion {
     /// The window with the smallest uncertainties, from the last of these periods backwards; `None` for too few.
-    fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
+    pub fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
         let n = cycles.len();
         let counts = WINDOWS.map(|share| (share * n as f64).round() as usize);
         let considered = counts.into_iter().filter(|count| *count >= 2 * Balance::FEWEST);
@@ -81,7 +81,7 @@ impl Criterion {
     }
 
     /// Whether the uncertainties are small enough, and the phase is near its target.
-    fn is_met(&self, estimate: &LevelEstimate) -> bool {
+    pub fn is_met(&self, estimate: &LevelEstimate) -> bool {
         let Estimate { value, uncertainty } = estimate.phase_error;
         self.size(estimate) <= 1.0 && value.abs() <= BESIDE + RANDOM * uncertainty
     }
@@ -162,7 +162,7 @@ impl Criterion {
 
 impl LevelEstimate {
     /// Means over the periods, of a motion that no balance describes.
-    fn means(cycles: &[Cycle]) -> Self {
+    pub fn means(cycles: &[Cycle]) -> Self {
         let mean = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&cycles.iter().map(value).collect::<Vec<f64>>());
         Self {
             periods: cycles.len(),
