@@ -52,7 +52,7 @@ export class Watching extends Page {
     }
     document.body.classList.add("watching");
     $("tour").hidden = true;
-    document.querySelector(".sim").hidden = true;
+    for (const element of document.querySelectorAll(".sim")) element.hidden = true;
     this.start();
     const source = new EventSource("rows");
     source.onmessage = ({ data }) => this.#take(JSON.parse(data), source);

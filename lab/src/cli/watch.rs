@@ -361,12 +361,13 @@ macro_rules! files {
         [$((concat!("/", $name), include_str!(concat!("../../../live/page/", $name)))),*]
     };
 }
-const FILES: [(&str, &str); 15] = files![
+const FILES: [(&str, &str); 16] = files![
     "index.html",
     "style.css",
     "controls.js",
     "link.js",
     "main.js",
+    "map.js",
     "module.js",
     "page.js",
     "pictures.js",
