@@ -150,11 +150,13 @@ mod tests {
     #[test]
     fn the_live_page_has_the_colours_of_the_table() {
         let style = include_str!("../../../live/page/style.css");
-        for (name, variable) in [(EXACT, "--blue"), (MEASURED, "--decay"), (PARTICLE, "--red")] {
-            let start = format!("{variable}: ");
-            let values = style.match_indices(&start).map(|(at, _)| at + start.len());
-            let values: Vec<String> = values.map(|from| style[from..from + 7].to_uppercase()).collect();
-            assert_eq!(values, row(name)[1..], "{variable}");
+        for name in [THEORY, EXACT, MEASURED, PARTICLE, MODULATION] {
+            for name in [name, unstable(name)] {
+                let start = format!("--{}: ", name.replace(' ', "-"));
+                let values = style.match_indices(&start).map(|(at, _)| at + start.len());
+                let values: Vec<&str> = values.map(|from| &style[from..from + 7]).collect();
+                assert_eq!(values, row(name)[1..], "{start}");
+            }
         }
     }
 
