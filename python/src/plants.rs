@@ -427,8 +427,6 @@ impl Plant {
 #[pyclass]
 pub struct Plants {
     plants: Vec<Saved>,
-    /// Memory for the next states: all plants stay as they are if one fails.
-    next: Vec<Saved>,
 }
 
 /// Parts of a batch per thread: plants differ in their cost.
@@ -444,7 +442,7 @@ fn reserve(plants: &mut Vec<Saved>, n: usize) -> PyResult<()> {
 
 impl Plants {
     fn of(plants: Vec<Saved>) -> Self {
-        Self { plants, next: Vec::new() }
+        Self { plants }
     }
 
     /// What `read` finds in every plant.
@@ -519,9 +517,10 @@ impl Plants {
     ) -> PyResult<Option<EventArrays<'py>>> {
         own_threads()?;
         let [durations, amplitudes, omegas] = [durations, amplitudes, omegas].map(|one| one.as_array().to_vec());
-        let Self { plants, next } = self;
-        next.clear();
-        reserve(next, plants.len())?;
+        let plants = &self.plants;
+        // All plants stay as they are if one fails.
+        let mut next = Vec::new();
+        reserve(&mut next, plants.len())?;
         let stop = AtomicBool::new(false);
         let found = wait(
             py,
@@ -559,7 +558,7 @@ impl Plants {
                 None => PyKeyboardInterrupt::new_err(()),
             })?);
         }
-        std::mem::swap(plants, next);
+        self.plants = next;
         Ok(events.then(|| merged.into_arrays(py)))
     }
 

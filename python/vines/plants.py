@@ -467,7 +467,7 @@ def _values(
     given = dict(first) | dict(starts or {})
     _check("parameters", values, _PARAMETERS, _CAVITY)
     _check("starts", given, _START)
-    if values.get("r_law", "constant") != "constant" and "r_plus" not in values:
+    if values.get("r_law") in _LAWS[1:] and "r_plus" not in values:
         raise ValueError(f"parameters: r_law = {values['r_law']!r} without r_plus, which is its parameter k or v_y")
     columns = [reals(name, values[name]) for name in _PARAMETERS]
     # Most batches have an ideal cavity: without its columns they need less memory.

@@ -109,8 +109,10 @@ fn a_particle_that_sticks_is_counted_and_timed() {
         rig.advance(drive, scene.sample_time()).unwrap();
     }
     let friction = rig.ground_truth().unwrap().unwrap().friction.unwrap();
+    let elapsed = 5000.0 * scene.sample_time();
+    assert!(friction.sticks > 1 && friction.loss > 0.0, "{friction:?}");
     assert!(
-        friction.sticks > 10 && friction.stuck_time > 0.0 && friction.loss > 0.0,
+        friction.stuck_time > 0.0 && friction.stuck_time < 0.5 * elapsed,
         "{friction:?}"
     );
 }
