@@ -3,6 +3,7 @@
 python examples/basin.py [FOLDER]    writes basin.zarr and basin.svg; continues an interrupted sweep
 """
 
+import csv
 import json
 import sys
 from pathlib import Path
@@ -20,7 +21,9 @@ cells = vines.sweep(scene, axes, out=folder / "basin.zarr", periods=1000)
 found = [code for code in range(len(vines.REGIMES)) if (cells.regime == code).any()]
 position = cells.regime.copy(data=[[found.index(code) for code in row] for row in cells.regime.values])
 figure, plot = plt.subplots(figsize=(6, 4.5), layout="constrained")
-colours = ListedColormap([f"C{code}" for code in found])
+with (Path(__file__).parent.parent / "lab/src/report/styles.csv").open() as styles:
+    colour = {row["name"]: row["light"] for row in csv.DictReader(styles)}
+colours = ListedColormap([colour[vines.REGIMES[code]] for code in found])
 image = plot.pcolormesh(
     1e3 * cells["start.q1"], cells["start.dq1"], position.T, cmap=colours, vmin=-0.5, vmax=len(found) - 0.5
 )

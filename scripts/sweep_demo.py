@@ -71,11 +71,14 @@ def sweep(vines, options, out):
 
 def draw(cells, labels, path):
     names = [name.replace("_", " ") for name in cells.regime.attrs["flag_meanings"].split()]
+    names = [name for name in names if name in COLOURS]  # without "failed" and "not computed"
     x, y = cells.regime.dims
     figure, plot = plt.subplots(figsize=(7, 4.6), layout="constrained")
     extent = [float(cells[x][0]), float(cells[x][-1]), float(cells[y][0]), float(cells[y][-1])]
     style = {"origin": "lower", "extent": extent, "aspect": "auto", "interpolation": "nearest"}
-    image = plot.imshow(cells.regime.values.T, cmap=ListedColormap([COLOURS[name] for name in names]), vmin=-0.5, vmax=7.5, **style)
+    style |= {"cmap": ListedColormap([COLOURS[name] for name in names]), "vmin": -0.5, "vmax": len(names) - 0.5}
+    image = plot.imshow(cells.regime.values.T, **style)
+    plot.locator_params(axis="x", nbins=6)
     figure.colorbar(image, ticks=range(len(names))).set_ticklabels(names)
     plot.set(xlabel=labels[0], ylabel=labels[1])
     figure.savefig(path, dpi=110)

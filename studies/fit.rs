@@ -22,8 +22,8 @@ use std::f64::consts::TAU;
 use common::{Failure, arguments, client, is_kept, quantile, share, tracked, uniform, write};
 use rayon::prelude::*;
 use vines_model::numerics::mean_square;
-use vines_testbench::experiment::{Plan, run};
 use vines_testbench::backbone::track;
+use vines_testbench::experiment::{Plan, run};
 use vines_testbench::fit::{Effect, Fit, MeasuredPoint, Quantity, Recording, at, explain, fit};
 use vines_testbench::rig::{BuiltIn, Chain, SensorsOnly, Simulated};
 use vines_testbench::scene::{Parameters, Scene};
@@ -149,14 +149,22 @@ fn effects(count: usize, seed: &str, snr: &str) -> Result<(), Failure> {
             let ratios = [epsilon, uniform(0.4, 2.5), uniform(0.4, 0.9)];
             let noise = uniform(0.0, 1e6) as u64;
             let scales = [0.01, 0.3, 0.2, 0.1, 0.2].map(|range| uniform(-range, range));
-            (ratios, noise, scales, (n < count).then(|| Effect::ALL[n % 4]), uniform(0.3, 1.0))
+            (
+                ratios,
+                noise,
+                scales,
+                (n < count).then(|| Effect::ALL[n % 4]),
+                uniform(0.3, 1.0),
+            )
         })
         .collect();
     let named: Vec<Option<Named>> = cases
         .par_iter()
         .map(|case| {
             let result = named(case, snr);
-            result.inspect_err(|error| println!("{:.4?} {:?}: {error}", case.0, case.3)).ok()
+            result
+                .inspect_err(|error| println!("{:.4?} {:?}: {error}", case.0, case.3))
+                .ok()
         })
         .collect();
     let mut rows = Vec::new();
@@ -203,13 +211,20 @@ fn named((ratios, noise, scales, effect, size): &Hidden, snr: &str) -> Result<Na
             (tilt.to_degrees(), lovines::Cavity { tilt, ..ideal.cavity })
         }
         Some(law) => {
-            let strength = if *law == Effect::Viscoelastic { (1.0 - ideal.restitution) / 2f64.powf(0.2) } else { 2.0 * ideal.restitution.powi(4) };
+            let strength = if *law == Effect::Viscoelastic {
+                (1.0 - ideal.restitution) / 2f64.powf(0.2)
+            } else {
+                2.0 * ideal.restitution.powi(4)
+            };
             let law = if *law == Effect::Viscoelastic {
                 lovines::Restitution::Viscoelastic(strength)
             } else {
                 lovines::Restitution::Plastic(strength)
             };
-            (strength, lovines::Cavity { restitution: [Some(law); 2], ..ideal.cavity })
+            (
+                strength,
+                lovines::Cavity { restitution: [Some(law); 2], ..ideal.cavity },
+            )
         }
     };
     let truth = Parameters { cavity, ..ideal };
@@ -217,14 +232,26 @@ fn named((ratios, noise, scales, effect, size): &Hidden, snr: &str) -> Result<Na
     let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let tracked = track(&mut rig, &mut controller, &scene, |_, _| {})?;
-    let points: Vec<MeasuredPoint> = tracked.points.iter().filter(is_kept).map(|point| (&point.at).into()).collect();
+    let points: Vec<MeasuredPoint> = tracked
+        .points
+        .iter()
+        .filter(is_kept)
+        .map(|point| (&point.at).into())
+        .collect();
     let begin = std::time::Instant::now();
     let found = explain(&points, scene.resonance, &scene.plant, &[], |_| {})?;
-    let (best, right) = (found.explains(), found.candidates.iter().find(|one| Some(one.effect) == *effect));
+    let (best, right) = (
+        found.explains(),
+        found.candidates.iter().find(|one| Some(one.effect) == *effect),
+    );
     println!(
         "{ratios:.4?} {effect:?} {strength:.5}: {} points, {}; right one {:?}, {:.2?}",
         points.len(),
-        if found.ideal.is_rejected() { found.verdict() } else { format!("ideal, {:.1} for {}", found.ideal.chi_square, found.ideal.degrees) },
+        if found.ideal.is_rejected() {
+            found.verdict()
+        } else {
+            format!("ideal, {:.1} for {}", found.ideal.chi_square, found.ideal.degrees)
+        },
         right.map(|one| (one.fit.chi_square, one.strength)),
         begin.elapsed()
     );

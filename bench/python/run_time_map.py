@@ -17,7 +17,7 @@ ACCEPTED_ELSEWHERE = (4.0, 8.0)
 # Regimes in the order of the legend, with their colours in all figures. Rare impacts: fewer than one per period.
 with (Path(__file__).parents[2] / "lab/src/report/styles.csv").open() as styles:
     COLOURS = {row["name"]: row["light"] for row in csv.DictReader(styles)} | {"rare impacts": "#b9b9b9"}
-NAMES = "symmetric 1:1,asymmetric 1:1,n impacts,quasi-periodic,modulated,chaotic,undecided".split(",")
+NAMES = ["symmetric 1:1", "asymmetric 1:1", "n impacts", "quasi-periodic", "modulated", "chaotic", "undecided"]
 REGIMES = {name: COLOURS[name] for name in ["no impacts", "rare impacts", *NAMES]}
 NOTE = (
     "Each cell is the default rig after 400 periods or more at that drive. One step of 200 periods is timed (50 with "

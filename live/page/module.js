@@ -73,6 +73,8 @@ class Bench {
   }
   manifold(bMax, points) { return this.#rows(this.exports.manifold(bMax, points), 3); }
   theory(points) { return this.#rows(this.exports.theory_backbone(points), 3); }
+  // The number of the regime under a constant drive.
+  regime(sigma, g) { return this.#values(this.exports.regime(sigma, g))[0]; }
   exact(points) { return this.#rows(this.exports.exact_backbone(points), 4); }
   tracked() { return this.#rows(this.exports.tracked(), 5); }
 }

@@ -147,6 +147,13 @@ export class Page {
     this.change("excitation", Number(g.toFixed(4)));
   }
 
+  // Starts again under a constant drive, as the cells of the map do.
+  goToDrive(sigma, g) {
+    say("");
+    this.start({ ...this.values, closed: 0, detuning: Number(sigma.toFixed(2)), excitation: Number(g.toFixed(2)) });
+    this.play(true);
+  }
+
   toNextImpact() {
     this.toEnd();
     let after = this.shown - (this.samples - 1) * this.step;

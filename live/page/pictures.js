@@ -1,6 +1,7 @@
 // Pictures and numbers of the page.
 
 import { $ } from "./controls.js";
+import { RegimeMap } from "./map.js";
 import { LOOP, ROW } from "./module.js";
 import { Plot, extent } from "./plots.js";
 import { Rig } from "./rig.js";
@@ -42,6 +43,7 @@ export class Pictures {
     Object.assign(this, { page, calm, past: [], ghost: [], reach: { mass: 1, base: 1 } });
     this.rig = new Rig($("rig"), colour);
     this.strip = new Strip(colour);
+    if (page.bench.regime) this.map = new RegimeMap(page, colour);
     const plot = (id, axes) => new Plot($(id), colour, axes);
     this.plots = {
       scope: plot("scope", { xLabel: "time, s", yLabel: "displacement over b" }),
@@ -109,6 +111,7 @@ export class Pictures {
     const { bench } = this.page;
     this.lines = { theory: bench.theory(160), exact: bench.exact(120) };
     this.manifoldEnd = 0;
+    this.map?.reset();
     // The curves leave the effects of a real cavity out.
     const real = EFFECTS.some((key) => this.page.values[key]);
     this.ideal = real ? " (ideal)" : "";
@@ -162,6 +165,7 @@ export class Pictures {
     this.#manifold(top, seen, point, linked);
     const done = page.points.filter((one) => one[0] <= page.shown + page.step);
     this.#backbone(top, seen, point, linked, done);
+    this.map?.draw(point);
     const words = page.bench.words();
     this.strip.draw(page, status, point, words, replay);
     this.#numbers(status, point, words, replay, done.length);

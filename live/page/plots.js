@@ -52,6 +52,13 @@ export class Plot {
     return share >= 0 && share <= 1 ? this.x[0] + share * (this.x[1] - this.x[0]) : undefined;
   }
 
+  // y likewise.
+  yAt(event) {
+    const [, top, , high] = this.box ?? [0, 0, 0, 0];
+    const share = 1 - (event.offsetY - top) / high;
+    return share >= 0 && share <= 1 ? this.y[0] + share * (this.y[1] - this.y[0]) : undefined;
+  }
+
   // The point of `points` nearest to a pointer, and its distance in pixels.
   nearest(points, event) {
     const distance = (point) => { const [x, y] = this.#at(point); return Math.hypot(x - event.offsetX, y - event.offsetY); };
@@ -87,6 +94,14 @@ export class Plot {
     const unstable = points.map((point, i) => ([points[i - 1], point, points[i + 1]].some((near) => near && !near[2]) ? point : null));
     this.line(unstable, `${colour}-unstable`, { dash: [4, 4], width: 0.7 * width });
     this.line(points.map((point) => (point[2] ? point : null)), colour, { label, width });
+  }
+
+  // A rectangle between two points, lower left and upper right.
+  cell(from, to, colour) {
+    const [left, bottom] = this.#at(from), [right, top] = this.#at(to);
+    this.c.fillStyle = this.colour(colour);
+    // Neighbours leave no gap.
+    this.c.fillRect(left, top, right - left + 0.5, bottom - top + 0.5);
   }
 
   points(points, colour, { label, radius = 3, open = false } = {}) {

@@ -52,7 +52,7 @@ export class Watching extends Page {
     }
     document.body.classList.add("watching");
     $("tour").hidden = true;
-    document.querySelector(".sim").hidden = true;
+    for (const element of document.querySelectorAll(".sim")) element.hidden = true;
     this.start();
     const source = new EventSource("rows");
     source.onmessage = ({ data }) => this.#take(JSON.parse(data), source);
@@ -71,8 +71,10 @@ export class Watching extends Page {
     this.bench.driven = this.driving = this.rows.length > 0 && this.rows.row(-1)[6] > 0;
     if (outcome) {
       source.close();
-      Object.assign(this.bench, { outcome: outcome.text, failed: outcome.failed });
-      if (!this.samples) say(outcome.text);
+      const { title } = this.bench.watch, { error } = outcome;
+      const text = error ? `${title} has failed: ${error}.` : `${title} has ended; its results are in the terminal.`;
+      Object.assign(this.bench, { outcome: text, failed: !!error });
+      if (!this.samples) say(text);
     }
   }
 

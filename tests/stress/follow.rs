@@ -4,7 +4,7 @@ use crate::common::Scene;
 use crate::spacing::Spacing;
 use crate::table::Table;
 use lovines::plant::MOST_IMPACTS;
-use lovines::{Drive, Event, Plant, State};
+use lovines::{Cavity, Drive, Event, Plant, State};
 use std::f64::consts::TAU;
 use std::time::Instant;
 
@@ -29,6 +29,9 @@ pub struct Worst {
     pub panics: u64,
     pub impacts: u64,
     pub stuck: u64,
+    pub released: u64,
+    /// Sticks to the floor inside the cavity.
+    pub sticks: u64,
     pub cut_short: u64,
     /// Of these, those that had not met as many impacts as that takes.
     pub cut_short_early: u64,
@@ -52,6 +55,8 @@ pub struct Worst {
     /// What energy and dissipated energy miss of that at the start, without damping and excitation.
     pub missing: Hardest,
     pub impacts_per_period: Hardest,
+    /// Evaluations of the motion per event and radian of the fastest rate.
+    pub work: Hardest,
     pub slowest: Hardest,
 }
 
@@ -103,6 +108,8 @@ impl Worst {
             panics: self.panics + other.panics,
             impacts: self.impacts + other.impacts,
             stuck: self.stuck + other.stuck,
+            released: self.released + other.released,
+            sticks: self.sticks + other.sticks,
             cut_short: self.cut_short + other.cut_short,
             cut_short_early: self.cut_short_early + other.cut_short_early,
             not_a_number: self.not_a_number + other.not_a_number,
@@ -117,6 +124,7 @@ impl Worst {
             growth: self.growth.or(other.growth),
             missing: self.missing.or(other.missing),
             impacts_per_period: self.impacts_per_period.or(other.impacts_per_period),
+            work: self.work.or(other.work),
             slowest: self.slowest.or(other.slowest),
         }
     }
@@ -136,6 +144,11 @@ impl Worst {
                 1e-12,
             ),
             ("impacts in a period, at most", self.impacts_per_period, f64::INFINITY),
+            (
+                "evaluations per event and radian of the fastest rate, at most",
+                self.work,
+                50.0,
+            ),
         ] {
             table.row(what, &worst.among(&among), worst.figure, allowed);
         }
@@ -159,7 +172,11 @@ impl Worst {
             self.cut_short as f64,
             f64::INFINITY,
         );
-        row("runs with other bits the second time", self.other_bits as f64, 0.0);
+        row(
+            "runs with other bits without the workspace",
+            self.other_bits as f64,
+            0.0,
+        );
         row(
             "scenes followed once only, because of more than 10^6 impacts",
             self.once_only as f64,
@@ -173,7 +190,7 @@ impl Worst {
     }
 }
 
-/// Follows a scene twice, unless it has very many impacts.
+/// Follows a scene twice, unless it has very many impacts: the second time the plant loses its workspace before every step.
 pub fn follow(scene: &Scene, name: Name) -> Worst {
     let began = Instant::now();
     let mut scene = scene.clone();
@@ -181,13 +198,13 @@ pub fn follow(scene: &Scene, name: Name) -> Worst {
     if shortened {
         scene.step = LONGEST_ELASTIC_STEP;
     }
-    let (mut worst, bits) = once(&scene, name);
+    let (mut worst, bits) = once(&scene, name, false);
     worst.shortened = u64::from(shortened);
     worst.slowest.see(began.elapsed().as_secs_f64(), name);
     if worst.impacts > MOST_FOLLOWED_TWICE {
         worst.once_only = 1;
     } else {
-        worst.other_bits = u64::from(once(&scene, name).1 != bits);
+        worst.other_bits = u64::from(once(&scene, name, true).1 != bits);
     }
     worst
 }
@@ -201,20 +218,35 @@ fn look(plant: &mut Plant, drive: Drive, step: f64) -> f64 {
         gone = part * step;
         let State { q1, q2, .. } = plant.state();
         // The difference of the two displacements carries their rounding.
-        let w = (q1 - q2).abs() - 4.0 * f64::EPSILON * q1.abs().max(q2.abs());
-        outside = outside.max(w / plant.parameters().half_width - 1.0);
+        let rounding = 4.0 * f64::EPSILON * q1.abs().max(q2.abs());
+        outside = outside.max(outside_by(plant, q1 - q2, rounding));
     }
     outside
 }
 
-fn once(s: &Scene, name: Name) -> (Worst, [u64; 4]) {
+/// How far `w` is outside the cavity, in its half-widths.
+fn outside_by(plant: &Plant, w: f64, rounding: f64) -> f64 {
+    let [plus, minus] = plant.parameters().gaps();
+    ((w - plus).max(-w - minus) - rounding) / (0.5 * (plus + minus))
+}
+
+fn once(s: &Scene, name: Name, forgetful: bool) -> (Worst, [u64; 4]) {
     let mut plant = Plant::new(s.parameters, s.start).expect("a scene that makes sense");
     let mut worst = Worst { scenes: 1, ..Worst::default() };
     let free = s.drive.amplitude == 0.0 && s.drive.signal == [0.0; 4];
+    let ideal = s.parameters.cavity == Cavity::IDEAL;
     let at_start = plant.energy(0.0);
-    let mut before = at_start;
+    // The energy of a weight on a tilted axis has no natural zero.
+    let (mut before, mut largest) = (at_start, at_start.abs());
     let mut drive = s.drive;
-    for _ in 0..STEPS {
+    for n in 0..STEPS {
+        if forgetful {
+            plant = Plant::from(plant.save());
+        }
+        if !ideal {
+            drive.amplitude = s.drive.amplitude * (1.0 + 0.3 * (n % 5) as f64);
+            drive.omega = s.drive.omega * (1.0 + 0.1 * (n % 3) as f64);
+        }
         let (mut impacts, mut backwards) = (0u64, 0);
         let mut looked = plant;
         let mut spacing = Spacing::of(&plant, &drive, s.step);
@@ -227,7 +259,7 @@ fn once(s: &Scene, name: Name) -> (Worst, [u64; 4]) {
                 }
             })
             .unwrap();
-        worst.too_close += spacing.too_close();
+        worst.too_close += if ideal { spacing.too_close() } else { 0 };
         if impacts <= MOST_LOOKED_AT {
             let inside = look(&mut looked, drive, s.step);
             worst.outside_within.see(inside, name);
@@ -242,26 +274,33 @@ fn once(s: &Scene, name: Name) -> (Worst, [u64; 4]) {
         worst.cut_short_early += u64::from(early);
         let State { q1, dq1, q2, dq2 } = plant.state();
         worst.not_a_number += u64::from(![q1, dq1, q2, dq2].iter().all(|x| x.is_finite()));
-        let w = plant.relative_displacement().abs() / s.parameters.half_width;
-        worst.outside.see(w - 1.0, name);
+        worst
+            .outside
+            .see(outside_by(&plant, plant.relative_displacement(), 0.0), name);
         let fastest = s.parameters.fastest_rate().max(s.drive.omega.abs());
         let periods = (s.step * fastest / TAU).max(1.0);
         worst.impacts_per_period.see(impacts as f64 / periods, name);
-        if free && at_start > 0.0 {
-            let (now, dissipated) = (plant.energy(0.0), plant.totals().dissipated);
-            worst.growth.see((now - before) / at_start, name);
+        let events = impacts + outcome.stuck + outcome.released;
+        let work = outcome.evaluations as f64 / (events as f64 + 1.0 + fastest * s.step);
+        worst.work.see(work, name);
+        if free && largest > 0.0 {
+            let (now, lost) = (plant.energy(0.0), plant.totals().dissipated + plant.totals().friction);
+            largest = largest.max(now.abs()).max(lost);
+            worst.growth.see((now - before) / largest, name);
             if s.parameters.damping == 0.0 {
-                let missing = (now + dissipated - at_start).abs() / at_start;
+                let missing = (now + lost - at_start).abs() / largest;
                 worst.missing.see(missing, name);
             }
             before = now;
         }
-        if worst.impacts >= ENOUGH {
+        worst.released += outcome.released;
+        if worst.impacts + worst.released >= ENOUGH {
             break;
         }
     }
     let x = plant.state();
-    if free && at_start == 0.0 {
+    worst.sticks = plant.totals().sticks;
+    if free && ideal && at_start == 0.0 {
         worst.stirred = u64::from(x != s.start);
     }
     (worst, [x.q1, x.dq1, x.q2, x.dq2].map(f64::to_bits))

@@ -2,7 +2,7 @@
 
 use crate::balance::{Walk, walk};
 use crate::common::{Scene, scene};
-use crate::follow::{Name, Worst, follow};
+use crate::follow::{Hardest, Name, Worst, follow};
 use crate::table::Table;
 use lovines::Drive;
 use proptest::prelude::*;
@@ -38,6 +38,7 @@ fn strategy(kind: &str) -> BoxedStrategy<Scene> {
         })
     };
     match kind {
+        "cavity" => crate::cavity::strategy(),
         "free" => with_any_loss(false).boxed(),
         "driven" => with_any_loss(true).boxed(),
         "at rest on the wall" => (with_any_loss(true), any::<bool>(), any::<bool>())
@@ -94,41 +95,43 @@ const PANELS: u32 = 500;
 /// The energy balance of damped rigs, driven or not, impacts and rests included; and whether the particle stays between its walls
 /// at the nodes of the quadrature.
 pub fn balance(n: usize, table: &mut Table) {
-    let damped = || {
+    fn damped() -> impl Strategy<Value = Scene> {
         let heavy = (-3.0..1.0f64).prop_map(|x| 2.0 * 10f64.powf(x));
         (any::<bool>().prop_flat_map(scene), heavy).prop_map(|(mut s, damping)| {
             s.parameters.damping = damping;
             s
         })
-    };
+    }
+    balances("damped", n, || damped().boxed(), table);
+}
+
+/// The same for scenes of any kind.
+pub fn balances(kind: &'static str, n: usize, strategy: fn() -> BoxedStrategy<Scene>, table: &mut Table) {
     let all: Vec<Walk> = (0..n)
         .into_par_iter()
-        .map_init(
-            || damped().boxed(),
-            |strategy, number| walk(&draw(strategy, number), PANELS),
-        )
+        .map_init(strategy, |strategy, number| walk(&draw(strategy, number), PANELS))
         .collect();
-    let (mut worst, mut hardest) = (Walk::default(), 0);
+    let (mut imbalance, mut outside) = (Hardest::default(), Hardest::default());
     for (number, one) in all.iter().enumerate() {
-        if one.imbalance > worst.imbalance {
-            (worst.imbalance, hardest) = (one.imbalance, number);
-        }
-        worst.outside = worst.outside.max(one.outside);
-        worst.events += one.events;
+        imbalance.see(one.imbalance, Name { kind, number });
+        outside.see(one.outside, Name { kind, number });
     }
-    let among = format!("{n} damped scenes, {} events; worst: {hardest}", worst.events);
-    table.row(
-        "energy balance with damper and base misses, relative",
-        &among,
-        worst.imbalance,
-        1e-12,
-    );
-    table.row(
-        "outside the cavity at the nodes of the quadrature, in half-widths",
-        &among,
-        worst.outside,
-        1e-12,
-    );
+    let events: u64 = all.iter().map(|one| u64::from(one.events)).sum();
+    let among = format!("{n} scenes, {events} events");
+    for (what, hardest) in [
+        ("energy balance with damper and base misses, relative", imbalance),
+        (
+            "outside the cavity at the nodes of the quadrature, in half-widths",
+            outside,
+        ),
+    ] {
+        table.row(
+            &format!("{kind}: {what}"),
+            &hardest.among(&among),
+            hardest.figure,
+            1e-12,
+        );
+    }
 }
 
 /// Follows one scene (`free:17`), and shows it and all that it did.
@@ -138,7 +141,8 @@ pub fn one(name: &str) {
     if kind == "new drives" {
         return crate::drives::one(number);
     }
-    let (kind, _) = KINDS.iter().find(|(k, _)| *k == kind).expect("a kind of scenes");
+    let kinds = KINDS.iter().map(|(kind, _)| *kind).chain(["cavity"]);
+    let kind = kinds.into_iter().find(|k| *k == kind).expect("a kind of scenes");
     let scene = draw(&strategy(kind), number);
     println!("{scene:#?}\n{:#?}", follow(&scene, Name { kind, number }));
 }
@@ -147,41 +151,40 @@ pub fn one(name: &str) {
 pub fn scenes(n: usize, table: &mut Table) {
     let mut all = Worst::default();
     for (kind, share) in KINDS {
-        let count = n * share / 1000;
-        let mut worst = Worst::default();
-        for begin in (0..count).step_by(PORTION) {
-            let portion: Vec<Worst> = (begin..count.min(begin + PORTION))
-                .into_par_iter()
-                .map_init(
-                    || strategy(kind),
-                    |strategy, number| {
-                        let scene = draw(strategy, number);
-                        match catch_unwind(|| follow(&scene, Name { kind, number })) {
-                            Ok(worst) => worst,
-                            Err(_) => {
-                                eprintln!("{kind} scene {number} panics: {scene:?}");
-                                Worst::panicked()
-                            }
-                        }
-                    },
-                )
-                .collect();
-            for one in portion {
-                worst = worst.and(one);
-            }
-            if count > PORTION {
-                table.progress(&format!("{} of {count} scenes, {kind}", count.min(begin + PORTION)));
-            }
-        }
-        table.progress(&format!("{kind}: {worst:?}"));
-        let among = format!("{count} scenes, {} impacts", worst.impacts);
-        table.row(
-            &format!("{kind}: outside its cavity by, in half-widths"),
-            &worst.outside.among(&among),
-            worst.outside.figure,
-            1e-12,
-        );
-        all = all.and(worst);
+        all = all.and(of_kind(kind, n * share / 1000, table));
     }
     all.rows(table);
+}
+
+/// Follows so many scenes of one kind.
+pub fn of_kind(kind: &'static str, count: usize, table: &mut Table) -> Worst {
+    let mut worst = Worst::default();
+    for begin in (0..count).step_by(PORTION) {
+        let portion: Vec<Worst> = (begin..count.min(begin + PORTION))
+            .into_par_iter()
+            .map_init(
+                || strategy(kind),
+                |strategy, number| {
+                    let scene = draw(strategy, number);
+                    catch_unwind(|| follow(&scene, Name { kind, number })).unwrap_or_else(|_| {
+                        eprintln!("{kind} scene {number} panics: {scene:?}");
+                        Worst::panicked()
+                    })
+                },
+            )
+            .collect();
+        worst = portion.into_iter().fold(worst, Worst::and);
+        if count > PORTION {
+            table.progress(&format!("{} of {count} scenes, {kind}", count.min(begin + PORTION)));
+        }
+    }
+    table.progress(&format!("{kind}: {worst:?}"));
+    let among = format!("{count} scenes, {} impacts, {} sticks", worst.impacts, worst.sticks);
+    table.row(
+        &format!("{kind}: outside its cavity by, in half-widths"),
+        &worst.outside.among(&among),
+        worst.outside.figure,
+        1e-12,
+    );
+    worst
 }

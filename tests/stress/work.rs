@@ -1,16 +1,11 @@
 //! Work per natural period at extreme values.
 
 use crate::table::Table;
-use lovines::{Drive, Outcome, Parameters, Plant, State};
+use lovines::{Drive, Parameters, Plant, State};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
-
-/// Evaluations of the motion in a step.
-fn evaluations(outcome: &Outcome) -> Option<u64> {
-    Some(outcome.evaluations)
-}
 
 /// Evaluations that are accepted per impact, drive cycle or natural period, whichever are the most in a natural period.
 const MOST_EVALUATIONS: f64 = 100.0;
@@ -25,8 +20,6 @@ const FREQUENCIES: [f64; 9] = [1e-3, 0.03, 0.3, 1.0, 1.7, 10.0, 30.0, 300.0, 1e3
 /// [`CYCLES`] of the drive where those are shorter: the work is then scaled to a natural period.
 const STEPS: u32 = 20;
 const CYCLES: f64 = 10.0;
-/// Where only time is measured, no more drives are begun after so much of it for one damping ratio.
-const ENOUGH_TIME_PER_RATIO: Duration = Duration::from_secs(20);
 const ENOUGH_IMPACTS: u64 = 100_000;
 const ENOUGH_TIME: Duration = Duration::from_millis(200);
 
@@ -37,28 +30,23 @@ struct Hardest {
     ratio: f64,
     impacts: f64,
     ns: f64,
-    evaluations: Option<f64>,
+    evaluations: f64,
     /// Evaluations per impact, drive cycle or natural period, whichever are the most in that period.
-    per_unit: Option<f64>,
+    per_unit: f64,
 }
 
 impl Hardest {
-    /// By evaluations where they are counted, else by time; one measure serves all drives.
-    fn weight(&self) -> f64 {
-        self.evaluations.unwrap_or(self.ns)
-    }
-
     fn or(self, other: Self) -> Self {
-        let mut more = if other.weight() > self.weight() { other } else { self };
-        more.per_unit = match (self.per_unit, other.per_unit) {
-            (Some(a), Some(b)) => Some(a.max(b)),
-            (a, b) => a.or(b),
+        let more = if other.evaluations > self.evaluations {
+            other
+        } else {
+            self
         };
-        more
+        Self { per_unit: self.per_unit.max(other.per_unit), ..more }
     }
 }
 
-pub fn rig(zeta: f64) -> Parameters {
+fn rig(zeta: f64) -> Parameters {
     Parameters {
         damping: 2.0 * zeta,
         ..Parameters::dimensionless(0.0084, 1.0, 0.65)
@@ -80,14 +68,14 @@ fn hardest(zeta: f64, amplitude: f64, ratio: f64) -> Hardest {
         let ns = before.elapsed().as_nanos() as f64 * steps_per_period;
         let in_a_period = outcome.impacts as f64 * steps_per_period;
         let units = in_a_period.max(ratio).max(1.0);
-        let counted = evaluations(&outcome).map(|n| n as f64 * steps_per_period);
+        let evaluations = outcome.evaluations as f64 * steps_per_period;
         worst = worst.or(Hardest {
             amplitude,
             ratio,
             impacts: in_a_period,
             ns,
-            evaluations: counted,
-            per_unit: counted.map(|n| n / units),
+            evaluations,
+            per_unit: evaluations / units,
         });
         impacts += outcome.impacts;
         if impacts > ENOUGH_IMPACTS || began.elapsed() > ENOUGH_TIME {
@@ -106,37 +94,23 @@ pub fn sweep(long: bool, table: &mut Table) {
             .flat_map(|&amplitude| FREQUENCIES.map(|ratio| (amplitude, ratio)))
             .step_by(every)
             .collect();
-        // Where only time is measured, the drives go one by one: others on the same cores would be in the figures.
-        let one = |&(amplitude, ratio): &(f64, f64)| hardest(zeta, amplitude, ratio);
-        let (worst, followed) = if evaluations(&Outcome::default()).is_some() {
-            let worst = (drives.par_iter().map(one)).reduce(Hardest::default, Hardest::or);
-            (worst, drives.len())
-        } else {
-            let began = Instant::now();
-            let found: Vec<Hardest> = (drives.iter())
-                .take_while(|_| began.elapsed() < ENOUGH_TIME_PER_RATIO)
-                .map(one)
-                .collect();
-            let followed = found.len();
-            let worst = found.into_iter().fold(Hardest::default(), Hardest::or);
-            (worst, followed)
-        };
-        rows.push((zeta, drives.len(), followed, worst));
+        let worst = (drives
+            .par_iter()
+            .map(|&(amplitude, ratio)| hardest(zeta, amplitude, ratio)))
+        .reduce(Hardest::default, Hardest::or);
+        rows.push((zeta, drives.len(), worst));
         table.progress(&format!("work at damping ratio {zeta}"));
     }
-    let shown = |x: Option<f64>| x.map_or_else(|| "not counted".to_owned(), |x| format!("{x:.1}"));
     let lines: Vec<String> = (rows.iter())
-        .map(|(zeta, drives, followed, w)| {
-            let counted = w
-                .evaluations
-                .map_or_else(|| "not counted".to_owned(), |n| format!("{n:.0}"));
+        .map(|(zeta, drives, w)| {
             format!(
-                "| {zeta:e} | {followed} of {drives} | E = {:e} b, omega = {:e} omega0 | {:.0} | {:.1} | {counted} | {} |",
+                "| {zeta:e} | {drives} | E = {:e} b, omega = {:e} omega0 | {:.0} | {:.1} | {:.0} | {:.1} |",
                 w.amplitude,
                 w.ratio,
                 w.impacts,
                 1e-3 * w.ns,
-                shown(w.per_unit),
+                w.evaluations,
+                w.per_unit,
             )
         })
         .collect();
@@ -146,14 +120,12 @@ pub fn sweep(long: bool, table: &mut Table) {
         "| damping ratio | drives | hardest drive | impacts | µs | evaluations | evaluations per unit |",
         &lines,
     );
-    for (zeta, drives, _, worst) in rows {
-        if let Some(per_unit) = worst.per_unit {
-            table.row(
-                &format!("damping ratio {zeta:e}: evaluations per impact, drive cycle or natural period"),
-                &format!("{drives} drives"),
-                per_unit,
-                MOST_EVALUATIONS,
-            );
-        }
+    for (zeta, drives, worst) in rows {
+        table.row(
+            &format!("damping ratio {zeta:e}: evaluations per impact, drive cycle or natural period"),
+            &format!("{drives} drives"),
+            worst.per_unit,
+            MOST_EVALUATIONS,
+        );
     }
 }

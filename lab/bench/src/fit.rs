@@ -474,7 +474,14 @@ struct Sums {
 impl<'a> Problem<'a> {
     fn new(points: Vec<MeasuredPoint>, definition: Definition, known: &'a [Known]) -> Self {
         let has_scale = known.iter().any(|one| one.quantity.needs_a_scale());
-        Self { points, definition, known, has_scale, shifts: Vec::new(), free: false }
+        Self {
+            points,
+            definition,
+            known,
+            has_scale,
+            shifts: Vec::new(),
+            free: false,
+        }
     }
 
     /// The smallest of the minima that are reached from the expected rig and from other restitution coefficients.
@@ -593,12 +600,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The speed at which the curve is nearest to a point, the residual there, and its derivative by the speed.
-    fn nearest(
-        &self,
-        x: &Unknowns,
-        point: usize,
-        start: Option<f64>,
-    ) -> Option<(f64, Vector3<f64>, Vector3<f64>)> {
+    fn nearest(&self, x: &Unknowns, point: usize, start: Option<f64>) -> Option<(f64, Vector3<f64>, Vector3<f64>)> {
         let (b, epsilon) = (x[3].exp(), x[4].exp());
         let manifold = SlowFlow::new(2.0 * x[1] / epsilon, x[2]).manifold;
         let by_theory = || {
@@ -640,7 +642,11 @@ impl<'a> Problem<'a> {
             ..Dimensionless::new(epsilon, 2.0 * x[1] / epsilon, x[2], 0.0)
         };
         let [omega, c, g] = backbone_at_speed(&model, speed)?;
-        Some(Curve { response: b * c, omega: omega0 * omega, drive: b * epsilon * g })
+        Some(Curve {
+            response: b * c,
+            omega: omega0 * omega,
+            drive: b * epsilon * g,
+        })
     }
 
     /// The curve at a speed less a point, over its standard uncertainties.
@@ -652,7 +658,11 @@ impl<'a> Problem<'a> {
         }
         let point = &self.points[point];
         let over = |value: f64, measured: Estimate| (value - measured.value) / measured.uncertainty;
-        Some(Vector3::new(over(response, point.response), over(omega, point.omega), over(drive, point.drive)))
+        Some(Vector3::new(
+            over(response, point.response),
+            over(omega, point.omega),
+            over(drive, point.drive),
+        ))
     }
 }
 

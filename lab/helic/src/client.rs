@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use thiserror::Error;
 
 use super::codec::{
-    COEFFICIENTS, ErrorCode, Frame, HARMONICS, Malformed, Packet, Status, VERSION, message, take, take_text, to_bytes,
+    COEFFICIENTS, ErrorCode, Frame, HARMONICS, Malformed, Packet, VERSION, message, take, take_text, to_bytes,
 };
 use super::device::WATCHDOG;
 use vines_net::{Bridge, CONNECT, Counters, is_loopback};
@@ -70,9 +70,15 @@ impl<T: Transport> Host<T> {
                 "the helic device has version {version} of the protocol, this program has version {VERSION}"
             )));
         }
-        let status = Status::decode(&answer)?;
-        host.sample_rate = status.sample_rate.into();
-        while host.parameters.len() < usize::from(status.parameters) {
+        let mut rest = &answer[..];
+        let [_, low, high, sources] = take(&mut rest)?;
+        host.sample_rate = f32::from_le_bytes(take(&mut rest)?).into();
+        // What remains is the time since the start of the device, ms.
+        if rest.len() != 4 {
+            return Err(Malformed.into());
+        }
+        let parameters = u16::from_le_bytes([low, high]);
+        while host.parameters.len() < usize::from(parameters) {
             let before = host.parameters.len();
             let start = (before as u16).to_le_bytes();
             let page = host.request(message::GET_PARAMS, start.into(), "GetParams")?;
@@ -93,7 +99,7 @@ impl<T: Transport> Host<T> {
         while !rest.is_empty() {
             host.sources.push((take_text(&mut rest)?, take_text(&mut rest)?));
         }
-        let complete = host.sources.len() == usize::from(status.sources);
+        let complete = host.sources.len() == usize::from(sources);
         complete.then_some(host).ok_or_else(|| Malformed.into())
     }
 

@@ -210,39 +210,3 @@ impl Packet {
         Ok(Self { sequence, first, dropped, decimation, width, values })
     }
 }
-
-/// The answer of a device to [`message::STATUS`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(missing_docs, reason = "the names of the protocol")]
-pub struct Status {
-    pub version: u8,
-    pub parameters: u16,
-    pub sources: u8,
-    /// Hz
-    pub sample_rate: f32,
-    /// ms, modulo 2^32
-    pub uptime: u32,
-}
-
-impl Status {
-    /// The payload.
-    pub fn encode(&self) -> Vec<u8> {
-        let [low, high] = self.parameters.to_le_bytes();
-        let head = [self.version, low, high, self.sources];
-        [head, self.sample_rate.to_le_bytes(), self.uptime.to_le_bytes()].concat()
-    }
-
-    /// Reads a payload.
-    pub fn decode(mut payload: &[u8]) -> Result<Self, Malformed> {
-        let bytes = &mut payload;
-        let [version, low, high, sources] = take(bytes)?;
-        let status = Self {
-            version,
-            parameters: u16::from_le_bytes([low, high]),
-            sources,
-            sample_rate: f32::from_le_bytes(take(bytes)?),
-            uptime: u32::from_le_bytes(take(bytes)?),
-        };
-        bytes.is_empty().then_some(status).ok_or(Malformed)
-    }
-}

@@ -8,8 +8,7 @@ use std::thread;
 use std::time::Instant;
 
 use super::codec::{
-    COEFFICIENTS, ErrorCode, Frame, HARMONICS, MAX_PAYLOAD, Packet, Status, VERSION, message, of_bytes, size, take,
-    to_bytes,
+    COEFFICIENTS, ErrorCode, Frame, HARMONICS, MAX_PAYLOAD, Packet, VERSION, message, of_bytes, size, take, to_bytes,
 };
 use vines_net::{Ended, POLL, RealTimeClock, ServerError, Session, is_loopback};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
@@ -273,9 +272,10 @@ impl Device {
                 Ok(Vec::new())
             }
             message::STATUS => {
-                let (parameters, sources) = (parameters().count() as u16, self.sources().count() as u8);
+                let [low, high] = (parameters().count() as u16).to_le_bytes();
+                let head = [VERSION, low, high, self.sources().count() as u8];
                 let sample_rate = self.sample_rate as f32;
-                Ok(Status { version: VERSION, parameters, sources, sample_rate, uptime }.encode())
+                Ok([head, sample_rate.to_le_bytes(), uptime.to_le_bytes()].concat())
             }
             _ => Err(ErrorCode::UnknownType),
         }

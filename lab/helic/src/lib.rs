@@ -1,7 +1,8 @@
 //! The control protocol of [helic-daq](https://github.com/dawbarton/helic-daq), version 3: a rig as one of its devices ([`Device`],
 //! [`HelicServer`]), and its devices as rigs ([`HelicRig`]).
 //!
-//! Source of all facts: `docs/protocol.md` of that project. `docs/helic.md` of this project says what is served, and where it differs.
+//! Source of all facts: `docs/protocol.md` of that project.
+#![doc = include_str!("../README.md")]
 
 #![forbid(unsafe_code)]
 

@@ -1,9 +1,15 @@
-//! Exact orbits against independent 40-digit references, and against laws they must obey.
+//! Guards exact orbits: the closed form against independent 40-digit references, and periodic motions by shooting against the closed form,
+//! against the plant, and along their curves.
+
+use std::f64::consts::TAU;
 
 use vines_model::{
     Dimensionless,
-    orbit::{Orbit, backbone_at_speed, exact_backbone, phase_resonant},
-    theory::{Manifold, SlowFlow},
+    orbit::{
+        Bifurcation, Branch, Condition, ContinuationLimits, ImpactPattern, Orbit, Periodic, backbone_at_speed,
+        branch_off, continue_both_ways, exact_backbone, phase_resonant, settle,
+    },
+    theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow},
 };
 
 mod reference;
@@ -79,5 +85,193 @@ fn the_backbone_over_the_speed_passes_through_every_orbit_of_the_backbone_over_t
             }
         }
         assert!(compared > 50, "{compared}");
+    }
+}
+
+// Shooting
+
+fn scene(g: f64) -> Dimensionless {
+    Dimensionless::new(0.0084, 1.43, 0.65, g)
+}
+
+#[test]
+fn shooting_and_the_closed_form_agree_to_rounding() {
+    for orbit in phase_resonant(&scene(1.1)) {
+        let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
+        let found = Periodic::find(&scene(1.1), &ImpactPattern::symmetric(), &orbit.unknowns(), conditions)
+            .expect("the motion");
+        let apart = (found.sigma - orbit.sigma).abs() + (found.c - orbit.c).abs();
+        assert!(apart < 1e-11, "{apart:e}");
+        for (one, other) in found.moduli().iter().zip(orbit.multipliers) {
+            assert!((one - other).abs() < 1e-9);
+        }
+    }
+}
+
+fn response(g: f64) -> (Dimensionless, Branch) {
+    let scene = scene(g);
+    let fastest = |one: &vines_model::orbit::Orbit, other: &vines_model::orbit::Orbit| one.b.total_cmp(&other.b);
+    let orbit = phase_resonant(&scene).into_iter().max_by(fastest).unwrap();
+    let conditions = [Condition::Excitation(g), Condition::PhaseResonance];
+    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
+    let branch = continue_both_ways(&scene, &start, Condition::Excitation(g), &ContinuationLimits::default());
+    (scene, branch)
+}
+
+/// The plant, started on the motion, for so many periods: the largest distance from its own start after each.
+fn distance_of_plant(scene: &Dimensionless, motion: &Periodic, periods: u32) -> f64 {
+    let [q1, dq1, q2, dq2] = motion.start(scene).expect("a state at phase zero");
+    let mut plant = scene.plant([q1, dq1, q2, dq2]).unwrap();
+    let omega = 1.0 + scene.epsilon * motion.sigma;
+    let drive = lovines::Drive::harmonic(scene.epsilon * motion.g, omega);
+    let whole = motion.pattern.periods();
+    (0..periods).fold(0.0, |most, _| {
+        for _ in 0..whole {
+            plant.advance(drive, TAU / omega).unwrap();
+        }
+        let now = plant.state();
+        let apart = [now.q1 - q1, now.dq1 - dq1, now.q2 - q2, now.dq2 - dq2];
+        apart.iter().fold(most, |most: f64, one| most.max(one.abs()))
+    })
+}
+
+#[test]
+fn an_exact_response_passes_folds_and_phase_resonance() {
+    let (scene, branch) = response(1.1);
+    let sigmas: Vec<f64> = branch.points.iter().map(|one| one.sigma).collect();
+    let turns = sigmas
+        .windows(3)
+        .filter(|s| (s[1] - s[0]) * (s[2] - s[1]) < 0.0)
+        .count();
+    println!(
+        "{} motions, {turns} turns of sigma, ended: {:?}; {:?}",
+        branch.points.len(),
+        branch.ended,
+        branch
+            .special
+            .iter()
+            .map(|one| (one.kind, one.motion.sigma, one.motion.b))
+            .collect::<Vec<_>>()
+    );
+    assert!(turns >= 1 && branch.points.iter().any(|one| !one.stable));
+    // Every motion is one that the plant repeats; unstable ones leave slowly.
+    for motion in branch.points.iter().step_by(20) {
+        let apart = distance_of_plant(&scene, motion, 2);
+        assert!(apart < 1e-9, "{apart:e} at sigma = {}", motion.sigma);
+    }
+    for fold in branch.special.iter().filter(|one| one.kind == Bifurcation::Fold) {
+        let nearest = fold.motion.multipliers.iter().map(|[re, im]| (re - 1.0).hypot(*im));
+        assert!(nearest.fold(f64::MAX, f64::min) < 1e-4);
+    }
+}
+
+#[test]
+fn symmetry_breaks_near_the_theorys_speed_and_asymmetric_motions_leave_it() {
+    let (scene, branch) = response(1.6);
+    let breaking = branch
+        .special
+        .iter()
+        .find(|one| one.kind == Bifurcation::SymmetryBreaking)
+        .expect("a symmetry breaking");
+    println!(
+        "symmetry breaks at B = {:.4} (theory {B_SYMMETRY_BREAKING:.4})",
+        breaking.motion.b
+    );
+    assert!((breaking.motion.b - B_SYMMETRY_BREAKING).abs() < 0.03);
+    let limits = ContinuationLimits { points: 60, ..ContinuationLimits::default() };
+    let aside = branch_off(&scene, breaking, Condition::Excitation(1.6), &limits).unwrap();
+    let uneven = |one: &Periodic| (one.bounces[1].phase - one.bounces[0].phase - std::f64::consts::PI).abs();
+    let interval = aside.points.iter().map(uneven).fold(0.0, f64::max);
+    println!(
+        "{} asymmetric motions, intervals off half a period by up to {interval:.3} rad",
+        aside.points.len()
+    );
+    assert!(interval > 0.05);
+    assert!(aside.points.iter().any(|one| one.stable));
+    for motion in aside.points.iter().step_by(10) {
+        assert!(distance_of_plant(&scene, motion, 2) < 1e-9);
+    }
+}
+
+#[test]
+fn the_exact_backbone_continued_is_the_closed_form() {
+    let scene = scene(1.1);
+    let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
+    let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
+    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
+    let branch = continue_both_ways(
+        &scene,
+        &start,
+        Condition::PhaseResonance,
+        &ContinuationLimits::default(),
+    );
+    assert!(branch.points.len() > 40, "{}: {:?}", branch.points.len(), branch.ended);
+    for motion in &branch.points {
+        let closed = exact_backbone(&scene, 1.0 + scene.epsilon * motion.sigma);
+        let nearest = closed
+            .iter()
+            .map(|one| (one.c - motion.c).abs().max((one.g - motion.g).abs()))
+            .fold(f64::MAX, f64::min);
+        assert!(
+            nearest < 1e-8,
+            "{nearest:e} at sigma = {}, C = {}",
+            motion.sigma,
+            motion.c
+        );
+    }
+}
+
+#[test]
+fn without_damping_drive_and_loss_the_backbone_is_the_conservative_mode() {
+    let scene = Dimensionless::new(0.0084, 0.0, 1.0, 0.0);
+    let mode = exact_backbone(&scene, 1.0 - 1.0 * scene.epsilon)
+        .into_iter()
+        .find(|one| one.c > 0.2)
+        .unwrap();
+    let conditions = [Condition::Sigma(mode.sigma), Condition::PhaseResonance];
+    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &mode.unknowns(), conditions).unwrap();
+    let limits = ContinuationLimits {
+        sigma: [-3.0, 0.5],
+        points: 200,
+        ..ContinuationLimits::default()
+    };
+    let branch = continue_both_ways(&scene, &start, Condition::PhaseResonance, &limits);
+    assert!(branch.points.len() > 20);
+    let (mut most_g, mut energies) = (0f64, 0f64);
+    for motion in &branch.points {
+        most_g = most_g.max(motion.g.abs());
+        let [q1, dq1, _, dq2] = motion.start(&Dimensionless { g: 0.0, ..scene }).unwrap();
+        let energy = 0.5 * (q1 * q1 + dq1 * dq1 + scene.epsilon * dq2 * dq2);
+        for [_, q1, dq1, _, dq2] in motion.motion(&scene, 40) {
+            let now = 0.5 * (q1 * q1 + dq1 * dq1 + scene.epsilon * dq2 * dq2);
+            energies = energies.max((now / energy - 1.0).abs());
+        }
+    }
+    println!(
+        "conservative mode: {} motions, G up to {most_g:.1e}, energy constant to {energies:.1e}",
+        branch.points.len()
+    );
+    assert!(most_g < 1e-9 && energies < 1e-9);
+}
+
+#[test]
+fn a_motion_with_more_impacts_is_followed_like_any_other() {
+    let scene = scene(2.2);
+    let motion = settle(&scene, -0.6, [0.0, 0.0, 0.0, 0.9], 800)
+        .unwrap()
+        .expect("a pattern");
+    assert!(motion.pattern.impacts() > 2);
+    let limits = ContinuationLimits { points: 40, ..ContinuationLimits::default() };
+    let branch = continue_both_ways(&scene, &motion, Condition::Excitation(2.2), &limits);
+    let kinds: Vec<_> = branch.special.iter().map(|one| (one.kind, one.motion.sigma)).collect();
+    println!(
+        "{} impacts in {} periods, followed through {} motions: {kinds:?}",
+        motion.pattern.impacts(),
+        motion.pattern.periods(),
+        branch.points.len()
+    );
+    assert!(branch.points.len() > 20);
+    for motion in branch.points.iter().step_by(7) {
+        assert!(distance_of_plant(&scene, motion, 1) < 1e-9);
     }
 }

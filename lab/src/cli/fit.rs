@@ -164,7 +164,11 @@ fn plant_section(report: &FitReport, plant: &vines::scene::Parameters) -> String
         let fitted = report.parameters.iter().find(|one| one.symbol == symbol);
         let u = fitted.map_or_else(String::new, |one| format!(" ± {:.2e}", one.uncertainty));
         let is_ideal = ["M", "k", "c", "m", "b", "r"].contains(&symbol);
-        let note = if is_ideal { format!("  # fitted{u}") } else { String::new() };
+        let note = if is_ideal {
+            format!("  # fitted{u}")
+        } else {
+            String::new()
+        };
         format!("{symbol} = {value}{note}\n")
     });
     format!("[plant]\n{}", lines.collect::<String>())

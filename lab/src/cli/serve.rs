@@ -56,7 +56,7 @@ pub(super) struct RigArguments {
     #[arg(long, value_name = "FILE")]
     histogram: Option<PathBuf>,
 
-    /// The protocol: `vines` (docs/network-protocol.md), or `helic`, as a device of helic-daq (docs/helic.md)
+    /// The protocol: `vines` (docs/network-protocol.md), or `helic`, as a device of helic-daq (lab/helic/README.md)
     #[arg(long, value_enum, default_value_t = Protocol::Vines)]
     protocol: Protocol,
 

@@ -2,7 +2,7 @@
 
 use super::table::{Table, row, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
-use crate::identification::{DecayEnd, Friction, ResonancePoint, Regime};
+use crate::identification::{DecayEnd, Friction, Regime, ResonancePoint};
 use crate::scene::{Definition, Dimensionless, Sensor};
 use crate::sweep::Map;
 

@@ -148,6 +148,19 @@ mod tests {
     }
 
     #[test]
+    fn the_live_page_has_the_colours_of_the_table() {
+        let style = include_str!("../../../live/page/style.css");
+        for name in [THEORY, EXACT, MEASURED, PARTICLE, MODULATION] {
+            for name in [name, unstable(name)] {
+                let start = format!("--{}: ", name.replace(' ', "-"));
+                let values = style.match_indices(&start).map(|(at, _)| at + start.len());
+                let values: Vec<&str> = values.map(|from| &style[from..from + 7]).collect();
+                assert_eq!(values, row(name)[1..], "{start}");
+            }
+        }
+    }
+
+    #[test]
     fn colours_are_changed_once_each() {
         let light = r##"<g fill="#000000" stroke="#FFFFFF" x="3"/>"##;
         assert_eq!(dark(light), r##"<g fill="#ECECEC" stroke="#14171A" x="3"/>"##);

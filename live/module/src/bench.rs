@@ -1,5 +1,7 @@
 //! Plant and controller, coupled sample by sample as `vines identify` couples them.
 
+use std::f64::consts::{PI, TAU};
+
 use lovines::{Event, Plant, Wall};
 use phase_lock::{Input, Move, Output, PhaseLock, State};
 use vines_model::regime::{Impact, Regime};
@@ -317,4 +319,37 @@ impl Bench {
     pub fn plant(&self) -> &Plant {
         &self.rig.plant
     }
+}
+
+/// Relaxations of the linear response after which a motion has its regime, and periods after which it is not waited for.
+const RELAXATIONS: f64 = 6.0;
+const LONGEST: f64 = 1000.0;
+
+/// The regime under a constant drive of detuning `sigma` and excitation `g`, from the start of the scene.
+///
+/// # Errors
+/// The message for a drive that the plant refuses.
+pub fn regime_at(scene: &Scene, sigma: f64, g: f64) -> Result<Regime, Message> {
+    let d = scene.dimensionless();
+    let omega = d.omega(sigma);
+    let drive = lovines::Drive::harmonic(d.amplitude(g), omega);
+    let mut plant = Plant::new(scene.plant, scene.start)?;
+    let mut impacts = LastImpacts::default();
+    // The amplitude relaxes by e in 1/(pi epsilon lambda) periods.
+    let periods = (RELAXATIONS / (PI * d.epsilon * d.lambda)).min(LONGEST) as usize;
+    for n in 0..periods {
+        let mut count = |event: Event| {
+            if let Event::Impact { t, velocity, .. } = event {
+                impacts.0.push(Impact { time: TAU * n as f64 + omega * t, velocity });
+            }
+        };
+        plant.advance_with(drive, TAU / omega, &mut count as &mut dyn FnMut(Event))?;
+        impacts.trim();
+    }
+    // A slow particle may be silent for a while.
+    let last = impacts.0.last().map_or(0.0, |last| last.time);
+    Ok(match last < 0.5 * TAU * periods as f64 {
+        true => Regime::NoImpacts,
+        false => impacts.regime(last),
+    })
 }

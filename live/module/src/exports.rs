@@ -8,14 +8,16 @@
 //! | [`manifold`] | triples (B, C, 1 if stable) |
 //! | [`theory_backbone`] | triples (sigma, C, 1 if stable) |
 //! | [`exact_backbone`] | quadruples (sigma, C, 1 if stable, G) |
+//! | [`regime`] | the number of the regime |
 //! | [`tracked`] | quintuples (time it is known, s; sigma; C; G; 1 if settled) |
 
 use std::cell::RefCell;
 
 use vines_model::curves;
+use vines_model::regime::Regime;
 use vines_testbench::live::Motion;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, regime_at};
 use crate::message::Message;
 use crate::settings::{COUNT, Settings};
 
@@ -263,6 +265,21 @@ pub extern "C" fn theory_backbone(points: u32) -> i32 {
 pub extern "C" fn exact_backbone(points: u32) -> i32 {
     values(|bench, output| {
         output.extend(curves::exact(&bench.scene.dimensionless(), points as usize).flatten());
+        Ok(())
+    })
+}
+
+/// The regime under a constant drive of detuning `sigma` and excitation `g`, from the start of the scene: 0 without impacts, 1 symmetric
+/// 1:1, 2 asymmetric 1:1, 3 irregular.
+#[unsafe(no_mangle)]
+pub extern "C" fn regime(sigma: f64, g: f64) -> i32 {
+    values(|bench, output| {
+        output.push(match regime_at(&bench.scene, sigma, g)? {
+            Regime::NoImpacts => 0.0,
+            Regime::Symmetric => 1.0,
+            Regime::Asymmetric => 2.0,
+            _ => 3.0,
+        });
         Ok(())
     })
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use vines_live::bench::Bench;
+use vines_live::bench::{Bench, regime_at};
 use vines_live::settings::{default_scene, index, settings_of};
 use vines_testbench::experiment::{Plan, run};
 use vines_testbench::identification::decay_points;
@@ -189,4 +189,22 @@ fn a_refused_setting_changes_nothing_and_says_why() {
     );
     assert_eq!(message.numbers, [1.5]);
     assert_eq!(bench.scene, paper());
+}
+
+#[test]
+fn a_cell_of_the_map_has_the_regime_that_the_bench_reaches_under_that_drive() {
+    let mut settings = Bench::default_settings();
+    settings[index::CLOSED] = 0.0;
+    let mut found = Vec::new();
+    for (sigma, g) in [(-1.0, 1.2), (-1.0, 1.7), (0.0, 0.8), (-0.5, 3.6)] {
+        (settings[index::DETUNING], settings[index::EXCITATION]) = (sigma, g);
+        let mut bench = Bench::new(settings).unwrap();
+        bench.run(40_000, |_| {}).unwrap();
+        let regime = regime_at(&bench.scene, sigma, g).unwrap();
+        assert_eq!(regime, bench.regime(), "sigma = {sigma}, G = {g}");
+        found.push(regime);
+    }
+    found.sort();
+    found.dedup();
+    assert!(found.len() >= 3, "{found:?}");
 }

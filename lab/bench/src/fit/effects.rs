@@ -147,7 +147,11 @@ impl Explanation {
             return format!(
                 "no single effect of the cavity explains it: chi-square is {} without one, with {}",
                 chi_square(&self.ideal),
-                if tried.is_empty() { "none of them a motion exists".into() } else { tried.join(", ") }
+                if tried.is_empty() {
+                    "none of them a motion exists".into()
+                } else {
+                    tried.join(", ")
+                }
             );
         };
         let [symbol, unit] = best.effect.symbol();
@@ -159,8 +163,12 @@ impl Explanation {
             chi_square(&best.fit),
             chi_square(&self.ideal)
         );
-        let others = self.candidates[1..].iter().filter(|one| one.criterion() - best.criterion() < POSSIBLE);
-        let others: Vec<String> = others.map(|one| format!("{} ({})", one.effect, chi_square(&one.fit))).collect();
+        let others = self.candidates[1..]
+            .iter()
+            .filter(|one| one.criterion() - best.criterion() < POSSIBLE);
+        let others: Vec<String> = others
+            .map(|one| format!("{} ({})", one.effect, chi_square(&one.fit)))
+            .collect();
         if !others.is_empty() {
             text += &format!("; the points do not exclude {}", others.join(", "));
         }
@@ -229,7 +237,10 @@ impl Problem<'_> {
             cavity: Cavity::IDEAL,
         };
         let mut x = ideal.x;
-        let d = Dimensionless { definition: self.definition, ..Dimensionless::of(&plant(&x), 0.0) };
+        let d = Dimensionless {
+            definition: self.definition,
+            ..Dimensionless::of(&plant(&x), 0.0)
+        };
         // The particle turns from -B to B: its speed relative to the wall before the impact is 2 B (1 + epsilon)/(1 + r).
         let speeds = vines_model::numerics::mean(ideal.speeds.iter().copied());
         let speed = 2.0 * speeds * (1.0 + d.epsilon) / (1.0 + d.r) * d.b * d.omega0;
@@ -265,15 +276,27 @@ impl Problem<'_> {
                 };
                 shifts.push(Shift { strength: x[6], value, slope });
             }
-            let problem = Problem { points: self.points.clone(), shifts, free: effect.adds_a_parameter(), ..*self };
+            let problem = Problem {
+                points: self.points.clone(),
+                shifts,
+                free: effect.adds_a_parameter(),
+                ..*self
+            };
             let (mut next, sums) = problem.minimum(x)?;
             let fit = problem.found(next, sums);
-            let strength = Estimate { value: next[6], uncertainty: fit.covariance[(6, 6)].max(0.0).sqrt() };
+            let strength = Estimate {
+                value: next[6],
+                uncertainty: fit.covariance[(6, 6)].max(0.0).sqrt(),
+            };
             let r = fit.estimate(Quantity::R)?;
             let result = effect.strength(Estimate { value: strength.value.max(0.0), ..strength }, r, speed);
             let change = (next - x).component_div(&fit.covariance.diagonal().map(|variance| variance.max(0.0).sqrt()));
             speeds.clone_from(&fit.speeds);
-            let settled = change.iter().take(5).chain(&[if problem.free { change[6] } else { 0.0 }]).all(|one| one.abs() < FOUND);
+            let settled = change
+                .iter()
+                .take(5)
+                .chain(&[if problem.free { change[6] } else { 0.0 }])
+                .all(|one| one.abs() < FOUND);
             let candidate = Candidate { effect, strength: result, fit, speed };
             if settled {
                 return (strength.value > 0.0 || !effect.adds_a_parameter()).then_some(candidate);

