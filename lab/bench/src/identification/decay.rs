@@ -79,7 +79,6 @@ const KEPT: f64 = 0.5;
 
 /// The points along the decay of a record, up to the loss of synchrony where the rig reports impacts, otherwise to
 /// the end of the impacts.
-#[must_use]
 pub fn decay_points(record: &Record, scene: &Scene) -> DecayPoints {
     let d = scene.dimensionless();
     let decay = record.decay();
