@@ -1,7 +1,7 @@
 //! How far does each stage of the measurement chain move the lock?
 //!
-//! Each stage alone, and some together: sigma and C of the lock less those of the ideal chain, the stated standard uncertainty of sigma,
-//! or why there is no lock.
+//! Each stage alone, and some together: differences of sigma and C of the lock from the lock of the ideal chain, the stated standard
+//! uncertainty of sigma, or why there is no lock.
 //!
 //! ```sh
 //! cargo run --release -p vines-testbench --example chain -- [KEY=VALUE ...]    # of the scene; writes validation/chain.csv

@@ -87,7 +87,7 @@ pub fn statistics(found: &[Found]) -> (String, [usize; 4]) {
     (text, [0, 1, 2, 3].map(|n| found.iter().map(|one| one.counts[n]).sum()))
 }
 
-/// Adds rows to validation/`name`.csv; a row replaces the one that begins with the same `key` cells.
+/// Adds rows to validation/`name`.csv; a row replaces an earlier row with equal first `key` cells.
 pub fn write(name: &str, header: &str, key: usize, rows: &[String]) -> Result<(), Failure> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../validation");
     let path = folder.join(format!("{name}.csv"));

@@ -3,7 +3,7 @@
 //! epsilon 0.001 to 0.05, lambda 0.1 to 3 (uniform logarithms), r 0.2 to 0.97, and a drive at which a stable symmetric 1:1 orbit exists
 //! within 20 % of omega0. A lock is correct within 2e-3 of that orbit in sigma and C, uncertain within four of its standard uncertainties
 //! u, and wrong beyond; other runs are refused, with a reason. A response that is held by control may have an orbit that is unstable
-//! under a constant drive. Errors and coverage are those of sigma and C.
+//! under a constant drive. Errors and coverage count sigma and C.
 //!
 //! ```sh
 //! cargo run --release -p vines-testbench --example locks -- RIGS SEED SNR    # SNR: dB, or none; writes validation/locks.csv

@@ -6,7 +6,7 @@ const KEY = "vines-story";
 const STEPS = [
   { text: "The particle meets the walls. Ten times slower than real: the base (blue) shakes the mass, and each impact, where a wall lights up, takes energy away.", next: "Next", begin: (page) => page.setSpeed(0.1) },
   { text: "The loop finds resonance, now ten times faster than real: it changes the frequency until the phase error is zero, and the lamp turns to LOCKED.", next: "Let go", begin: (page) => page.setSpeed(10) },
-  { text: "Let go: without the drive, the decay draws the backbone, which is what the experiment is for. Everything on this page is yours to try.", next: "Done", begin: (page) => { page.setSpeed(0.3); page.change("drive", 0); } },
+  { text: "Let go: without the drive, the decay draws the backbone, which is what the experiment is for. Everything on this page is yours to try.", next: "Done", begin: (page) => { page.setSpeed(0.3); page.change("drive", 0); $("backbone").scrollIntoView({ block: "nearest" }); } },
 ];
 
 const remembered = () => { try { return localStorage.getItem(KEY) !== null; } catch { return false; } };

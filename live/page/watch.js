@@ -71,8 +71,10 @@ export class Watching extends Page {
     this.bench.driven = this.driving = this.rows.length > 0 && this.rows.row(-1)[6] > 0;
     if (outcome) {
       source.close();
-      Object.assign(this.bench, { outcome: outcome.text, failed: outcome.failed });
-      if (!this.samples) say(outcome.text);
+      const { title } = this.bench.watch, { error } = outcome;
+      const text = error ? `${title} has failed: ${error}.` : `${title} has ended; its results are in the terminal.`;
+      Object.assign(this.bench, { outcome: text, failed: !!error });
+      if (!this.samples) say(text);
     }
   }
 

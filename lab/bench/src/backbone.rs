@@ -70,7 +70,6 @@ const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
 
 impl Criterion {
     /// The window with the smallest uncertainties, from the last of these periods backwards; `None` for too few.
-    #[must_use]
     pub fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
         let n = cycles.len();
         let counts = WINDOWS.map(|share| (share * n as f64).round() as usize);
@@ -82,7 +81,6 @@ impl Criterion {
     }
 
     /// Whether the uncertainties are small enough, and the phase is near its target.
-    #[must_use]
     pub fn is_met(&self, estimate: &LevelEstimate) -> bool {
         let Estimate { value, uncertainty } = estimate.phase_error;
         self.size(estimate) <= 1.0 && value.abs() <= BESIDE + RANDOM * uncertainty
@@ -164,7 +162,6 @@ impl Criterion {
 
 impl LevelEstimate {
     /// Means over the periods, of a motion that no balance describes.
-    #[must_use]
     pub fn means(cycles: &[Cycle]) -> Self {
         let mean = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&cycles.iter().map(value).collect::<Vec<f64>>());
         Self {

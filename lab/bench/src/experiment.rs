@@ -107,6 +107,13 @@ pub enum PhaseError {
     NotReported,
 }
 
+impl PhaseError {
+    /// From radians.
+    fn of(radians: f64) -> Self {
+        Self::Degrees(radians.to_degrees())
+    }
+}
+
 impl Display for PhaseError {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
@@ -354,62 +361,17 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
                 periods: self.periods,
                 stage,
                 fault: fault.unwrap_or(Fault::LockLost),
-                evidence: self.evidence(fault.unwrap_or(Fault::LockLost)),
+                evidence: evidence(self.samples, self.scene, fault.unwrap_or(Fault::LockLost), |error| {
+                    self.phase_error(error)
+                }),
             },
-        }
-    }
-
-    /// What the sensors read in the last period before a fault, what the scene allows, and what to do next.
-    fn evidence(&self, fault: Fault) -> String {
-        let config = self.scene.controller_config();
-        let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
-        let samples = &self.samples[self.samples.len().saturating_sub(period)..];
-        let largest = samples.iter().map(|one| one.sensors.response.abs()).fold(0.0, f64::max);
-        let sensors = samples.last().map(|one| one.sensors).unwrap_or_default();
-        let base = sensors
-            .reference
-            .map_or_else(String::new, |base| format!(", and the base {} m", short(base)));
-        let read = format!(
-            "the response read {} m{base}; in the last period at most {} m",
-            short(sensors.response),
-            short(largest)
-        );
-        match fault {
-            Fault::ResponseTooLarge => format!(
-                "it read {} m, and {}. Lower excitation.G or the levels of [backbone], or raise the limit if the rig bears it",
-                short(largest),
-                limit("response_max", config.response_max, " m")
-            ),
-            Fault::LockLost => {
-                let errors: Option<Vec<f64>> = samples.iter().map(|one| one.command.phase_error).collect();
-                let error = self.phase_error(errors.map(mean));
-                let allowed = limit(
-                    "lock.unlock_tolerance",
-                    Some(config.lock.unlock_tolerance.to_degrees()),
-                    " degrees",
-                );
-                format!("over the last period {error}, and {allowed}; {read}")
-            }
-            Fault::NoSignal => format!(
-                "{read}. An amplitude of {} m ({}) with a share of {} of the power ({}) is needed, and {} without it. {CHECK}",
-                short(config.lock.response_min * config.amplitude),
-                key("lock.response_min"),
-                config.lock.coherence_min,
-                key("lock.coherence_min"),
-                limit("signal_timeout", config.signal_timeout, " s")
-            ),
-            Fault::Implausible => {
-                let unit = " of the amplitude as the difference";
-                format!("{read}; {}. {CHECK}", limit("residual_max", config.residual_max, unit))
-            }
-            Fault::Sensor | Fault::TimedOut => format!("{read}. {CHECK}"),
         }
     }
 
     /// A phase error, rad, or why there is none.
     fn phase_error(&self, error: Option<f64>) -> PhaseError {
         match error {
-            Some(radians) => PhaseError::Degrees(radians.to_degrees()),
+            Some(radians) => PhaseError::of(radians),
             None if self.controller.reports_phase_error() => PhaseError::NotMeasured,
             None => PhaseError::NotReported,
         }
@@ -445,6 +407,59 @@ fn checked(command: Command) -> Result<Command, ExperimentError> {
     }
 }
 
+/// What the sensors read in the last period before a fault, what the scene allows, and what to do next. `phase_error` makes an error of radians,
+/// or of none.
+fn evidence(
+    samples: &[Sample],
+    scene: &Scene,
+    fault: Fault,
+    phase_error: impl Fn(Option<f64>) -> PhaseError,
+) -> String {
+    let config = scene.controller_config();
+    let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
+    let samples = &samples[samples.len().saturating_sub(period)..];
+    let largest = samples.iter().map(|one| one.sensors.response.abs()).fold(0.0, f64::max);
+    let sensors = samples.last().map(|one| one.sensors).unwrap_or_default();
+    let base = sensors
+        .reference
+        .map_or_else(String::new, |base| format!(", and the base {} m", short(base)));
+    let read = format!(
+        "the response read {} m{base}; in the last period at most {} m",
+        short(sensors.response),
+        short(largest)
+    );
+    match fault {
+        Fault::ResponseTooLarge => format!(
+            "it read {} m, and {}. Lower excitation.G or the levels of [backbone], or raise the limit if the rig bears it",
+            short(largest),
+            limit("response_max", config.response_max, " m")
+        ),
+        Fault::LockLost => {
+            let errors: Option<Vec<f64>> = samples.iter().map(|one| one.command.phase_error).collect();
+            let error = phase_error(errors.map(mean));
+            let allowed = limit(
+                "lock.unlock_tolerance",
+                Some(config.lock.unlock_tolerance.to_degrees()),
+                " degrees",
+            );
+            format!("over the last period {error}, and {allowed}; {read}")
+        }
+        Fault::NoSignal => format!(
+            "{read}. An amplitude of {} m ({}) with a share of {} of the power ({}) is needed, and {} without it. {CHECK}",
+            short(config.lock.response_min * config.amplitude),
+            key("lock.response_min"),
+            config.lock.coherence_min,
+            key("lock.coherence_min"),
+            limit("signal_timeout", config.signal_timeout, " s")
+        ),
+        Fault::Implausible => {
+            let unit = " of the amplitude as the difference";
+            format!("{read}; {}. {CHECK}", limit("residual_max", config.residual_max, unit))
+        }
+        Fault::Sensor | Fault::TimedOut => format!("{read}. {CHECK}"),
+    }
+}
+
 /// What to do about sensors.
 const CHECK: &str = "`vines check` looks for the cause";
 
@@ -467,27 +482,8 @@ mod tests {
     use super::*;
     use crate::rig::Sensors;
 
-    /// A rig and a controller that do nothing.
-    struct Idle;
-
-    impl Rig for Idle {
-        fn sense(&mut self) -> Result<Sensors, RigError> {
-            Ok(Sensors::default())
-        }
-
-        fn advance(&mut self, _: Drive, _: f64) -> Result<(), RigError> {
-            Ok(())
-        }
-    }
-
-    impl Controller for Idle {
-        fn sample(&mut self, _: Sensors, _: bool) -> Result<Command, ControllerError> {
-            Ok(Command::default())
-        }
-    }
-
     /// The text for a fault after a period of readings of the response, m, and of phase errors, rad, on the dimensionless default scene.
-    fn evidence(setting: &str, fault: Fault, reading: impl Fn(usize) -> (f64, Option<f64>)) -> String {
+    fn text(setting: &str, fault: Fault, reading: impl Fn(usize) -> (f64, Option<f64>)) -> String {
         let text = include_str!("../../../scenes/dimensionless.toml");
         let scene = Scene::parse("dimensionless.toml", text, &[setting.parse().unwrap()]).unwrap();
         let sample = |n: usize| {
@@ -499,8 +495,8 @@ mod tests {
                 ground_truth: None,
             }
         };
-        let mut samples = (0..150).map(sample).collect();
-        ControlLoop::new(&mut Idle, &mut Idle, &scene, &mut samples, 0, &mut |_, _| {}).evidence(fault)
+        let phase_error = |error: Option<f64>| error.map_or(PhaseError::NotMeasured, PhaseError::of);
+        evidence(&(0..150).map(sample).collect::<Vec<_>>(), &scene, fault, phase_error)
     }
 
     #[test]
@@ -553,7 +549,7 @@ mod tests {
             ),
         ];
         for (setting, fault, reading, expected) in cases {
-            let text = evidence(setting, fault, reading);
+            let text = text(setting, fault, reading);
             assert!(text.contains(expected), "`{expected}` is not in: {text}");
         }
     }

@@ -178,7 +178,6 @@ impl Friction {
 
 impl Lock {
     /// The number of impacts per period, or the note that the regime was determined without it.
-    #[must_use]
     pub fn impacts(&self) -> String {
         if self.impacts_per_period.is_nan() {
             "determined from the response alone".into()

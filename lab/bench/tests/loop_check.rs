@@ -156,7 +156,7 @@ fn the_check_measures_the_linear_response_and_states_gains_with_a_phase_margin()
 #[test]
 fn a_delay_of_both_channels_cancels_and_is_healthy() {
     let scene = at_rest(&[]);
-    // From 40 on, the phase alone is that of the opposite sign.
+    // From 40 on, the phase alone looks like the opposite sign.
     for delay in [16, 30, 40, 44, 48] {
         let mut rig = Altered {
             late: [delay; 2],

@@ -295,7 +295,7 @@ fn difficult_rigs_lock_from_rest_on_their_symmetric_motion() {
         [0.044486103, 0.29395524, 0.46215017, 0.81962723, 0.2295],
         // A modulation that decays over 540 periods resembles noise.
         [0.046079366, 0.68301824, 0.27802309, 0.89886111, 0.3386],
-        // Subharmonic motions of the same drive are left for the symmetric one.
+        // The drive has subharmonic motions, which are left for the symmetric one.
         [0.014429842, 0.80932254, 0.76757213, 0.75737775, 0.6190],
         [0.0048763899, 2.4297409, 0.94889327, 1.1322403, 0.4485],
     ] {

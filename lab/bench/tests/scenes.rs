@@ -231,7 +231,7 @@ fn levels_are_round_numbers() {
 fn levels_and_limits_are_given_in_metres_instead() {
     let metres = ["backbone.A_from=0.0068", "backbone.E_max=2e-4", "controller.E_max=3e-4"];
     let scene = paper(&metres).unwrap();
-    // The last level is that of the file, C = 0.14.
+    // The last level stays C = 0.14, as in the file.
     assert_eq!((scene.levels()[0], scene.levels()[28]), (0.0068, 0.0014));
     assert_eq!(scene.controller_config().amplitude_max, Some(3e-4));
     assert_eq!(scene.backbone_config().amplitude_max, Some(2e-4));

@@ -432,7 +432,8 @@ fn evaluate(samples: &Receiver<Sample>, view: &mut View, shared: &Mutex<Shared>)
     let mut rows = Vec::new();
     let mut begins = false;
     for sample in samples.try_iter() {
-        if sample.number == 0 {
+        // A new session, also if its first samples were dropped.
+        if sample.number == 0 || sample.number < view.last.number {
             *view = View::new(&view.scene);
             rows.clear();
             begins = true;
@@ -513,12 +514,7 @@ fn events(mut stream: &TcpStream, shared: &Mutex<Shared>) -> io::Result<()> {
             let from = if begins { now.first } else { next.max(now.first) };
             let rows: Vec<Row> = now.rows.iter().skip((from - now.first) as usize).copied().collect();
             (session, next) = (now.session, from + rows.len() as u64);
-            let outcome = now.complete.then(|| match &now.failure {
-                Some(error) => json!({ "failed": true, "text": format!("The experiment has failed: {error}.") }),
-                None => {
-                    json!({ "failed": false, "text": "The experiment has ended; its results are in the terminal." })
-                }
-            });
+            let outcome = now.complete.then(|| json!({ "error": now.failure }));
             let state = now.state.clone();
             drop(now);
             // Also without rows: a closed browser is noticed at the next event.

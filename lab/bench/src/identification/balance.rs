@@ -76,7 +76,6 @@ impl Balance {
     pub const FEWEST: usize = 4;
 
     /// From at least four periods of a rig whose linear response is `linear`.
-    #[must_use]
     pub fn of(cycles: &[Cycle], linear: &LinearResponse, slopes: Slopes) -> Option<Self> {
         let n = cycles.len() as f64;
         if cycles.len() < Self::FEWEST {
@@ -145,7 +144,6 @@ impl Balance {
     }
 
     /// `E_R`, m, and `omega_R`, rad/s, at the mean amplitude plus `ahead`, m.
-    #[must_use]
     pub fn at(&self, ahead: f64) -> [Estimate; 2] {
         let weights = [0.0, 1.0, ahead];
         let drive = self.drive.estimate(&weights).scaled(-1.0 / self.gain);
@@ -155,7 +153,6 @@ impl Balance {
     }
 
     /// Slopes of `E_R` and `omega_R` over the amplitude.
-    #[must_use]
     pub fn slopes(&self) -> [Estimate; 2] {
         let weights = [0.0, 0.0, 1.0];
         [
@@ -167,7 +164,6 @@ impl Balance {
     /// Frequency, rad/s, and amplitude, m, that a constant base of the commanded amplitude `command`, m, leads to.
     ///
     /// The base sensor calibrates both this base and the drive that it is compared with; its noise cancels.
-    #[must_use]
     pub fn limit(&self, command: f64) -> [Estimate; 2] {
         let [by_base, by_omega] = self.slopes().map(|slope| slope.value);
         let ahead = (command * self.calibration - self.at(0.0)[0].value) / by_base;
@@ -312,7 +308,6 @@ const TERMS: usize = 9;
 impl Cycle {
     /// The samples of one period; `phase` (rad): phase of the drive at the first, `target` (rad): phase target of the response relative to
     /// the base. `None` for too few samples.
-    #[must_use]
     pub fn of(samples: &[Sample], sample_time: f64, phase: f64, target: f64) -> Option<Self> {
         if samples.len() <= TERMS {
             return None;
@@ -372,7 +367,6 @@ impl Cycle {
     }
 
     /// The complete periods of the drive in these samples, in order.
-    #[must_use]
     pub fn all(samples: &[Sample], sample_time: f64, target: f64) -> Vec<Self> {
         let (mut cycles, mut begin, mut turns, mut phase) = (Vec::new(), 0, 0.0, 0.0);
         for (n, sample) in samples.iter().enumerate() {
@@ -386,7 +380,6 @@ impl Cycle {
     }
 
     /// Amplitude of the response, m.
-    #[must_use]
     pub fn amplitude(&self) -> f64 {
         self.response.norm()
     }

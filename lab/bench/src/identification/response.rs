@@ -105,7 +105,6 @@ impl Content {
 }
 
 /// The largest foreign tone in the response of these samples, if they would be irregular with it. `omega` (rad/s) is the frequency of the motion.
-#[must_use]
 pub fn foreign_tone(samples: &[Sample], scene: &Scene, omega: f64) -> Option<Tone> {
     let content = Content::of(samples, scene, omega)?;
     let tones = content.tones.iter();
@@ -131,7 +130,6 @@ pub(crate) fn without_tones(samples: &[Sample], scene: &Scene, omega: f64) -> Op
 ///
 /// Impacts need evidence: response over base departs from the linear response. Of a linear response that was measured on the rig, this is
 /// sufficient; with the linear response of the scene in its place, the third harmonic must be significant as well.
-#[must_use]
 pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, phase: f64, omega: f64) -> Regime {
     let Some(content) = Content::of(samples, scene, omega) else {
         return Regime::Unknown;
@@ -260,7 +258,6 @@ fn transform(values: &[f64], turn: f64) -> [f64; 2] {
 // The regime, from the impacts that a simulated rig reports.
 
 /// The impacts in the samples; of several between two samples, the last one.
-#[must_use]
 pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
     let truths: Vec<_> = samples.iter().filter_map(|sample| sample.ground_truth).collect();
     truths
@@ -282,7 +279,6 @@ pub(crate) fn longer_after(samples: &[Sample]) -> Option<i8> {
 }
 
 /// Impacts per period of `omega` (rad/s) over the samples, and the regime they make.
-#[must_use]
 pub fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64, Regime) {
     let mut truths = samples.iter().filter_map(|sample| sample.ground_truth);
     let (Some(first), Some(last)) = (truths.next(), truths.next_back()) else {
