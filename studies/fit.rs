@@ -17,25 +17,25 @@
 
 mod common;
 
-use std::f64::consts::TAU;
-
 use common::{Failure, arguments, client, is_kept, quantile, share, tracked, uniform, write};
 use rayon::prelude::*;
-use vines_model::numerics::mean_square;
+use vines_model::numerics::{Estimate, mean_square};
 use vines_testbench::backbone::track;
 use vines_testbench::experiment::{Plan, run};
-use vines_testbench::fit::{Effect, Fit, MeasuredPoint, Quantity, Recording, at, explain, fit};
+use vines_testbench::fit::{Effect, Fit, Known, MeasuredPoint, Quantity, Recording, at, explain, fit, parts};
 use vines_testbench::rig::{BuiltIn, Chain, SensorsOnly, Simulated};
 use vines_testbench::scene::{Parameters, Scene};
 
 /// A rig (epsilon, lambda, r), the seed of its noise, and the relative errors of the client's k, c, m, b and r.
 type Case = ([f64; 3], u64, [f64; 5]);
+/// Measured points, and the scene of the client.
+type Points = (Vec<MeasuredPoint>, Scene);
 
 fn main() -> Result<(), Failure> {
     let [source, count, seed, snr] = &arguments()[..] else {
         return Err("arguments: points|recordings RIGS SEED SNR|none".into());
     };
-    let measure: fn(&Case, &str) -> Result<(Vec<MeasuredPoint>, Scene), Failure> = match &**source {
+    let measure: fn(&Case, &str) -> Result<Points, Failure> = match &**source {
         "points" => points,
         "recordings" => recorded,
         "effects" => return effects(count.parse()?, seed, snr),
@@ -149,6 +149,8 @@ fn effects(count: usize, seed: &str, snr: &str) -> Result<(), Failure> {
             let ratios = [epsilon, uniform(0.4, 2.5), uniform(0.4, 0.9)];
             let noise = uniform(0.0, 1e6) as u64;
             let scales = [0.01, 0.3, 0.2, 0.1, 0.2].map(|range| uniform(-range, range));
+            let mut scales = scales;
+            scales[4] = scales[4].min(0.95 / ratios[2] - 1.0);
             (
                 ratios,
                 noise,
@@ -203,7 +205,7 @@ fn named((ratios, noise, scales, effect, size): &Hidden, snr: &str) -> Result<Na
     let (strength, cavity) = match effect {
         None => (f64::NAN, ideal.cavity),
         Some(Effect::Friction) => {
-            let mu = 0.01 * size / g;
+            let mu = 0.03 * size / g;
             (mu, lovines::Cavity { kinetic_friction: mu, ..ideal.cavity })
         }
         Some(Effect::Tilt) => {
@@ -238,14 +240,30 @@ fn named((ratios, noise, scales, effect, size): &Hidden, snr: &str) -> Result<Na
         .filter(is_kept)
         .map(|point| (&point.at).into())
         .collect();
+    let moved = at(&points, scene.resonance, &ideal, &[]).ok_or("the rig has no such motion")?;
+    let moved = moved
+        .residuals
+        .iter()
+        .flatten()
+        .fold(0.0, |most: f64, one| most.max(one.abs()));
     let begin = std::time::Instant::now();
-    let found = explain(&points, scene.resonance, &scene.plant, &[], |_| {})?;
+    // A ruler and a scale.
+    let mut random = uniform(*noise);
+    let known = [(Quantity::B, 1.0), (Quantity::Epsilon, ratios[0])].map(|(quantity, value)| {
+        let relative = 0.003;
+        let estimate = Estimate {
+            value: value * (1.0 + relative * random(-1.7, 1.7)),
+            uncertainty: relative * value,
+        };
+        Known { quantity, estimate }
+    });
+    let found = explain(&points, scene.resonance, &scene.plant, &known, |_| {})?;
     let (best, right) = (
         found.explains(),
         found.candidates.iter().find(|one| Some(one.effect) == *effect),
     );
     println!(
-        "{ratios:.4?} {effect:?} {strength:.5}: {} points, {}; right one {:?}, {:.2?}",
+        "{ratios:.4?} {effect:?} {strength:.5} moves by {moved:.0} u: {} points, {}; right one {:?}, {:.2?}",
         points.len(),
         if found.ideal.is_rejected() {
             found.verdict()
@@ -266,14 +284,14 @@ fn named((ratios, noise, scales, effect, size): &Hidden, snr: &str) -> Result<Na
 }
 
 /// The points of a tracked backbone.
-fn points((rig, noise, scales): &Case, snr: &str) -> Result<(Vec<MeasuredPoint>, Scene), Failure> {
+fn points((rig, noise, scales): &Case, snr: &str) -> Result<Points, Failure> {
     let (tracked, scene) = tracked(*rig, *noise, snr, *scales)?;
     let kept = tracked.points.iter().filter(is_kept);
     Ok((kept.map(|point| (&point.at).into()).collect(), scene))
 }
 
 /// The points of a recording.
-fn recorded((rig, noise, scales): &Case, snr: &str) -> Result<(Vec<MeasuredPoint>, Scene), Failure> {
+fn recorded((rig, noise, scales): &Case, snr: &str) -> Result<Points, Failure> {
     let (truth, mut scene) = client(*rig, *noise, snr, *scales)?;
     scene.start = lovines::State::default();
     let rig = Simulated::new(truth, scene.start)?;
@@ -291,28 +309,6 @@ fn recorded((rig, noise, scales): &Case, snr: &str) -> Result<(Vec<MeasuredPoint
     };
     // The client knows the linear response from its scene only.
     scene.measured = None;
-    let parts = recording.parts(&scene)?;
-    if std::env::var("VERBOSE").is_ok() {
-        let residuals = at(
-            &parts.iter().filter_map(|part| part.point).collect::<Vec<_>>(),
-            scene.resonance,
-            &truth,
-            &[],
-        )
-        .map(|one| one.residuals)
-        .unwrap_or_default();
-        let mut residuals = residuals.iter();
-        for part in &parts {
-            let point = part.point.map(|one| (one.response.value, one.omega, one.drive));
-            println!(
-                "{:.1?} {:?} {} {:.6?} {:.1?}",
-                part.seconds.map(|t| t / TAU),
-                part.kind,
-                part.regime,
-                point,
-                point.and_then(|_| residuals.next())
-            );
-        }
-    }
+    let parts = parts(&[recording], &scene, &[])?.concat();
     Ok((parts.into_iter().filter_map(|part| part.point).collect(), scene))
 }

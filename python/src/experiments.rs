@@ -19,7 +19,7 @@ use vines_testbench::{
     backbone::track,
     comparison::{Comparison, TrackedComparison},
     experiment::{self, Plan},
-    fit::{Known, MeasuredPoint, fit as fitted_rig},
+    fit::{Found, Known, MeasuredPoint, Part, Recording, find, parts},
     identification,
     rig::{BuiltIn, Simulated, Stoppable},
 };
@@ -78,8 +78,7 @@ pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
 /// `points`: response (m), frequency (rad/s) and drive (m), each with its standard uncertainty.
 #[pyfunction]
 pub fn fit(py: Python<'_>, scene: &Scene, points: Vec<[f64; 6]>, known: Vec<String>) -> PyResult<String> {
-    let known = known.iter().map(|one| one.parse::<Known>().map_err(invalid));
-    let known = known.collect::<PyResult<Vec<_>>>()?;
+    let known = parsed(&known)?;
     let estimate = |value, uncertainty| Estimate { value, uncertainty };
     let point = |[response, u_response, omega, u_omega, drive, u_drive]: [f64; 6]| MeasuredPoint {
         response: estimate(response, u_response),
@@ -87,15 +86,70 @@ pub fn fit(py: Python<'_>, scene: &Scene, points: Vec<[f64; 6]>, known: Vec<Stri
         drive: estimate(drive, u_drive),
     };
     let points: Vec<MeasuredPoint> = points.into_iter().map(point).collect();
-    let plant = scene.scene.plant;
-    let fit = py
-        .detach(|| fitted_rig(&points, scene.scene.resonance, &plant, &known))
+    fitted(py, scene, &points, &known, &[])
+}
+
+/// `recordings`: origin, names of the channels, time from sample to sample (s), response (m) and base (m).
+#[pyfunction]
+pub fn fit_recordings(
+    py: Python<'_>,
+    scene: &Scene,
+    recordings: Vec<(String, [String; 2], f64, Vec<f64>, Vec<f64>)>,
+    known: Vec<String>,
+) -> PyResult<String> {
+    let known = parsed(&known)?;
+    let recordings = recordings
+        .into_iter()
+        .map(|(origin, channels, sample_time, response, drive)| Recording {
+            origin,
+            channels,
+            sample_time,
+            response,
+            drive,
+        });
+    let recordings: Vec<Recording> = recordings.collect();
+    let parts = py
+        .detach(|| parts(&recordings, &scene.scene, &known))
+        .map_err(invalid)?
+        .concat();
+    let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
+    fitted(py, scene, &points, &known, &parts)
+}
+
+fn parsed(known: &[String]) -> PyResult<Vec<Known>> {
+    known.iter().map(|one| one.parse::<Known>().map_err(invalid)).collect()
+}
+
+/// The fit as JSON: its report, its plant, what effects say, and the parts of recordings.
+fn fitted(
+    py: Python<'_>,
+    scene: &Scene,
+    points: &[MeasuredPoint],
+    known: &[Known],
+    parts: &[Part],
+) -> PyResult<String> {
+    let scene = &scene.scene;
+    let Found { fit, plant, verdict } = py
+        .detach(|| find(points, scene.resonance, &scene.plant, known, |_| {}))
         .map_err(invalid)?;
-    let fitted = fit.plant(&plant);
-    json(&json!({"report": fit.report(&plant), "plant": {
-        "M": fitted.primary_mass, "k": fitted.stiffness, "c": fitted.damping,
-        "m": fitted.particle_mass, "b": fitted.half_width, "r": fitted.restitution,
-    }}))
+    let numbers = |point: MeasuredPoint| {
+        let MeasuredPoint { response, omega, drive } = point;
+        let omega = omega.scaled(1.0 / std::f64::consts::TAU);
+        json!({
+            "f_Hz": omega.value, "A_m": response.value, "E_m": drive.value,
+            "u_f_Hz": omega.uncertainty, "u_A_m": response.uncertainty, "u_E_m": drive.uncertainty,
+        })
+    };
+    let parts: Vec<_> = parts
+        .iter()
+        .map(|part| json!({"part": part, "point": part.point.map(numbers)}))
+        .collect();
+    json(
+        &json!({"report": fit.report(&scene.plant), "verdict": verdict, "parts": parts, "plant": {
+            "M": plant.primary_mass, "k": plant.stiffness, "c": plant.damping,
+            "m": plant.particle_mass, "b": plant.half_width, "r": plant.restitution,
+        }}),
+    )
 }
 
 #[pyfunction]

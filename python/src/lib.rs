@@ -21,6 +21,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(experiments::identify, module)?,
         wrap_pyfunction!(experiments::backbone, module)?,
         wrap_pyfunction!(experiments::fit, module)?,
+        wrap_pyfunction!(experiments::fit_recordings, module)?,
         wrap_pyfunction!(experiments::orbits, module)?,
         wrap_pyfunction!(experiments::theory, module)?,
         wrap_pyfunction!(experiments::regime, module)?,

@@ -11,9 +11,10 @@ from pathlib import Path as _Path
 
 from ._native import version as __version__
 from .experiments import Backbone, Identification, Orbit, Theory, backbone, identify, orbits, theory
-from .fits import Fit, fit
+from .fits import Fit, fit, fit_recordings
 from .phaselock import Output, PhaseLock
 from .plants import KINDS, Batch, Events, Plant, Trajectory
+from .recordings import Recording, read_recording
 from .regimes import Regime, regime
 from .scenes import Scene
 from .sweeps import REGIMES, Range, linspace, sweep
@@ -31,6 +32,7 @@ __all__ = [
     "PhaseLock",
     "Plant",
     "Range",
+    "Recording",
     "Regime",
     "Scene",
     "Theory",
@@ -38,10 +40,12 @@ __all__ = [
     "__version__",
     "backbone",
     "fit",
+    "fit_recordings",
     "fmu",
     "identify",
     "linspace",
     "orbits",
+    "read_recording",
     "regime",
     "sweep",
     "theory",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from . import _native
 from .experiments import Table, _table
+from .recordings import Recording
 from .results import Result, axes
 from .scenes import Scene, checked
 
@@ -41,6 +42,10 @@ class Fit(Result):
         Indices of the points that contradict the others and are left out, from 0.
     plant : dict
         The section `plant` of a scene, for `Scene(plant=...)`.
+    verdict : str or None
+        Which effect of a real cavity explains the points, or that none does; None if the ideal cavity describes them.
+    parts : tuple of dict
+        Parts of recordings: seconds, kind (held, sweep or decay), regime, and the point or None.
     """
 
     parameters: Table
@@ -52,6 +57,8 @@ class Fit(Result):
     residuals: NDArray[np.float64]
     left_out: tuple[int, ...]
     plant: dict[str, float]
+    verdict: str | None
+    parts: tuple[dict[str, Any], ...]
 
     def __getitem__(self, symbol: str) -> tuple[float, float]:
         """Return value and standard uncertainty of a parameter, such as `fit["r"]`."""
@@ -119,9 +126,49 @@ def fit(
         rows += np.column_stack(columns)[kept].tolist()
     for row in rows:
         row[2:4] = [math.tau * value for value in row[2:4]]
-    values = {name: value if isinstance(value, tuple) else (value, 0.0) for name, value in (known or {}).items()}
-    texts = [f"{name}={value}±{uncertainty}" for name, (value, uncertainty) in values.items()]
-    found = json.loads(_native.fit(checked(scene)._native, rows, texts))
+    return _result(_native.fit(checked(scene)._native, rows, _texts(known)))
+
+
+def fit_recordings(
+    recordings: Recording | Iterable[Recording],
+    scene: Scene | None = None,
+    *,
+    known: Mapping[str, float | tuple[float, float]] | Iterable[str] | None = None,
+) -> Fit:
+    """Fit a rig to recordings, as `vines fit record.csv` does.
+
+    Parameters
+    ----------
+    recordings : Recording or iterable of Recording
+        What `read_recording` returns, or two channels of your own as a `Recording`.
+    scene : Scene, optional
+        What the sensors read, about which natural frequency and damping the structure has, and where the search begins.
+    known : mapping, optional
+        As of `fit`.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    ValueError
+        A recording without a stretch near phase resonance, a channel that is clipped or swapped, or too few points.
+    """
+    every = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    given = [(one.origin, list(one.channels), one.sample_time, one.response, one.drive) for one in every]
+    return _result(_native.fit_recordings(checked(scene)._native, given, _texts(known)))
+
+
+def _texts(known: Mapping[str, float | tuple[float, float]] | Iterable[str] | None) -> list[str]:
+    if not isinstance(known, Mapping):
+        return list(known or [])
+    values = {name: value if isinstance(value, tuple) else (value, 0.0) for name, value in known.items()}
+    return [f"{name}={value}±{uncertainty}" for name, (value, uncertainty) in values.items()]
+
+
+def _result(text: str) -> Fit:
+    found = json.loads(text)
     report = found["report"]
     return Fit(
         parameters=_table(report["parameters"]),
@@ -129,5 +176,7 @@ def fit(
         residuals=np.array(report["residuals"]).reshape(-1, 3),
         left_out=tuple(number - 1 for number in report["left_out"]),
         plant=found["plant"],
+        verdict=found["verdict"],
+        parts=tuple(part["part"] | {"point": part["point"]} for part in found["parts"]),
         **{key: report[key] for key in ("describes", "chi_square", "p_value", "degrees")},
     )

@@ -14,6 +14,7 @@ use std::f64::consts::TAU;
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
+use lovines::Cavity;
 use nalgebra::{SMatrix, SVector, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -26,8 +27,8 @@ use vines_model::{ArgumentError, Definition};
 use crate::identification::ResonancePoint;
 use crate::scene::{Dimensionless, Parameters};
 
-pub use effects::{Candidate, Effect, Explanation, decimals, explain};
-pub use recording::{Kind, Part, Recording, RecordingError};
+pub use effects::{Candidate, Effect, Explanation, Found, decimals, explain, find};
+pub use recording::{Kind, Part, Recording, RecordingError, parts};
 
 /// A measured point of phase resonance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -199,6 +200,8 @@ const STEP: f64 = 1e-6;
 const ROUNDS: usize = 200;
 /// Restitution coefficients from which the minimisation begins, besides the expected one: chi-square may have several minima.
 const STARTS: [f64; 4] = [0.4, 0.55, 0.7, 0.85];
+/// Particle speeds from which the nearest place on the curve is searched for, if that of theory is not on it.
+const SPEEDS: [f64; 4] = [0.8, 0.9, 0.7, 1.0];
 /// Relative uncertainty of a value that is known exactly: above rounding.
 const EXACT: f64 = 1e-9;
 /// Fewest points: two equations each for five parameters, and one to spare.
@@ -399,15 +402,28 @@ pub fn at(points: &[MeasuredPoint], definition: Definition, plant: &Parameters, 
     })
 }
 
-/// What is to be said where the points contradict the rig `expected`: which parameters fit instead. `None` where they do not, or cannot tell.
+/// What is to be said where the points contradict the rig `expected`: which parameters fit instead. `None` where they do not, or cannot tell, or
+/// where the rig has effects of a real cavity, which the model has not.
 #[must_use]
 pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected: &Parameters) -> Option<String> {
-    if !at(points, definition, expected, &[])?.is_rejected() {
+    if expected.cavity != Cavity::IDEAL {
         return None;
+    }
+    let scene = at(points, definition, expected, &[])?;
+    if !scene.is_rejected() {
+        return None;
+    }
+    let chi_square = format!("chi-square is {:.0} for {}", scene.chi_square, scene.degrees);
+    if points.len() < FEWEST {
+        return Some(format!(
+            "the locked point does not belong to this scene ({chi_square}): track the backbone with `vines backbone`, and run `vines fit`"
+        ));
     }
     let fit = fit(points, definition, expected, &[]).ok()?;
     if fit.is_rejected() {
-        return Some("the points contradict the model, whatever its parameters; see `vines fit`".into());
+        return Some(format!(
+            "the points do not belong to this scene ({chi_square}), nor to the ideal cavity with other parameters; run `vines fit`"
+        ));
     }
     let report = fit.report(expected);
     let differs = |one: &&FittedParameter| (one.value - one.expected).abs() > SIGNIFICANT * one.uncertainty;
@@ -431,7 +447,7 @@ pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected:
         texts.join("; ")
     };
     Some(format!(
-        "the points do not belong to this scene: {texts}; see `vines fit`"
+        "the points do not belong to this scene: {texts}; run `vines fit`"
     ))
 }
 
@@ -447,12 +463,12 @@ struct Problem<'a> {
     free: bool,
 }
 
-/// Relative shift of frequency and drive at equal amplitude by an effect of some strength, and its derivative.
+/// Relative shifts of frequency and drive at equal amplitude by an effect, and their gradients, at some unknowns.
 #[derive(Clone, Copy)]
 struct Shift {
-    strength: f64,
+    at: Unknowns,
     value: [f64; 2],
-    slope: [f64; 2],
+    gradient: [Unknowns; 2],
 }
 
 /// A place on the curve: amplitude of the response, m, frequency, rad/s, and amplitude of the base, m.
@@ -607,7 +623,9 @@ impl<'a> Problem<'a> {
             let c = self.points[point].response.value / b;
             manifold.b(c, BranchSide::Right).unwrap_or(1.02 * manifold.b_min())
         };
-        let mut speed = start.unwrap_or_else(by_theory);
+        // Theory may put a speed where the exact curve has none.
+        let mut starts = [start.unwrap_or_else(by_theory)].into_iter().chain(SPEEDS);
+        let mut speed = starts.find(|speed| self.residual(x, point, *speed).is_some())?;
         let slope = |speed: f64| {
             let [below, above] = [-STEP, STEP].map(|step| self.residual(x, point, speed + step));
             Some((above? - below?) / (2.0 * STEP))
@@ -652,8 +670,8 @@ impl<'a> Problem<'a> {
     /// The curve at a speed less a point, over its standard uncertainties.
     fn residual(&self, x: &Unknowns, point: usize, speed: f64) -> Option<Vector3<f64>> {
         let Curve { response, mut omega, mut drive } = self.curve(x, speed)?;
-        if let Some(Shift { strength, value, slope }) = self.shifts.get(point) {
-            let [by_omega, by_drive] = [0, 1].map(|i| value[i] + slope[i] * (x[6] - strength));
+        if let Some(Shift { at, value, gradient }) = self.shifts.get(point) {
+            let [by_omega, by_drive] = [0, 1].map(|i| value[i] + gradient[i].dot(&(x - at)));
             (omega, drive) = (omega * (1.0 + by_omega), drive * (1.0 + by_drive));
         }
         let point = &self.points[point];

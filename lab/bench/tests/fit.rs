@@ -1,13 +1,15 @@
 //! Guards the fit of a rig's parameters to points of its backbone: exact points, noise, points that do not belong, and what is refused.
 
+use lovines::Cavity;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use vines_model::numerics::Estimate;
-use vines_model::orbit::backbone_at_speed;
-use vines_testbench::experiment::{Plan, run};
-use vines_testbench::fit::{Fit, FitError, Known, MeasuredPoint, Quantity, Recording, at, contradiction, fit};
-use vines_testbench::record::Sample;
-use vines_testbench::rig::{BuiltIn, Chain, SensorsOnly, Simulated};
+use vines_model::orbit::{backbone_at_speed, resonant_motion};
+use vines_testbench::backbone::track;
+use vines_testbench::fit::{
+    Effect, Fit, FitError, Kind, Known, MeasuredPoint, Quantity, Recording, contradiction, explain, fit, parts,
+};
+use vines_testbench::rig::{BuiltIn, Chain, Drive, Rig, RigError, RigStage, Sensors, Simulated};
 use vines_testbench::scene::{Definition, Dimensionless, Parameters, Scene};
 
 /// The rig that the points belong to.
@@ -179,58 +181,241 @@ fn points_of_another_rig_contradict_the_scene_and_those_of_its_own_do_not() {
     );
 }
 
-/// A recording of a whole experiment on [`RIG`]: search, lock, hold and decay.
-fn recording(settings: &[&str]) -> Recording {
+/// A recording of a backbone at 60 dB that is tracked on [`RIG`], and cut in the middle of its first and its last level.
+fn recording() -> Recording {
+    let settings = [
+        "chain.snr=60",
+        "backbone.C_from=0.65",
+        "backbone.C_to=0.25",
+        "backbone.points=10",
+    ];
     let overrides: Vec<_> = settings.iter().map(|one| one.parse().unwrap()).collect();
     let scene = Scene::load(None, &overrides).unwrap();
-    let rig = Simulated::new(RIG, Default::default()).unwrap();
-    let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
-    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-    let plan = Plan::of(&scene);
-    let record = run(&mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
-    let channel = |value: fn(&Sample) -> f64| record.samples.iter().map(value).collect();
+    let rig = Simulated::new(RIG, scene.start).unwrap();
+    let mut rig = Recorder {
+        rig: Chain::around(Box::new(rig), &scene),
+        read: Sensors::default(),
+        channels: [Vec::new(), Vec::new()],
+    };
+    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
+    track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
+    let [response, drive] = rig.channels;
+    // In the middle of the first level's and of the last level's hold.
+    let kept = 3000..response.len() - 500;
     Recording {
         origin: "record.csv".into(),
         channels: ["y".into(), "x".into()],
-        sample_time: record.sample_time,
-        response: channel(|one| one.sensors.response),
-        drive: channel(|one| one.sensors.reference.unwrap()),
+        sample_time: scene.sample_time(),
+        response: response[kept.clone()].to_vec(),
+        drive: drive[kept].to_vec(),
+    }
+}
+
+/// Keeps what is read.
+struct Recorder {
+    rig: Box<dyn Rig>,
+    read: Sensors,
+    channels: [Vec<f64>; 2],
+}
+
+impl RigStage for Recorder {
+    fn inner(&mut self) -> &mut dyn Rig {
+        &mut *self.rig
+    }
+
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.read = self.rig.sense()?;
+        Ok(self.read)
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.channels[0].push(self.read.response);
+        self.channels[1].push(self.read.reference.unwrap());
+        self.rig.advance(drive, step)
+    }
+}
+
+/// A scene with the wrong restitution, half-width, damping and stiffness.
+fn wrong_scene() -> Scene {
+    let settings = [
+        "plant.r=0.75",
+        "plant.b=0.0105",
+        "plant.c=3.5",
+        "plant.k=11600",
+        "plant.M=3.9",
+    ];
+    let overrides: Vec<_> = settings.iter().map(|one| one.parse().unwrap()).collect();
+    Scene::load(None, &overrides).unwrap()
+}
+
+#[test]
+fn a_recording_that_begins_and_ends_in_the_middle_of_a_level_gives_the_parameters() {
+    let scene = wrong_scene();
+    let parts = parts(&[recording()], &scene, &[]).unwrap().concat();
+    let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
+    assert!(
+        parts.iter().filter(|part| part.kind == Kind::Held).count() >= 4,
+        "{parts:?}"
+    );
+    let fit = fit(&points, Definition::default(), &scene.plant, &[]).unwrap();
+    for quantity in &Quantity::ALL[..5] {
+        let estimate = fit.estimate(*quantity).unwrap();
+        assert!(
+            pull(&fit, *quantity).abs() < 3.0 && estimate.uncertainty < 0.2 * estimate.value,
+            "{quantity}: {estimate:?}"
+        );
+    }
+    assert!(!fit.is_rejected());
+}
+
+#[test]
+fn channels_that_are_no_recording_of_a_rig_near_resonance_are_refused_with_what_to_do() {
+    let scene = wrong_scene();
+    let good = recording();
+    let count = 6000;
+    let good = Recording {
+        response: good.response[..count].to_vec(),
+        drive: good.drive[..count].to_vec(),
+        ..good
+    };
+    let refused = |damage: &dyn Fn(&mut Recording)| {
+        let mut damaged = good.clone();
+        damage(&mut damaged);
+        damaged.parts(&scene).unwrap_err().to_string()
+    };
+    let clipped = |values: &mut Vec<f64>| values.iter_mut().for_each(|value| *value = value.clamp(-5e-3, 5e-3));
+    let cases: [(String, &[&str]); 9] = [
+        (
+            refused(&|one| one.response[17] = f64::NAN),
+            &["channel y", "sample 18", "repair"],
+        ),
+        (
+            refused(&|one| one.drive.truncate(5999)),
+            &["y has 6000 samples", "x has 5999"],
+        ),
+        (
+            refused(&|one| clipped(&mut one.response)),
+            &["channel y is clipped", "reduce the gain"],
+        ),
+        (
+            refused(&|one| one.drive.fill(0.0)),
+            &["channel x is constant", "connected"],
+        ),
+        (
+            refused(&|one| std::mem::swap(&mut one.response, &mut one.drive)),
+            &["swapped"],
+        ),
+        (
+            refused(&|one| one.drive.iter_mut().for_each(|value| *value *= -1.0)),
+            &["wrong sign", "--drive x:-1"],
+        ),
+        (
+            refused(&|one| one.sample_time *= 3.0),
+            &["strongest oscillation", "--rate"],
+        ),
+        (
+            refused(&|one| one.sample_time *= 30.0),
+            &["are needed: give the rate with --rate"],
+        ),
+        (
+            refused(&|one| {
+                one.response.truncate(500);
+                one.drive.truncate(500);
+            }),
+            &["at least 16 are needed"],
+        ),
+    ];
+    for (message, words) in cases {
+        assert!(
+            message.starts_with("record.csv") && words.iter().all(|word| message.contains(word)),
+            "{message}"
+        );
+    }
+}
+
+/// The periodic motions of a rig with this cavity as points with the uncertainties of 60 dB, with noise.
+fn real_points(cavity: Cavity) -> Vec<MeasuredPoint> {
+    let rig = Parameters { cavity, ..RIG };
+    let mut random = ChaCha8Rng::seed_from_u64(11);
+    let mut measured = |value: f64, relative: f64| {
+        let normal: f64 = StandardNormal.sample(&mut random);
+        Estimate {
+            value: value * (1.0 + relative * normal),
+            uncertainty: value * relative,
+        }
+    };
+    let amplitudes = (0..10).map(|n| (0.36 + 0.03 * f64::from(n)) * RIG.half_width);
+    amplitudes
+        .map(|amplitude| {
+            let motion = resonant_motion(&rig, Definition::default(), amplitude, None).unwrap();
+            MeasuredPoint {
+                response: measured(amplitude, 1e-4),
+                omega: measured(motion.omega, 1e-6),
+                drive: measured(motion.amplitude, 1e-4),
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn the_effect_that_explains_a_misfit_is_named_with_its_strength() {
+    let known: Vec<Known> = ["b=0.0095±0.00003", "epsilon=0.00923±0.00003"]
+        .map(|one| one.parse().unwrap())
+        .into();
+    let scene = wrong_scene();
+    for (cavity, effect, strength) in [
+        (
+            Cavity { kinetic_friction: 0.03, ..Cavity::IDEAL },
+            Effect::Friction,
+            0.03,
+        ),
+        (
+            Cavity { tilt: 0.1, ..Cavity::IDEAL },
+            Effect::Tilt,
+            0.1_f64.to_degrees(),
+        ),
+    ] {
+        let found = explain(
+            &real_points(cavity),
+            Definition::default(),
+            &scene.plant,
+            &known,
+            |_| {},
+        )
+        .unwrap();
+        let best = found.explains().unwrap_or_else(|| panic!("{}", found.verdict()));
+        let Estimate { value, uncertainty } = best.strength;
+        assert!(
+            best.effect == effect && found.ideal.is_rejected(),
+            "{}",
+            found.verdict()
+        );
+        assert!(
+            (value - strength).abs() < 3.0 * uncertainty && uncertainty < 0.2 * strength,
+            "{:?}",
+            best.strength
+        );
+        assert!(
+            found.verdict().contains("without it, chi-square is"),
+            "{}",
+            found.verdict()
+        );
     }
 }
 
 #[test]
-fn a_recording_of_a_search_a_hold_and_a_decay_gives_points_on_the_backbone_of_the_rig() {
-    for snr in ["none", "60", "40"] {
-        let recording = recording(&[&format!("chain.snr={snr}")]);
-        let scene = Scene::load(None, &[]).unwrap();
-        let parts = recording.parts(&scene).unwrap();
-        let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
-        for part in &parts {
-            println!(
-                "{:.2?} {:?} {:?} {:?}",
-                part.seconds, part.kind, part.regime, part.point
-            );
-        }
-        let at = at(&points, Definition::default(), &RIG, &[]).unwrap();
-        println!(
-            "{snr}: {} points, chi-square {} residuals {:.1?}",
-            points.len(),
-            at.chi_square,
-            at.residuals
-        );
-        let fit = fit(&points, Definition::default(), &scene.plant, &[]);
-        match fit {
-            Ok(fit) => {
-                for quantity in &Quantity::ALL[..5] {
-                    println!(
-                        "{quantity} {:?} {:.2} u",
-                        fit.estimate(*quantity),
-                        pull(&fit, *quantity)
-                    );
-                }
-                println!("{:?} {} {:?}", fit.p_value(), fit.chi_square, fit.left_out);
-            }
-            Err(e) => println!("{e}"),
-        }
-    }
+fn unequal_gaps_leave_the_points_as_they_are() {
+    let half = RIG.half_width;
+    let skewed = Cavity {
+        b_plus: Some(1.1 * half),
+        b_minus: Some(0.9 * half),
+        ..Cavity::IDEAL
+    };
+    let [ideal, skewed] = [Cavity::IDEAL, skewed].map(|cavity| {
+        let rig = Parameters { cavity, ..RIG };
+        resonant_motion(&rig, Definition::default(), 0.5 * half, None).unwrap()
+    });
+    assert!(
+        (ideal.omega / skewed.omega - 1.0).abs() < 1e-11 && (ideal.amplitude / skewed.amplitude - 1.0).abs() < 1e-9
+    );
 }

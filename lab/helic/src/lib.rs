@@ -3,7 +3,6 @@
 //!
 //! Source of all facts: `docs/protocol.md` of that project.
 #![doc = include_str!("../README.md")]
-
 #![forbid(unsafe_code)]
 
 mod client;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use vines::experiment::{ExperimentError, Stage};
 use vines::net::{ReportLost, Timing};
 use vines::record::Sample;
-use vines::rig::{BuiltIn, Controller, Fault, Rig};
+use vines::rig::{BuiltIn, Command, Controller, Drive, Fault, Rig, RigError, RigStage, Sensors};
 use vines::{advice, loop_check, report, scene::Scene};
 
 use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
@@ -46,9 +46,61 @@ pub(super) struct ExperimentArguments {
     #[arg(long)]
     no_check: bool,
 
+    /// Write what the sensors read from the start to the end (CSV), as `vines fit` reads it
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+
     /// Print the results as JSON instead of a table
     #[arg(long)]
     pub json: bool,
+}
+
+/// A rig whose samples are kept for --record.
+pub(super) struct Recorder<'a> {
+    rig: &'a mut dyn Rig,
+    path: Option<&'a Path>,
+    sensors: Sensors,
+    time: f64,
+    samples: Vec<Sample>,
+}
+
+impl Recorder<'_> {
+    fn keep(&mut self, drive: Drive, step: f64) {
+        if self.path.is_some() {
+            let command = Command { drive, ..Command::default() };
+            let (time, sensors) = (self.time, self.sensors);
+            self.samples.push(Sample { time, sensors, command, ground_truth: None });
+        }
+        self.time += step;
+    }
+
+    /// Writes the file, if one is asked for.
+    pub(super) fn finish(self) -> Result<(), Failure> {
+        let Some(path) = self.path else { return Ok(()) };
+        vines::write_file(path, &vines::record::table(&self.samples)).map_err(Failure::run)?;
+        Ok(())
+    }
+}
+
+impl RigStage for Recorder<'_> {
+    fn inner(&mut self) -> &mut dyn Rig {
+        self.rig
+    }
+
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.sensors = self.rig.sense()?;
+        Ok(self.sensors)
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.keep(drive, step);
+        self.rig.advance(drive, step)
+    }
+
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.keep(drive, step);
+        self.rig.hold(drive, step)
+    }
 }
 
 /// A rig that has passed its loop check, and a controller, both connected.
@@ -59,6 +111,17 @@ pub(super) struct Session {
 }
 
 impl ExperimentArguments {
+    /// The rig, with a recorder for --record.
+    pub(super) fn recorded<'a>(&'a self, rig: &'a mut dyn Rig) -> Recorder<'a> {
+        Recorder {
+            rig,
+            path: self.record.as_deref(),
+            sensors: Sensors::default(),
+            time: 0.0,
+            samples: Vec::new(),
+        }
+    }
+
     /// Loads the scene and connects rig and controller; without a rig, it is this program's FMU. Invalid settings and a folder that
     /// cannot be written to are refused before anything is driven.
     pub(super) fn start(

@@ -4,12 +4,14 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::fit::{Fit, FitReport, Known, fit};
-use vines::points::{Column, read};
+use indicatif::ProgressBar;
+use serde::Serialize;
+use vines::fit::{Effect, Fit, FitReport, Found, Known, Part, decimals, find, parts};
+use vines::points::{Channel, Channels, Column, Measurement, read};
 use vines::report::Table;
 
 use super::failure::Failure;
-use super::options::SceneArguments;
+use super::options::{SceneArguments, positive};
 use super::output::{output, written};
 
 const HELP: &str = "\
@@ -18,6 +20,10 @@ uncertainty: a locked point of `vines identify` (identification.json), the point
 with the columns f_Hz, A_m, E_m, u_f_Hz, u_A_m and u_E_m, or others that --column names. Points that are not settled, or not symmetric
 1:1, are left out.
 
+A recording has two channels over time, the response and the displacement of the base, as CSV with a column `time` (s) or with --rate; a file
+of `vines` with the columns response and reference needs no options. Held stretches, slow sweeps and decays near phase resonance become points.
+The scene says what the sensor reads, and about which natural frequency and damping the structure has.
+
 The model is the exact symmetric 1:1 motion of a linear oscillator and a particle between two walls. The fit finds
   f0, zeta    natural frequency and damping ratio of the structure without the particle
   r           restitution coefficient
@@ -25,11 +31,14 @@ The model is the exact symmetric 1:1 motion of a linear oscillator and a particl
   epsilon     mass ratio m/M
 and, if --known gives one of M, m, k and c, the others in SI units. The scene is where the search begins, and what the result is compared with.
 
-If the model does not describe the points (probability of so large a chi-square below 1 %), every line says so, and the exit code is 1.
+If the model does not describe all points (probability of so large a chi-square below 1 %), friction, tilt, and two laws of a restitution that
+depends on the speed are fitted one at a time, by periodic motions of the plant. If one of them describes the points, the result is its fit. If
+none does, at most a fifth of the points are left out; if that does not help, every line says so, and the exit code is 1.
 
 Examples:
   vines fit out/tracked.csv
   vines fit out/tracked.csv out/identification.json --known m=0.032±0.0005
+  vines fit record.csv --response y:mm --drive x:um --rate 5000 --scene mine.toml
   vines fit table.csv --column A=amplitude:mm --column E=base:um --column f=frequency:Hz --column u_A=noise:mm --column u_E=noise_e:um --column u_f=noise_f:Hz
   vines fit out/tracked.csv --out rig.toml      a scene with the fitted plant, for every other command";
 
@@ -37,7 +46,7 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
-    /// Files with points: CSV, tracked.json or identification.json
+    /// Files with points or recordings: CSV, tracked.json or identification.json
     #[arg(value_name = "FILE", required = true)]
     points: Vec<PathBuf>,
 
@@ -52,6 +61,18 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "QUANTITY=NAME:UNIT")]
     column: Vec<Column>,
 
+    /// Channel of the response in a recording: its name, and its unit or metres per unit
+    #[arg(long, value_name = "NAME[:UNIT]")]
+    response: Option<Channel>,
+
+    /// Channel of the displacement of the base in a recording
+    #[arg(long, value_name = "NAME[:UNIT]")]
+    drive: Option<Channel>,
+
+    /// Samples a second of a recording without a column `time`
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    rate: Option<f64>,
+
     /// Write a scene with the fitted plant
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -61,21 +82,64 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// What is printed as JSON.
+#[derive(Serialize)]
+struct Output<'a> {
+    #[serde(flatten)]
+    report: &'a FitReport,
+    /// What the candidates say where the ideal cavity does not describe all points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    verdict: Option<String>,
+    /// Parts of recordings.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    parts: Vec<Part>,
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let (mut points, mut skipped) = (Vec::new(), 0);
+    let channels = Channels {
+        response: arguments.response.clone(),
+        drive: arguments.drive.clone(),
+        rate: arguments.rate,
+    };
+    let (mut points, mut skipped, mut recordings) = (Vec::new(), 0, Vec::new());
     for path in &arguments.points {
-        let (more, left_out) = read(path, &arguments.column).map_err(Failure::input)?;
-        points.extend(more);
-        skipped += left_out;
+        match read(path, &arguments.column, &channels).map_err(Failure::input)? {
+            Measurement::Points(more, left_out) => {
+                points.extend(more);
+                skipped += left_out;
+            }
+            Measurement::Recording(recording) => recordings.push(recording),
+        }
     }
-    let fit = fit(&points, scene.resonance, &scene.plant, &arguments.known).map_err(Failure::run)?;
+    let parts: Vec<Part> = parts(&recordings, &scene, &arguments.known)
+        .map_err(Failure::run)?
+        .concat();
+    points.extend(parts.iter().filter_map(|part| part.point));
+    let bar = ProgressBar::new(Effect::ALL.len() as u64);
+    let progress = |done: usize| bar.set_position(done as u64);
+    let found = find(&points, scene.resonance, &scene.plant, &arguments.known, progress);
+    bar.finish_and_clear();
+    let Found { fit, plant, verdict } = found.map_err(Failure::run)?;
     let report = fit.report(&scene.plant);
-    let mut text = output(arguments.json, &report, || {
-        summary(&report, &fit, points.len(), skipped)
+    let printed = Output {
+        report: &report,
+        verdict: verdict.clone(),
+        parts: parts.clone(),
+    };
+    let mut text = output(arguments.json, &printed, || {
+        let parts = if parts.is_empty() {
+            String::new()
+        } else {
+            recorded(&parts)
+        };
+        let verdict = verdict
+            .as_ref()
+            .map_or_else(String::new, |verdict| format!("{verdict}\n"));
+        parts + &summary(&report, &fit, points.len(), skipped) + &verdict
     })?;
     if let Some(path) = &arguments.out {
-        let plant = plant_section(&report, &fit.plant(&scene.plant));
+        let plant = plant_section(&report, &plant, verdict.as_deref());
         let scene = arguments.scene.with_plant(&plant)?;
         let files = vines::write_file(path, &scene).map_err(Failure::run)?;
         if !arguments.json {
@@ -87,16 +151,44 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     }
     super::output::print(&text)?;
     Err(Failure::run(format!(
-        "the model does not describe the points: chi-square is {:.0} for {} degrees of freedom. Friction, unequal gaps, tilt, a restitution \
-         that depends on the speed, or uncertainties that are too small may be the reason",
+        "the model does not describe the points: chi-square is {:.0} for {} degrees of freedom. Uncertainties that are too small, points of \
+         several branches, or several effects at a time may be the reason",
         fit.chi_square, fit.degrees
     )))
+}
+
+/// The parts of recordings.
+fn recorded(parts: &[Part]) -> String {
+    let rows = parts.iter().map(|part| {
+        let [from, to] = part.seconds.map(|time| format!("{time:.2}"));
+        let kind = format!("{:?}", part.kind).to_lowercase();
+        let values = part.point.map_or_else(
+            || [String::new(), String::new(), String::new()],
+            |point| {
+                [
+                    point.omega.scaled(1.0 / std::f64::consts::TAU),
+                    point.response.scaled(1e3),
+                    point.drive.scaled(1e3),
+                ]
+                .map(|one| {
+                    let decimals = decimals(one.uncertainty);
+                    format!("{:.decimals$} ± {:.decimals$}", one.value, one.uncertainty)
+                })
+            },
+        );
+        let [f, a, e] = values;
+        [from, to, kind, part.regime.to_string(), f, a, e]
+    });
+    Table::new("from, s | to, s | part | motion | f, Hz | A, mm | E, mm")
+        .rows(rows)
+        .text()
+        + "\n"
 }
 
 fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> String {
     let doubt = if report.describes { "" } else { " (rejected)" };
     let rows = report.parameters.iter().map(|one| {
-        let digits = digits(one.uncertainty);
+        let digits = decimals(one.uncertainty);
         let number = |value: f64| format!("{value:.digits$}");
         let difference = (one.value - one.expected) / one.uncertainty;
         [
@@ -149,17 +241,8 @@ fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> Stri
     text
 }
 
-/// Decimals for two digits of a standard uncertainty.
-fn digits(uncertainty: f64) -> usize {
-    if uncertainty > 0.0 && uncertainty.is_finite() {
-        (1.0 - uncertainty.log10().floor()).clamp(0.0, 15.0) as usize
-    } else {
-        6
-    }
-}
-
 /// The section `[plant]` of a scene, with the standard uncertainties in comments.
-fn plant_section(report: &FitReport, plant: &vines::scene::Parameters) -> String {
+fn plant_section(report: &FitReport, plant: &vines::scene::Parameters, verdict: Option<&str>) -> String {
     let lines = vines::scene::plant_keys(plant).into_iter().map(|(symbol, value)| {
         let fitted = report.parameters.iter().find(|one| one.symbol == symbol);
         let u = fitted.map_or_else(String::new, |one| format!(" ± {:.2e}", one.uncertainty));
@@ -171,5 +254,11 @@ fn plant_section(report: &FitReport, plant: &vines::scene::Parameters) -> String
         };
         format!("{symbol} = {value}{note}\n")
     });
-    format!("[plant]\n{}", lines.collect::<String>())
+    let verdict = verdict.map_or_else(String::new, |verdict| format!("# {verdict}\n"));
+    let doubt = if report.describes {
+        ""
+    } else {
+        "# Rejected: the model does not describe the points.\n"
+    };
+    format!("[plant]\n{verdict}{doubt}{}", lines.collect::<String>())
 }

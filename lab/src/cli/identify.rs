@@ -3,6 +3,7 @@
 use clap::Args;
 use indicatif::ProgressBar;
 use vines::experiment::{Plan, Stage, run_into};
+use vines::fit::contradiction;
 use vines::identification::{IdentificationError, identify};
 use vines::{advice, comparison::Comparison, report};
 
@@ -18,6 +19,7 @@ Examples:
   vines identify --scene scenes/dimensionless.toml --set excitation.G=1.3
   vines identify --controller mine.fmu             another controller on the same plant
   vines identify --rig udp://127.0.0.1:5510        a rig in real time across the network; see `vines rig`
+  vines identify --record run.csv                  what the sensors read as well, for `vines fit run.csv`
   vines identify --rig udp://127.0.0.1:5510 --watch    the same, shown in a browser while it runs
 
 Writes identification.json, backbone.csv, backbone.svg and sim.svg. Without --rig, the rig is this program's LoViNes.fmu; it is
@@ -44,11 +46,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let plan = Plan::of(&scene);
     let bar = progress_bar(plan.lock as u64, "{msg:29} [{wide_bar}] {pos}/{len} samples");
     let mut samples = Vec::new();
-    let (rig, controller) = (session.open.rig.as_mut(), session.controller.as_mut());
-    let record = run_into(&mut samples, rig, controller, &plan, |stage, done, of| {
+    let (mut rig, controller) = (
+        experiment.recorded(session.open.rig.as_mut()),
+        session.controller.as_mut(),
+    );
+    let record = run_into(&mut samples, &mut rig, controller, &plan, |stage, done, of| {
         show(&bar, stage, done, of)
     });
     bar.finish_and_clear();
+    rig.finish()?;
     let timing = session.close(&record);
     let record = record.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let identification = identify(&record, &scene).map_err(|error| {
@@ -67,7 +73,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if arguments.rig.is_none() {
         files.extend(fmus(&experiment.out)?);
     }
-    experiment.result(&result, &summary, &files, timing)
+    let mut text = experiment.result(&result, &summary, &files, timing)?;
+    // A rig that reports its impacts is a simulation of the scene.
+    let is_simulated = !identification.lock.impacts_per_period.is_nan();
+    let lock = [(&identification.lock.at).into()];
+    if !is_simulated
+        && !experiment.json
+        && let Some(line) = contradiction(&lock, scene.resonance, &scene.plant)
+    {
+        text += &format!("{line}\n");
+    }
+    Ok(text)
 }
 
 fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {

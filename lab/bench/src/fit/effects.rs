@@ -1,22 +1,24 @@
 //! Effects of a real cavity that explain why points contradict the ideal one: each is fitted alone, and they are compared.
 //!
 //! The curve of a rig with an effect is that of the ideal cavity, shifted: at the amplitude of a point the plant's own periodic motion
-//! ([`resonant_motion`]) has another frequency and another drive. The shifts are computed at the present parameters, once with the present
-//! strength of the effect and once with a little more; with them the fit of the ideal curve finds parameters and strength, and this is repeated
-//! until the strength is unchanged. At the end chi-square is that of the plant's motions.
+//! ([`resonant_motion`]) has another frequency and another drive. The shifts and their gradients over parameters and strength are computed at the
+//! present parameters; with them the fit of the ideal curve finds the next ones. At the end chi-square is that of the plant's motions.
 //!
 //! Unequal gaps are no candidate: they shift the particle by the middle of the cavity and change nothing that the points contain. The fitted b is
 //! half of the distance between the walls.
 
 use std::fmt::{self, Display, Formatter};
 
+use lovines::cavity::GRAVITY;
 use lovines::{Cavity, Restitution};
 use vines_model::Definition;
-use vines_model::numerics::Estimate;
-use vines_model::orbit::{PlantMotion, resonant_motion};
+use vines_model::numerics::{Estimate, mean};
+use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
 
-use super::{Curve, Fit, FitError, Known, MeasuredPoint, Problem, Quantity, Shift, Unknowns, checked};
-use crate::scene::{Dimensionless, Parameters};
+use super::{
+    Curve, Fit, FitError, Known, MeasuredPoint, Problem, Quantity, Shift, UNKNOWNS, Unknowns, checked, fit, unknowns,
+};
+use crate::scene::Parameters;
 
 /// An effect of a real cavity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,13 +48,15 @@ pub struct Candidate {
 
 /// Rounds in which the shifts are computed again.
 const ROUNDS: usize = 12;
-/// Change of the strength over its standard uncertainty at which it counts as found.
+/// What a further step would take from chi-square, at which the minimum counts as found.
 const FOUND: f64 = 0.02;
+/// Smallest share of a step.
+const SMALLEST: f64 = 1e-3;
 /// Strength from which the search begins, over that which gives the particle the acceleration `b omega0²`: friction and tilt of this size are
 /// about 0.03 and 2 degrees on the default rig.
 const TYPICAL: f64 = 0.01;
-/// Step of the strength for its derivative, over the typical one.
-const STEP: f64 = 1e-2;
+/// Step of a difference: of the unknowns, and of the strength over the typical one.
+const STEP: f64 = 1e-4;
 /// Difference of Akaike's criterion up to which a candidate that is not the best one remains possible: its evidence is a twentieth.
 const POSSIBLE: f64 = 6.0;
 
@@ -200,6 +204,41 @@ impl Candidate {
     }
 }
 
+/// The rig that fits some points.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// The fit: of the ideal cavity, or with the effect that explains why the points contradict it.
+    pub fit: Fit,
+    /// Its plant.
+    pub plant: Parameters,
+    /// What the effects say, if the ideal cavity does not describe all points.
+    pub verdict: Option<String>,
+}
+
+/// [`fit()`], and where the ideal cavity does not describe all points, the effect that does. `progress` is told the number of effects tried.
+///
+/// # Errors
+/// As [`fit()`].
+pub fn find(
+    points: &[MeasuredPoint],
+    definition: Definition,
+    expected: &Parameters,
+    known: &[Known],
+    progress: impl FnMut(usize),
+) -> Result<Found, FitError> {
+    let ideal = fit(points, definition, expected, known)?;
+    let plant = ideal.plant(expected);
+    if !ideal.is_rejected() && ideal.left_out.is_empty() {
+        return Ok(Found { fit: ideal, plant, verdict: None });
+    }
+    let explanation = explain(points, definition, expected, known, progress)?;
+    let verdict = Some(explanation.verdict());
+    Ok(match explanation.explains() {
+        Some(best) => Found { fit: best.fit.clone(), plant: best.plant(expected), verdict },
+        None => Found { fit: ideal, plant, verdict },
+    })
+}
+
 /// Fits the ideal cavity to all points, and, if they contradict it, each effect alone. `progress` is told the number of candidates done.
 ///
 /// # Errors
@@ -217,7 +256,7 @@ pub fn explain(
     if ideal.is_rejected() {
         for (n, effect) in Effect::ALL.into_iter().enumerate() {
             progress(n);
-            candidates.extend(problem.with_effect(effect, &ideal));
+            candidates.extend(problem.with_effect(effect, &ideal, expected));
         }
     }
     candidates.sort_by(|one, other| one.criterion().total_cmp(&other.criterion()));
@@ -225,88 +264,142 @@ pub fn explain(
 }
 
 impl Problem<'_> {
-    /// The fit with an effect, from the fit without; `None` if the plant has no such motions.
-    fn with_effect(&self, effect: Effect, ideal: &Fit) -> Option<Candidate> {
-        let plant = |x: &Unknowns| Parameters {
-            primary_mass: Quantity::PrimaryMass.of(x),
-            stiffness: Quantity::Stiffness.of(x),
-            damping: Quantity::Damping.of(x).max(0.0),
-            particle_mass: Quantity::ParticleMass.of(x),
-            half_width: Quantity::B.of(x),
-            restitution: x[2],
-            cavity: Cavity::IDEAL,
-        };
-        let mut x = ideal.x;
-        let d = Dimensionless {
-            definition: self.definition,
-            ..Dimensionless::of(&plant(&x), 0.0)
-        };
-        // The particle turns from -B to B: its speed relative to the wall before the impact is 2 B (1 + epsilon)/(1 + r).
-        let speeds = vines_model::numerics::mean(ideal.speeds.iter().copied());
-        let speed = 2.0 * speeds * (1.0 + d.epsilon) / (1.0 + d.r) * d.b * d.omega0;
-        let typical = TYPICAL * d.b * d.omega0 * d.omega0 / lovines::cavity::GRAVITY;
-        let (first, step) = match effect {
-            Effect::Friction => (typical, STEP * typical),
-            Effect::Tilt => (4.0 * typical * typical, STEP * typical * typical),
-            Effect::Viscoelastic | Effect::Plastic => (0.0, 0.0),
-        };
-        x[6] = first;
-        let mut speeds: Vec<f64> = ideal.speeds.clone();
-        let mut motions: Vec<Option<PlantMotion>> = vec![None; self.points.len()];
-        let mut previous = None;
-        for _ in 0..ROUNDS {
-            let here = plant(&x);
-            let mut shifts = Vec::with_capacity(speeds.len());
-            for (speed_of_particle, last) in speeds.iter().zip(&mut motions) {
-                let Curve { response, omega, drive } = self.curve(&x, *speed_of_particle)?;
-                let mut at = |strength: f64| {
-                    let cavity = effect.cavity(strength, x[2], speed);
-                    let rig = Parameters { cavity, ..here };
-                    let motion = resonant_motion(&rig, self.definition, response, last.as_ref()).ok()?;
-                    let shift = [motion.omega / omega - 1.0, motion.amplitude / drive - 1.0];
-                    *last = Some(motion);
-                    Some(shift)
-                };
-                let value = at(x[6])?;
-                let slope = if effect.adds_a_parameter() {
-                    let more = at(x[6] + step)?;
-                    [0, 1].map(|i| (more[i] - value[i]) / step)
-                } else {
-                    [0.0; 2]
-                };
-                shifts.push(Shift { strength: x[6], value, slope });
+    /// The best one of the fits with an effect from several starts, up to the first that describes the points; `None` if the plant has no such
+    /// motions.
+    fn with_effect(&self, effect: Effect, ideal: &Fit, expected: &Parameters) -> Option<Candidate> {
+        let mut best: Option<Candidate> = None;
+        for (x, strength) in [(ideal.x, 1.0), (unknowns(expected), 1.0), (ideal.x, 4.0)] {
+            if strength > 1.0 && !effect.adds_a_parameter() {
+                continue;
             }
-            let problem = Problem {
-                points: self.points.clone(),
-                shifts,
-                free: effect.adds_a_parameter(),
-                ..*self
-            };
-            let (mut next, sums) = problem.minimum(x)?;
-            let fit = problem.found(next, sums);
-            let strength = Estimate {
-                value: next[6],
-                uncertainty: fit.covariance[(6, 6)].max(0.0).sqrt(),
-            };
-            let r = fit.estimate(Quantity::R)?;
-            let result = effect.strength(Estimate { value: strength.value.max(0.0), ..strength }, r, speed);
-            let change = (next - x).component_div(&fit.covariance.diagonal().map(|variance| variance.max(0.0).sqrt()));
-            speeds.clone_from(&fit.speeds);
-            let settled = change
-                .iter()
-                .take(5)
-                .chain(&[if problem.free { change[6] } else { 0.0 }])
-                .all(|one| one.abs() < FOUND);
-            let candidate = Candidate { effect, strength: result, fit, speed };
-            if settled {
-                return (strength.value > 0.0 || !effect.adds_a_parameter()).then_some(candidate);
+            let found = self.with_effect_from(effect, x, strength * TYPICAL, ideal);
+            let both = best.into_iter().chain(found);
+            best = both.min_by(|one, other| one.criterion().total_cmp(&other.criterion()));
+            if best.as_ref().is_some_and(|one| !one.fit.is_rejected()) {
+                break;
             }
-            // Neither friction nor the square of a tilt is negative; a large step may lose the motion.
-            if problem.free {
-                next[6] = next[6].clamp(0.25 * x[6], 3.0 * x[6]);
-            }
-            (x, previous) = (next, Some(candidate));
         }
-        previous.filter(|one| one.strength.value > 0.0)
+        best
+    }
+
+    /// The fit with an effect, from the unknowns `x`: Gauss and Newton's method with the plant's motions, in steps that reduce chi-square.
+    fn with_effect_from(&self, effect: Effect, mut x: Unknowns, strength: f64, ideal: &Fit) -> Option<Candidate> {
+        let [b, omega0] = [Quantity::B.of(&x), x[0].exp()];
+        // The particle turns from -B to B: its speed relative to the wall before the impact is 2 B (1 + epsilon)/(1 + r).
+        let particle = mean(ideal.speeds.iter().copied());
+        let speed = 2.0 * particle * (1.0 + x[4].exp()) / (1.0 + x[2]) * b * omega0;
+        let typical = strength * b * omega0 * omega0 / GRAVITY;
+        let (typical, free) = match effect {
+            Effect::Friction => (typical, true),
+            Effect::Tilt => (4.0 * typical * typical, true),
+            Effect::Viscoelastic | Effect::Plastic => (0.0, false),
+        };
+        x[6] = typical;
+        let mut steps = Unknowns::from_element(STEP);
+        steps[6] = STEP * typical;
+        let mut motions: Vec<Option<PlantMotion>> = vec![None; self.points.len()];
+        let mut shift = |n: usize, x: &Unknowns, particle: f64| {
+            let Curve { response, omega, drive } = self.curve(x, particle)?;
+            let cavity = effect.cavity(x[6], x[2], speed);
+            let rig = Parameters { cavity, ..plant(x) };
+            let conditions = [DriveCondition::PhaseResonance, DriveCondition::Response(response)];
+            let motion = match &motions[n] {
+                Some(near) => periodic_motion(&rig, self.definition, near, conditions),
+                None => resonant_motion(&rig, self.definition, response, None),
+            };
+            let motion = motion.ok()?;
+            let shift = [motion.omega / omega - 1.0, motion.amplitude / drive - 1.0];
+            motions[n] = Some(motion);
+            Some(shift)
+        };
+        let mut problem = Problem {
+            points: self.points.clone(),
+            shifts: Vec::new(),
+            free,
+            ..*self
+        };
+        // Without shifts, the particle speeds at which the points are nearest.
+        let mut here = problem.sums(&x, &mut vec![None; self.points.len()])?;
+        here.chi_square = f64::INFINITY;
+        let mut next = x;
+        for _ in 0..ROUNDS {
+            let mut share = 1.0;
+            // A step that reduces chi-square; the first one is to the start.
+            loop {
+                let at = if here.chi_square.is_infinite() {
+                    next
+                } else {
+                    x + (next - x) * share
+                };
+                let mut values = here
+                    .speeds
+                    .iter()
+                    .enumerate()
+                    .map(|(n, particle)| shift(n, &at, *particle));
+                let gradient = [Unknowns::zeros(); 2];
+                let shifts = values.try_fold(Vec::new(), |mut shifts, value| {
+                    shifts.push(Shift { at, value: value?, gradient });
+                    Some(shifts)
+                });
+                problem.shifts = shifts.unwrap_or_default();
+                let mut speeds: Vec<Option<f64>> = here.speeds.iter().copied().map(Some).collect();
+                let is_complete = problem.shifts.len() == problem.points.len();
+                let there = is_complete.then(|| problem.sums(&at, &mut speeds)).flatten();
+                if let Some(there) = there.filter(|there| there.chi_square <= here.chi_square) {
+                    (x, here) = (at, there);
+                    break;
+                }
+                share *= 0.3;
+                if share < SMALLEST {
+                    return None;
+                }
+                // Too much of the effect may end the motion.
+                if here.chi_square.is_infinite() {
+                    next[6] *= 0.3;
+                }
+            }
+            // Values and gradients at the same places.
+            for (n, one) in problem.shifts.iter_mut().enumerate() {
+                one.value = shift(n, &x, here.speeds[n])?;
+            }
+            for i in (0..UNKNOWNS).filter(|i| *i != 5 && (free || *i != 6)) {
+                let mut more = x;
+                more[i] += steps[i];
+                for n in 0..here.speeds.len() {
+                    let value = shift(n, &more, here.speeds[n])?;
+                    let one = &mut problem.shifts[n];
+                    for (gradient, (value, before)) in one.gradient.iter_mut().zip(value.into_iter().zip(one.value)) {
+                        gradient[i] = (value - before) / steps[i];
+                    }
+                }
+            }
+            let mut speeds: Vec<Option<f64>> = here.speeds.iter().copied().map(Some).collect();
+            here = problem.sums(&x, &mut speeds)?;
+            let (mut best, least) = problem.minimum(x)?;
+            if here.chi_square - least.chi_square < FOUND {
+                let fit = problem.found(x, here);
+                let uncertainty = fit.covariance[(6, 6)].max(0.0).sqrt();
+                let strength = Estimate { value: x[6], uncertainty };
+                let strength = effect.strength(strength, fit.estimate(Quantity::R)?, speed);
+                return Some(Candidate { effect, strength, fit, speed });
+            }
+            // Neither friction nor the square of a tilt is negative.
+            best[6] = best[6].max(0.1 * x[6]);
+            next = best;
+        }
+        None
+    }
+}
+
+/// The ideal plant of some unknowns.
+fn plant(x: &Unknowns) -> Parameters {
+    Parameters {
+        primary_mass: Quantity::PrimaryMass.of(x),
+        stiffness: Quantity::Stiffness.of(x),
+        damping: Quantity::Damping.of(x).max(0.0),
+        particle_mass: Quantity::ParticleMass.of(x),
+        half_width: Quantity::B.of(x),
+        restitution: x[2],
+        cavity: Cavity::IDEAL,
     }
 }

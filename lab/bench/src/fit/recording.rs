@@ -20,7 +20,7 @@ use thiserror::Error;
 use vines_model::numerics::{Estimate, RANDOM, equally_spaced, mean, slope};
 use vines_model::regime::Regime;
 
-use super::MeasuredPoint;
+use super::{Known, MeasuredPoint, Quantity, fit};
 use crate::backbone::{Criterion, LevelEstimate};
 use crate::identification::{Balance, Cycle, Harmonic, harmonic, regime_by_response};
 use crate::record::Sample;
@@ -192,8 +192,46 @@ const SEARCHED: usize = 8192;
 const APART: f64 = 0.01;
 /// Relative change of the amplitude within a window from which on it is a sweep.
 const SWEPT: f64 = 0.01;
+/// Relative standard uncertainty of the damping that a scene states: three of them are 30 %.
+const DAMPING: f64 = 0.1;
 /// Periods by which the impacts follow a change of the amplitude late.
 const LAG: f64 = 1.6;
+
+/// The parts of each recording. The natural frequency and the damping are those of `scene` first, and then those that fit the points, if these
+/// determine them better.
+///
+/// # Errors
+/// As [`Recording::parts`].
+pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result<Vec<Vec<Part>>, RecordingError> {
+    let all = |linear: LinearResponse| {
+        let scene = Scene { measured: Some(linear), ..scene.clone() };
+        recordings
+            .iter()
+            .map(|one| one.parts(&scene))
+            .collect::<Result<Vec<_>, _>>()
+    };
+    let stated = scene.linear();
+    let uncertainty = DAMPING * stated.damping_rate;
+    let first = all(LinearResponse { uncertainty, ..stated })?;
+    let points: Vec<MeasuredPoint> = first.iter().flatten().filter_map(|part| part.point).collect();
+    let Ok(fit) = fit(&points, scene.resonance, &scene.plant, known) else {
+        return Ok(first);
+    };
+    let plant = fit.plant(&scene.plant);
+    let omega0 = plant.natural_frequency();
+    let [u_f0, u_zeta] =
+        [Quantity::F0, Quantity::Zeta].map(|one| fit.estimate(one).map_or(f64::NAN, |one| one.uncertainty));
+    let fitted = LinearResponse {
+        omega0,
+        damping_rate: 0.5 * plant.damping / plant.primary_mass,
+        uncertainty: (TAU * u_f0).max(omega0 * u_zeta),
+        gain: Complex64::new(0.0, -0.5 * omega0),
+    };
+    if fit.is_rejected() || fitted.uncertainty.is_nan() || fitted.uncertainty > uncertainty {
+        return Ok(first);
+    }
+    all(fitted).or(Ok(first))
+}
 
 impl Recording {
     /// The parts of the recording, with their points. `scene` says what the sensors read, and the natural frequency and the damping of the structure
@@ -322,7 +360,13 @@ impl Recording {
             let length = rest.iter().enumerate().take_while(belongs).count();
             let taken = rest.iter().take(length.max(1)).map(|one| one.samples).sum::<usize>();
             if length >= LEAST {
-                windows.push(Window { cycles: begin..begin + length, samples: from..from + taken });
+                // The impacts follow a move late.
+                let late = if length >= 3 * LEAST { LEAST } else { 0 };
+                let left = rest.iter().take(late).map(|one| one.samples).sum::<usize>();
+                windows.push(Window {
+                    cycles: begin + late..begin + length,
+                    samples: from + left..from + taken,
+                });
             }
             (begin, from) = (begin + length.max(1), from + taken);
         }
@@ -618,7 +662,9 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
     let damping = linear.damping_rate;
     let taken = |one: &Harmonic| -one.rate - damping * one.amplitude;
     let at_first = fits.first().map_or(0.0, |(_, one)| taken(one));
-    let synchronous: Vec<_> = fits.iter().take_while(|(_, one)| taken(one) > 0.5 * at_first).collect();
+    // Without impacts nothing is taken but by an error of the damping.
+    let has_impacts = |one: &Harmonic| taken(one) > 0.5 * f64::max(at_first, damping * one.amplitude);
+    let synchronous: Vec<_> = fits.iter().take_while(|(_, one)| has_impacts(one)).collect();
     let count = synchronous.len() as f64;
     let half = 0.5 * WINDOW * TAU / linear.omega0;
     synchronous

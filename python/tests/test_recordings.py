@@ -1,0 +1,107 @@
+"""Recordings in files of other programs, and their fit."""
+
+import subprocess
+import sys
+
+import h5py
+import nptdms
+import numpy as np
+import pytest
+import pyuff
+import scipy.io
+
+import vines
+
+
+@pytest.fixture(scope="module")
+def channels():
+    """Time, response in mm and base in um: the exact motion of the plant, held at four drives near phase resonance."""
+    scene = vines.Scene()
+    step = 2 * np.pi / scene.dimensionless["omega0"] / 64
+    phase, time, response, drive = 0.0, [], [], []
+    for g in (1.35, 1.2, 1.05, 0.95):
+        orbit = next(one for one in vines.orbits(vines.Scene(excitation={"G": g})) if one.stable)
+        given = scene.drive(sigma=orbit.sigma, G=g)
+        lag = phase
+        for n in range(40 * 64):
+            turn = given["omega"] * n * step
+            time.append(len(time) * step)
+            drive.append(given["amplitude"] * np.sin(lag + turn))
+            response.append(
+                scene.dimensionless["b"] * orbit.C * np.sin(lag + turn + orbit.gamma) + harmonic(lag + turn)
+            )
+        phase = lag + given["omega"] * 40 * 64 * step
+    noise = np.random.default_rng(5).normal(size=(2, len(time)))
+    response, drive = np.array(response), np.array(drive)
+    return np.array(time), 1e3 * response + 2e-3 * noise[0], 1e6 * drive + 0.05 * noise[1]
+
+
+def harmonic(phase):
+    """Third harmonic of a symmetric motion, m."""
+    return 4e-5 * np.sin(3 * phase + 0.4)
+
+
+def write(file, time, response, drive):
+    step = time[1] - time[0]
+    match file.suffix:
+        case ".csv":
+            table = np.column_stack([time, response, drive])
+            np.savetxt(file, table, delimiter=",", header="time,y,x", comments="", fmt="%.17g")
+        case ".mat":
+            scipy.io.savemat(file, {"t": time, "y": response, "x": drive.reshape(-1, 1)})
+        case ".h5":
+            with h5py.File(file, "w") as content:
+                content["time"], content["y"], content["x"] = time, response, drive
+        case ".tdms":
+            properties = {"wf_increment": step, "wf_start_offset": 0.0, "wf_samples": len(time)}
+            with nptdms.TdmsWriter(file) as writer:
+                named = [("y", response), ("x", drive)]
+                writer.write_segment([nptdms.ChannelObject("rig", *one, properties=properties) for one in named])
+        case ".uff":
+            both = {"type": 58, "func_type": 1, "rsp_node": 1, "rsp_dir": 1, "ref_node": 1, "ref_dir": 1, "binary": 0}
+            both |= {"abscissa_spacing": 1, "abscissa_spec_data_type": 17, "ordinate_spec_data_type": 8}
+            both |= {"orddenom_spec_data_type": 0, "ref_ent_name": "NONE", "x": time}
+            for name, data in (("y", response), ("x", drive)):
+                pyuff.UFF(str(file)).write_sets(both | {"data": data, "id1": name, "rsp_ent_name": name}, "add")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".mat", ".h5", ".tdms", ".uff"])
+def test_every_format_gives_the_same_numbers(channels, suffix, tmp_path):
+    file = tmp_path / f"record{suffix}"
+    write(file, *channels)
+    read = vines.read_recording(file, "y:mm", "x:um", rate=1 / (channels[0][1] - channels[0][0]))
+    assert np.allclose(read.response, 1e-3 * channels[1], rtol=1e-9, atol=1e-12)
+    assert np.allclose(read.drive, 1e-6 * channels[2], rtol=1e-9, atol=1e-15)
+    own = vines.Recording(str(file), ("y", "x"), read.sample_time, 1e-3 * channels[1], 1e-6 * channels[2])
+    fits = [vines.fit_recordings(one) for one in (own, read)]
+    # UFF58 as text has 12 digits.
+    assert np.allclose(fits[0].parameters["value"], fits[1].parameters["value"], rtol=1e-5)
+    assert len(fits[1].parts) >= 4
+
+
+def test_the_command_reads_a_mat_file(channels, tmp_path):
+    file = tmp_path / "record.mat"
+    write(file, *channels)
+    command = [sys.executable, "-m", "vines", "fit", file, "--response", "y:mm", "--drive", "x:um"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "chi-square" in done.stdout
+    done = subprocess.run([*command, "--time", "clock"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "no channel clock" in done.stderr
+
+
+def test_what_is_missing_is_named(channels, tmp_path):
+    file = tmp_path / "record.csv"
+    write(file, *channels)
+    for words, arguments in (
+        ("no channel z; it has time, y, x", ("z", "x")),
+        ("the unit furlong is unknown", ("y:furlong", "x")),
+    ):
+        with pytest.raises(ValueError, match=words):
+            vines.read_recording(file, *arguments)
+    time = channels[0].copy()
+    time[100:] += 1.0
+    write(file, time, *channels[1:])
+    with pytest.raises(ValueError, match="interrupted there"):
+        vines.read_recording(file, "y:mm", "x:um")
