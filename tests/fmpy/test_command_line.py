@@ -178,3 +178,27 @@ def test_a_rehearsal_ends_well_and_its_notebook_has_its_figures(tmp_path):
     assert figures
     for name in figures:
         ElementTree.parse(tmp_path / name)
+
+
+def test_fit_reads_recordings_and_says_what_is_wrong_with_one(call, tmp_path):
+    options = ["--set", "backbone.points=8", "--set", "chain.snr=60", "--set", "backbone.C_to=0.3"]
+    assert call("backbone", *options, "--record", "run.csv").returncode == 0
+    found = printed(call, "fit", "run.csv", "--set", "plant.r=0.7", "--set", "plant.b=0.0105", "--json")
+    assert found["describes"]
+    assert sum(part["kind"] == "held" for part in found["parts"]) >= 6
+    for symbol, truth in (("r", 0.65), ("b", 0.01), ("epsilon", 0.032 / 3.807)):
+        one = next(one for one in found["parameters"] if one["symbol"] == symbol)
+        assert abs(one["value"] - truth) < 4 * one["uncertainty"] < 0.2 * truth
+    lines = (tmp_path / "run.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "gap.csv").write_text("".join(lines[:3000] + lines[3100:]))
+    (tmp_path / "record.mat").touch()
+    for arguments, words in (
+        (["gap.csv"], "gap.csv, row 3001: the time goes from"),
+        (["record.mat"], "`python -m vines fit record.mat`"),
+        (["run.csv", "--response", "z"], "run.csv has no channel `z`; it has time, response"),
+        (["run.csv", "--drive", "reference:-1"], "wrong sign"),
+        (["run.csv", "--drive", "response", "--response", "reference"], "swapped"),
+    ):
+        done = call("fit", *arguments)
+        assert done.returncode != 0
+        assert words in done.stderr
