@@ -622,11 +622,7 @@ fn part(
     let slopes = neighbours(curve, here)[1].map_or([0.0; 2], |other| {
         [1, 2].map(|i| (other[i] - here[i]) / (other[0] - here[0]))
     });
-    let late = if kind == Kind::Sweep {
-        LAG * change * (alike - 1.0).max(0.0).sqrt()
-    } else {
-        0.0
-    };
+    let late = LAG * change * (alike - 1.0).max(0.0).sqrt();
     let beside = estimate.phase_error.value.abs() * base.value / level.value;
     let linear = scene.linear();
     let drive = Estimate::new(base.value, &[base.uncertainty, slopes[0] * late, beside * base.value]);
