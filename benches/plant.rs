@@ -4,7 +4,7 @@
 //! cargo bench --bench plant
 //! ```
 //!
-//! Absolute times depend on the machine and on what else it does; the ratios hardly do: plant and baseline take
+//! Absolute times depend on the machine and on what else it does; the ratios in the table at the end hardly do: plant and baseline take
 //! short turns. The table has medians over the pairs of turns. CONTRIBUTING.md tells which ratios a change must keep.
 
 mod baseline;
@@ -14,6 +14,7 @@ mod turns;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
+use criterion::{Criterion, Throughput};
 use scene::{PERIODS, SAMPLES, Scene, chatter, lock, nothing, quiet, sensors, settled, states};
 
 /// Seconds for the table.
@@ -226,12 +227,19 @@ fn table(cases: &[Case]) {
 
 fn main() {
     let cases = cases();
+    let mut criterion = Criterion::default()
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2))
+        .configure_from_args();
+    let mut group = criterion.benchmark_group("plant");
+    for case in &cases {
+        group.throughput(Throughput::Elements((case.run)()));
+        group.bench_function(&case.name, |b| b.iter(&case.run));
+    }
+    group.finish();
+    criterion.final_summary();
     // `cargo test --benches` only wants to see each run once.
     if std::env::args().any(|argument| argument == "--bench") {
         table(&cases);
-    } else {
-        for case in &cases {
-            black_box((case.run)());
-        }
     }
 }

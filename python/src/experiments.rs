@@ -89,10 +89,10 @@ pub fn fit(py: Python<'_>, scene: &Scene, points: Vec<[f64; 6]>, known: Vec<Stri
     fitted(py, scene, &points, &known, &[])
 }
 
-/// Origin, names of the channels, time from sample to sample (s), response (m) and base (m).
+/// A recording: origin, names of the channels, time from sample to sample (s), response (m) and base (m).
 type Channels = (String, [String; 2], f64, Vec<f64>, Vec<f64>);
 
-/// `recordings`: origin, names of the channels, time from sample to sample (s), response (m) and base (m).
+/// The fit of recordings.
 #[pyfunction]
 pub fn fit_recordings(
     py: Python<'_>,

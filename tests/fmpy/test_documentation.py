@@ -16,7 +16,7 @@ DOCS = ROOT / "docs"
 PAGES = sorted(set(DOCS.glob("*.md")) - {DOCS / "SUMMARY.md"})
 # Pages written by hand: lines of one, and of all with the README; words of a sentence.
 MOST_LINES = 200
-MOST_LINES_IN_ALL = 2520
+MOST_LINES_IN_ALL = 2400
 # Written by a test of the controller.
 MADE = ("controller-settings.md",)
 MOST_WORDS = 37

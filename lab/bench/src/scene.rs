@@ -7,6 +7,7 @@ mod names;
 mod overrides;
 
 use std::borrow::Cow;
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 use lovines::{Cavity, InvalidValue, Restitution, State};
@@ -125,7 +126,7 @@ impl Scene {
 
     /// The controller's sample time, s: rig and controller agree on it before anything is measured.
     pub fn sample_time(&self) -> f64 {
-        Dimensionless::of(&self.plant, self.amplitude).natural_period() / self.controller.samples_per_period
+        TAU / self.plant.natural_frequency() / self.controller.samples_per_period
     }
 }
 

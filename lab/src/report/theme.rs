@@ -149,15 +149,18 @@ mod tests {
 
     #[test]
     fn the_live_page_has_the_colours_of_the_table() {
-        let style = include_str!("../../../live/page/style.css");
-        for name in [THEORY, EXACT, MEASURED, PARTICLE, MODULATION] {
-            for name in [name, unstable(name)] {
-                let start = format!("--{}: ", name.replace(' ', "-"));
-                let values = style.match_indices(&start).map(|(at, _)| at + start.len());
-                let values: Vec<&str> = values.map(|from| &style[from..from + 7]).collect();
-                assert_eq!(values, row(name)[1..], "{start}");
-            }
+        let style = include_str!("../../../live/page/style.css").to_uppercase();
+        let (light, dark) = style.split_once("@MEDIA (PREFERS-COLOR-SCHEME: DARK)").unwrap();
+        let mut found = 0;
+        for [name, on_paper, on_screen] in STYLES.iter() {
+            let property = format!("--{}: ", name.replace([' ', ':'], "-").to_uppercase());
+            let value = |sheet: &str| Some(sheet.split_once(&property)?.1[..7].to_string());
+            let Some(colour) = value(light) else { continue };
+            assert_eq!(colour, *on_paper, "{name}");
+            assert_eq!(value(dark).unwrap_or(colour), *on_screen, "{name} on a dark screen");
+            found += 1;
         }
+        assert_eq!(found, 10, "rows of the table that the page has");
     }
 
     #[test]

@@ -240,20 +240,3 @@ fn the_page_has_all_its_files_and_answers_at_its_own_address_only() {
     write!(other, "GET / HTTP/1.1\r\nHost: example.org\r\n\r\n").unwrap();
     assert!(std::io::read_to_string(other).unwrap().starts_with("HTTP/1.1 403"));
 }
-
-#[test]
-fn the_page_has_the_colours_of_the_figures() {
-    let style = include_str!("../../../live/page/style.css").to_uppercase();
-    let (light, dark) = style.split_once("@MEDIA (PREFERS-COLOR-SCHEME: DARK)").unwrap();
-    let mut found = 0;
-    for row in include_str!("../../src/report/styles.csv").lines().skip(1) {
-        let [name, on_paper, on_screen] = row.split(',').collect::<Vec<_>>().try_into().unwrap();
-        let property = format!("--{}: ", name.replace([' ', ':'], "-").to_uppercase());
-        let value = |sheet: &str| Some(sheet.split_once(&property)?.1[..7].to_string());
-        let Some(colour) = value(light) else { continue };
-        assert_eq!(colour, on_paper, "{name}");
-        assert_eq!(value(dark).unwrap_or(colour), on_screen, "{name} on a dark screen");
-        found += 1;
-    }
-    assert_eq!(found, 10, "rows of the table that the page has");
-}

@@ -7,13 +7,14 @@
 //! cargo bench -p fmi2-boundary
 //! ```
 //!
-//! The table is of the least times of many short runs that take turns: those hardly depend on what else the
+//! The table at the end is of the least times of many short runs that take turns: those hardly depend on what else the
 //! machine does.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
+use criterion::{Criterion, Throughput};
 use fmi2_boundary::{Fmu, Interface, Master};
 use lovines::{Drive, Parameters, Plant, State};
 
@@ -219,11 +220,17 @@ fn least(cases: &mut [Case]) {
 }
 
 fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
     let mut cases = cases();
+    let mut group = criterion.benchmark_group("LoViNes");
+    for (name, run) in &mut cases {
+        group.throughput(Throughput::Elements(RUN.into()));
+        group.bench_function(name.as_str(), |b| b.iter(&mut *run));
+    }
+    group.finish();
+    criterion.final_summary();
     // `cargo test --benches` only wants to see each run once.
     if std::env::args().any(|argument| argument == "--bench") {
         least(&mut cases);
-    } else {
-        cases.iter_mut().for_each(|(_, run)| run());
     }
 }

@@ -99,9 +99,9 @@ pub fn decay_points(record: &Record, scene: &Scene) -> DecayPoints {
     let windows = fitted(&values, dt, omega, scene.record.window_periods);
     // Loss of amplitude by the impacts alone, m/s; the mean over the first period belongs to the 1:1 motion.
     let damping = scene.linear().damping_rate;
-    let taken = |window: &Window| -window.fit.rate - damping * window.fit.amplitude;
+    let taken = |window: &SlidingFit| -window.fit.rate - damping * window.fit.amplitude;
     let at_release = mean(windows.iter().take(PER_PERIOD as usize).map(taken));
-    let is_linear = |window: &Window| !has_impacts && taken(window) < KEPT * at_release;
+    let is_linear = |window: &SlidingFit| !has_impacts && taken(window) < KEPT * at_release;
     let end = if windows.iter().any(is_linear) {
         DecayEnd::Linear
     } else if has_impacts && until + 2.0 * half_period < last.time {
@@ -118,13 +118,13 @@ pub fn decay_points(record: &Record, scene: &Scene) -> DecayPoints {
 }
 
 /// A fit of some samples; `time`: its middle since the release, s.
-struct Window {
+struct SlidingFit {
     samples: Range<usize>,
     time: f64,
     fit: Harmonic,
 }
 
-impl Window {
+impl SlidingFit {
     fn point(&self, decay: &[Sample], d: &Dimensionless) -> FreeDecayPoint {
         let Harmonic { amplitude, omega, rate, uncertainties, .. } = self.fit;
         let speeds = decay[self.samples.clone()]
@@ -149,7 +149,7 @@ impl Window {
 }
 
 /// Fits in a sliding window of `periods`. Each fit starts from the frequency of the one before, the first from `omega`.
-fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<Window> {
+fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<SlidingFit> {
     let period = TAU / omega / dt;
     let window = (periods * period).round() as usize + 1;
     let step = ((period / PER_PERIOD).round() as usize).max(1);
@@ -158,7 +158,7 @@ fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<Window> 
         let fit = harmonic(values, dt, omega)?;
         omega = fit.omega;
         let time = (n as f64 + 0.5 * (window - 1) as f64) * dt;
-        Some(Window { samples: n..n + window, time, fit })
+        Some(SlidingFit { samples: n..n + window, time, fit })
     })
     .collect()
 }

@@ -10,7 +10,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use lovines::{Cavity, Drive, Event, InvalidValue, Outcome, Parameters, Plant, Restitution, State};
+use lovines::cavity::Rebound;
+use lovines::{Cavity, Drive, Event, InvalidValue, Outcome, Parameters, Plant, Restitution, State, Wall};
 use nalgebra::{Complex, Matrix4, Matrix6, Vector4, Vector6};
 use thiserror::Error;
 
@@ -241,13 +242,13 @@ impl Ideal {
         motion: impl Fn(&Dimensionless) -> Option<Candidate>,
     ) -> Option<Self> {
         let [plus, minus] = p.gaps();
-        let half_width = 0.5 * (plus + minus);
-        let laws = laws(p);
+        let [half_width, middle] = [0.5 * (plus + minus), 0.5 * (plus - minus)];
+        let rebound = Rebound::new(p);
         let mut speed = half_width * p.natural_frequency();
         let mut ideal = None;
         for _ in 0..SPEED_ROUNDS {
-            let restitution = laws.map(|law| coefficient(law, speed).clamp(p.cavity.least_restitution, 1.0));
-            let restitution = 0.5 * (restitution[0] + restitution[1]);
+            let [plus, minus] = Wall::BOTH.map(|wall| rebound.mean(wall, speed));
+            let restitution = 0.5 * (plus + minus);
             let plant = Parameters { half_width, restitution, ..*p };
             let scene = Dimensionless { definition, ..Dimensionless::of(&plant, 0.0) };
             let motion = motion(&scene)?;
@@ -262,7 +263,7 @@ impl Ideal {
                 state: State {
                     q1: start.q1 * unit,
                     dq1: start.dq1 * rate,
-                    q2: start.q2 * unit - 0.5 * (plus - minus),
+                    q2: start.q2 * unit - middle,
                     dq2: start.dq2 * rate,
                 },
                 omega: motion.omega * scene.omega0,
@@ -314,8 +315,8 @@ impl Ideal {
     fn with_effects(&self, p: &Parameters, share: f64) -> Parameters {
         let r = self.restitution;
         let between = |from: f64, to: f64| from + share * (to - from);
-        let restitution = laws(p).map(|law| {
-            Some(match law {
+        let restitution = p.cavity.restitution.map(|law| {
+            Some(match law.unwrap_or(Restitution::Constant(p.restitution)) {
                 Restitution::Constant(to) => Restitution::Constant(between(r, to)),
                 Restitution::Viscoelastic(to) => {
                     Restitution::Viscoelastic(between((1.0 - r) / self.speed.powf(0.2), to))
@@ -335,21 +336,6 @@ impl Ideal {
             ..p.cavity
         };
         Parameters { cavity, ..*p }
-    }
-}
-
-/// The laws of restitution of the walls at w = b_plus and w = -b_minus.
-fn laws(p: &Parameters) -> [Restitution; 2] {
-    let constant = Restitution::Constant(p.restitution);
-    p.cavity.restitution.map(|law| law.unwrap_or(constant))
-}
-
-/// The coefficient of restitution at the speed of approach `v`, m/s, before limits.
-fn coefficient(law: Restitution, v: f64) -> f64 {
-    match law {
-        Restitution::Constant(r) => r,
-        Restitution::Viscoelastic(k) => 1.0 - k * v.powf(0.2),
-        Restitution::Plastic(yield_speed) => (yield_speed / v).powf(0.25).min(1.0),
     }
 }
 
