@@ -538,6 +538,12 @@ impl<'a> Problem<'a> {
         let mut here = self.sums(&x, &mut speeds)?;
         let mut damping = 1e-3;
         for _ in 0..ROUNDS {
+            // What an undamped step would gain, and what rounding allows to be gained.
+            let least = 1e-9 * (1.0 + here.chi_square);
+            let undamped = here.normal.cholesky().map(|matrix| matrix.solve(&here.gradient));
+            if undamped.is_some_and(|step| step.dot(&here.gradient) < least) {
+                return Some((x, here));
+            }
             let mut matrix = here.normal;
             for i in 0..UNKNOWNS {
                 matrix[(i, i)] *= 1.0 + damping;
@@ -551,7 +557,7 @@ impl<'a> Problem<'a> {
                 Some(sums) => {
                     let gained = here.chi_square - sums.chi_square;
                     (x, here, speeds) = (next, sums, next_speeds);
-                    if gained < 1e-9 * (1.0 + here.chi_square) && damping < 1e-6 {
+                    if gained < 1e-3 * least {
                         return Some((x, here));
                     }
                     damping *= 0.1;
@@ -638,6 +644,10 @@ impl<'a> Problem<'a> {
         let mut by_speed = slope(speed)?;
         for _ in 0..ROUNDS {
             let mut step = -by_speed.dot(&residual) / by_speed.norm_squared();
+            // Where the curve does not change with the speed, or is not a number, no shorter step would end the search.
+            if !step.is_finite() {
+                break;
+            }
             let next = loop {
                 let there = self.residual(x, point, speed + step);
                 match there.filter(|there| there.norm_squared() <= residual.norm_squared()) {
