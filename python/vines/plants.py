@@ -1,5 +1,6 @@
 """Plants: oscillator, particle and walls, advanced from event to event in closed form."""
 
+import math
 import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -340,9 +341,9 @@ class Plant(_native.Plant):
                 f"values for {max(sizes) if min(sizes) else 0} plants: one is allowed here; Batch has more"
             )
         numbers = [float(value.item()) for value in values]
-        values, first = numbers[: -len(_START)], numbers[-len(_START) :]
-        ideal = [np.nan] * (len(_PARAMETERS) + len(_CAVITY) - len(values))
-        return super().__new__(cls, values + ideal, first)
+        given, first = numbers[: -len(_START)], numbers[-len(_START) :]
+        ideal = [math.nan] * (len(_PARAMETERS) + len(_CAVITY) - len(given))
+        return super().__new__(cls, given + ideal, first)
 
     def __repr__(self) -> str:
         state = ", ".join(f"{name} = {value:.6g}" for name, value in self.state.items())

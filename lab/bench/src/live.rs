@@ -19,7 +19,7 @@ const ENOUGH: usize = 12;
 pub struct LastImpacts(pub Vec<Impact>);
 
 impl LastImpacts {
-    /// Forgets the impacts before the last [`KEPT`].
+    /// Forgets all impacts but the last forty.
     pub fn trim(&mut self) {
         let surplus = self.0.len().saturating_sub(KEPT);
         self.0.drain(..surplus);
