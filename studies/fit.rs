@@ -5,7 +5,7 @@
 //! hold and the decay of `vines identify`, cut at both ends (`recordings`). For each parameter, of the fits that are not rejected:
 //! the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the error over u, and that over the
 //! Cramér–Rao bound of the same points; and the numbers of fits that are rejected, and of rigs without a fit or without
-//! the bound (at their true parameters, the curve ends before one of the points).
+//! the bound (at the true parameters, no place of the curve is found near one of the points).
 //!
 //! `effects` gives each rig one hidden effect of its cavity, in turn friction, tilt, and two laws of restitution, that moves its points by more than
 //! 5 u, and half of the rigs none. The table has the numbers of rigs that are flagged, because the ideal cavity does not describe their points, that
