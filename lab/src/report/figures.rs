@@ -257,7 +257,10 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
     let (width, height) = SIZE;
     let amplitude = "amplitude of the response, mm";
     let mut backbone = Panel::new((x, amplitude), (y, "frequency of phase resonance, Hz"))
-        .heading("Measured points, scene and fit", verdict.unwrap_or_default())
+        .heading(
+            "Measured points, scene and fit",
+            &verdict.unwrap_or_default().replace("; ", ";\n"),
+        )
         .legend(Legend::UpperRight);
     backbone.add(Shape::Line(1.6), expected, THEORY, "scene");
     backbone.add(Shape::Line(1.6), model, EXACT, "fit");
