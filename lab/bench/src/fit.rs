@@ -201,7 +201,9 @@ const ROUNDS: usize = 200;
 /// Restitution coefficients from which the minimisation begins, besides the expected one: chi-square may have several minima.
 const STARTS: [f64; 4] = [0.4, 0.55, 0.7, 0.85];
 /// Particle speeds from which the nearest place on the curve is searched for, if that of theory is not on it.
-const SPEEDS: [f64; 4] = [0.8, 0.9, 0.7, 1.0];
+const SPEEDS: [f64; 9] = [0.8, 0.9, 0.7, 1.0, 0.6, 1.1, 0.5, 1.2, 0.4];
+/// Relative gain of the squared distance from the curve at which the nearest place on it counts as found.
+const NEAREST: f64 = 1e-12;
 /// Relative uncertainty of a value that is known exactly: above rounding.
 const EXACT: f64 = 1e-9;
 /// Fewest points: two equations each for five parameters, and one to spare.
@@ -463,12 +465,14 @@ struct Problem<'a> {
     free: bool,
 }
 
-/// Relative shifts of frequency and drive at equal amplitude by an effect, and their gradients, at some unknowns.
+/// Relative shifts of frequency and drive at equal amplitude by an effect, and their derivatives, at some unknowns and a particle speed.
 #[derive(Clone, Copy)]
 struct Shift {
     at: Unknowns,
+    speed: f64,
     value: [f64; 2],
     gradient: [Unknowns; 2],
+    by_speed: [f64; 2],
 }
 
 /// A place on the curve: amplitude of the response, m, frequency, rad/s, and amplitude of the base, m.
@@ -534,6 +538,12 @@ impl<'a> Problem<'a> {
         let mut here = self.sums(&x, &mut speeds)?;
         let mut damping = 1e-3;
         for _ in 0..ROUNDS {
+            // What an undamped step would gain, and what rounding allows to be gained.
+            let least = 1e-9 * (1.0 + here.chi_square);
+            let undamped = here.normal.cholesky().map(|matrix| matrix.solve(&here.gradient));
+            if undamped.is_some_and(|step| step.dot(&here.gradient) < least) {
+                return Some((x, here));
+            }
             let mut matrix = here.normal;
             for i in 0..UNKNOWNS {
                 matrix[(i, i)] *= 1.0 + damping;
@@ -547,7 +557,7 @@ impl<'a> Problem<'a> {
                 Some(sums) => {
                     let gained = here.chi_square - sums.chi_square;
                     (x, here, speeds) = (next, sums, next_speeds);
-                    if gained < 1e-9 * (1.0 + here.chi_square) && damping < 1e-6 {
+                    if gained < 1e-3 * least {
                         return Some((x, here));
                     }
                     damping *= 0.1;
@@ -634,6 +644,10 @@ impl<'a> Problem<'a> {
         let mut by_speed = slope(speed)?;
         for _ in 0..ROUNDS {
             let mut step = -by_speed.dot(&residual) / by_speed.norm_squared();
+            // Where the curve does not change with the speed, or is not a number, no shorter step would end the search.
+            if !step.is_finite() {
+                break;
+            }
             let next = loop {
                 let there = self.residual(x, point, speed + step);
                 match there.filter(|there| there.norm_squared() <= residual.norm_squared()) {
@@ -643,9 +657,12 @@ impl<'a> Problem<'a> {
                 }
             };
             let Some(next) = next else { break };
+            // Far from the curve the steps become short, and chi-square does not need the last of them.
+            let gained = residual.norm_squared() - next.norm_squared();
+            let is_near = gained < NEAREST * (1.0 + residual.norm_squared());
             (speed, residual) = (speed + step, next);
             by_speed = slope(speed)?;
-            if step.abs() < 1e-12 {
+            if is_near || step.abs() < 1e-12 {
                 break;
             }
         }
@@ -670,8 +687,9 @@ impl<'a> Problem<'a> {
     /// The curve at a speed less a point, over its standard uncertainties.
     fn residual(&self, x: &Unknowns, point: usize, speed: f64) -> Option<Vector3<f64>> {
         let Curve { response, mut omega, mut drive } = self.curve(x, speed)?;
-        if let Some(Shift { at, value, gradient }) = self.shifts.get(point) {
-            let [by_omega, by_drive] = [0, 1].map(|i| value[i] + gradient[i].dot(&(x - at)));
+        if let Some(Shift { at, speed: near, value, gradient, by_speed }) = self.shifts.get(point) {
+            let [by_omega, by_drive] =
+                [0, 1].map(|i| value[i] + gradient[i].dot(&(x - at)) + by_speed[i] * (speed - near));
             (omega, drive) = (omega * (1.0 + by_omega), drive * (1.0 + by_drive));
         }
         let point = &self.points[point];

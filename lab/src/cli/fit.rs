@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 use vines::fit::{Effect, Fit, FitReport, Found, Known, Part, decimals, find, parts};
 use vines::points::{Channel, Channels, Column, Measurement, read};
-use vines::report::Table;
+use vines::report::{Table, write_fit};
 
 use super::failure::Failure;
 use super::options::{SceneArguments, positive};
@@ -77,6 +77,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
+    /// Write a figure (SVG): the points beside the scene and the fit, and the residuals, over amplitude
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
+
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
@@ -138,6 +142,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             .map_or_else(String::new, |verdict| format!("{verdict}\n"));
         parts + &summary(&report, &fit, points.len(), skipped) + &verdict
     })?;
+    if let Some(path) = &arguments.figure {
+        let file = write_fit(&points, &fit, &scene, verdict.as_deref(), path).map_err(Failure::run)?;
+        if !arguments.json {
+            text += &written(&[file]);
+        }
+    }
     if let Some(path) = &arguments.out {
         let plant = plant_section(&report, &plant, verdict.as_deref());
         let scene = arguments.scene.with_plant(&plant)?;

@@ -12,8 +12,9 @@ use super::figure::{
     AMPLITUDE_OF_V, DETUNING, Figure, Legend, Marked, Panel, Place, SIZE, SPEED, Shape, amplitude, caption, rig,
 };
 use super::theme::{EXACT, INK, MEASURED, MODULATION, PARTICLE, THEORY};
-use crate::comparison::{Comparison, TrackedComparison};
-use crate::numerics::{HarmonicBasis, equally_spaced, range};
+use crate::comparison::{Comparison, ExactCurve, TrackedComparison};
+use crate::fit::{Fit, MeasuredPoint};
+use crate::numerics::{Estimate, HarmonicBasis, equally_spaced, range};
 use crate::orbit::{self, ContinuationLimits, FrequencyResponse, Periodic};
 use crate::record::Record;
 use crate::scene::{Definition, Dimensionless, Scene};
@@ -216,6 +217,86 @@ fn tracked_drive(tracked: &TrackedComparison) -> Panel {
     let bars = places().zip(points().map(|point| point.at.u_g));
     error_bars(&mut panel, bars, true, high);
     panel
+}
+
+/// Measured points beside the backbones of a scene and of the fitted rig, and below them the residuals, over amplitude.
+///
+/// The places of the fit are those nearest to the points, with the effects of the cavity that it names.
+pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Option<&str>) -> Figure {
+    let p = scene.dimensionless();
+    let used: Vec<&MeasuredPoint> = (0..points.len())
+        .filter(|n| !fit.left_out.contains(n))
+        .map(|n| &points[n])
+        .collect();
+    let place = |point: &MeasuredPoint| (1e3 * point.response.value, point.omega.value / TAU);
+    let mut model: Vec<Place> = used
+        .iter()
+        .zip(&fit.residuals)
+        .map(|(point, residual)| {
+            let at = |measured: Estimate, over_u: f64| measured.value + over_u * measured.uncertainty;
+            (
+                1e3 * at(point.response, residual[0]),
+                at(point.omega, residual[1]) / TAU,
+            )
+        })
+        .collect();
+    model.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let [amplitudes, frequencies] = [|place: Place| place.0, |place: Place| place.1]
+        .map(|part| range((f64::MAX, f64::MIN), points.iter().map(|point| part(place(point)))));
+    let margin = 0.06 * (amplitudes.1 - amplitudes.0);
+    let x = (amplitudes.0 - margin, amplitudes.1 + margin);
+    let exact = ExactCurve::of(&p);
+    let expected: Vec<Place> = exact
+        .places()
+        .iter()
+        .map(|[c, sigma, _]| (1e3 * c * p.b, (p.omega0 + p.omega_change(*sigma)) / TAU))
+        .filter(|(amplitude, _)| (x.0..x.1).contains(amplitude))
+        .collect();
+    let (low, high) = range(frequencies, expected.iter().map(|place| place.1));
+    let y = (low - 0.08 * (high - low), high + 0.3 * (high - low));
+    let (width, height) = SIZE;
+    let amplitude = "amplitude of the response, mm";
+    let mut backbone = Panel::new((x, amplitude), (y, "frequency of phase resonance, Hz"))
+        .heading(
+            "Measured points, scene and fit",
+            &verdict.unwrap_or_default().replace("; ", ";\n"),
+        )
+        .legend(Legend::UpperRight);
+    backbone.add(Shape::Line(1.6), expected, THEORY, "scene");
+    backbone.add(Shape::Line(1.6), model, EXACT, "fit");
+    circles(&mut backbone, points.iter().map(place), "measured");
+    let bars = points.iter().map(|point| (place(point), point.omega.uncertainty / TAU));
+    error_bars(&mut backbone, bars, true, y.1 - y.0);
+    let left_out = fit.left_out.iter().map(|n| place(&points[*n])).collect();
+    backbone.add(Shape::Cross, left_out, MEASURED, "left out");
+
+    let residuals = fit.residuals.iter().flatten().map(|one| one.abs());
+    let most = 1.1 * residuals.fold(3.0, f64::max);
+    let model = if fit.is_rejected() { "rejected" } else { "not rejected" };
+    let text = format!(
+        "chi-square {:.1} for {} degrees of freedom: {model}",
+        fit.chi_square, fit.degrees
+    );
+    let mut below = Panel::new((x, amplitude), ((-most, 1.5 * most), "fit less measured, over u"))
+        .at([0.0, height, width, height])
+        .heading("Residuals over their standard uncertainties", &text)
+        .legend(Legend::UpperRight);
+    for limit in [-1.96, 1.96] {
+        below.add(Shape::Dashed(1.0), vec![(x.0, limit), (x.1, limit)], INK, "±1.96 u");
+    }
+    for (n, (shape, name)) in [
+        (Shape::Dot(3.0), "amplitude"),
+        (Shape::Circle(3.5), "frequency"),
+        (Shape::Square, "drive"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let places = used.iter().zip(&fit.residuals);
+        let places = places.map(|(point, residual)| (place(point).0, residual[n])).collect();
+        below.add(shape, places, [PARTICLE, MEASURED, EXACT][n], name);
+    }
+    Figure { size: (width, 2.0 * height), panels: vec![backbone, below] }
 }
 
 /// A time (periods), an amplitude and a detuning.

@@ -7,13 +7,15 @@ use phase_lock::ConfigError;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::figures::{backbone, manifold, regimes, tracked_with_drive};
+use super::figures::{backbone, fitted, manifold, regimes, tracked_with_drive};
 use super::theme::dark;
 use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
 use crate::files::{self, FileError};
+use crate::fit::{Fit, MeasuredPoint};
 use crate::orbit::Periodic;
 use crate::record::{Sample, table};
 use crate::regime::Regime;
+use crate::scene::Scene;
 use crate::sweep::{Map, MapCell, SweepError};
 
 /// Why a report could not be computed, or the files of a run could not be written.
@@ -64,6 +66,17 @@ pub fn write_tracked(result: &TrackedComparison, out: &Path) -> Result<Vec<PathB
         ("tracked.svg", tracked_with_drive(result).svg()),
     ];
     Ok(files::write(out, files)?)
+}
+
+/// Writes the figure of a fit to `file`: measured points, scene, fit and residuals.
+pub fn write_fit(
+    points: &[MeasuredPoint],
+    fit: &Fit,
+    scene: &Scene,
+    verdict: Option<&str>,
+    file: &Path,
+) -> Result<PathBuf, ReportError> {
+    Ok(files::write_file(file, &fitted(points, fit, scene, verdict).svg())?)
 }
 
 /// Writes `interrupted.csv`: the samples of an experiment that ended early, or without a motion that can be identified.

@@ -304,7 +304,7 @@ fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
     let tracked = vines(&["backbone", "--set", "backbone.points=8", "--out", out]);
     assert!(tracked.status.success(), "{tracked:?}");
     assert!(!String::from_utf8_lossy(&tracked.stdout).contains("do not belong"));
-    let (points, rig) = (format!("{out}/tracked.csv"), format!("{out}/rig.toml"));
+    let [points, rig, figure] = ["tracked.csv", "rig.toml", "fit.svg"].map(|name| format!("{out}/{name}"));
     let fit = vines(&[
         "fit",
         &points,
@@ -314,6 +314,8 @@ fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
         "m=0.032±0.0003",
         "--out",
         &rig,
+        "--figure",
+        &figure,
     ]);
     let text = String::from_utf8_lossy(&fit.stdout).into_owned();
     assert!(
@@ -322,6 +324,10 @@ fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
     );
     let scene = json(&["theory", "--scene", &rig, "--json"])["scene"].clone();
     assert!((scene["r"].as_f64().unwrap() - 0.65).abs() < 2e-3, "{scene}");
+    let drawn = std::fs::read_to_string(figure).unwrap();
+    for label in ["measured", "scene", "fit", "±1.96 u", ": not rejected"] {
+        assert!(drawn.contains(&format!("{label}<")), "{label}");
+    }
     let refused = vines(&["fit", &points, "--column", "A=amplitude:mm"]);
     assert!(
         String::from_utf8_lossy(&refused.stderr).contains("has no column `amplitude`"),

@@ -16,7 +16,8 @@ use vines_model::numerics::{Estimate, mean};
 use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
 
 use super::{
-    Curve, Fit, FitError, Known, MeasuredPoint, Problem, Quantity, Shift, UNKNOWNS, Unknowns, checked, fit, unknowns,
+    Curve, FEWEST, Fit, FitError, Known, MeasuredPoint, Problem, Quantity, Shift, UNKNOWNS, Unknowns, checked, fit,
+    unknowns,
 };
 use crate::scene::Parameters;
 
@@ -268,7 +269,13 @@ impl Problem<'_> {
     /// motions.
     fn with_effect(&self, effect: Effect, ideal: &Fit, expected: &Parameters) -> Option<Candidate> {
         let mut best: Option<Candidate> = None;
-        for (x, strength) in [(ideal.x, 1.0), (unknowns(expected), 1.0), (ideal.x, 4.0)] {
+        // Most effects shift the points of large amplitude least.
+        let mut strongest = self.points.clone();
+        strongest.sort_by(|one, other| other.response.value.total_cmp(&one.response.value));
+        strongest.truncate(strongest.len().div_ceil(2).max(FEWEST));
+        let strongest = Problem::new(strongest, self.definition, self.known).fit(expected);
+        let first = strongest.map_or(ideal.x, |fit| fit.x);
+        for (x, strength) in [(first, 1.0), (ideal.x, 1.0), (unknowns(expected), 1.0), (ideal.x, 4.0)] {
             if strength > 1.0 && !effect.adds_a_parameter() {
                 continue;
             }
@@ -312,6 +319,7 @@ impl Problem<'_> {
             motions[n] = Some(motion);
             Some(shift)
         };
+        let mut slopes = vec![[0.0; 2]; self.points.len()];
         let mut problem = Problem {
             points: self.points.clone(),
             shifts: Vec::new(),
@@ -321,7 +329,7 @@ impl Problem<'_> {
         // Without shifts, the particle speeds at which the points are nearest.
         let mut here = problem.sums(&x, &mut vec![None; self.points.len()])?;
         here.chi_square = f64::INFINITY;
-        let mut next = x;
+        let (mut next, mut next_speeds) = (x, here.speeds.clone());
         for _ in 0..ROUNDS {
             let mut share = 1.0;
             // A step that reduces chi-square; the first one is to the start.
@@ -331,20 +339,23 @@ impl Problem<'_> {
                 } else {
                     x + (next - x) * share
                 };
-                let mut values = here
-                    .speeds
-                    .iter()
-                    .enumerate()
-                    .map(|(n, particle)| shift(n, &at, *particle));
-                let gradient = [Unknowns::zeros(); 2];
-                let shifts = values.try_fold(Vec::new(), |mut shifts, value| {
-                    shifts.push(Shift { at, value: value?, gradient });
-                    Some(shifts)
+                let ends = here.speeds.iter().zip(&next_speeds);
+                let speeds: Vec<f64> = ends.map(|(from, to)| from + share * (to - from)).collect();
+                let shifts: Option<Vec<Shift>> = (0..speeds.len())
+                    .map(|n| {
+                        Some(Shift {
+                            at,
+                            speed: speeds[n],
+                            value: shift(n, &at, speeds[n])?,
+                            gradient: [Unknowns::zeros(); 2],
+                            by_speed: slopes[n],
+                        })
+                    })
+                    .collect();
+                let there = shifts.and_then(|shifts| {
+                    problem.shifts = shifts;
+                    problem.sums(&at, &mut speeds.into_iter().map(Some).collect::<Vec<_>>())
                 });
-                problem.shifts = shifts.unwrap_or_default();
-                let mut speeds: Vec<Option<f64>> = here.speeds.iter().copied().map(Some).collect();
-                let is_complete = problem.shifts.len() == problem.points.len();
-                let there = is_complete.then(|| problem.sums(&at, &mut speeds)).flatten();
                 if let Some(there) = there.filter(|there| there.chi_square <= here.chi_square) {
                     (x, here) = (at, there);
                     break;
@@ -358,9 +369,13 @@ impl Problem<'_> {
                     next[6] *= 0.3;
                 }
             }
-            // Values and gradients at the same places.
+            // Values and derivatives at the same places.
             for (n, one) in problem.shifts.iter_mut().enumerate() {
-                one.value = shift(n, &x, here.speeds[n])?;
+                one.speed = here.speeds[n];
+                one.value = shift(n, &x, one.speed)?;
+                let value = shift(n, &x, one.speed + STEP)?;
+                one.by_speed = [0, 1].map(|i| (value[i] - one.value[i]) / STEP);
+                slopes[n] = one.by_speed;
             }
             for i in (0..UNKNOWNS).filter(|i| *i != 5 && (free || *i != 6)) {
                 let mut more = x;
@@ -376,6 +391,7 @@ impl Problem<'_> {
             let mut speeds: Vec<Option<f64>> = here.speeds.iter().copied().map(Some).collect();
             here = problem.sums(&x, &mut speeds)?;
             let (mut best, least) = problem.minimum(x)?;
+            next_speeds.clone_from(&least.speeds);
             if here.chi_square - least.chi_square < FOUND {
                 let fit = problem.found(x, here);
                 let uncertainty = fit.covariance[(6, 6)].max(0.0).sqrt();
