@@ -54,7 +54,7 @@ fn steady_in(cavity: Cavity) -> Plant {
     Plant::new(parameters, start).expect("a scene")
 }
 
-/// The lock in a cavity for so many impacts, in one step.
+/// The lock in a cavity: one step with this number of impacts.
 fn locked_in(cavity: Cavity, impacts: u32) {
     let duration = f64::from(impacts / 2) * PERIOD;
     steps(

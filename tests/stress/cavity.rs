@@ -89,7 +89,7 @@ pub fn strategy() -> BoxedStrategy<Scene> {
         .boxed()
 }
 
-/// Follows so many scenes, and the energy balance of a tenth as many with damper and base.
+/// Follows this number of scenes, and the energy balance of a tenth of it with damper and base.
 pub fn scenes(n: usize, table: &mut Table) {
     of_kind("cavity", n, table).rows(table);
     balances("cavity", n / 10, strategy, table);

@@ -1,7 +1,7 @@
 //! Hard scenes by the thousand, as a table: `scripts/stress --plant` runs the long form (`SCENES=100000`), the test suite a
 //! short one. validation/stress.csv keeps the table of the long form. `SCENE=free:17` follows one scene only.
 //!
-//! Guards: no panic, no number that is none, no particle outside its cavity at and inside steps, energy and its balance, momentum and
+//! Guards: no panic, no NaN, no particle outside its cavity at and inside steps, energy and its balance, momentum and
 //! Newton's law, no impact twice or too soon, grazes of 1e-13, the same bits without the workspace, steps from 1e-9 to 1e6 periods, a new
 //! drive at every sample against an independent simulation, bounded work; all that with the ideal and, but for the last, a real cavity.
 

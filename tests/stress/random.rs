@@ -105,7 +105,7 @@ pub fn balance(n: usize, table: &mut Table) {
     balances("damped", n, || damped().boxed(), table);
 }
 
-/// The same for scenes of any kind.
+/// The energy balance of scenes of any kind.
 pub fn balances(kind: &'static str, n: usize, strategy: fn() -> BoxedStrategy<Scene>, table: &mut Table) {
     let all: Vec<Walk> = (0..n)
         .into_par_iter()
@@ -147,7 +147,7 @@ pub fn one(name: &str) {
     println!("{scene:#?}\n{:#?}", follow(&scene, Name { kind, number }));
 }
 
-/// Follows so many scenes, each twice, and tells the worst of all.
+/// Follows this number of scenes, each twice, and tells the worst of all.
 pub fn scenes(n: usize, table: &mut Table) {
     let mut all = Worst::default();
     for (kind, share) in KINDS {
@@ -156,7 +156,7 @@ pub fn scenes(n: usize, table: &mut Table) {
     all.rows(table);
 }
 
-/// Follows so many scenes of one kind.
+/// Follows this number of scenes of one kind.
 pub fn of_kind(kind: &'static str, count: usize, table: &mut Table) -> Worst {
     let mut worst = Worst::default();
     for begin in (0..count).step_by(PORTION) {

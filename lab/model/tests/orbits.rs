@@ -118,7 +118,7 @@ fn response(g: f64) -> (Dimensionless, Branch) {
     (scene, branch)
 }
 
-/// The plant, started on the motion, for so many periods: the largest distance from its own start after each.
+/// The largest distance of the plant from its own start after each of this number of periods, started on the motion.
 fn distance_of_plant(scene: &Dimensionless, motion: &Periodic, periods: u32) -> f64 {
     let [q1, dq1, q2, dq2] = motion.start(scene).expect("a state at phase zero");
     let mut plant = scene.plant([q1, dq1, q2, dq2]).unwrap();

@@ -121,10 +121,12 @@ pub fn ideal(results: &str, left_out: &str) -> String {
 /// What friction did, as a sentence.
 pub fn friction_text(friction: &Friction) -> String {
     let Friction { sticks_per_period, stuck_time, loss } = friction;
-    format!(
-        "per period of the hold, the particle stuck to the floor {sticks_per_period:.3} times, for {stuck_time:.3e} s in all, and friction \
-         took {loss:.3e} J"
-    )
+    let sticking = if *sticks_per_period > 0.0 {
+        format!("stuck to the floor {sticks_per_period:.3} times, for {stuck_time:.3e} s in all")
+    } else {
+        "never stuck to the floor".into()
+    };
+    format!("per period of the hold, friction took {loss:.3e} J, and the particle {sticking}")
 }
 
 fn decay(result: &Comparison) -> String {

@@ -171,7 +171,7 @@ const LEAST: usize = 2 * Balance::FEWEST;
 /// Largest relative distance of the amplitude from the mean of the first [`LEAST`] periods of a window, in these: drive and frequency are nearly
 /// linear in the amplitude there.
 const RANGE: f64 = 0.04;
-/// The same for a window with more periods, whose response is held.
+/// Largest such distance within a window of more periods, whose response is held.
 const HELD: f64 = 0.005;
 /// Largest phase error of a period, rad: the balances are of the first order in it.
 const PHASE_RANGE: f64 = 0.1;
