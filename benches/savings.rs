@@ -93,7 +93,7 @@ const EFFECTS: &[(&str, Cavity, f64)] = &[
     (
         "scatter of the restitution, irregular flights",
         Cavity { scatter: 0.01, ..Cavity::IDEAL },
-        4.0,
+        2.2,
     ),
 ];
 

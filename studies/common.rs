@@ -130,15 +130,7 @@ pub fn client(
     let fold = curve.places().first().ok_or("no backbone")?[0];
     let (from, to) = (0.95 * stable.min(0.75), 1.05 * fold);
     // The rig with M = k = b = 1, and the scene of the client in SI units.
-    let truth = Parameters {
-        primary_mass: 1.0,
-        stiffness: 1.0,
-        damping: epsilon * lambda,
-        particle_mass: epsilon,
-        half_width: 1.0,
-        restitution: r,
-        cavity: lovines::Cavity::IDEAL,
-    };
+    let truth = rig([epsilon, lambda, r]);
     let width = 1.0 + b;
     let settings = [
         format!("plant.M={:?}", 1.0),
@@ -336,4 +328,17 @@ pub fn checked_faults(between: &mut impl FnMut(f64, f64) -> f64) -> [(Verdict, R
         (Verdict::ResponseNoisy, Response(Noisy)),
         (Verdict::BaseNoisy, Base(Noisy)),
     ]
+}
+
+/// A rig with M = k = b = 1.
+pub fn rig([epsilon, lambda, r]: [f64; 3]) -> Parameters {
+    Parameters {
+        primary_mass: 1.0,
+        stiffness: 1.0,
+        damping: epsilon * lambda,
+        particle_mass: epsilon,
+        half_width: 1.0,
+        restitution: r,
+        cavity: lovines::Cavity::IDEAL,
+    }
 }

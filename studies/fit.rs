@@ -20,7 +20,7 @@ mod common;
 
 use std::time::Instant;
 
-use common::{Failure, arguments, client, is_kept, quantile, share, tracked, uniform, write};
+use common::{Failure, arguments, client, is_kept, quantile, rig, share, tracked, uniform, write};
 use rayon::prelude::*;
 use vines_model::numerics::{Estimate, mean_square};
 use vines_testbench::backbone::track;
@@ -129,19 +129,6 @@ fn fitted((ratios, ..): &Case, points: &[MeasuredPoint], scene: &Scene) -> Resul
         bound.chi_square
     );
     Ok(Fitted { fit, over_u, over_bound, seconds })
-}
-
-/// A rig with M = k = b = 1.
-fn rig([epsilon, lambda, r]: [f64; 3]) -> Parameters {
-    Parameters {
-        primary_mass: 1.0,
-        stiffness: 1.0,
-        damping: epsilon * lambda,
-        particle_mass: epsilon,
-        half_width: 1.0,
-        restitution: r,
-        cavity: lovines::Cavity::IDEAL,
-    }
 }
 
 /// What a fit says of a rig with a hidden effect, or with none.

@@ -63,7 +63,7 @@ pub struct Balance {
     within: [f64; 2],
 }
 
-/// Bound of the factor of the neglected terms of the second order; the terms that are kept have the same form and the factor 1.
+/// Bound of the coefficient of the neglected second-order terms, relative to the coefficient of the terms that are kept.
 const REMAINDER: f64 = 0.7;
 /// Variance of integrated white noise in a slope, which weighs it by a parabola, over its variance in a mean: 6/5.
 const PARABOLA: f64 = 1.2;
