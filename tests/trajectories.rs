@@ -1,7 +1,9 @@
-//! The plant against trajectories computed in 40-digit arithmetic by an independent program.
+//! Guards the plant's motion against trajectories in 40-digit arithmetic by independent programs (tests/reference): the ideal cavity, and the real
+//! one with its limits, mirror symmetry and scatter.
 
-use lovines::{Drive, Parameters, Plant, State, Wall};
+use lovines::{Cavity, Drive, Parameters, Plant, Restitution, State, Wall};
 use serde_json::Value;
+use std::collections::HashMap;
 
 fn number(value: &Value) -> f64 {
     value.as_str().expect("a decimal string").parse().expect("a number")
@@ -53,4 +55,248 @@ fn secular_growth_at_an_undamped_resonance_is_followed_to_1e_11() {
 #[test]
 fn a_chatter_into_sticking_and_out_of_it_is_followed_to_1e_11() {
     assert!(worst_error("chatter") < 1e-11);
+}
+
+/// A scene of tests/reference/cavity.
+struct Scene {
+    parameters: Parameters,
+    start: State,
+    drive: Drive,
+    step: f64,
+    /// Number of steps, q1, dq1, q2, dq2, wall, impacts, sticks, energy lost to friction, time stuck.
+    rows: Vec<Vec<f64>>,
+}
+
+fn scene(name: &str) -> Scene {
+    let path = format!("{}/tests/reference/cavity/{name}.csv", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).expect("reference data");
+    let (header, rows): (Vec<&str>, Vec<&str>) = text.lines().partition(|line| line.starts_with('#'));
+    let given: HashMap<&str, &str> = (header.iter())
+        .map(|line| line[2..].split_once(" = ").expect("a key and a value"))
+        .collect();
+    let at = |key: &str| given[key].parse::<f64>().expect("a number");
+    let law = |key: &str| match given["law"] {
+        "constant" => Restitution::Constant(at(key)),
+        "viscoelastic" => Restitution::Viscoelastic(at(key)),
+        "plastic" => Restitution::Plastic(at(key)),
+        other => panic!("{other}"),
+    };
+    let cavity = Cavity {
+        b_plus: Some(at("b_plus")),
+        b_minus: Some(at("b_minus")),
+        tilt: at("theta"),
+        kinetic_friction: at("mu_k"),
+        static_friction: given.get("mu_s").map(|text| text.parse().expect("a number")),
+        restitution: [Some(law("r_plus")), Some(law("r_minus"))],
+        least_restitution: at("r_min"),
+        scatter: at("scatter"),
+        seed: given["seed"].parse().expect("a whole number"),
+    };
+    let parameters = Parameters {
+        primary_mass: at("M"),
+        stiffness: at("k"),
+        damping: at("c"),
+        particle_mass: at("m"),
+        half_width: 0.5 * (at("b_plus") + at("b_minus")),
+        restitution: 0.65,
+        cavity,
+    };
+    let numbers = |line: &str| line.split(',').map(|text| text.parse().expect("a number")).collect();
+    Scene {
+        parameters,
+        start: State { q1: at("q1"), dq1: at("dq1"), q2: at("q2"), dq2: at("dq2") },
+        drive: Drive::harmonic(at("E"), at("omega")),
+        step: at("step"),
+        rows: rows[1..].iter().map(|line| numbers(line)).collect(),
+    }
+}
+
+/// Largest error of any displacement (in half-widths) and velocity (in half-widths times the natural frequency) in any row.
+fn worst_error_in_cavity(name: &str) -> f64 {
+    let Scene { parameters, start, drive, step, rows } = scene(name);
+    let mut plant = Plant::new(parameters, start).expect("a valid scene");
+    let (b, fast) = (parameters.half_width, parameters.natural_frequency());
+    let (mut worst, mut done) = (0.0f64, 0);
+    for row in &rows {
+        while done < row[0] as u32 {
+            plant.advance(drive, step).expect("a valid step");
+            done += 1;
+        }
+        let State { q1, dq1, q2, dq2 } = plant.state();
+        let error = [q1 - row[1], (dq1 - row[2]) / fast, q2 - row[3], (dq2 - row[4]) / fast]
+            .map(|error| error.abs() / b)
+            .into_iter()
+            .fold(0.0, f64::max);
+        let totals = plant.totals();
+        println!(
+            "{name} {done}: {error:.1e} {} {} {:e}",
+            totals.impacts,
+            totals.sticks,
+            totals.friction - row[8]
+        );
+        worst = worst.max(error);
+        assert_eq!(
+            plant.contact().map_or(0.0, |wall| wall.sign()),
+            row[5],
+            "{name}, step {done}: contact"
+        );
+        if name != "chatter" && name != "lower_wall" {
+            assert_eq!(totals.impacts, row[6] as u64, "{name}, step {done}: impacts");
+        }
+        assert_eq!(totals.sticks, row[7] as u64, "{name}, step {done}: sticks");
+        let energy = parameters.particle_mass * (b * fast) * (b * fast);
+        assert!(
+            (totals.friction - row[8]).abs() < 1e-11 * energy,
+            "{name}, step {done}: friction"
+        );
+        assert!(
+            (totals.stuck_time - row[9]).abs() * fast < 1e-8,
+            "{name}, step {done}: time stuck"
+        );
+    }
+    println!("{name}: worst error {worst:.1e}");
+    worst
+}
+
+macro_rules! trajectories {
+    ($($test:ident: $name:literal;)*) => {$(
+        #[test]
+        fn $test() {
+            assert!(worst_error_in_cavity($name) < 2e-12);
+        }
+    )*};
+}
+
+trajectories! {
+    sliding_that_ends_in_sticking_is_followed: "sliding";
+    stick_slip_in_mid_cavity_is_followed: "stick_slip";
+    rest_on_the_lower_wall_is_followed: "lower_wall";
+    chatter_under_tilt_is_followed: "chatter";
+    a_reversal_close_to_a_wall_is_followed: "reversal";
+    a_release_at_the_crest_of_the_friction_cone_is_followed: "crest";
+    a_lock_with_friction_is_followed: "friction";
+    a_vertical_cavity_is_followed: "vertical";
+    unequal_gaps_with_unequal_walls_are_followed: "skewed";
+    viscoelastic_restitution_is_followed: "viscoelastic";
+    plastic_restitution_is_followed: "plastic";
+    scattered_restitution_is_followed: "scatter";
+    all_effects_together_are_followed: "all";
+}
+
+/// The default rig near its 1:1 motion, with a cavity.
+fn lock(cavity: Cavity) -> (Plant, Drive) {
+    let parameters = Parameters { cavity, ..Parameters::dimensionless(0.0084, 1.43, 0.65) };
+    let start = State { q1: -0.4384, dq1: 0.0077, q2: -1.0039, dq2: -0.8781 };
+    (
+        Plant::new(parameters, start).expect("a valid scene"),
+        Drive::harmonic(0.0084 * 1.1, 0.990_417),
+    )
+}
+
+/// The largest distance of the lock with a cavity from the ideal lock within 20 periods.
+fn distance(cavity: Cavity) -> f64 {
+    let ((mut ideal, drive), (mut real, _)) = (lock(Cavity::IDEAL), lock(cavity));
+    let mut largest = 0.0f64;
+    for _ in 0..1270 {
+        ideal.advance(drive, 0.1).expect("a valid step");
+        real.advance(drive, 0.1).expect("a valid step");
+        let (a, b) = (ideal.state(), real.state());
+        largest = largest.max((a.q1 - b.q1).abs()).max((a.q2 - b.q2).abs());
+    }
+    assert!(ideal.totals().impacts > 30);
+    largest
+}
+
+#[test]
+fn a_small_effect_changes_the_motion_in_proportion() {
+    let effect = |size: f64| {
+        [
+            Cavity { kinetic_friction: size, ..Cavity::IDEAL },
+            Cavity { tilt: size, ..Cavity::IDEAL },
+            Cavity { b_plus: Some(1.0 + size), ..Cavity::IDEAL },
+            Cavity {
+                restitution: [Some(Restitution::Constant(0.65 + size)), None],
+                ..Cavity::IDEAL
+            },
+            Cavity { scatter: size, ..Cavity::IDEAL },
+        ]
+    };
+    for (small, smaller) in effect(1e-7).into_iter().zip(effect(1e-9)) {
+        let ratio = distance(small) / distance(smaller);
+        assert!((ratio - 100.0).abs() < 0.5, "{small:?}: {ratio}");
+    }
+    for nothing in effect(0.0) {
+        assert_eq!(distance(nothing), 0.0, "{nothing:?}");
+    }
+    // The general path against the fast one.
+    for least in effect(1e-300) {
+        assert!(distance(least) < 1e-12, "{least:?}");
+    }
+}
+
+#[test]
+fn a_mirrored_cavity_has_the_mirrored_motion() {
+    let laws = [Some(Restitution::Viscoelastic(0.3)), Some(Restitution::Constant(0.7))];
+    let cavity = Cavity {
+        b_plus: Some(1.1),
+        b_minus: Some(0.9),
+        tilt: 0.01,
+        kinetic_friction: 0.003,
+        restitution: laws,
+        ..Cavity::IDEAL
+    };
+    let mirrored = Cavity {
+        b_plus: Some(0.9),
+        b_minus: Some(1.1),
+        tilt: -0.01,
+        restitution: [laws[1], laws[0]],
+        ..cavity
+    };
+    let ((mut plant, drive), (mut mirror, _)) = (lock(cavity), lock(mirrored));
+    let State { q1, dq1, q2, dq2 } = plant.state();
+    mirror
+        .set_state(State { q1: -q1, dq1: -dq1, q2: -q2, dq2: -dq2 })
+        .expect("a valid state");
+    let opposite = Drive { amplitude: -drive.amplitude, ..drive };
+    for _ in 0..500 {
+        plant.advance(drive, 0.37).expect("a valid step");
+        mirror.advance(opposite, 0.37).expect("a valid step");
+        let (a, b) = (plant.state(), mirror.state());
+        assert!((a.q1 + b.q1).abs() < 1e-12 && (a.q2 + b.q2).abs() < 1e-12);
+    }
+    assert!(plant.totals().impacts > 40);
+}
+
+#[test]
+fn the_scatter_does_not_depend_on_the_steps_or_on_a_rollback() {
+    let cavity = Cavity { scatter: 0.1, seed: 3, ..Cavity::IDEAL };
+    let follow = |step: f64, n: u32, rollback: bool| {
+        let (mut plant, drive) = lock(cavity);
+        let mut velocities = Vec::new();
+        for _ in 0..n {
+            if rollback {
+                let saved = plant.save();
+                plant.advance(drive, 3.7 * step).expect("a valid step");
+                plant.restore(&saved);
+            }
+            let on_event = |event| {
+                if let lovines::Event::Impact { velocity, .. } = event {
+                    velocities.push(velocity);
+                }
+            };
+            plant.advance_with(drive, step, on_event).expect("a valid step");
+        }
+        velocities
+    };
+    let (long, short, back) = (
+        follow(400.0, 1, false),
+        follow(0.1, 4000, false),
+        follow(0.1, 4000, true),
+    );
+    assert!(long.len() > 100);
+    assert_eq!(short, back);
+    assert_eq!(long.len(), short.len());
+    for (a, b) in long.iter().zip(&short) {
+        assert!((a - b).abs() < 1e-11, "{a} {b}");
+    }
 }

@@ -12,12 +12,17 @@ pub struct Scene {
     pub step: f64,
 }
 
-/// Rigs from feather-light to equal masses, undamped to overdamped, dead to lively; starts that include both walls.
+/// Rigs from feather-light to equal masses; undamped, light, near-critical and over-critical damping; dead to lively; starts that include both
+/// walls.
 pub fn scene(driven: bool) -> impl Strategy<Value = Scene> {
     let decades = |from: f64, to: f64| (from..to).prop_map(|x| 10f64.powf(x));
     let rig = (
         decades(-6.0, 0.0),
-        prop_oneof![Just(0.0), decades(-12.0, 1.0)],
+        prop_oneof![
+            3 => Just(0.0),
+            3 => decades(-12.0, 1.0),
+            1 => (decades(-16.0, -2.0), any::<bool>()).prop_map(|(d, above)| if above { 1.0 + d } else { 1.0 - d }),
+        ],
         prop_oneof![3 => 1e-3..0.98f64, 1 => Just(0.65)],
     );
     let start = (

@@ -1,14 +1,81 @@
-//! Random scenes with friction, tilt, unequal gaps and all laws of restitution.
+//! Random scenes.
 
 use crate::common::{Scene, scene};
-use crate::random::{balances, of_kind};
-use crate::table::Table;
 use lovines::{Cavity, Drive, Restitution};
 use proptest::prelude::*;
 
+fn decades(from: f64, to: f64) -> impl Strategy<Value = f64> + Clone {
+    (from..to).prop_map(|x| 10f64.powf(x))
+}
+
+/// A scene whose walls have any loss: none, hardly any, nearly all.
+fn with_any_loss(driven: bool) -> impl Strategy<Value = Scene> {
+    let restitution = prop_oneof![
+        8 => Just(None),
+        1 => decades(-6.0, -2.0).prop_map(|x| Some(1.0 - x)),
+        1 => Just(Some(1.0)),
+        1 => decades(-3.0, 0.0).prop_map(Some),
+    ];
+    (scene(driven), restitution).prop_map(|(mut s, r)| {
+        s.parameters.restitution = r.unwrap_or(s.parameters.restitution);
+        s
+    })
+}
+
+/// Free and driven motions, rest on a wall, gaps of 1e-6 to 1e3 amplitudes, signals of order 3.
+pub fn hard() -> BoxedStrategy<Scene> {
+    let at_rest = (with_any_loss(true), any::<bool>(), any::<bool>()).prop_map(|(mut s, plus, still)| {
+        let b = s.parameters.half_width;
+        if still {
+            s.drive = Drive::default();
+            (s.start.q1, s.start.dq1) = (0.0, 0.0);
+        }
+        s.start.q2 = s.start.q1 - if plus { b } else { -b };
+        s.start.dq2 = s.start.dq1;
+        s
+    });
+    let gaps = (with_any_loss(true), decades(-6.0, 3.0)).prop_map(|(mut s, gap)| {
+        let w = s.start.q1 - s.start.q2;
+        let amplitude = s.start.q1.abs().max(s.drive.amplitude);
+        s.parameters.half_width = gap * amplitude;
+        // A narrow gap is crossed a million times a period.
+        s.step = s.step.min(1.0);
+        s.start.q2 = s.start.q1 - w.clamp(-1.0, 1.0) * s.parameters.half_width;
+        // The difference of two displacements carries their rounding.
+        if (s.start.q1 - s.start.q2).abs() > s.parameters.half_width {
+            s.start.q2 = s.start.q1;
+        }
+        s
+    });
+    let signals = (with_any_loss(true), prop::array::uniform3(-1.0..1.0f64)).prop_map(|(mut s, [u1, u2, u3])| {
+        // Of the order of the half-width at the end of a step, or of the scene where that is long.
+        let t = s.step.max(1.0);
+        s.drive.signal[1..].copy_from_slice(&[u1 / t, u2 / (t * t), u3 / (t * t * t)]);
+        s
+    });
+    prop_oneof![
+        6 => with_any_loss(false),
+        6 => with_any_loss(true),
+        3 => at_rest,
+        3 => gaps,
+        2 => signals,
+    ]
+    .boxed()
+}
+
+/// Damped rigs, driven or not.
+pub fn damped() -> BoxedStrategy<Scene> {
+    let damping = decades(-3.0, 1.0).prop_map(|ratio| 2.0 * ratio);
+    (any::<bool>().prop_flat_map(scene), damping)
+        .prop_map(|(mut s, damping)| {
+            s.parameters.damping = damping;
+            s
+        })
+        .boxed()
+}
+
 /// A scene with any of the effects. Gravity is from negligible to overwhelming against the accelerations of the rig.
-pub fn strategy() -> BoxedStrategy<Scene> {
-    let decades = |from: f64, to: f64| (from..to).prop_map(|x| 10f64.powf(x));
+pub fn cavity() -> BoxedStrategy<Scene> {
     let law = || {
         prop_oneof![
             2 => Just(None),
@@ -87,10 +154,4 @@ pub fn strategy() -> BoxedStrategy<Scene> {
             },
         )
         .boxed()
-}
-
-/// Follows this number of scenes, and the energy balance of a tenth of it with damper and base.
-pub fn scenes(n: usize, table: &mut Table) {
-    of_kind("cavity", n, table).rows(table);
-    balances("cavity", n / 10, strategy, table);
 }

@@ -1,0 +1,431 @@
+//! Guards the digits of the flow between events: every regime, scanned across each degeneracy, against an integrator of its own in 32 digits.
+//! Impacts in all regimes, near-critical damping among them, are compared with an independent simulation in tests/stress.
+//!
+//! ```text
+//! cargo test --test regimes -- --nocapture
+//! ```
+
+use core::fmt;
+use lovines::base_motion::BaseMotion;
+use lovines::oscillator::Oscillator;
+use lovines::segment::Segment;
+use lovines::{Drive, Parameters, Plant, State};
+use std::f64::consts::TAU;
+use twofloat::TwoFloat;
+
+/// Largest error after up to a thousand periods, relative to the motion and to what drives it.
+const LIMIT: f64 = 1e-13;
+
+#[test]
+fn no_regime_loses_digits() {
+    println!("| family | cases | up to 1 period | 10 | 100 | 1000 | hardest |\n|---|---|---|---|---|---|---|");
+    let mut failed = Vec::new();
+    for Family { name, cases } in families() {
+        let mut worst = Worst::default();
+        for case in &cases {
+            worst.add(case);
+        }
+        println!("| {name} | {} | {worst} |", cases.len());
+        if !worst.below(LIMIT) {
+            failed.push(name);
+        }
+    }
+    assert!(failed.is_empty(), "{failed:?}");
+}
+
+/// Lengths of the single step, in natural periods.
+const SPANS: [f64; 8] = [1e-9, 1e-4, 0.03, 0.2, 1.0, 10.0, 100.0, 1000.0];
+/// Samples that tell the size of a motion.
+const SAMPLES: i32 = 8;
+/// The general search looks at the motion again and again: for so many radians of its fastest rate at most.
+const LONGEST_SEARCH: f64 = 70.0;
+
+/// A mass on its spring, its start and its base.
+#[derive(Clone, Copy, Debug)]
+struct Case {
+    mass: f64,
+    stiffness: f64,
+    damping: f64,
+    /// Displacement, m, and velocity, m/s.
+    start: (f64, f64),
+    drive: Drive,
+}
+
+impl Case {
+    fn damping_ratio(&self) -> f64 {
+        0.5 * self.damping / (self.mass * self.stiffness).sqrt()
+    }
+}
+
+/// How large a motion and what drives it have been, as displacement and as velocity: the envelope of the free motion, which
+/// knows no zeros, and the base.
+#[derive(Clone, Copy, Debug)]
+struct Size {
+    slow: f64,
+    fast: f64,
+    displacement: f64,
+    velocity: f64,
+}
+
+impl Size {
+    fn of(case: &Case, oscillator: &Oscillator) -> Self {
+        let fast = oscillator.omega0.max(case.damping / case.mass);
+        let slow = oscillator.omega0_squared / fast;
+        let amplitude = case.drive.amplitude.abs();
+        Self {
+            slow,
+            fast,
+            displacement: amplitude,
+            velocity: amplitude * slow,
+        }
+    }
+
+    fn see(&mut self, z: &Vector, drive: &Drive) {
+        let [q, dq, sin, cos, u, du, ..] = z.map(number);
+        let base = u + drive.amplitude * sin;
+        let dbase = du + drive.amplitude * drive.omega * cos;
+        let most = |a: f64, b: f64, c: f64| a.max(b.abs()).max(c);
+        self.displacement = most(self.displacement, base, q.hypot(dq / self.fast));
+        self.velocity = most(self.velocity, dbase, dq.hypot(q * self.slow)).max(base.abs() * self.slow);
+    }
+
+    /// The larger of the errors of displacement and velocity.
+    fn error(&self, z: &Vector, (q, dq): (f64, f64)) -> f64 {
+        let part = |error: f64, of: f64| if error == 0.0 { 0.0 } else { error.abs() / of };
+        let (x, v) = (number(z[0] - q), number(z[1] - dq));
+        part(x, self.displacement).max(part(v, self.velocity))
+    }
+}
+
+/// The worst errors of a family, by length of the step.
+#[derive(Debug, Default)]
+struct Worst {
+    errors: [f64; SPANS.len()],
+    hardest: Option<(Case, &'static str, f64)>,
+}
+
+impl Worst {
+    /// Follows a case in one step of each length.
+    fn add(&mut self, case: &Case) {
+        let drive = &case.drive;
+        let system = System::new(case.mass, case.stiffness, case.damping, drive);
+        let oscillator = Oscillator::new(case.mass, case.stiffness, case.damping);
+        for (n, span) in SPANS.iter().enumerate() {
+            let t = span * TAU / oscillator.omega0;
+            let mut size = Size::of(case, &oscillator);
+            let mut z = start(case.start, drive);
+            size.see(&z, drive);
+            // Divided by a power of two, the parts are exact.
+            let flow = system.flow(t / f64::from(SAMPLES));
+            for _ in 0..SAMPLES {
+                z = after(&flow, &z);
+                size.see(&z, drive);
+            }
+            for (way, got) in ways(case, &oscillator, t) {
+                let error = size.error(&z, got);
+                // Not a number is the worst of all.
+                if error > self.most() || error.is_nan() {
+                    self.hardest = Some((*case, way, t));
+                }
+                if error > self.errors[n] || error.is_nan() {
+                    self.errors[n] = error;
+                }
+            }
+        }
+    }
+
+    fn most(&self) -> f64 {
+        self.errors.iter().fold(0.0, |a, b| a.max(*b))
+    }
+
+    fn below(&self, limit: f64) -> bool {
+        self.errors.iter().all(|error| *error <= limit)
+    }
+}
+
+/// Displacement and velocity after a step of `t` seconds, by each way there is.
+fn ways(case: &Case, oscillator: &Oscillator, t: f64) -> Vec<(&'static str, (f64, f64))> {
+    let parameters = Parameters {
+        primary_mass: case.mass,
+        stiffness: case.stiffness,
+        damping: case.damping,
+        particle_mass: 0.01 * case.mass,
+        // No wall in reach.
+        half_width: 1e13,
+        restitution: 0.65,
+        cavity: lovines::Cavity::IDEAL,
+    };
+    let start = State { q1: case.start.0, dq1: case.start.1, ..State::default() };
+    let advanced = |fast: bool| {
+        let mut plant = Plant::new(parameters, start).expect("a case that makes sense");
+        plant.set_fast_path(fast);
+        plant.begin(case.drive).unwrap();
+        plant.advance(case.drive, t).unwrap();
+        assert_eq!(plant.totals().impacts, 0);
+        (plant.state().q1, plant.state().dq1)
+    };
+    let base = BaseMotion { drive: case.drive, ..BaseMotion::default() };
+    let motion = Segment::new(oscillator, base, case.start);
+    let [x, v, ..] = motion.at(&motion.series(), t).derivatives;
+    let mut ways = vec![("closed form", (x, v))];
+    if t * motion.fastest() <= LONGEST_SEARCH {
+        ways.push(("search", advanced(false)));
+    }
+    ways.push(("plant", advanced(true)));
+    ways
+}
+
+impl fmt::Display for Worst {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let short = self.errors[..5].iter().fold(0.0f64, |a, b| a.max(*b));
+        write!(f, "{short:.1e}")?;
+        for error in &self.errors[5..] {
+            write!(f, " | {error:.1e}")?;
+        }
+        let Some((case, way, t)) = &self.hardest else {
+            return write!(f, " | none");
+        };
+        let Drive { signal, amplitude, omega } = case.drive;
+        write!(
+            f,
+            " | {way}, damping ratio {:e}, omega {omega:e}, E {amplitude}, signal {signal:?}, start {:?}, t {t:e}",
+            case.damping_ratio(),
+            case.start
+        )
+    }
+}
+
+struct Family {
+    name: &'static str,
+    cases: Vec<Case>,
+}
+
+const AT_REST: (f64, f64) = (0.0, 0.0);
+const MOVING: (f64, f64) = (0.7, -0.4);
+
+/// Damping ratios: none, hardly any, light, across critical damping, far above it.
+fn damping_ratios() -> Vec<f64> {
+    let near = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 2.3e-16];
+    let below = near.iter().map(|d| 1.0 - d);
+    let above = near.iter().rev().map(|d| 1.0 + d);
+    let light = [0.0, 1e-300, 1e-30, 1e-16, 1e-12, 1e-8, 1e-6, 1e-4, 5e-4, 1e-2, 0.1];
+    let around_half = [0.4999, 0.5, 0.5001, 0.8];
+    let heavy = [1.005, 1.0051, 1.1, 2.0, 30.0, 1e3];
+    (light.into_iter())
+        .chain(around_half)
+        .chain(below)
+        .chain([1.0])
+        .chain(above)
+        .chain(heavy)
+        .collect()
+}
+
+fn near_zero() -> impl Iterator<Item = f64> {
+    [
+        1e-16, 2.3e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1,
+    ]
+    .into_iter()
+    .flat_map(|d| [-d, d])
+    .chain([0.0])
+}
+
+/// The oscillator of unit mass and stiffness.
+fn unit(zeta: f64, drive: Drive, start: (f64, f64)) -> Case {
+    Case { mass: 1.0, stiffness: 1.0, damping: 2.0 * zeta, start, drive }
+}
+
+/// The rig of the default scene with another damping ratio, and as much of the natural frequency as driving frequency.
+fn rig(zeta: f64, amplitude: f64, ratio: f64, mass: f64, start: (f64, f64)) -> Case {
+    let stiffness: f64 = 11.68e3;
+    let omega0 = (stiffness / mass).sqrt();
+    Case {
+        mass,
+        stiffness,
+        damping: 2.0 * zeta * mass * omega0,
+        start: (0.01 * start.0, 0.01 * omega0 * start.1),
+        drive: Drive::harmonic(amplitude, ratio * omega0),
+    }
+}
+
+fn family(name: &'static str, cases: impl Iterator<Item = Case>) -> Family {
+    Family { name, cases: cases.collect() }
+}
+
+fn families() -> Vec<Family> {
+    let ratios = damping_ratios();
+    let every = |step: usize| ratios.iter().copied().step_by(step);
+    let tiny = [0.0, 1e-300, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4];
+    let mut families = vec![
+        family(
+            "free, damping ratio 0 to 1000",
+            every(1).flat_map(|z| [MOVING, (1.0, 0.0), (0.0, 1.0)].map(|s| unit(z, Drive::default(), s))),
+        ),
+        family(
+            "harmonic, damping ratio 0 to 1000",
+            every(1).flat_map(|z| [0.3, 1.7, 40.0].map(|omega| unit(z, Drive::harmonic(0.3, omega), MOVING))),
+        ),
+        family(
+            "omega across the resonance, 1e-16 to 0.1 off, damping ratio 0 to 1e-4",
+            tiny.into_iter().flat_map(|z| {
+                near_zero().flat_map(move |d| {
+                    let at = |e, s| unit(z, Drive::harmonic(e, 1.0 + d), s);
+                    [at(0.3, MOVING), at(1e-9, AT_REST)]
+                })
+            }),
+        ),
+        family(
+            "the same, default rig",
+            tiny.into_iter()
+                .flat_map(|z| near_zero().map(move |d| rig(z, 1e-4, 1.0 + d, 3.807, AT_REST))),
+        ),
+        family(
+            "the same, particle stuck",
+            tiny.into_iter()
+                .flat_map(|z| near_zero().map(move |d| rig(z, 1e-4, 1.0 + d, 3.807 + 0.032, MOVING))),
+        ),
+        family(
+            "omega 0 to 1e-2, both signs",
+            every(4).flat_map(|z| {
+                [0.0, 1e-300, -1e-300, 1e-100, -1e-30, 1e-16, -1e-12, 1e-8, -1e-4, 1e-2]
+                    .map(move |omega| unit(z, Drive::harmonic(0.3, omega), AT_REST))
+            }),
+        ),
+        family(
+            "omega negative",
+            every(2).flat_map(|z| {
+                [-1.0, -0.7, -1.0 - 1e-12].map(move |omega| unit(z, Drive::harmonic(0.3, omega), MOVING))
+            }),
+        ),
+        family(
+            "E = 0 with omega at the resonance, 0, and not",
+            every(4).flat_map(|z| [1.0, 0.0, 0.7].map(move |omega| unit(z, Drive::harmonic(0.0, omega), MOVING))),
+        ),
+    ];
+    let names = [
+        "signal of order 0, alone and with the oscillator",
+        "signal of order 1, alone and with the oscillator",
+        "signal of order 2, alone and with the oscillator",
+        "signal of order 3, alone and with the oscillator",
+    ];
+    for (order, name) in names.into_iter().enumerate() {
+        let mut alone = Drive::default();
+        alone.signal[order] = [0.4, -0.3, 0.2, 0.1][order];
+        let mut full = Drive::harmonic(0.3, 0.7);
+        full.signal[..=order].copy_from_slice(&[0.4, -0.3, 0.2, 0.1][..=order]);
+        let resonant = Drive { omega: 1.0 + 1e-12, ..full };
+        families.push(family(
+            name,
+            every(1).flat_map(move |z| {
+                let last = if z < 0.2 { resonant } else { full };
+                [unit(z, alone, AT_REST), unit(z, full, AT_REST), unit(z, last, MOVING)]
+            }),
+        ));
+    }
+    families
+}
+
+// The truth: the bare equation of motion, `M q'' + c (q' - e') + k (q - e) = 0`, integrated in double-double.
+//
+// Base and mass are one linear system with constant coefficients: `s' = omega c`, `c' = -omega s` for the built-in
+// oscillator, one state for each derivative of the signal. Its Taylor series over a short step is summed, and the step
+// doubled again and again by squaring. Nothing here knows a damping ratio, a resonance or a particular solution.
+
+/// `q, q', sin, cos, u, u', u'', u'''`.
+const SIZE: usize = 8;
+/// Terms of the series over a step of at most 1/8 of the fastest rate's time: the first left out is below 1e-36.
+const TERMS: usize = 22;
+
+type Vector = [TwoFloat; SIZE];
+type Matrix = [Vector; SIZE];
+
+/// The nearest double.
+fn number(x: TwoFloat) -> f64 {
+    x.hi() + x.lo()
+}
+
+fn zero() -> TwoFloat {
+    TwoFloat::from(0.0)
+}
+
+/// One oscillator and its base.
+struct System {
+    rates: Matrix,
+    fastest: f64,
+}
+
+impl System {
+    /// The equation for this mass (kg), stiffness (N/m) and damping (N·s/m).
+    fn new(mass: f64, stiffness: f64, damping: f64, drive: &Drive) -> Self {
+        let mut rates = [[zero(); SIZE]; SIZE];
+        let (spring, damper) = (TwoFloat::new_div(stiffness, mass), TwoFloat::new_div(damping, mass));
+        let (amplitude, omega) = (drive.amplitude, drive.omega);
+        rates[0][1] = TwoFloat::from(1.0);
+        rates[1] = [
+            -spring,
+            -damper,
+            spring * amplitude,
+            damper * TwoFloat::new_mul(amplitude, omega),
+            spring,
+            damper,
+            zero(),
+            zero(),
+        ];
+        rates[2][3] = TwoFloat::from(omega);
+        rates[3][2] = TwoFloat::from(-omega);
+        for n in 4..7 {
+            rates[n][n + 1] = TwoFloat::from(1.0);
+        }
+        let fastest = [(stiffness / mass).sqrt(), damping / mass, omega.abs()];
+        Self { rates, fastest: fastest.into_iter().fold(0.0, f64::max) }
+    }
+
+    /// What `t` seconds do to the state.
+    fn flow(&self, t: f64) -> Matrix {
+        let doublings = (8.0 * self.fastest * t).log2().ceil().max(0.0) as i32;
+        let h = TwoFloat::from(t * 0.5f64.powi(doublings));
+        let mut term = [[zero(); SIZE]; SIZE];
+        for (n, row) in term.iter_mut().enumerate() {
+            row[n] = TwoFloat::from(1.0);
+        }
+        let mut flow = term;
+        for n in 1..=TERMS {
+            let scale = h / n as f64;
+            term = product(&self.rates, &term).map(|row| row.map(|x| x * scale));
+            for (row, more) in flow.iter_mut().zip(&term) {
+                for (x, more) in row.iter_mut().zip(more) {
+                    *x += *more;
+                }
+            }
+        }
+        for _ in 0..doublings {
+            flow = product(&flow, &flow);
+        }
+        flow
+    }
+}
+
+fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    let mut product = [[zero(); SIZE]; SIZE];
+    for (row, out) in a.iter().zip(&mut product) {
+        for (x, line) in row.iter().zip(b) {
+            if *x == 0.0 {
+                continue;
+            }
+            for (sum, y) in out.iter_mut().zip(line) {
+                *sum += *x * *y;
+            }
+        }
+    }
+    product
+}
+
+/// The state that a flow leads to.
+fn after(flow: &Matrix, state: &Vector) -> Vector {
+    flow.map(|row| (row.iter().zip(state)).fold(zero(), |sum, (a, x)| sum + *a * *x))
+}
+
+/// A start at `q`, `q'`, with the built-in oscillator at phase 0.
+fn start((q, dq): (f64, f64), drive: &Drive) -> Vector {
+    let [u0, u1, u2, u3] = drive.signal;
+    [q, dq, 0.0, 1.0, u0, u1, 2.0 * u2, 6.0 * u3].map(TwoFloat::from)
+}
