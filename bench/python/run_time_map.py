@@ -10,7 +10,7 @@ from tables import number, replace, text_table
 # First and last values are those of docs/regimes.svg (`vines map`).
 SIGMA, G = (-5.0, 5.0), (0.1, 3.0)
 POINTS, QUICK_POINTS = (67, 39), (33, 21)
-EFFORT = {"methods": "both", "periods": 200, "brent_periods": 50, "runs": 7}
+EFFORT = {"periods": 200, "brent_periods": 50, "runs": 7}
 # Largest ratios to the default lock that are accepted, as a median and in the worst cell.
 ACCEPTED = {"symmetric 1:1": (1.5, 1.5)}
 ACCEPTED_ELSEWHERE = (4.0, 8.0)

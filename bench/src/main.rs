@@ -5,22 +5,20 @@
 //! {"growth": "periods", "budget": 0.1, "most": 1e6}
 //! {"profile": "chatter"}
 //! {"record": 20}
-//! {"map_g": 1.2, "sigmas": [-1.0, 0.0], "effort": {"methods": "both", "periods": 200, "brent_periods": 50, "runs": 5}}
+//! {"map_g": 1.2, "sigmas": [-1.0, 0.0], "effort": {"periods": 200, "brent_periods": 50, "runs": 5}}
 //! ```
-//!
-//! `vines-bench map` prints the map of run time on the terminal, without Python.
 
 #![forbid(unsafe_code)]
 
-mod closed_loop;
-mod growth;
+#[path = "../../benches/baseline/mod.rs"]
+mod baseline;
+mod cost;
+#[cfg(feature = "diffsol")]
+mod diffsol;
 mod map;
 mod method;
-mod methods;
-mod profile;
 mod scene;
-#[path = "../../benches/turns/mod.rs"]
-mod turns;
+mod solvers;
 
 use std::io::{BufRead, Write};
 use std::path::Path;
@@ -71,30 +69,19 @@ fn answer(folder: &Path, request: &str) -> anyhow::Result<serde_json::Value> {
         Request::Run { scene, method, setting, checks, budget, limit } => {
             let scene = Scene::load(folder, &scene)?;
             let (budget, limit) = (Duration::from_secs_f64(budget), Duration::from_secs_f64(limit));
-            let answer = methods::measure_named(&method, &scene, setting, &checks, budget, limit)?;
+            let answer = method::named(&method)?(&scene, setting, &checks, budget, limit);
             Ok(serde_json::to_value(answer)?)
         }
-        Request::Growth { growth, budget, most } => growth::measure(folder, &growth, budget, most),
-        Request::Profile { profile } => profile::of(&Scene::load(folder, &profile)?),
-        Request::Record { record } => Ok(json!({"drives": closed_loop::record(record)})),
-        Request::Loop { closed_loop, budget } => Ok(closed_loop::measure(closed_loop, budget)),
+        Request::Growth { growth, budget, most } => cost::growth(folder, &growth, budget, most),
+        Request::Profile { profile } => cost::profile(&Scene::load(folder, &profile)?),
+        Request::Record { record } => Ok(json!({"drives": cost::record(record)})),
+        Request::Loop { closed_loop, budget } => Ok(cost::closed_loop(closed_loop, budget)),
         Request::Map { map_g, sigmas, effort } => Ok(serde_json::to_value(map::row(map_g, &sigmas, &effort)?)?),
-        Request::Methods { methods } => Ok(json!(methods.then_some(methods::NAMES))),
+        Request::Methods { methods } => Ok(json!(methods.then(method::names))),
     }
 }
 
 fn main() -> std::io::Result<()> {
-    let arguments: Vec<String> = std::env::args().collect();
-    if arguments.get(1).is_some_and(|name| name == "map") {
-        match map::terminal::run(&arguments[2..]) {
-            Ok(text) => println!("{text}"),
-            Err(error) => {
-                eprintln!("error: {error:#}");
-                std::process::exit(2);
-            }
-        }
-        return Ok(());
-    }
     let folder = std::env::args_os()
         .nth(1)
         .unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());

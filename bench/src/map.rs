@@ -4,57 +4,200 @@
 //! take turns, so that their ratio does not depend on what else the machine does. Where there are fewer impacts than periods, the
 //! cost is that of a period.
 
-mod cell;
-mod reference;
-pub mod terminal;
+use std::f64::consts::TAU;
+use std::hint::black_box;
+use std::time::Instant;
 
-use anyhow::anyhow;
+use lovines::{Drive, Outcome, Parameters, Plant, State};
 use serde::{Deserialize, Serialize};
+use vines_model::{Dimensionless, map::observe, regime::Regime};
 
-pub use cell::Cell;
-use reference::Lock;
+use crate::baseline::Baseline;
 
-/// Which methods a map times.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Methods {
-    /// The plant alone.
-    Plant,
-    /// The plant, and the closed form with Brent's method.
-    Both,
-}
+/// Mass ratio of the default scene (scenes/paper.toml).
+const EPSILON: f64 = 0.032 / 3.807;
+/// Detuning and base amplitude where its loop locks.
+const LOCK: (f64, f64) = (-1.1394, 1.1);
+/// Periods that pass before anything is looked at, and over which a motion without repetition is followed before its regime is decided.
+const SETTLING: u32 = 400;
+/// Periods over which the plant is compared with the baseline, and the tolerances of the latter then and while it is timed.
+const COMPARED: u32 = 20;
+const TOLERANCES: (f64, f64) = (1e-13, 1e-12);
+/// Name of motions with fewer impacts than periods, whatever their pattern.
+const RARE: &str = "rare impacts";
 
 /// How a row is measured.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub struct Effort {
-    /// Methods to time.
-    pub methods: Methods,
     /// Periods in the timed step of the plant.
-    pub periods: u32,
+    periods: u32,
     /// Periods in the timed step of the closed form with Brent's method.
-    pub brent_periods: u32,
+    brent_periods: u32,
     /// Timed runs of each cell, and of the lock beside it.
-    pub runs: usize,
+    runs: usize,
 }
 
-impl Default for Effort {
-    fn default() -> Self {
-        Self {
-            methods: Methods::Both,
-            periods: 200,
-            brent_periods: 50,
-            runs: 5,
-        }
-    }
+/// What was measured in one cell.
+#[derive(Clone, Debug, Serialize)]
+pub struct Cell {
+    /// Detuning.
+    sigma: f64,
+    /// Base amplitude over `b epsilon`.
+    #[serde(rename = "G")]
+    g: f64,
+    /// What the motion settles into.
+    regime: &'static str,
+    /// Impacts per period of the timed step.
+    impacts_per_period: f64,
+    /// What the costs are of: an impact or a period.
+    unit: &'static str,
+    /// Cost in the plant, ns: the median of the runs.
+    ns: f64,
+    /// Over the cost of an impact at the default lock, measured in turns with this cell.
+    ratio: f64,
+    /// Evaluations of the closed form per impact (or period).
+    evaluations: f64,
+    /// Cost of the closed form with Brent's method, ns; none if it stalls.
+    brent_ns: Option<f64>,
+    /// Largest difference of the two methods after 20 periods, in half-widths and natural radians, where the motion repeats.
+    difference: Option<f64>,
 }
 
 /// The cells of one base amplitude.
 #[derive(Debug, Serialize)]
 pub struct Row {
     /// From the lowest detuning to the highest.
-    pub cells: Vec<Cell>,
+    cells: Vec<Cell>,
     /// Median cost of an impact at the default lock during this row, ns.
-    pub lock_ns: f64,
+    lock_ns: f64,
+}
+
+/// The default rig, its drive at a detuning and a base amplitude, and where it has settled.
+struct Settled {
+    plant: Plant,
+    drive: Drive,
+}
+
+impl Settled {
+    fn from(start: State, sigma: f64, g: f64) -> anyhow::Result<Self> {
+        let omega = 1.0 + EPSILON * sigma;
+        anyhow::ensure!(
+            omega > 0.0 && omega.is_finite() && g.is_finite(),
+            "sigma = {sigma}, G = {g} (dimensionless): a frequency of {omega} omega0; allowed are finite values with a frequency above 0"
+        );
+        let drive = Drive::harmonic(g * EPSILON, omega);
+        let mut plant = Plant::new(Parameters::dimensionless(EPSILON, 1.4274, 0.65), start)?;
+        plant.begin(drive)?;
+        plant.advance(drive, f64::from(SETTLING) * TAU / omega)?;
+        Ok(Self { plant, drive })
+    }
+
+    /// From the start of the default scene.
+    fn new(sigma: f64, g: f64) -> anyhow::Result<Self> {
+        Self::from(State { dq2: 0.9027, ..State::default() }, sigma, g)
+    }
+
+    fn state(&self) -> [f64; 4] {
+        let State { q1, dq1, q2, dq2 } = self.plant.state();
+        [q1, dq1, q2, dq2]
+    }
+
+    /// Wall time of `periods` in one step with the state read at the end, ns, and what the step met.
+    fn timed(&self, periods: u32) -> anyhow::Result<(f64, Outcome)> {
+        let mut plant = self.plant;
+        let duration = f64::from(periods) * TAU / self.drive.omega;
+        let began = Instant::now();
+        let outcome = plant.advance(black_box(self.drive), duration);
+        black_box(plant.state());
+        Ok((began.elapsed().as_nanos() as f64, outcome?))
+    }
+
+    /// The same of the baseline, per impact or period; none if it stalls.
+    fn baseline(&self, periods: u32) -> Option<f64> {
+        let Drive { amplitude, omega, .. } = self.drive;
+        let mut brent = Baseline::new(*self.plant.parameters(), self.state(), TOLERANCES.1);
+        let began = Instant::now();
+        let ended = brent.advance(black_box(amplitude), omega, f64::from(periods) * TAU / omega);
+        black_box(brent.q1);
+        let ns = began.elapsed().as_nanos() as f64;
+        ended.is_ok().then_some(ns / units(brent.impacts, periods))
+    }
+
+    /// Largest difference of plant and baseline after some periods; none if the latter stalls.
+    fn difference(&self) -> Option<f64> {
+        let (mut plant, drive) = (self.plant, self.drive);
+        let mut brent = Baseline::new(*plant.parameters(), self.state(), TOLERANCES.0);
+        for _ in 0..COMPARED {
+            plant.advance(drive, TAU / drive.omega).ok()?;
+            brent.advance(drive.amplitude, drive.omega, TAU / drive.omega).ok()?;
+        }
+        let s = plant.state();
+        let off = [brent.q1 - s.q1, brent.dq1 - s.dq1, brent.q2 - s.q2, brent.dq2 - s.dq2];
+        off.into_iter().map(f64::abs).reduce(f64::max)
+    }
+}
+
+/// Impacts, or periods where impacts are rarer.
+fn units(impacts: u64, periods: u32) -> f64 {
+    (impacts as f64).max(f64::from(periods))
+}
+
+/// A cell with its costs so far, ns: of the lock, of the plant, of the baseline.
+struct Timed {
+    settled: Settled,
+    cell: Cell,
+    lock_ns: Vec<f64>,
+    ns: Vec<f64>,
+    brent_ns: Vec<Option<f64>>,
+}
+
+impl Timed {
+    fn new(sigma: f64, g: f64) -> anyhow::Result<Self> {
+        let settled = Settled::new(sigma, g)?;
+        let scene = Dimensionless::of(settled.plant.parameters(), settled.drive.amplitude);
+        let found = observe(&scene, sigma, settled.state(), SETTLING as usize)?;
+        // What is timed is the regime that was found, not the transient before it, whose length depends on rounding.
+        let [q1, dq1, q2, dq2] = found.state;
+        let settled = Settled::from(State { q1, dq1, q2, dq2 }, sigma, g)?;
+        let repeats = found.periods > 0 || found.regime == Regime::NoImpacts;
+        let rare = 0.0 < found.impacts_per_period && found.impacts_per_period < 1.0;
+        let cell = Cell {
+            sigma,
+            g,
+            regime: if rare { RARE } else { found.regime.name() },
+            impacts_per_period: found.impacts_per_period,
+            unit: if found.impacts_per_period < 1.0 {
+                "period"
+            } else {
+                "impact"
+            },
+            ns: f64::NAN,
+            ratio: f64::NAN,
+            evaluations: f64::NAN,
+            brent_ns: None,
+            difference: repeats.then(|| settled.difference()).flatten(),
+        };
+        let (lock_ns, ns, brent_ns) = (Vec::new(), Vec::new(), Vec::new());
+        Ok(Self { settled, cell, lock_ns, ns, brent_ns })
+    }
+
+    /// One run of the lock, of the plant, and of the closed form with Brent's method.
+    fn run(&mut self, lock: &Settled, effort: &Effort) -> anyhow::Result<()> {
+        let (ns, outcome) = lock.timed(effort.periods)?;
+        self.lock_ns.push(ns / outcome.impacts as f64);
+        let (ns, outcome) = self.settled.timed(effort.periods)?;
+        let units = units(outcome.impacts, effort.periods);
+        self.ns.push(ns / units);
+        self.cell.evaluations = outcome.evaluations as f64 / units;
+        self.brent_ns.push(self.settled.baseline(effort.brent_periods));
+        Ok(())
+    }
+
+    fn judge(self) -> Cell {
+        let ns = median(self.ns);
+        let brent_ns = self.brent_ns.into_iter().collect::<Option<Vec<_>>>().map(median);
+        Cell { ns, ratio: ns / median(self.lock_ns), brent_ns, ..self.cell }
+    }
 }
 
 /// Measures the cells at `G` = `g` and each detuning in `sigmas`, in as many rounds as there are runs.
@@ -62,11 +205,9 @@ pub struct Row {
 /// # Errors
 /// A frequency that is not positive, or a value that the plant does not accept.
 pub fn row(g: f64, sigmas: &[f64], effort: &Effort) -> anyhow::Result<Row> {
-    let lock = Lock::settle()?;
-    let mut begun = sigmas
-        .iter()
-        .map(|&sigma| cell::Settled::new(sigma, g))
-        .collect::<Result<Vec<_>, _>>()?;
+    let lock = Settled::new(LOCK.0, LOCK.1)?;
+    let begun: anyhow::Result<Vec<_>> = sigmas.iter().map(|&sigma| Timed::new(sigma, g)).collect();
+    let mut begun = begun?;
     for round in 0..effort.runs {
         // Each round begins elsewhere: what another program does periodically does not meet the same cell every time.
         let first = round * begun.len() / effort.runs;
@@ -75,75 +216,24 @@ pub fn row(g: f64, sigmas: &[f64], effort: &Effort) -> anyhow::Result<Row> {
             cell.run(&lock, effort)?;
         }
     }
-    let lock_ns = median(begun.iter().flat_map(cell::Settled::lock_ns).collect());
+    let lock_ns = median(begun.iter().flat_map(|cell| cell.lock_ns.clone()).collect());
     Ok(Row {
-        cells: begun.iter().map(cell::Settled::judge).collect(),
-        lock_ns: lock_ns.unwrap_or(f64::NAN),
+        cells: begun.into_iter().map(Timed::judge).collect(),
+        lock_ns,
     })
 }
 
-/// The middle value, or the mean of the two in the middle; none of no values.
-fn median(mut values: Vec<f64>) -> Option<f64> {
+/// The middle value; not a number for no values.
+fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => None,
-        n if n % 2 == 1 => Some(values[middle]),
-        _ => Some(0.5 * (values[middle - 1] + values[middle])),
-    }
-}
-
-/// Equally spaced values; parsed from `-5:5:33`: first, last, how many.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Axis {
-    from: f64,
-    to: f64,
-    points: usize,
-}
-
-impl Axis {
-    /// As the regime map has it, with fewer points.
-    pub const SIGMA: Self = Self { from: -5.0, to: 5.0, points: 33 };
-    /// Likewise.
-    pub const G: Self = Self { from: 0.1, to: 3.0, points: 21 };
-
-    /// The values.
-    pub fn values(&self) -> Vec<f64> {
-        let step = (self.to - self.from) / (self.points - 1).max(1) as f64;
-        (0..self.points).map(|n| self.from + step * n as f64).collect()
-    }
-}
-
-impl std::str::FromStr for Axis {
-    type Err = anyhow::Error;
-
-    fn from_str(text: &str) -> anyhow::Result<Self> {
-        let wrong = || {
-            anyhow!(
-                "`{text}` is not an axis; expected FIRST:LAST:POINTS (dimensionless) with 1 to 500 points, for instance -5:5:33"
-            )
-        };
-        let parts: Vec<&str> = text.split(':').collect();
-        let number = |text: &str| text.parse::<f64>().ok().filter(|x| x.is_finite());
-        let (from, to, points) = match parts[..] {
-            [only] => (number(only), number(only), Some(1)),
-            [from, to, points] => (number(from), number(to), points.parse().ok()),
-            _ => (None, None, None),
-        };
-        match (from, to, points) {
-            (Some(from), Some(to), Some(points @ 1..=500)) if from <= to => Ok(Self { from, to, points }),
-            _ => Err(wrong()),
-        }
-    }
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn short() -> Effort {
-        Effort { periods: 20, brent_periods: 20, runs: 3, ..Effort::default() }
-    }
+    const SHORT: Effort = Effort { periods: 20, brent_periods: 20, runs: 3 };
 
     #[test]
     fn regimes_are_told_apart_and_the_two_methods_agree_where_motion_repeats() {
@@ -155,30 +245,16 @@ mod tests {
             (2.5, 0.0, "n impacts"),
         ];
         for (g, sigma, name) in expected {
-            let row = row(g, &[sigma], &short()).expect("a row");
+            let row = row(g, &[sigma], &SHORT).expect("a row");
             let cell = &row.cells[0];
             assert_eq!(cell.regime, name, "sigma = {sigma}, G = {g}");
             let difference = cell.difference.expect("a motion that repeats");
             assert!(difference < 1e-11, "{sigma}, {g}: {difference:e}");
             assert!(cell.ratio > 0.0 && cell.brent_ns.is_some());
         }
-        let rare = row(0.1, &[-4.0], &short()).expect("a row");
-        assert_eq!((rare.cells[0].regime, rare.cells[0].unit), (cell::RARE, "period"));
-    }
-
-    #[test]
-    fn a_frequency_below_zero_is_refused() {
-        let refused = row(1.0, &[-200.0], &short()).unwrap_err();
+        let rare = row(0.1, &[-4.0], &SHORT).expect("a row");
+        assert_eq!((rare.cells[0].regime, rare.cells[0].unit), (RARE, "period"));
+        let refused = row(1.0, &[-200.0], &SHORT).unwrap_err();
         assert!(refused.to_string().contains("sigma = -200"), "{refused}");
-    }
-
-    #[test]
-    fn axes_are_parsed_and_wrong_ones_refused() {
-        let axis: Axis = "-5:5:3".parse().expect("an axis");
-        assert_eq!(axis.values(), [-5.0, 0.0, 5.0]);
-        assert_eq!("1.2".parse::<Axis>().expect("a value").values(), [1.2]);
-        for wrong in ["", "1:2", "2:1:3", "1:2:0", "1:2:501", "a:2:3", "0:inf:3"] {
-            assert!(wrong.parse::<Axis>().is_err(), "{wrong}");
-        }
     }
 }

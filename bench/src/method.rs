@@ -1,11 +1,16 @@
-//! What every method can do, and how it is timed.
+//! What every method can do, how it is timed, and the methods: this project's plant, stepped in several ways and through its C interface, and the
+//! closed form with Brent's method.
 
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
+use fmi2_boundary::{Fmu, Interface, Master};
+use lovines::Plant;
 use serde::Serialize;
 
+use crate::baseline::{self, Baseline};
 use crate::scene::{Scene, Step};
-use crate::turns;
+use crate::solvers::{Moreau, Rk4};
 
 /// How a method failed.
 #[derive(Clone, Debug)]
@@ -52,18 +57,12 @@ pub struct Answer {
     pub failure: Option<String>,
 }
 
-/// Runs the scene in turns with the plant `P` for about `budget`, one turn at least; a run that lasts longer than `limit` is given up.
+/// Runs the scene in turns with the plant for about `budget`, one turn at least; a run that lasts longer than `limit` is given up.
 /// `checks` are the steps, counted from 1, after which the state is kept.
-pub fn measure<P: Method, M: Method>(
-    scene: &Scene,
-    setting: f64,
-    checks: &[usize],
-    budget: Duration,
-    limit: Duration,
-) -> Answer {
+fn measure<M: Method>(scene: &Scene, setting: f64, checks: &[usize], budget: Duration, limit: Duration) -> Answer {
     let mut answer = Answer::default();
     let began = Instant::now();
-    let mut plant = || run::<P>(scene, 0.0, checks, limit, &mut Vec::new()).map(|(ns, _)| (ns, 1.0));
+    let mut plant = || run::<Stepped>(scene, 0.0, checks, limit, &mut Vec::new()).map(|(ns, _)| (ns, 1.0));
     let (mut ns, mut plant_ns) = (Vec::new(), Vec::new());
     let mut method = || {
         answer.states.clear();
@@ -73,7 +72,7 @@ pub fn measure<P: Method, M: Method>(
     };
     let mut failure = None;
     while ns.is_empty() || began.elapsed() < budget {
-        match turns::pair(ns.len(), &mut plant, &mut method) {
+        match baseline::pair(ns.len(), &mut plant, &mut method) {
             Ok(pair) => {
                 plant_ns.push(pair[0]);
                 ns.push(pair[1]);
@@ -126,4 +125,215 @@ fn run<M: Method>(
         states.push(method.state());
     }
     Ok((ns, method.impacts()))
+}
+
+/// The methods by name.
+const METHODS: &[(&str, Measure)] = &[
+    ("plant", measure::<Stepped>),
+    ("plant-one-step", measure::<Stepped<true, 1, true>>),
+    ("plant-100", measure::<Stepped<true, 100>>),
+    ("plant-general", measure::<Stepped<false>>),
+    ("c-interface", measure::<Shell>),
+    ("brent", measure::<Baseline>),
+    ("rk4", measure::<Rk4>),
+    ("moreau", measure::<Moreau>),
+    #[cfg(feature = "diffsol")]
+    ("diffsol-tsit45", measure::<crate::diffsol::Tsit45>),
+    #[cfg(feature = "diffsol")]
+    ("diffsol-bdf", measure::<crate::diffsol::Bdf>),
+];
+
+/// [`measure`] for one method.
+pub type Measure = fn(&Scene, f64, &[usize], Duration, Duration) -> Answer;
+
+/// Names of the methods.
+pub fn names() -> Vec<&'static str> {
+    METHODS.iter().map(|(name, _)| *name).collect()
+}
+
+/// The method of that name.
+///
+/// # Errors
+/// An unknown name.
+pub fn named(name: &str) -> anyhow::Result<Measure> {
+    let method = METHODS.iter().find(|(other, _)| *other == name);
+    let unknown = || anyhow::anyhow!("there is no method {name}; there are {}", names().join(", "));
+    method.map(|(_, measure)| *measure).ok_or_else(unknown)
+}
+
+/// The plant at the start of a scene.
+///
+/// # Errors
+/// A scene that it refuses.
+pub fn begin(scene: &Scene) -> Result<Plant, Failure> {
+    let refused = |error: lovines::InvalidValue| Failure(error.to_string());
+    let mut plant = Plant::new(scene.parameters, scene.state()).map_err(refused)?;
+    if let Some(first) = scene.steps.first() {
+        plant.begin(first.drive()).map_err(refused)?;
+    }
+    Ok(plant)
+}
+
+/// The plant with its fast path or with the plain solver, which searches for every contact and keeps nothing between steps; each step of the
+/// scene in this many parts, with v and the base displacement read after each; or equal steps joined into one.
+pub struct Stepped<const FAST: bool = true, const PARTS: u32 = 1, const JOINED: bool = false>(Plant);
+
+impl<const FAST: bool, const PARTS: u32, const JOINED: bool> Method for Stepped<FAST, PARTS, JOINED> {
+    fn start(scene: &Scene, _setting: f64) -> Result<Self, Failure> {
+        let mut plant = begin(scene)?;
+        plant.set_fast_path(FAST);
+        Ok(Self(plant))
+    }
+
+    fn step(&mut self, step: &Step) -> Result<(), Failure> {
+        for _ in 0..PARTS {
+            let advanced = self.0.advance(step.drive(), step.duration / f64::from(PARTS));
+            advanced.map_err(|error| Failure(error.to_string()))?;
+            if PARTS > 1 {
+                std::hint::black_box((self.0.centre(), self.0.base_displacement()));
+            }
+        }
+        Ok(())
+    }
+
+    fn state(&self) -> [f64; 4] {
+        let s = self.0.state();
+        [s.q1, s.dq1, s.q2, s.dq2]
+    }
+
+    fn impacts(&self) -> u64 {
+        self.0.totals().impacts
+    }
+
+    fn steps(steps: &[Step]) -> Vec<Step> {
+        // The length of a joined step is rounded once, and not at every addition.
+        let joined = |run: &[Step]| Step { duration: run[0].duration * run.len() as f64, ..run[0] };
+        let equal = |a: &Step, b: &Step| JOINED && a == b;
+        steps.chunk_by(equal).map(joined).collect()
+    }
+}
+
+/// The plant through its C interface, as an FMI master in C calls it: two inputs set, one step, the states read.
+pub struct Shell {
+    rig: Master,
+    time: f64,
+    state: [f64; 4],
+}
+
+/// Value references of q1, der(q1), q2 and der(q2), and of omega and E.
+const STATE: [u32; 4] = [9, 10, 11, 12];
+const INPUTS: [u32; 2] = [8, 7];
+
+impl Method for Shell {
+    fn start(scene: &Scene, _setting: f64) -> Result<Self, Failure> {
+        static PLANT: OnceLock<Fmu> = OnceLock::new();
+        let rig = Master::new(PLANT.get_or_init(Fmu::plant), Interface::CoSimulation);
+        let p = &scene.parameters;
+        let masses = [
+            p.primary_mass,
+            p.stiffness,
+            p.damping,
+            p.particle_mass,
+            p.half_width,
+            p.restitution,
+        ];
+        for (vr, value) in (0..).zip(masses).chain(STATE.into_iter().zip(scene.start)) {
+            rig.well(rig.set_real(vr, value));
+        }
+        if let Some(first) = scene.steps.first() {
+            rig.well(rig.set_reals(&INPUTS, &[first.omega, first.amplitude]));
+        }
+        rig.start();
+        Ok(Self { rig, time: 0.0, state: scene.start })
+    }
+
+    fn step(&mut self, step: &Step) -> Result<(), Failure> {
+        self.rig
+            .well(self.rig.set_reals(&INPUTS, &[step.omega, step.amplitude]));
+        self.rig.well(self.rig.step(self.time, step.duration));
+        self.time += step.duration;
+        self.state = self.rig.reals(&STATE);
+        Ok(())
+    }
+
+    fn state(&self) -> [f64; 4] {
+        self.state
+    }
+
+    fn impacts(&self) -> u64 {
+        u64::try_from(self.rig.impacts()).unwrap_or(0)
+    }
+}
+
+/// Its setting is the tolerance of the root search, s.
+impl Method for Baseline {
+    fn start(scene: &Scene, setting: f64) -> Result<Self, Failure> {
+        Ok(Self::new(scene.parameters, scene.start, setting))
+    }
+
+    fn step(&mut self, step: &Step) -> Result<(), Failure> {
+        let ended = self.advance(step.amplitude, step.omega, step.duration);
+        ended.map_err(|_| {
+            let (t, n) = (self.elapsed, self.impacts);
+            Failure(format!("stalled in the step from t = {t:.3} on, after {n} impacts"))
+        })
+    }
+
+    fn state(&self) -> [f64; 4] {
+        [self.q1, self.dq1, self.q2, self.dq2]
+    }
+
+    fn impacts(&self) -> u64 {
+        self.impacts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// Largest error of a method at the end of a scene.
+    fn error_at_the_end(scene: &str, method: &str, setting: f64) -> f64 {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(folder.join("truth.json")).expect("the truth");
+        let truth: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        let last = truth[scene]["rows"].as_array().and_then(|rows| rows.last());
+        let last = last.expect("a last row");
+        let loaded = Scene::load(folder, scene).expect("a scene");
+        let (once, limit) = (Duration::ZERO, Duration::from_secs(60));
+        let answer = named(method).expect("a method")(&loaded, setting, &[], once, limit);
+        assert_eq!(answer.failure, None, "{method} in {scene}");
+        let states = answer.states.last().expect("the state at the end");
+        let error = |(n, x): (usize, &f64)| {
+            let truth: f64 = last[n + 1].as_str().and_then(|x| x.parse().ok()).expect("a number");
+            (x - truth).abs()
+        };
+        states.iter().enumerate().map(error).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_methods_lead_where_40_digit_arithmetic_does() {
+        let scenes = [
+            "decay",
+            "grazing",
+            "damped",
+            "resonance",
+            "centre",
+            "asymmetric",
+            "three",
+            "chaotic",
+        ];
+        for scene in scenes {
+            // In the chaotic scene a disturbance grows by 1e5.
+            let growth = if scene == "chaotic" { 1e2 } else { 1.0 };
+            for (method, setting, limit) in [("plant", 0.0, 1e-11), ("brent", 1e-12, 1e-9)] {
+                let error = error_at_the_end(scene, method, setting);
+                assert!(error < growth * limit, "{scene}, {method}: {error:e}");
+            }
+        }
+        assert!(error_at_the_end("decay", "rk4", 1000.0) < 1e-7);
+        assert!(error_at_the_end("chatter", "moreau", 10_000.0) < 1e-2);
+    }
 }

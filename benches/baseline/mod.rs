@@ -1,8 +1,8 @@
 //! What a careful user would write in an afternoon: the closed form between impacts, walls looked for on a grid, and the
-//! instant of an impact by Brent's method (crate `roots`). The measure that this project's speed is told in.
+//! instant of an impact by Brent's method (crate `roots`). Baseline of all speed ratios; and how two programs take turns.
 //!
-//! It shares no code with the plant but the names of its parameters, carries the phase from step to step, and knows no sticking: at the end of a chatter it stalls, and a
-//! contact that begins and ends between two points of the grid it does not see.
+//! It shares no code with the plant but the names of its parameters, carries the phase from step to step, and knows no sticking: at the end of a
+//! chatter it stalls, and it does not see a contact that begins and ends between two points of the grid.
 
 use lovines::Parameters;
 use roots::{SimpleConvergency, find_root_brent};
@@ -202,5 +202,41 @@ impl Baseline {
         self.dq2 = self.dq1 - separation;
         self.time = time;
         self.impacts += 1;
+    }
+}
+
+/// Length of a turn, ns. The state of the processor changes from second to second and meets both programs. The median of a turn leaves out the first runs after the other program's turn, and what interrupts others.
+const TURN: f64 = 2e6;
+
+/// Nanoseconds per unit of work: the median of the runs of one turn. `run` returns the nanoseconds that it took and its units of work.
+///
+/// # Errors
+/// Those of a run.
+pub fn turn<E>(run: &mut impl FnMut() -> Result<(f64, f64), E>) -> Result<f64, E> {
+    let (mut gone, mut costs) = (0.0, Vec::new());
+    while gone < TURN {
+        let (ns, work) = run()?;
+        gone += ns;
+        costs.push(ns / work);
+    }
+    let middle = costs.len() / 2;
+    Ok(*costs.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Nanoseconds per unit of work of both programs in the `n`-th pair of turns; each begins every other pair.
+///
+/// # Errors
+/// Those of a run.
+pub fn pair<E>(
+    n: usize,
+    first: &mut impl FnMut() -> Result<(f64, f64), E>,
+    second: &mut impl FnMut() -> Result<(f64, f64), E>,
+) -> Result<[f64; 2], E> {
+    if n.is_multiple_of(2) {
+        let ns = turn(first)?;
+        Ok([ns, turn(second)?])
+    } else {
+        let ns = turn(second)?;
+        Ok([turn(first)?, ns])
     }
 }

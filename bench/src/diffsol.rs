@@ -3,9 +3,9 @@
 use diffsol::{NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason};
 use lovines::Parameters;
 
-use super::impact::{acceleration, rebound};
 use crate::method::{Failure, Method};
 use crate::scene::{Scene, Step};
+use crate::solvers::{acceleration, rebound};
 
 type Matrix = NalgebraMat<f64>;
 
