@@ -1,4 +1,4 @@
-//! What each skip saves, in instructions: the plant as it is, and the same work with the skip kept from happening. And what each effect
+//! What each shortcut saves, in instructions: the plant as it is, and the same work without the shortcut. And what each effect
 //! of a real cavity costs, per impact of the default lock.
 //!
 //! ```text
@@ -14,55 +14,70 @@ use std::env::{args, current_exe};
 use std::hint::black_box;
 use std::process::{Command, ExitCode};
 
-use lovines::{Cavity, Drive, Event, Parameters, Plant, Restitution, State};
+use lovines::{Cavity, Drive, Parameters, Plant, Restitution, State};
 
 const OMEGA: f64 = 0.990_417;
 const PERIOD: f64 = TAU / OMEGA;
 /// A hundred steps a period, as a sampled controller takes them.
 const STEP: f64 = PERIOD / 100.0;
 
-fn drive() -> Drive {
-    Drive::harmonic(1e-3, OMEGA)
+/// The default rig, dimensionless, and what is done with it.
+#[derive(Clone, Copy)]
+struct Work {
+    start: State,
+    cavity: Cavity,
+    /// The plain solver: certified search for every contact.
+    plain: bool,
+    amplitude: f64,
+    step: f64,
+    /// What each step adds to frequency, amplitude and length of a step.
+    change: [f64; 3],
+    /// What is read after each step.
+    read: fn(&Plant),
 }
 
-/// The plain solver: certified search for every contact.
-fn plain(mut plant: Plant) -> Plant {
-    plant.set_fast_path(false);
-    plant
+/// Steps of a particle so slow that it meets no wall.
+const QUIET: Work = Work {
+    start: State { q1: 0.0, dq1: 0.0, q2: 0.0, dq2: 1e-6 },
+    cavity: Cavity::IDEAL,
+    plain: false,
+    amplitude: 1e-3,
+    step: STEP,
+    change: [0.0; 3],
+    read: nothing,
+};
+const SENSORS: Work = Work { read: sensors, ..QUIET };
+const PLAIN: Work = Work { plain: true, ..QUIET };
+const LONG: Work = Work { step: 100.0 * PERIOD, ..QUIET };
+
+impl Work {
+    fn run(&self, steps: u32) {
+        let parameters = Parameters {
+            cavity: self.cavity,
+            ..Parameters::dimensionless(0.0084, 1.43, 0.65)
+        };
+        let mut plant = Plant::new(parameters, self.start).expect("a valid scene");
+        plant.set_fast_path(!self.plain);
+        for n in 0..steps {
+            let [omega, amplitude, step] = self.change.map(|change| change * f64::from(n));
+            let drive = Drive::harmonic(self.amplitude + amplitude, OMEGA + omega);
+            plant.advance(black_box(drive), self.step + step).expect("a valid step");
+            (self.read)(&plant);
+        }
+        black_box(plant.state());
+    }
 }
 
-/// The default rig, dimensionless, with a particle so slow that it meets no wall.
-fn quiet() -> Plant {
-    let start = State { dq2: 1e-6, ..State::default() };
-    Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.65), start).expect("a scene")
-}
-
-/// The same rig in its steady 1:1 motion.
-fn steady() -> Plant {
-    steady_in(Cavity::IDEAL)
-}
-
-/// The same in another cavity.
-fn steady_in(cavity: Cavity) -> Plant {
+/// The steady 1:1 motion in a cavity: one step with this number of impacts.
+fn locked_in(cavity: Cavity, impacts: u32) {
     let start = State {
         q1: -0.438_371_55,
         dq1: 0.007_696_65,
         q2: -1.003_854_15,
         dq2: -0.878_123_25,
     };
-    let parameters = Parameters { cavity, ..Parameters::dimensionless(0.0084, 1.43, 0.65) };
-    Plant::new(parameters, start).expect("a scene")
-}
-
-/// The lock in a cavity: one step with this number of impacts.
-fn locked_in(cavity: Cavity, impacts: u32) {
-    let duration = f64::from(impacts / 2) * PERIOD;
-    steps(
-        steady_in(cavity),
-        1,
-        |_| (Drive::harmonic(0.0084 * 1.1, OMEGA), duration),
-        nothing,
-    );
+    let step = f64::from(impacts / 2) * PERIOD;
+    Work { start, cavity, amplitude: 0.0084 * 1.1, step, ..QUIET }.run(1);
 }
 
 const fn walls(law: Restitution) -> Cavity {
@@ -89,7 +104,7 @@ const EFFECTS: &[(&str, Cavity, f64)] = &[
     ),
     ("viscoelastic restitution", walls(Restitution::Viscoelastic(0.33)), 1.2),
     ("plastic restitution", walls(Restitution::Plastic(0.33)), 1.2),
-    // No two flights are alike, so that none can be predicted from another: the cost is that of an irregular motion.
+    // No two flights are alike, so that none can be predicted from another, as in an irregular motion.
     (
         "scatter of the restitution, irregular flights",
         Cavity { scatter: 0.01, ..Cavity::IDEAL },
@@ -97,26 +112,15 @@ const EFFECTS: &[(&str, Cavity, f64)] = &[
     ),
 ];
 
-/// So many steps of a plant under what `drive` tells for each, each followed by `read`.
-fn steps(mut plant: Plant, n: u32, step: impl Fn(u32) -> (Drive, f64), read: impl Fn(&Plant)) {
-    for k in 0..n {
-        let (drive, duration) = step(k);
-        plant.advance(black_box(drive), duration).unwrap();
-        read(&plant);
-    }
-    black_box(plant.state());
-}
-
-fn nothing(_: &Plant) {}
-
 /// Steps of a particle on a wall that pushes all the time: stuck, or without loss in hops of 1/300 period.
-fn pressed(hopping: bool, n: u32, step: f64) {
-    let half_width = 1e3;
+fn pressed(hopping: bool, n: u32) {
+    // Powers of two: the start is exactly at the wall.
+    let half_width = 1024.0;
     let parameters = Parameters {
         half_width,
         ..Parameters::dimensionless(0.0084, 1.43, if hopping { 1.0 } else { 0.65 })
     };
-    let (acceleration, q1) = (-1e-3, 1e-3);
+    let (acceleration, q1) = (-1.0 / 1024.0, 1.0 / 1024.0);
     let start = State {
         // Where the spring holds the mass at this acceleration.
         q1,
@@ -128,116 +132,90 @@ fn pressed(hopping: bool, n: u32, step: f64) {
         },
         ..State::default()
     };
-    let mut plant = Plant::new(parameters, start).expect("a scene");
-    for k in 0..n {
-        let t = f64::from(k) * step;
-        let signal = [0.5 * acceleration * t * t, acceleration * t, 0.5 * acceleration, 0.0];
-        plant
-            .advance(black_box(Drive { signal, ..Drive::default() }), step)
-            .unwrap();
+    let mut plant = Plant::new(parameters, start).expect("a valid scene");
+    let mut drive = Drive {
+        signal: [0.0, 0.0, 0.5 * acceleration, 0.0],
+        ..Drive::default()
+    };
+    for _ in 0..n {
+        plant.advance(black_box(drive), STEP).expect("a valid step");
+        // The same signal seen from now: one computed anew would jump by its rounding.
+        drive = plant.base().drive;
     }
     assert_eq!(plant.contact().is_some(), !hopping);
     assert_eq!(plant.totals().impacts > 0, hopping);
 }
 
-/// A run of so many units of work.
+/// Instructions of the work with the number of steps.
 type Run = fn(u32);
 
-/// A unit of which few are enough.
-const LONG: &str = "step of 100 periods";
-
-/// A skip, the unit of work, and that work with it and without it.
+/// A shortcut, the unit of work, and the work with it and without it.
 const ROWS: &[(&str, &str, Run, Run)] = &[
     (
         "walls out of reach: no root search",
         "step of 1/100 period",
-        |n| steps(quiet(), n, |_| (drive(), STEP), nothing),
-        |n| steps(plain(quiet()), n, |_| (drive(), STEP), nothing),
+        |n| QUIET.run(n),
+        |n| PLAIN.run(n),
     ),
     (
         "the same",
-        LONG,
-        |n| steps(quiet(), n, |_| (drive(), 100.0 * PERIOD), nothing),
-        |n| steps(plain(quiet()), n, |_| (drive(), 100.0 * PERIOD), nothing),
+        LONG_STEP,
+        |n| LONG.run(n),
+        |n| Work { plain: true, ..LONG }.run(n),
     ),
     (
         "no excitation: no forced terms",
         "step of the plain solver",
-        |n| steps(plain(quiet()), n, |_| (Drive::harmonic(0.0, OMEGA), STEP), nothing),
-        |n| steps(plain(quiet()), n, |_| (drive(), STEP), nothing),
+        |n| Work { amplitude: 0.0, ..PLAIN }.run(n),
+        |n| PLAIN.run(n),
     ),
     (
         "the same, fast path",
         "step of 1/100 period, v and base read",
-        |n| steps(quiet(), n, |_| (Drive::harmonic(0.0, OMEGA), STEP), sensors),
-        |n| steps(quiet(), n, |_| (drive(), STEP), sensors),
+        |n| Work { amplitude: 0.0, ..SENSORS }.run(n),
+        |n| SENSORS.run(n),
     ),
     (
         "particle stuck: hops of 1/300 period not followed",
         "step of 1/100 period",
-        |n| pressed(false, n, STEP),
-        |n| pressed(true, n, STEP),
+        |n| pressed(false, n),
+        |n| pressed(true, n),
     ),
     (
         "drive unchanged: its coefficients reused",
         "step of 1/100 period",
-        |n| steps(quiet(), n, |_| (drive(), STEP), nothing),
-        |n| {
-            steps(
-                quiet(),
-                n,
-                |k| (Drive::harmonic(1e-3, OMEGA + 1e-9 * f64::from(k)), STEP),
-                nothing,
-            )
-        },
+        |n| QUIET.run(n),
+        |n| Work { change: [1e-9, 0.0, 0.0], ..QUIET }.run(n),
     ),
     (
         "the same, amplitude alone changed",
         "step of 1/100 period",
-        |n| steps(quiet(), n, |_| (drive(), STEP), nothing),
-        |n| {
-            steps(
-                quiet(),
-                n,
-                |k| (Drive::harmonic(1e-3 + 1e-9 * f64::from(k), OMEGA), STEP),
-                nothing,
-            )
-        },
+        |n| QUIET.run(n),
+        |n| Work { change: [0.0, 1e-9, 0.0], ..QUIET }.run(n),
     ),
     (
         "step length unchanged: its coefficients reused",
         "step of 1/100 period, v and base read",
-        |n| steps(quiet(), n, |_| (drive(), STEP), sensors),
-        |n| steps(quiet(), n, |k| (drive(), STEP + 1e-9 * f64::from(k)), sensors),
+        |n| SENSORS.run(n),
+        |n| Work { change: [0.0, 0.0, 1e-9], ..SENSORS }.run(n),
     ),
     (
         "outputs when asked for: none",
         "step of 1/100 period",
-        |n| steps(quiet(), n, |_| (drive(), STEP), nothing),
-        |n| steps(quiet(), n, |_| (drive(), STEP), all),
+        |n| QUIET.run(n),
+        |n| Work { read: all, ..QUIET }.run(n),
     ),
     (
         "outputs when asked for: v and base",
         "step of 1/100 period",
-        |n| steps(quiet(), n, |_| (drive(), STEP), sensors),
-        |n| steps(quiet(), n, |_| (drive(), STEP), all),
-    ),
-    (
-        "impact records when wanted",
-        "impact",
-        |n| locked_in(Cavity::IDEAL, n),
-        |n| {
-            let mut impacts: Vec<Event> = Vec::new();
-            let duration = f64::from(n / 2) * PERIOD;
-            steady()
-                .advance_with(black_box(Drive::harmonic(0.0084 * 1.1, OMEGA)), duration, |event| {
-                    impacts.push(event)
-                })
-                .unwrap();
-            black_box(impacts);
-        },
+        |n| SENSORS.run(n),
+        |n| Work { read: all, ..QUIET }.run(n),
     ),
 ];
+/// A unit of which few are enough.
+const LONG_STEP: &str = "step of 100 periods";
+
+fn nothing(_: &Plant) {}
 
 fn sensors(plant: &Plant) {
     black_box((plant.centre(), plant.base_displacement()));
@@ -275,7 +253,7 @@ fn per_unit(arguments: &[&str], few: u32) -> Result<f64, String> {
 fn table() -> Result<(), String> {
     println!("| shortcut | unit of work | instructions | without it | saved |\n|---|---|---|---|---|");
     for (row, (skip, unit, ..)) in ROWS.iter().enumerate() {
-        let few = if *unit == LONG { 20 } else { 2000 };
+        let few = if *unit == LONG_STEP { 20 } else { 2000 };
         let cost = |how| per_unit(&[how, &row.to_string()], few);
         let (with, without) = (cost("with")?, cost("without")?);
         let saved = 100.0 * (1.0 - with / without);
