@@ -1,106 +1,318 @@
 //! Random sequences of calls, with valid and invalid arguments: no crash, no hang, and a reason for every error.
 
-mod calls;
-mod random;
-
+use std::ffi::{c_char, c_int};
+use std::ptr::{null, null_mut, without_provenance_mut};
 use std::time::{Duration, Instant};
 
+pub use fastrand::Rng;
 use fmi2_component::Status;
+use fmi2_component::abi::EventInfo;
+use fmi2_description::{Description, FmiType};
 
-use crate::library::Fmu;
-use crate::master::{Interface, Master};
-use calls::Caller;
-pub use random::RandomSource;
+use crate::{Fmu, Interface, Master, Raw};
 
-/// What became of the calls of some sequences.
-#[derive(Clone, Debug, Default)]
-pub struct Tally {
-    /// Sequences.
-    pub sequences: u64,
+/// Calls in a sequence.
+const CALLS: usize = 80;
+/// Elements of an array.
+const MOST: usize = 6;
+/// Values that nobody expects.
+const WILD: [f64; 12] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    1e9,
+    1e300,
+    -1e300,
+    1e-300,
+    f64::NAN,
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+    f64::MIN_POSITIVE,
+];
+
+/// A library under random calls, and what became of them.
+#[derive(Debug)]
+pub struct Fuzzer {
+    fmu: Fmu,
+    /// Value references of Real, Integer and Boolean variables, and one that is unknown.
+    references: [Vec<u32>; 3],
     /// Calls by their status: OK, warning, discard, error, fatal, pending.
     pub statuses: [u64; 6],
-    /// Error calls after which the state was compared with that before: none has changed.
+    /// Error calls after which the state was compared with the state before: none has changed.
     pub harmless: u64,
     /// The longest call.
     pub longest: Duration,
 }
 
-impl Tally {
-    /// Both together.
-    #[must_use]
-    pub fn and(mut self, other: &Self) -> Self {
-        self.sequences += other.sequences;
-        for (sum, more) in self.statuses.iter_mut().zip(other.statuses) {
-            *sum += more;
+impl Fuzzer {
+    /// No call yet.
+    pub fn new(fmu: Fmu) -> Self {
+        let description = Description::parse(fmu.description).expect("the library was built from it");
+        let references = [FmiType::Real, FmiType::Integer, FmiType::Boolean].map(|kind| {
+            let variables = description.variables.iter();
+            let of_kind = variables.filter(|v| v.content().is_some_and(|(of, _)| of == kind));
+            of_kind.map(|v| v.value_reference).chain([u32::MAX]).collect()
+        });
+        let (statuses, harmless, longest) = ([0; 6], 0, Duration::ZERO);
+        Self { fmu, references, statuses, harmless, longest }
+    }
+
+    /// Makes the sequence of that seed with a new instance. Panics if a call is fatal, or an error without a reason, or an illegal call
+    /// has changed something.
+    pub fn sequence(&mut self, seed: u64) {
+        let fmu = &self.fmu;
+        let mut random = Rng::with_seed(seed);
+        let interface = if fmu.description.contains("<ModelExchange") && random.bool() {
+            Interface::ModelExchange
+        } else {
+            Interface::CoSimulation
+        };
+        let master = Master::new(fmu, interface);
+        let mut caller = Caller {
+            master: &master,
+            states: [null_mut(); 3],
+            blob: Vec::new(),
+            time: 0.0,
+            references: &self.references,
+            stage: 0,
+            interface,
+        };
+        if random.bool() {
+            master.start();
         }
-        self.harmless += other.harmless;
-        self.longest = self.longest.max(other.longest);
-        self
-    }
-
-    /// All calls.
-    #[must_use]
-    pub fn calls(&self) -> u64 {
-        self.statuses.iter().sum()
-    }
-}
-
-/// A call that takes longer is told of.
-const SLOW: Duration = Duration::from_secs(2);
-/// Calls in a sequence.
-const CALLS: usize = 80;
-
-/// Makes the sequence of that seed with a new instance.
-///
-/// # Panics
-/// If a call is fatal, or an error without a reason, or an illegal call has changed something.
-#[must_use]
-pub fn sequence(fmu: &Fmu, seed: u64) -> Tally {
-    let mut random = RandomSource::new(seed);
-    let interface = if fmu.description.contains("<ModelExchange") && random.one_in(2) {
-        Interface::ModelExchange
-    } else {
-        Interface::CoSimulation
-    };
-    let master = Master::new(fmu, interface);
-    let mut caller = Caller::new(&master, fmu.description, interface);
-    let mut tally = Tally { sequences: 1, ..Tally::default() };
-    if random.one_in(2) {
-        master.start();
-    }
-    for n in 0..CALLS {
-        let before = random.one_in(8).then(|| snapshot(&master)).flatten();
-        let _ = master.heard();
-        let began = Instant::now();
-        let (name, status) = caller.call(&mut random);
-        tally.longest = tally.longest.max(began.elapsed());
-        if began.elapsed() > SLOW {
-            eprintln!(
-                "slow: {:?} for {name} ({status:?}) of {}, {interface:?}, seed {seed}, call {n}",
-                began.elapsed(),
-                fmu.name
-            );
-        }
-        tally.statuses[status as usize] += 1;
-        let heard = master.heard();
-        let place = || format!("{} {interface:?}, seed {seed}, call {n}: {name}: {heard:?}", fmu.name);
-        assert_ne!(status, Status::Fatal, "{}", place());
-        if matches!(status, Status::Error | Status::Discard) {
-            let reason = heard.iter().find(|line| line.status == status);
-            let reason = reason.unwrap_or_else(|| panic!("no reason: {}", place()));
-            assert!(reason.text.starts_with(name), "{}", place());
-            let illegal = reason.text.contains("is illegal in state");
-            if let Some(before) = before.filter(|_| illegal) {
-                assert_eq!(snapshot(&master), Some(before), "harm done: {}", place());
-                tally.harmless += 1;
+        for n in 0..CALLS {
+            let before = one_in(&mut random, 8).then(|| master.bytes());
+            let _ = master.heard();
+            let began = Instant::now();
+            let (name, status) = caller.call(&mut random);
+            self.longest = self.longest.max(began.elapsed());
+            self.statuses[status as usize] += 1;
+            let heard = master.heard();
+            let place = || format!("{} {interface:?}, seed {seed}, call {n}: {name}: {heard:?}", fmu.name);
+            assert_ne!(status, Status::Fatal, "{}", place());
+            if matches!(status, Status::Error | Status::Discard) {
+                let reason = heard.iter().find(|line| line.status == status);
+                let reason = reason.unwrap_or_else(|| panic!("no reason: {}", place()));
+                assert!(reason.text.starts_with(name), "{}", place());
+                let illegal = reason.text.contains("is illegal in state");
+                if let Some(before) = before.filter(|_| illegal) {
+                    assert_eq!(master.bytes(), before, "harm done: {}", place());
+                    let _ = master.heard();
+                    self.harmless += 1;
+                }
             }
         }
     }
-    tally
 }
 
-fn snapshot(master: &Master) -> Option<Vec<u8>> {
-    let bytes = master.bytes();
-    let _ = master.heard();
-    Some(bytes)
+/// True once in `many`.
+fn one_in(random: &mut Rng, many: usize) -> bool {
+    random.usize(..many) == 0
+}
+
+fn pick<T: Copy>(random: &mut Rng, of: &[T]) -> T {
+    of[random.usize(..of.len())]
+}
+
+fn between(random: &mut Rng, from: f64, to: f64) -> f64 {
+    from + (to - from) * random.f64()
+}
+
+/// Numbers, some of them wild.
+fn numbers(random: &mut Rng) -> [f64; MOST] {
+    std::array::from_fn(|_| match random.usize(..8) {
+        0 => pick(random, &WILD),
+        1..=3 => between(random, -1.0, 1.0),
+        4 => between(random, 0.0, 100.0),
+        _ => between(random, 0.0, 0.01),
+    })
+}
+
+/// A number of elements: mostly one.
+fn count(random: &mut Rng) -> usize {
+    match random.usize(..16) {
+        0 => pick(random, &[0, usize::MAX, 1 << 40, isize::MAX as usize]),
+        1..=11 => 1,
+        _ => random.usize(..=MOST),
+    }
+}
+
+/// An instance, and what its master has got from it.
+struct Caller<'a> {
+    master: &'a Master,
+    states: [Raw; 3],
+    blob: Vec<u8>,
+    time: f64,
+    references: &'a [Vec<u32>; 3],
+    /// How far set-up has come: what would be in order next.
+    stage: usize,
+    interface: Interface,
+}
+
+impl Caller<'_> {
+    /// Value references of a type, now and then of another one.
+    fn references(&self, random: &mut Rng, kind: usize) -> [u32; MOST] {
+        let kind = if one_in(random, 12) { random.usize(..3) } else { kind };
+        std::array::from_fn(|_| pick(random, &self.references[kind]))
+    }
+
+    /// Makes a call; returns its name and status.
+    fn call(&mut self, random: &mut Rng) -> (&'static str, Status) {
+        let (c, f) = (self.master.c, self.master.f);
+        // SAFETY: as the standard asks; arrays have MOST elements, which is no less than a count that is not absurd.
+        macro_rules! call {
+            ($name:ident($($argument:expr),*)) => { (stringify!($name), unsafe { (f.$name)(c, $($argument),*) }) };
+        }
+        let r = random;
+        let wild = one_in(r, 12);
+        let (n, m) = (count(r), count(r));
+        let [reals, integers, booleans] = [0, 1, 2].map(|kind| self.references(r, kind));
+        let [vr, vi, vb] = [&reals, &integers, &booleans].map(|vr| if one_in(r, 24) { null() } else { vr.as_ptr() });
+        let mut x = numbers(r);
+        let mut whole = [r.i32(-1..5); MOST];
+        let mut strings: [*const c_char; MOST] = [c"\xff%n%s".as_ptr(); MOST];
+        strings[1] = pick(r, &[null(), c"text".as_ptr()]);
+        // Now and then a function of the other interface.
+        let exchange = (self.interface == Interface::ModelExchange) != one_in(r, 12);
+        match r.usize(..16) {
+            0..=3 => match r.usize(..12) {
+                0..=3 => call!(fmi2SetReal(vr, n, if wild { null() } else { x.as_ptr() })),
+                4..=6 => call!(fmi2GetReal(vr, n, if wild { null_mut() } else { x.as_mut_ptr() })),
+                7 => call!(fmi2SetInteger(vi, n, whole.as_ptr())),
+                8 => call!(fmi2GetInteger(vi, n, whole.as_mut_ptr())),
+                9 => call!(fmi2SetBoolean(vb, n, whole.as_ptr())),
+                10 => call!(fmi2GetBoolean(vb, n, whole.as_mut_ptr())),
+                _ if wild => call!(fmi2GetString(vr, n, strings.as_mut_ptr())),
+                _ => call!(fmi2SetString(vr, n, strings.as_ptr())),
+            },
+            4 => self.state(r),
+            5..=6 => match r.usize(..3) {
+                0 => call!(fmi2SetRealInputDerivatives(vr, n, whole.as_ptr(), x.as_ptr())),
+                1 => call!(fmi2GetRealOutputDerivatives(vr, n, whole.as_ptr(), x.as_mut_ptr())),
+                _ => {
+                    let (knowns, mut answer) = (self.references(r, 0), [0.0; MOST]);
+                    call!(fmi2GetDirectionalDerivative(
+                        vr,
+                        n,
+                        knowns.as_ptr(),
+                        m,
+                        x.as_ptr(),
+                        answer.as_mut_ptr()
+                    ))
+                }
+            },
+            7 => match r.usize(..5) {
+                0 => call!(fmi2GetStatus(whole[0], &mut Status::Ok)),
+                1 => call!(fmi2GetRealStatus(whole[0], &mut x[0])),
+                2 => call!(fmi2GetIntegerStatus(whole[0], &mut 0)),
+                3 => call!(fmi2GetBooleanStatus(whole[0], null_mut())),
+                _ => call!(fmi2GetStringStatus(whole[0], &mut strings[0])),
+            },
+            8..=10 => self.life(r),
+            _ if exchange => {
+                if r.bool() {
+                    x = std::array::from_fn(|_| between(r, -0.01, 0.01));
+                }
+                let at = if one_in(r, 20) { null_mut() } else { x.as_mut_ptr() };
+                let n = pick(r, &[5, 5, 5, 5, 3, 0, usize::MAX]);
+                match r.usize(..12) {
+                    0 => call!(fmi2EnterEventMode()),
+                    1..=2 => call!(fmi2NewDiscreteStates(&mut EventInfo::default())),
+                    3..=4 => call!(fmi2EnterContinuousTimeMode()),
+                    5 => call!(fmi2CompletedIntegratorStep(1, &mut 0, &mut 0)),
+                    6 => call!(fmi2SetTime(x[0])),
+                    7 => call!(fmi2SetContinuousStates(at, n)),
+                    8 => call!(fmi2GetDerivatives(at, n)),
+                    9 => call!(fmi2GetEventIndicators(at, n)),
+                    10 => call!(fmi2GetContinuousStates(at, n)),
+                    _ => call!(fmi2GetNominalsOfContinuousStates(at, n)),
+                }
+            }
+            _ if one_in(r, 20) => call!(fmi2CancelStep()),
+            _ => {
+                let step = match r.usize(..12) {
+                    0 => pick(r, &WILD),
+                    1 => between(r, 0.0, 10.0),
+                    _ => between(r, 0.0, 0.01),
+                };
+                let time = if one_in(r, 12) { pick(r, &WILD) } else { self.time };
+                let done = call!(fmi2DoStep(time, step, 0));
+                if done.1 == Status::Ok {
+                    self.time = time + step;
+                }
+                done
+            }
+        }
+    }
+
+    /// The life cycle: mostly what is in order.
+    fn life(&mut self, r: &mut Rng) -> (&'static str, Status) {
+        let (c, f) = (self.master.c, self.master.f);
+        let mut time = || if one_in(r, 4) { pick(r, &WILD) } else { 0.0 };
+        let [start, stop, tolerance] = [time(), time(), time()];
+        let wanted = if one_in(r, 4) { r.usize(..6) } else { self.stage };
+        let defined = c_int::from(one_in(r, 6));
+        let categories = [c"logAll".as_ptr(), c"\xfe%s".as_ptr(), null()];
+        let (on, count) = (c_int::from(r.bool()), r.usize(..4));
+        // SAFETY: as the standard asks.
+        let (name, status) = unsafe {
+            match wanted {
+                0 => {
+                    self.time = start;
+                    let status = (f.fmi2SetupExperiment)(c, 1, tolerance, start, defined, stop);
+                    ("fmi2SetupExperiment", status)
+                }
+                1 => ("fmi2EnterInitializationMode", (f.fmi2EnterInitializationMode)(c)),
+                2 => ("fmi2ExitInitializationMode", (f.fmi2ExitInitializationMode)(c)),
+                3 | 4 => {
+                    let status = (f.fmi2SetDebugLogging)(c, on, count, categories.as_ptr());
+                    ("fmi2SetDebugLogging", status)
+                }
+                _ if one_in(r, 8) => ("fmi2Terminate", (f.fmi2Terminate)(c)),
+                _ => ("fmi2Reset", (f.fmi2Reset)(c)),
+            }
+        };
+        self.stage = match (name, status) {
+            ("fmi2Reset", Status::Ok) => 0,
+            (_, Status::Ok) if wanted == self.stage => (wanted + 1).min(5),
+            // Something is amiss: a reset comes next.
+            (_, Status::Error) => 5,
+            _ => self.stage,
+        };
+        (name, status)
+    }
+
+    /// FMU states, handles that were never given out, and damaged bytes.
+    fn state(&mut self, r: &mut Rng) -> (&'static str, Status) {
+        let (c, f) = (self.master.c, self.master.f);
+        let own = &mut self.states[r.usize(..3)];
+        let any = pick(r, &[*own, *own, null_mut(), without_provenance_mut(3)]);
+        // SAFETY: the blob is as long as it is said to be.
+        unsafe {
+            match r.usize(..6) {
+                0 => ("fmi2GetFMUstate", (f.fmi2GetFMUstate)(c, own)),
+                1 => ("fmi2SetFMUstate", (f.fmi2SetFMUstate)(c, any)),
+                2 => ("fmi2FreeFMUstate", (f.fmi2FreeFMUstate)(c, own)),
+                3 => {
+                    let status = (f.fmi2SerializedFMUstateSize)(c, any, &mut 0);
+                    ("fmi2SerializedFMUstateSize", status)
+                }
+                4 => {
+                    self.blob = vec![0; 4000];
+                    let size = pick(r, &[0, 10, self.blob.len()]);
+                    let status = (f.fmi2SerializeFMUstate)(c, any, self.blob.as_mut_ptr().cast(), size);
+                    ("fmi2SerializeFMUstate", status)
+                }
+                _ => {
+                    if let Some(byte) = self.blob.get_mut(r.usize(..4000)) {
+                        *byte ^= pick(r, &[0, 0, 1, 0x80]);
+                    }
+                    let (bytes, size) = (self.blob.as_ptr().cast(), self.blob.len());
+                    let status = (f.fmi2DeSerializeFMUstate)(c, bytes, size, own);
+                    ("fmi2DeSerializeFMUstate", status)
+                }
+            }
+        }
+    }
 }

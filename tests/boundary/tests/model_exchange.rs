@@ -1,4 +1,4 @@
-//! The life of an instance for model exchange, and jumps at its events.
+//! Guards the life of an instance for model exchange, and jumps at its events.
 
 use fmi2_boundary::{Fmu, Interface, Master};
 use fmi2_component::Status;
@@ -9,10 +9,7 @@ const DQ2: u32 = 12;
 const E: u32 = 6;
 
 fn event_mode(values: &[(u32, f64)]) -> Master {
-    let m = Master::new(&Fmu::plant(), Interface::ModelExchange);
-    for &(vr, value) in values {
-        m.well(m.set_real(vr, value));
-    }
+    let m = Master::with(&Fmu::plant(), Interface::ModelExchange, values);
     m.start();
     m
 }
@@ -26,12 +23,6 @@ fn resolve(m: &Master) -> EventInfo {
 
 fn go_on(m: &Master) {
     m.well(unsafe { (m.f.fmi2EnterContinuousTimeMode)(m.c) });
-}
-
-fn integer(m: &Master, vr: u32) -> i32 {
-    let mut value = 0;
-    m.well(unsafe { (m.f.fmi2GetInteger)(m.c, &vr, 1, &mut value) });
-    value
 }
 
 fn indicators(m: &Master) -> [f64; 5] {
@@ -96,7 +87,7 @@ fn a_particle_at_the_wall_rebounds_and_keeps_momentum() {
     let (v1, v2) = (m.real(DQ1), m.real(DQ2));
     assert!((3.0 * v1 + 0.5 * v2 - (3.0 * 0.4 - 0.5 * 0.2)).abs() < 1e-15);
     assert!((v1 - v2 + 0.65 * 0.6).abs() < 1e-15);
-    assert_eq!((integer(&m, 18), integer(&m, 21)), (1, 0));
+    assert_eq!((m.integer(18), m.integer(21)), (1, 0));
     assert!(indicators(&m).iter().all(|&z| z > 0.0));
     assert_eq!(resolve(&m).values_of_continuous_states_changed, 0, "once");
 }
@@ -118,7 +109,7 @@ fn a_particle_that_is_pressed_sticks_and_a_jump_of_the_base_frees_it() {
     let held = [(0, 3.0), (2, 6.0), (9, -0.005), (11, -0.015), (DQ2, 0.0)]; // to the last digit or so
     let m = event_mode(&held);
     resolve(&m);
-    assert_eq!(integer(&m, 21), 1);
+    assert_eq!(m.integer(21), 1);
     let mut dx = [0.0; 5];
     m.well(unsafe { (m.f.fmi2GetDerivatives)(m.c, dx.as_mut_ptr(), 5) });
     assert_eq!(dx[2], dx[3], "both are accelerated alike");
@@ -128,7 +119,7 @@ fn a_particle_that_is_pressed_sticks_and_a_jump_of_the_base_frees_it() {
     m.well(unsafe { (m.f.fmi2EnterEventMode)(m.c) });
     m.well(m.set_real(E, -0.001));
     resolve(&m);
-    assert_eq!(integer(&m, 21), 0);
+    assert_eq!(m.integer(21), 0);
     assert!(
         (m.real(DQ1) + 6.0 / 3.0 * 0.001).abs() < 1e-16,
         "the primary mass alone"
@@ -172,4 +163,41 @@ fn nominal_values_are_those_of_the_rig() {
     let mut nominals = [0.0; 5];
     m.well(unsafe { (m.f.fmi2GetNominalsOfContinuousStates)(m.c, nominals.as_mut_ptr(), 5) });
     assert_eq!(nominals, [0.5, 0.5, 1.0, 1.0, 1.0]);
+}
+
+#[test]
+fn a_particle_on_a_rough_floor_slides_sticks_and_slips() {
+    // A particle at rest, which friction holds: tilt, mu_k, mu_s.
+    let m = event_mode(&[(35, 0.05), (36, 0.1), (37, 0.15), (DQ2, 0.0)]);
+    let at = |t: f64| unsafe {
+        m.well((m.f.fmi2EnterContinuousTimeMode)(m.c));
+        m.well((m.f.fmi2SetTime)(m.c, t));
+        m.well((m.f.fmi2EnterEventMode)(m.c));
+    };
+    resolve(&m);
+    assert_eq!(m.integer(44), 1);
+    at(0.25);
+    assert_eq!(m.real(45), 0.25, "time stuck");
+    // A steeper slope lets it slip: der(w) < 0, because gravity pulls towards +q2.
+    m.well(m.set_real(35, 0.3));
+    resolve(&m);
+    assert!(indicators(&m)[4] < 1e-11 && indicators(&m)[2..4] == [1.0; 2]);
+    let pull = 9.80665 * (0.3f64.sin() - 0.1 * 0.3f64.cos());
+    assert!((m.real(27) - pull).abs() < 1e-14, "der(u2)");
+    let way = 1e-3;
+    let mut x = [0.0, way, 0.0, 0.1, 0.0];
+    unsafe {
+        m.well((m.f.fmi2EnterContinuousTimeMode)(m.c));
+        m.well((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5));
+    }
+    let loss = 0.032 * 9.80665 * 0.1 * 0.3f64.cos() * way;
+    assert!((m.real(46) / loss - 1.0).abs() < 1e-12, "energy lost to friction");
+    // The particle has turned round: it sticks or slides the other way, at the next event.
+    x[3] = -1e-6;
+    unsafe { m.well((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5)) };
+    assert!(indicators(&m)[4] < 0.0);
+    unsafe { m.well((m.f.fmi2EnterEventMode)(m.c)) };
+    resolve(&m);
+    assert!(indicators(&m).iter().all(|&z| z > 0.0));
+    assert_eq!((m.integer(44), m.real(15)), (1, 0.0), "it slides on from rest");
 }

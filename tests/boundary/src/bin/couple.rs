@@ -1,6 +1,6 @@
-//! Couples plant and controller and tells a digest of every output bit: `couple [samples] [libraries]`.
+//! Couples plant and controller and prints a digest of every state and output bit: `couple [samples] [libraries]`.
 //!
-//! The same digest on another platform says that both libraries compute the same there, bit by bit.
+//! Platforms with the same digest compute the same, bit by bit.
 
 use std::path::Path;
 
@@ -24,7 +24,7 @@ fn main() {
     }
     println!(
         "{samples} samples, {} impacts, locked: {}",
-        pair.plant.impacts(),
+        pair.impacts(),
         pair.is_locked()
     );
     println!("sha256 {}", pair.hash());

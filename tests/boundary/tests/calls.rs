@@ -1,0 +1,161 @@
+//! Guards both FMUs against arguments that make no sense: each is refused with one line that says why, changes nothing and takes bounded time.
+//! Random sequences of calls, of which `scripts/stress` makes many more; the exported symbols. What holds for every component is tested in
+//! `fmi2-component/tests/`.
+
+use std::time::{Duration, Instant};
+
+use fmi2_boundary::{Fmu, Functions, Interface, Master, fuzz::Fuzzer};
+use fmi2_component::Status;
+use object::{Object, ObjectSymbol};
+
+/// Value references: stiffness, damping, half-width, restitution, e, E, omega, q1, der(q1), der(q2), r_law.
+const K: u32 = 1;
+const C: u32 = 2;
+const B: u32 = 4;
+const R: u32 = 5;
+const SIGNAL: u32 = 6;
+const E: u32 = 7;
+const OMEGA: u32 = 8;
+const Q1: u32 = 9;
+const DQ1: u32 = 10;
+const DQ2: u32 = 12;
+const R_LAW: u32 = 38;
+
+/// No call may take longer, on a busy machine and with nothing optimised but the plant.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Asserts that a call is an error with one line that contains `reason`, takes bounded time, and changes nothing.
+#[track_caller]
+fn refused(m: &Master, reason: &str, call: impl FnOnce() -> Status) {
+    let before = m.bytes();
+    let _ = m.heard();
+    let began = Instant::now();
+    let status = call();
+    assert!(began.elapsed() < PATIENCE, "{:?}", began.elapsed());
+    assert_eq!(status, Status::Error);
+    m.heard_one(&[reason]);
+    assert_eq!(m.bytes(), before);
+}
+
+#[test]
+fn where_one_of_several_values_is_refused_none_is_set() {
+    let m = &Master::ready(&Fmu::plant());
+    // Stiffness and restitution are tunable: the first values are fine, the last is refused by the component itself.
+    refused(m, "at most 1", || m.set_reals(&[K, SIGNAL, R], &[9000.0, 0.5, 1.5]));
+    refused(m, "finite", || m.set_reals(&[SIGNAL, OMEGA], &[0.5, f64::NAN]));
+    refused(m, "cannot be set", || m.set_reals(&[SIGNAL, Q1], &[0.5, 0.5]));
+    refused(m, "orders 1 to 3", || {
+        let (vr, orders, values) = ([SIGNAL; 2], [1, 4], [0.5, 0.5]);
+        // SAFETY: arrays of two.
+        unsafe { (m.f.fmi2SetRealInputDerivatives)(m.c, vr.as_ptr(), 2, orders.as_ptr(), values.as_ptr()) }
+    });
+    let m = &Master::new(&Fmu::plant(), Interface::CoSimulation);
+    refused(m, "r_law", || m.set_integer(R_LAW, 3));
+    let m = &Master::ready(&Fmu::controller());
+    m.well(m.step(0.0, 1e-3));
+    // amplitude is fine, phase_target is not.
+    refused(m, "between -pi and pi", || m.set_reals(&[5, 10], &[1e-5, 7.0]));
+    refused(m, "samples", || m.step(1e-3, 1e300));
+    m.well(m.step(1e-3, 0.1));
+}
+
+#[test]
+fn a_step_of_absurdly_many_impacts_ends_with_an_error_and_a_reset_helps() {
+    let m = Master::with(
+        &Fmu::plant(),
+        Interface::CoSimulation,
+        &[(B, 1e-9), (R, 1.0), (DQ2, 1e8)],
+    );
+    m.start();
+    let began = Instant::now();
+    assert_eq!(m.step(0.0, 1.0), Status::Error);
+    assert!(began.elapsed() < PATIENCE, "{:?}", began.elapsed());
+    m.heard_one(&["there are 10000000 impacts within the first "]);
+    // SAFETY: the instance is alive.
+    m.well(unsafe { (m.f.fmi2Reset)(m.c) });
+    m.start();
+    m.well(m.step(0.0, 0.1));
+}
+
+#[test]
+fn a_step_that_could_not_end_or_whose_numbers_are_lost_in_rounding_is_not_begun() {
+    let m = &Master::ready(&Fmu::plant());
+    for step in [1e8, 1e300] {
+        refused(m, "rad of the fastest rate", || m.step(0.0, step));
+    }
+    let beyond_doubles = "m is refused; allowed is a finite number from -1e100 to 1e100";
+    for (vr, value, step, reason) in [
+        (OMEGA, -1e300, 1e-300, "rad/s is refused"),
+        (SIGNAL, 1e300, 1e-3, beyond_doubles),
+        (SIGNAL, -1e14, 1e-3, "2^52 half-widths"),
+        (E, -1e300, 1e-3, beyond_doubles),
+        (E, 5e13, 1e-3, "2^52 half-widths"),
+    ] {
+        m.well(m.set_real(vr, value));
+        refused(m, reason, || m.step(0.0, step));
+        m.well(m.set_real(vr, 0.0));
+    }
+    // SAFETY: one reference, order and value.
+    let curve = |third: f64| unsafe { (m.f.fmi2SetRealInputDerivatives)(m.c, &SIGNAL, 1, &3, &third) };
+    m.well(curve(1e30));
+    // Also by a step in which the base does not get there.
+    for step in [1.0, 1e-300] {
+        refused(m, "2^52 half-widths", || m.step(0.0, step));
+    }
+    m.well(curve(1.0));
+    m.well(m.step(0.0, 1.0));
+    let m = Master::with(&Fmu::plant(), Interface::CoSimulation, &[(C, 1e12)]);
+    m.start();
+    m.well(m.step(0.0, 1e-7));
+}
+
+#[test]
+fn a_start_beyond_double_precision_is_refused() {
+    let far = ["from -1e100 to 1e100", "2^52 half-widths"];
+    for (values, parts) in [
+        // The values themselves, and the rates that follow from them.
+        (&[(K, 1e300)][..], &["N/m is refused"][..]),
+        (&[(C, 1e300)], &["N.s/m is refused"]),
+        (&[(0, 1e-90), (K, 1e100)], &["rad/s is refused"]),
+        (&[(C, 1e60)], &["rad/s is refused"]),
+        (&[(OMEGA, -1e300)], &["rad/s is refused"]),
+        (&[(DQ1, 1e300)], &["der(q1)", far[0]]),
+        (&[(DQ1, -1e90)], &["der(q1)", far[1]]),
+        (&[(DQ2, 1e300)], &["der(q2)", far[0]]),
+        (&[(DQ2, -1e90)], &["der(q2)", far[1]]),
+    ] {
+        let m = Master::with(&Fmu::plant(), Interface::CoSimulation, values);
+        m.enter_initialization();
+        // SAFETY: the instance is alive.
+        assert_eq!(unsafe { (m.f.fmi2ExitInitializationMode)(m.c) }, Status::Error);
+        m.heard_one(parts);
+    }
+}
+
+#[test]
+fn calls_in_any_order_are_answered_and_every_error_has_a_reason() {
+    for fmu in [Fmu::plant(), Fmu::controller(), Fmu::tank()] {
+        let mut fuzzer = Fuzzer::new(fmu);
+        (0..400).for_each(|seed| fuzzer.sequence(seed));
+        let [ok, _, _, error, ..] = fuzzer.statuses;
+        let calls: u64 = fuzzer.statuses.iter().sum();
+        assert!(
+            ok > calls / 10 && error > calls / 10 && fuzzer.harmless > 100,
+            "{fuzzer:?}"
+        );
+    }
+}
+
+#[test]
+fn exactly_the_functions_of_the_standard_are_exported() {
+    let mut expected = Functions::NAMES.to_vec();
+    expected.sort_unstable();
+    for name in ["LoViNes", "PhaseLock", "Tank"] {
+        let bytes = std::fs::read(Fmu::path(name)).unwrap();
+        let library = object::File::parse(&*bytes).unwrap();
+        let defined = library.dynamic_symbols().filter(|s| s.is_definition());
+        let mut found: Vec<_> = defined.map(|s| s.name().unwrap().to_owned()).collect();
+        found.sort();
+        assert_eq!(found, expected, "{name}");
+    }
+}
