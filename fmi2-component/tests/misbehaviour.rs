@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::ptr::null_mut;
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 
-use fmi2_boundary::{Fmu, Master, callbacks, functions_of};
+use fmi2_boundary::{Fmu, Master, call, callbacks, functions_of};
 use fmi2_component::{Causality, Component, Initial, Key, Log, Model, Refusal, Status, Variability, Variable};
 
 struct Moody;
@@ -136,7 +136,7 @@ const PERSON: Fmu = Fmu {
 fn in_mood(mood: i32) -> Master {
     let master = Master::at(&PERSON, 1, "moody", None);
     master.start();
-    let status = unsafe { (master.f.fmi2SetInteger)(master.c, &0, 1, &mood) };
+    let status = call!(master.fmi2SetInteger(&0, 1, &mood));
     assert_eq!(status, Status::Ok);
     master
 }
@@ -159,10 +159,7 @@ fn a_panic_is_logged_and_ends_the_instance_only() {
     assert_fatal(&master);
 
     let master = in_mood(PANIC_ON_GET);
-    assert_eq!(
-        unsafe { (master.f.fmi2GetInteger)(master.c, &0, 1, &mut 0) },
-        Status::Fatal
-    );
+    assert_eq!(call!(master.fmi2GetInteger(&0, 1, &mut 0)), Status::Fatal);
     master.heard_one(&["fmi2GetInteger", "got 100%%"]);
     assert_fatal(&master);
     assert_eq!(other.step(0.0, 1.0), Status::Ok);
@@ -186,33 +183,28 @@ fn after_an_error_in_a_step_values_can_be_read_and_the_instance_reset() {
     let master = in_mood(ERROR_ON_STEP);
     assert_eq!(master.step(0.0, 1.0), Status::Error);
     master.heard_one(&["cannot go on"]);
-    assert_eq!(
-        unsafe { (master.f.fmi2GetInteger)(master.c, &0, 1, &mut 0) },
-        Status::Ok
-    );
+    assert_eq!(call!(master.fmi2GetInteger(&0, 1, &mut 0)), Status::Ok);
     assert_eq!(master.step(0.0, 1.0), Status::Error);
     master.heard_one(&["illegal in state error"]);
-    assert_eq!(unsafe { (master.f.fmi2Reset)(master.c) }, Status::Ok);
-    assert_eq!(unsafe { (master.f.fmi2EnterInitializationMode)(master.c) }, Status::Ok);
+    assert_eq!(call!(master.fmi2Reset()), Status::Ok);
+    assert_eq!(call!(master.fmi2EnterInitializationMode()), Status::Ok);
 }
 
 #[test]
 fn what_a_component_does_not_provide_is_refused() {
     let master = in_mood(0);
     let (mut state, mut size) = (null_mut(), 0);
-    unsafe {
-        assert_eq!((master.f.fmi2GetFMUstate)(master.c, &mut state), Status::Ok);
-        assert_eq!(
-            (master.f.fmi2SerializedFMUstateSize)(master.c, state, &mut size),
-            Status::Error
-        );
-        master.heard_one(&["cannot be serialised"]);
-        assert_eq!((master.f.fmi2GetReal)(master.c, &0, 1, &mut 0.0), Status::Error);
-        master.heard_one(&[
-            "value reference 0 is unknown",
-            "the model has no variables of type Real",
-        ]);
-    }
+    assert_eq!(call!(master.fmi2GetFMUstate(&mut state)), Status::Ok);
+    assert_eq!(
+        call!(master.fmi2SerializedFMUstateSize(state, &mut size)),
+        Status::Error
+    );
+    master.heard_one(&["cannot be serialised"]);
+    assert_eq!(call!(master.fmi2GetReal(&0, 1, &mut 0.0)), Status::Error);
+    master.heard_one(&[
+        "value reference 0 is unknown",
+        "the model has no variables of type Real",
+    ]);
 }
 
 #[test]

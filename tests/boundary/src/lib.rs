@@ -4,6 +4,8 @@
 //! not linked into one. The master keeps what its logger hears, and does nothing that it is not told to; a master that simulates is in
 //! `lab/fmu`.
 
+#![allow(clippy::macro_metavars_in_unsafe)] // `call!` is for tests, whose calls are all unsafe
+
 mod functions;
 pub mod fuzz;
 pub mod pair;
@@ -142,6 +144,15 @@ unsafe extern "C" fn hear(
         let text = |pointer| CStr::from_ptr(pointer).to_str().unwrap().to_owned();
         (*environment.cast::<Vec<Line>>()).push(Line { status, category: text(category), text: text(message) });
     }
+}
+
+/// Calls a function of an instance: `call!(master.fmi2DoStep(0.0, 0.1, 1))`. The arguments must be as the standard asks: arrays as long
+/// as they are said to be, or pointers and counts that the component must refuse.
+#[macro_export]
+macro_rules! call {
+    ($master:ident.$name:ident($($argument:expr),*)) => {
+        unsafe { ($master.f.$name)($master.c, $($argument),*) }
+    };
 }
 
 /// Callbacks whose logger appends to `lines`.

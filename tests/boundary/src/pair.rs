@@ -3,7 +3,7 @@
 use fmi2_description::{Causality, Description, FmiType};
 use sha2::{Digest, Sha256};
 
-use crate::{Fmu, Interface, Master};
+use crate::{Fmu, Interface, Master, call};
 
 /// The controller's sample time, s: a hundredth of the natural period.
 pub const SAMPLE_TIME: f64 = 0.001_134_357_339_553_793_8;
@@ -103,8 +103,7 @@ impl Pair {
     /// Whether the controller reports a lock.
     pub fn is_locked(&self) -> bool {
         let (m, mut locked) = (&self.controller.master, 0);
-        // SAFETY: one reference, one place.
-        m.well(unsafe { (m.f.fmi2GetBoolean)(m.c, &self.locked, 1, &mut locked) });
+        m.well(call!(m.fmi2GetBoolean(&self.locked, 1, &mut locked)));
         locked == 1
     }
 

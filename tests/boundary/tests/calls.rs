@@ -4,7 +4,7 @@
 
 use std::time::{Duration, Instant};
 
-use fmi2_boundary::{Fmu, Functions, Interface, Master, fuzz::Fuzzer};
+use fmi2_boundary::{Fmu, Functions, Interface, Master, call, fuzz::Fuzzer};
 use fmi2_component::Status;
 use object::{Object, ObjectSymbol};
 
@@ -46,8 +46,7 @@ fn where_one_of_several_values_is_refused_none_is_set() {
     refused(m, "cannot be set", || m.set_reals(&[SIGNAL, Q1], &[0.5, 0.5]));
     refused(m, "orders 1 to 3", || {
         let (vr, orders, values) = ([SIGNAL; 2], [1, 4], [0.5, 0.5]);
-        // SAFETY: arrays of two.
-        unsafe { (m.f.fmi2SetRealInputDerivatives)(m.c, vr.as_ptr(), 2, orders.as_ptr(), values.as_ptr()) }
+        call!(m.fmi2SetRealInputDerivatives(vr.as_ptr(), 2, orders.as_ptr(), values.as_ptr()))
     });
     let m = &Master::new(&Fmu::plant(), Interface::CoSimulation);
     refused(m, "r_law", || m.set_integer(R_LAW, 3));
@@ -71,8 +70,7 @@ fn a_step_of_absurdly_many_impacts_ends_with_an_error_and_a_reset_helps() {
     assert_eq!(m.step(0.0, 1.0), Status::Error);
     assert!(began.elapsed() < PATIENCE, "{:?}", began.elapsed());
     m.heard_one(&["there are 10000000 impacts within the first "]);
-    // SAFETY: the instance is alive.
-    m.well(unsafe { (m.f.fmi2Reset)(m.c) });
+    m.well(call!(m.fmi2Reset()));
     m.start();
     m.well(m.step(0.0, 0.1));
 }
@@ -95,8 +93,7 @@ fn a_step_that_could_not_end_or_whose_numbers_are_lost_in_rounding_is_not_begun(
         refused(m, reason, || m.step(0.0, step));
         m.well(m.set_real(vr, 0.0));
     }
-    // SAFETY: one reference, order and value.
-    let curve = |third: f64| unsafe { (m.f.fmi2SetRealInputDerivatives)(m.c, &SIGNAL, 1, &3, &third) };
+    let curve = |third: f64| call!(m.fmi2SetRealInputDerivatives(&SIGNAL, 1, &3, &third));
     m.well(curve(1e30));
     // Also by a step in which the base does not get there.
     for step in [1.0, 1e-300] {
@@ -126,8 +123,7 @@ fn a_start_beyond_double_precision_is_refused() {
     ] {
         let m = Master::with(&Fmu::plant(), Interface::CoSimulation, values);
         m.enter_initialization();
-        // SAFETY: the instance is alive.
-        assert_eq!(unsafe { (m.f.fmi2ExitInitializationMode)(m.c) }, Status::Error);
+        assert_eq!(call!(m.fmi2ExitInitializationMode()), Status::Error);
         m.heard_one(parts);
     }
 }

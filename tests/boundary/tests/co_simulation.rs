@@ -4,7 +4,7 @@
 use std::ptr::null_mut;
 use std::thread;
 
-use fmi2_boundary::{Fmu, Interface, Line, Master, fuzz, pair};
+use fmi2_boundary::{Fmu, Interface, Line, Master, call, fuzz, pair};
 use fmi2_component::Status;
 use lovines::{Cavity, Drive, Parameters, Plant, Restitution, State};
 
@@ -54,16 +54,13 @@ fn steps(m: &Master, from: u32, count: u32, step: f64) {
 /// Sets the state of another instance: its bytes, written out and read back.
 fn restore(m: &Master, bytes: &[u8]) -> Status {
     let mut state = null_mut();
-    // SAFETY: the bytes are as long as they are said to be; the state is freed once.
-    unsafe {
-        let status = (m.f.fmi2DeSerializeFMUstate)(m.c, bytes.as_ptr().cast(), bytes.len(), &mut state);
-        if status == Status::Ok {
-            m.well((m.f.fmi2SetFMUstate)(m.c, state));
-            m.well((m.f.fmi2FreeFMUstate)(m.c, &mut state));
-        }
-        assert!(state.is_null());
-        status
+    let status = call!(m.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &mut state));
+    if status == Status::Ok {
+        m.well(call!(m.fmi2SetFMUstate(state)));
+        m.well(call!(m.fmi2FreeFMUstate(&mut state)));
     }
+    assert!(state.is_null());
+    status
 }
 
 #[test]
@@ -198,12 +195,10 @@ fn a_reset_instance_equals_a_fresh_one_and_states_are_small() {
         // SAFETY: the instance is alive; so below.
         match interface {
             Interface::CoSimulation => steps(&used, 0, 100, 1e-3),
-            Interface::ModelExchange => {
-                used.well(unsafe { (used.f.fmi2NewDiscreteStates)(used.c, &mut Default::default()) })
-            }
+            Interface::ModelExchange => used.well(call!(used.fmi2NewDiscreteStates(&mut Default::default()))),
         }
         assert!(used.bytes().len() <= most, "{}: {} bytes", fmu.name, used.bytes().len());
-        used.well(unsafe { (used.f.fmi2Reset)(used.c) });
+        used.well(call!(used.fmi2Reset()));
         assert_eq!(used.bytes(), fresh.bytes());
     }
 }
@@ -250,8 +245,7 @@ fn a_start_parameter_and_its_output_are_one_value() {
                 m.well(m.set_real(set, value));
                 assert_eq!(m.reals(&[output, parameter]), [value; 2]);
             }
-            // SAFETY: the instance is alive.
-            unsafe { m.well((m.f.fmi2ExitInitializationMode)(m.c)) };
+            m.well(call!(m.fmi2ExitInitializationMode()));
             assert_eq!(m.set_real(parameter, 0.0), Status::Error, "it is fixed");
             assert_eq!(m.real(parameter), -2.5e-3);
         }
@@ -273,8 +267,7 @@ fn derivatives_of_held_inputs_have_no_effect_and_are_warned_of_once() {
             for order in 1..=3 {
                 // Zero is the derivative of a held input.
                 let value = if n < 3 { 0.0 } else { f64::from(n) };
-                // SAFETY: one element each.
-                given.well(unsafe { (given.f.fmi2SetRealInputDerivatives)(given.c, &vr, 1, &order, &value) });
+                given.well(call!(given.fmi2SetRealInputDerivatives(&vr, 1, &order, &value)));
             }
         }
         for m in [&held, &given] {

@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fmi2_boundary::{Fmu, Interface, Master};
+use fmi2_boundary::{Fmu, Interface, Master, call};
 use fmi2_component::Status;
 use fmi2_component::abi::EventInfo;
 use fmi2_description::{Causality, Description, FmiType, Initial, ModelStructure, ScalarVariable, Unknown};
@@ -35,15 +35,13 @@ fn plant(interface: Interface, rig: &[f64; 13], stuck: bool) -> Master {
 }
 
 fn leave_initialization(m: &Master) {
-    // SAFETY: the instance is alive.
-    m.well(unsafe { (m.f.fmi2ExitInitializationMode)(m.c) });
+    m.well(call!(m.fmi2ExitInitializationMode()));
 }
 
 /// The change of an unknown over the change of a known.
 fn partial(m: &Master, unknown: u32, known: u32) -> (Status, f64) {
     let mut slope = f64::NAN;
-    // SAFETY: one element each.
-    let status = unsafe { (m.f.fmi2GetDirectionalDerivative)(m.c, &unknown, 1, &known, 1, &2.0, &mut slope) };
+    let status = call!(m.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &2.0, &mut slope));
     (status, slope / 2.0)
 }
 
@@ -105,8 +103,7 @@ impl Model {
         match self.kind(place) {
             FmiType::Real => m.real(vr),
             FmiType::Boolean => {
-                // SAFETY: one reference, one place.
-                m.well(unsafe { (m.f.fmi2GetBoolean)(m.c, &vr, 1, &mut whole) });
+                m.well(call!(m.fmi2GetBoolean(&vr, 1, &mut whole)));
                 f64::from(whole)
             }
             _ => f64::from(m.integer(vr)),
@@ -117,8 +114,7 @@ impl Model {
         let (vr, whole) = (self.variable(place).value_reference, value as i32);
         m.well(match self.kind(place) {
             FmiType::Real => m.set_real(vr, value),
-            // SAFETY: one reference, one value.
-            FmiType::Boolean => unsafe { (m.f.fmi2SetBoolean)(m.c, &vr, 1, &whole) },
+            FmiType::Boolean => call!(m.fmi2SetBoolean(&vr, 1, &whole)),
             _ => m.set_integer(vr, whole),
         });
     }
@@ -196,20 +192,17 @@ fn exchanged(d: &Model, rig: &[f64; 13], stuck: bool) -> BTreeMap<Pair, f64> {
     let m = plant(Interface::ModelExchange, rig, stuck);
     leave_initialization(&m);
     let mut x = [0.0; 5];
-    // SAFETY: arrays of five.
-    unsafe {
-        m.well((m.f.fmi2NewDiscreteStates)(m.c, &mut EventInfo::default()));
-        m.well((m.f.fmi2EnterContinuousTimeMode)(m.c));
-        m.well((m.f.fmi2GetContinuousStates)(m.c, x.as_mut_ptr(), 5));
-        // Some way on: the energy lost to friction grows with the distance since the last event.
-        x[0] += if stuck {
-            0.0
-        } else {
-            1e-3 * (m.real(10) - m.real(12)).signum()
-        };
-        x[4] = 0.7;
-        m.well((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5));
-    }
+    m.well(call!(m.fmi2NewDiscreteStates(&mut EventInfo::default())));
+    m.well(call!(m.fmi2EnterContinuousTimeMode()));
+    m.well(call!(m.fmi2GetContinuousStates(x.as_mut_ptr(), 5)));
+    // Some way on: the energy lost to friction grows with the distance since the last event.
+    x[0] += if stuck {
+        0.0
+    } else {
+        1e-3 * (m.real(10) - m.real(12)).signum()
+    };
+    x[4] = 0.7;
+    m.well(call!(m.fmi2SetContinuousStates(x.as_ptr(), 5)));
     assert_eq!(d.get(&m, 22), f64::from(u8::from(stuck)), "contact");
     let unknowns = [d.unknowns(|s| &s.outputs), d.unknowns(|s| &s.derivatives)].concat();
     let mut slopes = BTreeMap::new();
@@ -221,8 +214,7 @@ fn exchanged(d: &Model, rig: &[f64; 13], stuck: bool) -> BTreeMap<Pair, f64> {
         let set = |value| {
             let mut x = x;
             x[place] = value;
-            // SAFETY: an array of five.
-            m.well(unsafe { (m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5) });
+            m.well(call!(m.fmi2SetContinuousStates(x.as_ptr(), 5)));
         };
         if stuck {
             let at = [x[place], x[place] + 1e-3];
@@ -341,8 +333,7 @@ fn motion(m: &Master, outputs: &[u32], [time, h]: [f64; 2], orders: usize) {
         let derivatives = |vr: &u32| -> Vec<f64> {
             let higher = (1..=3).map(|order| {
                 let mut slope = f64::NAN;
-                // SAFETY: one reference, one order, one place.
-                m.well(unsafe { (m.f.fmi2GetRealOutputDerivatives)(m.c, vr, 1, &order, &mut slope) });
+                m.well(call!(m.fmi2GetRealOutputDerivatives(vr, 1, &order, &mut slope)));
                 slope
             });
             std::iter::once(m.real(*vr)).chain(higher).collect()
@@ -373,8 +364,7 @@ fn output_derivatives_are_those_of_the_motion_with_and_without_friction_and_tilt
     m.start();
     motion(&m, &outputs, [0.0, 1e-4], 3);
     let mut answer = 0.0;
-    // SAFETY: one element each.
-    let status = unsafe { (m.f.fmi2GetRealOutputDerivatives)(m.c, &9, 1, &4, &mut answer) };
+    let status = call!(m.fmi2GetRealOutputDerivatives(&9, 1, &4, &mut answer));
     assert_eq!(status, Status::Error);
     // With stuck_time and friction_loss.
     let m = Master::with(

@@ -1,6 +1,6 @@
 //! Guards the life of an instance for model exchange, and jumps at its events.
 
-use fmi2_boundary::{Fmu, Interface, Master};
+use fmi2_boundary::{Fmu, Interface, Master, call};
 use fmi2_component::Status;
 use fmi2_component::abi::EventInfo;
 
@@ -16,24 +16,23 @@ fn event_mode(values: &[(u32, f64)]) -> Master {
 
 fn resolve(m: &Master) -> EventInfo {
     let mut info = EventInfo::default();
-    // SAFETY: one place; so below.
-    m.well(unsafe { (m.f.fmi2NewDiscreteStates)(m.c, &mut info) });
+    m.well(call!(m.fmi2NewDiscreteStates(&mut info)));
     info
 }
 
 fn go_on(m: &Master) {
-    m.well(unsafe { (m.f.fmi2EnterContinuousTimeMode)(m.c) });
+    m.well(call!(m.fmi2EnterContinuousTimeMode()));
 }
 
 fn indicators(m: &Master) -> [f64; 5] {
     let mut z = [0.0; 5];
-    m.well(unsafe { (m.f.fmi2GetEventIndicators)(m.c, z.as_mut_ptr(), 5) });
+    m.well(call!(m.fmi2GetEventIndicators(z.as_mut_ptr(), 5)));
     z
 }
 
 fn states(m: &Master) -> [f64; 5] {
     let mut x = [0.0; 5];
-    m.well(unsafe { (m.f.fmi2GetContinuousStates)(m.c, x.as_mut_ptr(), 5) });
+    m.well(call!(m.fmi2GetContinuousStates(x.as_mut_ptr(), 5)));
     x
 }
 
@@ -42,29 +41,23 @@ fn each_mode_has_its_own_functions() {
     let m = event_mode(&[]);
     assert_eq!(m.step(0.0, 0.1), Status::Error);
     assert!(m.heard()[0].text.contains("one of co-simulation"));
-    unsafe {
-        assert_eq!((m.f.fmi2CompletedIntegratorStep)(m.c, 1, &mut 0, &mut 0), Status::Error);
-        assert!(m.heard()[0].text.contains("legal in Continuous-Time Mode"));
-        m.well((m.f.fmi2EnterEventMode)(m.c));
-        resolve(&m);
-        go_on(&m);
-        m.well((m.f.fmi2CompletedIntegratorStep)(m.c, 1, &mut 0, &mut 0));
-        assert_eq!(
-            (m.f.fmi2NewDiscreteStates)(m.c, &mut EventInfo::default()),
-            Status::Error
-        );
-        let _ = m.heard();
-        m.well((m.f.fmi2Terminate)(m.c));
-        let _ = states(&m);
-    }
+    assert_eq!(call!(m.fmi2CompletedIntegratorStep(1, &mut 0, &mut 0)), Status::Error);
+    assert!(m.heard()[0].text.contains("legal in Continuous-Time Mode"));
+    m.well(call!(m.fmi2EnterEventMode()));
+    resolve(&m);
+    go_on(&m);
+    m.well(call!(m.fmi2CompletedIntegratorStep(1, &mut 0, &mut 0)));
+    assert_eq!(call!(m.fmi2NewDiscreteStates(&mut EventInfo::default())), Status::Error);
+    let _ = m.heard();
+    m.well(call!(m.fmi2Terminate()));
+    let _ = states(&m);
 }
 
 #[test]
 fn co_simulation_has_none_of_them() {
     for fmu in [Fmu::plant(), Fmu::controller()] {
         let m = Master::ready(&fmu);
-        // SAFETY: refused.
-        assert_eq!(unsafe { (m.f.fmi2SetTime)(m.c, 0.0) }, Status::Error);
+        assert_eq!(call!(m.fmi2SetTime(0.0)), Status::Error);
         assert!(m.heard()[0].text.contains("one of model exchange"));
     }
 }
@@ -97,7 +90,7 @@ fn a_jump_of_the_base_is_the_velocity_jump_that_the_damper_makes() {
     let m = event_mode(&[(0, 3.0), (2, 6.0)]);
     resolve(&m);
     go_on(&m);
-    m.well(unsafe { (m.f.fmi2EnterEventMode)(m.c) });
+    m.well(call!(m.fmi2EnterEventMode()));
     m.well(m.set_real(E, 0.01));
     resolve(&m);
     assert!((m.real(DQ1) - 6.0 / 3.0 * 0.01).abs() < 1e-16);
@@ -111,12 +104,12 @@ fn a_particle_that_is_pressed_sticks_and_a_jump_of_the_base_frees_it() {
     resolve(&m);
     assert_eq!(m.integer(21), 1);
     let mut dx = [0.0; 5];
-    m.well(unsafe { (m.f.fmi2GetDerivatives)(m.c, dx.as_mut_ptr(), 5) });
+    m.well(call!(m.fmi2GetDerivatives(dx.as_mut_ptr(), 5)));
     assert_eq!(dx[2], dx[3], "both are accelerated alike");
     assert!((dx[2] - 11680.0 * 0.005 / 3.032).abs() < 1e-12);
 
     go_on(&m);
-    m.well(unsafe { (m.f.fmi2EnterEventMode)(m.c) });
+    m.well(call!(m.fmi2EnterEventMode()));
     m.well(m.set_real(E, -0.001));
     resolve(&m);
     assert_eq!(m.integer(21), 0);
@@ -135,10 +128,8 @@ fn a_step_that_has_led_behind_a_wall_asks_for_an_event() {
     let (mut event, mut end) = (0, 0);
     let mut x = states(&m);
     x[1] = -0.0100001;
-    unsafe {
-        m.well((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5));
-        m.well((m.f.fmi2CompletedIntegratorStep)(m.c, 1, &mut event, &mut end));
-    }
+    m.well(call!(m.fmi2SetContinuousStates(x.as_ptr(), 5)));
+    m.well(call!(m.fmi2CompletedIntegratorStep(1, &mut event, &mut end)));
     assert_eq!((event, end), (1, 0));
     assert!(indicators(&m)[0] < 0.0);
 }
@@ -148,10 +139,8 @@ fn states_without_sense_are_refused() {
     let m = event_mode(&[]);
     go_on(&m);
     let x = [0.0, f64::NAN, 0.0, 0.0, 0.0];
-    unsafe {
-        assert_eq!((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5), Status::Discard);
-        assert_eq!((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 4), Status::Error);
-    }
+    assert_eq!(call!(m.fmi2SetContinuousStates(x.as_ptr(), 5)), Status::Discard);
+    assert_eq!(call!(m.fmi2SetContinuousStates(x.as_ptr(), 4)), Status::Error);
     let heard = m.heard();
     assert!(heard[0].text.contains("finite") && heard[1].text.contains("expected 5"));
     assert_eq!(states(&m)[1], 0.0);
@@ -161,7 +150,7 @@ fn states_without_sense_are_refused() {
 fn nominal_values_are_those_of_the_rig() {
     let m = event_mode(&[(0, 1.0), (1, 4.0), (4, 0.5)]);
     let mut nominals = [0.0; 5];
-    m.well(unsafe { (m.f.fmi2GetNominalsOfContinuousStates)(m.c, nominals.as_mut_ptr(), 5) });
+    m.well(call!(m.fmi2GetNominalsOfContinuousStates(nominals.as_mut_ptr(), 5)));
     assert_eq!(nominals, [0.5, 0.5, 1.0, 1.0, 1.0]);
 }
 
@@ -169,10 +158,10 @@ fn nominal_values_are_those_of_the_rig() {
 fn a_particle_on_a_rough_floor_slides_sticks_and_slips() {
     // A particle at rest, which friction holds: tilt, mu_k, mu_s.
     let m = event_mode(&[(35, 0.05), (36, 0.1), (37, 0.15), (DQ2, 0.0)]);
-    let at = |t: f64| unsafe {
-        m.well((m.f.fmi2EnterContinuousTimeMode)(m.c));
-        m.well((m.f.fmi2SetTime)(m.c, t));
-        m.well((m.f.fmi2EnterEventMode)(m.c));
+    let at = |t: f64| {
+        m.well(call!(m.fmi2EnterContinuousTimeMode()));
+        m.well(call!(m.fmi2SetTime(t)));
+        m.well(call!(m.fmi2EnterEventMode()));
     };
     resolve(&m);
     assert_eq!(m.integer(44), 1);
@@ -186,17 +175,15 @@ fn a_particle_on_a_rough_floor_slides_sticks_and_slips() {
     assert!((m.real(27) - pull).abs() < 1e-14, "der(u2)");
     let way = 1e-3;
     let mut x = [0.0, way, 0.0, 0.1, 0.0];
-    unsafe {
-        m.well((m.f.fmi2EnterContinuousTimeMode)(m.c));
-        m.well((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5));
-    }
+    m.well(call!(m.fmi2EnterContinuousTimeMode()));
+    m.well(call!(m.fmi2SetContinuousStates(x.as_ptr(), 5)));
     let loss = 0.032 * 9.80665 * 0.1 * 0.3f64.cos() * way;
     assert!((m.real(46) / loss - 1.0).abs() < 1e-12, "energy lost to friction");
     // The particle has turned round: it sticks or slides the other way, at the next event.
     x[3] = -1e-6;
-    unsafe { m.well((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5)) };
+    m.well(call!(m.fmi2SetContinuousStates(x.as_ptr(), 5)));
     assert!(indicators(&m)[4] < 0.0);
-    unsafe { m.well((m.f.fmi2EnterEventMode)(m.c)) };
+    m.well(call!(m.fmi2EnterEventMode()));
     resolve(&m);
     assert!(indicators(&m).iter().all(|&z| z > 0.0));
     assert_eq!((m.integer(44), m.real(15)), (1, 0.0), "it slides on from rest");
