@@ -145,8 +145,10 @@ fn an_unknown_category_is_a_warning() {
     assert_eq!(status, Error);
 }
 
+type Call = fn(&Master) -> Status;
+
 /// Every function that depends on the state, called with arguments that are in order.
-const CALLS: &[(&str, fn(&Master) -> Status)] = {
+const CALLS: &[(&str, Call)] = {
     macro_rules! calls {
         ($($name:ident($($argument:expr),*);)*) => { &[$((stringify!($name), |m| call!(m.$name($($argument),*)))),*] };
     }
@@ -205,7 +207,8 @@ fn each_state_has_its_functions_and_a_call_out_of_order_does_no_harm() {
     let read = "GetReal GetInteger GetBoolean";
     let write = "SetReal SetBoolean";
     let ask = "GetRealOutputDerivatives GetStatus GetRealStatus GetBooleanStatus GetStringStatus";
-    let states: [(fn(&Master), &[&str]); 5] = [
+    type Path = fn(&Master);
+    let states: [(Path, &[&str]); 5] = [
         (|_| (), &["SetupExperiment EnterInitializationMode", write]),
         (initialise, &["ExitInitializationMode", read, write]),
         (start, &["DoStep Terminate", read, write, ask]),
