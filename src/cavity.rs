@@ -1,4 +1,4 @@
-//! A real cavity: unequal gaps, tilt, friction, and a restitution that depends on the speed, on the wall and on chance.
+//! What a real cavity does: the forces of tilt and friction, and a restitution that depends on the speed, on the wall and on chance.
 //!
 //! With `theta` the tilt, `a_g = g sin(theta)` and `g_n = g cos(theta)`, the particle obeys
 //!
@@ -10,140 +10,10 @@
 //! displaced by `F/k` does; the particle's flight is a parabola. The closed form therefore stays.
 
 use crate::contact::{ImpactLaw, Resolution, Wall};
-use crate::parameters::{InvalidValue, Parameters};
+use crate::parameters::{Cavity, Parameters, Restitution};
 
 /// Standard gravity, m/s².
 pub const GRAVITY: f64 = 9.80665;
-
-/// How a wall returns the particle: the coefficient of restitution `r` at the speed of approach `v`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Restitution {
-    /// `r`, whatever the speed.
-    Constant(f64),
-    /// `r = 1 - k v^(1/5)`, with `k` in (s/m)^(1/5): viscoelastic spheres (Ramírez et al., Phys. Rev. E 60 (1999) 4465).
-    Viscoelastic(f64),
-    /// `r = min(1, (v/v_y)^(-1/4))`, with the yield speed `v_y` in m/s: plastic impact (Johnson, "Contact Mechanics", 1985, chapter 11).
-    Plastic(f64),
-}
-
-impl Restitution {
-    /// The coefficient at the speed of approach `v`, m/s, before limits.
-    fn at(self, v: f64) -> f64 {
-        match self {
-            Self::Constant(r) => r,
-            Self::Viscoelastic(k) => 1.0 - k * fifth_root(v),
-            Self::Plastic(yield_speed) => libm::sqrt(libm::sqrt(yield_speed / v)).min(1.0),
-        }
-    }
-
-    fn validate(self) -> Result<(), InvalidValue> {
-        let (name, value, unit, (low, high), allowed) = match self {
-            Self::Constant(r) => (
-                "r of a wall (coefficient of restitution)",
-                r,
-                "",
-                (f64::MIN_POSITIVE, 1.0),
-                "a number above 0 and at most 1",
-            ),
-            Self::Viscoelastic(k) => (
-                "k of a wall (viscoelastic restitution)",
-                k,
-                "(s/m)^(1/5)",
-                (0.0, 1e100),
-                "a number from 0 to 1e100",
-            ),
-            Self::Plastic(v) => (
-                "v_y of a wall (yield speed)",
-                v,
-                "m/s",
-                (1e-100, 1e100),
-                "a number from 1e-100 to 1e100",
-            ),
-        };
-        InvalidValue::unless((low..=high).contains(&value), name, value, unit, allowed)
-    }
-}
-
-/// What distinguishes a real cavity from the ideal one. The default is the ideal one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Cavity {
-    /// Gap `b_plus` to the wall at `w = b_plus`, m; `None`: the half-width `b`.
-    pub b_plus: Option<f64>,
-    /// Gap `b_minus` to the wall at `w = -b_minus`, m; `None`: the half-width `b`.
-    pub b_minus: Option<f64>,
-    /// Tilt `theta` of the axis, rad: gravity accelerates the particle by `g sin(theta)` along the axis.
-    pub tilt: f64,
-    /// Coefficient `mu_k` of kinetic friction between particle and floor.
-    pub kinetic_friction: f64,
-    /// Coefficient `mu_s` of static friction, at least `mu_k`; `None`: `mu_k`.
-    pub static_friction: Option<f64>,
-    /// Restitution of the walls at `w = b_plus` and at `w = -b_minus`; `None`: the constant of the parameters.
-    pub restitution: [Option<Restitution>; 2],
-    /// Least coefficient of restitution `r_min`.
-    pub least_restitution: f64,
-    /// Relative standard deviation of the coefficient of restitution from impact to impact.
-    pub scatter: f64,
-    /// Seed of the scatter.
-    pub seed: u64,
-}
-
-impl Cavity {
-    /// The ideal cavity.
-    pub const IDEAL: Self = Self {
-        b_plus: None,
-        b_minus: None,
-        tilt: 0.0,
-        kinetic_friction: 0.0,
-        static_friction: None,
-        restitution: [None; 2],
-        least_restitution: 0.0,
-        scatter: 0.0,
-        seed: 0,
-    };
-
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first invalid value, with its unit and the allowed range.
-    pub fn validate(&self) -> Result<(), InvalidValue> {
-        let within = |name, value: f64, unit, (low, high): (f64, f64), allowed| {
-            InvalidValue::unless((low..=high).contains(&value), name, value, unit, allowed)
-        };
-        let (gap, share) = ("a number from 1e-100 to 1e100", "a number from 0 to 1");
-        let (plus, minus) = (
-            "b_plus (gap to the wall w = b_plus)",
-            "b_minus (gap to the wall w = -b_minus)",
-        );
-        within(plus, self.b_plus.unwrap_or(1.0), "m", (1e-100, 1e100), gap)?;
-        within(minus, self.b_minus.unwrap_or(1.0), "m", (1e-100, 1e100), gap)?;
-        let (right, tilt) = (core::f64::consts::FRAC_PI_2, "a number from -pi/2 to pi/2");
-        within("theta (tilt)", self.tilt, "rad", (-right, right), tilt)?;
-        let mu = self.kinetic_friction;
-        within(
-            "mu_k (kinetic friction)",
-            mu,
-            "",
-            (0.0, 100.0),
-            "a number from 0 to 100",
-        )?;
-        let (held, allowed) = (self.static_friction.unwrap_or(mu), "a number from mu_k to 100");
-        within("mu_s (static friction)", held, "", (mu, 100.0), allowed)?;
-        for law in self.restitution.into_iter().flatten() {
-            law.validate()?;
-        }
-        let name = "r_min (least coefficient of restitution)";
-        within(name, self.least_restitution, "", (0.0, 1.0), share)?;
-        within("s (scatter of the restitution)", self.scatter, "", (0.0, 1.0), share)
-    }
-}
-
-impl Default for Cavity {
-    fn default() -> Self {
-        Self::IDEAL
-    }
-}
 
 /// Constant accelerations of the particle, m/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -231,7 +101,7 @@ impl Rebound {
     /// The coefficient at a speed of approach (m/s) without scatter.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn mean(&self, wall: Wall, speed: f64) -> f64 {
-        self.laws[wall.index()].at(speed).clamp(self.least, 1.0)
+        coefficient(self.laws[wall.index()], speed).clamp(self.least, 1.0)
     }
 
     /// The coefficient of impact number `number` at a speed of approach, m/s.
@@ -273,6 +143,15 @@ impl Rebound {
         };
         law.resting_with(back * self.mean(wall, speed * back))
             .rests(speed, (mean, error), resolution)
+    }
+}
+
+/// The coefficient of restitution at the speed of approach `v`, m/s, before limits.
+fn coefficient(law: Restitution, v: f64) -> f64 {
+    match law {
+        Restitution::Constant(r) => r,
+        Restitution::Viscoelastic(k) => 1.0 - k * fifth_root(v),
+        Restitution::Plastic(yield_speed) => libm::sqrt(libm::sqrt(yield_speed / v)).min(1.0),
     }
 }
 

@@ -16,7 +16,6 @@ pub mod plant;
 pub mod segment;
 
 pub use base_motion::{BaseMotion, Drive};
-pub use cavity::{Cavity, Restitution};
 pub use contact::Wall;
-pub use parameters::{InvalidValue, Parameters};
+pub use parameters::{Cavity, InvalidValue, Parameters, Restitution};
 pub use plant::{Event, Outcome, Plant, State, Totals};

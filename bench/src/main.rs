@@ -24,9 +24,46 @@ use std::io::{BufRead, Write};
 use std::path::Path;
 use std::time::Duration;
 
+use baseline::Baseline;
+use method::{Answer, Shell, Stepped, measure};
 use scene::Scene;
 use serde::Deserialize;
 use serde_json::json;
+use solvers::{Moreau, Rk4};
+
+/// The methods by name.
+const METHODS: &[(&str, Measure)] = &[
+    ("plant", measure::<Stepped>),
+    ("plant-one-step", measure::<Stepped<true, 1, true>>),
+    ("plant-100", measure::<Stepped<true, 100>>),
+    ("plant-general", measure::<Stepped<false>>),
+    ("c-interface", measure::<Shell>),
+    ("brent", measure::<Baseline>),
+    ("rk4", measure::<Rk4>),
+    ("moreau", measure::<Moreau>),
+    #[cfg(feature = "diffsol")]
+    ("diffsol-tsit45", measure::<diffsol::Tsit45>),
+    #[cfg(feature = "diffsol")]
+    ("diffsol-bdf", measure::<diffsol::Bdf>),
+];
+
+/// [`measure`] for one method.
+type Measure = fn(&Scene, f64, &[usize], Duration, Duration) -> Answer;
+
+/// Names of the methods.
+fn names() -> Vec<&'static str> {
+    METHODS.iter().map(|(name, _)| *name).collect()
+}
+
+/// The method of that name.
+///
+/// # Errors
+/// An unknown name.
+fn named(name: &str) -> anyhow::Result<Measure> {
+    let method = METHODS.iter().find(|(other, _)| *other == name);
+    let unknown = || anyhow::anyhow!("there is no method {name}; there are {}", names().join(", "));
+    method.map(|(_, measure)| *measure).ok_or_else(unknown)
+}
 
 #[derive(Deserialize)]
 #[serde(untagged)]
@@ -69,7 +106,7 @@ fn answer(folder: &Path, request: &str) -> anyhow::Result<serde_json::Value> {
         Request::Run { scene, method, setting, checks, budget, limit } => {
             let scene = Scene::load(folder, &scene)?;
             let (budget, limit) = (Duration::from_secs_f64(budget), Duration::from_secs_f64(limit));
-            let answer = method::named(&method)?(&scene, setting, &checks, budget, limit);
+            let answer = named(&method)?(&scene, setting, &checks, budget, limit);
             Ok(serde_json::to_value(answer)?)
         }
         Request::Growth { growth, budget, most } => cost::growth(folder, &growth, budget, most),
@@ -77,7 +114,7 @@ fn answer(folder: &Path, request: &str) -> anyhow::Result<serde_json::Value> {
         Request::Record { record } => Ok(json!({"drives": cost::record(record)})),
         Request::Loop { closed_loop, budget } => Ok(cost::closed_loop(closed_loop, budget)),
         Request::Map { map_g, sigmas, effort } => Ok(serde_json::to_value(map::row(map_g, &sigmas, &effort)?)?),
-        Request::Methods { methods } => Ok(json!(methods.then(method::names))),
+        Request::Methods { methods } => Ok(json!(methods.then(names))),
     }
 }
 
@@ -93,4 +130,52 @@ fn main() -> std::io::Result<()> {
         out.flush()?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Largest error of a method at the end of a scene.
+    fn error_at_the_end(scene: &str, method: &str, setting: f64) -> f64 {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(folder.join("truth.json")).expect("the truth");
+        let truth: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        let last = truth[scene]["rows"].as_array().and_then(|rows| rows.last());
+        let last = last.expect("a last row");
+        let loaded = Scene::load(folder, scene).expect("a scene");
+        let (once, limit) = (Duration::ZERO, Duration::from_secs(60));
+        let answer = named(method).expect("a method")(&loaded, setting, &[], once, limit);
+        assert_eq!(answer.failure, None, "{method} in {scene}");
+        let states = answer.states.last().expect("the state at the end");
+        let error = |(n, x): (usize, &f64)| {
+            let truth: f64 = last[n + 1].as_str().and_then(|x| x.parse().ok()).expect("a number");
+            (x - truth).abs()
+        };
+        states.iter().enumerate().map(error).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_methods_lead_where_40_digit_arithmetic_does() {
+        let scenes = [
+            "decay",
+            "grazing",
+            "damped",
+            "resonance",
+            "centre",
+            "asymmetric",
+            "three",
+            "chaotic",
+        ];
+        for scene in scenes {
+            // In the chaotic scene a disturbance grows by 1e5.
+            let growth = if scene == "chaotic" { 1e2 } else { 1.0 };
+            for (method, setting, limit) in [("plant", 0.0, 1e-11), ("brent", 1e-12, 1e-9)] {
+                let error = error_at_the_end(scene, method, setting);
+                assert!(error < growth * limit, "{scene}, {method}: {error:e}");
+            }
+        }
+        assert!(error_at_the_end("decay", "rk4", 1000.0) < 1e-7);
+        assert!(error_at_the_end("chatter", "moreau", 10_000.0) < 1e-2);
+    }
 }

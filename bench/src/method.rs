@@ -10,7 +10,6 @@ use serde::Serialize;
 
 use crate::baseline::{self, Baseline};
 use crate::scene::{Scene, Step};
-use crate::solvers::{Moreau, Rk4};
 
 /// How a method failed.
 #[derive(Clone, Debug)]
@@ -59,7 +58,7 @@ pub struct Answer {
 
 /// Runs the scene in turns with the plant for about `budget`, one turn at least; a run that lasts longer than `limit` is given up.
 /// `checks` are the steps, counted from 1, after which the state is kept.
-fn measure<M: Method>(scene: &Scene, setting: f64, checks: &[usize], budget: Duration, limit: Duration) -> Answer {
+pub fn measure<M: Method>(scene: &Scene, setting: f64, checks: &[usize], budget: Duration, limit: Duration) -> Answer {
     let mut answer = Answer::default();
     let began = Instant::now();
     let mut plant = || run::<Stepped>(scene, 0.0, checks, limit, &mut Vec::new()).map(|(ns, _)| (ns, 1.0));
@@ -125,40 +124,6 @@ fn run<M: Method>(
         states.push(method.state());
     }
     Ok((ns, method.impacts()))
-}
-
-/// The methods by name.
-const METHODS: &[(&str, Measure)] = &[
-    ("plant", measure::<Stepped>),
-    ("plant-one-step", measure::<Stepped<true, 1, true>>),
-    ("plant-100", measure::<Stepped<true, 100>>),
-    ("plant-general", measure::<Stepped<false>>),
-    ("c-interface", measure::<Shell>),
-    ("brent", measure::<Baseline>),
-    ("rk4", measure::<Rk4>),
-    ("moreau", measure::<Moreau>),
-    #[cfg(feature = "diffsol")]
-    ("diffsol-tsit45", measure::<crate::diffsol::Tsit45>),
-    #[cfg(feature = "diffsol")]
-    ("diffsol-bdf", measure::<crate::diffsol::Bdf>),
-];
-
-/// [`measure`] for one method.
-pub type Measure = fn(&Scene, f64, &[usize], Duration, Duration) -> Answer;
-
-/// Names of the methods.
-pub fn names() -> Vec<&'static str> {
-    METHODS.iter().map(|(name, _)| *name).collect()
-}
-
-/// The method of that name.
-///
-/// # Errors
-/// An unknown name.
-pub fn named(name: &str) -> anyhow::Result<Measure> {
-    let method = METHODS.iter().find(|(other, _)| *other == name);
-    let unknown = || anyhow::anyhow!("there is no method {name}; there are {}", names().join(", "));
-    method.map(|(_, measure)| *measure).ok_or_else(unknown)
 }
 
 /// The plant at the start of a scene.
@@ -285,55 +250,5 @@ impl Method for Baseline {
 
     fn impacts(&self) -> u64 {
         self.impacts
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use super::*;
-
-    /// Largest error of a method at the end of a scene.
-    fn error_at_the_end(scene: &str, method: &str, setting: f64) -> f64 {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let text = std::fs::read_to_string(folder.join("truth.json")).expect("the truth");
-        let truth: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-        let last = truth[scene]["rows"].as_array().and_then(|rows| rows.last());
-        let last = last.expect("a last row");
-        let loaded = Scene::load(folder, scene).expect("a scene");
-        let (once, limit) = (Duration::ZERO, Duration::from_secs(60));
-        let answer = named(method).expect("a method")(&loaded, setting, &[], once, limit);
-        assert_eq!(answer.failure, None, "{method} in {scene}");
-        let states = answer.states.last().expect("the state at the end");
-        let error = |(n, x): (usize, &f64)| {
-            let truth: f64 = last[n + 1].as_str().and_then(|x| x.parse().ok()).expect("a number");
-            (x - truth).abs()
-        };
-        states.iter().enumerate().map(error).fold(0.0, f64::max)
-    }
-
-    #[test]
-    fn the_methods_lead_where_40_digit_arithmetic_does() {
-        let scenes = [
-            "decay",
-            "grazing",
-            "damped",
-            "resonance",
-            "centre",
-            "asymmetric",
-            "three",
-            "chaotic",
-        ];
-        for scene in scenes {
-            // In the chaotic scene a disturbance grows by 1e5.
-            let growth = if scene == "chaotic" { 1e2 } else { 1.0 };
-            for (method, setting, limit) in [("plant", 0.0, 1e-11), ("brent", 1e-12, 1e-9)] {
-                let error = error_at_the_end(scene, method, setting);
-                assert!(error < growth * limit, "{scene}, {method}: {error:e}");
-            }
-        }
-        assert!(error_at_the_end("decay", "rk4", 1000.0) < 1e-7);
-        assert!(error_at_the_end("chatter", "moreau", 10_000.0) < 1e-2);
     }
 }

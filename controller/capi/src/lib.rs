@@ -13,7 +13,7 @@ extern crate phase_lock_f32 as phase_lock;
 use core::ffi::{c_char, c_int};
 use core::fmt::{Display, Write};
 
-use phase_lock::{Config, ConfigError};
+use phase_lock::{Config, ConfigError, PARAMETERS, Value};
 
 mod config;
 mod types;
@@ -24,6 +24,33 @@ pub use types::{
     PhaseLockController, PhaseLockDetector, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOptional,
     PhaseLockOutput, PhaseLockReal, PhaseLockStage,
 };
+
+/// Conversions of the configuration in both directions. Every parameter of the table is a field of the same name.
+macro_rules! conversions {
+    ($initial:tt $($group:ident { $($(#[doc = $doc:literal])+ $field:ident: $type:ty = $value:expr, $unit:literal, $range:ident;)* })*) => {
+        impl TryFrom<&PhaseLockConfig> for Config {
+            type Error = ConfigError;
+
+            fn try_from(c: &PhaseLockConfig) -> Result<Self, ConfigError> {
+                let mut config = Self::for_resonance(1.0, 1.0);
+                let values: [Value; PARAMETERS.len()] = [$($(c.$field.into(),)*)*];
+                for (parameter, value) in PARAMETERS.iter().zip(values) {
+                    parameter.set(&mut config, value)?;
+                }
+                Ok(config)
+            }
+        }
+
+        impl From<&Config> for PhaseLockConfig {
+            fn from(config: &Config) -> Self {
+                let [$($($field,)*)*] = PARAMETERS.each_ref().map(|parameter| parameter.get(config));
+                Self { $($($field: $field.into(),)*)* }
+            }
+        }
+    };
+}
+
+phase_lock::parameters!(conversions);
 
 const SUCCESS: c_int = 0;
 const INVALID_VALUE: c_int = 1;
@@ -235,7 +262,41 @@ fn halt(_: &core::panic::PanicInfo) -> ! {
 
 #[cfg(test)]
 mod tests {
+    use phase_lock::Detector;
+
     use super::*;
+
+    #[test]
+    fn every_parameter_survives_the_way_to_c_and_back() {
+        for detector in [Detector::Adaptive, Detector::Demodulator] {
+            let mut config = Config::for_resonance(55.0, 1e-4);
+            config.detector = detector;
+            for (n, parameter) in PARAMETERS.iter().enumerate() {
+                let value = match parameter.get(&config) {
+                    Value::Real(_) => Value::Real(1.0 + n as PhaseLockReal),
+                    Value::Integer(_) if parameter.name != "detector" => Value::Integer(5),
+                    same => same,
+                };
+                parameter.set(&mut config, value).expect(parameter.name);
+            }
+            let c = PhaseLockConfig::from(&config);
+            assert_eq!(Config::try_from(&c), Ok(config));
+            assert_eq!(PhaseLockConfig::from(&config), c);
+        }
+    }
+
+    #[test]
+    fn a_detector_that_does_not_exist_is_refused() {
+        let mut c = PhaseLockConfig::from(&Config::for_resonance(55.0, 1e-4));
+        for detector in [-1, 0, 3, 4, 5, i32::MAX] {
+            c.detector = detector;
+            let refused = Config::try_from(&c).unwrap_err();
+            assert_eq!(
+                (refused.name, refused.value),
+                ("detector", Some(detector as PhaseLockReal))
+            );
+        }
+    }
 
     #[test]
     fn a_message_that_does_not_fit_is_cut_at_a_character_and_terminated() {

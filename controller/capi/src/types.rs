@@ -1,8 +1,6 @@
 //! The types of the header but the configuration, and their conversions to and from the types of the core. The units are m, s, rad, rad/s.
 
-use phase_lock::{Config, ConfigError, Fault, Input, LoopState, Move, Output, PARAMETERS, PhaseLock, State, Value};
-
-use crate::config::PhaseLockConfig;
+use phase_lock::{Fault, Input, LoopState, Move, Output, PhaseLock, State, Value};
 
 /// The floating-point type: float if PHASE_LOCK_F32 is defined, for the library with the feature f32; otherwise double.
 #[cfg(feature = "f32")]
@@ -176,33 +174,6 @@ impl From<Value> for PhaseLockOptional {
     }
 }
 
-/// Conversions of the configuration in both directions. Every parameter of the table is a field of the same name.
-macro_rules! conversions {
-    ($initial:tt $($group:ident { $($(#[doc = $doc:literal])+ $field:ident: $type:ty = $value:expr, $unit:literal, $range:ident;)* })*) => {
-        impl TryFrom<&PhaseLockConfig> for Config {
-            type Error = ConfigError;
-
-            fn try_from(c: &PhaseLockConfig) -> Result<Self, ConfigError> {
-                let mut config = Self::for_resonance(1.0, 1.0);
-                let values: [Value; PARAMETERS.len()] = [$($(c.$field.into(),)*)*];
-                for (parameter, value) in PARAMETERS.iter().zip(values) {
-                    parameter.set(&mut config, value)?;
-                }
-                Ok(config)
-            }
-        }
-
-        impl From<&Config> for PhaseLockConfig {
-            fn from(config: &Config) -> Self {
-                let [$($($field,)*)*] = PARAMETERS.each_ref().map(|parameter| parameter.get(config));
-                Self { $($($field: $field.into(),)*)* }
-            }
-        }
-    };
-}
-
-phase_lock::parameters!(conversions);
-
 impl From<&PhaseLockInput> for Input {
     fn from(input: &PhaseLockInput) -> Self {
         Self {
@@ -258,45 +229,6 @@ impl From<Output> for PhaseLockOutput {
             },
             locked: o.locked,
             settled: o.settled,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use phase_lock::Detector;
-
-    use super::*;
-
-    #[test]
-    fn every_parameter_survives_the_way_to_c_and_back() {
-        for detector in [Detector::Adaptive, Detector::Demodulator] {
-            let mut config = Config::for_resonance(55.0, 1e-4);
-            config.detector = detector;
-            for (n, parameter) in PARAMETERS.iter().enumerate() {
-                let value = match parameter.get(&config) {
-                    Value::Real(_) => Value::Real(1.0 + n as PhaseLockReal),
-                    Value::Integer(_) if parameter.name != "detector" => Value::Integer(5),
-                    same => same,
-                };
-                parameter.set(&mut config, value).expect(parameter.name);
-            }
-            let c = PhaseLockConfig::from(&config);
-            assert_eq!(Config::try_from(&c), Ok(config));
-            assert_eq!(PhaseLockConfig::from(&config), c);
-        }
-    }
-
-    #[test]
-    fn a_detector_that_does_not_exist_is_refused() {
-        let mut c = PhaseLockConfig::from(&Config::for_resonance(55.0, 1e-4));
-        for detector in [-1, 0, 3, 4, 5, i32::MAX] {
-            c.detector = detector;
-            let refused = Config::try_from(&c).unwrap_err();
-            assert_eq!(
-                (refused.name, refused.value),
-                ("detector", Some(detector as PhaseLockReal))
-            );
         }
     }
 }
