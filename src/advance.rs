@@ -7,7 +7,8 @@ use crate::fast::Next;
 use crate::flight::{Flight, FlightEnd, Grip, until_released};
 use crate::oscillator::Oscillator;
 use crate::parameters::InvalidValue;
-use crate::plant::{Contact, Event, MOST_EVALUATIONS, MOST_IMPACTS, Masses, Outcome, Plant};
+use crate::plant::{Event, MOST_EVALUATIONS, MOST_IMPACTS, Outcome, Plant};
+use crate::rig::{Contact, Masses};
 use crate::segment::Segment;
 
 /// Largest number of releases per step: rounding can tear a particle off its wall again and again where values are extreme.

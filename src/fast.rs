@@ -17,7 +17,7 @@ use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive, Phase, shift};
 use crate::contact::Wall;
 use crate::oscillator::Oscillator;
-use crate::plant::{Moving, Rig};
+use crate::rig::{Moving, Rig};
 use crate::segment::Segment;
 use propagator::{Coefficients, Grid, Increment, Point, Propagator, SAME, ShortStep};
 use verify::{Horizon, Start};

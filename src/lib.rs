@@ -13,6 +13,7 @@ pub mod forcing;
 pub mod oscillator;
 pub mod parameters;
 pub mod plant;
+mod rig;
 pub mod segment;
 
 pub use base_motion::{BaseMotion, Drive};

@@ -243,6 +243,10 @@ fn reversed_swapped_and_dead_sensors_trip_in_the_first_periods_of_the_drive() {
         trips(10.0, |q, e| [3.0 * q, e]);
         trips(10.0, |q, e| [0.3 * q, e]);
     }
+    // A response that impacts hold back or enhance.
+    for factor in [0.7, 1.3] {
+        assert_eq!(periods_to_trip(0, |q, e| [factor * q, e]), None, "{factor}");
+    }
     assert!(periods_to_trip(0, |_, e| [0.0, e]).is_some_and(|periods| periods < 3.0));
     assert!(periods_to_trip(0, |q, _| [q, 0.0]).is_some_and(|periods| periods < 6.0));
     assert!(periods_to_trip(0, |_, _| [0.0, 0.0]).is_some_and(|periods| periods < 3.0));

@@ -6,7 +6,7 @@ use super::{FastPath, Next};
 use crate::arithmetic::Sum;
 use crate::base_motion::BaseMotion;
 use crate::contact::Wall;
-use crate::plant::{Moving, Rig};
+use crate::rig::{Moving, Rig};
 
 /// Largest displacements, in half-widths: the digits of `w` are those of `q1`.
 const WIDEST: f64 = 64.0;

@@ -11,7 +11,7 @@
 use super::propagator::{Coefficients, Point};
 use crate::base_motion::{BaseMotion, Drive};
 use crate::oscillator::Oscillator;
-use crate::plant::{Moving, Rig};
+use crate::rig::{Moving, Rig};
 
 /// Rounding error of a gap, in half-widths, and of a bound, relative.
 pub(super) const ROUNDING: f64 = 1e-14;
