@@ -185,19 +185,6 @@ mod tests {
     }
 
     #[test]
-    fn a_million_turns_in_one_step_and_in_a_million_agree() {
-        // 2^-4 is exact, so that both runs mean the same instants.
-        let drive = Drive::harmonic(1.0, 1.000_1);
-        let one = BaseMotion { drive, phase: Phase(0.5, 0.0) }.after(62_500.0);
-        let mut many = BaseMotion { drive, phase: Phase(0.5, 0.0) };
-        for _ in 0..1_000_000 {
-            many = many.after(0.062_5);
-        }
-        let difference = libm::remainder(one.phase.radians() - many.phase.radians(), TAU.0);
-        assert!(difference.abs() < 1e-12, "{difference:e}");
-    }
-
-    #[test]
     fn sevenths_of_a_turn_add_up_to_turns_without_losing_digits() {
         let omega = 0.990_417;
         let t = TAU.0 / omega / 7.0;

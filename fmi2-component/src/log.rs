@@ -185,24 +185,4 @@ mod tests {
     fn text_is_safe_as_a_printf_format() {
         assert_eq!(printf_safe("100 %n #r1# \0").to_str(), Ok("100 %%n ##r1## \u{fffd}"));
     }
-
-    #[test]
-    fn a_category_is_told_only_when_it_is_switched_on() {
-        let impacts = Category::new(1, "logImpacts");
-        let mut log = Log {
-            sink: None,
-            enabled: 0,
-            categories: &["logEvents", "logImpacts", "logAll"],
-            warned: RefCell::default(),
-        };
-        assert!(!log.wants(impacts));
-        assert!(log.enable_only(["logEvents"].into_iter()));
-        assert!(!log.wants(impacts));
-        assert!(log.enable_only(["logImpacts"].into_iter()));
-        assert!(log.wants(impacts));
-        assert!(log.enable_only(["logAll"].into_iter()));
-        assert!(log.wants(impacts));
-        assert!(!log.enable_only(["logNonsense"].into_iter()));
-        assert!(!log.wants(impacts));
-    }
 }

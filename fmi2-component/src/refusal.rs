@@ -72,18 +72,3 @@ fn describe(error: &dyn std::error::Error) -> String {
         None => error.to_string(),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn any_error_becomes_a_refusal() {
-        fn parse() -> Result<f64, Refusal> {
-            Ok("seven".parse::<f64>()?)
-        }
-        let refusal = parse().unwrap_err();
-        assert_eq!(refusal.status(), Status::Error);
-        assert_eq!(refusal.message(), "invalid float literal");
-    }
-}

@@ -197,19 +197,36 @@ impl From<&PhaseLockMove> for Move {
 }
 
 impl From<Output> for PhaseLockOutput {
-    fn from(o: Output) -> Self {
+    fn from(output: Output) -> Self {
+        // Every field: a new one of the core does not compile until it is here.
+        let Output {
+            omega,
+            amplitude,
+            drive,
+            phase_error,
+            response_amplitude,
+            response_target,
+            reference_amplitude,
+            coherence,
+            frequency,
+            response_mean,
+            state,
+            fault,
+            locked,
+            settled,
+        } = output;
         Self {
-            omega: o.omega,
-            amplitude: o.amplitude,
-            drive: o.drive,
-            phase_error: o.phase_error.into(),
-            response_amplitude: o.response_amplitude,
-            response_target: o.response_target.into(),
-            reference_amplitude: o.reference_amplitude,
-            coherence: o.coherence,
-            frequency: o.frequency,
-            response_mean: o.response_mean,
-            state: match o.state {
+            omega,
+            amplitude,
+            drive,
+            phase_error: phase_error.into(),
+            response_amplitude,
+            response_target: response_target.into(),
+            reference_amplitude,
+            coherence,
+            frequency,
+            response_mean,
+            state: match state {
                 LoopState::Idle => PhaseLockStage::Idle,
                 LoopState::Ramping => PhaseLockStage::Ramping,
                 LoopState::Acquiring => PhaseLockStage::Acquiring,
@@ -218,7 +235,7 @@ impl From<Output> for PhaseLockOutput {
                 LoopState::Tripped => PhaseLockStage::Tripped,
                 LoopState::ShutDown => PhaseLockStage::ShutDown,
             },
-            fault: match o.fault {
+            fault: match fault {
                 None => PhaseLockFault::None,
                 Some(Fault::Sensor) => PhaseLockFault::Sensor,
                 Some(Fault::ResponseTooLarge) => PhaseLockFault::ResponseTooLarge,
@@ -227,8 +244,8 @@ impl From<Output> for PhaseLockOutput {
                 Some(Fault::NoSignal) => PhaseLockFault::NoSignal,
                 Some(Fault::Implausible) => PhaseLockFault::Implausible,
             },
-            locked: o.locked,
-            settled: o.settled,
+            locked,
+            settled,
         }
     }
 }
