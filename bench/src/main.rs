@@ -10,26 +10,17 @@
 
 #![forbid(unsafe_code)]
 
-#[path = "../../benches/baseline/mod.rs"]
-mod baseline;
-mod cost;
-#[cfg(feature = "diffsol")]
-mod diffsol;
-mod map;
-mod method;
-mod scene;
-mod solvers;
-
 use std::io::{BufRead, Write};
 use std::path::Path;
 use std::time::Duration;
 
-use baseline::Baseline;
-use method::{Answer, Shell, Stepped, measure};
-use scene::Scene;
 use serde::Deserialize;
 use serde_json::json;
-use solvers::{Moreau, Rk4};
+use vines_bench::baseline::Baseline;
+use vines_bench::method::{Answer, Shell, Stepped, measure};
+use vines_bench::scene::Scene;
+use vines_bench::solvers::{Moreau, Rk4};
+use vines_bench::{cost, map};
 
 /// The methods by name.
 const METHODS: &[(&str, Measure)] = &[
@@ -42,9 +33,9 @@ const METHODS: &[(&str, Measure)] = &[
     ("rk4", measure::<Rk4>),
     ("moreau", measure::<Moreau>),
     #[cfg(feature = "diffsol")]
-    ("diffsol-tsit45", measure::<diffsol::Tsit45>),
+    ("diffsol-tsit45", measure::<vines_bench::diffsol::Tsit45>),
     #[cfg(feature = "diffsol")]
-    ("diffsol-bdf", measure::<diffsol::Bdf>),
+    ("diffsol-bdf", measure::<vines_bench::diffsol::Bdf>),
 ];
 
 /// [`measure`] for one method.

@@ -13,6 +13,8 @@ pub struct Step {
     pub amplitude: f64,
     /// Its frequency, rad/s.
     pub omega: f64,
+    /// The signal on top of it and its derivatives, m, m/s, m/s², m/s³; only the plant takes one.
+    pub signal: [f64; 4],
     /// Length of the step, s.
     pub duration: f64,
 }
@@ -21,7 +23,11 @@ impl Step {
     /// As the plant takes it.
     #[must_use]
     pub fn drive(&self) -> Drive {
-        Drive::harmonic(self.amplitude, self.omega)
+        Drive {
+            signal: self.signal,
+            amplitude: self.amplitude,
+            omega: self.omega,
+        }
     }
 }
 
@@ -73,13 +79,15 @@ impl Scene {
                 let step = Step {
                     amplitude: scene.amplitude,
                     omega: scene.omega,
+                    signal: [0.0; 4],
                     duration: scene.step,
                 };
                 vec![step; scene.steps]
             }
             Some(file) => {
                 let drives: Vec<[f64; 2]> = serde_json::from_str(&read(file)?).with_context(wrong)?;
-                let step = |[amplitude, omega]: [f64; 2]| Step { amplitude, omega, duration: scene.step };
+                let step =
+                    |[amplitude, omega]: [f64; 2]| Step { amplitude, omega, signal: [0.0; 4], duration: scene.step };
                 drives.into_iter().map(step).collect()
             }
         };

@@ -109,12 +109,17 @@ impl Motion {
 pub struct Baseline {
     rig: Parameters,
     tolerance: f64,
+    /// Displacement of the primary mass, m.
     pub q1: f64,
+    /// Its velocity, m/s.
     pub dq1: f64,
+    /// Displacement of the particle, m.
     pub q2: f64,
+    /// Its velocity, m/s.
     pub dq2: f64,
     /// Time since the start, s.
     pub elapsed: f64,
+    /// Impacts since the start.
     pub impacts: u64,
     /// Time since the step began, s.
     time: f64,
