@@ -70,10 +70,7 @@ impl From<LinkError> for Failure {
 
 impl From<PackError> for Failure {
     fn from(error: PackError) -> Self {
-        match error {
-            PackError::Read { .. } => Self::run(error),
-            _ => Self::input(error),
-        }
+        Self::input(error)
     }
 }
 

@@ -4,7 +4,7 @@
 use std::{
     fs,
     io::{Read, Write},
-    path::{Path, PathBuf},
+    path::Path,
 };
 
 use fmi2_description::Description;
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 use vines::experiment::{self, Plan};
 use vines::fmu::{FmuController, FmuRig};
 use vines::identification::identify;
-use vines::pack::{components, pack_bench};
+use vines::pack::{Binary, components, own_libraries, pack_bench};
 use vines::rig::{BuiltIn, Controller, Drive, GroundTruth, Move, Rig, RigError, Sensors, Simulated};
 use vines::scene::{Names, PAPER, Scene};
 
@@ -22,15 +22,15 @@ use crate::{PROGRAM, built_in};
 const PERIODS: f64 = 1000.0;
 const HOLD_PERIODS: f64 = 20.0;
 
-/// The folder of the libraries of this build: cargo makes them because this package depends on them.
-fn libraries() -> PathBuf {
-    Path::new(PROGRAM).with_file_name("deps")
+/// The libraries of this build: cargo makes them because this package depends on them.
+fn libraries() -> Vec<Binary> {
+    own_libraries(&components(), &Path::new(PROGRAM).with_file_name("deps")).unwrap()
 }
 
 /// Plant and controller with the parameters of a scene, packed into a folder.
 fn packed(scene: &Scene) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    pack_bench(scene, &libraries().as_path().into(), folder.path()).unwrap();
+    pack_bench(scene, &libraries(), folder.path()).unwrap();
     folder
 }
 
@@ -238,7 +238,7 @@ fn fmus_with_other_names_and_units_without_an_oscillator_and_without_settled_loc
     let scene = Scene::parse("names.toml", &text, &set).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = |name| folder.path().join(name);
-    pack_bench(&scene, &libraries().as_path().into(), folder.path()).unwrap();
+    pack_bench(&scene, &libraries(), folder.path()).unwrap();
     let hidden = [("omega", "w"), ("E", "amplitude"), ("base", "x"), ("impacts", "count")];
     let own = [("v", "y_sensor"), ("e", "x_given"), ("c", "damper")];
     renamed(
@@ -278,7 +278,7 @@ fn a_controller_without_the_output_of_its_phase_error_is_not_said_to_measure_non
     let scene = Scene::load(None, &set).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = |name| folder.path().join(name);
-    pack_bench(&scene, &libraries().as_path().into(), folder.path()).unwrap();
+    pack_bench(&scene, &libraries(), folder.path()).unwrap();
     renamed(&path("PhaseLock.fmu"), &path("loop.fmu"), &[("phase_error", "error")]);
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
     let mut controller = FmuController::load(&path("loop.fmu"), &scene.controller_config(), &Names::default()).unwrap();
