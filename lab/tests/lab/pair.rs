@@ -1,5 +1,4 @@
-//! Guards both FMUs coupled in co-simulation, with its delay of one sample, the values in their system file, and FMUs with other names and
-//! signs.
+//! Guards the bits of both FMUs beside the built-in plant and controller, and FMUs with other names and signs.
 
 use std::{
     fs,
@@ -7,7 +6,6 @@ use std::{
     path::Path,
 };
 
-use fmi2_description::Description;
 use tempfile::TempDir;
 use vines::experiment::{self, Plan};
 use vines::fmu::{FmuController, FmuRig};
@@ -16,11 +14,7 @@ use vines::pack::{Binary, components, own_libraries, pack_bench};
 use vines::rig::{BuiltIn, Controller, Drive, GroundTruth, Move, Rig, RigError, Sensors, Simulated};
 use vines::scene::{Names, PAPER, Scene};
 
-use crate::{PROGRAM, built_in};
-
-/// The periods that are driven: the default scene locks after about 110.
-const PERIODS: f64 = 1000.0;
-const HOLD_PERIODS: f64 = 20.0;
+use crate::PROGRAM;
 
 /// The libraries of this build: cargo makes them because this package depends on them.
 fn libraries() -> Vec<Binary> {
@@ -32,69 +26,6 @@ fn packed(scene: &Scene) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     pack_bench(scene, &libraries(), folder.path()).unwrap();
     folder
-}
-
-/// Names and types of the values in a parameter set of the system file.
-fn bindings(system: &Path, name: &str) -> Vec<[String; 2]> {
-    let mut archive = zip::ZipArchive::new(fs::File::open(system).unwrap()).unwrap();
-    let mut text = String::new();
-    archive.by_name(name).unwrap().read_to_string(&mut text).unwrap();
-    let parameters = text.lines().filter(|line| line.contains("<ssv:Parameter "));
-    let bindings = parameters.map(|line| {
-        let words: Vec<&str> = line.split('"').collect();
-        let kind = words[2].trim_start_matches("><ssv:").trim_end_matches(" value=");
-        [words[1], kind].map(String::from)
-    });
-    bindings.collect()
-}
-
-#[test]
-fn every_value_in_the_system_file_belongs_to_a_variable_of_its_fmu() {
-    let folder = packed(&Scene::load(None, &[]).unwrap());
-    for (component, name) in components().into_iter().zip(["plant", "controller"]) {
-        let description = Description::parse(&component.xml).unwrap();
-        let bindings = bindings(&folder.path().join("bench.ssp"), &format!("resources/{name}.ssv"));
-        assert!(bindings.len() > 8, "{bindings:?}");
-        for [name, kind] in bindings {
-            let variable = description.variables.iter().find(|variable| variable.name == name);
-            let (variable_kind, _) = variable.expect(&name).content().unwrap();
-            assert_eq!(format!("{variable_kind:?}"), kind, "{name}");
-        }
-    }
-}
-
-#[test]
-fn the_pair_in_co_simulation_locks_where_the_built_in_loop_does() {
-    let scene = Scene::load(None, &[]).unwrap();
-    let folder = packed(&scene);
-    let path = |name| folder.path().join(name);
-    let (values, names, config) = (scene.start_values(), Names::default(), scene.controller_config());
-    let mut rig = FmuRig::load(&path("LoViNes.fmu"), &values, scene.resonance, &scene.plant, &names).unwrap();
-    let mut controller = FmuController::load(&path("PhaseLock.fmu"), &config, &names).unwrap();
-    let samples = |periods: f64| (periods * scene.controller.samples_per_period) as usize;
-    let hold = samples(HOLD_PERIODS);
-    let (mut omega, mut before) = (0.0, 0);
-    let mut command = controller.sample(rig.sense().unwrap(), true).unwrap();
-    for n in 0..samples(PERIODS) {
-        // Both advance at the same time: the plant has the drive that follows from the reading before.
-        let next = controller.sample(rig.sense().unwrap(), true).unwrap();
-        if n + hold == samples(PERIODS) {
-            before = rig.ground_truth().unwrap().unwrap().impacts;
-        }
-        if n + hold >= samples(PERIODS) {
-            omega += command.drive.omega / hold as f64;
-        }
-        rig.advance(command.drive, scene.sample_time()).unwrap();
-        command = next;
-    }
-    assert!(command.settled);
-    let sigma = scene.dimensionless().sigma(omega);
-    let mut own = (Simulated::new(scene.plant, scene.start).unwrap(), built_in(&scene));
-    let off = sigma - locked(&mut own.0, &mut own.1, &scene);
-    println!("sigma = {sigma:.6}, off the own loop by {off:.1e}");
-    assert!(off.abs() < 1e-4);
-    let hits = rig.ground_truth().unwrap().unwrap().impacts - before;
-    assert!((39..=41).contains(&hits), "{hits} impacts in 20 periods");
 }
 
 #[test]
