@@ -12,9 +12,7 @@ use std::path::{Path, PathBuf};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-pub use files::{
-    ReportError, decay_csv, map_csv, write, write_fit, write_interrupted, write_lateness, write_map, write_tracked,
-};
+pub use files::{ReportError, decay_csv, map_csv, write, write_fit, write_interrupted, write_map, write_tracked};
 pub use table::{Table, number, row, with_uncertainty};
 
 use crate::scene::{Family, Scene};

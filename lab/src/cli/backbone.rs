@@ -47,16 +47,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         experiment.start("vines backbone", Some(&arguments.rig), |scene| scene.backbone_config())?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let mut samples = Vec::new();
-    let (mut rig, controller) = (
-        experiment.recorded(session.open.rig.as_mut()),
-        session.controller.as_mut(),
-    );
-    let tracked = track_into(&mut samples, &mut rig, controller, &scene, |done, _| {
+    let (rig, controller) = (session.open.rig.as_mut(), session.controller.as_mut());
+    let tracked = track_into(&mut samples, rig, controller, &scene, |done, _| {
         bar.set_position(done as u64);
     });
     bar.finish_and_clear();
-    rig.finish()?;
-    let timing = session.close(&tracked);
+    let timing = session.close(&tracked)?;
     let tracked = tracked.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let result = TrackedComparison::of(&tracked, &scene);
     let summary = report::summary::tracked(&result);

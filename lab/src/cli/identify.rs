@@ -46,16 +46,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let plan = Plan::of(&scene);
     let bar = progress_bar(plan.lock as u64, "{msg:29} [{wide_bar}] {pos}/{len} samples");
     let mut samples = Vec::new();
-    let (mut rig, controller) = (
-        experiment.recorded(session.open.rig.as_mut()),
-        session.controller.as_mut(),
-    );
-    let record = run_into(&mut samples, &mut rig, controller, &plan, |stage, done, of| {
+    let (rig, controller) = (session.open.rig.as_mut(), session.controller.as_mut());
+    let record = run_into(&mut samples, rig, controller, &plan, |stage, done, of| {
         show(&bar, stage, done, of)
     });
     bar.finish_and_clear();
-    rig.finish()?;
-    let timing = session.close(&record);
+    let timing = session.close(&record)?;
     let record = record.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let identification = identify(&record, &scene).map_err(|error| {
         let reason = match error {

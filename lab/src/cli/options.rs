@@ -1,6 +1,5 @@
-//! Options that several commands share: the scene, rigs and controllers, what the network may reach, and real time.
+//! Options that several commands share: the scene, rigs and controllers, and what the network may reach.
 
-use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::{Arc, OnceLock};
@@ -229,18 +228,6 @@ pub(super) fn no_key(scope: BindScope) -> Result<(), Failure> {
 
 #[derive(Debug, Args)]
 pub(super) struct ReachArguments {
-    /// Real-time priority (SCHED_FIFO), from 1 to 99
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=99))]
-    priority: Option<u8>,
-
-    /// Lock all memory, so that nothing is paged out
-    #[arg(long)]
-    lock_memory: bool,
-
-    /// Run on this processor only, from 0
-    #[arg(long, value_name = "N")]
-    cpu: Option<usize>,
-
     /// Allow network addresses beyond this machine without a key: anyone who can reach the address can drive the rig
     #[arg(long)]
     allow_remote: bool,
@@ -251,23 +238,8 @@ pub(super) struct ReachArguments {
 }
 
 impl ReachArguments {
-    /// Asks the system for priority, memory and processor, and returns which addresses the network may use.
+    /// Which addresses the network may use.
     pub(super) fn reach(&self) -> Result<BindScope, Failure> {
-        let asked = |option: String, answer: io::Result<()>, help: &str| {
-            answer.map_err(|error| Failure::run(format!("{option}: the system refuses: {error}; {help}")))
-        };
-        if let Some(priority) = self.priority {
-            let help = "allow it with `ulimit -r 99`, rtprio in /etc/security/limits.conf, or CAP_SYS_NICE";
-            asked(format!("--priority {priority}"), system::priority(priority), help)?;
-        }
-        if self.lock_memory {
-            let help = "allow it with `ulimit -l unlimited`, memlock in /etc/security/limits.conf, or CAP_IPC_LOCK";
-            asked("--lock-memory".into(), system::lock_memory(), help)?;
-        }
-        if let Some(cpu) = self.cpu {
-            let help = "`nproc` prints how many processors there are; the first is 0";
-            asked(format!("--cpu {cpu}"), system::processor(cpu), help)?;
-        }
         let Some(file) = &self.key else {
             return Ok(match self.allow_remote {
                 true => BindScope::Remote,
@@ -278,51 +250,6 @@ impl ReachArguments {
         let secret = std::fs::read(file).map_err(|error| refused(error.to_string()))?;
         let short = || refused("16 bytes or more are needed; `openssl rand -hex 32` writes a good key".into());
         Key::of(&secret).map(BindScope::Keyed).ok_or_else(short)
-    }
-}
-
-#[cfg(target_os = "linux")]
-mod system {
-    use std::io;
-
-    use rustix::{mm, thread};
-    use thread_priority::{
-        RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy, set_thread_priority_and_policy,
-        thread_native_id,
-    };
-
-    pub fn priority(priority: u8) -> io::Result<()> {
-        let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
-        let value = ThreadPriority::Crossplatform(priority.try_into().map_err(io::Error::other)?);
-        set_thread_priority_and_policy(thread_native_id(), value, policy).map_err(io::Error::other)
-    }
-
-    pub fn lock_memory() -> io::Result<()> {
-        let all = mm::MlockAllFlags::CURRENT | mm::MlockAllFlags::FUTURE;
-        Ok(mm::mlockall(all)?)
-    }
-
-    pub fn processor(number: usize) -> io::Result<()> {
-        if number >= thread::CpuSet::MAX_CPU {
-            return Err(io::Error::other("there is no such processor"));
-        }
-        let mut set = thread::CpuSet::new();
-        set.set(number);
-        Ok(thread::sched_setaffinity(None, &set)?)
-    }
-}
-
-#[cfg(not(target_os = "linux"))]
-mod system {
-    use std::io;
-
-    pub fn priority<T>(_: T) -> io::Result<()> {
-        Err(io::Error::other("this option exists on Linux only"))
-    }
-    pub use priority as processor;
-
-    pub fn lock_memory() -> io::Result<()> {
-        priority(())
     }
 }
 

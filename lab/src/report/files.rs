@@ -84,13 +84,6 @@ pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>,
     Ok(files::write(out, [("interrupted.csv", table(samples))])?)
 }
 
-/// Writes a histogram to `file`: upper limits of the lateness, s, and numbers of samples.
-pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let lines = classes.iter().map(|(limit, count)| format!("{limit:e},{count}\n"));
-    let text = String::from("lateness_s,samples\n") + &lines.collect::<String>();
-    Ok(vec![files::write_file(file, &text)?])
-}
-
 pub(super) fn json(result: &impl Serialize) -> Result<String, ReportError> {
     Ok(serde_json::to_string_pretty(result)? + "\n")
 }

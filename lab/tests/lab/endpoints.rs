@@ -241,15 +241,14 @@ fn combinations_that_do_not_exist_say_why() {
     std::fs::write(&short, "secret\n").unwrap();
     std::fs::write(&key, "0123456789abcdef\n").unwrap();
     let rig = ["rig", "--listen", "127.0.0.1:0"];
-    for (options, code, reason) in [
-        (&["--protocol", "helic", "--lock-step"][..], 2, "its own clock"),
-        (&["--protocol", "helic", "--key", &key], 2, "no authentication"),
-        (&["--key", &short], 2, "16 bytes"),
-        (&["--key", "no-such-file"], 2, "no-such-file"),
-        (&["--rig", "udp://127.0.0.1:1"], 2, "can be served"),
-        (&["--cpu", "5000"], 1, "--cpu 5000"),
+    for (options, reason) in [
+        (&["--protocol", "helic", "--lock-step"][..], "its own clock"),
+        (&["--protocol", "helic", "--key", &key], "no authentication"),
+        (&["--key", &short], "16 bytes"),
+        (&["--key", "no-such-file"], "no-such-file"),
+        (&["--rig", "udp://127.0.0.1:1"], "can be served"),
     ] {
-        fails(&[&rig[..], options].concat(), code, reason);
+        fails(&[&rig[..], options].concat(), 2, reason);
     }
     fails(
         &["identify", "--rig", "helic://127.0.0.1", "--key", &key],
