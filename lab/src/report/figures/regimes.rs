@@ -6,7 +6,7 @@ use super::WIDE;
 use crate::numerics::try_bisection;
 use crate::orbit::Periodic;
 use crate::regime::Regime;
-use crate::report::figure::{DETUNING, Figure, Legend, Marked, Panel, Place, SIZE, Shape};
+use crate::report::figure::{DETUNING, Figure, Legend, Panel, Place, SIZE, Shape};
 use crate::report::theme::{BORDER, letter};
 use crate::scene::Dimensionless;
 use crate::sweep::{Grid, Map, SIGMA};
@@ -27,29 +27,23 @@ pub fn regimes(map: &Map) -> Figure {
         .legend(Legend::Beside(205.0));
     for regime in Regime::SIMULATED {
         let (letter, ink) = letter(regime);
-        panel.add(
-            Shape::Cells(letter, ink),
-            stripes(map, regime),
-            regime.name(),
-            regime.name(),
-        );
+        let shape = Shape::Cells(letter, ink);
+        panel.add(shape, stripes(map, regime), regime.name(), regime.name());
     }
     panel.add(Shape::Border(2.2), outline(map), BORDER, "stable 1:1, theory");
     let place = place_on(map);
     for curve in &map.curves {
         // Solid where it bounds the stability of a motion.
         let motions = curve.branch.points.iter();
-        let points: Vec<Marked> = motions
-            .map(|motion| (place(motion), motion.bounds_stability()))
-            .collect();
-        panel.curve_on_map(&points, curve.kind.name(), curve.kind.name());
+        let points = motions.map(|motion| (place(motion), motion.bounds_stability()));
+        panel.curve_on_map(points, curve.kind.name());
     }
     let several = (0..).zip(&map.cells).filter(|(_, cell)| !cell.coexisting.is_empty());
-    let dots: Vec<Place> = several.map(|(n, _)| (x.at(n % x.points), y.at(n / x.points))).collect();
+    let dots = several.map(|(n, _)| (x.at(n % x.points), y.at(n / x.points)));
     panel.add(Shape::Dot(1.0), dots, BORDER, "several regimes");
     for (regime, place) in letters(map) {
         let (letter, ink) = letter(regime);
-        panel.add(Shape::Text(16.0), vec![place], ink, letter);
+        panel.add(Shape::Text(16.0), [place], ink, letter);
     }
     Figure { size, panels: vec![panel] }
 }
