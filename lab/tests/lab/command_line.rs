@@ -114,27 +114,6 @@ fn counts_of_zero_are_refused_with_the_allowed_range() {
 }
 
 #[test]
-fn a_plant_without_damping_locks_on_its_exact_orbit() {
-    let folder = tempfile::tempdir().unwrap();
-    let settings = ["plant.c=0", "plant.r=0.3", "excitation.G=0.8"].map(|one| format!("--set={one}"));
-    let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
-    let out = folder.path().to_str().unwrap();
-    let found = json(
-        &[
-            &["identify", "--rig", "built-in", "--json", "--out", out][..],
-            &settings,
-        ]
-        .concat(),
-    );
-    let orbits = json(&[&["orbit", "--json"][..], &settings].concat());
-    let stable = orbits.as_array().unwrap().iter().find(|orbit| orbit["stable"] == true);
-    for key in ["sigma", "C"] {
-        let difference = found["lock"][key].as_f64().unwrap() - stable.unwrap()[key].as_f64().unwrap();
-        assert!(difference.abs() < 1e-4, "{key}: {difference}");
-    }
-}
-
-#[test]
 fn a_drive_without_a_stable_orbit_is_told_at_which_drives_one_is_stable() {
     let folder = tempfile::tempdir().unwrap();
     let undamped = [
@@ -261,9 +240,7 @@ fn results_that_cannot_be_written_are_printed() {
     ];
     let quick: Vec<&str> = quick.into_iter().chain(["--rig", "built-in"]).collect();
     for (command, taken, part) in [
-        ("identify", "backbone.csv", "exact orbit"),
-        ("identify", "sim.svg", "sigma,"),
-        ("backbone", "tracked.json", "2 points in"),
+        ("identify", "sim.svg", "exact orbit"),
         ("backbone", "tracked.svg", "2 points in"),
     ] {
         let folder = tempfile::tempdir().unwrap();
@@ -278,10 +255,8 @@ fn results_that_cannot_be_written_are_printed() {
             "{message}"
         );
         // A figure that fails leaves the tables.
-        if taken.ends_with("svg") {
-            let results = ["identification.json", "tracked.json"].map(|name| folder.path().join(name).is_file());
-            assert!(results.contains(&true));
-        }
+        let results = ["identification.json", "tracked.json"].map(|name| folder.path().join(name).is_file());
+        assert!(results.contains(&true));
     }
 }
 

@@ -97,31 +97,26 @@ impl Drop for Server {
 fn built_in_fmu_and_lock_step_network_give_the_same_bits() {
     let (plant, controller) = (fmu("LoViNes.fmu"), fmu("PhaseLock.fmu"));
     let (plant, controller) = (plant.to_str().unwrap(), controller.to_str().unwrap());
-    let direct = identified(&["--rig", "built-in"]);
-    assert_eq!(identified(&["--rig", plant]), direct);
-    assert_eq!(identified(&["--rig", "built-in", "--controller", controller]), direct);
-    let rig = Server::start(&["rig", "--lock-step"]);
-    let peer = Server::start(&["controller"]);
-    assert_eq!(identified(&["--rig", &rig.1, "--controller", &peer.1]), direct);
-    for server in [rig, peer] {
-        let report = server.report();
-        assert!(report.contains("ended by the client"), "{report}");
-    }
-}
-
-#[test]
-fn the_sensors_of_the_scene_are_those_of_every_rig() {
-    let plant = fmu("LoViNes.fmu");
     let sensors = [
         "--set=resonance.sensor='acceleration'",
         "--set=resonance.reference='force'",
     ];
-    let with = |rig: &str| identified(&[&["--rig", rig], &sensors[..]].concat());
-    let direct = with("built-in");
-    assert_ne!(sigma(&direct), sigma(&identified(&["--rig", "built-in"])));
-    assert_eq!(with(plant.to_str().unwrap()), direct);
-    let rig = Server::start(&[&["rig", "--lock-step"], &sensors[..]].concat());
-    assert_eq!(with(&rig.1), direct);
+    let mut results = Vec::new();
+    for settings in [&[][..], &sensors] {
+        let with = |endpoints: &[&str]| identified(&[endpoints, settings].concat());
+        let direct = with(&["--rig", "built-in"]);
+        assert_eq!(with(&["--rig", plant]), direct);
+        assert_eq!(with(&["--rig", "built-in", "--controller", controller]), direct);
+        let rig = Server::start(&[&["rig", "--lock-step"], settings].concat());
+        let peer = Server::start(&["controller"]);
+        assert_eq!(with(&["--rig", &rig.1, "--controller", &peer.1]), direct);
+        for server in [rig, peer] {
+            let report = server.report();
+            assert!(report.contains("ended by the client"), "{report}");
+        }
+        results.push(sigma(&direct));
+    }
+    assert_ne!(results[0], results[1]);
 }
 
 #[test]
@@ -272,6 +267,23 @@ fn a_server_ends_in_order_on_a_signal() {
     assert_eq!(server.report(), "");
 }
 
+/// Sends a signal to an experiment on that rig after some seconds. Returns its messages.
+#[cfg(unix)]
+fn interrupted(rig: &Server, experiment: &[&str], signal: &str, seconds: u64) -> String {
+    let client = Command::new(PROGRAM)
+        .args(with_settings(&[experiment, &["--rig", &rig.1]].concat()))
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(seconds));
+    let pid = client.id().to_string();
+    assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
+    let output = client.wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(130), "{message}");
+    message
+}
+
 #[cfg(unix)]
 #[test]
 fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() {
@@ -282,20 +294,9 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() 
         let rig = Server::start(mode);
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().to_str().unwrap();
-        let arguments = ["identify", "--out", out, "--rig", &rig.1];
         // A signal that comes later finds the rig still driven.
-        let long = ["--set=record.hold_periods=20000"];
-        let client = Command::new(PROGRAM)
-            .args([&with_settings(&arguments)[..], &long].concat())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        std::thread::sleep(std::time::Duration::from_secs(3));
-        let pid = client.id().to_string();
-        assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
-        let output = client.wait_with_output().unwrap();
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(130), "{message}");
+        let long = ["identify", "--out", out, "--set=record.hold_periods=20000"];
+        let message = interrupted(&rig, &long, signal, 3);
         assert!(message.contains("interrupted"), "{message}");
         // What was measured is kept; the temporary folder of the FMUs is not.
         let left = std::fs::read_dir(out).unwrap().map(|entry| entry.unwrap().file_name());
@@ -303,32 +304,18 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() 
         let report: Value = serde_json::from_str(&rig.report()).unwrap();
         assert_eq!(report["ended"], "farewell");
     }
-}
-
-#[cfg(unix)]
-#[test]
-fn a_signal_between_two_points_of_a_backbone_keeps_the_points_and_ends_with_the_code_of_a_signal() {
+    // Between two points of a backbone, the points are kept.
     let rig = Server::start(&["rig", "--lock-step", "--silence", "30"]);
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_str().unwrap();
     let long = [
+        "backbone",
+        "--out",
+        folder.path().to_str().unwrap(),
         "--set=backbone.C_from=0.6",
         "--set=backbone.C_to=0.58",
         "--set=backbone.points=2000",
     ];
-    let client = Command::new(PROGRAM)
-        .args(with_settings(
-            &[&["backbone", "--out", out, "--rig", &rig.1], &long[..]].concat(),
-        ))
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    std::thread::sleep(std::time::Duration::from_secs(5));
-    let pid = client.id().to_string();
-    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
-    let output = client.wait_with_output().unwrap();
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(130), "{message}");
+    let message = interrupted(&rig, &long, "-INT", 5);
     assert!(message.contains("points were measured before. Written: "), "{message}");
 }
 
