@@ -83,22 +83,14 @@ impl Section {
     }
 }
 
-/// The finished report.
-#[derive(Debug)]
-pub struct Report {
-    /// The findings, one sentence per section.
-    pub findings: Vec<String>,
-    /// Files written; the page is the first.
-    pub written: Result<Vec<PathBuf>, ReportError>,
-}
-
 /// Writes the report on `subject` into `out`: `report.html`, each figure for light and dark backgrounds, and tables. `progress` gets the
-/// name of the section being made, and the fraction of all sections that is done, from 0 to 1.
+/// name of the section being made, and the fraction of all sections that is done, from 0 to 1. Returns the findings, a sentence per section,
+/// and the files; the page is the first.
 pub fn write_report(
     subject: &Subject,
     out: &Path,
     progress: &(dyn Fn(&str, f64) + Sync),
-) -> Result<Report, ReportError> {
+) -> Result<(Vec<String>, Vec<PathBuf>), ReportError> {
     let mut sections = Vec::new();
     for (n, (name, make)) in sections::SECTIONS.into_iter().enumerate() {
         let at = |part: f64| progress(name, (n as f64 + part) / sections::SECTIONS.len() as f64);
@@ -117,8 +109,7 @@ pub fn write_report(
         files.extend(section.attachments);
         findings.push(section.finding);
     }
-    let written = crate::files::write(out, files).map_err(ReportError::from);
-    Ok(Report { findings, written })
+    Ok((findings, crate::files::write(out, files)?))
 }
 
 /// The page: one file of HTML that needs nothing else.
@@ -129,25 +120,19 @@ fn page(scene: &Scene, sections: &[Section]) -> String {
         include_str!("report/page.css")
     );
     let page = html! {
-        (DOCTYPE) "\n"
+        (DOCTYPE)
         html lang="en" {
-            "\n"
             head {
-                "\n" meta charset="utf-8";
-                "\n" meta name="viewport" content="width=device-width, initial-scale=1";
-                "\n" link rel="icon" href="data:,";
-                "\n" title { "vines: report" }
-                "\n" style { "\n" (PreEscaped(style)) }
-                "\n"
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                link rel="icon" href="data:,";
+                title { "vines: report" }
+                style { (PreEscaped(style)) }
             }
-            "\n"
             body {
-                "\n"
                 (body(scene, sections))
             }
-            "\n"
         }
-        "\n"
     };
     page.into_string()
 }
@@ -166,54 +151,45 @@ fn body(scene: &Scene, sections: &[Section]) -> Markup {
     let json = serde_json::to_string_pretty(scene).unwrap_or_default();
     html! {
         h1 { "Nonlinear modal test of an oscillator with a vibro-impact nonlinear energy sink" }
-        "\n"
         p.scene {
             (format!("ε = {:.6}, λ = {:.4}, r = {}, G = {:.4}; ", p.epsilon, p.lambda, p.r, p.g))
             (format!("b = {} m, ω₀ = {:.4} rad/s", p.b, p.omega0))
         }
-        "\n"
         @if let Some(left_out) = scene.left_out() {
             p { (summary::ideal("Theory, exact orbits and the regime map on this page are", &left_out)) ". The measurements have it." }
-            "\n"
         }
         section {
-            h2 { "What was found" } "\n"
-            ul { "\n" @for section in sections { li { (section.finding) } "\n" } }
+            h2 { "What was found" }
+            ul { @for section in sections { li { (section.finding) } } }
         }
-        "\n"
         nav {
-            h2 { "Contents" } "\n"
+            h2 { "Contents" }
             ol {
-                "\n"
-                @for (n, title) in (1..).zip(titles) { li { a href=(format!("#s{n}")) { (title) } } "\n" }
+                @for (n, title) in (1..).zip(titles) { li { a href=(format!("#s{n}")) { (title) } } }
             }
         }
-        "\n"
         @for (n, section) in (1..).zip(sections) {
             section id=(format!("s{n}")) {
-                h2 { (n) " " (section.title) } "\n"
+                h2 { (n) " " (section.title) }
                 @for block in &section.blocks { (rendered(block, &mut figures)) }
             }
-            "\n"
         }
         (budget(sections))
         section id=(format!("s{}", sections.len() + 2)) {
-            h2 { (sections.len() + 2) " " (VERSIONS) } "\n"
+            h2 { (sections.len() + 2) " " (VERSIONS) }
             p {
                 "vines " (env!("CARGO_PKG_VERSION")) ", " (std::env::consts::ARCH) " on " (std::env::consts::OS)
                 ". Everything here follows from the scene and the version; the page carries no date, so that the same input \
                  gives the same bytes."
             }
-            "\n"
             pre { (json) }
         }
-        "\n"
     }
 }
 
 fn rendered(block: &Block, figures: &mut u32) -> Markup {
     match block {
-        Block::Words(text) => html! { p { (text) } "\n" },
+        Block::Words(text) => html! { p { (text) } },
         Block::Table { caption, table } => table.html(caption),
         Block::Figure { caption, svg, .. } => {
             *figures += 1;
@@ -226,7 +202,6 @@ fn rendered(block: &Block, figures: &mut u32) -> Markup {
                     (PreEscaped(labelled))
                     figcaption { "Figure " (*figures) ". " (caption) }
                 }
-                "\n"
             }
         }
     }
@@ -237,7 +212,7 @@ fn budget(sections: &[Section]) -> Markup {
     let table = Table::new("quantity | difference | cause").rows(rows);
     html! {
         section.budget id=(format!("s{}", sections.len() + 1)) {
-            h2 { (sections.len() + 1) " " (BUDGET) } "\n"
+            h2 { (sections.len() + 1) " " (BUDGET) }
             (table.html("Differences between results and references, with their causes."))
             p {
                 "M, k, c and m of the default scene are those of a published rig of this kind, because the study that it follows \
@@ -245,6 +220,5 @@ fn budget(sections: &[Section]) -> Markup {
                  result depends."
             }
         }
-        "\n"
     }
 }

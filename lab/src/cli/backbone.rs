@@ -7,7 +7,7 @@ use vines::{backbone::track_into, comparison::TrackedComparison, fit::contradict
 use super::experiment::{ExperimentArguments, interrupted};
 use super::failure::Failure;
 use super::options::Endpoint;
-use super::output::{output, print, saved, written};
+use super::output::{print, written};
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:
@@ -56,12 +56,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let tracked = tracked.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let result = TrackedComparison::of(&tracked, &scene);
     let summary = report::summary::tracked(&result);
-    let saved = saved(report::write_tracked(&result, &experiment.out), || {
-        output(experiment.json, &result, || summary.clone())
-    });
+    let files = report::write_tracked(&result, &experiment.out)?;
     if let Some(ended) = tracked.ended {
         let mut failure = Failure::from(ended);
-        let files = saved.map_or_else(|error| error.message, |files| written(&files));
+        let files = written(&files);
         failure.message += &format!(
             "\n{} points were measured before. {}",
             result.points.len(),
@@ -69,7 +67,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         );
         return Err(failure);
     }
-    let files = saved?;
     let mut text = experiment.result(&result, &summary, &files, timing)?;
     let settled = result.points.iter().filter(|one| one.point.settled);
     let points: Vec<_> = settled.map(|one| (&one.point.at).into()).collect();

@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use phase_lock::ConfigError;
 use vines::rig::{Interrupted, RigError};
 use vines::scene::{SceneError, refusal};
-use vines::{experiment::ExperimentError, net::LinkError, pack::PackError};
+use vines::{experiment::ExperimentError, net::LinkError, pack::PackError, report::ReportError};
 
 /// Exit code of a program that a signal ended: 128 and the number of SIGINT.
 pub(super) const INTERRUPTED: u8 = 130;
@@ -65,6 +65,12 @@ impl From<LinkError> for Failure {
             LinkError::Address { .. } | LinkError::Remote { .. } => Self::input(error),
             _ => Self::run(error),
         }
+    }
+}
+
+impl From<ReportError> for Failure {
+    fn from(error: ReportError) -> Self {
+        Self::run(error)
     }
 }
 

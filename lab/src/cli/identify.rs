@@ -62,10 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     })?;
     let result = Comparison::of(&identification, &scene);
     let summary = report::summary::identification(&result);
-    let mut files = saved(report::write(&result, &experiment.out), || {
-        let points = report::decay_csv(&result).map_err(Failure::run)?;
-        output(experiment.json, &result, || format!("{summary}\n{points}"))
-    })?;
+    let mut files = report::write(&result, &experiment.out)?;
     if arguments.rig.is_none() {
         files.extend(fmus(&experiment.out)?);
     }

@@ -61,18 +61,13 @@ impl Table {
         html! {
             table {
                 caption { (caption) }
-                "\n"
                 thead { tr { @for (n, cell) in self.headings.iter().enumerate() { th class=[class(n)] { (cell) } } } }
-                "\n"
                 tbody {
-                    "\n"
                     @for row in &self.rows {
                         tr { @for (n, cell) in row.iter().enumerate() { td class=[class(n)] { (cell) } } }
-                        "\n"
                     }
                 }
             }
-            "\n"
         }
     }
 

@@ -231,36 +231,6 @@ fn a_folder_that_is_a_file_is_refused_as_wrong_usage_before_anything_runs() {
 }
 
 #[test]
-fn results_that_cannot_be_written_are_printed() {
-    // The names of the files are taken by folders, as if the disk were full at the end.
-    let quick = [
-        "--set=record.decay_periods=40",
-        "--set=controller.amplitude_tolerance=4e-3",
-        "--set=backbone.points=2",
-    ];
-    let quick: Vec<&str> = quick.into_iter().chain(["--rig", "built-in"]).collect();
-    for (command, taken, part) in [
-        ("identify", "sim.svg", "exact orbit"),
-        ("backbone", "tracked.svg", "2 points in"),
-    ] {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(taken);
-        std::fs::create_dir_all(path.join("full")).unwrap();
-        let done = vines(&[&[command, "--out", folder.path().to_str().unwrap()], &quick[..]].concat());
-        let [text, message] = [&done.stdout, &done.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
-        assert_eq!(done.status.code(), Some(1), "{message}");
-        assert!(text.contains(part), "{command}: {text}");
-        assert!(
-            message.contains(taken) && message.contains("standard output has the results"),
-            "{message}"
-        );
-        // A figure that fails leaves the tables.
-        let results = ["identification.json", "tracked.json"].map(|name| folder.path().join(name).is_file());
-        assert!(results.contains(&true));
-    }
-}
-
-#[test]
 fn packing_refuses_what_it_cannot_pack_before_it_writes() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
