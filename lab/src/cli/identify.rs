@@ -9,7 +9,7 @@ use vines::{advice, comparison::Comparison, report};
 
 use super::experiment::{ExperimentArguments, interrupted, kept};
 use super::options::Endpoint;
-use super::output::{output, progress_bar, saved};
+use super::output::progress_bar;
 use super::{failure::Failure, pack::fmus};
 
 const HELP: &str = "\
