@@ -65,7 +65,6 @@ pub const fmi2Status_fmi2Warning: fmi2Status = 1;
 pub const fmi2Status_fmi2Discard: fmi2Status = 2;
 pub const fmi2Status_fmi2Error: fmi2Status = 3;
 pub const fmi2Status_fmi2Fatal: fmi2Status = 4;
-pub const fmi2Status_fmi2Pending: fmi2Status = 5;
 
 pub type fmi2Type = c_uint;
 pub const fmi2Type_fmi2ModelExchange: fmi2Type = 0;
@@ -204,12 +203,6 @@ functions! {
     fn fmi2GetEventIndicators(c: fmi2Component, eventIndicators: *mut fmi2Real, ni: usize) -> fmi2Status;
     fn fmi2GetContinuousStates(c: fmi2Component, x: *mut fmi2Real, nx: usize) -> fmi2Status;
     fn fmi2GetNominalsOfContinuousStates(c: fmi2Component, x_nominal: *mut fmi2Real, nx: usize) -> fmi2Status;
-    fn fmi2SetRealInputDerivatives(
-        c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, order: *const fmi2Integer, value: *const fmi2Real,
-    ) -> fmi2Status;
-    fn fmi2GetRealOutputDerivatives(
-        c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, order: *const fmi2Integer, value: *mut fmi2Real,
-    ) -> fmi2Status;
     fn fmi2DoStep(
         c: fmi2Component, currentCommunicationPoint: fmi2Real, communicationStepSize: fmi2Real,
         noSetFMUStatePriorToCurrentPoint: fmi2Boolean,
@@ -217,7 +210,6 @@ functions! {
     fn fmi2CancelStep(c: fmi2Component) -> fmi2Status;
     fn fmi2GetStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Status) -> fmi2Status;
     fn fmi2GetRealStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Real) -> fmi2Status;
-    fn fmi2GetIntegerStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Integer) -> fmi2Status;
     fn fmi2GetBooleanStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Boolean) -> fmi2Status;
     fn fmi2GetStringStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2String) -> fmi2Status;
 }
