@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use figure::Figure;
 pub use files::{ReportError, decay_csv, map_csv, write, write_fit, write_interrupted, write_map, write_tracked};
 pub use table::{Table, number, row, with_uncertainty};
 
@@ -29,24 +30,17 @@ pub struct Subject {
     pub map: [Axis; 2],
 }
 
-/// One part of a section. A figure is SVG for white paper; its name is the name of its files, without ending.
-#[derive(Debug, Clone, PartialEq)]
-enum Block {
-    Words(String),
-    Figure { name: String, caption: String, svg: String },
-    Table { caption: String, table: Table },
-}
-
 /// A section of the page, with its finding in a sentence or two.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Section {
     title: String,
     finding: String,
-    blocks: Vec<Block>,
+    /// Paragraphs, figures and tables, as HTML.
+    content: String,
     /// Lines of the error budget: what is uncertain, by how much, and where that number comes from.
     budget: Vec<[String; 3]>,
-    /// Tables for programs: name and content of a file.
-    attachments: Vec<(String, String)>,
+    /// Names and contents of its figures, for light and dark backgrounds, and of tables for programs.
+    files: Vec<(String, String)>,
 }
 
 impl Section {
@@ -61,17 +55,23 @@ impl Section {
         self
     }
 
-    fn words(&mut self, text: impl Into<String>) {
-        self.blocks.push(Block::Words(text.into()));
+    fn words(&mut self, text: impl AsRef<str>) {
+        self.content += &html! { p { (text.as_ref()) } }.into_string();
     }
 
-    fn figure(&mut self, name: &str, caption: impl Into<String>, svg: String) {
-        self.blocks
-            .push(Block::Figure { name: name.into(), caption: caption.into(), svg });
+    fn table(&mut self, caption: &str, table: &Table) {
+        self.content += &table.html(caption).into_string();
     }
 
-    fn table(&mut self, caption: &str, table: Table) {
-        self.blocks.push(Block::Table { caption: caption.into(), table });
+    /// A figure, with the name of its files without ending. On the page it has a label for readers who cannot see it.
+    fn figure(&mut self, name: &str, caption: &str, figure: &Figure) {
+        let svg = figure.svg();
+        let label = html! { (caption) }.into_string();
+        let labelled = svg.replacen("<svg", &format!("<svg role=\"img\" aria-label=\"{label}\""), 1);
+        let figure = html! { figure { (PreEscaped(labelled)) figcaption { (caption) } } };
+        self.content += &figure.into_string();
+        self.attach(&format!("{name}-dark.svg"), theme::dark(&svg));
+        self.attach(&format!("{name}.svg"), svg);
     }
 
     fn budget(&mut self, what: &str, size: String, why: &str) {
@@ -79,7 +79,7 @@ impl Section {
     }
 
     fn attach(&mut self, name: &str, text: String) {
-        self.attachments.push((name.into(), text));
+        self.files.push((name.into(), text));
     }
 }
 
@@ -100,13 +100,7 @@ pub fn write_report(
     let mut files = vec![("report.html".to_string(), page(&subject.scene, &sections))];
     let mut findings = Vec::new();
     for section in sections {
-        for block in section.blocks {
-            if let Block::Figure { name, svg, .. } = block {
-                files.push((format!("{name}-dark.svg"), theme::dark(&svg)));
-                files.push((format!("{name}.svg"), svg));
-            }
-        }
-        files.extend(section.attachments);
+        files.extend(section.files);
         findings.push(section.finding);
     }
     Ok((findings, crate::files::write(out, files)?))
@@ -143,7 +137,6 @@ const VERSIONS: &str = "Scene and versions";
 
 fn body(scene: &Scene, sections: &[Section]) -> Markup {
     let p = scene.dimensionless();
-    let mut figures = 0;
     let titles = sections
         .iter()
         .map(|section| section.title.as_str())
@@ -171,7 +164,7 @@ fn body(scene: &Scene, sections: &[Section]) -> Markup {
         @for (n, section) in (1..).zip(sections) {
             section id=(format!("s{n}")) {
                 h2 { (n) " " (section.title) }
-                @for block in &section.blocks { (rendered(block, &mut figures)) }
+                (PreEscaped(&section.content))
             }
         }
         (budget(sections))
@@ -183,26 +176,6 @@ fn body(scene: &Scene, sections: &[Section]) -> Markup {
                  gives the same bytes."
             }
             pre { (json) }
-        }
-    }
-}
-
-fn rendered(block: &Block, figures: &mut u32) -> Markup {
-    match block {
-        Block::Words(text) => html! { p { (text) } },
-        Block::Table { caption, table } => table.html(caption),
-        Block::Figure { caption, svg, .. } => {
-            *figures += 1;
-            // Inside a page the drawing has no prologue, and a label for readers who cannot see it.
-            let start = svg.find("<svg").map_or(0, |start| start + "<svg".len());
-            let label = html! { (caption) }.into_string();
-            let labelled = format!("<svg role=\"img\" aria-label=\"{label}\"{}", &svg[start..]);
-            html! {
-                figure {
-                    (PreEscaped(labelled))
-                    figcaption { "Figure " (*figures) ". " (caption) }
-                }
-            }
         }
     }
 }

@@ -261,10 +261,3 @@ pub(super) fn positive(text: &str) -> Result<f64, ArgumentError> {
         false => Err("must be above 0 and at most 1e8".into()),
     }
 }
-
-/// A number of runs, seeds or the like.
-pub(super) fn count<T: TryFrom<u64>>(text: &str) -> Result<T, ArgumentError> {
-    let value = text.parse().ok().filter(|count| (1..=1_000_000_000).contains(count));
-    let value = value.and_then(|count: u64| count.try_into().ok());
-    value.ok_or_else(|| "expected a whole number from 1 to 1000000000".into())
-}

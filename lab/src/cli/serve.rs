@@ -11,7 +11,7 @@ use vines::net::{Address, LinkError, Role, Served, Server, ServerError, Service,
 use vines::rig::{BuiltIn, Rig, RigError, RigFault, SensorsOnly, Simulated, faulty};
 
 use super::failure::{Failure, stop_flag};
-use super::options::{Endpoint, ReachArguments, SceneArguments, count, fmu, no_key, positive};
+use super::options::{Endpoint, ReachArguments, SceneArguments, fmu, no_key, positive};
 use super::output::print;
 use super::watch::WatchArguments;
 
@@ -242,7 +242,7 @@ struct ServingArguments {
     duration: Option<f64>,
 
     /// End after this many sessions
-    #[arg(long, value_name = "N", value_parser = count::<u64>)]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     sessions: Option<u64>,
 
     /// Print a line of JSON per session instead of text

@@ -104,13 +104,7 @@ fn bad_input_ends_with_code_two_and_one_message() {
     fails(&["theory", "--scene", "no-such.toml"], 2, "no-such.toml");
     fails(&["theory", "--points", "1"], 2, "--points");
     fails(&["dance"], 2, "dance");
-}
-
-#[test]
-fn counts_of_zero_are_refused_with_the_allowed_range() {
-    for server in ["rig", "controller"] {
-        fails(&[server, "--listen", "127.0.0.1:0", "--sessions", "0"], 2, "from 1 to");
-    }
+    fails(&["rig", "--listen", "127.0.0.1:0", "--sessions", "0"], 2, "1..");
 }
 
 #[test]
