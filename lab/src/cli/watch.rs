@@ -29,8 +29,8 @@ use super::failure::Failure;
 const CHANNEL: usize = 1 << 16;
 /// Rows per natural period that are shown, at most.
 const PER_PERIOD: f64 = 50.0;
-/// Time of which a browser that comes late gets the rows, natural periods: the last minute of the default scene.
-const KEPT_PERIODS: f64 = 520.0;
+/// Rows that a browser gets that comes late: more than the last minute of the default scene.
+const KEPT: usize = 30_000;
 /// Time between two evaluations of the samples.
 const PACE: Duration = Duration::from_millis(40);
 /// Longest wait for the request on a connection (browsers open some without one), and for a browser that does not read.
@@ -200,7 +200,7 @@ impl View {
         if sample.number.is_multiple_of(stride) {
             self.rows.push_back(row);
         }
-        if self.rows.len() > (KEPT_PERIODS * PER_PERIOD) as usize {
+        if self.rows.len() > KEPT {
             self.rows.pop_front();
             self.first += 1;
         }

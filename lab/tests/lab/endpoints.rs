@@ -269,9 +269,10 @@ fn a_server_ends_in_order_on_a_signal() {
 
 /// Sends a signal to an experiment on that rig after some seconds. Returns its messages.
 #[cfg(unix)]
-fn interrupted(rig: &Server, experiment: &[&str], signal: &str, seconds: u64) -> String {
+fn interrupted(rig: &Server, command: &str, out: &str, settings: &[&str], signal: &str, seconds: u64) -> String {
     let client = Command::new(PROGRAM)
-        .args(with_settings(&[experiment, &["--rig", &rig.1]].concat()))
+        .args(with_settings(&[command, "--out", out, "--rig", &rig.1]))
+        .args(settings)
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
@@ -295,8 +296,8 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() 
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().to_str().unwrap();
         // A signal that comes later finds the rig still driven.
-        let long = ["identify", "--out", out, "--set=record.hold_periods=20000"];
-        let message = interrupted(&rig, &long, signal, 3);
+        let long = ["--set=record.hold_periods=20000"];
+        let message = interrupted(&rig, "identify", out, &long, signal, 3);
         assert!(message.contains("interrupted"), "{message}");
         // What was measured is kept; the temporary folder of the FMUs is not.
         let left = std::fs::read_dir(out).unwrap().map(|entry| entry.unwrap().file_name());
@@ -308,14 +309,11 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() 
     let rig = Server::start(&["rig", "--lock-step", "--silence", "30"]);
     let folder = tempfile::tempdir().unwrap();
     let long = [
-        "backbone",
-        "--out",
-        folder.path().to_str().unwrap(),
         "--set=backbone.C_from=0.6",
         "--set=backbone.C_to=0.58",
         "--set=backbone.points=2000",
     ];
-    let message = interrupted(&rig, &long, "-INT", 5);
+    let message = interrupted(&rig, "backbone", folder.path().to_str().unwrap(), &long, "-INT", 5);
     assert!(message.contains("points were measured before. Written: "), "{message}");
 }
 

@@ -1,18 +1,13 @@
 //! The regime map: coloured cells, a letter on each region, and the theory's stable island.
 
-use std::convert::Infallible;
-
 use super::WIDE;
-use crate::numerics::try_bisection;
+use crate::numerics::bisection;
 use crate::orbit::Periodic;
 use crate::regime::Regime;
 use crate::report::figure::{DETUNING, Figure, Legend, Panel, Place, SIZE, Shape};
 use crate::report::theme::{BORDER, letter};
 use crate::scene::Dimensionless;
 use crate::sweep::{Grid, Map, SIGMA};
-
-/// Regions in which no square of 2 n + 1 cells fits, with this n, get no letter.
-const NARROW: usize = 1;
 
 pub fn regimes(map: &Map) -> Figure {
     let (Map { x, y, .. }, [x_name, y_name]) = (map, map.names());
@@ -131,7 +126,8 @@ fn letters(map: &Map) -> Vec<(Regime, Place)> {
             .map(|[column, row]| (depth(column, row), [column, row]))
             .collect();
         cells.sort_by_key(|one| std::cmp::Reverse(one.0));
-        let enough = cells.first().map_or(0, |deepest| deepest.0 / 2).max(NARROW);
+        // A region in which no square of three by three cells fits gets no letter.
+        let enough = cells.first().map_or(0, |deepest| deepest.0 / 2).max(1);
         for (_, place) in cells.into_iter().take_while(|one| one.0 >= enough) {
             let far = |(other, [x, y]): &(Regime, [usize; 2])| {
                 *other != regime || x.abs_diff(place[0]) > columns / 3 || y.abs_diff(place[1]) > rows / 3
@@ -167,8 +163,6 @@ fn without_curves(map: &Map) -> Vec<Option<Regime>> {
 
 /// Parts of the map across, in each direction, in which the border of the theory's island is searched for.
 const PARTS: usize = 100;
-/// Fraction of such a part to which the border is located: far below a pixel.
-const LOCATED: f64 = 1.0 / 4096.0;
 
 /// The border of the region where first-order theory has a stable symmetric 1:1 motion, by marching squares: pairs of ends.
 fn outline(map: &Map) -> Vec<Place> {
@@ -180,8 +174,7 @@ fn outline(map: &Map) -> Vec<Place> {
         .collect();
     let border = |(from, from_inside): (Place, bool), (to, _): (Place, bool)| {
         let at = |part: f64| (from.0 + part * (to.0 - from.0), from.1 + part * (to.1 - from.1));
-        let before = |part: f64| Ok::<_, Infallible>(inside(at(part)) == from_inside);
-        let Ok((_, end)) = try_bisection(0.0, 1.0, LOCATED, before);
+        let (_, end) = bisection(0.0, 1.0, |part| inside(at(part)) == from_inside);
         at(end)
     };
     let mut segments = Vec::new();
