@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use lovines::InvalidValue;
 use phase_lock::ConfigError;
 use serde::Serialize;
+use serde_json::Value;
 use thiserror::Error;
 
 use super::figures::{backbone, fitted, manifold, regimes, tracked_with_drive};
@@ -103,25 +104,16 @@ pub(super) fn csv<T: Serialize>(headings: &[&str], rows: impl IntoIterator<Item 
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// The points along a decay, as CSV.
+/// The points along a decay, as CSV: the columns are the keys of their JSON.
 pub fn decay_csv(result: &Comparison) -> Result<String, ReportError> {
-    #[derive(Serialize)]
-    struct Compared {
-        sigma_theory: Option<f64>,
-        sigma_exact: Option<f64>,
-        sigma_slow_flow: Option<f64>,
-        sigma_predicted: Option<f64>,
-    }
-    let rows = result.decay.iter().map(|compared| {
-        let row = Compared {
-            sigma_theory: compared.sigma_theory,
-            sigma_exact: compared.sigma_exact,
-            sigma_slow_flow: compared.sigma_slow_flow,
-            sigma_predicted: compared.sigma_predicted,
-        };
-        (compared.point, row)
-    });
-    csv(&[], rows)
+    let points = result.decay.iter().map(serde_json::to_value);
+    let points = points.collect::<Result<Vec<Value>, _>>()?;
+    let points: Vec<_> = points.iter().filter_map(Value::as_object).collect();
+    let Some(first) = points.first() else {
+        return Ok(String::new());
+    };
+    let headings: Vec<&str> = first.keys().map(String::as_str).collect();
+    csv(&headings, points.iter().map(|point| point.values().collect::<Vec<_>>()))
 }
 
 /// The points of a tracked backbone.
