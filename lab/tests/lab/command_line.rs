@@ -130,14 +130,8 @@ fn a_drive_without_a_stable_orbit_is_told_at_which_drives_one_is_stable() {
 fn curves_and_settled_orbits_come_as_json_too() {
     let backbone = json(&["orbit", "--backbone", "--json"]);
     assert!(backbone["points"].as_array().map_or(0, Vec::len) > 100);
-    let mode = [
-        "orbit",
-        "--backbone",
-        "--json",
-        "--set=plant.c=0.0",
-        "--set=plant.r=1.0",
-        "--set=excitation.G=0",
-    ];
+    let mode = ["--set=plant.c=0", "--set=plant.r=1", "--set=excitation.G=0"];
+    let mode = [&["orbit", "--backbone", "--json"], &mode[..]].concat();
     let mode = json(&mode);
     let points = mode["points"].as_array().unwrap();
     assert!(points.len() > 100 && points.iter().all(|one| one["G"].as_f64().unwrap().abs() < 1e-9));
@@ -163,12 +157,9 @@ fn a_map_is_written_as_table_and_figures() {
     let out = folder.path().to_str().unwrap();
     let output = vines(&[
         "map",
-        "--x",
-        "sigma=-2:1:4",
-        "--y",
-        "G=1:1.4:3",
-        "--periods",
-        "2000",
+        "--x=sigma=-2:1:4",
+        "--y=G=1:1.4:3",
+        "--periods=2000",
         "--out",
         out,
     ]);
@@ -244,18 +235,8 @@ fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
     assert!(tracked.status.success(), "{tracked:?}");
     assert!(!String::from_utf8_lossy(&tracked.stdout).contains("do not belong"));
     let [points, rig, figure] = ["tracked.csv", "rig.toml", "fit.svg"].map(|name| format!("{out}/{name}"));
-    let fit = vines(&[
-        "fit",
-        &points,
-        "--set",
-        "plant.r=0.75",
-        "--known",
-        "m=0.032±0.0003",
-        "--out",
-        &rig,
-        "--figure",
-        &figure,
-    ]);
+    let known = ["--set=plant.r=0.75", "--known=m=0.032±0.0003"];
+    let fit = vines(&[&["fit", &points, "--out", &rig, "--figure", &figure], &known[..]].concat());
     let text = String::from_utf8_lossy(&fit.stdout).into_owned();
     assert!(
         fit.status.success() && text.contains("the model describes them"),

@@ -124,14 +124,8 @@ fn a_rig_in_real_time_gives_the_same_sigma_within_5e_3() {
     let direct = identified(&["--rig", "built-in"]);
     let rig = Server::start(&["rig", "--json", "--silence", "5"]);
     let folder = tempfile::tempdir().unwrap();
-    let arguments = [
-        "identify",
-        "--json",
-        "--out",
-        folder.path().to_str().unwrap(),
-        "--rig",
-        &rig.1,
-    ];
+    let out = folder.path().to_str().unwrap();
+    let arguments = ["identify", "--json", "--out", out, "--rig", &rig.1];
     let done = vines(&with_settings(&arguments));
     let found: Value = serde_json::from_slice(&done.stdout).unwrap();
     assert!((sigma(&found) - sigma(&direct)).abs() < 5e-3);

@@ -11,16 +11,12 @@ use std::{
 
 use crate::PROGRAM;
 
-const ARGUMENTS: [&str; 9] = [
+const ARGUMENTS: [&str; 5] = [
     "sweep",
-    "--axis",
-    "sigma=-3:3:61",
-    "--axis",
-    "start.dq2=-0.7:0.7:50",
-    "--periods",
-    "200",
-    "--chunk",
-    "25",
+    "--axis=sigma=-3:3:61",
+    "--axis=start.dq2=-0.7:0.7:50",
+    "--periods=200",
+    "--chunk=25",
 ];
 
 fn vines(arguments: &[&str], out: &Path) -> Command {
@@ -124,7 +120,7 @@ fn ctrl_c_keeps_complete_chunks_and_the_same_command_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("store");
     let mut arguments = ARGUMENTS.map(String::from);
-    arguments[2] = "sigma=-3:3:3001".into();
+    arguments[1] = "--axis=sigma=-3:3:3001".into();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let child = vines(&arguments, &out).spawn().unwrap();
     let begun = (0..6000).any(|_| {
@@ -149,15 +145,7 @@ fn a_full_disk_and_a_folder_that_cannot_be_written_are_explained() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("store");
     // No file may grow beyond one block: as on a full disk, metadata that fits is written and a larger chunk is not.
-    let arguments = [
-        "sweep",
-        "--axis",
-        "plant.r=0.3:0.9:400",
-        "--periods",
-        "100",
-        "--sigma=-4",
-    ]
-    .join(" ");
+    let arguments = "sweep --axis plant.r=0.3:0.9:400 --periods 100 --sigma=-4";
     let script = format!(
         "trap '' XFSZ; ulimit -f 4; exec {} {arguments} --out {}",
         PROGRAM,
@@ -185,13 +173,7 @@ fn a_full_disk_and_a_folder_that_cannot_be_written_are_explained() {
 fn a_large_sweep_needs_a_confirmation() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("store");
-    let arguments = [
-        "sweep",
-        "--axis",
-        "plant.r=0.3:0.9:1000000",
-        "--axis",
-        "sigma=-5:5:1000000",
-    ];
+    let arguments = ["sweep", "--axis=plant.r=0.3:0.9:1000000", "--axis=sigma=-5:5:1000000"];
     let output = vines(&arguments, &out).output().unwrap();
     assert_eq!(output.status.code(), Some(2), "{}", text(&output));
     let text = text(&output);
