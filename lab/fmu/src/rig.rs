@@ -3,9 +3,8 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use phase_lock::Value;
 use vines_testbench::rig::{Drive, FrictionTotals, GroundTruth, Measured, Rig, RigError, Sensors, has_friction};
-use vines_testbench::scene::{Definition, Names, Parameters, Reference as ReferenceSignal, Sensor};
+use vines_testbench::scene::{Reference as ReferenceSignal, Scene, Sensor};
 
 use crate::instance::{FmiType, Fmu, FmuError, Variable};
 
@@ -45,15 +44,10 @@ struct Inside {
 }
 
 impl FmuRig {
-    /// Loads the plant at `path` and initialises it with parameters and a start, under the names of `LoViNes.fmu` or those that `names`
-    /// maps them to. It has the sensors of `definition`, for a plant with the parameters `plant`.
-    pub fn load(
-        path: &Path,
-        values: &[(&str, Value)],
-        definition: Definition,
-        plant: &Parameters,
-        names: &Names,
-    ) -> Result<Measured<Self>, FmuError> {
+    /// Loads the plant at `path` and initialises it with parameters and start of the scene, under the names of `LoViNes.fmu` or those that
+    /// the scene maps them to. It has the sensors of the scene.
+    pub fn load(path: &Path, scene: &Scene) -> Result<Measured<Self>, FmuError> {
+        let (names, definition) = (&scene.rig_names, scene.resonance);
         let mut fmu = Fmu::load(path, "plant", names, NAMES)?;
         let [omega, amplitude] = ["omega", "E"].map(|ours| fmu.find(FmiType::Real, ours));
         let inputs = omega?.zip(amplitude?).map(|(omega, amplitude)| [omega, amplitude]);
@@ -71,10 +65,10 @@ impl FmuRig {
             ReferenceSignal::Base => fmu.find(FmiType::Real, "base")?,
             ReferenceSignal::Force => Some(fmu.need(FmiType::Real, "base")?),
         };
-        fmu.start(values)?;
-        let inside = Inside::of(&fmu, has_friction(plant))?;
+        fmu.start(&scene.start_values())?;
+        let inside = Inside::of(&fmu, has_friction(&scene.plant))?;
         let rig = Self { fmu, inputs, held, phase: 0.0, response, reference, inside };
-        Ok(Measured::new(rig, definition, plant))
+        Ok(Measured::new(rig, definition, &scene.plant))
     }
 }
 

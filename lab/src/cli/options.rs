@@ -1,17 +1,17 @@
 //! Options that several commands share: the scene, rigs and controllers, and what the network may reach.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::{Arc, OnceLock};
 
 use clap::Args;
 use phase_lock::Config;
 use vines::ArgumentError;
-use vines::fmu::{FmuController, FmuError, FmuRig};
+use vines::fmu::{FmuController, FmuRig};
 use vines::helic::{Channels, DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::report::summary::ideal;
-use vines::rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable};
+use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
 use vines::scene::{Family, Name, Names, Override, PAPER, Scene, SceneError};
 
 use super::failure::{Failure, stop_flag};
@@ -137,7 +137,7 @@ impl Endpoint {
                 let plant = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
                 Box::new(plant.with_sensors(scene.resonance))
             }
-            Self::Fmu(file) => Box::new(fmu(file, scene).map_err(Failure::run)?),
+            Self::Fmu(file) => Box::new(FmuRig::load(file, scene).map_err(Failure::run)?),
             Self::Network(address) if address.starts_with("helic://") => Box::new(helic(address, scene, scope)?),
             Self::Network(address) => {
                 let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time(), scope.key())?;
@@ -172,16 +172,6 @@ impl Endpoint {
             }
         })
     }
-}
-
-pub(super) fn fmu(file: &Path, scene: &Scene) -> Result<Measured<FmuRig>, FmuError> {
-    FmuRig::load(
-        file,
-        &scene.start_values(),
-        scene.resonance,
-        &scene.plant,
-        &scene.rig_names,
-    )
 }
 
 /// The helic device at `helic://HOST[:PORT]`.

@@ -6,12 +6,13 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use vines::ArgumentError;
+use vines::fmu::FmuRig;
 use vines::helic::{Device, HelicServer};
 use vines::net::{Address, LinkError, Role, Served, Server, ServerError, Service, Session, resolve};
 use vines::rig::{BuiltIn, Rig, RigError, RigFault, SensorsOnly, Simulated, faulty};
 
 use super::failure::{Failure, stop_flag};
-use super::options::{Endpoint, ReachArguments, SceneArguments, fmu, no_key, positive};
+use super::options::{Endpoint, ReachArguments, SceneArguments, no_key, positive};
 use super::output::print;
 use super::watch::WatchArguments;
 
@@ -156,14 +157,14 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
                 "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic",
             ));
         }
-        Endpoint::Fmu(file) => drop(fmu(file, &scene).map_err(Failure::run)?),
+        Endpoint::Fmu(file) => drop(FmuRig::load(file, &scene).map_err(Failure::run)?),
         Endpoint::BuiltIn => {}
     }
     let (serving, json) = (&arguments.serving, arguments.serving.json);
     let watch = arguments.watch.start("vines rig", &scene)?;
     let make = || -> Result<Box<dyn Rig>, RigError> {
         let rig: Box<dyn Rig> = match (&arguments.rig, arguments.fault) {
-            (Endpoint::Fmu(file), _) => Box::new(fmu(file, &scene)?),
+            (Endpoint::Fmu(file), _) => Box::new(FmuRig::load(file, &scene)?),
             (_, Some(Fault { kind, seconds })) => {
                 Box::new(faulty(&scene, kind, seconds, move |zero| print_reaction(zero, json))?)
             }

@@ -43,8 +43,7 @@ fn the_fmu_has_the_bits_of_the_plant_in_a_real_cavity() {
     ];
     let scene = Scene::load(None, &effects.map(|one| one.parse().unwrap())).unwrap();
     let folder = packed(&scene);
-    let (path, values) = (folder.path().join("LoViNes.fmu"), scene.start_values());
-    let mut fmu = FmuRig::load(&path, &values, scene.resonance, &scene.plant, &Names::default()).unwrap();
+    let mut fmu = FmuRig::load(&folder.path().join("LoViNes.fmu"), &scene).unwrap();
     let mut own = Simulated::new(scene.plant, scene.start).unwrap();
     let drive = Drive {
         omega: 0.99 * scene.dimensionless().omega0,
@@ -160,19 +159,11 @@ fn fmus_with_other_names_and_units_without_an_oscillator_and_without_settled_loc
     renamed(&path("PhaseLock.fmu"), &path("loop.fmu"), &own);
 
     // Drive and response both with the opposite sign: the motion is the same.
-    let rig = |names| {
-        FmuRig::load(
-            &path("rig.fmu"),
-            &scene.start_values(),
-            scene.resonance,
-            &scene.plant,
-            names,
-        )
-    };
-    let none = Names::default();
-    let missing = rig(&none).err().unwrap().to_string();
+    let rig = |scene| FmuRig::load(&path("rig.fmu"), scene);
+    let unmapped = Scene { rig_names: Names::default(), ..scene.clone() };
+    let missing = rig(&unmapped).err().unwrap().to_string();
     assert!(missing.contains("`e`") && missing.contains("[rig.names]"), "{missing}");
-    let mut rig = rig(&scene.rig_names).unwrap();
+    let mut rig = rig(&scene).unwrap();
     let config = scene.controller_config();
     let mut controller = FmuController::load(&path("loop.fmu"), &config, &scene.controller_names).unwrap();
     let found = locked(&mut rig, &mut controller, &scene);
