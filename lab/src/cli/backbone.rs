@@ -68,8 +68,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         return Err(failure);
     }
     let mut text = experiment.result(&result, &summary, &files, timing)?;
-    let settled = result.points.iter().filter(|one| one.point.settled);
-    let points: Vec<_> = settled.map(|one| (&one.point.at).into()).collect();
+    let settled = result.points.iter().filter(|compared| compared.point.settled);
+    let points: Vec<_> = settled.map(|compared| (&compared.point.at).into()).collect();
     if let Some(line) =
         contradiction(&points, scene.resonance, &scene.plant).filter(|_| !experiment.json && result.left_out.is_none())
     {

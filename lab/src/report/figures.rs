@@ -225,7 +225,7 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
             )
         })
         .collect();
-    model.sort_by(|one, other| one.0.total_cmp(&other.0));
+    model.sort_by(|place, next| place.0.total_cmp(&next.0));
     let [amplitudes, frequencies] = [|place: Place| place.0, |place: Place| place.1]
         .map(|part| range((f64::MAX, f64::MIN), points.iter().map(|point| part(place(point)))));
     let margin = 0.06 * (amplitudes.1 - amplitudes.0);
@@ -255,7 +255,7 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
     let left_out = fit.left_out.iter().map(|n| place(&points[*n]));
     backbone.add(Shape::Cross, left_out, MEASURED, "left out");
 
-    let residuals = fit.residuals.iter().flatten().map(|one| one.abs());
+    let residuals = fit.residuals.iter().flatten().map(|residual| residual.abs());
     let most = 1.1 * residuals.fold(3.0, f64::max);
     let model = if fit.is_rejected() { "rejected" } else { "not rejected" };
     let text = format!(

@@ -31,8 +31,8 @@ static STYLES: LazyLock<Vec<[&str; 5]>> = LazyLock::new(|| {
 
 /// The row of a name; the names are those of this file, of regimes and of bifurcations.
 fn row(name: &str) -> [&'static str; 5] {
-    let found = STYLES.iter().find(|row| row[0] == name);
-    *found.unwrap_or_else(|| panic!("styles.csv has no row `{name}`"))
+    let style = STYLES.iter().find(|row| row[0] == name);
+    *style.unwrap_or_else(|| panic!("styles.csv has no row `{name}`"))
 }
 
 /// The colour of a name on white paper, as `#RRGGBB`.

@@ -46,11 +46,11 @@ pub fn regimes(map: &Map) -> Figure {
 /// Where a motion lies on a map over sigma and G.
 fn place_on(map: &Map) -> impl Fn(&Periodic) -> Place {
     let swapped = map.names()[1] == SIGMA;
-    move |one| {
+    move |motion| {
         if swapped {
-            (one.g, one.sigma)
+            (motion.g, motion.sigma)
         } else {
-            (one.sigma, one.g)
+            (motion.sigma, motion.g)
         }
     }
 }
@@ -86,20 +86,20 @@ fn label(name: &str) -> &str {
 /// The cells of a regime, with neighbours in a row merged.
 fn stripes(map: &Map, regime: Regime) -> Vec<Place> {
     let (x, y) = (map.x, map.y);
-    let mut found = Vec::new();
+    let mut corners = Vec::new();
     for (row, cells) in (0..).zip(map.cells.chunks(x.points as usize)) {
         let mut column = 0;
-        for run in cells.chunk_by(|one, other| one.result.regime == other.result.regime) {
+        for run in cells.chunk_by(|cell, next| cell.result.regime == next.result.regime) {
             if run[0].result.regime == regime {
                 let left = x.at(column) - x.step() / 2.0;
                 let right = x.at(column + run.len() as u64 - 1) + x.step() / 2.0;
                 let low = y.at(row) - y.step() / 2.0;
-                found.extend([(left, low), (right, low + y.step())]);
+                corners.extend([(left, low), (right, low + y.step())]);
             }
             column += run.len() as u64;
         }
     }
-    found
+    corners
 }
 
 /// For each regime, the places farthest from its border and from the curves, far apart from each other.
@@ -118,27 +118,30 @@ fn letters(map: &Map) -> Vec<(Regime, Place)> {
         };
         (1..=most).take_while(|reach| alike(*reach)).count()
     };
-    let mut found: Vec<(Regime, [usize; 2])> = Vec::new();
+    let mut letters: Vec<(Regime, [usize; 2])> = Vec::new();
     for regime in Regime::SIMULATED {
         let own = (0..free.len()).filter(|n| free[*n] == Some(regime));
         let mut cells: Vec<(usize, [usize; 2])> = own
             .map(|n| [n % columns, n / columns])
             .map(|[column, row]| (depth(column, row), [column, row]))
             .collect();
-        cells.sort_by_key(|one| std::cmp::Reverse(one.0));
+        cells.sort_by_key(|cell| std::cmp::Reverse(cell.0));
         // A region in which no square of three by three cells fits gets no letter.
         let enough = cells.first().map_or(0, |deepest| deepest.0 / 2).max(1);
-        for (_, place) in cells.into_iter().take_while(|one| one.0 >= enough) {
+        for (_, place) in cells.into_iter().take_while(|cell| cell.0 >= enough) {
             let far = |(other, [x, y]): &(Regime, [usize; 2])| {
                 *other != regime || x.abs_diff(place[0]) > columns / 3 || y.abs_diff(place[1]) > rows / 3
             };
-            if found.iter().all(far) {
-                found.push((regime, place));
+            if letters.iter().all(far) {
+                letters.push((regime, place));
             }
         }
     }
     let place = |[column, row]: [usize; 2]| (map.x.at(column as u64), map.y.at(row as u64));
-    found.into_iter().map(|(regime, cell)| (regime, place(cell))).collect()
+    letters
+        .into_iter()
+        .map(|(regime, cell)| (regime, place(cell)))
+        .collect()
 }
 
 /// The regimes of the cells, except where a curve passes.
