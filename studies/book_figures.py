@@ -150,12 +150,15 @@ def coverage():
     for study, count, name in (("tracking", "settled", "tracked"), ("locks", "correct", "locks")):
         with (DOCS.parent / f"validation/{study}.csv").open() as table:
             for row in csv.DictReader(table):
+                scene = {"none": "the rig", "parameters": "wrong scene"}.get(row.get("difference", "none"))
+                if scene is None:
+                    continue
                 noise = "clean" if row["snr_dB"] == "none" else f"{row['snr_dB']} dB"
                 deviation, number = 100 * (float(row["within_1.96u"]) - 0.95), int(row[count])
                 axes.plot(deviation, len(names), "o", color=MEASURED, ms=5)
                 band = 100 * 1.96 * (0.95 * 0.05 / number) ** 0.5
                 axes.barh(len(names), 2 * band, left=-band, height=0.7, color=COLOURS["symmetric 1:1"], zorder=0)
-                names.append(f"{name}, {noise}, {row.get('scene', 'the rig').replace('another', 'wrong scene')}")
+                names.append(f"{name}, {noise}, {scene}")
     axes.axvline(0, color=THEORY, lw=0.8)
     axes.set_yticks(range(len(names)), names)
     axes.invert_yaxis()

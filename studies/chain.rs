@@ -4,13 +4,13 @@
 //! uncertainty of sigma, or why there is no lock.
 //!
 //! ```sh
-//! cargo run --release -p vines-testbench --example chain -- [KEY=VALUE ...]    # of the scene; writes validation/chain.csv
+//! cargo run --release -p vines-testbench --example chain    # writes validation/chain.csv
 //! ```
 
 mod common;
 
-use common::{Failure, arguments, scene, write};
-use vines_testbench::experiment::{ExperimentError, Plan, run};
+use common::{Failure, scene, write};
+use vines_testbench::experiment::{Plan, run};
 use vines_testbench::identification::{ResonancePoint, identify};
 use vines_testbench::rig::{BuiltIn, Simulated};
 
@@ -38,23 +38,12 @@ const STAGES: [&str; 18] = [
 
 /// The lock behind a stage, held for 200 periods.
 fn lock(stage: &str) -> Result<ResonancePoint, Failure> {
-    let stage = stage.split_whitespace().map(|one| format!("chain.{one}"));
-    let hold = "record.hold_periods=200".into();
-    let scene = scene(
-        "",
-        &arguments().into_iter().chain(stage).chain([hold]).collect::<Vec<_>>(),
-    )?;
+    let mut settings: Vec<String> = stage.split_whitespace().map(|one| format!("chain.{one}")).collect();
+    settings.push("record.hold_periods=200".into());
+    let scene = scene("", &settings)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let record = run(
-        &mut *Simulated::of(&scene)?,
-        &mut controller,
-        &Plan::of(&scene),
-        |_, _, _| {},
-    );
-    let record = record.map_err(|error| match error {
-        ExperimentError::Tripped { fault, .. } => fault.text().into(),
-        other => other.to_string(),
-    })?;
+    let mut rig = Simulated::of(&scene)?;
+    let record = run(rig.as_mut(), &mut controller, &Plan::of(&scene), |_, _, _| {})?;
     Ok(identify(&record, &scene)?.lock.at)
 }
 

@@ -34,8 +34,8 @@ fn run(rig: &mut dyn Rig, scene: &Scene, tracks: bool) -> Result<Option<[f64; 2]
 /// Time from the fault to a drive of zero, s; `None` if it was missed.
 fn zero(scene: &Scene, fault: RigFault, seconds: f64, tracks: bool) -> Option<f64> {
     let zero = Rc::new(Cell::new(None));
-    let told = Rc::clone(&zero);
-    let mut rig = faulty(scene, fault, seconds, move |time| told.set(time)).ok()?;
+    let report = Rc::clone(&zero);
+    let mut rig = faulty(scene, fault, seconds, move |time| report.set(time)).ok()?;
     let ended = run(&mut rig, scene, tracks).is_ok_and(|ended| ended.is_some());
     drop(rig);
     zero.get().filter(|_| !ended)

@@ -12,9 +12,8 @@ use std::path::{Path, PathBuf};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-pub use files::{
-    ReportError, decay_csv, map_csv, write, write_fit, write_interrupted, write_lateness, write_map, write_tracked,
-};
+use figure::Figure;
+pub use files::{ReportError, decay_csv, map_csv, write, write_fit, write_interrupted, write_map, write_tracked};
 pub use table::{Table, number, row, with_uncertainty};
 
 use crate::scene::{Family, Scene};
@@ -31,24 +30,17 @@ pub struct Subject {
     pub map: [Axis; 2],
 }
 
-/// One part of a section. A figure is SVG for white paper; its name is the name of its files, without ending.
-#[derive(Debug, Clone, PartialEq)]
-enum Block {
-    Words(String),
-    Figure { name: String, caption: String, svg: String },
-    Table { caption: String, table: Table },
-}
-
 /// A section of the page, with its finding in a sentence or two.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Section {
     title: String,
     finding: String,
-    blocks: Vec<Block>,
+    /// Paragraphs, figures and tables, as HTML.
+    content: String,
     /// Lines of the error budget: what is uncertain, by how much, and where that number comes from.
     budget: Vec<[String; 3]>,
-    /// Tables for programs: name and content of a file.
-    attachments: Vec<(String, String)>,
+    /// Names and contents of its figures, for light and dark backgrounds, and of tables for programs.
+    files: Vec<(String, String)>,
 }
 
 impl Section {
@@ -63,17 +55,23 @@ impl Section {
         self
     }
 
-    fn words(&mut self, text: impl Into<String>) {
-        self.blocks.push(Block::Words(text.into()));
+    fn words(&mut self, text: impl AsRef<str>) {
+        self.content += &html! { p { (text.as_ref()) } }.into_string();
     }
 
-    fn figure(&mut self, name: &str, caption: impl Into<String>, svg: String) {
-        self.blocks
-            .push(Block::Figure { name: name.into(), caption: caption.into(), svg });
+    fn table(&mut self, caption: &str, table: &Table) {
+        self.content += &table.html(caption).into_string();
     }
 
-    fn table(&mut self, caption: &str, table: Table) {
-        self.blocks.push(Block::Table { caption: caption.into(), table });
+    /// A figure, with the name of its files without ending. On the page it has a label for readers who cannot see it.
+    fn figure(&mut self, name: &str, caption: &str, figure: &Figure) {
+        let svg = figure.svg();
+        let label = html! { (caption) }.into_string();
+        let labelled = svg.replacen("<svg", &format!("<svg role=\"img\" aria-label=\"{label}\""), 1);
+        let figure = html! { figure { (PreEscaped(labelled)) figcaption { (caption) } } };
+        self.content += &figure.into_string();
+        self.attach(&format!("{name}-dark.svg"), theme::dark(&svg));
+        self.attach(&format!("{name}.svg"), svg);
     }
 
     fn budget(&mut self, what: &str, size: String, why: &str) {
@@ -81,26 +79,18 @@ impl Section {
     }
 
     fn attach(&mut self, name: &str, text: String) {
-        self.attachments.push((name.into(), text));
+        self.files.push((name.into(), text));
     }
 }
 
-/// The finished report.
-#[derive(Debug)]
-pub struct Report {
-    /// The findings, one sentence per section.
-    pub findings: Vec<String>,
-    /// Files written; the page is the first.
-    pub written: Result<Vec<PathBuf>, ReportError>,
-}
-
 /// Writes the report on `subject` into `out`: `report.html`, each figure for light and dark backgrounds, and tables. `progress` gets the
-/// name of the section being made, and the fraction of all sections that is done, from 0 to 1.
+/// name of the section being made, and the fraction of all sections that is done, from 0 to 1. Returns the findings, a sentence per section,
+/// and the files; the page is the first.
 pub fn write_report(
     subject: &Subject,
     out: &Path,
     progress: &(dyn Fn(&str, f64) + Sync),
-) -> Result<Report, ReportError> {
+) -> Result<(Vec<String>, Vec<PathBuf>), ReportError> {
     let mut sections = Vec::new();
     for (n, (name, make)) in sections::SECTIONS.into_iter().enumerate() {
         let at = |part: f64| progress(name, (n as f64 + part) / sections::SECTIONS.len() as f64);
@@ -110,17 +100,10 @@ pub fn write_report(
     let mut files = vec![("report.html".to_string(), page(&subject.scene, &sections))];
     let mut findings = Vec::new();
     for section in sections {
-        for block in section.blocks {
-            if let Block::Figure { name, svg, .. } = block {
-                files.push((format!("{name}-dark.svg"), theme::dark(&svg)));
-                files.push((format!("{name}.svg"), svg));
-            }
-        }
-        files.extend(section.attachments);
+        files.extend(section.files);
         findings.push(section.finding);
     }
-    let written = crate::files::write(out, files).map_err(ReportError::from);
-    Ok(Report { findings, written })
+    Ok((findings, crate::files::write(out, files)?))
 }
 
 /// The page: one file of HTML that needs nothing else.
@@ -131,25 +114,19 @@ fn page(scene: &Scene, sections: &[Section]) -> String {
         include_str!("report/page.css")
     );
     let page = html! {
-        (DOCTYPE) "\n"
+        (DOCTYPE)
         html lang="en" {
-            "\n"
             head {
-                "\n" meta charset="utf-8";
-                "\n" meta name="viewport" content="width=device-width, initial-scale=1";
-                "\n" link rel="icon" href="data:,";
-                "\n" title { "vines: report" }
-                "\n" style { "\n" (PreEscaped(style)) }
-                "\n"
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                link rel="icon" href="data:,";
+                title { "vines: report" }
+                style { (PreEscaped(style)) }
             }
-            "\n"
             body {
-                "\n"
                 (body(scene, sections))
             }
-            "\n"
         }
-        "\n"
     };
     page.into_string()
 }
@@ -160,7 +137,6 @@ const VERSIONS: &str = "Scene and versions";
 
 fn body(scene: &Scene, sections: &[Section]) -> Markup {
     let p = scene.dimensionless();
-    let mut figures = 0;
     let titles = sections
         .iter()
         .map(|section| section.title.as_str())
@@ -168,68 +144,38 @@ fn body(scene: &Scene, sections: &[Section]) -> Markup {
     let json = serde_json::to_string_pretty(scene).unwrap_or_default();
     html! {
         h1 { "Nonlinear modal test of an oscillator with a vibro-impact nonlinear energy sink" }
-        "\n"
         p.scene {
             (format!("ε = {:.6}, λ = {:.4}, r = {}, G = {:.4}; ", p.epsilon, p.lambda, p.r, p.g))
             (format!("b = {} m, ω₀ = {:.4} rad/s", p.b, p.omega0))
         }
-        "\n"
         @if let Some(left_out) = scene.left_out() {
             p { (summary::ideal("Theory, exact orbits and the regime map on this page are", &left_out)) ". The measurements have it." }
-            "\n"
         }
         section {
-            h2 { "What was found" } "\n"
-            ul { "\n" @for section in sections { li { (section.finding) } "\n" } }
+            h2 { "What was found" }
+            ul { @for section in sections { li { (section.finding) } } }
         }
-        "\n"
         nav {
-            h2 { "Contents" } "\n"
+            h2 { "Contents" }
             ol {
-                "\n"
-                @for (n, title) in (1..).zip(titles) { li { a href=(format!("#s{n}")) { (title) } } "\n" }
+                @for (n, title) in (1..).zip(titles) { li { a href=(format!("#s{n}")) { (title) } } }
             }
         }
-        "\n"
         @for (n, section) in (1..).zip(sections) {
             section id=(format!("s{n}")) {
-                h2 { (n) " " (section.title) } "\n"
-                @for block in &section.blocks { (rendered(block, &mut figures)) }
+                h2 { (n) " " (section.title) }
+                (PreEscaped(&section.content))
             }
-            "\n"
         }
         (budget(sections))
         section id=(format!("s{}", sections.len() + 2)) {
-            h2 { (sections.len() + 2) " " (VERSIONS) } "\n"
+            h2 { (sections.len() + 2) " " (VERSIONS) }
             p {
                 "vines " (env!("CARGO_PKG_VERSION")) ", " (std::env::consts::ARCH) " on " (std::env::consts::OS)
                 ". Everything here follows from the scene and the version; the page carries no date, so that the same input \
                  gives the same bytes."
             }
-            "\n"
             pre { (json) }
-        }
-        "\n"
-    }
-}
-
-fn rendered(block: &Block, figures: &mut u32) -> Markup {
-    match block {
-        Block::Words(text) => html! { p { (text) } "\n" },
-        Block::Table { caption, table } => table.html(caption),
-        Block::Figure { caption, svg, .. } => {
-            *figures += 1;
-            // Inside a page the drawing has no prologue, and a label for readers who cannot see it.
-            let start = svg.find("<svg").map_or(0, |start| start + "<svg".len());
-            let label = html! { (caption) }.into_string();
-            let labelled = format!("<svg role=\"img\" aria-label=\"{label}\"{}", &svg[start..]);
-            html! {
-                figure {
-                    (PreEscaped(labelled))
-                    figcaption { "Figure " (*figures) ". " (caption) }
-                }
-                "\n"
-            }
         }
     }
 }
@@ -239,7 +185,7 @@ fn budget(sections: &[Section]) -> Markup {
     let table = Table::new("quantity | difference | cause").rows(rows);
     html! {
         section.budget id=(format!("s{}", sections.len() + 1)) {
-            h2 { (sections.len() + 1) " " (BUDGET) } "\n"
+            h2 { (sections.len() + 1) " " (BUDGET) }
             (table.html("Differences between results and references, with their causes."))
             p {
                 "M, k, c and m of the default scene are those of a published rig of this kind, because the study that it follows \
@@ -247,6 +193,5 @@ fn budget(sections: &[Section]) -> Markup {
                  result depends."
             }
         }
-        "\n"
     }
 }

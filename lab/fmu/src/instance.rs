@@ -17,7 +17,7 @@ use vines_testbench::scene::{Name, Names};
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum FmuError {
-    #[error("cannot load {}: {reason}", path.display())]
+    #[error("cannot load {} as an FMU: {reason}", path.display())]
     Load { path: PathBuf, reason: String },
     #[error("{} has no {kind:?} variable `{name}`, which the bench needs; [rig.names] and [controller_names] of the scene map names", path.display())]
     Variable { path: PathBuf, kind: FmiType, name: String },
@@ -25,46 +25,13 @@ pub enum FmuError {
         "[rig.names] or [controller_names] of the scene maps `{name}`, which this bench does not have; it has: {names}"
     )]
     Name { name: String, names: String },
-    #[error("{} refused to {action} at t = {time} s: the FMU {reason}", path.display())]
+    #[error("{} refused to {action} at t = {time} s: it returned {status:?}", path.display())]
     Refused {
         path: PathBuf,
         action: &'static str,
         time: f64,
-        reason: &'static str,
+        status: Fmi2Error,
     },
-}
-
-/// Why a file cannot be loaded, in words.
-fn reason(error: fmi::Error) -> String {
-    use fmi::Error;
-    match error {
-        Error::Zip(source) => not_an_archive(&source.to_string()),
-        Error::ArchiveStructure(text) => not_an_archive(&text),
-        Error::Schema(source) => format!("modelDescription.xml: {source}"),
-        Error::UnsupportedFmuType(_) => NO_CO_SIMULATION.into(),
-        Error::UnsupportedPlatform { os, arch } => {
-            format!("FMUs of FMI 2.0 cannot be loaded on {os} with the processor {arch}")
-        }
-        Error::Instantiation => "the FMU cannot be instantiated; its own message has been logged".into(),
-        Error::LibLoading { .. } => format!("the library of the FMU cannot be loaded: {error}"),
-        _ => error.to_string(),
-    }
-}
-
-const NO_CO_SIMULATION: &str = "the FMU does not support co-simulation";
-
-fn not_an_archive(text: &str) -> String {
-    format!("the file is not an FMU, which is a zip archive: {text}")
-}
-
-/// What the status of a call that failed means (FMI 2.0, clause 2.1.3).
-fn status(error: &Fmi2Error) -> &'static str {
-    match error {
-        Fmi2Error::Discard => "discarded the call (fmi2Discard)",
-        Fmi2Error::Error => "reported an error (fmi2Error)",
-        // The other one, a wrong `fmi2GetTypesPlatform`, is not a status: the bench does not call that function.
-        Fmi2Error::Fatal | Fmi2Error::TypesPlatformMismatch(_) => "reported a fatal error (fmi2Fatal)",
-    }
 }
 
 impl From<FmuError> for RigError {
@@ -100,21 +67,13 @@ impl FmiType {
     }
 }
 
-impl From<Value> for FmiType {
-    fn from(value: Value) -> Self {
-        match value {
-            Value::Real(_) => Self::Real,
-            Value::Integer(_) => Self::Integer,
-            Value::Boolean(_) => Self::Boolean,
-        }
-    }
+/// A variable: its type, its value reference, and SI units per unit of it.
+#[derive(Clone, Copy)]
+pub(super) struct Variable {
+    kind: FmiType,
+    reference: [<Fmi2Import as FmiImport>::ValueRef; 1],
+    factor: f64,
 }
-
-/// A variable, and SI units per unit of it.
-pub(super) type Named = (Reference, f64);
-
-/// Value reference of a variable.
-pub(super) type Reference = <Fmi2Import as FmiImport>::ValueRef;
 
 /// A loaded FMU at its simulated time.
 pub(super) struct Fmu {
@@ -123,37 +82,40 @@ pub(super) struct Fmu {
     /// The description, and the folder with the unpacked FMU.
     import: Fmi2Import,
     path: PathBuf,
+    /// What the scene calls its variables.
+    names: Names,
     time: f64,
 }
 
 impl Fmu {
-    /// Loads the FMU at `path`; `name` is its name in log messages.
-    pub fn load(path: &Path, name: &str) -> Result<Self, FmuError> {
+    /// Loads the FMU at `path`; `name` is its name in log messages. Of the names of this bench, `names` may map those in `known`, separated by
+    /// commas.
+    pub fn load(path: &Path, name: &str, names: &Names, known: &str) -> Result<Self, FmuError> {
+        let list: Vec<&str> = known.split(", ").collect();
+        if let Some(name) = names.unknown(&list) {
+            return Err(FmuError::Name { name: name.into(), names: known.into() });
+        }
         let (import, instance) = open(path, name).map_err(|reason| FmuError::Load { path: path.into(), reason })?;
-        Ok(Self { instance, import, path: path.into(), time: 0.0 })
+        let (path, names) = (path.into(), names.clone());
+        Ok(Self { instance, import, path, names, time: 0.0 })
     }
 
-    /// The variable of this type that `names` has for `ours`, and its factor. A name that the user gave must exist.
-    pub fn named(&self, kind: FmiType, names: &Names, ours: &str) -> Result<Option<Named>, FmuError> {
-        let Name { name, factor } = names.of(ours);
+    /// The variable of this type for `ours`. A name that the user gave must exist.
+    pub fn find(&self, kind: FmiType, ours: &str) -> Result<Option<Variable>, FmuError> {
+        let Name { name, factor } = self.names.of(ours);
         let variables = &self.import.model_description().model_variables.variables;
         let variable = variables
             .iter()
             .find(|variable| variable.name == name && FmiType::of(&variable.elem) == Some(kind));
         match variable {
-            None if names.mapped(ours).is_some() => Err(self.missing(kind, &name)),
-            variable => Ok(variable.map(|variable| (variable.value_reference, factor))),
+            None if self.names.mapped(ours).is_some() => Err(self.missing(kind, &name)),
+            variable => Ok(variable.map(|variable| Variable { kind, reference: [variable.value_reference], factor })),
         }
     }
 
-    /// The reference of a variable without a unit, if there is one.
-    pub fn switch(&self, kind: FmiType, names: &Names, ours: &str) -> Result<Option<Reference>, FmuError> {
-        Ok(self.named(kind, names, ours)?.map(|(reference, _)| reference))
-    }
-
     /// A variable that the bench needs.
-    pub fn need(&self, kind: FmiType, names: &Names, ours: &str) -> Result<Named, FmuError> {
-        self.named(kind, names, ours)?.ok_or_else(|| self.missing(kind, ours))
+    pub fn need(&self, kind: FmiType, ours: &str) -> Result<Variable, FmuError> {
+        self.find(kind, ours)?.ok_or_else(|| self.missing(kind, ours))
     }
 
     fn missing(&self, kind: FmiType, name: &str) -> FmuError {
@@ -162,19 +124,18 @@ impl Fmu {
 
     /// Sets the values that the FMU has variables for, and initialises it at time 0. A warning in the log names the
     /// others; the FMU keeps its own values for these.
-    pub fn start(&mut self, names: &Names, values: &[(&str, Value)]) -> Result<(), FmuError> {
+    pub fn start(&mut self, values: &[(&str, Value)]) -> Result<(), FmuError> {
         let mut missing = Vec::new();
         for &(name, value) in values {
-            let Some((reference, factor)) = self.named(value.into(), names, name)? else {
-                missing.push(format!("`{name}`"));
-                continue;
+            let (kind, value) = match value {
+                Value::Real(value) => (FmiType::Real, value),
+                Value::Integer(value) => (FmiType::Integer, value.into()),
+                Value::Boolean(value) => (FmiType::Boolean, f64::from(u8::from(value))),
             };
-            let reference = [reference];
-            self.ask("take its parameters", |i| match value {
-                Value::Real(x) => i.set_real(&reference, &[x / factor]),
-                Value::Integer(n) => i.set_integer(&reference, &[n]),
-                Value::Boolean(b) => i.set_boolean(&reference, &[b.into()]),
-            })?;
+            match self.find(kind, name)? {
+                Some(variable) => self.set(variable, value)?,
+                None => missing.push(format!("`{name}`")),
+            }
         }
         if !missing.is_empty() {
             let path = self.path.display();
@@ -183,8 +144,7 @@ impl Fmu {
         self.ask("start", |i| {
             i.setup_experiment(None, 0.0, None)?;
             i.enter_initialization_mode()?;
-            i.exit_initialization_mode()?;
-            Ok(())
+            i.exit_initialization_mode()
         })
     }
 
@@ -196,69 +156,57 @@ impl Fmu {
         Ok(())
     }
 
-    /// Values of real variables, SI units.
-    pub fn read<const N: usize>(&mut self, action: &'static str, variables: [Named; N]) -> Result<[f64; N], FmuError> {
-        let (references, mut values) = (variables.map(|(reference, _)| reference), [0.0; N]);
-        self.ask(action, |i| i.get_real(&references, &mut values))?;
-        Ok(std::array::from_fn(|n| values[n] * variables[n].1))
+    /// Value of a variable, SI units; of a boolean one 0 or 1.
+    pub fn get(&mut self, variable: Variable) -> Result<f64, FmuError> {
+        let Variable { kind, reference, factor } = variable;
+        let (mut real, mut whole) = ([0.0], [0]);
+        self.ask("give a value", |i| match kind {
+            FmiType::Real => i.get_real(&reference, &mut real),
+            FmiType::Integer => i.get_integer(&reference, &mut whole),
+            FmiType::Boolean => i.get_boolean(&reference, &mut whole),
+        })?;
+        Ok(match kind {
+            FmiType::Real => real[0] * factor,
+            FmiType::Integer | FmiType::Boolean => whole[0].into(),
+        })
     }
 
-    /// Sets real variables, SI units.
-    pub fn write(&mut self, action: &'static str, variables: &[Named], values: &[f64]) -> Result<(), FmuError> {
-        let (references, factors): (Vec<_>, Vec<_>) = variables.iter().copied().unzip();
-        let values: Vec<f64> = values
-            .iter()
-            .zip(factors)
-            .map(|(value, factor)| value / factor)
-            .collect();
-        self.ask(action, |i| i.set_real(&references, &values)).map(drop)
+    /// Value of a variable that the FMU may lack.
+    pub fn get_if(&mut self, variable: Option<Variable>) -> Result<Option<f64>, FmuError> {
+        variable.map(|variable| self.get(variable)).transpose()
     }
 
-    /// Value of an integer variable.
-    pub fn integer(&mut self, action: &'static str, reference: Reference) -> Result<i32, FmuError> {
-        let mut value = [0];
-        self.ask(action, |i| i.get_integer(&[reference], &mut value))?;
-        Ok(value[0])
+    /// Sets a variable, SI units.
+    pub fn set(&mut self, variable: Variable, value: f64) -> Result<(), FmuError> {
+        let Variable { kind, reference, factor } = variable;
+        self.ask("take a value", |i| match kind {
+            FmiType::Real => i.set_real(&reference, &[value / factor]),
+            FmiType::Integer => i.set_integer(&reference, &[value as i32]),
+            FmiType::Boolean => i.set_boolean(&reference, &[i32::from(value != 0.0)]),
+        })
     }
 
     /// Calls the FMU; `action` completes the message "refused to …".
-    pub fn ask<T>(
+    fn ask<T>(
         &mut self,
         action: &'static str,
         call: impl FnOnce(&mut InstanceCS) -> Result<T, Fmi2Error>,
-    ) -> Result<T, FmuError> {
-        call(&mut self.instance).map_err(|error| FmuError::Refused {
-            path: self.path.clone(),
-            action,
-            time: self.time,
-            reason: status(&error),
-        })
+    ) -> Result<(), FmuError> {
+        let (path, time) = (&self.path, self.time);
+        let refused = |status| FmuError::Refused { path: path.clone(), action, time, status };
+        call(&mut self.instance).map(drop).map_err(refused)
     }
-}
-
-/// Refuses names in the scene that are not among `names`, separated by commas.
-pub(super) fn names_exist(mapped: &Names, names: &str) -> Result<(), FmuError> {
-    let list: Vec<&str> = names.split(", ").collect();
-    mapped.unknown(&list).map_or(Ok(()), |name| {
-        Err(FmuError::Name { name: name.into(), names: names.into() })
-    })
 }
 
 /// Unpacks the FMU at `path` and instantiates it for co-simulation, with logging on.
 fn open(path: &Path, name: &str) -> Result<(Fmi2Import, InstanceCS), String> {
+    let reason = |error: fmi::Error| error.to_string();
     // The crate would report another version as an error of the XML.
     let version = fmi::import::peek_descr_path(path).map_err(reason)?.fmi_version;
     if version != "2.0" {
-        return Err(format!("the FMU has FMI version {version}; version 2.0 is needed"));
+        return Err(format!("it has FMI version {version}; version 2.0 is needed"));
     }
     let import: Fmi2Import = fmi::import::from_path(path).map_err(reason)?;
-    let co_simulation = import.model_description().co_simulation.as_ref();
-    let identifier = &co_simulation.ok_or(NO_CO_SIMULATION)?.model_identifier;
-    let library = import.shared_lib_path(identifier).map_err(reason)?;
-    if !import.archive_path().join(&library).is_file() {
-        let library = library.display();
-        return Err(format!("the FMU has no library for this platform ({library})"));
-    }
     let instance = import.instantiate_cs(name, false, true).map_err(reason)?;
     Ok((import, instance))
 }
@@ -286,9 +234,9 @@ mod tests {
     #[test]
     fn a_file_that_is_not_an_archive_is_refused() {
         let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"));
-        let message = Fmu::load(path, "rig").err().unwrap().to_string();
+        let message = Fmu::load(path, "rig", &Names::default(), "").err().unwrap().to_string();
         assert!(
-            message.contains("Cargo.toml") && message.contains("zip archive"),
+            message.contains("Cargo.toml") && message.contains("Zip archive"),
             "{message}"
         );
     }

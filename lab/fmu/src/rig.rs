@@ -3,11 +3,10 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use phase_lock::Value;
 use vines_testbench::rig::{Drive, FrictionTotals, GroundTruth, Measured, Rig, RigError, Sensors, has_friction};
-use vines_testbench::scene::{Definition, Names, Parameters, Reference as ReferenceSignal, Sensor};
+use vines_testbench::scene::{Reference as ReferenceSignal, Scene, Sensor};
 
-use crate::instance::{FmiType, Fmu, FmuError, Named, Reference, names_exist};
+use crate::instance::{FmiType, Fmu, FmuError, Variable};
 
 /// The names of this bench that a scene may map.
 const NAMES: &str = "omega, E, e, response, base, impacts, impact_time, impact_velocity, sticks, stuck_time, friction_loss, M, k, c, \
@@ -24,82 +23,73 @@ const NAMES: &str = "omega, E, e, response, base, impacts, impact_time, impact_v
 pub struct FmuRig {
     fmu: Fmu,
     /// `omega` and `E`.
-    inputs: Option<[Named; 2]>,
+    inputs: Option<[Variable; 2]>,
     /// `e`, for held samples of the base displacement.
-    held: Option<Named>,
+    held: Option<Variable>,
     /// Phase of the base for an FMU without an oscillator, rad.
     phase: f64,
-    response: Named,
-    reference: Option<Named>,
+    response: Variable,
+    reference: Option<Variable>,
     inside: Option<Inside>,
 }
 
 /// The variables of the ground truth.
 #[derive(Clone, Copy)]
 struct Inside {
-    impacts: Reference,
+    impacts: Variable,
     /// `impact_time`, `impact_velocity` and `der(q2)`.
-    reals: [Named; 3],
-    /// `sticks`, and `stuck_time` and `friction_loss`, for a plant with friction.
-    friction: Option<(Reference, [Named; 2])>,
+    reals: [Variable; 3],
+    /// `sticks`, `stuck_time` and `friction_loss`, for a plant with friction.
+    friction: Option<[Variable; 3]>,
 }
 
 impl FmuRig {
-    /// Loads the plant at `path` and initialises it with parameters and a start, under the names of `LoViNes.fmu` or those that `names`
-    /// maps them to. It has the sensors of `definition`, for a plant with the parameters `plant`.
-    pub fn load(
-        path: &Path,
-        values: &[(&str, Value)],
-        definition: Definition,
-        plant: &Parameters,
-        names: &Names,
-    ) -> Result<Measured<Self>, FmuError> {
-        names_exist(names, NAMES)?;
-        let mut fmu = Fmu::load(path, "plant")?;
-        let [omega, amplitude] = ["omega", "E"].map(|ours| fmu.named(FmiType::Real, names, ours));
+    /// Loads the plant at `path` and initialises it with parameters and start of the scene, under the names of `LoViNes.fmu` or those that
+    /// the scene maps them to. It has the sensors of the scene.
+    pub fn load(path: &Path, scene: &Scene) -> Result<Measured<Self>, FmuError> {
+        let (names, definition) = (&scene.rig_names, scene.resonance);
+        let mut fmu = Fmu::load(path, "plant", names, NAMES)?;
+        let [omega, amplitude] = ["omega", "E"].map(|ours| fmu.find(FmiType::Real, ours));
         let inputs = omega?.zip(amplitude?).map(|(omega, amplitude)| [omega, amplitude]);
         let held = match inputs {
-            Some(_) => fmu.named(FmiType::Real, names, "e")?,
-            None => Some(fmu.need(FmiType::Real, names, "e")?),
+            Some(_) => fmu.find(FmiType::Real, "e")?,
+            None => Some(fmu.need(FmiType::Real, "e")?),
         };
         let ours = match definition.sensor {
             _ if names.mapped("response").is_some() => "response",
             Sensor::V => "v",
             Sensor::Q1 | Sensor::Acceleration => "q1",
         };
-        let response = fmu.need(FmiType::Real, names, ours)?;
+        let response = fmu.need(FmiType::Real, ours)?;
         let reference = match definition.reference {
-            ReferenceSignal::Base => fmu.named(FmiType::Real, names, "base")?,
-            ReferenceSignal::Force => Some(fmu.need(FmiType::Real, names, "base")?),
+            ReferenceSignal::Base => fmu.find(FmiType::Real, "base")?,
+            ReferenceSignal::Force => Some(fmu.need(FmiType::Real, "base")?),
         };
-        fmu.start(names, values)?;
-        let inside = Inside::of(&fmu, names, has_friction(plant))?;
+        fmu.start(&scene.start_values())?;
+        let inside = Inside::of(&fmu, has_friction(&scene.plant))?;
         let rig = Self { fmu, inputs, held, phase: 0.0, response, reference, inside };
-        Ok(Measured::new(rig, definition, plant))
+        Ok(Measured::new(rig, definition, &scene.plant))
     }
 }
 
 impl Inside {
-    fn of(fmu: &Fmu, names: &Names, has_friction: bool) -> Result<Option<Self>, FmuError> {
-        let real = |ours| fmu.named(FmiType::Real, names, ours);
+    fn of(fmu: &Fmu, has_friction: bool) -> Result<Option<Self>, FmuError> {
+        let real = |ours| fmu.find(FmiType::Real, ours);
         let reals = [real("impact_time")?, real("impact_velocity")?, real("der(q2)")?];
-        let (Some(impacts), [Some(a), Some(b), Some(c)]) = (fmu.switch(FmiType::Integer, names, "impacts")?, reals)
-        else {
+        let (Some(impacts), [Some(a), Some(b), Some(c)]) = (fmu.find(FmiType::Integer, "impacts")?, reals) else {
             return Ok(None);
         };
-        let sticks = fmu.switch(FmiType::Integer, names, "sticks")?.filter(|_| has_friction);
+        let sticks = fmu.find(FmiType::Integer, "sticks")?.filter(|_| has_friction);
         let losses = real("stuck_time")?.zip(real("friction_loss")?);
-        let friction = sticks.zip(losses.map(|(time, loss)| [time, loss]));
+        let friction = sticks.zip(losses).map(|(sticks, (time, loss))| [sticks, time, loss]);
         Ok(Some(Self { impacts, reals: [a, b, c], friction }))
     }
 }
 
 impl Rig for FmuRig {
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        let read = "read its sensors";
-        let [response] = self.fmu.read(read, [self.response])?;
-        let reference = self.reference.map(|reference| self.fmu.read(read, [reference]));
-        let reference = reference.transpose()?.map(|[value]| value);
+        let response = self.fmu.get(self.response)?;
+        let reference = self.fmu.get_if(self.reference)?;
         Ok(Sensors { response, reference })
     }
 
@@ -110,16 +100,16 @@ impl Rig for FmuRig {
             self.phase = (self.phase + drive.omega * step) % TAU;
             return self.hold(Drive { displacement, ..drive }, step);
         };
-        self.fmu
-            .write("take a drive", &inputs, &[drive.omega, drive.amplitude])?;
+        self.fmu.set(inputs[0], drive.omega)?;
+        self.fmu.set(inputs[1], drive.amplitude)?;
         Ok(self.fmu.step(step)?)
     }
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let mut inputs = vec![self.held.ok_or(RigError::NoHold)?];
-        inputs.extend(self.inputs.map(|[_, amplitude]| amplitude));
-        let values = [drive.displacement, 0.0];
-        self.fmu.write("take a sample of the base", &inputs, &values)?;
+        self.fmu.set(self.held.ok_or(RigError::NoHold)?, drive.displacement)?;
+        if let Some([_, amplitude]) = self.inputs {
+            self.fmu.set(amplitude, 0.0)?;
+        }
         Ok(self.fmu.step(step)?)
     }
 
@@ -127,20 +117,18 @@ impl Rig for FmuRig {
         let Some(inside) = self.inside else {
             return Ok(None);
         };
-        let action = "report its impacts";
-        let [impact_time, impact_velocity, particle_velocity] = self.fmu.read(action, inside.reals)?;
-        let impacts = self.fmu.integer(action, inside.impacts)?;
-        let friction = inside.friction.map(|(sticks, reals)| -> Result<_, FmuError> {
-            let [stuck_time, loss] = self.fmu.read(action, reals)?;
-            let sticks = self.fmu.integer(action, sticks)?.into();
-            Ok(FrictionTotals { sticks, stuck_time, loss })
+        let mut get = |variable| self.fmu.get(variable);
+        let [time, velocity, particle] = inside.reals.map(&mut get);
+        let friction = inside.friction.map(|variables| -> Result<_, FmuError> {
+            let [sticks, stuck_time, loss] = variables.map(&mut get);
+            Ok(FrictionTotals { sticks: sticks? as i64, stuck_time: stuck_time?, loss: loss? })
         });
         Ok(Some(GroundTruth {
-            impacts: impacts.into(),
-            impact_time,
-            impact_velocity,
-            particle_velocity,
+            impact_time: time?,
+            impact_velocity: velocity?,
+            particle_velocity: particle?,
             friction: friction.transpose()?,
+            impacts: get(inside.impacts)? as i64,
         }))
     }
 }

@@ -7,7 +7,7 @@ use vines::{backbone::track_into, comparison::TrackedComparison, fit::contradict
 use super::experiment::{ExperimentArguments, interrupted};
 use super::failure::Failure;
 use super::options::Endpoint;
-use super::output::{output, print, saved, written};
+use super::output::{print, written};
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:
@@ -47,25 +47,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         experiment.start("vines backbone", Some(&arguments.rig), |scene| scene.backbone_config())?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let mut samples = Vec::new();
-    let (mut rig, controller) = (
-        experiment.recorded(session.open.rig.as_mut()),
-        session.controller.as_mut(),
-    );
-    let tracked = track_into(&mut samples, &mut rig, controller, &scene, |done, _| {
+    let (rig, controller) = (session.open.rig.as_mut(), session.controller.as_mut());
+    let tracked = track_into(&mut samples, rig, controller, &scene, |done, _| {
         bar.set_position(done as u64);
     });
     bar.finish_and_clear();
-    rig.finish()?;
-    let timing = session.close(&tracked);
+    let timing = session.close(&tracked)?;
     let tracked = tracked.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let result = TrackedComparison::of(&tracked, &scene);
     let summary = report::summary::tracked(&result);
-    let saved = saved(report::write_tracked(&result, &experiment.out), || {
-        output(experiment.json, &result, || summary.clone())
-    });
+    let files = report::write_tracked(&result, &experiment.out)?;
     if let Some(ended) = tracked.ended {
         let mut failure = Failure::from(ended);
-        let files = saved.map_or_else(|error| error.message, |files| written(&files));
+        let files = written(&files);
         failure.message += &format!(
             "\n{} points were measured before. {}",
             result.points.len(),
@@ -73,10 +67,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         );
         return Err(failure);
     }
-    let files = saved?;
     let mut text = experiment.result(&result, &summary, &files, timing)?;
-    let settled = result.points.iter().filter(|one| one.point.settled);
-    let points: Vec<_> = settled.map(|one| (&one.point.at).into()).collect();
+    let settled = result.points.iter().filter(|compared| compared.point.settled);
+    let points: Vec<_> = settled.map(|compared| (&compared.point.at).into()).collect();
     if let Some(line) =
         contradiction(&points, scene.resonance, &scene.plant).filter(|_| !experiment.json && result.left_out.is_none())
     {

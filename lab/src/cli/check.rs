@@ -74,7 +74,7 @@ pub(super) fn described(checked: &LoopCheck) -> String {
         ])
     });
     let table = Table::new("channel | gain | phase | delay | noise | floor").rows(rows);
-    let mut text = format!("{}\n", table.markdown());
+    let mut text = format!("{}\n", table.text());
     if !checked.quantities.is_empty() {
         let rows = checked.quantities.iter().map(|quantity| {
             let separator = if quantity.unit.is_empty() { "" } else { ", " };
@@ -84,7 +84,7 @@ pub(super) fn described(checked: &LoopCheck) -> String {
                 number(quantity.expected),
             ]
         });
-        text += &format!("{}\n", Table::new("measured | value | scene").rows(rows).markdown());
+        text += &format!("{}\n", Table::new("measured | value | scene").rows(rows).text());
     }
     for quantity in checked.quantities.iter().filter(|quantity| quantity.differs()) {
         let consequence = match quantity.verdict {

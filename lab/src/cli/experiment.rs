@@ -1,6 +1,8 @@
 //! What the commands share that drive a rig through an experiment: options, loop check, doubtful results, and what is kept of a failure.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use clap::Args;
 use phase_lock::Config;
@@ -8,7 +10,7 @@ use serde::Serialize;
 use vines::experiment::{ExperimentError, Stage};
 use vines::net::{ReportLost, Timing};
 use vines::record::Sample;
-use vines::rig::{BuiltIn, Command, Controller, Drive, Fault, Rig, RigError, RigStage, Sensors};
+use vines::rig::{BuiltIn, Command, Controller, Drive, Fault, GroundTruth, Rig, RigError, RigStage, Sensors};
 use vines::{advice, loop_check, report, scene::Scene};
 
 use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
@@ -55,73 +57,70 @@ pub(super) struct ExperimentArguments {
     pub json: bool,
 }
 
-/// A rig whose samples are kept for --record.
-pub(super) struct Recorder<'a> {
-    rig: &'a mut dyn Rig,
-    path: Option<&'a Path>,
-    sensors: Sensors,
-    time: f64,
-    samples: Vec<Sample>,
+/// Before the first sample.
+pub(super) fn no_sample() -> Sample {
+    let (sensors, command) = (Sensors::default(), Command::default());
+    Sample { time: 0.0, sensors, command, ground_truth: None }
 }
 
-impl Recorder<'_> {
-    fn keep(&mut self, drive: Drive, step: f64) {
-        if self.path.is_some() {
-            let command = Command { drive, ..Command::default() };
-            let (time, sensors) = (self.time, self.sensors);
-            self.samples.push(Sample { time, sensors, command, ground_truth: None });
-        }
-        self.time += step;
+/// A rig whose samples are shown to a function, each with the time to the next one, s.
+pub(super) struct Tap<F> {
+    rig: Box<dyn Rig>,
+    now: Sample,
+    on_sample: F,
+}
+
+impl<F: FnMut(Sample, f64) + 'static> Tap<F> {
+    pub(super) fn around(rig: Box<dyn Rig>, on_sample: F) -> Box<dyn Rig> {
+        Box::new(Self { rig, now: no_sample(), on_sample })
     }
 
-    /// Writes the file, if one is asked for.
-    pub(super) fn finish(self) -> Result<(), Failure> {
-        let Some(path) = self.path else { return Ok(()) };
-        vines::write_file(path, &vines::record::table(&self.samples)).map_err(Failure::run)?;
-        Ok(())
+    fn show(&mut self, drive: Drive, step: f64) {
+        self.now.command.drive = drive;
+        (self.on_sample)(self.now, step);
+        self.now.time += step;
     }
 }
 
-impl RigStage for Recorder<'_> {
+impl<F: FnMut(Sample, f64) + 'static> RigStage for Tap<F> {
     fn inner(&mut self) -> &mut dyn Rig {
-        self.rig
+        self.rig.as_mut()
     }
 
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.sensors = self.rig.sense()?;
-        Ok(self.sensors)
+        self.now.sensors = self.rig.sense()?;
+        Ok(self.now.sensors)
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.keep(drive, step);
+        self.show(drive, step);
         self.rig.advance(drive, step)
     }
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.keep(drive, step);
+        self.show(drive, step);
         self.rig.hold(drive, step)
     }
+
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        self.now.ground_truth = self.rig.ground_truth()?;
+        Ok(self.now.ground_truth)
+    }
 }
+
+/// What a rig in real time reports at the end of a session.
+pub(super) type Closed = Option<Result<Timing, ReportLost>>;
 
 /// A rig that has passed its loop check, and a controller, both connected.
 pub(super) struct Session {
     pub controller: Box<dyn Controller>,
     pub open: OpenRig,
     watch: Option<Watch>,
+    /// The file of --record, and the samples for it.
+    record: Option<(PathBuf, Rc<RefCell<Vec<Sample>>>)>,
 }
 
 impl ExperimentArguments {
-    /// The rig, with a recorder for --record.
-    pub(super) fn recorded<'a>(&'a self, rig: &'a mut dyn Rig) -> Recorder<'a> {
-        Recorder {
-            rig,
-            path: self.record.as_deref(),
-            sensors: Sensors::default(),
-            time: 0.0,
-            samples: Vec::new(),
-        }
-    }
-
     /// Loads the scene and connects rig and controller; without a rig, it is this program's FMU. Invalid settings and a folder that
     /// cannot be written to are refused before anything is driven.
     pub(super) fn start(
@@ -150,7 +149,12 @@ impl ExperimentArguments {
         if let Some(watch) = &watch {
             (open.rig, controller) = (watch.rig(open.rig), watch.controller(controller));
         }
-        Ok((scene, Session { controller, open, watch }))
+        let record = self.record.clone().map(|file| (file, Rc::default()));
+        if let Some((_, samples)) = &record {
+            let samples: Rc<RefCell<Vec<Sample>>> = Rc::clone(samples);
+            open.rig = Tap::around(open.rig, move |sample, _| samples.borrow_mut().push(sample));
+        }
+        Ok((scene, Session { controller, open, watch, record }))
     }
 
     /// Checks a rig that is not a simulation, and refuses one that is not as expected. Such a rig starts at rest.
@@ -187,7 +191,7 @@ impl ExperimentArguments {
         result: &impl Serialize,
         summary: &str,
         paths: &[PathBuf],
-        timing: Option<Result<Timing, ReportLost>>,
+        timing: Closed,
     ) -> Result<String, Failure> {
         let text = output(self.json, result, || format!("{summary}\n{}", written(paths)))?;
         let doubt = match &timing {
@@ -207,14 +211,17 @@ impl ExperimentArguments {
 }
 
 impl Session {
-    /// Ends the session after `result`; a rig in real time reports its missed deadlines.
-    pub(super) fn close<T>(self, result: &Result<T, ExperimentError>) -> Option<Result<Timing, ReportLost>> {
+    /// Ends the session after `result`, and writes the file of --record. A rig in real time reports its missed deadlines.
+    pub(super) fn close<T>(mut self, result: &Result<T, ExperimentError>) -> Result<Closed, Failure> {
         drop(self.controller);
-        let timing = self.open.close();
-        if let (Some(watch), Err(error)) = (&self.watch, result) {
-            watch.failed(error);
+        if let (Some(watch), Err(error)) = (&mut self.watch, result) {
+            watch.failure = Some(error.to_string());
         }
-        timing
+        let timing = self.open.close();
+        if let Some((file, samples)) = &self.record {
+            vines::write_file(file, &vines::record::table(&samples.borrow())).map_err(Failure::run)?;
+        }
+        Ok(timing)
     }
 }
 

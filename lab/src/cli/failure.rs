@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use phase_lock::ConfigError;
 use vines::rig::{Interrupted, RigError};
 use vines::scene::{SceneError, refusal};
-use vines::{experiment::ExperimentError, net::LinkError, pack::PackError};
+use vines::{experiment::ExperimentError, net::LinkError, pack::PackError, report::ReportError};
 
 /// Exit code of a program that a signal ended: 128 and the number of SIGINT.
 pub(super) const INTERRUPTED: u8 = 130;
@@ -68,12 +68,15 @@ impl From<LinkError> for Failure {
     }
 }
 
+impl From<ReportError> for Failure {
+    fn from(error: ReportError) -> Self {
+        Self::run(error)
+    }
+}
+
 impl From<PackError> for Failure {
     fn from(error: PackError) -> Self {
-        match error {
-            PackError::Read { .. } => Self::run(error),
-            _ => Self::input(error),
-        }
+        Self::input(error)
     }
 }
 

@@ -9,7 +9,7 @@ use vines::{advice, comparison::Comparison, report};
 
 use super::experiment::{ExperimentArguments, interrupted, kept};
 use super::options::Endpoint;
-use super::output::{output, progress_bar, saved};
+use super::output::progress_bar;
 use super::{failure::Failure, pack::fmus};
 
 const HELP: &str = "\
@@ -46,16 +46,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let plan = Plan::of(&scene);
     let bar = progress_bar(plan.lock as u64, "{msg:29} [{wide_bar}] {pos}/{len} samples");
     let mut samples = Vec::new();
-    let (mut rig, controller) = (
-        experiment.recorded(session.open.rig.as_mut()),
-        session.controller.as_mut(),
-    );
-    let record = run_into(&mut samples, &mut rig, controller, &plan, |stage, done, of| {
+    let (rig, controller) = (session.open.rig.as_mut(), session.controller.as_mut());
+    let record = run_into(&mut samples, rig, controller, &plan, |stage, done, of| {
         show(&bar, stage, done, of)
     });
     bar.finish_and_clear();
-    rig.finish()?;
-    let timing = session.close(&record);
+    let timing = session.close(&record)?;
     let record = record.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let identification = identify(&record, &scene).map_err(|error| {
         let reason = match error {
@@ -66,10 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     })?;
     let result = Comparison::of(&identification, &scene);
     let summary = report::summary::identification(&result);
-    let mut files = saved(report::write(&result, &experiment.out), || {
-        let points = report::decay_csv(&result).map_err(Failure::run)?;
-        output(experiment.json, &result, || format!("{summary}\n{points}"))
-    })?;
+    let mut files = report::write(&result, &experiment.out)?;
     if arguments.rig.is_none() {
         files.extend(fmus(&experiment.out)?);
     }

@@ -12,7 +12,7 @@ use vines::sweep::{Axis, Map};
 
 use super::failure::Failure;
 use super::options::{SceneArguments, warn_left_out};
-use super::output::{progress_bar, saved, writable, written};
+use super::output::{progress_bar, writable, written};
 
 const HELP: &str = "\
 Every cell is one plant, driven at a fixed frequency from the scene's start:
@@ -85,10 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let map = map.run(*confirmations, || bar.inc(1)).map_err(Failure::input)?;
     bar.finish_and_clear();
     let summary = summary(arguments, &map);
-    let files = saved(report::write_map(&map, out), || {
-        let cells = report::map_csv(&map).map_err(Failure::run)?;
-        Ok(format!("{summary}\n{cells}"))
-    })?;
+    let files = report::write_map(&map, out)?;
     Ok(format!("{summary}\n{}", written(&files)))
 }
 

@@ -1,18 +1,17 @@
-//! Options that several commands share: the scene, rigs and controllers, what the network may reach, and real time.
+//! Options that several commands share: the scene, rigs and controllers, and what the network may reach.
 
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::{Arc, OnceLock};
 
 use clap::Args;
 use phase_lock::Config;
 use vines::ArgumentError;
-use vines::fmu::{FmuController, FmuError, FmuRig};
+use vines::fmu::{FmuController, FmuRig};
 use vines::helic::{Channels, DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::report::summary::ideal;
-use vines::rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable};
+use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
 use vines::scene::{Family, Name, Names, Override, PAPER, Scene, SceneError};
 
 use super::failure::{Failure, stop_flag};
@@ -138,7 +137,7 @@ impl Endpoint {
                 let plant = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
                 Box::new(plant.with_sensors(scene.resonance))
             }
-            Self::Fmu(file) => Box::new(fmu(file, scene).map_err(Failure::run)?),
+            Self::Fmu(file) => Box::new(FmuRig::load(file, scene).map_err(Failure::run)?),
             Self::Network(address) if address.starts_with("helic://") => Box::new(helic(address, scene, scope)?),
             Self::Network(address) => {
                 let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time(), scope.key())?;
@@ -173,16 +172,6 @@ impl Endpoint {
             }
         })
     }
-}
-
-pub(super) fn fmu(file: &Path, scene: &Scene) -> Result<Measured<FmuRig>, FmuError> {
-    FmuRig::load(
-        file,
-        &scene.start_values(),
-        scene.resonance,
-        &scene.plant,
-        &scene.rig_names,
-    )
 }
 
 /// The helic device at `helic://HOST[:PORT]`.
@@ -229,18 +218,6 @@ pub(super) fn no_key(scope: BindScope) -> Result<(), Failure> {
 
 #[derive(Debug, Args)]
 pub(super) struct ReachArguments {
-    /// Real-time priority (SCHED_FIFO), from 1 to 99
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=99))]
-    priority: Option<u8>,
-
-    /// Lock all memory, so that nothing is paged out
-    #[arg(long)]
-    lock_memory: bool,
-
-    /// Run on this processor only, from 0
-    #[arg(long, value_name = "N")]
-    cpu: Option<usize>,
-
     /// Allow network addresses beyond this machine without a key: anyone who can reach the address can drive the rig
     #[arg(long)]
     allow_remote: bool,
@@ -251,23 +228,8 @@ pub(super) struct ReachArguments {
 }
 
 impl ReachArguments {
-    /// Asks the system for priority, memory and processor, and returns which addresses the network may use.
+    /// Which addresses the network may use.
     pub(super) fn reach(&self) -> Result<BindScope, Failure> {
-        let asked = |option: String, answer: io::Result<()>, help: &str| {
-            answer.map_err(|error| Failure::run(format!("{option}: the system refuses: {error}; {help}")))
-        };
-        if let Some(priority) = self.priority {
-            let help = "allow it with `ulimit -r 99`, rtprio in /etc/security/limits.conf, or CAP_SYS_NICE";
-            asked(format!("--priority {priority}"), system::priority(priority), help)?;
-        }
-        if self.lock_memory {
-            let help = "allow it with `ulimit -l unlimited`, memlock in /etc/security/limits.conf, or CAP_IPC_LOCK";
-            asked("--lock-memory".into(), system::lock_memory(), help)?;
-        }
-        if let Some(cpu) = self.cpu {
-            let help = "`nproc` prints how many processors there are; the first is 0";
-            asked(format!("--cpu {cpu}"), system::processor(cpu), help)?;
-        }
         let Some(file) = &self.key else {
             return Ok(match self.allow_remote {
                 true => BindScope::Remote,
@@ -281,51 +243,6 @@ impl ReachArguments {
     }
 }
 
-#[cfg(target_os = "linux")]
-mod system {
-    use std::io;
-
-    use rustix::{mm, thread};
-    use thread_priority::{
-        RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy, set_thread_priority_and_policy,
-        thread_native_id,
-    };
-
-    pub fn priority(priority: u8) -> io::Result<()> {
-        let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
-        let value = ThreadPriority::Crossplatform(priority.try_into().map_err(io::Error::other)?);
-        set_thread_priority_and_policy(thread_native_id(), value, policy).map_err(io::Error::other)
-    }
-
-    pub fn lock_memory() -> io::Result<()> {
-        let all = mm::MlockAllFlags::CURRENT | mm::MlockAllFlags::FUTURE;
-        Ok(mm::mlockall(all)?)
-    }
-
-    pub fn processor(number: usize) -> io::Result<()> {
-        if number >= thread::CpuSet::MAX_CPU {
-            return Err(io::Error::other("there is no such processor"));
-        }
-        let mut set = thread::CpuSet::new();
-        set.set(number);
-        Ok(thread::sched_setaffinity(None, &set)?)
-    }
-}
-
-#[cfg(not(target_os = "linux"))]
-mod system {
-    use std::io;
-
-    pub fn priority<T>(_: T) -> io::Result<()> {
-        Err(io::Error::other("this option exists on Linux only"))
-    }
-    pub use priority as processor;
-
-    pub fn lock_memory() -> io::Result<()> {
-        priority(())
-    }
-}
-
 /// A number above 0 and at most 1e8, for seconds and metres.
 pub(super) fn positive(text: &str) -> Result<f64, ArgumentError> {
     let value: f64 = text.parse().map_err(|_| "expected a number")?;
@@ -333,11 +250,4 @@ pub(super) fn positive(text: &str) -> Result<f64, ArgumentError> {
         true => Ok(value),
         false => Err("must be above 0 and at most 1e8".into()),
     }
-}
-
-/// A number of runs, seeds or the like.
-pub(super) fn count<T: TryFrom<u64>>(text: &str) -> Result<T, ArgumentError> {
-    let value = text.parse().ok().filter(|count| (1..=1_000_000_000).contains(count));
-    let value = value.and_then(|count: u64| count.try_into().ok());
-    value.ok_or_else(|| "expected a whole number from 1 to 1000000000".into())
 }

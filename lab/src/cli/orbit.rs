@@ -4,13 +4,14 @@ use std::f64::consts::TAU;
 
 use clap::Args;
 use lovines::{Event, State};
+use serde_json::json;
 use vines::orbit::{
     Branch, BranchEnd, Condition, ContinuationLimits, DOUBLINGS, Orbit, Periodic, backbone, continue_both_ways,
     phase_resonant, resonant_motion_under, response, settle, settled_motion, stable_resonant,
 };
 use vines::report::{
     Table, number, row,
-    summary::{ideal, parameters},
+    summary::{self, parameters},
 };
 use vines::{
     ArgumentError,
@@ -183,42 +184,6 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
     })
 }
 
-/// A periodic motion of the plant, as it is printed.
-#[derive(serde::Serialize)]
-struct PlantOrbit {
-    /// Frequency, Hz, its detuning, and the amplitude of the base, m.
-    f_hz: f64,
-    sigma: f64,
-    e_m: f64,
-    /// Amplitude (m) and phase (degrees, to the reference) of the first harmonic of the response.
-    a_m: f64,
-    phase_deg: f64,
-    periods: u32,
-    /// Per motion: impacts, how often the particle comes to rest on a wall, how often it sticks to the floor inside the cavity.
-    impacts: usize,
-    rests: usize,
-    sticks: usize,
-    /// Real and imaginary parts over the whole motion, by rising modulus.
-    multipliers: [[f64; 2]; 4],
-    stable: bool,
-    /// (q1, q1', q2, q2') where the phase of the base is 0, m and m/s.
-    state: [f64; 4],
-    events: Vec<PlantEvent>,
-    /// What the ideal cavity leaves out, with detuning and amplitude (m) of its exact orbit at resonance under the same base.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    ideal: Option<(String, f64, f64)>,
-}
-
-#[derive(serde::Serialize)]
-struct PlantEvent {
-    phase_deg: f64,
-    event: &'static str,
-    /// +1 or -1: the wall of an impact, of coming to rest or of a release; the direction of w' after slip or reversal.
-    side: Option<f64>,
-    /// Relative velocity just before an impact, m/s.
-    velocity: Option<f64>,
-}
-
 /// The motion of the plant with the effects of its cavity.
 fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure> {
     let (plant, definition, numbers) = (&scene.plant, scene.resonance, scene.dimensionless());
@@ -236,8 +201,12 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
             })?
         }
     };
+    let ideal = match arguments.sigma {
+        None => scene.left_out().zip(stable_resonant(&numbers)),
+        Some(_) => None,
+    };
     let events = motion.events.iter().map(|(phase, event)| {
-        let phase_deg = phase.to_degrees();
+        // The wall of an impact, of coming to rest or of a release, or the direction of w' afterwards; w' just before an impact.
         let (event, side, velocity) = match *event {
             Event::Impact { wall, velocity, .. } => ("impact", Some(wall.sign()), Some(velocity)),
             Event::Stuck { wall, .. } => ("rests on the wall", Some(wall.sign()), None),
@@ -246,67 +215,72 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
             Event::Slip { direction, .. } => ("slips", Some(direction), None),
             Event::Reversal { direction, .. } => ("turns round", Some(direction), None),
         };
-        PlantEvent { phase_deg, event, side, velocity }
+        (phase.to_degrees(), event, side, velocity)
     });
+    let events: Vec<_> = events.collect();
     let State { q1, dq1, q2, dq2 } = motion.state;
-    let orbit = PlantOrbit {
-        f_hz: motion.omega / TAU,
-        sigma: numbers.sigma(motion.omega),
-        e_m: motion.amplitude,
-        a_m: motion.response.norm(),
-        phase_deg: motion.response.arg().to_degrees(),
-        periods: motion.periods,
-        impacts: motion.impacts,
-        rests: motion.rests,
-        sticks: motion.sticks,
-        multipliers: motion.multipliers.map(|z| [z.re, z.im]),
-        stable: motion.is_stable(),
-        state: [q1, dq1, q2, dq2],
-        events: events.collect(),
-        ideal: match arguments.sigma {
-            None => scene.left_out().zip(stable_resonant(&numbers)),
-            Some(_) => None,
-        }
-        .map(|(left_out, orbit)| (left_out, orbit.sigma, orbit.c * numbers.b)),
-    };
+    let mut result = json!({
+        "f_hz": motion.omega / TAU,
+        "sigma": numbers.sigma(motion.omega),
+        "e_m": motion.amplitude,
+        "a_m": motion.response.norm(),
+        "phase_deg": motion.response.arg().to_degrees(),
+        "periods": motion.periods,
+        "impacts": motion.impacts,
+        "rests": motion.rests,
+        "sticks": motion.sticks,
+        "multipliers": motion.multipliers.map(|z| [z.re, z.im]),
+        "stable": motion.is_stable(),
+        "state": [q1, dq1, q2, dq2],
+        "events": events.iter().map(|(phase_deg, event, side, velocity)| {
+            json!({ "phase_deg": phase_deg, "event": event, "side": side, "velocity": velocity })
+        }).collect::<Vec<_>>(),
+    });
+    if let Some((left_out, orbit)) = &ideal {
+        result["ideal"] = json!([left_out, orbit.sigma, orbit.c * numbers.b]);
+    }
     let title = "Periodic motion of the plant with all effects of its cavity";
-    shown(&numbers, title, &orbit, arguments.json, || plant_text(&orbit))
+    shown(&numbers, title, &result, arguments.json, || {
+        let rows = events.iter().map(|(phase, event, side, velocity)| {
+            let side = side.map_or("-".into(), |side| format!("{side:+}"));
+            vec![
+                number(*phase),
+                event.to_string(),
+                side,
+                velocity.map_or("-".into(), number),
+            ]
+        });
+        let ideal = ideal.as_ref().map(|(left_out, orbit)| {
+            let (sigma, a_m) = (orbit.sigma, orbit.c * numbers.b);
+            let results = format!("sigma = {sigma:.6} and response {a_m:.6e} m are");
+            format!("  ({})\n", summary::ideal(&results, left_out))
+        });
+        format!(
+            "  {:.6} Hz, sigma = {:.6}; base {:.6e} m; response {:.6e} m at {:.4} degrees\n  in {} period{}: impacts {}, at rest on a wall \
+             {}, sticking to the floor {}\n  multipliers {}: {}\n{}\n{}",
+            motion.omega / TAU,
+            numbers.sigma(motion.omega),
+            motion.amplitude,
+            motion.response.norm(),
+            motion.response.arg().to_degrees(),
+            motion.periods,
+            if motion.periods == 1 { "" } else { "s" },
+            motion.impacts,
+            motion.rests,
+            motion.sticks,
+            multipliers(motion.multipliers.map(|z| [z.re, z.im])),
+            if motion.is_stable() { "stable" } else { "unstable" },
+            ideal.unwrap_or_default(),
+            Table::new("phase, degrees | event | side | w' before, m/s")
+                .rows(rows)
+                .text(),
+        )
+    })
 }
 
-/// A motion and its events.
-fn plant_text(orbit: &PlantOrbit) -> String {
-    let PlantOrbit {
-        f_hz,
-        sigma,
-        e_m,
-        a_m,
-        phase_deg,
-        periods,
-        impacts,
-        rests,
-        sticks,
-        ..
-    } = orbit;
-    let multipliers = orbit.multipliers.map(|[re, im]| format!("{re:.5}{im:+.5}i"));
-    let s = if *periods == 1 { "" } else { "s" };
-    let blank = |value: Option<f64>| value.map_or("-".into(), number);
-    let rows = orbit.events.iter().map(|one| {
-        let side = one.side.map_or("-".into(), |side| format!("{side:+}"));
-        vec![number(one.phase_deg), one.event.to_string(), side, blank(one.velocity)]
-    });
-    let table = Table::new("phase, degrees | event | side | w' before, m/s").rows(rows);
-    let ideal = orbit.ideal.as_ref().map(|(left_out, sigma, a_m)| {
-        let results = format!("sigma = {sigma:.6} and response {a_m:.6e} m are");
-        format!("  ({})\n", ideal(&results, left_out))
-    });
-    format!(
-        "  {f_hz:.6} Hz, sigma = {sigma:.6}; base {e_m:.6e} m; response {a_m:.6e} m at {phase_deg:.4} degrees\n  in {periods} period{s}: impacts \
-         {impacts}, at rest on a wall {rests}, sticking to the floor {sticks}\n  multipliers {}: {}\n{}\n{}",
-        multipliers.join(", "),
-        if orbit.stable { "stable" } else { "unstable" },
-        ideal.unwrap_or_default(),
-        table.text()
-    )
+/// Multipliers in a line: real and imaginary parts.
+fn multipliers(multipliers: [[f64; 2]; 4]) -> String {
+    multipliers.map(|[re, im]| format!("{re:.5}{im:+.5}i")).join(", ")
 }
 
 /// Refuses a detuning whose frequency is not positive.
@@ -335,7 +309,6 @@ fn shown(
 /// The motion and the states after its impacts.
 fn described(pattern: &str, motion: &Periodic) -> String {
     let Periodic { sigma, c, b, gamma, .. } = motion;
-    let multipliers = motion.multipliers.map(|[re, im]| format!("{re:.5}{im:+.5}i"));
     let rows = motion.bounces.iter().map(|impact| {
         let phase = impact.phase.to_degrees().rem_euclid(360.0);
         row(
@@ -347,7 +320,7 @@ fn described(pattern: &str, motion: &Periodic) -> String {
     format!(
         "{pattern}\n  sigma = {sigma:.6}, C = {c:.6}, phase {:.4} degrees, B = {b:.6}\n  multipliers {}\n\n{}",
         gamma.to_degrees(),
-        multipliers.join(", "),
+        multipliers(motion.multipliers),
         table.text()
     )
 }

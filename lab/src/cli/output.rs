@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
-use vines::report::ReportError;
 
 use super::failure::Failure;
 
@@ -38,19 +37,6 @@ pub(super) fn yes_no(value: bool) -> String {
 pub(super) fn written(paths: &[PathBuf]) -> String {
     let files: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     format!("Written: {}\n", files.join(", "))
-}
-
-/// The files of a result. If they cannot be written, the result is printed as `text` instead.
-pub(super) fn saved(
-    files: Result<Vec<PathBuf>, ReportError>,
-    text: impl FnOnce() -> Result<String, Failure>,
-) -> Result<Vec<PathBuf>, Failure> {
-    files.or_else(|error| {
-        print(&text()?)?;
-        Err(Failure::run(format!(
-            "{error}; standard output has the results instead"
-        )))
-    })
 }
 
 /// Checks that files can be written to a folder before anything runs. A folder that does not exist is not created yet: that its parent

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use vines::pack::{Binary, Libraries, components, pack, pack_bench};
+use vines::pack::{Binary, components, own_libraries, pack, pack_bench};
+use vines::rig::BuiltIn;
 
 use super::{failure::Failure, options::SceneArguments};
 
@@ -42,20 +43,25 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let folder = match (&arguments.libraries, arguments.only_binaries) {
-        (_, true) => None,
-        (Some(folder), _) => Some(folder.clone()),
-        (None, _) => Some(beside_this_program()?),
-    };
-    let libraries = Libraries { folder, others: arguments.binaries.clone() };
-    let written = pack_bench(&scene, &libraries, &arguments.out)?;
+    BuiltIn::new(&scene.controller_config())?;
+    let mut binaries = Vec::new();
+    if !arguments.only_binaries {
+        let folder = arguments.libraries.clone().map_or_else(beside_this_program, Ok)?;
+        binaries = own_libraries(&components(), &folder)?;
+    }
+    binaries.extend(arguments.binaries.iter().cloned());
+    let written = pack_bench(&scene, &binaries, &arguments.out)?;
     Ok(written.iter().map(|path| format!("{}\n", path.display())).collect())
 }
 
 /// Packs this program's FMUs into a folder; the plant is the first.
 pub(super) fn fmus(out: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let libraries = beside_this_program()?.as_path().into();
-    Ok(pack(&components(), &libraries, out)?)
+    let components = components();
+    Ok(pack(
+        &components,
+        &own_libraries(&components, &beside_this_program()?)?,
+        out,
+    )?)
 }
 
 fn beside_this_program() -> Result<PathBuf, Failure> {

@@ -8,7 +8,7 @@ use vines::report::{Subject, write_report};
 use vines::rig::BuiltIn;
 use vines::sweep::{Axis, Map};
 
-use super::output::{progress_bar, saved, writable};
+use super::output::{progress_bar, writable};
 use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
@@ -58,10 +58,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         bar.set_position((1000.0 * done) as u64);
     });
     bar.finish_and_clear();
-    let report = report.map_err(Failure::run)?;
-    let findings = report.findings.iter().map(|finding| format!("- {finding}\n"));
-    let findings: String = findings.collect();
-    let written = saved(report.written, || Ok(findings.clone()))?;
+    let (findings, written) = report?;
+    let findings: String = findings.iter().map(|finding| format!("- {finding}\n")).collect();
     let page = written.first().map(|page| page.display().to_string());
     Ok(format!(
         "{findings}\nWritten: {} and {} figures and tables\n",

@@ -1,17 +1,18 @@
 //! Servers: `vines rig`, the plant at a network address, and `vines controller`, the phase-locked loop.
 
+use std::str::FromStr;
 use std::sync::{Arc, atomic::Ordering};
 use std::time::{Duration, Instant};
-use std::{path::PathBuf, str::FromStr};
 
 use clap::{Args, ValueEnum};
+use vines::ArgumentError;
+use vines::fmu::FmuRig;
 use vines::helic::{Device, HelicServer};
 use vines::net::{Address, LinkError, Role, Served, Server, ServerError, Service, Session, resolve};
 use vines::rig::{BuiltIn, Rig, RigError, RigFault, SensorsOnly, Simulated, faulty};
-use vines::{ArgumentError, report};
 
 use super::failure::{Failure, stop_flag};
-use super::options::{Endpoint, ReachArguments, SceneArguments, count, fmu, no_key, positive};
+use super::options::{Endpoint, ReachArguments, SceneArguments, no_key, positive};
 use super::output::print;
 use super::watch::WatchArguments;
 
@@ -51,10 +52,6 @@ pub(super) struct RigArguments {
 
     #[command(flatten)]
     watch: WatchArguments,
-
-    /// Write the histogram of the lateness of each session to this file (CSV); each session overwrites it
-    #[arg(long, value_name = "FILE")]
-    histogram: Option<PathBuf>,
 
     /// The protocol: `vines` (docs/network-protocol.md), or `helic`, as a device of helic-daq (lab/helic/README.md)
     #[arg(long, value_enum, default_value_t = Protocol::Vines)]
@@ -160,14 +157,14 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
                 "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic",
             ));
         }
-        Endpoint::Fmu(file) => drop(fmu(file, &scene).map_err(Failure::run)?),
+        Endpoint::Fmu(file) => drop(FmuRig::load(file, &scene).map_err(Failure::run)?),
         Endpoint::BuiltIn => {}
     }
     let (serving, json) = (&arguments.serving, arguments.serving.json);
     let watch = arguments.watch.start("vines rig", &scene)?;
     let make = || -> Result<Box<dyn Rig>, RigError> {
         let rig: Box<dyn Rig> = match (&arguments.rig, arguments.fault) {
-            (Endpoint::Fmu(file), _) => Box::new(fmu(file, &scene)?),
+            (Endpoint::Fmu(file), _) => Box::new(FmuRig::load(file, &scene)?),
             (_, Some(Fault { kind, seconds })) => {
                 Box::new(faulty(&scene, kind, seconds, move |zero| print_reaction(zero, json))?)
             }
@@ -179,18 +176,11 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
             None => rig,
         })
     };
-    let keep = |session: &Session| {
-        if let Some(file) = &arguments.histogram
-            && let Err(error) = report::write_lateness(&session.histogram, file)
-        {
-            eprintln!("warning: {error}");
-        }
-    };
     let step = scene.sample_time();
     let max_amplitude = arguments.max_amplitude.unwrap_or(scene.plant.half_width);
     if helic {
         let device = Device::new(make().map_err(Failure::run)?, step, max_amplitude).map_err(Failure::run)?;
-        return serving.serve_helic(device, step, keep);
+        return serving.serve_helic(device, step);
     }
     let (silence, mode, transport): (_, _, fn(_) -> _) = match arguments.lock_step {
         true => (SILENCE_LOCK_STEP, "in lock-step", Address::Tcp),
@@ -202,7 +192,7 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
         silence: arguments.silence.unwrap_or(silence),
     };
     let name = format!("rig, {mode}, {:.1} samples per second,", 1.0 / step);
-    serving.serve(&name, transport, service, || Ok(Served::Rig(make()?)), keep)
+    serving.serve(&name, transport, service, || Ok(Served::Rig(make()?)))
 }
 
 const CONTROLLER_HELP: &str = "\
@@ -236,7 +226,7 @@ pub(super) fn controller(arguments: &ControllerArguments) -> Result<String, Fail
     let service = Service { role: Role::Controller, sample_time, silence };
     let make = || Ok(Served::Controller(Box::new(controller.clone())));
     let serving = &arguments.serving;
-    serving.serve("controller", Address::Tcp, service, make, |_| {})
+    serving.serve("controller", Address::Tcp, service, make)
 }
 
 #[derive(Debug, Args)]
@@ -253,7 +243,7 @@ struct ServingArguments {
     duration: Option<f64>,
 
     /// End after this many sessions
-    #[arg(long, value_name = "N", value_parser = count::<u64>)]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     sessions: Option<u64>,
 
     /// Print a line of JSON per session instead of text
@@ -262,25 +252,24 @@ struct ServingArguments {
 }
 
 impl ServingArguments {
-    /// Serves `what` at a TCP or UDP address: prints the address, then a report per session, which `keep` gets, too.
+    /// Serves `what` at a TCP or UDP address: prints the address, then a report per session.
     fn serve(
         &self,
         what: &str,
         transport: fn(std::net::SocketAddr) -> Address,
         service: Service,
         make: impl FnMut() -> Result<Served, ServerError>,
-        keep: impl Fn(&Session),
     ) -> Result<String, Failure> {
         let scope = self.reach.reach()?;
         let mut server = Server::listen(transport(resolve(&self.listen, scope)?), service, scope.key())?;
         let address = server.address().map_err(Failure::run)?;
-        self.run(&format!("{what} on {address}"), keep, |stop, report_session| {
+        self.run(&format!("{what} on {address}"), |stop, report_session| {
             server.serve(make, stop, report_session)
         })
     }
 
     /// Serves `device` as a device of helic-daq, sampled every `sample_time`, s.
-    fn serve_helic(&self, device: Device, sample_time: f64, keep: impl Fn(&Session)) -> Result<String, Failure> {
+    fn serve_helic(&self, device: Device, sample_time: f64) -> Result<String, Failure> {
         let scope = self.reach.reach()?;
         no_key(scope)?;
         let address = resolve(&self.listen, scope)?;
@@ -288,7 +277,7 @@ impl ServingArguments {
         let mut server = HelicServer::listen(address, device, sample_time).map_err(listen)?;
         let what = format!("helic device, {:.1} samples per second, on", 1.0 / sample_time);
         let address = server.address().map_err(Failure::run)?;
-        self.run(&format!("{what} helic://{address}"), keep, |stop, report_session| {
+        self.run(&format!("{what} helic://{address}"), |stop, report_session| {
             server.serve(stop, report_session)
         })
     }
@@ -297,7 +286,6 @@ impl ServingArguments {
     fn run(
         &self,
         what: &str,
-        keep: impl Fn(&Session),
         serve: impl FnOnce(&mut dyn FnMut() -> bool, &mut dyn FnMut(&Session)) -> Result<(), ServerError>,
     ) -> Result<String, Failure> {
         let stop = stop_flag()?;
@@ -313,7 +301,6 @@ impl ServingArguments {
                 true => serde_json::to_string(session).map_or_else(|error| error.to_string(), |line| line + "\n"),
                 false => session.to_string(),
             };
-            keep(session);
             // A closed output does not stop the server.
             let _ = print(&text);
             served += 1;

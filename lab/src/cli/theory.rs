@@ -1,11 +1,10 @@
 //! `vines theory`: first-order theory of a scene.
 
 use clap::Args;
-use serde::Serialize;
+use serde_json::json;
 use vines::{
     report::{Table, row, summary::parameters},
-    scene::Dimensionless,
-    theory::{Activation, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, SlowFlow, backbone, resonant},
+    theory::{Activation, B_SYMMETRY_BREAKING, BranchSide, SlowFlow, backbone, resonant},
 };
 
 use super::output::{output, yes_no};
@@ -42,31 +41,6 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// The JSON that is printed.
-#[derive(Debug, Serialize)]
-struct Report {
-    scene: Dimensionless,
-    manifold: Constants,
-    solutions: Vec<BackbonePoint>,
-    sigma: f64,
-    activation: Activation,
-    /// At that sigma; empty unless it was given.
-    equilibria: Vec<Equilibrium>,
-    backbone: Vec<BackbonePoint>,
-}
-
-#[derive(Debug, Serialize)]
-struct Constants {
-    #[serde(rename = "R")]
-    dissipation: f64,
-    #[serde(rename = "B_min")]
-    b_min: f64,
-    #[serde(rename = "C_min")]
-    c_min: f64,
-    #[serde(rename = "B_symmetry_breaking")]
-    b_symmetry_breaking: f64,
-}
-
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load_for("theory is")?.dimensionless();
     let flow = SlowFlow::new(scene.lambda, scene.r);
@@ -78,70 +52,64 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let solutions = resonant(&scene);
     let stable = solutions.iter().find(|point| point.stable());
     let sigma = arguments.sigma.or(stable.map(|point| point.sigma)).unwrap_or(0.0);
-    let at_sigma = arguments.sigma.map(|sigma| flow.equilibria(scene.g, sigma));
+    let equilibria = arguments.sigma.map(|sigma| flow.equilibria(scene.g, sigma));
+    let activation = flow.activation(scene.epsilon, sigma);
+    let (dissipation, b_min, c_min) = (flow.manifold.dissipation, flow.manifold.b_min(), flow.manifold.c_min());
     let points = arguments.points as usize;
     // From near the end of the left branch, where the particle is at rest, to a little beyond the stable range.
     let highest = 1.2 * B_SYMMETRY_BREAKING;
-    let report = Report {
-        scene,
-        manifold: Constants {
-            dissipation: flow.manifold.dissipation,
-            b_min: flow.manifold.b_min(),
-            c_min: flow.manifold.c_min(),
-            b_symmetry_breaking: B_SYMMETRY_BREAKING,
+    let result = json!({
+        "scene": scene,
+        "manifold": {
+            "R": dissipation,
+            "B_min": b_min,
+            "C_min": c_min,
+            "B_symmetry_breaking": B_SYMMETRY_BREAKING,
         },
-        solutions,
-        sigma,
-        activation: flow.activation(scene.epsilon, sigma),
-        equilibria: at_sigma.unwrap_or_default(),
-        backbone: backbone(&scene, highest / points as f64, highest, points),
-    };
-    output(arguments.json, &report, || text(&report, arguments.sigma.is_some()))
-}
-
-fn text(report: &Report, with_equilibria: bool) -> String {
-    let Constants { dissipation, b_min, c_min, b_symmetry_breaking } = report.manifold;
-    let solutions = report.solutions.iter().map(|point| {
-        let stable = [point.impacts_stable, point.slow_flow_stable];
-        cells(point.branch, [point.sigma, point.c, point.b], stable)
+        "solutions": solutions,
+        "sigma": sigma,
+        "activation": activation,
+        "equilibria": equilibria.clone().unwrap_or_default(),
+        "backbone": backbone(&scene, highest / points as f64, highest, points),
     });
-    let mut text = format!(
-        "First-order theory\n  {}\n\n\
-         Slow invariant manifold: R = {dissipation:.6}, fold at B = {b_min:.6}, C = {c_min:.6}\n\
-         Symmetric impacts are stable for {b_min:.6} < B < {b_symmetry_breaking:.6}\n\n\
-         Resonance: {}\n{}\n{}",
-        parameters(&report.scene),
-        report.scene.definition.name(),
-        table("branch | sigma | C | B", solutions),
-        thresholds(report),
-    );
-    if with_equilibria {
-        let equilibria = report.equilibria.iter().map(|point| {
+    output(arguments.json, &result, || {
+        let rows = solutions.iter().map(|point| {
             let stable = [point.impacts_stable, point.slow_flow_stable];
-            cells(point.branch, [point.c, point.b, point.gamma.to_degrees()], stable)
+            cells(point.branch, [point.sigma, point.c, point.b], stable)
         });
-        let equilibria = table("branch | C | B | phase, degrees", equilibria);
-        text += &format!("\nEquilibria at sigma = {}\n{equilibria}", report.sigma);
-    }
-    text
+        let mut text = format!(
+            "First-order theory\n  {}\n\n\
+             Slow invariant manifold: R = {dissipation:.6}, fold at B = {b_min:.6}, C = {c_min:.6}\n\
+             Symmetric impacts are stable for {b_min:.6} < B < {B_SYMMETRY_BREAKING:.6}\n\n\
+             Resonance: {}\n{}\n{}",
+            parameters(&scene),
+            scene.definition.name(),
+            table("branch | sigma | C | B", rows),
+            thresholds(&activation, sigma),
+        );
+        if let Some(equilibria) = &equilibria {
+            let rows = equilibria.iter().map(|point| {
+                let stable = [point.impacts_stable, point.slow_flow_stable];
+                cells(point.branch, [point.c, point.b, point.gamma.to_degrees()], stable)
+            });
+            let equilibria = table("branch | C | B | phase, degrees", rows);
+            text += &format!("\nEquilibria at sigma = {sigma}\n{equilibria}");
+        }
+        text
+    })
 }
 
-fn thresholds(report: &Report) -> String {
-    let activation = &report.activation;
+fn thresholds(activation: &Activation, sigma: f64) -> String {
     let stable = activation
         .stable
         .map_or("none at any G".into(), |g| format!("G = {g:.6}"));
     format!(
-        "Activation at sigma = {:.6}\n  steady linear response reaches the wall      G = {:.6}\n  \
+        "Activation at sigma = {sigma:.6}\n  steady linear response reaches the wall      G = {:.6}\n  \
          impacts begin from rest, e = E sin(omega t)  G = {:.6} (exact)\n  \
          the same with the best phase of e            G = {:.6} (exact)\n  \
          some 1:1 motion exists                       G = {:.6}\n  \
          a stable one exists                          {stable}\n",
-        report.sigma,
-        activation.steady_linear,
-        activation.from_rest,
-        activation.from_rest_any_phase,
-        activation.existence
+        activation.steady_linear, activation.from_rest, activation.from_rest_any_phase, activation.existence
     )
 }
 

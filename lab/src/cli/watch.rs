@@ -1,41 +1,40 @@
 //! `--watch`: the live page for a running experiment, read-only, on this machine.
 //!
 //! Stages around rig and controller copy every sample into a bounded channel. Where it is full, the sample is dropped: the experiment never
-//! waits, and allocates nothing for it. A thread evaluates the samples, and one thread per browser sends the rows as server-sent events.
+//! waits, and allocates nothing for it. One thread evaluates the samples and sends the rows to all browsers as server-sent events.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
-use std::fmt::Display;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::rc::Rc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use clap::Args;
 use serde_json::{Value, json};
 use vines::curves;
 use vines::live::{Decay, LastImpacts, Motion};
+use vines::record::Sample;
 use vines::regime::Impact;
-use vines::rig::{Command, Controller, ControllerError, Drive, GroundTruth, Move, Rig, RigError, RigStage, Sensors};
+use vines::rig::{Command, Controller, ControllerError, Move, Rig, Sensors};
 use vines::scene::Scene;
 use vines_model::Sensor;
 
+use super::experiment::{Tap, no_sample};
 use super::failure::Failure;
 
 /// Samples that wait for the evaluation: more than a minute of the default scene in real time.
 const CHANNEL: usize = 1 << 16;
 /// Rows per natural period that are shown, at most.
 const PER_PERIOD: f64 = 50.0;
-/// Time of which a browser that comes late gets the rows, natural periods: the last minute of the default scene.
-const KEPT_PERIODS: f64 = 520.0;
-/// How often samples are evaluated and sent, and how long a browser that does not read is waited for.
+/// Rows that a browser gets that comes late: more than the last minute of the default scene.
+const KEPT: usize = 30_000;
+/// Time between two evaluations of the samples.
 const PACE: Duration = Duration::from_millis(40);
-const PATIENCE: Duration = Duration::from_secs(2);
-/// Connections at the same time; a browser has about six.
-const MOST: usize = 32;
+/// Longest wait for the request on a connection (browsers open some without one), and for a browser that does not read.
+const PATIENCE: [Duration; 2] = [Duration::from_millis(200), Duration::from_secs(2)];
 
 #[derive(Debug, Args)]
 pub(super) struct WatchArguments {
@@ -46,7 +45,7 @@ pub(super) struct WatchArguments {
 }
 
 impl WatchArguments {
-    /// Starts the server, if it is asked for, before this thread gets real-time priority, which a new thread would inherit.
+    /// Starts the server, if it is asked for.
     pub(super) fn start(&self, title: &str, scene: &Scene) -> Result<Option<Watch>, Failure> {
         self.watch.map(|port| Watch::start(port, title, scene)).transpose()
     }
@@ -54,25 +53,28 @@ impl WatchArguments {
 
 /// The server of the page.
 pub(super) struct Watch {
-    sender: SyncSender<Sample>,
+    sender: SyncSender<Message>,
     /// The last command of the controller, which the stage around the rig sends with its sample.
-    command: Rc<Cell<Option<Command>>>,
-    shared: Arc<Mutex<Shared>>,
+    command: Rc<Cell<Command>>,
     thread: Option<thread::JoinHandle<()>>,
+    /// The error that the experiment ended with.
+    pub failure: Option<String>,
+}
+
+enum Message {
+    Sample(Numbered),
+    /// The end of the experiment, with its error.
+    End(Option<String>),
 }
 
 /// What the stages send.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sample {
+#[derive(Clone, Copy)]
+struct Numbered {
     /// Number of the sample since the start of the session.
     number: u64,
-    /// Time, and time to the next sample, s.
-    time: f64,
+    sample: Sample,
+    /// Time to the next sample, s.
     step: f64,
-    sensors: Sensors,
-    ground_truth: Option<GroundTruth>,
-    drive: Drive,
-    command: Option<Command>,
 }
 
 impl Watch {
@@ -85,93 +87,55 @@ impl Watch {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(refused)?;
         listener.set_nonblocking(true).map_err(refused)?;
         let address = listener.local_addr().map_err(refused)?;
-        let table = Arc::new(table(title, scene).to_string());
+        let table = table(title, scene).to_string();
         let (sender, receiver) = sync_channel(CHANNEL);
-        let shared = Arc::<Mutex<Shared>>::default();
-        let (view, log) = (View::new(scene), Arc::clone(&shared));
-        let thread = thread::spawn(move || serve(&listener, address, &receiver, view, &log, &table));
+        let view = View::new(scene.clone(), 0);
+        let thread = thread::spawn(move || serve(&listener, address, &receiver, view, &table));
         eprintln!("Watch it at http://{address}/");
-        Ok(Self { sender, command: Rc::default(), shared, thread: Some(thread) })
+        Ok(Self {
+            sender,
+            command: Rc::default(),
+            thread: Some(thread),
+            failure: None,
+        })
     }
 
     /// The rig, with its samples shown.
     pub(super) fn rig(&self, rig: Box<dyn Rig>) -> Box<dyn Rig> {
-        let (sender, command) = (self.sender.clone(), Rc::clone(&self.command));
-        Box::new(WatchedRig { rig, sender, command, now: Sample::default() })
+        let (sender, command, mut number) = (self.sender.clone(), Rc::clone(&self.command), 0);
+        Tap::around(rig, move |mut sample, step| {
+            let drive = sample.command.drive;
+            sample.command = Command { drive, ..command.get() };
+            // The receiver polls, so that this wakes no thread. A full channel, or a server that has ended, drops the sample.
+            let _ = sender.try_send(Message::Sample(Numbered { number, sample, step }));
+            number += 1;
+        })
     }
 
     /// The controller, with its state shown.
     pub(super) fn controller(&self, controller: Box<dyn Controller>) -> Box<dyn Controller> {
         Box::new(WatchedController { controller, command: Rc::clone(&self.command) })
     }
-
-    /// Tells the browsers the error that the experiment ended with.
-    pub(super) fn failed(&self, error: &dyn Display) {
-        locked(&self.shared).failure = Some(error.to_string());
-    }
 }
 
 impl Drop for Watch {
     /// The last rows and the outcome reach the browsers before the program ends.
     fn drop(&mut self) {
-        locked(&self.shared).over = true;
         // A panic of the server was printed; the experiment is over.
+        let _ = self.sender.send(Message::End(self.failure.take()));
         let _ = self.thread.take().map(thread::JoinHandle::join);
-    }
-}
-
-struct WatchedRig {
-    rig: Box<dyn Rig>,
-    sender: SyncSender<Sample>,
-    command: Rc<Cell<Option<Command>>>,
-    now: Sample,
-}
-
-impl WatchedRig {
-    fn send(&mut self, drive: Drive, step: f64) {
-        let sample = Sample { drive, step, command: self.command.get(), ..self.now };
-        // The receiver polls, so that this wakes no thread. A full channel, or a server that has ended, drops the sample.
-        let _ = self.sender.try_send(sample);
-        self.now.number += 1;
-        self.now.time += step;
-    }
-}
-
-impl RigStage for WatchedRig {
-    fn inner(&mut self) -> &mut dyn Rig {
-        self.rig.as_mut()
-    }
-
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.now.sensors = self.rig.sense()?;
-        Ok(self.now.sensors)
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.send(drive, step);
-        self.rig.advance(drive, step)
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.send(drive, step);
-        self.rig.hold(drive, step)
-    }
-
-    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
-        self.now.ground_truth = self.rig.ground_truth()?;
-        Ok(self.now.ground_truth)
     }
 }
 
 struct WatchedController {
     controller: Box<dyn Controller>,
-    command: Rc<Cell<Option<Command>>>,
+    command: Rc<Cell<Command>>,
 }
 
 impl Controller for WatchedController {
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
         let command = self.controller.sample(sensors, active)?;
-        self.command.set(Some(command));
+        self.command.set(command);
         Ok(command)
     }
 
@@ -193,32 +157,14 @@ impl Controller for WatchedController {
 /// A row of the record, with the columns of the page's module (live/page/module.js); NaN: not measured.
 type Row = [f64; 11];
 
-/// Rows and state of the present session, which the threads share.
-#[derive(Default)]
-struct Shared {
+/// Makes rows from the samples of a session, and keeps the last of them.
+struct View {
+    scene: Scene,
     session: u64,
     /// Rows that are kept, and the number of the first of them.
     rows: VecDeque<Row>,
     first: u64,
-    state: Value,
-    /// The error that the experiment ended with.
-    failure: Option<String>,
-    /// No further sample comes; and no further row.
-    over: bool,
-    complete: bool,
-    /// Browsers that receive events.
-    streams: usize,
-}
-
-fn locked(shared: &Mutex<Shared>) -> MutexGuard<'_, Shared> {
-    // Every change leaves the rows in order.
-    shared.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Makes rows from samples.
-struct View {
-    scene: Scene,
-    last: Sample,
+    last: Numbered,
     phase: f64,
     impacts: LastImpacts,
     fit: Decay,
@@ -227,22 +173,45 @@ struct View {
 }
 
 impl View {
-    fn new(scene: &Scene) -> Self {
+    fn new(scene: Scene, session: u64) -> Self {
         Self {
-            scene: scene.clone(),
-            last: Sample::default(),
+            particle: scene.start.q2,
+            scene,
+            session,
+            rows: VecDeque::new(),
+            first: 0,
+            last: Numbered { number: 0, sample: no_sample(), step: 0.0 },
             phase: 0.0,
             impacts: LastImpacts::default(),
             fit: Decay::default(),
-            particle: scene.start.q2,
+        }
+    }
+
+    /// Takes a sample; a number of rows per period is kept.
+    fn take(&mut self, sample: Numbered) {
+        // A new session, also if its first samples were dropped.
+        if sample.number == 0 || sample.number < self.last.number {
+            *self = Self::new(self.scene.clone(), self.session + 1);
+        }
+        let row = self.row(sample);
+        self.last = sample;
+        let period = self.scene.dimensionless().natural_period();
+        let stride = (period / (PER_PERIOD * sample.step)).floor().max(1.0) as u64;
+        if sample.number.is_multiple_of(stride) {
+            self.rows.push_back(row);
+        }
+        if self.rows.len() > KEPT {
+            self.rows.pop_front();
+            self.first += 1;
         }
     }
 
     /// The row of a sample.
-    fn row(&mut self, now: &Sample) -> Row {
-        let Sample { time, step, sensors, ground_truth, drive, command, .. } = *now;
-        let driven = drive.amplitude != 0.0 || drive.displacement != 0.0;
-        let was_driven = self.last.drive.amplitude != 0.0 || self.last.drive.displacement != 0.0;
+    fn row(&mut self, now: Numbered) -> Row {
+        let Numbered { sample, step, .. } = now;
+        let Sample { time, sensors, command, ground_truth } = sample;
+        let (drive, before) = (command.drive, self.last.sample.command.drive);
+        let [driven, was_driven] = [drive, before].map(|drive| drive.amplitude != 0.0 || drive.displacement != 0.0);
         let follows = now.number == self.last.number + 1;
         // A window of samples without gaps, under a drive or without one.
         if !follows || driven != was_driven || self.fit.ended {
@@ -250,7 +219,7 @@ impl View {
             let omega = if drive.omega > 0.0 { drive.omega } else { omega0 };
             self.fit.drive(Motion { omega, ..self.fit.motion });
         }
-        self.particle(now);
+        self.particle(&sample);
         let speed = ground_truth.map_or(f64::NAN, |truth| truth.particle_velocity.abs());
         self.fit
             .sample(sensors.response, speed, step, self.scene.record.window_periods);
@@ -269,15 +238,12 @@ impl View {
         };
         let decays = !driven && (ground_truth.is_none() || self.fit.synchronous);
         self.phase += drive.omega * step;
-        self.last = *now;
         [
             time,
             sensors.reference.unwrap_or(f64::NAN),
             sensors.response,
             relative,
-            command
-                .and_then(|command| command.phase_error)
-                .map_or(f64::NAN, f64::to_degrees),
+            command.phase_error.map_or(f64::NAN, f64::to_degrees),
             drive.omega,
             drive.amplitude,
             motion.amplitude,
@@ -290,22 +256,23 @@ impl View {
     /// Notes an impact since the sample before, and moves the particle: from the wall that it met, or on as it was.
     fn particle(&mut self, now: &Sample) {
         let Some(truth) = now.ground_truth else { return };
-        let before = self.last.ground_truth.map_or(0, |truth| truth.impacts);
+        let Numbered { sample: last, step, .. } = self.last;
+        let before = last.ground_truth.map_or(0, |truth| truth.impacts);
         let velocity = truth.particle_velocity;
         if truth.impacts == before {
-            self.particle += velocity * self.last.step;
+            self.particle += velocity * step;
             return;
         }
         let since = now.time - truth.impact_time;
         self.impacts.0.push(Impact {
-            time: self.phase - now.drive.omega * since,
+            time: self.phase - now.command.drive.omega * since,
             velocity: truth.impact_velocity,
         });
         self.impacts.trim();
         let plant = &self.scene.plant;
         let epsilon = plant.particle_mass / plant.primary_mass;
         // The response v = q1 + epsilon q2 is smooth at an impact; the relative displacement is that of the wall there.
-        let rate = (now.sensors.response - self.last.sensors.response) / self.last.step.max(f64::MIN_POSITIVE);
+        let rate = (now.sensors.response - last.sensors.response) / step.max(f64::MIN_POSITIVE);
         let response = now.sensors.response - rate * since;
         let [plus, minus] = plant.gaps();
         let wall = if truth.impact_velocity > 0.0 { plus } else { -minus };
@@ -314,14 +281,12 @@ impl View {
 
     /// What the page shows beside the rows.
     fn state(&self) -> Value {
-        let Sample { command, ground_truth, .. } = self.last;
-        let state = command.and_then(|command| command.state);
-        let fault = command.and_then(|command| command.fault);
+        let Sample { command, ground_truth, .. } = self.last.sample;
         json!({
-            "state": state.map(|state| state as u8),
-            "settled": command.is_some_and(|command| command.settled),
-            "fault": fault.map_or(0, |fault| fault as u8),
-            "fault_text": fault.map_or("", |fault| fault.text()),
+            "state": command.state.map(|state| state as u8),
+            "settled": command.settled,
+            "fault": command.fault.map_or(0, |fault| fault as u8),
+            "fault_text": command.fault.map_or("", |fault| fault.text()),
             "impacts": ground_truth.map(|truth| truth.impacts),
             "per_period": self.impacts.per_period(),
             "regime": ground_truth.map(|_| self.impacts.regime(self.phase).name()),
@@ -389,144 +354,86 @@ fn kind(name: &str) -> &'static str {
     }
 }
 
-/// Evaluates samples and accepts browsers until the experiment is over; then waits until they have got the rest.
-fn serve(
-    listener: &TcpListener,
-    address: SocketAddr,
-    samples: &Receiver<Sample>,
-    mut view: View,
-    shared: &Arc<Mutex<Shared>>,
-    table: &Arc<String>,
-) {
-    let mut browsers: Vec<thread::JoinHandle<()>> = Vec::new();
-    loop {
-        let over = locked(shared).over;
-        evaluate(samples, &mut view, shared);
-        while let Ok((stream, _)) = listener.accept() {
-            browsers.retain(|browser| !browser.is_finished());
-            if browsers.len() < MOST {
-                let (shared, table) = (Arc::clone(shared), Arc::clone(table));
-                // A browser that is closed ends its connection only.
-                browsers.push(thread::spawn(move || drop(answer(&stream, address, &shared, &table))));
+/// Evaluates samples and serves browsers until the experiment is over and its end is sent.
+fn serve(listener: &TcpListener, address: SocketAddr, messages: &Receiver<Message>, mut view: View, table: &str) {
+    let mut browsers = Vec::new();
+    let mut outcome = Value::Null;
+    while outcome.is_null() {
+        thread::sleep(PACE);
+        for message in messages.try_iter() {
+            match message {
+                Message::Sample(sample) => view.take(sample),
+                Message::End(error) => outcome = json!({ "error": error }),
             }
         }
-        if over {
-            break;
+        while let Ok((stream, _)) = listener.accept() {
+            let stream = answer(stream, address, table).ok().flatten();
+            browsers.extend(stream.map(|stream| Browser { stream, session: 0, next: 0 }));
         }
-        thread::sleep(PACE);
-    }
-    locked(shared).complete = true;
-    let since = Instant::now();
-    // Browsers also hold connections without a request, which are not worth a long wait.
-    while since.elapsed() < PATIENCE
-        && (locked(shared).streams > 0
-            || since.elapsed() < PATIENCE / 4 && browsers.iter().any(|browser| !browser.is_finished()))
-    {
-        thread::sleep(PACE);
+        // A browser that is closed ends its connection only.
+        browsers.retain_mut(|browser| browser.send(&view, &outcome).is_ok());
     }
 }
 
-/// Turns all samples that wait into rows, a number of them per period.
-fn evaluate(samples: &Receiver<Sample>, view: &mut View, shared: &Mutex<Shared>) {
-    let period = view.scene.dimensionless().natural_period();
-    let mut rows = Vec::new();
-    let mut begins = false;
-    for sample in samples.try_iter() {
-        // A new session, also if its first samples were dropped.
-        if sample.number == 0 || sample.number < view.last.number {
-            *view = View::new(&view.scene);
-            rows.clear();
-            begins = true;
-        }
-        let row = view.row(&sample);
-        let stride = (period / (PER_PERIOD * sample.step)).floor().max(1.0) as u64;
-        if sample.number.is_multiple_of(stride) {
-            rows.push(row);
-        }
-    }
-    let mut shared = locked(shared);
-    if begins {
-        shared.session += 1;
-        shared.rows.clear();
-        shared.first = 0;
-    }
-    shared.state = view.state();
-    shared.rows.extend(rows);
-    let surplus = shared.rows.len().saturating_sub((KEPT_PERIODS * PER_PERIOD) as usize);
-    shared.rows.drain(..surplus);
-    shared.first += surplus as u64;
-}
-
-/// Answers one request.
-fn answer(mut stream: &TcpStream, address: SocketAddr, shared: &Mutex<Shared>, table: &str) -> io::Result<()> {
+/// Answers one request. Returns the stream of a browser that asks for the rows.
+fn answer(mut stream: TcpStream, address: SocketAddr, table: &str) -> io::Result<Option<TcpStream>> {
     stream.set_nonblocking(false)?;
-    stream.set_read_timeout(Some(PATIENCE))?;
-    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_read_timeout(Some(PATIENCE[0]))?;
+    stream.set_write_timeout(Some(PATIENCE[1]))?;
     // A request of this page has less than a kilobyte.
-    let head: Vec<String> = BufReader::new(stream.take(1 << 14))
+    let head: Vec<String> = BufReader::new((&stream).take(1 << 14))
         .lines()
         .take_while(|line| line.as_ref().is_ok_and(|line| !line.is_empty()))
         .collect::<Result<_, _>>()?;
-    let words: Vec<&str> = head.first().map_or("", String::as_str).split(' ').collect();
-    // A page of another site that gets this address by its own name must not read along.
-    let local = [address.to_string(), format!("localhost:{}", address.port())];
-    let host = |line: &String| {
-        line.split_once(": ")
-            .filter(|(name, _)| name.eq_ignore_ascii_case("host"))
-            .map(|(_, host)| host.to_string())
-    };
-    let known = head.iter().find_map(host).is_some_and(|host| local.contains(&host));
-    let path = words
-        .get(1)
-        .map_or("", |path| path.split('?').next().unwrap_or_default());
+    let mut words = head.first().map_or("", String::as_str).split([' ', '?']);
+    let (method, path) = (words.next(), words.next().unwrap_or_default());
     let path = if path == "/" { "/index.html" } else { path };
-    let file = FILES.iter().find(|(name, _)| *name == path);
-    let (status, kind, content) = match (words.first(), path) {
-        _ if !known => (
+    // A page of another site that gets this address by its own name must not read along.
+    let headers = head.iter().filter_map(|line| line.split_once(": "));
+    let mut hosts = headers.filter(|(name, _)| name.eq_ignore_ascii_case("host"));
+    let local = [address.to_string(), format!("localhost:{}", address.port())];
+    let is_local = hosts
+        .next()
+        .is_some_and(|(_, host)| local.iter().any(|local| local == host));
+    let (status, kind, content) = match (method, path) {
+        _ if !is_local => (
             "403 Forbidden",
             "text/plain",
             "this server answers at its own address only",
         ),
-        (Some(&"GET"), "/rows") => return events(stream, shared),
-        (Some(&"GET"), "/settings.json") => ("200 OK", "application/json", table),
-        (Some(&"GET"), _) => match file {
+        (Some("GET"), "/rows") => ("200 OK", "text/event-stream", ""),
+        (Some("GET"), "/settings.json") => ("200 OK", "application/json", table),
+        (Some("GET"), _) => match FILES.iter().find(|(name, _)| *name == path) {
             Some((name, text)) => ("200 OK", kind(name), *text),
             None => ("404 Not Found", "text/plain", "no such file"),
         },
         _ => ("405 Method Not Allowed", "text/plain", "only GET"),
     };
-    let length = content.len();
+    // The end of the connection is the end of the content.
+    let headers = "Cache-Control: no-store\r\nConnection: close";
     write!(
         stream,
-        "HTTP/1.1 {status}\r\nContent-Type: {kind}; charset=utf-8\r\nContent-Length: {length}\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n{content}"
-    )
+        "HTTP/1.1 {status}\r\nContent-Type: {kind}; charset=utf-8\r\n{headers}\r\n\r\n{content}"
+    )?;
+    Ok((kind == "text/event-stream").then_some(stream))
 }
 
-/// Sends what is new until everything is sent.
-fn events(mut stream: &TcpStream, shared: &Mutex<Shared>) -> io::Result<()> {
-    locked(shared).streams += 1;
-    let mut send = || -> io::Result<()> {
-        stream.write_all(b"HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n")?;
-        let (mut session, mut next) = (0, 0);
-        loop {
-            let now = locked(shared);
-            let begins = now.session != session;
-            let from = if begins { now.first } else { next.max(now.first) };
-            let rows: Vec<Row> = now.rows.iter().skip((from - now.first) as usize).copied().collect();
-            (session, next) = (now.session, from + rows.len() as u64);
-            let outcome = now.complete.then(|| json!({ "error": now.failure }));
-            let state = now.state.clone();
-            drop(now);
-            // Also without rows: a closed browser is noticed at the next event.
-            let event = json!({ "begins": begins, "rows": rows, "state": state, "outcome": outcome });
-            write!(stream, "data: {event}\n\n")?;
-            if outcome.is_some() {
-                return Ok(());
-            }
-            thread::sleep(PACE);
-        }
-    };
-    let sent = send();
-    locked(shared).streams -= 1;
-    sent
+/// A browser that receives events.
+struct Browser {
+    stream: TcpStream,
+    /// The session whose rows it gets, and the number of the next row.
+    session: u64,
+    next: u64,
+}
+
+impl Browser {
+    /// Sends what is new. Also without rows: a closed browser is noticed at the next event.
+    fn send(&mut self, view: &View, outcome: &Value) -> io::Result<()> {
+        let begins = view.session != self.session;
+        let from = if begins { view.first } else { self.next.max(view.first) };
+        let rows: Vec<&Row> = view.rows.iter().skip((from - view.first) as usize).collect();
+        (self.session, self.next) = (view.session, from + rows.len() as u64);
+        let event = json!({ "begins": begins, "rows": rows, "state": view.state(), "outcome": outcome });
+        self.stream.write_all(format!("data: {event}\n\n").as_bytes())
+    }
 }

@@ -69,6 +69,8 @@ struct Series {
     /// The name of the colour, in the table of styles.
     colour: &'static str,
     label: String,
+    /// Whether lines have a halo: they are on a map.
+    halo: bool,
 }
 
 /// How a series is drawn; widths, radii and sizes in px.
@@ -76,10 +78,7 @@ struct Series {
 pub enum Shape {
     /// A solid line through the places: measured values, and stable motions.
     Line(f64),
-    /// A line on a map, with a halo.
-    OnMap(f64),
     Dashed(f64),
-    DashedOnMap(f64),
     /// Segments, such as error bars: two places each.
     Bars(f64),
     /// The border of an area of a map: two places each.
@@ -105,15 +104,15 @@ impl Figure {
     /// The figure as SVG, for white paper.
     pub fn svg(&self) -> String {
         let (width, height) = self.size;
-        let mut svg = format!(
+        let mut svg = Svg(format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
              font-family=\"{FONT}\">\n"
-        );
-        rectangle(&mut svg, [0.0, 0.0, width, height], PAPER, "");
+        ));
+        svg.rectangle([0.0, 0.0, width, height], PAPER, "");
         for panel in &self.panels {
             panel.draw(&mut svg);
         }
-        svg + "</svg>\n"
+        svg.0 + "</svg>\n"
     }
 }
 
@@ -147,36 +146,42 @@ impl Panel {
     }
 
     /// Adds a series, unless it has nothing to draw: the legend does not name what is not there.
-    pub fn add(&mut self, shape: Shape, places: Vec<Place>, colour: &'static str, label: &str) {
+    pub fn add(&mut self, shape: Shape, places: impl IntoIterator<Item = Place>, colour: &'static str, label: &str) {
+        let halo = matches!(shape, Shape::Border(_));
+        self.series(shape, places.into_iter().collect(), colour, label, halo);
+    }
+
+    fn series(&mut self, shape: Shape, places: Vec<Place>, colour: &'static str, label: &str, halo: bool) {
         if !places.is_empty() {
             let label = label.into();
-            self.series.push(Series { shape, places, colour, label });
+            self.series.push(Series { shape, places, colour, label, halo });
         }
     }
 
     /// A curve of motions, solid where they are stable and dashed where they are not.
-    pub fn curve(&mut self, points: &[Marked], width: f64, colour: &'static str, name: &str) {
-        let label = |stable| match (name, stable) {
-            ("", _) => String::new(),
-            (name, true) => format!("{name}, stable"),
-            (name, false) => format!("{name}, unstable"),
-        };
+    pub fn curve(&mut self, points: impl IntoIterator<Item = Marked>, width: f64, colour: &'static str, name: &str) {
+        let points: Vec<Marked> = points.into_iter().collect();
         // The stable pieces first, and so in the legend.
-        for run in runs(points, true) {
-            self.add(Shape::Line(width), run, colour, &label(true));
+        for run in runs(&points, true) {
+            self.add(Shape::Line(width), run, colour, &format!("{name}, stable"));
         }
-        for run in runs(points, false) {
-            self.add(Shape::Dashed(width), run, unstable(colour), &label(false));
+        for run in runs(&points, false) {
+            self.add(
+                Shape::Dashed(width),
+                run,
+                unstable(colour),
+                &format!("{name}, unstable"),
+            );
         }
     }
 
     /// A curve of motions on a map.
-    pub fn curve_on_map(&mut self, points: &[Marked], colour: &'static str, label: &str) {
-        for run in runs(points, true) {
-            self.add(Shape::OnMap(2.2), run, colour, label);
-        }
-        for run in runs(points, false) {
-            self.add(Shape::DashedOnMap(2.2), run, colour, label);
+    pub fn curve_on_map(&mut self, points: impl IntoIterator<Item = Marked>, colour: &'static str) {
+        let points: Vec<Marked> = points.into_iter().collect();
+        for (shape, stable) in [(Shape::Line(2.2), true), (Shape::Dashed(2.2), false)] {
+            for run in runs(&points, stable) {
+                self.series(shape, run, colour, colour, true);
+            }
         }
     }
 
@@ -192,13 +197,11 @@ impl Panel {
         entries
     }
 
-    fn draw(&self, svg: &mut String) {
+    fn draw(&self, svg: &mut Svg) {
         let [left, top, width, height] = self.area;
         let entries = self.entries();
-        let longest = entries
-            .iter()
-            .map(|entry| text_width(&entry.label, SMALL + 1.0))
-            .fold(0.0, f64::max);
+        let longest = entries.iter().map(|entry| text_width(&entry.label, SMALL + 1.0));
+        let longest = longest.fold(0.0, f64::max);
         let key = [ENTRY.1 + 26.0 + longest, ENTRY.0 * entries.len() as f64 + 10.0];
         let beside = if let Legend::Beside(width) = self.legend {
             width
@@ -214,61 +217,39 @@ impl Panel {
             size: [width - MARGINS[0] - MARGINS[2] - beside, height - head - MARGINS[1]],
             ranges: self.ranges,
         };
-        let [x, y] = frame.place;
+        let ([x, y], [w, h]) = (frame.place, frame.size);
         if !self.title.is_empty() {
-            text(svg, &self.title, [x, top + 28.0], TITLE, INK, "start");
+            svg.text(&self.title, [x, top + 28.0], TITLE, INK, "start");
         }
         for (n, line) in (0..).zip(&self.captions) {
-            text(
-                svg,
-                line,
-                [x, top + 48.0 + 18.0 * f64::from(n)],
-                SMALL,
-                CAPTION,
-                "start",
-            );
+            svg.text(line, [x, top + 48.0 + 18.0 * f64::from(n)], SMALL, CAPTION, "start");
         }
         frame.draw(svg, &self.labels);
         // Curves end at the axes; marks are whole.
-        let [w, h] = frame.size;
-        *svg += &format!(
+        svg.0 += &format!(
             "<svg x=\"{x:.2}\" y=\"{y:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" viewBox=\"{x:.2} {y:.2} {w:.2} {h:.2}\">\n"
         );
-        for series in &self.series {
-            series.draw(svg, &frame, false);
-        }
-        svg.push_str("</svg>\n");
-        for series in &self.series {
-            series.draw(svg, &frame, true);
-        }
+        let (marks, curves): (Vec<&Series>, Vec<&Series>) = self.series.iter().partition(|series| series.is_mark());
+        curves.iter().for_each(|series| series.draw(svg, &frame));
+        svg.0 += "</svg>\n";
+        marks.iter().for_each(|series| series.draw(svg, &frame));
         if entries.is_empty() || self.legend == Legend::None {
             return;
         }
         let right = x + w - key[0] - 8.0;
-        let corner = match self.legend {
+        let [x, y] = match self.legend {
             Legend::LowerRight => [right, y + h - key[1] - 8.0],
             Legend::Beside(_) => [x + w + 10.0, y],
             _ => [right, y + 8.0],
         };
         if beside == 0.0 {
-            rectangle(
-                svg,
-                [corner[0], corner[1], key[0], key[1]],
-                PAPER,
-                " fill-opacity=\"0.9\"",
-            );
+            svg.rectangle([x, y, key[0], key[1]], PAPER, " fill-opacity=\"0.9\"");
         }
         for (n, entry) in (0..).zip(entries) {
-            let line = corner[1] + 5.0 + ENTRY.0 * (f64::from(n) + 0.5);
-            entry.sample(svg, [corner[0] + 8.0, line]);
-            text(
-                svg,
-                &entry.label,
-                [corner[0] + ENTRY.1 + 16.0, line + 4.5],
-                SMALL + 1.0,
-                INK,
-                "start",
-            );
+            let line = y + 5.0 + ENTRY.0 * (f64::from(n) + 0.5);
+            entry.sample(svg, [x + 8.0, line]);
+            let place = [x + ENTRY.1 + 16.0, line + 4.5];
+            svg.text(&entry.label, place, SMALL + 1.0, INK, "start");
         }
     }
 }
@@ -297,33 +278,27 @@ impl Frame {
     }
 
     /// Grid, ticks, axes and their labels.
-    fn draw(&self, svg: &mut String, labels: &[String; 2]) {
+    fn draw(&self, svg: &mut Svg, labels: &[String; 2]) {
         let ([left, top], [width, height]) = (self.place, self.size);
         let (right, bottom) = (left + width, top + height);
         let [(x, _), (y, _)] = self.ranges;
         for (value, label) in ticks(self.ranges[0], width / 75.0) {
             let [at, _] = self.at((value, y));
-            path(svg, &[[at, top], [at, bottom]], 1.0, GRID, "");
-            text(svg, &label, [at, bottom + 18.0], SMALL, INK, "middle");
+            svg.line(&[[at, top], [at, bottom]], 1.0, GRID, "");
+            svg.text(&label, [at, bottom + 18.0], SMALL, INK, "middle");
         }
         for (value, label) in ticks(self.ranges[1], height / 45.0) {
             let [_, at] = self.at((x, value));
-            path(svg, &[[left, at], [right, at]], 1.0, GRID, "");
-            text(svg, &label, [left - 7.0, at + 4.5], SMALL, INK, "end");
+            svg.line(&[[left, at], [right, at]], 1.0, GRID, "");
+            svg.text(&label, [left - 7.0, at + 4.5], SMALL, INK, "end");
         }
-        path(svg, &[[left, top], [left, bottom], [right, bottom]], 1.0, INK, "");
-        text(
-            svg,
-            &labels[0],
-            [left + width / 2.0, bottom + 42.0],
-            LABEL,
-            INK,
-            "middle",
-        );
+        svg.line(&[[left, top], [left, bottom], [right, bottom]], 1.0, INK, "");
+        let [middle, below] = [left + width / 2.0, bottom + 42.0];
+        svg.text(&labels[0], [middle, below], LABEL, INK, "middle");
         let [x, y] = [left - 46.0, top + height / 2.0];
-        *svg += &format!("<g transform=\"rotate(-90 {x:.2} {y:.2})\">");
-        text(svg, &labels[1], [x, y], LABEL, INK, "middle");
-        svg.push_str("</g>\n");
+        svg.0 += &format!("<g transform=\"rotate(-90 {x:.2} {y:.2})\">");
+        svg.text(&labels[1], [x, y], LABEL, INK, "middle");
+        svg.0 += "</g>\n";
     }
 }
 
@@ -342,11 +317,19 @@ fn ticks((from, to): (f64, f64), most: f64) -> Vec<(f64, String)> {
 }
 
 impl Series {
-    /// Draws the series, if it is one of the marks and texts, or one of the others.
-    fn draw(&self, svg: &mut String, frame: &Frame, marks: bool) {
+    /// Whether it is a mark or a text, which may extend beyond the axes.
+    fn is_mark(&self) -> bool {
+        use Shape::*;
+        matches!(
+            self.shape,
+            Circle(_) | Dot(_) | Square | Cross | Text(_) | TextOnCurve(_)
+        )
+    }
+
+    fn draw(&self, svg: &mut Svg, frame: &Frame) {
         let places: Vec<[f64; 2]> = self.places.iter().map(|place| frame.at(*place)).collect();
         match self.shape {
-            Shape::Line(_) | Shape::OnMap(_) | Shape::Dashed(_) | Shape::DashedOnMap(_) if !marks => {
+            Shape::Line(_) | Shape::Dashed(_) => {
                 let mut points: Vec<[f64; 2]> = Vec::new();
                 for (n, [x, y]) in places.iter().copied().enumerate() {
                     let far = points.last().is_none_or(|[a, b]| (x - a).hypot(y - b) >= APART);
@@ -354,86 +337,78 @@ impl Series {
                         points.push([x, y]);
                     }
                 }
-                self.stroke(svg, &points);
+                self.stroke(svg, &[&points]);
             }
-            Shape::Bars(_) | Shape::Border(_) if !marks => {
-                // The halo of one segment must not hide its neighbour.
-                places.chunks_exact(2).for_each(|pair| self.halo(svg, pair));
-                places.chunks_exact(2).for_each(|pair| self.line(svg, pair));
-            }
-            Shape::Cells(..) if !marks => {
+            Shape::Bars(_) | Shape::Border(_) => self.stroke(svg, &places.chunks_exact(2).collect::<Vec<_>>()),
+            Shape::Cells(..) => {
                 for pair in places.chunks_exact(2) {
                     let [[a, b], [c, d]] = [pair[0], pair[1]];
                     let area = [a.min(c), b.min(d), (a - c).abs(), (b - d).abs()];
                     // Cells lie side by side without a seam.
-                    rectangle(svg, area, self.colour, " shape-rendering=\"crispEdges\"");
+                    svg.rectangle(area, self.colour, " shape-rendering=\"crispEdges\"");
                 }
             }
-            Shape::Circle(_) | Shape::Dot(_) | Shape::Square | Shape::Cross if marks => {
-                for place in self.places.iter().filter(|place| frame.contains(**place)) {
-                    self.mark(svg, frame.at(*place));
-                }
-            }
-            Shape::Text(size) | Shape::TextOnCurve(size) if marks => {
+            Shape::Text(size) | Shape::TextOnCurve(size) => {
                 for [x, y] in places {
                     let width = text_width(&self.label, size);
                     if matches!(self.shape, Shape::TextOnCurve(_)) {
                         let area = [x - width / 2.0, y - 0.6 * size, width, 1.2 * size];
-                        rectangle(svg, area, PAPER, " fill-opacity=\"0.85\"");
+                        svg.rectangle(area, PAPER, " fill-opacity=\"0.85\"");
                     }
-                    text(svg, &self.label, [x, y + 0.35 * size], size, self.colour, "middle");
+                    svg.text(&self.label, [x, y + 0.35 * size], size, self.colour, "middle");
                 }
             }
-            _ => {}
+            _ => {
+                for place in self.places.iter().filter(|place| frame.contains(**place)) {
+                    self.mark(svg, frame.at(*place));
+                }
+            }
         }
     }
 
     /// The sample in a legend.
-    fn sample(&self, svg: &mut String, [x, y]: [f64; 2]) {
+    fn sample(&self, svg: &mut Svg, [x, y]: [f64; 2]) {
         let middle = [x + ENTRY.1 / 2.0, y];
         match self.shape {
-            Shape::Circle(_) | Shape::Dot(_) | Shape::Square | Shape::Cross => self.mark(svg, middle),
+            _ if self.is_mark() => self.mark(svg, middle),
             Shape::Cells(letter, ink) => {
                 let edge = format!(" stroke=\"{}\"", colour(INK));
-                rectangle(svg, [x, y - 8.5, ENTRY.1, 17.0], self.colour, &edge);
-                text(svg, letter, [middle[0], y + 4.5], SMALL, ink, "middle");
+                svg.rectangle([x, y - 8.5, ENTRY.1, 17.0], self.colour, &edge);
+                svg.text(letter, [middle[0], y + 4.5], SMALL, ink, "middle");
             }
-            _ => self.stroke(svg, &[[x, y], [x + ENTRY.1, y]]),
+            _ => self.stroke(svg, &[&[[x, y], [x + ENTRY.1, y]]]),
         }
     }
 
-    fn stroke(&self, svg: &mut String, points: &[[f64; 2]]) {
-        self.halo(svg, points);
-        self.line(svg, points);
-    }
-
-    fn halo(&self, svg: &mut String, points: &[[f64; 2]]) {
-        if let Shape::OnMap(width) | Shape::DashedOnMap(width) | Shape::Border(width) = self.shape {
-            path(svg, points, width + 2.8, HALO, "");
-        }
-    }
-
-    fn line(&self, svg: &mut String, points: &[[f64; 2]]) {
-        let (width, dashes) = match self.shape {
-            Shape::Dashed(width) | Shape::DashedOnMap(width) => (width, " stroke-dasharray=\"7 5\""),
-            Shape::Line(width) | Shape::OnMap(width) | Shape::Bars(width) | Shape::Border(width) => (width, ""),
-            _ => return,
+    /// Lines. The halo of one must not hide its neighbour.
+    fn stroke(&self, svg: &mut Svg, lines: &[&[[f64; 2]]]) {
+        let (Shape::Line(width) | Shape::Dashed(width) | Shape::Bars(width) | Shape::Border(width)) = self.shape else {
+            return;
         };
-        path(svg, points, width, self.colour, dashes);
+        let dashes = match self.shape {
+            Shape::Dashed(_) => " stroke-dasharray=\"7 5\"",
+            _ => "",
+        };
+        for line in lines.iter().filter(|_| self.halo) {
+            svg.line(line, width + 2.8, HALO, "");
+        }
+        for line in lines {
+            svg.line(line, width, self.colour, dashes);
+        }
     }
 
-    fn mark(&self, svg: &mut String, [x, y]: [f64; 2]) {
+    fn mark(&self, svg: &mut Svg, [x, y]: [f64; 2]) {
         let shade = colour(self.colour);
         let circle = |radius, style: &str| format!("<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius}\" {style}/>\n");
         match self.shape {
             Shape::Circle(r) => {
-                *svg += &circle(r, &format!("fill=\"none\" stroke=\"{shade}\" stroke-width=\"1.5\""));
+                svg.0 += &circle(r, &format!("fill=\"none\" stroke=\"{shade}\" stroke-width=\"1.5\""));
             }
-            Shape::Dot(r) => *svg += &circle(r, &format!("fill=\"{shade}\"")),
-            Shape::Square => rectangle(svg, [x - 4.5, y - 4.5, 9.0, 9.0], self.colour, ""),
+            Shape::Dot(r) => svg.0 += &circle(r, &format!("fill=\"{shade}\"")),
+            Shape::Square => svg.rectangle([x - 4.5, y - 4.5, 9.0, 9.0], self.colour, ""),
             _ => {
                 for d in [4.0, -4.0] {
-                    path(svg, &[[x - 4.0, y - d], [x + 4.0, y + d]], 1.2, self.colour, "");
+                    svg.line(&[[x - 4.0, y - d], [x + 4.0, y + d]], 1.2, self.colour, "");
                 }
             }
         }
@@ -453,22 +428,28 @@ fn runs(points: &[Marked], wanted: bool) -> Vec<Vec<Place>> {
     runs.collect()
 }
 
-fn path(svg: &mut String, points: &[[f64; 2]], width: f64, name: &str, more: &str) {
-    let points: Vec<String> = points.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
-    let (points, colour) = (points.join(" "), colour(name));
-    *svg +=
-        &format!("<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"{more}/>\n");
-}
+/// The drawing so far. Colours are names of the table of styles.
+struct Svg(String);
 
-fn rectangle(svg: &mut String, [x, y, width, height]: [f64; 4], name: &str, more: &str) {
-    let (place, colour) = (format!("x=\"{x:.2}\" y=\"{y:.2}\""), colour(name));
-    *svg += &format!("<rect {place} width=\"{width:.2}\" height=\"{height:.2}\" fill=\"{colour}\"{more}/>\n");
-}
+impl Svg {
+    fn line(&mut self, points: &[[f64; 2]], width: f64, name: &str, more: &str) {
+        let points: Vec<String> = points.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
+        let (points, colour) = (points.join(" "), colour(name));
+        self.0 += &format!(
+            "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"{more}/>\n"
+        );
+    }
 
-fn text(svg: &mut String, words: &str, [x, y]: [f64; 2], size: f64, name: &str, anchor: &str) {
-    let (words, colour) = (maud::html! { (words) }.into_string(), colour(name));
-    let place = format!("x=\"{x:.2}\" y=\"{y:.2}\" text-anchor=\"{anchor}\"");
-    *svg += &format!("<text {place} font-size=\"{size}\" fill=\"{colour}\">{words}</text>\n");
+    fn rectangle(&mut self, [x, y, width, height]: [f64; 4], name: &str, more: &str) {
+        let (place, colour) = (format!("x=\"{x:.2}\" y=\"{y:.2}\""), colour(name));
+        self.0 += &format!("<rect {place} width=\"{width:.2}\" height=\"{height:.2}\" fill=\"{colour}\"{more}/>\n");
+    }
+
+    fn text(&mut self, words: &str, [x, y]: [f64; 2], size: f64, name: &str, anchor: &str) {
+        let (words, colour) = (maud::html! { (words) }.into_string(), colour(name));
+        let place = format!("x=\"{x:.2}\" y=\"{y:.2}\" text-anchor=\"{anchor}\"");
+        self.0 += &format!("<text {place} font-size=\"{size}\" fill=\"{colour}\">{words}</text>\n");
+    }
 }
 
 /// Width of a text in a usual font, px.
@@ -513,7 +494,7 @@ mod tests {
         let mut panel = Panel::new(((0.0, 4.0), ""), ((0.0, 1.0), "")).legend(Legend::UpperRight);
         let points = [true, true, false, true].into_iter().enumerate();
         let points: Vec<Marked> = points.map(|(n, stable)| ((n as f64, 0.5), stable)).collect();
-        panel.curve(&points, 2.0, EXACT, "orbits");
+        panel.curve(points, 2.0, EXACT, "orbits");
         let spans: Vec<(f64, f64, &str)> = panel
             .series
             .iter()

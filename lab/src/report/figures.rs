@@ -33,7 +33,7 @@ const FIRST_ORDER: &str = "first-order theory";
 const VISIBLE: f64 = 0.02;
 
 fn circles(panel: &mut Panel, points: impl Iterator<Item = Place>, label: &str) {
-    panel.add(Shape::Circle(3.5), points.collect(), MEASURED, label);
+    panel.add(Shape::Circle(3.5), points, MEASURED, label);
 }
 
 /// Error bars of 95 %: places with their standard uncertainties, vertical or horizontal, on an axis of that range.
@@ -43,7 +43,7 @@ fn error_bars(panel: &mut Panel, bars: impl Iterator<Item = (Place, f64)>, verti
         let (dx, dy) = if vertical { (0.0, 1.96 * u) } else { (1.96 * u, 0.0) };
         [(x - dx, y - dy), (x + dx, y + dy)]
     });
-    panel.add(Shape::Bars(1.2), ends.collect(), MEASURED, "95 % of the measurement");
+    panel.add(Shape::Bars(1.2), ends, MEASURED, "95 % of the measurement");
 }
 
 /// The right branch of first-order theory's backbone, from the fold up to an amplitude.
@@ -56,17 +56,18 @@ fn theory_backbone(p: &Dimensionless, top: f64) -> Vec<Marked> {
 }
 
 /// Adds the right branch of the backbone, by theory and exact, each with its stability.
-fn add_backbones(panel: &mut Panel, p: &Dimensionless, theory: &[Marked]) {
+fn add_backbones(panel: &mut Panel, p: &Dimensionless, theory: Vec<Marked>) {
     let fold = SlowFlow::new(p.lambda, p.r).manifold.b_min();
     let branch = orbit::backbone(p, &ContinuationLimits::default());
-    let exact: Vec<Marked> = branch
-        .iter()
-        .flat_map(|branch| &branch.points)
-        .filter(|motion| motion.b >= fold)
-        .map(|motion| ((motion.sigma, motion.c), motion.stable))
-        .collect();
+    let motions = branch.iter().flat_map(|branch| &branch.points);
+    let exact = motions.filter(|motion| motion.b >= fold);
     panel.curve(theory, 2.0, THEORY, FIRST_ORDER);
-    panel.curve(&exact, 1.6, EXACT, "exact orbits");
+    panel.curve(
+        exact.map(|motion| ((motion.sigma, motion.c), motion.stable)),
+        1.6,
+        EXACT,
+        "exact orbits",
+    );
 }
 
 /// The identified backbone beside theory and exact orbits: amplitude over detuning.
@@ -90,23 +91,18 @@ pub fn backbone(result: &Comparison) -> Figure {
     let mut panel = Panel::new(((low, high), DETUNING), ((0.0, top), amplitude(p)))
         .heading(&title, &caption(p, lock.g))
         .legend(Legend::UpperRight);
-    add_backbones(&mut panel, p, &theory);
+    add_backbones(&mut panel, p, theory);
     let predicted = result.decay.iter();
     let predicted = predicted.filter_map(|compared| Some((compared.sigma_predicted?, compared.point.c)));
-    let predicted = predicted.filter(|(_, c)| *c > fold).collect();
-    panel.add(
-        Shape::Line(1.0),
-        predicted,
-        EXACT,
-        "free decay, predicted by the exact plant",
-    );
+    let label = "free decay, predicted by the exact plant";
+    panel.add(Shape::Line(1.0), predicted.filter(|(_, c)| *c > fold), EXACT, label);
     let identified = decay().step_by(THINNED).map(|point| (point.sigma, point.c));
     circles(&mut panel, identified, IDENTIFIED);
     let place = (lock.sigma, lock.c);
     for (uncertainty, vertical, range) in [(lock.u_sigma, false, high - low), (lock.u_c, true, top)] {
         error_bars(&mut panel, std::iter::once((place, uncertainty)), vertical, range);
     }
-    panel.add(Shape::Square, vec![place], MEASURED, "locked, measured");
+    panel.add(Shape::Square, [place], MEASURED, "locked, measured");
     Figure::single(panel)
 }
 
@@ -115,15 +111,10 @@ const FASTEST: f64 = 1.4;
 
 /// The slow invariant manifold from speed 0 on, as a function of the particle speed: amplitude as `read`, and stability.
 fn manifold_curve(flow: &SlowFlow, read: impl Fn(f64, f64) -> f64) -> Vec<Marked> {
+    let place = |b| (b, read(b, flow.manifold.c(b)));
     let speeds = equally_spaced(0.0, FASTEST, 401);
-    speeds
-        .map(|b| {
-            (
-                (b, read(b, flow.manifold.c(b))),
-                theory::impacts_stable(&flow.manifold, b),
-            )
-        })
-        .collect()
+    let points = speeds.map(|b| (place(b), theory::impacts_stable(&flow.manifold, b)));
+    points.collect()
 }
 
 /// The slow invariant manifold with the decay on it: amplitude over particle speed, the axes of the study.
@@ -138,15 +129,12 @@ pub fn manifold(result: &Comparison) -> Figure {
         )
         .legend(Legend::LowerRight);
     let curve = manifold_curve(&flow, |b, c| c * reading(p, b, flow.free_detuning(b)));
-    panel.curve(&curve, 2.0, THEORY, "manifold");
+    panel.curve(curve, 2.0, THEORY, "manifold");
     let decay = result.decay.iter().map(|compared| compared.point).step_by(THINNED);
-    circles(
-        &mut panel,
-        decay.filter_map(|point| point.b.map(|b| (b, point.c))),
-        IDENTIFIED,
-    );
+    let decay = decay.filter_map(|point| Some((point.b?, point.c)));
+    circles(&mut panel, decay, IDENTIFIED);
     if let Some(b) = lock.b {
-        panel.add(Shape::Square, vec![(b, lock.at.c)], MEASURED, "locked, measured");
+        panel.add(Shape::Square, [(b, lock.at.c)], MEASURED, "locked, measured");
     }
     Figure::single(panel)
 }
@@ -182,13 +170,13 @@ fn tracked_amplitude(tracked: &TrackedComparison) -> Panel {
     let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
         .heading("Backbone, tracked with the loop closed", &text)
         .legend(Legend::UpperRight);
-    add_backbones(&mut panel, p, &theory_backbone(p, top));
+    add_backbones(&mut panel, p, theory_backbone(p, top));
     let places = || points().map(|point| (point.at.sigma, point.at.c));
     circles(&mut panel, places(), "tracked");
     let bars = places().zip(points().map(|point| point.at.u_sigma));
     error_bars(&mut panel, bars, false, x.1 - x.0);
     let unsettled = places().zip(points()).filter(|(_, point)| !point.settled);
-    let unsettled = unsettled.map(|(place, _)| place).collect();
+    let unsettled = unsettled.map(|(place, _)| place);
     panel.add(Shape::Cross, unsettled, MEASURED, "not settled in time");
     panel
 }
@@ -205,13 +193,10 @@ fn tracked_drive(tracked: &TrackedComparison) -> Panel {
     .heading("The drive that holds each level", "")
     .legend(Legend::LowerRight);
     let theory = theory::backbone(p, SlowFlow::new(p.lambda, p.r).manifold.b_min(), 1.3, 600);
-    let theory: Vec<Marked> = theory
-        .iter()
-        .map(|point| ((point.c, point.g), point.stable()))
-        .collect();
-    panel.curve(&theory, 2.0, THEORY, FIRST_ORDER);
+    let theory = theory.iter().map(|point| ((point.c, point.g), point.stable()));
+    panel.curve(theory, 2.0, THEORY, FIRST_ORDER);
     let exact = tracked.exact.places().iter().map(|place| (place[0], place[2]));
-    panel.add(Shape::Line(1.6), exact.collect(), EXACT, "exact orbits");
+    panel.add(Shape::Line(1.6), exact, EXACT, "exact orbits");
     let places = || points().map(|point| (point.at.c, point.at.g));
     circles(&mut panel, places(), "tracked");
     let bars = places().zip(points().map(|point| point.at.u_g));
@@ -240,7 +225,7 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
             )
         })
         .collect();
-    model.sort_by(|one, other| one.0.total_cmp(&other.0));
+    model.sort_by(|place, next| place.0.total_cmp(&next.0));
     let [amplitudes, frequencies] = [|place: Place| place.0, |place: Place| place.1]
         .map(|part| range((f64::MAX, f64::MIN), points.iter().map(|point| part(place(point)))));
     let margin = 0.06 * (amplitudes.1 - amplitudes.0);
@@ -267,10 +252,10 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
     circles(&mut backbone, points.iter().map(place), "measured");
     let bars = points.iter().map(|point| (place(point), point.omega.uncertainty / TAU));
     error_bars(&mut backbone, bars, true, y.1 - y.0);
-    let left_out = fit.left_out.iter().map(|n| place(&points[*n])).collect();
+    let left_out = fit.left_out.iter().map(|n| place(&points[*n]));
     backbone.add(Shape::Cross, left_out, MEASURED, "left out");
 
-    let residuals = fit.residuals.iter().flatten().map(|one| one.abs());
+    let residuals = fit.residuals.iter().flatten().map(|residual| residual.abs());
     let most = 1.1 * residuals.fold(3.0, f64::max);
     let model = if fit.is_rejected() { "rejected" } else { "not rejected" };
     let text = format!(
@@ -282,19 +267,23 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
         .heading("Residuals over their standard uncertainties", &text)
         .legend(Legend::UpperRight);
     for limit in [-1.96, 1.96] {
-        below.add(Shape::Dashed(1.0), vec![(x.0, limit), (x.1, limit)], INK, "±1.96 u");
+        below.add(Shape::Dashed(1.0), [(x.0, limit), (x.1, limit)], INK, "±1.96 u");
     }
-    for (n, (shape, name)) in [
-        (Shape::Dot(3.0), "amplitude"),
-        (Shape::Circle(3.5), "frequency"),
-        (Shape::Square, "drive"),
+    for (n, (shape, colour, name)) in [
+        (Shape::Dot(3.0), PARTICLE, "amplitude"),
+        (Shape::Circle(3.5), MEASURED, "frequency"),
+        (Shape::Square, EXACT, "drive"),
     ]
     .into_iter()
     .enumerate()
     {
         let places = used.iter().zip(&fit.residuals);
-        let places = places.map(|(point, residual)| (place(point).0, residual[n])).collect();
-        below.add(shape, places, [PARTICLE, MEASURED, EXACT][n], name);
+        below.add(
+            shape,
+            places.map(|(point, residual)| (place(point).0, residual[n])),
+            colour,
+            name,
+        );
     }
     Figure { size: (width, 2.0 * height), panels: vec![backbone, below] }
 }
@@ -351,9 +340,9 @@ fn driven_panel(result: &Comparison, driven: &[Triple], row: usize, y: ((f64, f6
         let caption = format!("{}, G = {:.3}", rig(&result.parameters), result.lock.at.g);
         panel = panel.heading("Seeking and holding resonance", &caption);
     }
-    let measured = driven.iter().map(|triple| (triple[0], triple[row])).collect();
+    let measured = driven.iter().map(|triple| (triple[0], triple[row]));
     panel.add(Shape::Line(1.6), measured, MEASURED, "measured");
-    let level = |value: [f64; 2]| vec![(0.0, value[row - 1]), (end, value[row - 1])];
+    let level = |value: [f64; 2]| [(0.0, value[row - 1]), (end, value[row - 1])];
     if let Some(exact) = &result.exact {
         panel.add(Shape::Line(1.6), level([exact.c, exact.sigma]), EXACT, "exact orbit");
     }
@@ -371,12 +360,7 @@ fn decay_panel(theory: &[Triple], points: &[Triple], row: usize, y: (f64, f64)) 
         panel = panel.heading("Free decay", "the drive is off from 0 on");
     }
     let place = |triple: &Triple| (triple[0], triple[row]);
-    panel.add(
-        Shape::Line(1.2),
-        theory.iter().map(place).collect(),
-        THEORY,
-        FIRST_ORDER,
-    );
+    panel.add(Shape::Line(1.2), theory.iter().map(place), THEORY, FIRST_ORDER);
     circles(&mut panel, points.iter().map(place), IDENTIFIED);
     panel.legend(if row == 1 { Legend::UpperRight } else { Legend::None })
 }
@@ -424,7 +408,7 @@ pub fn approach(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
             &caption(p, lock.g),
         )
         .legend(Legend::LowerRight);
-    panel.curve(&manifold_curve(&flow, |_, c| c), 2.4, THEORY, "manifold");
+    panel.curve(manifold_curve(&flow, |_, c| c), 2.4, THEORY, "manifold");
     // Starts on all sides of the manifold: B and C in parts of those at the locked point.
     for (b, c) in [(0.93, 1.35), (1.07, 0.65), (0.8, 0.75), (1.14, 1.2)] {
         let places = sequence(lock.g, (b * lock.b, c * lock.c));
@@ -433,7 +417,7 @@ pub fn approach(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
     }
     let free = sequence(0.0, (lock.b, lock.c));
     panel.add(Shape::Circle(3.5), free, MODULATION, "without drive");
-    panel.add(Shape::Square, vec![(lock.b, lock.c)], INK, "phase resonance");
+    panel.add(Shape::Square, [(lock.b, lock.c)], INK, "phase resonance");
     Figure::single(panel)
 }
 
@@ -461,7 +445,7 @@ pub fn backbones(p: &Dimensionless) -> Figure {
             .collect();
         // Without loss at the impacts C vanishes at the fold, and sigma jumps from one side to the other there.
         for piece in points.chunk_by(|place, next| (place.0.0 - next.0.0).abs() < 1.0) {
-            panel.curve(piece, width, THEORY, FIRST_ORDER);
+            panel.curve(piece.iter().copied(), width, THEORY, FIRST_ORDER);
         }
         // The label is beside the fold, where the curves are distinct; for a fold near the axis, where its curve enters from the left.
         let flow = SlowFlow::new(p.lambda, r);
@@ -473,7 +457,7 @@ pub fn backbones(p: &Dimensionless) -> Figure {
             Some((sigma, c)) => (sigma + 0.4, c),
             None => (0.0, 0.1),
         };
-        panel.add(Shape::TextOnCurve(size), vec![place], INK, &format!("r = {r}"));
+        panel.add(Shape::TextOnCurve(size), [place], INK, &format!("r = {r}"));
     }
     Figure::single(panel)
 }
@@ -499,10 +483,8 @@ pub fn responses(p: &Dimensionless, responses: &[FrequencyResponse]) -> Figure {
     for response in responses {
         // The label is on the left flank, below the peak.
         let stable = response.symmetric().flat_map(|branch| &branch.points);
-        let stable: Vec<Place> = stable
-            .filter(|point| point.stable)
-            .map(|point| (point.sigma, point.c))
-            .collect();
+        let stable = stable.filter(|point| point.stable);
+        let stable: Vec<Place> = stable.map(|point| (point.sigma, point.c)).collect();
         let Some(peak) = stable.iter().copied().max_by(|place, next| place.1.total_cmp(&next.1)) else {
             continue;
         };
@@ -510,15 +492,12 @@ pub fn responses(p: &Dimensionless, responses: &[FrequencyResponse]) -> Figure {
         let flank = stable.into_iter().filter(|place| place.0 < peak.0);
         if let Some((sigma, c)) = flank.min_by(|place, next| off(place).total_cmp(&off(next))) {
             let label = format!("G = {:.3}", response.g);
-            panel.add(Shape::TextOnCurve(13.0), vec![(sigma, c)], INK, &label);
+            panel.add(Shape::TextOnCurve(13.0), [(sigma, c)], INK, &label);
         }
     }
     let backbone = theory::backbone(p, fold, 1.4 * B_SYMMETRY_BREAKING, 600);
-    let backbone: Vec<Marked> = backbone
-        .iter()
-        .map(|point| ((point.sigma, point.c), point.stable()))
-        .collect();
-    panel.curve(&backbone, 2.6, THEORY, "backbone");
+    let backbone = backbone.iter().map(|point| ((point.sigma, point.c), point.stable()));
+    panel.curve(backbone, 2.6, THEORY, "backbone");
     Figure { size: (WIDE, SIZE.1), panels: vec![panel] }
 }
 
@@ -530,12 +509,12 @@ fn add_response(panel: &mut Panel, p: &Dimensionless, response: &FrequencyRespon
             let c = point.motion.c * reading(p, point.motion.b, point.sigma);
             ((point.sigma, c), stable)
         });
-        panel.curve(&points.collect::<Vec<_>>(), 1.0, THEORY, "theory");
+        panel.curve(points, 1.0, THEORY, "theory");
     }
     for component in &response.components {
         let points = component.branch.points.iter();
-        let points: Vec<Marked> = points.map(|point| ((point.sigma, point.c), point.stable)).collect();
-        panel.curve(&points, 2.0, EXACT, "exact");
+        let points = points.map(|point| ((point.sigma, point.c), point.stable));
+        panel.curve(points, 2.0, EXACT, "exact");
     }
 }
 
@@ -579,16 +558,12 @@ fn displacements(p: &Dimensionless, motion: &Periodic, rows: &[[f64; 5]], impact
         .heading("One period of the locked motion", &caption)
         .legend(Legend::Beside(182.0));
     for side in [1.0, -1.0] {
-        panel.add(
-            Shape::Line(2.0),
-            over_period(rows, |row| row[1] + side),
-            INK,
-            "walls, q₁ ± 1",
-        );
+        let wall = over_period(rows, |row| row[1] + side);
+        panel.add(Shape::Line(2.0), wall, INK, "walls, q₁ ± 1");
     }
     panel.add(Shape::Line(2.4), q1, EXACT, "mass q₁");
     panel.add(Shape::Line(2.0), q2, PARTICLE, "particle q₂");
-    let marks = impacts.iter().map(|(t, q2, _)| (*t, *q2)).collect();
+    let marks = impacts.iter().map(|(t, q2, _)| (*t, *q2));
     panel.add(Shape::Circle(6.0), marks, INK, "impacts");
     panel
 }
@@ -603,8 +578,8 @@ fn coordinates(p: &Dimensionless, rows: &[[f64; 5]], impacts: &[Impact], theory:
         ((-1.15 * high, 1.15 * high), "v and w, over b"),
     )
     .legend(Legend::Beside(182.0));
-    panel.add(Shape::Line(1.0), vec![(0.0, 1.0), (1.0, 1.0)], INK, "walls, w = ± 1");
-    panel.add(Shape::Line(1.0), vec![(0.0, -1.0), (1.0, -1.0)], INK, "");
+    panel.add(Shape::Line(1.0), [(0.0, 1.0), (1.0, 1.0)], INK, "walls, w = ± 1");
+    panel.add(Shape::Line(1.0), [(0.0, -1.0), (1.0, -1.0)], INK, "");
     panel.add(Shape::Line(2.6), w, PARTICLE, "w = q₁ − q₂");
     panel.add(Shape::Line(2.6), v, EXACT, "v = q₁ + ε q₂");
     if let Some(point) = theory {
@@ -612,10 +587,10 @@ fn coordinates(p: &Dimensionless, rows: &[[f64; 5]], impacts: &[Impact], theory:
         let wave = Waveform::new(&scene, point.sigma, point.b, -FRAC_PI_2);
         for value in [Waveform::w, Waveform::v] {
             let places = (0..=POINTS).map(|n| (part(n), value(&wave, part(n) * TAU / wave.omega)));
-            panel.add(Shape::Line(0.9), places.collect(), THEORY, FIRST_ORDER);
+            panel.add(Shape::Line(0.9), places, THEORY, FIRST_ORDER);
         }
     }
-    let marks = impacts.iter().map(|(t, _, wall)| (*t, *wall)).collect();
+    let marks = impacts.iter().map(|(t, _, wall)| (*t, *wall));
     panel.add(Shape::Circle(6.0), marks, INK, "");
     panel
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use lovines::InvalidValue;
 use phase_lock::ConfigError;
 use serde::Serialize;
+use serde_json::Value;
 use thiserror::Error;
 
 use super::figures::{backbone, fitted, manifold, regimes, tracked_with_drive};
@@ -84,13 +85,6 @@ pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>,
     Ok(files::write(out, [("interrupted.csv", table(samples))])?)
 }
 
-/// Writes a histogram to `file`: upper limits of the lateness, s, and numbers of samples.
-pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let lines = classes.iter().map(|(limit, count)| format!("{limit:e},{count}\n"));
-    let text = String::from("lateness_s,samples\n") + &lines.collect::<String>();
-    Ok(vec![files::write_file(file, &text)?])
-}
-
 pub(super) fn json(result: &impl Serialize) -> Result<String, ReportError> {
     Ok(serde_json::to_string_pretty(result)? + "\n")
 }
@@ -110,25 +104,16 @@ pub(super) fn csv<T: Serialize>(headings: &[&str], rows: impl IntoIterator<Item 
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// The points along a decay, as CSV.
+/// The points along a decay, as CSV: the columns are the keys of their JSON.
 pub fn decay_csv(result: &Comparison) -> Result<String, ReportError> {
-    #[derive(Serialize)]
-    struct Compared {
-        sigma_theory: Option<f64>,
-        sigma_exact: Option<f64>,
-        sigma_slow_flow: Option<f64>,
-        sigma_predicted: Option<f64>,
-    }
-    let rows = result.decay.iter().map(|compared| {
-        let row = Compared {
-            sigma_theory: compared.sigma_theory,
-            sigma_exact: compared.sigma_exact,
-            sigma_slow_flow: compared.sigma_slow_flow,
-            sigma_predicted: compared.sigma_predicted,
-        };
-        (compared.point, row)
-    });
-    csv(&[], rows)
+    let points = result.decay.iter().map(serde_json::to_value);
+    let points = points.collect::<Result<Vec<Value>, _>>()?;
+    let points: Vec<_> = points.iter().filter_map(Value::as_object).collect();
+    let Some(first) = points.first() else {
+        return Ok(String::new());
+    };
+    let headings: Vec<&str> = first.keys().map(String::as_str).collect();
+    csv(&headings, points.iter().map(|point| point.values().collect::<Vec<_>>()))
 }
 
 /// The points of a tracked backbone.

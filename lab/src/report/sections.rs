@@ -58,19 +58,19 @@ fn experiment(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
         "Amplitude and frequency over time. Left: the loop searches for phase resonance and holds it; measured once per period. Right: \
          the drive is off, and the motion decays along the backbone until the impacts lose synchrony at the fold. \
          Times are in periods 2π/ω₀ of the oscillator alone.",
-        figures::history(&record, scene, &result).svg(),
+        &figures::history(&record, scene, &result),
     );
     section.figure(
         "decay-on-sim",
         "The decay on the slow invariant manifold (axes of the study: amplitude over particle speed), from the locked point (square) down \
          the right branch to its fold.",
-        figures::manifold(&result).svg(),
+        &figures::manifold(&result),
     );
     section.figure(
         "identified-backbone",
         "The identified backbone: points along the decay (circles), the locked point (square), the exact curve and first-order theory. \
          Uncertainties of the locked point are drawn where they are longer than its mark.",
-        figures::backbone(&result).svg(),
+        &figures::backbone(&result),
     );
     section.attach("backbone.csv", decay_csv(&result)?);
     section.attach("identification.json", json(&result)?);
@@ -196,7 +196,7 @@ fn describe_lock(section: &mut Section, result: &Comparison) {
     section.table(
         "The locked point. σ = (ω/ω₀ − 1)/ε; C: amplitude of the response over b; B: particle speed over b ω₀. Numbers after ± are \
          standard uncertainties.",
-        Table::new(&format!(" | {}", names.join(" | "))).rows(rows),
+        &Table::new(&format!(" | {}", names.join(" | "))).rows(rows),
     );
     if let Some(friction) = &lock.friction {
         section.words(format!("Friction: {}.", summary::friction_text(friction)));
@@ -233,7 +233,7 @@ fn tracking(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
     section.figure(
         "tracked-backbone",
         "The backbone tracked with the loop closed, the exact curve and first-order theory.",
-        figures::tracked(&tracked).svg(),
+        &figures::tracked(&tracked),
     );
     if let Some(worst) = tracked.worst() {
         section.budget(
@@ -267,14 +267,14 @@ fn theory(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
              manifold reach it within a few impacts and move along it to the locked point (square). Without drive, the motion moves \
              down to the fold and loses its synchrony there. It lies a little below the manifold, as the measured decay does: the \
              drift along the manifold is not infinitely slow compared with the approach to it.",
-            figures::approach(&p, point).svg(),
+            &figures::approach(&p, point),
         );
     }
     section.figure(
         "backbones",
         "Backbones of first-order theory. Their shape does not depend on λ, but their stability does. The smaller the loss at the \
          impacts, the lower the amplitude at the fold.",
-        figures::backbones(&p).svg(),
+        &figures::backbones(&p),
     );
     match convergence(&p, 6) {
         Some(study) => {
@@ -288,7 +288,7 @@ fn theory(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
                 .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|value| format!("{value:.3e}")));
             section.table(
                 "Theory minus exact orbit at phase resonance; λ, r and G as in the scene.",
-                Table::new("ε | in σ | in C | in B").rows(rows),
+                &Table::new("ε | in σ | in C | in B").rows(rows),
             );
             section.words(section.finding.clone());
             section.attach("convergence.csv", csv(&[], &study.rows)?);
@@ -333,14 +333,14 @@ fn curves(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
             "responses",
             "Frequency responses at several excitations: exact, first-order, and the backbone of the theory near their maxima. \
              Where a response loses its symmetry, the asymmetric motions (blue, beside the dashed curve) take over.",
-            figures::responses(&p, &responses).svg(),
+            &figures::responses(&p, &responses),
         );
     }
     let changes = changes(&responses);
     if !changes.is_empty() {
         section.table(
             "Where the symmetric motions on the exact frequency responses change stability.",
-            changes,
+            &changes,
         );
     }
     if let Some(motion) = locked(&p) {
@@ -351,7 +351,7 @@ fn curves(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
             "period",
             "One period of the locked motion. Above: the primary mass with its walls, and the particle between them; circles \
              mark the impacts. Below: centre of mass and relative displacement, exact and by first-order theory.",
-            figures::period(&p, &motion, theory).svg(),
+            &figures::period(&p, &motion, theory),
         );
     }
     section.attach("curves.csv", curves_csv(&curve, &responses)?);
@@ -452,7 +452,7 @@ fn regimes(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
         "regimes",
         "The regime map. The black line is the border of the island in which first-order theory has a stable symmetric 1:1 motion. The \
          coloured curves are exact bifurcations of the 1:1 motions, solid where they bound the stability of one.",
-        figures::regimes(&map).svg(),
+        &figures::regimes(&map),
     );
     section.budget(
         "regime map",
@@ -482,6 +482,6 @@ fn describe_map(section: &mut Section, map: &Map, subject: &Subject) {
          quasi-periodic if the exponent is zero within its uncertainty, and otherwise undecided.",
         x, y, LIMIT
     ));
-    section.table("How often each regime occurs.", summary::regimes(map));
+    section.table("How often each regime occurs.", &summary::regimes(map));
     section.words(section.finding.clone());
 }

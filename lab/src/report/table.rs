@@ -1,4 +1,4 @@
-//! Tables: as text for a terminal, as Markdown for the documentation, as HTML for the page.
+//! Tables: as text for a terminal, as HTML for a page.
 
 use maud::{Markup, html};
 
@@ -46,14 +46,6 @@ impl Table {
         all().map(line).collect()
     }
 
-    /// A Markdown table.
-    pub fn markdown(&self) -> String {
-        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-        let rule = format!("|{}\n", "---|".repeat(self.headings.len()));
-        let rows: String = self.rows.iter().map(|row| line(row)).collect();
-        line(&self.headings) + &rule + &rows
-    }
-
     /// An HTML table with its caption; columns of numbers are set to the right.
     pub fn html(&self, caption: &str) -> Markup {
         let numbers = self.numbers();
@@ -61,18 +53,13 @@ impl Table {
         html! {
             table {
                 caption { (caption) }
-                "\n"
                 thead { tr { @for (n, cell) in self.headings.iter().enumerate() { th class=[class(n)] { (cell) } } } }
-                "\n"
                 tbody {
-                    "\n"
                     @for row in &self.rows {
                         tr { @for (n, cell) in row.iter().enumerate() { td class=[class(n)] { (cell) } } }
-                        "\n"
                     }
                 }
             }
-            "\n"
         }
     }
 
@@ -114,14 +101,6 @@ mod tests {
     #[test]
     fn words_are_set_to_the_left_and_numbers_to_the_right() {
         assert_eq!(table().text(), "  what        C\n  a < b     0.5\n  c      -10.25\n");
-    }
-
-    #[test]
-    fn markdown_has_a_rule_below_the_headings() {
-        assert_eq!(
-            table().markdown(),
-            "| what | C |\n|---|---|\n| a < b | 0.5 |\n| c | -10.25 |\n"
-        );
     }
 
     #[test]

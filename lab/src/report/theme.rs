@@ -19,20 +19,20 @@ pub const MODULATION: &str = "modulation";
 pub const HALO: &str = "halo";
 pub const BORDER: &str = "theory border";
 
-/// Rows of the table: name, colour on white paper, colour on a dark screen.
-static STYLES: LazyLock<Vec<[&str; 3]>> = LazyLock::new(|| {
+/// Rows of the table: name, colour on white paper, colour on a dark screen; letter on a map, and the name of the letter's colour.
+static STYLES: LazyLock<Vec<[&str; 5]>> = LazyLock::new(|| {
     let rows = include_str!("styles.csv").lines().skip(1);
     rows.map(|row| {
         let mut cells = row.split(',');
-        [(); 3].map(|()| cells.next().unwrap_or_default())
+        [(); 5].map(|()| cells.next().unwrap_or_default())
     })
     .collect()
 });
 
 /// The row of a name; the names are those of this file, of regimes and of bifurcations.
-fn row(name: &str) -> [&'static str; 3] {
-    let found = STYLES.iter().find(|row| row[0] == name);
-    *found.unwrap_or_else(|| panic!("styles.csv has no row `{name}`"))
+fn row(name: &str) -> [&'static str; 5] {
+    let style = STYLES.iter().find(|row| row[0] == name);
+    *style.unwrap_or_else(|| panic!("styles.csv has no row `{name}`"))
 }
 
 /// The colour of a name on white paper, as `#RRGGBB`.
@@ -51,39 +51,8 @@ pub fn unstable(name: &'static str) -> &'static str {
 
 /// The letter of a regime on the map, and the name of the letter's colour.
 pub fn letter(regime: Regime) -> (&'static str, &'static str) {
-    let letter = match regime {
-        Regime::NoImpacts => "O",
-        Regime::Symmetric => "S",
-        Regime::Asymmetric => "A",
-        Regime::Several => "n",
-        Regime::QuasiPeriodic => "Q",
-        Regime::Modulated => "M",
-        Regime::Chaotic => "C",
-        Regime::Undecided => "U",
-        // The map shows none of these.
-        Regime::Other | Regime::Unresolved | Regime::NotEstablished | Regime::Unknown => "?",
-    };
-    let [_, light, dark] = row(regime.name());
-    let ink = match (luminance(light) > 0.25, light == dark) {
-        (true, true) => BORDER,
-        (false, true) => HALO,
-        (true, false) => INK,
-        (false, false) => PAPER,
-    };
-    (letter, ink)
-}
-
-/// Relative luminance of a colour `#RRGGBB`, from 0 to 1 (WCAG 2.2).
-fn luminance(colour: &str) -> f64 {
-    let channel = |from: usize| {
-        let value = u8::from_str_radix(&colour[from..from + 2], 16).unwrap_or_default();
-        let value = f64::from(value) / 255.0;
-        match value <= 0.04045 {
-            true => value / 12.92,
-            false => ((value + 0.055) / 1.055).powf(2.4),
-        }
-    };
-    0.2126 * channel(1) + 0.7152 * channel(3) + 0.0722 * channel(5)
+    let [_, _, _, letter, colour] = row(regime.name());
+    (letter, colour)
 }
 
 /// A figure for dark screens.
@@ -95,9 +64,9 @@ pub fn dark(svg: &str) -> String {
 
 /// Style rules that give figures inside a page their dark colours.
 pub fn dark_rules() -> String {
-    let changed = STYLES.iter().filter(|[_, light, dark]| light != dark);
+    let changed = STYLES.iter().filter(|[_, light, dark, ..]| light != dark);
     changed
-        .flat_map(|[_, light, dark]| {
+        .flat_map(|[_, light, dark, ..]| {
             ["fill", "stroke"].map(|what| format!("svg [{what}=\"{light}\"]{{{what}:{dark}}}"))
         })
         .collect()
@@ -107,6 +76,18 @@ pub fn dark_rules() -> String {
 mod tests {
     use super::*;
     use crate::orbit::Bifurcation;
+
+    /// Relative luminance of a colour `#RRGGBB`, from 0 to 1 (WCAG 2.2).
+    fn luminance(colour: &str) -> f64 {
+        let channel = |from: usize| {
+            let value = f64::from(u8::from_str_radix(&colour[from..from + 2], 16).unwrap()) / 255.0;
+            match value <= 0.04045 {
+                true => value / 12.92,
+                false => ((value + 0.055) / 1.055).powf(2.4),
+            }
+        };
+        0.2126 * channel(1) + 0.7152 * channel(3) + 0.0722 * channel(5)
+    }
 
     #[test]
     fn regimes_differ_in_lightness() {
@@ -152,7 +133,7 @@ mod tests {
         let style = include_str!("../../../live/page/style.css").to_uppercase();
         let (light, dark) = style.split_once("@MEDIA (PREFERS-COLOR-SCHEME: DARK)").unwrap();
         let mut found = 0;
-        for [name, on_paper, on_screen] in STYLES.iter() {
+        for [name, on_paper, on_screen, ..] in STYLES.iter() {
             let property = format!("--{}: ", name.replace([' ', ':'], "-").to_uppercase());
             let value = |sheet: &str| Some(sheet.split_once(&property)?.1[..7].to_string());
             let Some(colour) = value(light) else { continue };

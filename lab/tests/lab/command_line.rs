@@ -104,34 +104,7 @@ fn bad_input_ends_with_code_two_and_one_message() {
     fails(&["theory", "--scene", "no-such.toml"], 2, "no-such.toml");
     fails(&["theory", "--points", "1"], 2, "--points");
     fails(&["dance"], 2, "dance");
-}
-
-#[test]
-fn counts_of_zero_are_refused_with_the_allowed_range() {
-    for server in ["rig", "controller"] {
-        fails(&[server, "--listen", "127.0.0.1:0", "--sessions", "0"], 2, "from 1 to");
-    }
-}
-
-#[test]
-fn a_plant_without_damping_locks_on_its_exact_orbit() {
-    let folder = tempfile::tempdir().unwrap();
-    let settings = ["plant.c=0", "plant.r=0.3", "excitation.G=0.8"].map(|one| format!("--set={one}"));
-    let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
-    let out = folder.path().to_str().unwrap();
-    let found = json(
-        &[
-            &["identify", "--rig", "built-in", "--json", "--out", out][..],
-            &settings,
-        ]
-        .concat(),
-    );
-    let orbits = json(&[&["orbit", "--json"][..], &settings].concat());
-    let stable = orbits.as_array().unwrap().iter().find(|orbit| orbit["stable"] == true);
-    for key in ["sigma", "C"] {
-        let difference = found["lock"][key].as_f64().unwrap() - stable.unwrap()[key].as_f64().unwrap();
-        assert!(difference.abs() < 1e-4, "{key}: {difference}");
-    }
+    fails(&["rig", "--listen", "127.0.0.1:0", "--sessions", "0"], 2, "1..");
 }
 
 #[test]
@@ -157,14 +130,8 @@ fn a_drive_without_a_stable_orbit_is_told_at_which_drives_one_is_stable() {
 fn curves_and_settled_orbits_come_as_json_too() {
     let backbone = json(&["orbit", "--backbone", "--json"]);
     assert!(backbone["points"].as_array().map_or(0, Vec::len) > 100);
-    let mode = [
-        "orbit",
-        "--backbone",
-        "--json",
-        "--set=plant.c=0.0",
-        "--set=plant.r=1.0",
-        "--set=excitation.G=0",
-    ];
+    let mode = ["--set=plant.c=0", "--set=plant.r=1", "--set=excitation.G=0"];
+    let mode = [&["orbit", "--backbone", "--json"], &mode[..]].concat();
     let mode = json(&mode);
     let points = mode["points"].as_array().unwrap();
     assert!(points.len() > 100 && points.iter().all(|one| one["G"].as_f64().unwrap().abs() < 1e-9));
@@ -190,12 +157,9 @@ fn a_map_is_written_as_table_and_figures() {
     let out = folder.path().to_str().unwrap();
     let output = vines(&[
         "map",
-        "--x",
-        "sigma=-2:1:4",
-        "--y",
-        "G=1:1.4:3",
-        "--periods",
-        "2000",
+        "--x=sigma=-2:1:4",
+        "--y=G=1:1.4:3",
+        "--periods=2000",
         "--out",
         out,
     ]);
@@ -252,40 +216,6 @@ fn a_folder_that_is_a_file_is_refused_as_wrong_usage_before_anything_runs() {
 }
 
 #[test]
-fn results_that_cannot_be_written_are_printed() {
-    // The names of the files are taken by folders, as if the disk were full at the end.
-    let quick = [
-        "--set=record.decay_periods=40",
-        "--set=controller.amplitude_tolerance=4e-3",
-        "--set=backbone.points=2",
-    ];
-    let quick: Vec<&str> = quick.into_iter().chain(["--rig", "built-in"]).collect();
-    for (command, taken, part) in [
-        ("identify", "backbone.csv", "exact orbit"),
-        ("identify", "sim.svg", "sigma,"),
-        ("backbone", "tracked.json", "2 points in"),
-        ("backbone", "tracked.svg", "2 points in"),
-    ] {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(taken);
-        std::fs::create_dir_all(path.join("full")).unwrap();
-        let done = vines(&[&[command, "--out", folder.path().to_str().unwrap()], &quick[..]].concat());
-        let [text, message] = [&done.stdout, &done.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
-        assert_eq!(done.status.code(), Some(1), "{message}");
-        assert!(text.contains(part), "{command}: {text}");
-        assert!(
-            message.contains(taken) && message.contains("standard output has the results"),
-            "{message}"
-        );
-        // A figure that fails leaves the tables.
-        if taken.ends_with("svg") {
-            let results = ["identification.json", "tracked.json"].map(|name| folder.path().join(name).is_file());
-            assert!(results.contains(&true));
-        }
-    }
-}
-
-#[test]
 fn packing_refuses_what_it_cannot_pack_before_it_writes() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
@@ -305,18 +235,8 @@ fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
     assert!(tracked.status.success(), "{tracked:?}");
     assert!(!String::from_utf8_lossy(&tracked.stdout).contains("do not belong"));
     let [points, rig, figure] = ["tracked.csv", "rig.toml", "fit.svg"].map(|name| format!("{out}/{name}"));
-    let fit = vines(&[
-        "fit",
-        &points,
-        "--set",
-        "plant.r=0.75",
-        "--known",
-        "m=0.032±0.0003",
-        "--out",
-        &rig,
-        "--figure",
-        &figure,
-    ]);
+    let known = ["--set=plant.r=0.75", "--known=m=0.032±0.0003"];
+    let fit = vines(&[&["fit", &points, "--out", &rig, "--figure", &figure], &known[..]].concat());
     let text = String::from_utf8_lossy(&fit.stdout).into_owned();
     assert!(
         fit.status.success() && text.contains("the model describes them"),

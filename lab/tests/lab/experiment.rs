@@ -4,11 +4,10 @@
 use vines::comparison::Comparison;
 use vines::experiment::{self, ExperimentError, Plan};
 use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
-use vines::net::LinkError;
 use vines::record::Record;
 use vines::rig::{
-    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Fault, GroundTruth, Rig, RigError, Sensors,
-    SensorsOnly, Simulated,
+    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Fault, GroundTruth, Rig, Sensors, SensorsOnly,
+    Simulated,
 };
 use vines::scene::{LinearResponse, Scene};
 
@@ -27,10 +26,10 @@ fn measure(scene: &Scene) -> Record {
 }
 
 /// A controller that cannot control the response: it holds the drive.
-struct ConstantDrive(BuiltIn);
+pub struct ConstantDrive(BuiltIn);
 
 impl ConstantDrive {
-    fn new(scene: &Scene) -> Self {
+    pub fn new(scene: &Scene) -> Self {
         Self(built_in(scene))
     }
 }
@@ -86,42 +85,6 @@ fn the_lock_is_the_exact_orbit_for_every_sensor_and_reference() {
 }
 
 #[test]
-fn the_decay_follows_theory_and_the_distance_halves_with_epsilon() {
-    let rms = |settings: &[&str]| identified(settings).rms_sigma_error.unwrap();
-    let (full, half) = (rms(&[]), rms(&["plant.epsilon=0.0042"]));
-    println!("RMS of sigma over C > 0.2: {full:.4}, at half epsilon {half:.4}");
-    assert!(full <= 0.08);
-    assert!((0.4..0.6).contains(&(half / full)));
-}
-
-#[test]
-fn a_lock_of_the_linear_mode_is_not_taken_for_the_impacting_one() {
-    // Under a constant drive nothing ever hits a particle at rest in the middle, and the loop locks all the same, at sigma = 0.
-    let scene = scene(&["start.dq2=0"]);
-    let mut rig = plant(&scene);
-    let record = run(&mut rig, &mut ConstantDrive::new(&scene), &scene).unwrap();
-    let refusal = identify(&record, &scene).unwrap_err();
-    let IdentificationError::Regime { regime, sigma, .. } = refusal else {
-        panic!("{refusal}");
-    };
-    assert_eq!(regime, Regime::NoImpacts);
-    assert!(sigma.abs() < 0.05, "{sigma}");
-}
-
-#[test]
-fn from_rest_the_experiment_reaches_the_symmetric_orbit() {
-    let found = identified(&["start.dq2=0.0"]);
-    let exact = found.exact.unwrap();
-    let (sigma, c) = (found.lock.at.sigma - exact.sigma, found.lock.at.c - exact.c);
-    println!(
-        "after {:.0} periods: sigma off by {sigma:.1e}, C by {c:.1e}",
-        found.lock.periods_to_lock
-    );
-    assert!(sigma.abs() < 1e-3 && c.abs() < 1e-3 && found.lock.regime == Regime::Symmetric);
-    assert!(found.lock.periods_to_lock < 400.0);
-}
-
-#[test]
 fn the_default_lock_takes_at_most_150_periods() {
     let scene = Scene::load(None, &[]).unwrap();
     let found = Comparison::of(&identify(&measure(&scene), &scene).unwrap(), &scene);
@@ -161,18 +124,25 @@ fn a_rig_that_does_not_report_its_impacts_is_identified_from_its_response() {
 }
 
 #[test]
-fn the_linear_mode_of_a_rig_that_does_not_report_its_impacts_is_refused() {
+fn a_lock_of_the_linear_mode_is_not_taken_for_the_impacting_one() {
+    // Under a constant drive nothing ever hits a particle at rest in the middle, and the loop locks all the same, at sigma = 0.
     let mut scene = scene(&["start.dq2=0"]);
     // Only the loop check knows the linear response of such a rig.
     let checked = Some(LinearResponse::of(&scene));
     for (measured, expected) in [(None, Regime::NotEstablished), (checked, Regime::NoImpacts)] {
         scene.measured = measured;
         let refusal = identified_without_ground_truth(&scene).unwrap_err();
-        let IdentificationError::Regime { regime, .. } = refusal else {
-            panic!("{refusal}");
-        };
-        assert_eq!(regime, expected);
+        assert!(
+            matches!(refusal, IdentificationError::Regime { regime, .. } if regime == expected),
+            "{refusal}"
+        );
     }
+    let record = run(&mut plant(&scene), &mut ConstantDrive::new(&scene), &scene).unwrap();
+    let refusal = identify(&record, &scene).unwrap_err();
+    let IdentificationError::Regime { regime: Regime::NoImpacts, sigma, .. } = refusal else {
+        panic!("{refusal}");
+    };
+    assert!(sigma.abs() < 0.05, "{sigma}");
 }
 
 #[test]
@@ -272,27 +242,6 @@ fn of_an_asymmetric_pair_the_motion_that_was_followed_is_named() {
 }
 
 #[test]
-fn a_drive_without_a_stable_orbit_ends_the_search_with_a_reason() {
-    let scene = scene(&["excitation.G=0.9", "start.dq2=0"]);
-    let mut rig = plant(&scene);
-    let mut controller = built_in(&scene);
-    let mut samples = Vec::new();
-    let ended = experiment::run_into(&mut samples, &mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {});
-    assert!(
-        matches!(
-            ended,
-            Err(ExperimentError::NotReached { .. } | ExperimentError::NoLock { .. })
-        ),
-        "{ended:?}"
-    );
-    let reason = vines::advice::reason(&scene, None).unwrap();
-    assert!(
-        reason.contains("no stable symmetric 1:1 orbit at G = 0.9000; it is stable for G from"),
-        "{reason}"
-    );
-}
-
-#[test]
 fn a_gap_in_the_range_of_stable_orbits_is_stated() {
     let scene = scene(&[
         "plant.epsilon=0.02",
@@ -305,60 +254,6 @@ fn a_gap_in_the_range_of_stable_orbits_is_stated() {
         reason.ends_with("it is stable for G from 0.415 to 0.486 and from 0.822 to 0.824"),
         "{reason}"
     );
-}
-
-/// A rig whose response is noise of a shift register.
-struct Noise(u32);
-
-impl Rig for Noise {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 17;
-        self.0 ^= self.0 << 5;
-        Ok(Sensors {
-            response: f64::from(self.0) / f64::from(u32::MAX) - 0.5,
-            reference: None,
-        })
-    }
-
-    fn advance(&mut self, _: Drive, _: f64) -> Result<(), RigError> {
-        Ok(())
-    }
-}
-
-#[test]
-fn noise_is_never_locked_and_ends_the_experiment_with_its_reason() {
-    let scene = scene(&[]);
-    let mut controller = built_in(&scene);
-    let mut samples = Vec::new();
-    let outcome = experiment::run_into(
-        &mut samples,
-        &mut Noise(1),
-        &mut controller,
-        &Plan::of(&scene),
-        |_, _, _| {},
-    );
-    assert!(matches!(
-        outcome,
-        Err(ExperimentError::Tripped { fault: Fault::NoSignal, .. })
-    ));
-    assert!(samples.len() < 2500, "{}", samples.len());
-}
-
-#[test]
-fn a_sensor_of_two_bits_has_no_phase_rather_than_a_phase_error_of_zero() {
-    let scene = scene(&[
-        "chain.adc_bits=2",
-        "phase_lock.signal_timeout='none'",
-        "phase_lock.residual_max='none'",
-        "record.lock_periods=5",
-    ]);
-    let plant = Simulated::new(scene.plant, scene.start).unwrap();
-    let mut rig = Chain::around(Box::new(plant), &scene);
-    let mut controller = built_in(&scene);
-    let outcome = run(&mut *rig, &mut controller, &scene);
-    let message = outcome.unwrap_err().to_string();
-    assert!(message.contains("the phase cannot be measured"), "{message}");
 }
 
 #[test]
@@ -384,53 +279,6 @@ fn a_response_above_its_limit_ends_the_experiment_at_once_and_keeps_what_was_mea
     let last = samples.last().unwrap();
     assert!(last.sensors.response.abs() > 0.3 && samples.len() > 100);
     assert_eq!(vines::record::table(&samples).lines().count(), samples.len() + 1);
-}
-
-#[test]
-fn a_drive_that_is_not_a_number_never_reaches_the_rig() {
-    let (scene, mut rig) = (scene(&[]), Shaken(Drive::default()));
-    for drive in [(f64::NAN, 0.1), (1.0, f64::INFINITY)] {
-        let drive = Drive { omega: drive.0, amplitude: drive.1, displacement: 0.0 };
-        let outcome = run(&mut rig, &mut OpenLoop(drive), &scene);
-        assert!(matches!(outcome, Err(ExperimentError::NotANumber(_))));
-        assert_eq!(rig.0, Drive::default());
-    }
-}
-
-/// A controller that drives for a while, then fails.
-struct Failing(usize);
-
-impl Controller for Failing {
-    fn sample(&mut self, _: Sensors, _: bool) -> Result<Command, ControllerError> {
-        let left = self.0.checked_sub(1);
-        self.0 = left.ok_or_else(|| LinkError::System(std::io::ErrorKind::NotConnected.into()))?;
-        Ok(Command {
-            drive: Drive { omega: 1.0, amplitude: 0.01, displacement: 0.0 },
-            ..Command::default()
-        })
-    }
-}
-
-/// A rig that keeps its last drive.
-struct Shaken(Drive);
-
-impl Rig for Shaken {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        Ok(Sensors::default())
-    }
-
-    fn advance(&mut self, drive: Drive, _: f64) -> Result<(), RigError> {
-        self.0 = drive;
-        Ok(())
-    }
-}
-
-#[test]
-fn a_controller_that_fails_does_not_leave_the_rig_driven() {
-    let (scene, mut rig) = (scene(&[]), Shaken(Drive::default()));
-    let outcome = run(&mut rig, &mut Failing(10), &scene);
-    assert!(matches!(outcome, Err(ExperimentError::Controller(_))));
-    assert_eq!(rig.0, Drive::default());
 }
 
 /// A controller that runs open loop.
@@ -464,29 +312,4 @@ fn an_experiment_takes_any_controller_and_records_every_stage() {
             .iter()
             .all(|sample| sample.command.drive == Drive::default())
     );
-}
-
-#[test]
-fn limits_of_a_scene_reach_the_controller() {
-    let run = |settings: &[&str]| {
-        let scene = scene(settings);
-        let mut rig = plant(&scene);
-        let mut controller = built_in(&scene);
-        let mut drives = Vec::new();
-        for _ in 0..4000 {
-            let command = controller.sample(rig.sense().unwrap(), true).unwrap();
-            drives.push(command.drive.amplitude);
-            rig.advance(command.drive, scene.sample_time()).unwrap();
-        }
-        (scene.amplitude, drives)
-    };
-    let (amplitude, drives) = run(&["controller.ramp_periods=10"]);
-    assert!((drives[500] / amplitude - 0.5).abs() < 0.01);
-    // A response too large takes the drive away for good.
-    let (_, drives) = run(&["controller.C_max=0.2"]);
-    assert!(drives[0] > 0.0 && drives[3999] == 0.0);
-    let (_, drives) = run(&["record.lock_periods=20"]);
-    assert!(drives[1900] > 0.0 && drives[3999] == 0.0);
-    let refused = vines::scene::Scene::load(None, &["controller.G_max=1.0".parse().unwrap()]).unwrap_err();
-    assert!(refused.to_string().starts_with("excitation.G: amplitude"), "{refused}");
 }

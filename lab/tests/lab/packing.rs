@@ -8,7 +8,7 @@ use std::{
     process::Command,
 };
 
-use vines::pack::{Binary, Component, Libraries, pack};
+use vines::pack::{Binary, Component, PackError, own_libraries, pack};
 
 const GUID: &str = "0f2e5d6c-3b1a-4a7e-9c58-d40f1e2b7a96";
 
@@ -19,9 +19,8 @@ fn component() -> Component {
         xml: format!(
             "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"Tiny\" guid=\"{GUID}\"><ModelVariables/></fmiModelDescription>"
         ),
-        svg: "",
         png: b"",
-        text: "",
+        page: "",
     }
 }
 
@@ -55,14 +54,15 @@ fn build(folder: &Path, function: &str, guid: &str) {
     assert!(status.success());
 }
 
-fn complaint(folder: &Path) -> String {
-    complaint_of(folder, &folder.into())
+/// Packs the libraries of this machine in `folder`, and others, into `folder`/out.
+fn packed(folder: &Path, others: &[Binary]) -> Result<Vec<PathBuf>, PackError> {
+    let own = own_libraries(&[component()], folder)?;
+    pack(&[component()], &[&own, others].concat(), &folder.join("out"))
 }
 
-fn complaint_of(folder: &Path, libraries: &Libraries) -> String {
-    let out = folder.join("out");
-    let error = pack(&[component()], libraries, &out).expect_err("a mistake");
-    assert!(!out.exists(), "nothing is written");
+fn complaint(folder: &Path, others: &[Binary]) -> String {
+    let error = packed(folder, others).expect_err("a mistake");
+    assert!(!folder.join("out").exists(), "nothing is written");
     error.to_string()
 }
 
@@ -70,8 +70,8 @@ fn complaint_of(folder: &Path, libraries: &Libraries) -> String {
 fn a_component_is_packed_with_its_library_in_its_platforms_folder() {
     let folder = tempfile::tempdir().unwrap();
     build(folder.path(), "fmi2Instantiate", GUID);
-    let out = folder.path().join("new/out");
-    let written = pack(&[component()], &folder.path().into(), &out).unwrap();
+    let out = folder.path().join("out");
+    let written = packed(folder.path(), &[]).unwrap();
     assert_eq!(written, [out.join("Tiny.fmu")]);
     assert_eq!(fs::read_dir(&out).unwrap().count(), 1, "no temporary file is left");
 
@@ -91,7 +91,7 @@ fn a_library_that_is_missing_or_of_another_kind_is_named_with_the_way_to_build_i
     let folder = tempfile::tempdir().unwrap();
     let path = library(folder.path());
     let refused = |part: &str| {
-        let message = complaint(folder.path());
+        let message = complaint(folder.path(), &[]);
         let named = path.display().to_string();
         for part in [part, named.as_str(), "cargo build --release -p tiny-fmu", "--libraries"] {
             assert!(message.contains(part), "{message}");
@@ -115,69 +115,22 @@ fn a_library_that_is_missing_or_of_another_kind_is_named_with_the_way_to_build_i
     build(folder.path(), "something_else", GUID);
     refused("fmi2Instantiate");
     build(folder.path(), "fmi2Instantiate", "of an older table");
-    refused("other variables than Tiny has now");
-}
-
-/// The same library once more, as one for the platform of a folder.
-fn with_other(folder: &Path, argument: &str) -> Libraries {
-    let path = library(folder).display().to_string();
-    let other: Binary = format!("{argument}={path}").parse().unwrap();
-    Libraries { folder: Some(folder.into()), others: vec![other] }
+    let message = complaint(folder.path(), &[]);
+    assert!(message.contains("built from other variables"), "{message}");
 }
 
 #[test]
-fn only_the_libraries_given_are_packed_where_this_platform_is_left_out() {
+fn a_library_given_for_this_machine_takes_the_place_of_the_one_in_the_folder() {
     let folder = tempfile::tempdir().unwrap();
     build(folder.path(), "fmi2Instantiate", GUID);
-    let running = running();
-    let mut libraries = with_other(folder.path(), running);
-    libraries.folder = None;
-    let out = folder.path().join("out");
-    let written = pack(&[component()], &libraries, &out).unwrap();
-    let zip = zip::ZipArchive::new(fs::File::open(&written[0]).unwrap()).unwrap();
-    let names = zip.file_names().map(|name| name.unwrap().into_owned());
-    let served = names.filter(|name| name.starts_with("binaries/"));
-    assert_eq!(
-        served.collect::<Vec<_>>(),
-        [format!("binaries/{running}/Tiny{DLL_SUFFIX}")]
-    );
-}
-
-#[test]
-fn a_platform_is_served_exactly_once() {
-    let folder = tempfile::tempdir().unwrap();
-    let message = complaint_of(folder.path(), &Libraries { folder: None, others: Vec::new() });
-    for part in ["no library of Tiny", "--binary PLATFORM=FILE"] {
-        assert!(message.contains(part), "{message}");
-    }
-    build(folder.path(), "fmi2Instantiate", GUID);
-    let mut libraries = with_other(folder.path(), "win32");
-    libraries.others.push(libraries.others[0].clone());
-    let message = complaint_of(folder.path(), &libraries);
-    assert!(message.contains("the second win32 library of Tiny"), "{message}");
-}
-
-#[test]
-fn a_library_given_for_this_machine_takes_the_place_of_that_in_the_folder() {
-    let (folder, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    build(folder.path(), "fmi2Instantiate", GUID);
-    fs::write(library(other.path()), format!("a library with {GUID}")).unwrap();
-    let mut libraries = with_other(other.path(), running());
-    libraries.folder = Some(folder.path().into());
-    let written = pack(&[component()], &libraries, &folder.path().join("out")).unwrap();
+    let other = folder.path().join("other");
+    fs::write(&other, format!("a library with {GUID}")).unwrap();
+    let other: Binary = format!("{}={}", running(), other.display()).parse().unwrap();
+    let written = packed(folder.path(), &[other]).unwrap();
     let mut zip = zip::ZipArchive::new(fs::File::open(&written[0]).unwrap()).unwrap();
     let inside = format!("binaries/{}/Tiny{DLL_SUFFIX}", running());
-    let size = fs::metadata(library(other.path())).unwrap().len();
-    assert_eq!(zip.by_name(&inside).unwrap().size(), size);
-}
-
-#[test]
-fn a_library_that_belongs_to_no_component_is_refused() {
-    let (folder, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    build(folder.path(), "fmi2Instantiate", GUID);
-    build(other.path(), "fmi2Instantiate", "of a stranger");
-    let mut libraries = with_other(other.path(), running());
-    libraries.folder = Some(folder.path().into());
-    let message = complaint_of(folder.path(), &libraries);
-    assert!(message.contains("belongs to none of Tiny"), "{message}");
+    assert_eq!(
+        zip.by_name(&inside).unwrap().size() as usize,
+        "a library with ".len() + GUID.len()
+    );
 }

@@ -1,155 +1,64 @@
-//! Guards both FMUs coupled in co-simulation, with its delay of one sample, the values in their system file, and FMUs with other names and
-//! signs.
+//! Guards the bits of both FMUs beside the built-in plant and controller, and FMUs with other names and signs.
 
 use std::{
     fs,
     io::{Read, Write},
-    path::{Path, PathBuf},
+    path::Path,
 };
 
-use fmi2_description::Description;
 use tempfile::TempDir;
 use vines::experiment::{self, Plan};
 use vines::fmu::{FmuController, FmuRig};
 use vines::identification::identify;
-use vines::pack::{components, pack_bench};
+use vines::pack::{Binary, components, own_libraries, pack_bench};
 use vines::rig::{BuiltIn, Controller, Drive, GroundTruth, Move, Rig, RigError, Sensors, Simulated};
 use vines::scene::{Names, PAPER, Scene};
 
-use crate::{PROGRAM, built_in};
+use crate::PROGRAM;
 
-/// The periods that are driven: the default scene locks after about 110.
-const PERIODS: f64 = 1000.0;
-const HOLD_PERIODS: f64 = 20.0;
-
-/// The folder of the libraries of this build: cargo makes them because this package depends on them.
-fn libraries() -> PathBuf {
-    Path::new(PROGRAM).with_file_name("deps")
+/// The libraries of this build: cargo makes them because this package depends on them.
+fn libraries() -> Vec<Binary> {
+    own_libraries(&components(), &Path::new(PROGRAM).with_file_name("deps")).unwrap()
 }
 
 /// Plant and controller with the parameters of a scene, packed into a folder.
 fn packed(scene: &Scene) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    pack_bench(scene, &libraries().as_path().into(), folder.path()).unwrap();
+    pack_bench(scene, &libraries(), folder.path()).unwrap();
     folder
 }
 
-/// Names and types of the values in a parameter set of the system file.
-fn bindings(system: &Path, name: &str) -> Vec<[String; 2]> {
-    let mut archive = zip::ZipArchive::new(fs::File::open(system).unwrap()).unwrap();
-    let mut text = String::new();
-    archive.by_name(name).unwrap().read_to_string(&mut text).unwrap();
-    let parameters = text.lines().filter(|line| line.contains("<ssv:Parameter "));
-    let bindings = parameters.map(|line| {
-        let words: Vec<&str> = line.split('"').collect();
-        let kind = words[2].trim_start_matches("><ssv:").trim_end_matches(" value=");
-        [words[1], kind].map(String::from)
-    });
-    bindings.collect()
-}
-
 #[test]
-fn every_value_in_the_system_file_belongs_to_a_variable_of_its_fmu() {
-    let folder = packed(&Scene::load(None, &[]).unwrap());
-    for (component, name) in components().into_iter().zip(["plant", "controller"]) {
-        let description = Description::parse(&component.xml).unwrap();
-        let bindings = bindings(&folder.path().join("bench.ssp"), &format!("resources/{name}.ssv"));
-        assert!(bindings.len() > 8, "{bindings:?}");
-        for [name, kind] in bindings {
-            let variable = description.variables.iter().find(|variable| variable.name == name);
-            let (variable_kind, _) = variable.expect(&name).content().unwrap();
-            assert_eq!(format!("{variable_kind:?}"), kind, "{name}");
-        }
-    }
-}
-
-#[test]
-fn the_pair_in_co_simulation_locks_where_the_built_in_loop_does() {
-    let scene = Scene::load(None, &[]).unwrap();
-    let folder = packed(&scene);
-    let path = |name| folder.path().join(name);
-    let (values, names, config) = (scene.start_values(), Names::default(), scene.controller_config());
-    let mut rig = FmuRig::load(&path("LoViNes.fmu"), &values, scene.resonance, &scene.plant, &names).unwrap();
-    let mut controller = FmuController::load(&path("PhaseLock.fmu"), &config, &names).unwrap();
-    let samples = |periods: f64| (periods * scene.controller.samples_per_period) as usize;
-    let hold = samples(HOLD_PERIODS);
-    let (mut omega, mut before) = (0.0, 0);
-    let mut command = controller.sample(rig.sense().unwrap(), true).unwrap();
-    for n in 0..samples(PERIODS) {
-        // Both advance at the same time: the plant has the drive that follows from the reading before.
-        let next = controller.sample(rig.sense().unwrap(), true).unwrap();
-        if n + hold == samples(PERIODS) {
-            before = rig.ground_truth().unwrap().unwrap().impacts;
-        }
-        if n + hold >= samples(PERIODS) {
-            omega += command.drive.omega / hold as f64;
-        }
-        rig.advance(command.drive, scene.sample_time()).unwrap();
-        command = next;
-    }
-    assert!(command.settled);
-    let sigma = scene.dimensionless().sigma(omega);
-    let mut own = (Simulated::new(scene.plant, scene.start).unwrap(), built_in(&scene));
-    let off = sigma - locked(&mut own.0, &mut own.1, &scene);
-    println!("sigma = {sigma:.6}, off the own loop by {off:.1e}");
-    assert!(off.abs() < 1e-4);
-    let hits = rig.ground_truth().unwrap().unwrap().impacts - before;
-    assert!((39..=41).contains(&hits), "{hits} impacts in 20 periods");
-}
-
-#[test]
-fn the_fmu_has_the_bits_of_the_plant_in_every_real_cavity() {
-    let scenes = [
-        include_str!("../../../scenes/rough.toml"),
-        include_str!("../../../scenes/skewed.toml"),
-        include_str!("../../../scenes/vertical.toml"),
-        include_str!("../../../scenes/viscoelastic.toml"),
-    ];
-    let all = [
+fn the_fmu_has_the_bits_of_the_plant_in_a_real_cavity() {
+    let effects = [
         "plant.mu_k=0.1",
         "plant.mu_s=0.2",
         "plant.theta=0.3",
         "plant.b_plus=0.011",
         "plant.r_minus=0.6",
-    ];
-    let more = [
         "plant.r_min=0.2",
         "plant.r_scatter=0.1",
         "plant.seed=5",
         "start.dq2=0.5",
     ];
-    let effects: Vec<_> = all.into_iter().chain(more).map(|one| one.parse().unwrap()).collect();
-    let mut scenes: Vec<Scene> = scenes
-        .iter()
-        .map(|text| Scene::parse("preset", text, &[]).unwrap())
-        .collect();
-    scenes.push(Scene::load(None, &effects).unwrap());
-    let folder = packed(&scenes[0]);
-    let path = folder.path().join("LoViNes.fmu");
-    for scene in scenes {
-        let values = scene.start_values();
-        let mut fmu = FmuRig::load(&path, &values, scene.resonance, &scene.plant, &Names::default()).unwrap();
-        let mut own = Simulated::new(scene.plant, scene.start).unwrap();
-        let drive = Drive {
-            omega: 0.99 * scene.dimensionless().omega0,
-            amplitude: 3.0 * scene.amplitude,
-            displacement: 0.0,
-        };
-        for n in 0..3000 {
-            assert_eq!(
-                fmu.sense().unwrap(),
-                own.sense().unwrap(),
-                "{:?}, sample {n}",
-                scene.plant
-            );
-            assert_eq!(fmu.ground_truth().unwrap(), own.ground_truth().unwrap(), "sample {n}");
-            for rig in [&mut fmu as &mut dyn Rig, &mut own] {
-                rig.advance(drive, scene.sample_time()).unwrap();
-            }
+    let scene = Scene::load(None, &effects.map(|one| one.parse().unwrap())).unwrap();
+    let folder = packed(&scene);
+    let mut fmu = FmuRig::load(&folder.path().join("LoViNes.fmu"), &scene).unwrap();
+    let mut own = Simulated::new(scene.plant, scene.start).unwrap();
+    let drive = Drive {
+        omega: 0.99 * scene.dimensionless().omega0,
+        amplitude: 3.0 * scene.amplitude,
+        displacement: 0.0,
+    };
+    for n in 0..3000 {
+        assert_eq!(fmu.sense().unwrap(), own.sense().unwrap(), "sample {n}");
+        assert_eq!(fmu.ground_truth().unwrap(), own.ground_truth().unwrap(), "sample {n}");
+        for rig in [&mut fmu as &mut dyn Rig, &mut own] {
+            rig.advance(drive, scene.sample_time()).unwrap();
         }
-        let truth = own.ground_truth().unwrap().unwrap();
-        assert!(truth.impacts > 10, "{truth:?}");
     }
+    let truth = own.ground_truth().unwrap().unwrap();
+    assert!(truth.impacts > 10, "{truth:?}");
 }
 
 #[test]
@@ -238,7 +147,7 @@ fn fmus_with_other_names_and_units_without_an_oscillator_and_without_settled_loc
     let scene = Scene::parse("names.toml", &text, &set).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = |name| folder.path().join(name);
-    pack_bench(&scene, &libraries().as_path().into(), folder.path()).unwrap();
+    pack_bench(&scene, &libraries(), folder.path()).unwrap();
     let hidden = [("omega", "w"), ("E", "amplitude"), ("base", "x"), ("impacts", "count")];
     let own = [("v", "y_sensor"), ("e", "x_given"), ("c", "damper")];
     renamed(
@@ -250,19 +159,11 @@ fn fmus_with_other_names_and_units_without_an_oscillator_and_without_settled_loc
     renamed(&path("PhaseLock.fmu"), &path("loop.fmu"), &own);
 
     // Drive and response both with the opposite sign: the motion is the same.
-    let rig = |names| {
-        FmuRig::load(
-            &path("rig.fmu"),
-            &scene.start_values(),
-            scene.resonance,
-            &scene.plant,
-            names,
-        )
-    };
-    let none = Names::default();
-    let missing = rig(&none).err().unwrap().to_string();
+    let rig = |scene| FmuRig::load(&path("rig.fmu"), scene);
+    let unmapped = Scene { rig_names: Names::default(), ..scene.clone() };
+    let missing = rig(&unmapped).err().unwrap().to_string();
     assert!(missing.contains("`e`") && missing.contains("[rig.names]"), "{missing}");
-    let mut rig = rig(&scene.rig_names).unwrap();
+    let mut rig = rig(&scene).unwrap();
     let config = scene.controller_config();
     let mut controller = FmuController::load(&path("loop.fmu"), &config, &scene.controller_names).unwrap();
     let found = locked(&mut rig, &mut controller, &scene);
@@ -278,7 +179,7 @@ fn a_controller_without_the_output_of_its_phase_error_is_not_said_to_measure_non
     let scene = Scene::load(None, &set).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = |name| folder.path().join(name);
-    pack_bench(&scene, &libraries().as_path().into(), folder.path()).unwrap();
+    pack_bench(&scene, &libraries(), folder.path()).unwrap();
     renamed(&path("PhaseLock.fmu"), &path("loop.fmu"), &[("phase_error", "error")]);
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
     let mut controller = FmuController::load(&path("loop.fmu"), &scene.controller_config(), &Names::default()).unwrap();

@@ -18,7 +18,7 @@ fn write(out: &Path) {
         family: Family::parse("dimensionless.toml", Some(text), &overrides).unwrap(),
         map: ["sigma=-2:1:7", "G=0.8:1.8:6"].map(|range| range.parse().unwrap()),
     };
-    write_report(&subject, out, &|_, _| {}).unwrap().written.unwrap();
+    write_report(&subject, out, &|_, _| {}).unwrap();
 }
 
 /// Debian's Chromium, if it is here, on a page: what it says on the console, and what it makes of the page.

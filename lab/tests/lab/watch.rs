@@ -68,19 +68,13 @@ fn rows(events: &[Value]) -> Vec<&Vec<Value>> {
 
 /// An experiment of few periods.
 fn identify<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
-    let short = [
-        "identify",
-        "--json",
-        "--rig",
-        "built-in",
-        "--out",
-        out,
-        "--set",
-        "record.hold_periods=10",
-        "--set",
-        "record.decay_periods=25",
-    ];
-    [&short, more].concat()
+    let short = ["--set=record.hold_periods=10", "--set=record.decay_periods=25"];
+    [
+        &["identify", "--json", "--rig", "built-in", "--out", out],
+        &short[..],
+        more,
+    ]
+    .concat()
 }
 
 #[test]
@@ -189,21 +183,9 @@ fn a_served_rig_shows_the_sessions_of_its_clients() {
     assert!(events.last().unwrap()["state"]["impacts"].as_i64().unwrap() > 100);
 }
 
-/// A rig in real time, to be watched or to make an experiment last.
-const RIG: [&str; 8] = [
-    "rig",
-    "--listen",
-    "127.0.0.1:0",
-    "--duration",
-    "60",
-    "--silence",
-    "20",
-    "--json",
-];
-
 #[test]
 fn the_page_has_all_its_files_and_answers_at_its_own_address_only() {
-    let rig = Watched::start(&RIG);
+    let rig = Watched::start(&["rig", "--listen=127.0.0.1:0", "--duration=60"]);
     let page = rig.get("GET /");
     assert!(
         page.starts_with("HTTP/1.1 200 OK") && page.contains("<title>vines: live bench</title>"),

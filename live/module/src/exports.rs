@@ -41,29 +41,27 @@ thread_local! {
     };
 }
 
-/// What fills the output array.
-type Action<'a> = dyn FnMut(&mut Bench, &mut Vec<f64>) -> Result<(), Message> + 'a;
-
-/// Runs `action`, puts its values into the output array and returns how many there are; -1 and a message at an error.
-fn values(mut action: impl FnMut(&mut Bench, &mut Vec<f64>) -> Result<(), Message>) -> i32 {
-    values_of(&mut action)
-}
-
-/// The same, compiled once.
+/// Does something with the page, and returns how many values are in the output array then; -1 and a message at an error. Compiled once.
 #[inline(never)]
-fn values_of(action: &mut Action) -> i32 {
+fn on_page(action: &mut dyn FnMut(&mut Page) -> Result<(), Message>) -> i32 {
     PAGE.with_borrow_mut(|page| {
-        let Page { bench, output, message, .. } = page;
-        output.clear();
-        output.reserve_exact(CAPACITY);
-        let result = bench.as_mut().ok_or_else(|| "restart first".into());
-        match result.and_then(|bench| action(bench, output)) {
-            Ok(()) => output.len() as i32,
+        page.output.clear();
+        page.output.reserve_exact(CAPACITY);
+        match action(page) {
+            Ok(()) => page.output.len() as i32,
             Err(error) => {
-                (*message, *output) = (error.text, error.numbers);
+                (page.message, page.output) = (error.text, error.numbers);
                 -1
             }
         }
+    })
+}
+
+/// Fills the output array with values of the bench.
+fn values(mut action: impl FnMut(&mut Bench, &mut Vec<f64>) -> Result<(), Message>) -> i32 {
+    on_page(&mut |page| match &mut page.bench {
+        Some(bench) => action(bench, &mut page.output),
+        None => Err("restart first".into()),
     })
 }
 
@@ -98,21 +96,11 @@ pub extern "C" fn message_length() -> usize {
     PAGE.with_borrow(|page| page.message.len())
 }
 
-fn with_settings(action: impl FnOnce(&mut Option<Box<Bench>>, Settings) -> Result<(), Message>) -> i32 {
-    PAGE.with_borrow_mut(|page| match action(&mut page.bench, page.settings) {
-        Ok(()) => 0,
-        Err(Message { text, numbers }) => {
-            (page.message, page.output) = (text, numbers);
-            -1
-        }
-    })
-}
-
 /// A bench at the start of the settings. Returns 0, or -1 and a message.
 #[unsafe(no_mangle)]
 pub extern "C" fn restart() -> i32 {
-    with_settings(|bench, settings| {
-        *bench = Some(Box::new(Bench::new(settings)?));
+    on_page(&mut |page| {
+        page.bench = Some(Box::new(Bench::new(page.settings)?));
         Ok(())
     })
 }
@@ -120,8 +108,8 @@ pub extern "C" fn restart() -> i32 {
 /// Applies the settings to the running bench. Returns 0, or -1 and a message.
 #[unsafe(no_mangle)]
 pub extern "C" fn apply() -> i32 {
-    with_settings(|bench, settings| match bench {
-        Some(bench) => bench.apply(settings),
+    on_page(&mut |page| match &mut page.bench {
+        Some(bench) => bench.apply(page.settings),
         None => Err("restart first".into()),
     })
 }

@@ -6,10 +6,7 @@
 
 pub mod bench;
 pub mod exports;
-#[cfg(target_arch = "wasm32")]
-mod mathematics;
 pub mod message;
-mod rig;
 pub mod settings;
 mod tracking;
 
@@ -21,3 +18,23 @@ use lol_alloc::{AssumeSingleThreaded, FreeListAllocator};
 #[global_allocator]
 static ALLOCATOR: AssumeSingleThreaded<FreeListAllocator> =
     unsafe { AssumeSingleThreaded::new(FreeListAllocator::new()) };
+
+/// The mathematical functions that the standard library calls, from the crate that plant and controller use: one copy instead of two.
+#[cfg(target_arch = "wasm32")]
+mod mathematics {
+    // SAFETY of the names: they are those of the C library, with its signatures; the compiler's own are weak.
+    macro_rules! functions {
+        ($($name:ident($($argument:ident),*))*) => {
+            $(
+                #[unsafe(no_mangle)]
+                extern "C" fn $name($($argument: f64),*) -> f64 {
+                    libm::$name($($argument),*)
+                }
+            )*
+        };
+    }
+
+    functions! {
+        sin(x) cos(x) exp(x) log(x) atan(x) atan2(y, x) hypot(x, y)
+    }
+}

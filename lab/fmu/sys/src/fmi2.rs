@@ -2,7 +2,48 @@
 
 #![allow(non_camel_case_types, non_snake_case, non_upper_case_globals, clippy::missing_safety_doc, clippy::too_many_arguments)]
 
-pub mod logger;
+/// What an FMU logs, as a record of the crate `log`.
+pub mod logger {
+    use std::ffi::{CStr, c_int};
+
+    use log::{Level, Record};
+
+    use super::{fmi2ComponentEnvironment, fmi2Status, fmi2String};
+
+    unsafe extern "C" {
+        /// In logger.c.
+        pub fn callback_logger_handler(
+            environment: fmi2ComponentEnvironment,
+            instance: fmi2String,
+            status: fmi2Status,
+            category: fmi2String,
+            message: fmi2String,
+            ...
+        );
+    }
+
+    /// Called by logger.c with the complete message.
+    #[unsafe(no_mangle)]
+    extern "C" fn vines_fmi2_log(instance: fmi2String, status: c_int, message: fmi2String) {
+        let level = match status {
+            0 => Level::Info,
+            1 => Level::Warn,
+            2 => Level::Trace,
+            _ => Level::Error,
+        };
+        // Safety: the standard has them end with NUL, and they live until this function returns.
+        let text = |from: fmi2String| (!from.is_null()).then(|| unsafe { CStr::from_ptr(from) }.to_string_lossy());
+        let [instance, message] = [instance, message].map(|from| text(from).unwrap_or("NULL".into()));
+        log::logger().log(
+            &Record::builder()
+                .args(format_args!("{message}"))
+                .level(level)
+                .module_path(Some("logger"))
+                .target(&instance)
+                .build(),
+        );
+    }
+}
 
 use std::ffi::{OsStr, c_char, c_int, c_uint, c_void};
 
@@ -24,7 +65,6 @@ pub const fmi2Status_fmi2Warning: fmi2Status = 1;
 pub const fmi2Status_fmi2Discard: fmi2Status = 2;
 pub const fmi2Status_fmi2Error: fmi2Status = 3;
 pub const fmi2Status_fmi2Fatal: fmi2Status = 4;
-pub const fmi2Status_fmi2Pending: fmi2Status = 5;
 
 pub type fmi2Type = c_uint;
 pub const fmi2Type_fmi2ModelExchange: fmi2Type = 0;
@@ -163,12 +203,6 @@ functions! {
     fn fmi2GetEventIndicators(c: fmi2Component, eventIndicators: *mut fmi2Real, ni: usize) -> fmi2Status;
     fn fmi2GetContinuousStates(c: fmi2Component, x: *mut fmi2Real, nx: usize) -> fmi2Status;
     fn fmi2GetNominalsOfContinuousStates(c: fmi2Component, x_nominal: *mut fmi2Real, nx: usize) -> fmi2Status;
-    fn fmi2SetRealInputDerivatives(
-        c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, order: *const fmi2Integer, value: *const fmi2Real,
-    ) -> fmi2Status;
-    fn fmi2GetRealOutputDerivatives(
-        c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, order: *const fmi2Integer, value: *mut fmi2Real,
-    ) -> fmi2Status;
     fn fmi2DoStep(
         c: fmi2Component, currentCommunicationPoint: fmi2Real, communicationStepSize: fmi2Real,
         noSetFMUStatePriorToCurrentPoint: fmi2Boolean,
@@ -176,7 +210,6 @@ functions! {
     fn fmi2CancelStep(c: fmi2Component) -> fmi2Status;
     fn fmi2GetStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Status) -> fmi2Status;
     fn fmi2GetRealStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Real) -> fmi2Status;
-    fn fmi2GetIntegerStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Integer) -> fmi2Status;
     fn fmi2GetBooleanStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Boolean) -> fmi2Status;
     fn fmi2GetStringStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2String) -> fmi2Status;
 }

@@ -1,18 +1,13 @@
 //! The regime map: coloured cells, a letter on each region, and the theory's stable island.
 
-use std::convert::Infallible;
-
 use super::WIDE;
-use crate::numerics::try_bisection;
+use crate::numerics::bisection;
 use crate::orbit::Periodic;
 use crate::regime::Regime;
-use crate::report::figure::{DETUNING, Figure, Legend, Marked, Panel, Place, SIZE, Shape};
+use crate::report::figure::{DETUNING, Figure, Legend, Panel, Place, SIZE, Shape};
 use crate::report::theme::{BORDER, letter};
 use crate::scene::Dimensionless;
 use crate::sweep::{Grid, Map, SIGMA};
-
-/// Regions in which no square of 2 n + 1 cells fits, with this n, get no letter.
-const NARROW: usize = 1;
 
 pub fn regimes(map: &Map) -> Figure {
     let (Map { x, y, .. }, [x_name, y_name]) = (map, map.names());
@@ -27,29 +22,23 @@ pub fn regimes(map: &Map) -> Figure {
         .legend(Legend::Beside(205.0));
     for regime in Regime::SIMULATED {
         let (letter, ink) = letter(regime);
-        panel.add(
-            Shape::Cells(letter, ink),
-            stripes(map, regime),
-            regime.name(),
-            regime.name(),
-        );
+        let shape = Shape::Cells(letter, ink);
+        panel.add(shape, stripes(map, regime), regime.name(), regime.name());
     }
     panel.add(Shape::Border(2.2), outline(map), BORDER, "stable 1:1, theory");
     let place = place_on(map);
     for curve in &map.curves {
         // Solid where it bounds the stability of a motion.
         let motions = curve.branch.points.iter();
-        let points: Vec<Marked> = motions
-            .map(|motion| (place(motion), motion.bounds_stability()))
-            .collect();
-        panel.curve_on_map(&points, curve.kind.name(), curve.kind.name());
+        let points = motions.map(|motion| (place(motion), motion.bounds_stability()));
+        panel.curve_on_map(points, curve.kind.name());
     }
     let several = (0..).zip(&map.cells).filter(|(_, cell)| !cell.coexisting.is_empty());
-    let dots: Vec<Place> = several.map(|(n, _)| (x.at(n % x.points), y.at(n / x.points))).collect();
+    let dots = several.map(|(n, _)| (x.at(n % x.points), y.at(n / x.points)));
     panel.add(Shape::Dot(1.0), dots, BORDER, "several regimes");
     for (regime, place) in letters(map) {
         let (letter, ink) = letter(regime);
-        panel.add(Shape::Text(16.0), vec![place], ink, letter);
+        panel.add(Shape::Text(16.0), [place], ink, letter);
     }
     Figure { size, panels: vec![panel] }
 }
@@ -57,11 +46,11 @@ pub fn regimes(map: &Map) -> Figure {
 /// Where a motion lies on a map over sigma and G.
 fn place_on(map: &Map) -> impl Fn(&Periodic) -> Place {
     let swapped = map.names()[1] == SIGMA;
-    move |one| {
+    move |motion| {
         if swapped {
-            (one.g, one.sigma)
+            (motion.g, motion.sigma)
         } else {
-            (one.sigma, one.g)
+            (motion.sigma, motion.g)
         }
     }
 }
@@ -97,20 +86,20 @@ fn label(name: &str) -> &str {
 /// The cells of a regime, with neighbours in a row merged.
 fn stripes(map: &Map, regime: Regime) -> Vec<Place> {
     let (x, y) = (map.x, map.y);
-    let mut found = Vec::new();
+    let mut corners = Vec::new();
     for (row, cells) in (0..).zip(map.cells.chunks(x.points as usize)) {
         let mut column = 0;
-        for run in cells.chunk_by(|one, other| one.result.regime == other.result.regime) {
+        for run in cells.chunk_by(|cell, next| cell.result.regime == next.result.regime) {
             if run[0].result.regime == regime {
                 let left = x.at(column) - x.step() / 2.0;
                 let right = x.at(column + run.len() as u64 - 1) + x.step() / 2.0;
                 let low = y.at(row) - y.step() / 2.0;
-                found.extend([(left, low), (right, low + y.step())]);
+                corners.extend([(left, low), (right, low + y.step())]);
             }
             column += run.len() as u64;
         }
     }
-    found
+    corners
 }
 
 /// For each regime, the places farthest from its border and from the curves, far apart from each other.
@@ -129,26 +118,30 @@ fn letters(map: &Map) -> Vec<(Regime, Place)> {
         };
         (1..=most).take_while(|reach| alike(*reach)).count()
     };
-    let mut found: Vec<(Regime, [usize; 2])> = Vec::new();
+    let mut letters: Vec<(Regime, [usize; 2])> = Vec::new();
     for regime in Regime::SIMULATED {
         let own = (0..free.len()).filter(|n| free[*n] == Some(regime));
         let mut cells: Vec<(usize, [usize; 2])> = own
             .map(|n| [n % columns, n / columns])
             .map(|[column, row]| (depth(column, row), [column, row]))
             .collect();
-        cells.sort_by_key(|one| std::cmp::Reverse(one.0));
-        let enough = cells.first().map_or(0, |deepest| deepest.0 / 2).max(NARROW);
-        for (_, place) in cells.into_iter().take_while(|one| one.0 >= enough) {
+        cells.sort_by_key(|cell| std::cmp::Reverse(cell.0));
+        // A region in which no square of three by three cells fits gets no letter.
+        let enough = cells.first().map_or(0, |deepest| deepest.0 / 2).max(1);
+        for (_, place) in cells.into_iter().take_while(|cell| cell.0 >= enough) {
             let far = |(other, [x, y]): &(Regime, [usize; 2])| {
                 *other != regime || x.abs_diff(place[0]) > columns / 3 || y.abs_diff(place[1]) > rows / 3
             };
-            if found.iter().all(far) {
-                found.push((regime, place));
+            if letters.iter().all(far) {
+                letters.push((regime, place));
             }
         }
     }
     let place = |[column, row]: [usize; 2]| (map.x.at(column as u64), map.y.at(row as u64));
-    found.into_iter().map(|(regime, cell)| (regime, place(cell))).collect()
+    letters
+        .into_iter()
+        .map(|(regime, cell)| (regime, place(cell)))
+        .collect()
 }
 
 /// The regimes of the cells, except where a curve passes.
@@ -173,8 +166,6 @@ fn without_curves(map: &Map) -> Vec<Option<Regime>> {
 
 /// Parts of the map across, in each direction, in which the border of the theory's island is searched for.
 const PARTS: usize = 100;
-/// Fraction of such a part to which the border is located: far below a pixel.
-const LOCATED: f64 = 1.0 / 4096.0;
 
 /// The border of the region where first-order theory has a stable symmetric 1:1 motion, by marching squares: pairs of ends.
 fn outline(map: &Map) -> Vec<Place> {
@@ -186,8 +177,7 @@ fn outline(map: &Map) -> Vec<Place> {
         .collect();
     let border = |(from, from_inside): (Place, bool), (to, _): (Place, bool)| {
         let at = |part: f64| (from.0 + part * (to.0 - from.0), from.1 + part * (to.1 - from.1));
-        let before = |part: f64| Ok::<_, Infallible>(inside(at(part)) == from_inside);
-        let Ok((_, end)) = try_bisection(0.0, 1.0, LOCATED, before);
+        let (_, end) = bisection(0.0, 1.0, |part| inside(at(part)) == from_inside);
         at(end)
     };
     let mut segments = Vec::new();
