@@ -136,7 +136,7 @@ fn a_verification_names_damaged_and_missing_files_and_the_same_sweep_replaces_th
         &["--verify"],
         &out,
         1,
-        &[named, "impacts/c/1 is empty", "12 of 20 cells", "Without --verify"],
+        &[named, "impacts/c/1 is truncated", "12 of 20 cells", "Without --verify"],
     );
     go(
         &[],
@@ -144,7 +144,7 @@ fn a_verification_names_damaged_and_missing_files_and_the_same_sweep_replaces_th
         0,
         &[
             named,
-            "impacts/c/1 is empty",
+            "impacts/c/1 is truncated",
             "computed again",
             "12 already complete, 8 computed",
         ],
@@ -156,7 +156,7 @@ fn a_verification_names_damaged_and_missing_files_and_the_same_sweep_replaces_th
         &[&merge],
         &merged,
         0,
-        &[named, "impacts/c/1 is empty", "12 already complete, 8 computed"],
+        &[named, "impacts/c/1 is truncated", "12 already complete, 8 computed"],
     );
     assert!(content(&merged) == whole);
 }
