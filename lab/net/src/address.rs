@@ -7,8 +7,8 @@ use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use thiserror::Error;
 use vines_testbench::rig::{ControllerError, RigError};
 
-use super::frame::{Refusal, VERSION};
-use super::link::Key;
+use crate::frame::{Refusal, VERSION};
+use crate::seal::Key;
 
 /// Which addresses are allowed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,13 +5,14 @@ use std::io;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use super::address::{Address, LinkError, ServerError};
-use super::frame::{
+use crate::address::{Address, LinkError, ServerError};
+use crate::frame::{
     Frame, FrameError, Kind, Reading, Refusal, VERSION, bit, flag, read_command, read_move, read_reading,
     write_command, write_reading,
 };
-use super::link::{Key, Link, Received};
-use super::timing::{Counters, Ended, RealTimeClock, Session, Timing};
+use crate::link::{Link, Received};
+use crate::seal::Key;
+use crate::timing::{Counters, Ended, RealTimeClock, Session, Timing};
 use vines_testbench::rig::{Controller, Drive, Rig, RigError};
 use vines_testbench::scene::Definition;
 
