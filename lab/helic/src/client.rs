@@ -1,7 +1,6 @@
 //! The host: the parameters and sources of a device by name, and the device as a rig of the bench. The oscillator runs on the device; the
 //! host sets frequency and amplitude, step by step.
 
-use std::collections::VecDeque;
 use std::f64::consts::TAU;
 use std::io;
 
@@ -12,8 +11,9 @@ use crate::codec::{
 };
 use crate::device::WATCHDOG;
 use crate::network::Transport;
-use vines_net::{Bridge, Counters};
+use vines_net::{Counters, Readings};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
+use vines_testbench::scene::Names;
 
 /// Largest relative difference between the sample rates: the device states its own with 24 bits.
 const SAME_RATE: f64 = 1e-6;
@@ -22,7 +22,7 @@ const SAME_RATE: f64 = 1e-6;
 const RUNNING: f64 = 0.01;
 /// Interval at which the device is asked whether its output is on, as a share of the longest silence: a trip ends the run before the silence
 /// of a device that has stopped would.
-const SUPERVISION: f64 = 0.25;
+const CHECKED: f64 = 0.25;
 
 /// Why a device cannot be used, in words.
 #[derive(Debug, Error)]
@@ -114,11 +114,10 @@ impl<T: Transport> Host<T> {
         }
     }
 
-    /// Index and type of a parameter.
-    fn parameter(&self, name: &str) -> Result<(u16, u8), HostError> {
-        let index = self.parameters.iter().position(|(own, _)| own == name);
-        let index = index.ok_or_else(|| HostError(format!("the helic device has no parameter \"{name}\"")))?;
-        Ok((index as u16, self.parameters[index].1))
+    /// Index and type of a parameter, if the device has it.
+    fn parameter(&self, name: &str) -> Option<(u16, u8)> {
+        let mut all = (0..).zip(&self.parameters);
+        all.find_map(|(index, (own, code))| (own == name).then_some((index, *code)))
     }
 
     /// Id of a source.
@@ -135,7 +134,8 @@ impl<T: Transport> Host<T> {
 
     /// The request that sets a parameter.
     fn setting(&self, name: &str, values: &[f64]) -> Result<Frame, HostError> {
-        let (index, code) = self.parameter(name)?;
+        let missing = || HostError(format!("the helic device has no parameter \"{name}\""));
+        let (index, code) = self.parameter(name).ok_or_else(missing)?;
         let payload = [&index.to_le_bytes()[..], &to_bytes(code, values)].concat();
         Ok(Frame { kind: message::SET_PAR, sequence: 0, payload })
     }
@@ -150,11 +150,30 @@ impl<T: Transport> Host<T> {
     fn stream(&mut self, sources: &[u8], decimation: u16) -> Result<(), HostError> {
         let [d, e] = decimation.to_le_bytes();
         let setup = [&[d, e, 0, 0, 0, 0, sources.len() as u8], sources].concat();
-        let port = self.transport.port().map_err(lost("its stream"))?;
-        self.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
-        self.request(message::STREAM_SETUP, setup, "StreamSetup")?;
-        self.request(message::STREAM_START, port.to_le_bytes().into(), "StreamStart")
-            .map(drop)
+        let port = self.transport.port().map_err(lost("its stream"))?.to_le_bytes();
+        for (kind, payload, what) in [
+            (message::STREAM_STOP, Vec::new(), "StreamStop"),
+            (message::STREAM_SETUP, setup, "StreamSetup"),
+            (message::STREAM_START, port.into(), "StreamStart"),
+        ] {
+            self.request(kind, payload, what)?;
+        }
+        Ok(())
+    }
+
+    /// Checks that the output of the device is on, if it reports it.
+    fn check_output(&mut self) -> Result<(), HostError> {
+        let Some((index, _)) = self.parameter("safety") else {
+            return Ok(());
+        };
+        let answer = self.request(message::GET_PAR, index.to_le_bytes().into(), "safety")?;
+        match answer.first() {
+            // Armed and not tripped; a device without a gate reads 0.
+            Some(safety) if *safety != 0 && safety & 0b11 != 1 => Err(HostError(format!(
+                "the output of the helic device is off (safety = {safety}): it has tripped, or was disarmed; the drive is zero"
+            ))),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -166,29 +185,6 @@ fn lost(what: &str) -> impl Fn(io::Error) -> HostError {
     }
 }
 
-/// The quantities that a host reads from a device, and the gain of its output.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Channels {
-    /// Source of the response, and m per unit of it.
-    pub response: (String, f64),
-    /// Source of the base displacement, and m per unit; None if no sensor reads it.
-    pub reference: Option<(String, f64)>,
-    /// Base displacement per volt of the output, m.
-    pub gain: f64,
-}
-
-impl Default for Channels {
-    /// The channels of `vines rig --protocol helic`.
-    fn default() -> Self {
-        let source = |name: &str| (name.to_string(), 1e-3);
-        Self {
-            response: source("response"),
-            reference: Some(source("reference")),
-            gain: 1e-3,
-        }
-    }
-}
-
 /// A device as a rig.
 ///
 /// The device samples on its own clock, and its readings arrive in packets. A drive is sent when all readings that have arrived are used
@@ -197,88 +193,95 @@ impl Default for Channels {
 #[derive(Debug)]
 pub struct HelicRig<T: Transport> {
     host: Host<T>,
-    channels: Channels,
     sample_time: f64,
-    /// Sources of the stream.
+    /// Sources of the stream: response, base displacement if a sensor reads it, and phase; m per unit of the first two.
     sources: Vec<u8>,
+    factors: Vec<f64>,
+    /// Base displacement per volt of the output, m.
+    gain: f64,
     /// Samples of the device per sample of the scene.
     decimation: u16,
     is_streaming: bool,
-    /// Readings and phase of the device's oscillator, turns, of the samples that have arrived; None if lost.
-    records: VecDeque<Option<(Sensors, f64)>>,
+    /// With the phase of the device's oscillator, turns.
+    readings: Readings<f64>,
     now: Option<Sensors>,
-    bridge: Bridge,
-    /// Number of the sample that the next packet begins with.
+    /// Number of the device's sample that the next packet begins with.
     next: Option<u32>,
-    /// Phase of the host's drive at the present sample, turns.
-    phase: f64,
-    /// Lead of the host's drive over the device's oscillator at the last record, turns.
+    /// Lead of the host's drive over the device's oscillator at the last reading that arrived, turns.
     lead: Option<f64>,
-    /// Phase of the device's oscillator at the last record, unless the record before the present one was lost, and its step, turns.
+    /// Phase of the device's oscillator at the present reading, unless it was lost, and its step since the reading before, turns.
     device_phase: Option<f64>,
     device_turn: Option<f64>,
     /// Time since the device was last asked whether its output is on, s.
-    unsupervised: f64,
+    unchecked: f64,
     wanted: Drive,
     /// Frequency of the device, rad/s, and the cosine and sine of its forcing, V.
     omega: f64,
     parts: [f64; 2],
-    /// Packets that have arrived, and samples that were bridged.
+    /// Packets that have arrived, and samples that were reconstructed.
     pub counters: Counters,
 }
 
 impl<T: Transport> HelicRig<T> {
-    /// Sets the device up; `sample_time` in s.
-    pub fn new(transport: T, channels: Channels, sample_time: f64, samples_per_period: f64) -> Result<Self, HostError> {
+    /// Sets the device up. `names` are those of its sources, where they differ from the virtual device; `sample_time` in s.
+    pub fn new(transport: T, names: &Names, sample_time: f64, samples_per_period: f64) -> Result<Self, HostError> {
+        if let Some(name) = names.unknown(&["response", "base", "E"]) {
+            return Err(HostError(format!(
+                "[rig.names] maps `{name}`; for a helic device there are response, base and E"
+            )));
+        }
         let mut host = Host::new(transport)?;
         let ratio = host.sample_rate * sample_time;
         if ratio < 0.5 || (ratio / ratio.round() - 1.0).abs() > SAME_RATE {
-            let suggestion = ratio * samples_per_period;
             return Err(HostError(format!(
                 "the helic device takes {} samples per second, which is not a multiple of the scene's {}: set \
-                 controller.samples_per_period to {suggestion} (or that over an integer)",
+                 controller.samples_per_period to {} (or that over an integer)",
                 host.sample_rate,
-                1.0 / sample_time
+                1.0 / sample_time,
+                ratio * samples_per_period
             )));
         }
-        let reference = channels.reference.iter().map(|(name, _)| name.as_str());
-        let names = [channels.response.0.as_str()]
-            .into_iter()
-            .chain(reference)
-            .chain(["phase"]);
-        let sources = names.map(|name| host.source(name)).collect::<Result<_, _>>()?;
+        // Of `vines rig --protocol helic`: mm, and mm per volt.
+        let named = |ours: &str, name: &str| {
+            let mapped = names.mapped(ours).map(|mapped| (mapped.name.clone(), mapped.factor));
+            mapped.unwrap_or_else(|| (name.into(), 1e-3))
+        };
+        let sensors = [named("response", "response"), named("base", "reference")];
+        let sensors = sensors.into_iter().filter(|(name, _)| !name.is_empty());
+        let (mut sources, factors): (Vec<String>, Vec<f64>) = sensors.unzip();
+        sources.push("phase".into());
+        let sources = sources.iter().map(|name| host.source(name)).collect::<Result<_, _>>()?;
         host.set("arm", &[0.0])?;
         for series in ["target_coeffs", "forcing_coeffs"] {
             host.set(series, &[0.0; COEFFICIENTS])?;
         }
         let silence = host.transport.silence().as_secs_f64();
-        // Not every device has these.
         for (name, value) in [
             ("table_mode", 0.0),
             ("control_mode", 0.0),
             ("freq", 0.0),
             (WATCHDOG, silence),
         ] {
-            if host.parameter(name).is_ok() {
+            // Not every device has these.
+            if host.parameter(name).is_some() {
                 host.set(name, &[value])?;
             }
         }
         Ok(Self {
             host,
-            channels,
             sample_time,
             sources,
+            factors,
+            gain: named("E", "").1,
             decimation: ratio.round() as u16,
             is_streaming: false,
-            records: VecDeque::new(),
+            readings: Readings::default(),
             now: None,
-            bridge: Bridge::default(),
             next: None,
-            phase: 0.0,
             lead: None,
             device_phase: None,
             device_turn: None,
-            unsupervised: 0.0,
+            unchecked: 0.0,
             wanted: Drive::default(),
             omega: 0.0,
             parts: [0.0; 2],
@@ -304,35 +307,27 @@ impl<T: Transport> HelicRig<T> {
             self.host.stream(&self.sources, self.decimation)?;
             self.is_streaming = true;
         }
-        let reading = loop {
-            // The first record after the lost ones.
-            let next = self.records.iter().flatten().next().copied();
-            match (self.records.pop_front(), next) {
-                (Some(Some((sensors, phase))), _) => {
-                    self.device_turn = self.device_phase.map(|before| (phase - before).rem_euclid(1.0));
-                    self.device_phase = Some(phase);
-                    self.lead = Some(self.phase - phase);
-                    break sensors;
-                }
-                (Some(None), Some((sensors, _))) => {
-                    let ahead = 1 + self.records.iter().take_while(|record| record.is_none()).count() as u64;
-                    let turn = self.wanted.omega * self.sample_time / TAU;
-                    self.device_phase = None;
-                    break self.bridge.fill(self.phase, &sensors, ahead, turn);
-                }
-                _ => {
+        let taken = loop {
+            match self.readings.take(&mut self.counters) {
+                Some(taken) => break taken,
+                None => {
                     self.command()?;
                     self.receive()?;
                 }
             }
         };
-        self.bridge.keep(self.phase, reading);
-        self.now = Some(reading);
-        self.unsupervised += self.sample_time;
-        if self.unsupervised > SUPERVISION * self.host.transport.silence().as_secs_f64() && self.is_driven() {
-            self.supervise()?;
+        if let Some(phase) = taken.with {
+            self.device_turn = self.device_phase.map(|before| (phase - before).rem_euclid(1.0));
+            self.lead = Some(self.readings.phase() - phase);
         }
-        Ok(reading)
+        self.device_phase = taken.with;
+        self.unchecked += self.sample_time;
+        if self.is_driven() && self.unchecked > CHECKED * self.host.transport.silence().as_secs_f64() {
+            self.unchecked = 0.0;
+            self.host.check_output()?;
+        }
+        self.now = Some(taken.sensors);
+        Ok(taken.sensors)
     }
 
     /// Waits for the next packet.
@@ -362,33 +357,17 @@ impl<T: Transport> HelicRig<T> {
                  the load of this machine"
             )));
         }
-        self.records.extend((0..missed).map(|_| None));
-        (0..missed).for_each(|_| self.counters.hold(missed.into()));
         self.counters.received += 1;
-        for record in packet.values.chunks_exact(width) {
-            let read = |n: usize, factor: f64| factor * f64::from(record[n]);
-            let response = read(0, self.channels.response.1);
-            let reference = self.channels.reference.as_ref().map(|(_, factor)| read(1, *factor));
-            let phase = read(width - 1, 1.0);
-            self.records.push_back(Some((Sensors { response, reference }, phase)));
+        let first = self.readings.next() + u64::from(missed);
+        for (number, record) in (first..).zip(packet.values.chunks_exact(width)) {
+            let read = |n: usize| Some(self.factors.get(n)? * f64::from(record[n]));
+            let sensors = Sensors { response: read(0).unwrap_or_default(), reference: read(1) };
+            let phase = record[width - 1].into();
+            self.readings.arrive(number, sensors, phase, &mut self.counters);
         }
         let records = (packet.values.len() / width) as u32;
         self.next = Some(packet.first.wrapping_add(records * step));
         Ok(())
-    }
-
-    /// Checks that the output of the device is on, if it reports it.
-    fn supervise(&mut self) -> Result<(), HostError> {
-        self.unsupervised = 0.0;
-        let index = self.host.parameter("safety")?.0.to_le_bytes();
-        let bytes = self.host.request(message::GET_PAR, index.into(), "safety")?;
-        match bytes.first().copied().unwrap_or_default() {
-            // Armed and not tripped; a device without a gate reads 0.
-            safety if safety == 0 || safety & 0b11 == 1 => Ok(()),
-            safety => Err(HostError(format!(
-                "the output of the helic device is off (safety = {safety}): it has tripped, or was disarmed; the drive is zero"
-            ))),
-        }
     }
 
     /// Sends the drive, as far as it has changed.
@@ -399,7 +378,7 @@ impl<T: Transport> HelicRig<T> {
         }
         let turn = self.omega * self.sample_time / TAU;
         let runs = self.device_turn.is_some_and(|now| (now - turn).abs() <= RUNNING * turn);
-        let volts = self.wanted.amplitude / self.channels.gain;
+        let volts = self.wanted.amplitude / self.gain;
         let parts = match self.lead {
             // The drive begins when the oscillator has its frequency.
             Some(lead) if self.is_driven() || runs => {
@@ -425,9 +404,9 @@ impl<T: Transport> HelicRig<T> {
         self.parts = parts;
         if !was_driven {
             self.host.set("arm", &[1.0])?;
-            self.unsupervised = 0.0;
+            self.unchecked = 0.0;
         } else if !self.is_driven() {
-            self.supervise()?;
+            self.host.check_output()?;
             self.host.set("arm", &[0.0])?;
             self.host.transport.guard(&[]).map_err(lost("arm"))?;
         }
@@ -462,7 +441,7 @@ impl<T: Transport> Rig for HelicRig<T> {
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         self.wanted = drive;
         self.now = None;
-        self.phase += drive.omega * step / TAU;
+        self.readings.advance(drive.omega * step / TAU);
         if drive.amplitude == 0.0 && self.is_driven() {
             // A drive of zero is not delayed.
             let sent = self.command();

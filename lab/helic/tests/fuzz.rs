@@ -8,8 +8,9 @@ use std::io;
 use std::sync::{Arc, Mutex};
 
 use vines_helic::codec::{Frame, Packet, message};
-use vines_helic::{Channels, Device, HelicRig, Transport};
+use vines_helic::{Device, HelicRig, Transport};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
+use vines_testbench::scene::Names;
 
 use noise::Noise;
 
@@ -159,7 +160,7 @@ fn damaged_answers_and_packets_never_make_the_host_panic() {
         runs += 1;
         let transport = Damaged(device().0, Noise(noise.next()));
         packets += 1;
-        let Ok(mut rig) = HelicRig::new(transport, Channels::default(), 1e-3, 100.0) else {
+        let Ok(mut rig) = HelicRig::new(transport, &Names::default(), 1e-3, 100.0) else {
             continue;
         };
         for n in 0..1000 {

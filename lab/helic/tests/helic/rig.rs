@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 use std::io;
 
 use vines_helic::codec::Frame;
-use vines_helic::{Channels, Device, HelicRig, Transport};
+use vines_helic::{Device, HelicRig, Transport};
 use vines_testbench::experiment::{self, Plan};
 use vines_testbench::identification::identify;
 use vines_testbench::rig::{BuiltIn, Drive, Rig, Simulated};
-use vines_testbench::scene::{PAPER, Scene};
+use vines_testbench::scene::{Names, PAPER, Scene};
 
 use super::host::{Host, device, scene};
 
@@ -63,7 +63,7 @@ impl<F: FnMut(usize) -> usize> Transport for Direct<F> {
 fn connect<F: FnMut(usize) -> usize>(fate: F) -> HelicRig<Direct<F>> {
     let scene = scene();
     let samples = scene.controller.samples_per_period;
-    HelicRig::new(Direct::new(fate), Channels::default(), scene.sample_time(), samples).unwrap()
+    HelicRig::new(Direct::new(fate), &Names::default(), scene.sample_time(), samples).unwrap()
 }
 
 fn drive() -> Drive {
@@ -86,7 +86,7 @@ fn the_experiment_on_a_device_gives_the_backbone_of_the_plant() {
     let [coarse, fine] = [8.0, 16.0].map(|samples| {
         let device = Device::new(Box::new(plant()), step / samples, scene.plant.half_width).unwrap();
         let direct = Direct { device, ..Direct::new(|_| 1) };
-        let mut rig = HelicRig::new(direct, Channels::default(), step, 100.0).unwrap();
+        let mut rig = HelicRig::new(direct, &Names::default(), step, 100.0).unwrap();
         let found = run(&mut rig);
         assert!(!rig.counters.is_troubled(), "{}", rig.counters);
         assert!((found.at.c - expected.at.c).abs() < 1e-3);
@@ -130,7 +130,7 @@ fn an_experiment_rides_through_lost_datagrams_and_gives_the_same_backbone() {
         let plant = Simulated::new(scene.plant, scene.start).unwrap();
         let device = Device::new(Box::new(plant), scene.sample_time() / 8.0, scene.plant.half_width).unwrap();
         let direct = Direct { device, ..Direct::new(fate) };
-        let mut rig = HelicRig::new(direct, Channels::default(), scene.sample_time(), 100.0).unwrap();
+        let mut rig = HelicRig::new(direct, &Names::default(), scene.sample_time(), 100.0).unwrap();
         let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
         let record = experiment::run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap();
         println!("{}", rig.counters);
@@ -187,8 +187,9 @@ fn a_device_that_has_tripped_ends_the_run() {
 fn names_and_rates_that_do_not_fit_are_explained() {
     let scene = scene();
     let step = scene.sample_time();
-    let channels = Channels { response: ("laser".into(), 1e-3), ..Channels::default() };
-    let refused = HelicRig::new(Direct::new(|_| 1), channels, step, 100.0)
+    let mapped = format!("{PAPER}\n[rig.names]\nresponse = {{ name = \"laser\", unit = \"mm\" }}\n");
+    let names = Scene::parse("mapped.toml", &mapped, &[]).unwrap().rig_names;
+    let refused = HelicRig::new(Direct::new(|_| 1), &names, step, 100.0)
         .err()
         .unwrap()
         .to_string();
@@ -196,7 +197,7 @@ fn names_and_rates_that_do_not_fit_are_explained() {
         refused.contains("no source \"laser\"") && refused.contains("response [mm]"),
         "{refused}"
     );
-    let refused = HelicRig::new(Direct::new(|_| 1), Channels::default(), 0.7 * step, 70.0)
+    let refused = HelicRig::new(Direct::new(|_| 1), &Names::default(), 0.7 * step, 70.0)
         .err()
         .unwrap();
     assert!(
@@ -208,7 +209,7 @@ fn names_and_rates_that_do_not_fit_are_explained() {
 #[test]
 fn a_slower_scene_uses_every_second_sample_of_the_device() {
     let scene = scene();
-    let mut rig = HelicRig::new(Direct::new(|_| 1), Channels::default(), 2.0 * scene.sample_time(), 50.0).unwrap();
+    let mut rig = HelicRig::new(Direct::new(|_| 1), &Names::default(), 2.0 * scene.sample_time(), 50.0).unwrap();
     for _ in 0..100 {
         rig.sense().unwrap();
         rig.advance(Drive::default(), 2.0 * scene.sample_time()).unwrap();
@@ -225,7 +226,7 @@ fn the_drive_has_the_phase_of_the_host_however_late_its_commands_are() {
         host.set("freq", &[37.0]).unwrap();
         (0..777).for_each(|_| drop(host.device.tick().unwrap()));
         direct.device = host.device;
-        let mut rig = HelicRig::new(direct, Channels::default(), scene.sample_time(), 100.0).unwrap();
+        let mut rig = HelicRig::new(direct, &Names::default(), scene.sample_time(), 100.0).unwrap();
         let turn = 55.0 * scene.sample_time();
         let mut driven = 0;
         for n in 0..600 {
