@@ -1,6 +1,6 @@
 //! The connection to a device: requests over TCP, the stream over UDP, and a thread that stops the drive when this program hangs.
 
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{self, ErrorKind, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -52,7 +52,6 @@ enum Sign {
 pub struct Network {
     control: TcpStream,
     stream: UdpSocket,
-    bytes: Vec<u8>,
     silence: Duration,
     /// The requests that stop the drive; empty while there is none.
     stop: Vec<u8>,
@@ -74,8 +73,7 @@ impl Network {
         let ((watchdog, signs), fired) = (mpsc::channel(), Arc::new(AtomicBool::new(false)));
         let (channel, has_fired) = (control.try_clone()?, Arc::clone(&fired));
         thread::Builder::new().spawn(move || watch(&signs, channel, silence, &has_fired))?;
-        let (bytes, stop) = (Vec::new(), Vec::new());
-        let mut network = Self { control, stream, bytes, silence, stop, watchdog, fired };
+        let mut network = Self { control, stream, silence, stop: Vec::new(), watchdog, fired };
         network.guard(&[])?;
         Ok(network)
     }
@@ -95,6 +93,7 @@ impl Network {
                     self.silence.as_secs_f64()
                 ),
                 (_, true) => format!("{what} for {:.2} s", began.elapsed().as_secs_f64()),
+                _ if error.kind() == ErrorKind::UnexpectedEof => "the connection is closed".into(),
                 _ => error.to_string(),
             })
         })
@@ -105,24 +104,20 @@ impl Transport for Network {
     fn request(&mut self, request: &Frame) -> io::Result<Frame> {
         self.waiting("no answer", |network| {
             network.control.write_all(&request.encode())?;
-            let mut more = [0; 2048];
-            loop {
-                let answer = Frame::take(&mut network.bytes);
-                if let Some(answer) = answer.map_err(|error| io::Error::new(ErrorKind::InvalidData, error))? {
-                    return Ok(answer);
-                }
-                match uninterrupted(|| network.control.read(&mut more))? {
-                    0 => return Err(io::Error::other("the connection is closed")),
-                    size => network.bytes.extend(&more[..size]),
-                }
-            }
+            Frame::read(&mut network.control)
         })
     }
 
     fn datagram(&mut self) -> io::Result<Vec<u8>> {
         self.waiting("no packet of its stream has arrived", |network| {
             let mut bytes = vec![0; 2048];
-            let size = uninterrupted(|| network.stream.recv(&mut bytes))?;
+            let size = loop {
+                match network.stream.recv(&mut bytes) {
+                    // A signal: whoever catches it decides what it means.
+                    Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                    received => break received?,
+                }
+            };
             bytes.truncate(size);
             // Without effect after the thread has closed the connection.
             let _ = network.watchdog.send(Sign::Reading);
@@ -149,16 +144,6 @@ impl Transport for Network {
 
     fn close(&mut self) {
         stop_and_close(&mut self.control, &self.stop);
-    }
-}
-
-/// Repeats a call that a signal has interrupted: whoever catches signals decides what they mean.
-fn uninterrupted<T>(mut call: impl FnMut() -> io::Result<T>) -> io::Result<T> {
-    loop {
-        match call() {
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            outcome => return outcome,
-        }
     }
 }
 

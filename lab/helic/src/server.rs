@@ -23,12 +23,28 @@ pub struct HelicServer {
 
 /// The connection to a host.
 struct Connection {
-    stream: TcpStream,
+    control: TcpStream,
     peer: SocketAddr,
     bytes: Vec<u8>,
     opened: Instant,
     /// Number of its first sample.
     first: u64,
+}
+
+impl Connection {
+    /// Answers the requests that have arrived; an error if the host has left, or has sent bytes that are not a frame.
+    fn exchange(&mut self, device: &mut Device, uptime: u32) -> io::Result<()> {
+        let mut more = [0; 2048];
+        match self.control.read(&mut more) {
+            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => return Ok(()),
+            size => self.bytes.extend(&more[..size?]),
+        }
+        while let Some(request) = Frame::take(&mut self.bytes).map_err(io::Error::other)? {
+            self.control.write_all(&device.handle(&request, uptime).encode())?;
+        }
+        Ok(())
+    }
 }
 
 impl HelicServer {
@@ -61,17 +77,17 @@ impl HelicServer {
         loop {
             let stopped = stop();
             if host.is_none()
-                && let Ok((stream, peer)) = self.control.accept()
+                && let Ok((control, peer)) = self.control.accept()
             {
-                stream.set_nodelay(true)?;
-                stream.set_nonblocking(true)?;
+                control.set_nodelay(true)?;
+                control.set_nonblocking(true)?;
                 clock.forget();
                 let (bytes, opened) = (Vec::new(), Instant::now());
-                host = Some(Connection { stream, peer, bytes, opened, first: tick });
+                host = Some(Connection { control, peer, bytes, opened, first: tick });
             }
             let uptime = clock.due(0).elapsed().as_millis() as u32;
             let device = &mut self.device;
-            let left = host.as_mut().is_some_and(|host| !host.exchange(device, uptime));
+            let left = host.as_mut().is_some_and(|host| host.exchange(device, uptime).is_err());
             if let Some(host) = host.take_if(|_| left || stopped) {
                 device.disconnect();
                 report(&Session {
@@ -97,31 +113,6 @@ impl HelicServer {
                 }
             }
             thread::sleep(clock.due(tick + 1).saturating_duration_since(Instant::now()).min(POLL));
-        }
-    }
-}
-
-impl Connection {
-    /// Answers the requests that have arrived; false if the host has left, or has sent bytes that are not a frame.
-    fn exchange(&mut self, device: &mut Device, uptime: u32) -> bool {
-        let mut more = [0; 2048];
-        match self.stream.read(&mut more) {
-            Ok(0) => return false,
-            Ok(size) => self.bytes.extend(&more[..size]),
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => return true,
-            Err(_) => return false,
-        }
-        loop {
-            match Frame::take(&mut self.bytes) {
-                Ok(Some(request)) => {
-                    let answer = device.handle(&request, uptime).encode();
-                    if self.stream.write_all(&answer).is_err() {
-                        return false;
-                    }
-                }
-                Ok(None) => return true,
-                Err(_) => return false,
-            }
         }
     }
 }
