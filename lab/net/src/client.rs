@@ -54,7 +54,12 @@ impl Client {
         let end = Instant::now() + CONNECT;
         loop {
             match Self::open(peer, controller, sample_time, key) {
-                Err(LinkError::Refused { reason: Refusal::Busy, .. }) if Instant::now() < end => thread::sleep(RESEND),
+                // Over TCP, a server that has another client closes the connection.
+                Err(LinkError::Refused { reason: Refusal::Busy, .. } | LinkError::Closed { .. })
+                    if Instant::now() < end =>
+                {
+                    thread::sleep(RESEND);
+                }
                 outcome => return outcome,
             }
         }
@@ -117,7 +122,9 @@ impl Client {
             let again = Instant::now() + RESEND;
             let until = if self.link.is_real_time() { end.min(again) } else { end };
             match self.link.receive(until)?.map(|(received, _)| received) {
-                Some(Err(FrameError::Version(theirs))) => return Err(LinkError::Version { peer, theirs }),
+                Some(Err(FrameError::Version(theirs))) => {
+                    return Err(LinkError::Refused { peer, reason: Refusal::Version(theirs) });
+                }
                 Some(Err(FrameError::Closed)) => return Err(LinkError::Closed { peer, time }),
                 Some(Err(_)) => self.counters.malformed += 1,
                 Some(Ok(frame)) if frame.session != self.session => self.counters.foreign += 1,

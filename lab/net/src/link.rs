@@ -16,11 +16,11 @@ const FINE: Duration = Duration::from_millis(20);
 pub const POLL: Duration = Duration::from_micros(50);
 /// Shorter waits do not sleep: the system wakes a program up later than it asks for, by about this.
 const SPIN: Duration = Duration::from_micros(100);
-/// Interval at which a server without a session looks for connections and their frames: short against the time for loading a rig.
+/// Interval at which a server without a connection looks for one: short against the time for loading a rig.
 const ACCEPT: Duration = Duration::from_millis(5);
 /// Longest time for sending a frame over TCP to a peer that does not read: the longest silence in lock-step (protocol, "Faults").
 const SEND: Duration = Duration::from_secs(5);
-/// Longest time for a TCP client to say Hello: half of the time after which a client gives up.
+/// Longest time for a TCP client to say Hello: half of the time after which another one gives up.
 const HELLO: Duration = Duration::from_secs(1);
 
 /// A frame, or why the bytes are none.
@@ -39,15 +39,12 @@ enum Socket {
     Udp(UdpSocket),
 }
 
-/// TCP connections.
+/// One TCP connection; while a server has one, it closes others at once.
 #[derive(Debug)]
 struct Connections {
     /// None at the end of a client.
     listener: Option<TcpListener>,
-    /// The peer of the session.
     peer: Option<Connection>,
-    /// Clients of a server that have not opened a session.
-    visitors: Vec<Connection>,
 }
 
 impl Link {
@@ -57,7 +54,7 @@ impl Link {
         let socket = match peer {
             Address::Tcp(to) => {
                 let connection = Connection::new(TcpStream::connect_timeout(&to, patience)?, to, seal.size())?;
-                Socket::Tcp(Connections { listener: None, peer: Some(connection), visitors: Vec::new() })
+                Socket::Tcp(Connections { listener: None, peer: Some(connection) })
             }
             Address::Udp(to) => {
                 // Bound to loopback if the peer is on loopback.
@@ -82,7 +79,7 @@ impl Link {
             Address::Tcp(address) => {
                 let listener = TcpListener::bind(address)?;
                 listener.set_nonblocking(true)?;
-                Socket::Tcp(Connections { listener: Some(listener), peer: None, visitors: Vec::new() })
+                Socket::Tcp(Connections { listener: Some(listener), peer: None })
             }
         };
         Ok(Self { socket, seal: Seal::new(key, Side::Server) })
@@ -118,30 +115,16 @@ impl Link {
             // A client's socket is connected: some systems then refuse an address.
             Socket::Udp(socket) if self.seal.side == Side::Client => delivered(socket.send(&bytes)),
             Socket::Udp(socket) => delivered(socket.send_to(&bytes, to)),
-            Socket::Tcp(all) => {
-                let connection = all
-                    .peer
-                    .iter_mut()
-                    .chain(&mut all.visitors)
-                    .find(|connection| connection.from == to);
-                connection.map_or(Ok(()), |connection| connection.send(&bytes))
-            }
-        }
-    }
-
-    /// The session is that of this client.
-    pub fn prefer(&mut self, client: SocketAddr) {
-        if let Socket::Tcp(all) = &mut self.socket
-            && let Some(index) = all.visitors.iter().position(|visitor| visitor.from == client)
-        {
-            all.peer = Some(all.visitors.swap_remove(index));
+            Socket::Tcp(all) => match &mut all.peer {
+                Some(peer) if peer.from == to => peer.send(&bytes),
+                _ => Ok(()),
+            },
         }
     }
 
     pub fn close(&mut self, client: SocketAddr) {
         if let Socket::Tcp(all) = &mut self.socket {
             all.peer.take_if(|peer| peer.from == client);
-            all.visitors.retain(|visitor| visitor.from != client);
         }
     }
 }
@@ -150,34 +133,22 @@ impl Connections {
     fn receive(&mut self, deadline: Instant, seal: &Seal) -> io::Result<Option<(Received, SocketAddr)>> {
         loop {
             while let Some(Ok((stream, from))) = self.listener.as_ref().map(TcpListener::accept) {
-                // A connection without options has been closed.
-                self.visitors.extend(Connection::new(stream, from, seal.size()));
-            }
-            // Visitors are not waited for: they cost the client of the session, and each other, no time.
-            for index in (0..self.visitors.len()).rev() {
-                let visitor = &mut self.visitors[index];
-                let received = visitor
-                    .receive(Instant::now(), seal)?
-                    .map(|frame| (frame, visitor.from));
-                let ends = match &received {
-                    None => visitor.since.elapsed() > HELLO,
-                    // Another version gets an answer.
-                    Some((Err(error), _)) => !matches!(error, FrameError::Version(_)),
-                    Some((Ok(_), _)) => false,
-                };
-                if ends {
-                    drop(self.visitors.swap_remove(index));
-                }
-                if received.is_some() {
-                    return Ok(received);
+                if self.peer.is_none() {
+                    self.peer = Connection::new(stream, from, seal.size()).ok();
                 }
             }
             if let Some(peer) = &mut self.peer {
                 let received = peer.receive(deadline, seal)?.map(|frame| (frame, peer.from));
+                let is_over = match &received {
+                    Some((Err(FrameError::Closed), _)) => true,
+                    // Another version gets an answer.
+                    Some((Err(error), _)) => !peer.has_spoken && !matches!(error, FrameError::Version(_)),
+                    Some((Ok(_), _)) => false,
+                    None => !peer.has_spoken && peer.since.elapsed() > HELLO,
+                };
+                peer.has_spoken |= matches!(received, Some((Ok(_), _)));
                 // A server forgets the connection; a client reads again that it is closed.
-                if matches!(received, Some((Err(FrameError::Closed), _))) && self.listener.is_some() {
-                    self.peer = None;
-                }
+                self.peer.take_if(|_| is_over && self.listener.is_some());
                 return Ok(received);
             }
             let left = deadline.saturating_duration_since(Instant::now());
@@ -195,6 +166,8 @@ struct Connection {
     stream: TcpStream,
     from: SocketAddr,
     since: Instant,
+    /// Whether a valid frame has arrived.
+    has_spoken: bool,
     bytes: Vec<u8>,
     /// Number of bytes of the next frame that have arrived.
     filled: usize,
@@ -206,7 +179,7 @@ impl Connection {
         stream.set_nodelay(true)?;
         stream.set_write_timeout(Some(SEND))?;
         let (since, bytes) = (Instant::now(), vec![0; size]);
-        Ok(Self { stream, from, since, bytes, filled: 0 })
+        Ok(Self { stream, from, since, has_spoken: false, bytes, filled: 0 })
     }
 
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {

@@ -160,7 +160,6 @@ impl Server {
                 return Ok(None);
             }
         };
-        self.link.prefer(from);
         let drawn = self.link.seal.draw().map_err(io::Error::other)?;
         welcome.values[3..5].copy_from_slice(&drawn);
         self.link.seal.begin(hello.session, drawn);
@@ -210,8 +209,6 @@ impl Server {
                 if frame.kind == Kind::Hello {
                     self.refuse(Refusal::Busy, &frame, from)?;
                 }
-                // Over TCP, nobody else may keep the server from its client.
-                self.link.close(from);
             }
             // The report was lost, and the session has ended in the meantime.
             (Ok(frame), None) if frame.kind == Kind::Farewell => {
@@ -225,8 +222,10 @@ impl Server {
                 let mut answer = Frame { kind: Kind::Sensors, values: [0.0; 6], ..frame };
                 answer.flags = flag::SHUT_DOWN;
                 self.link.send(&answer, from)?;
+                self.link.close(from);
             }
-            (Ok(_), None) => {}
+            // Over TCP, nobody without a session may keep the server from its clients.
+            (Ok(_), None) => self.link.close(from),
         }
         Ok(())
     }
