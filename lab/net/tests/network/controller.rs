@@ -1,4 +1,4 @@
-//! A controller across the network: late, missing and invalid answers, moves of the response, and a lock that the bench judges.
+//! Guards a controller across the network: late, missing and invalid answers, moves of the response, and a lock that the bench judges.
 
 use std::sync::{Arc, Mutex};
 use std::thread::sleep;

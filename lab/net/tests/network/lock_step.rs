@@ -1,4 +1,4 @@
-//! In lock-step, every bit equals that of the built-in plant, and a frame that is not allowed is answered at once. Refused sessions say
+//! Guards lock-step: every bit equals that of the built-in plant, and a frame that is not allowed is answered at once. Refused sessions say
 //! what to do.
 
 use std::net::{TcpStream, UdpSocket};

@@ -32,6 +32,7 @@ fn bridged(known: u64, lost: u64, turn: f64, motion: fn(u64) -> Sensors) -> Vec<
                 assert_eq!(counters.late, 1, "a reading after a later one");
             }
             let taken = readings.take(&mut counters).unwrap();
+            assert_eq!(counters.longest, if n < known { 0 } else { lost });
             assert_eq!(taken.with.is_none(), (known..known + lost).contains(&n));
             readings.advance(turn);
             (n >= known).then_some(taken.sensors)
