@@ -169,8 +169,8 @@ pub enum ServerError {
     Rig(#[from] RigError),
     #[error(transparent)]
     Controller(#[from] ControllerError),
-    #[error(transparent)]
-    Link(#[from] LinkError),
+    #[error("{0}")]
+    Refused(#[from] Refusal),
     #[error("the network: {0}")]
     System(#[from] io::Error),
 }

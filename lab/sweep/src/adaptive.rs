@@ -37,31 +37,15 @@ pub(crate) fn run(sweep: &Sweep, store: &Store, stride: usize, monitor: &Monitor
         ];
         near.into_iter().flatten()
     };
-    let mut codes = vec![ABSENT; rows * columns];
-    let mut computed = vec![false; rows * columns];
+    let (mut codes, mut computed) = (vec![ABSENT; rows * columns], vec![false; rows * columns]);
     let mut stride = stride.min((rows.min(columns) / SIDE).max(1).next_power_of_two());
-    let mut next: Vec<usize> = grid(stride).collect();
-    let mut round = 0;
+    let (mut candidates, mut round): (Vec<usize>, _) = (grid(stride).collect(), 0);
     loop {
-        for (batch, cells) in next.chunks(sweep.chunk_size() as usize).enumerate() {
-            let Some(results) = results(sweep, store, &format!("{ROUNDS}/{round}-{batch}"), cells, monitor)? else {
-                return Ok(false);
-            };
-            for (n, code) in cells.iter().zip(results) {
-                (codes[*n], computed[*n]) = (code, true);
-            }
-        }
-        round += 1;
-        // Only a cell that was computed, or its neighbour, can differ now; on a new grid, any.
-        let mut candidates: Vec<usize> = next.iter().flat_map(|n| neighbours(*n, stride).chain([*n])).collect();
-        loop {
-            candidates.sort_unstable();
-            candidates.dedup();
-            let differs = |n: &usize| neighbours(*n, stride).any(|other| codes[other] != codes[*n]);
-            candidates.retain(|n| !computed[*n] && differs(n));
-            if !candidates.is_empty() {
-                break;
-            }
+        candidates.sort_unstable();
+        candidates.dedup();
+        let differs = |n: &usize| neighbours(*n, stride).any(|other| codes[other] != codes[*n]);
+        candidates.retain(|n| !computed[*n] && (codes[*n] == ABSENT || differs(n)));
+        if candidates.is_empty() {
             if stride == 1 {
                 return write(sweep, store, &codes, &computed, monitor);
             }
@@ -71,8 +55,20 @@ pub(crate) fn run(sweep: &Sweep, store: &Store, stride: usize, monitor: &Monitor
             }
             stride /= 2;
             candidates = grid(stride).collect();
+            continue;
         }
-        next = candidates;
+        for (batch, cells) in candidates.chunks(sweep.chunk_size() as usize).enumerate() {
+            let Some(results) = results(sweep, store, &format!("{ROUNDS}/{round}-{batch}"), cells, monitor)? else {
+                return Ok(false);
+            };
+            for (n, code) in cells.iter().zip(results) {
+                (codes[*n], computed[*n]) = (code, true);
+            }
+        }
+        round += 1;
+        // Only a cell that was computed, or its neighbour, can differ now; on a new grid, any.
+        let near = |n: &usize| neighbours(*n, stride).chain([*n]);
+        candidates = candidates.iter().flat_map(near).collect();
     }
 }
 
@@ -118,7 +114,7 @@ fn write(sweep: &Sweep, store: &Store, codes: &[u8], computed: &[bool], monitor:
         let cells: Vec<Cell> = indices.map(|index| index.map_or_else(Cell::default, cell)).collect();
         store.write_chunk(&index, &cells)?;
     }
-    let inferred = computed.iter().filter(|computed| !**computed).count();
-    monitor.inferred.store(inferred as u64, Relaxed);
+    let inferred = computed.iter().map(|computed| u64::from(!computed)).sum();
+    monitor.inferred.store(inferred, Relaxed);
     Ok(true)
 }

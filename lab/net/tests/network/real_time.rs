@@ -11,7 +11,7 @@ use std::time::Duration;
 use vines_net::frame::{Frame, Kind};
 use vines_net::{Address, Counters, Ended, LinkError, NetRig, RAMP_SAMPLES, ReportLost, Session, Timing};
 use vines_testbench::experiment::{self, ExperimentError, Plan};
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Rig, Sensors, Simulated};
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Rig, Sensors};
 
 use crate::{PATIENT, drive, scene, serve_controller, serve_rig, shake};
 
