@@ -4,8 +4,6 @@
 use std::f64::consts::TAU;
 use std::io;
 
-use thiserror::Error;
-
 use crate::codec::{
     COEFFICIENTS, ErrorCode, Frame, HARMONICS, Malformed, Packet, VERSION, message, take, take_text, to_bytes,
 };
@@ -24,21 +22,14 @@ const RUNNING: f64 = 0.01;
 /// of a device that has stopped would.
 const CHECKED: f64 = 0.25;
 
-/// Why a device cannot be used, in words.
-#[derive(Debug, Error)]
-#[error("{0}")]
-pub struct HostError(String);
-
-impl From<Malformed> for HostError {
+impl From<Malformed> for RigError {
     fn from(_: Malformed) -> Self {
-        Self("the helic device sent an answer that does not match the request: is it another version?".into())
+        failed("the helic device sent an answer that does not match the request: is it another version?")
     }
 }
 
-impl From<HostError> for RigError {
-    fn from(error: HostError) -> Self {
-        Self::Failed(error.into())
-    }
+fn failed(message: impl Into<String>) -> RigError {
+    RigError::Failed(message.into().into())
 }
 
 /// A device, seen from its host.
@@ -56,7 +47,7 @@ struct Host<T> {
 
 impl<T: Transport> Host<T> {
     /// Reads what the device has.
-    fn new(transport: T) -> Result<Self, HostError> {
+    fn new(transport: T) -> Result<Self, RigError> {
         let (parameters, sources) = (Vec::new(), Vec::new());
         let mut host = Self {
             transport,
@@ -71,7 +62,7 @@ impl<T: Transport> Host<T> {
         let [version, low, high, _] = take(&mut rest)?;
         // The version first: everything after it may differ between versions.
         if version != VERSION {
-            return Err(HostError(format!(
+            return Err(failed(format!(
                 "the helic device has version {version} of the protocol, this program has version {VERSION}"
             )));
         }
@@ -99,7 +90,7 @@ impl<T: Transport> Host<T> {
     }
 
     /// Sends a request and returns the payload of the answer; `what` names it in errors.
-    fn request(&mut self, kind: u8, payload: Vec<u8>, what: &str) -> Result<Vec<u8>, HostError> {
+    fn request(&mut self, kind: u8, payload: Vec<u8>, what: &str) -> Result<Vec<u8>, RigError> {
         self.sequence = self.sequence.wrapping_add(1);
         let request = Frame { kind, sequence: self.sequence, payload };
         let answer = self.transport.request(&request).map_err(lost(what))?;
@@ -107,7 +98,7 @@ impl<T: Transport> Host<T> {
             _ if answer.sequence != self.sequence => Err(Malformed.into()),
             (message::ERROR, &[code, cause]) if cause == kind => {
                 let code = ErrorCode::of_number(code).ok_or(Malformed)?;
-                Err(HostError(format!("the helic device refuses {what}: {code:?}")))
+                Err(failed(format!("the helic device refuses {what}: {code:?}")))
             }
             (answered, _) if answered == kind => Ok(answer.payload),
             _ => Err(Malformed.into()),
@@ -121,11 +112,11 @@ impl<T: Transport> Host<T> {
     }
 
     /// Id of a source.
-    fn source(&self, name: &str) -> Result<u8, HostError> {
+    fn source(&self, name: &str) -> Result<u8, RigError> {
         let index = self.sources.iter().position(|(own, _)| own == name);
         index.map(|index| index as u8).ok_or_else(|| {
             let all: Vec<_> = self.sources.iter().map(|(name, unit)| format!("{name} [{unit}]")).collect();
-            HostError(format!(
+            failed(format!(
                 "the helic device has no source \"{name}\"; it has: {}; [rig.names] of the scene maps response and base",
                 all.join(", ")
             ))
@@ -133,21 +124,21 @@ impl<T: Transport> Host<T> {
     }
 
     /// The request that sets a parameter.
-    fn setting(&self, name: &str, values: &[f64]) -> Result<Frame, HostError> {
-        let missing = || HostError(format!("the helic device has no parameter \"{name}\""));
+    fn setting(&self, name: &str, values: &[f64]) -> Result<Frame, RigError> {
+        let missing = || failed(format!("the helic device has no parameter \"{name}\""));
         let (index, code) = self.parameter(name).ok_or_else(missing)?;
         let payload = [&index.to_le_bytes()[..], &to_bytes(code, values)].concat();
         Ok(Frame { kind: message::SET_PAR, sequence: 0, payload })
     }
 
     /// Sets a parameter.
-    fn set(&mut self, name: &str, values: &[f64]) -> Result<(), HostError> {
+    fn set(&mut self, name: &str, values: &[f64]) -> Result<(), RigError> {
         let Frame { kind, payload, .. } = self.setting(name, values)?;
         self.request(kind, payload, name).map(drop)
     }
 
     /// Sets the stream up without an end, and starts it.
-    fn stream(&mut self, sources: &[u8], decimation: u16) -> Result<(), HostError> {
+    fn stream(&mut self, sources: &[u8], decimation: u16) -> Result<(), RigError> {
         let [d, e] = decimation.to_le_bytes();
         let setup = [&[d, e, 0, 0, 0, 0, sources.len() as u8], sources].concat();
         let port = self.transport.port().map_err(lost("its stream"))?.to_le_bytes();
@@ -162,14 +153,14 @@ impl<T: Transport> Host<T> {
     }
 
     /// Checks that the output of the device is on, if it reports it.
-    fn check_output(&mut self) -> Result<(), HostError> {
+    fn check_output(&mut self) -> Result<(), RigError> {
         let Some((index, _)) = self.parameter("safety") else {
             return Ok(());
         };
         let answer = self.request(message::GET_PAR, index.to_le_bytes().into(), "safety")?;
         match answer.first() {
             // Armed and not tripped; a device without a gate reads 0.
-            Some(safety) if *safety != 0 && safety & 0b11 != 1 => Err(HostError(format!(
+            Some(safety) if *safety != 0 && safety & 0b11 != 1 => Err(failed(format!(
                 "the output of the helic device is off (safety = {safety}): it has tripped, or was disarmed; the drive is zero"
             ))),
             _ => Ok(()),
@@ -177,9 +168,9 @@ impl<T: Transport> Host<T> {
     }
 }
 
-fn lost(what: &str) -> impl Fn(io::Error) -> HostError {
+fn lost(what: &str) -> impl Fn(io::Error) -> RigError {
     move |error| {
-        HostError(format!(
+        failed(format!(
             "the helic device, {what}: {error}; the drive is stopped as far as the device can still be reached"
         ))
     }
@@ -224,16 +215,16 @@ pub struct HelicRig<T: Transport> {
 
 impl<T: Transport> HelicRig<T> {
     /// Sets the device up. `names` are those of its sources, where they differ from the virtual device; `sample_time` in s.
-    pub fn new(transport: T, names: &Names, sample_time: f64, samples_per_period: f64) -> Result<Self, HostError> {
+    pub fn new(transport: T, names: &Names, sample_time: f64, samples_per_period: f64) -> Result<Self, RigError> {
         if let Some(name) = names.unknown(&["response", "base", "E"]) {
-            return Err(HostError(format!(
+            return Err(failed(format!(
                 "[rig.names] maps `{name}`; for a helic device there are response, base and E"
             )));
         }
         let mut host = Host::new(transport)?;
         let ratio = host.sample_rate * sample_time;
         if ratio < 0.5 || (ratio / ratio.round() - 1.0).abs() > SAME_RATE {
-            return Err(HostError(format!(
+            return Err(failed(format!(
                 "the helic device takes {} samples per second, which is not a multiple of the scene's {}: set \
                  controller.samples_per_period to {} (or that over an integer)",
                 host.sample_rate,
@@ -298,7 +289,7 @@ impl<T: Transport> HelicRig<T> {
         self.parts != [0.0; 2]
     }
 
-    fn reading(&mut self) -> Result<Sensors, HostError> {
+    fn reading(&mut self) -> Result<Sensors, RigError> {
         if let Some(now) = self.now {
             return Ok(now);
         }
@@ -331,7 +322,7 @@ impl<T: Transport> HelicRig<T> {
     }
 
     /// Waits for the next packet.
-    fn receive(&mut self) -> Result<(), HostError> {
+    fn receive(&mut self) -> Result<(), RigError> {
         let bytes = self.host.transport.datagram().map_err(lost("its stream"))?;
         let Ok(packet) = Packet::decode(&bytes) else {
             self.counters.malformed += 1;
@@ -352,7 +343,7 @@ impl<T: Transport> HelicRig<T> {
         let seconds = f64::from(missed) * self.sample_time;
         let allowed = self.host.transport.silence().as_secs_f64();
         if seconds > allowed {
-            return Err(HostError(format!(
+            return Err(failed(format!(
                 "{missed} samples of the helic device did not arrive, {seconds:.3} s; up to {allowed} s are bridged. Check the network and \
                  the load of this machine"
             )));
@@ -371,7 +362,7 @@ impl<T: Transport> HelicRig<T> {
     }
 
     /// Sends the drive, as far as it has changed.
-    fn command(&mut self) -> Result<(), HostError> {
+    fn command(&mut self) -> Result<(), RigError> {
         if self.wanted.omega != self.omega {
             self.host.set("freq", &[self.wanted.omega / TAU])?;
             self.omega = self.wanted.omega;
@@ -414,21 +405,17 @@ impl<T: Transport> HelicRig<T> {
     }
 
     /// After an error the device is not driven any more.
-    fn checked<V>(&mut self, outcome: Result<V, HostError>) -> Result<V, RigError> {
-        if outcome.is_err() {
-            self.host.transport.close();
-        }
-        Ok(outcome?)
+    fn checked<V>(&mut self, outcome: Result<V, RigError>) -> Result<V, RigError> {
+        outcome.inspect_err(|_| self.host.transport.close())
     }
 
-    fn stop(&mut self) -> Result<(), HostError> {
+    fn stop(&mut self) -> Result<(), RigError> {
         if self.is_driven() {
             self.host.set("forcing_coeffs", &[0.0; COEFFICIENTS])?;
         }
         self.host.set("arm", &[0.0])?;
-        self.host
-            .request(message::STREAM_STOP, Vec::new(), "StreamStop")
-            .map(drop)
+        self.host.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
+        Ok(())
     }
 }
 

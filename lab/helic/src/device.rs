@@ -186,7 +186,7 @@ impl Device {
 
     /// The values of a parameter of the table.
     fn values(&mut self, name: &str) -> &mut Vec<f64> {
-        let parameter = self.parameters.iter_mut().find(|one| one.name == name);
+        let parameter = self.parameters.iter_mut().find(|parameter| parameter.name == name);
         &mut parameter.expect("the parameter is in the table").values
     }
 

@@ -11,7 +11,7 @@ mod device;
 mod network;
 mod server;
 
-pub use client::{HelicRig, HostError};
+pub use client::HelicRig;
 pub use device::Device;
 pub use network::{LONGEST_SILENCE, Network, Transport};
 pub use server::{DEFAULT_PORT, HelicServer};

@@ -149,7 +149,10 @@ impl Axis {
             "chain.snr" => "dB",
             name => {
                 let parameter = name.strip_prefix("phase_lock.").and_then(Parameter::find);
-                parameter.map_or("1", |one| if one.unit.is_empty() { "1" } else { one.unit })
+                parameter.map_or(
+                    "1",
+                    |parameter| if parameter.unit.is_empty() { "1" } else { parameter.unit },
+                )
             }
         }
     }

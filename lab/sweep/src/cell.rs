@@ -118,12 +118,16 @@ impl Cell {
         self.orbits
             .iter()
             .flatten()
-            .max_by(|one, other| one.b.total_cmp(&other.b))
+            .max_by(|first, second| first.b.total_cmp(&second.b))
     }
 
     /// The regime as it is stored.
     pub(crate) fn code(&self) -> u8 {
-        let position = |regime| regime::Regime::SIMULATED.iter().position(|one| *one == regime);
+        let position = |regime| {
+            regime::Regime::SIMULATED
+                .iter()
+                .position(|simulated| *simulated == regime)
+        };
         match self.regime.and_then(position) {
             Some(code) => code as u8,
             None if self.is_known() => FAILED,
@@ -214,6 +218,6 @@ const VARIABLES: [Variable; 25] = [
 /// The variables of a sweep.
 pub(crate) fn variables(results: Results, is_adaptive: bool) -> impl Iterator<Item = Variable> {
     let groups = if is_adaptive { vec!["adaptive"] } else { results.names() };
-    let stored = move |one: &Variable| one.group.is_empty() || groups.contains(&one.group);
+    let stored = move |variable: &Variable| variable.group.is_empty() || groups.contains(&variable.group);
     VARIABLES.into_iter().filter(stored)
 }

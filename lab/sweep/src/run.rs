@@ -95,7 +95,7 @@ fn count(sweep: &Sweep, store: &Store, shard: Shard, monitor: &Monitor) -> u64 {
 /// # Errors
 /// A folder that cannot be used, or a store of another sweep.
 pub fn collect(sweep: &Sweep, folder: &Path, from: &[PathBuf], monitor: &Monitor) -> Result<(), StoreError> {
-    let sources = from.iter().map(|one| Store::existing(sweep, one));
+    let sources = from.iter().map(|folder| Store::existing(sweep, folder));
     let sources: Vec<Store> = sources.collect::<Result<_, _>>()?;
     let store = Store::open(sweep, folder, Shard::ALL, monitor)?;
     for index in Shard::ALL.chunks(sweep) {

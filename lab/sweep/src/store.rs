@@ -163,7 +163,11 @@ impl<'a> Store<'a> {
 
     /// Reads the files of a chunk and verifies their checksums; None if they are not all there and undamaged. Damage is noted.
     pub(crate) fn chunk(&self, index: &[u64], monitor: &Monitor) -> Option<Vec<Vec<u8>>> {
-        let keys: Vec<String> = self.variables.iter().map(|one| chunk_key(one.name, index)).collect();
+        let keys: Vec<String> = self
+            .variables
+            .iter()
+            .map(|variable| chunk_key(variable.name, index))
+            .collect();
         let files: Vec<io::Result<Vec<u8>>> = keys.iter().map(|key| self.read(key)).collect();
         let is_missing = |file: &io::Result<_>| file.as_ref().is_err_and(|error| error.kind() == ErrorKind::NotFound);
         if !files.iter().all(is_missing) {
@@ -179,13 +183,13 @@ impl<'a> Store<'a> {
     /// Writes all variables of a chunk.
     pub(crate) fn write_chunk(&self, index: &[u64], cells: &[Cell]) -> Result<(), StoreError> {
         let mut variables = self.variables.iter();
-        variables.try_for_each(|one| self.write(&chunk_key(one.name, index), &one.read.bytes(cells)))
+        variables.try_for_each(|variable| self.write(&chunk_key(variable.name, index), &variable.read.bytes(cells)))
     }
 
     /// Writes the content of a chunk of another store of the same sweep.
     pub(crate) fn copy_chunk(&self, index: &[u64], files: &[Vec<u8>]) -> Result<(), StoreError> {
         let mut files = self.variables.iter().zip(files);
-        files.try_for_each(|(one, content)| self.write(&chunk_key(one.name, index), content))
+        files.try_for_each(|(variable, content)| self.write(&chunk_key(variable.name, index), content))
     }
 
     /// The content of a compressed file whose checksum is right.

@@ -135,7 +135,9 @@ impl Settings {
             _ => None,
         });
         let paired: Vec<(&String, u64)> = lengths.collect();
-        if let Some([(first, length), (other, second)]) = paired.array_windows().find(|[one, other]| one.1 != other.1) {
+        if let Some([(first, length), (other, second)]) =
+            paired.array_windows().find(|[first, second]| first.1 != second.1)
+        {
             return refused(format!(
                 "{first} has {length} paired values and {other} has {second}: paired values belong together, one per sample"
             ));
@@ -288,7 +290,11 @@ impl Sweep {
         let (mut streams, seed) = (0.., self.settings.seed);
         self.settings.axes.iter().map(move |axis| {
             let name = axis.points().map_or(SAMPLE, |_| axis.name.as_str());
-            let dimension = self.dimensions.iter().position(|one| one == name).unwrap_or(0);
+            let dimension = self
+                .dimensions
+                .iter()
+                .position(|dimension| dimension == name)
+                .unwrap_or(0);
             let is_random = matches!(axis.values, Values::Random(_));
             let stream = if is_random { streams.next() } else { None };
             let value = move |n| axis.at(n, seed, stream.unwrap_or_default());
@@ -367,8 +373,8 @@ impl Sweep {
 /// Indices of the n-th element of an array, the last index fastest.
 fn position(mut n: u64, shape: &[u64]) -> Vec<u64> {
     let mut index = shape.to_vec();
-    for one in index.iter_mut().rev() {
-        (*one, n) = (n % *one, n / *one);
+    for place in index.iter_mut().rev() {
+        (*place, n) = (n % *place, n / *place);
     }
     index
 }
