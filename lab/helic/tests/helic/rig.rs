@@ -81,8 +81,11 @@ fn shake<T: Transport>(rig: &mut HelicRig<T>, samples: usize, step: f64) -> Resu
     (0..samples).map(|_| sample()).collect()
 }
 
+/// How often the n-th datagram arrives.
+type Fate = fn(usize) -> usize;
+
 /// The locked point of the default scene, on the plant or on a device with this many samples per sample of the scene.
-fn lock(device: Option<(f64, fn(usize) -> usize)>) -> (Lock, Counters) {
+fn lock(device: Option<(f64, Fate)>) -> (Lock, Counters) {
     let mut scene = Scene::parse("paper.toml", PAPER, &[]).unwrap();
     scene.record.decay_periods = Some(150.0);
     let (mut plant, step) = (Simulated::new(scene.plant, scene.start).unwrap(), scene.sample_time());
