@@ -137,8 +137,8 @@ pub enum LinkError {
     )]
     ShutDown { peer: Address, time: f64, seconds: f64 },
     #[error(
-        "{peer} has closed the connection, at t = {time:.3} s of the experiment: it has another client, was stopped, or received nothing for too \
-         long"
+        "{peer} has closed the connection, at t = {time:.3} s of the experiment: it has another client or another key, was stopped, or received nothing \
+         for too long"
     )]
     Closed { peer: Address, time: f64 },
     #[error(
