@@ -1,22 +1,17 @@
 //! The host: the parameters and sources of a device by name, and the device as a rig of the bench. The oscillator runs on the device; the
 //! host sets frequency and amplitude, step by step.
 
-use std::collections::VecDeque;
 use std::f64::consts::TAU;
-use std::io::{self, ErrorKind, Read, Write};
-use std::net::{Shutdown, SocketAddr, TcpStream, UdpSocket};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::io;
 
-use thiserror::Error;
-
-use super::codec::{
+use crate::codec::{
     COEFFICIENTS, ErrorCode, Frame, HARMONICS, Malformed, Packet, VERSION, message, take, take_text, to_bytes,
 };
-use super::device::WATCHDOG;
-use vines_net::{Bridge, CONNECT, Counters, is_loopback};
+use crate::device::WATCHDOG;
+use crate::network::Transport;
+use vines_net::{Counters, Readings};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
+use vines_testbench::scene::Names;
 
 /// Largest relative difference between the sample rates: the device states its own with 24 bits.
 const SAME_RATE: f64 = 1e-6;
@@ -25,23 +20,16 @@ const SAME_RATE: f64 = 1e-6;
 const RUNNING: f64 = 0.01;
 /// Interval at which the device is asked whether its output is on, as a share of the longest silence: a trip ends the run before the silence
 /// of a device that has stopped would.
-const SUPERVISION: f64 = 0.25;
+const CHECKED: f64 = 0.25;
 
-/// Why a device cannot be used, in words.
-#[derive(Debug, Error)]
-#[error("{0}")]
-pub struct HostError(String);
-
-impl From<Malformed> for HostError {
+impl From<Malformed> for RigError {
     fn from(_: Malformed) -> Self {
-        Self("the helic device sent an answer that does not match the request: is it another version?".into())
+        failed("the helic device sent an answer that does not match the request: is it another version?")
     }
 }
 
-impl From<HostError> for RigError {
-    fn from(error: HostError) -> Self {
-        Self::Failed(error.into())
-    }
+fn failed(message: impl Into<String>) -> RigError {
+    RigError::Failed(message.into().into())
 }
 
 /// A device, seen from its host.
@@ -59,38 +47,37 @@ struct Host<T> {
 
 impl<T: Transport> Host<T> {
     /// Reads what the device has.
-    fn new(transport: T) -> Result<Self, HostError> {
-        let (parameters, sources, sample_rate) = (Vec::new(), Vec::new(), 0.0);
-        let mut host = Self { transport, sequence: 0, parameters, sources, sample_rate };
+    fn new(transport: T) -> Result<Self, RigError> {
+        let (parameters, sources) = (Vec::new(), Vec::new());
+        let mut host = Self {
+            transport,
+            sequence: 0,
+            parameters,
+            sources,
+            sample_rate: 0.0,
+        };
         let advice = "Status (is `vines rig --protocol helic` or the device running, with no other host?)";
         let answer = host.request(message::STATUS, Vec::new(), advice)?;
+        let mut rest = &answer[..];
+        let [version, low, high, _] = take(&mut rest)?;
         // The version first: everything after it may differ between versions.
-        if let Some(version) = answer.first().filter(|version| **version != VERSION) {
-            return Err(HostError(format!(
+        if version != VERSION {
+            return Err(failed(format!(
                 "the helic device has version {version} of the protocol, this program has version {VERSION}"
             )));
         }
-        let mut rest = &answer[..];
-        let [_, low, high, sources] = take(&mut rest)?;
         host.sample_rate = f32::from_le_bytes(take(&mut rest)?).into();
-        // What remains is the time since the start of the device, ms.
-        if rest.len() != 4 {
-            return Err(Malformed.into());
-        }
         let parameters = u16::from_le_bytes([low, high]);
         while host.parameters.len() < usize::from(parameters) {
-            let before = host.parameters.len();
-            let start = (before as u16).to_le_bytes();
-            let page = host.request(message::GET_PARAMS, start.into(), "GetParams")?;
-            let mut rest = &page[..];
-            let (echo, next) = (take(&mut rest)?, u16::from_le_bytes(take(&mut rest)?));
+            let start = host.parameters.len();
+            let page = host.request(message::GET_PARAMS, (start as u16).to_le_bytes().into(), "GetParams")?;
+            let mut rest = page.get(4..).ok_or(Malformed)?;
             while !rest.is_empty() {
                 let name = take_text(&mut rest)?;
                 let [code, _, _, _] = take(&mut rest)?;
                 host.parameters.push((name, code));
             }
-            let count = host.parameters.len();
-            if echo != start || count == before || count != usize::from(next) {
+            if host.parameters.len() == start {
                 return Err(Malformed.into());
             }
         }
@@ -99,12 +86,11 @@ impl<T: Transport> Host<T> {
         while !rest.is_empty() {
             host.sources.push((take_text(&mut rest)?, take_text(&mut rest)?));
         }
-        let complete = host.sources.len() == usize::from(sources);
-        complete.then_some(host).ok_or_else(|| Malformed.into())
+        Ok(host)
     }
 
     /// Sends a request and returns the payload of the answer; `what` names it in errors.
-    fn request(&mut self, kind: u8, payload: Vec<u8>, what: &str) -> Result<Vec<u8>, HostError> {
+    fn request(&mut self, kind: u8, payload: Vec<u8>, what: &str) -> Result<Vec<u8>, RigError> {
         self.sequence = self.sequence.wrapping_add(1);
         let request = Frame { kind, sequence: self.sequence, payload };
         let answer = self.transport.request(&request).map_err(lost(what))?;
@@ -112,26 +98,25 @@ impl<T: Transport> Host<T> {
             _ if answer.sequence != self.sequence => Err(Malformed.into()),
             (message::ERROR, &[code, cause]) if cause == kind => {
                 let code = ErrorCode::of_number(code).ok_or(Malformed)?;
-                Err(HostError(format!("the helic device refuses {what}: {code:?}")))
+                Err(failed(format!("the helic device refuses {what}: {code:?}")))
             }
             (answered, _) if answered == kind => Ok(answer.payload),
             _ => Err(Malformed.into()),
         }
     }
 
-    /// Index and type of a parameter.
-    fn parameter(&self, name: &str) -> Result<(u16, u8), HostError> {
-        let index = self.parameters.iter().position(|(own, _)| own == name);
-        let index = index.ok_or_else(|| HostError(format!("the helic device has no parameter \"{name}\"")))?;
-        Ok((index as u16, self.parameters[index].1))
+    /// Index and type of a parameter, if the device has it.
+    fn parameter(&self, name: &str) -> Option<(u16, u8)> {
+        let mut all = (0..).zip(&self.parameters);
+        all.find_map(|(index, (own, code))| (own == name).then_some((index, *code)))
     }
 
     /// Id of a source.
-    fn source(&self, name: &str) -> Result<u8, HostError> {
+    fn source(&self, name: &str) -> Result<u8, RigError> {
         let index = self.sources.iter().position(|(own, _)| own == name);
         index.map(|index| index as u8).ok_or_else(|| {
             let all: Vec<_> = self.sources.iter().map(|(name, unit)| format!("{name} [{unit}]")).collect();
-            HostError(format!(
+            failed(format!(
                 "the helic device has no source \"{name}\"; it has: {}; [rig.names] of the scene maps response and base",
                 all.join(", ")
             ))
@@ -139,58 +124,55 @@ impl<T: Transport> Host<T> {
     }
 
     /// The request that sets a parameter.
-    fn setting(&self, name: &str, values: &[f64]) -> Result<Frame, HostError> {
-        let (index, code) = self.parameter(name)?;
+    fn setting(&self, name: &str, values: &[f64]) -> Result<Frame, RigError> {
+        let missing = || failed(format!("the helic device has no parameter \"{name}\""));
+        let (index, code) = self.parameter(name).ok_or_else(missing)?;
         let payload = [&index.to_le_bytes()[..], &to_bytes(code, values)].concat();
         Ok(Frame { kind: message::SET_PAR, sequence: 0, payload })
     }
 
     /// Sets a parameter.
-    fn set(&mut self, name: &str, values: &[f64]) -> Result<(), HostError> {
+    fn set(&mut self, name: &str, values: &[f64]) -> Result<(), RigError> {
         let Frame { kind, payload, .. } = self.setting(name, values)?;
         self.request(kind, payload, name).map(drop)
     }
 
     /// Sets the stream up without an end, and starts it.
-    fn stream(&mut self, sources: &[u8], decimation: u16) -> Result<(), HostError> {
+    fn stream(&mut self, sources: &[u8], decimation: u16) -> Result<(), RigError> {
         let [d, e] = decimation.to_le_bytes();
         let setup = [&[d, e, 0, 0, 0, 0, sources.len() as u8], sources].concat();
-        let port = self.transport.port().map_err(lost("its stream"))?;
-        self.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
-        self.request(message::STREAM_SETUP, setup, "StreamSetup")?;
-        self.request(message::STREAM_START, port.to_le_bytes().into(), "StreamStart")
-            .map(drop)
+        let port = self.transport.port().map_err(lost("its stream"))?.to_le_bytes();
+        for (kind, payload, what) in [
+            (message::STREAM_STOP, Vec::new(), "StreamStop"),
+            (message::STREAM_SETUP, setup, "StreamSetup"),
+            (message::STREAM_START, port.into(), "StreamStart"),
+        ] {
+            self.request(kind, payload, what)?;
+        }
+        Ok(())
+    }
+
+    /// Checks that the output of the device is on, if it reports it.
+    fn check_output(&mut self) -> Result<(), RigError> {
+        let Some((index, _)) = self.parameter("safety") else {
+            return Ok(());
+        };
+        let answer = self.request(message::GET_PAR, index.to_le_bytes().into(), "safety")?;
+        match answer.first() {
+            // Armed and not tripped; a device without a gate reads 0.
+            Some(safety) if *safety != 0 && safety & 0b11 != 1 => Err(failed(format!(
+                "the output of the helic device is off (safety = {safety}): it has tripped, or was disarmed; the drive is zero"
+            ))),
+            _ => Ok(()),
+        }
     }
 }
 
-fn lost(what: &str) -> impl Fn(io::Error) -> HostError {
+fn lost(what: &str) -> impl Fn(io::Error) -> RigError {
     move |error| {
-        HostError(format!(
+        failed(format!(
             "the helic device, {what}: {error}; the drive is stopped as far as the device can still be reached"
         ))
-    }
-}
-
-/// The quantities that a host reads from a device, and the gain of its output.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Channels {
-    /// Source of the response, and m per unit of it.
-    pub response: (String, f64),
-    /// Source of the base displacement, and m per unit; None if no sensor reads it.
-    pub reference: Option<(String, f64)>,
-    /// Base displacement per volt of the output, m.
-    pub gain: f64,
-}
-
-impl Default for Channels {
-    /// The channels of `vines rig --protocol helic`.
-    fn default() -> Self {
-        let source = |name: &str| (name.to_string(), 1e-3);
-        Self {
-            response: source("response"),
-            reference: Some(source("reference")),
-            gain: 1e-3,
-        }
     }
 }
 
@@ -202,88 +184,95 @@ impl Default for Channels {
 #[derive(Debug)]
 pub struct HelicRig<T: Transport> {
     host: Host<T>,
-    channels: Channels,
     sample_time: f64,
-    /// Sources of the stream.
+    /// Sources of the stream: response, base displacement if a sensor reads it, and phase; m per unit of the first two.
     sources: Vec<u8>,
+    factors: Vec<f64>,
+    /// Base displacement per volt of the output, m.
+    gain: f64,
     /// Samples of the device per sample of the scene.
     decimation: u16,
     is_streaming: bool,
-    /// Readings and phase of the device's oscillator, turns, of the samples that have arrived; None if lost.
-    records: VecDeque<Option<(Sensors, f64)>>,
+    /// With the phase of the device's oscillator, turns.
+    readings: Readings<f64>,
     now: Option<Sensors>,
-    bridge: Bridge,
-    /// Number of the sample that the next packet begins with.
+    /// Number of the device's sample that the next packet begins with.
     next: Option<u32>,
-    /// Phase of the host's drive at the present sample, turns.
-    phase: f64,
-    /// Lead of the host's drive over the device's oscillator at the last record, turns.
+    /// Lead of the host's drive over the device's oscillator at the last reading that arrived, turns.
     lead: Option<f64>,
-    /// Phase of the device's oscillator at the last record, unless the record before the present one was lost, and its step, turns.
+    /// Phase of the device's oscillator at the present reading, unless it was lost, and its step since the reading before, turns.
     device_phase: Option<f64>,
     device_turn: Option<f64>,
     /// Time since the device was last asked whether its output is on, s.
-    unsupervised: f64,
+    unchecked: f64,
     wanted: Drive,
     /// Frequency of the device, rad/s, and the cosine and sine of its forcing, V.
     omega: f64,
     parts: [f64; 2],
-    /// Packets that have arrived, and samples that were bridged.
+    /// Packets that have arrived, and samples that were reconstructed.
     pub counters: Counters,
 }
 
 impl<T: Transport> HelicRig<T> {
-    /// Sets the device up; `sample_time` in s.
-    pub fn new(transport: T, channels: Channels, sample_time: f64, samples_per_period: f64) -> Result<Self, HostError> {
+    /// Sets the device up. `names` are those of its sources, where they differ from the virtual device; `sample_time` in s.
+    pub fn new(transport: T, names: &Names, sample_time: f64, samples_per_period: f64) -> Result<Self, RigError> {
+        if let Some(name) = names.unknown(&["response", "base", "E"]) {
+            return Err(failed(format!(
+                "[rig.names] maps `{name}`; for a helic device there are response, base and E"
+            )));
+        }
         let mut host = Host::new(transport)?;
         let ratio = host.sample_rate * sample_time;
         if ratio < 0.5 || (ratio / ratio.round() - 1.0).abs() > SAME_RATE {
-            let suggestion = ratio * samples_per_period;
-            return Err(HostError(format!(
+            return Err(failed(format!(
                 "the helic device takes {} samples per second, which is not a multiple of the scene's {}: set \
-                 controller.samples_per_period to {suggestion} (or that over an integer)",
+                 controller.samples_per_period to {} (or that over an integer)",
                 host.sample_rate,
-                1.0 / sample_time
+                1.0 / sample_time,
+                ratio * samples_per_period
             )));
         }
-        let reference = channels.reference.iter().map(|(name, _)| name.as_str());
-        let names = [channels.response.0.as_str()]
-            .into_iter()
-            .chain(reference)
-            .chain(["phase"]);
-        let sources = names.map(|name| host.source(name)).collect::<Result<_, _>>()?;
+        // Of `vines rig --protocol helic`: mm, and mm per volt.
+        let named = |ours: &str, name: &str| {
+            let mapped = names.mapped(ours).map(|mapped| (mapped.name.clone(), mapped.factor));
+            mapped.unwrap_or_else(|| (name.into(), 1e-3))
+        };
+        let sensors = [named("response", "response"), named("base", "reference")];
+        let sensors = sensors.into_iter().filter(|(name, _)| !name.is_empty());
+        let (mut sources, factors): (Vec<String>, Vec<f64>) = sensors.unzip();
+        sources.push("phase".into());
+        let sources = sources.iter().map(|name| host.source(name)).collect::<Result<_, _>>()?;
         host.set("arm", &[0.0])?;
         for series in ["target_coeffs", "forcing_coeffs"] {
             host.set(series, &[0.0; COEFFICIENTS])?;
         }
         let silence = host.transport.silence().as_secs_f64();
-        // Not every device has these.
         for (name, value) in [
             ("table_mode", 0.0),
             ("control_mode", 0.0),
             ("freq", 0.0),
             (WATCHDOG, silence),
         ] {
-            if host.parameter(name).is_ok() {
+            // Not every device has these.
+            if host.parameter(name).is_some() {
                 host.set(name, &[value])?;
             }
         }
         Ok(Self {
             host,
-            channels,
             sample_time,
             sources,
+            factors,
+            gain: named("E", "").1,
             decimation: ratio.round() as u16,
             is_streaming: false,
-            records: VecDeque::new(),
+            readings: Readings::default(),
             now: None,
-            bridge: Bridge::default(),
             next: None,
-            phase: 0.0,
             lead: None,
             device_phase: None,
             device_turn: None,
-            unsupervised: 0.0,
+            unchecked: 0.0,
             wanted: Drive::default(),
             omega: 0.0,
             parts: [0.0; 2],
@@ -300,7 +289,7 @@ impl<T: Transport> HelicRig<T> {
         self.parts != [0.0; 2]
     }
 
-    fn reading(&mut self) -> Result<Sensors, HostError> {
+    fn reading(&mut self) -> Result<Sensors, RigError> {
         if let Some(now) = self.now {
             return Ok(now);
         }
@@ -309,39 +298,31 @@ impl<T: Transport> HelicRig<T> {
             self.host.stream(&self.sources, self.decimation)?;
             self.is_streaming = true;
         }
-        let reading = loop {
-            // The first record after the lost ones.
-            let next = self.records.iter().flatten().next().copied();
-            match (self.records.pop_front(), next) {
-                (Some(Some((sensors, phase))), _) => {
-                    self.device_turn = self.device_phase.map(|before| (phase - before).rem_euclid(1.0));
-                    self.device_phase = Some(phase);
-                    self.lead = Some(self.phase - phase);
-                    break sensors;
-                }
-                (Some(None), Some((sensors, _))) => {
-                    let ahead = 1 + self.records.iter().take_while(|record| record.is_none()).count() as u64;
-                    let turn = self.wanted.omega * self.sample_time / TAU;
-                    self.device_phase = None;
-                    break self.bridge.fill(self.phase, &sensors, ahead, turn);
-                }
-                _ => {
+        let taken = loop {
+            match self.readings.take(&mut self.counters) {
+                Some(taken) => break taken,
+                None => {
                     self.command()?;
                     self.receive()?;
                 }
             }
         };
-        self.bridge.keep(self.phase, reading);
-        self.now = Some(reading);
-        self.unsupervised += self.sample_time;
-        if self.unsupervised > SUPERVISION * self.host.transport.silence().as_secs_f64() && self.is_driven() {
-            self.supervise()?;
+        if let Some(phase) = taken.with {
+            self.device_turn = self.device_phase.map(|before| (phase - before).rem_euclid(1.0));
+            self.lead = Some(self.readings.phase() - phase);
         }
-        Ok(reading)
+        self.device_phase = taken.with;
+        self.unchecked += self.sample_time;
+        if self.is_driven() && self.unchecked > CHECKED * self.host.transport.silence().as_secs_f64() {
+            self.unchecked = 0.0;
+            self.host.check_output()?;
+        }
+        self.now = Some(taken.sensors);
+        Ok(taken.sensors)
     }
 
     /// Waits for the next packet.
-    fn receive(&mut self) -> Result<(), HostError> {
+    fn receive(&mut self) -> Result<(), RigError> {
         let bytes = self.host.transport.datagram().map_err(lost("its stream"))?;
         let Ok(packet) = Packet::decode(&bytes) else {
             self.counters.malformed += 1;
@@ -362,49 +343,33 @@ impl<T: Transport> HelicRig<T> {
         let seconds = f64::from(missed) * self.sample_time;
         let allowed = self.host.transport.silence().as_secs_f64();
         if seconds > allowed {
-            return Err(HostError(format!(
+            return Err(failed(format!(
                 "{missed} samples of the helic device did not arrive, {seconds:.3} s; up to {allowed} s are bridged. Check the network and \
                  the load of this machine"
             )));
         }
-        self.records.extend((0..missed).map(|_| None));
-        (0..missed).for_each(|_| self.counters.hold(missed.into()));
         self.counters.received += 1;
-        for record in packet.values.chunks_exact(width) {
-            let read = |n: usize, factor: f64| factor * f64::from(record[n]);
-            let response = read(0, self.channels.response.1);
-            let reference = self.channels.reference.as_ref().map(|(_, factor)| read(1, *factor));
-            let phase = read(width - 1, 1.0);
-            self.records.push_back(Some((Sensors { response, reference }, phase)));
+        let first = self.readings.next() + u64::from(missed);
+        for (number, record) in (first..).zip(packet.values.chunks_exact(width)) {
+            let read = |n: usize| Some(self.factors.get(n)? * f64::from(record[n]));
+            let sensors = Sensors { response: read(0).unwrap_or_default(), reference: read(1) };
+            let phase = record[width - 1].into();
+            self.readings.arrive(number, sensors, phase, &mut self.counters);
         }
         let records = (packet.values.len() / width) as u32;
         self.next = Some(packet.first.wrapping_add(records * step));
         Ok(())
     }
 
-    /// Checks that the output of the device is on, if it reports it.
-    fn supervise(&mut self) -> Result<(), HostError> {
-        self.unsupervised = 0.0;
-        let index = self.host.parameter("safety")?.0.to_le_bytes();
-        let bytes = self.host.request(message::GET_PAR, index.into(), "safety")?;
-        match bytes.first().copied().unwrap_or_default() {
-            // Armed and not tripped; a device without a gate reads 0.
-            safety if safety == 0 || safety & 0b11 == 1 => Ok(()),
-            safety => Err(HostError(format!(
-                "the output of the helic device is off (safety = {safety}): it has tripped, or was disarmed; the drive is zero"
-            ))),
-        }
-    }
-
     /// Sends the drive, as far as it has changed.
-    fn command(&mut self) -> Result<(), HostError> {
+    fn command(&mut self) -> Result<(), RigError> {
         if self.wanted.omega != self.omega {
             self.host.set("freq", &[self.wanted.omega / TAU])?;
             self.omega = self.wanted.omega;
         }
         let turn = self.omega * self.sample_time / TAU;
         let runs = self.device_turn.is_some_and(|now| (now - turn).abs() <= RUNNING * turn);
-        let volts = self.wanted.amplitude / self.channels.gain;
+        let volts = self.wanted.amplitude / self.gain;
         let parts = match self.lead {
             // The drive begins when the oscillator has its frequency.
             Some(lead) if self.is_driven() || runs => {
@@ -430,9 +395,9 @@ impl<T: Transport> HelicRig<T> {
         self.parts = parts;
         if !was_driven {
             self.host.set("arm", &[1.0])?;
-            self.unsupervised = 0.0;
+            self.unchecked = 0.0;
         } else if !self.is_driven() {
-            self.supervise()?;
+            self.host.check_output()?;
             self.host.set("arm", &[0.0])?;
             self.host.transport.guard(&[]).map_err(lost("arm"))?;
         }
@@ -440,21 +405,17 @@ impl<T: Transport> HelicRig<T> {
     }
 
     /// After an error the device is not driven any more.
-    fn checked<V>(&mut self, outcome: Result<V, HostError>) -> Result<V, RigError> {
-        if outcome.is_err() {
-            self.host.transport.close();
-        }
-        Ok(outcome?)
+    fn checked<V>(&mut self, outcome: Result<V, RigError>) -> Result<V, RigError> {
+        outcome.inspect_err(|_| self.host.transport.close())
     }
 
-    fn stop(&mut self) -> Result<(), HostError> {
+    fn stop(&mut self) -> Result<(), RigError> {
         if self.is_driven() {
             self.host.set("forcing_coeffs", &[0.0; COEFFICIENTS])?;
         }
         self.host.set("arm", &[0.0])?;
-        self.host
-            .request(message::STREAM_STOP, Vec::new(), "StreamStop")
-            .map(drop)
+        self.host.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
+        Ok(())
     }
 }
 
@@ -467,7 +428,7 @@ impl<T: Transport> Rig for HelicRig<T> {
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         self.wanted = drive;
         self.now = None;
-        self.phase += drive.omega * step / TAU;
+        self.readings.advance(drive.omega * step / TAU);
         if drive.amplitude == 0.0 && self.is_driven() {
             // A drive of zero is not delayed.
             let sent = self.command();
@@ -484,194 +445,6 @@ impl<T: Transport> Drop for HelicRig<T> {
         }
         if self.counters.is_troubled() {
             log::warn!("helic device: {}", self.counters);
-        }
-    }
-}
-
-/// Longest silence of a driven device, and of a host that drives it. The drive stops within 0.2 s, with 50 ms for the network.
-pub const LONGEST_SILENCE: Duration = Duration::from_millis(150);
-
-/// The connection to a device.
-pub trait Transport {
-    /// Sends a request and returns the answer.
-    fn request(&mut self, request: &Frame) -> io::Result<Frame>;
-
-    /// The next datagram of the stream.
-    fn datagram(&mut self) -> io::Result<Vec<u8>>;
-
-    /// Port on which the datagrams arrive.
-    fn port(&self) -> io::Result<u16>;
-
-    /// Longest silence of either side while the device is driven.
-    fn silence(&self) -> Duration {
-        LONGEST_SILENCE
-    }
-
-    /// From now on the device is driven: when the host takes no datagram for too long, the transport sends the requests `stop`, which stop
-    /// the drive, and closes the control channel. Without requests, it is not driven any more. A transport without a clock does nothing.
-    fn guard(&mut self, _stop: &[Frame]) -> io::Result<()> {
-        Ok(())
-    }
-
-    /// Sends the requests that stop the drive, if there is one, and closes the control channel.
-    fn close(&mut self) {}
-}
-
-/// A device on the network.
-#[derive(Debug)]
-pub struct Network {
-    control: TcpStream,
-    stream: UdpSocket,
-    bytes: Vec<u8>,
-    silence: Duration,
-    watchdog: Arc<Mutex<Watchdog>>,
-}
-
-/// What the thread that watches over the host knows.
-#[derive(Debug)]
-struct Watchdog {
-    /// The requests that stop the drive; empty while there is none.
-    stop: Vec<u8>,
-    last_reading: Instant,
-    fired: Option<Instant>,
-}
-
-impl Network {
-    /// Connects to the control channel at `peer`, and sends the device's stream port the datagram that opens firewalls. The drive stops after
-    /// a silence of either side that is longer than `silence`; [`LONGEST_SILENCE`] fits a device that sends a packet every 5 ms.
-    pub fn connect(peer: SocketAddr, silence: Duration) -> io::Result<Self> {
-        let control = TcpStream::connect_timeout(&peer, CONNECT)?;
-        control.set_nodelay(true)?;
-        let stream = UdpSocket::bind((control.local_addr()?.ip(), 0))?;
-        stream.set_read_timeout(Some(silence))?;
-        if !is_loopback(peer.ip()) {
-            stream.send_to(b"vines", (peer.ip(), peer.port().saturating_add(1)))?;
-        }
-        let (stop, last_reading) = (Vec::new(), Instant::now());
-        let watchdog = Arc::new(Mutex::new(Watchdog { stop, last_reading, fired: None }));
-        let (shared, channel) = (Arc::downgrade(&watchdog), control.try_clone()?);
-        thread::Builder::new().spawn(move || watch(&shared, channel, silence))?;
-        let network = Self { control, stream, bytes: Vec::new(), silence, watchdog };
-        network.patience(CONNECT)?;
-        Ok(network)
-    }
-
-    /// Sets the longest time for an answer.
-    fn patience(&self, patience: Duration) -> io::Result<()> {
-        self.control.set_read_timeout(Some(patience))?;
-        self.control.set_write_timeout(Some(patience))
-    }
-
-    /// `error` in words, after waiting since `began`.
-    fn explained(&self, error: io::Error, waited: &str, began: Instant) -> io::Error {
-        let (fired, kind) = (lock(&self.watchdog).fired, error.kind());
-        let silence = self.silence.as_secs_f64();
-        io::Error::other(if fired.is_some_and(|fired| fired < began) {
-            format!(
-                "this program took no reading for {silence} s, so the drive was stopped and the connection closed; is the machine too busy?"
-            )
-        } else if fired.is_some() || matches!(kind, ErrorKind::WouldBlock | ErrorKind::TimedOut) {
-            format!("{waited} for {:.2} s", began.elapsed().as_secs_f64())
-        } else if matches!(
-            kind,
-            ErrorKind::ConnectionAborted | ErrorKind::BrokenPipe | ErrorKind::ConnectionReset
-        ) {
-            "the connection is closed".into()
-        } else {
-            return error;
-        })
-    }
-
-    fn answer(&mut self, request: &Frame) -> io::Result<Frame> {
-        self.control.write_all(&request.encode())?;
-        let mut more = [0; 2048];
-        loop {
-            let answer = Frame::take(&mut self.bytes);
-            if let Some(answer) = answer.map_err(|error| io::Error::new(ErrorKind::InvalidData, error))? {
-                return Ok(answer);
-            }
-            match uninterrupted(|| self.control.read(&mut more))? {
-                0 => return Err(ErrorKind::ConnectionAborted.into()),
-                size => self.bytes.extend(&more[..size]),
-            }
-        }
-    }
-}
-
-impl Transport for Network {
-    fn request(&mut self, request: &Frame) -> io::Result<Frame> {
-        let began = Instant::now();
-        let answer = self.answer(request);
-        answer.map_err(|error| self.explained(error, "no answer", began))
-    }
-
-    fn datagram(&mut self) -> io::Result<Vec<u8>> {
-        let (began, mut bytes) = (Instant::now(), vec![0; 2048]);
-        let size = uninterrupted(|| self.stream.recv(&mut bytes))
-            .map_err(|error| self.explained(error, "no packet of its stream has arrived", began))?;
-        bytes.truncate(size);
-        lock(&self.watchdog).last_reading = Instant::now();
-        Ok(bytes)
-    }
-
-    fn port(&self) -> io::Result<u16> {
-        Ok(self.stream.local_addr()?.port())
-    }
-
-    fn silence(&self) -> Duration {
-        self.silence
-    }
-
-    fn guard(&mut self, stop: &[Frame]) -> io::Result<()> {
-        self.patience(if stop.is_empty() { CONNECT } else { self.silence })?;
-        let mut watchdog = lock(&self.watchdog);
-        watchdog.stop = stop.iter().flat_map(Frame::encode).collect();
-        watchdog.last_reading = Instant::now();
-        Ok(())
-    }
-
-    fn close(&mut self) {
-        stop_and_close(&mut self.control, &lock(&self.watchdog).stop);
-    }
-}
-
-/// Repeats a call that a signal has interrupted: whoever catches signals decides what they mean.
-fn uninterrupted<T>(mut call: impl FnMut() -> io::Result<T>) -> io::Result<T> {
-    loop {
-        match call() {
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            outcome => return outcome,
-        }
-    }
-}
-
-/// Sends the requests `stop` without waiting for their answers, and closes the control channel.
-fn stop_and_close(control: &mut TcpStream, stop: &[u8]) {
-    // What cannot be sent does not arrive; the end of the connection may.
-    let _ = control.write_all(stop);
-    let _ = control.shutdown(Shutdown::Both);
-}
-
-fn lock(watchdog: &Mutex<Watchdog>) -> MutexGuard<'_, Watchdog> {
-    watchdog.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Stops the drive when the host takes no reading for longer than `silence`, whether it waits for an answer, for a disk or for a terminal.
-/// Ends with the connection.
-fn watch(shared: &Weak<Mutex<Watchdog>>, mut control: TcpStream, silence: Duration) {
-    let mut left = silence;
-    loop {
-        thread::sleep(left);
-        let Some(watchdog) = shared.upgrade() else {
-            return;
-        };
-        let mut watchdog = lock(&watchdog);
-        left = (watchdog.last_reading + silence).saturating_duration_since(Instant::now());
-        if watchdog.stop.is_empty() {
-            left = silence;
-        } else if left.is_zero() {
-            watchdog.fired = Some(Instant::now());
-            return stop_and_close(&mut control, &watchdog.stop);
         }
     }
 }

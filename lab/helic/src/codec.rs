@@ -1,5 +1,7 @@
 //! Frames of the control channel and packets of the stream, as bytes. Everything is little-endian.
 
+use std::io::{self, Read};
+
 use crc::{CRC_16_IBM_3740, Crc};
 use thiserror::Error;
 
@@ -131,6 +133,17 @@ impl Frame {
         let mut bytes = [&MAGIC[..], &[self.kind, self.sequence], &length, &self.payload].concat();
         bytes.extend(crc16(&bytes[2..]).to_le_bytes());
         bytes
+    }
+
+    /// Waits for the next frame of a connection.
+    pub fn read(stream: &mut impl Read) -> io::Result<Self> {
+        let mut bytes = vec![0; HEADER];
+        stream.read_exact(&mut bytes)?;
+        let length = usize::from(u16::from_le_bytes([bytes[4], bytes[5]]));
+        bytes.resize(HEADER + length.min(MAX_PAYLOAD) + 2, 0);
+        stream.read_exact(&mut bytes[HEADER..])?;
+        let frame = Self::take(&mut bytes).map_err(io::Error::other)?;
+        frame.ok_or_else(|| io::Error::other(Malformed))
     }
 
     /// Takes the first frame from the bytes that a connection has received; None if more bytes are needed.

@@ -1,49 +1,35 @@
-//! A rig as a device: its parameters, its stream, the requests of the host, and one sample after another; and its server, which has control
-//! channel, stream and the clock of the device.
+//! A rig as a device: its parameters, its stream, the requests of the host, and one sample after another.
 
 use std::f64::consts::TAU;
-use std::io::{self, ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
-use std::thread;
-use std::time::Instant;
 
-use super::codec::{
+use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
+
+use crate::codec::{
     COEFFICIENTS, ErrorCode, Frame, HARMONICS, MAX_PAYLOAD, Packet, VERSION, message, of_bytes, size, take, to_bytes,
 };
-use vines_net::{Ended, POLL, RealTimeClock, ServerError, Session, is_loopback};
-use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 
 /// Longest silence of the host, s, before the output is disarmed; 0: no limit.
 pub(crate) const WATCHDOG: &str = "rig_watchdog";
-/// Names, type and number of values of the parameters, in the order of version 3; then come those of the rig.
+/// Names, type and number of values of the parameters, in the order of version 3; then come those of the rig. A host may set those with an
+/// asterisk. What has no value here belongs to the waveform table or to the statistics of the processor, and stays 0.
 const PARAMETERS: &[(&str, u8, usize)] = &[
     ("firmware experiment", b'c', 16),
     ("sample_freq", b'f', 1),
     ("ticks loop_time_last loop_time_max clock_jitter overruns", b'I', 1),
     ("tick_timeouts records_dropped", b'I', 1),
-    ("freq", b'f', 1),
-    ("target_coeffs forcing_coeffs", b'f', COEFFICIENTS),
+    ("freq*", b'f', 1),
+    ("target_coeffs* forcing_coeffs*", b'f', COEFFICIENTS),
     ("table", b'f', 4096),
     ("table_len", b'H', 1),
     ("table_freq table_gain", b'f', 1),
-    ("table_interp table_mode table_mult", b'I', 1),
+    ("table_interp table_mode* table_mult", b'I', 1),
     ("table_phase", b'f', 1),
     ("table_trigger wake_phase_min wake_phase_max t_measure_max", b'I', 1),
-    ("t_actuate_max t_rest_max diag_reset cmd_backlog_max", b'I', 1),
-    ("arm safety mcu_reboot", b'I', 1),
+    ("t_actuate_max t_rest_max diag_reset* cmd_backlog_max", b'I', 1),
+    ("arm* safety mcu_reboot", b'I', 1),
     ("rig_gain rig_out_max", b'f', 1),
-    (WATCHDOG, b'f', 1),
+    ("rig_watchdog*", b'f', 1),
     ("impacts", b'I', 1),
-];
-/// Parameters that a host may set.
-const WRITABLE: [&str; 7] = [
-    "freq",
-    "target_coeffs",
-    "forcing_coeffs",
-    "table_mode",
-    "diag_reset",
-    "arm",
-    WATCHDOG,
 ];
 /// Sources of a stream, with their units. A rig without a base sensor has no `reference`.
 const SOURCES: [(&str, &str); 8] = [
@@ -67,35 +53,6 @@ const EPOCH: u32 = 1 << 24;
 /// Longest time before a packet is sent, s (protocol, "Stream channel").
 const FLUSH: f64 = 0.005;
 
-/// The definitions of all parameters: name, type, number of values.
-fn parameters() -> impl Iterator<Item = (&'static str, u8, usize)> {
-    let rows = PARAMETERS.iter();
-    rows.flat_map(|&(names, code, count)| names.split(' ').map(move |name| (name, code, count)))
-}
-
-fn parameter(index: u16) -> Result<(&'static str, u8, usize), ErrorCode> {
-    parameters().nth(index.into()).ok_or(ErrorCode::BadIndex)
-}
-
-/// A page of definitions: those from `start` on that fit into a payload.
-fn page(start: u16) -> Result<Vec<u8>, ErrorCode> {
-    if usize::from(start) > parameters().count() {
-        return Err(ErrorCode::BadIndex);
-    }
-    let (mut next, mut page) = (start, Vec::new());
-    for (name, code, count) in parameters().skip(start.into()) {
-        let [low, high] = (count as u16).to_le_bytes();
-        let writable = WRITABLE.contains(&name).into();
-        let definition = [name.as_bytes(), &[0, code, low, high, writable]].concat();
-        if 4 + page.len() + definition.len() > MAX_PAYLOAD {
-            break;
-        }
-        page.extend(definition);
-        next += 1;
-    }
-    Ok([&start.to_le_bytes()[..], &next.to_le_bytes(), &page].concat())
-}
-
 /// The stream: what the host has set up, and the packet that is being filled.
 #[derive(Debug, Default)]
 struct Stream {
@@ -105,10 +62,9 @@ struct Stream {
     count: u32,
     /// Port of the host while the stream runs.
     port: Option<u16>,
-    /// Samples and records since the start, and samples since the last packet.
+    /// Samples and records since the start.
     samples: u64,
     records: u32,
-    age: u32,
     packet: Packet,
 }
 
@@ -131,15 +87,14 @@ impl Stream {
     /// Starts the stream to a port of the host.
     fn start(&mut self, payload: &[u8]) -> Result<(), ErrorCode> {
         let port = u16::from_le_bytes(payload.try_into().map_err(|_| ErrorCode::BadLength)?);
-        if self.port.is_some() {
-            return Err(ErrorCode::Busy);
+        match () {
+            () if self.port.is_some() => return Err(ErrorCode::Busy),
+            () if port == 0 || self.sources.is_empty() => return Err(ErrorCode::BadValue),
+            () => {}
         }
-        if port == 0 || self.sources.is_empty() {
-            return Err(ErrorCode::BadValue);
-        }
-        (self.port, self.samples, self.records, self.age) = (Some(port), 0, 0, 0);
-        let width = self.sources.len() as u8;
-        self.packet = Packet { decimation: self.decimation, width, ..Packet::default() };
+        (self.port, self.samples, self.records) = (Some(port), 0, 0);
+        let (decimation, width) = (self.decimation, self.sources.len() as u8);
+        self.packet = Packet { decimation, width, ..Packet::default() };
         Ok(())
     }
 
@@ -155,20 +110,26 @@ impl Stream {
             self.records += 1;
         }
         self.samples += 1;
-        self.age += 1;
-        let width = self.sources.len();
-        let complete = self.count != 0 && self.records == self.count;
-        let due = packet.values.len() / width >= Packet::capacity(width) || f64::from(self.age + 1) > flush;
-        if packet.values.is_empty() || !(due || complete) {
+        let is_complete = self.records == self.count;
+        let is_full = packet.values.len() >= self.sources.len() * Packet::capacity(self.sources.len());
+        let is_due = f64::from(index.wrapping_sub(packet.first) + 2) > flush;
+        if packet.values.is_empty() || !(is_complete || is_full || is_due) {
             return None;
         }
         let bytes = packet.encode();
         packet.sequence = packet.sequence.wrapping_add(1);
         packet.values.clear();
-        self.age = 0;
-        self.port.take_if(|_| complete);
+        self.port.take_if(|_| is_complete);
         Some((port, bytes))
     }
+}
+
+/// A parameter. Its type is a letter as in Python's `struct`.
+struct Parameter {
+    name: &'static str,
+    code: u8,
+    is_writable: bool,
+    values: Vec<f64>,
 }
 
 /// A device. Everything in it happens at a sample or between two of them, in the order of the calls.
@@ -176,16 +137,7 @@ pub struct Device {
     rig: Box<dyn Rig>,
     has_reference: bool,
     sample_rate: f64,
-    /// Largest output, V.
-    largest: f64,
-    /// Frequency of the oscillator, Hz, and its series target and forcing, V.
-    frequency: f64,
-    series: [Vec<f64>; 2],
-    armed: bool,
-    safety: u8,
-    /// s
-    watchdog: f64,
-    impacts: u32,
+    parameters: Vec<Parameter>,
     stream: Stream,
     /// Phase of the oscillator, 2^-32 turns.
     phase: u32,
@@ -200,42 +152,59 @@ pub struct Device {
 impl Device {
     /// The rig `rig` as a device, sampled every `sample_time`, s; its output is limited to `max_amplitude`, m.
     pub fn new(mut rig: Box<dyn Rig>, sample_time: f64, max_amplitude: f64) -> Result<Self, RigError> {
-        Ok(Self {
+        let all = PARAMETERS.iter().flat_map(|&(names, code, count)| {
+            names.split(' ').map(move |name| {
+                let is_writable = name.ends_with('*');
+                let name = name.trim_end_matches('*');
+                Parameter { name, code, is_writable, values: vec![0.0; count] }
+            })
+        });
+        let mut device = Self {
             has_reference: rig.sense()?.reference.is_some(),
             rig,
             sample_rate: 1.0 / sample_time,
-            largest: max_amplitude / (GAIN * MILLI),
-            frequency: 0.0,
-            series: [vec![0.0; COEFFICIENTS], vec![0.0; COEFFICIENTS]],
-            armed: false,
-            safety: 0,
-            watchdog: 0.0,
-            impacts: 0,
+            parameters: all.collect(),
             stream: Stream::default(),
             phase: 0,
             ticks: 0,
             commands: 0,
             epoch: 0,
             silence: 0,
-        })
+        };
+        for (name, text) in [
+            ("firmware", concat!("vines ", env!("CARGO_PKG_VERSION"))),
+            ("experiment", "vines"),
+        ] {
+            let letters = device.values(name).iter_mut().zip(text.bytes());
+            letters.for_each(|(value, letter)| *value = letter.into());
+        }
+        device.values("sample_freq")[0] = device.sample_rate;
+        device.values("rig_gain")[0] = GAIN;
+        device.values("rig_out_max")[0] = max_amplitude / (GAIN * MILLI);
+        Ok(device)
+    }
+
+    /// The values of a parameter of the table.
+    fn values(&mut self, name: &str) -> &mut Vec<f64> {
+        let parameter = self.parameters.iter_mut().find(|parameter| parameter.name == name);
+        &mut parameter.expect("the parameter is in the table").values
     }
 
     /// The host has left: output and stream stop.
     pub fn disconnect(&mut self) {
         self.stream.port = None;
-        self.armed = false;
+        self.values("arm")[0] = 0.0;
     }
 
     /// Whether the output may be other than zero.
-    pub fn is_driven(&self) -> bool {
-        self.armed
+    pub fn is_driven(&mut self) -> bool {
+        self.values("arm")[0] == 1.0
     }
 
     fn sources(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
         let has_reference = self.has_reference;
-        SOURCES
-            .into_iter()
-            .filter(move |(name, _)| has_reference || *name != "reference")
+        let all = SOURCES.into_iter();
+        all.filter(move |(name, _)| has_reference || *name != "reference")
     }
 
     /// Answers a request. `uptime` in ms.
@@ -257,7 +226,7 @@ impl Device {
         match kind {
             message::GET_PARAMS => {
                 let start = payload.try_into().map_err(|_| ErrorCode::BadLength)?;
-                page(u16::from_le_bytes(start))
+                self.page(u16::from_le_bytes(start))
             }
             message::GET_SOURCES => {
                 let entry = |(name, unit): (&str, &str)| format!("{name}\0{unit}\0").into_bytes();
@@ -272,7 +241,7 @@ impl Device {
                 Ok(Vec::new())
             }
             message::STATUS => {
-                let [low, high] = (parameters().count() as u16).to_le_bytes();
+                let [low, high] = (self.parameters.len() as u16).to_le_bytes();
                 let head = [VERSION, low, high, self.sources().count() as u8];
                 let sample_rate = self.sample_rate as f32;
                 Ok([head, sample_rate.to_le_bytes(), uptime.to_le_bytes()].concat())
@@ -281,64 +250,61 @@ impl Device {
         }
     }
 
+    /// A page of definitions: those from `start` on that fit into a payload.
+    fn page(&self, start: u16) -> Result<Vec<u8>, ErrorCode> {
+        let all = self.parameters.get(start.into()..).ok_or(ErrorCode::BadIndex)?;
+        let (mut next, mut page) = (start, Vec::new());
+        for Parameter { name, code, is_writable, values } in all {
+            let [low, high] = (values.len() as u16).to_le_bytes();
+            let definition = [name.as_bytes(), &[0, *code, low, high, (*is_writable).into()]].concat();
+            if 4 + page.len() + definition.len() > MAX_PAYLOAD {
+                break;
+            }
+            page.extend(definition);
+            next += 1;
+        }
+        Ok([&start.to_le_bytes()[..], &next.to_le_bytes(), &page].concat())
+    }
+
     /// The values of the parameters with these indices, as bytes.
     fn read(&self, indices: &[u8]) -> Result<Vec<u8>, ErrorCode> {
-        if indices.is_empty() || !indices.len().is_multiple_of(2) {
-            return Err(ErrorCode::BadLength);
-        }
+        let (indices, rest) = indices.as_chunks();
         let mut bytes = Vec::new();
-        for index in of_bytes(b'H', indices) {
-            let (name, code, count) = parameter(index as u16)?;
-            let text = |text: &str| text.bytes().map(f64::from).collect();
-            let mut values: Vec<f64> = match name {
-                "firmware" => text(concat!("vines ", env!("CARGO_PKG_VERSION"))),
-                "experiment" => text("vines"),
-                "sample_freq" => vec![self.sample_rate],
-                "ticks" => vec![self.ticks.into()],
-                "freq" => vec![self.frequency],
-                "target_coeffs" => self.series[0].clone(),
-                "forcing_coeffs" => self.series[1].clone(),
-                "arm" => vec![self.armed.into()],
-                "safety" => vec![self.safety.into()],
-                "rig_gain" => vec![GAIN],
-                "rig_out_max" => vec![self.largest],
-                WATCHDOG => vec![self.watchdog],
-                "impacts" => vec![self.impacts.into()],
-                // The waveform table, and statistics of the processor.
-                _ => Vec::new(),
-            };
-            values.resize(count, 0.0);
-            bytes.extend(to_bytes(code, &values));
+        for index in indices {
+            let parameter = self.parameters.get(usize::from(u16::from_le_bytes(*index)));
+            let Parameter { code, values, .. } = parameter.ok_or(ErrorCode::BadIndex)?;
+            bytes.extend(to_bytes(*code, values));
         }
-        (bytes.len() <= MAX_PAYLOAD)
-            .then_some(bytes)
-            .ok_or(ErrorCode::BadLength)
+        let is_allowed = !indices.is_empty() && rest.is_empty() && bytes.len() <= MAX_PAYLOAD;
+        is_allowed.then_some(bytes).ok_or(ErrorCode::BadLength)
     }
 
     /// Sets a parameter: `index u16, values`.
     fn set(&mut self, payload: &[u8]) -> Result<(), ErrorCode> {
         let (index, bytes) = payload.split_first_chunk().ok_or(ErrorCode::BadLength)?;
-        let (name, code, count) = parameter(u16::from_le_bytes(*index))?;
-        if !WRITABLE.contains(&name) {
+        let (highest, largest) = (0.5 * self.sample_rate, self.values("rig_out_max")[0]);
+        let parameter = self.parameters.get_mut(usize::from(u16::from_le_bytes(*index)));
+        let parameter = parameter.ok_or(ErrorCode::BadIndex)?;
+        if !parameter.is_writable {
             return Err(ErrorCode::ReadOnly);
         }
-        if bytes.len() != count * size(code) {
+        if bytes.len() != parameter.values.len() * size(parameter.code) {
             return Err(ErrorCode::BadLength);
         }
-        let values = of_bytes(code, bytes);
-        let value = values[0];
-        let is_command = !["arm", WATCHDOG, "diag_reset"].contains(&name);
-        match name {
-            "freq" if (0.0..0.5 * self.sample_rate).contains(&value) => self.frequency = value,
-            "target_coeffs" if amplitude(&values) <= self.largest => self.series[0] = values,
-            "forcing_coeffs" if amplitude(&values) <= self.largest => self.series[1] = values,
-            "arm" if value <= 1.0 => self.armed = value == 1.0,
-            WATCHDOG if value >= 0.0 && value.is_finite() => self.watchdog = value,
-            // There is no waveform table, and there are no statistics.
-            "table_mode" if value == 0.0 => {}
-            "diag_reset" => {}
-            _ => return Err(ErrorCode::BadValue),
+        let values = of_bytes(parameter.code, bytes);
+        let (is_command, is_allowed) = match parameter.name {
+            "freq" => (true, (0.0..highest).contains(&values[0])),
+            "target_coeffs" | "forcing_coeffs" => (true, amplitude(&values) <= largest),
+            // There is no waveform table.
+            "table_mode" => (true, values[0] == 0.0),
+            "arm" => (false, values[0] <= 1.0),
+            WATCHDOG => (false, values[0] >= 0.0 && values[0].is_finite()),
+            _ => (false, true),
+        };
+        if !is_allowed {
+            return Err(ErrorCode::BadValue);
         }
+        parameter.values = values;
         self.commands += u32::from(is_command);
         Ok(())
     }
@@ -346,41 +312,40 @@ impl Device {
     /// One sample: reads the sensors, drives the rig until the next sample, and returns a packet for a port of the host if one is complete.
     pub fn tick(&mut self) -> Result<Option<(u16, Vec<u8>)>, RigError> {
         let Sensors { response, reference } = self.rig.sense()?;
-        let step = 1.0 / self.sample_rate;
+        let (step, phase) = (1.0 / self.sample_rate, self.phase);
         self.epoch = (self.epoch + std::mem::take(&mut self.commands)) % EPOCH;
         self.silence = self.silence.saturating_add(1);
-        if self.watchdog > 0.0 && f64::from(self.silence) * step > self.watchdog {
-            self.armed = false;
+        let watchdog = self.values(WATCHDOG)[0];
+        if watchdog > 0.0 && f64::from(self.silence) * step > watchdog {
+            self.values("arm")[0] = 0.0;
         }
-        let [target, forcing] = [0, 1].map(|n| value(&self.series[n], self.phase));
+        let [target, forcing] = ["target_coeffs", "forcing_coeffs"].map(|name| value(self.values(name), phase));
         let out = self.gate(target + forcing);
-        let (turns, epoch) = (f64::from(self.phase) / TURN, f64::from(self.epoch));
-        let sensors = [Some(response), reference]
-            .into_iter()
-            .flatten()
-            .map(|length| length / MILLI);
+        let (turns, epoch) = (f64::from(phase) / TURN, f64::from(self.epoch));
+        let sensors = [Some(response), reference].into_iter().flatten();
+        let sensors = sensors.map(|length| length / MILLI);
         let values: Vec<f64> = sensors.chain([target, forcing, 0.0, turns, out, epoch]).collect();
         let packet = self.stream.record(self.ticks, &values, FLUSH * self.sample_rate);
         let displacement = out * GAIN * MILLI;
         self.rig.hold(Drive { displacement, ..Drive::default() }, step)?;
-        let turn = self.frequency * step * TURN;
-        self.phase = self.phase.wrapping_add(turn.round() as u32);
+        let turn = self.values("freq")[0] * step * TURN;
+        self.phase = phase.wrapping_add(turn.round() as u32);
         self.ticks = self.ticks.wrapping_add(1);
-        self.impacts = self.rig.ground_truth()?.map_or(0, |inside| inside.impacts as u32);
+        self.values("ticks")[0] = self.ticks.into();
+        let impacts = self.rig.ground_truth()?.map_or(0, |inside| inside.impacts);
+        self.values("impacts")[0] = impacts as f64;
         Ok(packet)
     }
 
     /// The output, V: zero unless armed, and never more than the limit.
     fn gate(&mut self, wanted: f64) -> f64 {
-        let quiet = !self.armed || !wanted.is_finite();
-        let out = if quiet {
-            0.0
-        } else {
-            wanted.clamp(-self.largest, self.largest)
-        };
-        let limited = !quiet && out != wanted;
+        let (is_armed, largest) = (self.is_driven(), self.values("rig_out_max")[0]);
+        let is_quiet = !is_armed || !wanted.is_finite();
+        let out = if is_quiet { 0.0 } else { wanted.clamp(-largest, largest) };
+        let is_limited = !is_quiet && out != wanted;
         // Bits: 0 armed, 1 tripped (nothing trips here), 2 limited, 3 quiet.
-        self.safety = u8::from(self.armed) | u8::from(limited) << 2 | u8::from(quiet) << 3;
+        let safety = u8::from(is_armed) | u8::from(is_limited) << 2 | u8::from(is_quiet) << 3;
+        self.values("safety")[0] = safety.into();
         out
     }
 }
@@ -395,128 +360,12 @@ fn amplitude(coefficients: &[f64]) -> f64 {
 /// Value of a Fourier series at a phase of its fundamental.
 fn value(coefficients: &[f64], phase: u32) -> f64 {
     let (cosines, sines) = coefficients[1..].split_at(HARMONICS);
-    let harmonics = (1..)
-        .zip(cosines.iter().zip(sines))
-        .filter(|(_, (a, b))| **a != 0.0 || **b != 0.0);
-    let values = harmonics.map(|(k, (a, b))| {
-        let (sine, cosine) = (TAU * f64::from(phase.wrapping_mul(k)) / TURN).sin_cos();
-        a * cosine + b * sine
-    });
+    let harmonics = (1..).zip(cosines.iter().zip(sines));
+    let values = harmonics
+        .filter(|(_, (a, b))| **a != 0.0 || **b != 0.0)
+        .map(|(k, (a, b))| {
+            let (sine, cosine) = (TAU * f64::from(phase.wrapping_mul(k)) / TURN).sin_cos();
+            a * cosine + b * sine
+        });
     coefficients[0] + values.sum::<f64>()
-}
-
-/// Port of the control channel; the stream has the next one.
-pub const DEFAULT_PORT: u16 = 2350;
-
-/// The server of a device, one host at a time.
-pub struct HelicServer {
-    control: TcpListener,
-    stream: UdpSocket,
-    device: Device,
-    sample_time: f64,
-}
-
-/// The connection to a host.
-struct Connection {
-    stream: TcpStream,
-    peer: SocketAddr,
-    bytes: Vec<u8>,
-    opened: Instant,
-    /// Number of its first sample.
-    first: u64,
-}
-
-impl HelicServer {
-    /// Listens on `address` (TCP), and sends the stream from the next port. With port 0 the system chooses both ports.
-    pub fn listen(address: SocketAddr, device: Device, sample_time: f64) -> io::Result<Self> {
-        let control = TcpListener::bind(address)?;
-        control.set_nonblocking(true)?;
-        // A host on this machine may use the next port itself.
-        let any_port = address.port() == 0 || is_loopback(address.ip());
-        let port = if any_port { 0 } else { address.port().saturating_add(1) };
-        let stream = UdpSocket::bind((address.ip(), port))?;
-        stream.set_nonblocking(true)?;
-        Ok(Self { control, stream, device, sample_time })
-    }
-
-    /// Address of the control channel.
-    pub fn address(&self) -> io::Result<SocketAddr> {
-        self.control.local_addr()
-    }
-
-    /// Serves until `stop` returns true. `report` receives the report when a host has left.
-    pub fn serve(
-        &mut self,
-        mut stop: impl FnMut() -> bool,
-        mut report: impl FnMut(&Session),
-    ) -> Result<(), ServerError> {
-        let mut clock = RealTimeClock::start(self.sample_time);
-        let mut host: Option<Connection> = None;
-        let mut tick = 0;
-        loop {
-            let stopped = stop();
-            if host.is_none()
-                && let Ok((stream, peer)) = self.control.accept()
-            {
-                stream.set_nodelay(true)?;
-                stream.set_nonblocking(true)?;
-                clock.forget();
-                let (bytes, opened) = (Vec::new(), Instant::now());
-                host = Some(Connection { stream, peer, bytes, opened, first: tick });
-            }
-            let uptime = clock.due(0).elapsed().as_millis() as u32;
-            let device = &mut self.device;
-            let left = host.as_mut().is_some_and(|host| !host.exchange(device, uptime));
-            if let Some(host) = host.take_if(|_| left || stopped) {
-                device.disconnect();
-                report(&Session {
-                    peer: host.peer,
-                    ended: if left { Ended::Farewell } else { Ended::Stopped },
-                    samples: tick - host.first,
-                    sample_time: self.sample_time,
-                    seconds: host.opened.elapsed().as_secs_f64(),
-                    timing: Some(clock.timing(0)),
-                    histogram: clock.classes(),
-                    counters: None,
-                });
-            }
-            if stopped {
-                return Ok(());
-            }
-            while Instant::now() >= clock.due(tick + 1) {
-                tick += 1;
-                clock.serve(tick);
-                if let (Some((port, bytes)), Some(host)) = (self.device.tick()?, &host) {
-                    // A packet that cannot be sent now counts as lost in the network.
-                    let _ = self.stream.send_to(&bytes, (host.peer.ip(), port));
-                }
-            }
-            thread::sleep(clock.due(tick + 1).saturating_duration_since(Instant::now()).min(POLL));
-        }
-    }
-}
-
-impl Connection {
-    /// Answers the requests that have arrived; false if the host has left, or has sent bytes that are not a frame.
-    fn exchange(&mut self, device: &mut Device, uptime: u32) -> bool {
-        let mut more = [0; 2048];
-        match self.stream.read(&mut more) {
-            Ok(0) => return false,
-            Ok(size) => self.bytes.extend(&more[..size]),
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => return true,
-            Err(_) => return false,
-        }
-        loop {
-            match Frame::take(&mut self.bytes) {
-                Ok(Some(request)) => {
-                    let answer = device.handle(&request, uptime).encode();
-                    if self.stream.write_all(&answer).is_err() {
-                        return false;
-                    }
-                }
-                Ok(None) => return true,
-                Err(_) => return false,
-            }
-        }
-    }
 }

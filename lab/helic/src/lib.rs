@@ -8,6 +8,10 @@
 mod client;
 pub mod codec;
 mod device;
+mod network;
+mod server;
 
-pub use client::{Channels, HelicRig, HostError, LONGEST_SILENCE, Network, Transport};
-pub use device::{DEFAULT_PORT, Device, HelicServer};
+pub use client::HelicRig;
+pub use device::Device;
+pub use network::{LONGEST_SILENCE, Network, Transport};
+pub use server::{DEFAULT_PORT, HelicServer};

@@ -1,4 +1,4 @@
-//! Random and mutated frames: a device that gets mutated frames beside genuine ones does what one does that gets the genuine ones only.
+//! Guards device and host against random and mutated frames: a device that gets mutated frames beside genuine ones does what one does that gets the genuine ones only.
 
 #[path = "../../net/tests/fuzz/noise.rs"]
 mod noise;
@@ -8,8 +8,9 @@ use std::io;
 use std::sync::{Arc, Mutex};
 
 use vines_helic::codec::{Frame, Packet, message};
-use vines_helic::{Channels, Device, HelicRig, Transport};
+use vines_helic::{Device, HelicRig, Transport};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
+use vines_testbench::scene::Names;
 
 use noise::Noise;
 
@@ -52,33 +53,24 @@ fn device() -> (Device, Log) {
 
 /// A request that makes sense, or one of the right form with random content.
 fn request(noise: &mut Noise) -> Frame {
+    let index = |noise: &mut Noise, first, count| ((first + noise.below(count)) as u16).to_le_bytes().to_vec();
     let mut payload = match noise.below(4) {
         0 => {
             let length = noise.below(40);
             noise.bytes(length)
         }
-        // SetPar with a small integer or a float.
-        1 => [
-            &(noise.below(50) as u16).to_le_bytes()[..],
-            &(noise.below(3) as u32).to_le_bytes(),
-        ]
-        .concat(),
-        2 => [
-            &(noise.below(50) as u16).to_le_bytes()[..],
-            &(noise.below(9) as f32 / 8.0).to_le_bytes(),
-        ]
-        .concat(),
-        // The series of forcing or target.
+        // A small integer, a float, and the series of forcing or target.
+        1 => [index(noise, 0, 50), (noise.below(3) as u32).to_le_bytes().into()].concat(),
+        2 => [index(noise, 0, 50), (noise.below(9) as f32 / 8.0).to_le_bytes().into()].concat(),
         _ => {
-            let values = (0..33).flat_map(|_| (noise.below(100) as f32 / 1000.0).to_le_bytes());
-            let values: Vec<u8> = values.collect();
-            [&(11 + noise.below(2) as u16).to_le_bytes()[..], &values].concat()
+            let mut series = index(noise, 11, 2);
+            (0..33).for_each(|_| series.extend((noise.below(100) as f32 / 1000.0).to_le_bytes()));
+            series
         }
     };
-    let kind = if noise.below(3) == 0 {
-        noise.below(13) as u8
-    } else {
-        message::SET_PAR
+    let kind = match noise.below(3) {
+        0 => noise.below(13) as u8,
+        _ => message::SET_PAR,
     };
     if kind == message::GET_PARAMS {
         payload.truncate(2);
@@ -159,7 +151,7 @@ fn damaged_answers_and_packets_never_make_the_host_panic() {
         runs += 1;
         let transport = Damaged(device().0, Noise(noise.next()));
         packets += 1;
-        let Ok(mut rig) = HelicRig::new(transport, Channels::default(), 1e-3, 100.0) else {
+        let Ok(mut rig) = HelicRig::new(transport, &Names::default(), 1e-3, 100.0) else {
             continue;
         };
         for n in 0..1000 {

@@ -7,8 +7,8 @@ use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use thiserror::Error;
 use vines_testbench::rig::{ControllerError, RigError};
 
-use super::frame::{Refusal, VERSION};
-use super::link::Key;
+use crate::frame::Refusal;
+use crate::seal::Key;
 
 /// Which addresses are allowed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,16 +78,15 @@ impl Address {
 /// The address of `HOST:PORT`. If the name has several, an IPv4 address.
 pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
     let failed = |message: String| LinkError::Address { address: text.into(), message };
-    let mut addresses: Vec<_> = text
-        .to_socket_addrs()
-        .map_err(|error| failed(format!("{error}; expected HOST:PORT")))?
-        .collect();
-    addresses.sort_by_key(SocketAddr::is_ipv6);
-    let address = *addresses
-        .first()
-        .ok_or_else(|| failed("the name has no address".into()))?;
+    let addresses = text.to_socket_addrs();
+    let addresses = addresses.map_err(|error| failed(format!("{error}; expected HOST:PORT")))?;
+    let address = addresses.min_by_key(SocketAddr::is_ipv6);
+    let address = address.ok_or_else(|| failed("the name has no address".into()))?;
     if scope == BindScope::Loopback && !is_loopback(address.ip()) {
-        return Err(LinkError::Remote { address });
+        return Err(failed(format!(
+            "{address} is not a loopback address. Use --key on both sides; without it, everyone who can reach the address can drive the \
+             rig, so use --allow-remote only on a network where everyone may do so"
+        )));
     }
     Ok(address)
 }
@@ -96,13 +95,8 @@ pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the fields")]
 pub enum LinkError {
-    #[error("{address} is not an address: {message}")]
+    #[error("{address} cannot be used: {message}")]
     Address { address: String, message: String },
-    #[error(
-        "{address} is not a loopback address. Use --key on both sides; without it, everyone who can reach the address can drive the \
-         rig, so use --allow-remote only on a network where everyone may do so"
-    )]
-    Remote { address: SocketAddr },
     #[error("cannot listen on {address}: {source}")]
     Listen { address: Address, source: io::Error },
     #[error("no answer from {peer} within {seconds} s: is `{command}` running there, with the same --key or none?")]
@@ -111,10 +105,6 @@ pub enum LinkError {
         command: String,
         seconds: f64,
     },
-    #[error(
-        "{peer} has version {theirs} of the protocol, this program has version {VERSION}: use the same release of both"
-    )]
-    Version { peer: Address, theirs: u16 },
     #[error("{peer} refuses: {reason}")]
     Refused { peer: Address, reason: Refusal },
     #[error(
@@ -147,7 +137,8 @@ pub enum LinkError {
     )]
     ShutDown { peer: Address, time: f64, seconds: f64 },
     #[error(
-        "{peer} has closed the connection, at t = {time:.3} s of the experiment: it was stopped, or received nothing for too long"
+        "{peer} has closed the connection, at t = {time:.3} s of the experiment: it has another client or another key, was stopped, or received nothing \
+         for too long"
     )]
     Closed { peer: Address, time: f64 },
     #[error(
@@ -178,8 +169,8 @@ pub enum ServerError {
     Rig(#[from] RigError),
     #[error(transparent)]
     Controller(#[from] ControllerError),
-    #[error(transparent)]
-    Link(#[from] LinkError),
+    #[error("{0}")]
+    Refused(#[from] Refusal),
     #[error("the network: {0}")]
     System(#[from] io::Error),
 }

@@ -13,14 +13,15 @@ use vines_testbench::rig::{
 };
 use vines_testbench::scene::Definition;
 
-use super::address::{Address, LinkError};
-use super::bridge::Bridge;
-use super::frame::{
+use crate::address::{Address, LinkError};
+use crate::frame::{
     Frame, FrameError, Kind, Reading, Refusal, bit, flag, read_command, read_reading, write_command, write_move,
     write_reading,
 };
-use super::link::{Key, Link};
-use super::timing::{Counters, ReportLost, Timing};
+use crate::link::Link;
+use crate::readings::Readings;
+use crate::seal::Key;
+use crate::timing::{Counters, ReportLost, Timing};
 
 /// Longest time until a server answers that has nothing to drive yet: forty repetitions of Hello.
 pub const CONNECT: Duration = Duration::from_secs(2);
@@ -53,7 +54,12 @@ impl Client {
         let end = Instant::now() + CONNECT;
         loop {
             match Self::open(peer, controller, sample_time, key) {
-                Err(LinkError::Refused { reason: Refusal::Busy, .. }) if Instant::now() < end => thread::sleep(RESEND),
+                // Over TCP, a server that has another client closes the connection.
+                Err(LinkError::Refused { reason: Refusal::Busy, .. } | LinkError::Closed { .. })
+                    if Instant::now() < end =>
+                {
+                    thread::sleep(RESEND);
+                }
                 outcome => return outcome,
             }
         }
@@ -116,7 +122,9 @@ impl Client {
             let again = Instant::now() + RESEND;
             let until = if self.link.is_real_time() { end.min(again) } else { end };
             match self.link.receive(until)?.map(|(received, _)| received) {
-                Some(Err(FrameError::Version(theirs))) => return Err(LinkError::Version { peer, theirs }),
+                Some(Err(FrameError::Version(theirs))) => {
+                    return Err(LinkError::Refused { peer, reason: Refusal::Version(theirs) });
+                }
                 Some(Err(FrameError::Closed)) => return Err(LinkError::Closed { peer, time }),
                 Some(Err(_)) => self.counters.malformed += 1,
                 Some(Ok(frame)) if frame.session != self.session => self.counters.foreign += 1,
@@ -158,20 +166,13 @@ impl Drop for Client {
 
 /// A rig at a network address: in lock-step over TCP, in real time over UDP.
 ///
-/// Lost readings are bridged, so that the controller gets every sample of the rig's clock.
+/// Lost readings are reconstructed, so that the controller gets every sample of the rig's clock.
 #[derive(Debug)]
 pub struct NetRig {
     client: Client,
-    /// Reading of the present sample, if it has arrived.
-    now: Option<Reading>,
-    /// The last valid reading.
-    good: Reading,
-    /// The frame with the newest reading, which may be that of a later sample.
-    newest: Option<Frame>,
-    bridge: Bridge,
-    /// Phase of the drive at the present sample, and its last step, turns.
-    phase: f64,
-    turn: f64,
+    readings: Readings<Option<GroundTruth>>,
+    /// The last one that has arrived.
+    ground_truth: Option<GroundTruth>,
     timing: Arc<OnceLock<Result<Timing, ReportLost>>>,
 }
 
@@ -180,12 +181,8 @@ impl NetRig {
     pub fn connect(peer: Address, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
         Ok(Self {
             client: Client::connect(peer, false, sample_time, key)?,
-            now: None,
-            good: Reading::default(),
-            newest: None,
-            bridge: Bridge::default(),
-            phase: 0.0,
-            turn: 0.0,
+            readings: Readings::default(),
+            ground_truth: None,
             timing: Arc::default(),
         })
     }
@@ -220,49 +217,26 @@ impl NetRig {
     }
 
     /// The reading of the present sample.
-    fn reading(&mut self) -> Result<Reading, LinkError> {
-        if let Some(reading) = self.now {
-            return Ok(reading);
-        }
+    fn reading(&mut self) -> Result<Sensors, LinkError> {
         let end = Instant::now() + self.client.silence;
-        let (next, ahead) = loop {
-            match self.newest {
-                Some(frame) if frame.sequence >= self.client.at => {
-                    break (read_reading(&frame), frame.sequence - self.client.at);
-                }
-                _ => self.wait(end)?,
+        loop {
+            if let Some(taken) = self.readings.take(&mut self.client.counters) {
+                self.ground_truth = taken.with.unwrap_or(self.ground_truth);
+                return Ok(taken.sensors);
             }
-        };
-        let mut reading = next;
-        if ahead > 0 {
-            self.client.counters.hold(ahead);
-            let sensors = self.bridge.fill(self.phase, &next.sensors, ahead, self.turn);
-            reading = Reading { sensors, ..self.good };
+            let frame = self.client.receive(end)?.ok_or_else(|| self.client.silent())?;
+            if frame.kind == Kind::Sensors {
+                let Reading { sensors, ground_truth } = read_reading(&frame);
+                let counters = &mut self.client.counters;
+                let samples = self.readings.arrive(frame.sequence, sensors, ground_truth, counters);
+                let Client { peer, sample_time, silence, .. } = self.client;
+                let (seconds, allowed) = (samples as f64 * sample_time, silence.as_secs_f64());
+                if seconds > allowed {
+                    let time = self.client.time();
+                    return Err(LinkError::Blackout { peer, samples, seconds, allowed, time });
+                }
+            }
         }
-        self.bridge.keep(self.phase, reading.sensors);
-        (self.good, self.now) = (reading, Some(reading));
-        Ok(reading)
-    }
-
-    /// Waits for a later reading.
-    fn wait(&mut self, end: Instant) -> Result<(), LinkError> {
-        let frame = self.client.receive(end)?.ok_or_else(|| self.client.silent())?;
-        if frame.kind != Kind::Sensors {
-            return Ok(());
-        }
-        if self.newest.is_some_and(|newest| newest.sequence >= frame.sequence) {
-            self.client.counters.late += 1;
-            return Ok(());
-        }
-        let samples = frame.sequence.saturating_sub(self.client.at);
-        let Client { peer, sample_time, silence, .. } = self.client;
-        let (seconds, allowed) = (samples as f64 * sample_time, silence.as_secs_f64());
-        if samples > (allowed / sample_time) as u64 {
-            let time = self.client.time();
-            return Err(LinkError::Blackout { peer, samples, seconds, allowed, time });
-        }
-        self.newest = Some(frame);
-        Ok(())
     }
 
     fn drive(&mut self, drive: Drive, holds: bool, step: f64) -> Result<(), LinkError> {
@@ -271,10 +245,8 @@ impl NetRig {
         frame.flags |= bit(flag::HOLD, holds);
         self.client.send(frame)?;
         self.client.at += 1;
-        self.now = None;
         // A rig that plays samples has no frequency: then a line is all that bridges a gap.
-        self.turn = drive.omega * step / TAU;
-        self.phase += self.turn;
+        self.readings.advance(drive.omega * step / TAU);
         Ok(())
     }
 
@@ -299,7 +271,7 @@ impl NetRig {
 
 impl Rig for NetRig {
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        Ok(self.reading()?.sensors)
+        Ok(self.reading()?)
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
@@ -311,7 +283,8 @@ impl Rig for NetRig {
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
-        Ok(self.reading()?.ground_truth)
+        self.reading()?;
+        Ok(self.ground_truth)
     }
 }
 
@@ -338,7 +311,6 @@ pub struct NetController {
     answered: u64,
     /// Judges the lock of a controller that does not report the state of its loop.
     settling: Settling,
-    failed: bool,
 }
 
 impl NetController {
@@ -359,7 +331,6 @@ impl NetController {
             good: Command::default(),
             answered: 0,
             settling: Settling::new(config),
-            failed: false,
         })
     }
 
@@ -426,13 +397,7 @@ impl NetController {
 
 impl Controller for NetController {
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
-        if self.failed {
-            return Err(self.client.silent().into());
-        }
-        let answer = self.ask(sensors, active);
-        // Latched: after one failure the peer is not asked again.
-        self.failed = answer.is_err();
-        Ok(answer?)
+        Ok(self.ask(sensors, active)?)
     }
 
     fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {

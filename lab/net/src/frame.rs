@@ -260,16 +260,19 @@ pub enum Refusal {
     #[error("it is a rig where a controller is needed, or the reverse")]
     Role,
     /// 4: the version of the server.
-    #[error("it has version {0} of the protocol, this program has {VERSION}")]
+    #[error("it has version {0} of the protocol, this program has version {VERSION}: use the same release of both")]
     Version(u16),
     /// 5: a value, rad/s or m, that is not finite or above its limit: frequency, amplitude, displacement.
-    #[error("{}", excess(*index, *value, *limit))]
+    #[error(
+        "the {} of the drive is {value:e}, allowed is up to {limit:e}: half the sample rate, and `vines rig --max-amplitude`",
+        ["frequency, rad/s,", "amplitude, m,", "displacement, m,"].get(*index).unwrap_or(&"value")
+    )]
     Drive { index: usize, value: f64, limit: f64 },
     /// 6
     #[error("a frame was damaged, or was not that of the present sample")]
     Unexpected,
     /// 7: what the controller cannot move, and the value that it refuses.
-    #[error("its controller {}", immovable(*index, *value))]
+    #[error("its controller {}: {value}", MOVE.get(*index).map_or("refuses a move", |(_, reason)| reason))]
     Move { index: usize, value: f64 },
     #[error("reason {0}")]
     Other(f64),
@@ -306,58 +309,45 @@ impl Refusal {
     }
 }
 
-/// Values of a refused move, by their numbers from 1, with unit and allowed range: those of the frame, then what the controller lacks.
-const MOVE: [(&str, &str, &str); 8] = [
-    ("response", "m", "above 0"),
-    ("duration", "s", "0 or above"),
-    ("amplitude", "m", CONFIGURED),
-    ("omega", "rad/s", CONFIGURED),
-    ("phase_target", "rad", CONFIGURED),
-    ("growth", "m/s", CONFIGURED),
-    ("amplitude_max", "m", ""),
-    ("state", "", ""),
+/// What a controller says of a move that it refuses, by the numbers of the protocol, and the value that it refuses.
+const MOVE: [(&str, &str); 10] = [
+    ("", "cannot control the response amplitude now"),
+    (
+        "response",
+        "refuses a move of the response to this value, m, which is not above 0",
+    ),
+    (
+        "duration",
+        "refuses a move of this duration, s, which is not 0 or above",
+    ),
+    ("amplitude", "refuses a move with this change of the drive amplitude, m"),
+    ("omega", "refuses a move with this change of the frequency, rad/s"),
+    ("phase_target", "refuses a move with this phase target, rad"),
+    ("growth", "refuses a move with this growth at its end, m/s"),
+    (
+        "amplitude_max",
+        "has no limit of the drive, which the control of the response needs: set phase_lock.amplitude_max in its scene",
+    ),
+    (
+        "state",
+        "can control the response in a closed loop only, state 2 (acquiring) or 3 (locked), and is in this state",
+    ),
+    ("", "cannot control the response amplitude"),
 ];
-const CONFIGURED: &str = "a finite number that the configuration of the controller allows";
 
 impl From<ControllerError> for Refusal {
     /// The refusal of a move.
     fn from(error: ControllerError) -> Self {
         let (index, value) = match error {
             ControllerError::Refused(error) => {
-                let index = MOVE.iter().position(|(name, ..)| *name == error.name);
-                (index.map_or(0, |index| index + 1), error.value.unwrap_or(f64::NAN))
+                let index = MOVE.iter().position(|(name, _)| *name == error.name);
+                (index.unwrap_or_default(), error.value.unwrap_or(f64::NAN))
             }
-            ControllerError::NoResponseLoop => (MOVE.len() + 1, 0.0),
+            ControllerError::NoResponseLoop => (MOVE.len() - 1, 0.0),
             ControllerError::Failed(_) => (0, 0.0),
         };
         Self::Move { index, value }
     }
-}
-
-/// The message for a move that is refused.
-fn immovable(index: usize, value: f64) -> String {
-    match index {
-        1..=6 => {
-            let (name, unit, allowed) = MOVE[index - 1];
-            format!("refuses a move with {name} = {value} {unit}: allowed is {allowed}")
-        }
-        7 => "has no limit of the drive, which the control of the response amplitude needs: set phase_lock.amplitude_max in its scene".into(),
-        8 => format!(
-            "is in state {value}: the response amplitude can be controlled in a closed loop only, in state 2 (acquiring) or 3 (locked)"
-        ),
-        9 => "cannot control the response amplitude".into(),
-        _ => "cannot control the response amplitude now".into(),
-    }
-}
-
-/// The message for a drive that is not allowed.
-fn excess(index: usize, value: f64, limit: f64) -> String {
-    let (name, unit, advice) = match index {
-        0 => ("frequency", "rad/s", "the limit is half its sample rate"),
-        1 => ("amplitude", "m", "`vines rig --max-amplitude` sets the limit"),
-        _ => ("displacement", "m", "`vines rig --max-amplitude` sets the limit"),
-    };
-    format!("the {name} of the drive is {value:e} {unit}, allowed is up to {limit:e} {unit}; {advice}")
 }
 
 #[cfg(test)]

@@ -11,17 +11,19 @@
 #![forbid(unsafe_code)]
 
 mod address;
-mod bridge;
 mod client;
 pub mod frame;
 mod link;
+mod readings;
+mod seal;
 mod server;
 mod timing;
 
 pub use address::{Address, BindScope, LinkError, ServerError, is_loopback, resolve};
-pub use bridge::Bridge;
 pub use client::{CONNECT, NetController, NetRig};
 pub use frame::Refusal;
-pub use link::{Key, POLL};
+pub use link::POLL;
+pub use readings::{Readings, Taken};
+pub use seal::Key;
 pub use server::{RAMP_SAMPLES, Role, Served, Server, Service};
 pub use timing::{Counters, Ended, RealTimeClock, ReportLost, Session, Timing};

@@ -1,125 +1,14 @@
-//! Frames over TCP and UDP, with a deadline for receiving, and their authentication.
+//! Frames over TCP and UDP, with a deadline for receiving.
 
-use std::fmt::{self, Debug, Formatter};
 use std::hint;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use hmac::{Hmac, KeyInit, Mac};
-use sha2::{Digest, Sha256};
-
-use super::address::{Address, is_loopback};
-use super::frame::{Frame, FrameError, Kind, SIZE};
-
-/// Length of the authentication code, HMAC-SHA-256, bytes.
-const TAG: usize = 32;
-/// Shortest secret, bytes: 128 bits, which cannot be guessed.
-const SECRET: usize = 16;
-
-/// A shared key.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub struct Key([u8; 32]);
-
-impl Key {
-    /// The key of a secret; None if it is shorter than 16 bytes. Space at its end does not count.
-    pub fn of(secret: &[u8]) -> Option<Self> {
-        let secret = secret.trim_ascii_end();
-        (secret.len() >= SECRET).then(|| Self(Sha256::digest(secret).into()))
-    }
-}
-
-impl Debug for Key {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.write_str("Key")
-    }
-}
-
-/// One side of a connection: which frames it sends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Side {
-    Client = 1,
-    Server = 2,
-}
-
-/// Encodes and decodes frames, with a code if there is a key.
-///
-/// The code covers the sender's side, a number that the server draws for the session, and the frame, in which the client's number of
-/// the session and the number of the sample are counters against a replay. Hello, Welcome and the refusal of a session come before the
-/// number of the server, and are covered without it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Seal {
-    key: Option<Key>,
-    side: Side,
-    /// The client's number of the session, and the server's.
-    session: Option<(u64, [f64; 2])>,
-}
-
-impl Seal {
-    pub fn new(key: Option<Key>, side: Side) -> Self {
-        Self { key, side, session: None }
-    }
-
-    /// Length of a frame, bytes.
-    pub fn size(&self) -> usize {
-        SIZE + if self.key.is_some() { TAG } else { 0 }
-    }
-
-    /// Draws the server's number of a session: integers that are exact as values of a frame, or zeros without a key.
-    pub fn draw(&self) -> Result<[f64; 2], getrandom::Error> {
-        let number = || Ok((getrandom::u64()? >> 12) as f64);
-        self.key.map_or(Ok([0.0; 2]), |_| Ok([number()?, number()?]))
-    }
-
-    /// From now on, frames of this session need its numbers.
-    pub fn begin(&mut self, session: u64, drawn: [f64; 2]) {
-        self.session = Some((session, drawn));
-    }
-
-    /// The bytes of a frame.
-    pub fn encode(&self, frame: &Frame) -> Vec<u8> {
-        let mut bytes = frame.encode().to_vec();
-        if let Some(mac) = self.mac(frame, &bytes, self.side) {
-            bytes.extend(mac.finalize().into_bytes());
-        }
-        bytes
-    }
-
-    /// Reads a datagram of the other side.
-    pub fn decode(&self, bytes: &[u8]) -> Result<Frame, FrameError> {
-        if self.key.is_none() {
-            return Frame::decode(bytes);
-        }
-        let (bytes, tag) = bytes.split_at(bytes.len().min(SIZE));
-        let frame = Frame::decode(bytes)?;
-        let from = if self.side == Side::Client {
-            Side::Server
-        } else {
-            Side::Client
-        };
-        let mac = self.mac(&frame, bytes, from).ok_or(FrameError::Tag)?;
-        // In constant time.
-        mac.verify_slice(tag).map_err(|_| FrameError::Tag)?;
-        Ok(frame)
-    }
-
-    fn mac(&self, frame: &Frame, bytes: &[u8], from: Side) -> Option<Hmac<Sha256>> {
-        let opens = matches!(frame.kind, Kind::Hello | Kind::Welcome);
-        let session = self.session.filter(|(number, _)| *number == frame.session && !opens);
-        // Only the start of a session is valid without the server's number.
-        if session.is_none() && !opens && frame.kind != Kind::Refusal {
-            return None;
-        }
-        let mut mac = Hmac::<Sha256>::new_from_slice(&self.key?.0).ok()?;
-        mac.update(&[from as u8, session.is_some().into()]);
-        for number in session.map_or([0.0; 2], |(_, drawn)| drawn) {
-            mac.update(&number.to_le_bytes());
-        }
-        mac.update(bytes);
-        Some(mac)
-    }
-}
+use crate::address::{Address, is_loopback};
+use crate::frame::{Frame, FrameError};
+use crate::seal::{Key, Seal, Side};
 
 /// Shorter waits use polling: the time-outs of the system may be as coarse as 16 ms, which is several samples.
 const FINE: Duration = Duration::from_millis(20);
@@ -127,11 +16,11 @@ const FINE: Duration = Duration::from_millis(20);
 pub const POLL: Duration = Duration::from_micros(50);
 /// Shorter waits do not sleep: the system wakes a program up later than it asks for, by about this.
 const SPIN: Duration = Duration::from_micros(100);
-/// Interval at which a server without a session looks for connections and their frames: short against the time for loading a rig.
+/// Interval at which a server without a connection looks for one: short against the time for loading a rig.
 const ACCEPT: Duration = Duration::from_millis(5);
 /// Longest time for sending a frame over TCP to a peer that does not read: the longest silence in lock-step (protocol, "Faults").
 const SEND: Duration = Duration::from_secs(5);
-/// Longest time for a TCP client to say Hello: half of the time after which a client gives up.
+/// Longest time for a TCP client to say Hello: half of the time after which another one gives up.
 const HELLO: Duration = Duration::from_secs(1);
 
 /// A frame, or why the bytes are none.
@@ -150,15 +39,12 @@ enum Socket {
     Udp(UdpSocket),
 }
 
-/// TCP connections.
+/// One TCP connection; while a server has one, it closes others at once.
 #[derive(Debug)]
 struct Connections {
     /// None at the end of a client.
     listener: Option<TcpListener>,
-    /// The peer of the session.
     peer: Option<Connection>,
-    /// Clients of a server that have not opened a session.
-    visitors: Vec<Connection>,
 }
 
 impl Link {
@@ -168,7 +54,7 @@ impl Link {
         let socket = match peer {
             Address::Tcp(to) => {
                 let connection = Connection::new(TcpStream::connect_timeout(&to, patience)?, to, seal.size())?;
-                Socket::Tcp(Connections { listener: None, peer: Some(connection), visitors: Vec::new() })
+                Socket::Tcp(Connections { listener: None, peer: Some(connection) })
             }
             Address::Udp(to) => {
                 // Bound to loopback if the peer is on loopback.
@@ -193,7 +79,7 @@ impl Link {
             Address::Tcp(address) => {
                 let listener = TcpListener::bind(address)?;
                 listener.set_nonblocking(true)?;
-                Socket::Tcp(Connections { listener: Some(listener), peer: None, visitors: Vec::new() })
+                Socket::Tcp(Connections { listener: Some(listener), peer: None })
             }
         };
         Ok(Self { socket, seal: Seal::new(key, Side::Server) })
@@ -229,30 +115,16 @@ impl Link {
             // A client's socket is connected: some systems then refuse an address.
             Socket::Udp(socket) if self.seal.side == Side::Client => delivered(socket.send(&bytes)),
             Socket::Udp(socket) => delivered(socket.send_to(&bytes, to)),
-            Socket::Tcp(all) => {
-                let connection = all
-                    .peer
-                    .iter_mut()
-                    .chain(&mut all.visitors)
-                    .find(|connection| connection.from == to);
-                connection.map_or(Ok(()), |connection| connection.send(&bytes))
-            }
-        }
-    }
-
-    /// The session is that of this client.
-    pub fn prefer(&mut self, client: SocketAddr) {
-        if let Socket::Tcp(all) = &mut self.socket
-            && let Some(index) = all.visitors.iter().position(|visitor| visitor.from == client)
-        {
-            all.peer = Some(all.visitors.swap_remove(index));
+            Socket::Tcp(all) => match &mut all.peer {
+                Some(peer) if peer.from == to => peer.send(&bytes),
+                _ => Ok(()),
+            },
         }
     }
 
     pub fn close(&mut self, client: SocketAddr) {
         if let Socket::Tcp(all) = &mut self.socket {
             all.peer.take_if(|peer| peer.from == client);
-            all.visitors.retain(|visitor| visitor.from != client);
         }
     }
 }
@@ -261,34 +133,22 @@ impl Connections {
     fn receive(&mut self, deadline: Instant, seal: &Seal) -> io::Result<Option<(Received, SocketAddr)>> {
         loop {
             while let Some(Ok((stream, from))) = self.listener.as_ref().map(TcpListener::accept) {
-                // A connection without options has been closed.
-                self.visitors.extend(Connection::new(stream, from, seal.size()));
-            }
-            // Visitors are not waited for: they cost the client of the session, and each other, no time.
-            for index in (0..self.visitors.len()).rev() {
-                let visitor = &mut self.visitors[index];
-                let received = visitor
-                    .receive(Instant::now(), seal)?
-                    .map(|frame| (frame, visitor.from));
-                let ends = match &received {
-                    None => visitor.since.elapsed() > HELLO,
-                    // Another version gets an answer.
-                    Some((Err(error), _)) => !matches!(error, FrameError::Version(_)),
-                    Some((Ok(_), _)) => false,
-                };
-                if ends {
-                    drop(self.visitors.swap_remove(index));
-                }
-                if received.is_some() {
-                    return Ok(received);
+                if self.peer.is_none() {
+                    self.peer = Connection::new(stream, from, seal.size()).ok();
                 }
             }
             if let Some(peer) = &mut self.peer {
                 let received = peer.receive(deadline, seal)?.map(|frame| (frame, peer.from));
+                let is_over = match &received {
+                    Some((Err(FrameError::Closed), _)) => true,
+                    // Another version gets an answer.
+                    Some((Err(error), _)) => !peer.has_spoken && !matches!(error, FrameError::Version(_)),
+                    Some((Ok(_), _)) => false,
+                    None => !peer.has_spoken && peer.since.elapsed() > HELLO,
+                };
+                peer.has_spoken |= matches!(received, Some((Ok(_), _)));
                 // A server forgets the connection; a client reads again that it is closed.
-                if matches!(received, Some((Err(FrameError::Closed), _))) && self.listener.is_some() {
-                    self.peer = None;
-                }
+                self.peer.take_if(|_| is_over && self.listener.is_some());
                 return Ok(received);
             }
             let left = deadline.saturating_duration_since(Instant::now());
@@ -306,6 +166,8 @@ struct Connection {
     stream: TcpStream,
     from: SocketAddr,
     since: Instant,
+    /// Whether a valid frame has arrived.
+    has_spoken: bool,
     bytes: Vec<u8>,
     /// Number of bytes of the next frame that have arrived.
     filled: usize,
@@ -317,7 +179,7 @@ impl Connection {
         stream.set_nodelay(true)?;
         stream.set_write_timeout(Some(SEND))?;
         let (since, bytes) = (Instant::now(), vec![0; size]);
-        Ok(Self { stream, from, since, bytes, filled: 0 })
+        Ok(Self { stream, from, since, has_spoken: false, bytes, filled: 0 })
     }
 
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
@@ -400,7 +262,3 @@ fn delivered(sent: io::Result<usize>) -> io::Result<()> {
         _ => Ok(()),
     }
 }
-
-#[cfg(test)]
-#[path = "../tests/unit/link.rs"]
-mod tests;

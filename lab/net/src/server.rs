@@ -5,13 +5,14 @@ use std::io;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use super::address::{Address, LinkError, ServerError};
-use super::frame::{
+use crate::address::{Address, LinkError, ServerError};
+use crate::frame::{
     Frame, FrameError, Kind, Reading, Refusal, VERSION, bit, flag, read_command, read_move, read_reading,
     write_command, write_reading,
 };
-use super::link::{Key, Link, Received};
-use super::timing::{Counters, Ended, RealTimeClock, Session, Timing};
+use crate::link::{Link, Received};
+use crate::seal::Key;
+use crate::timing::{Counters, Ended, RealTimeClock, Session, Timing};
 use vines_testbench::rig::{Controller, Drive, Rig, RigError};
 use vines_testbench::scene::Definition;
 
@@ -159,7 +160,6 @@ impl Server {
                 return Ok(None);
             }
         };
-        self.link.prefer(from);
         let drawn = self.link.seal.draw().map_err(io::Error::other)?;
         welcome.values[3..5].copy_from_slice(&drawn);
         self.link.seal.begin(hello.session, drawn);
@@ -209,8 +209,6 @@ impl Server {
                 if frame.kind == Kind::Hello {
                     self.refuse(Refusal::Busy, &frame, from)?;
                 }
-                // Over TCP, nobody else may keep the server from its client.
-                self.link.close(from);
             }
             // The report was lost, and the session has ended in the meantime.
             (Ok(frame), None) if frame.kind == Kind::Farewell => {
@@ -224,8 +222,10 @@ impl Server {
                 let mut answer = Frame { kind: Kind::Sensors, values: [0.0; 6], ..frame };
                 answer.flags = flag::SHUT_DOWN;
                 self.link.send(&answer, from)?;
+                self.link.close(from);
             }
-            (Ok(_), None) => {}
+            // Over TCP, nobody without a session may keep the server from its clients.
+            (Ok(_), None) => self.link.close(from),
         }
         Ok(())
     }
@@ -303,13 +303,14 @@ impl Run {
         self.heard = Instant::now();
         self.counters.received += 1;
         match frame.kind {
-            _ if !self.real_time => {
-                if let Err(refusal) = self.answer(frame, link)? {
+            _ if !self.real_time => match self.answer(frame, link) {
+                Err(ServerError::Refused(refusal)) => {
                     let cause = Frame { sequence: self.at, ..*frame };
                     link.send(&refusal.answer(&cause), self.peer)?;
                     self.end(Ended::Refused);
                 }
-            }
+                outcome => outcome?,
+            },
             Kind::Drive => self.take_drive(frame),
             Kind::Hello if self.clock.is_none() => self.welcome(link)?,
             Kind::Hello => {}
@@ -323,34 +324,29 @@ impl Run {
     }
 
     /// Answers a frame in lock-step.
-    fn answer(&mut self, frame: &Frame, link: &mut Link) -> Result<Result<(), Refusal>, ServerError> {
+    fn answer(&mut self, frame: &Frame, link: &mut Link) -> Result<(), ServerError> {
         match (&mut self.served, frame.kind) {
-            _ if frame.sequence != self.at => return Ok(Err(Refusal::Unexpected)),
+            _ if frame.sequence != self.at => Err(Refusal::Unexpected.into()),
             (Served::Controller(controller), Kind::Sensors) => {
                 let command = controller.sample(read_reading(frame).sensors, frame.has(flag::ACTIVE))?;
                 self.at += 1;
-                link.send(&write_command(*frame, &command), self.peer)?;
+                Ok(link.send(&write_command(*frame, &command), self.peer)?)
             }
             (Served::Controller(controller), Kind::Move) => {
                 let (to, phase_target) = read_move(frame);
-                // No answer: the next drive follows from it. A refusal ends the session.
-                let held = if frame.has(flag::HOLD) {
-                    controller.hold_drive()
-                } else {
-                    controller.hold_response(to, phase_target)
+                // No answer: the next drive follows from it.
+                let held = match frame.has(flag::HOLD) {
+                    true => controller.hold_drive(),
+                    false => controller.hold_response(to, phase_target),
                 };
-                return Ok(held.map_err(Refusal::from));
+                Ok(held.map_err(Refusal::from)?)
             }
-            (Served::Rig(_), Kind::Drive) => match self.service.drive(frame) {
-                Err(refusal) => return Ok(Err(refusal)),
-                Ok(drive) => {
-                    self.drive.set(drive, frame.has(flag::HOLD));
-                    self.advance(link)?;
-                }
-            },
-            _ => return Ok(Err(Refusal::Unexpected)),
+            (Served::Rig(_), Kind::Drive) => {
+                self.drive.set(self.service.drive(frame)?, frame.has(flag::HOLD));
+                self.advance(link)
+            }
+            _ => Err(Refusal::Unexpected.into()),
         }
-        Ok(Ok(()))
     }
 
     /// Takes a drive in real time, if it is valid and newer than the last one.
@@ -401,12 +397,7 @@ impl Run {
         };
         let reading = Reading { sensors: rig.sense()?, ground_truth: rig.ground_truth()? };
         let (sequence, time) = (self.at, self.at as f64 * self.service.sample_time);
-        let frame = Frame {
-            sequence,
-            time,
-            ..Frame::new(Kind::Sensors, self.welcome.session)
-        };
-        let mut frame = write_reading(frame, &reading);
+        let mut frame = write_reading(Frame { sequence, time, ..self.welcome }, &reading);
         frame.flags |= bit(flag::SHUT_DOWN, self.drive.is_shut_down());
         Ok(link.send(&frame, self.peer)?)
     }

@@ -62,7 +62,7 @@ impl From<ExperimentError> for Failure {
 impl From<LinkError> for Failure {
     fn from(error: LinkError) -> Self {
         match error {
-            LinkError::Address { .. } | LinkError::Remote { .. } => Self::input(error),
+            LinkError::Address { .. } => Self::input(error),
             _ => Self::run(error),
         }
     }

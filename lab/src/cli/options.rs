@@ -8,11 +8,11 @@ use clap::Args;
 use phase_lock::Config;
 use vines::ArgumentError;
 use vines::fmu::{FmuController, FmuRig};
-use vines::helic::{Channels, DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
+use vines::helic::{DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::report::summary::ideal;
 use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
-use vines::scene::{Family, Name, Names, Override, PAPER, Scene, SceneError};
+use vines::scene::{Family, Names, Override, PAPER, Scene, SceneError};
 
 use super::failure::{Failure, stop_flag};
 
@@ -185,28 +185,7 @@ fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Netw
         Failure::run(format!("no answer from {address}: {error}; {advice}"))
     })?;
     let samples = scene.controller.samples_per_period;
-    HelicRig::new(network, channels(&scene.rig_names)?, scene.sample_time(), samples).map_err(Failure::run)
-}
-
-/// The sources of a device and the gain of its output, by the scene's names `response`, `base` and `E`.
-fn channels(names: &Names) -> Result<Channels, Failure> {
-    if let Some(name) = names.unknown(&["response", "base", "E"]) {
-        return Err(Failure::input(format!(
-            "[rig.names] maps `{name}`; for a helic device there are response, base and E"
-        )));
-    }
-    let Channels { mut response, mut reference, mut gain } = Channels::default();
-    if let Some(Name { name, factor }) = names.mapped("response") {
-        response = (name.clone(), *factor);
-    }
-    if let Some(Name { name, factor }) = names.mapped("base") {
-        // A device without a base sensor: "".
-        reference = Some((name.clone(), *factor)).filter(|(name, _)| !name.is_empty());
-    }
-    if let Some(Name { factor, .. }) = names.mapped("E") {
-        gain = *factor;
-    }
-    Ok(Channels { response, reference, gain })
+    HelicRig::new(network, &scene.rig_names, scene.sample_time(), samples).map_err(Failure::run)
 }
 
 /// Refuses a key where the protocol has none.

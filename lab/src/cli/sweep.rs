@@ -153,7 +153,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     }
     let damage = damage(&monitor, "Their chunks were copied or computed again");
     text += &damage;
-    if let Some(reason) = monitor.reason.lock().ok().and_then(|mut reason| reason.take()) {
+    if let Some(reason) = monitor.reason.get() {
         text += &format!("First failure: {reason}\n");
     }
     if complete {

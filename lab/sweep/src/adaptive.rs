@@ -5,23 +5,20 @@
 //! the first grid is missed; `inferred` marks what was not computed. What is computed next follows from the results so far, so that a
 //! sweep that was killed reads the results of its rounds again and continues.
 
-use std::{collections::BTreeMap, sync::atomic::Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 
 use rayon::prelude::*;
 use vines_model::regime::Regime;
 
 use crate::{
-    cell::{ABSENT, Cell, FAILED, code},
-    run::Monitor,
+    cell::{ABSENT, Cell, FAILED},
+    monitor::Monitor,
     store::{ROUNDS, Store, StoreError},
     sweep::Sweep,
 };
 
 /// Smallest number of cells of the first grid along a side, roughly.
 const SIDE: usize = 4;
-
-/// A cell as a round keeps it: its number, row by row, the code of its regime, and why it failed.
-type Computed = (usize, u8, String);
 
 /// Computes the store of an adaptive sweep. False if the monitor stopped it.
 pub(crate) fn run(sweep: &Sweep, store: &Store, stride: usize, monitor: &Monitor) -> Result<bool, StoreError> {
@@ -33,119 +30,91 @@ pub(crate) fn run(sweep: &Sweep, store: &Store, stride: usize, monitor: &Monitor
     let neighbours = |n: usize, stride: usize| {
         let (row, column) = (n / columns, n % columns);
         let near = [
-            (row.checked_sub(stride), Some(column)),
-            (row.checked_add(stride), Some(column)),
-            (Some(row), column.checked_sub(stride)),
-            (Some(row), column.checked_add(stride)),
+            (row >= stride).then(|| n - stride * columns),
+            (row + stride < rows).then_some(n + stride * columns),
+            (column >= stride).then(|| n - stride),
+            (column + stride < columns).then_some(n + stride),
         ];
-        let inside =
-            move |(row, column): (Option<usize>, Option<usize>)| Some((row.filter(|row| *row < rows)?, column?));
-        let cells = near.into_iter().filter_map(inside);
-        cells
-            .filter(move |cell| cell.1 < columns)
-            .map(move |(row, column)| row * columns + column)
+        near.into_iter().flatten()
     };
-    let mut codes = vec![ABSENT; rows * columns];
-    let (mut computed, mut failures) = (vec![false; rows * columns], BTreeMap::new());
+    let (mut codes, mut computed) = (vec![ABSENT; rows * columns], vec![false; rows * columns]);
     let mut stride = stride.min((rows.min(columns) / SIDE).max(1).next_power_of_two());
-    let mut next: Vec<usize> = grid(stride).collect();
-    let mut round = 0;
+    let (mut candidates, mut round): (Vec<usize>, _) = (grid(stride).collect(), 0);
     loop {
-        for (batch, cells) in next.chunks(sweep.chunk_size()).enumerate() {
+        candidates.sort_unstable();
+        candidates.dedup();
+        let differs = |n: &usize| neighbours(*n, stride).any(|other| codes[other] != codes[*n]);
+        candidates.retain(|n| !computed[*n] && (codes[*n] == ABSENT || differs(n)));
+        if candidates.is_empty() {
+            if stride == 1 {
+                return write(sweep, store, &codes, &computed, monitor);
+            }
+            for n in grid(stride / 2).filter(|n| !computed[*n]) {
+                let (row, column) = (n / columns, n % columns);
+                codes[n] = codes[(row - row % stride) * columns + column - column % stride];
+            }
+            stride /= 2;
+            candidates = grid(stride).collect();
+            continue;
+        }
+        for (batch, cells) in candidates.chunks(sweep.chunk_size() as usize).enumerate() {
             let Some(results) = results(sweep, store, &format!("{ROUNDS}/{round}-{batch}"), cells, monitor)? else {
                 return Ok(false);
             };
-            for (n, code, failure) in results {
-                (codes[n], computed[n]) = (code, true);
-                if !failure.is_empty() {
-                    failures.insert(n, failure);
-                }
+            for (n, code) in cells.iter().zip(results) {
+                (codes[*n], computed[*n]) = (code, true);
             }
         }
         round += 1;
         // Only a cell that was computed, or its neighbour, can differ now; on a new grid, any.
-        let mut candidates: Vec<usize> = next.iter().flat_map(|n| neighbours(*n, stride).chain([*n])).collect();
-        loop {
-            candidates.sort_unstable();
-            candidates.dedup();
-            let differs = |n: &usize| neighbours(*n, stride).any(|other| codes[other] != codes[*n]);
-            candidates.retain(|n| !computed[*n] && differs(n));
-            if !candidates.is_empty() {
-                break;
-            }
-            if stride == 1 {
-                return write(sweep, store, &codes, &computed, &failures, monitor);
-            }
-            for n in grid(stride / 2) {
-                let (row, column) = (n / columns, n % columns);
-                if codes[n] == ABSENT {
-                    codes[n] = codes[(row - row % stride) * columns + column - column % stride];
-                }
-            }
-            stride /= 2;
-            candidates = grid(stride).collect();
-        }
-        next = candidates;
+        let near = |n: &usize| neighbours(*n, stride).chain([*n]);
+        candidates = candidates.iter().flat_map(near).collect();
     }
 }
 
-/// Computes cells, or reads what was kept of them. `None` if the monitor stopped it.
+/// The codes of cells: computed, or kept from an earlier run. `None` if the monitor stopped it.
 fn results(
     sweep: &Sweep,
     store: &Store,
     key: &str,
     cells: &[usize],
     monitor: &Monitor,
-) -> Result<Option<Vec<Computed>>, StoreError> {
-    let kept = store.kept(key, monitor);
-    if let Some(results) = kept.and_then(|text| serde_json::from_slice(&text).ok()) {
+) -> Result<Option<Vec<u8>>, StoreError> {
+    if let Ok(codes) = store.read(key) {
         monitor.found.fetch_add(cells.len() as u64, Relaxed);
-        return Ok(Some(results));
+        return Ok(Some(codes));
     }
     let compute = |n: &usize| {
-        (!monitor.stop.load(Relaxed)).then(|| {
-            let cell = sweep.cell_at(&[*n as u64 / sweep.shape[1], *n as u64 % sweep.shape[1]]);
-            monitor.note(&cell);
-            (*n, code(&cell), cell.failure)
-        })
+        let cell = (!monitor.stopped()).then(|| sweep.cell(&sweep.cell_index(*n as u64)))?;
+        monitor.note(&cell);
+        Some(cell.code())
     };
-    let results: Option<Vec<Computed>> = cells.par_iter().map(compute).collect();
-    if let Some(results) = &results {
-        store.keep(key, &serde_json::to_vec(results).unwrap_or_default())?;
-    }
-    Ok(results)
+    let codes: Option<Vec<u8>> = cells.par_iter().map(compute).collect();
+    codes.iter().try_for_each(|codes| store.write(key, codes))?;
+    Ok(codes)
 }
 
 /// Writes all chunks. False if the monitor stopped it.
-fn write(
-    sweep: &Sweep,
-    store: &Store,
-    codes: &[u8],
-    computed: &[bool],
-    failures: &BTreeMap<usize, String>,
-    monitor: &Monitor,
-) -> Result<bool, StoreError> {
+fn write(sweep: &Sweep, store: &Store, codes: &[u8], computed: &[bool], monitor: &Monitor) -> Result<bool, StoreError> {
     let cell = |index: Vec<u64>| {
         let n = (index[0] * sweep.shape[1] + index[1]) as usize;
-        let beside = (codes[n] == FAILED).then(|| "not computed, as a neighbouring cell failed".to_string());
-        Cell {
-            regime: Regime::SIMULATED.get(usize::from(codes[n])).copied(),
-            inferred: !computed[n],
-            failure: failures.get(&n).cloned().or(beside).unwrap_or_default(),
-            ..Cell::default()
-        }
+        let failure = match (codes[n], computed[n]) {
+            (FAILED, true) => sweep.cell(&index).failure,
+            (FAILED, false) => "not computed, as a neighbouring cell failed".into(),
+            _ => String::new(),
+        };
+        let regime = Regime::SIMULATED.get(usize::from(codes[n])).copied();
+        Cell { regime, inferred: !computed[n], failure, ..Cell::default() }
     };
     for index in (0..sweep.chunks()).map(|n| sweep.chunk_index(n)) {
-        if monitor.stop.load(Relaxed) {
+        if monitor.stopped() {
             return Ok(false);
         }
-        let cells: Vec<Cell> = (0..sweep.chunk_size() as u64)
-            .map(|n| sweep.cell_index(&index, n).map_or_else(Cell::default, cell))
-            .collect();
-        store.write(&index, &cells)?;
+        let indices = (0..sweep.chunk_size()).map(|n| sweep.chunk_cell(&index, n));
+        let cells: Vec<Cell> = indices.map(|index| index.map_or_else(Cell::default, cell)).collect();
+        store.write_chunk(&index, &cells)?;
     }
-    let inferred = computed.iter().filter(|computed| !**computed).count();
-    monitor.inferred.store(inferred as u64, Relaxed);
-    store.tidy()?;
+    let inferred = computed.iter().map(|computed| u64::from(!computed)).sum();
+    monitor.inferred.store(inferred, Relaxed);
     Ok(true)
 }

@@ -71,37 +71,28 @@ impl Axis {
     /// # Errors
     /// A value that is not finite, fewer than two values, a value twice, or an empty interval.
     pub fn new(name: &str, values: Values) -> Result<Self, ArgumentError> {
-        let finite = |value: f64| match value.is_finite() {
-            true => Ok(()),
-            false => Err(ArgumentError::from(format!("{name} = {value} is not a finite number"))),
+        let (numbers, points) = match &values {
+            Values::Grid(Grid { from, to, points }) => (&[*from, *to][..], *points),
+            Values::List(list) | Values::Paired(list) => (&list[..], list.len() as u64),
+            Values::Random(interval) => (&interval[..], u64::MAX),
         };
-        match &values {
-            Values::Grid(Grid { from, to, points }) => {
-                [*from, *to].into_iter().try_for_each(finite)?;
-                few(name, *points, *from)?;
-                if from >= to {
-                    return Err(format!("{name} from {from} to {to}: the first must be below the last").into());
-                }
+        if let Some(value) = numbers.iter().find(|value| !value.is_finite()) {
+            return Err(format!("{name} = {value} is not a finite number").into());
+        }
+        match (&values, numbers) {
+            (_, []) => return Err(format!("{name} has no values; at least 2 are needed").into()),
+            (_, [value, ..]) if points < 2 => return Err(constant(name, *value).into()),
+            (Values::Grid(_) | Values::Random(_), [from, to]) if from >= to => {
+                return Err(format!("{name} from {from} to {to}: the first must be below the last").into());
             }
-            Values::List(list) => {
-                list.iter().copied().try_for_each(finite)?;
-                few(name, list.len() as u64, list.first().copied().unwrap_or(f64::NAN))?;
+            (Values::List(list), _) => {
                 let mut sorted = list.clone();
                 sorted.sort_by(f64::total_cmp);
                 if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
                     return Err(format!("{name} has the value {} twice", pair[0]).into());
                 }
             }
-            Values::Paired(list) => {
-                list.iter().copied().try_for_each(finite)?;
-                few(name, list.len() as u64, list.first().copied().unwrap_or(f64::NAN))?;
-            }
-            Values::Random([from, to]) => {
-                [*from, *to].into_iter().try_for_each(finite)?;
-                if from >= to {
-                    return Err(format!("{name} from {from} to {to}: the first must be below the last").into());
-                }
-            }
+            _ => {}
         }
         Ok(Self { name: name.into(), values })
     }
@@ -113,14 +104,6 @@ impl Axis {
             Values::Grid(grid) => Some(grid.points),
             Values::List(list) => Some(list.len() as u64),
             Values::Paired(_) | Values::Random(_) => None,
-        }
-    }
-
-    /// Number of values if they are listed sample by sample.
-    pub(crate) fn paired(&self) -> Option<u64> {
-        match &self.values {
-            Values::Paired(list) => Some(list.len() as u64),
-            _ => None,
         }
     }
 
@@ -153,11 +136,6 @@ impl Axis {
         short.map_or(&self.name, |(short, _)| short)
     }
 
-    /// Whether its values are random numbers.
-    pub(crate) fn is_random(&self) -> bool {
-        matches!(self.values, Values::Random(_))
-    }
-
     /// Unit: `1` for a count, and for what a scene states relative to omega0, b or a period.
     #[must_use]
     pub fn unit(&self) -> &'static str {
@@ -171,31 +149,24 @@ impl Axis {
             "chain.snr" => "dB",
             name => {
                 let parameter = name.strip_prefix("phase_lock.").and_then(Parameter::find);
-                parameter.map_or("1", |one| if one.unit.is_empty() { "1" } else { one.unit })
+                parameter.map_or(
+                    "1",
+                    |parameter| if parameter.unit.is_empty() { "1" } else { parameter.unit },
+                )
             }
         }
     }
 }
 
-/// Refuses fewer than two values; a constant belongs elsewhere.
-fn few(name: &str, points: u64, value: f64) -> Result<(), ArgumentError> {
-    match points {
-        0 => Err(format!("{name} has no values; at least 2 are needed").into()),
-        1 if name == SIGMA => Err(format!(
-            "{name} has one value; at least 2 are needed. A constant is a setting of the sweep: --sigma={value}, \
-             in Python sigma={value}"
-        )
-        .into()),
-        1 => {
-            let (section, key) = name.split_once('.').unwrap_or(("section", name));
-            Err(format!(
-                "{name} has one value; at least 2 are needed. A constant belongs to the scene: --set {name}={value}, \
-                 in Python Scene({section}={{\"{key}\": {value}}})"
-            )
-            .into())
+/// The message for an axis with one value: where a constant belongs.
+fn constant(name: &str, value: f64) -> String {
+    let place = match name.split_once('.') {
+        Some((section, key)) => {
+            format!("the scene: --set {name}={value}, in Python Scene({section}={{\"{key}\": {value}}})")
         }
-        _ => Ok(()),
-    }
+        None => format!("the sweep: --{name}={value}, in Python {name}={value}"),
+    };
+    format!("{name} has one value; at least 2 are needed. A constant is a setting of {place}")
 }
 
 impl Display for Axis {

@@ -2,32 +2,23 @@
 //!
 //! A [`Sweep`] has the cells in their order. [`Map::run`] keeps the regimes of two axes in memory; [`run()`] computes the chunks that
 //! the store does not have, or whose checksums are wrong. Every cell depends only on its position: a sweep that was killed gives the same
-//! bytes as one that was not. Without the feature `store`, no part of Zarr is compiled.
+//! bytes as one that was not.
 
 #![forbid(unsafe_code)]
-#![cfg_attr(
-    not(feature = "store"),
-    allow(dead_code, reason = "chunks and variables serve the store")
-)]
 
+mod adaptive;
 mod axis;
 mod cell;
 mod map;
-mod sweep;
-
-#[cfg(feature = "store")]
-mod adaptive;
-#[cfg(feature = "store")]
+mod monitor;
 mod run;
-#[cfg(feature = "store")]
 mod store;
+mod sweep;
 
 pub use axis::{Axis, Grid, SIGMA, Values};
 pub use cell::{ABSENT, FAILED, Results, UNCOUNTED};
 pub use map::{Map, MapCell};
-pub use sweep::{Settings, Shard, Sweep, SweepError};
-
-#[cfg(feature = "store")]
-pub use run::{Estimate, EstimateError, Monitor, collect, estimate, run, verify};
-#[cfg(feature = "store")]
+pub use monitor::Monitor;
+pub use run::{Estimate, EstimateError, collect, estimate, run, verify};
 pub use store::StoreError;
+pub use sweep::{Settings, Shard, Sweep, SweepError};

@@ -5,8 +5,8 @@ use vines_model::{Dimensionless, orbit::stable_resonant};
 use vines_testbench::scene::{Family, Scene, SceneError};
 
 use crate::{
-    axis::{Axis, SIGMA},
-    cell::{Cell, Results, compute, variables},
+    axis::{Axis, SIGMA, Values},
+    cell::{Cell, Results, variables},
 };
 
 /// Settings of a sweep besides its scene.
@@ -45,71 +45,6 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
-    /// Whether there is an axis with this name.
-    fn has(&self, name: &str) -> bool {
-        self.axes.iter().any(|axis| axis.name == name)
-    }
-
-    pub(crate) fn check(&self) -> Result<(), SweepError> {
-        let refused = |message: String| Err(SweepError::Setting(message));
-        let axes = &self.axes;
-        if axes.is_empty() {
-            return refused("a sweep needs at least one axis, for instance plant.r=0.3:1:71".into());
-        }
-        if let Some((n, axis)) = axes
-            .iter()
-            .enumerate()
-            .find(|(n, axis)| axes[..*n].iter().any(|one| one.name == axis.name))
-        {
-            return refused(format!("axis {} is {} again", n + 1, axis.name));
-        }
-        if self.sigma.is_some() && self.has(SIGMA) {
-            return refused("sigma is an axis and a constant: give one of them".into());
-        }
-        if let Some(sigma) = self.sigma.filter(|sigma| !sigma.is_finite()) {
-            return refused(format!("sigma = {sigma} (dimensionless) is not a finite number"));
-        }
-        if !(100..=u32::MAX as usize / 8).contains(&self.periods) {
-            return refused(format!(
-                "{} periods: from 100 to {} are allowed",
-                self.periods,
-                u32::MAX / 8
-            ));
-        }
-        if !(1..=CHUNK).contains(&self.chunk) {
-            return refused(format!(
-                "a chunk of {} cells: from 1 to {CHUNK} are allowed, which must be in memory",
-                self.chunk
-            ));
-        }
-        self.adaptive.map_or(Ok(()), |stride| self.check_adaptive(stride))
-    }
-
-    fn check_adaptive(&self, stride: u64) -> Result<(), SweepError> {
-        let refused = |message: String| Err(SweepError::Setting(message));
-        if !stride.is_power_of_two() || !(2..=64).contains(&stride) {
-            return refused(format!(
-                "adaptive refinement from every {stride}-th cell: 2, 4, 8, 16, 32 or 64 are allowed"
-            ));
-        }
-        let points: Vec<u64> = self.axes.iter().filter_map(Axis::points).collect();
-        if points.len() != 2 || self.axes.len() != 2 {
-            return refused("adaptive refinement needs exactly two axes, each a grid or a list".into());
-        }
-        if points[0].checked_mul(points[1]).is_none_or(|cells| cells > ADAPTIVE) {
-            return refused(format!(
-                "adaptive refinement of more than {} cells, which must be in memory",
-                ADAPTIVE
-            ));
-        }
-        if self.results != Results::default() {
-            return refused("adaptive refinement has the regime only: leave out other results".into());
-        }
-        Ok(())
-    }
-}
-
 /// Why a sweep cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
@@ -124,6 +59,10 @@ pub enum SweepError {
     Setting(String),
 }
 
+fn refused<T>(message: impl Into<String>) -> Result<T, SweepError> {
+    Err(SweepError::Setting(message.into()))
+}
+
 /// Most cells of an adaptive sweep: all their regimes are in memory, two bytes per cell.
 const ADAPTIVE: u64 = 1_000_000_000;
 /// Most cells of a chunk: all their results are in memory, half a kilobyte per cell.
@@ -134,58 +73,103 @@ const MOST: u64 = 1 << 53;
 const SAMPLES: u64 = 1 << 32;
 
 /// The dimension that paired and random axes share.
-pub(crate) const SAMPLE: &str = "sample";
+const SAMPLE: &str = "sample";
 
-/// Names and lengths of the dimensions.
-pub(crate) fn dimensions(settings: &Settings) -> Result<(Vec<String>, Vec<u64>), SweepError> {
-    let refused = |message: String| Err(SweepError::Setting(message));
-    let own = || {
-        settings
-            .axes
-            .iter()
-            .filter_map(|axis| axis.points().map(|points| (axis.name.clone(), points)))
-    };
-    let (mut names, mut shape): (Vec<String>, Vec<u64>) = own().unzip();
-    let sampled = settings.axes.len() - names.len();
-    let mut paired = settings
-        .axes
-        .iter()
-        .filter_map(|axis| Some((&axis.name, axis.paired()?)));
-    let mut samples = settings.samples;
-    if let Some((first, length)) = paired.next() {
-        if let Some((other, second)) = paired.find(|(_, other)| *other != length) {
+impl Settings {
+    /// Whether there is an axis with this name.
+    fn has(&self, name: &str) -> bool {
+        self.axes.iter().any(|axis| axis.name == name)
+    }
+
+    fn check(&self) -> Result<(), SweepError> {
+        let axes = &self.axes;
+        if axes.is_empty() {
+            return refused("a sweep needs at least one axis, for instance plant.r=0.3:1:71");
+        }
+        if let Some(n) = (1..axes.len()).find(|n| axes[..*n].iter().any(|axis| axis.name == axes[*n].name)) {
+            return refused(format!("axis {} is {} again", n + 1, axes[n].name));
+        }
+        if self.sigma.is_some() && self.has(SIGMA) {
+            return refused("sigma is an axis and a constant: give one of them");
+        }
+        if let Some(sigma) = self.sigma.filter(|sigma| !sigma.is_finite()) {
+            return refused(format!("sigma = {sigma} (dimensionless) is not a finite number"));
+        }
+        let most = u32::MAX as usize / 8;
+        if !(100..=most).contains(&self.periods) {
+            return refused(format!("{} periods: from 100 to {most} are allowed", self.periods));
+        }
+        if !(1..=CHUNK).contains(&self.chunk) {
+            return refused(format!(
+                "a chunk of {} cells: from 1 to {CHUNK} are allowed, which must be in memory",
+                self.chunk
+            ));
+        }
+        let Some(stride) = self.adaptive else {
+            return Ok(());
+        };
+        if !stride.is_power_of_two() || !(2..=64).contains(&stride) {
+            return refused(format!(
+                "adaptive refinement from every {stride}-th cell: 2, 4, 8, 16, 32 or 64 are allowed"
+            ));
+        }
+        let points: Option<Vec<u64>> = axes.iter().map(Axis::points).collect();
+        match points.as_deref() {
+            Some([rows, columns]) if rows.checked_mul(*columns).is_none_or(|cells| cells > ADAPTIVE) => refused(
+                format!("adaptive refinement of more than {ADAPTIVE} cells, which must be in memory"),
+            ),
+            Some([_, _]) if self.results != Results::default() => {
+                refused("adaptive refinement has the regime only: leave out other results")
+            }
+            Some([_, _]) => Ok(()),
+            _ => refused("adaptive refinement needs exactly two axes, each a grid or a list"),
+        }
+    }
+
+    /// Names and lengths of the dimensions.
+    fn dimensions(&self) -> Result<(Vec<String>, Vec<u64>), SweepError> {
+        let own = |axis: &Axis| Some((axis.name.clone(), axis.points()?));
+        let (mut names, mut shape): (Vec<String>, Vec<u64>) = self.axes.iter().filter_map(own).unzip();
+        let lengths = self.axes.iter().filter_map(|axis| match &axis.values {
+            Values::Paired(list) => Some((&axis.name, list.len() as u64)),
+            _ => None,
+        });
+        let paired: Vec<(&String, u64)> = lengths.collect();
+        if let Some([(first, length), (other, second)]) =
+            paired.array_windows().find(|[first, second]| first.1 != second.1)
+        {
             return refused(format!(
                 "{first} has {length} paired values and {other} has {second}: paired values belong together, one per sample"
             ));
         }
-        if samples.is_some_and(|samples| samples != length) {
-            return refused(format!(
-                "{length} paired values of {first} are {length} samples: leave out another number"
-            ));
+        let sampled = names.len() < self.axes.len();
+        match (self.samples, paired.first()) {
+            (Some(_), _) if !sampled => return refused("a number of samples needs a random axis"),
+            (None, None) if sampled => {
+                return refused("random axes need a number of samples (--samples N, in Python samples=N)");
+            }
+            (Some(samples), Some((name, length))) if samples != *length => {
+                return refused(format!(
+                    "{length} paired values of {name} are {length} samples: leave out another number"
+                ));
+            }
+            _ => {}
         }
-        samples = Some(length);
-    }
-    match samples {
-        None if sampled > 0 => {
-            return refused("random axes need a number of samples (--samples N, in Python samples=N)".into());
-        }
-        Some(_) if sampled == 0 => return refused("a number of samples needs a random axis".into()),
-        Some(samples) if !(2..=SAMPLES).contains(&samples) => {
-            return refused(format!("{samples} samples: from 2 to {SAMPLES} are allowed"));
-        }
-        Some(samples) => {
+        if let Some(samples) = self.samples.or(paired.first().map(|(_, length)| *length)) {
+            if !(2..=SAMPLES).contains(&samples) {
+                return refused(format!("{samples} samples: from 2 to {SAMPLES} are allowed"));
+            }
             names.push(SAMPLE.into());
             shape.push(samples);
         }
-        None => {}
+        let cells = shape
+            .iter()
+            .try_fold(1_u64, |product, length| product.checked_mul(*length));
+        if cells.is_none_or(|cells| cells > MOST) {
+            return refused("more than 2^53 cells: take fewer values");
+        }
+        Ok((names, shape))
     }
-    let cells = shape
-        .iter()
-        .try_fold(1_u64, |product, length| product.checked_mul(*length));
-    if cells.is_none_or(|cells| cells > MOST) {
-        return refused("more than 2^53 cells: take fewer values".into());
-    }
-    Ok((names, shape))
 }
 
 /// A checked sweep.
@@ -212,23 +196,17 @@ impl Sweep {
         for axis in settings.axes.iter().filter(|axis| axis.name != SIGMA) {
             family.vary(&axis.name)?;
         }
-        let (dimensions, shape) = dimensions(&settings)?;
-        let mut left = settings.chunk;
-        let mut chunk: Vec<u64> = shape
-            .iter()
-            .rev()
-            .map(|length| {
-                let part = left.min(*length);
-                left = (left / part).max(1);
-                part
-            })
-            .collect();
-        chunk.reverse();
+        let (dimensions, shape) = settings.dimensions()?;
+        let (mut chunk, mut left) = (shape.clone(), settings.chunk);
+        for length in chunk.iter_mut().rev() {
+            *length = left.min(*length);
+            left = (left / *length).max(1);
+        }
         let resonant = || stable_resonant(&scene.dimensionless()).map_or(0.0, |orbit| orbit.sigma);
-        let sigma = if settings.has(SIGMA) {
-            0.0
-        } else {
-            settings.sigma.unwrap_or_else(resonant)
+        let sigma = match settings.sigma {
+            Some(sigma) => sigma,
+            None if settings.has(SIGMA) => 0.0,
+            None => resonant(),
         };
         Ok(Self { family, settings, scene, sigma, dimensions, shape, chunk })
     }
@@ -243,6 +221,85 @@ impl Sweep {
     #[must_use]
     pub fn sigma(&self) -> Option<f64> {
         (!self.settings.has(SIGMA)).then_some(self.sigma)
+    }
+
+    /// The settings.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn cells(&self) -> u64 {
+        self.shape.iter().product()
+    }
+
+    /// Number of chunks.
+    #[must_use]
+    pub fn chunks(&self) -> u64 {
+        self.chunk_grid().iter().product()
+    }
+
+    /// Bytes of the store before compression.
+    #[must_use]
+    pub fn bytes(&self) -> f64 {
+        let coordinates: u64 = self.coordinates().map(|(_, dimension, _)| self.shape[dimension]).sum();
+        self.variables().count() as f64 * 7.0 * self.cells() as f64 + 8.0 * coordinates as f64
+    }
+
+    pub(crate) fn variables(&self) -> impl Iterator<Item = crate::cell::Variable> {
+        variables(self.settings.results, self.settings.adaptive.is_some())
+    }
+
+    /// Number of chunks along each dimension.
+    fn chunk_grid(&self) -> Vec<u64> {
+        let lengths = self.shape.iter().zip(&self.chunk);
+        lengths.map(|(length, part)| length.div_ceil(*part)).collect()
+    }
+
+    /// Index of the n-th chunk.
+    pub(crate) fn chunk_index(&self, n: u64) -> Vec<u64> {
+        position(n, &self.chunk_grid())
+    }
+
+    /// Number of cells of a chunk, with those outside the sweep at its border.
+    pub(crate) fn chunk_size(&self) -> u64 {
+        self.chunk.iter().product()
+    }
+
+    /// Indices of the n-th cell of a chunk; None outside the sweep.
+    pub(crate) fn chunk_cell(&self, index: &[u64], n: u64) -> Option<Vec<u64>> {
+        let inside = position(n, &self.chunk);
+        let chunks = index.iter().zip(&self.chunk).zip(&self.shape);
+        let cell = inside.into_iter().zip(chunks);
+        cell.map(|(n, ((chunk, part), length))| Some(chunk * part + n).filter(|n| n < length))
+            .collect()
+    }
+
+    /// Number of cells of a chunk that lie inside the sweep.
+    pub(crate) fn chunk_count(&self, index: &[u64]) -> u64 {
+        let lengths = index.iter().zip(&self.chunk).zip(&self.shape);
+        lengths
+            .map(|((n, part), length)| (*part).min(length - n * part))
+            .product()
+    }
+
+    /// The axes with their dimensions and values.
+    pub(crate) fn coordinates(&self) -> impl Iterator<Item = (&Axis, usize, impl Fn(u64) -> f64)> {
+        let (mut streams, seed) = (0.., self.settings.seed);
+        self.settings.axes.iter().map(move |axis| {
+            let name = axis.points().map_or(SAMPLE, |_| axis.name.as_str());
+            let dimension = self
+                .dimensions
+                .iter()
+                .position(|dimension| dimension == name)
+                .unwrap_or(0);
+            let is_random = matches!(axis.values, Values::Random(_));
+            let stream = if is_random { streams.next() } else { None };
+            let value = move |n| axis.at(n, seed, stream.unwrap_or_default());
+            (axis, dimension, value)
+        })
     }
 
     /// Scene, detuning and dimensionless numbers where the axes have these values, one per axis.
@@ -267,117 +324,27 @@ impl Sweep {
         numbers.g = g.unwrap_or(numbers.g);
         let omega = 1.0 + numbers.epsilon * sigma;
         if omega <= 0.0 {
-            return Err(SweepError::Setting(format!(
+            return refused(format!(
                 "sigma = {sigma} (dimensionless) gives the frequency {omega} omega0, which must be above 0"
-            )));
+            ));
         }
         Ok((scene, sigma, numbers))
     }
 
-    /// The settings.
-    #[must_use]
-    pub fn settings(&self) -> &Settings {
-        &self.settings
-    }
-
-    /// Number of cells.
-    #[must_use]
-    pub fn cells(&self) -> u64 {
-        self.shape.iter().product()
-    }
-
-    /// Number of chunks.
-    #[must_use]
-    pub fn chunks(&self) -> u64 {
-        self.grid().iter().product()
-    }
-
-    /// Bytes of the store before compression.
-    #[must_use]
-    pub fn bytes(&self) -> f64 {
-        let coordinates: u64 = self.coordinates().map(|(_, dimension, _)| self.shape[dimension]).sum();
-        variables(&self.settings).count() as f64 * 7.0 * self.cells() as f64 + 8.0 * coordinates as f64
-    }
-
-    /// Number of chunks along each dimension.
-    fn grid(&self) -> Vec<u64> {
-        self.shape
-            .iter()
-            .zip(&self.chunk)
-            .map(|(length, part)| length.div_ceil(*part))
-            .collect()
-    }
-
-    /// Index of the n-th chunk.
-    pub(crate) fn chunk_index(&self, n: u64) -> Vec<u64> {
-        position(n, &self.grid())
-    }
-
-    /// Number of cells of a chunk that lie inside the sweep.
-    pub(crate) fn chunk_cells(&self, index: &[u64]) -> u64 {
-        index
-            .iter()
-            .zip(&self.chunk)
-            .zip(&self.shape)
-            .map(|((n, part), length)| (*part).min(length - n * part))
-            .product()
-    }
-
-    /// Number of cells of a chunk, with those outside the sweep at its border.
-    pub(crate) fn chunk_size(&self) -> usize {
-        self.chunk.iter().product::<u64>() as usize
-    }
-
-    /// Indices of the n-th cell of a chunk; None outside the sweep.
-    pub(crate) fn cell_index(&self, chunk: &[u64], n: u64) -> Option<Vec<u64>> {
-        let mut index = position(n, &self.chunk);
-        for (n, (chunk, part)) in index.iter_mut().zip(chunk.iter().zip(&self.chunk)) {
-            *n += chunk * part;
-        }
-        index
-            .iter()
-            .zip(&self.shape)
-            .all(|(n, length)| n < length)
-            .then_some(index)
-    }
-
-    /// The axes with their dimensions and values.
-    pub(crate) fn coordinates(&self) -> impl Iterator<Item = (&Axis, usize, impl Fn(u64) -> f64)> {
-        let (mut streams, seed) = (0.., self.settings.seed);
-        self.settings.axes.iter().map(move |axis| {
-            let name = axis.points().map_or(SAMPLE, |_| axis.name.as_str());
-            let dimension = self.dimensions.iter().position(|one| one == name).unwrap_or(0);
-            let stream = if axis.is_random() { streams.next() } else { None };
-            let value = move |n| axis.at(n, seed, stream.unwrap_or_default());
-            (axis, dimension, value)
-        })
-    }
-
-    /// Computes the n-th cell of a chunk; outside the sweep it is empty.
-    pub(crate) fn cell(&self, chunk: &[u64], n: u64) -> Cell {
-        self.cell_index(chunk, n)
-            .map_or_else(Cell::default, |index| self.cell_at(&index))
-    }
-
     /// Computes the cell with these indices.
-    pub(crate) fn cell_at(&self, index: &[u64]) -> Cell {
-        let values: Vec<f64> = self
-            .coordinates()
-            .map(|(_, dimension, at)| at(index[dimension]))
-            .collect();
-        match self.at(&values) {
-            Ok((scene, sigma, numbers)) => compute(&scene, sigma, &numbers, &self.settings),
-            Err(error) => Cell::failed(error.to_string()),
-        }
+    pub(crate) fn cell(&self, index: &[u64]) -> Cell {
+        let coordinates = self.coordinates();
+        let values: Vec<f64> = coordinates.map(|(_, dimension, at)| at(index[dimension])).collect();
+        let Settings { results, periods, .. } = self.settings;
+        let computed = self
+            .at(&values)
+            .and_then(|(scene, sigma, numbers)| Ok(Cell::compute(&scene, sigma, &numbers, results, periods)?));
+        computed.unwrap_or_else(|error| Cell { failure: error.to_string(), ..Cell::default() })
     }
 
-    /// The cell at a relative position in the sweep, from 0 to 1.
-    pub(crate) fn cell_near(&self, position: f64) -> Cell {
-        let chunk = self.chunk_index(((self.chunks() - 1) as f64 * position) as u64);
-        let inside = (0..self.chunk_size() as u64)
-            .rev()
-            .find(|n| self.cell_index(&chunk, *n).is_some());
-        self.cell(&chunk, (inside.unwrap_or(0) as f64 * position) as u64)
+    /// Index of the n-th cell.
+    pub(crate) fn cell_index(&self, n: u64) -> Vec<u64> {
+        position(n, &self.shape)
     }
 
     /// All that determines the cells, as it is written to the store.
@@ -405,16 +372,10 @@ impl Sweep {
 
 /// Indices of the n-th element of an array, the last index fastest.
 fn position(mut n: u64, shape: &[u64]) -> Vec<u64> {
-    let mut index: Vec<u64> = shape
-        .iter()
-        .rev()
-        .map(|length| {
-            let one = n % length;
-            n /= length;
-            one
-        })
-        .collect();
-    index.reverse();
+    let mut index = shape.to_vec();
+    for place in index.iter_mut().rev() {
+        (*place, n) = (n % *place, n / *place);
+    }
     index
 }
 
@@ -434,13 +395,12 @@ impl Shard {
     /// Number of its cells.
     #[must_use]
     pub fn cells(self, sweep: &Sweep) -> u64 {
-        self.chunks(sweep)
-            .map(|n| sweep.chunk_cells(&sweep.chunk_index(n)))
-            .sum()
+        self.chunks(sweep).map(|index| sweep.chunk_count(&index)).sum()
     }
 
-    /// Its chunks.
-    pub(crate) fn chunks(self, sweep: &Sweep) -> impl Iterator<Item = u64> + Send {
-        (self.number..sweep.chunks()).step_by(self.of as usize)
+    /// The indices of its chunks.
+    pub(crate) fn chunks(self, sweep: &Sweep) -> impl Iterator<Item = Vec<u64>> + Send {
+        let all = self.number..sweep.chunks();
+        all.step_by(self.of as usize).map(|n| sweep.chunk_index(n))
     }
 }

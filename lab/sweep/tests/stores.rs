@@ -1,77 +1,33 @@
-//! Stores of sweeps: several writers, damage, cells without results, and folders that hold something else.
+//! Guards the stores of sweeps: several writers, stops, damage, cells without results, and folders that hold something else.
 
 mod common;
 
-use std::{collections::BTreeMap, fs, io::Read, path::Path, sync::atomic::Ordering::Relaxed, thread, time::Duration};
+use std::{fs, io::Read, path::Path, sync::atomic::Ordering::Relaxed, thread, time::Duration};
 
-use common::{array, files, numbers, plan, refused, settings};
+use common::{computed, computed_part, counts, files, numbers, plan, refused_in, settings, values};
 use vines_sweep::{ABSENT, FAILED, Monitor, Settings, Shard, Sweep, UNCOUNTED, collect, run, verify};
-
-#[test]
-fn a_folder_of_other_stores_does_not_become_a_store() {
-    let folder = tempfile::tempdir().unwrap();
-    let plan = plan(settings(&["plant.r=0.3,0.5"])).unwrap();
-    let inner = folder.path().join("r.zarr");
-    assert!(run(&plan, &inner, Shard::ALL, &Monitor::default()).unwrap());
-    let before = files(folder.path());
-    let error = run(&plan, folder.path(), Shard::ALL, &Monitor::default())
-        .unwrap_err()
-        .to_string();
-    assert!(error.contains("not the store of a sweep"), "{error}");
-    assert!(files(folder.path()) == before);
-}
-
-#[test]
-fn a_stop_ends_a_sweep_that_still_writes_its_axes_or_counts_its_chunks() {
-    let folder = tempfile::tempdir().unwrap();
-    let samples = Settings {
-        samples: Some(4_000_000_000),
-        chunk: 1,
-        ..settings(&["plant.r=random:0.3:0.9"])
-    };
-    let monitor = Monitor::default();
-    let stopped = |plan: &_| {
-        thread::scope(|scope| {
-            let running = scope.spawn(|| run(plan, folder.path(), Shard::ALL, &monitor));
-            thread::sleep(Duration::from_millis(100));
-            monitor.stop.store(true, Relaxed);
-            running.join().unwrap().unwrap()
-        })
-    };
-    assert!(!stopped(&plan(samples).unwrap()));
-    assert!(!folder.path().join("zarr.json").exists());
-}
-
-#[test]
-fn a_chunk_that_does_not_fit_into_memory_is_refused() {
-    let error = refused(Settings { chunk: 1 << 40, ..settings(&["plant.r=0.3:0.9:400"]) });
-    assert!(error.contains("1099511627776 cells: from 1 to 1000000"), "{error}");
-}
+use vines_testbench::scene::Family;
 
 /// Three chunks: two of seven cells, and one of four.
 fn three_chunks() -> Sweep {
     plan(settings(&["plant.r=0.3:0.9:18"])).unwrap()
 }
 
-fn computed(plan: &Sweep, folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    assert!(run(plan, folder, Shard::ALL, &Monitor::default()).unwrap());
-    files(folder)
-}
-
 type Damage = fn(&Path);
 
 /// Ways to damage a file, and what is said of it.
-const DAMAGE: [(&str, Damage); 6] = [
+const DAMAGE: [(&str, Damage); 5] = [
     ("is missing", |file| fs::remove_file(file).unwrap()),
-    ("is empty", |file| fs::write(file, []).unwrap()),
+    ("is truncated", |file| fs::write(file, []).unwrap()),
     ("is truncated", |file| {
         edit(file, |content| content.truncate(content.len() - 3))
     }),
-    ("is truncated", |file| edit(file, |content| content.truncate(5))),
-    ("damaged content or checksum", |file| {
+    ("is damaged", |file| {
         edit(file, |content| *content.last_mut().unwrap() ^= 1)
     }),
-    ("continues after its end", |file| edit(file, |content| content.push(0))),
+    ("is damaged (it continues after its end)", |file| {
+        edit(file, |content| content.push(0))
+    }),
 ];
 
 fn edit(file: &Path, change: impl FnOnce(&mut Vec<u8>)) {
@@ -80,29 +36,67 @@ fn edit(file: &Path, change: impl FnOnce(&mut Vec<u8>)) {
     fs::write(file, content).unwrap();
 }
 
+/// Verifies a store, and returns what is damaged and the number of its cells.
+fn verified(plan: &Sweep, folder: &Path) -> (Option<String>, u64) {
+    let (before, monitor) = (files(folder), Monitor::default());
+    assert!(verify(plan, folder, Shard::ALL, &monitor).unwrap());
+    assert!(before == files(folder));
+    (monitor.damage(), counts(&monitor).0)
+}
+
+#[test]
+fn shards_stops_and_resumptions_give_the_same_bytes() {
+    let [whole, parts] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
+    let axes = [
+        "start.dq2=random:-1:1",
+        "plant.r=0.4,0.65,0.8",
+        "excitation.G=random:0.5:1.5",
+    ];
+    let plan = plan(Settings { samples: Some(20), ..settings(&axes) }).unwrap();
+    computed(&plan, whole.path());
+    let stopped = Monitor::default();
+    stopped.stop.store(true, Relaxed);
+    assert!(!run(&plan, parts.path(), Shard::ALL, &stopped).unwrap());
+    for number in [1, 0] {
+        computed_part(&plan, parts.path(), number, 2);
+    }
+    assert_eq!(counts(&computed(&plan, parts.path())), (60, 0));
+    assert!(files(whole.path()) == files(parts.path()));
+}
+
+#[test]
+fn a_stop_ends_a_sweep_that_still_writes_its_axes() {
+    let folder = tempfile::tempdir().unwrap();
+    let random = settings(&["plant.r=random:0.3:0.9"]);
+    let plan = plan(Settings { samples: Some(4_000_000_000), chunk: 1, ..random }).unwrap();
+    let monitor = Monitor::default();
+    thread::scope(|scope| {
+        let running = scope.spawn(|| run(&plan, folder.path(), Shard::ALL, &monitor));
+        thread::sleep(Duration::from_millis(100));
+        monitor.stop.store(true, Relaxed);
+        assert!(!running.join().unwrap().unwrap());
+    });
+    assert_eq!(counts(&monitor), (0, 0));
+}
+
 #[test]
 fn a_damaged_chunk_is_reported_by_a_verification_and_computed_again_by_the_same_sweep() {
     let folder = tempfile::tempdir().unwrap();
     let plan = three_chunks();
-    let whole = computed(&plan, folder.path());
-    let counts = |monitor: &Monitor| (monitor.found.load(Relaxed), monitor.computed.load(Relaxed));
+    computed(&plan, folder.path());
+    let whole = files(folder.path());
     for (fault, damage) in DAMAGE {
         for name in ["regime/c/1", "settling/c/1", "failure/c/1"] {
             let file = folder.path().join(name);
             damage(&file);
-            let before = files(folder.path());
-            let monitor = Monitor::default();
-            assert!(verify(&plan, folder.path(), Shard::ALL, &monitor).unwrap());
-            let text = monitor.damage().unwrap();
+            let (text, found) = verified(&plan, folder.path());
             assert!(
-                text.contains(&format!("{} ", file.display())) && text.contains(fault),
-                "{text}"
+                text.as_ref().unwrap().contains(&format!("{} {fault}", file.display())),
+                "{text:?}"
             );
-            assert_eq!(counts(&monitor), (11, 0), "{name} {fault}");
-            assert!(before == files(folder.path()));
-            let monitor = Monitor::default();
-            assert!(run(&plan, folder.path(), Shard::ALL, &monitor).unwrap());
-            assert_eq!((monitor.damage(), counts(&monitor)), (Some(text), (11, 7)));
+            assert_eq!(found, 11, "{name} {fault}");
+            let monitor = computed(&plan, folder.path());
+            assert_eq!((monitor.damage(), counts(&monitor)), (text, (11, 7)));
             assert!(whole == files(folder.path()), "{name} {fault}");
         }
     }
@@ -113,164 +107,163 @@ fn a_damaged_chunk_is_reported_by_a_verification_and_computed_again_by_the_same_
     {
         fs::remove_file(folder.path().join(name)).unwrap();
     }
-    let monitor = Monitor::default();
-    assert!(verify(&plan, folder.path(), Shard::ALL, &monitor).unwrap());
-    assert_eq!((monitor.damage(), counts(&monitor)), (None, (11, 0)));
-    assert!(computed(&plan, folder.path()) == whole);
+    assert_eq!(verified(&plan, folder.path()), (None, 11));
+    computed(&plan, folder.path());
+    assert!(whole == files(folder.path()));
 }
 
 #[test]
 fn a_flipped_bit_is_found_or_changes_no_value() {
     let folder = tempfile::tempdir().unwrap();
     let plan = plan(settings(&["plant.r=0.3:0.9:5"])).unwrap();
-    let whole = computed(&plan, folder.path());
+    computed(&plan, folder.path());
+    let content = |file: &[u8]| {
+        let mut content = Vec::new();
+        flate2::read::GzDecoder::new(file).read_to_end(&mut content).unwrap();
+        content
+    };
     for name in ["followed/c/0", "settling/c/0", "failure/c/0"] {
         let file = folder.path().join(name);
-        let values = content(&whole[name]);
-        for bit in 0..8 * whole[name].len() {
+        let whole = fs::read(&file).unwrap();
+        for bit in 0..8 * whole.len() {
             edit(&file, |content| content[bit / 8] ^= 1 << (bit % 8));
             let monitor = Monitor::default();
             assert!(verify(&plan, folder.path(), Shard::ALL, &monitor).unwrap());
-            // Bits that fill up a byte, and unused codes.
-            let same = || content(&fs::read(&file).unwrap()) == values;
+            // Bits that fill up a byte, unused codes, and the time in the header.
+            let same = || content(&fs::read(&file).unwrap()) == content(&whole);
             assert!(monitor.damage().is_some() || same(), "{name}: bit {bit}");
-            fs::write(&file, &whole[name]).unwrap();
+            fs::write(&file, &whole).unwrap();
         }
     }
 }
 
-/// The content of a compressed file.
-fn content(file: &[u8]) -> Vec<u8> {
-    let mut content = Vec::new();
-    flate2::read::GzDecoder::new(file).read_to_end(&mut content).unwrap();
-    content
-}
-
 #[test]
-fn a_damaged_chunk_is_not_collected_but_taken_from_elsewhere_or_computed() {
-    let [one, other, merged] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
+fn stores_of_parts_are_collected_to_the_same_bytes_and_damaged_chunks_are_taken_from_elsewhere_or_computed() {
+    let [whole, one, other, merged] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
     let plan = three_chunks();
-    let whole = computed(&plan, one.path());
-    assert!(run(&plan, other.path(), Shard { number: 0, of: 2 }, &Monitor::default()).unwrap());
-    let sources = [one.path().to_path_buf(), other.path().to_path_buf()];
-    let collected = |count: u64| {
+    computed(&plan, whole.path());
+    let whole = files(whole.path());
+    computed_part(&plan, one.path(), 0, 2);
+    computed_part(&plan, other.path(), 1, 2);
+    let collected = |sources: &[&Path], count: u64| {
         let monitor = Monitor::default();
+        let sources: Vec<_> = sources.iter().map(|source| source.to_path_buf()).collect();
         collect(&plan, merged.path(), &sources, &monitor).unwrap();
         assert!(run(&plan, merged.path(), Shard::ALL, &monitor).unwrap());
-        assert_eq!(monitor.computed.load(Relaxed), count);
+        assert_eq!(counts(&monitor), (18 - count, count));
         assert!(whole == files(merged.path()));
-        monitor.damage().unwrap()
+        monitor.damage()
     };
+    let both = [one.path(), other.path()];
+    assert_eq!(collected(&both, 0), None);
     for (fault, damage) in DAMAGE {
-        // The first chunk is in the other store, too; the second is not.
-        for (name, count) in [("regime/c/0", 0), ("regime/c/1", 7)] {
-            let file = one.path().join(name);
-            damage(&file);
-            let text = collected(count);
-            assert!(text.contains(fault), "{text}");
-            fs::write(&file, &whole[name]).unwrap();
-            // What is damaged in the merged store comes from the sources again.
-            damage(&merged.path().join(name));
-            collected(0);
-            fs::remove_dir_all(merged.path()).unwrap();
-        }
+        // What is damaged in the merged store comes from the sources again.
+        damage(&merged.path().join("regime/c/1"));
+        assert!(collected(&both, 0).unwrap().contains(fault));
+        damage(&other.path().join("regime/c/1"));
+        fs::remove_dir_all(merged.path()).unwrap();
+        assert!(collected(&both, 7).unwrap().contains(fault));
+        fs::write(other.path().join("regime/c/1"), &whole["regime/c/1"]).unwrap();
     }
+    let error = collect(&plan, merged.path(), &["missing".into()], &Monitor::default()).unwrap_err();
+    assert!(error.to_string().contains("missing is not the store"), "{error}");
 }
 
 #[test]
-fn damaged_axes_and_metadata_are_written_again_and_attributes_of_users_stay() {
+fn axes_and_metadata_are_written_again_and_attributes_of_users_stay() {
     let folder = tempfile::tempdir().unwrap();
     let plan = three_chunks();
-    let whole = computed(&plan, folder.path());
+    computed(&plan, folder.path());
+    let whole = files(folder.path());
+    fs::remove_file(folder.path().join("failure/zarr.json")).unwrap();
     for (fault, damage) in DAMAGE {
-        for name in ["plant.r/c/1", "plant.r/zarr.json", "failure/zarr.json"] {
-            damage(&folder.path().join(name));
-            let before = files(folder.path());
-            let monitor = Monitor::default();
-            assert!(verify(&plan, folder.path(), Shard::ALL, &monitor).unwrap());
-            let text = monitor.damage().unwrap();
-            assert!(
-                text.contains(name) && (name.ends_with("json") || text.contains(fault)),
-                "{text}"
-            );
-            assert!(before == files(folder.path()));
-            assert!(computed(&plan, folder.path()) == whole, "{name} {fault}");
-        }
+        damage(&folder.path().join("plant.r/c/1"));
+        let text = verified(&plan, folder.path()).0.unwrap();
+        assert!(text.contains(&format!("plant.r/c/1 {fault}")), "{text}");
+        assert_eq!(
+            text.contains("failure/zarr.json is missing"),
+            fault == "is missing",
+            "{text}"
+        );
+        computed(&plan, folder.path());
+        assert!(whole == files(folder.path()), "{fault}");
     }
-    let replace = |name: &str, here: &str, there: &str| {
-        let file = folder.path().join(name);
-        let text = fs::read_to_string(&file).unwrap();
-        assert!(text.contains(here), "{text}");
-        fs::write(file, text.replacen(here, there, 1)).unwrap();
-    };
-    replace("zarr.json", "uint32", "uint64");
-    assert!(computed(&plan, folder.path()) == whole);
-    replace("zarr.json", "\"title\"", "\"note\": \"mine\", \"title\"");
-    replace("regime/zarr.json", "\"long_name\"", "\"note\": \"mine\", \"long_name\"");
+    for (name, here) in [("zarr.json", "\"title\""), ("regime/zarr.json", "\"long_name\"")] {
+        edit(&folder.path().join(name), |content| {
+            let text = String::from_utf8(content.clone()).unwrap();
+            *content = text.replacen(here, &format!("\"note\": \"mine\", {here}"), 1).into();
+        });
+    }
     let mine = files(folder.path());
-    assert!(computed(&plan, folder.path()) == mine);
+    computed(&plan, folder.path());
+    assert!(mine != whole && mine == files(folder.path()));
 }
 
 #[test]
-fn chunks_without_the_file_that_names_their_sweep_are_not_taken_for_those_of_another() {
+fn a_store_of_another_sweep_and_other_files_stay_as_they_are() {
     let folder = tempfile::tempdir().unwrap();
-    let whole = computed(&three_chunks(), folder.path());
-    let other = plan(settings(&["plant.r=0.3:0.8:18"])).unwrap();
-    for (_, damage) in DAMAGE {
-        damage(&folder.path().join("zarr.json"));
-        let before = files(folder.path());
-        for plan in [&other, &three_chunks()] {
-            let error = run(plan, folder.path(), Shard::ALL, &Monitor::default())
-                .unwrap_err()
-                .to_string();
-            // With a wrong last byte or one more, the file is no JSON either.
-            assert!(
-                error.contains("zarr.json, which says to which sweep they belong"),
-                "{error}"
-            );
-            assert!(before == files(folder.path()));
-        }
-        fs::write(folder.path().join("zarr.json"), &whole["zarr.json"]).unwrap();
-    }
-    // Axes that a kill has left are those of another sweep.
-    for name in whole
-        .keys()
-        .filter(|name| *name == "zarr.json" || name.contains("/c/") && !name.starts_with("plant.r"))
-    {
-        fs::remove_file(folder.path().join(name)).unwrap();
-    }
-    for entry in fs::read_dir(folder.path()).unwrap().flatten() {
-        drop(fs::remove_dir(entry.path().join("c")));
-    }
-    assert!(run(&other, folder.path(), Shard::ALL, &Monitor::default()).unwrap());
-    assert_eq!(numbers(folder.path(), "plant.r")[17], 0.8);
+    let inner = folder.path().join("r.zarr");
+    let values = || settings(&["plant.r=0.3,0.5"]);
+    computed(&plan(values()).unwrap(), &inner);
+    let axes = refused_in(&plan(settings(&["plant.r=0.3,0.6"])).unwrap(), &inner);
+    assert!(axes.contains("another `axes`"), "{axes}");
+    let family = Family::parse("", None, &["plant.b=0.02".parse().unwrap()]).unwrap();
+    let scene = refused_in(&Sweep::new(family, values()).unwrap(), &inner);
+    assert!(scene.contains("another `scene`"), "{scene}");
+    // Another version does not continue the store.
+    let group = inner.join("zarr.json");
+    let text = fs::read_to_string(&group).unwrap();
+    fs::write(&group, text.replace(env!("CARGO_PKG_VERSION"), "0.0.9")).unwrap();
+    let version = refused_in(&plan(values()).unwrap(), &inner);
+    assert!(version.contains("another `version`"), "{version}");
+    // Chunks without the file that says to which sweep they belong, a folder of stores, and one of other files.
+    let no_store = |folder: &Path| {
+        let error = refused_in(&plan(values()).unwrap(), folder);
+        assert!(error.contains("is not the store of a sweep"), "{error}");
+    };
+    fs::write(&group, &text[..text.len() - 3]).unwrap();
+    no_store(&inner);
+    fs::remove_file(&group).unwrap();
+    no_store(&inner);
+    no_store(folder.path());
+    fs::write(folder.path().join("notes.txt"), "mine").unwrap();
+    no_store(folder.path());
+}
+
+#[test]
+fn what_a_kill_leaves_before_the_metadata_is_no_other_file() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join(".partial")).unwrap();
+    fs::write(folder.path().join(".partial/0"), "{").unwrap();
+    computed(&three_chunks(), folder.path());
+    assert!(!folder.path().join(".partial").exists());
 }
 
 #[test]
 fn cells_that_are_not_computed_differ_from_computed_and_failed_ones() {
     let folder = tempfile::tempdir().unwrap();
     // The last chunk is not full, and the starts of the first cells are outside the cavity.
-    let plan = plan(Settings {
-        chunk: 2,
-        ..settings(&["start.q2=-0.011,-0.005,0.002,0.003,0.004"])
-    })
-    .unwrap();
-    assert!(run(&plan, folder.path(), Shard { number: 0, of: 2 }, &Monitor::default()).unwrap());
-    let regime = array(folder.path(), "regime");
-    let codes: Vec<u8> = regime.retrieve_array_subset(&regime.subset_all()).unwrap();
+    let starts = settings(&["start.q2=-0.011,-0.005,0.002,0.003,0.004"]);
+    let plan = plan(Settings { chunk: 2, ..starts }).unwrap();
+    let monitor = computed_part(&plan, folder.path(), 0, 2);
+    assert_eq!((counts(&monitor), monitor.failed.load(Relaxed)), ((0, 3), 1));
+    let codes: Vec<u8> = values(folder.path(), "regime");
     assert_eq!((codes[0], &codes[2..4]), (FAILED, &[ABSENT; 2][..]));
     assert!(codes[1] < 8 && codes[4] < 8, "{codes:?}");
+    let absent = [true, false, true, true, false];
     for name in ["followed", "impacts", "periods"] {
-        let counts = array(folder.path(), name);
-        let values: Vec<u32> = counts.retrieve_array_subset(&counts.subset_all()).unwrap();
-        assert_eq!(
-            values.iter().map(|one| *one == UNCOUNTED).collect::<Vec<_>>(),
-            [true, false, true, true, false]
-        );
-        assert_eq!(counts.attributes()["_FillValue"], UNCOUNTED);
+        let counts: Vec<u32> = values(folder.path(), name);
+        assert_eq!(counts.iter().map(|one| *one == UNCOUNTED).collect::<Vec<_>>(), absent);
+        let metadata = fs::read_to_string(folder.path().join(name).join("zarr.json")).unwrap();
+        assert!(metadata.contains("\"_FillValue\": 4294967295"), "{metadata}");
     }
-    let failure = array(folder.path(), "failure");
-    let reasons: Vec<String> = failure.retrieve_array_subset(&failure.subset_all()).unwrap();
-    assert!(reasons[0].contains("from -b_minus to b_plus"), "{reasons:?}");
+    let settling = numbers(folder.path(), "settling");
+    assert_eq!(settling.iter().map(|one| one.is_nan()).collect::<Vec<_>>(), absent);
+    let reasons: Vec<String> = values(folder.path(), "failure");
+    assert_eq!(monitor.reason.get(), Some(&reasons[0]));
+    assert!(
+        reasons[0].contains("0.011 m") && reasons[0].contains("from -b_minus to b_plus"),
+        "{reasons:?}"
+    );
     assert_eq!(reasons[1..], ["", "not computed", "not computed", ""]);
 }

@@ -1,16 +1,13 @@
-//! Sweeps against single cells and the regime map, and what is refused.
+//! Guards the cells of sweeps and of the regime map against each other, theory and orbits, and what is refused.
 
 mod common;
 
-use std::{
-    fs,
-    sync::atomic::{AtomicBool, Ordering::Relaxed},
-};
+use std::sync::atomic::AtomicBool;
 
-use common::{files, numbers, plan, refused, settings};
+use common::{computed, numbers, plan, refused, settings};
 
 use vines_model::{map::LIMIT, regime::Regime};
-use vines_sweep::{Axis, Map, Monitor, Results, Settings, Shard, Sweep, collect, estimate, run};
+use vines_sweep::{Axis, Map, Results, Settings, estimate};
 use vines_testbench::scene::Family;
 
 /// A map of the default scene.
@@ -92,7 +89,7 @@ fn a_sweep_over_sigma_and_g_has_the_bits_of_the_map() {
         ..settings(&["sigma=-3:3:7", "excitation.G=0.4:2.4:6"])
     })
     .unwrap();
-    assert!(run(&plan, folder.path(), Shard::ALL, &Monitor::default()).unwrap());
+    computed(&plan, folder.path());
     let map = map("G=0.4:2.4:6", "sigma=-3:3:7", 400).unwrap().run(0, || {}).unwrap();
     let settling: Vec<f64> = map.cells.iter().map(|cell| cell.result.transient).collect();
     assert_eq!(numbers(folder.path(), "settling"), settling);
@@ -115,7 +112,7 @@ fn on_a_symmetric_motion_the_response_is_that_of_the_exact_orbit() {
         ..settings(&["sigma=-1.2:-1.05:2", "excitation.G=1.05:1.25:3"])
     })
     .unwrap();
-    assert!(run(&plan, folder.path(), Shard::ALL, &Monitor::default()).unwrap());
+    computed(&plan, folder.path());
     let [found, exact] = ["C", "orbit_C"].map(|name| numbers(folder.path(), name));
     // At an impact on the orbit, m M/(M + m) (1 - r^2) w'^2/2; two per period. Base amplitude and C give the damper's part to first order.
     let [impact, damper] = ["impact_power", "damper_power"].map(|name| numbers(folder.path(), name));
@@ -136,86 +133,15 @@ fn on_a_symmetric_motion_the_response_is_that_of_the_exact_orbit() {
 }
 
 #[test]
-fn shards_stops_and_resumptions_give_the_same_bytes() {
-    let whole = tempfile::tempdir().unwrap();
-    let parts = tempfile::tempdir().unwrap();
-    let settings = Settings {
-        samples: Some(20),
-        ..settings(&[
-            "start.dq2=random:-1:1",
-            "plant.r=0.4,0.65,0.8",
-            "excitation.G=random:0.5:1.5",
-        ])
-    };
-    let plan = plan(settings).unwrap();
-    assert!(run(&plan, whole.path(), Shard::ALL, &Monitor::default()).unwrap());
-    let stopped = Monitor::default();
-    stopped.stop.store(true, Relaxed);
-    assert!(!run(&plan, parts.path(), Shard::ALL, &stopped).unwrap());
-    for number in [1, 0] {
-        assert!(run(&plan, parts.path(), Shard { number, of: 2 }, &Monitor::default()).unwrap());
-    }
-    let monitor = Monitor::default();
-    assert!(run(&plan, parts.path(), Shard::ALL, &monitor).unwrap());
-    assert_eq!((monitor.found.load(Relaxed), monitor.computed.load(Relaxed)), (60, 0));
-    assert!(files(whole.path()) == files(parts.path()));
-}
-
-#[test]
-fn shards_in_stores_of_their_own_are_collected_to_the_same_bytes() {
-    let [whole, first, second, merged] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
-    let plan = plan(settings(&["start.dq2=0.1:0.6:9", "plant.r=0.5,0.65"])).unwrap();
-    assert!(run(&plan, whole.path(), Shard::ALL, &Monitor::default()).unwrap());
-    let parts = [&first, &second].map(|folder| folder.path().to_path_buf());
-    for (number, folder) in (0..).zip(&parts) {
-        assert!(run(&plan, folder, Shard { number, of: 2 }, &Monitor::default()).unwrap());
-    }
-    for (sources, computed) in [(&parts[..1], 6), (&parts[..], 0)] {
-        let monitor = Monitor::default();
-        collect(&plan, merged.path(), sources, &monitor).unwrap();
-        assert!(run(&plan, merged.path(), Shard::ALL, &monitor).unwrap());
-        assert_eq!(monitor.computed.load(Relaxed), computed);
-        assert!(files(whole.path()) == files(merged.path()));
-        std::fs::remove_dir_all(merged.path()).unwrap();
-    }
-    let error = collect(&plan, merged.path(), &["missing".into()], &Monitor::default());
-    let error = error.unwrap_err().to_string();
-    assert!(error.contains("missing is not the store"), "{error}");
-}
-
-#[test]
 fn the_locked_point_of_a_cell_is_that_of_the_experiment() {
     let folder = tempfile::tempdir().unwrap();
     let results = Results::parse(["lock"]).unwrap();
     let plan = plan(Settings { results, chunk: 100, ..settings(&["excitation.G=0.1,1.1"]) }).unwrap();
-    assert!(run(&plan, folder.path(), Shard::ALL, &Monitor::default()).unwrap());
+    computed(&plan, folder.path());
     // As the README shows for the default scene; at G = 0.1, nothing is hit.
     let sigma = numbers(folder.path(), "lock_sigma");
     assert!(sigma[0].is_nan() && (sigma[1] + 1.139_376).abs() < 4e-6, "{sigma:?}");
     assert!((numbers(folder.path(), "lock_C")[1] - 0.448_018).abs() < 4e-6);
-}
-
-#[test]
-fn a_failed_cell_has_its_reason_and_stops_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let plan = plan(Settings {
-        chunk: 4,
-        ..settings(&["start.q1=0,0.006", "start.q2=-0.006,0"])
-    })
-    .unwrap();
-    let monitor = Monitor::default();
-    assert!(run(&plan, folder.path(), Shard::ALL, &monitor).unwrap());
-    assert_eq!((monitor.computed.load(Relaxed), monitor.failed.load(Relaxed)), (4, 1));
-    let reason = monitor.reason.lock().unwrap().clone().unwrap();
-    assert!(
-        reason.contains("0.012") && reason.contains('m') && reason.contains("from -b_minus to b_plus"),
-        "{reason}"
-    );
-    let settling = numbers(folder.path(), "settling");
-    assert_eq!(
-        settling.iter().map(|one| one.is_nan()).collect::<Vec<_>>(),
-        [false, false, true, false]
-    );
 }
 
 #[test]
@@ -246,6 +172,8 @@ fn axes_that_make_no_sense_are_refused_with_their_name_and_value() {
     assert!(refused(settings(&["plant.r=random:0.3:0.5"])).contains("--samples"));
     assert!(refused(Settings { periods: 99, ..settings(&["plant.r=0.3:0.5:3"]) }).contains("99 periods"));
     assert!(refused(Settings { sigma: Some(f64::NAN), ..settings(&["plant.r=0.3:0.5:3"]) }).contains("NaN"));
+    let chunk = refused(Settings { chunk: 1 << 40, ..settings(&["plant.r=0.3:0.9:400"]) });
+    assert!(chunk.contains("1099511627776 cells: from 1 to 1000000"), "{chunk}");
     assert!(refused(settings(&["plant.r=0.3:0.5:9999999999", "plant.b=1:2:9999999999"])).contains("2^53"));
     let none = estimate(
         &plan(settings(&["plant.r=1.2:1.4:3"])).unwrap(),
@@ -270,52 +198,4 @@ fn a_sweep_of_10_12_cells_is_estimated_and_found_large() {
     println!("{estimate:?}");
     assert_eq!(estimate.cells, 1_000_000_000_000);
     assert!(estimate.is_large() && estimate.bytes > 1e13 && estimate.hours > 100.0);
-}
-
-#[test]
-fn a_store_of_another_sweep_or_other_files_stay_as_they_are() {
-    let folder = tempfile::tempdir().unwrap();
-    let go = |settings| run(&plan(settings).unwrap(), folder.path(), Shard::ALL, &Monitor::default());
-    assert!(go(settings(&["plant.r=0.3,0.5"])).unwrap());
-    let before = files(folder.path());
-    let axes = go(settings(&["plant.r=0.3,0.6"])).unwrap_err().to_string();
-    assert!(axes.contains("another `axes`"), "{axes}");
-    let family = Family::parse("", None, &["plant.b=0.02".parse().unwrap()]).unwrap();
-    let other = Sweep::new(family, settings(&["plant.r=0.3,0.5"])).unwrap();
-    let scene = run(&other, folder.path(), Shard::ALL, &Monitor::default())
-        .unwrap_err()
-        .to_string();
-    assert!(scene.contains("another `scene`"), "{scene}");
-    assert!(before == files(folder.path()));
-    // Another version does not continue the store.
-    let group = folder.path().join("zarr.json");
-    let text = fs::read_to_string(&group).unwrap();
-    for (here, there, found) in [
-        (env!("CARGO_PKG_VERSION"), "0.0.9", "0.0.9"),
-        ("\"version\"", "\"other\"", "unknown"),
-    ] {
-        fs::write(&group, text.replace(here, there)).unwrap();
-        let message = go(settings(&["plant.r=0.3,0.5"])).unwrap_err().to_string();
-        assert!(
-            message.contains("another version") && message.contains(found),
-            "{message}"
-        );
-        fs::write(&group, &text).unwrap();
-        assert!(before == files(folder.path()));
-    }
-    let notes = tempfile::tempdir().unwrap();
-    fs::write(notes.path().join("notes.txt"), "mine").unwrap();
-    let error = run(&other, notes.path(), Shard::ALL, &Monitor::default())
-        .unwrap_err()
-        .to_string();
-    assert!(error.contains("not the store of a sweep"), "{error}");
-    assert_eq!(files(notes.path()).len(), 1);
-}
-
-#[test]
-fn folders_that_a_kill_left_empty_are_no_other_files() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::create_dir(folder.path().join("regime")).unwrap();
-    let plan = plan(settings(&["plant.r=0.3,0.5"])).unwrap();
-    assert!(run(&plan, folder.path(), Shard::ALL, &Monitor::default()).unwrap());
 }

@@ -109,7 +109,7 @@ fn damaged_and_missing_files_are_named_by_a_verification_and_replaced_by_the_sam
     go(&[], 0, "12 already complete, 8 computed");
     let whole = content(&out);
     fs::write(out.join("impacts/c/1"), "").unwrap();
-    go(&["--verify"], 1, "impacts/c/1 is empty");
+    go(&["--verify"], 1, "impacts/c/1 is truncated");
     go(&[], 0, "12 already complete, 8 computed");
     go(&["--verify"], 0, "20 of 20 cells are complete and undamaged");
     assert!(content(&out) == whole);

@@ -9,9 +9,10 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use vines_helic::codec::{Frame, message};
-use vines_helic::{Channels, Device, HelicRig, HelicServer, Network, Transport};
+use vines_helic::{Device, HelicRig, HelicServer, Network, Transport};
 use vines_net::{Ended, Session};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
+use vines_testbench::scene::Names;
 
 use super::host::{device, scene};
 
@@ -55,7 +56,7 @@ impl Served {
 fn a_device_on_the_network_is_driven_and_disarmed_when_its_host_leaves() {
     let (scene, server) = (scene(), Served::start(device));
     let network = Network::connect(server.address, PATIENT).unwrap();
-    let mut rig = HelicRig::new(network, Channels::default(), scene.sample_time(), 100.0).unwrap();
+    let mut rig = HelicRig::new(network, &Names::default(), scene.sample_time(), 100.0).unwrap();
     let drive = Drive { omega: 55.0, amplitude: 9e-5, displacement: 0.0 };
     let mut largest = 0.0_f64;
     for _ in 0..400 {
@@ -141,7 +142,7 @@ fn drive(rig: &mut HelicRig<Network>, samples: u32) -> Result<(), RigError> {
 
 fn connected(address: SocketAddr) -> HelicRig<Network> {
     let network = Network::connect(address, SHORT).unwrap();
-    HelicRig::new(network, Channels::default(), scene().sample_time(), 100.0).unwrap()
+    HelicRig::new(network, &Names::default(), scene().sample_time(), 100.0).unwrap()
 }
 
 fn is_off(base: &Mutex<f64>) -> bool {

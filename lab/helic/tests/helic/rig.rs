@@ -4,11 +4,12 @@ use std::collections::VecDeque;
 use std::io;
 
 use vines_helic::codec::Frame;
-use vines_helic::{Channels, Device, HelicRig, Transport};
+use vines_helic::{Device, HelicRig, Transport};
+use vines_net::Counters;
 use vines_testbench::experiment::{self, Plan};
-use vines_testbench::identification::identify;
-use vines_testbench::rig::{BuiltIn, Drive, Rig, Simulated};
-use vines_testbench::scene::{PAPER, Scene};
+use vines_testbench::identification::{Lock, identify};
+use vines_testbench::rig::{BuiltIn, Drive, Rig, RigError, Sensors, Simulated};
+use vines_testbench::scene::{Names, PAPER, Scene};
 
 use super::host::{Host, device, scene};
 
@@ -63,181 +64,153 @@ impl<F: FnMut(usize) -> usize> Transport for Direct<F> {
 fn connect<F: FnMut(usize) -> usize>(fate: F) -> HelicRig<Direct<F>> {
     let scene = scene();
     let samples = scene.controller.samples_per_period;
-    HelicRig::new(Direct::new(fate), Channels::default(), scene.sample_time(), samples).unwrap()
+    HelicRig::new(Direct::new(fate), &Names::default(), scene.sample_time(), samples).unwrap()
 }
 
 fn drive() -> Drive {
     Drive { omega: 55.0, amplitude: 9e-5, displacement: 0.0 }
 }
 
-#[test]
-fn the_experiment_on_a_device_gives_the_backbone_of_the_plant() {
-    let mut scene = scene();
+/// Drives the rig for some samples, and returns its readings.
+fn shake<T: Transport>(rig: &mut HelicRig<T>, samples: usize, step: f64) -> Result<Vec<Sensors>, RigError> {
+    let mut sample = || {
+        let sensors = rig.sense()?;
+        rig.advance(drive(), step)?;
+        Ok(sensors)
+    };
+    (0..samples).map(|_| sample()).collect()
+}
+
+/// How often the n-th datagram arrives.
+type Fate = fn(usize) -> usize;
+
+/// The locked point of the default scene, on the plant or on a device with this many samples per sample of the scene.
+fn lock(device: Option<(f64, Fate)>) -> (Lock, Counters) {
+    let mut scene = Scene::parse("paper.toml", PAPER, &[]).unwrap();
     scene.record.decay_periods = Some(150.0);
-    let plant = || Simulated::new(scene.plant, scene.start).unwrap();
-    let step = scene.sample_time();
-    let run = |rig: &mut dyn Rig| {
+    let (mut plant, step) = (Simulated::new(scene.plant, scene.start).unwrap(), scene.sample_time());
+    let measure = |rig: &mut dyn Rig| {
         let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
         let record = experiment::run(rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap();
         identify(&record, &scene).unwrap().lock
     };
-    let expected = run(&mut plant());
-    // The device holds its output for a sample, which is half a sample late: the difference is proportional to its sample time.
+    let Some((samples, fate)) = device else {
+        return (measure(&mut plant), Counters::default());
+    };
+    let device = Device::new(Box::new(plant), step / samples, scene.plant.half_width).unwrap();
+    let direct = Direct { device, ..Direct::new(fate) };
+    let mut rig = HelicRig::new(direct, &Names::default(), step, 100.0).unwrap();
+    (measure(&mut rig), rig.counters)
+}
+
+#[test]
+fn the_experiment_on_a_device_gives_the_backbone_of_the_plant_also_through_lost_datagrams() {
+    let expected = lock(None).0.at;
     let [coarse, fine] = [8.0, 16.0].map(|samples| {
-        let device = Device::new(Box::new(plant()), step / samples, scene.plant.half_width).unwrap();
-        let direct = Direct { device, ..Direct::new(|_| 1) };
-        let mut rig = HelicRig::new(direct, Channels::default(), step, 100.0).unwrap();
-        let found = run(&mut rig);
-        assert!(!rig.counters.is_troubled(), "{}", rig.counters);
-        assert!((found.at.c - expected.at.c).abs() < 1e-3);
-        found.at.sigma - expected.at.sigma
+        let (found, counters) = lock(Some((samples, |_| 1)));
+        assert!(!counters.is_troubled(), "{counters}");
+        assert!((found.at.c - expected.c).abs() < 1e-3);
+        found.at
     });
+    // The device holds its output for a sample, which is half a sample late: the difference is proportional to its sample time.
+    let late = [coarse, fine].map(|found| found.sigma - expected.sigma);
     println!(
-        "sigma = {}, {coarse} more with 8 and {fine} more with 16 samples of the device",
-        expected.at.sigma
+        "sigma = {}, with 8 and 16 samples of the device {late:?} more",
+        expected.sigma
     );
     assert!(
-        (coarse / fine - 2.0).abs() < 0.2 && fine.abs() < 0.003,
-        "{coarse} {fine}"
+        (late[0] / late[1] - 2.0).abs() < 0.2 && late[1].abs() < 0.003,
+        "{late:?}"
     );
+    // The first one; one in fifty, and now and then six in a row, 30 ms.
+    let lost = |n| usize::from(n != 0 && n * 7919 % 50 != 13 && n % 997 <= 990);
+    let (found, counters) = lock(Some((8.0, lost)));
+    assert!(counters.held > 300, "{counters}");
+    let distance = (found.at.sigma - coarse.sigma).abs().max((found.at.c - coarse.c).abs());
+    assert!(distance < 1e-3, "{distance}");
 }
 
 #[test]
 fn lost_and_repeated_datagrams_are_counted_and_bridged() {
-    let scene = scene();
+    let step = scene().sample_time();
     // Every seventh is lost, every fifth comes twice.
     let mut rig = connect(|n| if n % 7 == 3 { 0 } else { 1 + usize::from(n % 5 == 2) });
-    let mut readings = Vec::new();
-    for _ in 0..4000 {
-        readings.push(rig.sense().unwrap());
-        rig.advance(drive(), scene.sample_time()).unwrap();
-    }
+    let readings = shake(&mut rig, 4000, step).unwrap();
     println!("{}", rig.counters);
     assert!(rig.counters.held > 400 && rig.counters.late > 100, "{}", rig.counters);
     // The samples keep their times, and those that were lost repeat the period before.
     for (n, sensors) in readings.iter().enumerate().skip(300) {
-        let expected = 9e-5 * (55.0 * (n - 1) as f64 * scene.sample_time()).sin();
+        let expected = 9e-5 * (55.0 * (n - 1) as f64 * step).sin();
         let error = (sensors.reference.unwrap() - expected).abs();
         assert!(error < 2e-3 * 9e-5, "{n}: {error}");
     }
 }
 
 #[test]
-fn an_experiment_rides_through_lost_datagrams_and_gives_the_same_backbone() {
-    let mut scene = scene();
-    scene.start = Scene::parse("paper.toml", PAPER, &[]).unwrap().start;
-    let run = |fate: fn(usize) -> usize| {
-        let plant = Simulated::new(scene.plant, scene.start).unwrap();
-        let device = Device::new(Box::new(plant), scene.sample_time() / 8.0, scene.plant.half_width).unwrap();
-        let direct = Direct { device, ..Direct::new(fate) };
-        let mut rig = HelicRig::new(direct, Channels::default(), scene.sample_time(), 100.0).unwrap();
-        let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-        let record = experiment::run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap();
-        println!("{}", rig.counters);
-        (identify(&record, &scene).unwrap().lock, rig.counters)
-    };
-    let (expected, _) = run(|_| 1);
-    // The first one; one in fifty, and now and then six in a row, 30 ms.
-    let (found, counters) = run(|n| usize::from(n != 0 && n * 7919 % 50 != 13 && n % 997 <= 990));
-    assert!(counters.held > 300, "{counters}");
-    let distance = (found.at.sigma - expected.at.sigma)
-        .abs()
-        .max((found.at.c - expected.at.c).abs());
-    assert!(distance < 1e-3, "{distance}");
-}
-
-#[test]
-fn a_longer_blackout_ends_the_run_and_says_how_long_it_was() {
-    let scene = scene();
+fn a_longer_blackout_or_a_device_that_has_tripped_ends_the_run_and_says_so() {
+    let step = scene().sample_time();
     let mut rig = connect(|n| usize::from(!(100..140).contains(&n)));
-    let error = (0..1000).find_map(|_| {
-        let sensed = rig.sense();
-        sensed.and_then(|_| rig.advance(drive(), scene.sample_time())).err()
-    });
-    let message = error.unwrap().to_string();
-    assert!(
-        message.contains("samples of the helic device did not arrive, 0.1"),
-        "{message}"
-    );
-    assert!(message.contains("up to 0.15 s are bridged"), "{message}");
-}
+    let message = shake(&mut rig, 1000, step).unwrap_err().to_string();
+    let parts = [
+        "samples of the helic device did not arrive, 0.1",
+        "up to 0.15 s are bridged",
+    ];
+    assert!(parts.iter().all(|part| message.contains(part)), "{message}");
 
-#[test]
-fn a_device_that_has_tripped_ends_the_run() {
-    let scene = scene();
     let mut rig = connect(|_| 1);
-    for _ in 0..50 {
-        rig.sense().unwrap();
-        rig.advance(drive(), scene.sample_time()).unwrap();
-    }
+    shake(&mut rig, 50, step).unwrap();
     let mut host = Host::new(device());
     std::mem::swap(&mut host.device, &mut rig.transport().device);
     assert_eq!(host.number("safety"), 1);
     host.set("arm", &[0.0]).unwrap();
     std::mem::swap(&mut host.device, &mut rig.transport().device);
-    let error = (0..1000).find_map(|_| {
-        rig.sense()
-            .and_then(|_| rig.advance(drive(), scene.sample_time()))
-            .err()
-    });
-    assert!(error.unwrap().to_string().contains("output of the helic device is off"));
+    let message = shake(&mut rig, 1000, step).unwrap_err().to_string();
+    assert!(message.contains("output of the helic device is off"), "{message}");
 }
 
 #[test]
-fn names_and_rates_that_do_not_fit_are_explained() {
-    let scene = scene();
-    let step = scene.sample_time();
-    let channels = Channels { response: ("laser".into(), 1e-3), ..Channels::default() };
-    let refused = HelicRig::new(Direct::new(|_| 1), channels, step, 100.0)
-        .err()
-        .unwrap()
-        .to_string();
+fn names_and_rates_that_do_not_fit_are_explained_and_a_slower_scene_uses_every_second_sample() {
+    let step = scene().sample_time();
+    let names = |text: &str| {
+        let text = format!("{PAPER}\n[rig.names]\n{text}");
+        Scene::parse("mapped.toml", &text, &[]).unwrap().rig_names
+    };
+    let refused = |names: Names, step: f64| {
+        let rig = HelicRig::new(Direct::new(|_| 1), &names, step, 70.0);
+        rig.err().unwrap().to_string()
+    };
+    let missing = refused(names("response = { name = \"laser\", unit = \"mm\" }"), step);
     assert!(
-        refused.contains("no source \"laser\"") && refused.contains("response [mm]"),
-        "{refused}"
+        missing.contains("no source \"laser\"") && missing.contains("response [mm]"),
+        "{missing}"
     );
-    let refused = HelicRig::new(Direct::new(|_| 1), Channels::default(), 0.7 * step, 70.0)
-        .err()
-        .unwrap();
-    assert!(
-        refused.to_string().contains("controller.samples_per_period"),
-        "{refused}"
-    );
-}
-
-#[test]
-fn a_slower_scene_uses_every_second_sample_of_the_device() {
-    let scene = scene();
-    let mut rig = HelicRig::new(Direct::new(|_| 1), Channels::default(), 2.0 * scene.sample_time(), 50.0).unwrap();
-    for _ in 0..100 {
-        rig.sense().unwrap();
-        rig.advance(Drive::default(), 2.0 * scene.sample_time()).unwrap();
-    }
+    assert!(refused(names("force = \"F\""), step).contains("maps `force`"));
+    let rate = refused(Names::default(), 0.7 * step);
+    assert!(rate.contains("controller.samples_per_period"), "{rate}");
+    let mut rig = HelicRig::new(Direct::new(|_| 1), &Names::default(), 2.0 * step, 50.0).unwrap();
+    shake(&mut rig, 100, 2.0 * step).unwrap();
     assert!(!rig.counters.is_troubled());
 }
 
 #[test]
 fn the_drive_has_the_phase_of_the_host_however_late_its_commands_are() {
-    let scene = scene();
+    let step = scene().sample_time();
     for under_way in [0, 10, 30] {
         let mut direct = Direct { under_way, ..Direct::new(|_| 1) };
         let mut host = Host::new(direct.device);
         host.set("freq", &[37.0]).unwrap();
         (0..777).for_each(|_| drop(host.device.tick().unwrap()));
         direct.device = host.device;
-        let mut rig = HelicRig::new(direct, Channels::default(), scene.sample_time(), 100.0).unwrap();
-        let turn = 55.0 * scene.sample_time();
+        let mut rig = HelicRig::new(direct, &Names::default(), step, 100.0).unwrap();
         let mut driven = 0;
-        for n in 0..600 {
-            let base = rig.sense().unwrap().reference.unwrap();
+        for (n, sensors) in (-1..).zip(shake(&mut rig, 600, step).unwrap()) {
             // The base is held from the sample before.
-            let expected = 9e-5 * (turn * f64::from(n - 1)).sin();
+            let (base, expected) = (sensors.reference.unwrap(), 9e-5 * (55.0 * step * f64::from(n)).sin());
             driven += u32::from(base != 0.0);
             assert!(
                 base == 0.0 || (base - expected).abs() < 1e-9,
                 "{under_way}, {n}: {base} {expected}"
             );
-            rig.advance(drive(), scene.sample_time()).unwrap();
         }
         assert!(driven > 300, "{under_way}: {driven}");
     }

@@ -1,4 +1,4 @@
-//! Random and mutated frames on every connection: no panic, and no drive reaches a rig that was not sent.
+//! Guards every connection against random and mutated frames: no panic, and no drive reaches a rig that was not sent.
 //!
 //! `scripts/stress --network` runs this with 10^7 frames per connection; FRAMES and SEED set both. The suite takes a small part.
 
@@ -125,9 +125,7 @@ fn noise_like(noise: &mut Noise, like: &Frame, same_length: bool) -> Vec<u8> {
 #[test]
 fn mutated_datagrams_never_drive_a_rig_in_real_time() {
     let ((frames, seed), target) = (size(), Target::start(Address::Udp, None));
-    let (mut noise, Address::Udp(peer)) = (Noise(seed), target.address) else {
-        panic!()
-    };
+    let (mut noise, peer) = (Noise(seed), target.address.socket());
     let [client, stranger] = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
     client.set_nonblocking(true).unwrap();
     let (mut session, mut number, mut last) = (noise.next(), 0, None);
@@ -168,14 +166,10 @@ fn mutated_datagrams_never_drive_a_rig_in_real_time() {
 #[test]
 fn mutated_frames_never_drive_a_rig_in_lock_step() {
     let ((frames, seed), target) = (size(), Target::start(Address::Tcp, None));
-    let (mut noise, Address::Tcp(peer)) = (Noise(seed ^ 2), target.address) else {
-        panic!()
-    };
+    let (mut noise, peer) = (Noise(seed ^ 2), target.address.socket());
     let (mut done, mut sessions) = (0, 0u64);
     while done < frames {
-        let Ok(mut stream) = TcpStream::connect(peer) else {
-            panic!("the server has ended")
-        };
+        let mut stream = TcpStream::connect(peer).expect("the server has not ended");
         stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
         let session = noise.next();
         sessions += 1;
@@ -208,102 +202,76 @@ fn mutated_frames_never_drive_a_rig_in_lock_step() {
     assert!(sent > 0);
 }
 
-/// Frames that the relay remembers.
-const HEARD: usize = 4096;
-
-/// Passes all frames between a client and a server, and sends from the client's address.
-struct Relay {
-    front: UdpSocket,
-    back: UdpSocket,
-    client: Option<SocketAddr>,
-    heard: Vec<Vec<u8>>,
-    noise: Noise,
+/// Passes all frames between a client and a server until it is `over`, and sends `frames` forged or repeated ones from the client's address;
+/// then sets `finished`. Returns the number of forged frames.
+fn attack(
+    [front, back]: [UdpSocket; 2],
+    mut noise: Noise,
+    frames: u64,
+    finished: &AtomicBool,
+    over: &AtomicBool,
+) -> u64 {
+    let (mut client, mut heard, mut bytes, mut done) = (None, Vec::new(), [0; 256], 0);
+    while !over.load(Ordering::Relaxed) {
+        let mut is_idle = true;
+        while let Ok((length, from)) = front.recv_from(&mut bytes) {
+            (client, is_idle) = (Some(from), false);
+            let _ = back.send(&bytes[..length]);
+            if heard.len() == HEARD {
+                heard.swap_remove(noise.below(HEARD));
+            }
+            heard.push(bytes[..length].to_vec());
+        }
+        while let (Ok(length), Some(client)) = (back.recv(&mut bytes), client) {
+            is_idle = false;
+            let _ = front.send_to(&bytes[..length], client);
+        }
+        if done < frames {
+            let forged = (0..16).filter_map(|_| forge(heard.get(noise.below(heard.len()))?.clone(), &mut noise));
+            done += forged.inspect(|forged| drop(back.send(forged))).count() as u64;
+        } else if is_idle {
+            finished.store(true, Ordering::Relaxed);
+            thread::sleep(Duration::from_micros(50));
+        }
+    }
+    done
 }
 
-impl Relay {
-    fn new(server: SocketAddr, seed: u64) -> Self {
-        let [front, back] = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
-        back.connect(server).unwrap();
-        front.set_nonblocking(true).unwrap();
-        back.set_nonblocking(true).unwrap();
-        let (client, heard, noise) = (None, Vec::new(), Noise(seed));
-        Self { front, back, client, heard, noise }
-    }
+/// Frames that the attacker remembers.
+const HEARD: usize = 4096;
 
-    /// Passes what has arrived; whether there was anything.
-    fn pass(&mut self) -> bool {
-        let (mut bytes, mut any) = ([0; 256], false);
-        while let Ok((length, from)) = self.front.recv_from(&mut bytes) {
-            (self.client, any) = (Some(from), true);
-            let _ = self.back.send(&bytes[..length]);
-            if self.heard.len() == HEARD {
-                self.heard.swap_remove(self.noise.below(HEARD));
-            }
-            self.heard.push(bytes[..length].to_vec());
+/// A drive as it was, one with another content and a correct checksum, or a mutated frame.
+fn forge(mut forged: Vec<u8>, noise: &mut Noise) -> Option<Vec<u8>> {
+    match (noise.below(3), Frame::decode(&forged[..SIZE])) {
+        // A genuine farewell would end the session.
+        (0, Ok(frame)) if frame.kind == Kind::Drive => {}
+        (1, Ok(mut frame)) if frame.kind == Kind::Drive => {
+            frame.sequence = frame.sequence.wrapping_add(noise.below(5) as u64);
+            frame.values[noise.below(3)] = 1e-4 * noise.below(100) as f64;
+            forged[..SIZE].copy_from_slice(&frame.encode());
         }
-        while let (Ok(length), Some(client)) = (self.back.recv(&mut bytes), self.client) {
-            any = true;
-            let _ = self.front.send_to(&bytes[..length], client);
+        _ => {
+            let genuine = forged.clone();
+            noise.mutate(&mut forged);
+            // A repeated Hello drives nothing, but keeps the server busy.
+            return (forged != genuine).then_some(forged);
         }
-        any
     }
-
-    /// Sends a forged or repeated frame; whether it did.
-    fn forge(&mut self) -> bool {
-        let noise = &mut self.noise;
-        let Some(mut forged) = self.heard.get(noise.below(self.heard.len())).cloned() else {
-            return false;
-        };
-        match (noise.below(3), Frame::decode(&forged[..SIZE])) {
-            // As it was; a genuine farewell would end the session.
-            (0, Ok(frame)) if frame.kind == Kind::Drive => {}
-            (1, Ok(mut frame)) if frame.kind == Kind::Drive => {
-                frame.sequence = frame.sequence.wrapping_add(noise.below(5) as u64);
-                frame.values[noise.below(3)] = 1e-4 * noise.below(100) as f64;
-                forged[..SIZE].copy_from_slice(&frame.encode());
-            }
-            _ => {
-                let genuine = forged.clone();
-                noise.mutate(&mut forged);
-                // A repeated Hello drives nothing, but keeps the server busy.
-                if forged == genuine {
-                    return false;
-                }
-            }
-        }
-        let _ = self.back.send(&forged);
-        true
-    }
-
-    /// Forges `frames` frames, sets `finished`, and serves the genuine client until it is `over`.
-    fn run(mut self, frames: u64, finished: &AtomicBool, over: &AtomicBool) -> u64 {
-        let mut done = 0;
-        while !over.load(Ordering::Relaxed) {
-            if done < frames {
-                self.pass();
-                done += (0..16).filter(|_| self.forge()).count() as u64;
-            } else if !self.pass() {
-                finished.store(true, Ordering::Relaxed);
-                thread::sleep(Duration::from_micros(50));
-            }
-        }
-        done
-    }
+    Some(forged)
 }
 
 /// With a key, not even a frame with a correct checksum, session and number is taken, nor one of another session.
 #[test]
 fn with_a_key_forged_and_replayed_datagrams_never_drive_a_rig() {
     let ((frames, seed), key) = (size(), Key::of(b"a shared secret of the fuzzer"));
-    let target = Target::start(Address::Udp, key);
-    let (mut noise, Address::Udp(server)) = (Noise(seed ^ 3), target.address) else {
-        panic!()
-    };
-    let relay = Relay::new(server, noise.next());
-    let address = Address::Udp(relay.front.local_addr().unwrap());
-    let [over, finished] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+    let (target, mut noise) = (Target::start(Address::Udp, key), Noise(seed ^ 3));
+    let sockets = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
+    sockets.iter().for_each(|socket| socket.set_nonblocking(true).unwrap());
+    sockets[1].connect(target.address.socket()).unwrap();
+    let address = Address::Udp(sockets[0].local_addr().unwrap());
+    let (own, [over, finished]) = (Noise(noise.next()), [(); 2].map(|()| Arc::new(AtomicBool::new(false))));
     let flags = [Arc::clone(&finished), Arc::clone(&over)];
-    let attacker = thread::spawn(move || relay.run(frames, &flags[0], &flags[1]));
+    let attacker = thread::spawn(move || attack(sockets, own, frames, &flags[0], &flags[1]));
     let mut sessions = 0;
     for attempt in 0..3 + frames / 100_000 {
         if attempt > 1 && finished.load(Ordering::Relaxed) {
@@ -323,8 +291,9 @@ fn with_a_key_forged_and_replayed_datagrams_never_drive_a_rig() {
     over.store(true, Ordering::Relaxed);
     let done = attacker.join().unwrap();
     let sent = target.sent.lock().unwrap().len();
-    println!("UDP with a key: {done} frames beside {sent} drives in {sessions} sessions");
     let refused = target.end();
-    println!("  {refused} of them counted by the server");
+    println!(
+        "UDP with a key: {done} frames beside {sent} drives in {sessions} sessions, {refused} counted by the server"
+    );
     assert!(sent > 0);
 }

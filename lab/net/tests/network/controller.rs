@@ -1,4 +1,4 @@
-//! A controller across the network: late, missing and invalid answers, moves of the response, and a lock that the bench judges.
+//! Guards a controller across the network: late, missing and invalid answers, moves of the response, and a lock that the bench judges.
 
 use std::sync::{Arc, Mutex};
 use std::thread::sleep;
@@ -161,7 +161,13 @@ fn a_move_that_the_controller_cannot_make_ends_the_session_with_the_reason() {
     let scene = scene(&[]);
     let server = serve_built_in(&scene);
     // The loop is open.
-    for (response, reason) in [(0.0, "response = 0 m: allowed is above 0"), (0.1, "is in state 0: ")] {
+    for (response, reason) in [
+        (0.0, "not above 0: 0"),
+        (
+            0.1,
+            "closed loop only, state 2 (acquiring) or 3 (locked), and is in this state: 0",
+        ),
+    ] {
         let mut peer = server.controller(&scene, None);
         peer.sample(reading(0), false).unwrap();
         peer.hold_response(Move { response, ..Move::default() }, 0.0).unwrap();

@@ -1,4 +1,4 @@
-//! Addresses from text, and which of them are allowed.
+//! Guards addresses from text, and which of them are allowed.
 
 use super::*;
 

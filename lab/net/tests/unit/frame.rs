@@ -1,4 +1,4 @@
-//! Frames and the readings and commands in them survive encoding; damaged, foreign and random bytes are refused.
+//! Guards the format: frames and the readings and commands in them survive encoding; damaged, foreign and random bytes are refused.
 
 use super::*;
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! The drive of a served rig after a loss of frames and after a shutdown.
+//! Guards the drive of a served rig after a loss of frames and after a shutdown.
 
 use super::*;
 

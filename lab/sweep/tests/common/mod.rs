@@ -2,12 +2,17 @@
 
 #![allow(dead_code, reason = "every test program uses a part of it")]
 
-use std::{collections::BTreeMap, fs, path::Path, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::Path,
+    sync::{Arc, atomic::Ordering::Relaxed},
+};
 
-use vines_sweep::{Settings, Sweep};
+use vines_sweep::{Monitor, Settings, Shard, Sweep, run};
 use vines_testbench::scene::Family;
 use zarrs::{
-    array::Array,
+    array::{Array, ElementOwned},
     storage::{WritableStorageTraits, store::MemoryStore},
 };
 
@@ -28,13 +33,37 @@ pub fn refused(settings: Settings) -> String {
     plan(settings).unwrap_err()
 }
 
+/// Computes a part of a sweep to its end.
+pub fn computed_part(plan: &Sweep, folder: &Path, number: u64, of: u64) -> Monitor {
+    let monitor = Monitor::default();
+    assert!(run(plan, folder, Shard { number, of }, &monitor).unwrap());
+    monitor
+}
+
+/// Computes a sweep to its end.
+pub fn computed(plan: &Sweep, folder: &Path) -> Monitor {
+    computed_part(plan, folder, 0, 1)
+}
+
+/// Cells that were in the store, and that were computed.
+pub fn counts(monitor: &Monitor) -> (u64, u64) {
+    (monitor.found.load(Relaxed), monitor.computed.load(Relaxed))
+}
+
+/// The message of a run that is refused, and that leaves a folder as it is.
+pub fn refused_in(plan: &Sweep, folder: &Path) -> String {
+    let before = files(folder);
+    let error = run(plan, folder, Shard::ALL, &Monitor::default()).unwrap_err();
+    assert!(before == files(folder), "{error}");
+    error.to_string()
+}
+
 /// All files of a store.
 pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut all = BTreeMap::new();
     let mut folders = vec![folder.to_path_buf()];
     while let Some(one) = folders.pop() {
-        for entry in fs::read_dir(&one).unwrap().flatten() {
-            let path = entry.path();
+        for path in fs::read_dir(&one).unwrap().map(|entry| entry.unwrap().path()) {
             if path.is_dir() {
                 folders.push(path);
             } else {
@@ -46,17 +75,17 @@ pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     all
 }
 
-/// The numbers of a variable.
-pub fn numbers(folder: &Path, name: &str) -> Vec<f64> {
-    let array = array(folder, name);
-    array.retrieve_array_subset(&array.subset_all()).unwrap()
-}
-
-pub fn array(folder: &Path, name: &str) -> Array<MemoryStore> {
+/// The values of a variable, as zarrs reads them.
+pub fn values<T: ElementOwned>(folder: &Path, name: &str) -> Vec<T> {
     let memory = MemoryStore::new();
     for (key, value) in files(&folder.join(name)) {
         let key = format!("a/{key}").as_str().try_into().unwrap();
         memory.set(&key, value.into()).unwrap();
     }
-    Array::open(Arc::new(memory), "/a").unwrap()
+    let array = Array::open(Arc::new(memory), "/a").unwrap();
+    array.retrieve_array_subset(&array.subset_all()).unwrap()
+}
+
+pub fn numbers(folder: &Path, name: &str) -> Vec<f64> {
+    values(folder, name)
 }

@@ -1,4 +1,4 @@
-//! Lost readings: gaps in a periodic motion, and an experiment that rides through them.
+//! Guards lost readings: gaps in a periodic motion, and an experiment that rides through them.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -16,16 +16,37 @@ fn motion(n: u64) -> Sensors {
     Sensors { response, reference: Some(0.1 * (TAU * turns).cos()) }
 }
 
+/// The readings after a gap of `lost` ones after `known` ones; the drive turns by `turn`.
+fn bridged(known: u64, lost: u64, turn: f64, motion: fn(u64) -> Sensors) -> Vec<Sensors> {
+    let (mut readings, mut counters) = (Readings::default(), Counters::default());
+    (0..=known + lost)
+        .filter_map(|n| {
+            if n < known {
+                assert_eq!(readings.arrive(n, motion(n), n, &mut counters), 0);
+            } else if n == known {
+                assert_eq!(
+                    readings.arrive(known + lost, motion(known + lost), n, &mut counters),
+                    lost
+                );
+                assert_eq!(readings.arrive(known, motion(known), n, &mut counters), 0);
+                assert_eq!(counters.late, 1, "a reading after a later one");
+            }
+            let taken = readings.take(&mut counters).unwrap();
+            assert_eq!(counters.longest, if n < known { 0 } else { lost });
+            assert_eq!(taken.with.is_none(), (known..known + lost).contains(&n));
+            readings.advance(turn);
+            (n >= known).then_some(taken.sensors)
+        })
+        .collect()
+}
+
 /// The largest errors of response and reference over a gap of `lost` readings after `known` ones.
 fn errors(known: u64, lost: u64) -> [f64; 2] {
-    let (mut bridge, mut worst) = (Bridge::default(), [0.0_f64; 2]);
-    (0..known).for_each(|n| bridge.keep(0.0103 * n as f64, motion(n)));
-    for n in known..known + lost {
-        let (phase, ahead) = (0.0103 * n as f64, known + lost - n);
-        let (filled, expected) = (bridge.fill(phase, &motion(known + lost), ahead, 0.0103), motion(n));
+    let mut worst = [0.0_f64; 2];
+    for (n, filled) in (known..).zip(bridged(known, lost, 0.0103, motion)) {
+        let expected = motion(n);
         worst[0] = worst[0].max((filled.response - expected.response).abs());
         worst[1] = worst[1].max((filled.reference.unwrap() - expected.reference.unwrap()).abs());
-        bridge.keep(phase, filled);
     }
     worst
 }
@@ -43,23 +64,21 @@ fn without_a_period_before_it_a_gap_is_bridged_by_a_line() {
     let [response, reference] = errors(10, 4);
     assert!(response < 0.03 && reference < 1e-3, "{response} {reference}");
     // Nothing at all before the gap, and no frequency.
-    let mut bridge = Bridge::default();
-    assert_eq!(bridge.fill(0.0, &motion(7), 3, 0.0), motion(7));
-    (0..5).for_each(|_| bridge.keep(0.0, Sensors { response: 1.0, reference: None }));
-    let next = Sensors { response: 3.0, reference: None };
-    assert_eq!(bridge.fill(0.0, &next, 1, 0.0).response, 2.0);
+    assert_eq!(bridged(0, 3, 0.0, motion)[0], motion(3));
+    let line = |n: u64| Sensors {
+        response: 1.0 + 2.0 * n.saturating_sub(5) as f64,
+        reference: None,
+    };
+    assert_eq!(bridged(6, 1, 0.0, line)[0].response, 3.0);
 }
 
 /// A rig whose readings and drives are lost in a gap. Until its end the rig has the last drive; a base of held samples stands still.
 struct Interrupted {
     rig: Box<dyn Rig>,
-    bridge: Bridge,
+    readings: Readings<()>,
     gap: Range<u64>,
     at: u64,
-    phase: f64,
     drive: (Drive, bool, f64),
-    /// The first reading after the gap.
-    next: Sensors,
 }
 
 impl Interrupted {
@@ -73,7 +92,7 @@ impl Interrupted {
 
     fn step(&mut self, drive: Drive, holds: bool, step: f64) -> Result<(), RigError> {
         self.drive = (drive, holds, step);
-        self.phase += drive.omega * step / TAU;
+        self.readings.advance(drive.omega * step / TAU);
         self.at += 1;
         if self.gap.contains(&(self.at - 1)) {
             Ok(())
@@ -85,20 +104,19 @@ impl Interrupted {
 
 impl Rig for Interrupted {
     fn sense(&mut self) -> Result<Sensors, RigError> {
+        let mut counters = Counters::default();
         if self.at == self.gap.start {
             for _ in self.gap.clone() {
                 self.rig.sense()?;
                 self.apply()?;
             }
-            self.next = self.rig.sense()?;
+            let next = self.rig.sense()?;
+            self.readings.arrive(self.gap.end, next, (), &mut counters);
+        } else if !self.gap.contains(&self.at) && self.at != self.gap.end {
+            let reading = self.rig.sense()?;
+            self.readings.arrive(self.at, reading, (), &mut counters);
         }
-        let turn = self.drive.0.omega * self.drive.2 / TAU;
-        let reading = match self.gap.contains(&self.at) {
-            true => self.bridge.fill(self.phase, &self.next, self.gap.end - self.at, turn),
-            false => self.rig.sense()?,
-        };
-        self.bridge.keep(self.phase, reading);
-        Ok(reading)
+        Ok(self.readings.take(&mut counters).expect("there is a reading").sensors)
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
@@ -124,12 +142,10 @@ fn a_run_rides_through_a_gap_of_30_ms_at_any_phase_whoever_makes_the_sine_of_the
             let plant = Simulated::new(scene.plant, scene.start).unwrap();
             let rig = Interrupted {
                 rig: Box::new(plant.with_sensors(scene.resonance)),
-                bridge: Bridge::default(),
+                readings: Readings::default(),
                 gap: from..from + lost,
                 at: 0,
-                phase: 0.0,
                 drive: (Drive::default(), false, scene.sample_time()),
-                next: Sensors::default(),
             };
             let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
             let mut rig = Chain::around(Box::new(rig), &scene);

@@ -1,4 +1,4 @@
-//! Authenticated frames: replays, reflections and other keys are refused.
+//! Guards authenticated frames: replays, reflections and other keys are refused.
 
 use super::*;
 
