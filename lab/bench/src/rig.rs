@@ -178,11 +178,6 @@ pub trait Controller {
     /// Errors of the implementation: a refused call, a lost connection.
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError>;
 
-    /// Whether the controller reports its phase error wherever it can be measured.
-    fn reports_phase_error(&self) -> bool {
-        true
-    }
-
     /// Controls the amplitude of the response from now on, moves it as stated, and holds the phase `phase_target`, rad.
     ///
     /// # Errors

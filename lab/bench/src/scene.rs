@@ -6,7 +6,6 @@ mod controller;
 mod names;
 mod overrides;
 
-use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
@@ -15,7 +14,7 @@ use phase_lock::{ConfigError, Number, Value};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error, ser::SerializeMap};
 
 pub use backbone::BackboneSettings;
-pub use chain::{ChainSettings, RatioOf};
+pub use chain::ChainSettings;
 pub use controller::{ControllerSettings, KEYS, LinearResponse, PhaseLock, key, refusal};
 pub use lovines::Parameters;
 pub use names::{Name, Names};
@@ -80,7 +79,7 @@ impl Scene {
 
     /// Levels of the tracked backbone, amplitudes of the response, m, in the order in which they are visited.
     pub fn levels(&self) -> Vec<f64> {
-        self.backbone.levels()
+        self.backbone.levels(self.plant.half_width)
     }
 
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
@@ -176,11 +175,11 @@ impl Excitation {
     fn in_metres(&self, origin: &str, d: &Dimensionless) -> Result<f64, SceneError> {
         match (self.g, self.e) {
             (Some(g), None) => {
-                Checked::new("excitation.G", g, "(dimensionless)").not_negative()?;
+                not_negative("excitation.G", g, "(dimensionless)")?;
                 Ok(d.amplitude(g))
             }
             (None, Some(e)) => {
-                Checked::new("excitation.E", e, "m").not_negative()?;
+                not_negative("excitation.E", e, "m")?;
                 Ok(e)
             }
             (given, _) => Err(SceneError::Keys {
@@ -194,66 +193,7 @@ impl Excitation {
     }
 }
 
-/// A length that a file gives in metres or over a unit of the rig.
-struct Length<'a> {
-    origin: &'a str,
-    section: &'static str,
-    /// Its keys: over the unit, and in metres.
-    keys: [&'static str; 2],
-    over_unit: Option<f64>,
-    in_metres: Option<f64>,
-}
-
-impl Length<'_> {
-    /// The length in metres; `unit` in m.
-    fn resolve(self, unit: f64) -> Result<Option<f64>, SceneError> {
-        let Self { origin, section, keys: [key, in_metres], .. } = self;
-        let check = |key: &str, value, unit| {
-            let key = format!("{section}.{key}").into();
-            Checked { key, value, unit }.positive()
-        };
-        match (self.over_unit, self.in_metres) {
-            (Some(_), Some(_)) => Err(SceneError::Keys {
-                origin: origin.into(),
-                message: format!(
-                    "[{section}] has both {key} and {in_metres} (m), which say the same thing: give one of them"
-                ),
-            }),
-            (Some(value), None) => {
-                check(
-                    key,
-                    value,
-                    if key.starts_with('G') {
-                        "(over b epsilon)"
-                    } else {
-                        "(over b)"
-                    },
-                )?;
-                Ok(Some(value * unit))
-            }
-            (None, Some(value)) => check(in_metres, value, "m").map(|()| Some(value)),
-            (None, None) => Ok(None),
-        }
-    }
-}
-
 impl Sections {
-    /// Replaces a section.
-    fn replace(&mut self, name: &str, table: toml::Table) -> Result<(), toml::de::Error> {
-        match name {
-            "plant" => self.plant = PlantSection::deserialize(table)?,
-            "start" => self.start = StartSection::deserialize(table)?,
-            "excitation" => self.excitation = Excitation::deserialize(table)?,
-            "controller" => self.controller = ControllerSettings::deserialize(table)?,
-            "phase_lock" => self.phase_lock = PhaseLock::deserialize(table)?,
-            "record" => self.record = RecordSettings::deserialize(table)?,
-            "backbone" => self.backbone = BackboneSettings::deserialize(table)?,
-            "chain" => self.chain = ChainSettings::deserialize(table)?,
-            _ => self.resonance = Definition::deserialize(table)?,
-        }
-        Ok(())
-    }
-
     fn resolve(self, origin: &str) -> Result<Scene, SceneError> {
         let plant = self.plant.resolve(origin)?;
         let d = Dimensionless::of(&plant, 0.0);
@@ -261,10 +201,10 @@ impl Sections {
             start: self.start.resolve(&plant)?,
             amplitude: self.excitation.in_metres(origin, &d)?,
             plant,
-            controller: self.controller.in_metres(origin, &d)?,
+            controller: self.controller,
             phase_lock: self.phase_lock,
             record: self.record,
-            backbone: self.backbone.in_metres(origin, &d)?,
+            backbone: self.backbone,
             chain: self.chain,
             resonance: self.resonance,
             rig_names: self.rig.names,
@@ -272,6 +212,7 @@ impl Sections {
             measured: None,
         };
         scene.controller.check()?;
+        scene.backbone.check()?;
         scene.record.check(&scene.controller, scene.lock_periods())?;
         scene.chain.check(&scene.controller)?;
         if scene.resonance.reference == Reference::Force && !scene.chain.reference {
@@ -308,11 +249,6 @@ impl Scene {
 }
 
 // The `[plant]` section, in SI units or dimensionless, and the `[start]` section.
-
-/// Keys that only the SI form has.
-const SI_KEYS: [&str; 5] = ["M", "k", "c", "m", "b"];
-/// Keys that only the dimensionless form has.
-const DIMENSIONLESS_KEYS: [&str; 2] = ["epsilon", "lambda"];
 
 /// The section as written.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -405,8 +341,7 @@ impl PlantSection {
             ));
         }
         // The FMU has a signed seed of 32 bits.
-        Checked::new("plant.seed", self.seed.into(), "")
-            .check(self.seed <= i32::MAX as u32, "must be from 0 to 2147483647")?;
+        within("plant.seed", self.seed.into(), "", [0.0, i32::MAX.into()])?;
         let cavity = self.cavity();
         let plant = if is_si {
             Parameters {
@@ -420,8 +355,8 @@ impl PlantSection {
             }
         } else {
             let (epsilon, lambda) = (need(self.epsilon, "epsilon")?, need(self.lambda, "lambda")?);
-            Checked::new("plant.epsilon", epsilon, "(dimensionless)").positive()?;
-            Checked::new("plant.lambda", lambda, "(dimensionless)").not_negative()?;
+            positive("plant.epsilon", epsilon, "(dimensionless)")?;
+            not_negative("plant.lambda", lambda, "(dimensionless)")?;
             Parameters {
                 cavity,
                 ..Parameters::dimensionless(epsilon, lambda, need(self.r, "r")?)
@@ -568,23 +503,26 @@ impl RecordSettings {
     /// `lock_periods` is the time limit for the lock, as set or by default.
     fn check(&self, controller: &ControllerSettings, lock_periods: f64) -> Result<(), SceneError> {
         let unit = "(natural periods)";
-        Checked::new("record.lock_periods", lock_periods, unit).positive()?;
-        Checked::new("record.hold_periods", self.hold_periods, unit).check(
-            (3.0..=1e6).contains(&self.hold_periods),
-            "must be from 3 (to count impacts and measure) to 1000000",
-        )?;
-        if let Some(decay_periods) = self.decay_periods {
-            Checked::new("record.decay_periods", decay_periods, unit).positive()?;
-        }
+        positive("record.lock_periods", lock_periods, unit)?;
+        // At least enough to count impacts and measure.
+        within("record.hold_periods", self.hold_periods, unit, [3.0, 1e6])?;
+        positive("record.decay_periods", self.decay_periods.unwrap_or(1.0), unit)?;
         let longest = self.decay_periods.unwrap_or(1000.0);
-        Checked::new("record.window_periods", self.window_periods, "(periods)").check(
-            (0.5..=longest).contains(&self.window_periods),
-            format!("must be from 0.5 to {longest} (decay_periods, or 1000)"),
+        within(
+            "record.window_periods",
+            self.window_periods,
+            "(periods)",
+            [0.5, longest],
         )?;
         let samples =
             controller.samples_per_period * (lock_periods + self.hold_periods + self.decay_periods.unwrap_or(0.0));
-        Checked::new("samples_per_period times all periods of [record]", samples, "samples")
-            .check(samples <= MOST_SAMPLES, "must be at most 20 million")
+        check(
+            "samples_per_period times all periods of [record]",
+            samples,
+            "samples",
+            samples <= MOST_SAMPLES,
+            "must be at most 20 million",
+        )
     }
 }
 
@@ -613,40 +551,31 @@ fn option<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<Opt
 
 // Range checks that name the value, its unit and what is allowed.
 
-/// One number of a scene, under the name that the file gives it.
-struct Checked {
-    pub key: Cow<'static, str>,
-    pub value: f64,
-    pub unit: &'static str,
+/// Refuses the value of a key, in its unit, unless it is finite and `ok`.
+fn check(
+    key: &'static str,
+    value: f64,
+    unit: &'static str,
+    ok: bool,
+    allowed: impl Into<String>,
+) -> Result<(), SceneError> {
+    if ok && value.is_finite() {
+        return Ok(());
+    }
+    Err(SceneError::Value { key, value, unit, allowed: allowed.into() })
 }
 
-impl Checked {
-    fn new(key: &'static str, value: f64, unit: &'static str) -> Self {
-        Self { key: key.into(), value, unit }
-    }
+fn positive(key: &'static str, value: f64, unit: &'static str) -> Result<(), SceneError> {
+    check(key, value, unit, value > 0.0, "must be positive and finite")
+}
 
-    fn positive(self) -> Result<(), SceneError> {
-        let is_allowed = self.value > 0.0;
-        self.check(is_allowed, "must be positive and finite")
-    }
+fn not_negative(key: &'static str, value: f64, unit: &'static str) -> Result<(), SceneError> {
+    check(key, value, unit, value >= 0.0, "must be zero or positive, and finite")
+}
 
-    fn not_negative(self) -> Result<(), SceneError> {
-        let is_allowed = self.value >= 0.0;
-        self.check(is_allowed, "must be zero or positive, and finite")
-    }
-
-    /// A value that is not finite is refused whatever `ok` says.
-    fn check(self, ok: bool, allowed: impl Into<String>) -> Result<(), SceneError> {
-        if ok && self.value.is_finite() {
-            return Ok(());
-        }
-        Err(SceneError::Value {
-            key: self.key,
-            value: self.value,
-            unit: self.unit,
-            allowed: allowed.into(),
-        })
-    }
+fn within(key: &'static str, value: f64, unit: &'static str, [low, high]: [f64; 2]) -> Result<(), SceneError> {
+    let allowed = format!("must be from {low} to {high}");
+    check(key, value, unit, (low..=high).contains(&value), allowed)
 }
 
 // Errors of a scene.
@@ -665,7 +594,7 @@ pub enum SceneError {
     Override { argument: String, message: String },
     #[error("{key} = {} {unit}: {allowed}", Number(*value))]
     Value {
-        key: Cow<'static, str>,
+        key: &'static str,
         value: f64,
         unit: &'static str,
         allowed: String,

@@ -78,7 +78,7 @@ fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most_and_six_bits_s
 #[test]
 fn a_delay_that_nobody_compensates_is_seen_and_one_common_to_both_sensors_is_not() {
     let ideal = at(&[]).unwrap();
-    let late = at(&["chain.delay=1", "chain.reference=false", "chain.compensate=false"]).unwrap();
+    let late = at(&["chain.delay=1", "chain.reference=false", "controller.delay=0"]).unwrap();
     assert!((late.sigma - ideal.sigma + 0.078).abs() < 0.005);
     let both = at(&["chain.delay=1"]).unwrap();
     assert!((both.sigma - ideal.sigma).abs() < 1e-6);
@@ -163,13 +163,10 @@ fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04
 // What is measured does not depend on the plant that the client's scene states: restitution, mass of the particle and half-width of the cavity
 // are used for the comparison only.
 
-/// Drive, limits and levels in metres: G = 1.1, and C from 0.6 to 0.3 of the default scene.
-const IN_METRES: [&str; 6] = [
+/// Drive, G = 1.1 of the default scene, and its limit in metres.
+const IN_METRES: [&str; 3] = [
     "excitation.E=9.246125558142296e-5",
-    "controller.E_max=6e-4",
-    "backbone.E_max=4e-4",
-    "backbone.A_from=0.006",
-    "backbone.A_to=0.003",
+    "phase_lock.amplitude_max=3e-4",
     "backbone.points=4",
 ];
 
@@ -177,7 +174,13 @@ const IN_METRES: [&str; 6] = [
 fn falsified(settings: &[&str], wrong: &[&str]) -> (SensorsOnly, Scene) {
     let truth = paper(&[&IN_METRES[..], settings].concat());
     let rig = SensorsOnly::around(Simulated::of(&truth).unwrap());
-    (rig, paper(&[&IN_METRES[..], settings, wrong].concat()))
+    // The levels 6 and 3 mm over the half-width that the scene states.
+    let levels = if wrong.contains(&"plant.b=0.012") {
+        ["backbone.C_from=0.5", "backbone.C_to=0.25"]
+    } else {
+        ["backbone.C_from=0.6", "backbone.C_to=0.3"]
+    };
+    (rig, paper(&[&IN_METRES[..], &levels, settings, wrong].concat()))
 }
 
 /// The values in SI units, bit by bit.

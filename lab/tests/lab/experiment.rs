@@ -302,7 +302,7 @@ fn a_gap_in_the_range_of_stable_orbits_is_stated() {
     ]);
     let reason = vines::advice::reason(&scene, None).unwrap();
     assert!(
-        reason.ends_with("it is stable for G from 0.415 to 0.486 and from 0.822 to 0.824"),
+        reason.ends_with("it is stable for G from 0.415 to 0.824, with gaps"),
         "{reason}"
     );
 }
@@ -363,7 +363,7 @@ fn a_sensor_of_two_bits_has_no_phase_rather_than_a_phase_error_of_zero() {
 
 #[test]
 fn a_response_above_its_limit_ends_the_experiment_at_once_and_keeps_what_was_measured() {
-    let scene = scene(&["controller.C_max=0.3"]);
+    let scene = scene(&["phase_lock.response_max=0.3"]);
     let mut rig = plant(&scene);
     let mut controller = built_in(&scene);
     let mut samples = Vec::new();
@@ -377,8 +377,8 @@ fn a_response_above_its_limit_ends_the_experiment_at_once_and_keeps_what_was_mea
     );
     let message = error.to_string();
     assert!(
-        message.contains("the response exceeded its limit; it read 0.3")
-            && message.contains("controller.C_max allows 0.3 m"),
+        message.contains("the response exceeded its limit; the response read")
+            && message.contains("phase_lock.response_max is 0.3 m"),
         "{message}"
     );
     let last = samples.last().unwrap();
@@ -480,13 +480,14 @@ fn limits_of_a_scene_reach_the_controller() {
         }
         (scene.amplitude, drives)
     };
-    let (amplitude, drives) = run(&["controller.ramp_periods=10"]);
+    // In ten periods to the amplitude 1.1 times 0.0084.
+    let (amplitude, drives) = run(&["phase_lock.ramp_rate=1.4706e-4"]);
     assert!((drives[500] / amplitude - 0.5).abs() < 0.01);
     // A response too large takes the drive away for good.
-    let (_, drives) = run(&["controller.C_max=0.2"]);
+    let (_, drives) = run(&["phase_lock.response_max=0.2"]);
     assert!(drives[0] > 0.0 && drives[3999] == 0.0);
     let (_, drives) = run(&["record.lock_periods=20"]);
     assert!(drives[1900] > 0.0 && drives[3999] == 0.0);
-    let refused = vines::scene::Scene::load(None, &["controller.G_max=1.0".parse().unwrap()]).unwrap_err();
+    let refused = vines::scene::Scene::load(None, &["phase_lock.amplitude_max=8e-5".parse().unwrap()]).unwrap_err();
     assert!(refused.to_string().starts_with("excitation.G: amplitude"), "{refused}");
 }
