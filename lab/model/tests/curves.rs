@@ -413,34 +413,3 @@ fn every_bifurcation_of_a_response_lies_on_a_curve_and_every_point_of_a_curve_is
         assert!(n > 0 || counts[0] > 15 && counts[1] > 15, "{counts:?}");
     }
 }
-
-#[test]
-fn two_bifurcations_of_a_kind_within_a_step_are_both_found() {
-    // A pair of multipliers leaves the circle at sigma = -0.6139 and returns at -0.5910: the count of those outside does not change.
-    let scene = Dimensionless::new(0.021564311166206957, 1.5038521612880744, 0.7548147212665681, 0.9354);
-    let mut found: Vec<f64> = bifurcations(&scene)
-        .into_iter()
-        .filter(|one| one.kind == Bifurcation::Torus)
-        .map(|one| one.motion.sigma)
-        .filter(|sigma| (-0.65..-0.55).contains(sigma))
-        .collect();
-    found.sort_by(f64::total_cmp);
-    println!("{found:?}");
-    assert!(matches!(found[..], [first, second] if (first + 0.6139).abs() < 1e-3 && (second + 0.5910).abs() < 1e-3));
-}
-
-#[test]
-fn a_curve_of_asymmetric_folds_reaches_the_symmetry_breaking_where_it_ends() {
-    // It ends at sigma = -0.854134, G = 0.535646, where the equations are singular, and at sigma = -0.050283, G = 1.347293.
-    let scene = Dimensionless::new(0.01868089571475754, 0.45669401694636375, 0.8115318618163199, 0.535649);
-    let curves = bifurcation_curves(&scene, &LIMITS);
-    let folds = curves
-        .iter()
-        .find(|one| one.name() == "fold of asymmetric 1:1")
-        .unwrap();
-    assert_eq!(folds.branch.ended, [BranchEnd::Joins; 2]);
-    // 3e-6 above the end, both halves of the motion differ by 3e-3.
-    let found = bifurcations(&scene);
-    let fold = |one: &&BranchBifurcation| one.kind == Bifurcation::Fold && (one.motion.sigma + 0.854126).abs() < 1e-5;
-    assert!(found.iter().any(|one| fold(&one)), "{found:?}");
-}
