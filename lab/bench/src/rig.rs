@@ -77,23 +77,14 @@ pub trait Rig {
     fn sense(&mut self) -> Result<Sensors, RigError>;
 
     /// Drives the rig for one sample period of `step` seconds.
-    ///
-    /// # Errors
-    /// As [`Rig::sense`].
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError>;
 
     /// Holds the base at the displacement of the drive for one sample period of `step` seconds.
-    ///
-    /// # Errors
-    /// As [`Rig::sense`], and a rig whose base follows its own oscillator only.
     fn hold(&mut self, _drive: Drive, _step: f64) -> Result<(), RigError> {
         Err(RigError::NoHold)
     }
 
     /// The ground truth, if the rig is a simulation.
-    ///
-    /// # Errors
-    /// As [`Rig::sense`].
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         Ok(None)
     }
@@ -105,33 +96,21 @@ pub trait RigStage {
     fn inner(&mut self) -> &mut dyn Rig;
 
     /// What the next stage or the controller reads: [`Rig::sense`].
-    ///
-    /// # Errors
-    /// As [`Rig::sense`].
     fn sense(&mut self) -> Result<Sensors, RigError> {
         self.inner().sense()
     }
 
     /// [`Rig::advance`].
-    ///
-    /// # Errors
-    /// As [`Rig::sense`].
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         self.inner().advance(drive, step)
     }
 
     /// [`Rig::hold`].
-    ///
-    /// # Errors
-    /// As [`Rig::hold`].
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         self.inner().hold(drive, step)
     }
 
     /// [`Rig::ground_truth`].
-    ///
-    /// # Errors
-    /// As [`Rig::sense`].
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         self.inner().ground_truth()
     }
@@ -187,9 +166,6 @@ pub trait Controller {
     }
 
     /// Controls the amplitude of the drive again, at its setpoint.
-    ///
-    /// # Errors
-    /// As [`Controller::hold_response`].
     fn hold_drive(&mut self) -> Result<(), ControllerError> {
         Err(ControllerError::NoResponseLoop)
     }

@@ -10,8 +10,8 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 use lovines::{Cavity, InvalidValue, Restitution, State};
-use phase_lock::{ConfigError, Number, Value};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error, ser::SerializeMap};
+use phase_lock::{ConfigError, Number};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
 pub use backbone::BackboneSettings;
 pub use chain::ChainSettings;
@@ -283,8 +283,8 @@ struct PlantSection {
     seed: u32,
 }
 
-/// A law of restitution; `r_plus` and `r_minus` are its parameters at the two walls.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+/// A law of restitution; `r_plus` and `r_minus` are its parameters at the two walls. The numbers are the codes in `LoViNes.fmu`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Law {
     #[default]
@@ -294,9 +294,6 @@ enum Law {
 }
 
 impl Law {
-    /// In the order of their codes in `LoViNes.fmu`.
-    const ALL: [Self; 3] = [Self::Constant, Self::Viscoelastic, Self::Plastic];
-
     /// The law and its parameter.
     fn of(law: Restitution) -> (Self, f64) {
         match law {
@@ -402,14 +399,14 @@ impl StartSection {
     }
 }
 
-/// The parameters under their symbols, which are the names of the FMU's variables; of the cavity those that are not ideal.
-fn symbols(plant: &Parameters) -> Vec<(&'static str, Value)> {
+/// The parameters under their symbols, which are the keys of a scene in SI units and the names of the FMU's variables; of the cavity those that
+/// are not ideal.
+fn symbols(plant: &Parameters) -> Vec<(&'static str, toml::Value)> {
     let Cavity { restitution, seed, .. } = plant.cavity;
     let [plus, minus] = restitution.map(|law| law.map(Law::of));
     let law = plus.or(minus).map_or(Law::Constant, |(law, _)| law);
-    let real = |(symbol, value)| (symbol, Value::Real(value));
-    let given =
-        |(symbol, value): (_, Option<f64>)| value.filter(|value| *value != 0.0).map(|value| real((symbol, value)));
+    let real = |(symbol, value): (_, f64)| (symbol, value.into());
+    let given = |(symbol, value): (_, Option<f64>)| Some(real((symbol, value.filter(|value| *value != 0.0)?)));
     let plants = [
         ("M", plant.primary_mass),
         ("k", plant.stiffness),
@@ -429,44 +426,30 @@ fn symbols(plant: &Parameters) -> Vec<(&'static str, Value)> {
         ("r_min", Some(plant.cavity.least_restitution)),
         ("r_scatter", Some(plant.cavity.scatter)),
     ];
-    let codes = [("r_law", law as i32), ("seed", seed as i32)];
-    let codes = codes.into_iter().filter(|(_, code)| *code != 0);
-    let mut symbols: Vec<_> = plants
-        .map(real)
-        .into_iter()
-        .chain(cavity.into_iter().filter_map(given))
-        .collect();
-    symbols.extend(codes.map(|(symbol, code)| (symbol, Value::Integer(code))));
+    let mut symbols: Vec<_> = plants.into_iter().map(real).collect();
+    symbols.extend(cavity.into_iter().filter_map(given));
+    if law != Law::Constant {
+        symbols.push(("r_law", format!("{law:?}").to_lowercase().into()));
+    }
+    if seed != 0 {
+        symbols.push(("seed", (seed as i64).into()));
+    }
     symbols
 }
 
 /// The keys of the section `[plant]` and their values, as a scene in SI units has them.
 pub fn plant_keys(plant: &Parameters) -> Vec<(&'static str, String)> {
-    let keys = symbols(plant).into_iter().map(|(symbol, value)| {
-        let text = match value {
-            Value::Integer(code) if symbol == "r_law" => format!("\"{:?}\"", Law::ALL[code as usize]).to_lowercase(),
-            Value::Integer(number) => number.to_string(),
-            Value::Real(number) => format!("{number:?}"),
-            Value::Boolean(is_on) => is_on.to_string(),
-        };
-        (symbol, text)
+    let keys = symbols(plant).into_iter().map(|(symbol, value)| match value {
+        toml::Value::Float(number) => (symbol, format!("{number:?}")),
+        toml::Value::Integer(number) => (symbol, number.to_string()),
+        text => (symbol, format!("{:?}", text.as_str().unwrap_or_default())),
     });
     keys.collect()
 }
 
 /// Writes the parameters under their symbols, as a scene has them.
 fn serialize<S: Serializer>(plant: &Parameters, serializer: S) -> Result<S::Ok, S::Error> {
-    let symbols = symbols(plant);
-    let mut map = serializer.serialize_map(Some(symbols.len()))?;
-    for (symbol, value) in symbols {
-        match value {
-            Value::Integer(code) if symbol == "r_law" => map.serialize_entry(symbol, &Law::ALL[code as usize])?,
-            Value::Integer(_) => map.serialize_entry(symbol, &plant.cavity.seed)?,
-            Value::Real(number) => map.serialize_entry(symbol, &number)?,
-            Value::Boolean(_) => {}
-        }
-    }
-    map.end()
+    serializer.collect_map(symbols(plant))
 }
 
 // The `[record]` section: how long to drive, to record and to average.

@@ -2,7 +2,7 @@
 
 use vines_model::{
     Dimensionless,
-    map::{RegimeResult, Run, observe},
+    map::{CellRun, RegimeResult, observe},
     orbit::{phase_resonant, settle},
     regime::Regime,
 };
@@ -35,7 +35,7 @@ fn each_regime_is_found_where_it_is_known_to_be() {
 fn a_motion_on_its_way_to_the_symmetric_orbit_is_decided_before_it_has_settled() {
     let (scene, sigma) = (Dimensionless::new(0.0084, 1.43, 0.65, 1.1), -1.1408);
     let early = at(1.1, sigma, MOVING);
-    let full = Run::new(&scene, sigma, MOVING).unwrap().decided(400, 400).unwrap();
+    let full = CellRun::new(&scene, sigma, MOVING).unwrap().decided(400, 400).unwrap();
     println!("{early:?}\n{full:?}");
     assert_eq!((early.regime, early.impacts, early.periods), (full.regime, 2, 1));
     assert!(early.followed < 100 && early.recurrence.unwrap() > 1e-5);

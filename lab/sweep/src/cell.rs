@@ -5,7 +5,7 @@ use std::error::Error;
 use Read::{Count, Failure, Number, Regime as Code};
 use vines_model::{
     ArgumentError, Dimensionless,
-    map::{RegimeResult, Run, SteadyResponse},
+    map::{CellRun, RegimeResult, SteadyResponse},
     orbit::{Orbit, symmetric_orbits},
     regime::Regime,
 };
@@ -86,7 +86,7 @@ pub struct Cell {
 pub(crate) fn compute(scene: &Scene, sigma: f64, numbers: &Dimensionless, settings: &Settings) -> Cell {
     let results = settings.results;
     let simulated = || {
-        let mut run = Run::new(numbers, sigma, scene.dimensionless_start())?;
+        let mut run = CellRun::new(numbers, sigma, scene.dimensionless_start())?;
         let result = run.decided(0, settings.periods)?;
         let response = results.response.then(|| run.response(&result)).transpose()?;
         Ok((result, response))

@@ -221,7 +221,7 @@ const FINEST: f64 = 1e-12;
 /// Difference in sigma of a bifurcation that is located twice.
 const SAME: f64 = 1e-9;
 
-struct Curve<'a> {
+struct Continuation<'a> {
     scene: &'a Dimensionless,
     start: &'a Periodic,
     condition: Condition,
@@ -229,7 +229,7 @@ struct Curve<'a> {
     reach: f64,
 }
 
-impl Curve<'_> {
+impl Continuation<'_> {
     /// The direction of the curve, and the sign of its equations' determinant, which is the same all along the curve.
     fn tangent(&self, x: &Unknowns, towards: &Unknowns) -> Option<(Unknowns, f64)> {
         let returned = follow(self.scene, &self.start.pattern, x)?;
@@ -368,7 +368,7 @@ pub fn continue_from(
     limits: &ContinuationLimits,
 ) -> Branch {
     let reach = APPROACH * limits.step;
-    let curve = Curve { scene, start, condition, reach };
+    let curve = Continuation { scene, start, condition, reach };
     let mut branch = Branch {
         points: vec![start.clone()],
         special: Vec::new(),
@@ -459,7 +459,7 @@ pub fn branch_off(
     let mut towards = Unknowns::zeros();
     towards.fixed_rows_mut::<4>(0).copy_from(&aside);
     let doubled = Periodic { pattern: from.pattern.doubled(), ..from.clone() };
-    let curve = Curve { scene, start: &doubled, condition, reach: 0.0 };
+    let curve = Continuation { scene, start: &doubled, condition, reach: 0.0 };
     let x = curve.correct(&from.unknowns(), &towards, ASIDE)?;
     let start = curve.motion(&x)?;
     let mut branch = continue_from(scene, &start, condition, &towards, limits);

@@ -163,7 +163,7 @@ pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknown
         .copy_from(&(monodromy - Matrix4::identity()));
     by.column_mut(4).scale_mut(scene.epsilon);
 
-    let harmonic = Harmonic::new(scene, &map, pattern);
+    let harmonic = HarmonicCoefficients::new(scene, &map, pattern);
     let (s, s_by) = harmonic.of(g, sum, &sum_by, scene.epsilon);
     Some(Returned { residual, by, s, s_by, bounces, durations, monodromy })
 }
@@ -181,12 +181,12 @@ fn chained(step: &Step, by: &ByAll) -> (ByAll, RowByAll) {
 }
 
 /// `S = direct G + impulses sum`: the base through the oscillator, and the impulses through the oscillator and, for v, the particle.
-struct Harmonic {
+struct HarmonicCoefficients {
     direct: [Complex<f64>; 2],
     impulses: [Complex<f64>; 2],
 }
 
-impl Harmonic {
+impl HarmonicCoefficients {
     /// Each coefficient with its derivative by Omega.
     fn new(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern) -> Self {
         let omega = map.oscillator.omega;
@@ -283,7 +283,7 @@ pub enum Bifurcation {
 }
 
 /// The value of an equation and its derivative by the unknowns.
-pub(super) type Row = (f64, RowSVector<f64, 6>);
+pub(super) type Equation = (f64, RowSVector<f64, 6>);
 
 /// Step of the central differences for conditions on second derivatives of the map. It affects how fast Newton's method converges, not where to.
 const STEP: f64 = 1e-6;
@@ -341,7 +341,7 @@ impl Condition {
         pattern: &ImpactPattern,
         x: &Unknowns,
         returned: &Returned,
-    ) -> Row {
+    ) -> Equation {
         let mut row = RowSVector::<f64, 6>::zeros();
         match *self {
             Condition::Sigma(sigma) => {
@@ -366,7 +366,7 @@ fn by_differences(
     x: &Unknowns,
     returned: &Returned,
     f: impl Fn(&Returned) -> f64,
-) -> Row {
+) -> Equation {
     let at = |n: usize, step: f64| {
         let mut moved = *x;
         moved[n] += step;
@@ -572,7 +572,7 @@ pub(super) fn newton(
     scene: &Dimensionless,
     pattern: &ImpactPattern,
     mut x: Unknowns,
-    conditions: impl Fn(&Unknowns, &Returned) -> [Row; 2],
+    conditions: impl Fn(&Unknowns, &Returned) -> [Equation; 2],
 ) -> Option<Unknowns> {
     let mut last = f64::INFINITY;
     for _ in 0..ROUNDS {

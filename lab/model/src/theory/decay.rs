@@ -29,20 +29,20 @@ pub struct DecayPoint {
 /// `D1 C~ = -loss(B)` becomes `D1 B = -loss(B) dB/dC~`, and `tau1` is the integral of `(2 K B - pi)/loss(B)`
 /// with `K = R^2 + pi^2/4`: a logarithm and an arc tangent, because the loss is quadratic in B.
 #[derive(Debug, Clone, Copy)]
-pub struct Decay {
+pub struct ManifoldDecay {
     flow: SlowFlow,
     start: f64,
 }
 
 impl SlowFlow {
     /// The free decay from the particle speed `b`; None left of the fold, or without dissipation.
-    pub fn decay(&self, b: f64) -> Option<Decay> {
+    pub fn decay(&self, b: f64) -> Option<ManifoldDecay> {
         let dissipates = self.lambda > 0.0 || self.manifold.dissipation > 0.0;
-        (dissipates && b >= self.manifold.b_min()).then_some(Decay { flow: *self, start: b })
+        (dissipates && b >= self.manifold.b_min()).then_some(ManifoldDecay { flow: *self, start: b })
     }
 }
 
-impl Decay {
+impl ManifoldDecay {
     /// Slow time at which the fold is reached and the impacts lose synchrony; infinite if it never is.
     pub fn duration(&self) -> f64 {
         self.time(self.flow.manifold.b_min())
