@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use lovines::{Cavity, InvalidValue, Restitution, State};
 use phase_lock::{ConfigError, Number};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+use vines_model::ArgumentError;
 
 pub use backbone::BackboneSettings;
 pub use chain::ChainSettings;
@@ -511,24 +512,14 @@ impl RecordSettings {
 
 // Options of a scene: a number, or `false` or "none". Zero is a number like every other.
 
-/// What the file says.
-#[derive(Deserialize)]
-#[serde(untagged, expecting = "expected a number, or false or \"none\"")]
-enum WrittenOption<T> {
-    Value(T),
-    Switch(bool),
-    Word(String),
-}
-
 /// Reads an option.
 fn option<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<Option<T>, D::Error> {
-    match WrittenOption::deserialize(from)? {
-        WrittenOption::Value(value) => Ok(Some(value)),
-        WrittenOption::Switch(false) => Ok(None),
-        WrittenOption::Word(word) if word == "none" => Ok(None),
-        WrittenOption::Switch(_) | WrittenOption::Word(_) => {
-            Err(D::Error::custom("expected a number, or false or \"none\""))
-        }
+    match toml::Value::deserialize(from)? {
+        toml::Value::Boolean(false) => Ok(None),
+        toml::Value::String(word) if word == "none" => Ok(None),
+        value => T::deserialize(value)
+            .map(Some)
+            .map_err(|_| D::Error::custom("expected a number, or false or \"none\"")),
     }
 }
 
@@ -572,7 +563,7 @@ pub enum SceneError {
     #[error("{origin}: {message}")]
     Syntax { origin: String, message: String },
     #[error("--set: {0}")]
-    Argument(#[from] SyntaxError),
+    Argument(#[from] ArgumentError),
     #[error("--set {argument}: {message}")]
     Override { argument: String, message: String },
     #[error("{key} = {} {unit}: {allowed}", Number(*value))]
@@ -590,16 +581,6 @@ pub enum SceneError {
     Controller(#[from] ConfigError),
     #[error("{origin}: {message}")]
     Keys { origin: String, message: String },
-}
-
-/// An argument that is not `section.key=value`.
-#[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages explain the variants")]
-pub enum SyntaxError {
-    #[error("{}; expected section.key=value, for instance plant.r=0.7 or resonance.sensor=q1", .0.message())]
-    Toml(#[from] toml::de::Error),
-    #[error("expected one section.key=value, for instance plant.r=0.7")]
-    NotOneKey,
 }
 
 /// A message of the TOML reader, without types of Rust.

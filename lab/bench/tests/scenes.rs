@@ -140,10 +140,7 @@ fn values_that_make_no_sense_are_named_with_unit_and_range() {
             "excitation.G=-1",
             ["excitation.G = -1 (dimensionless)", "zero or positive"],
         ),
-        (
-            "controller.omega_start=2",
-            ["controller.omega_start = 2 (omega0)", "omega_max = 1.1"],
-        ),
+        ("phase_lock.omega_start=70", ["phase_lock.omega_start", "omega_max"]),
         (
             "controller.omega_max=0.5",
             ["controller.omega_max = 0.5 (omega0)", "omega_min = 0.9"],
@@ -289,7 +286,7 @@ fn every_parameter_of_the_controller_has_exactly_one_key_of_the_scene() {
             (_, Value::Integer(_)) => "5".into(),
             ("sample_time", _) => "120.0".into(),
             ("omega_max", _) => "1.2".into(),
-            ("omega_start", _) => "1.01".into(),
+            ("omega_start", _) => "56.0".into(),
             ("omega_min", _) => "0.8".into(),
             ("bandwidth", _) => "0.12".into(),
             ("amplitude", _) => "1.2".into(),

@@ -43,14 +43,8 @@ struct InputChannel {
 
 impl InputChannel {
     fn read(&mut self, value: f64, elapsed: f64, normal: &mut NormalDistribution) -> f64 {
-        let noisy = match &mut self.sensor {
-            Some(sensor) => sensor.read(value, normal),
-            None => value,
-        };
-        let filtered = match &mut self.filter {
-            Some(filter) => filter.pass(noisy, elapsed),
-            None => noisy,
-        };
+        let noisy = self.sensor.as_mut().map_or(value, |sensor| sensor.read(value, normal));
+        let filtered = self.filter.as_mut().map_or(noisy, |filter| filter.pass(noisy, elapsed));
         converted(self.converter.as_ref(), filtered)
     }
 }

@@ -19,8 +19,6 @@ pub struct ControllerSettings {
     pub samples_per_period: f64,
     /// Bandwidth of the phase detector, in units of omega0: the only tuning parameter; the gains of the loop follow from it.
     pub bandwidth: f64,
-    /// Frequency at the start, in units of omega0.
-    pub omega_start: f64,
     /// Lowest frequency allowed, in units of omega0.
     pub omega_min: f64,
     /// Highest frequency allowed, in units of omega0.
@@ -43,7 +41,6 @@ impl Default for ControllerSettings {
         Self {
             samples_per_period: 100.0,
             bandwidth: 0.1,
-            omega_start: 1.0,
             omega_min: 0.9,
             omega_max: 1.1,
             phase_target: -90.0,
@@ -112,13 +109,6 @@ impl ControllerSettings {
             "(omega0)",
             high > low,
             format!("must be above omega_min = {low}"),
-        )?;
-        check(
-            "controller.omega_start",
-            self.omega_start,
-            "(omega0)",
-            (low..=high).contains(&self.omega_start),
-            format!("must lie between omega_min = {low} and omega_max = {high}"),
         )?;
         within("controller.phase_target", self.phase_target, "degrees", [-180.0, 180.0])
     }
@@ -195,7 +185,6 @@ impl Scene {
         });
         self.phase_lock.apply(Config {
             sample_time: self.sample_time(),
-            omega_start: c.omega_start * omega0,
             omega_min: c.omega_min * omega0,
             omega_max: c.omega_max * omega0,
             bandwidth: c.bandwidth * omega0,
@@ -301,9 +290,8 @@ const IMPACTS: f64 = 1.1;
 // The `[phase_lock]` section: parameters of the controller that no other key sets, in SI units and by their names in `PhaseLock.fmu`.
 
 /// The parameters that other keys of a scene set, in units that suit any plant.
-pub const KEYS: [(&str, &str); 13] = [
+pub const KEYS: [(&str, &str); 12] = [
     ("sample_time", "controller.samples_per_period"),
-    ("omega_start", "controller.omega_start"),
     ("omega_min", "controller.omega_min"),
     ("omega_max", "controller.omega_max"),
     ("amplitude", "excitation.G"),

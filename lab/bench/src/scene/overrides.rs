@@ -4,8 +4,9 @@ use std::str::FromStr;
 
 use serde::Deserialize;
 use toml::{Table, Value};
+use vines_model::ArgumentError;
 
-use super::{PAPER, Scene, SceneError, Sections, SyntaxError, plain};
+use super::{PAPER, Scene, SceneError, Sections, plain};
 
 /// One replaced value.
 #[derive(Debug, Clone)]
@@ -17,15 +18,17 @@ pub struct Override {
 }
 
 impl FromStr for Override {
-    type Err = SyntaxError;
+    type Err = ArgumentError;
 
-    fn from_str(argument: &str) -> Result<Self, SyntaxError> {
+    fn from_str(argument: &str) -> Result<Self, ArgumentError> {
         // What is not TOML is text: the shell takes quotes away.
         let text = || {
             let (key, word) = argument.split_once('=')?;
             format!("{key}={:?}", word.trim()).parse().ok()
         };
-        let table: Table = argument.parse().or_else(|error| text().ok_or(error))?;
+        let expected = "expected section.key=value, for instance plant.r=0.7 or resonance.sensor=q1";
+        let parsed: Result<Table, toml::de::Error> = argument.parse().or_else(|error| text().ok_or(error));
+        let table = parsed.map_err(|error| format!("{}; {expected}", error.message()))?;
         let single = |table: Table| {
             let mut entries = table.into_iter();
             entries.next().filter(|_| entries.next().is_none())
@@ -34,7 +37,7 @@ impl FromStr for Override {
             Some((section, Value::Table(keys))) => (section, single(keys)),
             _ => (String::new(), None),
         };
-        let (key, value) = keys.ok_or(SyntaxError::NotOneKey)?;
+        let (key, value) = keys.ok_or(expected)?;
         Ok(Self { argument: argument.into(), section, key, value })
     }
 }
