@@ -235,5 +235,4 @@ fn a_base_that_becomes_late_while_the_lock_is_held_is_an_error() {
     let late = with(&scene, RigFault::Base(SensorFault::Late(3)), settled);
     let refused = identify(&late, &scene).unwrap_err();
     assert!(matches!(refused, IdentificationError::OffTarget { .. }), "{refused}");
-    println!("{refused}");
 }

@@ -144,7 +144,6 @@ fn the_check_measures_the_linear_response_and_states_gains_with_a_phase_margin()
             .unwrap()
             .linear
             .unwrap();
-        println!("{found:?}");
         let damping = 0.5 * d.epsilon * d.lambda * d.omega0;
         assert!((found.damping_rate / damping - 1.0).abs() < tolerance);
         assert!((found.response_gain / (0.5 * d.omega0) - 1.0).abs() < tolerance);
@@ -219,7 +218,6 @@ fn natural_frequency_and_damping_of_the_rig_replace_those_of_the_scene() {
             .collect();
         assert_eq!(differ, ["natural frequency", "damping rate"]);
         let linear = found.linear.unwrap();
-        println!("{settings:?}: {linear:?}");
         let (omega0, damping) = (plant.natural_frequency(), 0.5 * plant.damping / plant.primary_mass);
         // Clean, the fit is exact but for rounding.
         let limit = 3.0 * linear.u_damping_rate + 1e-6 * omega0;

@@ -67,7 +67,6 @@ fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most_and_six_bits_s
         "chain.reference=false",
     ])
     .unwrap();
-    println!("sigma moves by {:.1e}", real.sigma - ideal.sigma);
     assert!((real.sigma - ideal.sigma).abs() <= 2e-3);
     assert!((real.c - ideal.c).abs() <= 2e-3);
     // The response is within one step of this converter.
@@ -149,7 +148,6 @@ fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04
         mean_square(errors).sqrt()
     };
     let [fit, through_noise] = [rms(clean), rms(&noisy(clean, 40.0, 1))];
-    println!("clean {fit:.1e}, at 40 dB {through_noise:.1e}");
     assert!(fit <= 0.02 && through_noise <= 0.04);
     // The zero crossings that the fit is compared with do not depend on the sample time.
     let fitted = decay_points(clean, scene).points;
@@ -377,7 +375,6 @@ fn a_backbone_is_tracked_through_mains_hum_and_ripple_and_its_points_say_so() {
         let scene = checked(&[settings, &levels].concat());
         let tracked = |tones: &[(f64, f64)]| tracked(&mut rig(&scene, tones), &scene);
         for (clean, point) in tracked(&[]).iter().zip(tracked(&in_metres(tones, &scene))) {
-            println!("{tones:?}, {settings:?}: {point:?}");
             assert!(
                 point.settled
                     && [point, *clean]
@@ -402,7 +399,6 @@ fn a_lock_is_identified_through_mains_hum_and_ripple() {
             identify(&record, &scene).unwrap().lock
         };
         let (clean, found) = (lock(&[]), lock(&in_metres(tones, &scene)));
-        println!("{tones:?}, {settings:?}: {found:?}");
         let said = found.tone.unwrap().to_string();
         assert!(
             said.starts_with(&format!("a foreign tone of {:.1} Hz, ", tones[0].0)),
@@ -455,7 +451,6 @@ fn no_motion_of_a_particle_is_a_foreign_tone() {
             irregular += usize::from(regime == Regime::Other);
         }
     }
-    println!("{irregular} of 120 windows are irregular");
     assert!(irregular >= 30);
 }
 
@@ -472,7 +467,6 @@ fn the_phase_of_a_steady_motion_locks_as_fast_as_reported_and_faster_the_wider_t
         scene.controller.bandwidth = bandwidth;
         let [from_start, from_motion] =
             [&start, &motion].map(|rig| periods_to_settle(&mut rig.clone(), &scene, true).unwrap());
-        println!("{bandwidth}: {from_start:.0} periods from the start, {from_motion:.0} from the motion");
         // The criterion counts whole periods.
         assert!(from_motion.round() <= published + 1.0 && from_motion < before);
         // From rest the response grows and the impacts find their rhythm first, for about 15 periods.
@@ -560,10 +554,6 @@ fn single_precision_keeps_the_lock_within_1e_4_in_sigma() {
             };
             (drive, output.settled)
         });
-        println!(
-            "{settings:?}: {expected:.6}, in single precision {:+.1e}, settled: {settled}",
-            sigma - expected
-        );
         // With the lightest damping, rounding in single precision is larger than the drift that counts as settled.
         let is_lightest = settings.contains(&"plant.m=0.004");
         assert!((sigma - expected).abs() < 1e-4 && (settled || is_lightest) && locks);

@@ -53,6 +53,5 @@ fn the_waveform_approaches_the_exact_motion_as_epsilon() {
     };
     let (coarse, fine) = (distance(1e-2), distance(1e-3));
     let slope = (coarse / fine).log10();
-    println!("q2 of the waveform less the exact one: {coarse:.1e}, {fine:.1e}, as epsilon^{slope:.2}");
     close(slope, 1.0, 0.1);
 }
