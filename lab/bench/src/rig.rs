@@ -208,20 +208,14 @@ pub enum ControllerError {
 impl RigError {
     /// The error of the implementation, if it is an `E`.
     pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
-        match self {
-            Self::Failed(cause) => cause.downcast_ref(),
-            Self::Refused(_) | Self::NoHold => None,
-        }
+        self.source()?.downcast_ref()
     }
 }
 
 impl ControllerError {
     /// The error of the implementation, if it is an `E`.
     pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
-        match self {
-            Self::Failed(cause) => cause.downcast_ref(),
-            Self::NoResponseLoop | Self::Refused(_) => None,
-        }
+        self.source()?.downcast_ref()
     }
 }
 

@@ -52,14 +52,6 @@ fn a_dimensionless_scene_is_its_own_model() {
 }
 
 #[test]
-fn one_value_can_be_set() {
-    let scene = paper(&["plant.r=0.7", "record.lock_periods=10", "start.dq2 = -0.4"]).unwrap();
-    assert_eq!(scene.plant.restitution, 0.7);
-    assert_eq!(scene.lock_periods(), 10.0);
-    assert_eq!(scene.start.dq2, -0.4);
-}
-
-#[test]
 fn setting_e_replaces_g_and_back() {
     assert_eq!(paper(&["excitation.E=1e-4"]).unwrap().amplitude, 1e-4);
     let text = "[plant]\nepsilon = 0.01\nlambda = 1\nr = 0.65\n[excitation]\nE = 0.02";

@@ -13,9 +13,6 @@ use rand_distr::{Distribution, StandardNormal};
 use super::{Drive, Rig, RigError, RigStage, Sensors};
 use crate::scene::Scene;
 
-/// Largest deviation of a sampling instant, in standard deviations.
-const JITTER_MAX: f64 = 4.0;
-
 /// A rig behind its measurement chain.
 pub struct Chain {
     rig: Box<dyn Rig>,
@@ -94,7 +91,7 @@ impl Chain {
     /// Duration of a sample period of `step` seconds, whose end is not where it should be.
     fn taken(&mut self, step: f64) -> f64 {
         let late = if self.jitter > 0.0 {
-            self.jitter * self.normal.next().clamp(-JITTER_MAX, JITTER_MAX)
+            self.jitter * self.normal.next()
         } else {
             0.0
         };
