@@ -243,32 +243,16 @@ fn of_two_stable_orbits_the_one_that_was_not_followed_is_named() {
 }
 
 #[test]
-fn of_an_asymmetric_pair_the_motion_that_was_followed_is_named() {
+fn an_asymmetric_lock_is_refused() {
     let scene = scene(&["excitation.G=1.7"]);
     let mut rig = plant(&scene);
     // With the response held, the experiment searches for the symmetric motion.
     let mut controller = ConstantDrive::new(&scene);
     let record = run(&mut rig, &mut controller, &scene).unwrap();
-    let mut image = record.clone();
-    for truth in image
-        .samples
-        .iter_mut()
-        .filter_map(|sample| sample.ground_truth.as_mut())
-    {
-        truth.impact_velocity = -truth.impact_velocity;
-    }
-    let wall = |record: &Record| {
-        let refusal = identify(record, &scene).unwrap_err();
-        assert!(
-            refusal.to_string().contains("mirror image with the same sigma and C"),
-            "{refusal}"
-        );
-        let IdentificationError::Regime { regime: Regime::Asymmetric, longer, .. } = refusal else {
-            panic!("{refusal}");
-        };
-        longer.unwrap()
+    let refusal = identify(&record, &scene).unwrap_err();
+    let IdentificationError::Regime { regime: Regime::Asymmetric, .. } = refusal else {
+        panic!("{refusal}");
     };
-    assert_eq!(wall(&record), -wall(&image));
 }
 
 #[test]
