@@ -63,19 +63,6 @@ impl ImpactPattern {
         Self { walls, half_periods: 2 * self.half_periods, mirrored: false }
     }
 
-    /// The pattern of half the length that this one doubles; None if it does not repeat itself or its mirror image.
-    pub fn halved(&self) -> Option<Self> {
-        let count = self.walls.len() / 2;
-        let (walls, rest) = self.walls.split_at(count);
-        let half = Self {
-            walls: walls.into(),
-            half_periods: self.half_periods / 2,
-            mirrored: !self.half_periods.is_multiple_of(4),
-        };
-        let same = walls.iter().zip(rest).all(|(one, other)| half.sign() * one == *other);
-        (!self.mirrored && self.walls.len().is_multiple_of(2) && count > 0 && same).then_some(half)
-    }
-
     /// Impacts over the whole period of the motion.
     pub fn impacts(&self) -> usize {
         self.walls.len() * if self.mirrored { 2 } else { 1 }
@@ -489,9 +476,12 @@ impl Periodic {
     /// How far the second half of the motion is from repeating the first one or its mirror image; None for a pattern that is not
     /// the double of another. It changes sign where a branch passes the motion that it doubles.
     pub(super) fn halves_apart(&self) -> Option<Vector4<f64>> {
-        let half = self.pattern.halved()?;
-        let (first, middle) = (&self.bounces[0], &self.bounces[half.walls.len()]);
-        Some(first.apart(middle, half.turn(), half.sign()))
+        let ImpactPattern { walls, half_periods, mirrored } = &self.pattern;
+        let (first, second) = walls.split_at(walls.len() / 2);
+        let sign = if half_periods.is_multiple_of(4) { 1.0 } else { -1.0 };
+        let doubles = !mirrored && first.len() == second.len() && first.iter().zip(second).all(|(a, b)| sign * a == *b);
+        let middle = self.bounces.get(first.len()).filter(|_| doubles && !first.is_empty())?;
+        Some(self.bounces[0].apart(middle, 0.5 * self.pattern.turn(), sign))
     }
 
     /// Numbers that a motion shares with its mirror image and with itself one period later.
