@@ -145,8 +145,8 @@ fn the_decay_in_closed_form_follows_the_slow_flow_to_the_fold() {
         let decay = flow.decay(1.0, 20_001).expect("it dissipates");
         assert_eq!(decay[0].tau1, 0.0);
         close(decay[20_000].c, flow.manifold.c_min(), 1e-14);
-        // D1 C~ by differences between neighbours.
-        for around in decay.windows(3).step_by(1999) {
+        // D1 C~ by differences between neighbours, away from the fold.
+        for around in decay[..15_000].windows(3).step_by(1999) {
             let [before, at, after] = [&around[0], &around[1], &around[2]];
             let rate = (after.c.powi(2) - before.c.powi(2)) / (after.tau1 - before.tau1);
             close(rate, -flow.loss(at.b), 1e-7);
