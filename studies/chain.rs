@@ -14,18 +14,18 @@ use vines_testbench::experiment::{Plan, run};
 use vines_testbench::identification::{ResonancePoint, identify};
 use vines_testbench::rig::{BuiltIn, Simulated};
 
-/// Settings of `[chain]`; the first is the ideal chain.
+/// Settings of `[chain]`, unless they name another section; the first is the ideal chain.
 const STAGES: [&str; 18] = [
     "",
     "adc_bits=16",
     "adc_bits=12",
     "adc_bits=8",
     "hold=true reference=false",
-    "hold=true reference=false compensate=false",
+    "hold=true reference=false controller.delay=0",
     "hold=true",
     "hold=true reference=false dac_bits=16",
     "delay=1 reference=false",
-    "delay=1 reference=false compensate=false",
+    "delay=1 reference=false controller.delay=0",
     "delay=1",
     "delay=5 reference=false",
     "filter=10.0",
@@ -38,7 +38,11 @@ const STAGES: [&str; 18] = [
 
 /// The lock behind a stage, held for 200 periods.
 fn lock(stage: &str) -> Result<ResonancePoint, Failure> {
-    let mut settings: Vec<String> = stage.split_whitespace().map(|one| format!("chain.{one}")).collect();
+    let key = |setting: &str| match setting.starts_with("controller.") {
+        true => setting.to_string(),
+        false => format!("chain.{setting}"),
+    };
+    let mut settings: Vec<String> = stage.split_whitespace().map(key).collect();
     settings.push("record.hold_periods=200".into());
     let scene = scene("", &settings)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;

@@ -262,7 +262,7 @@ pub const LOCK_TIMES: [(f64, f64); 5] = [(0.02, 234.0), (0.05, 102.0), (0.1, 55.
 /// Only the phase is to settle; the largest bandwidth needs more than a hundred samples per period.
 pub const LOCK_TIME_SETTINGS: [&str; 5] = [
     "controller.phase_tolerance=2.0",
-    "controller.dwell_periods=20",
+    "phase_lock.lock.dwell=20",
     "controller.frequency_tolerance=0.22",
     "controller.amplitude_tolerance=27.0",
     "controller.samples_per_period=200",

@@ -5,7 +5,7 @@ const MOST_CHANGES = 150;
 // Samples that a link repeats; more would take seconds.
 const MOST_SAMPLES = 3e6;
 
-// Largest displacement over b that a mass is put to: C_max of the default scene.
+// Largest displacement over b that a mass is put to: the limit of the default scene.
 const MOST_PLACE = 4;
 
 // The address that repeats the motion of `page`. A motion with too many changes or samples is left out, and a sentence says so: the link

@@ -10,7 +10,7 @@ use pyo3::{
 };
 use serde_json::json;
 use vines_model::{
-    map::Run,
+    map::CellRun,
     numerics::Estimate,
     orbit,
     theory::{SlowFlow, resonant},
@@ -217,7 +217,7 @@ pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<Real>, periods: i64) 
                     .find(|orbit| orbit.stable)
                     .map_or(0.0, |orbit| orbit.sigma)
             });
-            let mut run = Run::new(&numbers, sigma, start)?.stopped_by(flag);
+            let mut run = CellRun::new(&numbers, sigma, start)?.stopped_by(flag);
             run.decided(0, periods as usize).map(|point| (sigma, point))
         },
     )?;

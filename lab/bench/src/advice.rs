@@ -1,6 +1,5 @@
 //! Advice after a run without the expected lock, from the exact orbits of the scene.
 
-use lovines::cavity::GRAVITY;
 use vines_model::numerics::range;
 use vines_model::orbit::{Orbit, exact_backbone, phase_resonant};
 use vines_model::regime::Regime;
@@ -12,8 +11,6 @@ use crate::scene::{Dimensionless, Scene};
 /// Detunings at which the backbone is searched for stable orbits, and their distance.
 const SEARCHED: [f64; 2] = [-6.0, 3.0];
 const STEP: f64 = 0.005;
-/// Smallest gap in the range of drives that is searched for.
-const GAP: f64 = 2e-3;
 
 /// The stable symmetric 1:1 orbits at phase resonance, at any drive, by rising detuning.
 pub fn stable_orbits(d: &Dimensionless) -> Vec<Orbit> {
@@ -29,43 +26,14 @@ pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
     (low <= high).then_some([low, high])
 }
 
-/// The ranges of drives with a stable symmetric 1:1 orbit at phase resonance, without gaps wider than `GAP`.
-fn stable_ranges(d: &Dimensionless) -> Vec<[f64; 2]> {
-    let mut drives: Vec<f64> = stable_orbits(d).into_iter().map(|orbit| orbit.g).collect();
-    drives.sort_by(f64::total_cmp);
-    let is_stable = |g: f64| {
-        let orbits = phase_resonant(&Dimensionless { g, ..*d });
-        orbits.iter().any(|orbit| orbit.stable)
-    };
-    let mut ranges: Vec<[f64; 2]> = Vec::new();
-    for g in drives {
-        match ranges.last_mut() {
-            Some(last) if g - last[1] < GAP || is_stable(0.5 * (g + last[1])) => last[1] = g,
-            _ => ranges.push([g, g]),
-        }
-    }
-    ranges
-}
-
 /// Why a run that was expected to lock the symmetric 1:1 motion may not have done so, from the scene and the regime of the last periods.
 /// `None` where the exact orbits give no reason.
 pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
     let reason = ideal_reason(scene, regime)?;
-    let Some(left_out) = scene.left_out() else {
-        return Some(reason);
-    };
-    let weight =
-        GRAVITY * scene.plant.cavity.tilt.sin().abs() / (scene.plant.half_width * scene.dimensionless().omega0.powi(2));
-    let weight = match weight {
-        0.0 => String::new(),
-        weight => format!(
-            ". Gravity along the axis is {weight:.2} b omega0^2: at r = 0.65 and G = 1.1, the 1:1 motion between both walls is lost at about \
-             0.15, and the particle stays near the lower wall"
-        ),
-    };
-    Some(format!(
-        "{reason}. This is said of the ideal cavity, without {left_out}{weight}"
-    ))
+    Some(match scene.left_out() {
+        Some(left_out) => format!("{reason}. This is said of the ideal cavity, without {left_out}"),
+        None => reason,
+    })
 }
 
 fn ideal_reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
@@ -73,12 +41,13 @@ fn ideal_reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
     let mut stable = phase_resonant(&d);
     stable.retain(|orbit| orbit.stable);
     if stable.is_empty() {
-        let text = |[low, high]: &[f64; 2]| format!("from {low:.3} to {high:.3}");
-        let ranges: Vec<String> = stable_ranges(&d).iter().map(text).collect();
-        let range = match ranges[..] {
-            [] => "at no G".into(),
-            _ => format!("for G {}", ranges.join(" and ")),
-        };
+        let range = stable_range(&d).map_or_else(
+            || "at no G".into(),
+            |[low, high]| {
+                let gaps = if (low..=high).contains(&d.g) { ", with gaps" } else { "" };
+                format!("for G from {low:.3} to {high:.3}{gaps}")
+            },
+        );
         return Some(format!(
             "there is no stable symmetric 1:1 orbit at G = {:.4}; it is stable {range}",
             d.g
@@ -86,17 +55,15 @@ fn ideal_reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
     }
     let place = |orbit: &Orbit| format!("sigma = {:.4}, C = {:.4}", orbit.sigma, orbit.c);
     let places: Vec<String> = stable.iter().map(place).collect();
-    let plural = match places[..] {
-        [_] => "orbit of this G is",
-        _ => "orbits of this G are",
-    };
-    let place = format!("the stable symmetric 1:1 {plural} at {}", places.join(" and at "));
-    let omegas = || stable.iter().map(|orbit| 1.0 + d.epsilon * orbit.sigma);
+    let place = format!(
+        "at this G, the stable symmetric 1:1 motion is at {}",
+        places.join(" and at ")
+    );
     let [low, high] = [scene.controller.omega_min, scene.controller.omega_max];
-    if !omegas().any(|omega| (low..=high).contains(&omega)) {
-        let omega = omegas().next_back()?;
+    if !stable.iter().any(|orbit| (low..=high).contains(&orbit.omega)) {
         return Some(format!(
-            "{place}, thus at omega = {omega:.4} omega0, which controller.omega_min = {low} and controller.omega_max = {high} exclude"
+            "{place}, thus at omega = {:.4} omega0, which controller.omega_min = {low} and controller.omega_max = {high} exclude",
+            stable[0].omega
         ));
     }
     match regime? {

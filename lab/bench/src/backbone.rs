@@ -255,9 +255,6 @@ pub fn track(
 }
 
 /// [`track`], which leaves what was measured last in `samples` if it ends before the first point.
-///
-/// # Errors
-/// As [`track`].
 pub fn track_into(
     samples: &mut Vec<Sample>,
     rig: &mut (impl Rig + ?Sized),

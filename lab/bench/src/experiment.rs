@@ -5,7 +5,6 @@
 mod search;
 
 use std::f64::consts::TAU;
-use std::fmt::{self, Display, Formatter};
 
 use thiserror::Error;
 use vines_model::numerics::mean;
@@ -96,35 +95,12 @@ impl Stage {
     }
 }
 
-/// The phase error of a controller, or why there is none.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum PhaseError {
-    /// Its size, degrees.
-    Degrees(f64),
-    /// The signals have no measurable phase.
-    NotMeasured,
-    /// The controller does not say it.
-    NotReported,
-}
-
-impl PhaseError {
-    /// From radians.
-    fn of(radians: f64) -> Self {
-        Self::Degrees(radians.to_degrees())
-    }
-}
-
-impl Display for PhaseError {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Degrees(degrees) => write!(f, "the phase error is {degrees:.3} degrees"),
-            Self::NotMeasured => write!(f, "the phase cannot be measured"),
-            Self::NotReported => write!(
-                f,
-                "the controller does not report its phase error (an FMU does by the output `phase_error`, which [controller_names] can map)"
-            ),
-        }
-    }
+/// A phase error in degrees, in words.
+fn phase_in_words(error: Option<f64>) -> String {
+    error.map_or_else(
+        || "the phase cannot be measured, or the controller does not report its phase error".into(),
+        |degrees| format!("the phase error is {degrees:.3} degrees"),
+    )
 }
 
 /// Why an experiment ended early.
@@ -136,12 +112,14 @@ pub enum ExperimentError {
     #[error(transparent)]
     Controller(#[from] ControllerError),
     #[error(
-        "no lock within {periods:.0} periods of the drive: {phase_error} at omega = {omega:.6} rad/s; \
-         see record.lock_periods and the [controller] section"
+        "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s; \
+         see record.lock_periods and the [controller] section",
+        phase_in_words(*phase_error)
     )]
     NoLock {
         periods: f64,
-        phase_error: PhaseError,
+        /// Degrees.
+        phase_error: Option<f64>,
         omega: f64,
     },
     #[error("the requested drive G = {g:.4} was not reached within {periods:.0} periods: {why}")]
@@ -155,7 +133,7 @@ pub enum ExperimentError {
     },
     #[error(
         "the 1:1 motion, held at {held:.4e} m (C = {:.4}), is {regime} at {level:.4e} m (C = {:.4}): the backbone ends between the two, or the \
-         step was too large; set backbone.A_to or C_to nearer to the former, or more backbone.points",
+         step was too large; set backbone.C_to nearer to the former, or more backbone.points",
         held / b, level / b
     )]
     MotionLost {
@@ -361,19 +339,8 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
                 periods: self.periods,
                 stage,
                 fault: fault.unwrap_or(Fault::LockLost),
-                evidence: evidence(self.samples, self.scene, fault.unwrap_or(Fault::LockLost), |error| {
-                    self.phase_error(error)
-                }),
+                evidence: evidence(self.samples, self.scene, fault.unwrap_or(Fault::LockLost)),
             },
-        }
-    }
-
-    /// A phase error, rad, or why there is none.
-    fn phase_error(&self, error: Option<f64>) -> PhaseError {
-        match error {
-            Some(radians) => PhaseError::of(radians),
-            None if self.controller.reports_phase_error() => PhaseError::NotMeasured,
-            None => PhaseError::NotReported,
         }
     }
 
@@ -381,7 +348,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     fn no_lock(&self, command: &Command) -> ExperimentError {
         ExperimentError::NoLock {
             periods: self.periods,
-            phase_error: self.phase_error(command.phase_error),
+            phase_error: command.phase_error.map(f64::to_degrees),
             omega: command.drive.omega,
         }
     }
@@ -407,67 +374,42 @@ fn checked(command: Command) -> Result<Command, ExperimentError> {
     }
 }
 
-/// What the sensors read in the last period before a fault, what the scene allows, and what to do next. `phase_error` makes an error of radians,
-/// or of none.
-fn evidence(
-    samples: &[Sample],
-    scene: &Scene,
-    fault: Fault,
-    phase_error: impl Fn(Option<f64>) -> PhaseError,
-) -> String {
+/// What the sensors read in the last period before a fault, and the limit of the scene that was exceeded.
+fn evidence(samples: &[Sample], scene: &Scene, fault: Fault) -> String {
     let config = scene.controller_config();
     let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
     let samples = &samples[samples.len().saturating_sub(period)..];
     let largest = samples.iter().map(|one| one.sensors.response.abs()).fold(0.0, f64::max);
-    let sensors = samples.last().map(|one| one.sensors).unwrap_or_default();
-    let base = sensors
+    let last = samples.last().map(|one| one.sensors).unwrap_or_default();
+    let base = last
         .reference
         .map_or_else(String::new, |base| format!(", and the base {} m", short(base)));
     let read = format!(
         "the response read {} m{base}; in the last period at most {} m",
-        short(sensors.response),
+        short(last.response),
         short(largest)
     );
+    let limit = |name, value: Option<f64>, unit| {
+        let value = value.map_or_else(|| "none".into(), short);
+        format!(
+            "{read}; {} is {value}{unit}. `vines check` looks for the cause",
+            key(name)
+        )
+    };
     match fault {
-        Fault::ResponseTooLarge => format!(
-            "it read {} m, and {}. Lower excitation.G or the levels of [backbone], or raise the limit if the rig bears it",
-            short(largest),
-            limit("response_max", config.response_max, " m")
-        ),
+        Fault::ResponseTooLarge => limit("response_max", config.response_max, " m"),
         Fault::LockLost => {
             let errors: Option<Vec<f64>> = samples.iter().map(|one| one.command.phase_error).collect();
-            let error = phase_error(errors.map(mean));
-            let allowed = limit(
-                "lock.unlock_tolerance",
-                Some(config.lock.unlock_tolerance.to_degrees()),
-                " degrees",
-            );
-            format!("over the last period {error}, and {allowed}; {read}")
+            let error = phase_in_words(errors.map(|errors| mean(errors).to_degrees()));
+            let tolerance = Some(config.lock.unlock_tolerance);
+            format!(
+                "over the last period {error}; {}",
+                limit("lock.unlock_tolerance", tolerance, " rad")
+            )
         }
-        Fault::NoSignal => format!(
-            "{read}. An amplitude of {} m ({}) with a share of {} of the power ({}) is needed, and {} without it. {CHECK}",
-            short(config.lock.response_min * config.amplitude),
-            key("lock.response_min"),
-            config.lock.coherence_min,
-            key("lock.coherence_min"),
-            limit("signal_timeout", config.signal_timeout, " s")
-        ),
-        Fault::Implausible => {
-            let unit = " of the amplitude as the difference";
-            format!("{read}; {}. {CHECK}", limit("residual_max", config.residual_max, unit))
-        }
-        Fault::Sensor | Fault::TimedOut => format!("{read}. {CHECK}"),
-    }
-}
-
-/// What to do about sensors.
-const CHECK: &str = "`vines check` looks for the cause";
-
-/// What the scene allows for a parameter of the controller.
-fn limit(parameter: &str, value: Option<f64>, unit: &str) -> String {
-    match value {
-        Some(value) => format!("{} allows {}{unit}", key(parameter), short(value)),
-        None => format!("{} sets no limit", key(parameter)),
+        Fault::NoSignal => limit("signal_timeout", config.signal_timeout, " s"),
+        Fault::Implausible => limit("residual_max", config.residual_max, " of the amplitude"),
+        Fault::Sensor | Fault::TimedOut => format!("{read}. `vines check` looks for the cause"),
     }
 }
 
@@ -482,12 +424,12 @@ mod tests {
     use super::*;
     use crate::rig::Sensors;
 
-    /// The text for a fault after a period of readings of the response, m, and of phase errors, rad, on the dimensionless default scene.
-    fn text(setting: &str, fault: Fault, reading: impl Fn(usize) -> (f64, Option<f64>)) -> String {
-        let text = include_str!("../../../scenes/dimensionless.toml");
-        let scene = Scene::parse("dimensionless.toml", text, &[setting.parse().unwrap()]).unwrap();
+    #[test]
+    fn a_fault_is_stated_with_the_readings_and_the_limit_of_the_scene() {
+        let scene = Scene::load(None, &["phase_lock.response_max=0.3".parse().unwrap()]).unwrap();
         let sample = |n: usize| {
-            let (response, phase_error) = reading(n);
+            let response = if n == 140 { -0.301_234_9 } else { 0.2 };
+            let phase_error = Some(if n < 50 { 9.0 } else { 0.25 });
             Sample {
                 time: n as f64 * scene.sample_time(),
                 sensors: Sensors { response, reference: Some(0.01) },
@@ -495,62 +437,17 @@ mod tests {
                 ground_truth: None,
             }
         };
-        let phase_error = |error: Option<f64>| error.map_or(PhaseError::NotMeasured, PhaseError::of);
-        evidence(&(0..150).map(sample).collect::<Vec<_>>(), &scene, fault, phase_error)
-    }
-
-    #[test]
-    fn a_fault_is_stated_with_the_readings_and_the_limit_of_the_scene() {
-        type Reading = fn(usize) -> (f64, Option<f64>);
-        let cases: [(&str, Fault, Reading, &str); 7] = [
-            // The largest reading of the last period, also if the controller switched the drive off a few samples later.
-            (
-                "controller.C_max=0.3",
-                Fault::ResponseTooLarge,
-                |n| (if n == 140 { -0.301_234_9 } else { 0.2 }, None),
-                "it read 0.30123 m, and controller.C_max allows 0.3 m. Lower",
-            ),
-            (
-                "controller.C_max='none'",
-                Fault::ResponseTooLarge,
-                |_| (0.2, None),
-                "controller.C_max sets no limit",
-            ),
-            (
-                "excitation.G=1",
-                Fault::LockLost,
-                |n| (0.4, Some(if n < 50 { 9.0 } else { 0.25 })),
-                "the phase error is 14.324 degrees, and phase_lock.lock.unlock_tolerance allows 11.459 degrees; the response read 0.4 m, \
-                 and the base 0.01 m; in the last period at most 0.4 m",
-            ),
-            (
-                "excitation.G=1",
-                Fault::LockLost,
-                |_| (0.4, None),
-                "the phase cannot be measured",
-            ),
-            (
-                "excitation.G=1",
-                Fault::NoSignal,
-                |_| (1e-7, None),
-                "at most 1e-7 m. An amplitude of 0.00084 m (phase_lock.lock.response_min) with a share of 0.5",
-            ),
-            (
-                "phase_lock.residual_max=0.2",
-                Fault::Sensor,
-                |n| (if n == 149 { f64::NAN } else { 0.4 }, None),
-                "the response read NaN m, and the base 0.01 m; in the last period at most 0.4 m",
-            ),
-            (
-                "phase_lock.residual_max=0.2",
-                Fault::Implausible,
-                |_| (0.4, None),
-                "phase_lock.residual_max allows 0.2 of the amplitude as the difference. `vines check`",
-            ),
-        ];
-        for (setting, fault, reading, expected) in cases {
-            let text = text(setting, fault, reading);
-            assert!(text.contains(expected), "`{expected}` is not in: {text}");
+        let samples: Vec<Sample> = (0..150).map(sample).collect();
+        // The largest reading of the last period, also if the controller switched the drive off a few samples later.
+        let read = "the response read 0.2 m, and the base 0.01 m; in the last period at most 0.30123 m";
+        for (fault, limit) in [
+            (Fault::ResponseTooLarge, "phase_lock.response_max is 0.3 m"),
+            (Fault::LockLost, "phase_lock.lock.unlock_tolerance is 0.2 rad"),
+            (Fault::LockLost, "the phase error is 14.324 degrees"),
+            (Fault::Sensor, "`vines check`"),
+        ] {
+            let text = evidence(&samples, &scene, fault);
+            assert!(text.contains(read) && text.contains(limit), "{text}");
         }
     }
 }

@@ -15,7 +15,6 @@ use crate::scene::{Dimensionless, LinearResponse, Scene};
 
 pub use balance::{Balance, Cycle, Slopes};
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, decay_points, harmonic};
-use response::longer_after;
 pub(crate) use response::{ASYMMETRIC, without_tones};
 pub use response::{Tone, classify, foreign_tone, impacts, regime_by_response};
 pub use vines_model::regime::{Impact, Regime};
@@ -26,8 +25,7 @@ pub enum IdentificationError {
     /// The loop locked another regime than symmetric 1:1.
     #[error(
         "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the regime is {regime}, not symmetric 1:1 with two \
-         impacts per period. Try another [start] (the particle must be moving) or another G{}",
-        mirrored(*longer)
+         impacts per period. Try another [start] (the particle must be moving) or another G"
     )]
     Regime {
         /// What was found instead.
@@ -36,8 +34,6 @@ pub enum IdentificationError {
         sigma: f64,
         /// Amplitude at the lock.
         c: f64,
-        /// The wall, -1 or 1, after which an asymmetric motion's longer flight begins, if the rig reports the impacts.
-        longer: Option<i8>,
     },
     /// The hold contains no periodic motion.
     #[error(
@@ -69,16 +65,6 @@ pub enum IdentificationError {
     },
 }
 
-/// Names the one of two mirror images that was followed.
-fn mirrored(longer: Option<i8>) -> String {
-    longer.map_or_else(String::new, |wall| {
-        format!(
-            ". An asymmetric motion has a mirror image with the same sigma and C; this is the one whose longer flight begins at w = {}b",
-            if wall > 0 { '+' } else { '-' }
-        )
-    })
-}
-
 /// What a record says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
@@ -104,14 +90,7 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
         _ => false,
     };
     if !is_expected {
-        return Err(IdentificationError::Regime {
-            regime: lock.regime,
-            sigma: lock.at.sigma,
-            c: lock.at.c,
-            longer: (lock.regime == Regime::Asymmetric)
-                .then(|| longer_after(record.hold()))
-                .flatten(),
-        });
+        return Err(IdentificationError::Regime { regime: lock.regime, sigma: lock.at.sigma, c: lock.at.c });
     }
     on_target(&lock, scene)?;
     sensors_after_release(record, scene)?;

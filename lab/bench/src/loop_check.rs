@@ -125,10 +125,7 @@ fn without_drift(readings: &mut [[f64; 3]]) {
 
 /// Frequency, rad/s, and amplitude, m, of the drive.
 fn drive(scene: &Scene) -> (f64, f64) {
-    (
-        scene.controller.omega_start * scene.linear().omega0,
-        SHARE * scene.amplitude,
-    )
+    (scene.controller_config().omega_start, SHARE * scene.amplitude)
 }
 
 /// Phasors of response and base, m, at the end of a check of the scene's linear resonator.

@@ -77,23 +77,14 @@ pub trait Rig {
     fn sense(&mut self) -> Result<Sensors, RigError>;
 
     /// Drives the rig for one sample period of `step` seconds.
-    ///
-    /// # Errors
-    /// As [`Rig::sense`].
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError>;
 
     /// Holds the base at the displacement of the drive for one sample period of `step` seconds.
-    ///
-    /// # Errors
-    /// As [`Rig::sense`], and a rig whose base follows its own oscillator only.
     fn hold(&mut self, _drive: Drive, _step: f64) -> Result<(), RigError> {
         Err(RigError::NoHold)
     }
 
     /// The ground truth, if the rig is a simulation.
-    ///
-    /// # Errors
-    /// As [`Rig::sense`].
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         Ok(None)
     }
@@ -105,33 +96,21 @@ pub trait RigStage {
     fn inner(&mut self) -> &mut dyn Rig;
 
     /// What the next stage or the controller reads: [`Rig::sense`].
-    ///
-    /// # Errors
-    /// As [`Rig::sense`].
     fn sense(&mut self) -> Result<Sensors, RigError> {
         self.inner().sense()
     }
 
     /// [`Rig::advance`].
-    ///
-    /// # Errors
-    /// As [`Rig::sense`].
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         self.inner().advance(drive, step)
     }
 
     /// [`Rig::hold`].
-    ///
-    /// # Errors
-    /// As [`Rig::hold`].
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         self.inner().hold(drive, step)
     }
 
     /// [`Rig::ground_truth`].
-    ///
-    /// # Errors
-    /// As [`Rig::sense`].
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         self.inner().ground_truth()
     }
@@ -178,11 +157,6 @@ pub trait Controller {
     /// Errors of the implementation: a refused call, a lost connection.
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError>;
 
-    /// Whether the controller reports its phase error wherever it can be measured.
-    fn reports_phase_error(&self) -> bool {
-        true
-    }
-
     /// Controls the amplitude of the response from now on, moves it as stated, and holds the phase `phase_target`, rad.
     ///
     /// # Errors
@@ -192,9 +166,6 @@ pub trait Controller {
     }
 
     /// Controls the amplitude of the drive again, at its setpoint.
-    ///
-    /// # Errors
-    /// As [`Controller::hold_response`].
     fn hold_drive(&mut self) -> Result<(), ControllerError> {
         Err(ControllerError::NoResponseLoop)
     }
@@ -237,20 +208,14 @@ pub enum ControllerError {
 impl RigError {
     /// The error of the implementation, if it is an `E`.
     pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
-        match self {
-            Self::Failed(cause) => cause.downcast_ref(),
-            Self::Refused(_) | Self::NoHold => None,
-        }
+        self.source()?.downcast_ref()
     }
 }
 
 impl ControllerError {
     /// The error of the implementation, if it is an `E`.
     pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
-        match self {
-            Self::Failed(cause) => cause.downcast_ref(),
-            Self::NoResponseLoop | Self::Refused(_) => None,
-        }
+        self.source()?.downcast_ref()
     }
 }
 

@@ -6,16 +6,16 @@ mod controller;
 mod names;
 mod overrides;
 
-use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 use lovines::{Cavity, InvalidValue, Restitution, State};
-use phase_lock::{ConfigError, Number, Value};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error, ser::SerializeMap};
+use phase_lock::{ConfigError, Number};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+use vines_model::ArgumentError;
 
 pub use backbone::BackboneSettings;
-pub use chain::{ChainSettings, RatioOf};
+pub use chain::ChainSettings;
 pub use controller::{ControllerSettings, KEYS, LinearResponse, PhaseLock, key, refusal};
 pub use lovines::Parameters;
 pub use names::{Name, Names};
@@ -80,7 +80,7 @@ impl Scene {
 
     /// Levels of the tracked backbone, amplitudes of the response, m, in the order in which they are visited.
     pub fn levels(&self) -> Vec<f64> {
-        self.backbone.levels()
+        self.backbone.levels(self.plant.half_width)
     }
 
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
@@ -176,11 +176,11 @@ impl Excitation {
     fn in_metres(&self, origin: &str, d: &Dimensionless) -> Result<f64, SceneError> {
         match (self.g, self.e) {
             (Some(g), None) => {
-                Checked::new("excitation.G", g, "(dimensionless)").not_negative()?;
+                not_negative("excitation.G", g, "(dimensionless)")?;
                 Ok(d.amplitude(g))
             }
             (None, Some(e)) => {
-                Checked::new("excitation.E", e, "m").not_negative()?;
+                not_negative("excitation.E", e, "m")?;
                 Ok(e)
             }
             (given, _) => Err(SceneError::Keys {
@@ -194,66 +194,7 @@ impl Excitation {
     }
 }
 
-/// A length that a file gives in metres or over a unit of the rig.
-struct Length<'a> {
-    origin: &'a str,
-    section: &'static str,
-    /// Its keys: over the unit, and in metres.
-    keys: [&'static str; 2],
-    over_unit: Option<f64>,
-    in_metres: Option<f64>,
-}
-
-impl Length<'_> {
-    /// The length in metres; `unit` in m.
-    fn resolve(self, unit: f64) -> Result<Option<f64>, SceneError> {
-        let Self { origin, section, keys: [key, in_metres], .. } = self;
-        let check = |key: &str, value, unit| {
-            let key = format!("{section}.{key}").into();
-            Checked { key, value, unit }.positive()
-        };
-        match (self.over_unit, self.in_metres) {
-            (Some(_), Some(_)) => Err(SceneError::Keys {
-                origin: origin.into(),
-                message: format!(
-                    "[{section}] has both {key} and {in_metres} (m), which say the same thing: give one of them"
-                ),
-            }),
-            (Some(value), None) => {
-                check(
-                    key,
-                    value,
-                    if key.starts_with('G') {
-                        "(over b epsilon)"
-                    } else {
-                        "(over b)"
-                    },
-                )?;
-                Ok(Some(value * unit))
-            }
-            (None, Some(value)) => check(in_metres, value, "m").map(|()| Some(value)),
-            (None, None) => Ok(None),
-        }
-    }
-}
-
 impl Sections {
-    /// Replaces a section.
-    fn replace(&mut self, name: &str, table: toml::Table) -> Result<(), toml::de::Error> {
-        match name {
-            "plant" => self.plant = PlantSection::deserialize(table)?,
-            "start" => self.start = StartSection::deserialize(table)?,
-            "excitation" => self.excitation = Excitation::deserialize(table)?,
-            "controller" => self.controller = ControllerSettings::deserialize(table)?,
-            "phase_lock" => self.phase_lock = PhaseLock::deserialize(table)?,
-            "record" => self.record = RecordSettings::deserialize(table)?,
-            "backbone" => self.backbone = BackboneSettings::deserialize(table)?,
-            "chain" => self.chain = ChainSettings::deserialize(table)?,
-            _ => self.resonance = Definition::deserialize(table)?,
-        }
-        Ok(())
-    }
-
     fn resolve(self, origin: &str) -> Result<Scene, SceneError> {
         let plant = self.plant.resolve(origin)?;
         let d = Dimensionless::of(&plant, 0.0);
@@ -261,10 +202,10 @@ impl Sections {
             start: self.start.resolve(&plant)?,
             amplitude: self.excitation.in_metres(origin, &d)?,
             plant,
-            controller: self.controller.in_metres(origin, &d)?,
+            controller: self.controller,
             phase_lock: self.phase_lock,
             record: self.record,
-            backbone: self.backbone.in_metres(origin, &d)?,
+            backbone: self.backbone,
             chain: self.chain,
             resonance: self.resonance,
             rig_names: self.rig.names,
@@ -272,6 +213,7 @@ impl Sections {
             measured: None,
         };
         scene.controller.check()?;
+        scene.backbone.check()?;
         scene.record.check(&scene.controller, scene.lock_periods())?;
         scene.chain.check(&scene.controller)?;
         if scene.resonance.reference == Reference::Force && !scene.chain.reference {
@@ -309,11 +251,6 @@ impl Scene {
 
 // The `[plant]` section, in SI units or dimensionless, and the `[start]` section.
 
-/// Keys that only the SI form has.
-const SI_KEYS: [&str; 5] = ["M", "k", "c", "m", "b"];
-/// Keys that only the dimensionless form has.
-const DIMENSIONLESS_KEYS: [&str; 2] = ["epsilon", "lambda"];
-
 /// The section as written.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -347,8 +284,8 @@ struct PlantSection {
     seed: u32,
 }
 
-/// A law of restitution; `r_plus` and `r_minus` are its parameters at the two walls.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+/// A law of restitution; `r_plus` and `r_minus` are its parameters at the two walls. The numbers are the codes in `LoViNes.fmu`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Law {
     #[default]
@@ -358,9 +295,6 @@ enum Law {
 }
 
 impl Law {
-    /// In the order of their codes in `LoViNes.fmu`.
-    const ALL: [Self; 3] = [Self::Constant, Self::Viscoelastic, Self::Plastic];
-
     /// The law and its parameter.
     fn of(law: Restitution) -> (Self, f64) {
         match law {
@@ -405,8 +339,7 @@ impl PlantSection {
             ));
         }
         // The FMU has a signed seed of 32 bits.
-        Checked::new("plant.seed", self.seed.into(), "")
-            .check(self.seed <= i32::MAX as u32, "must be from 0 to 2147483647")?;
+        within("plant.seed", self.seed.into(), "", [0.0, i32::MAX.into()])?;
         let cavity = self.cavity();
         let plant = if is_si {
             Parameters {
@@ -420,8 +353,8 @@ impl PlantSection {
             }
         } else {
             let (epsilon, lambda) = (need(self.epsilon, "epsilon")?, need(self.lambda, "lambda")?);
-            Checked::new("plant.epsilon", epsilon, "(dimensionless)").positive()?;
-            Checked::new("plant.lambda", lambda, "(dimensionless)").not_negative()?;
+            positive("plant.epsilon", epsilon, "(dimensionless)")?;
+            not_negative("plant.lambda", lambda, "(dimensionless)")?;
             Parameters {
                 cavity,
                 ..Parameters::dimensionless(epsilon, lambda, need(self.r, "r")?)
@@ -467,14 +400,14 @@ impl StartSection {
     }
 }
 
-/// The parameters under their symbols, which are the names of the FMU's variables; of the cavity those that are not ideal.
-fn symbols(plant: &Parameters) -> Vec<(&'static str, Value)> {
+/// The parameters under their symbols, which are the keys of a scene in SI units and the names of the FMU's variables; of the cavity those that
+/// are not ideal.
+fn symbols(plant: &Parameters) -> Vec<(&'static str, toml::Value)> {
     let Cavity { restitution, seed, .. } = plant.cavity;
     let [plus, minus] = restitution.map(|law| law.map(Law::of));
     let law = plus.or(minus).map_or(Law::Constant, |(law, _)| law);
-    let real = |(symbol, value)| (symbol, Value::Real(value));
-    let given =
-        |(symbol, value): (_, Option<f64>)| value.filter(|value| *value != 0.0).map(|value| real((symbol, value)));
+    let real = |(symbol, value): (_, f64)| (symbol, value.into());
+    let given = |(symbol, value): (_, Option<f64>)| Some(real((symbol, value.filter(|value| *value != 0.0)?)));
     let plants = [
         ("M", plant.primary_mass),
         ("k", plant.stiffness),
@@ -494,44 +427,30 @@ fn symbols(plant: &Parameters) -> Vec<(&'static str, Value)> {
         ("r_min", Some(plant.cavity.least_restitution)),
         ("r_scatter", Some(plant.cavity.scatter)),
     ];
-    let codes = [("r_law", law as i32), ("seed", seed as i32)];
-    let codes = codes.into_iter().filter(|(_, code)| *code != 0);
-    let mut symbols: Vec<_> = plants
-        .map(real)
-        .into_iter()
-        .chain(cavity.into_iter().filter_map(given))
-        .collect();
-    symbols.extend(codes.map(|(symbol, code)| (symbol, Value::Integer(code))));
+    let mut symbols: Vec<_> = plants.into_iter().map(real).collect();
+    symbols.extend(cavity.into_iter().filter_map(given));
+    if law != Law::Constant {
+        symbols.push(("r_law", format!("{law:?}").to_lowercase().into()));
+    }
+    if seed != 0 {
+        symbols.push(("seed", (seed as i64).into()));
+    }
     symbols
 }
 
 /// The keys of the section `[plant]` and their values, as a scene in SI units has them.
 pub fn plant_keys(plant: &Parameters) -> Vec<(&'static str, String)> {
-    let keys = symbols(plant).into_iter().map(|(symbol, value)| {
-        let text = match value {
-            Value::Integer(code) if symbol == "r_law" => format!("\"{:?}\"", Law::ALL[code as usize]).to_lowercase(),
-            Value::Integer(number) => number.to_string(),
-            Value::Real(number) => format!("{number:?}"),
-            Value::Boolean(is_on) => is_on.to_string(),
-        };
-        (symbol, text)
+    let keys = symbols(plant).into_iter().map(|(symbol, value)| match value {
+        toml::Value::Float(number) => (symbol, format!("{number:?}")),
+        toml::Value::Integer(number) => (symbol, number.to_string()),
+        text => (symbol, format!("{:?}", text.as_str().unwrap_or_default())),
     });
     keys.collect()
 }
 
 /// Writes the parameters under their symbols, as a scene has them.
 fn serialize<S: Serializer>(plant: &Parameters, serializer: S) -> Result<S::Ok, S::Error> {
-    let symbols = symbols(plant);
-    let mut map = serializer.serialize_map(Some(symbols.len()))?;
-    for (symbol, value) in symbols {
-        match value {
-            Value::Integer(code) if symbol == "r_law" => map.serialize_entry(symbol, &Law::ALL[code as usize])?,
-            Value::Integer(_) => map.serialize_entry(symbol, &plant.cavity.seed)?,
-            Value::Real(number) => map.serialize_entry(symbol, &number)?,
-            Value::Boolean(_) => {}
-        }
-    }
-    map.end()
+    serializer.collect_map(symbols(plant))
 }
 
 // The `[record]` section: how long to drive, to record and to average.
@@ -568,85 +487,69 @@ impl RecordSettings {
     /// `lock_periods` is the time limit for the lock, as set or by default.
     fn check(&self, controller: &ControllerSettings, lock_periods: f64) -> Result<(), SceneError> {
         let unit = "(natural periods)";
-        Checked::new("record.lock_periods", lock_periods, unit).positive()?;
-        Checked::new("record.hold_periods", self.hold_periods, unit).check(
-            (3.0..=1e6).contains(&self.hold_periods),
-            "must be from 3 (to count impacts and measure) to 1000000",
-        )?;
-        if let Some(decay_periods) = self.decay_periods {
-            Checked::new("record.decay_periods", decay_periods, unit).positive()?;
-        }
+        positive("record.lock_periods", lock_periods, unit)?;
+        // At least enough to count impacts and measure.
+        within("record.hold_periods", self.hold_periods, unit, [3.0, 1e6])?;
+        positive("record.decay_periods", self.decay_periods.unwrap_or(1.0), unit)?;
         let longest = self.decay_periods.unwrap_or(1000.0);
-        Checked::new("record.window_periods", self.window_periods, "(periods)").check(
-            (0.5..=longest).contains(&self.window_periods),
-            format!("must be from 0.5 to {longest} (decay_periods, or 1000)"),
+        within(
+            "record.window_periods",
+            self.window_periods,
+            "(periods)",
+            [0.5, longest],
         )?;
         let samples =
             controller.samples_per_period * (lock_periods + self.hold_periods + self.decay_periods.unwrap_or(0.0));
-        Checked::new("samples_per_period times all periods of [record]", samples, "samples")
-            .check(samples <= MOST_SAMPLES, "must be at most 20 million")
+        check(
+            "samples_per_period times all periods of [record]",
+            samples,
+            "samples",
+            samples <= MOST_SAMPLES,
+            "must be at most 20 million",
+        )
     }
 }
 
 // Options of a scene: a number, or `false` or "none". Zero is a number like every other.
 
-/// What the file says.
-#[derive(Deserialize)]
-#[serde(untagged, expecting = "expected a number, or false or \"none\"")]
-enum WrittenOption<T> {
-    Value(T),
-    Switch(bool),
-    Word(String),
-}
-
 /// Reads an option.
 fn option<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<Option<T>, D::Error> {
-    match WrittenOption::deserialize(from)? {
-        WrittenOption::Value(value) => Ok(Some(value)),
-        WrittenOption::Switch(false) => Ok(None),
-        WrittenOption::Word(word) if word == "none" => Ok(None),
-        WrittenOption::Switch(_) | WrittenOption::Word(_) => {
-            Err(D::Error::custom("expected a number, or false or \"none\""))
-        }
+    match toml::Value::deserialize(from)? {
+        toml::Value::Boolean(false) => Ok(None),
+        toml::Value::String(word) if word == "none" => Ok(None),
+        value => T::deserialize(value)
+            .map(Some)
+            .map_err(|_| D::Error::custom("expected a number, or false or \"none\"")),
     }
 }
 
 // Range checks that name the value, its unit and what is allowed.
 
-/// One number of a scene, under the name that the file gives it.
-struct Checked {
-    pub key: Cow<'static, str>,
-    pub value: f64,
-    pub unit: &'static str,
+/// Refuses the value of a key, in its unit, unless it is finite and `ok`.
+fn check(
+    key: &'static str,
+    value: f64,
+    unit: &'static str,
+    ok: bool,
+    allowed: impl Into<String>,
+) -> Result<(), SceneError> {
+    if ok && value.is_finite() {
+        return Ok(());
+    }
+    Err(SceneError::Value { key, value, unit, allowed: allowed.into() })
 }
 
-impl Checked {
-    fn new(key: &'static str, value: f64, unit: &'static str) -> Self {
-        Self { key: key.into(), value, unit }
-    }
+fn positive(key: &'static str, value: f64, unit: &'static str) -> Result<(), SceneError> {
+    check(key, value, unit, value > 0.0, "must be positive and finite")
+}
 
-    fn positive(self) -> Result<(), SceneError> {
-        let is_allowed = self.value > 0.0;
-        self.check(is_allowed, "must be positive and finite")
-    }
+fn not_negative(key: &'static str, value: f64, unit: &'static str) -> Result<(), SceneError> {
+    check(key, value, unit, value >= 0.0, "must be zero or positive, and finite")
+}
 
-    fn not_negative(self) -> Result<(), SceneError> {
-        let is_allowed = self.value >= 0.0;
-        self.check(is_allowed, "must be zero or positive, and finite")
-    }
-
-    /// A value that is not finite is refused whatever `ok` says.
-    fn check(self, ok: bool, allowed: impl Into<String>) -> Result<(), SceneError> {
-        if ok && self.value.is_finite() {
-            return Ok(());
-        }
-        Err(SceneError::Value {
-            key: self.key,
-            value: self.value,
-            unit: self.unit,
-            allowed: allowed.into(),
-        })
-    }
+fn within(key: &'static str, value: f64, unit: &'static str, [low, high]: [f64; 2]) -> Result<(), SceneError> {
+    let allowed = format!("must be from {low} to {high}");
+    check(key, value, unit, (low..=high).contains(&value), allowed)
 }
 
 // Errors of a scene.
@@ -660,12 +563,12 @@ pub enum SceneError {
     #[error("{origin}: {message}")]
     Syntax { origin: String, message: String },
     #[error("--set: {0}")]
-    Argument(#[from] SyntaxError),
+    Argument(#[from] ArgumentError),
     #[error("--set {argument}: {message}")]
     Override { argument: String, message: String },
     #[error("{key} = {} {unit}: {allowed}", Number(*value))]
     Value {
-        key: Cow<'static, str>,
+        key: &'static str,
         value: f64,
         unit: &'static str,
         allowed: String,
@@ -678,16 +581,6 @@ pub enum SceneError {
     Controller(#[from] ConfigError),
     #[error("{origin}: {message}")]
     Keys { origin: String, message: String },
-}
-
-/// An argument that is not `section.key=value`.
-#[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages explain the variants")]
-pub enum SyntaxError {
-    #[error("{}; expected section.key=value, for instance plant.r=0.7 or resonance.sensor=q1", .0.message())]
-    Toml(#[from] toml::de::Error),
-    #[error("expected one section.key=value, for instance plant.r=0.7")]
-    NotOneKey,
 }
 
 /// A message of the TOML reader, without types of Rust.

@@ -7,7 +7,7 @@ use vines_model::orbit::phase_resonant;
 use vines_testbench::experiment::{Plan, run};
 use vines_testbench::identification::{Lock, Regime, identify};
 use vines_testbench::rig::{BuiltIn, Simulated};
-use vines_testbench::scene::{Dimensionless, Family, Override, Scene, SceneError, plant_keys};
+use vines_testbench::scene::{Dimensionless, Override, Scene, SceneError, plant_keys};
 
 fn set(arguments: &[&str]) -> Vec<Override> {
     arguments.iter().map(|one| one.parse().unwrap()).collect()
@@ -190,16 +190,4 @@ fn what_theory_leaves_out_is_named() {
     assert!(left_out(&["plant.r_minus=0.7"]).starts_with("the restitution"));
     assert!(!paper(&["plant.r_minus=0.7"]).unwrap().has_mirror_images());
     assert_eq!(left_out(&["plant.r_scatter=0.01"]), "the scatter of the restitution");
-}
-
-#[test]
-fn an_effect_can_be_an_axis_of_a_sweep() {
-    let mut family = Family::parse("", None, &[]).unwrap();
-    family.vary("plant.mu_k").unwrap();
-    family.vary("plant.theta").unwrap();
-    let scene = family.scene(&[0.05, 0.2]).unwrap();
-    assert_eq!(
-        (scene.plant.cavity.kinetic_friction, scene.plant.cavity.tilt),
-        (0.05, 0.2)
-    );
 }

@@ -128,10 +128,6 @@ impl Controller for FmuController {
         Ok(self.exchange(sensors, active)?)
     }
 
-    fn reports_phase_error(&self) -> bool {
-        self.phase_error.is_some()
-    }
-
     fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
         let (inputs, hold) = self.response_loop.as_ref().ok_or(ControllerError::NoResponseLoop)?;
         let Move { response, duration, amplitude, omega, growth } = to;

@@ -36,7 +36,7 @@ const FIRST: usize = 16;
 /// # Errors
 /// Invalid parameters or an invalid start.
 pub fn observe(scene: &Dimensionless, sigma: f64, start: [f64; 4], limit: usize) -> Result<RegimeResult, InvalidValue> {
-    Run::new(scene, sigma, start)?.decided(0, limit)
+    CellRun::new(scene, sigma, start)?.decided(0, limit)
 }
 
 /// Distance between the starts of motions that must agree: far above rounding, and magnified by chaos to order one in ln(1e9) = 21 Lyapunov
@@ -48,9 +48,6 @@ const LATE: f64 = 500.0;
 
 /// The regime as by [`observe`], and the regime of a motion from another start, 1e-9 and more apart, if it differs. `others` such motions
 /// are followed where chance decides when chaos ends: the regime is irregular, or it began late.
-///
-/// # Errors
-/// As [`observe`].
 pub fn observe_confirmed(
     scene: &Dimensionless,
     sigma: f64,
@@ -109,7 +106,7 @@ pub struct RegimeResult {
 const STRETCH: f64 = 1e4;
 
 /// A simulated motion.
-pub struct Run {
+pub struct CellRun {
     scene: Dimensionless,
     sigma: f64,
     /// Its caches are large.
@@ -123,7 +120,7 @@ pub struct Run {
     stop: Arc<AtomicBool>,
 }
 
-impl Run {
+impl CellRun {
     /// The dimensionless plant of `scene` at the detuning `sigma`, from `start` = (q1, q1', q2, q2').
     ///
     /// # Errors
@@ -148,9 +145,6 @@ impl Run {
     }
 
     /// Follows the motion until its regime is decided, for at most `limit` periods; it is not examined before `first` periods.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
     pub fn decided(&mut self, first: usize, limit: usize) -> Result<RegimeResult, InvalidValue> {
         let mut periods = first.max(FIRST).min(limit);
         loop {
@@ -295,7 +289,7 @@ const ZERO: f64 = 2e-3;
 /// Share of captured impacts from which a chaotic motion is called modulated.
 const CAPTURES: f64 = 0.2;
 
-impl Run {
+impl CellRun {
     /// The regime, if the motion so far shows one that lasts: no impacts, or a stable periodic motion.
     fn lasting(&self) -> Result<Option<RegimeResult>, InvalidValue> {
         match self.without_impacts() {
@@ -425,11 +419,8 @@ pub struct SteadyResponse {
     pub damper_power: f64,
 }
 
-impl Run {
+impl CellRun {
     /// Follows the motion further, and reads its response over whole repetitions or, if nothing repeats, over 64 periods.
-    ///
-    /// # Errors
-    /// As [`Run::new`].
     pub fn response(&mut self, result: &RegimeResult) -> Result<SteadyResponse, InvalidValue> {
         let repeats = result.periods > 0;
         if let Some(exponent) = result.exponent.filter(|exponent| repeats && *exponent < 0.0) {

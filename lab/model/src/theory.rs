@@ -13,7 +13,7 @@ mod resonance;
 mod slow_flow;
 
 pub use activation::Activation;
-pub use decay::{Decay, DecayPoint, Waveform, triangle_wave};
+pub use decay::{DecayPoint, Waveform};
 pub use modulation::{Drift, ImpactSequence, Modulation};
 pub use resonance::{backbone, backbone_at_level, free_sigma, reading, resonant};
 pub use slow_flow::{

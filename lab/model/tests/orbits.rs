@@ -38,7 +38,6 @@ fn orbits_match_the_references_to_all_their_digits() {
         }
         assert_eq!(orbit.stable, row.multipliers[3] < 1.0, "{row:?}");
     }
-    println!("largest deviation: sigma, C, B {state:.2e}, multipliers {multipliers:.2e}");
     assert!(state < 1e-10, "the references have ten digits: {state:e}");
     assert!(multipliers < 6e-7, "the references have six digits: {multipliers:e}");
 }
@@ -94,20 +93,6 @@ fn scene(g: f64) -> Dimensionless {
     Dimensionless::new(0.0084, 1.43, 0.65, g)
 }
 
-#[test]
-fn shooting_and_the_closed_form_agree_to_rounding() {
-    for orbit in phase_resonant(&scene(1.1)) {
-        let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
-        let found = Periodic::find(&scene(1.1), &ImpactPattern::symmetric(), &orbit.unknowns(), conditions)
-            .expect("the motion");
-        let apart = (found.sigma - orbit.sigma).abs() + (found.c - orbit.c).abs();
-        assert!(apart < 1e-11, "{apart:e}");
-        for (one, other) in found.moduli().iter().zip(orbit.multipliers) {
-            assert!((one - other).abs() < 1e-9);
-        }
-    }
-}
-
 fn response(g: f64) -> (Dimensionless, Branch) {
     let scene = scene(g);
     let fastest = |one: &vines_model::orbit::Orbit, other: &vines_model::orbit::Orbit| one.b.total_cmp(&other.b);
@@ -143,16 +128,6 @@ fn an_exact_response_passes_folds_and_phase_resonance() {
         .windows(3)
         .filter(|s| (s[1] - s[0]) * (s[2] - s[1]) < 0.0)
         .count();
-    println!(
-        "{} motions, {turns} turns of sigma, ended: {:?}; {:?}",
-        branch.points.len(),
-        branch.ended,
-        branch
-            .special
-            .iter()
-            .map(|one| (one.kind, one.motion.sigma, one.motion.b))
-            .collect::<Vec<_>>()
-    );
     assert!(turns >= 1 && branch.points.iter().any(|one| !one.stable));
     // Every motion is one that the plant repeats; unstable ones leave slowly.
     for motion in branch.points.iter().step_by(20) {
@@ -173,19 +148,11 @@ fn symmetry_breaks_near_the_theorys_speed_and_asymmetric_motions_leave_it() {
         .iter()
         .find(|one| one.kind == Bifurcation::SymmetryBreaking)
         .expect("a symmetry breaking");
-    println!(
-        "symmetry breaks at B = {:.4} (theory {B_SYMMETRY_BREAKING:.4})",
-        breaking.motion.b
-    );
     assert!((breaking.motion.b - B_SYMMETRY_BREAKING).abs() < 0.03);
     let limits = ContinuationLimits { points: 60, ..ContinuationLimits::default() };
     let aside = branch_off(&scene, breaking, Condition::Excitation(1.6), &limits).unwrap();
     let uneven = |one: &Periodic| (one.bounces[1].phase - one.bounces[0].phase - std::f64::consts::PI).abs();
     let interval = aside.points.iter().map(uneven).fold(0.0, f64::max);
-    println!(
-        "{} asymmetric motions, intervals off half a period by up to {interval:.3} rad",
-        aside.points.len()
-    );
     assert!(interval > 0.05);
     assert!(aside.points.iter().any(|one| one.stable));
     for motion in aside.points.iter().step_by(10) {
@@ -247,10 +214,6 @@ fn without_damping_drive_and_loss_the_backbone_is_the_conservative_mode() {
             energies = energies.max((now / energy - 1.0).abs());
         }
     }
-    println!(
-        "conservative mode: {} motions, G up to {most_g:.1e}, energy constant to {energies:.1e}",
-        branch.points.len()
-    );
     assert!(most_g < 1e-9 && energies < 1e-9);
 }
 
@@ -263,13 +226,6 @@ fn a_motion_with_more_impacts_is_followed_like_any_other() {
     assert!(motion.pattern.impacts() > 2);
     let limits = ContinuationLimits { points: 40, ..ContinuationLimits::default() };
     let branch = continue_both_ways(&scene, &motion, Condition::Excitation(2.2), &limits);
-    let kinds: Vec<_> = branch.special.iter().map(|one| (one.kind, one.motion.sigma)).collect();
-    println!(
-        "{} impacts in {} periods, followed through {} motions: {kinds:?}",
-        motion.pattern.impacts(),
-        motion.pattern.periods(),
-        branch.points.len()
-    );
     assert!(branch.points.len() > 20);
     for motion in branch.points.iter().step_by(7) {
         assert!(distance_of_plant(&scene, motion, 1) < 1e-9);

@@ -139,10 +139,6 @@ impl Controller for WatchedController {
         Ok(command)
     }
 
-    fn reports_phase_error(&self) -> bool {
-        self.controller.reports_phase_error()
-    }
-
     fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
         self.controller.hold_response(to, phase_target)
     }

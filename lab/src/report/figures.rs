@@ -324,8 +324,8 @@ pub fn history(record: &Record, scene: &Scene, result: &Comparison) -> Figure {
 /// The decay along the manifold by first-order theory, from an amplitude.
 fn backbone_decay(p: &Dimensionless, from: f64) -> Vec<Triple> {
     let start = theory::backbone_at_level(p, from);
-    let decay = start.and_then(|point| SlowFlow::new(p.lambda, p.r).decay(point.b));
-    let samples = decay.map(|decay| decay.samples(POINTS)).unwrap_or_default();
+    let decay = start.and_then(|point| SlowFlow::new(p.lambda, p.r).decay(point.b, POINTS));
+    let samples = decay.unwrap_or_default();
     let samples = samples.iter().map(|point| {
         let c = point.c * reading(p, point.b, point.sigma);
         [point.tau1 / (p.epsilon * TAU), c, point.sigma]

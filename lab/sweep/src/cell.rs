@@ -5,7 +5,7 @@ use std::error::Error;
 use Read::{Count, Failure, Number, Regime};
 use vines_model::{
     ArgumentError, Dimensionless,
-    map::{RegimeResult, Run, SteadyResponse},
+    map::{CellRun, RegimeResult, SteadyResponse},
     orbit::{Orbit, symmetric_orbits},
     regime,
 };
@@ -89,7 +89,7 @@ impl Cell {
         results: Results,
         periods: usize,
     ) -> Result<Self, lovines::InvalidValue> {
-        let mut run = Run::new(numbers, sigma, scene.dimensionless_start())?;
+        let mut run = CellRun::new(numbers, sigma, scene.dimensionless_start())?;
         let result = run.decided(0, periods)?;
         let response = results.response.then(|| run.response(&result)).transpose()?;
         let (lock, failure) = match results.lock.then(|| locked(scene)).transpose() {

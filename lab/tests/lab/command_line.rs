@@ -183,8 +183,8 @@ fn absurd_curves_and_maps_are_refused() {
     fails(&["orbit", "--response", "--set=excitation.G=0"], 1, "G = 0");
     fails(&["orbit", "--response", "--range=2:-2"], 2, "first below the last");
     fails(&["theory", "--sigma=nan"], 2, "finite");
-    let refused = ["identify", "--set=controller.G_max=1.0"];
-    fails(&refused, 2, "amplitude_max is controller.G_max");
+    let refused = ["identify", "--set=phase_lock.amplitude_max=8e-5"];
+    fails(&refused, 2, "amplitude_max is phase_lock.amplitude_max");
     fails(
         &["map", "--x", "G=1:2:3", "--y", "G=1:2:3"],
         2,

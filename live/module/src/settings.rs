@@ -38,7 +38,7 @@ pub fn default_scene() -> Scene {
         amplitude: d.amplitude(EXCITATION[0]),
         controller: ControllerSettings::default(),
         record: RecordSettings::default(),
-        backbone: BackboneSettings::of(&d),
+        backbone: BackboneSettings::default(),
         phase_lock: PhaseLock::default(),
         rig_names: Names::default(),
         controller_names: Names::default(),
@@ -109,7 +109,7 @@ pub fn changed(mut scene: Scene, values: &Settings) -> Scene {
         .any(differs)
     {
         scene.amplitude = d.amplitude(values[index::EXCITATION]);
-        scene.backbone = BackboneSettings::of(&d);
+        scene.backbone = BackboneSettings::default();
     }
     if differs(index::START_SPEED) || differs(index::GAP) {
         scene.start.dq2 = values[index::START_SPEED] * d.b * d.omega0;

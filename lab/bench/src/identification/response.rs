@@ -10,7 +10,7 @@ use std::fmt::{self, Display, Formatter};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use serde::Serialize;
-use vines_model::numerics::{HarmonicBasis, golden_section, mean, noise};
+use vines_model::numerics::{HarmonicBasis, golden_section, noise};
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
 use crate::record::Sample;
@@ -265,17 +265,6 @@ pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
         .filter(|pair| pair[1].impacts > pair[0].impacts)
         .map(|pair| Impact { time: pair[1].impact_time, velocity: pair[1].impact_velocity })
         .collect()
-}
-
-/// The wall, -1 or 1, after which the longer flights begin, on average; `None` without impacts.
-pub(crate) fn longer_after(samples: &[Sample]) -> Option<i8> {
-    let impacts = impacts(samples);
-    let after = |wall: f64| {
-        let flights = impacts.windows(2).filter(move |pair| pair[0].velocity * wall > 0.0);
-        mean(flights.map(|pair| pair[1].time - pair[0].time))
-    };
-    let difference = after(1.0) - after(-1.0);
-    (!difference.is_nan()).then_some(if difference > 0.0 { 1 } else { -1 })
 }
 
 /// Impacts per period of `omega` (rad/s) over the samples, and the regime they make.

@@ -11,10 +11,7 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::{Drive, Rig, RigError, RigStage, Sensors};
-use crate::scene::{RatioOf, Scene};
-
-/// Largest deviation of a sampling instant, in standard deviations.
-const JITTER_MAX: f64 = 4.0;
+use crate::scene::Scene;
 
 /// A rig behind its measurement chain.
 pub struct Chain {
@@ -43,14 +40,8 @@ struct InputChannel {
 
 impl InputChannel {
     fn read(&mut self, value: f64, elapsed: f64, normal: &mut NormalDistribution) -> f64 {
-        let noisy = match &mut self.sensor {
-            Some(sensor) => sensor.read(value, normal),
-            None => value,
-        };
-        let filtered = match &mut self.filter {
-            Some(filter) => filter.pass(noisy, elapsed),
-            None => noisy,
-        };
+        let noisy = self.sensor.as_mut().map_or(value, |sensor| sensor.read(value, normal));
+        let filtered = self.filter.as_mut().map_or(noisy, |filter| filter.pass(noisy, elapsed));
         converted(self.converter.as_ref(), filtered)
     }
 }
@@ -77,7 +68,7 @@ impl Chain {
         let channel = |range: f64| InputChannel {
             sensor: settings
                 .snr
-                .map(|snr| NoisySensor::new(snr, settings.snr_of, range, scene.controller.samples_per_period)),
+                .map(|snr| NoisySensor::new(snr, scene.controller.samples_per_period)),
             filter: settings.filter.map(|cut_off| LowPass::new(cut_off * d.omega0)),
             converter: settings.adc_bits.map(|bits| Converter::new(bits, range)),
         };
@@ -100,7 +91,7 @@ impl Chain {
     /// Duration of a sample period of `step` seconds, whose end is not where it should be.
     fn taken(&mut self, step: f64) -> f64 {
         let late = if self.jitter > 0.0 {
-            self.jitter * self.normal.next().clamp(-JITTER_MAX, JITTER_MAX)
+            self.jitter * self.normal.next()
         } else {
             0.0
         };
@@ -233,19 +224,18 @@ pub struct NoisySensor {
     ratio: f64,
     /// Mean square of the signal.
     power: f64,
-    /// Weight of a new sample in the running mean square; 0 for a fixed one.
+    /// Weight of a new sample in the running mean square.
     follow: f64,
 }
 
 impl NoisySensor {
-    /// A sensor with the signal-to-noise ratio `snr` (dB), relative to the mean power of about the last `memory` samples, or to
-    /// a sine that fills `range`.
-    pub fn new(snr: f64, of: RatioOf, range: f64, memory: f64) -> Self {
-        let (power, follow) = match of {
-            RatioOf::Signal => (0.0, 1.0 / memory),
-            RatioOf::Range => (0.5 * range * range, 0.0),
-        };
-        Self { ratio: 10_f64.powf(-snr / 20.0), power, follow }
+    /// A sensor with the signal-to-noise ratio `snr` (dB), relative to the mean power of about the last `memory` samples.
+    pub fn new(snr: f64, memory: f64) -> Self {
+        Self {
+            ratio: 10_f64.powf(-snr / 20.0),
+            power: 0.0,
+            follow: 1.0 / memory,
+        }
     }
 
     pub fn read(&mut self, value: f64, normal: &mut NormalDistribution) -> f64 {
@@ -292,23 +282,18 @@ mod tests {
         assert_eq!(seen, [-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75]);
     }
 
-    /// Power of the noise on a sine of amplitude 3, relative to that of the sine, dB.
-    fn measured(of: RatioOf) -> f64 {
-        let (mut sensor, mut normal) = (NoisySensor::new(40.0, of, 30.0, 100.0), NormalDistribution::new(7));
+    #[test]
+    fn noise_has_the_power_that_was_asked_for() {
+        let (mut sensor, mut normal) = (NoisySensor::new(40.0, 100.0), NormalDistribution::new(7));
         let mut noise = 0.0;
         for n in 0..200_000 {
             let value = 3.0 * (f64::from(n) * 0.0628).sin();
             let added = sensor.read(value, &mut normal) - value;
             noise += if n < 1000 { 0.0 } else { added * added };
         }
-        10.0 * (4.5 / (noise / 199_000.0)).log10()
-    }
-
-    #[test]
-    fn noise_has_the_power_that_was_asked_for() {
-        assert!((measured(RatioOf::Signal) - 40.0).abs() < 0.1);
-        // The range is ten times the signal, so the ratio is 20 dB lower.
-        assert!((measured(RatioOf::Range) - 20.0).abs() < 0.1);
+        // Of a sine of amplitude 3.
+        let ratio = 10.0 * (4.5 / (noise / 199_000.0)).log10();
+        assert!((ratio - 40.0).abs() < 0.1, "{ratio} dB");
     }
 
     #[test]

@@ -2,17 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Checked, ControllerSettings, SceneError, option};
-
-/// Reference of a signal-to-noise ratio.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum RatioOf {
-    /// The present signal: the noise is proportional to its RMS.
-    Signal,
-    /// A sine that fills the range of the channel: the noise is the same at every level.
-    Range,
-}
+use super::{ControllerSettings, SceneError, check, option, positive, within};
 
 /// The stages between the rig and the controller; each can be switched off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -30,11 +20,9 @@ pub struct ChainSettings {
     pub base_range: f64,
     /// The base follows held samples instead of an oscillator in the rig.
     pub hold: bool,
-    /// Signal-to-noise ratio of the sensors, dB; absent: no noise.
+    /// Signal-to-noise ratio of the sensors, dB: the noise is proportional to the RMS of the signal. Absent: no noise.
     #[serde(deserialize_with = "option")]
     pub snr: Option<f64>,
-    /// Reference of that ratio.
-    pub snr_of: RatioOf,
     /// Seed of noise and jitter.
     pub seed: u64,
     /// Cut-off of the anti-alias filter (Butterworth, second order), in units of omega0; absent: no filter.
@@ -46,8 +34,6 @@ pub struct ChainSettings {
     pub delay: u32,
     /// Whether a sensor reads the base.
     pub reference: bool,
-    /// Whether the controller knows the delay from the drive to the sensors. It needs the delay where no sensor reads the base.
-    pub compensate: bool,
 }
 
 impl Default for ChainSettings {
@@ -59,13 +45,11 @@ impl Default for ChainSettings {
             base_range: 4.0,
             hold: false,
             snr: None,
-            snr_of: RatioOf::Signal,
             seed: 1,
             filter: None,
             jitter: 0.0,
             delay: 0,
             reference: true,
-            compensate: true,
         }
     }
 }
@@ -87,12 +71,9 @@ impl ChainSettings {
         adc_bits.or(dac_bits).is_some() || hold || snr.or(filter).is_some() || jitter > 0.0 || delay > 0 || !reference
     }
 
-    /// Delay from the drive to the sensors that the controller compensates, in units of 1/omega0, for samples `step` apart: on
-    /// average, a held sample lags by half a sample.
-    pub fn stated_delay(&self, step: f64) -> f64 {
-        if !self.compensate {
-            return 0.0;
-        }
+    /// Delay from the drive to the sensors, in units of 1/omega0, for samples `step` apart: on average, a held sample lags by half a
+    /// sample.
+    pub fn total_delay(&self, step: f64) -> f64 {
         let held = if self.hold { 0.5 } else { 0.0 };
         (f64::from(self.delay) + held) * step + self.filter_delay()
     }
@@ -107,28 +88,27 @@ impl ChainSettings {
 
     pub(super) fn check(&self, controller: &ControllerSettings) -> Result<(), SceneError> {
         for (key, bits) in [("chain.adc_bits", self.adc_bits), ("chain.dac_bits", self.dac_bits)] {
-            let bits = bits.unwrap_or(1);
-            Checked::new(key, bits.into(), "bits")
-                .check((1..=32).contains(&bits), "must be from 1 to 32, or \"none\"")?;
+            within(key, bits.unwrap_or(1).into(), "bits", [1.0, 32.0])?;
         }
-        Checked::new("chain.dac_bits", self.dac_bits.unwrap_or(0).into(), "bits").check(
+        check(
+            "chain.dac_bits",
+            self.dac_bits.unwrap_or(0).into(),
+            "bits",
             self.dac_bits.is_none() || self.hold,
             "needs chain.hold = true: only samples of the drive can be quantised",
         )?;
-        Checked::new("chain.response_range", self.response_range, "(over b)").positive()?;
-        Checked::new("chain.base_range", self.base_range, "(over b epsilon)").positive()?;
-        if let Some(snr) = self.snr {
-            Checked::new("chain.snr", snr, "dB").check((-40.0..=300.0).contains(&snr), "must be from -40 to 300")?;
-        }
+        positive("chain.response_range", self.response_range, "(over b)")?;
+        positive("chain.base_range", self.base_range, "(over b epsilon)")?;
+        within("chain.snr", self.snr.unwrap_or(0.0), "dB", [-40.0, 300.0])?;
+        // Up to half the sampling frequency.
         let nyquist = 0.5 * controller.samples_per_period;
-        if let Some(filter) = self.filter {
-            Checked::new("chain.filter", filter, "(omega0)").check(
-                (2.0..=nyquist).contains(&filter),
-                format!("must be from 2 to {nyquist} (half the sampling frequency), or \"none\""),
-            )?;
-        }
-        Checked::new("chain.jitter", self.jitter, "samples")
-            .check((0.0..=0.1).contains(&self.jitter), "must be from 0 to 0.1")?;
-        Checked::new("chain.delay", self.delay.into(), "samples").check(self.delay <= 1000, "must be from 0 to 1000")
+        within(
+            "chain.filter",
+            self.filter.unwrap_or(nyquist),
+            "(omega0)",
+            [2.0, nyquist],
+        )?;
+        within("chain.jitter", self.jitter, "samples", [0.0, 0.1])?;
+        within("chain.delay", self.delay.into(), "samples", [0.0, 1000.0])
     }
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
 use vines_model::ArgumentError;
 
-use super::{Checked, Dimensionless, Length, Scene, SceneError, Sensor, option, symbols};
+use super::{Law, Scene, SceneError, Sensor, check, not_negative, positive, symbols, within};
 
 /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -19,8 +19,6 @@ pub struct ControllerSettings {
     pub samples_per_period: f64,
     /// Bandwidth of the phase detector, in units of omega0: the only tuning parameter; the gains of the loop follow from it.
     pub bandwidth: f64,
-    /// Frequency at the start, in units of omega0.
-    pub omega_start: f64,
     /// Lowest frequency allowed, in units of omega0.
     pub omega_min: f64,
     /// Highest frequency allowed, in units of omega0.
@@ -34,24 +32,8 @@ pub struct ControllerSettings {
     pub frequency_tolerance: f64,
     /// As `frequency_tolerance`, for the amplitude.
     pub amplitude_tolerance: f64,
-    /// How long all of this must hold, periods.
-    pub dwell_periods: u32,
-    /// Largest drive allowed over `b epsilon`, in a file only: [`Scene`] has it as `e_max`.
-    #[serde(rename = "G_max", skip_serializing)]
-    pub g_max: Option<f64>,
-    /// Largest drive allowed, base amplitude, m; by default four times the larger of the requested drive and the drive at which impacts begin.
-    #[serde(rename = "E_max")]
-    pub e_max: Option<f64>,
-    /// Response above which the drive is shut down, over b.
-    #[serde(rename = "C_max", deserialize_with = "option")]
-    pub c_max: Option<f64>,
-    /// Duration of the ramp of the drive to its amplitude, and to zero after a fault, natural periods; 0 to jump. By default the
-    /// amplitude changes as fast as a base with the largest one moves.
-    pub ramp_periods: Option<f64>,
-    /// Duration of the ramp of the drive to zero at the release, natural periods; 0 to switch off at once.
-    pub release_periods: f64,
-    /// Delay of the rig from the drive to the sensors, samples, in addition to that of `[chain]`; used where no sensor reads the base.
-    pub delay: f64,
+    /// Delay from the drive to the sensors, samples, used where no sensor reads the base; by default that of `[chain]`.
+    pub delay: Option<f64>,
 }
 
 impl Default for ControllerSettings {
@@ -59,20 +41,13 @@ impl Default for ControllerSettings {
         Self {
             samples_per_period: 100.0,
             bandwidth: 0.1,
-            omega_start: 1.0,
             omega_min: 0.9,
             omega_max: 1.1,
             phase_target: -90.0,
             phase_tolerance: 0.3,
             frequency_tolerance: 2e-4,
             amplitude_tolerance: 8e-5,
-            dwell_periods: 20,
-            g_max: None,
-            e_max: None,
-            c_max: Some(4.0),
-            ramp_periods: None,
-            release_periods: 0.0,
-            delay: 0.0,
+            delay: None,
         }
     }
 }
@@ -101,29 +76,9 @@ impl ControllerSettings {
         self.detector().bandwidth_max()
     }
 
-    /// The section with its largest drive in metres.
-    pub(super) fn in_metres(mut self, origin: &str, d: &Dimensionless) -> Result<Self, SceneError> {
-        let (over_unit, in_metres) = (self.g_max.take(), self.e_max);
-        let keys = ["G_max", "E_max"];
-        let limit = Length { origin, section: "controller", keys, over_unit, in_metres };
-        self.e_max = limit.resolve(d.amplitude(1.0))?;
-        Ok(self)
-    }
-
     pub(super) fn check(&self) -> Result<(), SceneError> {
+        not_negative("controller.delay", self.delay.unwrap_or(0.0), "samples")?;
         for (key, value, unit) in [
-            (
-                "controller.ramp_periods",
-                self.ramp_periods.unwrap_or(0.0),
-                "(natural periods)",
-            ),
-            ("controller.release_periods", self.release_periods, "(natural periods)"),
-            ("controller.delay", self.delay, "samples"),
-        ] {
-            Checked::new(key, value, unit).not_negative()?;
-        }
-        for (key, value, unit) in [
-            ("controller.C_max", self.c_max.unwrap_or(1.0), "(over b)"),
             ("controller.omega_min", self.omega_min, "(omega0)"),
             ("controller.phase_tolerance", self.phase_tolerance, "degrees"),
             (
@@ -133,61 +88,29 @@ impl ControllerSettings {
             ),
             ("controller.amplitude_tolerance", self.amplitude_tolerance, "(relative)"),
         ] {
-            Checked::new(key, value, unit).positive()?;
+            positive(key, value, unit)?;
         }
+        // Two samples per period of the highest harmonic at omega_max.
+        let fewest = (2.0 * self.detector().highest_harmonic() as f64 * self.omega_max).floor() + 1.0;
         let samples = self.samples_per_period;
-        let highest = self.detector().highest_harmonic();
-        let fewest = (2.0 * highest as f64 * self.omega_max).floor() + 1.0;
+        within("controller.samples_per_period", samples, "(samples)", [fewest, 1e5])?;
         let widest = self.bandwidth_max();
-        let (low, high, start) = (self.omega_min, self.omega_max, self.omega_start);
-        let (target, dwell) = (self.phase_target, self.dwell_periods);
-        for (key, value, unit, is_allowed, allowed) in [
-            (
-                "controller.samples_per_period",
-                samples,
-                "(samples)",
-                (fewest..=1e5).contains(&samples),
-                format!("must be from {fewest} (two per period of harmonic {highest} at omega_max) to 100000"),
-            ),
-            (
-                "controller.bandwidth",
-                self.bandwidth,
-                "(omega0)",
-                self.bandwidth > 0.0 && self.bandwidth <= widest,
-                format!("must be above 0 and at most {widest:.3} with {samples} samples per period"),
-            ),
-            (
-                "controller.omega_max",
-                high,
-                "(omega0)",
-                high > low,
-                format!("must be above omega_min = {low}"),
-            ),
-            (
-                "controller.omega_start",
-                start,
-                "(omega0)",
-                (low..=high).contains(&start),
-                format!("must lie between omega_min = {low} and omega_max = {high}"),
-            ),
-            (
-                "controller.phase_target",
-                target,
-                "degrees",
-                target.abs() <= 180.0,
-                "must lie between -180 and 180 degrees".into(),
-            ),
-            (
-                "controller.dwell_periods",
-                dwell.into(),
-                "(periods)",
-                (4..=400).contains(&dwell),
-                "must be from 4 to 400".into(),
-            ),
-        ] {
-            Checked::new(key, value, unit).check(is_allowed, allowed)?;
-        }
-        Ok(())
+        check(
+            "controller.bandwidth",
+            self.bandwidth,
+            "(omega0)",
+            self.bandwidth > 0.0 && self.bandwidth <= widest,
+            format!("must be above 0 and at most {widest:.3} with {samples} samples per period"),
+        )?;
+        let (low, high) = (self.omega_min, self.omega_max);
+        check(
+            "controller.omega_max",
+            high,
+            "(omega0)",
+            high > low,
+            format!("must be above omega_min = {low}"),
+        )?;
+        within("controller.phase_target", self.phase_target, "degrees", [-180.0, 180.0])
     }
 }
 
@@ -231,8 +154,18 @@ impl Scene {
     pub fn start_values(&self) -> Vec<(&'static str, Setting)> {
         let State { q1, dq1, q2, dq2 } = self.start;
         let start = [("q1", q1), ("der(q1)", dq1), ("q2", q2), ("der(q2)", dq2)];
-        let start = start.map(|(name, value)| (name, Setting::Real(value)));
-        [symbols(&self.plant), start.into()].concat()
+        let plant = symbols(&self.plant).into_iter().map(|(name, value)| {
+            let code = |law: Law| Setting::Integer(law as i32);
+            let setting = match value {
+                Value::Float(number) => Setting::Real(number),
+                Value::Integer(number) => Setting::Integer(number as i32),
+                law => Law::deserialize(law).map_or(Setting::Integer(0), code),
+            };
+            (name, setting)
+        });
+        plant
+            .chain(start.map(|(name, value)| (name, Setting::Real(value))))
+            .collect()
     }
 
     /// Configuration of the controller for the scene's excitation.
@@ -241,37 +174,32 @@ impl Scene {
         let omega0 = d.omega0;
         let c = &self.controller;
         let period = d.natural_period();
-        // Without periods or without a drive, steps.
-        let rate = |amplitude: f64, periods: f64| {
-            Some(amplitude / (periods * period)).filter(|rate| *rate > 0.0 && rate.is_finite())
-        };
-        let amplitude_max = c.e_max.unwrap_or(4.0 * self.drive_needed());
-        let defaults = Config::for_resonance(omega0, self.amplitude);
+        let delay = c.delay.map_or_else(
+            || self.chain.total_delay(omega0 * self.sample_time()) / omega0,
+            |samples| samples * self.sample_time(),
+        );
+        let limits = self.phase_lock.apply(Config {
+            amplitude_max: Some(4.0 * self.drive_needed()),
+            response_max: Some(4.0 * d.b),
+            ..Config::for_resonance(omega0, self.amplitude)
+        });
         self.phase_lock.apply(Config {
             sample_time: self.sample_time(),
-            omega_start: c.omega_start * omega0,
             omega_min: c.omega_min * omega0,
             omega_max: c.omega_max * omega0,
             bandwidth: c.bandwidth * omega0,
             damping_rate: Some(self.linear().damping_rate).filter(|rate| *rate > 0.0),
             phase_target: c.phase_target_radians(),
-            delay: self.chain.stated_delay(omega0 * self.sample_time()) / omega0
-                + (c.delay + f64::from(u8::from(self.resonance.is_late()))) * self.sample_time(),
-            amplitude_max: Some(amplitude_max),
-            response_max: c.c_max.map(|c| c * d.b),
-            ramp_rate: match c.ramp_periods {
-                Some(periods) => rate(self.amplitude, periods),
-                // The velocity of a base that moves with the largest amplitude.
-                None => Some(amplitude_max * omega0),
-            },
-            release_rate: rate(self.amplitude, c.release_periods),
+            delay: delay + f64::from(u8::from(self.resonance.is_late())) * self.sample_time(),
+            // The velocity of a base that moves with the largest amplitude.
+            ramp_rate: limits.amplitude_max.map(|largest| largest * omega0),
             // The range in a period, or in half a time constant of the detector: the loop locks as fast as without a limit.
             omega_rate: Some((c.omega_max - c.omega_min) * omega0 * (2.0 * c.bandwidth * omega0).max(1.0 / period)),
             acquire_timeout: Some(self.lock_periods() * period),
             residual_max: Some(self.residual()),
             reference_connected: self.chain.reference,
             lock: self.lock_criterion(),
-            ..defaults
+            ..limits
         })
     }
 
@@ -280,13 +208,11 @@ impl Scene {
         let c = &self.controller;
         let bandwidth = self.bandwidth().max(BANDWIDTH_MIN);
         let approached = PI * bandwidth;
-        let defaults = LockCriterion::default();
         LockCriterion {
             phase_tolerance: c.phase_tolerance.to_radians(),
             frequency_drift: c.frequency_tolerance * bandwidth * approached,
             amplitude_drift: c.amplitude_tolerance * approached,
-            dwell: c.dwell_periods,
-            ..defaults
+            ..LockCriterion::default()
         }
     }
 
@@ -329,11 +255,17 @@ impl Scene {
 
     /// Configuration of the controller for tracking: with the largest drive of `[backbone]`, and a bandwidth at which the loops are not coupled.
     pub fn backbone_config(&self) -> Config {
-        let limits = self.backbone.e_max.into_iter().chain(self.controller.e_max);
+        let config = self.controller_config();
+        let limit = self
+            .phase_lock
+            .sets("amplitude_max")
+            .then_some(config.amplitude_max)
+            .flatten();
+        let largest = self.dimensionless().amplitude(self.backbone.g_max);
         Config {
-            amplitude_max: limits.reduce(f64::min),
+            amplitude_max: Some(largest.min(limit.unwrap_or(f64::INFINITY))),
             bandwidth: self.controller.bandwidth.min(self.coupled_bandwidth()) * self.linear().omega0,
-            ..self.controller_config()
+            ..config
         }
     }
 
@@ -358,23 +290,17 @@ const IMPACTS: f64 = 1.1;
 // The `[phase_lock]` section: parameters of the controller that no other key sets, in SI units and by their names in `PhaseLock.fmu`.
 
 /// The parameters that other keys of a scene set, in units that suit any plant.
-pub const KEYS: [(&str, &str); 18] = [
+pub const KEYS: [(&str, &str); 12] = [
     ("sample_time", "controller.samples_per_period"),
-    ("omega_start", "controller.omega_start"),
     ("omega_min", "controller.omega_min"),
     ("omega_max", "controller.omega_max"),
     ("amplitude", "excitation.G"),
-    ("amplitude_max", "controller.G_max"),
-    ("ramp_rate", "controller.ramp_periods"),
-    ("release_rate", "controller.release_periods"),
     ("phase_target", "controller.phase_target"),
     ("bandwidth", "controller.bandwidth"),
     ("delay", "controller.delay"),
     ("lock.phase_tolerance", "controller.phase_tolerance"),
     ("lock.frequency_drift", "controller.frequency_tolerance"),
     ("lock.amplitude_drift", "controller.amplitude_tolerance"),
-    ("lock.dwell", "controller.dwell_periods"),
-    ("response_max", "controller.C_max"),
     ("acquire_timeout", "record.lock_periods"),
     ("reference_connected", "chain.reference"),
 ];
@@ -436,6 +362,11 @@ impl Serialize for PhaseLock {
 }
 
 impl PhaseLock {
+    /// Whether a value is given for a parameter.
+    fn sets(&self, name: &str) -> bool {
+        self.0.iter().any(|(given, _)| *given == name)
+    }
+
     /// The configuration with these values. Without the feature `parameters` there are none, and nothing that sets them is compiled.
     fn apply(&self, mut config: Config) -> Config {
         let settings = if cfg!(feature = "parameters") { &self.0[..] } else { &[] };

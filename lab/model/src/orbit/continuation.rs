@@ -5,8 +5,7 @@
 //! curve bends. A branch ends where its pattern of impacts ends, at a graze.
 //!
 //! Each kind of bifurcation has a test function of the multipliers that is zero there, and smooth also where multipliers meet. A change of
-//! its sign shows one bifurcation; two of a kind between two points of the branch cancel, and are found where the function is closest to
-//! zero.
+//! its sign shows a bifurcation; two of a kind within one step are missed.
 
 use nalgebra::{Matrix4, Matrix6, SVector};
 use serde::{Serialize, Serializer, ser::SerializeStruct};
@@ -14,7 +13,7 @@ use serde::{Serialize, Serializer, ser::SerializeStruct};
 use super::impact_map::Bounce;
 use super::periodic::{Bifurcation, Condition, Periodic, Returned, Unknowns, follow, newton, wrapped};
 use crate::Dimensionless;
-use crate::numerics::{golden_section, try_bisection};
+use crate::numerics::try_bisection;
 
 /// Ranges, number of points and step of a continuation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,28 +41,21 @@ impl Default for ContinuationLimits {
 }
 
 /// Why a branch ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BranchEnd {
     /// It left the range of sigma or G.
-    #[serde(rename = "left the range")]
     Range,
     /// It came back to its start.
-    #[serde(rename = "closed")]
     Closed,
     /// The largest number of points was reached.
-    #[serde(rename = "number of points")]
     Points,
     /// Its motions, which are not 1:1, are unstable for a hundred points from there on: such a branch winds on within chaos.
-    #[serde(rename = "unstable from there on")]
     Unstable,
     /// It joins the branch whose symmetry it breaks or whose period it doubles; beyond that it is its own mirror image.
-    #[serde(rename = "joins a shorter pattern")]
     Joins,
     /// The complex pair of multipliers on the unit circle becomes real.
-    #[serde(rename = "strong resonance")]
     Resonance,
     /// The pattern of impacts ends here: a graze, or impacts that accumulate.
-    #[serde(rename = "graze")]
     Graze,
 }
 
@@ -193,6 +185,12 @@ impl BranchEnd {
     }
 }
 
+impl Serialize for BranchEnd {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
 impl BranchBifurcation {
     /// As in a table. A modulation begins at a torus bifurcation only if the motion was stable before.
     pub fn name(&self) -> &'static str {
@@ -220,12 +218,10 @@ const STRAIGHT: f64 = 0.98;
 const APPROACH: f64 = 1.0 / 256.0;
 /// Fraction of a step to which the end of a branch or a bifurcation is located.
 const FINEST: f64 = 1e-12;
-/// Largest distance from the joint at which a curve that cannot reach it ends.
-const NEXT: f64 = 0.05;
 /// Difference in sigma of a bifurcation that is located twice.
 const SAME: f64 = 1e-9;
 
-struct Curve<'a> {
+struct Continuation<'a> {
     scene: &'a Dimensionless,
     start: &'a Periodic,
     condition: Condition,
@@ -233,7 +229,7 @@ struct Curve<'a> {
     reach: f64,
 }
 
-impl Curve<'_> {
+impl Continuation<'_> {
     /// The direction of the curve, and the sign of its equations' determinant, which is the same all along the curve.
     fn tangent(&self, x: &Unknowns, towards: &Unknowns) -> Option<(Unknowns, f64)> {
         let returned = follow(self.scene, &self.start.pattern, x)?;
@@ -304,27 +300,17 @@ impl Curve<'_> {
             }
             Condition::Bifurcation(_) => {}
             _ => {
-                let found = self.part(last.unknowns(), tangent * step).crossings(last, motion);
+                let found = crossings(self.beside(last.unknowns(), tangent * step), [last, motion]);
                 branch.special.extend(found);
-                branch.special.extend(self.pairs(&branch.points, motion));
             }
         }
         false
     }
 
-    /// The bifurcations that cancel between the point before the last one and `motion`.
-    fn pairs(&self, points: &[Periodic], motion: &Periodic) -> Vec<BranchBifurcation> {
-        let [.., before, last] = points else {
-            return Vec::new();
-        };
-        let from = before.unknowns();
-        self.part(from, motion.unknowns() - from).pairs([before, last, motion])
-    }
-
-    /// The part of the curve beside `chord`.
-    fn part(&self, from: Unknowns, chord: Unknowns) -> Part<impl Fn(f64) -> Option<Periodic>> {
+    /// The motions of the curve beside `chord`, over the part of its length.
+    fn beside(&self, from: Unknowns, chord: Unknowns) -> impl Fn(f64) -> Option<Periodic> {
         let (step, tangent) = (chord.norm(), chord.normalize());
-        Part(move |part: f64| self.motion(&self.correct(&from, &tangent, part * step)?))
+        move |part| self.motion(&self.correct(&from, &tangent, part * step)?)
     }
 
     /// Whether a motion lies in the ranges; the range of G does not limit a curve at constant G.
@@ -343,9 +329,9 @@ impl Curve<'_> {
         }
         if apart.dot(turned) < 0.0 {
             // A little beyond the start, which the plane at the end of the step may miss.
-            let part = self.part(*next, turned * (1.1 * apart.norm()));
-            let found = branch.points.last().map(|last| part.crossings(last, self.start));
-            branch.special.extend(found.into_iter().flatten());
+            let beyond = self.beside(*next, turned * (1.1 * apart.norm()));
+            let last = branch.points.last().unwrap_or(self.start);
+            branch.special.extend(crossings(beyond, [last, self.start]));
         } else if let [first, .., last] = &branch.special[..]
             && (first.motion.sigma - last.motion.sigma).abs() < SAME
         {
@@ -356,22 +342,9 @@ impl Curve<'_> {
         true
     }
 
-    /// Whether a motion that is the double of a bifurcating one is next to `last`. The equations of bifurcations are singular there: rounding,
-    /// over the square of the difference of both halves, ends the curve before it passes.
-    fn stops_at_joint(&self, last: &Periodic) -> bool {
-        let (Condition::Bifurcation(_), Some(half)) = (self.condition, last.pattern.halved()) else {
-            return false;
-        };
-        let from = last.unknowns();
-        let flip = Condition::Bifurcation(Bifurcation::flip(&half));
-        let found = Periodic::find(self.scene, &half, &from, [flip, Condition::Sigma(last.sigma)]);
-        found.is_some_and(|one| (one.unknowns() - from).norm() < NEXT)
-    }
-
     /// The last motion within a step before the one that the branch doubles.
     fn joint(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Periodic> {
-        let x = from.unknowns();
-        let at = |part: f64| self.motion(&self.correct(&x, tangent, part * step)?);
+        let at = self.beside(from.unknowns(), tangent * step);
         let before = |part: f64| at(part).map(|one| !joins(from, &one)).ok_or(());
         let (end, _) = try_bisection(0.0, 1.0, FINEST, before).ok()?;
         at(end)
@@ -395,7 +368,7 @@ pub fn continue_from(
     limits: &ContinuationLimits,
 ) -> Branch {
     let reach = APPROACH * limits.step;
-    let curve = Curve { scene, start, condition, reach };
+    let curve = Continuation { scene, start, condition, reach };
     let mut branch = Branch {
         points: vec![start.clone()],
         special: Vec::new(),
@@ -440,9 +413,6 @@ pub fn continue_from(
         if straight {
             step = (step * 1.5).min(limits.step);
         }
-    }
-    if curve.stops_at_joint(branch.points.last().unwrap_or(start)) {
-        branch.ended[1] = BranchEnd::Joins;
     }
     branch
 }
@@ -489,7 +459,7 @@ pub fn branch_off(
     let mut towards = Unknowns::zeros();
     towards.fixed_rows_mut::<4>(0).copy_from(&aside);
     let doubled = Periodic { pattern: from.pattern.doubled(), ..from.clone() };
-    let curve = Curve { scene, start: &doubled, condition, reach: 0.0 };
+    let curve = Continuation { scene, start: &doubled, condition, reach: 0.0 };
     let x = curve.correct(&from.unknowns(), &towards, ASIDE)?;
     let start = curve.motion(&x)?;
     let mut branch = continue_from(scene, &start, condition, &towards, limits);
@@ -499,74 +469,25 @@ pub fn branch_off(
 
 /// Largest rounding error of a test function: in conservative motions, some of these functions are zero everywhere.
 const ROUNDING: f64 = 1e-9;
-/// Largest rounding error of the test function of folds where both halves of a motion differ by less than [`HALVES`]: the function is small there.
-const ROUNDING_OF_FOLDS: f64 = 1e-12;
-const HALVES: f64 = 0.1;
-/// Difference of the halves below which a fold cannot be told from rounding, which grows with its inverse.
-const EQUAL_HALVES: f64 = 5e-4;
 /// Largest distance of a multiplier from the circle where a crossing is located.
 const LOCATED: f64 = 1e-4;
 
-/// A part of a branch, from 0 to 1.
-struct Part<F: Fn(f64) -> Option<Periodic>>(pub F);
-
-impl<F: Fn(f64) -> Option<Periodic>> Part<F> {
-    /// The bifurcations between two neighbouring points, in order.
-    fn crossings(&self, from: &Periodic, to: &Periodic) -> Vec<BranchBifurcation> {
-        let found = kinds(from)
-            .into_iter()
-            .filter_map(|kind| self.crossing(kind, [(0.0, from), (1.0, to)]));
-        let mut found: Vec<_> = found.collect();
-        found.sort_by(|one, other| one.0.total_cmp(&other.0));
-        found.into_iter().map(|one| one.1).collect()
-    }
-
-    /// The bifurcations that cancel around the second of three neighbouring points.
-    fn pairs(&self, points: [&Periodic; 3]) -> Vec<BranchBifurcation> {
-        kinds(points[0])
-            .into_iter()
-            .flat_map(|kind| self.pair(kind, points))
-            .collect()
-    }
-
-    fn pair(&self, kind: Bifurcation, points: [&Periodic; 3]) -> Vec<BranchBifurcation> {
-        let sign = kind.test(&points[1].monodromy).signum();
-        let [before, at, after] = points.map(|one| sign * kind.test(&one.monodromy));
-        // A smooth function does not come nearer to zero than at the points by more than it changes between them.
-        if at >= before || at > after || at >= before.max(after) - at {
-            return Vec::new();
-        }
-        let value = |part: f64| (self.0)(part).map_or(f64::INFINITY, |one| sign * kind.test(&one.monodromy));
-        let nearest = golden_section(0.0, 1.0, value);
-        let Some(motion) = (self.0)(nearest) else {
-            return Vec::new();
-        };
-        let both = [
-            [(0.0, points[0]), (nearest, &motion)],
-            [(nearest, &motion), (1.0, points[2])],
-        ];
-        both.into_iter()
-            .filter_map(|ends| Some(self.crossing(kind, ends)?.1))
-            .collect()
-    }
-
-    /// The part at which a test function passes zero between two motions, and the motion there; None if it does not, or if only a
-    /// saddle is neutral.
-    fn crossing(&self, kind: Bifurcation, [from, to]: [(f64, &Periodic); 2]) -> Option<(f64, BranchBifurcation)> {
-        let [first, last] = [from, to].map(|one| kind.test(&one.1.monodromy));
-        if first * last >= 0.0 || is_rounding(kind, [from.1, to.1], first.abs().max(last.abs())) {
+/// The bifurcations between two neighbouring motions, in order; `beside` has the motions between them, from 0 to 1.
+fn crossings(beside: impl Fn(f64) -> Option<Periodic>, [from, to]: [&Periodic; 2]) -> Vec<BranchBifurcation> {
+    let crossing = |kind: Bifurcation| {
+        let [first, last] = [from, to].map(|one| kind.test(&one.monodromy));
+        if first * last >= 0.0 || first.abs().max(last.abs()) < ROUNDING {
             return None;
         }
-        let like_first = |part: f64| {
-            (self.0)(part)
-                .map(|one| kind.test(&one.monodromy) * first > 0.0)
-                .ok_or(())
-        };
-        let (_, beyond) = try_bisection(from.0, to.0, FINEST, like_first).ok()?;
-        let motion = (self.0)(beyond)?;
+        let like_first = |part: f64| Ok(kind.test(&beside(part).ok_or(())?.monodromy) * first > 0.0);
+        let (_, beyond) = try_bisection::<()>(0.0, 1.0, FINEST, like_first).ok()?;
+        let motion = beside(beyond)?;
         let of_stable = motion.bounds_stability();
         on_circle(kind, &motion).then_some((beyond, BranchBifurcation { kind, of_stable, motion }))
-    }
+    };
+    let mut found: Vec<_> = kinds(from).into_iter().filter_map(crossing).collect();
+    found.sort_by(|one, other| one.0.total_cmp(&other.0));
+    found.into_iter().map(|one| one.1).collect()
 }
 
 fn kinds(motion: &Periodic) -> [Bifurcation; 3] {
@@ -575,17 +496,6 @@ fn kinds(motion: &Periodic) -> [Bifurcation; 3] {
         Bifurcation::flip(&motion.pattern),
         Bifurcation::Torus,
     ]
-}
-
-/// Whether a change of sign between two motions is rounding; `largest` is the larger of the two values.
-fn is_rounding(kind: Bifurcation, motions: [&Periodic; 2], largest: f64) -> bool {
-    let apart = motions.map(|one| one.halves_apart().map_or(f64::INFINITY, |apart| apart.norm()));
-    let apart = apart[0].min(apart[1]);
-    if kind == Bifurcation::Fold && apart < HALVES {
-        largest < ROUNDING_OF_FOLDS || apart < EQUAL_HALVES
-    } else {
-        largest < ROUNDING
-    }
 }
 
 /// Two real multipliers whose product is one are a neutral saddle, not a bifurcation.

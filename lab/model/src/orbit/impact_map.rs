@@ -10,9 +10,6 @@ use serde::Serialize;
 use super::oscillator::ForcedOscillator;
 use crate::Dimensionless;
 
-/// Dimensionless positions and velocities (q1, q1', q2, q2').
-type State = [f64; 4];
-
 /// State just after an impact. The base displacement is `epsilon G sin(phase)` there, and the particle is at `q1 - wall`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bounce {
@@ -168,8 +165,8 @@ impl ImpactMap {
         })
     }
 
-    /// State at the time `t` after a bounce, before the next.
-    pub(super) fn state(&self, from: &Bounce, t: f64) -> State {
+    /// (q1, q1', q2, q2') at the time `t` after a bounce, before the next.
+    pub(super) fn state(&self, from: &Bounce, t: f64) -> [f64; 4] {
         let [q1, dq1] = ParticleFlight::new(&self.oscillator, from).primary(t).into();
         [q1, dq1, from.q2() + from.dq2 * t, from.dq2]
     }
@@ -204,7 +201,7 @@ impl<'a> ParticleFlight<'a> {
     }
 
     /// The flight from a state with the relative displacement `w`.
-    fn between(oscillator: &'a ForcedOscillator, phase: f64, [q1, dq1, q2, dq2]: State, w: f64) -> Self {
+    fn between(oscillator: &'a ForcedOscillator, phase: f64, [q1, dq1, q2, dq2]: [f64; 4], w: f64) -> Self {
         let free = Vector2::new(q1, dq1) - oscillator.harmonic(phase);
         // Of the free motion q^2 + q'^2 never grows.
         Self {

@@ -6,11 +6,11 @@ use crate::Dimensionless;
 
 /// The damped oscillator with unit natural frequency; `zeta = epsilon lambda/2`.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Oscillator {
+pub(crate) struct FreeOscillator {
     zeta: f64,
 }
 
-impl Oscillator {
+impl FreeOscillator {
     pub(crate) fn new(zeta: f64) -> Self {
         Self { zeta }
     }
@@ -67,7 +67,7 @@ impl Oscillator {
 /// The oscillator at one frequency and excitation.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ForcedOscillator {
-    pub(super) free: Oscillator,
+    pub(super) free: FreeOscillator,
     pub(super) zeta: f64,
     pub(super) omega: f64,
     epsilon: f64,
@@ -80,7 +80,7 @@ impl ForcedOscillator {
     /// The oscillator of `scene` (except its G) at the frequency `omega` over omega0 and the excitation `g`.
     pub(crate) fn new(scene: &Dimensionless, omega: f64, g: f64) -> Self {
         let zeta = scene.epsilon * scene.lambda / 2.0;
-        let free = Oscillator::new(zeta);
+        let free = FreeOscillator::new(zeta);
         let (force, compliance) = (free.base_force(omega), free.compliance(omega));
         let unit = force * compliance * scene.epsilon;
         let stiffness_by = Complex::new(-2.0 * omega, 2.0 * zeta);

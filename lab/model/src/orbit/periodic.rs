@@ -63,19 +63,6 @@ impl ImpactPattern {
         Self { walls, half_periods: 2 * self.half_periods, mirrored: false }
     }
 
-    /// The pattern of half the length that this one doubles; None if it does not repeat itself or its mirror image.
-    pub fn halved(&self) -> Option<Self> {
-        let count = self.walls.len() / 2;
-        let (walls, rest) = self.walls.split_at(count);
-        let half = Self {
-            walls: walls.into(),
-            half_periods: self.half_periods / 2,
-            mirrored: !self.half_periods.is_multiple_of(4),
-        };
-        let same = walls.iter().zip(rest).all(|(one, other)| half.sign() * one == *other);
-        (!self.mirrored && self.walls.len().is_multiple_of(2) && count > 0 && same).then_some(half)
-    }
-
     /// Impacts over the whole period of the motion.
     pub fn impacts(&self) -> usize {
         self.walls.len() * if self.mirrored { 2 } else { 1 }
@@ -163,7 +150,7 @@ pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknown
         .copy_from(&(monodromy - Matrix4::identity()));
     by.column_mut(4).scale_mut(scene.epsilon);
 
-    let harmonic = Harmonic::new(scene, &map, pattern);
+    let harmonic = HarmonicCoefficients::new(scene, &map, pattern);
     let (s, s_by) = harmonic.of(g, sum, &sum_by, scene.epsilon);
     Some(Returned { residual, by, s, s_by, bounces, durations, monodromy })
 }
@@ -181,12 +168,12 @@ fn chained(step: &Step, by: &ByAll) -> (ByAll, RowByAll) {
 }
 
 /// `S = direct G + impulses sum`: the base through the oscillator, and the impulses through the oscillator and, for v, the particle.
-struct Harmonic {
+struct HarmonicCoefficients {
     direct: [Complex<f64>; 2],
     impulses: [Complex<f64>; 2],
 }
 
-impl Harmonic {
+impl HarmonicCoefficients {
     /// Each coefficient with its derivative by Omega.
     fn new(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern) -> Self {
         let omega = map.oscillator.omega;
@@ -283,7 +270,7 @@ pub enum Bifurcation {
 }
 
 /// The value of an equation and its derivative by the unknowns.
-pub(super) type Row = (f64, RowSVector<f64, 6>);
+pub(super) type Equation = (f64, RowSVector<f64, 6>);
 
 /// Step of the central differences for conditions on second derivatives of the map. It affects how fast Newton's method converges, not where to.
 const STEP: f64 = 1e-6;
@@ -341,7 +328,7 @@ impl Condition {
         pattern: &ImpactPattern,
         x: &Unknowns,
         returned: &Returned,
-    ) -> Row {
+    ) -> Equation {
         let mut row = RowSVector::<f64, 6>::zeros();
         match *self {
             Condition::Sigma(sigma) => {
@@ -366,7 +353,7 @@ fn by_differences(
     x: &Unknowns,
     returned: &Returned,
     f: impl Fn(&Returned) -> f64,
-) -> Row {
+) -> Equation {
     let at = |n: usize, step: f64| {
         let mut moved = *x;
         moved[n] += step;
@@ -489,9 +476,12 @@ impl Periodic {
     /// How far the second half of the motion is from repeating the first one or its mirror image; None for a pattern that is not
     /// the double of another. It changes sign where a branch passes the motion that it doubles.
     pub(super) fn halves_apart(&self) -> Option<Vector4<f64>> {
-        let half = self.pattern.halved()?;
-        let (first, middle) = (&self.bounces[0], &self.bounces[half.walls.len()]);
-        Some(first.apart(middle, half.turn(), half.sign()))
+        let ImpactPattern { walls, half_periods, mirrored } = &self.pattern;
+        let (first, second) = walls.split_at(walls.len() / 2);
+        let sign = if half_periods.is_multiple_of(4) { 1.0 } else { -1.0 };
+        let doubles = !mirrored && first.len() == second.len() && first.iter().zip(second).all(|(a, b)| sign * a == *b);
+        let middle = self.bounces.get(first.len()).filter(|_| doubles && !first.is_empty())?;
+        Some(self.bounces[0].apart(middle, 0.5 * self.pattern.turn(), sign))
     }
 
     /// Numbers that a motion shares with its mirror image and with itself one period later.
@@ -572,7 +562,7 @@ pub(super) fn newton(
     scene: &Dimensionless,
     pattern: &ImpactPattern,
     mut x: Unknowns,
-    conditions: impl Fn(&Unknowns, &Returned) -> [Row; 2],
+    conditions: impl Fn(&Unknowns, &Returned) -> [Equation; 2],
 ) -> Option<Unknowns> {
     let mut last = f64::INFINITY;
     for _ in 0..ROUNDS {

@@ -108,9 +108,6 @@ pub fn resonant_motion(
 }
 
 /// The motion near `guess` that satisfies both conditions; of `guess`, only state, drive and number of periods matter.
-///
-/// # Errors
-/// As [`resonant_motion`].
 pub fn periodic_motion(
     parameters: &Parameters,
     definition: Definition,
@@ -125,9 +122,6 @@ pub fn periodic_motion(
 
 /// The motion at phase resonance under a base of the amplitude `amplitude`, m, continued from the stable symmetric motion of the ideal cavity
 /// with the smallest response.
-///
-/// # Errors
-/// As [`resonant_motion`].
 pub fn resonant_motion_under(
     parameters: &Parameters,
     definition: Definition,
@@ -149,9 +143,6 @@ const NEAR: f64 = 1e-2;
 const LONGEST: u32 = 32;
 
 /// The motion that a state at phase 0 of the base leads to under a drive within `settle` periods; `None` if it does not repeat within 32.
-///
-/// # Errors
-/// As [`resonant_motion`].
 pub fn settled_motion(
     parameters: &Parameters,
     definition: Definition,

@@ -14,7 +14,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Complex, Matrix2, Vector2};
 
-use super::oscillator::Oscillator;
+use super::oscillator::FreeOscillator;
 use super::{AfterImpact, Condition, ImpactPattern, Orbit, Periodic, Unknowns};
 use crate::numerics::{bisection, golden_section, quadratic};
 use crate::theory::{BranchSide, Manifold, SlowFlow};
@@ -57,7 +57,7 @@ struct SymmetricMotions {
 impl SymmetricMotions {
     fn new(scene: &Dimensionless, omega: f64) -> Option<Self> {
         let Dimensionless { epsilon, r, .. } = *scene;
-        let oscillator = Oscillator::new(epsilon * scene.lambda / 2.0);
+        let oscillator = FreeOscillator::new(epsilon * scene.lambda / 2.0);
 
         // Unit impulses at tau = 0, -T, -2T…, alternating: half a period later the state is minus the one before.
         let flight = oscillator.propagator(PI / omega);

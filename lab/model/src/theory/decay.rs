@@ -1,13 +1,13 @@
 //! The free decay along the manifold in closed form (docs/theory.md, eq. 20), and the first-order motion in physical time: a sine for
 //! v, and a sine with a triangle wave for w (eq. 22).
 
-use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
+use std::f64::consts::{FRAC_2_PI, PI};
 
 use serde::Serialize;
 
 use super::slow_flow::SlowFlow;
 use crate::Dimensionless;
-use crate::numerics::{bisection, equally_spaced};
+use crate::numerics::equally_spaced;
 
 /// One point of the free decay.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -24,64 +24,30 @@ pub struct DecayPoint {
     pub sigma: f64,
 }
 
-/// The free decay from one particle speed on the right branch down to the fold.
-///
-/// `D1 C~ = -loss(B)` becomes `D1 B = -loss(B) dB/dC~`, and `tau1` is the integral of `(2 K B - pi)/loss(B)`
-/// with `K = R^2 + pi^2/4`: a logarithm and an arc tangent, because the loss is quadratic in B.
-#[derive(Debug, Clone, Copy)]
-pub struct Decay {
-    flow: SlowFlow,
-    start: f64,
-}
-
 impl SlowFlow {
-    /// The free decay from the particle speed `b`; None left of the fold, or without dissipation.
-    pub fn decay(&self, b: f64) -> Option<Decay> {
-        let dissipates = self.lambda > 0.0 || self.manifold.dissipation > 0.0;
-        (dissipates && b >= self.manifold.b_min()).then_some(Decay { flow: *self, start: b })
-    }
-}
-
-impl Decay {
-    /// Slow time at which the fold is reached and the impacts lose synchrony; infinite if it never is.
-    pub fn duration(&self) -> f64 {
-        self.time(self.flow.manifold.b_min())
-    }
-
-    /// Slow time at which the particle speed has fallen to `b`, between the fold and the start.
-    pub fn time(&self, b: f64) -> f64 {
-        self.primitive(self.start) - self.primitive(b)
-    }
-
-    /// Where the decay is at the slow time `tau1`; None before the release and after the fold.
-    pub fn at(&self, tau1: f64) -> Option<DecayPoint> {
-        if !(0.0..=self.duration()).contains(&tau1) {
-            return None;
-        }
-        let until = |b: f64| self.time(b) <= tau1;
-        let (b, _) = bisection(self.start, self.flow.manifold.b_min(), until);
-        Some(self.point(tau1, b))
-    }
-
-    /// `points` points from the start to the fold, at equal steps of B.
-    pub fn samples(&self, points: usize) -> Vec<DecayPoint> {
-        let b_min = self.flow.manifold.b_min();
-        equally_spaced(self.start, b_min, points)
-            .map(|b| self.point(self.time(b), b))
-            .collect()
-    }
-
-    fn point(&self, tau1: f64, b: f64) -> DecayPoint {
-        DecayPoint {
-            tau1,
-            c: self.flow.manifold.c(b),
+    /// `points` points of the free decay from the particle speed `b` on the right branch down to the fold, at equal steps of B; None left of the
+    /// fold, or without dissipation.
+    pub fn decay(&self, b: f64, points: usize) -> Option<Vec<DecayPoint>> {
+        let (dissipates, fold) = (
+            self.lambda > 0.0 || self.manifold.dissipation > 0.0,
+            self.manifold.b_min(),
+        );
+        let start = self.time_primitive(b);
+        let point = |b: f64| DecayPoint {
+            tau1: start - self.time_primitive(b),
+            c: self.manifold.c(b),
             b,
-            sigma: self.flow.free_detuning(b),
-        }
+            sigma: self.free_detuning(b),
+        };
+        (dissipates && b >= fold).then(|| equally_spaced(b, fold, points).map(point).collect())
     }
 
-    fn primitive(&self, b: f64) -> f64 {
-        let SlowFlow { lambda, manifold } = self.flow;
+    /// Slow time of the decay as a function of B, up to a constant and the sign.
+    ///
+    /// `D1 C~ = -loss(B)` becomes `D1 B = -loss(B) dB/dC~`, and `tau1` is the integral of `(2 K B - pi)/loss(B)`
+    /// with `K = R^2 + pi^2/4`: a logarithm and an arc tangent, because the loss is quadratic in B.
+    fn time_primitive(&self, b: f64) -> f64 {
+        let SlowFlow { lambda, manifold } = *self;
         let (r, k) = (manifold.dissipation, manifold.curvature());
         let a = lambda * k + 2.0 * FRAC_2_PI * r;
         // The root and this slope are never negative on the right branch; the root vanishes with lambda or R.
@@ -93,7 +59,7 @@ impl Decay {
             1.0 / slope
         };
         let rest = if r > 0.0 { 8.0 * r / a * arc } else { 0.0 };
-        k / a * self.flow.loss(b).ln() + rest
+        k / a * self.loss(b).ln() + rest
     }
 }
 
@@ -110,7 +76,6 @@ pub struct Waveform {
     pub gamma: f64,
     /// Phase of the triangle wave at t = 0, rad.
     pub psi: f64,
-    epsilon: f64,
 }
 
 impl Waveform {
@@ -124,7 +89,6 @@ impl Waveform {
             omega: scene.omega(sigma),
             gamma,
             psi: flow.psi(b, gamma),
-            epsilon: scene.epsilon,
         }
     }
 
@@ -137,24 +101,9 @@ impl Waveform {
     pub fn w(&self, t: f64) -> f64 {
         self.v(t) + self.triangle * triangle_wave(self.omega * t + self.psi)
     }
-
-    /// Displacement of the primary mass, m: `(v + epsilon w)/(1 + epsilon)`.
-    pub fn q1(&self, t: f64) -> f64 {
-        (self.v(t) + self.epsilon * self.w(t)) / (1.0 + self.epsilon)
-    }
-
-    /// Displacement of the particle, m: `(v - w)/(1 + epsilon)`.
-    pub fn q2(&self, t: f64) -> f64 {
-        (self.v(t) - self.w(t)) / (1.0 + self.epsilon)
-    }
-
-    /// The first impact on the wall w = +b at or after t = 0, s.
-    pub fn impact_time(&self) -> f64 {
-        (FRAC_PI_2 - self.psi).rem_euclid(std::f64::consts::TAU) / self.omega
-    }
 }
 
 /// The triangle wave Pi: slope ±1, height pi/2, zero and rising at 0.
-pub fn triangle_wave(phase: f64) -> f64 {
+fn triangle_wave(phase: f64) -> f64 {
     phase.sin().asin()
 }

@@ -3,11 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use lovines::Drive;
-use vines_model::{
-    Dimensionless,
-    numerics::try_bisection,
-    theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow},
-};
+use vines_model::{Dimensionless, numerics::try_bisection, theory::SlowFlow};
 
 use crate::{EPSILON, LAMBDA, R, close, flow};
 
@@ -99,23 +95,6 @@ fn the_activation_thresholds_are_where_equilibria_begin() {
     close(flow.activation(EPSILON, 0.0).from_rest, LAMBDA, 1e-4);
 }
 
-#[test]
-fn elastic_undamped_motion_needs_no_excitation_on_its_backbone() {
-    let flow = SlowFlow::new(0.0, 1.0);
-    for b in [0.7, 0.9, 1.2] {
-        close(flow.backbone_at(b).g, 0.0, 1e-15);
-        close(flow.excitation_at(flow.free_detuning(b), b), 0.0, 1e-15);
-    }
-}
-
-#[test]
-fn the_stable_island_lies_between_fold_and_symmetry_breaking() {
-    let flow = flow();
-    let (b_min, sigma) = (Manifold::new(R).b_min(), -1.0);
-    let within = flow.stable_at(sigma, 0.5 * (b_min + B_SYMMETRY_BREAKING));
-    assert!(within && !flow.stable_at(sigma, b_min - 0.01) && !flow.stable_at(sigma, B_SYMMETRY_BREAKING + 0.01));
-}
-
 /// The smallest G at which the plant, at rest until the drive is switched on at a phase of the base, has an impact within `periods`.
 fn first_impact(scene: &Dimensionless, sigma: f64, phase: f64, periods: f64) -> f64 {
     let hits = |g: f64| {
@@ -139,7 +118,6 @@ fn impacts_begin_from_rest_where_the_program_says() {
         let after = [beat, 2.0 * beat, 20_000.0].map(|periods| first_impact(&scene, sigma, 0.0, periods));
         let phases = (0..8).map(|n| first_impact(&scene, sigma, f64::from(n) * PI / 8.0, 2.0 * beat));
         let phases: Vec<f64> = phases.collect();
-        println!("sigma = {sigma}: {found:?}; after one beat, two, 20,000 periods {after:.6?}; by phase {phases:.4?}");
         assert!((found.from_rest - known).abs() <= digit, "{found:?}");
         assert!(
             after.iter().all(|one| (one - found.from_rest).abs() < 1e-6),
