@@ -4,15 +4,16 @@
 //! cargo bench -p vines-bench
 //! ```
 //!
-//! Absolute times depend on the machine and on what else it does; the ratios hardly do: plant and baseline take short turns. The table has
-//! medians over the pairs of turns. CONTRIBUTING.md says which ratios a change must keep.
+//! Absolute times depend on the machine and on what else it does; the ratios in the table at the end hardly do: plant and baseline take short
+//! turns. The table has medians over the pairs of turns. CONTRIBUTING.md says which ratios a change must keep.
 
 use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
 
+use criterion::{BatchSize, Criterion, Throughput};
 use lovines::{Parameters, Plant, State};
 use vines_bench::baseline::Baseline;
-use vines_bench::method::{Stepped, measure};
+use vines_bench::method::{Method, Stepped, measure};
 use vines_bench::scene::{Scene, Step};
 
 /// Duration of the measurement, and of the turns of a case in each round.
@@ -186,8 +187,26 @@ fn quartiles(pairs: &[[f64; 2]], value: impl Fn(&[f64; 2]) -> f64) -> [f64; 3] {
     [1, 2, 3].map(|n| values[n * (values.len() - 1) / 4])
 }
 
+/// The cost of a step of the plant in each case, without its setting up.
+fn absolute(cases: &[Case]) {
+    let mut criterion = Criterion::default()
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2))
+        .configure_from_args();
+    let mut group = criterion.benchmark_group("plant");
+    for Case { name, scene, .. } in cases {
+        let start = || Stepped::start(scene, 0.0).expect("a valid scene");
+        let run = |plant: &mut Stepped| scene.steps.iter().try_for_each(|step| plant.step(step));
+        group.throughput(Throughput::Elements(scene.steps.len() as u64));
+        group.bench_function(name, |b| b.iter_batched_ref(start, run, BatchSize::SmallInput));
+    }
+    group.finish();
+    criterion.final_summary();
+}
+
 fn main() {
     let mut cases = cases();
+    absolute(&cases);
     // `cargo test --benches` only wants to see each run once.
     let measured = std::env::args().any(|argument| argument == "--bench");
     let (duration, round) = if measured {
