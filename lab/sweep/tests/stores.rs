@@ -4,9 +4,10 @@ mod common;
 
 use std::{fs, io::Read, path::Path, sync::atomic::Ordering::Relaxed, thread, time::Duration};
 
-use common::{computed, computed_part, counts, files, numbers, plan, refused_in, settings, values};
+use common::{array, computed, computed_part, counts, files, numbers, plan, refused_in, settings, values};
 use vines_sweep::{ABSENT, FAILED, Monitor, Settings, Shard, Sweep, UNCOUNTED, collect, run, verify};
 use vines_testbench::scene::Family;
+use zarrs::storage::ReadableStorageTraits;
 
 /// Three chunks: two of seven cells, and one of four.
 fn three_chunks() -> Sweep {
@@ -62,6 +63,24 @@ fn shards_stops_and_resumptions_give_the_same_bytes() {
     }
     assert_eq!(counts(&computed(&plan, parts.path())), (60, 0));
     assert!(files(whole.path()) == files(parts.path()));
+}
+
+#[test]
+fn a_store_has_the_bytes_that_zarrs_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let random = settings(&["start.dq2=random:-1:1"]);
+    let all = Settings { samples: Some(4000), chunk: 4000, periods: 100, ..random };
+    computed(&plan(all).unwrap(), folder.path());
+    for name in ["start.dq2", "settling"] {
+        let (memory, array) = array(folder.path(), name);
+        let values: Vec<f64> = array.retrieve_chunk(&[0]).unwrap();
+        array.store_chunk(&[0], values).unwrap();
+        let written = memory.get(&"a/c/0".try_into().unwrap()).unwrap().unwrap();
+        assert!(
+            written == fs::read(folder.path().join(name).join("c/0")).unwrap(),
+            "{name}"
+        );
+    }
 }
 
 #[test]
