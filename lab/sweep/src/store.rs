@@ -171,7 +171,7 @@ impl<'a> Store<'a> {
             .iter()
             .map(|variable| chunk_key(variable.name, index))
             .collect();
-        let files: Vec<io::Result<Vec<u8>>> = keys.iter().map(|key| Ok(self.file(key)?.0)).collect();
+        let files: Vec<io::Result<Vec<u8>>> = keys.iter().map(|key| Ok(self.read(key)?.0)).collect();
         let is_missing = |file: &io::Result<_>| file.as_ref().is_err_and(|error| error.kind() == ErrorKind::NotFound);
         if !files.iter().all(is_missing) {
             for (key, file) in keys.iter().zip(&files) {
@@ -196,7 +196,7 @@ impl<'a> Store<'a> {
     }
 
     /// A compressed file whose checksum is right, and its content.
-    fn file(&self, key: &str) -> io::Result<(Vec<u8>, Vec<u8>)> {
+    pub(crate) fn read(&self, key: &str) -> io::Result<(Vec<u8>, Vec<u8>)> {
         let (file, mut content) = (fs::read(self.root.join(key))?, Vec::new());
         let mut decoder = GzDecoder::new(&file[..]);
         decoder.read_to_end(&mut content)?;
@@ -204,11 +204,6 @@ impl<'a> Store<'a> {
             [] => Ok((file, content)),
             _ => Err(io::Error::new(ErrorKind::InvalidData, "it continues after its end")),
         }
-    }
-
-    /// The content of a compressed file.
-    pub(crate) fn read(&self, key: &str) -> io::Result<Vec<u8>> {
-        self.file(key).map(|(_, content)| content)
     }
 
     /// Writes a compressed file.
