@@ -13,10 +13,6 @@ mod output;
 mod pack;
 mod report;
 mod serve;
-#[cfg(feature = "sweep")]
-mod sweep;
-#[cfg(not(feature = "sweep"))]
-#[path = "cli/without_sweep.rs"]
 mod sweep;
 mod theory;
 mod watch;
