@@ -89,13 +89,9 @@ client_environments() {
     done
 }
 
-# The program `vines` and the libraries of the two FMUs; with the argument `sweep`, the program has the command of that name, whose store
-# is a third of the build. One call for all: cargo builds packages again for another selection, because features of dependencies differ.
+# The program `vines` and the libraries of the two FMUs. One call for all: cargo builds packages again for another selection, because
+# features of dependencies differ.
 build() {
-    local features=()
-    # Scripts that this one calls build the same.
-    [ "${1:-}" != sweep ] || export VINES_SWEEPS=1
-    [ -z "${VINES_SWEEPS:-}" ] || features=(--features vines/sweep)
     stage "Building vines and the FMUs (the first time: some minutes)"
-    progress build --release --locked -p vines -p lovines-fmu -p phase-lock-fmu --no-default-features "${features[@]}"
+    progress build --release --locked -p vines -p lovines-fmu -p phase-lock-fmu
 }

@@ -3,7 +3,6 @@
 #[path = "../../net/tests/fuzz/noise.rs"]
 mod noise;
 
-use std::env;
 use std::io;
 use std::sync::{Arc, Mutex};
 
@@ -12,13 +11,7 @@ use vines_helic::{Device, HelicRig, Transport};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 use vines_testbench::scene::Names;
 
-use noise::Noise;
-
-/// Number of frames and the seed, as in the tests of the other protocol.
-fn size() -> (u64, u64) {
-    let number = |name, default| env::var(name).map_or(default, |text| text.parse().unwrap());
-    (number("FRAMES", 20_000), number("SEED", 1))
-}
+use noise::{Noise, size};
 
 /// m
 const LARGEST: f64 = 5e-3;

@@ -15,7 +15,6 @@ mod output;
 mod pack;
 mod report;
 mod serve;
-#[cfg(feature = "sweep")]
 mod sweep;
 mod theory;
 mod watch;

@@ -80,7 +80,7 @@ fn results(
     cells: &[usize],
     monitor: &Monitor,
 ) -> Result<Option<Vec<u8>>, StoreError> {
-    if let Ok(codes) = store.read(key) {
+    if let Ok((_, codes)) = store.read(key) {
         monitor.found.fetch_add(cells.len() as u64, Relaxed);
         return Ok(Some(codes));
     }

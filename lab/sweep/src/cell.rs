@@ -28,16 +28,20 @@ pub struct Results {
 }
 
 impl Results {
+    /// What may be asked for besides the regime, in the order of the store.
+    fn groups(&mut self) -> [(&'static str, &mut bool); 3] {
+        [
+            ("response", &mut self.response),
+            ("orbits", &mut self.orbits),
+            ("lock", &mut self.lock),
+        ]
+    }
+
     /// The names of the groups, in the order of the store.
     #[must_use]
-    pub fn names(&self) -> Vec<&'static str> {
-        let all = [
-            (true, "regime"),
-            (self.response, "response"),
-            (self.orbits, "orbits"),
-            (self.lock, "lock"),
-        ];
-        all.into_iter().filter_map(|(is, name)| is.then_some(name)).collect()
+    pub fn names(mut self) -> Vec<&'static str> {
+        let asked = self.groups().into_iter().filter(|(_, is_asked)| **is_asked);
+        std::iter::once("regime").chain(asked.map(|(name, _)| name)).collect()
     }
 
     /// From the names of groups; `regime` is always there.
@@ -46,17 +50,12 @@ impl Results {
     /// An unknown name.
     pub fn parse<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Self, ArgumentError> {
         let mut results = Self::default();
-        for name in names {
-            match name.trim() {
-                "regime" => {}
-                "response" => results.response = true,
-                "orbits" => results.orbits = true,
-                "lock" => results.lock = true,
-                other => {
-                    return Err(
-                        format!("unknown results `{other}`; known are regime, response, orbits and lock").into(),
-                    );
-                }
+        for name in names.into_iter().map(str::trim).filter(|name| *name != "regime") {
+            match results.groups().into_iter().find(|(group, _)| *group == name) {
+                Some((_, is_asked)) => *is_asked = true,
+                None => Err(format!(
+                    "unknown results `{name}`; known are regime, response, orbits and lock"
+                ))?,
             }
         }
         Ok(results)

@@ -77,13 +77,10 @@ impl Map {
             cells: Vec::new(),
             curves: Vec::new(),
         };
-        for [x, y] in [
-            [map.x.from, map.y.from],
-            [map.x.to, map.y.from],
-            [map.x.from, map.y.to],
-            [map.x.to, map.y.to],
-        ] {
-            map.sweep.at(&[y, x])?;
+        for x in [map.x.from, map.x.to] {
+            for y in [map.y.from, map.y.to] {
+                map.sweep.at(&[y, x])?;
+            }
         }
         Ok(map)
     }

@@ -7,11 +7,14 @@ use std::{
     error::Error,
     fs,
     hash::{BuildHasher, RandomState},
-    io::{self, ErrorKind, Read as _, Write as _},
+    io::{self, ErrorKind, Read as _},
     path::{Path, PathBuf},
 };
 
-use flate2::{Compression, bufread::GzDecoder, write::GzEncoder};
+use flate2::{
+    Compression,
+    bufread::{GzDecoder, GzEncoder},
+};
 use serde_json::{Map, Value, json};
 use vines_model::regime::Regime;
 
@@ -168,7 +171,7 @@ impl<'a> Store<'a> {
             .iter()
             .map(|variable| chunk_key(variable.name, index))
             .collect();
-        let files: Vec<io::Result<Vec<u8>>> = keys.iter().map(|key| self.read(key)).collect();
+        let files: Vec<io::Result<Vec<u8>>> = keys.iter().map(|key| Ok(self.read(key)?.0)).collect();
         let is_missing = |file: &io::Result<_>| file.as_ref().is_err_and(|error| error.kind() == ErrorKind::NotFound);
         if !files.iter().all(is_missing) {
             for (key, file) in keys.iter().zip(&files) {
@@ -186,19 +189,19 @@ impl<'a> Store<'a> {
         variables.try_for_each(|variable| self.write(&chunk_key(variable.name, index), &variable.read.bytes(cells)))
     }
 
-    /// Writes the content of a chunk of another store of the same sweep.
+    /// Writes the files of a chunk of another store of the same sweep.
     pub(crate) fn copy_chunk(&self, index: &[u64], files: &[Vec<u8>]) -> Result<(), StoreError> {
         let mut files = self.variables.iter().zip(files);
-        files.try_for_each(|(variable, content)| self.write(&chunk_key(variable.name, index), content))
+        files.try_for_each(|(variable, file)| self.put(&chunk_key(variable.name, index), file))
     }
 
-    /// The content of a compressed file whose checksum is right.
-    pub(crate) fn read(&self, key: &str) -> io::Result<Vec<u8>> {
-        let file = fs::read(self.root.join(key))?;
-        let (mut decoder, mut content) = (GzDecoder::new(&file[..]), Vec::new());
+    /// A compressed file whose checksum is right, and its content.
+    pub(crate) fn read(&self, key: &str) -> io::Result<(Vec<u8>, Vec<u8>)> {
+        let (file, mut content) = (fs::read(self.root.join(key))?, Vec::new());
+        let mut decoder = GzDecoder::new(&file[..]);
         decoder.read_to_end(&mut content)?;
         match decoder.into_inner() {
-            [] => Ok(content),
+            [] => Ok((file, content)),
             _ => Err(io::Error::new(ErrorKind::InvalidData, "it continues after its end")),
         }
     }
@@ -241,11 +244,11 @@ impl<'a> Store<'a> {
     }
 }
 
-/// Compresses a content.
+/// Compresses a content. The bytes depend on how the compressor is called: a writer gives others.
 fn packed(content: &[u8]) -> Vec<u8> {
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::new(LEVEL));
-    let file = encoder.write_all(content).and_then(|()| encoder.finish());
-    file.expect("memory takes all bytes")
+    let (mut encoder, mut file) = (GzEncoder::new(content, Compression::new(LEVEL)), Vec::new());
+    encoder.read_to_end(&mut file).expect("memory can be read");
+    file
 }
 
 /// Metadata as a file.

@@ -5,7 +5,6 @@
 mod noise;
 
 use std::collections::HashMap;
-use std::env;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,13 +17,7 @@ use vines_net::{Address, Key, NetRig, Role, Served, Server, Service};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 use vines_testbench::scene::Definition;
 
-use noise::Noise;
-
-/// Number of frames per connection, and the seed.
-fn size() -> (u64, u64) {
-    let number = |name, default| env::var(name).map_or(default, |text| text.parse().unwrap());
-    (number("FRAMES", 20_000), number("SEED", 1))
-}
+use noise::{Noise, size};
 
 const SAMPLE_TIME: f64 = 1e-3;
 const LARGEST: f64 = 1e-3;

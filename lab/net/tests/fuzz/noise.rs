@@ -1,5 +1,11 @@
 //! Random numbers (SplitMix64) and mutations.
 
+/// Number of frames per connection, and the seed.
+pub fn size() -> (u64, u64) {
+    let number = |name, default| std::env::var(name).map_or(default, |text| text.parse().unwrap());
+    (number("FRAMES", 20_000), number("SEED", 1))
+}
+
 pub struct Noise(pub u64);
 
 impl Noise {

@@ -75,14 +75,19 @@ pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     all
 }
 
-/// The values of a variable, as zarrs reads them.
-pub fn values<T: ElementOwned>(folder: &Path, name: &str) -> Vec<T> {
-    let memory = MemoryStore::new();
+/// A variable as zarrs reads it.
+pub fn array(folder: &Path, name: &str) -> (Arc<MemoryStore>, Array<MemoryStore>) {
+    let memory = Arc::new(MemoryStore::new());
     for (key, value) in files(&folder.join(name)) {
         let key = format!("a/{key}").as_str().try_into().unwrap();
         memory.set(&key, value.into()).unwrap();
     }
-    let array = Array::open(Arc::new(memory), "/a").unwrap();
+    let array = Array::open(Arc::clone(&memory), "/a").unwrap();
+    (memory, array)
+}
+
+pub fn values<T: ElementOwned>(folder: &Path, name: &str) -> Vec<T> {
+    let (_, array) = array(folder, name);
     array.retrieve_array_subset(&array.subset_all()).unwrap()
 }
 
