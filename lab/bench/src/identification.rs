@@ -14,6 +14,7 @@ use crate::record::{Record, Sample};
 use crate::scene::{Dimensionless, LinearResponse, Scene};
 
 pub use balance::{Balance, Cycle, Slopes};
+pub(crate) use decay::PER_PERIOD;
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, decay_points, harmonic};
 pub(crate) use response::{ASYMMETRIC, without_tones};
 pub use response::{Tone, classify, foreign_tone, impacts, regime_by_response};

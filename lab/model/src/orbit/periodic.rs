@@ -413,8 +413,6 @@ pub struct Periodic {
 const CONVERGED: f64 = 1e-12;
 const ROUNDING: f64 = 1e-10;
 const ROUNDS: usize = 30;
-/// Closing error of a motion that is known in closed form, and is not one with an earlier contact.
-const CLOSED: f64 = 1e-8;
 
 impl Periodic {
     /// The motion with the pattern `pattern` near the unknowns `guess` that satisfies both conditions, by Newton's method with
@@ -439,7 +437,7 @@ impl Periodic {
 
     /// The motion at unknowns that may satisfy the closing equations; None if they do not.
     pub(super) fn closed(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
-        let returned = follow(scene, pattern, x).filter(|returned| returned.residual.norm() < CLOSED)?;
+        let returned = follow(scene, pattern, x).filter(|returned| returned.residual.norm() < EXACT)?;
         Some(Self::of(pattern, x, returned))
     }
 
@@ -589,8 +587,8 @@ pub(super) fn newton(
     None
 }
 
-/// Largest distance of a settling motion from itself one repetition later.
-const NEAR: f64 = 1e-2;
+/// Largest distance of a settling motion from itself one repetition later, over b and b omega0, from which Newton's method starts.
+pub(crate) const NEAR: f64 = 1e-2;
 /// Largest distance of an exact motion from itself one repetition later.
 const EXACT: f64 = 1e-8;
 /// Patterns that are tried, from the shortest: after a period doubling, only the second is stable.
