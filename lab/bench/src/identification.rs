@@ -184,7 +184,7 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
         (count, Regime::Unknown) => (count, regime_by_response(hold, scene, base.value, target, omega.value)),
-        told => told,
+        by_impacts => by_impacts,
     };
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
     let tone = (!is_simulated)

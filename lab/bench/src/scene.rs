@@ -73,7 +73,7 @@ impl Scene {
         })
     }
 
-    /// The linear response: as measured, otherwise that of the scene's plant.
+    /// The linear response: as measured, otherwise by the scene's plant.
     pub fn linear(&self) -> LinearResponse {
         self.measured.unwrap_or_else(|| LinearResponse::of(self))
     }

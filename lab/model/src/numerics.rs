@@ -266,7 +266,7 @@ pub fn student_factor(degrees: f64) -> f64 {
     1.0 + (first + second + third) / z
 }
 
-/// Standard deviation of a sum of residuals over that of as many independent ones, from the correlation of neighbours (a process of first
+/// Standard deviation of a sum of residuals over the one of as many independent values, from the correlation of neighbours (a process of first
 /// order): the effective number of values is smaller than their number.
 fn colour(residuals: &[f64]) -> f64 {
     let neighbours: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();

@@ -32,7 +32,7 @@ pub struct ControllerSettings {
     pub frequency_tolerance: f64,
     /// As `frequency_tolerance`, for the amplitude.
     pub amplitude_tolerance: f64,
-    /// Delay from the drive to the sensors, samples, used where no sensor reads the base; by default that of `[chain]`.
+    /// Delay from the drive to the sensors, samples, used where no sensor reads the base; by default the delay of `[chain]`.
     pub delay: Option<f64>,
 }
 

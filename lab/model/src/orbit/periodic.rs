@@ -183,23 +183,23 @@ impl HarmonicCoefficients {
         let force = map.oscillator.free.base_force(omega);
         let direct = force * compliance * scene.epsilon;
         let direct_by = (Complex::new(0.0, 2.0 * zeta) * compliance + force * compliance_by) * scene.epsilon;
-        // (2i/duration) times the response to a force through the oscillator, less that of a free mass: the impulse on the
+        // (2i/duration) times the response to a force through the oscillator, less the response of a free mass: the impulse on the
         // particle is the opposite one.
         let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
         let Definition { sensor, reference, .. } = scene.definition;
         let particle = f64::from(u8::from(sensor == Sensor::V));
         let inner = compliance + particle / (omega * omega);
         let inner_by = compliance_by - 2.0 * particle / omega.powi(3);
-        // The factor of the sensor, seen from the reference, and its logarithmic derivative.
+        // The factor of the sensor relative to the reference, and its logarithmic derivative.
         let damping = scene.epsilon * scene.lambda;
         let (factor, slope) = if sensor == Sensor::Acceleration {
             (omega * omega, 2.0 / omega)
         } else {
             (1.0, 0.0)
         };
-        let seen = Complex::from_polar(factor, -reference.phase(damping, omega));
-        let seen_by = Complex::new(slope, -reference.phase_slope(damping, omega));
-        let read = |[z, by]: [Complex<f64>; 2]| [z * seen, (by + z * seen_by) * seen];
+        let sensor = Complex::from_polar(factor, -reference.phase(damping, omega));
+        let sensor_by = Complex::new(slope, -reference.phase_slope(damping, omega));
+        let read = |[z, by]: [Complex<f64>; 2]| [z * sensor, (by + z * sensor_by) * sensor];
         Self {
             direct: read([direct, direct_by]),
             impulses: read([weight * inner, weight * inner_by + weight / omega * inner]),

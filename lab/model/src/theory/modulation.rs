@@ -14,9 +14,10 @@
 //! ```
 //!
 //! Steady drift, `B+ - B- = d dB/dC` and `x+ - x = d dx/dC`, makes this two linear equations for the deviations of B and x. The mean of the
-//! particle's force on v over the flight gives the change of sigma per unit of `C' = dC/dtau`. Over many flights it differs from that of
+//! particle's force on v over the flight gives the change of sigma per unit of `C' = dC/dtau`. Over many flights it differs from the change of
 //! one flight, because the force grows within a flight: by `m d(R B^2/C)/dC / C` in sigma, with the mean `m = pi/2 - 4/pi` of `s^2 cos s` over
-//! half a period. Three terms of the same order follow from the oscillator: `lambda C'/(2C)`, `lambda C'/C` and `-C' G_R'(C)/(4C)`. The map of the impacts, iterated at a constant rate, confirms all of this (tests/unit/modulation.rs).
+//! half a period. Three terms of the same order follow from the oscillator: `lambda C'/(2C)`, `lambda C'/C` and `-C' G_R'(C)/(4C)`.
+//! The map of the impacts, iterated at a constant rate, confirms all of this (tests/unit/modulation.rs).
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI, TAU};
 

@@ -41,7 +41,7 @@ pub fn free_sigma(scene: &Dimensionless, c: f64) -> Option<f64> {
 
 /// The amplitude that the scene's sensor reads over the amplitude of v, at the particle speed `b` and the detuning `sigma`.
 pub fn reading(scene: &Dimensionless, b: f64, sigma: f64) -> f64 {
-    Reading::of(scene).seen(b, sigma).norm()
+    Reading::of(scene).reading(b, sigma).norm()
 }
 
 /// Rounds of a fixed-point iteration.
@@ -58,7 +58,7 @@ impl<'a> Reading<'a> {
     }
 
     /// The harmonic that the sensor reads over the harmonic of v, at the particle speed `b` and the detuning `sigma`.
-    fn seen(&self, b: f64, sigma: f64) -> Complex<f64> {
+    fn reading(&self, b: f64, sigma: f64) -> Complex<f64> {
         let Dimensionless { epsilon, definition, .. } = *self.scene;
         if definition.sensor == Sensor::V {
             return Complex::new(1.0, 0.0);
@@ -106,7 +106,7 @@ impl<'a> Reading<'a> {
         // Sensors differ from v by a factor of 1 + O(epsilon): each round gains as much.
         for _ in 0..ROUNDS {
             let b = self.flow.manifold.b(amplitude, BranchSide::Right)?;
-            amplitude = c / self.seen(b, self.flow.free_detuning(b)).norm();
+            amplitude = c / self.reading(b, self.flow.free_detuning(b)).norm();
         }
         self.flow.manifold.b(amplitude, BranchSide::Right)
     }
@@ -115,7 +115,9 @@ impl<'a> Reading<'a> {
     fn phase(&self, b: f64) -> f64 {
         let Dimensionless { epsilon, lambda, definition, .. } = *self.scene;
         match definition.resonance {
-            Resonance::Phase => definition.reference.phase(epsilon * lambda, 1.0) - FRAC_PI_2 - self.seen(b, 0.0).arg(),
+            Resonance::Phase => {
+                definition.reference.phase(epsilon * lambda, 1.0) - FRAC_PI_2 - self.reading(b, 0.0).arg()
+            }
             // The amplitude is a function of B alone, which is extreme at phase resonance of v (eq. 15); for the acceleration to within epsilon.
             Resonance::Peak => -FRAC_PI_2,
         }
@@ -124,6 +126,11 @@ impl<'a> Reading<'a> {
     fn resonance(&self, b: f64) -> BackbonePoint {
         let [g, sigma] = self.driven(b, self.phase(b));
         let point = self.flow.backbone_at(b);
-        BackbonePoint { c: point.c * self.seen(b, sigma).norm(), sigma, g, ..point }
+        BackbonePoint {
+            c: point.c * self.reading(b, sigma).norm(),
+            sigma,
+            g,
+            ..point
+        }
     }
 }
