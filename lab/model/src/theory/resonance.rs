@@ -41,11 +41,15 @@ pub fn free_sigma(scene: &Dimensionless, c: f64) -> Option<f64> {
 
 /// The amplitude that the scene's sensor reads over the amplitude of v, at the particle speed `b` and the detuning `sigma`.
 pub fn reading(scene: &Dimensionless, b: f64, sigma: f64) -> f64 {
-    Reading::of(scene).reading(b, sigma).norm()
+    Reading::of(scene).seen(b, sigma).norm()
 }
 
 /// Rounds of a fixed-point iteration.
 const ROUNDS: usize = 12;
+/// Largest distance of a peak from phase resonance of v, rad.
+const ASIDE: f64 = 0.3;
+/// Relative step of a difference quotient.
+const STEP: f64 = 1e-5;
 
 struct Reading<'a> {
     scene: &'a Dimensionless,
@@ -58,7 +62,7 @@ impl<'a> Reading<'a> {
     }
 
     /// The harmonic that the sensor reads over the harmonic of v, at the particle speed `b` and the detuning `sigma`.
-    fn reading(&self, b: f64, sigma: f64) -> Complex<f64> {
+    fn seen(&self, b: f64, sigma: f64) -> Complex<f64> {
         let Dimensionless { epsilon, definition, .. } = *self.scene;
         if definition.sensor == Sensor::V {
             return Complex::new(1.0, 0.0);
@@ -106,7 +110,7 @@ impl<'a> Reading<'a> {
         // Sensors differ from v by a factor of 1 + O(epsilon): each round gains as much.
         for _ in 0..ROUNDS {
             let b = self.flow.manifold.b(amplitude, BranchSide::Right)?;
-            amplitude = c / self.reading(b, self.flow.free_detuning(b)).norm();
+            amplitude = c / self.seen(b, self.flow.free_detuning(b)).norm();
         }
         self.flow.manifold.b(amplitude, BranchSide::Right)
     }
@@ -114,23 +118,39 @@ impl<'a> Reading<'a> {
     /// Phase of v, rad, at which the motion of the particle speed `b` is resonant.
     fn phase(&self, b: f64) -> f64 {
         let Dimensionless { epsilon, lambda, definition, .. } = *self.scene;
-        match definition.resonance {
-            Resonance::Phase => {
-                definition.reference.phase(epsilon * lambda, 1.0) - FRAC_PI_2 - self.reading(b, 0.0).arg()
+        match (definition.resonance, definition.sensor) {
+            (Resonance::Phase, _) => {
+                definition.reference.phase(epsilon * lambda, 1.0) - FRAC_PI_2 - self.seen(b, 0.0).arg()
             }
-            // The amplitude is a function of B alone, which is extreme at phase resonance of v (eq. 15); for the acceleration to within epsilon.
-            Resonance::Peak => -FRAC_PI_2,
+            // The amplitude is a function of B alone, which is extreme at phase resonance of v (eq. 15).
+            (Resonance::Peak, Sensor::V | Sensor::Q1) => -FRAC_PI_2,
+            (Resonance::Peak, Sensor::Acceleration) => self.aside(b) - FRAC_PI_2,
         }
+    }
+
+    /// Distance x of the peak of the acceleration from phase resonance of v, rad. The amplitude is `f(B) (1 + epsilon sigma)^2`, with
+    /// `sigma = sigma_R - (L/2C) tan x`, and the excitation `L(B)/cos x`, with `L = loss/C`. Along a response the excitation is constant,
+    /// and at the peak the amplitude is, too.
+    fn aside(&self, b: f64) -> f64 {
+        let epsilon = self.scene.epsilon;
+        let c = self.flow.manifold.c(b);
+        let mut tangent = 0.0_f64;
+        for _ in 0..ROUNDS {
+            let excitation = |b: f64| self.flow.loss(b) / self.flow.manifold.c(b);
+            let sigma = |b: f64| self.flow.free_detuning(b) - excitation(b) * tangent / (2.0 * self.flow.manifold.c(b));
+            let amplitude = |b: f64| (self.flow.manifold.c(b) * self.seen(b, sigma(b)).norm()).ln();
+            let slope = |f: &dyn Fn(f64) -> f64| (f(b * (1.0 + STEP)) - f(b * (1.0 - STEP))) / (2.0 * STEP * b);
+            let omega = 1.0 + epsilon * sigma(b);
+            let ratio = -epsilon * slope(&excitation) / (c * omega * slope(&amplitude));
+            tangent = ratio * (1.0 + tangent * tangent);
+        }
+        // At the fold, where B is no function of the amplitude, there is no peak.
+        tangent.atan().clamp(-ASIDE, ASIDE)
     }
 
     fn resonance(&self, b: f64) -> BackbonePoint {
         let [g, sigma] = self.driven(b, self.phase(b));
         let point = self.flow.backbone_at(b);
-        BackbonePoint {
-            c: point.c * self.reading(b, sigma).norm(),
-            sigma,
-            g,
-            ..point
-        }
+        BackbonePoint { c: point.c * self.seen(b, sigma).norm(), sigma, g, ..point }
     }
 }
