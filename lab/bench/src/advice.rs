@@ -31,7 +31,7 @@ pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
 pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
     let reason = ideal_reason(scene, regime)?;
     Some(match scene.left_out() {
-        Some(left_out) => format!("{reason}. This is said of the ideal cavity, without {left_out}"),
+        Some(left_out) => format!("{reason}. This holds for the ideal cavity, without {left_out}"),
         None => reason,
     })
 }

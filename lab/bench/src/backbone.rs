@@ -131,7 +131,7 @@ impl Criterion {
             let known = known.map_or(0.0, |slopes| slopes[i].value.abs());
             own[i].value.abs().max(known).hypot(own[i].uncertainty)
         };
-        // What is not noise belongs to the force of the impacts, a phasor: what is seen of it in one balance may be in the other, too.
+        // What is not noise belongs to the force of the impacts, a phasor: a part that shows in one balance may be in the other, too.
         let (units, change) = ([1.0, amplitude / whole.gain], LAG * whole.change);
         let systematic = [0, 1].map(|i| {
             let noise = first[i].uncertainty.hypot(second[i].uncertainty);

@@ -373,7 +373,7 @@ fn predicted(orbit: &Orbit, scene: &Scene) -> Vec<[f64; 3]> {
 fn by_slow_flow(d: &Dimensionless, c: f64) -> Option<f64> {
     let flow = SlowFlow::new(d.lambda, d.r);
     let g = flow.backbone_at(flow.manifold.b(c, BranchSide::Right)?).g;
-    Some(free_sigma(d, c)? - 0.5 * d.epsilon * g * flow.drift(c)?.sigma)
+    Some(free_sigma(d, c)? - 0.5 * d.epsilon * g * flow.drift(c)?)
 }
 
 #[cfg(test)]

@@ -59,7 +59,7 @@ impl<'a> Plan<'a> {
 
 /// Share of its amplitude to which the response of the linear rig falls in the recorded decay. The 1:1 motion has a smaller range, from symmetry
 /// breaking to the fold, and impacts make the decay faster.
-const DECAYED: f64 = 0.05;
+pub(crate) const DECAYED: f64 = 0.05;
 /// Longest recorded decay, natural periods, unless the scene asks for a longer one: a bound for rigs with little damping.
 const LONGEST_DECAY: f64 = 5000.0;
 

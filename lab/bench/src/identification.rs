@@ -14,6 +14,7 @@ use crate::record::{Record, Sample};
 use crate::scene::{Dimensionless, LinearResponse, Scene};
 
 pub use balance::{Balance, Cycle, Slopes};
+pub(crate) use decay::PER_PERIOD;
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, decay_points, harmonic};
 pub(crate) use response::{ASYMMETRIC, without_tones};
 pub use response::{Tone, classify, foreign_tone, impacts, regime_by_response};
@@ -21,48 +22,30 @@ pub use vines_model::regime::{Impact, Regime};
 
 /// Why a record cannot be identified.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum IdentificationError {
-    /// The loop locked another regime than symmetric 1:1.
     #[error(
         "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the regime is {regime}, not symmetric 1:1 with two \
          impacts per period. Try another [start] (the particle must be moving) or another G"
     )]
-    Regime {
-        /// What was found instead.
-        regime: Regime,
-        /// Detuning at the lock.
-        sigma: f64,
-        /// Amplitude at the lock.
-        c: f64,
-    },
-    /// The hold contains no periodic motion.
+    Regime { regime: Regime, sigma: f64, c: f64 },
     #[error(
         "the hold contains no periodic motion: the response or the base reads zero; check the sensors and record.hold_periods"
     )]
     NoMotion,
-    /// The phase was off its target while the lock was held.
     #[error(
         "the phase was {error:.3} ± {uncertainty:.3} degrees off its target while the lock was held; controller.phase_tolerance allows \
          {tolerance} degrees. A channel may have become late: `vines check` measures its delay"
     )]
     OffTarget {
-        /// Mean phase error of the hold, degrees.
         error: f64,
-        /// Its standard uncertainty, degrees.
         uncertainty: f64,
-        /// Degrees.
         tolerance: f64,
     },
-    /// A sensor failed after the release.
     #[error(
         "a sensor {what} {seconds:.3} s after the release, so that the decay is not recorded: check its cable and converter"
     )]
-    SensorAfterRelease {
-        /// Time since the release, s.
-        seconds: f64,
-        /// What it does.
-        what: &'static str,
-    },
+    SensorAfterRelease { seconds: f64, what: &'static str },
 }
 
 /// What a record says.
@@ -201,7 +184,7 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
         (count, Regime::Unknown) => (count, regime_by_response(hold, scene, base.value, target, omega.value)),
-        told => told,
+        by_impacts => by_impacts,
     };
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
     let tone = (!is_simulated)

@@ -5,7 +5,8 @@ use std::f64::consts::{PI, TAU};
 
 use vines_model::regime::{Impact, MEASURED, Regime, end_of_synchrony, one_to_one};
 
-use crate::identification::harmonic;
+use crate::experiment::DECAYED;
+use crate::identification::{PER_PERIOD, harmonic};
 
 /// Impacts that are kept to determine the regime from.
 const KEPT: usize = 40;
@@ -49,11 +50,6 @@ impl LastImpacts {
         one_to_one(&self.0, self.per_period(), MEASURED)
     }
 }
-
-/// Fits per period, as in the identification.
-const PER_PERIOD: f64 = 8.0;
-/// Share of the first amplitude at which the fits end: an experiment records a decay down to it.
-const END: f64 = 0.05;
 
 /// Impacts that synchrony is determined from at every sample; it is lost once.
 const LAST: usize = 4;
@@ -117,7 +113,7 @@ impl Decay {
         }
         match harmonic(&self.values, sample_time, self.motion.omega) {
             Some(fit) => {
-                self.ended = fit.amplitude < END * *self.first.get_or_insert(fit.amplitude);
+                self.ended = fit.amplitude < DECAYED * *self.first.get_or_insert(fit.amplitude);
                 self.motion = Motion {
                     omega: fit.omega,
                     amplitude: fit.amplitude,

@@ -241,7 +241,7 @@ impl Simulated {
         Ok(Chain::around(Box::new(plant), scene))
     }
 
-    /// The same with the sensors of a definition.
+    /// This plant with the sensors of a definition.
     pub fn with_sensors(mut self, definition: Definition) -> Measured<Self> {
         self.sensor = definition.sensor;
         let parameters = *self.plant.parameters();

@@ -1,5 +1,26 @@
 //! Scenes: plant, excitation, controller, measurement chain and durations, read from TOML.
 
+/// The keys of a section, each with its default.
+macro_rules! settings {
+    (
+        $(#[$about:meta])*
+        pub struct $name:ident { $($(#[$meaning:meta])* $key:ident: $type:ty = $default:expr,)* }
+    ) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct $name {
+            $($(#[$meaning])* pub $key: $type,)*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($key: $default,)* }
+            }
+        }
+    };
+}
+
 mod backbone;
 mod chain;
 mod controller;
@@ -73,7 +94,7 @@ impl Scene {
         })
     }
 
-    /// The linear response: as measured, otherwise that of the scene's plant.
+    /// The linear response: as measured, otherwise by the scene's plant.
     pub fn linear(&self) -> LinearResponse {
         self.measured.unwrap_or_else(|| LinearResponse::of(self))
     }
@@ -455,28 +476,17 @@ fn serialize<S: Serializer>(plant: &Parameters, serializer: S) -> Result<S::Ok, 
 
 // The `[record]` section: how long to drive, to record and to average.
 
-/// Durations of an experiment.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RecordSettings {
-    /// Time limit for the lock, natural periods; by default at least 3000, and 20 relaxation times.
-    pub lock_periods: Option<f64>,
-    /// How long the settled lock is held and measured, natural periods.
-    pub hold_periods: f64,
-    /// Length of the recorded decay, natural periods; by default as long as the linear response takes to fall to 5 %.
-    pub decay_periods: Option<f64>,
-    /// Window of the fit along the decay, periods of the motion.
-    pub window_periods: f64,
-}
-
-impl Default for RecordSettings {
-    fn default() -> Self {
-        Self {
-            lock_periods: None,
-            hold_periods: 20.0,
-            decay_periods: None,
-            window_periods: 2.5,
-        }
+settings! {
+    /// Durations of an experiment.
+    pub struct RecordSettings {
+        /// Time limit for the lock, natural periods; by default at least 3000, and 20 relaxation times.
+        lock_periods: Option<f64> = None,
+        /// How long the settled lock is held and measured, natural periods.
+        hold_periods: f64 = 20.0,
+        /// Length of the recorded decay, natural periods; by default as long as the linear response takes to fall to 5 %.
+        decay_periods: Option<f64> = None,
+        /// Window of the fit along the decay, periods of the motion.
+        window_periods: f64 = 2.5,
     }
 }
 

@@ -1,4 +1,4 @@
-//! docs/controller-settings.md follows from the controller's table of settings and the keys of a scene.
+//! Guards that docs/controller-settings.md follows from the controller's table of settings and the keys of a scene.
 
 use std::path::Path;
 

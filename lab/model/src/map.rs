@@ -18,7 +18,7 @@ use serde::Serialize;
 use crate::Dimensionless;
 use crate::numerics::{SIGNIFICANT, mean, standard_deviation};
 use crate::orbit::oscillator::ForcedOscillator;
-use crate::orbit::{Periodic, periodic_near};
+use crate::orbit::{NEAR, Periodic, periodic_near};
 use crate::regime::{Impact, Regime, synchrony};
 
 /// Default of the largest number of periods that a cell is followed.
@@ -278,8 +278,6 @@ fn state([q1, dq1, q2, dq2]: [f64; 4]) -> State {
 const BESIDE: f64 = 1e-8;
 /// Largest number of periods over which it is followed: an exponent of zero is then known to [`ZERO`].
 const OBSERVED: usize = 5000;
-/// Differences of states (q1/b, q1'/(b omega0), ...) below which a motion may be on its way to a periodic one.
-const NEAR: f64 = 1e-2;
 /// Differences below which it repeats: far above rounding, far below what separates two motions.
 const SAME: f64 = 1e-6;
 /// Longest repetition in the search, periods. The window is a third of it, and at least two repetitions.

@@ -241,7 +241,7 @@ impl Estimate {
 
     /// The mean of independent values.
     pub fn mean(values: &[f64]) -> Self {
-        let fit = Regression::fit(&[vec![1.0; values.len()]], values, &[], 0.0);
+        let fit = Regression::fit(&[vec![1.0; values.len()]], values, None, 0.0);
         fit.map_or(Self { value: f64::NAN, uncertainty: f64::NAN }, |fit| {
             fit.estimate(&[1.0])
         })
@@ -266,7 +266,7 @@ pub fn student_factor(degrees: f64) -> f64 {
     1.0 + (first + second + third) / z
 }
 
-/// Standard deviation of a sum of residuals over that of as many independent ones, from the correlation of neighbours (a process of first
+/// Standard deviation of a sum of residuals over the one of as many independent values, from the correlation of neighbours (a process of first
 /// order): the effective number of values is smaller than their number.
 fn colour(residuals: &[f64]) -> f64 {
     let neighbours: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();
@@ -275,17 +275,6 @@ fn colour(residuals: &[f64]) -> f64 {
     let longest = (1.0 - 12.0 / residuals.len() as f64).clamp(0.0, 0.9);
     let correlation = (neighbours / squares).clamp(0.0, longest);
     ((1.0 + correlation) / (1.0 - correlation)).sqrt()
-}
-
-/// What is known of a coefficient in advance.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Prior {
-    /// Number of the coefficient.
-    pub coefficient: usize,
-    /// Its expected value.
-    pub value: f64,
-    /// The standard uncertainty of that.
-    pub uncertainty: f64,
 }
 
 /// A linear least-squares fit.
@@ -299,22 +288,21 @@ pub struct Regression {
 
 impl Regression {
     /// Fits `values` by the sum of `columns`. `noise` is the standard deviation of a value, 0 where it is not known; where the
-    /// residuals scatter significantly more, their scatter counts, with Student's distribution and the correlation of neighbours. Priors need a known noise. `None` for
-    /// too few values, or columns that are not independent.
-    pub fn fit(columns: &[Vec<f64>], values: &[f64], priors: &[Prior], noise: f64) -> Option<Self> {
+    /// residuals scatter significantly more, their scatter counts, with Student's distribution and the correlation of neighbours. `prior` is what
+    /// is known of a coefficient in advance; it needs a known noise. `None` for too few values, or columns that are not independent.
+    pub fn fit(columns: &[Vec<f64>], values: &[f64], prior: Option<(usize, Estimate)>, noise: f64) -> Option<Self> {
         let (rows, terms) = (values.len(), columns.len());
-        let degrees = (rows + priors.len())
+        let degrees = (rows + usize::from(prior.is_some()))
             .checked_sub(terms)
             .filter(|n| *n > 0 || noise > 0.0)? as f64;
-        let data = DMatrix::from_fn(rows, terms, |row, column| columns[column][row]);
-        let values = DVector::from_column_slice(values);
+        let mut matrix = DMatrix::from_fn(rows, terms, |row, column| columns[column][row]);
+        let mut right = DVector::from_column_slice(values);
         // A prior counts as one more value, weighted by its uncertainty relative to the noise.
-        let (mut matrix, mut right) = (data, values);
-        for prior in priors {
-            let (row, weight) = (matrix.nrows(), noise / prior.uncertainty);
-            matrix = matrix.insert_row(row, 0.0);
-            right = right.insert_row(row, prior.value * weight);
-            matrix[(row, prior.coefficient)] = weight;
+        if let Some((coefficient, Estimate { value, uncertainty })) = prior {
+            let weight = noise / uncertainty;
+            matrix = matrix.insert_row(rows, 0.0);
+            right = right.insert_row(rows, value * weight);
+            matrix[(rows, coefficient)] = weight;
         }
         // Columns of very different size make the normal equations ill-conditioned; scaled to length 1 they are not.
         let lengths: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();

@@ -22,6 +22,7 @@ pub use continuation::{
 };
 pub use convergence::{Convergence, Difference, convergence};
 pub use impact_map::{Bounce, ImpactMap};
+pub(crate) use periodic::NEAR;
 pub use periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, periodic_near, settle};
 pub use plant::{
     DriveCondition, NoMotion, PlantMotion, periodic_motion, resonant_motion, resonant_motion_under, settled_motion,

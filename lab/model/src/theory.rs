@@ -4,7 +4,7 @@
 //! relative motion with the triangle wave Pi of slope ±1 and height pi/2, so that B is the particle's speed. On the slow invariant
 //! manifold, C is a function of B, and B is the better coordinate: everything below is polynomial in it, and
 //! both branches are one curve. All results are of first order in epsilon: the mass ratio itself appears only where
-//! fast and slow time are combined: in the modulation from impact to impact, and in a waveform. Equation numbers are those of docs/theory.md.
+//! fast and slow time are combined: in the modulation from impact to impact, and in a waveform. Equation numbers refer to docs/theory.md.
 
 mod activation;
 mod decay;
@@ -14,7 +14,7 @@ mod slow_flow;
 
 pub use activation::Activation;
 pub use decay::{DecayPoint, Waveform};
-pub use modulation::{Drift, ImpactSequence, Modulation};
+pub use modulation::{ImpactSequence, Modulation};
 pub use resonance::{backbone, backbone_at_level, free_sigma, reading, resonant};
 pub use slow_flow::{
     B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, Manifold, ResponsePoint, SlowFlow, impacts_stable,

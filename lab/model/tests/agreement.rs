@@ -1,4 +1,4 @@
-//! Regimes of random cells of three maps, decided as `vines map` does, compared with two other motions: the same one further on, and that
+//! Guards the regimes of random cells of three maps, decided as `vines map` does, compared with two other motions: the same one further on, and that
 //! of a plant which follows other steps from the start, so that chaos is another one after some hundred periods.
 //!
 //! The comparison has its own rules: the pattern of the impacts instead of the state, and a disturbed second plant instead of the

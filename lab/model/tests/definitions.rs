@@ -1,4 +1,4 @@
-//! Resonance by phase and by peak, relative to the base and to its force, of v, q1 and the acceleration.
+//! Guards resonance by phase and by peak, relative to the base and to its force, of v, q1 and the acceleration.
 
 use vines_model::{
     Definition, Dimensionless, Reference, Resonance, Sensor,

@@ -1,4 +1,4 @@
-//! The regime of a cell against exact orbits and simulations whose outcome is known.
+//! Guards the regime of a cell of a map against exact orbits and simulations whose outcome is known.
 
 use vines_model::{
     Dimensionless,

@@ -1,4 +1,4 @@
-//! Periodic motions of the plant with the effects of its cavity: the ideal limit, closure, symmetry, and what is refused.
+//! Guards periodic motions of the plant with the effects of its cavity: the ideal limit, closure, symmetry, and what is refused.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

@@ -21,7 +21,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DVector};
-use vines_model::numerics::{Estimate, HarmonicBasis, Prior, Regression, mean, slope};
+use vines_model::numerics::{Estimate, HarmonicBasis, Regression, mean, slope};
 
 use crate::record::{Sample, drive_phases};
 use crate::scene::LinearResponse;
@@ -117,9 +117,8 @@ impl Balance {
             Slopes::Rising => [Estimate { value: scale[0], uncertainty: scale[0] }, unknown(scale[1])],
             Slopes::Known(slopes) => slopes,
         };
-        let prior = |Estimate { value, uncertainty }| [Prior { coefficient: 2, value, uncertainty }];
-        let drive = Regression::fit(&columns, &amplitudes, &prior(by_base.scaled(-gain)), noise)?;
-        let turning = Regression::fit(&columns, &phases, &prior(by_omega), noise / response)?;
+        let drive = Regression::fit(&columns, &amplitudes, Some((2, by_base.scaled(-gain))), noise)?;
+        let turning = Regression::fit(&columns, &phases, Some((2, by_omega)), noise / response)?;
         let duration = cycles[cycles.len() - 1].time - cycles[0].time;
         let forces: Vec<f64> = drives.iter().map(|drive| drive.force.re).collect();
         let neglected = REMAINDER * inertia * (slope(&forces) * n / duration);

@@ -72,7 +72,7 @@ pub struct DecayPoints {
 }
 
 /// Points per period along the decay.
-const PER_PERIOD: f64 = 8.0;
+pub(crate) const PER_PERIOD: f64 = 8.0;
 /// Smallest loss of amplitude by the impacts of a 1:1 motion, over the loss at the release: with the speed of the particle, it changes by a third
 /// down to the fold.
 const KEPT: f64 = 0.5;

@@ -1,7 +1,7 @@
 //! The regime from the response alone, as on a real rig.
 //!
 //! Two impacts per period at even intervals excite odd harmonics, and uneven impacts even ones, too. Irregular impacts make amplitude
-//! and phase fluctuate, which leaves a residual. The motion without impacts is the linear mode: response over base is that of a
+//! and phase fluctuate, which leaves a residual. The motion without impacts is the linear mode: response over base is as in a
 //! linear test at small amplitude, which the loop check makes.
 
 use std::f64::consts::{PI, TAU};
@@ -161,7 +161,7 @@ fn is_linear(linear: &LinearResponse, measured: Complex64, omega: f64) -> bool {
 // Foreign tones: lines in the response that no motion of the particle produces.
 //
 // The response belongs to a linear oscillator, which only its base and the particle excite. The particle stays in its cavity: a line of its
-// relative position has at most the amplitude 4b/π, that of a square wave. With x = ω/ω0, a line of the response v therefore has at most
+// relative position has at most the amplitude 4b/π, as a square wave has. With x = ω/ω0, a line of the response v therefore has at most
 // the amplitude `4 epsilon b/(π |x² - 1|)`, of q1 x² times as much, and of the acceleration x⁴ times as much, whatever the motion: irregular,
 // period-doubled or quasi-periodic. A larger line comes from a sensor or a cable, for instance from the mains.
 

@@ -56,44 +56,39 @@ pub enum SensorFault {
 
 impl RigFault {
     /// The faults by name, as `vines rig --fault` takes them; the sample numbers are a quarter and 37 % of a default period.
-    pub const ALL: [(&'static str, Self); 27] = [
-        ("response sensor dead", Self::Response(SensorFault::Dead)),
-        ("response sensor frozen", Self::Response(SensorFault::Frozen)),
-        ("response sensor reversed", Self::Response(SensorFault::Reversed)),
-        (
-            "response sensor saturated at half",
-            Self::Response(SensorFault::Saturated),
-        ),
-        (
-            "response sensor at the end of its range",
-            Self::Response(SensorFault::Stuck),
-        ),
-        ("response sensor × 3", Self::Response(SensorFault::Gain(3.0))),
-        ("response sensor × 0.3", Self::Response(SensorFault::Gain(0.3))),
-        ("response sensor with an offset", Self::Response(SensorFault::Offset)),
-        ("response sensor noisy", Self::Response(SensorFault::Noisy)),
-        ("response sensor loose", Self::Response(SensorFault::Loose)),
-        ("response sensor late", Self::Response(SensorFault::Late(25))),
-        ("response NaN", Self::Response(SensorFault::Value(f64::NAN))),
-        ("response infinite", Self::Response(SensorFault::Value(f64::INFINITY))),
-        ("base sensor dead", Self::Base(SensorFault::Dead)),
-        ("base sensor frozen", Self::Base(SensorFault::Frozen)),
-        ("base sensor reversed", Self::Base(SensorFault::Reversed)),
-        ("base sensor saturated at half", Self::Base(SensorFault::Saturated)),
-        ("base sensor noisy", Self::Base(SensorFault::Noisy)),
-        ("base sensor late", Self::Base(SensorFault::Late(25))),
-        ("base NaN", Self::Base(SensorFault::Value(f64::NAN))),
-        ("sensors swapped", Self::Swapped),
-        (
-            "both sensors frozen (clock stands still)",
-            Self::Both(SensorFault::Frozen),
-        ),
-        ("clock jumps back", Self::Both(SensorFault::Late(37))),
-        ("clock jumps forward", Self::Forward(37)),
-        ("shaker off", Self::Shaker(0.0)),
-        ("shaker × 5 (overload)", Self::Shaker(5.0)),
-        ("structure changes (lost lock)", Self::Structure),
-    ];
+    pub const ALL: [(&'static str, Self); 27] = {
+        use RigFault::*;
+        use SensorFault::*;
+        [
+            ("response sensor dead", Response(Dead)),
+            ("response sensor frozen", Response(Frozen)),
+            ("response sensor reversed", Response(Reversed)),
+            ("response sensor saturated at half", Response(Saturated)),
+            ("response sensor at the end of its range", Response(Stuck)),
+            ("response sensor × 3", Response(Gain(3.0))),
+            ("response sensor × 0.3", Response(Gain(0.3))),
+            ("response sensor with an offset", Response(Offset)),
+            ("response sensor noisy", Response(Noisy)),
+            ("response sensor loose", Response(Loose)),
+            ("response sensor late", Response(Late(25))),
+            ("response NaN", Response(Value(f64::NAN))),
+            ("response infinite", Response(Value(f64::INFINITY))),
+            ("base sensor dead", Base(Dead)),
+            ("base sensor frozen", Base(Frozen)),
+            ("base sensor reversed", Base(Reversed)),
+            ("base sensor saturated at half", Base(Saturated)),
+            ("base sensor noisy", Base(Noisy)),
+            ("base sensor late", Base(Late(25))),
+            ("base NaN", Base(Value(f64::NAN))),
+            ("sensors swapped", Swapped),
+            ("both sensors frozen (clock stands still)", Both(Frozen)),
+            ("clock jumps back", Both(Late(37))),
+            ("clock jumps forward", Forward(37)),
+            ("shaker off", Shaker(0.0)),
+            ("shaker × 5 (overload)", Shaker(5.0)),
+            ("structure changes (lost lock)", Structure),
+        ]
+    };
 }
 
 /// Healthy readings that are kept: more than a default period.

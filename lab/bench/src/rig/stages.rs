@@ -37,7 +37,7 @@ impl<R: Rig> Measured<R> {
         }
     }
 
-    /// Second difference over the displacement, times `step` (s): at omega0 exactly that of a sine.
+    /// Second difference over the displacement, times `step` (s): at omega0 exact for a sine.
     fn gain(&self, step: f64) -> f64 {
         let sine = (0.5 * self.plant[1] * step).sin();
         4.0 * sine * sine / step

@@ -4,38 +4,25 @@ use serde::{Deserialize, Serialize};
 
 use super::{SceneError, positive, within};
 
-/// How the response amplitude is stepped with the loop closed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct BackboneSettings {
-    /// First level, response amplitude over b.
-    #[serde(rename = "C_from")]
-    pub c_from: f64,
-    /// Last level, response amplitude over b.
-    #[serde(rename = "C_to")]
-    pub c_to: f64,
-    /// Number of levels, at equal distances.
-    pub points: u32,
-    /// Largest drive allowed, base amplitude over `b epsilon`.
-    #[serde(rename = "G_max")]
-    pub g_max: f64,
-    /// Periods after which a point is taken, settled or not.
-    pub dwell_max: u32,
-    /// Largest standard uncertainty of the drive E as a share of it, and of the frequency as a share of the half-power bandwidth of a linear rig
-    /// that this drive holds at the largest level: `omega0 E/A`. Noise and transients lengthen the dwell until both are reached.
-    pub precision: f64,
-}
-
-impl Default for BackboneSettings {
-    fn default() -> Self {
-        Self {
-            c_from: 0.7,
-            c_to: 0.14,
-            points: 29,
-            g_max: 4.0,
-            dwell_max: 150,
-            precision: 9e-4,
-        }
+settings! {
+    /// How the response amplitude is stepped with the loop closed.
+    pub struct BackboneSettings {
+        /// First level, response amplitude over b.
+        #[serde(rename = "C_from")]
+        c_from: f64 = 0.7,
+        /// Last level, response amplitude over b.
+        #[serde(rename = "C_to")]
+        c_to: f64 = 0.14,
+        /// Number of levels, at equal distances.
+        points: u32 = 29,
+        /// Largest drive allowed, base amplitude over `b epsilon`.
+        #[serde(rename = "G_max")]
+        g_max: f64 = 4.0,
+        /// Periods after which a point is taken, settled or not.
+        dwell_max: u32 = 150,
+        /// Largest standard uncertainty of the drive E as a share of it, and of the frequency as a share of the half-power bandwidth of a linear rig
+        /// that this drive holds at the largest level: `omega0 E/A`. Noise and transients lengthen the dwell until both are reached.
+        precision: f64 = 9e-4,
     }
 }
 

@@ -4,53 +4,35 @@ use serde::{Deserialize, Serialize};
 
 use super::{ControllerSettings, SceneError, check, option, positive, within};
 
-/// The stages between the rig and the controller; each can be switched off.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ChainSettings {
-    /// Resolution of the inputs, bits; absent: ideal.
-    #[serde(deserialize_with = "option")]
-    pub adc_bits: Option<u32>,
-    /// Resolution of the output, bits; absent: ideal. Needs `hold`.
-    #[serde(deserialize_with = "option")]
-    pub dac_bits: Option<u32>,
-    /// Range of the response channel, ± this value, over b; readings saturate there.
-    pub response_range: f64,
-    /// Range of the base channel and of the output, ± this value, over `b epsilon`.
-    pub base_range: f64,
-    /// The base follows held samples instead of an oscillator in the rig.
-    pub hold: bool,
-    /// Signal-to-noise ratio of the sensors, dB: the noise is proportional to the RMS of the signal. Absent: no noise.
-    #[serde(deserialize_with = "option")]
-    pub snr: Option<f64>,
-    /// Seed of noise and jitter.
-    pub seed: u64,
-    /// Cut-off of the anti-alias filter (Butterworth, second order), in units of omega0; absent: no filter.
-    #[serde(deserialize_with = "option")]
-    pub filter: Option<f64>,
-    /// Standard deviation of the sampling instants, in samples.
-    pub jitter: f64,
-    /// Delay from the sensors to the controller, samples.
-    pub delay: u32,
-    /// Whether a sensor reads the base.
-    pub reference: bool,
-}
-
-impl Default for ChainSettings {
-    fn default() -> Self {
-        Self {
-            adc_bits: None,
-            dac_bits: None,
-            response_range: 2.0,
-            base_range: 4.0,
-            hold: false,
-            snr: None,
-            seed: 1,
-            filter: None,
-            jitter: 0.0,
-            delay: 0,
-            reference: true,
-        }
+settings! {
+    /// The stages between the rig and the controller; each can be switched off.
+    pub struct ChainSettings {
+        /// Resolution of the inputs, bits; absent: ideal.
+        #[serde(deserialize_with = "option")]
+        adc_bits: Option<u32> = None,
+        /// Resolution of the output, bits; absent: ideal. Needs `hold`.
+        #[serde(deserialize_with = "option")]
+        dac_bits: Option<u32> = None,
+        /// Range of the response channel, ± this value, over b; readings saturate there.
+        response_range: f64 = 2.0,
+        /// Range of the base channel and of the output, ± this value, over `b epsilon`.
+        base_range: f64 = 4.0,
+        /// The base follows held samples instead of an oscillator in the rig.
+        hold: bool = false,
+        /// Signal-to-noise ratio of the sensors, dB: the noise is proportional to the RMS of the signal. Absent: no noise.
+        #[serde(deserialize_with = "option")]
+        snr: Option<f64> = None,
+        /// Seed of noise and jitter.
+        seed: u64 = 1,
+        /// Cut-off of the anti-alias filter (Butterworth, second order), in units of omega0; absent: no filter.
+        #[serde(deserialize_with = "option")]
+        filter: Option<f64> = None,
+        /// Standard deviation of the sampling instants, in samples.
+        jitter: f64 = 0.0,
+        /// Delay from the sensors to the controller, samples.
+        delay: u32 = 0,
+        /// Whether a sensor reads the base.
+        reference: bool = true,
     }
 }
 

@@ -11,44 +11,28 @@ use vines_model::ArgumentError;
 
 use super::{Law, Scene, SceneError, Sensor, check, not_negative, positive, symbols, within};
 
-/// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ControllerSettings {
-    /// Samples per natural period `2 pi/omega0`.
-    pub samples_per_period: f64,
-    /// Bandwidth of the phase detector, in units of omega0: the only tuning parameter; the gains of the loop follow from it.
-    pub bandwidth: f64,
-    /// Lowest frequency allowed, in units of omega0.
-    pub omega_min: f64,
-    /// Highest frequency allowed, in units of omega0.
-    pub omega_max: f64,
-    /// Phase of the response relative to the base, degrees.
-    pub phase_target: f64,
-    /// Largest phase error that counts as locked, degrees.
-    pub phase_tolerance: f64,
-    /// Distance from the steady state that counts as settled: of the frequency, over the half-power bandwidth of the linear response, and of
-    /// the response amplitude, relative. Judged by the drift and the rate at which the steady state is approached; noise widens it.
-    pub frequency_tolerance: f64,
-    /// As `frequency_tolerance`, for the amplitude.
-    pub amplitude_tolerance: f64,
-    /// Delay from the drive to the sensors, samples, used where no sensor reads the base; by default that of `[chain]`.
-    pub delay: Option<f64>,
-}
-
-impl Default for ControllerSettings {
-    fn default() -> Self {
-        Self {
-            samples_per_period: 100.0,
-            bandwidth: 0.1,
-            omega_min: 0.9,
-            omega_max: 1.1,
-            phase_target: -90.0,
-            phase_tolerance: 0.3,
-            frequency_tolerance: 2e-4,
-            amplitude_tolerance: 8e-5,
-            delay: None,
-        }
+settings! {
+    /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
+    pub struct ControllerSettings {
+        /// Samples per natural period `2 pi/omega0`.
+        samples_per_period: f64 = 100.0,
+        /// Bandwidth of the phase detector, in units of omega0: the only tuning parameter; the gains of the loop follow from it.
+        bandwidth: f64 = 0.1,
+        /// Lowest frequency allowed, in units of omega0.
+        omega_min: f64 = 0.9,
+        /// Highest frequency allowed, in units of omega0.
+        omega_max: f64 = 1.1,
+        /// Phase of the response relative to the base, degrees.
+        phase_target: f64 = -90.0,
+        /// Largest phase error that counts as locked, degrees.
+        phase_tolerance: f64 = 0.3,
+        /// Distance from the steady state that counts as settled: of the frequency, over the half-power bandwidth of the linear response, and of
+        /// the response amplitude, relative. Judged by the drift and the rate at which the steady state is approached; noise widens it.
+        frequency_tolerance: f64 = 2e-4,
+        /// As `frequency_tolerance`, for the amplitude.
+        amplitude_tolerance: f64 = 8e-5,
+        /// Delay from the drive to the sensors, samples, used where no sensor reads the base; by default the delay of `[chain]`.
+        delay: Option<f64> = None,
     }
 }
 

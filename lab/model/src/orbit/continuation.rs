@@ -88,7 +88,7 @@ const DRAWN: f64 = 1e-4;
 
 /// A motion of a branch as it is serialised; the impacts follow from the first one.
 #[derive(Serialize)]
-struct DrawnMotion<'a> {
+struct DrawnMotion {
     #[serde(rename = "G")]
     g: f64,
     sigma: f64,
@@ -99,28 +99,22 @@ struct DrawnMotion<'a> {
     b: f64,
     multipliers: [[f64; 2]; 4],
     stable: bool,
-    start: &'a Bounce,
-}
-
-impl<'a> From<&'a Periodic> for DrawnMotion<'a> {
-    fn from(motion: &'a Periodic) -> Self {
-        let Periodic { g, sigma, c, gamma, b, multipliers, stable, ref bounces, .. } = *motion;
-        Self {
-            g,
-            sigma,
-            c,
-            gamma,
-            b,
-            multipliers,
-            stable,
-            start: &bounces[0],
-        }
-    }
+    start: Bounce,
 }
 
 impl Serialize for Branch {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let points: Vec<DrawnMotion> = self.drawn().into_iter().map(DrawnMotion::from).collect();
+        let drawn = |one: &Periodic| DrawnMotion {
+            g: one.g,
+            sigma: one.sigma,
+            c: one.c,
+            gamma: one.gamma,
+            b: one.b,
+            multipliers: one.multipliers,
+            stable: one.stable,
+            start: one.bounces[0],
+        };
+        let points: Vec<DrawnMotion> = self.drawn().into_iter().map(drawn).collect();
         let mut fields = serializer.serialize_struct("Branch", 4)?;
         fields.serialize_field("shape", &self.points[0].pattern)?;
         fields.serialize_field("points", &points)?;

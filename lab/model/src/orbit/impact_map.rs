@@ -99,7 +99,7 @@ impl ImpactMap {
     }
 
     /// The state just after the first impact that follows from (q1, q1', q2, q2') at a phase of the base, rad, with the
-    /// particle inside its cavity; None as for [`Self::next`].
+    /// particle inside its cavity; `None` where [`Self::next`] has none.
     pub fn first(&self, phase: f64, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
         let flight = ParticleFlight::between(&self.oscillator, phase, [q1, dq1, q2, dq2], q1 - q2);
         Some(self.landed(&flight)?.next)
@@ -125,7 +125,7 @@ impl ImpactMap {
         (1.0 + self.r) / (1.0 + self.epsilon)
     }
 
-    /// The same with its derivatives.
+    /// The next impact with its derivatives by state, frequency and excitation.
     pub(super) fn step(&self, from: &Bounce) -> Option<Step> {
         let Landed { duration: t, dq1, dw, next } = self.landed(&ParticleFlight::new(&self.oscillator, from))?;
 

@@ -183,23 +183,23 @@ impl HarmonicCoefficients {
         let force = map.oscillator.free.base_force(omega);
         let direct = force * compliance * scene.epsilon;
         let direct_by = (Complex::new(0.0, 2.0 * zeta) * compliance + force * compliance_by) * scene.epsilon;
-        // (2i/duration) times the response to a force through the oscillator, less that of a free mass: the impulse on the
+        // (2i/duration) times the response to a force through the oscillator, less the response of a free mass: the impulse on the
         // particle is the opposite one.
         let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
         let Definition { sensor, reference, .. } = scene.definition;
         let particle = f64::from(u8::from(sensor == Sensor::V));
         let inner = compliance + particle / (omega * omega);
         let inner_by = compliance_by - 2.0 * particle / omega.powi(3);
-        // The factor of the sensor, seen from the reference, and its logarithmic derivative.
+        // The factor of the sensor relative to the reference, and its logarithmic derivative.
         let damping = scene.epsilon * scene.lambda;
         let (factor, slope) = if sensor == Sensor::Acceleration {
             (omega * omega, 2.0 / omega)
         } else {
             (1.0, 0.0)
         };
-        let seen = Complex::from_polar(factor, -reference.phase(damping, omega));
-        let seen_by = Complex::new(slope, -reference.phase_slope(damping, omega));
-        let read = |[z, by]: [Complex<f64>; 2]| [z * seen, (by + z * seen_by) * seen];
+        let sensor = Complex::from_polar(factor, -reference.phase(damping, omega));
+        let sensor_by = Complex::new(slope, -reference.phase_slope(damping, omega));
+        let read = |[z, by]: [Complex<f64>; 2]| [z * sensor, (by + z * sensor_by) * sensor];
         Self {
             direct: read([direct, direct_by]),
             impulses: read([weight * inner, weight * inner_by + weight / omega * inner]),
@@ -413,8 +413,6 @@ pub struct Periodic {
 const CONVERGED: f64 = 1e-12;
 const ROUNDING: f64 = 1e-10;
 const ROUNDS: usize = 30;
-/// Closing error of a motion that is known in closed form, and is not one with an earlier contact.
-const CLOSED: f64 = 1e-8;
 
 impl Periodic {
     /// The motion with the pattern `pattern` near the unknowns `guess` that satisfies both conditions, by Newton's method with
@@ -439,7 +437,7 @@ impl Periodic {
 
     /// The motion at unknowns that may satisfy the closing equations; None if they do not.
     pub(super) fn closed(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
-        let returned = follow(scene, pattern, x).filter(|returned| returned.residual.norm() < CLOSED)?;
+        let returned = follow(scene, pattern, x).filter(|returned| returned.residual.norm() < EXACT)?;
         Some(Self::of(pattern, x, returned))
     }
 
@@ -589,8 +587,8 @@ pub(super) fn newton(
     None
 }
 
-/// Largest distance of a settling motion from itself one repetition later.
-const NEAR: f64 = 1e-2;
+/// Largest distance of a settling motion from itself one repetition later, over b and b omega0, from which Newton's method starts.
+pub(crate) const NEAR: f64 = 1e-2;
 /// Largest distance of an exact motion from itself one repetition later.
 const EXACT: f64 = 1e-8;
 /// Patterns that are tried, from the shortest: after a period doubling, only the second is stable.

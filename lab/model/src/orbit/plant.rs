@@ -15,6 +15,7 @@ use lovines::{Cavity, Drive, Event, InvalidValue, Outcome, Parameters, Plant, Re
 use nalgebra::{Complex, Matrix4, Matrix6, Vector4, Vector6};
 use thiserror::Error;
 
+use super::periodic::NEAR;
 use super::symmetric::{Candidate, at_amplitude, at_speed, stable_resonant};
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
 use crate::{Definition, Dimensionless, Resonance, Sensor};
@@ -137,8 +138,6 @@ pub fn resonant_motion_under(
     Ideal { amplitude, ..ideal }.continued(parameters, definition, None)
 }
 
-/// Largest difference, over b and b omega0, between a simulated state and one some periods later from which Newton's method starts.
-const NEAR: f64 = 1e-2;
 /// Longest motion that is searched, periods of the base.
 const LONGEST: u32 = 32;
 

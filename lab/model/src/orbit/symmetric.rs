@@ -199,15 +199,12 @@ fn peak(scene: &Dimensionless, near: &Orbit, condition: Condition) -> Option<Orb
 
 /// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.
 pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
-    driven(scene, sigma).collect()
-}
-
-fn driven(scene: &Dimensionless, sigma: f64) -> impl Iterator<Item = Orbit> {
     SymmetricMotions::new(scene, 1.0 + scene.epsilon * sigma)
         .and_then(|motions| motions.driven(scene.g))
         .into_iter()
         .flatten()
         .filter_map(|candidate| accept(scene, &candidate))
+        .collect()
 }
 
 /// The smallest G under which there is a symmetric 1:1 orbit at the detuning `sigma`, if its flights meet no wall.

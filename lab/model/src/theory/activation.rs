@@ -102,7 +102,7 @@ const FORGOTTEN: f64 = 12.0;
 const LONGEST: f64 = 20_000.0;
 
 /// The smallest G at which the primary mass, at rest until the drive is switched on, moves by the half-width of the cavity: for a base that
-/// begins as `sin(Omega tau)`, and for the phase of the base at the beginning that needs the least. Another phase than that of the sine
+/// begins as `sin(Omega tau)`, and for the phase of the base at the beginning that needs the least. Another phase
 /// is a jump of the base, which the damper passes on as an impulse.
 fn impacts_from_rest(epsilon: f64, lambda: f64, sigma: f64) -> [f64; 2] {
     let (zeta, omega) = (epsilon * lambda / 2.0, 1.0 + epsilon * sigma);

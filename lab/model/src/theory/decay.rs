@@ -20,7 +20,7 @@ pub struct DecayPoint {
     /// Particle speed over `b omega0`.
     #[serde(rename = "B")]
     pub b: f64,
-    /// Detuning of the motion, equal to that of the backbone.
+    /// Detuning of the motion, equal to the backbone's.
     pub sigma: f64,
 }
 

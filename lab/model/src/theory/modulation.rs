@@ -14,10 +14,10 @@
 //! ```
 //!
 //! Steady drift, `B+ - B- = d dB/dC` and `x+ - x = d dx/dC`, makes this two linear equations for the deviations of B and x. The mean of the
-//! particle's force on v over the flight gives the change of sigma per unit of `C' = dC/dtau`. Over many flights it differs from that of
-//! one flight, because the force grows within a flight: by `m d(R B^2/C)/dC / C` in sigma and by `-2 m d(B sin x)/dC` in the drive, with the
-//! mean `m = pi/2 - 4/pi` of `s^2 cos s` over half a period. Three terms of the same order follow from the oscillator: `lambda C'/(2C)`, `lambda C'/C`
-//! and `-C' G_R'(C)/(4C)`. The map of the impacts, iterated at a constant rate, confirms all of this (tests/unit/modulation.rs).
+//! particle's force on v over the flight gives the change of sigma per unit of `C' = dC/dtau`. Over many flights it differs from the change of
+//! one flight, because the force grows within a flight: by `m d(R B^2/C)/dC / C` in sigma, with the mean `m = pi/2 - 4/pi` of `s^2 cos s` over
+//! half a period. Three terms of the same order follow from the oscillator: `lambda C'/(2C)`, `lambda C'/C` and `-C' G_R'(C)/(4C)`.
+//! The map of the impacts, iterated at a constant rate, confirms all of this (tests/unit/modulation.rs).
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI, TAU};
 
@@ -184,42 +184,28 @@ impl Iterator for ImpactSequence {
     }
 }
 
-/// Change of detuning and drive by a drift of the amplitude, per unit of `dC/dtau`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drift {
-    /// Of the detuning of phase resonance.
-    pub sigma: f64,
-    /// Of the drive of phase resonance G, beyond the drive that changes the amplitude.
-    pub g: f64,
-}
-
 impl SlowFlow {
-    /// The effect of a slow drift at the amplitude `c` on the right branch. `None` at the fold and below.
-    pub fn drift(&self, c: f64) -> Option<Drift> {
+    /// Change of the detuning of phase resonance by a slow drift at the amplitude `c` on the right branch, per unit of `dC/dtau`. `None` at the
+    /// fold and below.
+    pub fn drift(&self, c: f64) -> Option<f64> {
         let b = self.manifold.b(c, BranchSide::Right)?;
         let rate = 1e-6 * c;
         let [up, down] = [rate, -rate].map(|rate| self.flight(c, b, rate));
-        let slope = |i: usize| (up[i] - down[i]) / (2.0 * rate);
         let step = 1e-3 * c;
         let beside = self.backbone_at(self.manifold.b(c + step, BranchSide::Right)?);
-        let here = self.backbone_at(b);
-        let by_drive = (beside.g - here.g) / step;
-        let turned = (beside.sigma * (c + step) - here.sigma * c) / step;
+        let by_drive = (beside.g - self.backbone_at(b).g) / step;
         // The mean over a flight, in which the particle's force grows, is not that over many flights: the difference has the mean of
         // s² cos s over half a period.
         let grown = FRAC_PI_2 - 4.0 / PI;
-        let drift = Drift {
-            // The damper acts on the velocity, which a change of C shifts in phase; at phase resonance the damper's force
-            // on the base leads it by 2 zeta; and the losses change with C.
-            sigma: slope(0) + (0.25 * PI * grown * (by_drive - self.lambda) + 1.5 * self.lambda - 0.25 * by_drive) / c,
-            // The last part is the work that a change of the frequency needs at a constant amplitude.
-            g: slope(1) - PI * grown * turned + (turned - here.sigma),
-        };
-        (drift.sigma.is_finite() && drift.g.is_finite()).then_some(drift)
+        // The damper acts on the velocity, which a change of C shifts in phase; at phase resonance the damper's force
+        // on the base leads it by 2 zeta; and the losses change with C.
+        let sigma = (up - down) / (2.0 * rate)
+            + (0.25 * PI * grown * (by_drive - self.lambda) + 1.5 * self.lambda - 0.25 * by_drive) / c;
+        sigma.is_finite().then_some(sigma)
     }
 
-    /// Detuning and drive of phase resonance by the flight in the middle of which the amplitude is `c` and changes at `rate`.
-    fn flight(&self, c: f64, b: f64, rate: f64) -> [f64; 2] {
+    /// Detuning of phase resonance by the flight in the middle of which the amplitude is `c` and changes at `rate`.
+    fn flight(&self, c: f64, b: f64, rate: f64) -> f64 {
         let (change, r) = (PI * rate, self.manifold.dissipation);
         let c = c - 0.5 * change;
         let slope = 2.0 * c * self.manifold.slope(b);
@@ -241,9 +227,7 @@ impl SlowFlow {
         let (begin, length) = (1.0 - c * x.sin(), PI + x_step);
         let (end, after) = (begin - speed * length, x + length);
         let by_sin = begin * x.cos() - end * after.cos() - speed * (after.sin() - x.sin());
-        let by_cos = end * after.sin() - begin * x.sin() - speed * (after.cos() - x.cos());
-        let middle = c + 0.5 * change;
-        [by_sin / (length * middle), self.lambda * middle + 2.0 * by_cos / length]
+        by_sin / (length * (c + 0.5 * change))
     }
 }
 

@@ -1,4 +1,4 @@
-//! First-order theory.
+//! Guards first-order theory: its identities, the impact sequence, frequency responses and activation, and waveforms.
 
 mod identities;
 mod modulation;
