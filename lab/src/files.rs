@@ -1,7 +1,9 @@
 //! Files that are complete or absent.
 
-use std::io;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
 
 /// Why a file could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -22,18 +24,15 @@ pub(crate) fn write<N: AsRef<Path>, C: AsRef<[u8]>>(
     std::fs::create_dir_all(out).map_err(|source| failed(out, source))?;
     let mut finished = Vec::new();
     for (name, content) in files {
-        let path = out.join(&name);
-        let temporary = out.join(format!(".{}.new", name.as_ref().display()));
-        std::fs::write(&temporary, content).map_err(|source| {
-            // What is left of it if the disk is full, if anything.
-            let _ = std::fs::remove_file(&temporary);
-            failed(&path, source)
-        })?;
-        finished.push((temporary, path));
+        let path = out.join(name);
+        let mut file = temporary(out).map_err(|source| failed(&path, source))?;
+        file.write_all(content.as_ref())
+            .map_err(|source| failed(&path, source))?;
+        finished.push((file, path));
     }
-    let keep = |(temporary, path): (PathBuf, PathBuf)| match std::fs::rename(&temporary, &path) {
-        Ok(()) => Ok(path),
-        Err(source) => Err(failed(&path, source)),
+    let keep = |(file, path): (NamedTempFile, PathBuf)| match file.persist(&path) {
+        Ok(_) => Ok(path),
+        Err(error) => Err(failed(&path, error.error)),
     };
     finished.into_iter().map(keep).collect()
 }
@@ -49,4 +48,16 @@ pub fn write_file(path: &Path, content: &str) -> Result<PathBuf, FileError> {
         .unwrap_or(Path::new("."));
     let name = path.file_name().unwrap_or_default();
     Ok(write(folder, [(name, content)])?.remove(0))
+}
+
+/// A temporary file that others may read once it is kept, as with any file made here.
+fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".vines-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
 }
