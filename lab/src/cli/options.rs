@@ -41,12 +41,7 @@ impl SceneArguments {
 
     /// The text of the scene's file with another section `[plant]`.
     pub(super) fn with_plant(&self, plant: &str) -> Result<String, SceneError> {
-        let text = match &self.scene {
-            None => PAPER.to_string(),
-            Some(path) => {
-                std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.clone(), source })?
-            }
-        };
+        let text = self.text()?.unwrap_or_else(|| PAPER.into());
         let (mut lines, mut inside) = (String::new(), false);
         for line in text.lines() {
             if line.trim_start().starts_with('[') {
@@ -64,11 +59,16 @@ impl SceneArguments {
 
     /// The scene, of which numbers may vary.
     pub(super) fn family(&self) -> Result<Family, SceneError> {
-        let Some(path) = &self.scene else {
-            return Family::parse("", None, &self.set);
+        let name = self.scene.as_ref().map(|path| path.display().to_string());
+        Family::parse(&name.unwrap_or_default(), self.text()?.as_deref(), &self.set)
+    }
+
+    /// The text of the scene's file.
+    fn text(&self) -> Result<Option<String>, SceneError> {
+        let read = |path: &PathBuf| {
+            std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.clone(), source })
         };
-        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.clone(), source })?;
-        Family::parse(&path.display().to_string(), Some(&text), &self.set)
+        self.scene.as_ref().map(read).transpose()
     }
 }
 

@@ -89,12 +89,12 @@ pub(super) fn json(result: &impl Serialize) -> Result<String, ReportError> {
     Ok(serde_json::to_string_pretty(result)? + "\n")
 }
 
-/// A CSV table with a line per row. The headings are the names of the fields; tuples have none, and need `headings`.
-pub(super) fn csv<T: Serialize>(headings: &[&str], rows: impl IntoIterator<Item = T>) -> Result<String, ReportError> {
+/// A CSV table with a line per row. The headings are the names of the fields; tuples have none, and need `headings`, separated by commas.
+pub(super) fn csv<T: Serialize>(headings: &str, rows: impl IntoIterator<Item = T>) -> Result<String, ReportError> {
     let own = headings.is_empty();
     let mut writer = csv::WriterBuilder::new().has_headers(own).from_writer(Vec::new());
     if !own {
-        writer.write_record(headings)?;
+        writer.write_record(headings.split(','))?;
     }
     for row in rows {
         writer.serialize(row)?;
@@ -113,7 +113,10 @@ pub fn decay_csv(result: &Comparison) -> Result<String, ReportError> {
         return Ok(String::new());
     };
     let headings: Vec<&str> = first.keys().map(String::as_str).collect();
-    csv(&headings, points.iter().map(|point| point.values().collect::<Vec<_>>()))
+    csv(
+        &headings.join(","),
+        points.iter().map(|point| point.values().collect::<Vec<_>>()),
+    )
 }
 
 /// The points of a tracked backbone.
@@ -152,38 +155,24 @@ pub(super) fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportEr
         };
         (point.at, row)
     };
-    csv(&[], result.points.iter().map(row))
+    csv("", result.points.iter().map(row))
 }
 
 /// The cells of a map, as CSV.
 pub fn map_csv(map: &Map) -> Result<String, ReportError> {
-    const HEADINGS: [&str; 16] = [
-        "sigma",
-        "G",
-        "r",
-        "regime",
-        "followed",
-        "transient",
-        "recurrence",
-        "exponent",
-        "exponent_error",
-        "synchrony",
-        "impacts_per_period",
-        "impacts",
-        "periods",
-        "sticks_per_period",
-        "theory_stable",
-        "coexisting",
-    ];
+    const HEADINGS: &str = "sigma,G,r,regime,followed,transient,recurrence,exponent,exponent_error,synchrony,impacts_per_period,impacts,\
+                            periods,sticks_per_period,theory_stable,coexisting";
     // Axes that are not among the first three columns come before them.
-    let own = map.names().map(|name| !HEADINGS.contains(&name));
+    let own = map
+        .names()
+        .map(|name| HEADINGS.split(',').all(|heading| heading != name));
     let names = map
         .names()
         .into_iter()
         .zip(own)
         .filter(|(_, own)| *own)
         .map(|(name, _)| name);
-    let headings: Vec<&str> = names.chain(HEADINGS).collect();
+    let headings: Vec<&str> = names.chain([HEADINGS]).collect();
     let row = |(n, cell): (u64, &MapCell)| {
         let MapCell { sigma, g, r, result, theory_stable, .. } = *cell;
         let place = [map.x.at(n % map.x.points), map.y.at(n / map.x.points)];
@@ -196,17 +185,17 @@ pub fn map_csv(map: &Map) -> Result<String, ReportError> {
         let coexisting: Vec<&str> = cell.coexisting.iter().map(Regime::name).collect();
         (place, [sigma, g, r], result, theory_stable, coexisting.join("; "))
     };
-    csv(&headings, (0..).zip(&map.cells).map(row))
+    csv(&headings.join(","), (0..).zip(&map.cells).map(row))
 }
 
 /// The points of the bifurcation curves.
 pub(super) fn bifurcations_csv(map: &Map) -> Result<String, ReportError> {
-    let headings = ["curve", "bifurcation", "sigma", "G", "C", "B", "bounds_stability"];
+    let headings = "curve,bifurcation,sigma,G,C,B,bounds_stability";
     let rows = map.curves.iter().enumerate().flat_map(|(n, curve)| {
         curve.branch.points.iter().map(move |motion| {
             let Periodic { sigma, g, c, b, .. } = *motion;
             (n + 1, curve.name(), sigma, g, c, b, motion.bounds_stability())
         })
     });
-    csv(&headings, rows)
+    csv(headings, rows)
 }

@@ -291,7 +291,7 @@ fn theory(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
                 &Table::new("ε | in σ | in C | in B").rows(rows),
             );
             section.words(section.finding.clone());
-            section.attach("convergence.csv", csv(&[], &study.rows)?);
+            section.attach("convergence.csv", csv("", &study.rows)?);
         }
         None => {
             return Ok(section.concluded("Theory and exact orbits have no common stable phase-resonant motion here."));
@@ -422,7 +422,7 @@ fn excitations(p: &Dimensionless) -> Vec<f64> {
 
 /// The orbits of all curves, as CSV.
 fn curves_csv(backbone: &Branch, responses: &[FrequencyResponse]) -> Result<String, ReportError> {
-    let headings = ["curve", "sigma", "G", "C", "gamma", "B", "largest_multiplier", "stable"];
+    let headings = "curve,sigma,G,C,gamma,B,largest_multiplier,stable";
     let components = responses.iter().flat_map(|response| {
         let components = response.components.iter();
         components.map(|component| (format!("G={:.4}: {}", response.g, component.name), &component.branch))
@@ -434,7 +434,7 @@ fn curves_csv(backbone: &Branch, responses: &[FrequencyResponse]) -> Result<Stri
             (curve.clone(), sigma, g, c, gamma, b, motion.moduli()[3], stable)
         })
     });
-    csv(&headings, rows)
+    csv(headings, rows)
 }
 
 /// The regime map.
