@@ -1,4 +1,4 @@
-//! The fast ways against the plain search, and against each other.
+//! Guards the fast path against the plain solver: impacts, states, and the work near a wall.
 
 mod common;
 
