@@ -1,7 +1,7 @@
 //! Single impacts, grazes, motions without loss, extreme values, and extreme lengths of a step.
 
-use crate::common::{Scene, scene};
 use crate::figures::Figures;
+use crate::scenes::{Scene, decades, scene};
 use lovines::base_motion::BaseMotion;
 use lovines::oscillator::Oscillator;
 use lovines::plant::{MOST_EVALUATIONS, MOST_IMPACTS};
@@ -9,10 +9,6 @@ use lovines::segment::Segment;
 use lovines::{Drive, Parameters, Plant, State};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
-
-fn decades(from: f64, to: f64) -> impl Strategy<Value = f64> {
-    (from..to).prop_map(|x| 10f64.powf(x))
-}
 
 /// A rig and the velocities with which primary mass and particle meet.
 pub fn impacts() -> BoxedStrategy<(Scene, f64, f64)> {
