@@ -2,8 +2,8 @@
 //! momentum and Newton's law, grazes of 1e-13, the same bits without the workspace, steps from 1e-9 to 1e6 periods, a new drive at every
 //! sample against an independent simulation, the fast path against the plain solver, bounded work.
 //!
-//! Prints a table. `scripts/stress --plant` runs the long form (`SCENES=100000`), the test suite a short one; validation/stress.csv keeps the
-//! table of the long form. `SCENE=hard:17` follows scene 17 of the kind `hard` only.
+//! Prints a table. `scripts/stress --plant` runs the long form (`SCENES=100000`), the test suite a short one; validation/stress.csv keeps a
+//! table of 10,000 scenes. `SCENE=hard:17` follows scene 17 of the kind `hard` only.
 
 mod drives;
 mod figures;
