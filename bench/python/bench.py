@@ -224,10 +224,6 @@ class Bench:
     def map_points(self):
         return run_time_map.QUICK_POINTS if self.options.quick else run_time_map.POINTS
 
-    def profiles(self):
-        """What each scene asks of the plant, counted."""
-        return {scene: self.rust.ask({"profile": scene}, 60) for scene in dict.fromkeys(row.scene for row in self.rows)}
-
 
 def only_map(options):
     """The map of run time without the rest."""
@@ -284,7 +280,6 @@ def main():
     bench.start()
     bench.measure()
     growth, loop = bench.growth()
-    profiles = bench.profiles()
     rows, lock = run_time_map.measure(bench.rust, bench.map_points(), bench.progress)
     for worker in set(bench.workers.values()):
         worker.end()
@@ -292,7 +287,7 @@ def main():
 
     options.out.mkdir(parents=True, exist_ok=True)
     run_time_map.write(rows, lock, options.out)
-    print(report.write(bench, growth, loop, profiles, (rows, lock), options.out))
+    print(report.write(bench, growth, loop, (rows, lock), options.out))
     figure.write(bench, options.out / "work-precision.svg")
     if options.keep:
         root = HERE.parent

@@ -54,8 +54,8 @@ def cells(row, bench):
 HEAD = ["method", "setting", "ns/impact", "spread", "rounds", "error", "time/plant", "quartiles", "verdict"]
 
 
-def savings(bench, profiles):
-    """Per scene: what the plant skipped, counted and timed."""
+def savings(bench):
+    """Per scene: what the plant's fast path and long steps save."""
     rows = []
     for scene in dict.fromkeys(row.scene for row in bench.rows):
         timed = {row.name: row for row in bench.rows if row.scene == scene and row.times}
@@ -65,31 +65,9 @@ def savings(bench, profiles):
 
         general, at_once = over("plant-general"), over("plant-one-step")
         once = None if at_once is None else 1 / at_once
-        rows.append([scene, ratio(general), ratio(once), skipped(profiles[scene], general)])
-    head = ["scene", "by its search", "by not stopping", "what the plant skips"]
+        rows.append([scene, ratio(general), ratio(once)])
+    head = ["scene", "by its search", "by not stopping"]
     return head, rows
-
-
-def skipped(profile, general):
-    """In words, with the counts and what leaving it out was measured to save."""
-    words = []
-    if general is not None:
-        if general > 1.5:
-            words.append(
-                "the plain solver: a particle faster than the primary mass can be meets the wall ahead once, and "
-                "what is known of a drive that stays is kept"
-            )
-        else:
-            words.append("little of the plain solver, which meets most contacts here")
-    empty = profile["empty"] / profile["steps"]
-    if empty > 0.01:
-        words.append(f"a search within {100 * empty:.3g} % of the steps, in which nothing is met")
-    if profile["at_rest"] > 0:
-        words.append(
-            f"impacts too low for doubles (it follows {profile['impacts']}), and any search during the "
-            f"{100 * profile['at_rest']:.0f} % of the time at rest on a wall"
-        )
-    return "; ".join(words)
 
 
 GROWTH_NOTE = (
@@ -207,7 +185,7 @@ def renew(readme, bench):
     replace(readme, wrapped(f"{before}{BEGIN}\n{MATRIX_NOTE}\n\n{table}\n{END}{after}"))
 
 
-def write(bench, growth, loop, profiles, run_times, folder):
+def write(bench, growth, loop, run_times, folder):
     """Writes performance.txt and performance.csv; returns the text."""
     from run_time_map import as_text
 
@@ -222,7 +200,7 @@ def write(bench, growth, loop, profiles, run_times, folder):
         rows = [cells(row, bench) for row in bench.rows if row.scene == scene]
         text += [f"{scene}: {title} ({count})", text_table(HEAD, rows), ""]
     sections = [
-        ("What the plant skips, and what that saves", SAVINGS_NOTE, *savings(bench, profiles)),
+        ("What the plant's search and long steps save", SAVINGS_NOTE, *savings(bench)),
         ("Cost of a sample in the loop scene", SAMPLE_NOTE, *samples(bench)),
         ("Cost as work grows", GROWTH_NOTE, *growths(growth)),
     ]

@@ -1,10 +1,10 @@
-//! The plant alone: how its run time grows with the work, what a scene asks of it, and its cost with the phase-lock controller in the loop.
+//! The plant alone: how its run time grows with the work, and its cost with the phase-lock controller in the loop.
 
 use std::f64::consts::TAU;
 use std::path::Path;
 use std::time::Instant;
 
-use lovines::{Drive, Event, Parameters, Plant, State};
+use lovines::{Drive, Parameters, Plant, State};
 use phase_lock::{Config, Input};
 use serde_json::{Value, json};
 
@@ -63,34 +63,6 @@ pub fn growth(folder: &Path, what: &str, budget: f64, most: f64) -> anyhow::Resu
         size *= 10f64.sqrt();
     }
     Ok(json!({ "points": points }))
-}
-
-/// Counts of the plant's run through the scene.
-///
-/// # Errors
-/// A scene that the plant refuses.
-pub fn profile(scene: &Scene) -> anyhow::Result<Value> {
-    let mut plant = begin(scene).map_err(|failure| anyhow::anyhow!(failure.0))?;
-    let (mut empty, mut at_rest, mut whole) = (0u64, 0.0, 0.0);
-    for step in &scene.steps {
-        // Since when, in this step, the particle has been on a wall.
-        let mut since = plant.contact().map(|_| 0.0);
-        let outcome = plant.advance_with(step.drive(), step.duration, |event| match event {
-            Event::Stuck { t, .. } => since = Some(t),
-            Event::Released { t, .. } => at_rest += t - since.take().unwrap_or(t),
-            _ => {}
-        });
-        let outcome = outcome?;
-        at_rest += since.map_or(0.0, |since| step.duration - since);
-        whole += step.duration;
-        empty += u64::from(outcome.impacts == 0);
-    }
-    Ok(json!({
-        "steps": scene.steps.len(),
-        "empty": empty,
-        "impacts": plant.totals().impacts,
-        "at_rest": at_rest / whole,
-    }))
 }
 
 const SAMPLES: usize = 100;

@@ -3,7 +3,6 @@
 //! ```text
 //! {"scene": "steady", "method": "plant", "setting": 0, "checks": [10, 20], "budget": 0.1, "limit": 10}
 //! {"growth": "periods", "budget": 0.1, "most": 1e6}
-//! {"profile": "chatter"}
 //! {"record": 20}
 //! {"map_g": 1.2, "sigmas": [-1.0, 0.0], "effort": {"periods": 200, "brent_periods": 50, "runs": 5}}
 //! ```
@@ -72,9 +71,6 @@ enum Request {
         budget: f64,
         most: f64,
     },
-    Profile {
-        profile: String,
-    },
     Record {
         record: usize,
     },
@@ -101,7 +97,6 @@ fn answer(folder: &Path, request: &str) -> anyhow::Result<serde_json::Value> {
             Ok(serde_json::to_value(answer)?)
         }
         Request::Growth { growth, budget, most } => cost::growth(folder, &growth, budget, most),
-        Request::Profile { profile } => cost::profile(&Scene::load(folder, &profile)?),
         Request::Record { record } => Ok(json!({"drives": cost::record(record)})),
         Request::Loop { closed_loop, budget } => Ok(cost::closed_loop(closed_loop, budget)),
         Request::Map { map_g, sigmas, effort } => Ok(serde_json::to_value(map::row(map_g, &sigmas, &effort)?)?),

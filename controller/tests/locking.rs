@@ -86,7 +86,7 @@ fn retuning_keeps_the_lock_settles_again_and_leaves_no_trace_of_the_values_befor
     let mut bench = Bench::new(config());
     bench.run_to_lock(2000).expect("a lock");
     let target = config().phase_target;
-    bench.controller.retune(0.9 * AMPLITUDE, target).expect("within limits");
+    bench.retune(0.9 * AMPLITUDE, target);
     let output = bench.sample();
     assert!(output.locked && !output.settled);
     let output = bench.run(400);
@@ -187,7 +187,7 @@ fn a_new_phase_target_is_acquired_with_the_drive_on() {
         bench.run_to_lock(3000).expect("a lock");
         let amplitude = bench.controller.config().amplitude;
         let target = bench.controller.config().phase_target + change;
-        bench.controller.retune(amplitude, target).unwrap();
+        bench.retune(amplitude, target);
         let output = bench.sample();
         assert!(!output.locked && output.amplitude == amplitude);
         let (_, output) = bench.run_to_lock(3000).expect("a lock");
@@ -203,10 +203,7 @@ fn a_new_phase_target_is_acquired_with_the_drive_on() {
 fn a_ramp_down_to_zero_has_the_rate_of_the_ramp_up() {
     let mut bench = Bench::new(Config { ramp_rate: Some(AMPLITUDE), ..config() });
     bench.run_to_lock(3000).expect("a lock");
-    bench
-        .controller
-        .retune(0.0, bench.controller.config().phase_target)
-        .unwrap();
+    bench.retune(0.0, bench.controller.config().phase_target);
     let samples = (1.05 / bench.controller.config().sample_time) as usize;
     let output = (0..samples).map(|_| bench.sample()).last().unwrap();
     assert_eq!(output.amplitude, 0.0);
@@ -268,10 +265,7 @@ fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
             amplitude: drive,
             ..Move::default()
         };
-        bench
-            .controller
-            .hold_response(&mut bench.state, to)
-            .expect("a closed loop");
+        bench.hold(to);
         // A free transient would decay by a factor of 2.6 in 30 periods.
         let output = bench.run(30);
         println!("{share}: {:.5}", output.response_amplitude / before);
@@ -286,10 +280,7 @@ fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
     bench.controller.hold_drive(&mut bench.state);
     let output = bench.run(30);
     assert_eq!((output.response_target, output.amplitude), (None, AMPLITUDE));
-    bench
-        .controller
-        .hold_response(&mut bench.state, Move { response: before, ..Move::default() })
-        .unwrap();
+    bench.hold(Move { response: before, ..Move::default() });
     assert!(bench.sample().response_target.is_some());
     // Switching the drive off ends the control of the response.
     bench.active = false;

@@ -121,10 +121,7 @@ fn holding(config: Config) -> Bench {
         amplitude: -0.5 * AMPLITUDE,
         ..Move::default()
     };
-    bench
-        .controller
-        .hold_response(&mut bench.state, to)
-        .expect("a closed loop");
+    bench.hold(to);
     bench.run(200);
     bench
 }
@@ -209,10 +206,7 @@ fn the_plausibility_check_does_not_trip_at_a_change_of_the_drive() {
     let mut bench = Bench::new(Config { ramp_rate: None, ..config() });
     for amplitude in [1.0, 3.0, 0.2, 1.0] {
         bench.run(50);
-        bench
-            .controller
-            .retune(amplitude * AMPLITUDE, -1.5)
-            .expect("a sensible drive");
+        bench.retune(amplitude * AMPLITUDE, -1.5);
     }
     assert_eq!(bench.run(50).fault, None);
 }

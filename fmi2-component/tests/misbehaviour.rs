@@ -25,17 +25,10 @@ impl Model for Moody {
 }
 
 /// No variable of type `T`.
+#[derive(Clone, Copy)]
 struct Nothing<T: 'static>(std::marker::PhantomData<T>);
 
-impl<T> Clone for Nothing<T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<T> Copy for Nothing<T> {}
-
-impl<T: 'static> Key for Nothing<T> {
+impl<T: Copy + 'static> Key for Nothing<T> {
     type Value = T;
     const VARIABLES: &'static [Variable<T>] = &[];
     const ALL: &'static [Self] = &[];

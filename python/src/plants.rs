@@ -8,7 +8,7 @@ use std::{
 use lovines::{
     Cavity, Drive, Event, InvalidValue, Parameters, Plant as OnePlant, Restitution, State, Wall, plant::Saved,
 };
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ndarray::Array2};
+use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ndarray::Array2};
 use pyo3::{
     exceptions::{PyKeyboardInterrupt, PyMemoryError},
     prelude::*,
@@ -25,18 +25,12 @@ use crate::{
 
 /// Number of the plant, time, kind (its position in `KINDS` of plants.py), wall, relative velocity.
 #[derive(Default)]
-struct Events {
-    plant: Vec<u64>,
-    time: Vec<f64>,
-    kind: Vec<u8>,
-    wall: Vec<i8>,
-    velocity: Vec<f64>,
-}
+struct Events(Vec<(u64, f64, u8, i8, f64)>);
 
 impl Events {
     #[inline(never)]
     fn push(&mut self, plant: usize, time: f64, event: Event) {
-        let (kind, t, wall, velocity) = match event {
+        let (kind, t, at, velocity) = match event {
             Event::Impact { t, wall, velocity } => (0, t, Some(wall), velocity),
             Event::Stuck { t, wall } => (1, t, Some(wall), f64::NAN),
             Event::Released { t, wall } => (2, t, Some(wall), f64::NAN),
@@ -44,35 +38,26 @@ impl Events {
             Event::Slip { t, .. } => (4, t, None, f64::NAN),
             Event::Reversal { t, .. } => (5, t, None, f64::NAN),
         };
-        self.plant.push(plant as u64);
-        self.time.push(time + t);
-        self.kind.push(kind);
-        self.wall
-            .push(wall.map_or(0, |wall| if wall == Wall::Plus { 1 } else { -1 }));
-        self.velocity.push(velocity);
+        self.0.push((plant as u64, time + t, kind, sign(at), velocity));
     }
 
     fn into_arrays(self, py: Python<'_>) -> EventArrays<'_> {
+        fn column<'py, T: Element>(py: Python<'py>, all: impl Iterator<Item = T>) -> Bound<'py, PyArray1<T>> {
+            all.collect::<Vec<T>>().into_pyarray(py)
+        }
         (
-            self.plant.into_pyarray(py),
-            self.time.into_pyarray(py),
-            self.kind.into_pyarray(py),
-            self.wall.into_pyarray(py),
-            self.velocity.into_pyarray(py),
+            column(py, self.0.iter().map(|event| event.0)),
+            column(py, self.0.iter().map(|event| event.1)),
+            column(py, self.0.iter().map(|event| event.2)),
+            column(py, self.0.iter().map(|event| event.3)),
+            column(py, self.0.iter().map(|event| event.4)),
         )
     }
+}
 
-    fn is_empty(&self) -> bool {
-        self.plant.is_empty()
-    }
-
-    fn append(&mut self, mut other: Self) {
-        self.plant.append(&mut other.plant);
-        self.time.append(&mut other.time);
-        self.kind.append(&mut other.kind);
-        self.wall.append(&mut other.wall);
-        self.velocity.append(&mut other.velocity);
-    }
+/// 1 or -1 for a wall, 0 for none.
+fn sign(wall: Option<Wall>) -> i8 {
+    wall.map_or(0, |wall| if wall == Wall::Plus { 1 } else { -1 })
 }
 
 type EventArrays<'py> = (
@@ -193,9 +178,7 @@ fn state([q1, dq1, q2, dq2]: [f64; 4]) -> State {
 }
 
 fn wall(plant: &OnePlant) -> i8 {
-    plant
-        .contact()
-        .map_or(0, |wall| if wall == Wall::Plus { 1 } else { -1 })
+    sign(plant.contact())
 }
 
 /// One plant, with all that makes a single step fast.
@@ -271,7 +254,7 @@ impl Plant {
             let mut found = Events::default();
             advance(plant, motion, 0, Some(&mut found), stop).map(|()| found)
         })?;
-        Ok((!found.is_empty()).then(|| found.into_arrays(py)))
+        Ok((!found.0.is_empty()).then(|| found.into_arrays(py)))
     }
 
     /// Advances it in equal steps. Returns rows of time, q1, dq1, q2, dq2 and base displacement, and the events.
@@ -553,10 +536,14 @@ impl Plants {
         )?;
         let mut merged = Events::default();
         for found in found {
-            merged.append(found.map_err(|(n, failure)| match failure {
-                Some(error) => invalid(format!("plant {n}: {error}")),
-                None => PyKeyboardInterrupt::new_err(()),
-            })?);
+            merged.0.append(
+                &mut found
+                    .map_err(|(n, failure)| match failure {
+                        Some(error) => invalid(format!("plant {n}: {error}")),
+                        None => PyKeyboardInterrupt::new_err(()),
+                    })?
+                    .0,
+            );
         }
         self.plants = next;
         Ok(events.then(|| merged.into_arrays(py)))

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _native
+from ._native import Plant as _Plant
+from ._native import Plants as _Plants
 from .datasets import dataset
 from .numbers import reals
 from .results import Result, axes
@@ -120,7 +121,7 @@ class Batch:
         if rows.ndim != 2:
             raise ValueError(f"parameters and starts of shape {rows.shape[:-1]}: one-dimensional arrays are allowed")
         values, first = np.split(rows, [-len(_START)], axis=1)
-        self._native = _native.Plants(np.ascontiguousarray(values), np.ascontiguousarray(first))
+        self._native = _Plants(np.ascontiguousarray(values), np.ascontiguousarray(first))
 
     def __len__(self) -> int:
         return len(self._native)
@@ -187,7 +188,7 @@ class Batch:
         return self._native.save()
 
     def __setstate__(self, saved: bytes) -> None:
-        self._native = _native.Plants.restore(saved)
+        self._native = _Plants.restore(saved)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {len(self)} plants>"
@@ -286,7 +287,7 @@ class Trajectory(Result):
         return ax
 
 
-class Plant(_native.Plant):
+class Plant(_Plant):
     """One plant.
 
     A step of a sample loop takes about a microsecond. All that the plant shows is read at once:

@@ -3,8 +3,8 @@
 //! The simulation starts every sample anew from the displacements and velocities of the plant: what the plant remembers in error shows
 //! in the next sample, and no error grows from sample to sample.
 
-use crate::common::{Scene, scene};
 use crate::figures::{ANY, Figures};
+use crate::scenes::{Scene, scene};
 use crate::simulation::Simulation;
 use lovines::{Drive, Event, Plant};
 use proptest::prelude::*;

@@ -1,9 +1,10 @@
 //! One scene: the states at and inside its steps, the totals and the energy; and the energy balance with damping and a moving base.
 
-use crate::common::Scene;
 use crate::figures::{ANY, Figures};
+use crate::scenes::{Scene, scene};
 use lovines::plant::MOST_IMPACTS;
 use lovines::{Cavity, Drive, Event, Plant, State};
+use proptest::prelude::*;
 use std::f64::consts::TAU;
 
 /// Steps that each scene is followed for, and impacts after which it has shown what it is.
@@ -153,6 +154,52 @@ fn once(s: &Scene, forgetful: bool, figures: &mut Figures) -> Plant {
         );
     }
     plant
+}
+
+/// A scene, the length of its steps, the decade of the changes of its drive at every sample, and which of its numbers change.
+pub type Changing = (Scene, f64, f64, u8);
+
+/// Any selection of offset, slope, amplitude and frequency changes, or none.
+pub fn changing() -> BoxedStrategy<Changing> {
+    let steady = scene(true).prop_map(|s| (s.clone(), s.step.min(1.0), 0.0, 0));
+    prop_oneof![steady, (scene(true), 0.005..0.12f64, -6.0..0.5f64, 1..16u8)].boxed()
+}
+
+/// The fast path against the plain solver. Impacts drive neighbours apart: only while there are few does a small distance mean agreement.
+pub fn agree((s, step, change, which): &Changing, figures: &mut Figures) {
+    let mut fast = Plant::new(s.parameters, s.start).expect("a valid scene");
+    let mut searched = fast;
+    searched.set_fast_path(false);
+    for n in 0..60 {
+        let changed = |number: u32| {
+            let part = (f64::from(n * 4 + number) * 0.618_033_988_749_895).fract() - 0.5;
+            if which >> number & 1 == 1 {
+                10f64.powf(*change) * part
+            } else {
+                0.0
+            }
+        };
+        let drive = Drive {
+            signal: [s.drive.signal[0] + 0.1 * changed(0), 0.1 * changed(1), 0.0, 0.0],
+            amplitude: s.drive.amplitude * (1.0 + changed(2)),
+            omega: s.drive.omega * (1.0 + changed(3)),
+        };
+        for plant in [&mut fast, &mut searched] {
+            plant.advance(drive, *step).expect("a valid step");
+        }
+        let impacts = [&fast, &searched].map(|plant| plant.totals().impacts);
+        if impacts[0].max(impacts[1]) > 3 {
+            break;
+        }
+        let [a, b] = [&fast, &searched].map(|plant| {
+            let State { q1, dq1, q2, dq2 } = plant.state();
+            [q1, dq1, q2, dq2]
+        });
+        let size = 1.0 + b.iter().fold(0.0f64, |size, x| size.max(x.abs()));
+        let off = a.iter().zip(b).fold(0.0f64, |off, (a, b)| off.max((a - b).abs()));
+        figures.count("impacts of one solver only", impacts[0].abs_diff(impacts[1]), 0.0);
+        figures.largest("fast path and plain solver differ by, relative", off / size, 1e-10);
+    }
 }
 
 /// Nodes and weights of the Gauss-Legendre formula with 8 points on [-1, 1] (positive half).

@@ -1,12 +1,10 @@
 //! Guards the plant in random and extreme scenes: no panic, no NaN, no particle outside its cavity at and inside steps, energy and its balance,
 //! momentum and Newton's law, grazes of 1e-13, the same bits without the workspace, steps from 1e-9 to 1e6 periods, a new drive at every
-//! sample against an independent simulation, bounded work.
+//! sample against an independent simulation, the fast path against the plain solver, bounded work.
 //!
-//! Prints a table. `scripts/stress --plant` runs the long form (`SCENES=100000`), the test suite a short one; validation/stress.csv keeps the
-//! table of the long form. `SCENE=hard:17` follows scene 17 of the kind `hard` only.
+//! Prints a table. `scripts/stress --plant` runs the long form (`SCENES=100000`), the test suite a short one; validation/stress.csv keeps a
+//! table of 10,000 scenes. `SCENE=hard:17` follows scene 17 of the kind `hard` only.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod drives;
 mod figures;
 mod follow;
@@ -26,6 +24,7 @@ fn hard_scenes_are_survived() {
     let n = number_of_scenes();
     let mut figures = Figures::default();
     run("hard", n, scenes::hard, follow::follow, &mut figures);
+    run("fast path", 2 * n, follow::changing, follow::agree, &mut figures);
     run("damped", n / 10, scenes::damped, follow::balance, &mut figures);
     run("new drives", n / 5, drives::scenes, drives::follow, &mut figures);
     run("impact", n, single::impacts, single::impact, &mut figures);

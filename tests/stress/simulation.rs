@@ -3,7 +3,7 @@
 //! It sums the Taylor series of the equation of motion over short panels, and finds contacts and releases as roots of its polynomials
 //! in Bernstein form (Descartes' rule of signs). Displacements and velocities at the start alone decide whether the particle rests.
 
-use crate::common::Scene;
+use crate::scenes::Scene;
 use lovines::{Drive, Plant, Wall};
 
 /// Degree of the polynomials, and length of a panel in units of the fastest rate's time: the first term left out is below 1e-19.

@@ -1,7 +1,7 @@
 //! Single impacts, grazes, motions without loss, extreme values, and extreme lengths of a step.
 
-use crate::common::{Scene, scene};
 use crate::figures::Figures;
+use crate::scenes::{Scene, decades, scene};
 use lovines::base_motion::BaseMotion;
 use lovines::oscillator::Oscillator;
 use lovines::plant::{MOST_EVALUATIONS, MOST_IMPACTS};
@@ -9,10 +9,6 @@ use lovines::segment::Segment;
 use lovines::{Drive, Parameters, Plant, State};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
-
-fn decades(from: f64, to: f64) -> impl Strategy<Value = f64> {
-    (from..to).prop_map(|x| 10f64.powf(x))
-}
 
 /// A rig and the velocities with which primary mass and particle meet.
 pub fn impacts() -> BoxedStrategy<(Scene, f64, f64)> {
@@ -140,9 +136,15 @@ pub fn conserves(epsilon: &f64, figures: &mut Figures) {
 
 /// Damping ratio; amplitude of the base, in half-widths; its frequency, in natural frequencies.
 pub fn extremes() -> BoxedStrategy<(f64, f64, f64)> {
-    let damping = prop_oneof![1 => Just(0.0), 2 => decades(-12.0, 6.0), 1 => decades(-1.0, 1.0)];
-    let amplitude = prop_oneof![1 => Just(0.0), 9 => decades(-3.0, 3.0)];
-    (damping, amplitude, decades(-3.0, 3.0)).boxed()
+    let damping = vec![
+        0.0, 1e-12, 1e-6, 1e-3, 1e-2, 0.1, 0.5, 1.0, 2.0, 10.0, 1e2, 1e3, 1e4, 1e5, 1e6,
+    ];
+    let amplitude = vec![0.0, 1e-3, 0.1, 1.0, 30.0, 1e3];
+    let frequency = vec![1e-3, 0.03, 0.3, 1.0, 1.7, 10.0, 30.0, 300.0, 1e3];
+    [damping, amplitude, frequency]
+        .map(prop::sample::select)
+        .prop_map(|[damping, amplitude, frequency]| (damping, amplitude, frequency))
+        .boxed()
 }
 
 /// Steps that an extreme scene is followed for; fewer after this number of impacts.

@@ -1,4 +1,4 @@
-//! A C program with the static library, against the Rust core.
+//! Guards the static library in a C program, bit by bit against the Rust core.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

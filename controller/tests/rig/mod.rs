@@ -1,7 +1,7 @@
 //! A linear resonator on a moving base, exact between samples, and a control loop around it.
 #![allow(dead_code)] // each test binary uses a part of it
 
-use phase_lock::{Config, Input, Output, PhaseLock, State};
+use phase_lock::{Config, Input, Move, Output, PhaseLock, State};
 
 pub const OMEGA_0: f64 = 55.39;
 /// Damping ratio: the response relaxes with a time constant of 1/(2 pi ZETA) = 32 periods.
@@ -91,6 +91,18 @@ impl Bench {
         let h = self.controller.config().sample_time;
         self.resonator.advance(output.amplitude, output.omega, h);
         output
+    }
+
+    /// Controls the response amplitude instead of the drive's, with a move to a new setpoint.
+    pub fn hold(&mut self, to: Move) {
+        let held = self.controller.hold_response(&mut self.state, to);
+        held.expect("a closed loop");
+    }
+
+    /// Changes the drive amplitude, m, and the phase target, rad.
+    pub fn retune(&mut self, amplitude: f64, phase_target: f64) {
+        let retuned = self.controller.retune(amplitude, phase_target);
+        retuned.expect("within limits");
     }
 
     /// Runs for a number of nominal periods. Returns the last output.

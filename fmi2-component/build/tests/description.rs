@@ -1,4 +1,4 @@
-//! What is read from a description, and what is refused.
+//! Guards the build step: what it reads from a description, what it refuses, and what the GUID depends on.
 
 use fmi2_component_build::{Error, describe, guid_of, source_of};
 

@@ -232,19 +232,6 @@ mod tests {
     const TANK: &str = include_str!("../../example/modelDescription.xml");
 
     #[test]
-    fn variables_are_found_by_name_with_their_type_and_attributes() {
-        let description = Description::parse(TANK).unwrap();
-        let (kind, level) = description.variable("level").and_then(ScalarVariable::content).unwrap();
-        assert_eq!((kind, level.declared_type.as_deref()), (FmiType::Real, Some("Length")));
-        let area = description.variable("area").expect("a variable");
-        assert_eq!(
-            (area.value_reference, area.content().unwrap().1.start.as_deref()),
-            (0, Some("2"))
-        );
-        assert!(description.variable("depth").is_none());
-    }
-
-    #[test]
     fn elements_of_other_tools_are_ignored() {
         let other = "<Annotations><Tool name=\"t\"><a b=\"1\">text</a></Tool></Annotations>";
         let plain = Description::parse(TANK).unwrap();

@@ -448,7 +448,7 @@ mod tests {
         (plant.contact().map(Contact::Wall)).or(plant.sticks().then_some(Contact::Floor))
     }
 
-    /// A master: the classical method of Runge and Kutta, and bisection for the events.
+    /// A master: integration, and bisection for the events.
     struct Master {
         hybrid: Hybrid,
         /// The drive as the sample begins.
@@ -483,33 +483,23 @@ mod tests {
             hybrid
         }
 
+        /// The classical method of Runge and Kutta.
         fn step(&self, t: f64, h: f64) -> Hybrid {
+            let numbers = |s: States| [s.q1, s.u1, s.q2, s.u2, s.phase];
+            let states = |[q1, u1, q2, u2, phase]: [f64; 5]| States { q1, u1, q2, u2, phase };
+            let start = numbers(self.hybrid.states);
+            let after = |rates: [f64; 5], h: f64| states(std::array::from_fn(|n| start[n] + h * rates[n]));
             let rates = |hybrid: Hybrid| {
                 let now = hybrid.instant();
                 let (u1, u2) = now.reduced_accelerations();
-                States { q1: now.dq1, u1, q2: now.dq2, u2, phase: now.omega }
+                [now.dq1, u1, now.dq2, u2, now.omega]
             };
-            let start = self.hybrid.states;
-            let along = |rate: &States, h: f64| States {
-                q1: start.q1 + h * rate.q1,
-                u1: start.u1 + h * rate.u1,
-                q2: start.q2 + h * rate.q2,
-                u2: start.u2 + h * rate.u2,
-                phase: start.phase + h * rate.phase,
-            };
-            let a = rates(self.at(start, t));
-            let b = rates(self.at(along(&a, 0.5 * h), t + 0.5 * h));
-            let c = rates(self.at(along(&b, 0.5 * h), t + 0.5 * h));
-            let d = rates(self.at(along(&c, h), t + h));
-            let mean = |of: fn(&States) -> f64| (of(&a) + 2.0 * (of(&b) + of(&c)) + of(&d)) / 6.0;
-            let rate = States {
-                q1: mean(|s| s.q1),
-                u1: mean(|s| s.u1),
-                q2: mean(|s| s.q2),
-                u2: mean(|s| s.u2),
-                phase: mean(|s| s.phase),
-            };
-            self.at(along(&rate, h), t + h)
+            let a = rates(self.at(self.hybrid.states, t));
+            let b = rates(self.at(after(a, 0.5 * h), t + 0.5 * h));
+            let c = rates(self.at(after(b, 0.5 * h), t + 0.5 * h));
+            let d = rates(self.at(after(c, h), t + h));
+            let mean = std::array::from_fn(|n| (a[n] + 2.0 * (b[n] + c[n]) + d[n]) / 6.0);
+            self.at(after(mean, h), t + h)
         }
 
         /// Displacement and velocity of the primary mass, relative displacement and velocity after the sample, the totals, and rests on a
