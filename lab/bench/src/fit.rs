@@ -200,8 +200,6 @@ const STEP: f64 = 1e-6;
 const ROUNDS: usize = 200;
 /// Restitution coefficients from which the minimisation begins, besides the expected one: chi-square may have several minima.
 const STARTS: [f64; 4] = [0.4, 0.55, 0.7, 0.85];
-/// Particle speeds from which the nearest place on the curve is searched for, if that of theory is not on it.
-const SPEEDS: [f64; 9] = [0.8, 0.9, 0.7, 1.0, 0.6, 1.1, 0.5, 1.2, 0.4];
 /// Relative gain of the squared distance from the curve at which the nearest place on it counts as found.
 const NEAREST: f64 = 1e-12;
 /// Relative uncertainty of a value that is known exactly: above rounding.
@@ -633,9 +631,7 @@ impl<'a> Problem<'a> {
             let c = self.points[point].response.value / b;
             manifold.b(c, BranchSide::Right).unwrap_or(1.02 * manifold.b_min())
         };
-        // Theory may put a speed where the exact curve has none.
-        let mut starts = [start.unwrap_or_else(by_theory)].into_iter().chain(SPEEDS);
-        let mut speed = starts.find(|speed| self.residual(x, point, *speed).is_some())?;
+        let mut speed = start.unwrap_or_else(by_theory);
         let slope = |speed: f64| {
             let [below, above] = [-STEP, STEP].map(|step| self.residual(x, point, speed + step));
             Some((above? - below?) / (2.0 * STEP))

@@ -15,7 +15,7 @@ use lovines::{Cavity, Drive, Event, InvalidValue, Outcome, Parameters, Plant, Re
 use nalgebra::{Complex, Matrix4, Matrix6, Vector4, Vector6};
 use thiserror::Error;
 
-use super::symmetric::{Candidate, at_amplitude, at_speed, stable_resonant};
+use super::symmetric::{Candidate, at_amplitude, at_speed, of_orbit, stable_resonant};
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
 use crate::{Definition, Dimensionless, Resonance, Sensor};
 
@@ -137,7 +137,7 @@ pub fn resonant_motion_under(
     Solver::new(parameters, definition, 1, conditions)?;
     let motion = |scene: &Dimensionless| {
         let g = scene.excitation(amplitude);
-        stable_resonant(&Dimensionless { g, ..*scene }).and_then(|orbit| at_speed(scene, orbit.b))
+        stable_resonant(&Dimensionless { g, ..*scene }).and_then(|orbit| of_orbit(scene, &orbit))
     };
     let ideal = Ideal::with(parameters, definition, motion).ok_or(NoMotion::NoIdealMotionUnder(amplitude))?;
     Ideal { amplitude, ..ideal }.continued(parameters, definition, None)
