@@ -24,9 +24,10 @@ use common::{Failure, arguments, client, is_kept, quantile, rig, share, uniform,
 use lovines::{Cavity, Restitution};
 use rayon::prelude::*;
 use vines_model::numerics::{Estimate, mean_square};
-use vines_testbench::backbone::track;
+use vines_testbench::backbone::{Tracked, track};
 use vines_testbench::experiment::{Plan, run};
 use vines_testbench::fit::{Effect, Fit, Known, MeasuredPoint, Quantity, Recording, at, explain, fit, parts};
+use vines_testbench::identification::Regime;
 use vines_testbench::rig::{BuiltIn, Chain, SensorsOnly, Simulated};
 use vines_testbench::scene::{Parameters, Scene};
 
@@ -147,7 +148,9 @@ struct Named {
 }
 
 fn effects(count: usize, seed: &str, snr: &str) -> Result<(), Failure> {
-    let kinds: Vec<Option<Effect>> = (0..2 * count).map(|n| (n < count).then(|| Effect::ALL[n % 4])).collect();
+    let kinds: Vec<Option<Effect>> = (0..2 * count)
+        .map(|n| (n < count).then(|| Effect::ALL[n % 4]))
+        .collect();
     let first: u64 = seed.parse()?;
     let named: Vec<(Named, usize)> = kinds
         .par_iter()
@@ -156,7 +159,11 @@ fn effects(count: usize, seed: &str, snr: &str) -> Result<(), Failure> {
             let mut uniform = uniform(first + 1000 * n as u64);
             // The rigs that the loop does not lock, and those that the effect hardly moves, are drawn again.
             for drawn in 1.. {
-                let ratios = [uniform(2e-3_f64.ln(), 0.03_f64.ln()).exp(), uniform(0.4, 2.5), uniform(0.4, 0.9)];
+                let ratios = [
+                    uniform(2e-3_f64.ln(), 0.03_f64.ln()).exp(),
+                    uniform(0.4, 2.5),
+                    uniform(0.4, 0.9),
+                ];
                 let scales = [0.01, 0.3, 0.2, 0.1, 0.2].map(|range| uniform(-range, range));
                 let [k, c, m, b, r] = scales;
                 let hidden = Hidden {
@@ -224,7 +231,10 @@ impl Hidden {
         let both = |law| Cavity { restitution: [Some(law); 2], ..Cavity::IDEAL };
         match self.effect {
             None => Cavity::IDEAL,
-            Some(Effect::Friction) => Cavity { kinetic_friction: LARGEST[0] * self.size / g, ..Cavity::IDEAL },
+            Some(Effect::Friction) => Cavity {
+                kinetic_friction: LARGEST[0] * self.size / g,
+                ..Cavity::IDEAL
+            },
             Some(Effect::Tilt) => Cavity { tilt: LARGEST[1] * self.size / g, ..Cavity::IDEAL },
             Some(Effect::Viscoelastic) => both(Restitution::Viscoelastic((1.0 - r) / speed.powf(0.2))),
             Some(Effect::Plastic) => both(Restitution::Plastic(speed * r.powi(4))),
@@ -236,9 +246,21 @@ impl Hidden {
         let Self { ratios, noise, effect, size, .. } = *self;
         let (ideal, scene) = client(ratios, noise, snr, self.scales)?;
         let truth = Parameters { cavity: self.cavity(), ..ideal };
-        let points = of_backbone(truth, &scene)?;
+        let tracked = tracked(truth, &scene)?;
+        // Much friction keeps the particle from the walls.
+        if !matches!(
+            tracked.points[0].regime_by_impacts,
+            Some(Regime::Symmetric | Regime::Asymmetric)
+        ) {
+            return Ok(None);
+        }
+        let points = kept(&tracked);
         let moved = at(&points, scene.resonance, &ideal, &[]).ok_or("the ideal rig has no such motion")?;
-        let moved = moved.residuals.iter().flatten().fold(0.0, |most: f64, one| most.max(one.abs()));
+        let moved = moved
+            .residuals
+            .iter()
+            .flatten()
+            .fold(0.0, |most: f64, one| most.max(one.abs()));
         if points.len() < 6 || (effect.is_some() && moved < 5.0) {
             return Ok(None);
         }
@@ -265,7 +287,11 @@ impl Hidden {
         println!(
             "{ratios:.4?} {effect:?} {size:.2} moves by {moved:.0} u: {} points, {}; strength {over_u:.1?} u, {seconds:.2} s",
             points.len(),
-            if flagged { found.verdict() } else { format!("ideal, {:.1} for {}", found.ideal.chi_square, found.ideal.degrees) },
+            if flagged {
+                found.verdict()
+            } else {
+                format!("ideal, {:.1} for {}", found.ideal.chi_square, found.ideal.degrees)
+            },
         );
         Ok(Some(Named {
             effect,
@@ -279,20 +305,27 @@ impl Hidden {
     }
 }
 
-/// The points of the backbone of a rig that a client tracks.
-fn of_backbone(truth: Parameters, scene: &Scene) -> Result<Vec<MeasuredPoint>, Failure> {
+/// The backbone of a rig that a client tracks.
+fn tracked(truth: Parameters, scene: &Scene) -> Result<Tracked, Failure> {
     let rig = Simulated::new(truth, scene.start)?;
-    let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), scene));
+    let mut rig = Chain::around(Box::new(rig), scene);
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
-    let tracked = track(&mut rig, &mut controller, scene, |_, _| {})?;
-    let kept = tracked.points.iter().filter(is_kept);
-    Ok(kept.map(|point| (&point.at).into()).collect())
+    Ok(track(&mut *rig, &mut controller, scene, |_, _| {})?)
+}
+
+fn kept(tracked: &Tracked) -> Vec<MeasuredPoint> {
+    tracked
+        .points
+        .iter()
+        .filter(is_kept)
+        .map(|point| (&point.at).into())
+        .collect()
 }
 
 /// The points of a tracked backbone.
 fn points((rig, noise, scales): &Case, snr: &str) -> Result<Points, Failure> {
     let (truth, scene) = client(*rig, *noise, snr, *scales)?;
-    Ok((of_backbone(truth, &scene)?, scene))
+    Ok((kept(&tracked(truth, &scene)?), scene))
 }
 
 /// The points of a recording.

@@ -495,13 +495,7 @@ impl Sums {
 impl<'a> Problem<'a> {
     fn new(points: Vec<MeasuredPoint>, definition: Definition, known: &'a [Known]) -> Self {
         let has_scale = known.iter().any(|one| one.quantity.needs_a_scale());
-        Self {
-            points,
-            definition,
-            known,
-            has_scale,
-            free: false,
-        }
+        Self { points, definition, known, has_scale, free: false }
     }
 
     /// The smallest of the minima that are reached from the expected rig and from other restitution coefficients.

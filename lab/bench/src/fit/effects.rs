@@ -8,6 +8,7 @@
 //! Unequal gaps are no candidate: they shift the particle by the middle of the cavity and change nothing that the points contain. The fitted b is
 //! half of the distance between the walls.
 
+use std::cmp::Ordering;
 use std::fmt::{self, Display, Formatter};
 
 use lovines::cavity::GRAVITY;
@@ -18,8 +19,8 @@ use vines_model::numerics::{Estimate, mean};
 use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
 
 use super::{
-    FEWEST, Fit, FitError, Known, MeasuredPoint, Problem, Quantity, Sums, UNKNOWNS, Unknowns, checked, fit, gradient,
-    shifted, unknowns,
+    FEWEST, Fit, FitError, Known, LEFT_OUT, MeasuredPoint, Problem, Quantity, Sums, UNKNOWNS, Unknowns, checked, fit,
+    gradient, shifted,
 };
 use crate::scene::Parameters;
 
@@ -55,8 +56,8 @@ const ROUNDS: usize = 30;
 const FARTHEST: f64 = 0.1;
 /// Difference of the response over b at which a motion is at a point.
 const NEAR: f64 = 1e-3;
-/// Shares of the points, those of the largest amplitudes, that are fitted one after the other before all of them.
-const STAGES: [f64; 2] = [0.5, 0.75];
+/// Shares of the points, those of the largest amplitudes, that are fitted one after the other.
+const STAGES: [f64; 3] = [0.5, 0.8, 1.0];
 /// What a further step would take from chi-square, at which the minimum counts as found.
 const FOUND: f64 = 0.02;
 /// Smallest share of a step.
@@ -170,9 +171,15 @@ impl Explanation {
             chi_square(&best.fit),
             chi_square(&self.ideal)
         );
+        let left_out = best.fit.left_out.len();
+        if left_out > 0 {
+            text += &format!(
+                "; {left_out} points of the smallest responses do not belong to this motion, and are left out"
+            );
+        }
         let others = self.candidates[1..]
             .iter()
-            .filter(|one| one.criterion() - best.criterion() < POSSIBLE);
+            .filter(|one| one.fit.left_out == best.fit.left_out && one.criterion() - best.criterion() < POSSIBLE);
         let others: Vec<String> = others
             .map(|one| format!("{} ({})", one.effect, chi_square(&one.fit)))
             .collect();
@@ -197,6 +204,13 @@ impl Candidate {
     /// Akaike's criterion.
     fn criterion(&self) -> f64 {
         self.fit.chi_square + 2.0 * f64::from(u8::from(self.effect.adds_a_parameter()))
+    }
+
+    /// The better one first: one that describes the points, that leaves out fewer of them, and then by Akaike's criterion.
+    fn order(&self, other: &Self) -> Ordering {
+        let first = |one: &Self| (one.fit.is_rejected(), one.fit.left_out.len());
+        let by_criterion = self.criterion().total_cmp(&other.criterion());
+        first(self).cmp(&first(other)).then(by_criterion)
     }
 
     /// The plant of the fit, with the effect. Without a known mass, stiffness or damping, its primary mass is that of `scene`.
@@ -237,8 +251,10 @@ pub fn find(
     let explanation = explain(points, definition, expected, known, progress)?;
     let verdict = Some(explanation.verdict());
     Ok(match explanation.explains() {
-        Some(best) => Found { fit: best.fit.clone(), plant: best.plant(expected), verdict },
-        None => Found { fit: ideal, plant, verdict },
+        Some(best) if ideal.is_rejected() || best.fit.left_out.len() <= ideal.left_out.len() => {
+            Found { fit: best.fit.clone(), plant: best.plant(expected), verdict }
+        }
+        _ => Found { fit: ideal, plant, verdict },
     })
 }
 
@@ -262,7 +278,7 @@ pub fn explain(
             candidates.extend(problem.with_effect(effect, expected));
         }
     }
-    candidates.sort_by(|one, other| one.criterion().total_cmp(&other.criterion()));
+    candidates.sort_by(Candidate::order);
     Ok(Explanation { ideal, candidates })
 }
 
@@ -270,30 +286,60 @@ impl Problem<'_> {
     /// The fit with an effect; `None` if the plant has no such motions.
     ///
     /// Beside the fold a motion with wrong parameters may not exist, and most effects shift the points of large amplitude least: these are fitted
-    /// first, and each fit starts the one of more points.
+    /// first, and each fit starts the one of more points. A strong effect moves the fold, and the points beyond it belong to another motion: those of
+    /// the smallest amplitudes, a fifth at most, are left out if the others agree.
     fn with_effect(&self, effect: Effect, expected: &Parameters) -> Option<Candidate> {
-        let mut order = self.points.clone();
-        order.sort_by(|one, other| other.response.value.total_cmp(&one.response.value));
-        let strongest = |share: f64| {
-            let count = (share * order.len() as f64).ceil() as usize;
-            Problem::new(order[..count.max(FEWEST)].to_vec(), self.definition, self.known)
+        let mut order: Vec<usize> = (0..self.points.len()).collect();
+        order.sort_by(|one, other| {
+            self.points[*other]
+                .response
+                .value
+                .total_cmp(&self.points[*one].response.value)
+        });
+        let of = |points: Vec<MeasuredPoint>| Problem::new(points, self.definition, self.known);
+        let largest = |share: f64| {
+            let mut kept = order[..((share * order.len() as f64).ceil() as usize).max(FEWEST)].to_vec();
+            kept.sort_unstable();
+            kept
         };
-        let ideal = strongest(STAGES[0]).fit(expected).ok()?;
-        let starts = [ideal.x, unknowns(expected)].into_iter();
-        let found = starts.filter_map(|start| {
-            let typical = TYPICAL * start[3].exp() * start[0].exp().powi(2) / GRAVITY;
-            let mut x = start;
+        let strongest: Vec<MeasuredPoint> = largest(STAGES[0]).into_iter().map(|n| self.points[n]).collect();
+        let starts = [1.0, 5.0]
+            .into_iter()
+            .filter(|factor| *factor == 1.0 || effect.adds_a_parameter());
+        let ideal = of(strongest).fit(expected).ok()?;
+        let found = starts.filter_map(|factor| {
+            let mut x = ideal.x;
+            let typical = factor * TYPICAL * x[3].exp() * x[0].exp().powi(2) / GRAVITY;
             x[6] = match effect {
                 Effect::Friction => typical,
                 Effect::Tilt => 4.0 * typical * typical,
                 Effect::Viscoelastic | Effect::Plastic => 0.0,
             };
+            let mut best: Option<Candidate> = None;
             for share in STAGES {
-                x = strongest(share).with_effect_from(effect, x, &ideal)?.fit.x;
+                let kept = largest(share);
+                let points = kept.iter().map(|n| self.points[*n]).collect();
+                let Some(mut next) = of(points).with_effect_from(effect, x, &ideal) else {
+                    break;
+                };
+                if next.fit.is_rejected() && best.as_ref().is_some_and(|one| !one.fit.is_rejected()) {
+                    break;
+                }
+                next.fit.left_out = (0..self.points.len()).filter(|n| !kept.contains(n)).collect();
+                x = next.fit.x;
+                best = Some(next);
             }
-            self.with_effect_from(effect, x, &ideal)
+            best.filter(|one| one.fit.left_out.len() * LEFT_OUT <= self.points.len())
         });
-        found.min_by(|one, other| one.criterion().total_cmp(&other.criterion()))
+        let mut best: Option<Candidate> = None;
+        for one in found {
+            let describes_all = !one.fit.is_rejected() && one.fit.left_out.is_empty();
+            best = best.into_iter().chain([one]).min_by(Candidate::order);
+            if describes_all {
+                break;
+            }
+        }
+        best
     }
 
     /// The fit with an effect, from the unknowns `x`: Gauss and Newton's method, in steps that reduce chi-square.
@@ -317,7 +363,8 @@ impl Problem<'_> {
                 let strength = Estimate { value: value(&x), uncertainty: variance.max(0.0).sqrt() };
                 return Some(Candidate { effect, strength, fit, speed });
             }
-            let shares = std::iter::successors(Some(1.0), |share| Some(0.4 * share)).take_while(|share| *share > SMALLEST);
+            let shares =
+                std::iter::successors(Some(1.0), |share| Some(0.4 * share)).take_while(|share| *share > SMALLEST);
             (x, places) = shares.into_iter().find_map(|share| {
                 let mut next = x - step * share;
                 // Neither friction nor the square of a tilt is negative.
@@ -372,14 +419,27 @@ impl PlantCurve<'_> {
             return None;
         }
         let [length, rate] = units(x);
-        let at = [near.response.norm() + ahead * tangent[0] * length, near.omega + ahead * tangent[1] * rate];
+        let at = [
+            near.response.norm() + ahead * tangent[0] * length,
+            near.omega + ahead * tangent[1] * rate,
+        ];
         let cavity = self.effect.cavity(x[6], x[2], self.speed);
-        let conditions = [DriveCondition::PhaseResonance, DriveCondition::Across { at, normal: tangent }];
-        periodic_motion(&Parameters { cavity, ..plant(x) }, self.problem.definition, near, conditions).ok()
+        let conditions = [
+            DriveCondition::PhaseResonance,
+            DriveCondition::Across { at, normal: tangent },
+        ];
+        periodic_motion(
+            &Parameters { cavity, ..plant(x) },
+            self.problem.definition,
+            near,
+            conditions,
+        )
+        .ok()
     }
 
     fn residual(&self, n: usize, motion: &PlantMotion) -> Vector3<f64> {
-        self.problem.over_u(n, motion.response.norm(), motion.omega, motion.amplitude)
+        self.problem
+            .over_u(n, motion.response.norm(), motion.omega, motion.amplitude)
     }
 
     /// As [`PlantCurve::motion`], for a point.
@@ -387,11 +447,19 @@ impl PlantCurve<'_> {
         let motion = self.motion(x, near, tangent, ahead)?;
         let next = self.motion(x, &motion, tangent, STEP)?;
         let [length, rate] = units(x);
-        let change = [(next.response.norm() - motion.response.norm()) / length, (next.omega - motion.omega) / rate];
+        let change = [
+            (next.response.norm() - motion.response.norm()) / length,
+            (next.omega - motion.omega) / rate,
+        ];
         let size = change[0].hypot(change[1]);
         let residual = self.residual(n, &motion);
         let along = (self.residual(n, &next) - residual) / size;
-        Some(Place { motion, tangent: change.map(|one| one / size), residual, along })
+        Some(Place {
+            motion,
+            tangent: change.map(|one| one / size),
+            residual,
+            along,
+        })
     }
 
     /// The motions with the amplitudes of the points, or at the fold, from the largest one along the curve.
@@ -401,7 +469,13 @@ impl PlantCurve<'_> {
         order.sort_by(|one, other| points[*other].response.value.total_cmp(&points[*one].response.value));
         let cavity = self.effect.cavity(x[6], x[2], self.speed);
         let largest = points[order[0]].response.value;
-        let mut near = resonant_motion(&Parameters { cavity, ..plant(x) }, self.problem.definition, largest, None).ok()?;
+        let mut near = resonant_motion(
+            &Parameters { cavity, ..plant(x) },
+            self.problem.definition,
+            largest,
+            None,
+        )
+        .ok()?;
         let (mut tangent, mut places) = ([1.0, 0.0], Vec::new());
         for n in order {
             let mut place = self.place(x, n, &near, tangent, 0.0)?;
@@ -424,7 +498,11 @@ impl PlantCurve<'_> {
     fn chi_square(&self, x: &Unknowns, places: &[Place]) -> f64 {
         let mut sums = Sums::default();
         self.problem.add_known(x, &mut sums);
-        sums.chi_square + places.iter().map(|one| one.across(&one.residual).norm_squared()).sum::<f64>()
+        sums.chi_square
+            + places
+                .iter()
+                .map(|one| one.across(&one.residual).norm_squared())
+                .sum::<f64>()
     }
 
     /// Chi-square with its derivatives, and the derivatives of the residuals.
