@@ -122,7 +122,7 @@ fn fitted((ratios, ..): &Case, points: &[MeasuredPoint], scene: &Scene) -> Resul
     };
     let (over_u, over_bound) = (over(&fit), over(&bound));
     println!(
-        "{:.4?} {} of {} points: {over_u:.1?} u, chi-square {:.1} of {}, of the rig {:.1}, {seconds:.3} s",
+        "{:.4?} {} of {} points: {over_u:.1?} u, chi-square {:.1} of {}, of the rig {:.1}, {over_bound:.1?} bounds, {seconds:.3} s",
         ratios,
         fit.residuals.len(),
         points.len(),

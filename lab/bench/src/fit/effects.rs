@@ -249,13 +249,12 @@ pub fn find(
         return Ok(Found { fit: ideal, plant, verdict: None });
     }
     let explanation = explain(points, definition, expected, known, progress)?;
-    let verdict = Some(explanation.verdict());
-    Ok(match explanation.explains() {
-        Some(best) if ideal.is_rejected() || best.fit.left_out.len() <= ideal.left_out.len() => {
-            Found { fit: best.fit.clone(), plant: best.plant(expected), verdict }
-        }
-        _ => Found { fit: ideal, plant, verdict },
-    })
+    let best = explanation
+        .explains()
+        .filter(|best| ideal.is_rejected() || best.fit.left_out.len() <= ideal.left_out.len());
+    let verdict = (ideal.is_rejected() || best.is_some()).then(|| explanation.verdict());
+    let (fit, plant) = best.map_or((ideal, plant), |best| (best.fit.clone(), best.plant(expected)));
+    Ok(Found { fit, plant, verdict })
 }
 
 /// Fits the ideal cavity to all points, and, if they contradict it, each effect alone. `progress` is told the number of candidates done.
