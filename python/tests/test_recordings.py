@@ -83,11 +83,16 @@ def test_every_format_gives_the_same_fit(channels, tmp_path):
         write(tmp_path / name, *cut)
         read = vines.read_recording(tmp_path / name, "y:mm", "x:um", rate=rate)
         fit = vines.fit_recordings(read)
-        found[name] = (read.response, read.drive, np.array([fit.parameters["value"], fit.parameters["uncertainty"]]))
+        found[name] = (read.response, read.drive, fit.parameters["value"], fit.parameters["uncertainty"])
+    first = found.pop("record.csv")
+    # UFF58 has twelve digits; the others have all bits.
+    rounded = found.pop("record.uff")
     for name, arrays in found.items():
-        for one, first in zip(arrays, found["record.csv"], strict=True):
-            # UFF58 has twelve digits; the others have all bits.
-            assert np.allclose(one, first, rtol=1e-6, atol=1e-15) if name == "record.uff" else np.array_equal(one, first), name
+        assert all(np.array_equal(*pair) for pair in zip(arrays, first, strict=True)), name
+    assert np.allclose(rounded[0], first[0], rtol=1e-9, atol=1e-12)
+    assert np.allclose(rounded[1], first[1], rtol=1e-9, atol=1e-15)
+    apart = (rounded[2] - first[2]) / first[3]
+    assert np.all(np.abs(apart) < 1e-3), apart
 
 
 def test_the_command_names_what_is_missing(channels, tmp_path):
