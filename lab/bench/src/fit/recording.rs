@@ -243,6 +243,9 @@ impl Recording {
     pub fn parts(&self, scene: &Scene) -> Result<Vec<Part>, RecordingError> {
         let linear = scene.linear();
         self.check(&linear)?;
+        // The regime is judged with the sample time of the scene.
+        let mut scene = scene.clone();
+        scene.controller.samples_per_period *= scene.sample_time() / self.sample_time;
         let anchors = self.anchors(&linear);
         let target = scene.controller.phase_target_radians();
         let runs: Vec<Run> = anchors
@@ -253,7 +256,7 @@ impl Recording {
             })
             .collect();
         self.plausible(&runs)?;
-        let parts = evaluated(&runs, scene, self.sample_time);
+        let parts = evaluated(&runs, &scene, self.sample_time);
         if parts.iter().all(|part| part.point.is_none()) {
             return Err(self.nothing(&anchors, &parts, &linear));
         }
