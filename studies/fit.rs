@@ -4,12 +4,12 @@
 //! c by 30 %, k by 1 %. The client fits f0, zeta, r, b and epsilon to the backbone that it tracks (`points`), or to a recording of the search, the
 //! hold and the decay of `vines identify`, cut at both ends (`recordings`). For each parameter, of the fits that are not rejected:
 //! the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the error over u, and that over the
-//! Cramér–Rao bound of the same points; and the numbers of fits that are rejected, and of rigs without a fit or without
-//! the bound (at the true parameters, no place of the curve is found near one of the points).
+//! Cramér–Rao bound of the same points; and the numbers of fits that are rejected, and of rigs without a fit.
 //!
-//! `effects` gives each rig one hidden effect of its cavity, in turn friction, tilt, and two laws of restitution, that moves its points by more than
-//! 5 u, and half of the rigs none. The table has the numbers of rigs that are flagged, because the ideal cavity does not describe their points, that
-//! are explained by the right effect, by a wrong one alone, and by the right one only among others; and the coverage of the strength.
+//! `effects` gives each rig one hidden effect of its cavity, in turn friction, tilt, and two laws of restitution, and as many rigs none. A rig is drawn again if
+//! the loop does not lock on it, if friction keeps the particle from the walls, or if the effect moves its points by less than 5 u. The table has the
+//! numbers of rigs that were drawn, measured, flagged because the ideal cavity does not describe their points, explained by the right effect, by a wrong one
+//! alone, and by the right one only among others; and the coverage of the strength.
 //!
 //! ```sh
 //! cargo run --release -p vines-testbench --example fit -- points|recordings RIGS SEED SNR    # SNR: dB, or none; writes validation/fit.csv
@@ -38,13 +38,13 @@ type Points = (Vec<MeasuredPoint>, Scene);
 
 fn main() -> Result<(), Failure> {
     let [source, count, seed, snr] = &arguments()[..] else {
-        return Err("arguments: points|recordings RIGS SEED SNR|none".into());
+        return Err("arguments: points|recordings|effects RIGS SEED SNR|none".into());
     };
     let measure: fn(&Case, &str) -> Result<Points, Failure> = match &**source {
         "points" => points,
         "recordings" => recorded,
         "effects" => return effects(count.parse()?, seed, snr),
-        other => return Err(format!("{other}: there are points and recordings").into()),
+        other => return Err(format!("{other}: there are points, recordings and effects").into()),
     };
     let mut uniform = uniform(seed.parse()?);
     let mut cases: Vec<Case> = Vec::new();
@@ -220,7 +220,7 @@ struct Hidden {
     size: f64,
 }
 
-/// Largest friction and tilt over b omega0²: on the default rig a friction of FRICTION, and 9 degrees.
+/// Largest friction and tilt, times g, over b omega0²: on the default rig a friction of 0.31, and 9 degrees.
 const LARGEST: [f64; 2] = [0.1, 0.05];
 
 impl Hidden {
