@@ -4,12 +4,12 @@
 //! c by 30 %, k by 1 %. The client fits f0, zeta, r, b and epsilon to the backbone that it tracks (`points`), or to a recording of the search, the
 //! hold and the decay of `vines identify`, cut at both ends (`recordings`). For each parameter, of the fits that are not rejected:
 //! the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the error over u, and that over the
-//! Cramér–Rao bound of the same points; and the numbers of fits that are rejected, and of rigs without a fit or without
-//! the bound (at the true parameters, no place of the curve is found near one of the points).
+//! Cramér–Rao bound of the same points; and the numbers of fits that are rejected, and of rigs without a fit.
 //!
-//! `effects` gives each rig one hidden effect of its cavity, in turn friction, tilt, and two laws of restitution, that moves its points by more than
-//! 5 u, and half of the rigs none. The table has the numbers of rigs that are flagged, because the ideal cavity does not describe their points, that
-//! are explained by the right effect, by a wrong one alone, and by the right one only among others; and the coverage of the strength.
+//! `effects` gives each rig one hidden effect of its cavity, in turn friction, tilt, and two laws of restitution, and as many rigs none. A rig is drawn again if
+//! the loop does not lock on it, if friction keeps the particle from the walls, or if the effect moves its points by less than 5 u. The table has the
+//! numbers of rigs that were drawn, measured, flagged because the ideal cavity does not describe their points, explained by the right effect, by a wrong one
+//! alone, and by the right one only among others; and the coverage of the strength.
 //!
 //! ```sh
 //! cargo run --release -p vines-testbench --example fit -- points|recordings RIGS SEED SNR    # SNR: dB, or none; writes validation/fit.csv
@@ -20,12 +20,14 @@ mod common;
 
 use std::time::Instant;
 
-use common::{Failure, arguments, client, is_kept, quantile, rig, share, tracked, uniform, write};
+use common::{Failure, arguments, client, is_kept, quantile, rig, share, uniform, write};
+use lovines::{Cavity, Restitution};
 use rayon::prelude::*;
 use vines_model::numerics::{Estimate, mean_square};
-use vines_testbench::backbone::track;
+use vines_testbench::backbone::{Tracked, track};
 use vines_testbench::experiment::{Plan, run};
 use vines_testbench::fit::{Effect, Fit, Known, MeasuredPoint, Quantity, Recording, at, explain, fit, parts};
+use vines_testbench::identification::Regime;
 use vines_testbench::rig::{BuiltIn, Chain, SensorsOnly, Simulated};
 use vines_testbench::scene::{Parameters, Scene};
 
@@ -36,13 +38,13 @@ type Points = (Vec<MeasuredPoint>, Scene);
 
 fn main() -> Result<(), Failure> {
     let [source, count, seed, snr] = &arguments()[..] else {
-        return Err("arguments: points|recordings RIGS SEED SNR|none".into());
+        return Err("arguments: points|recordings|effects RIGS SEED SNR|none".into());
     };
     let measure: fn(&Case, &str) -> Result<Points, Failure> = match &**source {
         "points" => points,
         "recordings" => recorded,
         "effects" => return effects(count.parse()?, seed, snr),
-        other => return Err(format!("{other}: there are points and recordings").into()),
+        other => return Err(format!("{other}: there are points, recordings and effects").into()),
     };
     let mut uniform = uniform(seed.parse()?);
     let mut cases: Vec<Case> = Vec::new();
@@ -120,7 +122,7 @@ fn fitted((ratios, ..): &Case, points: &[MeasuredPoint], scene: &Scene) -> Resul
     };
     let (over_u, over_bound) = (over(&fit), over(&bound));
     println!(
-        "{:.4?} {} of {} points: {over_u:.1?} u, chi-square {:.1} of {}, of the rig {:.1}, {seconds:.3} s",
+        "{:.4?} {} of {} points: {over_u:.1?} u, chi-square {:.1} of {}, of the rig {:.1}, {over_bound:.1?} bounds, {seconds:.3} s",
         ratios,
         fit.residuals.len(),
         points.len(),
@@ -146,43 +148,51 @@ struct Named {
 }
 
 fn effects(count: usize, seed: &str, snr: &str) -> Result<(), Failure> {
-    let mut uniform = uniform(seed.parse()?);
-    let cases: Vec<_> = (0..2 * count)
-        .map(|n| {
-            let epsilon = uniform(2e-3_f64.ln(), 0.03_f64.ln()).exp();
-            let ratios = [epsilon, uniform(0.4, 2.5), uniform(0.4, 0.9)];
-            let noise = uniform(0.0, 1e6) as u64;
-            let scales = [0.01, 0.3, 0.2, 0.1, 0.2].map(|range| uniform(-range, range));
-            let mut scales = scales;
-            scales[4] = scales[4].min(0.95 / ratios[2] - 1.0);
-            (
-                ratios,
-                noise,
-                scales,
-                (n < count).then(|| Effect::ALL[n % 4]),
-                uniform(0.3, 1.0),
-            )
-        })
+    let kinds: Vec<Option<Effect>> = (0..2 * count)
+        .map(|n| (n < count).then(|| Effect::ALL[n % 4]))
         .collect();
-    let named: Vec<Option<Named>> = cases
+    let first: u64 = seed.parse()?;
+    let named: Vec<(Named, usize)> = kinds
         .par_iter()
-        .map(|case| {
-            let result = named(case, snr);
-            result
-                .inspect_err(|error| println!("{:.4?} {:?}: {error}", case.0, case.3))
-                .ok()
+        .enumerate()
+        .map(|(n, effect)| {
+            let mut uniform = uniform(first + 1000 * n as u64);
+            // The rigs that the loop does not lock, and those that the effect hardly moves, are drawn again.
+            for drawn in 1.. {
+                let ratios = [
+                    uniform(2e-3_f64.ln(), 0.03_f64.ln()).exp(),
+                    uniform(0.4, 2.5),
+                    uniform(0.4, 0.9),
+                ];
+                let scales = [0.01, 0.3, 0.2, 0.1, 0.2].map(|range| uniform(-range, range));
+                let [k, c, m, b, r] = scales;
+                let hidden = Hidden {
+                    ratios,
+                    noise: uniform(0.0, 1e6) as u64,
+                    scales: [k, c, m, b, r.min(0.95 / ratios[2] - 1.0)],
+                    effect: *effect,
+                    size: uniform(0.1, 1.0),
+                };
+                match hidden.named(snr) {
+                    Ok(Some(named)) => return (named, drawn),
+                    Ok(None) => {}
+                    Err(error) => println!("{:.4?} {effect:?} {:.2}: {error}", hidden.ratios, hidden.size),
+                }
+            }
+            unreachable!()
         })
         .collect();
-    let flagged = named.iter().flatten().filter(|one| one.flagged);
-    times("a fit with its candidates", flagged.map(|one| one.seconds));
+    let flagged = named.iter().filter(|(one, _)| one.flagged);
+    times("a fit with its candidates", flagged.map(|(one, _)| one.seconds));
     let mut rows = Vec::new();
     for effect in Effect::ALL.map(Some).into_iter().chain([None]) {
-        let of: Vec<&Named> = named.iter().flatten().filter(|one| one.effect == effect).collect();
-        let number = |is: fn(&Named) -> bool| of.iter().filter(|one| is(one)).count();
-        let pulls: Vec<f64> = of.iter().filter_map(|one| one.over_u.map(f64::abs)).collect();
+        let of: Vec<&(Named, usize)> = named.iter().filter(|(one, _)| one.effect == effect).collect();
+        let number = |is: fn(&Named) -> bool| of.iter().filter(|(one, _)| is(one)).count();
+        let pulls: Vec<f64> = of.iter().filter_map(|(one, _)| one.over_u.map(f64::abs)).collect();
         let name = effect.map_or_else(|| "none".into(), |effect| effect.to_string());
         rows.push(format!(
-            "{name},{snr},{seed},{},{},{},{},{},{:.3},{:.1}",
+            "{name},{snr},{seed},{},{},{},{},{},{},{:.3},{:.1}",
+            of.iter().map(|(_, drawn)| drawn).sum::<usize>(),
             of.len(),
             number(|one| one.flagged),
             number(|one| one.right),
@@ -194,108 +204,128 @@ fn effects(count: usize, seed: &str, snr: &str) -> Result<(), Failure> {
     }
     write(
         "fit_effects",
-        "effect,snr_dB,seed,rigs,flagged,named,misnamed,among_others,strength_within_1.96u,largest_u",
+        "effect,snr_dB,seed,drawn,rigs,flagged,named,misnamed,among_others,strength_within_1.96u,largest_u",
         2,
         &rows,
     )
 }
 
-/// A rig, the seed of its noise, the client's errors, an effect, and its size.
-type Hidden = ([f64; 3], u64, [f64; 5], Option<Effect>, f64);
+/// A rig with a hidden effect, the seed of its noise, and the client's errors.
+struct Hidden {
+    ratios: [f64; 3],
+    noise: u64,
+    scales: [f64; 5],
+    effect: Option<Effect>,
+    /// Size of friction or tilt, up to 1.
+    size: f64,
+}
 
-fn named((ratios, noise, scales, effect, size): &Hidden, snr: &str) -> Result<Named, Failure> {
-    let (_, scene) = client(*ratios, *noise, snr, *scales)?;
-    let ideal = rig(*ratios);
-    // Friction and tilt over b omega0²: up to 0.015 and 0.05, on the default rig 0.046 and 9 degrees; laws of restitution with the value r at the usual
-    // speed of impacts, 2 b omega0.
-    let g = lovines::cavity::GRAVITY;
-    let (strength, cavity) = match effect {
-        None => (f64::NAN, ideal.cavity),
-        Some(Effect::Friction) => {
-            let mu = 0.015 * size / g;
-            (mu, lovines::Cavity { kinetic_friction: mu, ..ideal.cavity })
+/// Largest friction and tilt, times g, over b omega0²: on the default rig a friction of 0.31, and 9 degrees.
+const LARGEST: [f64; 2] = [0.1, 0.05];
+
+impl Hidden {
+    /// The cavity. Laws of restitution have the value r at the speed of impacts of the middle of the stable motions, B = 0.85.
+    fn cavity(&self) -> Cavity {
+        let (g, [epsilon, _, r]) = (lovines::cavity::GRAVITY, self.ratios);
+        let speed = 2.0 * 0.85 * (1.0 + epsilon) / (1.0 + r);
+        let both = |law| Cavity { restitution: [Some(law); 2], ..Cavity::IDEAL };
+        match self.effect {
+            None => Cavity::IDEAL,
+            Some(Effect::Friction) => Cavity {
+                kinetic_friction: LARGEST[0] * self.size / g,
+                ..Cavity::IDEAL
+            },
+            Some(Effect::Tilt) => Cavity { tilt: LARGEST[1] * self.size / g, ..Cavity::IDEAL },
+            Some(Effect::Viscoelastic) => both(Restitution::Viscoelastic((1.0 - r) / speed.powf(0.2))),
+            Some(Effect::Plastic) => both(Restitution::Plastic(speed * r.powi(4))),
         }
-        Some(Effect::Tilt) => {
-            let tilt = 0.05 * size / g;
-            (tilt.to_degrees(), lovines::Cavity { tilt, ..ideal.cavity })
+    }
+
+    /// What is said of the rig; `None` where the effect hardly moves its points.
+    fn named(&self, snr: &str) -> Result<Option<Named>, Failure> {
+        let Self { ratios, noise, effect, size, .. } = *self;
+        let (ideal, scene) = client(ratios, noise, snr, self.scales)?;
+        let truth = Parameters { cavity: self.cavity(), ..ideal };
+        let tracked = tracked(truth, &scene)?;
+        // Much friction keeps the particle from the walls.
+        if !matches!(
+            tracked.points[0].regime_by_impacts,
+            Some(Regime::Symmetric | Regime::Asymmetric)
+        ) {
+            return Ok(None);
         }
-        Some(law) => {
-            let strength = if *law == Effect::Viscoelastic {
-                (1.0 - ideal.restitution) / 2f64.powf(0.2)
-            } else {
-                2.0 * ideal.restitution.powi(4)
+        let points = kept(&tracked);
+        let moved = at(&points, scene.resonance, &ideal, &[]).ok_or("the ideal rig has no such motion")?;
+        let moved = moved
+            .residuals
+            .iter()
+            .flatten()
+            .fold(0.0, |most: f64, one| most.max(one.abs()));
+        if points.len() < 6 || (effect.is_some() && moved < 5.0) {
+            return Ok(None);
+        }
+        let begin = Instant::now();
+        // A ruler and a scale.
+        let mut random = uniform(noise);
+        let known = [(Quantity::B, 1.0), (Quantity::Epsilon, ratios[0])].map(|(quantity, value)| {
+            let relative = 0.003;
+            let estimate = Estimate {
+                value: value * (1.0 + relative * random(-1.7, 1.7)),
+                uncertainty: relative * value,
             };
-            let law = if *law == Effect::Viscoelastic {
-                lovines::Restitution::Viscoelastic(strength)
+            Known { quantity, estimate }
+        });
+        let found = explain(&points, scene.resonance, &scene.plant, &known, |_| {})?;
+        let seconds = begin.elapsed().as_secs_f64();
+        let flagged = found.ideal.is_rejected();
+        let best = found.explains();
+        let right = found.candidates.iter().find(|one| Some(one.effect) == effect);
+        let over_u = right.filter(|one| !one.fit.is_rejected()).map(|one| {
+            let truth = one.effect.strength_of(&truth.cavity);
+            (one.strength.value - truth) / one.strength.uncertainty
+        });
+        println!(
+            "{ratios:.4?} {effect:?} {size:.2} moves by {moved:.0} u: {} points, {}; strength {over_u:.1?} u, {seconds:.2} s",
+            points.len(),
+            if flagged {
+                found.verdict()
             } else {
-                lovines::Restitution::Plastic(strength)
-            };
-            (
-                strength,
-                lovines::Cavity { restitution: [Some(law); 2], ..ideal.cavity },
-            )
-        }
-    };
-    let truth = Parameters { cavity, ..ideal };
+                format!("ideal, {:.1} for {}", found.ideal.chi_square, found.ideal.degrees)
+            },
+        );
+        Ok(Some(Named {
+            effect,
+            flagged,
+            right: best.is_some_and(|one| Some(one.effect) == effect),
+            explained: best.is_some(),
+            possible: right.is_some_and(|one| !one.fit.is_rejected()),
+            over_u,
+            seconds,
+        }))
+    }
+}
+
+/// The backbone of a rig that a client tracks.
+fn tracked(truth: Parameters, scene: &Scene) -> Result<Tracked, Failure> {
     let rig = Simulated::new(truth, scene.start)?;
-    let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
+    let mut rig = Chain::around(Box::new(rig), scene);
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
-    let tracked = track(&mut rig, &mut controller, &scene, |_, _| {})?;
-    let points: Vec<MeasuredPoint> = tracked
+    Ok(track(&mut *rig, &mut controller, scene, |_, _| {})?)
+}
+
+fn kept(tracked: &Tracked) -> Vec<MeasuredPoint> {
+    tracked
         .points
         .iter()
         .filter(is_kept)
         .map(|point| (&point.at).into())
-        .collect();
-    let moved = at(&points, scene.resonance, &ideal, &[]).ok_or("the rig has no such motion")?;
-    let moved = moved
-        .residuals
-        .iter()
-        .flatten()
-        .fold(0.0, |most: f64, one| most.max(one.abs()));
-    let begin = Instant::now();
-    // A ruler and a scale.
-    let mut random = uniform(*noise);
-    let known = [(Quantity::B, 1.0), (Quantity::Epsilon, ratios[0])].map(|(quantity, value)| {
-        let relative = 0.003;
-        let estimate = Estimate {
-            value: value * (1.0 + relative * random(-1.7, 1.7)),
-            uncertainty: relative * value,
-        };
-        Known { quantity, estimate }
-    });
-    let found = explain(&points, scene.resonance, &scene.plant, &known, |_| {})?;
-    let seconds = begin.elapsed().as_secs_f64();
-    let (best, right) = (
-        found.explains(),
-        found.candidates.iter().find(|one| Some(one.effect) == *effect),
-    );
-    println!(
-        "{ratios:.4?} {effect:?} {strength:.5} moves by {moved:.0} u: {} points, {}; right one {:?}, {seconds:.2} s",
-        points.len(),
-        if found.ideal.is_rejected() {
-            found.verdict()
-        } else {
-            format!("ideal, {:.1} for {}", found.ideal.chi_square, found.ideal.degrees)
-        },
-        right.map(|one| (one.fit.chi_square, one.strength))
-    );
-    Ok(Named {
-        effect: *effect,
-        flagged: found.ideal.is_rejected(),
-        right: best.is_some_and(|one| Some(one.effect) == *effect),
-        explained: best.is_some(),
-        possible: right.is_some_and(|one| !one.fit.is_rejected()),
-        over_u: right.map(|one| (one.strength.value - strength) / one.strength.uncertainty),
-        seconds,
-    })
+        .collect()
 }
 
 /// The points of a tracked backbone.
 fn points((rig, noise, scales): &Case, snr: &str) -> Result<Points, Failure> {
-    let (tracked, scene) = tracked(*rig, *noise, snr, *scales)?;
-    let kept = tracked.points.iter().filter(is_kept);
-    Ok((kept.map(|point| (&point.at).into()).collect(), scene))
+    let (truth, scene) = client(*rig, *noise, snr, *scales)?;
+    Ok((kept(&tracked(truth, &scene)?), scene))
 }
 
 /// The points of a recording.

@@ -137,10 +137,7 @@ impl Quantity {
 
     /// The gradient over the unknowns.
     fn gradient(self, x: &Unknowns) -> Unknowns {
-        Unknowns::from_fn(|i, _| {
-            let [below, above] = [-STEP, STEP].map(|step| self.of(&shifted(x, i, step)));
-            (above - below) / (2.0 * STEP)
-        })
+        gradient(x, |x| self.of(x))
     }
 }
 
@@ -200,8 +197,6 @@ const STEP: f64 = 1e-6;
 const ROUNDS: usize = 200;
 /// Restitution coefficients from which the minimisation begins, besides the expected one: chi-square may have several minima.
 const STARTS: [f64; 4] = [0.4, 0.55, 0.7, 0.85];
-/// Particle speeds from which the nearest place on the curve is searched for, if that of theory is not on it.
-const SPEEDS: [f64; 9] = [0.8, 0.9, 0.7, 1.0, 0.6, 1.1, 0.5, 1.2, 0.4];
 /// Relative gain of the squared distance from the curve at which the nearest place on it counts as found.
 const NEAREST: f64 = 1e-12;
 /// Relative uncertainty of a value that is known exactly: above rounding.
@@ -225,6 +220,16 @@ fn unknowns(plant: &Parameters) -> Unknowns {
         plant.primary_mass.ln(),
         0.0,
     ])
+}
+
+/// The gradient of a quantity.
+fn gradient(x: &Unknowns, of: impl Fn(&Unknowns) -> f64) -> Unknowns {
+    Unknowns::from_fn(|i, _| {
+        // The strength of an effect may be small, and is not negative.
+        let step = if i == 6 && x[6] != 0.0 { STEP * x[6] } else { STEP };
+        let [below, above] = [-step, step].map(|step| of(&shifted(x, i, step)));
+        (above - below) / (2.0 * step)
+    })
 }
 
 fn shifted(x: &Unknowns, i: usize, step: f64) -> Unknowns {
@@ -459,30 +464,12 @@ struct Problem<'a> {
     definition: Definition,
     known: &'a [Known],
     has_scale: bool,
-    /// How an effect of the cavity shifts the curve at each point; empty for the ideal cavity.
-    shifts: Vec<Shift>,
     /// Whether the strength of the effect is unknown.
     free: bool,
 }
 
-/// Relative shifts of frequency and drive at equal amplitude by an effect, and their derivatives, at some unknowns and a particle speed.
-#[derive(Clone, Copy)]
-struct Shift {
-    at: Unknowns,
-    speed: f64,
-    value: [f64; 2],
-    gradient: [Unknowns; 2],
-    by_speed: [f64; 2],
-}
-
-/// A place on the curve: amplitude of the response, m, frequency, rad/s, and amplitude of the base, m.
-struct Curve {
-    response: f64,
-    omega: f64,
-    drive: f64,
-}
-
 /// Chi-square at some unknowns, with the gradient and the matrix of its quadratic approximation.
+#[derive(Default)]
 struct Sums {
     chi_square: f64,
     gradient: Unknowns,
@@ -491,17 +478,24 @@ struct Sums {
     speeds: Vec<f64>,
 }
 
+impl Sums {
+    /// Adds a point: its residual, and the derivatives over the unknowns.
+    fn add(&mut self, rows: [Vector3<f64>; UNKNOWNS], residual: Vector3<f64>) {
+        for i in 0..UNKNOWNS {
+            self.gradient[i] += rows[i].dot(&residual);
+            for j in 0..UNKNOWNS {
+                self.normal[(i, j)] += rows[i].dot(&rows[j]);
+            }
+        }
+        self.chi_square += residual.norm_squared();
+        self.residuals.push(residual.into());
+    }
+}
+
 impl<'a> Problem<'a> {
     fn new(points: Vec<MeasuredPoint>, definition: Definition, known: &'a [Known]) -> Self {
         let has_scale = known.iter().any(|one| one.quantity.needs_a_scale());
-        Self {
-            points,
-            definition,
-            known,
-            has_scale,
-            shifts: Vec::new(),
-            free: false,
-        }
+        Self { points, definition, known, has_scale, free: false }
     }
 
     /// The smallest of the minima that are reached from the expected rig and from other restitution coefficients.
@@ -575,13 +569,7 @@ impl<'a> Problem<'a> {
         if !(0.0 < x[2] && x[2] <= 1.0) {
             return None;
         }
-        let mut sums = Sums {
-            chi_square: 0.0,
-            gradient: Unknowns::zeros(),
-            normal: Covariance::zeros(),
-            residuals: Vec::with_capacity(self.points.len()),
-            speeds: Vec::with_capacity(self.points.len()),
-        };
+        let mut sums = Sums::default();
         for (n, speed) in speeds.iter_mut().enumerate() {
             let (b, residual, by_speed) = self.nearest(x, n, *speed)?;
             *speed = Some(b);
@@ -590,23 +578,21 @@ impl<'a> Problem<'a> {
             let along = by_speed.normalize();
             let mut rows = [Vector3::zeros(); UNKNOWNS];
             for (i, row) in rows.iter_mut().enumerate() {
-                if i == 5 || (i == 6 && !self.free) {
+                if i >= 5 {
                     continue;
                 }
                 let [below, above] = [-STEP, STEP].map(|step| self.residual(&shifted(x, i, step), n, b));
                 let slope = (above? - below?) / (2.0 * STEP);
                 *row = slope - along * along.dot(&slope);
             }
-            let residual = residual - along * along.dot(&residual);
-            for i in 0..UNKNOWNS {
-                sums.gradient[i] += rows[i].dot(&residual);
-                for j in 0..UNKNOWNS {
-                    sums.normal[(i, j)] += rows[i].dot(&rows[j]);
-                }
-            }
-            sums.chi_square += residual.norm_squared();
-            sums.residuals.push(residual.into());
+            sums.add(rows, residual - along * along.dot(&residual));
         }
+        self.add_known(x, &mut sums);
+        sums.chi_square.is_finite().then_some(sums)
+    }
+
+    /// Adds what is known from elsewhere, and what makes the matrix regular.
+    fn add_known(&self, x: &Unknowns, sums: &mut Sums) {
         for one in self.known {
             let Estimate { value, uncertainty } = one.estimate;
             let u = uncertainty.max(EXACT * value.abs()).max(f64::MIN_POSITIVE);
@@ -622,7 +608,6 @@ impl<'a> Problem<'a> {
         if !self.free {
             sums.normal[(6, 6)] += 1.0;
         }
-        sums.chi_square.is_finite().then_some(sums)
     }
 
     /// The speed at which the curve is nearest to a point, the residual there, and its derivative by the speed.
@@ -633,9 +618,7 @@ impl<'a> Problem<'a> {
             let c = self.points[point].response.value / b;
             manifold.b(c, BranchSide::Right).unwrap_or(1.02 * manifold.b_min())
         };
-        // Theory may put a speed where the exact curve has none.
-        let mut starts = [start.unwrap_or_else(by_theory)].into_iter().chain(SPEEDS);
-        let mut speed = starts.find(|speed| self.residual(x, point, *speed).is_some())?;
+        let mut speed = start.unwrap_or_else(by_theory);
         let slope = |speed: f64| {
             let [below, above] = [-STEP, STEP].map(|step| self.residual(x, point, speed + step));
             Some((above? - below?) / (2.0 * STEP))
@@ -669,36 +652,26 @@ impl<'a> Problem<'a> {
         Some((speed, residual, by_speed))
     }
 
-    /// The curve of the ideal cavity at a speed.
-    fn curve(&self, x: &Unknowns, speed: f64) -> Option<Curve> {
+    /// The curve of the ideal cavity at a speed less a point, over its standard uncertainties.
+    fn residual(&self, x: &Unknowns, point: usize, speed: f64) -> Option<Vector3<f64>> {
         let (omega0, b, epsilon) = (x[0].exp(), x[3].exp(), x[4].exp());
         let model = Dimensionless {
             definition: self.definition,
             ..Dimensionless::new(epsilon, 2.0 * x[1] / epsilon, x[2], 0.0)
         };
         let [omega, c, g] = backbone_at_speed(&model, speed)?;
-        Some(Curve {
-            response: b * c,
-            omega: omega0 * omega,
-            drive: b * epsilon * g,
-        })
+        Some(self.over_u(point, b * c, omega0 * omega, b * epsilon * g))
     }
 
-    /// The curve at a speed less a point, over its standard uncertainties.
-    fn residual(&self, x: &Unknowns, point: usize, speed: f64) -> Option<Vector3<f64>> {
-        let Curve { response, mut omega, mut drive } = self.curve(x, speed)?;
-        if let Some(Shift { at, speed: near, value, gradient, by_speed }) = self.shifts.get(point) {
-            let [by_omega, by_drive] =
-                [0, 1].map(|i| value[i] + gradient[i].dot(&(x - at)) + by_speed[i] * (speed - near));
-            (omega, drive) = (omega * (1.0 + by_omega), drive * (1.0 + by_drive));
-        }
+    /// A response, m, a frequency, rad/s, and a drive, m, less those of a point, over its standard uncertainties.
+    fn over_u(&self, point: usize, response: f64, omega: f64, drive: f64) -> Vector3<f64> {
         let point = &self.points[point];
         let over = |value: f64, measured: Estimate| (value - measured.value) / measured.uncertainty;
-        Some(Vector3::new(
+        Vector3::new(
             over(response, point.response),
             over(omega, point.omega),
             over(drive, point.drive),
-        ))
+        )
     }
 }
 

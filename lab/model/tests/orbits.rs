@@ -66,24 +66,29 @@ fn no_orbit_is_invented_where_the_excitation_is_too_weak() {
 }
 
 #[test]
-fn the_backbone_over_the_speed_passes_through_every_orbit_of_the_backbone_over_the_frequency() {
-    for (epsilon, lambda, r) in [(0.0084, 1.43, 0.65), (0.03, 0.4, 0.9), (0.002, 2.5, 0.4)] {
+fn the_curve_of_the_backbone_has_an_orbit_of_every_frequency_that_it_passes() {
+    for (epsilon, lambda, r) in [
+        (0.0084, 1.43, 0.65),
+        (0.03, 0.4, 0.9),
+        (0.002, 2.5, 0.4),
+        (0.0137, 2.36, 0.86),
+    ] {
         let scene = Dimensionless::new(epsilon, lambda, r, 1.0);
-        let mut compared = 0;
-        for n in -300..100 {
-            let omega = 1.0 + epsilon * 0.01 * f64::from(n);
-            let fold = SlowFlow::new(lambda, r).manifold.b_min();
-            for orbit in exact_backbone(&scene, omega).into_iter().filter(|orbit| orbit.b > fold) {
-                let [at, c, g] = backbone_at_speed(&scene, orbit.b).unwrap_or_else(|| panic!("{scene:?} {orbit:?}"));
-                assert!((at - omega).abs() < 1e-11, "{scene:?} {orbit:?}: {at}");
-                assert!(
-                    (c - orbit.c).abs() < 1e-9 && (g - orbit.g).abs() < 1e-8,
-                    "{orbit:?}: {c} {g}"
-                );
-                compared += 1;
-            }
+        let fold = SlowFlow::new(lambda, r).manifold.b_min();
+        let mut before = None;
+        for n in 0..2000 {
+            let speed = 1.3 + 0.0005 * f64::from(n) * (fold - 1.3);
+            let [omega, c, g] = backbone_at_speed(&scene, speed).unwrap_or_else(|| panic!("{scene:?} {speed}"));
+            let orbits = exact_backbone(&scene, omega);
+            let apart = orbits.iter().map(|orbit| (orbit.c - c).hypot(orbit.g - g));
+            assert!(
+                apart.fold(1.0, f64::min) < 1e-8,
+                "{scene:?} {speed}: {c} {g} {orbits:?}"
+            );
+            let is_smooth = before.is_none_or(|before: [f64; 2]| (c - before[0]).hypot(omega - before[1]) < 0.01);
+            assert!(is_smooth, "{scene:?} {speed}: {before:?} {omega}, {c}");
+            before = Some([c, omega]);
         }
-        assert!(compared > 50, "{compared}");
     }
 }
 

@@ -1,23 +1,26 @@
 //! Effects of a real cavity that explain why points contradict the ideal one: each is fitted alone, and they are compared.
 //!
-//! The curve of a rig with an effect is that of the ideal cavity, shifted: at the amplitude of a point the plant's own periodic motion
-//! ([`resonant_motion`]) has another frequency and another drive. The shifts and their gradients over parameters and strength are computed at the
-//! present parameters; with them the fit of the ideal curve finds the next ones. At the end chi-square is that of the plant's motions.
+//! The points of a rig with an effect lie on a curve of the plant's own periodic motions ([`periodic_motion`]). For given parameters each point has a
+//! motion near it; the distance from the tangent of the curve there, and its derivatives over parameters and strength, are differences between motions
+//! on the line across the curve. Gauss and Newton's method finds the parameters, and moves every motion along its curve to the place nearest to the
+//! point.
 //!
 //! Unequal gaps are no candidate: they shift the particle by the middle of the cavity and change nothing that the points contain. The fitted b is
 //! half of the distance between the walls.
 
+use std::cmp::Ordering;
 use std::fmt::{self, Display, Formatter};
 
 use lovines::cavity::GRAVITY;
 use lovines::{Cavity, Restitution};
+use nalgebra::Vector3;
 use vines_model::Definition;
 use vines_model::numerics::{Estimate, mean};
 use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
 
 use super::{
-    Curve, FEWEST, Fit, FitError, Known, MeasuredPoint, Problem, Quantity, Shift, UNKNOWNS, Unknowns, checked, fit,
-    unknowns,
+    FEWEST, Fit, FitError, Known, LEFT_OUT, MeasuredPoint, Problem, Quantity, Sums, UNKNOWNS, Unknowns, checked, fit,
+    gradient, shifted,
 };
 use crate::scene::Parameters;
 
@@ -47,8 +50,14 @@ pub struct Candidate {
     speed: f64,
 }
 
-/// Rounds in which the shifts are computed again.
-const ROUNDS: usize = 12;
+/// Most steps of a fit, and of a motion along the curve to a point.
+const ROUNDS: usize = 30;
+/// Longest step along the curve, in units of its tangent.
+const FARTHEST: f64 = 0.1;
+/// Difference of the response over b at which a motion is at a point.
+const NEAR: f64 = 1e-3;
+/// Shares of the points, those of the largest amplitudes, that are fitted one after the other.
+const STAGES: [f64; 3] = [0.5, 0.8, 1.0];
 /// What a further step would take from chi-square, at which the minimum counts as found.
 const FOUND: f64 = 0.02;
 /// Smallest share of a step.
@@ -56,7 +65,7 @@ const SMALLEST: f64 = 1e-3;
 /// Strength from which the search begins, over that which gives the particle the acceleration `b omega0²`: friction and tilt of this size are
 /// about 0.03 and 2 degrees on the default rig.
 const TYPICAL: f64 = 0.01;
-/// Step of a difference: of the unknowns, and of the strength over the typical one.
+/// Step of a difference: of the unknowns, of the strength relative, and along the curve.
 const STEP: f64 = 1e-4;
 /// Difference of Akaike's criterion up to which a candidate that is not the best one remains possible: its evidence is a twentieth.
 const POSSIBLE: f64 = 6.0;
@@ -93,21 +102,15 @@ impl Effect {
         }
     }
 
-    /// The strength in the unit of [`Effect::symbol`].
-    fn strength(self, x: Estimate, r: Estimate, speed: f64) -> Estimate {
-        match self {
-            Self::Friction => x,
-            Self::Tilt => {
-                let tilt = x.value.sqrt();
-                Estimate { value: tilt, uncertainty: x.uncertainty / (2.0 * tilt) }.scaled(1f64.to_degrees())
-            }
-            Self::Viscoelastic => {
-                Estimate { value: 1.0 - r.value, uncertainty: r.uncertainty }.scaled(speed.powf(-0.2))
-            }
-            Self::Plastic => Estimate {
-                value: speed * r.value.powi(4),
-                uncertainty: 4.0 * speed * r.value.powi(3) * r.uncertainty,
-            },
+    /// The strength of this effect in a cavity, in the unit of [`Effect::symbol`].
+    #[must_use]
+    pub fn strength_of(self, cavity: &Cavity) -> f64 {
+        match (self, cavity.restitution[0]) {
+            (Self::Friction, _) => cavity.kinetic_friction,
+            (Self::Tilt, _) => cavity.tilt.to_degrees(),
+            (Self::Viscoelastic, Some(Restitution::Viscoelastic(k))) => k,
+            (Self::Plastic, Some(Restitution::Plastic(v))) => v,
+            _ => 0.0,
         }
     }
 }
@@ -168,9 +171,15 @@ impl Explanation {
             chi_square(&best.fit),
             chi_square(&self.ideal)
         );
+        let left_out = best.fit.left_out.len();
+        if left_out > 0 {
+            text += &format!(
+                "; {left_out} points of the smallest responses do not belong to this motion, and are left out"
+            );
+        }
         let others = self.candidates[1..]
             .iter()
-            .filter(|one| one.criterion() - best.criterion() < POSSIBLE);
+            .filter(|one| one.fit.left_out == best.fit.left_out && one.criterion() - best.criterion() < POSSIBLE);
         let others: Vec<String> = others
             .map(|one| format!("{} ({})", one.effect, chi_square(&one.fit)))
             .collect();
@@ -195,6 +204,13 @@ impl Candidate {
     /// Akaike's criterion.
     fn criterion(&self) -> f64 {
         self.fit.chi_square + 2.0 * f64::from(u8::from(self.effect.adds_a_parameter()))
+    }
+
+    /// The better one first: one that describes the points, that leaves out fewer of them, and then by Akaike's criterion.
+    fn order(&self, other: &Self) -> Ordering {
+        let first = |one: &Self| (one.fit.is_rejected(), one.fit.left_out.len());
+        let by_criterion = self.criterion().total_cmp(&other.criterion());
+        first(self).cmp(&first(other)).then(by_criterion)
     }
 
     /// The plant of the fit, with the effect. Without a known mass, stiffness or damping, its primary mass is that of `scene`.
@@ -233,11 +249,12 @@ pub fn find(
         return Ok(Found { fit: ideal, plant, verdict: None });
     }
     let explanation = explain(points, definition, expected, known, progress)?;
-    let verdict = Some(explanation.verdict());
-    Ok(match explanation.explains() {
-        Some(best) => Found { fit: best.fit.clone(), plant: best.plant(expected), verdict },
-        None => Found { fit: ideal, plant, verdict },
-    })
+    let best = explanation
+        .explains()
+        .filter(|best| ideal.is_rejected() || best.fit.left_out.len() <= ideal.left_out.len());
+    let verdict = (ideal.is_rejected() || best.is_some()).then(|| explanation.verdict());
+    let (fit, plant) = best.map_or((ideal, plant), |best| (best.fit.clone(), best.plant(expected)));
+    Ok(Found { fit, plant, verdict })
 }
 
 /// Fits the ideal cavity to all points, and, if they contradict it, each effect alone. `progress` is told the number of candidates done.
@@ -257,154 +274,260 @@ pub fn explain(
     if ideal.is_rejected() {
         for (n, effect) in Effect::ALL.into_iter().enumerate() {
             progress(n);
-            candidates.extend(problem.with_effect(effect, &ideal, expected));
+            candidates.extend(problem.with_effect(effect, expected));
         }
     }
-    candidates.sort_by(|one, other| one.criterion().total_cmp(&other.criterion()));
+    candidates.sort_by(Candidate::order);
     Ok(Explanation { ideal, candidates })
 }
 
 impl Problem<'_> {
-    /// The best one of the fits with an effect from several starts, up to the first that describes the points; `None` if the plant has no such
-    /// motions.
-    fn with_effect(&self, effect: Effect, ideal: &Fit, expected: &Parameters) -> Option<Candidate> {
-        let mut best: Option<Candidate> = None;
-        // Most effects shift the points of large amplitude least.
-        let mut strongest = self.points.clone();
-        strongest.sort_by(|one, other| other.response.value.total_cmp(&one.response.value));
-        strongest.truncate(strongest.len().div_ceil(2).max(FEWEST));
-        let strongest = Problem::new(strongest, self.definition, self.known).fit(expected);
-        let first = strongest.map_or(ideal.x, |fit| fit.x);
-        for (x, strength) in [(first, 1.0), (ideal.x, 1.0), (unknowns(expected), 1.0), (ideal.x, 4.0)] {
-            if strength > 1.0 && !effect.adds_a_parameter() {
-                continue;
+    /// The fit with an effect; `None` if the plant has no such motions.
+    ///
+    /// Beside the fold a motion with wrong parameters may not exist, and most effects shift the points of large amplitude least: these are fitted
+    /// first, and each fit starts the one of more points. A strong effect moves the fold, and the points beyond it belong to another motion: those of
+    /// the smallest amplitudes, a fifth at most, are left out if the others agree.
+    fn with_effect(&self, effect: Effect, expected: &Parameters) -> Option<Candidate> {
+        let mut order: Vec<usize> = (0..self.points.len()).collect();
+        order.sort_by(|one, other| {
+            self.points[*other]
+                .response
+                .value
+                .total_cmp(&self.points[*one].response.value)
+        });
+        let of = |points: Vec<MeasuredPoint>| Problem::new(points, self.definition, self.known);
+        let largest = |share: f64| {
+            let mut kept = order[..((share * order.len() as f64).ceil() as usize).max(FEWEST)].to_vec();
+            kept.sort_unstable();
+            kept
+        };
+        let strongest: Vec<MeasuredPoint> = largest(STAGES[0]).into_iter().map(|n| self.points[n]).collect();
+        let starts = [1.0, 5.0]
+            .into_iter()
+            .filter(|factor| *factor == 1.0 || effect.adds_a_parameter());
+        let ideal = of(strongest).fit(expected).ok()?;
+        let found = starts.filter_map(|factor| {
+            let mut x = ideal.x;
+            let typical = factor * TYPICAL * x[3].exp() * x[0].exp().powi(2) / GRAVITY;
+            x[6] = match effect {
+                Effect::Friction => typical,
+                Effect::Tilt => 4.0 * typical * typical,
+                Effect::Viscoelastic | Effect::Plastic => 0.0,
+            };
+            let mut best: Option<Candidate> = None;
+            for share in STAGES {
+                let kept = largest(share);
+                let points = kept.iter().map(|n| self.points[*n]).collect();
+                let Some(mut next) = of(points).with_effect_from(effect, x, &ideal) else {
+                    break;
+                };
+                if next.fit.is_rejected() && best.as_ref().is_some_and(|one| !one.fit.is_rejected()) {
+                    break;
+                }
+                next.fit.left_out = (0..self.points.len()).filter(|n| !kept.contains(n)).collect();
+                x = next.fit.x;
+                best = Some(next);
             }
-            let found = self.with_effect_from(effect, x, strength * TYPICAL, ideal);
-            let both = best.into_iter().chain(found);
-            best = both.min_by(|one, other| one.criterion().total_cmp(&other.criterion()));
-            if best.as_ref().is_some_and(|one| !one.fit.is_rejected()) {
+            best.filter(|one| one.fit.left_out.len() * LEFT_OUT <= self.points.len())
+        });
+        let mut best: Option<Candidate> = None;
+        for one in found {
+            let describes_all = !one.fit.is_rejected() && one.fit.left_out.is_empty();
+            best = best.into_iter().chain([one]).min_by(Candidate::order);
+            if describes_all {
                 break;
             }
         }
         best
     }
 
-    /// The fit with an effect, from the unknowns `x`: Gauss and Newton's method with the plant's motions, in steps that reduce chi-square.
-    fn with_effect_from(&self, effect: Effect, mut x: Unknowns, strength: f64, ideal: &Fit) -> Option<Candidate> {
-        let [b, omega0] = [Quantity::B.of(&x), x[0].exp()];
+    /// The fit with an effect, from the unknowns `x`: Gauss and Newton's method, in steps that reduce chi-square.
+    fn with_effect_from(&self, effect: Effect, mut x: Unknowns, ideal: &Fit) -> Option<Candidate> {
         // The particle turns from -B to B: its speed relative to the wall before the impact is 2 B (1 + epsilon)/(1 + r).
-        let particle = mean(ideal.speeds.iter().copied());
-        let speed = 2.0 * particle * (1.0 + x[4].exp()) / (1.0 + x[2]) * b * omega0;
-        let typical = strength * b * omega0 * omega0 / GRAVITY;
-        let (typical, free) = match effect {
-            Effect::Friction => (typical, true),
-            Effect::Tilt => (4.0 * typical * typical, true),
-            Effect::Viscoelastic | Effect::Plastic => (0.0, false),
-        };
-        x[6] = typical;
-        let mut steps = Unknowns::from_element(STEP);
-        steps[6] = STEP * typical;
-        let mut motions: Vec<Option<PlantMotion>> = vec![None; self.points.len()];
-        let mut shift = |n: usize, x: &Unknowns, particle: f64| {
-            let Curve { response, omega, drive } = self.curve(x, particle)?;
-            let cavity = effect.cavity(x[6], x[2], speed);
-            let rig = Parameters { cavity, ..plant(x) };
-            let conditions = [DriveCondition::PhaseResonance, DriveCondition::Response(response)];
-            let motion = match &motions[n] {
-                Some(near) => periodic_motion(&rig, self.definition, near, conditions),
-                None => resonant_motion(&rig, self.definition, response, None),
-            };
-            let motion = motion.ok()?;
-            let shift = [motion.omega / omega - 1.0, motion.amplitude / drive - 1.0];
-            motions[n] = Some(motion);
-            Some(shift)
-        };
-        let mut slopes = vec![[0.0; 2]; self.points.len()];
-        let mut problem = Problem {
-            points: self.points.clone(),
-            shifts: Vec::new(),
-            free,
-            ..*self
-        };
-        // Without shifts, the particle speeds at which the points are nearest.
-        let mut here = problem.sums(&x, &mut vec![None; self.points.len()])?;
-        here.chi_square = f64::INFINITY;
-        let (mut next, mut next_speeds) = (x, here.speeds.clone());
+        let particle = mean(ideal.speeds.iter().copied()) * Quantity::B.of(&ideal.x) * ideal.x[0].exp();
+        let speed = 2.0 * particle * (1.0 + ideal.x[4].exp()) / (1.0 + ideal.x[2]);
+        let free = effect.adds_a_parameter();
+        let problem = Problem { points: self.points.clone(), free, ..*self };
+        let curve = PlantCurve { problem: &problem, effect, speed };
+        let mut places = curve.along(&x)?;
         for _ in 0..ROUNDS {
-            let mut share = 1.0;
-            // A step that reduces chi-square; the first one is to the start.
-            loop {
-                let at = if here.chi_square.is_infinite() {
-                    next
-                } else {
-                    x + (next - x) * share
-                };
-                let ends = here.speeds.iter().zip(&next_speeds);
-                let speeds: Vec<f64> = ends.map(|(from, to)| from + share * (to - from)).collect();
-                let shifts: Option<Vec<Shift>> = (0..speeds.len())
-                    .map(|n| {
-                        Some(Shift {
-                            at,
-                            speed: speeds[n],
-                            value: shift(n, &at, speeds[n])?,
-                            gradient: [Unknowns::zeros(); 2],
-                            by_speed: slopes[n],
-                        })
-                    })
-                    .collect();
-                let there = shifts.and_then(|shifts| {
-                    problem.shifts = shifts;
-                    problem.sums(&at, &mut speeds.into_iter().map(Some).collect::<Vec<_>>())
-                });
-                if let Some(there) = there.filter(|there| there.chi_square <= here.chi_square) {
-                    (x, here) = (at, there);
-                    break;
-                }
-                share *= 0.3;
-                if share < SMALLEST {
-                    return None;
-                }
-                // Too much of the effect may end the motion.
-                if here.chi_square.is_infinite() {
-                    next[6] *= 0.3;
-                }
-            }
-            // Values and derivatives at the same places.
-            for (n, one) in problem.shifts.iter_mut().enumerate() {
-                one.speed = here.speeds[n];
-                one.value = shift(n, &x, one.speed)?;
-                let value = shift(n, &x, one.speed + STEP)?;
-                one.by_speed = [0, 1].map(|i| (value[i] - one.value[i]) / STEP);
-                slopes[n] = one.by_speed;
-            }
-            for i in (0..UNKNOWNS).filter(|i| *i != 5 && (free || *i != 6)) {
-                let mut more = x;
-                more[i] += steps[i];
-                for n in 0..here.speeds.len() {
-                    let value = shift(n, &more, here.speeds[n])?;
-                    let one = &mut problem.shifts[n];
-                    for (gradient, (value, before)) in one.gradient.iter_mut().zip(value.into_iter().zip(one.value)) {
-                        gradient[i] = (value - before) / steps[i];
-                    }
-                }
-            }
-            let mut speeds: Vec<Option<f64>> = here.speeds.iter().copied().map(Some).collect();
-            here = problem.sums(&x, &mut speeds)?;
-            let (mut best, least) = problem.minimum(x)?;
-            next_speeds.clone_from(&least.speeds);
-            if here.chi_square - least.chi_square < FOUND {
-                let fit = problem.found(x, here);
-                let uncertainty = fit.covariance[(6, 6)].max(0.0).sqrt();
-                let strength = Estimate { value: x[6], uncertainty };
-                let strength = effect.strength(strength, fit.estimate(Quantity::R)?, speed);
+            let (sums, rows) = curve.sums(&x, &places)?;
+            let step = sums.normal.cholesky()?.solve(&sums.gradient);
+            let gain = step.dot(&sums.gradient);
+            if gain < FOUND {
+                let fit = problem.found(x, sums);
+                let value = |x: &Unknowns| effect.strength_of(&effect.cavity(x[6], x[2], speed));
+                let gradient = gradient(&x, value);
+                let variance = (gradient.transpose() * fit.covariance * gradient)[0];
+                let strength = Estimate { value: value(&x), uncertainty: variance.max(0.0).sqrt() };
                 return Some(Candidate { effect, strength, fit, speed });
             }
-            // Neither friction nor the square of a tilt is negative.
-            best[6] = best[6].max(0.1 * x[6]);
-            next = best;
+            let shares =
+                std::iter::successors(Some(1.0), |share| Some(0.4 * share)).take_while(|share| *share > SMALLEST);
+            (x, places) = shares.into_iter().find_map(|share| {
+                let mut next = x - step * share;
+                // Neither friction nor the square of a tilt is negative.
+                next[6] = next[6].max(0.1 * x[6]);
+                let moved: Option<Vec<Place>> = places
+                    .iter()
+                    .enumerate()
+                    .map(|(n, place)| {
+                        let change: Vector3<f64> = (0..UNKNOWNS).map(|i| rows[n][i] * (next - x)[i]).sum();
+                        let expected = place.residual + change;
+                        let ahead = -place.along.dot(&expected) / place.along.norm_squared();
+                        curve.place(&next, n, &place.motion, place.tangent, ahead.clamp(-FARTHEST, FARTHEST))
+                    })
+                    .collect();
+                let moved = moved?;
+                (curve.chi_square(&next, &moved) <= sums.chi_square).then_some((next, moved))
+            })?;
         }
         None
     }
+}
+
+/// The curve of all motions at phase resonance of the plant with an effect.
+struct PlantCurve<'a> {
+    problem: &'a Problem<'a>,
+    effect: Effect,
+    speed: f64,
+}
+
+/// A motion on the curve.
+struct Place {
+    motion: PlantMotion,
+    /// Direction of the curve: change of the response over b and of the frequency over epsilon omega0, a unit vector.
+    tangent: [f64; 2],
+    /// The motion less the point, over its standard uncertainties, and the derivative along the curve.
+    residual: Vector3<f64>,
+    along: Vector3<f64>,
+}
+
+impl Place {
+    /// What is perpendicular to the curve.
+    fn across(&self, value: &Vector3<f64>) -> Vector3<f64> {
+        let along = self.along.normalize();
+        value - along * along.dot(value)
+    }
+}
+
+impl PlantCurve<'_> {
+    /// The motion near `near` on the line across the curve `ahead` of it.
+    fn motion(&self, x: &Unknowns, near: &PlantMotion, tangent: [f64; 2], ahead: f64) -> Option<PlantMotion> {
+        if !(0.0 < x[2] && x[2] <= 1.0) {
+            return None;
+        }
+        let [length, rate] = units(x);
+        let at = [
+            near.response.norm() + ahead * tangent[0] * length,
+            near.omega + ahead * tangent[1] * rate,
+        ];
+        let cavity = self.effect.cavity(x[6], x[2], self.speed);
+        let conditions = [
+            DriveCondition::PhaseResonance,
+            DriveCondition::Across { at, normal: tangent },
+        ];
+        periodic_motion(
+            &Parameters { cavity, ..plant(x) },
+            self.problem.definition,
+            near,
+            conditions,
+        )
+        .ok()
+    }
+
+    fn residual(&self, n: usize, motion: &PlantMotion) -> Vector3<f64> {
+        self.problem
+            .over_u(n, motion.response.norm(), motion.omega, motion.amplitude)
+    }
+
+    /// As [`PlantCurve::motion`], for a point.
+    fn place(&self, x: &Unknowns, n: usize, near: &PlantMotion, tangent: [f64; 2], ahead: f64) -> Option<Place> {
+        let motion = self.motion(x, near, tangent, ahead)?;
+        let next = self.motion(x, &motion, tangent, STEP)?;
+        let [length, rate] = units(x);
+        let change = [
+            (next.response.norm() - motion.response.norm()) / length,
+            (next.omega - motion.omega) / rate,
+        ];
+        let size = change[0].hypot(change[1]);
+        let residual = self.residual(n, &motion);
+        let along = (self.residual(n, &next) - residual) / size;
+        Some(Place {
+            motion,
+            tangent: change.map(|one| one / size),
+            residual,
+            along,
+        })
+    }
+
+    /// The motions with the amplitudes of the points, or at the fold, from the largest one along the curve.
+    fn along(&self, x: &Unknowns) -> Option<Vec<Place>> {
+        let points = &self.problem.points;
+        let mut order: Vec<usize> = (0..points.len()).collect();
+        order.sort_by(|one, other| points[*other].response.value.total_cmp(&points[*one].response.value));
+        let cavity = self.effect.cavity(x[6], x[2], self.speed);
+        let largest = points[order[0]].response.value;
+        let mut near = resonant_motion(
+            &Parameters { cavity, ..plant(x) },
+            self.problem.definition,
+            largest,
+            None,
+        )
+        .ok()?;
+        let (mut tangent, mut places) = ([1.0, 0.0], Vec::new());
+        for n in order {
+            let mut place = self.place(x, n, &near, tangent, 0.0)?;
+            for _ in 0..ROUNDS {
+                let rest = (points[n].response.value - place.motion.response.norm()) / units(x)[0];
+                // Beyond the fold the amplitude rises again.
+                if rest.abs() < NEAR || place.tangent[0] < 0.0 {
+                    break;
+                }
+                let ahead = (rest / place.tangent[0]).clamp(-FARTHEST, FARTHEST);
+                place = self.place(x, n, &place.motion, place.tangent, ahead)?;
+            }
+            (near, tangent) = (place.motion.clone(), place.tangent);
+            places.push((n, place));
+        }
+        places.sort_by_key(|(n, _)| *n);
+        Some(places.into_iter().map(|(_, place)| place).collect())
+    }
+
+    fn chi_square(&self, x: &Unknowns, places: &[Place]) -> f64 {
+        let mut sums = Sums::default();
+        self.problem.add_known(x, &mut sums);
+        sums.chi_square
+            + places
+                .iter()
+                .map(|one| one.across(&one.residual).norm_squared())
+                .sum::<f64>()
+    }
+
+    /// Chi-square with its derivatives, and the derivatives of the residuals.
+    fn sums(&self, x: &Unknowns, places: &[Place]) -> Option<(Sums, Vec<[Vector3<f64>; UNKNOWNS]>)> {
+        let (mut sums, mut all) = (Sums::default(), Vec::new());
+        for (n, place) in places.iter().enumerate() {
+            let mut rows = [Vector3::zeros(); UNKNOWNS];
+            for i in (0..UNKNOWNS).filter(|i| *i != 5 && (self.problem.free || *i != 6)) {
+                let step = if i == 6 { STEP * x[6] } else { STEP };
+                let at = |step: f64| {
+                    let motion = self.motion(&shifted(x, i, step), &place.motion, place.tangent, 0.0)?;
+                    Some((self.residual(n, &motion) - place.residual) / step)
+                };
+                rows[i] = at(step).or_else(|| at(-step))?;
+            }
+            sums.add(rows.map(|row| place.across(&row)), place.across(&place.residual));
+            all.push(rows);
+        }
+        self.problem.add_known(x, &mut sums);
+        Some((sums, all))
+    }
+}
+
+/// b, m, and epsilon omega0, rad/s.
+fn units(x: &Unknowns) -> [f64; 2] {
+    [x[3].exp(), (x[4] + x[0]).exp()]
 }
 
 /// The ideal plant of some unknowns.

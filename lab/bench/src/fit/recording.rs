@@ -19,13 +19,14 @@ use serde::Serialize;
 use thiserror::Error;
 use vines_model::numerics::{Estimate, RANDOM, equally_spaced, mean, slope};
 use vines_model::regime::Regime;
+use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
 
 use super::{Known, MeasuredPoint, Quantity, fit};
 use crate::backbone::{Criterion, LevelEstimate};
 use crate::identification::{Balance, Cycle, Harmonic, harmonic, regime_by_response};
 use crate::record::Sample;
 use crate::rig::{Command, Drive, Sensors};
-use crate::scene::{LinearResponse, Scene};
+use crate::scene::{LinearResponse, Parameters, Scene};
 
 /// Two channels of a measurement, sampled at equal distances.
 #[derive(Debug, Clone, PartialEq)]
@@ -203,8 +204,8 @@ const LAG: f64 = 1.6;
 /// # Errors
 /// As [`Recording::parts`].
 pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result<Vec<Vec<Part>>, RecordingError> {
-    let all = |linear: LinearResponse| {
-        let scene = Scene { measured: Some(linear), ..scene.clone() };
+    let all = |linear: LinearResponse, plant: Parameters| {
+        let scene = Scene { measured: Some(linear), plant, ..scene.clone() };
         recordings
             .iter()
             .map(|one| one.parts(&scene))
@@ -212,7 +213,7 @@ pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result
     };
     let stated = scene.linear();
     let uncertainty = DAMPING * stated.damping_rate;
-    let first = all(LinearResponse { uncertainty, ..stated })?;
+    let first = all(LinearResponse { uncertainty, ..stated }, scene.plant)?;
     let points: Vec<MeasuredPoint> = first.iter().flatten().filter_map(|part| part.point).collect();
     let Ok(fit) = fit(&points, scene.resonance, &scene.plant, known) else {
         return Ok(first);
@@ -230,7 +231,7 @@ pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result
     if fit.is_rejected() || fitted.uncertainty.is_nan() || fitted.uncertainty > uncertainty {
         return Ok(first);
     }
-    all(fitted).or(Ok(first))
+    all(fitted, plant).or(Ok(first))
 }
 
 impl Recording {
@@ -242,6 +243,9 @@ impl Recording {
     pub fn parts(&self, scene: &Scene) -> Result<Vec<Part>, RecordingError> {
         let linear = scene.linear();
         self.check(&linear)?;
+        // The regime is judged with the sample time of the scene.
+        let mut scene = scene.clone();
+        scene.controller.samples_per_period *= scene.sample_time() / self.sample_time;
         let anchors = self.anchors(&linear);
         let target = scene.controller.phase_target_radians();
         let runs: Vec<Run> = anchors
@@ -252,7 +256,7 @@ impl Recording {
             })
             .collect();
         self.plausible(&runs)?;
-        let parts = evaluated(&runs, scene, self.sample_time);
+        let parts = evaluated(&runs, &scene, self.sample_time);
         if parts.iter().all(|part| part.point.is_none()) {
             return Err(self.nothing(&anchors, &parts, &linear));
         }
@@ -634,7 +638,10 @@ fn part(
             beside * (omega.value - linear.omega0),
         ],
     );
-    let is_point = matches!(regime, Regime::Symmetric | Regime::Unresolved)
+    // Beyond the amplitude at which the symmetric motion loses its symmetry, noise hides another motion.
+    let manifold = Manifold::new(scene.plant.restitution);
+    let largest = manifold.c(B_SYMMETRY_BREAKING) * scene.plant.half_width;
+    let is_point = (regime == Regime::Symmetric || (regime == Regime::Unresolved && level.value < largest))
         && drive.value > 0.0
         && drive.uncertainty < VAGUE * drive.value
         && omega.uncertainty.is_finite();

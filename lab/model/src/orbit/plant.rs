@@ -16,7 +16,7 @@ use nalgebra::{Complex, Matrix4, Matrix6, Vector4, Vector6};
 use thiserror::Error;
 
 use super::periodic::NEAR;
-use super::symmetric::{Candidate, at_amplitude, at_speed, stable_resonant};
+use super::symmetric::{Candidate, at_amplitude, at_speed, of_orbit, stable_resonant};
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
 use crate::{Definition, Dimensionless, Resonance, Sensor};
 
@@ -64,6 +64,13 @@ pub enum DriveCondition {
     PhaseResonance,
     /// The part of the response's first harmonic that lags the reference by a quarter of a period, m.
     Response(f64),
+    /// Response and frequency lie on a line: the place of a curve that crosses it, also where amplitude or frequency have an extremum.
+    Across {
+        /// Amplitude of the response, m, and angular frequency, rad/s, of a point of the line.
+        at: [f64; 2],
+        /// The normal of the line, over b and over epsilon omega0.
+        normal: [f64; 2],
+    },
 }
 
 /// Why no periodic motion was found.
@@ -132,7 +139,7 @@ pub fn resonant_motion_under(
     Solver::new(parameters, definition, 1, conditions)?;
     let motion = |scene: &Dimensionless| {
         let g = scene.excitation(amplitude);
-        stable_resonant(&Dimensionless { g, ..*scene }).and_then(|orbit| at_speed(scene, orbit.b))
+        stable_resonant(&Dimensionless { g, ..*scene }).and_then(|orbit| of_orbit(scene, &orbit))
     };
     let ideal = Ideal::with(parameters, definition, motion).ok_or(NoMotion::NoIdealMotionUnder(amplitude))?;
     Ideal { amplitude, ..ideal }.continued(parameters, definition, None)
@@ -530,7 +537,7 @@ impl<'a> Solver<'a> {
     /// The equations at `x`, all over b or as numbers, and the first harmonic if a condition needs it.
     fn residual(&mut self, section: &mut Section, x: &Unknowns) -> Option<Unknowns> {
         let end = self.follow(section, x)?;
-        let measured = |condition| matches!(condition, DriveCondition::PhaseResonance | DriveCondition::Response(_));
+        let measured = |condition| !matches!(condition, DriveCondition::Omega(_) | DriveCondition::Amplitude(_));
         let response = if self.conditions.into_iter().any(measured) {
             self.harmonic(section, x)? / self.scale[0]
         } else {
@@ -544,6 +551,9 @@ impl<'a> Solver<'a> {
                 DriveCondition::Amplitude(amplitude) => x[5] - amplitude / self.scale[5],
                 DriveCondition::PhaseResonance => response.re,
                 DriveCondition::Response(amplitude) => response.im + amplitude / self.scale[0],
+                DriveCondition::Across { at: [amplitude, omega], normal } => {
+                    normal[0] * (response.im + amplitude / self.scale[0]) - normal[1] * (x[4] - omega / self.scale[4])
+                }
             };
         }
         residual.iter().all(|value| value.is_finite()).then_some(residual)

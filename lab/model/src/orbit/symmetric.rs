@@ -121,9 +121,17 @@ impl SymmetricMotions {
         self.base_over_y.norm() / self.epsilon * self.beta.abs() / self.alpha.hypot(self.beta)
     }
 
+    /// First harmonic y at the particle speed `b`, and of the response but for the factor of the sensor.
+    fn y(&self, b: f64) -> Complex<f64> {
+        Complex::new(self.beta * b, 1.0 + self.alpha * b)
+    }
+
+    fn response(&self, b: f64) -> Complex<f64> {
+        self.y(b) + self.kappa * b
+    }
+
     fn at(&self, b: f64) -> Candidate {
-        let y = Complex::new(self.beta * b, 1.0 + self.alpha * b);
-        let v = y + self.kappa * b;
+        let (y, v) = (self.y(b), self.response(b));
         let base = y * self.base_over_y;
         let p_before = self.p - Vector2::new(0.0, 1.0);
         let [q1, before] = (Vector2::new(y.im, self.omega * y.re) - p_before * (2.0 * self.epsilon * b)).into();
@@ -349,23 +357,37 @@ const CONVERGED: f64 = 1e-9;
 /// Difference of the frequencies of the secant, as a share of epsilon: far above rounding, far below the curvature.
 const SECANT: f64 = 1e-4;
 
-/// `[Omega, C, G]` of the symmetric 1:1 motion at phase resonance with the particle speed `b` over `b omega0`: the frequency over omega0, the
-/// amplitude of the response over b, and the amplitude of the base over `b epsilon`. `None` where there is none.
+/// `[Omega, C, G]` on the curve of all symmetric 1:1 motions at phase resonance: the frequency over omega0, the amplitude of the response over b,
+/// and the amplitude of the base over `b epsilon`.
 ///
+/// `speed`, the particle speed of the first-order motion, over `b omega0`, parametrises the curve: the exact motion has its impacts at nearly the same
+/// phase of the response. Neither the speed itself nor the frequency would do, because both have extrema along the curve.
 /// Stability and the flights between the impacts are not examined; [`exact_backbone`] does.
-pub fn backbone_at_speed(scene: &Dimensionless, b: f64) -> Option<[f64; 3]> {
-    let motion = at_speed(scene, b)?;
+pub fn backbone_at_speed(scene: &Dimensionless, speed: f64) -> Option<[f64; 3]> {
+    let motion = at_speed(scene, speed)?;
     Some([motion.omega, motion.c, motion.g])
 }
 
-/// The motion at phase resonance with the particle speed `b`.
-pub(super) fn at_speed(scene: &Dimensionless, b: f64) -> Option<Candidate> {
+/// The motion of [`backbone_at_speed`]: Newton's method for the frequency.
+pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Candidate> {
     let Dimensionless { epsilon, lambda, r, .. } = *scene;
+    let flow = SlowFlow::new(lambda, r);
+    let mut omega = 1.0 + epsilon * flow.free_detuning(speed);
+    // Of the first-order response; the exact one turns through half a circle without dissipation, too.
+    let direction = Complex::new((flow.manifold.dissipation + epsilon) * speed, 1.0 - FRAC_PI_2 * speed);
+    let motion = |omega: f64| {
+        let motions = SymmetricMotions::new(scene, omega)?;
+        // The response is i + rate B: it has the direction at this B.
+        let rate = motions.response(1.0) - Complex::i();
+        let b = direction.re / (rate.re * direction.im - rate.im * direction.re);
+        Some((motions, b))
+    };
     let off = |omega: f64| {
-        let [square, linear, constant] = SymmetricMotions::new(scene, omega)?.resonance();
+        let (motions, b) = motion(omega)?;
+        let [square, linear, constant] = motions.resonance();
         Some((square * b + linear) * b + constant)
     };
-    let (mut omega, mut last) = (1.0 + epsilon * SlowFlow::new(lambda, r).free_detuning(b), f64::INFINITY);
+    let mut last = f64::INFINITY;
     for _ in 0..SPEED_ROUNDS {
         let here = off(omega)?;
         let slope = (off(omega + SECANT * epsilon)? - here) / (SECANT * epsilon);
@@ -375,23 +397,30 @@ pub(super) fn at_speed(scene: &Dimensionless, b: f64) -> Option<Candidate> {
             break;
         }
     }
-    let motion = SymmetricMotions::new(scene, omega)?.at(b);
+    let (motions, b) = motion(omega)?;
+    let motion = motions.at(b);
     let values = [omega, motion.c, motion.g];
     (values.iter().all(|value| value.is_finite()) && last.abs() < CONVERGED * epsilon).then_some(motion)
 }
 
-/// The motion at phase resonance beyond the fold whose response has the amplitude `c` over b: the secant method over the particle speed.
+/// The motion at phase resonance beyond the fold whose response has the amplitude `c` over b: the secant method over the speed.
 pub(super) fn at_amplitude(scene: &Dimensionless, c: f64) -> Option<Candidate> {
     let start = Manifold::new(scene.r).b(c, BranchSide::Right)?;
-    let (mut before, mut at) = (at_speed(scene, start)?, at_speed(scene, start * (1.0 + SECANT))?);
+    let at = |speed: f64| Some((speed, at_speed(scene, speed)?));
+    let (mut before, mut here) = (at(start)?, at(start * (1.0 + SECANT))?);
     for _ in 0..SPEED_ROUNDS {
-        let next = at.b - (at.c - c) * (at.b - before.b) / (at.c - before.c);
-        if (at.c - c).abs() < CONVERGED || next == at.b {
+        let next = here.0 - (here.1.c - c) * (here.0 - before.0) / (here.1.c - before.1.c);
+        if (here.1.c - c).abs() < CONVERGED || next == here.0 {
             break;
         }
-        (before, at) = (at, at_speed(scene, next)?);
+        (before, here) = (here, at(next)?);
     }
-    ((at.c - c).abs() < CONVERGED).then_some(at)
+    ((here.1.c - c).abs() < CONVERGED).then_some(here.1)
+}
+
+/// The motion of an orbit at phase resonance.
+pub(super) fn of_orbit(scene: &Dimensionless, orbit: &Orbit) -> Option<Candidate> {
+    Some(SymmetricMotions::new(scene, orbit.omega)?.at(orbit.b))
 }
 
 impl Candidate {
