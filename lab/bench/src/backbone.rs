@@ -58,7 +58,7 @@ pub struct LevelEstimate {
 /// fold, 0.03 rad change sigma at equal C by 1.1e-3.
 const BESIDE: f64 = 0.02;
 /// Delay of the impacts behind a change of the amplitude, periods: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
-/// (studies/off_scene.rs).
+/// (studies/tracking.rs).
 const LAG: f64 = 1.6;
 /// Largest scatter of the periods about the fit, over the noise of the sensors: chi-square per degree of freedom is then at most 4.
 const EXCESS: f64 = 2.0;
