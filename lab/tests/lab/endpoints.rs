@@ -179,6 +179,26 @@ fn from_a_rig_that_shows_its_sensors_only_and_is_at_rest_lock_and_backbone_are_t
 }
 
 #[test]
+fn measured_points_of_another_rig_end_with_the_parameters_that_fit_instead() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = ["--out", folder.path().to_str().unwrap()];
+    let few = ["--set=backbone.points=6", "--set=backbone.C_to=0.4"];
+    for (arguments, line) in [
+        (&["identify"][..], "the locked point does not belong to this scene"),
+        (
+            &[&["backbone"][..], &few].concat(),
+            "the points do not belong to this scene: ",
+        ),
+    ] {
+        let other = Server::start(&["rig", "--lock-step", "--sensors-only", "--set=plant.r=0.58"]);
+        let done = vines(&with_settings(&[arguments, &["--rig", &other.1], &out].concat()));
+        let text = String::from_utf8_lossy(&done.stdout).into_owned();
+        let last = text.lines().last().unwrap_or_default();
+        assert!(last.starts_with(line) && last.ends_with("`vines fit`"), "{text}");
+    }
+}
+
+#[test]
 fn a_backbone_without_a_single_impact_is_a_failure() {
     // The cavity is too wide for the particle to reach its walls.
     let wide = ["--set=plant.b=1"];
