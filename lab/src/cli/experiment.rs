@@ -10,11 +10,12 @@ use serde::Serialize;
 use vines::experiment::{ExperimentError, Stage};
 use vines::net::{ReportLost, Timing};
 use vines::record::Sample;
-use vines::rig::{BuiltIn, Command, Controller, Drive, Fault, GroundTruth, Rig, RigError, RigStage, Sensors};
+use vines::rig::{BuiltIn, Command, Controller, Fault, Rig, Sensors};
 use vines::{advice, loop_check, report, scene::Scene};
 
 use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
 use super::output::{log_warnings, output, print, writable, written};
+use super::tap::Tap;
 use super::watch::{Watch, WatchArguments};
 use super::{check, failure::Failure, pack::fmus};
 
@@ -55,57 +56,6 @@ pub(super) struct ExperimentArguments {
     /// Print the results as JSON instead of a table
     #[arg(long)]
     pub json: bool,
-}
-
-/// Before the first sample.
-pub(super) fn no_sample() -> Sample {
-    let (sensors, command) = (Sensors::default(), Command::default());
-    Sample { time: 0.0, sensors, command, ground_truth: None }
-}
-
-/// A rig whose samples are shown to a function, each with the time to the next one, s.
-pub(super) struct Tap<F> {
-    rig: Box<dyn Rig>,
-    now: Sample,
-    on_sample: F,
-}
-
-impl<F: FnMut(Sample, f64) + 'static> Tap<F> {
-    pub(super) fn around(rig: Box<dyn Rig>, on_sample: F) -> Box<dyn Rig> {
-        Box::new(Self { rig, now: no_sample(), on_sample })
-    }
-
-    fn show(&mut self, drive: Drive, step: f64) {
-        self.now.command.drive = drive;
-        (self.on_sample)(self.now, step);
-        self.now.time += step;
-    }
-}
-
-impl<F: FnMut(Sample, f64) + 'static> RigStage for Tap<F> {
-    fn inner(&mut self) -> &mut dyn Rig {
-        self.rig.as_mut()
-    }
-
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.now.sensors = self.rig.sense()?;
-        Ok(self.now.sensors)
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.show(drive, step);
-        self.rig.advance(drive, step)
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.show(drive, step);
-        self.rig.hold(drive, step)
-    }
-
-    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
-        self.now.ground_truth = self.rig.ground_truth()?;
-        Ok(self.now.ground_truth)
-    }
 }
 
 /// What a rig in real time reports at the end of a session.

@@ -16,6 +16,7 @@ mod pack;
 mod report;
 mod serve;
 mod sweep;
+mod tap;
 mod theory;
 mod watch;
 

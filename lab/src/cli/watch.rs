@@ -22,8 +22,8 @@ use vines::rig::{Command, Controller, ControllerError, Move, Rig, Sensors};
 use vines::scene::Scene;
 use vines_model::Sensor;
 
-use super::experiment::{Tap, no_sample};
 use super::failure::Failure;
+use super::tap::{Tap, no_sample};
 
 /// Samples that wait for the evaluation: more than a minute of the default scene in real time.
 const CHANNEL: usize = 1 << 16;

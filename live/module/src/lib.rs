@@ -7,6 +7,7 @@
 pub mod bench;
 pub mod exports;
 pub mod message;
+mod rig;
 pub mod settings;
 mod tracking;
 

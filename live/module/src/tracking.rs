@@ -8,8 +8,8 @@ use vines_testbench::backbone;
 use vines_testbench::rig::{Command, Controller, ControllerError, Sensors};
 use vines_testbench::scene::Scene;
 
-use crate::bench::NoisyRig;
 use crate::message::Message;
+use crate::rig::NoisyRig;
 
 /// A point of the tracked backbone, dimensionless.
 #[derive(Debug, Clone, Copy)]
