@@ -62,7 +62,7 @@ pub struct Part {
     pub seconds: [f64; 2],
     /// What it is.
     pub kind: Kind,
-    /// The point; absent if it is not one of the backbone.
+    /// The point; absent if it is not one of the backbone, or if another part has a better one at this amplitude.
     #[serde(skip)]
     pub point: Option<MeasuredPoint>,
     /// The regime of its motion.
@@ -256,7 +256,8 @@ impl Recording {
             })
             .collect();
         self.plausible(&runs)?;
-        let parts = evaluated(&runs, &scene, self.sample_time);
+        let mut parts = evaluated(&runs, &scene, self.sample_time);
+        best_of_each_amplitude(&mut parts);
         if parts.iter().all(|part| part.point.is_none()) {
             return Err(self.nothing(&anchors, &parts, &linear));
         }
@@ -565,6 +566,21 @@ fn evaluated(runs: &[Run], scene: &Scene, sample_time: f64) -> Vec<Part> {
         }
     }
     parts
+}
+
+/// Leaves of points with about the same amplitude the best one: their errors are alike, whatever their number.
+fn best_of_each_amplitude(parts: &mut [Part]) {
+    let u = |point: &MeasuredPoint| point.drive.uncertainty / point.drive.value;
+    let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
+    for part in parts {
+        let is_second = |one: &MeasuredPoint| {
+            let better = |other: &MeasuredPoint| {
+                (other.response.value / one.response.value - 1.0).abs() < HELD && u(other) < u(one)
+            };
+            points.iter().any(better)
+        };
+        part.point = part.point.filter(|point| !is_second(point));
+    }
 }
 
 /// Change of the amplitude in a period, m; 0 if it is noise.
