@@ -335,17 +335,21 @@ impl Law {
 }
 
 impl PlantSection {
+    /// Whether the plant is in SI units. Of two sets of units, one would silently be ignored.
+    fn is_si(&self) -> Result<bool, &'static str> {
+        let is_si = [self.mass, self.k, self.c, self.m, self.b].iter().any(Option::is_some);
+        if is_si && (self.epsilon.is_some() || self.lambda.is_some()) {
+            return Err(
+                "[plant] mixes SI keys (M, k, c, m, b) with dimensionless ones (epsilon, lambda): \
+                 give one set or the other, and r (epsilon = m/M, lambda = c/(m omega0))",
+            );
+        }
+        Ok(is_si)
+    }
+
     fn resolve(&self, origin: &str) -> Result<Parameters, SceneError> {
         let keys = |message: &str| SceneError::Keys { origin: origin.into(), message: message.into() };
-        let si = [self.mass, self.k, self.c, self.m, self.b];
-        let dimensionless = [self.epsilon, self.lambda];
-        let is_si = si.iter().any(Option::is_some);
-        if is_si && dimensionless.iter().any(Option::is_some) {
-            return Err(keys(
-                "[plant] mixes SI keys (M, k, c, m, b) with dimensionless ones (epsilon, lambda): \
-                 give one set or the other, and r",
-            ));
-        }
+        let is_si = self.is_si().map_err(keys)?;
         let need = |value: Option<f64>, key: &str| {
             value.ok_or_else(|| {
                 keys(&format!(

@@ -80,7 +80,8 @@ pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, S
     }
     for one in overrides {
         one.merge_into(&mut table)?;
-        Sections::deserialize(table.clone()).map_err(|error| one.error(plain(error.message())))?;
+        let sections = Sections::deserialize(table.clone()).map_err(|error| one.error(plain(error.message())))?;
+        sections.plant.is_si().map_err(|message| one.error(message))?;
     }
     Ok(table)
 }
