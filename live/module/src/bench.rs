@@ -2,11 +2,11 @@
 
 use std::f64::consts::{PI, TAU};
 
-use lovines::{Event, InvalidValue, Plant, Wall};
+use lovines::{Event, Plant, Wall};
 use phase_lock::{Input, Move, Output, PhaseLock, State};
 use vines_model::regime::{Impact, Regime};
 use vines_testbench::live::{Decay, LastImpacts, Motion};
-use vines_testbench::rig::{Command, Drive, Rig, RigError, Sensors};
+use vines_testbench::rig::{Command, Drive};
 use vines_testbench::scene::Scene;
 
 use crate::message::Message;
