@@ -10,7 +10,7 @@ use serde::Serialize;
 use vines::experiment::{ExperimentError, Stage};
 use vines::net::{ReportLost, Timing};
 use vines::record::Sample;
-use vines::rig::{BuiltIn, Command, Controller, Fault, Rig, Sensors};
+use vines::rig::{BuiltIn, Controller, Fault, Rig};
 use vines::{advice, loop_check, report, scene::Scene};
 
 use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
