@@ -238,7 +238,8 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
         .filter(|(amplitude, _)| (x.0..x.1).contains(amplitude))
         .collect();
     let (low, high) = range(frequencies, expected.iter().map(|place| place.1));
-    let y = (low - 0.08 * (high - low), high + 0.3 * (high - low));
+    // Space for the legend below the right end, the highest.
+    let y = (low - 0.3 * (high - low), high + 0.08 * (high - low));
     let (width, height) = SIZE;
     let amplitude = "amplitude of the response, mm";
     let mut backbone = Panel::new((x, amplitude), (y, "frequency of phase resonance, Hz"))
@@ -246,7 +247,7 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
             "Measured points, scene and fit",
             &verdict.unwrap_or_default().replace("; ", ";\n"),
         )
-        .legend(Legend::UpperRight);
+        .legend(Legend::LowerRight);
     backbone.add(Shape::Line(1.6), expected, THEORY, "scene");
     backbone.add(Shape::Line(1.6), model, EXACT, "fit");
     circles(&mut backbone, points.iter().map(place), "measured");
