@@ -71,15 +71,45 @@ fn variables() -> String {
     text
 }
 
+/// The variables after the parameters, and the structure of the model, for parameters that were those of `present`: value references, and
+/// indices, which count from 1.
+fn renumbered(text: &str, present: &[&str]) -> String {
+    let number = |text: &str, first: usize| {
+        let n: usize = text.parse().unwrap();
+        let new = match present.get(n.wrapping_sub(first)) {
+            Some(name) => PARAMETERS.iter().position(|parameter| parameter.name == *name).unwrap() + first,
+            None => n + PARAMETERS.len() - present.len(),
+        };
+        new.to_string()
+    };
+    let mut new = String::new();
+    let mut parts = text.split('"');
+    while let (Some(name), Some(value)) = (parts.next(), parts.next()) {
+        let value = if name.ends_with(" valueReference=") {
+            number(value, 0)
+        } else if name.ends_with(" index=") || name.ends_with(" dependencies=") {
+            let all: Vec<String> = value.split_whitespace().map(|index| number(index, 1)).collect();
+            all.join(" ")
+        } else {
+            value.to_owned()
+        };
+        write!(new, "{name}\"{value}\"").unwrap();
+    }
+    new + text.rsplit('"').next().unwrap()
+}
+
 #[test]
 fn the_parameters_of_the_model_description_follow_from_the_settings() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("modelDescription.xml");
     let present = std::fs::read_to_string(&path).unwrap();
     let (before, rest) = present.split_once("  <ModelVariables>\n").unwrap();
-    let (_, after) = rest.split_once("    <ScalarVariable name=\"response\"").unwrap();
+    let (parameters, after) = rest.split_once("    <ScalarVariable name=\"response\"").unwrap();
+    let names = parameters.split("<ScalarVariable name=\"").skip(1);
+    let names: Vec<&str> = names.map(|rest| rest.split('"').next().unwrap()).collect();
     let text = format!(
-        "{before}  <ModelVariables>\n{}    <ScalarVariable name=\"response\"{after}",
-        variables()
+        "{before}  <ModelVariables>\n{}    <ScalarVariable name=\"response\"{}",
+        variables(),
+        renumbered(after, &names)
     );
     if std::env::var_os("UPDATE").is_some() {
         std::fs::write(&path, &text).unwrap();
