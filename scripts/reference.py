@@ -79,11 +79,10 @@ def table(head, rows):
 
 
 def commands(program):
-    """Sections of the page on the command line, by command; a program without `sweep` has fewer."""
+    """Sections of the page on the command line, by command."""
     top = run(program, "--help")
     listed = re.findall(r"^  (\w+) (.*)", top.partition("Commands:")[2].partition("Options:")[0], re.MULTILINE)
-    # A program without `sweep` lists the script that builds one with it.
-    names = [name for name, words in listed if name != "help" and "scripts/sweep" not in words]
+    names = [name for name, _ in listed if name != "help"]
     texts = {"vines": top} | {f"vines {name}": run(program, name, "--help") for name in names}
     return {name: f"## {name}\n\n```text\n{text.rstrip()}\n```\n" for name, text in texts.items()}
 

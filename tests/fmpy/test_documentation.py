@@ -85,7 +85,6 @@ def test_the_generated_pages_are_those_of_the_program(vines):
     assert reference.variables() == written["fmu-variables.md"]
     assert reference.python() == written["python-api.md"]
     assert reference.outputs(vines) == written["output-files.md"]
-    # A program without `sweep` has the other commands.
     for name, section in reference.commands(vines).items():
         if name != "vines":
             assert section in written["cli.md"], f"{name}: run scripts/docs"
