@@ -255,6 +255,10 @@ pub enum FitError {
         "no symmetric 1:1 motion has these points, whatever the parameters: are amplitudes in m, frequencies in Hz or rad/s as stated?"
     )]
     NoMotion,
+    #[error(
+        "the points do not determine the five parameters: measure at further amplitudes, or give a parameter that is known (--known)"
+    )]
+    Undetermined,
 }
 
 /// The fitted rig.
@@ -281,10 +285,8 @@ impl Fit {
     pub fn estimate(&self, quantity: Quantity) -> Option<Estimate> {
         let gradient = quantity.gradient(&self.x);
         let variance = (gradient.transpose() * self.covariance * gradient)[0];
-        (self.has_scale || !quantity.needs_a_scale()).then(|| Estimate {
-            value: quantity.of(&self.x),
-            uncertainty: variance.max(0.0).sqrt(),
-        })
+        (self.has_scale || !quantity.needs_a_scale())
+            .then(|| Estimate { value: quantity.of(&self.x), uncertainty: variance.sqrt() })
     }
 
     /// Correlation of two quantities.
@@ -350,7 +352,7 @@ impl Fit {
 /// contradicts the model, the fit is that of all points, and rejected.
 ///
 /// # Errors
-/// Too few points, values that are not positive, or points that no motion has.
+/// Too few points, values that are not positive, points that no motion has, or that do not determine the parameters.
 pub fn fit(
     points: &[MeasuredPoint],
     definition: Definition,
@@ -508,7 +510,16 @@ impl<'a> Problem<'a> {
         let (x, sums) = minima
             .min_by(|one, other| one.1.chi_square.total_cmp(&other.1.chi_square))
             .ok_or(FitError::NoMotion)?;
-        Ok(self.found(x, sums))
+        let fit = self.found(x, sums);
+        let is_determined = |estimate: Estimate| estimate.uncertainty.is_finite() && estimate.uncertainty > 0.0;
+        match Quantity::ALL
+            .iter()
+            .filter_map(|one| fit.estimate(*one))
+            .all(is_determined)
+        {
+            true => Ok(fit),
+            false => Err(FitError::Undetermined),
+        }
     }
 
     /// The fit with these unknowns.
@@ -516,7 +527,10 @@ impl<'a> Problem<'a> {
         let equations = 2 * self.points.len() + self.known.len();
         Fit {
             x,
-            covariance: sums.normal.try_inverse().unwrap_or(Covariance::from_element(f64::NAN)),
+            covariance: sums
+                .normal
+                .cholesky()
+                .map_or(Covariance::from_element(f64::NAN), |matrix| matrix.inverse()),
             has_scale: self.has_scale,
             chi_square: sums.chi_square,
             degrees: equations.saturating_sub(5 + usize::from(self.has_scale) + usize::from(self.free)),
