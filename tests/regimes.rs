@@ -40,7 +40,7 @@ fn no_regime_loses_digits() {
 const SPANS: [f64; 8] = [1e-9, 1e-4, 0.03, 0.2, 1.0, 10.0, 100.0, 1000.0];
 /// Samples that tell the size of a motion.
 const SAMPLES: i32 = 8;
-/// The general search looks at the motion again and again: for so many radians of its fastest rate at most.
+/// Longest span of the general search, radians of the fastest rate: its work grows with the span.
 const LONGEST_SEARCH: f64 = 70.0;
 
 /// A mass on its spring, its start and its base.

@@ -216,7 +216,7 @@ const TURN: f64 = 2e6;
 /// Nanoseconds per unit of work: the median of the runs of one turn. `run` returns the nanoseconds that it took and its units of work.
 ///
 /// # Errors
-/// Those of a run.
+/// An error of a run.
 pub fn turn<E>(run: &mut impl FnMut() -> Result<(f64, f64), E>) -> Result<f64, E> {
     let (mut gone, mut costs) = (0.0, Vec::new());
     while gone < TURN {
@@ -231,7 +231,7 @@ pub fn turn<E>(run: &mut impl FnMut() -> Result<(f64, f64), E>) -> Result<f64, E
 /// Nanoseconds per unit of work of both programs in the `n`-th pair of turns; each begins every other pair.
 ///
 /// # Errors
-/// Those of a run.
+/// An error of a run.
 pub fn pair<E>(
     n: usize,
     first: &mut impl FnMut() -> Result<(f64, f64), E>,

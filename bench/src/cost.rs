@@ -69,7 +69,7 @@ const SAMPLES: usize = 100;
 const EPSILON: f64 = 0.0084;
 const LAMBDA: f64 = 1.43;
 
-/// Runs the pair for so many periods of the free oscillation; `see` gets what drives the plant, sample by sample.
+/// Runs plant and controller for a number of periods of the free oscillation; `see` gets amplitude and frequency of the drive at every sample.
 fn coupled(periods: usize, mut see: impl FnMut(f64, f64)) -> Plant {
     let parameters = Parameters::dimensionless(EPSILON, LAMBDA, 0.65);
     let start = State { dq2: 0.9, ..State::default() };

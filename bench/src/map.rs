@@ -112,7 +112,7 @@ impl Settled {
         Ok((began.elapsed().as_nanos() as f64, outcome?))
     }
 
-    /// The same of the baseline, per impact or period; none if it stalls.
+    /// Nanoseconds of the baseline per impact, or per period of a motion without impacts; none if it stalls.
     fn baseline(&self, periods: u32) -> Option<f64> {
         let Drive { amplitude, omega, .. } = self.drive;
         let mut brent = Baseline::new(*self.plant.parameters(), self.state(), TOLERANCES.1);

@@ -21,7 +21,7 @@ pub struct Monitor {
     pub found: AtomicU64,
     /// Cells computed since the start.
     pub computed: AtomicU64,
-    /// Those of them that failed.
+    /// Number of computed cells that failed.
     pub failed: AtomicU64,
     /// Cells that were inferred; known at the end of an adaptive sweep.
     pub inferred: AtomicU64,

@@ -6,8 +6,8 @@ use vines::experiment::{self, ExperimentError, Plan};
 use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
 use vines::record::Record;
 use vines::rig::{
-    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Fault, GroundTruth, Rig, Sensors, SensorsOnly,
-    Simulated,
+    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Fault, GroundTruth, Rig, RigError, Sensors,
+    SensorsOnly, Simulated,
 };
 use vines::scene::{LinearResponse, Scene};
 
@@ -226,6 +226,27 @@ fn an_asymmetric_lock_is_refused() {
 }
 
 #[test]
+fn a_drive_without_a_stable_orbit_ends_the_search_with_a_reason() {
+    let scene = scene(&["excitation.G=0.9", "start.dq2=0"]);
+    let mut rig = plant(&scene);
+    let mut controller = built_in(&scene);
+    let mut samples = Vec::new();
+    let ended = experiment::run_into(&mut samples, &mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {});
+    assert!(
+        matches!(
+            ended,
+            Err(ExperimentError::NotReached { .. } | ExperimentError::NoLock { .. })
+        ),
+        "{ended:?}"
+    );
+    let reason = vines::advice::reason(&scene, None).unwrap();
+    assert!(
+        reason.contains("no stable symmetric 1:1 orbit at G = 0.9000; it is stable for G from"),
+        "{reason}"
+    );
+}
+
+#[test]
 fn a_gap_in_the_range_of_stable_orbits_is_stated() {
     let scene = scene(&[
         "plant.epsilon=0.02",
@@ -238,6 +259,60 @@ fn a_gap_in_the_range_of_stable_orbits_is_stated() {
         reason.ends_with("it is stable for G from 0.415 to 0.824, with gaps"),
         "{reason}"
     );
+}
+
+/// A rig whose response is noise of a shift register.
+struct Noise(u32);
+
+impl Rig for Noise {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        Ok(Sensors {
+            response: f64::from(self.0) / f64::from(u32::MAX) - 0.5,
+            reference: None,
+        })
+    }
+
+    fn advance(&mut self, _: Drive, _: f64) -> Result<(), RigError> {
+        Ok(())
+    }
+}
+
+#[test]
+fn noise_is_never_locked_and_ends_the_experiment_with_its_reason() {
+    let scene = scene(&[]);
+    let mut controller = built_in(&scene);
+    let mut samples = Vec::new();
+    let outcome = experiment::run_into(
+        &mut samples,
+        &mut Noise(1),
+        &mut controller,
+        &Plan::of(&scene),
+        |_, _, _| {},
+    );
+    assert!(matches!(
+        outcome,
+        Err(ExperimentError::Tripped { fault: Fault::NoSignal, .. })
+    ));
+    assert!(samples.len() < 2500, "{}", samples.len());
+}
+
+#[test]
+fn a_sensor_of_two_bits_has_no_phase_rather_than_a_phase_error_of_zero() {
+    let scene = scene(&[
+        "chain.adc_bits=2",
+        "phase_lock.signal_timeout='none'",
+        "phase_lock.residual_max='none'",
+        "record.lock_periods=5",
+    ]);
+    let plant = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut rig = Chain::around(Box::new(plant), &scene);
+    let mut controller = built_in(&scene);
+    let outcome = run(&mut *rig, &mut controller, &scene);
+    let message = outcome.unwrap_err().to_string();
+    assert!(message.contains("the phase cannot be measured"), "{message}");
 }
 
 #[test]
