@@ -8,8 +8,8 @@ use crate::flight::{Flight, FlightEnd, Grip, until_released};
 use crate::oscillator::Oscillator;
 use crate::parameters::InvalidValue;
 use crate::plant::{Event, MOST_EVALUATIONS, MOST_IMPACTS, Outcome, Plant};
-use crate::rig::{Contact, Masses};
 use crate::segment::Segment;
+use crate::system::{Contact, Masses};
 
 /// Largest number of releases per step: rounding can tear a particle off its wall again and again where values are extreme.
 const MOST_RELEASES: u64 = 2_000_000;
@@ -61,7 +61,7 @@ impl Plant {
         duration: f64,
         on_event: impl FnMut(Event),
     ) -> Result<Outcome, InvalidValue> {
-        if !self.record.begun {
+        if !self.status.begun {
             check_duration(duration)?;
             self.begin(drive)?;
         }
@@ -72,20 +72,22 @@ impl Plant {
             drive.validate()?;
             check_duration(duration)?;
             self.jump(&drive);
-            self.fast.drive_changed(&self.moving.rig.free, &self.moving.base.drive);
+            self.fast
+                .drive_changed(&self.moving.system.free, &self.moving.base.drive);
         } else if drive.omega != before.omega {
             drive.validate_frequency()?;
             check_duration(duration)?;
             self.moving.base.drive.omega = drive.omega;
-            self.fast.drive_changed(&self.moving.rig.free, &self.moving.base.drive);
+            self.fast
+                .drive_changed(&self.moving.system.free, &self.moving.base.drive);
         }
-        if self.record.contact.is_none() && self.fast.step(&mut self.moving, duration) {
-            self.record.time += duration;
+        if self.status.contact.is_none() && self.fast.step(&mut self.moving, duration) {
+            self.status.time += duration;
             return Ok(Outcome { elapsed: duration, evaluations: 1, ..Outcome::default() });
         }
         check_duration(duration)?;
         let outcome = self.follow(duration, on_event);
-        self.record.time += outcome.elapsed;
+        self.status.time += outcome.elapsed;
         Ok(outcome)
     }
 
@@ -95,13 +97,13 @@ impl Plant {
         let before = core::mem::replace(&mut self.moving.base.drive, *drive);
         let jump =
             (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * self.fast.state.phasor.1;
-        let oscillator = &self.moving.rig.free;
+        let oscillator = &self.moving.system.free;
         let kick = 2.0 * oscillator.delta * jump;
         if jump != 0.0 {
             self.moving.masses.primary = self.moving.masses.primary.plus([0.0, kick]);
             self.moving.masses.dw += kick;
             // The impulse acts on the primary mass alone; contact is decided anew.
-            self.record.contact = None;
+            self.status.contact = None;
         }
         self.fast.state.contact_free.jump(oscillator, &before, drive, kick);
     }
@@ -116,14 +118,14 @@ impl Plant {
             outcome: Outcome::default(),
             on_event,
         };
-        if self.record.contact.is_none()
+        if self.status.contact.is_none()
             && let Some(wall) = self.wall_touched()
         {
             self.touch(wall, &mut step);
         }
         while step.goes_on() {
             let left = step.left.value();
-            if let Some(contact) = self.record.contact {
+            if let Some(contact) = self.status.contact {
                 self.stay(contact, left, &mut step);
             } else {
                 match self.fast.next(&mut self.moving, left, duration) {
@@ -134,7 +136,7 @@ impl Plant {
                         self.touch(wall, &mut step);
                         continue;
                     }
-                    Next::Search(_) if self.moving.rig.forces.holding > 0.0 => self.slide(left, None, &mut step),
+                    Next::Search(_) if self.moving.system.forces.holding > 0.0 => self.slide(left, None, &mut step),
                     Next::Search(limit) => self.search(limit, None, &mut step),
                 }
             }
@@ -155,10 +157,10 @@ impl Plant {
         if released.is_none() && self.arrives(limit, 0.0, step) {
             return;
         }
-        let (rig, masses) = (&self.moving.rig, self.moving.masses);
-        let motion = Segment::new(&rig.free, self.moving.base, masses.primary.values.into());
-        let pull = rig.forces.gravity;
-        let flight = Flight::new(motion, (masses.w.value(), masses.dw), rig.half_width, pull);
+        let (system, masses) = (&self.moving.system, self.moving.masses);
+        let motion = Segment::new(&system.free, self.moving.base, masses.primary.values.into());
+        let pull = system.forces.gravity;
+        let flight = Flight::new(motion, (masses.w.value(), masses.dw), system.half_width, pull);
         let end = flight.first_contact(limit, released);
         self.fly(&end, pull, step);
     }
@@ -173,8 +175,8 @@ impl Plant {
             None => self.direction(),
         };
         if direction == 0.0 {
-            self.record.contact = Some(Contact::Floor);
-            self.record.totals.sticks += 1;
+            self.status.contact = Some(Contact::Floor);
+            self.status.totals.sticks += 1;
             let t = step.now();
             (step.on_event)(Event::Sticking { t });
             return;
@@ -182,19 +184,19 @@ impl Plant {
         if slips.is_none() && masses.dw != 0.0 && self.arrives(limit, direction, step) {
             return;
         }
-        let rig = &self.moving.rig;
-        let friction = rig.friction(direction);
-        let base = rig.pushed(self.moving.base, -friction);
-        let motion = Segment::new(&rig.free, base, masses.primary.values.into());
-        let pull = rig.forces.gravity + friction;
-        let flight = Flight::new(motion, (masses.w.value(), masses.dw), rig.half_width, pull);
+        let system = &self.moving.system;
+        let friction = system.friction(direction);
+        let base = system.pushed(self.moving.base, -friction);
+        let motion = Segment::new(&system.free, base, masses.primary.values.into());
+        let pull = system.forces.gravity + friction;
+        let flight = Flight::new(motion, (masses.w.value(), masses.dw), system.half_width, pull);
         let flight = flight.with_error(masses.w.error());
         let end = flight.first_wall_or_reversal(limit, direction, slips.is_some() || masses.dw == 0.0);
         let moved = match end.wall {
-            Some(wall) => (wall.sign() * rig.half_width - masses.w.value()) - masses.w.error(),
+            Some(wall) => (wall.sign() * system.half_width - masses.w.value()) - masses.w.error(),
             None => end.drifted,
         };
-        self.record.totals.friction += rig.parameters.particle_mass * rig.forces.kinetic * moved.abs();
+        self.status.totals.friction += system.parameters.particle_mass * system.forces.kinetic * moved.abs();
         self.fly(&end, pull, step);
         if end.reversed {
             let masses = &mut self.moving.masses;
@@ -210,16 +212,16 @@ impl Plant {
 
     /// Moves on to the wall ahead, if constant forces act and the fast path finds the contact within `limit` seconds.
     fn arrives(&mut self, limit: f64, direction: f64, step: &mut Step<impl FnMut(Event)>) -> bool {
-        if !self.moving.rig.forces.act() {
+        if !self.moving.system.forces.act() {
             return false;
         }
         let w = self.moving.masses.w;
         let Some((t, wall)) = self.fast.next_with_forces(&mut self.moving, limit, direction) else {
             return false;
         };
-        let rig = &self.moving.rig;
-        let moved = (wall.sign() * rig.half_width - w.value()) - w.error();
-        self.record.totals.friction += rig.parameters.particle_mass * rig.forces.kinetic * moved.abs();
+        let system = &self.moving.system;
+        let moved = (wall.sign() * system.half_width - w.value()) - w.error();
+        self.status.totals.friction += system.parameters.particle_mass * system.forces.kinetic * moved.abs();
         step.left = step.left.minus(t);
         self.touch(wall, step);
         true
@@ -227,7 +229,7 @@ impl Plant {
 
     /// Moves on to the end of a flight or of a stretch of sliding, in which the particle has the constant acceleration `pull`, m/s².
     fn fly(&mut self, end: &FlightEnd, pull: f64, step: &mut Step<impl FnMut(Event)>) {
-        let half_width = self.moving.rig.half_width;
+        let half_width = self.moving.system.half_width;
         self.fast.evaluations += end.evaluations;
         let masses = &mut self.moving.masses;
         masses.primary = masses.primary.plus([end.moved, end.gained]);
@@ -244,7 +246,7 @@ impl Plant {
     /// Sign of the relative velocity `w'` from now on while the particle slides; 0 where static friction holds it, and where there is no
     /// friction.
     pub(crate) fn direction(&self) -> f64 {
-        let forces = &self.moving.rig.forces;
+        let forces = &self.moving.system.forces;
         let masses = &self.moving.masses;
         if forces.holding == 0.0 {
             return 0.0;
@@ -259,13 +261,13 @@ impl Plant {
     /// Both masses move as one for at most `left` seconds, until the particle is released; then it goes on. The release is not
     /// remembered beyond this call: another drive or other parameters may hold the particle again.
     fn stay(&mut self, contact: Contact, left: f64, step: &mut Step<impl FnMut(Event)>) {
-        let rig = &self.moving.rig;
+        let system = &self.moving.system;
         let start = self.moving.masses.primary.values;
         let wall = contact.wall();
-        let forces = &rig.forces;
+        let forces = &system.forces;
         let noise = self.acceleration_error(start[1]);
-        let base = rig.pushed(self.moving.base, forces.gravity);
-        let motion = Segment::new(&rig.stuck, base, start.into());
+        let base = system.pushed(self.moving.base, forces.gravity);
+        let motion = Segment::new(&system.stuck, base, start.into());
         let grip = Grip {
             wall,
             gravity: forces.gravity,
@@ -280,17 +282,17 @@ impl Plant {
         self.base_moves(stay.t);
         step.left = step.left.plus(-stay.t);
         if wall.is_none() {
-            self.record.totals.stuck_time += stay.t;
+            self.status.totals.stuck_time += stay.t;
         }
         if let Some(direction) = stay.released {
-            self.record.contact = None;
+            self.status.contact = None;
             step.outcome.released += 1;
             let (t, left) = (step.now(), step.left.value());
             (step.on_event)(match wall {
                 Some(wall) => Event::Released { t, wall },
                 None => Event::Slip { t, direction },
             });
-            if self.moving.rig.forces.holding > 0.0 {
+            if self.moving.system.forces.holding > 0.0 {
                 self.slide(left, Some(direction), step);
             } else {
                 self.search(left, wall, step);
@@ -332,36 +334,36 @@ impl Plant {
     /// The wall that the particle touches.
     #[inline]
     pub(crate) fn wall_touched(&self) -> Option<Wall> {
-        let (w, b) = (self.moving.masses.w.value(), self.moving.rig.half_width);
+        let (w, b) = (self.moving.masses.w.value(), self.moving.system.half_width);
         (w.abs() >= b).then(|| Wall::ahead(w))
     }
 
     /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave.
     #[inline]
     fn touch(&mut self, wall: Wall, step: &mut Step<impl FnMut(Event)>) {
-        let rig = &self.moving.rig;
-        self.moving.masses.w = Sum::from(wall.sign() * rig.half_width);
+        let system = &self.moving.system;
+        self.moving.masses.w = Sum::from(wall.sign() * system.half_width);
         let left = step.left.value();
-        let touch = if rig.is_real {
+        let touch = if system.is_real {
             self.real_touch(wall, left)
         } else {
-            rig.law.touch(wall, self.velocities(), |primary, speed| {
+            system.law.touch(wall, self.velocities(), |primary, speed| {
                 let (largest, resolution) = (self.acceleration_bound(primary), self.resolution(left));
-                !rig.law.certainly_leaves(speed, largest, &resolution)
-                    && rig.law.rests(speed, self.pressing(wall, primary), &resolution)
+                !system.law.certainly_leaves(speed, largest, &resolution)
+                    && system.law.rests(speed, self.pressing(wall, primary), &resolution)
             })
         };
         self.moving.masses.primary = self.moving.masses.primary.plus([0.0, touch.kick]);
         self.moving.masses.particle = touch.particle;
         self.moving.masses.dw = touch.relative;
         let t = step.now();
-        self.record.totals.add(&touch, self.record.time + t);
+        self.status.totals.add(&touch, self.status.time + t);
         if let Some(velocity) = touch.impact {
             step.outcome.impacts += 1;
             (step.on_event)(Event::Impact { t, wall, velocity });
         }
         if touch.stuck {
-            self.record.contact = Some(Contact::Wall(wall));
+            self.status.contact = Some(Contact::Wall(wall));
             step.outcome.stuck += 1;
             (step.on_event)(Event::Stuck { t, wall });
         }
@@ -370,18 +372,19 @@ impl Plant {
     /// The same in a cavity with constant forces or a restitution that varies.
     #[inline(never)]
     fn real_touch(&self, wall: Wall, left: f64) -> Touch {
-        let (rig, velocities) = (&self.moving.rig, self.velocities());
-        let mut law = rig.law;
-        if rig.varies {
-            law = law.with_restitution((rig.rebound).of_impact(wall, velocities.2.abs(), self.record.totals.impacts));
+        let (system, velocities) = (&self.moving.system, self.velocities());
+        let mut law = system.law;
+        if system.varies {
+            law =
+                law.with_restitution((system.rebound).of_impact(wall, velocities.2.abs(), self.status.totals.impacts));
         }
-        let resolution = Resolution { elastic: !rig.varies, ..self.resolution(left) };
+        let resolution = Resolution { elastic: !system.varies, ..self.resolution(left) };
         law.touch(wall, velocities, |primary, speed| {
-            let largest = self.acceleration_bound(primary) + rig.forces.joint * rig.forces.size();
+            let largest = self.acceleration_bound(primary) + system.forces.joint * system.forces.size();
             !law.resting_with(1.0).certainly_leaves(speed, largest, &resolution)
-                && (rig.rebound).rests(
+                && (system.rebound).rests(
                     &law,
-                    &rig.forces,
+                    &system.forces,
                     (wall, speed),
                     self.pressing(wall, primary),
                     &resolution,
@@ -400,9 +403,9 @@ impl Plant {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn resolution(&self, left: f64) -> Resolution {
         Resolution {
-            lowest_hop: LOWEST_HOP * self.moving.rig.half_width,
+            lowest_hop: LOWEST_HOP * self.moving.system.half_width,
             longest_chatter: left,
-            fastest: self.moving.rig.free.fastest,
+            fastest: self.moving.system.free.fastest,
             elastic: true,
         }
     }
@@ -418,13 +421,13 @@ impl Plant {
     /// Acceleration of the primary mass at a velocity, while it moves alone and without friction, m/s².
     fn acceleration(&self, velocity: f64) -> f64 {
         let start = (self.moving.masses.primary.values[0], velocity);
-        Segment::new(&self.moving.rig.free, self.moving.base, start).derivatives_at_start()[2]
+        Segment::new(&self.moving.system.free, self.moving.base, start).derivatives_at_start()[2]
     }
 
     /// An upper bound of the acceleration's magnitude, m/s²: the sum of its terms.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn acceleration_bound(&self, velocity: f64) -> f64 {
-        let Oscillator { delta, omega0_squared, .. } = self.moving.rig.free;
+        let Oscillator { delta, omega0_squared, .. } = self.moving.system.free;
         let drive = &self.moving.base.drive;
         let position = self.moving.masses.primary.values[0].abs() + drive.signal[0].abs() + drive.amplitude.abs();
         let velocity = velocity.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
@@ -433,7 +436,7 @@ impl Plant {
 
     /// Rounding error of the acceleration, m/s².
     pub(crate) fn acceleration_error(&self, velocity: f64) -> f64 {
-        let nothing = NOTHING * self.moving.rig.half_width * self.moving.rig.free.omega0_squared;
-        ROUNDING * (self.acceleration_bound(velocity) + self.moving.rig.forces.size()) + nothing
+        let nothing = NOTHING * self.moving.system.half_width * self.moving.system.free.omega0_squared;
+        ROUNDING * (self.acceleration_bound(velocity) + self.moving.system.forces.size()) + nothing
     }
 }

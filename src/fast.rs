@@ -17,9 +17,9 @@ use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive, Phase, shift};
 use crate::contact::Wall;
 use crate::oscillator::Oscillator;
-use crate::rig::{Moving, Rig};
 use crate::segment::Segment;
-use propagator::{Coefficients, Grid, Increment, Point, Propagator, SAME, ShortStep};
+use crate::system::{Moving, System};
+use propagator::{Coefficients, Grid, Increment, PhasePoint, Propagator, SAME, ShortStep};
 use verify::{Horizon, Start};
 
 /// How often a phasor is rotated before it is computed from the phase again.
@@ -71,16 +71,16 @@ pub(crate) struct FastPath {
 }
 
 impl FastPath {
-    /// Empty, for a rig.
-    pub fn new(rig: &Rig) -> Self {
+    /// Empty, for a system.
+    pub fn new(system: &System) -> Self {
         let mut path = Self::default();
-        path.choose(rig);
+        path.choose(system);
         path
     }
 
     /// Decides whether it serves.
-    pub fn choose(&mut self, rig: &Rig) {
-        self.serves = !self.state.disabled && !rig.forces.act();
+    pub fn choose(&mut self, system: &System) {
+        self.serves = !self.state.disabled && !system.forces.act();
     }
 
     /// Its state.
@@ -89,12 +89,12 @@ impl FastPath {
     }
 
     /// Takes over a state of the same oscillator. The workspace stays.
-    pub fn restore(&mut self, state: &Predictions, rig: &Rig) {
+    pub fn restore(&mut self, state: &Predictions, system: &System) {
         self.state = *state;
         if self.cache.step.t.to_bits() != state.step.to_bits() {
             self.cache.step = ShortStep::from(state.step);
         }
-        self.choose(rig);
+        self.choose(system);
     }
 
     /// The state was changed from outside.
@@ -126,10 +126,10 @@ impl FastPath {
 
     /// Where the motion stands, relative to the line that follows the base signal.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    fn point(&self, moving: &Moving) -> Point {
+    fn point(&self, moving: &Moving) -> PhasePoint {
         let [offset, slope, ..] = moving.base.drive.signal;
         let [x, v] = moving.masses.primary.values;
-        Point { y: x - offset, dy: v - slope, phasor: self.state.phasor }
+        PhasePoint { y: x - offset, dy: v - slope, phasor: self.state.phasor }
     }
 
     /// Takes a step whose propagator is cached, if it meets no contact. Returns whether it was taken.
@@ -163,12 +163,12 @@ impl FastPath {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn take_step(&mut self, moving: &mut Moving, late: f64) {
         let drive = &moving.base.drive;
-        let response = self.cache.step.response(&moving.rig.free, drive.omega);
+        let response = self.cache.step.response(&moving.system.free, drive.omega);
         let (start, step) = (self.point(moving), &self.cache.step);
         let mut increment = step.increment(&response, drive.amplitude, &start);
         let (mut angle, mut t) = (response.angle, step.t);
         if late != 0.0 {
-            increment = increment.later(&moving.rig.free, drive, (start.y, start.dy), late);
+            increment = increment.later(&moving.system.free, drive, (start.y, start.dy), late);
             angle = angle.plus(drive.omega * late);
             t += late;
         }
@@ -202,8 +202,8 @@ impl FastPath {
     /// Adds `dx` to the relative displacement, and what the particle flies in `t` seconds: no wall is met.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn drift(&mut self, moving: &mut Moving, dx: f64, t: f64) {
-        let Moving { rig, masses, .. } = moving;
-        masses.drift(dx - masses.particle * t, rig.half_width);
+        let Moving { system, masses, .. } = moving;
+        masses.drift(dx - masses.particle * t, system.half_width);
         self.state.contact_free.t -= t;
     }
 
@@ -215,8 +215,8 @@ impl FastPath {
     }
 
     /// Moves on by `t` seconds, in which no wall is met; `duration` is the length of the whole step.
-    fn coast(&mut self, moving: &mut Moving, start: &Point, t: f64, duration: f64) -> Next {
-        let (oscillator, drive) = (&moving.rig.free, moving.base.drive);
+    fn coast(&mut self, moving: &mut Moving, start: &PhasePoint, t: f64, duration: f64) -> Next {
+        let (oscillator, drive) = (&moving.system.free, moving.base.drive);
         let fastest = oscillator.fastest.max(drive.omega.abs());
         self.evaluations += 1;
         if t == duration && self.repeats(oscillator, &drive, duration) {

@@ -13,8 +13,8 @@ pub mod forcing;
 pub mod oscillator;
 pub mod parameters;
 pub mod plant;
-mod rig;
 pub mod segment;
+mod system;
 
 pub use base_motion::{BaseMotion, Drive};
 pub use contact::Wall;

@@ -1,4 +1,4 @@
-//! What the rig is made of, in SI units, validated once.
+//! What the system is made of, in SI units, validated once.
 
 use core::fmt;
 
@@ -26,7 +26,7 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// The dimensionless rig: `M = k = b = 1`, `m = epsilon`, `c = epsilon lambda`.
+    /// The dimensionless system: `M = k = b = 1`, `m = epsilon`, `c = epsilon lambda`.
     pub fn dimensionless(epsilon: f64, lambda: f64, restitution: f64) -> Self {
         Self {
             primary_mass: 1.0,

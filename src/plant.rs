@@ -8,8 +8,8 @@ use crate::base_motion::{BaseMotion, Drive};
 use crate::contact::{Touch, Wall};
 use crate::fast::{FastPath, Predictions};
 use crate::parameters::{InvalidValue, Parameters};
-pub use crate::rig::Contact;
-use crate::rig::{Masses, Moving, Rig};
+pub use crate::system::Contact;
+use crate::system::{Masses, Moving, System};
 
 /// Largest number of impacts per step.
 pub const MOST_IMPACTS: u64 = 10_000_000;
@@ -26,14 +26,14 @@ pub const MOST_EVALUATIONS: u64 = 500_000_000;
 )]
 pub struct Plant {
     pub(crate) moving: Moving,
-    pub(crate) record: Record,
+    pub(crate) status: Status,
     pub(crate) fast: FastPath,
 }
 
 /// State beside what moves.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Record {
+pub(crate) struct Status {
     /// What the particle is at rest on.
     pub contact: Option<Contact>,
     /// Whether the base has a position: the first drive sets it, later ones may make it jump.
@@ -49,15 +49,15 @@ impl Plant {
     /// Invalid parameters, a state that is not finite, a particle outside its cavity.
     pub fn new(parameters: Parameters, start: State) -> Result<Self, InvalidValue> {
         parameters.validate()?;
-        let rig = Rig::from(parameters);
+        let system = System::from(parameters);
         Ok(Self {
             moving: Moving {
-                rig,
-                masses: masses(&rig, start)?,
+                system,
+                masses: masses(&system, start)?,
                 base: BaseMotion::default(),
             },
-            record: Record::default(),
-            fast: FastPath::new(&rig),
+            status: Status::default(),
+            fast: FastPath::new(&system),
         })
     }
 
@@ -66,8 +66,8 @@ impl Plant {
     /// # Errors
     /// A state that is not finite, a particle outside its cavity; the plant stays as it is.
     pub fn set_state(&mut self, state: State) -> Result<(), InvalidValue> {
-        self.moving.masses = masses(&self.moving.rig, state)?;
-        self.record.contact = None;
+        self.moving.masses = masses(&self.moving.system, state)?;
+        self.status.contact = None;
         self.fast.state_changed(&self.moving.base);
         Ok(())
     }
@@ -79,7 +79,7 @@ impl Plant {
     pub fn begin(&mut self, drive: Drive) -> Result<(), InvalidValue> {
         drive.validate()?;
         self.moving.base.drive = drive;
-        self.record.begun = true;
+        self.status.begun = true;
         self.fast.state_changed(&self.moving.base);
         Ok(())
     }
@@ -88,7 +88,7 @@ impl Plant {
     /// the test oracle of the fast path.
     pub fn set_fast_path(&mut self, on: bool) {
         self.fast.state.disabled = !on;
-        self.fast.choose(&self.moving.rig);
+        self.fast.choose(&self.moving.system);
     }
 
     /// Changes the parameters from now on; displacements, velocities and totals stay. A change of masses or half-width has
@@ -98,25 +98,25 @@ impl Plant {
     /// Invalid parameters; the old ones stay.
     pub fn set_parameters(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
         parameters.validate()?;
-        self.moving.rig = Rig::from(parameters);
+        self.moving.system = System::from(parameters);
         self.fast.parameters_changed(&self.moving.base);
-        self.fast.choose(&self.moving.rig);
+        self.fast.choose(&self.moving.system);
         Ok(())
     }
 
     /// The parameters.
     pub fn parameters(&self) -> &Parameters {
-        &self.moving.rig.parameters
+        &self.moving.system.parameters
     }
 
     /// Time since the start, s, or as [`Self::set_time`] set it. Only impact times depend on it.
     pub fn time(&self) -> f64 {
-        self.record.time
+        self.status.time
     }
 
     /// Sets the clock, s: impact times refer to it.
     pub fn set_time(&mut self, time: f64) {
-        self.record.time = time;
+        self.status.time = time;
     }
 
     /// Positions and velocities now.
@@ -135,7 +135,7 @@ impl Plant {
     /// Relative displacement `w = q1 - q2`, m.
     #[inline]
     pub fn relative_displacement(&self) -> f64 {
-        self.moving.masses.w.value() + self.moving.rig.middle
+        self.moving.masses.w.value() + self.moving.system.middle
     }
 
     /// Relative velocity `w'`, m/s.
@@ -148,7 +148,7 @@ impl Plant {
     #[inline]
     pub fn centre(&self) -> f64 {
         let q1 = self.moving.masses.primary.values[0];
-        q1 + self.moving.rig.mass_ratio * (q1 - self.relative_displacement())
+        q1 + self.moving.system.mass_ratio * (q1 - self.relative_displacement())
     }
 
     /// The base motion now: drive, and the phase of its oscillator.
@@ -165,18 +165,18 @@ impl Plant {
 
     /// The wall the particle is stuck to, if it is.
     pub fn contact(&self) -> Option<Wall> {
-        self.record.contact.and_then(Contact::wall)
+        self.status.contact.and_then(Contact::wall)
     }
 
     /// Whether the particle sticks to the floor inside the cavity.
     pub fn sticks(&self) -> bool {
-        self.record.contact == Some(Contact::Floor)
+        self.status.contact == Some(Contact::Floor)
     }
 
     /// Constant accelerations of the particle now, m/s²: by gravity along the axis, and by kinetic friction while it slides.
     pub fn constant_accelerations(&self) -> (f64, f64) {
-        let forces = &self.moving.rig.forces;
-        let direction = if self.record.contact.is_some() {
+        let forces = &self.moving.system.forces;
+        let direction = if self.status.contact.is_some() {
             0.0
         } else {
             self.direction()
@@ -186,23 +186,23 @@ impl Plant {
 
     /// Totals since the start.
     pub fn totals(&self) -> &Totals {
-        &self.record.totals
+        &self.status.totals
     }
 
     /// Mechanical energy, J: of both masses' motion, of the spring between the primary mass and a base at `displacement`, m, and of the
     /// particle's weight on a tilted axis (0 at `q2 = 0`).
     pub fn energy(&self, displacement: f64) -> f64 {
-        let p = &self.moving.rig.parameters;
+        let p = &self.moving.system.parameters;
         let State { q1, dq1, q2, dq2 } = self.state();
         let stretch = q1 - displacement;
         0.5 * (p.primary_mass * dq1 * dq1 + p.particle_mass * dq2 * dq2 + p.stiffness * stretch * stretch)
-            - p.particle_mass * self.moving.rig.forces.gravity * q2
+            - p.particle_mass * self.moving.system.forces.gravity * q2
     }
 }
 
 /// The masses at `start`, checked.
-fn masses(rig: &Rig, start: State) -> Result<Masses, InvalidValue> {
-    let b = rig.half_width;
+fn masses(system: &System, start: State) -> Result<Masses, InvalidValue> {
+    let b = system.half_width;
     let finite = |name, value: f64, unit| {
         let allowed = "a finite number from -1e100 to 1e100";
         InvalidValue::unless(value.abs() <= 1e100, name, value, unit, allowed)
@@ -211,12 +211,12 @@ fn masses(rig: &Rig, start: State) -> Result<Masses, InvalidValue> {
     finite("der(q1) (velocity of the primary mass)", start.dq1, "m/s")?;
     finite("q2 (displacement of the particle)", start.q2, "m")?;
     finite("der(q2) (velocity of the particle)", start.dq2, "m/s")?;
-    let w = (start.q1 - start.q2) - rig.middle;
+    let w = (start.q1 - start.q2) - system.middle;
     // The difference of two displacements carries their rounding; a start on the wall means on the wall.
     let slack = 4.0 * f64::EPSILON * (b + start.q1.abs().max(start.q2.abs()));
     let name = "w = q1 - q2 (particle outside its cavity)";
     let allowed = "a number from -b_minus to b_plus, which are b unless set";
-    InvalidValue::unless(w.abs() <= b + slack, name, w + rig.middle, "m", allowed)?;
+    InvalidValue::unless(w.abs() <= b + slack, name, w + system.middle, "m", allowed)?;
     Ok(Masses {
         primary: Sums { values: [start.q1, start.dq1], errors: [0.0; 2] },
         w: Sum::from(w.clamp(-b, b)),
@@ -361,30 +361,30 @@ pub struct Saved {
     parameters: Parameters,
     masses: Masses,
     base: BaseMotion,
-    record: Record,
+    status: Status,
     fast: Predictions,
 }
 
 impl Plant {
     /// The plant without what can be computed again.
     pub fn save(&self) -> Saved {
-        let Moving { rig, masses, base } = self.moving;
-        let (parameters, fast) = (rig.parameters, self.fast.save());
-        Saved { parameters, masses, base, record: self.record, fast }
+        let Moving { system, masses, base } = self.moving;
+        let (parameters, fast) = (system.parameters, self.fast.save());
+        Saved { parameters, masses, base, status: self.status, fast }
     }
 
     /// Makes this plant the one that was saved. One plant can take the place of many in turn: what it has computed for the last one is
     /// used again as far as it serves.
     pub fn restore(&mut self, saved: &Saved) {
-        if self.moving.rig.parameters != saved.parameters {
-            let rig = Rig::from(saved.parameters);
-            if self.moving.rig.free != rig.free {
+        if self.moving.system.parameters != saved.parameters {
+            let system = System::from(saved.parameters);
+            if self.moving.system.free != system.free {
                 self.fast = FastPath::default();
             }
-            self.moving.rig = rig;
+            self.moving.system = system;
         }
-        (self.moving.masses, self.moving.base, self.record) = (saved.masses, saved.base, saved.record);
-        self.fast.restore(&saved.fast, &self.moving.rig);
+        (self.moving.masses, self.moving.base, self.status) = (saved.masses, saved.base, saved.status);
+        self.fast.restore(&saved.fast, &self.moving.system);
     }
 }
 
@@ -396,11 +396,11 @@ impl From<Plant> for Saved {
 
 impl From<&Saved> for Plant {
     fn from(saved: &Saved) -> Self {
-        let rig = Rig::from(saved.parameters);
+        let system = System::from(saved.parameters);
         let mut fast = FastPath::default();
-        fast.restore(&saved.fast, &rig);
-        let Saved { masses, base, record, .. } = *saved;
-        Self { moving: Moving { rig, masses, base }, record, fast }
+        fast.restore(&saved.fast, &system);
+        let Saved { masses, base, status, .. } = *saved;
+        Self { moving: Moving { system, masses, base }, status, fast }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Partial derivatives of what the master may ask for, and time derivatives of the outputs.
 
 use super::variables::Real;
-use super::{LoViNes, Progress, Rig};
+use super::{LoViNes, Progress, Simulation};
 use crate::model_exchange::equations::{Dual, Instant, Scalar};
 use crate::model_exchange::rates::Movement;
 use fmi2_component::{Causality, Key, Refusal};
@@ -84,9 +84,9 @@ impl LoViNes {
             Real::der_q2_start => Real::der_q2,
             other => other,
         };
-        let (now, integrated) = match &self.rig {
-            Rig::Steps(plant) => (self.instant(plant), false),
-            Rig::Equations(hybrid) => (hybrid.instant(), self.progress == Progress::UnderWay),
+        let (now, integrated) = match &self.simulation {
+            Simulation::Steps(plant) => (self.instant(plant), false),
+            Simulation::Equations(hybrid) => (hybrid.instant(), self.progress == Progress::UnderWay),
         };
         let reduced_are_states = match known {
             Real::u1 | Real::u2 => true,
@@ -122,7 +122,7 @@ impl LoViNes {
 
     /// The time derivative of an output at the end of the last step.
     pub(super) fn time_derivative(&self, variable: Real, order: u32) -> Result<f64, Refusal> {
-        let Rig::Steps(plant) = &self.rig else {
+        let Simulation::Steps(plant) = &self.simulation else {
             return Err(Refusal::error("output derivatives exist in co-simulation only"));
         };
         if order > MOST {

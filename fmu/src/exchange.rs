@@ -2,7 +2,7 @@
 
 use super::derivatives::of_instant;
 use super::variables::Real;
-use super::{LoViNes, Progress, Rig, log};
+use super::{LoViNes, Progress, Simulation, log};
 use crate::model_exchange::hybrid::Hybrid;
 use fmi2_component::{Discrete, Log, ModelExchange, Refusal};
 use lovines::{Drive, Parameters, State};
@@ -27,16 +27,16 @@ impl LoViNes {
     }
 
     fn hybrid(&self) -> &Hybrid {
-        match &self.rig {
-            Rig::Equations(hybrid) => hybrid,
-            Rig::Steps(_) => unreachable!("the shell asks this only after select"),
+        match &self.simulation {
+            Simulation::Equations(hybrid) => hybrid,
+            Simulation::Steps(_) => unreachable!("the shell asks this only after select"),
         }
     }
 
     fn hybrid_mut(&mut self) -> &mut Hybrid {
-        match &mut self.rig {
-            Rig::Equations(hybrid) => hybrid,
-            Rig::Steps(_) => unreachable!("the shell asks this only after select"),
+        match &mut self.simulation {
+            Simulation::Equations(hybrid) => hybrid,
+            Simulation::Steps(_) => unreachable!("the shell asks this only after select"),
         }
     }
 }
@@ -45,7 +45,7 @@ impl ModelExchange for LoViNes {
     fn select(&mut self) {
         let parameters = Parameters::dimensionless(1.0, 0.0, 1.0);
         let hybrid = Hybrid::new(parameters, State::default(), Drive::default());
-        self.rig = Rig::Equations(hybrid.expect("unit parameters make sense"));
+        self.simulation = Simulation::Equations(hybrid.expect("unit parameters make sense"));
     }
 
     fn set_state(&mut self, state: Real, value: f64) {

@@ -29,15 +29,15 @@ mod variables {
 
 fmi2_component::export!(LoViNes, model_exchange);
 
-/// What a master has set, and the rig made from it.
+/// What a master has set, and the simulation made from it.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct LoViNes {
-    rig: Rig,
+    simulation: Simulation,
     /// What moves the base; the derivatives of its signal hold for one step.
     drive: Drive,
     /// Whether an input was set since the last step: the inputs then determine the base, not the end of the step.
     inputs_set: bool,
-    /// Progress of the rig.
+    /// Progress of the simulation.
     progress: Progress,
     #[serde(skip)]
     outputs: Outputs,
@@ -59,10 +59,10 @@ fn unknown() -> Cell<f64> {
     Cell::new(f64::NAN)
 }
 
-/// The rig for the interface that the master has chosen.
+/// The simulation for the interface that the master has chosen.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 #[allow(clippy::large_enum_variant)] // one per instance; a pointer would cost time in every step
-enum Rig {
+enum Simulation {
     Steps(Plant),
     Equations(Hybrid),
 }
@@ -96,7 +96,7 @@ impl Component for LoViNes {
         let parameters = Parameters::dimensionless(1.0, 0.0, 1.0);
         let start = State::default();
         Self {
-            rig: Rig::Steps(Plant::new(parameters, start).expect("unit parameters make sense")),
+            simulation: Simulation::Steps(Plant::new(parameters, start).expect("unit parameters make sense")),
             drive: Drive::default(),
             inputs_set: false,
             progress: Progress::None,
@@ -134,9 +134,9 @@ impl Component for LoViNes {
     }
 
     fn get_integer(&self, variable: Integer) -> i32 {
-        let (totals, contact) = match &self.rig {
-            Rig::Steps(plant) => (*plant.totals(), plant.contact()),
-            Rig::Equations(hybrid) => (hybrid.totals(), hybrid.contact().and_then(Contact::wall)),
+        let (totals, contact) = match &self.simulation {
+            Simulation::Steps(plant) => (*plant.totals(), plant.contact()),
+            Simulation::Equations(hybrid) => (hybrid.totals(), hybrid.contact().and_then(Contact::wall)),
         };
         match variable {
             Integer::impacts => i32::try_from(totals.impacts).unwrap_or(i32::MAX),
@@ -163,14 +163,14 @@ impl Component for LoViNes {
     }
 
     fn initialise(&mut self, start_time: f64, _log: &Log) -> Result<(), Refusal> {
-        match &mut self.rig {
-            Rig::Steps(plant) => {
+        match &mut self.simulation {
+            Simulation::Steps(plant) => {
                 *plant = Plant::new(self.parameters, self.start)?;
                 Reach::of(&self.parameters).check(&self.start)?;
                 plant.set_time(start_time);
                 plant.begin(self.drive)?;
             }
-            Rig::Equations(hybrid) => {
+            Simulation::Equations(hybrid) => {
                 *hybrid = Hybrid::new(self.parameters, self.start, self.drive)?;
                 hybrid.time = start_time;
             }
@@ -187,7 +187,7 @@ impl Component for LoViNes {
 
     fn leave_initialization(&mut self) {
         // From now on the states of the integrator count, not the values that were set.
-        if matches!(self.rig, Rig::Equations(_)) {
+        if matches!(self.simulation, Simulation::Equations(_)) {
             self.progress = Progress::UnderWay;
         }
     }
@@ -202,7 +202,7 @@ impl Component for LoViNes {
 
     #[inline]
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
-        let Rig::Steps(plant) = &mut self.rig else {
+        let Simulation::Steps(plant) = &mut self.simulation else {
             return Err(Refusal::error("steps exist in co-simulation only"));
         };
         plant.set_time(time);

@@ -2,7 +2,7 @@
 
 use super::derivatives;
 use super::variables::Real;
-use super::{LoViNes, Progress, Rig};
+use super::{LoViNes, Progress, Simulation};
 use lovines::{BaseMotion, Plant};
 use std::cell::Cell;
 
@@ -61,7 +61,7 @@ impl LoViNes {
     /// Keeps what masters read after a step. Returns whether the rounding error of displacements is narrower than the cavity.
     #[inline]
     pub(super) fn keep_outputs(&mut self) -> bool {
-        let Rig::Steps(plant) = &self.rig else {
+        let Simulation::Steps(plant) = &self.simulation else {
             return false;
         };
         let (state, totals) = (plant.state(), plant.totals());
@@ -87,9 +87,9 @@ impl LoViNes {
     #[cold]
     #[inline(never)]
     pub(super) fn work_out(&self, variable: Real) -> f64 {
-        match &self.rig {
-            Rig::Steps(plant) => self.of_plant(plant, variable),
-            Rig::Equations(hybrid) => self.of_equations(hybrid, variable),
+        match &self.simulation {
+            Simulation::Steps(plant) => self.of_plant(plant, variable),
+            Simulation::Equations(hybrid) => self.of_equations(hybrid, variable),
         }
     }
 

@@ -3,7 +3,7 @@
 use super::outputs::Outputs;
 use super::reach::Reach;
 use super::variables::Real;
-use super::{LoViNes, Progress, Rig, unknown};
+use super::{LoViNes, Progress, Simulation, unknown};
 use fmi2_component::Refusal;
 use lovines::{Cavity, InvalidValue, Parameters, Restitution};
 
@@ -84,7 +84,7 @@ impl LoViNes {
         self.inputs_set = true;
         self.outputs.forget_base();
         self.longest = unknown();
-        if let Rig::Equations(hybrid) = &mut self.rig {
+        if let Simulation::Equations(hybrid) = &mut self.simulation {
             hybrid.drive = self.drive;
         }
     }
@@ -144,9 +144,9 @@ impl LoViNes {
     /// Passes changed parameters to the rig.
     pub(super) fn set_parameters(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
         if self.progress != Progress::None {
-            match &mut self.rig {
-                Rig::Steps(plant) => plant.set_parameters(parameters)?,
-                Rig::Equations(hybrid) => hybrid.set_parameters(parameters)?,
+            match &mut self.simulation {
+                Simulation::Steps(plant) => plant.set_parameters(parameters)?,
+                Simulation::Equations(hybrid) => hybrid.set_parameters(parameters)?,
             }
         }
         self.parameters = parameters;

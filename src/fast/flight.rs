@@ -1,12 +1,12 @@
 //! The next contact of a free flight: predicted, then verified.
 
-use super::propagator::{Coefficients, Increment, NEAR, Nearby, POINTS, Point, Propagator, STRETCH, TERMS, angle};
-use super::verify::{Horizon, Mark, Sample, Start};
+use super::propagator::{Coefficients, Increment, NEAR, Nearby, POINTS, PhasePoint, Propagator, STRETCH, TERMS, angle};
+use super::verify::{Horizon, Mark, RelativeMotion, Start};
 use super::{FastPath, Next};
 use crate::arithmetic::Sum;
 use crate::base_motion::BaseMotion;
 use crate::contact::Wall;
-use crate::rig::{Moving, Rig};
+use crate::system::{Moving, System};
 
 /// Largest displacements, in half-widths: the digits of `w` are those of `q1`.
 const WIDEST: f64 = 64.0;
@@ -14,7 +14,7 @@ const WIDEST: f64 = 64.0;
 const HEAVIEST: f64 = 6.0;
 
 /// What a flight leads to.
-pub(super) enum Found {
+pub(super) enum FlightEnd {
     /// A verified contact, within the step or beyond its end.
     Contact(Arrival),
     /// No contact for this time, s.
@@ -35,24 +35,24 @@ impl FastPath {
             return Next::Search(to_search.min(left));
         }
         let point = self.point(moving);
-        let (rig, base) = (&moving.rig, &moving.base);
-        let soon = left * rig.free.fastest.max(base.drive.omega.abs()) <= 1.0;
+        let (system, base) = (&moving.system, &moving.base);
+        let soon = left * system.free.fastest.max(base.drive.omega.abs()) <= 1.0;
         if left < self.state.contact_free.t || (soon && self.is_contact_free(moving, left)) {
             return self.coast(moving, &point, left, duration);
         }
-        if !applies(rig, base, &point) {
+        if !applies(system, base, &point) {
             return Next::Search(left);
         }
-        self.coefficients.prepare(&rig.free, base.drive.omega);
+        self.coefficients.prepare(&system.free, base.drive.omega);
         if let Some(next) = self.as_before(moving, &point, left, duration) {
             return next;
         }
         let mut start = Start::new(moving, point);
         let found = match out_of_reach(&self.coefficients, &start) {
-            Some(t) if t > self.coefficients.stretch => Found::Free(t),
+            Some(t) if t > self.coefficients.stretch => FlightEnd::Free(t),
             _ => {
                 start.here.sample.ddw = start.acceleration(&self.coefficients, &point);
-                let hop = self.hop(&start, left).map(Found::Contact);
+                let hop = self.hop(&start, left).map(FlightEnd::Contact);
                 hop.unwrap_or_else(|| self.march(&start, left, None))
             }
         };
@@ -62,18 +62,18 @@ impl FastPath {
     /// The contact within `left` seconds of a particle with a constant acceleration and friction in `direction`, if it certainly moves
     /// towards the wall ahead all the time: the plant has moved on to it.
     pub fn next_with_forces(&mut self, moving: &mut Moving, left: f64, direction: f64) -> Option<(Sum, Wall)> {
-        let (rig, base) = (&moving.rig, &moving.base);
+        let (system, base) = (&moving.system, &moving.base);
         let mut point = self.point(moving);
-        point.y -= rig.shift(-rig.friction(direction));
-        if self.state.disabled || !applies(rig, base, &point) {
+        point.y -= system.shift(-system.friction(direction));
+        if self.state.disabled || !applies(system, base, &point) {
             return None;
         }
-        self.coefficients.prepare(&rig.free, base.drive.omega);
-        let pull = rig.forces.gravity + rig.friction(direction);
+        self.coefficients.prepare(&system.free, base.drive.omega);
+        let pull = system.forces.gravity + system.friction(direction);
         let start = Start { pull, ..Start::new(moving, point) };
         self.evaluations += 1;
         let expected = (self.cache)
-            .expected(&self.state.sequence, &rig.free, &self.coefficients)
+            .expected(&self.state.sequence, &system.free, &self.coefficients)
             .and_then(|propagator| arrive::<true>(&self.coefficients, propagator, &start))
             .filter(|arrival| start.is_monotone(&start.here, arrival.t.value()));
         let Arrival { t, wall, added, angle } = match expected {
@@ -92,20 +92,20 @@ impl FastPath {
 
     /// Does what was found.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    fn take(&mut self, moving: &mut Moving, point: &Point, found: &Found, left: f64, duration: f64) -> Next {
+    fn take(&mut self, moving: &mut Moving, point: &PhasePoint, found: &FlightEnd, left: f64, duration: f64) -> Next {
         match found {
-            Found::Contact(arrival) => self.meet(moving, point, arrival, left, duration),
-            Found::Free(t) => {
+            FlightEnd::Contact(arrival) => self.meet(moving, point, arrival, left, duration),
+            FlightEnd::Free(t) => {
                 self.state.contact_free = Horizon::unchanged(*t);
                 self.coast(moving, point, t.min(left), duration)
             }
-            Found::Nothing => Next::Search(left),
+            FlightEnd::Nothing => Next::Search(left),
         }
     }
 
     /// Moves on to a verified contact, or to the end of the step before it.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    fn meet(&mut self, moving: &mut Moving, point: &Point, arrival: &Arrival, left: f64, duration: f64) -> Next {
+    fn meet(&mut self, moving: &mut Moving, point: &PhasePoint, arrival: &Arrival, left: f64, duration: f64) -> Next {
         let t = arrival.t.value();
         if t > left {
             self.state.contact_free = Horizon::unchanged(t);
@@ -119,8 +119,8 @@ impl FastPath {
 
     /// The flight that followed the last one before, or the end of a step that did, if it lies ahead again.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    fn as_before(&mut self, moving: &mut Moving, point: &Point, left: f64, duration: f64) -> Option<Next> {
-        let propagator = (self.cache).expected(&self.state.sequence, &moving.rig.free, &self.coefficients)?;
+    fn as_before(&mut self, moving: &mut Moving, point: &PhasePoint, left: f64, duration: f64) -> Option<Next> {
+        let propagator = (self.cache).expected(&self.state.sequence, &moving.system.free, &self.coefficients)?;
         self.evaluations += 1;
         let mut start = Start::new(moving, *point);
         let drive = &start.base.drive;
@@ -129,7 +129,7 @@ impl FastPath {
             let increment = propagator.increment(drive.amplitude, point);
             let increment = Nearby::<4>::new(&self.coefficients, drive.amplitude, point, &increment).at(h);
             let w = start.here.sample.w + (increment.y + start.drift * left);
-            if w.abs() >= start.rig.half_width || !start.is_monotone(&start.here, left) {
+            if w.abs() >= start.system.half_width || !start.is_monotone(&start.here, left) {
                 return None;
             }
             let angle = propagator.angle.plus(self.coefficients.omega * h);
@@ -150,10 +150,10 @@ impl FastPath {
 
 /// Whether the motion is such that bounds can verify anything, and displacements such that `w` has all its digits.
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
-    let oscillator = &rig.free;
+fn applies(system: &System, base: &BaseMotion, point: &PhasePoint) -> bool {
+    let oscillator = &system.free;
     let [offset, slope, ..] = base.drive.signal;
-    let widest = WIDEST * rig.half_width;
+    let widest = WIDEST * system.half_width;
     let fastest = widest * oscillator.omega0;
     base.drive.is_straight()
         && base.drive.omega >= 0.0
@@ -167,17 +167,17 @@ fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
 /// That displacement is at most the amplitude of the steady response and that of the free motion, which never grows.
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn out_of_reach(coefficients: &Coefficients, start: &Start) -> Option<f64> {
-    let (b, here) = (start.rig.half_width, &start.here);
+    let (b, here) = (start.system.half_width, &start.here);
     let steady = coefficients.forcing.steady()? * start.base.drive.amplitude;
     let particle = here.point.y - here.sample.w;
     let room = b * (1.0 - 1e-9) - particle.abs() - steady.l1_norm();
     if room <= 0.0 || start.base.drive.signal[1] != 0.0 {
         return None;
     }
-    let Point { y, dy, phasor: (cos, sin) } = here.point;
+    let PhasePoint { y, dy, phasor: (cos, sin) } = here.point;
     let y = y - (steady.re * sin + steady.im * cos);
     let dy = dy - coefficients.omega * (steady.re * cos - steady.im * sin);
-    let omega0 = start.rig.free.omega0;
+    let omega0 = start.system.free.omega0;
     let room = room - (y * y + (dy / omega0) * (dy / omega0)).sqrt();
     (room > 0.0).then(|| room / start.drift.abs())
 }
@@ -195,14 +195,14 @@ impl FastPath {
     /// The return to the wall that the particle has just left, if it is a short hop that ends within `left` seconds.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn hop(&mut self, start: &Start, left: f64) -> Option<Arrival> {
-        let (here, b) = (&start.here.sample, start.rig.half_width);
+        let (here, b) = (&start.here.sample, start.system.half_width);
         if here.w.abs() != b {
             return None;
         }
         let s = 1f64.copysign(here.w);
         let (speed, pressing) = (-s * here.dw, s * here.ddw);
         let about = 2.0 * speed / pressing;
-        let fastest = (start.rig.free.fastest).max(start.base.drive.omega.abs());
+        let fastest = (start.system.free.fastest).max(start.base.drive.omega.abs());
         let short = speed > 0.0
             && pressing > 0.0
             && about * fastest <= LONGEST
@@ -249,7 +249,7 @@ impl FastPath {
     /// Marches over the flight until a contact is found or `left` seconds are over. Where a stretch cannot be verified, it is
     /// halved, down to [`SHORTEST`].
     #[inline(never)]
-    pub(super) fn march(&mut self, start: &Start, left: f64, predicted: Option<&Arrival>) -> Found {
+    pub(super) fn march(&mut self, start: &Start, left: f64, predicted: Option<&Arrival>) -> FlightEnd {
         let mut from = start.here;
         // Points of the grid in the next stretch.
         let mut n = STRETCH;
@@ -259,13 +259,13 @@ impl FastPath {
                 && arrival.t.value() - from.t <= LONGEST_STRETCH * self.coefficients.stretch
                 && arrival.is_first(start, &self.coefficients, &from)
             {
-                return Found::Contact(*arrival);
+                return FlightEnd::Contact(*arrival);
             }
             // The start of a predicted flight has been tried.
             if (predicted.is_none() || from.t > 0.0)
                 && let Some(arrival) = self.rest(start, &from)
             {
-                return Found::Contact(arrival);
+                return FlightEnd::Contact(arrival);
             }
             let to = self.mark(start, &from, n);
             let found = match stretch(start, &from, &to) {
@@ -282,7 +282,7 @@ impl FastPath {
                 Stretch::Unknown => None,
             };
             match found {
-                Some(arrival) => return Found::Contact(arrival),
+                Some(arrival) => return FlightEnd::Contact(arrival),
                 None if n > SHORTEST && divided < MOST_DIVIDED => {
                     n /= 2;
                     divided += 1;
@@ -292,10 +292,10 @@ impl FastPath {
                     self.state.to_search = self.coefficients.stretch;
                     break;
                 }
-                None => return Found::Nothing,
+                None => return FlightEnd::Nothing,
             }
         }
-        Found::Free(from.t)
+        FlightEnd::Free(from.t)
     }
 
     /// The contact after a mark, if it is near and the particle certainly drifts towards it all the time.
@@ -303,7 +303,7 @@ impl FastPath {
     fn rest(&mut self, start: &Start, from: &Mark) -> Option<Arrival> {
         let wall = Wall::ahead(start.drift);
         // If the primary mass stood still.
-        let t = (wall.sign() * start.rig.half_width - from.sample.w) / start.drift;
+        let t = (wall.sign() * start.system.half_width - from.sample.w) / start.drift;
         if t > self.coefficients.span || !start.is_monotone(from, from.t + t) {
             return None;
         }
@@ -324,7 +324,7 @@ impl FastPath {
         let increment = match n {
             0 => Increment { y: 0.0, dy: 0.0, phasor: from.point.phasor },
             _ => (self.cache.grid)
-                .over(&start.rig.free, coefficients, n)
+                .over(&start.system.free, coefficients, n)
                 .increment(amplitude, &from.point),
         };
         (
@@ -354,7 +354,7 @@ impl FastPath {
     pub(super) fn mark(&mut self, start: &Start, from: &Mark, n: usize) -> Mark {
         self.evaluations += 1;
         self.state.rotations += 1;
-        let propagator = (self.cache.grid).over(&start.rig.free, &self.coefficients, n);
+        let propagator = (self.cache.grid).over(&start.system.free, &self.coefficients, n);
         let increment = propagator.increment(start.base.drive.amplitude, &from.point);
         start.mark(&self.coefficients, increment.to(&from.point), from.t + propagator.t)
     }
@@ -363,7 +363,7 @@ impl FastPath {
 /// What happens between two marks.
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn stretch(start: &Start, from: &Mark, to: &Mark) -> Stretch {
-    let (b, t) = (start.rig.half_width, to.t - from.t);
+    let (b, t) = (start.system.half_width, to.t - from.t);
     if to.sample.w.abs() < b {
         return if start.is_open(from, &to.sample, to.t) {
             Stretch::Open
@@ -372,7 +372,7 @@ fn stretch(start: &Start, from: &Mark, to: &Mark) -> Stretch {
         };
     }
     let wall = Wall::ahead(to.sample.w);
-    let shape = |Sample { w, dw, ddw }: Sample| [w, dw * t, ddw * (t * t / 2.0)];
+    let shape = |RelativeMotion { w, dw, ddw }: RelativeMotion| [w, dw * t, ddw * (t * t / 2.0)];
     match crossing(wall.sign() * b, shape(from.sample), shape(to.sample)) {
         Some(part) => Stretch::Contact(from.t + part * t, wall),
         None => Stretch::Unknown,
@@ -429,8 +429,8 @@ impl Arrival {
     #[inline(always)]
     pub fn is_first(&self, start: &Start, coefficients: &Coefficients, from: &Mark) -> bool {
         let there = self.added.to(&start.here.point);
-        let sample = Sample {
-            w: self.wall.sign() * start.rig.half_width,
+        let sample = RelativeMotion {
+            w: self.wall.sign() * start.system.half_width,
             dw: start.here.sample.dw + self.added.dy,
             ddw: start.acceleration(coefficients, &there),
         };
@@ -453,7 +453,7 @@ pub(super) fn arrive<const FORCED: bool>(
     let drift = |rate: f64| if FORCED { start.drift - rate * t } else { start.drift };
     let w = here.sample.w + (increment.y + drift(half) * t);
     let slowness = 1.0 / (here.point.dy + increment.dy + drift(start.pull));
-    let first = (wall.sign() * start.rig.half_width - w) * slowness;
+    let first = (wall.sign() * start.system.half_width - w) * slowness;
     // Not a number where the approach has no speed.
     let close = first.abs() < coefficients.near;
     if !close {
@@ -491,7 +491,7 @@ impl FastPath {
     /// one point of the grid to a nearer one.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn arrive_after(&mut self, start: &Start, from: &Mark, mut t: f64, wall: Wall) -> Option<Arrival> {
-        let ahead = wall.sign() * start.rig.half_width - from.sample.w;
+        let ahead = wall.sign() * start.system.half_width - from.sample.w;
         for _ in 0..MOST_POINTS {
             let (at, nearby) = self.near_point(start, from, t);
             let (elapsed, half) = (at - from.t, 0.5 * start.pull);
@@ -538,7 +538,7 @@ impl FastPath {
             if error <= ENOUGH * (at - from.t + h) && step.abs() <= SHORT * self.coefficients.reach {
                 let phasor = nearby.phasor(h + step);
                 let (y, dy) = (there.y + (h * nearby.dy + deviation), nearby.dy + gained);
-                let ddw = start.acceleration(&self.coefficients, &Point { y: from.point.y + y, dy, phasor });
+                let ddw = start.acceleration(&self.coefficients, &PhasePoint { y: from.point.y + y, dy, phasor });
                 let added = Increment {
                     y: (from.point.y - start.here.point.y) + (y + step * (dy + 0.5 * step * ddw)),
                     dy: (from.point.dy - start.here.point.dy)

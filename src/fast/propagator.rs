@@ -9,7 +9,7 @@ use num_complex::Complex64;
 
 /// Where the motion stands, relative to the line that follows the base signal.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Point {
+pub(super) struct PhasePoint {
     /// Displacement, m.
     pub y: f64,
     /// Velocity, m/s.
@@ -29,8 +29,8 @@ pub(super) struct Increment {
 impl Increment {
     /// Where it leads.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub fn to(&self, start: &Point) -> Point {
-        Point {
+    pub fn to(&self, start: &PhasePoint) -> PhasePoint {
+        PhasePoint {
             y: start.y + self.y,
             dy: start.dy + self.dy,
             phasor: self.phasor,
@@ -120,7 +120,7 @@ impl Propagator {
 
     /// What the propagator adds to `start`.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub fn increment(&self, amplitude: f64, start: &Point) -> Increment {
+    pub fn increment(&self, amplitude: f64, start: &PhasePoint) -> Increment {
         let (head, tail) = &self.free;
         let (y, dy) = head.of(start.y, start.dy);
         let (more_y, more_dy) = tail.of(start.y, start.dy);
@@ -146,7 +146,7 @@ pub(super) struct Nearby<const N: usize> {
 
 impl<const N: usize> Nearby<N> {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub fn new(coefficients: &Coefficients, amplitude: f64, start: &Point, there: &Increment) -> Self {
+    pub fn new(coefficients: &Coefficients, amplitude: f64, start: &PhasePoint, there: &Increment) -> Self {
         let (f, df) = coefficients.forcing_at(there.phasor);
         let (f, df) = (amplitude * f, amplitude * df);
         let (y, dy) = (start.y + there.y, start.dy + there.dy);
@@ -419,7 +419,7 @@ impl ShortStep {
 
     /// What one step adds to `start` while the signal is a straight line.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub fn increment(&self, response: &StepResponse, amplitude: f64, start: &Point) -> Increment {
+    pub fn increment(&self, response: &StepResponse, amplitude: f64, start: &PhasePoint) -> Increment {
         let (head, tail) = &self.free;
         let (y, dy) = head.of(start.y, start.dy);
         let (more_y, more_dy) = tail.of(start.y, start.dy);
@@ -554,7 +554,7 @@ mod tests {
                 let drive = Drive { signal: [0.3, -0.2, 0.1, 0.7], ..Drive::harmonic(0.4, omega) };
                 let base = BaseMotion { drive, ..BaseMotion::default() };
                 let [x, v, ..] = Segment::new(&oscillator, base, (0.7, -0.4)).derivatives(t);
-                let start = Point { y: 0.7 - 0.3, dy: -0.4 + 0.2, phasor: (1.0, 0.0) };
+                let start = PhasePoint { y: 0.7 - 0.3, dy: -0.4 + 0.2, phasor: (1.0, 0.0) };
                 let response = step.response(&oscillator, omega);
                 let mut increment = step.increment(&response, drive.amplitude, &start);
                 increment.bend(drive.signal, &step);

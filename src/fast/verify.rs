@@ -8,17 +8,17 @@
 //!
 //! Taylor's theorem with Lagrange's remainder then bounds each gap from below (R. E. Moore, "Interval Analysis", Prentice-Hall 1966).
 
-use super::propagator::{Coefficients, Point};
+use super::propagator::{Coefficients, PhasePoint};
 use crate::base_motion::{BaseMotion, Drive};
 use crate::oscillator::Oscillator;
-use crate::rig::{Moving, Rig};
+use crate::system::{Moving, System};
 
 /// Rounding error of a gap, in half-widths, and of a bound, relative.
 pub(super) const ROUNDING: f64 = 1e-14;
 
 /// Relative motion at an instant.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sample {
+pub(super) struct RelativeMotion {
     /// `w`, m; `w'`, m/s; `w''`, m/s².
     pub w: f64,
     pub dw: f64,
@@ -49,11 +49,11 @@ pub(super) fn forcing(oscillator: &Oscillator, drive: &Drive, t: f64) -> f64 {
 
 /// `R²` at an instant, (m/s)².
 #[inline(always)]
-pub(super) fn speed_squared(oscillator: &Oscillator, at: &Point) -> f64 {
+pub(super) fn speed_squared(oscillator: &Oscillator, at: &PhasePoint) -> f64 {
     at.dy * at.dy + oscillator.omega0_squared * (at.y * at.y)
 }
 
-impl Sample {
+impl RelativeMotion {
     /// Whether `|w| < b` up to time `t`, but for a start at a wall, for any motion with `|w'''| <= jerk`.
     ///
     /// The remainder `jerk h³/6` is at most `(jerk t/3) h²/2`, so that parabolas bound the gap to either wall from below. A concave one is
@@ -77,14 +77,14 @@ impl Sample {
 pub(super) struct Mark {
     /// Time since the start of the flight, s: an exact multiple of the spacing.
     pub t: f64,
-    pub point: Point,
-    pub sample: Sample,
+    pub point: PhasePoint,
+    pub sample: RelativeMotion,
 }
 
 /// The start of a flight, while the base signal is a straight line.
 #[derive(Clone, Copy)]
 pub(super) struct Start<'a> {
-    pub rig: &'a Rig,
+    pub system: &'a System,
     pub base: &'a BaseMotion,
     pub here: Mark,
     /// Velocity of the base's line less that of the particle, m/s.
@@ -95,11 +95,11 @@ pub(super) struct Start<'a> {
 
 impl<'a> Start<'a> {
     #[inline(always)]
-    pub fn new(moving: &'a Moving, point: Point) -> Self {
-        let Moving { rig, masses, base } = moving;
-        let sample = Sample { w: masses.w.value(), dw: masses.dw, ddw: 0.0 };
+    pub fn new(moving: &'a Moving, point: PhasePoint) -> Self {
+        let Moving { system, masses, base } = moving;
+        let sample = RelativeMotion { w: masses.w.value(), dw: masses.dw, ddw: 0.0 };
         Self {
-            rig,
+            system,
             base,
             here: Mark { t: 0.0, point, sample },
             drift: base.drive.signal[1] - masses.particle,
@@ -109,9 +109,9 @@ impl<'a> Start<'a> {
 
     /// The motion at a point of the flight, `t` seconds on.
     #[inline(always)]
-    pub fn mark(&self, coefficients: &Coefficients, point: Point, t: f64) -> Mark {
+    pub fn mark(&self, coefficients: &Coefficients, point: PhasePoint, t: f64) -> Mark {
         let here = &self.here;
-        let sample = Sample {
+        let sample = RelativeMotion {
             w: here.sample.w + ((point.y - here.point.y) + self.drift * t),
             dw: point.dy + self.drift,
             ddw: self.acceleration(coefficients, &point),
@@ -121,8 +121,8 @@ impl<'a> Start<'a> {
 
     /// Relative acceleration at a point of the flight, m/s².
     #[inline(always)]
-    pub fn acceleration(&self, coefficients: &Coefficients, point: &Point) -> f64 {
-        let oscillator = &self.rig.free;
+    pub fn acceleration(&self, coefficients: &Coefficients, point: &PhasePoint) -> f64 {
+        let oscillator = &self.system.free;
         let (f, _) = coefficients.forcing_at(point.phasor);
         self.base.drive.amplitude * f - (oscillator.omega0_squared * point.y + 2.0 * oscillator.delta * point.dy)
     }
@@ -131,7 +131,7 @@ impl<'a> Start<'a> {
     /// Then the wall ahead is met once, and the other one is left behind.
     #[inline(always)]
     pub fn is_monotone(&self, from: &Mark, t: f64) -> bool {
-        let (oscillator, drive, t) = (&self.rig.free, &self.base.drive, t - from.t);
+        let (oscillator, drive, t) = (&self.system.free, &self.base.drive, t - from.t);
         let slowed = if self.pull == 0.0 { 0.0 } else { self.pull.abs() * t };
         let spare = (self.drift.abs() - slowed) - harmonic_forcing(oscillator, drive) * t;
         spare > 0.0 && spare * spare * (1.0 - 1e-9) > speed_squared(oscillator, &from.point)
@@ -140,20 +140,20 @@ impl<'a> Start<'a> {
     /// `|w'''|` is at most this for `t` seconds after a mark, m/s³.
     #[inline(always)]
     pub fn jerk(&self, from: &Mark, t: f64) -> f64 {
-        let Oscillator { delta, omega0_squared, omega0, .. } = self.rig.free;
+        let Oscillator { delta, omega0_squared, omega0, .. } = self.system.free;
         let damping = 2.0 * delta;
-        let forcing = harmonic_forcing(&self.rig.free, &self.base.drive);
-        let speed = speed_squared(&self.rig.free, &from.point).sqrt() + forcing * t;
+        let forcing = harmonic_forcing(&self.system.free, &self.base.drive);
+        let speed = speed_squared(&self.system.free, &from.point).sqrt() + forcing * t;
         let acceleration = (omega0 + damping) * speed + forcing;
         damping * acceleration + omega0_squared * speed + self.base.drive.omega.abs() * forcing
     }
 
     /// Whether both walls are certainly not met between a mark and a sample at the time `t`, but for a contact at that time.
     #[inline(always)]
-    pub fn is_open(&self, from: &Mark, to: &Sample, t: f64) -> bool {
+    pub fn is_open(&self, from: &Mark, to: &RelativeMotion, t: f64) -> bool {
         let t = t - from.t;
-        let (b, jerk, half) = (self.rig.half_width, self.jerk(from, t), 0.5 * t);
-        let backwards = Sample { dw: -to.dw, ..*to };
+        let (b, jerk, half) = (self.system.half_width, self.jerk(from, t), 0.5 * t);
+        let backwards = RelativeMotion { dw: -to.dw, ..*to };
         t > 0.0 && from.sample.is_open(b, jerk, half) && backwards.is_open(b, jerk, half)
     }
 }
@@ -190,13 +190,13 @@ impl Horizon {
     }
 
     /// What a bound from the start alone shows: no contact for `t` seconds or more, or nothing.
-    pub(super) fn ahead(moving: &Moving, start: &Point, t: f64) -> Self {
-        let Moving { rig, masses, base } = moving;
-        let (b, w, dw, reach) = (rig.half_width, masses.w.value(), masses.dw, AHEAD * t);
-        let forcing = forcing(&rig.free, &base.drive, reach) * (1.0 + MARGIN);
-        let speed = speed_squared(&rig.free, start).sqrt() + forcing * reach;
+    pub(super) fn ahead(moving: &Moving, start: &PhasePoint, t: f64) -> Self {
+        let Moving { system, masses, base } = moving;
+        let (b, w, dw, reach) = (system.half_width, masses.w.value(), masses.dw, AHEAD * t);
+        let forcing = forcing(&system.free, &base.drive, reach) * (1.0 + MARGIN);
+        let speed = speed_squared(&system.free, start).sqrt() + forcing * reach;
         let jumps = MARGIN * speed;
-        let acceleration = (rig.free.omega0 + 2.0 * rig.free.delta) * (speed + jumps) + forcing;
+        let acceleration = (system.free.omega0 + 2.0 * system.free.delta) * (speed + jumps) + forcing;
         // The bound of the gap to either wall is concave: it is above 0 in between if it is at the end.
         let open = |t: f64| {
             let (moved, lost) = (dw * t, t * (jumps + 0.5 * acceleration * t));
@@ -242,7 +242,7 @@ mod tests {
         fn a_sample_verified_as_open_is_open(
             w in -1.0..=1.0f64, dw in -2.0..2.0f64, ddw in -3.0..3.0f64, jerk in 0.0..2.0f64, t in 0.01..3.0f64,
         ) {
-            let open = Sample { w, dw, ddw }.is_open(1.0, jerk, t);
+            let open = RelativeMotion { w, dw, ddw }.is_open(1.0, jerk, t);
             let farthest = (1..=400).map(|n| {
                 let h = t * f64::from(n) / 400.0;
                 (w + h * (dw + 0.5 * h * ddw)).abs() + jerk * h * h * h / 6.0
@@ -252,13 +252,13 @@ mod tests {
 
         #[test]
         fn a_clear_sample_is_verified(w in -0.5..0.5f64, dw in -0.2..0.2f64, ddw in -0.1..0.1f64) {
-            let open = Sample { w, dw, ddw }.is_open(1.0, 0.1, 1.0);
+            let open = RelativeMotion { w, dw, ddw }.is_open(1.0, 0.1, 1.0);
             prop_assert!(open);
         }
 
         #[test]
         fn a_start_on_a_wall_is_open_only_if_it_leaves(dw in -2.0..2.0f64) {
-            let open = Sample { w: 1.0, dw, ddw: 0.0 }.is_open(1.0, 1e-3, 0.1);
+            let open = RelativeMotion { w: 1.0, dw, ddw: 0.0 }.is_open(1.0, 1e-3, 0.1);
             prop_assert_eq!(open, dw < -1e-5);
         }
     }

@@ -10,7 +10,7 @@
 pub(crate) const DERIVATIVES: usize = 3;
 
 /// A communication point: its time, s, and the value set there.
-type Point = (f64, f64);
+type CommunicationPoint = (f64, f64);
 
 /// A value with the coefficients of its Taylor polynomial, as the master has set it, and those before.
 #[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
@@ -22,7 +22,7 @@ pub(crate) struct InputSignal {
     /// Whether the master has given derivatives for the step to come, be they zero.
     given: bool,
     /// The last communication points before this one, the latest first.
-    before: [Option<Point>; 2],
+    before: [Option<CommunicationPoint>; 2],
 }
 
 impl InputSignal {
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     /// A channel that has read these values at these times.
-    fn read(points: &[Point]) -> InputSignal {
+    fn read(points: &[CommunicationPoint]) -> InputSignal {
         let mut signal = InputSignal::default();
         for &(time, value) in points {
             signal.value = value;

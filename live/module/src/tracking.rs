@@ -13,7 +13,7 @@ use crate::rig::NoisyRig;
 
 /// A point of the tracked backbone, dimensionless.
 #[derive(Debug, Clone, Copy)]
-pub struct Point {
+pub struct BackbonePoint {
     /// Number of the sample after which the point is known.
     pub sample: u64,
     /// Frequency of the drive at that sample, rad/s, which the bench repeats.
@@ -33,7 +33,7 @@ pub struct Tracking {
     /// Moves with their phase targets (rad) and the sample before which each is made, in reverse.
     moves: Vec<(u64, Move, f64)>,
     /// All points, also those that are not yet reached.
-    pub points: Vec<Point>,
+    pub points: Vec<BackbonePoint>,
 }
 
 impl Tracking {
@@ -90,7 +90,7 @@ pub fn track(scene: &Scene, rig: &NoisyRig, lock: PhaseLock, state: State, sampl
     let tracked = backbone::track(&mut rig.clone(), &mut controller, scene, |_, _| begun.push(last.get()))?;
     let ends = begun.into_iter().skip(1).chain([last.get()]);
     let points = tracked.points.iter().zip(ends);
-    let points = points.map(|(point, (sample, omega))| Point {
+    let points = points.map(|(point, (sample, omega))| BackbonePoint {
         sample,
         omega,
         sigma: point.at.sigma,

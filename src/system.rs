@@ -1,4 +1,4 @@
-//! Coefficients of a rig, and what moves in it.
+//! Coefficients of a system, and what moves in it.
 
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::{BaseMotion, Drive};
@@ -9,7 +9,7 @@ use crate::parameters::Parameters;
 
 /// The parameters and what follows from them.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rig {
+pub(crate) struct System {
     pub parameters: Parameters,
     pub mass_ratio: f64,
     /// Half the distance between the walls, m.
@@ -29,7 +29,7 @@ pub(crate) struct Rig {
     pub stuck: Oscillator,
 }
 
-impl From<Parameters> for Rig {
+impl From<Parameters> for System {
     fn from(p: Parameters) -> Self {
         let total = p.primary_mass + p.particle_mass;
         let ([plus, minus], rebound, forces) = (p.gaps(), Rebound::new(&p), Forces::new(&p));
@@ -50,7 +50,7 @@ impl From<Parameters> for Rig {
     }
 }
 
-impl Rig {
+impl System {
     /// Acceleration of the particle by kinetic friction while `w'` has the sign `direction`, m/s².
     pub fn friction(&self, direction: f64) -> f64 {
         self.forces.kinetic * direction
@@ -118,10 +118,10 @@ impl Masses {
     }
 }
 
-/// The parts of a plant that move, and the rig.
+/// The parts of a plant that move, and the system.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moving {
-    pub rig: Rig,
+    pub system: System,
     pub masses: Masses,
     pub base: BaseMotion,
 }
