@@ -4,7 +4,7 @@ use crate::amplitude_loop::{AmplitudeLoop, AmplitudeState, Move};
 use crate::config::{Config, ConfigError};
 use crate::drive::{DriveGenerator, DriveState, PresentDrive};
 use crate::loop_filter::{Frequency, LoopFilter};
-use crate::oscillator::Oscillator;
+use crate::oscillator::PhaseAccumulator;
 use crate::real::consts::FRAC_PI_2;
 use crate::real::{Real, limited};
 use crate::sensing::{Channels, Measurement, Sensing};
@@ -28,7 +28,7 @@ pub struct PhaseLock {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct State {
-    oscillator: Oscillator,
+    oscillator: PhaseAccumulator,
     channels: Channels,
     frequency: Frequency,
     drive: DriveState,

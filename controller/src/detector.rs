@@ -128,7 +128,7 @@ impl PhaseDetector {
 #[cfg(not(feature = "f32"))]
 mod tests {
     use super::*;
-    use crate::oscillator::Oscillator;
+    use crate::oscillator::PhaseAccumulator;
 
     /// A detector of bandwidth 0.1 for a frequency near 1.
     fn detector(detector: Detector, sample_time: f64) -> PhaseDetector {
@@ -140,7 +140,7 @@ mod tests {
         let (omega, sample_time) = (1.0, core::f64::consts::TAU / 100.3);
         let detector = detector(method, sample_time);
         let mut estimate = Estimate::default();
-        let mut oscillator = Oscillator::default();
+        let mut oscillator = PhaseAccumulator::default();
         let mut worst = 0.0_f64;
         for n in 0..10_000 {
             let rotor = oscillator.rotor();
@@ -184,7 +184,7 @@ mod tests {
         let detector = detector(Detector::Adaptive, 0.06);
         let mut estimate = Estimate::default();
         assert_eq!(estimate.coherence(), 0.0);
-        let mut oscillator = Oscillator::default();
+        let mut oscillator = PhaseAccumulator::default();
         for _ in 0..5_000 {
             let rotor = oscillator.rotor();
             detector.update(&mut estimate, rotor.im, &detector.rotors(rotor));

@@ -58,11 +58,11 @@ impl Complex {
 /// causes no rounding error however long the run is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Oscillator {
+pub struct PhaseAccumulator {
     turns: Sum,
 }
 
-impl Oscillator {
+impl PhaseAccumulator {
     /// `exp(i phase)`.
     pub fn rotor(self) -> Complex {
         Complex::of_turns(self.turns.get())
@@ -86,7 +86,7 @@ mod tests {
 
     #[test]
     fn a_million_binary_steps_return_to_exactly_zero() {
-        let mut oscillator = Oscillator::default();
+        let mut oscillator = PhaseAccumulator::default();
         let step = TAU / 128.0;
         let wraps = (0..1 << 20).filter(|_| oscillator.advance(step, 1.0)).count();
         assert_eq!(wraps, 1 << 13);

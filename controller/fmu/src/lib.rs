@@ -17,11 +17,11 @@ mod variables {
     include!(concat!(env!("OUT_DIR"), "/variables.rs"));
 }
 
-fmi2_component::export!(Controller);
+fmi2_component::export!(SampledController);
 
 /// Values set by the master, and the controller made from them.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
-struct Controller {
+struct SampledController {
     config: Config,
     response: InputSignal,
     reference: InputSignal,
@@ -74,7 +74,7 @@ const LONGEST_STEP: f64 = 2.0;
 /// Largest number of samples per step: a few seconds of computing time.
 const MAX_SAMPLES: f64 = 1e7;
 
-impl Controller {
+impl SampledController {
     /// The value of a parameter or of an output; 0 for an output without a value.
     fn value(&self, variable: impl Key) -> Value {
         let name = variable.variable().name;
@@ -106,7 +106,7 @@ impl Controller {
     }
 }
 
-impl Component for Controller {
+impl Component for SampledController {
     type Model = Model;
 
     fn new() -> Self {
