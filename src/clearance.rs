@@ -23,7 +23,7 @@ pub struct Gap {
     pub jerk: f64,
 }
 
-/// Bounds of the derivatives of the gaps over the next so many seconds, given the derivatives of the motion now.
+/// Bounds of the derivatives of the gaps over a `window` from now, s, given those of the motion now.
 pub trait Bounds {
     /// A bound of the third derivative.
     fn third(&self, d: &Derivatives, window: f64) -> f64;

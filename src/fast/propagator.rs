@@ -289,7 +289,7 @@ impl Coefficients {
     }
 }
 
-/// The first so many bits of a number after its first one.
+/// `x` with only the first `bits` bits of its mantissa.
 fn leading_bits(x: f64, bits: u32) -> f64 {
     f64::from_bits(x.to_bits() & (u64::MAX << (52 - bits)))
 }

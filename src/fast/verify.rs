@@ -166,7 +166,7 @@ impl<'a> Start<'a> {
 // do. A bound with a margin for both remains true until the margin is used up. A drive that changes at every sample, as a phase-locked
 // loop changes it, therefore asks for no new bound.
 
-/// Contact is looked for so many steps ahead.
+/// Steps ahead of the present one within which contact is looked for.
 const AHEAD: f64 = 32.0;
 /// Margins, as parts of `F` and of `R`.
 const MARGIN: f64 = 1.0 / 16.0;
