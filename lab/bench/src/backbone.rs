@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use vines_model::numerics::{Estimate, RANDOM};
 
-use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stage};
+use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Plan, Search, Stage};
 use crate::identification::{
     Balance, Cycle, Regime, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
 };
@@ -222,6 +222,8 @@ type Held = [f64; 3];
 const FIRST: usize = 24;
 /// Largest additional drive of a move, as a share of the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
+/// Periods after which a point is taken, settled or not.
+const LONGEST: usize = 150;
 /// Shortest duration of a move, periods.
 const MOVE: f64 = 4.0;
 /// Largest relative difference of the response from its level that counts as reached.
@@ -263,7 +265,7 @@ pub fn track_into(
     progress: impl FnMut(usize, usize),
 ) -> Result<Tracked, ExperimentError> {
     experiment::holds_a_phase(scene)?;
-    let limit = (scene.lock_periods() * scene.controller.samples_per_period) as usize;
+    let limit = Plan::of(scene).lock;
     let mut quiet = |_, _| {};
     let mut tracker = Tracker {
         run: experiment::ControlLoop::new(rig, controller, scene, samples, limit, &mut quiet),
@@ -327,7 +329,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
 
     /// Goes to a level, m, and holds it until the point has settled, or for the longest time allowed.
     fn hold(&mut self, level: f64) -> Result<LevelPoint, ExperimentError> {
-        let (start, settings) = (self.run.periods, &self.scene.backbone);
+        let start = self.run.periods;
         let (to, periods) = self.step(level);
         self.run.controller.hold_response(to, self.target)?;
         self.run.samples.clear();
@@ -349,7 +351,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
                 estimate.is_some_and(|estimate| criterion.is_met(&estimate) && is_reached(estimate.response, level));
             // The halves of a transient can agree by chance.
             confirmed = if is_met { confirmed + 1 } else { 0 };
-            if cycles.len() >= settings.dwell_max as usize || confirmed >= CONFIRMED {
+            if cycles.len() >= LONGEST || confirmed >= CONFIRMED {
                 break estimate;
             }
         };

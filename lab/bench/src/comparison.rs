@@ -8,7 +8,7 @@ use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow, free_sigma, reson
 
 use crate::backbone::{LevelPoint, Tracked};
 use crate::experiment::Plan;
-use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime, decay_points};
+use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime, WINDOW, decay_points};
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Drive, Rig, Simulated};
 use crate::scene::{Dimensionless, Scene};
@@ -364,7 +364,7 @@ fn predicted(orbit: &Orbit, scene: &Scene) -> Vec<[f64; 3]> {
         released: 1,
         held: false,
     };
-    let points = decay_points(&record, scene).points;
+    let points = decay_points(&record, scene, WINDOW).points;
     points.iter().map(|one| [one.c, one.sigma, one.rate]).collect()
 }
 

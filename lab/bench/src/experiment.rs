@@ -40,7 +40,7 @@ impl<'a> Plan<'a> {
         Self {
             scene,
             sample_time,
-            lock: samples(scene.lock_periods()),
+            lock: (scene.lock_time() / sample_time).round() as usize,
             hold: samples(scene.record.hold_periods),
             decay: samples(decay_periods(scene)),
         }
@@ -113,7 +113,7 @@ pub enum ExperimentError {
     Controller(#[from] ControllerError),
     #[error(
         "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s; \
-         see record.lock_periods and the [controller] section",
+         see phase_lock.acquire_timeout and the [controller] section",
         phase_in_words(*phase_error)
     )]
     NoLock {

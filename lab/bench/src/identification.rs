@@ -15,7 +15,7 @@ use crate::scene::{Dimensionless, LinearResponse, Scene};
 
 pub use balance::{Balance, Cycle, Slopes};
 pub(crate) use decay::PER_PERIOD;
-pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, decay_points, harmonic};
+pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
 pub(crate) use response::{ASYMMETRIC, without_tones};
 pub use response::{Tone, classify, foreign_tone, impacts, regime_by_response};
 pub use vines_model::regime::{Impact, Regime};
@@ -34,8 +34,8 @@ pub enum IdentificationError {
     )]
     NoMotion,
     #[error(
-        "the phase was {error:.3} ± {uncertainty:.3} degrees off its target while the lock was held; controller.phase_tolerance allows \
-         {tolerance} degrees. A channel may have become late: `vines check` measures its delay"
+        "the phase was {error:.3} ± {uncertainty:.3} degrees off its target while the lock was held; phase_lock.lock.phase_tolerance allows \
+         {tolerance:.3} degrees. A channel may have become late: `vines check` measures its delay"
     )]
     OffTarget {
         error: f64,
@@ -77,7 +77,7 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
     }
     on_target(&lock, scene)?;
     sensors_after_release(record, scene)?;
-    let decay = decay_points(record, scene);
+    let decay = decay_points(record, scene, WINDOW);
     Ok(Identification { parameters, lock, decay })
 }
 
@@ -336,7 +336,8 @@ const STEPS: f64 = 8.0;
 
 /// Refuses a lock whose phase is farther from its target than the tolerance of the lock.
 fn on_target(lock: &Lock, scene: &Scene) -> Result<(), IdentificationError> {
-    let (error, tolerance) = (lock.at.phase_error_deg, scene.controller.phase_tolerance);
+    let tolerance = scene.controller_config().lock.phase_tolerance.to_degrees();
+    let error = lock.at.phase_error_deg;
     if error.abs() <= tolerance + SIGNIFICANT * lock.at.u_phase_deg {
         return Ok(());
     }

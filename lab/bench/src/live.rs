@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use vines_model::regime::{Impact, MEASURED, Regime, end_of_synchrony, one_to_one};
 
 use crate::experiment::DECAYED;
-use crate::identification::{PER_PERIOD, harmonic};
+use crate::identification::{PER_PERIOD, WINDOW, harmonic};
 
 /// Impacts that are kept to determine the regime from.
 const KEPT: usize = 40;
@@ -94,15 +94,15 @@ impl Decay {
         }
     }
 
-    /// A sample without a drive: response, m, and speed of the particle, m/s. The window has `periods` periods.
-    pub fn sample(&mut self, response: f64, speed: f64, sample_time: f64, periods: f64) {
+    /// A sample without a drive: response, m, and speed of the particle, m/s.
+    pub fn sample(&mut self, response: f64, speed: f64, sample_time: f64) {
         // A plant that has not been driven yet has no decay.
         if self.motion.omega == 0.0 || self.ended {
             return;
         }
         if self.window == 0 {
             let period = TAU / self.motion.omega / sample_time;
-            self.window = (periods * period).round() as usize + 1;
+            self.window = (WINDOW * period).round() as usize + 1;
             self.stride = ((period / PER_PERIOD).round() as usize).max(1);
             self.synchronous = true;
         }

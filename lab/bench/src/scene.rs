@@ -235,7 +235,7 @@ impl Sections {
         };
         scene.controller.check()?;
         scene.backbone.check()?;
-        scene.record.check(&scene.controller, scene.lock_periods())?;
+        scene.record.check(&scene)?;
         scene.chain.check(&scene.controller)?;
         if scene.resonance.reference == Reference::Force && !scene.chain.reference {
             let message = "resonance.reference = \"force\" with chain.reference = false: the force k e + c e' follows from the base \
@@ -483,14 +483,10 @@ fn serialize<S: Serializer>(plant: &Parameters, serializer: S) -> Result<S::Ok, 
 settings! {
     /// Durations of an experiment.
     pub struct RecordSettings {
-        /// Time limit for the lock, natural periods; by default at least 3000, and 20 relaxation times.
-        lock_periods: Option<f64> = None,
         /// How long the settled lock is held and measured, natural periods.
         hold_periods: f64 = 20.0,
         /// Length of the recorded decay, natural periods; by default as long as the linear response takes to fall to 5 %.
         decay_periods: Option<f64> = None,
-        /// Window of the fit along the decay, periods of the motion.
-        window_periods: f64 = 2.5,
     }
 }
 
@@ -498,24 +494,15 @@ settings! {
 const MOST_SAMPLES: f64 = 2e7;
 
 impl RecordSettings {
-    /// `lock_periods` is the time limit for the lock, as set or by default.
-    fn check(&self, controller: &ControllerSettings, lock_periods: f64) -> Result<(), SceneError> {
+    fn check(&self, scene: &Scene) -> Result<(), SceneError> {
         let unit = "(natural periods)";
-        positive("record.lock_periods", lock_periods, unit)?;
         // At least enough to count impacts and measure.
         within("record.hold_periods", self.hold_periods, unit, [3.0, 1e6])?;
         positive("record.decay_periods", self.decay_periods.unwrap_or(1.0), unit)?;
-        let longest = self.decay_periods.unwrap_or(1000.0);
-        within(
-            "record.window_periods",
-            self.window_periods,
-            "(periods)",
-            [0.5, longest],
-        )?;
-        let samples =
-            controller.samples_per_period * (lock_periods + self.hold_periods + self.decay_periods.unwrap_or(0.0));
+        let periods = self.hold_periods + self.decay_periods.unwrap_or(0.0);
+        let samples = scene.lock_time() / scene.sample_time() + scene.controller.samples_per_period * periods;
         check(
-            "samples_per_period times all periods of [record]",
+            "samples of phase_lock.acquire_timeout and of all periods of [record]",
             samples,
             "samples",
             samples <= MOST_SAMPLES,
@@ -608,5 +595,21 @@ fn plain(message: &str) -> String {
         ("expected a map", "expected a table"),
     ];
     let replace = |text: String, (from, to)| text.replace(from, to);
-    words.into_iter().fold(message.trim().to_string(), replace)
+    let plain = words.into_iter().fold(message.trim().to_string(), replace);
+    let former = FORMER
+        .iter()
+        .find(|(key, _)| message.contains(&format!("unknown field `{key}`")));
+    former.map_or(plain.clone(), |(key, now)| format!("{plain}; `{key}` is now {now}"))
 }
+
+/// Keys of former scenes, and what has taken their place.
+const FORMER: [(&str, &str); 8] = [
+    ("phase_tolerance", "phase_lock.lock.phase_tolerance, rad"),
+    ("frequency_tolerance", "phase_lock.lock.frequency_drift"),
+    ("amplitude_tolerance", "phase_lock.lock.amplitude_drift"),
+    ("delay", "phase_lock.delay, s"),
+    ("lock_periods", "phase_lock.acquire_timeout, s"),
+    ("G_max", "phase_lock.amplitude_max, m"),
+    ("dwell_max", "always 150 periods"),
+    ("window_periods", "always 2.5 periods"),
+];

@@ -14,7 +14,7 @@ use vines_testbench::backbone::{LevelPoint, track};
 use vines_testbench::comparison::COMPARED_ABOVE;
 use vines_testbench::experiment::{ExperimentError, Plan, run};
 use vines_testbench::identification::{
-    Lock, Regime, ResonancePoint, decay_points, foreign_tone, identify, regime_by_response,
+    Lock, Regime, ResonancePoint, WINDOW, decay_points, foreign_tone, identify, regime_by_response,
 };
 use vines_testbench::loop_check::check;
 use vines_testbench::record::{Record, Sample};
@@ -77,7 +77,7 @@ fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most_and_six_bits_s
 #[test]
 fn a_delay_that_nobody_compensates_is_seen_and_one_common_to_both_sensors_is_not() {
     let ideal = at(&[]).unwrap();
-    let late = at(&["chain.delay=1", "chain.reference=false", "controller.delay=0"]).unwrap();
+    let late = at(&["chain.delay=1", "chain.reference=false", "phase_lock.delay=0"]).unwrap();
     assert!((late.sigma - ideal.sigma + 0.078).abs() < 0.005);
     let both = at(&["chain.delay=1"]).unwrap();
     assert!((both.sigma - ideal.sigma).abs() < 1e-6);
@@ -140,7 +140,7 @@ fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04
     });
     let (clean, scene, truth) = &decays[0];
     let rms = |record: &Record| {
-        let points = decay_points(record, scene).points;
+        let points = decay_points(record, scene, WINDOW).points;
         let above = points.iter().filter(|point| point.c > COMPARED_ABOVE);
         let errors = above.filter_map(|point| Some(point.sigma - common::at(truth, point.tau)?));
         let errors: Vec<f64> = errors.collect();
@@ -150,7 +150,7 @@ fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04
     let [fit, through_noise] = [rms(clean), rms(&noisy(clean, 40.0, 1))];
     assert!(fit <= 0.02 && through_noise <= 0.04);
     // The zero crossings that the fit is compared with do not depend on the sample time.
-    let fitted = decay_points(clean, scene).points;
+    let fitted = decay_points(clean, scene, WINDOW).points;
     let last = fitted.iter().rfind(|point| point.c > COMPARED_ABOVE).unwrap().tau;
     let above = truth.iter().filter(|[tau, _]| *tau < last);
     let errors = above.filter_map(|[tau, sigma]| Some(sigma - common::at(&decays[1].2, *tau)?));

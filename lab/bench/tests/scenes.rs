@@ -80,6 +80,10 @@ fn an_unknown_key_is_named_with_those_allowed() {
         &["--set plant.mass=1", "`mass`", "`M`", "`r`"],
     );
     says(&complaint(paper(&["plants.r=1"])), &["`plants`", "`plant`", "`record`"]);
+    says(
+        &complaint(paper(&["record.lock_periods=5"])),
+        &["`hold_periods`", "`lock_periods` is now phase_lock.acquire_timeout, s"],
+    );
     let result = Scene::parse("my.toml", "[plant]\nM = 1\nkk = 2\n", &[]);
     says(&complaint(result), &["my.toml", "line 3", "`kk`", "`k`"]);
 }
@@ -241,7 +245,10 @@ fn a_record_too_long_for_the_memory_counts_the_default_time_limit_of_the_lock() 
     ]));
     says(
         &message,
-        &["samples_per_period times all periods", "at most 20 million"],
+        &[
+            "phase_lock.acquire_timeout and of all periods of [record]",
+            "at most 20 million",
+        ],
     );
 }
 
@@ -283,6 +290,7 @@ fn every_parameter_of_the_controller_has_exactly_one_key_of_the_scene() {
             ("bandwidth", _) => "0.12".into(),
             ("amplitude", _) => "1.2".into(),
             ("acquire_timeout", _) => "2500".into(),
+            ("lock.phase_tolerance", _) => "0.1".into(),
             ("lock.unlock_tolerance" | "lock.coherence_min" | "lock.response_min", _) => "0.3".into(),
             _ => "3.5".to_owned(),
         };

@@ -217,8 +217,7 @@ impl View {
         }
         self.particle(&sample);
         let speed = ground_truth.map_or(f64::NAN, |truth| truth.particle_velocity.abs());
-        self.fit
-            .sample(sensors.response, speed, step, self.scene.record.window_periods);
+        self.fit.sample(sensors.response, speed, step);
         self.fit.watch(&self.impacts, self.phase);
         let mut motion = self.fit.motion;
         if driven {

@@ -48,8 +48,8 @@ fn identified(settings: &[&str]) -> Comparison {
 #[test]
 fn a_longer_wait_brings_the_lock_closer_to_the_exact_orbit() {
     let strict = [
-        "controller.amplitude_tolerance=1e-7",
-        "controller.frequency_tolerance=1e-6",
+        "phase_lock.lock.amplitude_drift=3.8e-9",
+        "phase_lock.lock.frequency_drift=4.5e-10",
     ];
     let found = identified(&strict);
     let exact = found.exact.unwrap();
@@ -158,7 +158,7 @@ fn the_decay_of_the_exact_plant_predicts_the_measured_one_a_hundred_times_better
 
 #[test]
 fn a_decay_too_short_for_points_keeps_the_lock_and_says_that_the_record_ended() {
-    let found = identified(&["record.decay_periods=1", "record.window_periods=1"]);
+    let found = identified(&["record.decay_periods=1"]);
     assert!(found.decay.is_empty() && found.exact.is_some());
     assert_eq!(found.decay_end, DecayEnd::Record);
     assert!(vines::report::summary::identification(&found).contains("no points"));
@@ -305,7 +305,7 @@ fn a_sensor_of_two_bits_has_no_phase_rather_than_a_phase_error_of_zero() {
         "chain.adc_bits=2",
         "phase_lock.signal_timeout='none'",
         "phase_lock.residual_max='none'",
-        "record.lock_periods=5",
+        "phase_lock.acquire_timeout=31.4",
     ]);
     let plant = Simulated::new(scene.plant, scene.start).unwrap();
     let mut rig = Chain::around(Box::new(plant), &scene);
@@ -355,11 +355,7 @@ impl Controller for OpenLoop {
 
 #[test]
 fn an_experiment_takes_any_controller_and_records_every_stage() {
-    let scene = scene(&[
-        "record.hold_periods=3",
-        "record.decay_periods=2",
-        "record.window_periods=1.5",
-    ]);
+    let scene = scene(&["record.hold_periods=3", "record.decay_periods=2"]);
     let mut rig = plant(&scene);
     let drive = Drive { omega: 1.0, amplitude: 0.01, displacement: 0.0 };
     let record = run(&mut rig, &mut OpenLoop(drive), &scene).unwrap();

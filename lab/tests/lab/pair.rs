@@ -175,7 +175,7 @@ fn fmus_with_other_names_and_units_without_an_oscillator_and_without_settled_loc
 
 #[test]
 fn a_controller_without_the_output_of_its_phase_error_is_not_said_to_measure_none() {
-    let set = ["record.lock_periods=5"].map(|one| one.parse().unwrap());
+    let set = ["phase_lock.acquire_timeout=0.6"].map(|one| one.parse().unwrap());
     let scene = Scene::load(None, &set).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = |name| folder.path().join(name);

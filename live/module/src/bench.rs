@@ -176,8 +176,7 @@ impl Bench {
             speed: self.rig.plant.state().dq2.abs(),
         };
         if drive.amplitude == 0.0 {
-            self.decay
-                .sample(sensors.response, motion.speed, step, self.scene.record.window_periods);
+            self.decay.sample(sensors.response, motion.speed, step);
             self.decay.watch(&self.impacts, self.phase);
             motion = self.decay.motion;
         } else {

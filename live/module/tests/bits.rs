@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use vines_live::bench::{Bench, regime_at};
 use vines_live::settings::{default_scene, index, settings_of};
 use vines_testbench::experiment::{Plan, run};
-use vines_testbench::identification::decay_points;
+use vines_testbench::identification::{WINDOW, decay_points};
 use vines_testbench::live::Motion;
 use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
@@ -55,7 +55,7 @@ fn the_free_decay_has_the_bits_of_the_lab() {
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
     let mut controller = ConstantDrive(BuiltIn::new(&scene.controller_config()).unwrap());
     let record = run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap();
-    let points = decay_points(&record, &scene).points;
+    let points = decay_points(&record, &scene, WINDOW).points;
     assert!(points.len() > 50, "{} points", points.len());
     let mut bench = Bench::new(Bench::default_settings()).unwrap();
     bench.run(record.released, |_| {}).unwrap();

@@ -15,11 +15,6 @@ settings! {
         c_to: f64 = 0.14,
         /// Number of levels, at equal distances.
         points: u32 = 29,
-        /// Largest drive allowed, base amplitude over `b epsilon`.
-        #[serde(rename = "G_max")]
-        g_max: f64 = 4.0,
-        /// Periods after which a point is taken, settled or not.
-        dwell_max: u32 = 150,
         /// Largest standard uncertainty of the drive E as a share of it, and of the frequency as a share of the half-power bandwidth of a linear rig
         /// that this drive holds at the largest level: `omega0 E/A`. Noise and transients lengthen the dwell until both are reached.
         precision: f64 = 9e-4,
@@ -30,11 +25,8 @@ impl BackboneSettings {
     pub(super) fn check(&self) -> Result<(), SceneError> {
         positive("backbone.C_from", self.c_from, "(over b)")?;
         positive("backbone.C_to", self.c_to, "(over b)")?;
-        positive("backbone.G_max", self.g_max, "(over b epsilon)")?;
         positive("backbone.precision", self.precision, "(relative)")?;
-        within("backbone.points", self.points.into(), "(levels)", [1.0, 1e4])?;
-        // Two halves of four periods.
-        within("backbone.dwell_max", self.dwell_max.into(), "(periods)", [8.0, 1e4])
+        within("backbone.points", self.points.into(), "(levels)", [1.0, 1e4])
     }
 
     /// The levels, amplitudes of the response in m, for the half-width `b`, m, in the order in which they are visited.

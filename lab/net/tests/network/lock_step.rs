@@ -15,7 +15,7 @@ use crate::{drive, scene, serve_built_in, serve_rig, service, shake};
 #[test]
 fn an_experiment_across_the_network_gives_the_same_bits_also_with_held_samples() {
     for settings in [
-        &["controller.amplitude_tolerance=8e-3", "controller.bandwidth=0.3"],
+        &["phase_lock.lock.amplitude_drift=3e-4", "controller.bandwidth=0.3"],
         &["chain.hold=true", "chain.dac_bits=12"],
     ] {
         let scene = scene(&[&settings[..], &["record.decay_periods=150"]].concat());
