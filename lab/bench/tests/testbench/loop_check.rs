@@ -1,17 +1,16 @@
 //! Guards the verdicts of the loop check, on random rigs, healthy and with faults, and what it measures; `studies/check.rs` takes more rigs.
 
-#[path = "../../../studies/common.rs"]
-mod common;
-
-use common::{checked_faults, checked_rig, uniform};
 use lovines::State;
-use vines_testbench::loop_check::{Verdict, check};
-use vines_testbench::rig::{Chain, Drive, Rig, RigError, Sensors, Simulated, faulty};
+use vines_testbench::loop_check::{LoopCheck, Verdict, check};
+use vines_testbench::rig::{Chain, Drive, Rig, RigError, RigFault, RigStage, SensorFault, Simulated, faulty};
 use vines_testbench::scene::Scene;
+
+use super::common::{checked_faults, checked_rig, uniform};
+use super::paper;
 
 /// The default scene with these settings, at rest.
 fn at_rest(settings: &[&str]) -> Scene {
-    common::scene("", &[settings, &["start.dq2=0"]].concat()).unwrap()
+    paper(&[settings, &["start.dq2=0"]].concat())
 }
 
 #[test]
@@ -43,13 +42,9 @@ fn healthy_rigs_pass_and_faults_are_named() {
     }
 }
 
-/// A rig between whose sensors, drive and clock and the bench something is wrong.
+/// A rig whose drive and clock are not those of the bench.
 struct Altered {
     plant: Box<dyn Rig>,
-    factors: [f64; 2],
-    /// Delays of the channels, samples, and their readings, the latest last.
-    late: [usize; 2],
-    past: Vec<Sensors>,
     clock: f64,
     /// Drive from elsewhere, m.
     hum: f64,
@@ -58,34 +53,9 @@ struct Altered {
     turns: f64,
 }
 
-impl Altered {
-    fn new(plant: Box<dyn Rig>) -> Self {
-        Self {
-            plant,
-            factors: [1.0; 2],
-            late: [0; 2],
-            past: Vec::new(),
-            clock: 1.0,
-            hum: 0.0,
-            largest: 0.0,
-            turns: 0.0,
-        }
-    }
-}
-
-impl Rig for Altered {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.past.push(self.plant.sense()?);
-        // Before the first reading, the rig rests.
-        let still = Sensors { response: 0.0, reference: Some(0.0) };
-        let ago = |samples: usize| {
-            let index = self.past.len().checked_sub(samples + 1);
-            index.map_or(still, |index| self.past[index])
-        };
-        Ok(Sensors {
-            response: self.factors[0] * ago(self.late[0]).response,
-            reference: ago(self.late[1]).reference.map(|base| self.factors[1] * base),
-        })
+impl RigStage for Altered {
+    fn inner(&mut self) -> &mut dyn Rig {
+        &mut *self.plant
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
@@ -96,11 +66,17 @@ impl Rig for Altered {
     }
 }
 
+/// The check of the rig of a scene with another clock and a drive from elsewhere, m.
+fn altered(scene: &Scene, clock: f64, hum: f64) -> (LoopCheck, Altered) {
+    let plant = Simulated::of(scene).unwrap();
+    let mut rig = Altered { plant, clock, hum, largest: 0.0, turns: 0.0 };
+    (check(&mut rig, scene).unwrap(), rig)
+}
+
 #[test]
 fn the_check_drives_at_a_hundredth_and_ends_at_the_phase_where_it_began() {
     let scene = at_rest(&[]);
-    let mut rig = Altered::new(Simulated::of(&scene).unwrap());
-    let found = check(&mut rig, &scene).unwrap();
+    let (found, rig) = altered(&scene, 1.0, 0.0);
     assert_eq!(found.verdict, Verdict::Healthy);
     assert!(rig.largest <= 0.01 * scene.amplitude * (1.0 + 1e-12));
     assert!((rig.turns - rig.turns.round()).abs() < 1e-9, "{}", rig.turns);
@@ -111,55 +87,22 @@ fn the_check_drives_at_a_hundredth_and_ends_at_the_phase_where_it_began() {
 fn a_rig_that_moves_before_the_drive_comes_to_rest_first_or_is_named() {
     let mut scene = at_rest(&[]);
     let b = scene.plant.half_width;
-    for (start, hum, expected) in [
-        (State { dq1: 0.05, ..State::default() }, 0.0, Verdict::Healthy),
-        (State { dq1: 0.05, ..State::default() }, 1e-5, Verdict::NotAtRest),
-        // A particle beside the middle is an offset.
-        (State { q2: 0.95 * b, ..State::default() }, 0.0, Verdict::Healthy),
-        (
-            State { q2: -0.5 * b, dq2: 0.005, ..State::default() },
-            0.0,
-            Verdict::Healthy,
-        ),
+    // A particle beside the middle is an offset.
+    for (dq1, q2, dq2, hum, expected) in [
+        (0.05, 0.0, 0.0, 0.0, Verdict::Healthy),
+        (0.05, 0.0, 0.0, 1e-5, Verdict::NotAtRest),
+        (0.0, 0.95 * b, 0.0, 0.0, Verdict::Healthy),
+        (0.0, -0.5 * b, 0.005, 0.0, Verdict::Healthy),
     ] {
-        scene.start = start;
-        let mut rig = Altered { hum, ..Altered::new(Simulated::of(&scene).unwrap()) };
-        let found = check(&mut rig, &scene).unwrap();
-        assert_eq!(found.verdict, expected, "{start:?}, {hum}: {found:?}");
-    }
-}
-
-#[test]
-fn a_delay_of_both_channels_cancels_and_is_healthy() {
-    let scene = at_rest(&[]);
-    // From 40 on, the phase alone looks like the opposite sign.
-    for delay in [16, 30, 40, 44, 48] {
-        let mut rig = Altered {
-            late: [delay; 2],
-            ..Altered::new(Simulated::of(&scene).unwrap())
-        };
-        let found = check(&mut rig, &scene).unwrap();
-        assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
-        assert!((found.base.unwrap().delay - delay as f64).abs() < 0.5, "{found:?}");
+        scene.start = State { dq1, q2, dq2, ..State::default() };
+        let (found, _) = altered(&scene, 1.0, hum);
+        assert_eq!(found.verdict, expected, "{:?}, {hum}: {found:?}", scene.start);
     }
 }
 
 #[test]
 fn what_would_falsify_a_measurement_is_refused_with_and_without_noise() {
-    type Alter = fn(&mut Altered);
-    let cases: [(Alter, Verdict); 11] = [
-        (|_| {}, Verdict::Healthy),
-        (|rig| rig.factors[0] = 2.0, Verdict::ResponseGain),
-        (|rig| rig.factors[0] = 0.9, Verdict::ResponseGain),
-        (|rig| rig.factors[1] = 2.0, Verdict::BaseGain),
-        (|rig| rig.factors[1] = 1.1, Verdict::BaseGain),
-        (|rig| rig.late = [3, 0], Verdict::ResponseLate),
-        (|rig| rig.late = [0, 3], Verdict::BaseLate),
-        (|rig| rig.late = [1, 0], Verdict::ResponseLate),
-        (|rig| rig.late = [5, 5], Verdict::Healthy),
-        (|rig| rig.clock = 1.01, Verdict::Clock),
-        (|rig| rig.clock = 0.99, Verdict::Clock),
-    ];
+    use {RigFault::*, SensorFault::*};
     for settings in [
         &[][..],
         &["chain.snr=40"],
@@ -167,12 +110,30 @@ fn what_would_falsify_a_measurement_is_refused_with_and_without_noise() {
         &["resonance.reference='force'"],
     ] {
         let scene = at_rest(settings);
-        for (alter, expected) in cases {
-            let mut rig = Altered::new(Simulated::of(&scene).unwrap());
-            alter(&mut rig);
-            let found = check(&mut rig, &scene).unwrap();
+        for (clock, expected) in [(1.0, Verdict::Healthy), (1.01, Verdict::Clock), (0.99, Verdict::Clock)] {
+            let (found, _) = altered(&scene, clock, 0.0);
             assert_eq!(found.verdict, expected, "{settings:?}: {found:?}");
         }
+        for (fault, expected) in [
+            (Response(Gain(2.0)), Verdict::ResponseGain),
+            (Response(Gain(0.9)), Verdict::ResponseGain),
+            (Base(Gain(2.0)), Verdict::BaseGain),
+            (Base(Gain(1.1)), Verdict::BaseGain),
+            (Response(Late(3)), Verdict::ResponseLate),
+            (Base(Late(3)), Verdict::BaseLate),
+            (Response(Late(1)), Verdict::ResponseLate),
+            (Both(Late(5)), Verdict::Healthy),
+        ] {
+            let found = check(&mut faulty(&scene, fault, 0.0, |_| {}).unwrap(), &scene).unwrap();
+            assert_eq!(found.verdict, expected, "{settings:?}, {fault:?}: {found:?}");
+        }
+    }
+    // A delay of both channels cancels; from 40 on, the phase alone looks like the opposite sign.
+    let scene = at_rest(&[]);
+    for delay in [16, 30, 40, 44, 48] {
+        let found = check(&mut faulty(&scene, Both(Late(delay)), 0.0, |_| {}).unwrap(), &scene).unwrap();
+        assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+        assert!((found.base.unwrap().delay - delay as f64).abs() < 0.5, "{found:?}");
     }
 }
 
@@ -187,13 +148,8 @@ fn natural_frequency_and_damping_of_the_rig_replace_those_of_the_scene() {
         let rig = Simulated::new(plant, scene.start).unwrap();
         let found = check(&mut *Chain::around(Box::new(rig), &scene), &scene).unwrap();
         assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
-        let differ: Vec<&str> = found
-            .quantities
-            .iter()
-            .filter(|one| one.differs())
-            .map(|one| one.name)
-            .collect();
-        assert_eq!(differ, ["natural frequency", "damping rate"]);
+        let differ = found.quantities.iter().filter(|one| one.differs()).map(|one| one.name);
+        assert!(differ.eq(["natural frequency", "damping rate"]));
         let linear = found.linear.unwrap();
         let (omega0, damping) = (plant.natural_frequency(), 0.5 * plant.damping / plant.primary_mass);
         // Clean, the fit is exact but for rounding.

@@ -1,14 +1,10 @@
 //! Guards that every fault of a rig, of its connection and of a controller ends the run with a drive of zero, and how soon, and that a record with
 //! a fault which no longer matters to the drive is refused; `studies/faults.rs` takes more instants.
 
-#[path = "../../../studies/common.rs"]
-mod common;
-
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 
-use vines_testbench::backbone::{Tracked, track};
 use vines_testbench::experiment::{self, ExperimentError, Plan};
 use vines_testbench::identification::{IdentificationError, identify};
 use vines_testbench::record::Record;
@@ -16,26 +12,9 @@ use vines_testbench::rig::{
     BuiltIn, Command, Controller, ControllerError, Drive, Rig, RigError, RigFault, SensorFault, Sensors, Simulated,
     faulty,
 };
-use vines_testbench::scene::{LinearResponse, Scene};
+use vines_testbench::scene::Scene;
 
-/// The default scene with these settings, and a linear response as a loop check finds it.
-fn scene(settings: &[&str]) -> Scene {
-    let mut scene = common::scene("", settings).unwrap();
-    scene.measured = Some(LinearResponse::of(&scene));
-    scene
-}
-
-/// The record of an experiment.
-fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
-    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-    experiment::run(rig, &mut controller, &Plan::of(scene), |_, _, _| {})
-}
-
-/// The tracked backbone.
-fn tracked(rig: &mut dyn Rig, scene: &Scene) -> Result<Tracked, ExperimentError> {
-    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
-    track(rig, &mut controller, scene, |_, _| {})
-}
+use super::{checked as scene, record, tracked};
 
 /// Time from a fault to a drive of zero, s, and whether the run ended early.
 fn injected(scene: &Scene, fault: RigFault, seconds: f64, tracks: bool) -> (Option<f64>, bool) {
@@ -55,11 +34,10 @@ fn injected(scene: &Scene, fault: RigFault, seconds: f64, tracks: bool) -> (Opti
 /// seconds and the ramp.
 fn inject(settings: &[&str], instants: usize, limit: f64) {
     let scene = scene(&[settings, &["phase_lock.release_rate=4.1e-4", "record.decay_periods=6"]].concat());
-    let healthy = || Simulated::of(&scene).unwrap();
-    let record = record(&mut *healthy(), &scene).unwrap();
+    let record = healthy(&scene);
     let (step, period) = (record.sample_time, scene.dimensionless().natural_period());
     let [settled, released] = [record.settled, record.released].map(|sample| sample as f64 * step);
-    let tracked = tracked(&mut *healthy(), &scene).unwrap();
+    let tracked = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
     let tracking = (tracked.periods_to_lock + 40.0) * period;
     let config = scene.controller_config();
     let ramp = config
@@ -95,46 +73,35 @@ fn every_fault_switches_the_drive_off_within_its_ramp() {
 
 #[test]
 fn every_fault_is_found_through_noise_and_12_bits() {
-    inject(
-        &["chain.snr=40", "chain.adc_bits=12", "phase_lock.ramp_rate=1.6e-3"],
-        1,
-        0.07,
-    );
+    let noisy = ["chain.snr=40", "chain.adc_bits=12", "phase_lock.ramp_rate=1.6e-3"];
+    inject(&noisy, 1, 0.07);
 }
 
 #[test]
 fn faults_in_the_first_periods_of_the_drive_are_found_within_a_second() {
-    let scene = scene(&["start.dq2=0"]);
+    use {RigFault::*, SensorFault::*};
+    let at_rest = scene(&["start.dq2=0"]);
     for fault in [
-        RigFault::Response(SensorFault::Reversed),
-        RigFault::Base(SensorFault::Reversed),
-        RigFault::Both(SensorFault::Dead),
-        RigFault::Response(SensorFault::Dead),
-        RigFault::Base(SensorFault::Dead),
-        RigFault::Response(SensorFault::Gain(0.3)),
-        RigFault::Response(SensorFault::Gain(3.0)),
-        RigFault::Shaker(0.0),
-        RigFault::Swapped,
+        Response(Reversed),
+        Base(Reversed),
+        Both(Dead),
+        Response(Dead),
+        Base(Dead),
+        Response(Gain(0.3)),
+        Response(Gain(3.0)),
+        Shaker(0.0),
+        Swapped,
     ] {
         // A gain that is wrong from the start is found by the loop check, which compares it with the drive.
-        let from_the_start = matches!(fault, RigFault::Response(SensorFault::Gain(gain)) if gain > 1.0);
-        for seconds in [0.0, 0.25, 0.6, 0.9, 1.3, 2.0]
-            .into_iter()
-            .skip(usize::from(from_the_start))
-        {
-            let (zero, ended) = injected(&scene, fault, seconds, false);
-            assert!(
-                ended && zero.is_some_and(|time| time < 1.0),
-                "{fault:?} at {seconds} s: {zero:?}"
-            );
+        let from_the_start = usize::from(fault == Response(Gain(3.0)));
+        for seconds in [0.0, 0.25, 0.6, 0.9, 1.3, 2.0].into_iter().skip(from_the_start) {
+            let (zero, ended) = injected(&at_rest, fault, seconds, false);
+            let is_found = ended && zero.is_some_and(|time| time < 1.0);
+            assert!(is_found, "{fault:?} at {seconds} s: {zero:?}");
         }
     }
-}
-
-#[test]
-fn a_held_drive_that_does_not_reach_the_rig_is_found() {
-    let scene = scene(&["chain.hold=true"]);
-    let (zero, ended) = injected(&scene, RigFault::Shaker(0.0), 10.0, false);
+    // A held drive that does not reach the rig.
+    let (zero, ended) = injected(&scene(&["chain.hold=true"]), Shaker(0.0), 10.0, false);
     assert!(ended && zero.is_some_and(|time| time < 0.06), "{zero:?}");
 }
 
@@ -187,52 +154,48 @@ fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() 
     let ended = ends(|| Err(RigError::Failed("the connection is lost".into())), Ok);
     assert!(matches!(ended, Ok(Err(ExperimentError::Rig(_)))));
     assert!(ends(|| panic!("injected"), Ok).is_err());
-    let ended = ends(
-        || Ok(()),
-        |_| Err(ControllerError::Failed("the connection is lost".into())),
-    );
-    assert!(matches!(ended, Ok(Err(ExperimentError::Controller(_)))));
-    let nan = |command: Command| {
-        Ok(Command {
-            drive: Drive { amplitude: f64::NAN, ..command.drive },
-            ..command
-        })
+    let lost = |_| Err(ControllerError::Failed("the connection is lost".into()));
+    assert!(matches!(ends(|| Ok(()), lost), Ok(Err(ExperimentError::Controller(_)))));
+    let nan = |Command { drive, .. }| {
+        let drive = Drive { amplitude: f64::NAN, ..drive };
+        Ok(Command { drive, ..Command::default() })
     };
     assert!(matches!(ends(|| Ok(()), nan), Ok(Err(ExperimentError::NotANumber(_)))));
 }
 
-/// The record of a rig with a fault after some seconds.
-fn with(scene: &Scene, fault: RigFault, seconds: f64) -> Record {
-    record(&mut faulty(scene, fault, seconds, |_| {}).unwrap(), scene).unwrap()
+/// Refuses the record of a rig with a fault after some seconds.
+fn refused(scene: &Scene, fault: RigFault, seconds: f64) -> IdentificationError {
+    let failed = record(&mut faulty(scene, fault, seconds, |_| {}).unwrap(), scene).unwrap();
+    identify(&failed, scene).unwrap_err()
+}
+
+/// The record of the rig of a scene without faults.
+fn healthy(scene: &Scene) -> Record {
+    record(&mut *Simulated::of(scene).unwrap(), scene).unwrap()
 }
 
 #[test]
-fn a_sensor_that_dies_after_the_release_is_an_error() {
+fn a_sensor_that_dies_after_the_release_or_becomes_late_in_the_hold_is_an_error() {
+    use {RigFault::*, SensorFault::*};
     for settings in [&[][..], &["chain.adc_bits=14"], &["chain.snr=40"]] {
         let scene = scene(settings);
-        let healthy = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+        let healthy = healthy(&scene);
         identify(&healthy, &scene).unwrap();
         let release = healthy.released as f64 * healthy.sample_time;
         for fault in [
-            RigFault::Response(SensorFault::Dead),
-            RigFault::Response(SensorFault::Frozen),
-            RigFault::Response(SensorFault::Value(f64::NAN)),
-            RigFault::Base(SensorFault::Value(f64::NAN)),
+            Response(Dead),
+            Response(Frozen),
+            Response(Value(f64::NAN)),
+            Base(Value(f64::NAN)),
         ] {
-            let failed = with(&scene, fault, release + 0.5);
-            let refused = identify(&failed, &scene);
-            let is_named = matches!(refused, Err(IdentificationError::SensorAfterRelease { seconds, .. }) if (seconds - 0.5).abs() < 0.25);
-            assert!(is_named, "{settings:?}, {fault:?}");
+            let error = refused(&scene, fault, release + 0.5);
+            let is_named = matches!(error, IdentificationError::SensorAfterRelease { seconds, .. } if (seconds - 0.5).abs() < 0.25);
+            assert!(is_named, "{settings:?}, {fault:?}: {error}");
         }
     }
-}
-
-#[test]
-fn a_base_that_becomes_late_while_the_lock_is_held_is_an_error() {
     let scene = scene(&[]);
-    let healthy = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+    let healthy = healthy(&scene);
     let settled = (healthy.settled + 2) as f64 * healthy.sample_time;
-    let late = with(&scene, RigFault::Base(SensorFault::Late(3)), settled);
-    let refused = identify(&late, &scene).unwrap_err();
-    assert!(matches!(refused, IdentificationError::OffTarget { .. }), "{refused}");
+    let error = refused(&scene, Base(Late(3)), settled);
+    assert!(matches!(error, IdentificationError::OffTarget { .. }), "{error}");
 }
