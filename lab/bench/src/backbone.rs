@@ -12,7 +12,7 @@ use vines_model::numerics::{Estimate, RANDOM};
 
 use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Plan, Search, Stage};
 use crate::identification::{
-    Balance, Cycle, Regime, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
+    Cycle, Regime, ResonanceFit, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
 };
 use crate::record::Sample;
 use crate::rig::{Controller, Move, Rig};
@@ -20,7 +20,7 @@ use crate::scene::{LinearResponse, Scene};
 
 // One level: the window of the fit, and the judge of whether the motion is steady.
 //
-// The balances ([`Balance`]) give drive and frequency of phase resonance from any window of periods, with their standard uncertainties.
+// The balances ([`ResonanceFit`]) give drive and frequency of phase resonance from any window of periods, with their standard uncertainties.
 // What is not noise shows as a difference between the two halves of the window beyond their noise; it counts as a part of the
 // uncertainty. A level is settled when the uncertainties are as small as the scene asks: noise lengthens the window, and so does a
 // transient.
@@ -73,7 +73,7 @@ impl Criterion {
     pub fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
         let n = cycles.len();
         let counts = WINDOWS.map(|share| (share * n as f64).round() as usize);
-        let considered = counts.into_iter().filter(|count| *count >= 2 * Balance::FEWEST);
+        let considered = counts.into_iter().filter(|count| *count >= 2 * ResonanceFit::FEWEST);
         considered
             .filter_map(|count| self.of(&cycles[n - count..]))
             .filter(|estimate| estimate.at.iter().all(|one| (one.value + one.uncertainty).is_finite()))
@@ -117,7 +117,7 @@ impl Criterion {
 
     /// The point of a window.
     fn of(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
-        let fit = |cycles: &[Cycle], slopes| Balance::of(cycles, &self.linear, slopes);
+        let fit = |cycles: &[Cycle], slopes| ResonanceFit::of(cycles, &self.linear, slopes);
         let whole = fit(cycles, Slopes::Unknown)?;
         let [base, omega] = whole.at(0.0).map(|one| one.value);
         let known = self.slopes([whole.response.value, base, omega]);

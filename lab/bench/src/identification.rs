@@ -1,7 +1,7 @@
 //! What a record says: the locked point, its regime, and the backbone along the free decay.
 
-mod balance;
 mod decay;
+mod resonance_fit;
 mod response;
 
 use std::f64::consts::TAU;
@@ -13,9 +13,9 @@ use vines_model::numerics::{Estimate, RANDOM, SIGNIFICANT, mean, standard_deviat
 use crate::record::{Record, Sample};
 use crate::scene::{Dimensionless, LinearResponse, Scene};
 
-pub use balance::{Balance, Cycle, Slopes};
 pub(crate) use decay::PER_PERIOD;
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
+pub use resonance_fit::{Cycle, ResonanceFit, Slopes};
 pub(crate) use response::{ASYMMETRIC, without_tones};
 pub use response::{Tone, classify, foreign_tone, impacts, regime_by_response};
 pub use vines_model::regime::{Impact, Regime};
@@ -209,12 +209,12 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
 /// A long window has less noise, a late one is nearer to the end. Where even the shortest disagrees, the difference is a part of the
 /// uncertainty.
 fn limits(approach: &[Cycle], wide: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[Estimate; 2]> {
-    let slopes = Balance::of(wide, linear, Slopes::Rising)?.slopes();
+    let slopes = ResonanceFit::of(wide, linear, Slopes::Rising)?.slopes();
     let slopes = slopes.map(|one| Estimate::new(one.value, &[one.uncertainty, BENT * one.value]));
-    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, linear, Slopes::Known(slopes))?.limit(command));
+    let limit = |cycles: &[Cycle]| Some(ResonanceFit::of(cycles, linear, Slopes::Known(slopes))?.limit(command));
     let mut cycles = approach;
     let mut whole = limit(cycles)?;
-    while cycles.len() >= 4 * Balance::FEWEST {
+    while cycles.len() >= 4 * ResonanceFit::FEWEST {
         cycles = &cycles[cycles.len() / 2..];
         let late = limit(cycles)?;
         let beyond = [0, 1].map(|i| ((whole[i].value - late[i].value).abs() - RANDOM * late[i].uncertainty).max(0.0));

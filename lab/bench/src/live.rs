@@ -56,7 +56,7 @@ const LAST: usize = 4;
 
 /// A motion that is nearly harmonic.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Motion {
+pub struct HarmonicMotion {
     /// Frequency, rad/s.
     pub omega: f64,
     /// Amplitude of the response, m.
@@ -78,7 +78,7 @@ pub struct Decay {
     /// Amplitude of the first fit, m.
     first: Option<f64>,
     /// The motion by the last fit; before the first one, as it was at the release.
-    pub motion: Motion,
+    pub motion: HarmonicMotion,
     /// Whether the particle has met both walls in turn, at even intervals, since the release.
     pub synchronous: bool,
     /// Whether there are no further fits: the motion has died out.
@@ -87,7 +87,7 @@ pub struct Decay {
 
 impl Decay {
     /// A sample with a drive, and its motion: what was fitted before is over.
-    pub fn drive(&mut self, motion: Motion) {
+    pub fn drive(&mut self, motion: HarmonicMotion) {
         self.motion = motion;
         if self.window > 0 {
             *self = Self { motion, ..Self::default() };
@@ -114,7 +114,7 @@ impl Decay {
         match harmonic(&self.values, sample_time, self.motion.omega) {
             Some(fit) => {
                 self.ended = fit.amplitude < DECAYED * *self.first.get_or_insert(fit.amplitude);
-                self.motion = Motion {
+                self.motion = HarmonicMotion {
                     omega: fit.omega,
                     amplitude: fit.amplitude,
                     speed: self.speeds.iter().sum::<f64>() / self.speeds.len() as f64,

@@ -6,7 +6,7 @@ use vines_live::bench::{Bench, regime_at};
 use vines_live::settings::{default_scene, index, settings_of};
 use vines_testbench::experiment::{Plan, run};
 use vines_testbench::identification::{WINDOW, decay_points};
-use vines_testbench::live::Motion;
+use vines_testbench::live::HarmonicMotion;
 use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
 
@@ -61,7 +61,7 @@ fn the_free_decay_has_the_bits_of_the_lab() {
     bench.run(record.released, |_| {}).unwrap();
     let released = bench.motion;
     bench.drive(false);
-    let mut fits: Vec<Motion> = Vec::new();
+    let mut fits: Vec<HarmonicMotion> = Vec::new();
     let mut lost = None;
     bench
         .run(record.decay().len(), |row| {
@@ -75,7 +75,7 @@ fn the_free_decay_has_the_bits_of_the_lab() {
         .unwrap();
     // Until the first fit, the motion is that of the release.
     assert_eq!(fits.remove(0), released);
-    for (point, Motion { omega, amplitude, speed }) in points.iter().zip(&fits) {
+    for (point, HarmonicMotion { omega, amplitude, speed }) in points.iter().zip(&fits) {
         assert_eq!(
             (point.f_hz, point.a_m),
             (omega / TAU, *amplitude),
