@@ -10,7 +10,7 @@
 mod common;
 
 use common::{Failure, scene, write};
-use vines_testbench::experiment::{Plan, run};
+use vines_testbench::experiment::run;
 use vines_testbench::identification::{ResonancePoint, identify};
 use vines_testbench::rig::{BuiltIn, Simulated};
 
@@ -47,7 +47,7 @@ fn lock(stage: &str) -> Result<ResonancePoint, Failure> {
     let scene = scene("", &settings)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
     let mut rig = Simulated::of(&scene)?;
-    let record = run(rig.as_mut(), &mut controller, &Plan::of(&scene), |_, _, _| {})?;
+    let record = run(rig.as_mut(), &mut controller, &scene, |_, _, _| {})?;
     Ok(identify(&record, &scene)?.lock.at)
 }
 

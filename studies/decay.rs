@@ -13,7 +13,7 @@ mod common;
 use common::{Failure, arguments, at, crossings, noisy, scene, share, write};
 use vines_model::numerics::{mean, mean_square};
 use vines_testbench::comparison::COMPARED_ABOVE;
-use vines_testbench::experiment::{self, Plan};
+use vines_testbench::experiment;
 use vines_testbench::identification::decay_points;
 use vines_testbench::rig::{BuiltIn, Simulated};
 
@@ -27,7 +27,7 @@ fn main() -> Result<(), Failure> {
     let scene = scene("", &[""; 0])?;
     let mut rig = Simulated::new(scene.plant, scene.start)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let clean = experiment::run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {})?;
+    let clean = experiment::run(&mut rig, &mut controller, &scene, |_, _, _| {})?;
     let truth = crossings(&clean, &scene);
     let mut rows = Vec::new();
     for window in WINDOWS {

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use vines_model::numerics::{Estimate, RANDOM};
 
-use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Plan, Search, Stage};
+use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stage};
 use crate::identification::{
     Cycle, Regime, ResonanceFit, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
 };
@@ -265,10 +265,9 @@ pub fn track_into(
     progress: impl FnMut(usize, usize),
 ) -> Result<Tracked, ExperimentError> {
     experiment::holds_a_phase(scene)?;
-    let limit = Plan::of(scene).lock;
     let mut quiet = |_, _| {};
     let mut tracker = Tracker {
-        run: experiment::ControlLoop::new(rig, controller, scene, samples, limit, &mut quiet),
+        run: experiment::ControlLoop::new(rig, controller, scene, samples, &mut quiet),
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),

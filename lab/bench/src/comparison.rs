@@ -7,7 +7,7 @@ use vines_model::orbit::{self, ContinuationLimits, Orbit, backbone};
 use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow, free_sigma, resonant};
 
 use crate::backbone::{LevelPoint, Tracked};
-use crate::experiment::Plan;
+use crate::experiment::Stage;
 use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime, WINDOW, decay_points};
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Drive, Rig, Simulated};
@@ -356,7 +356,7 @@ fn predicted(orbit: &Orbit, scene: &Scene) -> Vec<[f64; 3]> {
         Some(sample)
     };
     // The first sample stands for the hold, which gives the frequency at the release.
-    let samples = (0..Plan::of(scene).decay + 1).map_while(&mut sample).collect();
+    let samples = (0..Stage::Decaying.samples(scene) + 1).map_while(&mut sample).collect();
     let record = Record {
         sample_time: step,
         samples,

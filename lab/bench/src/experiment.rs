@@ -16,47 +16,6 @@ use crate::scene::{Resonance, Scene, key};
 
 pub(crate) use search::Search;
 
-/// Durations of the stages, in samples.
-#[derive(Debug, Clone, Copy)]
-pub struct Plan<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// Time from sample to sample, s.
-    pub sample_time: f64,
-    /// Time limit for the lock.
-    pub lock: usize,
-    /// How long the lock is held and recorded once it has settled.
-    pub hold: usize,
-    /// Length of the recorded decay.
-    pub decay: usize,
-}
-
-impl<'a> Plan<'a> {
-    /// The plan of a scene.
-    pub fn of(scene: &'a Scene) -> Self {
-        let sample_time = scene.sample_time();
-        let period = TAU / scene.linear().omega0;
-        let samples = |periods: f64| (periods * period / sample_time).round() as usize;
-        Self {
-            scene,
-            sample_time,
-            lock: (scene.lock_time() / sample_time).round() as usize,
-            hold: samples(scene.record.hold_periods),
-            decay: samples(decay_periods(scene)),
-        }
-    }
-
-    /// Samples of a stage, at most.
-    fn samples(&self, stage: Stage) -> usize {
-        match stage {
-            Stage::Locking => self.lock,
-            Stage::Holding => self.hold,
-            Stage::Decaying => self.decay,
-            Stage::Tracking => usize::MAX,
-        }
-    }
-}
-
 /// Share of its amplitude to which the response of the linear rig falls in the recorded decay. The 1:1 motion has a smaller range, from symmetry
 /// breaking to the fold, and impacts make the decay faster.
 pub(crate) const DECAYED: f64 = 0.05;
@@ -77,13 +36,25 @@ pub enum Stage {
     Locking,
     /// Phase resonance is held and measured.
     Holding,
-    /// The response is held at one level after another.
-    Tracking,
     /// The drive is off.
     Decaying,
+    /// The response is held at one level after another.
+    Tracking,
 }
 
 impl Stage {
+    /// Samples of the stage in an experiment on a scene, at most: the time limit for the lock, the hold, or the recorded decay.
+    pub fn samples(self, scene: &Scene) -> usize {
+        let (sample_time, period) = (scene.sample_time(), TAU / scene.linear().omega0);
+        let seconds = match self {
+            Self::Locking => scene.lock_time(),
+            Self::Holding => scene.record.hold_periods * period,
+            Self::Decaying => decay_periods(scene) * period,
+            Self::Tracking => f64::INFINITY,
+        };
+        (seconds / sample_time).round() as usize
+    }
+
     /// What the experiment does in it.
     pub fn name(self) -> &'static str {
         match self {
@@ -155,10 +126,10 @@ pub enum ExperimentError {
 pub fn run(
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
-    plan: &Plan,
+    scene: &Scene,
     progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
-    run_into(&mut Vec::new(), rig, controller, plan, progress)
+    run_into(&mut Vec::new(), rig, controller, scene, progress)
 }
 
 /// [`run`], which leaves what was measured in `samples` if the experiment ends early.
@@ -166,14 +137,15 @@ pub fn run_into(
     samples: &mut Vec<Sample>,
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
-    plan: &Plan,
+    scene: &Scene,
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
-    holds_a_phase(plan.scene)?;
-    let mut report = |stage, taken| progress(stage, taken, plan.samples(stage));
-    let mut bench = ControlLoop::new(rig, controller, plan.scene, samples, plan.lock, &mut report);
-    let held = if plan.scene.controller.is_at_phase_resonance() {
-        Search::new(&mut bench, plan.scene).lock()?
+    holds_a_phase(scene)?;
+    let counts = [Stage::Locking, Stage::Holding, Stage::Decaying].map(|stage| stage.samples(scene));
+    let mut report = |stage, taken| progress(stage, taken, counts[stage as usize]);
+    let mut bench = ControlLoop::new(rig, controller, scene, samples, &mut report);
+    let held = if scene.controller.is_at_phase_resonance() {
+        Search::new(&mut bench, scene).lock()?
     } else {
         None
     };
@@ -183,15 +155,15 @@ pub fn run_into(
     }
     let settled = bench.taken - 1;
     for stage in [Stage::Holding, Stage::Decaying] {
-        for _ in 0..plan.samples(stage) {
+        for _ in 0..counts[stage as usize] {
             bench.sample(stage)?;
         }
     }
     drop(bench);
     let samples = std::mem::take(samples);
     Ok(Record {
-        sample_time: plan.sample_time,
-        released: samples.len() - plan.decay,
+        sample_time: scene.sample_time(),
+        released: samples.len() - counts[Stage::Decaying as usize],
         samples,
         settled,
         held: held == Some(true),
@@ -241,13 +213,12 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
 pub(crate) type Period = (usize, f64);
 
 impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
-    /// Before the first sample; a lock must have been found after `limit` samples.
+    /// Before the first sample.
     pub fn new(
         rig: &'a mut R,
         controller: &'a mut C,
         scene: &'a Scene,
         samples: &'a mut Vec<Sample>,
-        limit: usize,
         progress: &'a mut dyn FnMut(Stage, usize),
     ) -> Self {
         Self {
@@ -259,7 +230,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             taken: 0,
             periods: 0.0,
             last: Command::default(),
-            limit,
+            limit: Stage::Locking.samples(scene),
             progress,
             stage: (Stage::Locking, 0),
             driven: false,

@@ -2,7 +2,7 @@
 //! stable, and experiments that end early.
 
 use vines::comparison::Comparison;
-use vines::experiment::{self, ExperimentError, Plan};
+use vines::experiment::{self, ExperimentError};
 use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
 use vines::record::Record;
 use vines::rig::{
@@ -18,7 +18,7 @@ fn run(
     controller: &mut impl Controller,
     scene: &Scene,
 ) -> Result<Record, ExperimentError> {
-    experiment::run(rig, controller, &Plan::of(scene), |_, _, _| {})
+    experiment::run(rig, controller, scene, |_, _, _| {})
 }
 
 fn measure(scene: &Scene) -> Record {
@@ -231,7 +231,7 @@ fn a_drive_without_a_stable_orbit_ends_the_search_with_a_reason() {
     let mut rig = plant(&scene);
     let mut controller = built_in(&scene);
     let mut samples = Vec::new();
-    let ended = experiment::run_into(&mut samples, &mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {});
+    let ended = experiment::run_into(&mut samples, &mut rig, &mut controller, &scene, |_, _, _| {});
     assert!(
         matches!(
             ended,
@@ -285,13 +285,7 @@ fn noise_is_never_locked_and_ends_the_experiment_with_its_reason() {
     let scene = scene(&[]);
     let mut controller = built_in(&scene);
     let mut samples = Vec::new();
-    let outcome = experiment::run_into(
-        &mut samples,
-        &mut Noise(1),
-        &mut controller,
-        &Plan::of(&scene),
-        |_, _, _| {},
-    );
+    let outcome = experiment::run_into(&mut samples, &mut Noise(1), &mut controller, &scene, |_, _, _| {});
     assert!(matches!(
         outcome,
         Err(ExperimentError::Tripped { fault: Fault::NoSignal, .. })
@@ -321,7 +315,7 @@ fn a_response_above_its_limit_ends_the_experiment_at_once_and_keeps_what_was_mea
     let mut rig = plant(&scene);
     let mut controller = built_in(&scene);
     let mut samples = Vec::new();
-    let outcome = experiment::run_into(&mut samples, &mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {});
+    let outcome = experiment::run_into(&mut samples, &mut rig, &mut controller, &scene, |_, _, _| {});
     let Err(error @ ExperimentError::Tripped { periods, fault, .. }) = &outcome else {
         panic!("{outcome:?}");
     };

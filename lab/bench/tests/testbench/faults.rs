@@ -5,7 +5,7 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 
-use vines_testbench::experiment::{self, ExperimentError, Plan};
+use vines_testbench::experiment::{self, ExperimentError};
 use vines_testbench::identification::{IdentificationError, identify};
 use vines_testbench::record::Record;
 use vines_testbench::rig::{
@@ -146,7 +146,7 @@ fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() 
         let plant = Simulated::new(scene.plant, scene.start).unwrap();
         let mut rig = Lost { rig: plant, left: 2000, fails, last: f64::NAN };
         let mut controller = Broken(BuiltIn::new(&scene.controller_config()).unwrap(), 2000, breaks);
-        let run = || experiment::run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {});
+        let run = || experiment::run(&mut rig, &mut controller, &scene, |_, _, _| {});
         let ended = catch_unwind(AssertUnwindSafe(run));
         assert_eq!(rig.last, 0.0);
         ended

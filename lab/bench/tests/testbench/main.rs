@@ -8,7 +8,7 @@ mod measuring;
 mod scenes;
 
 use vines_testbench::backbone::{Tracked, track};
-use vines_testbench::experiment::{ExperimentError, Plan, run};
+use vines_testbench::experiment::{ExperimentError, run};
 use vines_testbench::record::Record;
 use vines_testbench::rig::{BuiltIn, Rig};
 use vines_testbench::scene::{LinearResponse, Scene};
@@ -28,7 +28,7 @@ fn checked(settings: &[&str]) -> Scene {
 /// The record of an experiment.
 fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-    run(rig, &mut controller, &Plan::of(scene), |_, _, _| {})
+    run(rig, &mut controller, scene, |_, _, _| {})
 }
 
 /// The tracked backbone.

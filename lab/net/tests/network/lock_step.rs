@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use vines_net::frame::{Frame, Kind};
 use vines_net::{Address, Ended, LinkError, NetController, NetRig, RAMP_SAMPLES, Refusal, Server};
-use vines_testbench::experiment::{self, Plan};
+use vines_testbench::experiment;
 use vines_testbench::rig::{BuiltIn, Chain, Controller, Drive, Rig, RigError, Simulated};
 use vines_testbench::scene::Definition;
 
@@ -21,7 +21,7 @@ fn an_experiment_across_the_network_gives_the_same_bits_also_with_held_samples()
         let scene = scene(&[&settings[..], &["record.decay_periods=150"]].concat());
         let measure = |rig: Box<dyn Rig>, controller: &mut dyn Controller| {
             let mut rig = Chain::around(rig, &scene);
-            experiment::run(rig.as_mut(), controller, &Plan::of(&scene), |_, _, _| {}).unwrap()
+            experiment::run(rig.as_mut(), controller, &scene, |_, _, _| {}).unwrap()
         };
         let plant = Simulated::new(scene.plant, scene.start).unwrap();
         let direct = measure(Box::new(plant), &mut BuiltIn::new(&scene.controller_config()).unwrap());
