@@ -264,10 +264,9 @@ pub fn track_into(
     scene: &Scene,
     progress: impl FnMut(usize, usize),
 ) -> Result<Tracked, ExperimentError> {
-    experiment::holds_a_phase(scene)?;
     let mut quiet = |_, _| {};
     let mut tracker = Tracker {
-        run: experiment::ControlLoop::new(rig, controller, scene, samples, &mut quiet),
+        run: experiment::ControlLoop::new(rig, controller, scene, samples, &mut quiet)?,
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
@@ -332,11 +331,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let (to, periods) = self.step(level);
         self.run.controller.hold_response(to, self.target)?;
         self.run.samples.clear();
-        let late = if self.states.is_empty() {
-            FIRST + FOLLOWED
-        } else {
-            FOLLOWED
-        };
+        let late = FOLLOWED + FIRST * usize::from(self.states.is_empty());
         while self.run.periods - start < periods + late as f64 {
             self.cycle()?;
         }

@@ -73,15 +73,12 @@ impl Comparison {
         let distance = |sigma: f64, c: f64| (sigma - lock.at.sigma).hypot(c - lock.at.c);
         let mut solutions = resonant(&parameters);
         solutions.retain(|point| at_resonance && point.stable());
-        let theory = solutions
-            .into_iter()
-            .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
+        solutions.sort_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
+        let theory = solutions.first().copied();
         let mut orbits = orbit::phase_resonant(&parameters);
         orbits.retain(|_| at_resonance);
-        let exact = orbits
-            .iter()
-            .copied()
-            .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
+        let by_distance = |a: &&Orbit, b: &&Orbit| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c));
+        let exact = orbits.iter().min_by(by_distance).copied();
         let curve = ExactCurve::of(&parameters);
         let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene));
         let decay: Vec<ComparedPoint> = found

@@ -140,10 +140,9 @@ pub fn run_into(
     scene: &Scene,
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
-    holds_a_phase(scene)?;
     let counts = [Stage::Locking, Stage::Holding, Stage::Decaying].map(|stage| stage.samples(scene));
     let mut report = |stage, taken| progress(stage, taken, counts[stage as usize]);
-    let mut bench = ControlLoop::new(rig, controller, scene, samples, &mut report);
+    let mut bench = ControlLoop::new(rig, controller, scene, samples, &mut report)?;
     let held = if scene.controller.is_at_phase_resonance() {
         Search::new(&mut bench, scene).lock()?
     } else {
@@ -168,14 +167,6 @@ pub fn run_into(
         settled,
         held: held == Some(true),
     })
-}
-
-/// Refuses a scene whose resonance is no phase that a loop can hold.
-pub(crate) fn holds_a_phase(scene: &Scene) -> Result<(), ExperimentError> {
-    match scene.resonance.resonance {
-        Resonance::Phase => Ok(()),
-        Resonance::Peak => Err(ExperimentError::Peak),
-    }
 }
 
 // Rig and controller, sample by sample. Whatever fails, the rig is left with a drive of zero as far as it still takes one.
@@ -213,15 +204,18 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
 pub(crate) type Period = (usize, f64);
 
 impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
-    /// Before the first sample.
+    /// Before the first sample. A scene whose resonance is no phase that a loop can hold is refused.
     pub fn new(
         rig: &'a mut R,
         controller: &'a mut C,
         scene: &'a Scene,
         samples: &'a mut Vec<Sample>,
         progress: &'a mut dyn FnMut(Stage, usize),
-    ) -> Self {
-        Self {
+    ) -> Result<Self, ExperimentError> {
+        if scene.resonance.resonance == Resonance::Peak {
+            return Err(ExperimentError::Peak);
+        }
+        Ok(Self {
             rig,
             controller,
             scene,
@@ -234,7 +228,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             progress,
             stage: (Stage::Locking, 0),
             driven: false,
-        }
+        })
     }
 
     /// One sample; in a stage other than the decay, a controller that switches the drive off is an error.
@@ -292,11 +286,8 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         while command.drive.amplitude > 0.0 {
             let asked = self.controller.sample(self.rig.sense()?, true)?;
             // A ramp never rises, whatever the controller says.
-            let amplitude = if asked.drive.amplitude < command.drive.amplitude {
-                asked.drive.amplitude
-            } else {
-                0.0
-            };
+            let falls = |amplitude: &f64| *amplitude < command.drive.amplitude;
+            let amplitude = Some(asked.drive.amplitude).filter(falls).unwrap_or(0.0);
             command = checked(Command { drive: Drive { amplitude, ..asked.drive }, ..asked })?;
             self.advance(command.drive)?;
         }
@@ -304,15 +295,12 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     }
 
     fn tripped(&self, stage: Stage, command: &Command) -> ExperimentError {
-        match command.fault {
-            Some(Fault::TimedOut) => self.no_lock(command),
-            fault => ExperimentError::Tripped {
-                periods: self.periods,
-                stage,
-                fault: fault.unwrap_or(Fault::LockLost),
-                evidence: evidence(self.samples, self.scene, fault.unwrap_or(Fault::LockLost)),
-            },
+        let fault = command.fault.unwrap_or(Fault::LockLost);
+        if fault == Fault::TimedOut {
+            return self.no_lock(command);
         }
+        let evidence = evidence(self.samples, self.scene, fault);
+        ExperimentError::Tripped { periods: self.periods, stage, fault, evidence }
     }
 
     /// The error of a search without a result.
@@ -398,17 +386,12 @@ mod tests {
     #[test]
     fn a_fault_is_stated_with_the_readings_and_the_limit_of_the_scene() {
         let scene = Scene::load(None, &["phase_lock.response_max=0.3".parse().unwrap()]).unwrap();
-        let sample = |n: usize| {
-            let response = if n == 140 { -0.301_234_9 } else { 0.2 };
-            let phase_error = Some(if n < 50 { 9.0 } else { 0.25 });
-            Sample {
-                time: n as f64 * scene.sample_time(),
-                sensors: Sensors { response, reference: Some(0.01) },
-                command: Command { phase_error, ..Command::default() },
-                ground_truth: None,
-            }
-        };
-        let samples: Vec<Sample> = (0..150).map(sample).collect();
+        let mut samples = vec![Sample::default(); 150];
+        for (n, sample) in samples.iter_mut().enumerate() {
+            sample.sensors = Sensors { response: 0.2, reference: Some(0.01) };
+            sample.command.phase_error = Some(if n < 50 { 9.0 } else { 0.25 });
+        }
+        samples[140].sensors.response = -0.301_234_9;
         // The largest reading of the last period, also if the controller switched the drive off a few samples later.
         let read = "the response read 0.2 m, and the base 0.01 m; in the last period at most 0.30123 m";
         for (fault, limit) in [

@@ -169,17 +169,13 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
     let [base, phase_error, response] = means(&held);
     let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
     let [omega, limit] = limits(&approach, &wide, &scene.linear(), command)?;
-    let speeds: Option<Vec<f64>> = hold
-        .iter()
-        .map(|s| s.ground_truth.map(|w| d.speed(w.particle_velocity.abs())))
-        .collect();
+    let speed = |sample: &Sample| Some(d.speed(sample.ground_truth?.particle_velocity.abs()));
+    let speeds: Option<Vec<f64>> = hold.iter().map(speed).collect();
     // The speed belongs to the amplitude of the hold, and changes about as it does.
     let aside = ((limit.value - response.value).abs() + limit.uncertainty) / limit.value;
     let b = speeds.map(|speeds| {
-        let per_period = speeds
-            .chunks(hold.len().div_ceil(held.len()))
-            .map(|c| mean(c.iter().copied()));
-        let speed = Estimate::mean(&per_period.collect::<Vec<f64>>());
+        let periods = speeds.chunks(hold.len().div_ceil(held.len()));
+        let speed = Estimate::mean(&periods.map(|c| mean(c.iter().copied())).collect::<Vec<f64>>());
         Estimate::new(speed.value, &[speed.uncertainty, speed.value * aside])
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
@@ -187,9 +183,11 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
         by_impacts => by_impacts,
     };
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
-    let tone = (!is_simulated)
-        .then(|| foreign_tone(hold, scene, omega.value))
-        .flatten();
+    let tone = if is_simulated {
+        None
+    } else {
+        foreign_tone(hold, scene, omega.value)
+    };
     Some(Lock {
         at: ResonancePoint::new([limit, base, omega, phase_error], d),
         b: b.map(|b| b.value),

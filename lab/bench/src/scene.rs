@@ -204,13 +204,11 @@ impl Excitation {
                 not_negative("excitation.E", e, "m")?;
                 Ok(e)
             }
-            (given, _) => Err(SceneError::Keys {
-                origin: origin.into(),
-                message: format!(
-                    "[excitation] has {} of G (dimensionless) and E (m): give exactly one, with G = E/(b epsilon)",
-                    if given.is_some() { "both" } else { "neither" }
-                ),
-            }),
+            (given, _) => {
+                let given = if given.is_some() { "both" } else { "neither" };
+                let one = "of G (dimensionless) and E (m): give exactly one, with G = E/(b epsilon)";
+                Err(SceneError::text(origin, format!("[excitation] has {given} {one}")))
+            }
         }
     }
 }
@@ -240,7 +238,7 @@ impl Sections {
         if scene.resonance.reference == Reference::Force && !scene.chain.reference {
             let message = "resonance.reference = \"force\" with chain.reference = false: the force k e + c e' follows from the base \
                            sensor; switch it on, or take the reference \"base\"";
-            return Err(SceneError::Keys { origin: origin.into(), message: message.into() });
+            return Err(SceneError::text(origin, message));
         }
         let fastest = scene.controller.omega_max * scene.dimensionless().omega0;
         lovines::Drive::harmonic(scene.amplitude, fastest)
@@ -348,7 +346,7 @@ impl PlantSection {
     }
 
     fn resolve(&self, origin: &str) -> Result<Parameters, SceneError> {
-        let keys = |message: &str| SceneError::Keys { origin: origin.into(), message: message.into() };
+        let keys = |message: &str| SceneError::text(origin, message);
         let is_si = self.is_si().map_err(keys)?;
         let need = |value: Option<f64>, key: &str| {
             value.ok_or_else(|| {
@@ -561,8 +559,6 @@ fn within(key: &'static str, value: f64, unit: &'static str, [low, high]: [f64; 
 pub enum SceneError {
     #[error("cannot read the scene {}: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
-    #[error("{origin}: {message}")]
-    Syntax { origin: String, message: String },
     #[error("--set: {0}")]
     Argument(#[from] ArgumentError),
     #[error("--set {argument}: {message}")]
@@ -581,7 +577,14 @@ pub enum SceneError {
     #[error("{}", refusal(.0))]
     Controller(#[from] ConfigError),
     #[error("{origin}: {message}")]
-    Keys { origin: String, message: String },
+    Text { origin: String, message: String },
+}
+
+impl SceneError {
+    /// An error of the text that `origin` names.
+    fn text(origin: &str, message: impl Into<String>) -> Self {
+        Self::Text { origin: origin.into(), message: message.into() }
+    }
 }
 
 /// A message of the TOML reader, without types of Rust.

@@ -18,7 +18,7 @@ use vines_testbench::identification::{
 use vines_testbench::loop_check::check;
 use vines_testbench::record::{Record, Sample};
 use vines_testbench::rig::{
-    BuiltIn, Chain, Command, Controller, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated,
+    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated,
 };
 use vines_testbench::scene::{Dimensionless, LinearResponse, Scene};
 
@@ -495,20 +495,33 @@ fn rounded(config: &phase_lock::Config) -> single::Config {
     rounded
 }
 
+/// The controller in single precision.
+struct Single(single::PhaseLock, single::State);
+
+impl Controller for Single {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
+        let reference = sensors.reference.map(|value| value as f32);
+        let input = single::Input { response: sensors.response as f32, reference, active };
+        let output = self.0.process(&mut self.1, input);
+        let [omega, amplitude, displacement] = [output.omega, output.amplitude, output.drive].map(f64::from);
+        let drive = Drive { omega, amplitude, displacement };
+        Ok(Command { drive, settled: output.settled, ..Command::default() })
+    }
+}
+
 /// Mean detuning after `settle` periods, and whether the lock was settled all the time.
-fn detuning(scene: &Scene, settle: f64, mut sample: impl FnMut(f64, Option<f64>) -> (Drive, bool)) -> (f64, bool) {
+fn detuning(scene: &Scene, settle: f64, controller: &mut dyn Controller) -> (f64, bool) {
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
     let step = scene.sample_time();
     let samples = |periods: f64| (periods * scene.controller.samples_per_period) as usize;
     let (mut omega, mut settled) = (0.0, true);
     for n in 0..samples(settle + LOOK) {
-        let sensors = rig.sense().unwrap();
-        let (drive, is_settled) = sample(sensors.response, sensors.reference);
+        let command = controller.sample(rig.sense().unwrap(), true).unwrap();
         if n >= samples(settle) {
-            omega += drive.omega / samples(LOOK) as f64;
-            settled &= is_settled;
+            omega += command.drive.omega / samples(LOOK) as f64;
+            settled &= command.settled;
         }
-        rig.advance(drive, step).unwrap();
+        rig.advance(command.drive, step).unwrap();
     }
     (scene.dimensionless().sigma(omega), settled)
 }
@@ -528,25 +541,10 @@ fn single_precision_keeps_the_lock_within_1e_4_in_sigma() {
     ] {
         let scene = paper(&settings.split_whitespace().collect::<Vec<_>>());
         let config = scene.controller_config();
-        let mut double = BuiltIn::new(&config).unwrap();
-        let (expected, locks) = detuning(&scene, settle, |response, reference| {
-            let sensors = Sensors { response, reference };
-            let command = double.sample(sensors, true).unwrap();
-            (command.drive, command.settled)
-        });
+        let (expected, locks) = detuning(&scene, settle, &mut BuiltIn::new(&config).unwrap());
         let controller = rounded(&config).build().unwrap();
-        let mut state = controller.start();
-        let (sigma, settled) = detuning(&scene, settle, |response, reference| {
-            let reference = reference.map(|value| value as f32);
-            let input = single::Input { response: response as f32, reference, active: true };
-            let output = controller.process(&mut state, input);
-            let drive = Drive {
-                omega: output.omega.into(),
-                amplitude: output.amplitude.into(),
-                displacement: output.drive.into(),
-            };
-            (drive, output.settled)
-        });
+        let state = controller.start();
+        let (sigma, settled) = detuning(&scene, settle, &mut Single(controller, state));
         // With the lightest damping, rounding in single precision is larger than the drift that counts as settled.
         let is_lightest = settle == 30000.0;
         assert!((sigma - expected).abs() < 1e-4 && (settled || is_lightest) && locks);

@@ -159,6 +159,21 @@ fn text_on_the_command_line_needs_no_quotes_and_what_is_no_assignment_is_refused
     }
 }
 
+#[test]
+fn names_have_units_or_factors_and_mistakes_are_named() {
+    let names = "rig.names={ response = 'y', base = { name = 'x', unit = 'mm' }, E = { name = 'A', factor = -0.5 } }";
+    let names = paper(&[names]).rig_names;
+    let found = ["response", "base", "E", "omega"].map(|ours| names.of(ours));
+    assert_eq!(found.each_ref().map(|one| one.factor), [1.0, 1e-3, -0.5, 1.0]);
+    assert_eq!(found.each_ref().map(|one| &*one.name), ["y", "x", "A", "omega"]);
+    assert_eq!(names.unknown(&["response", "base"]), Some("E"));
+    refused(&[
+        "rig.names.a={ name = 'x', unit = 'furlong' } => unknown",
+        "rig.names.a={ name = 'x', unit = 'm', factor = 2 } => not both",
+        "rig.names.a={ name = 'x', factor = 0.0 } => other than 0",
+    ]);
+}
+
 // The settings of the controller: every parameter of its table has a key, and its options are absent, `false` or "none", never 0.
 
 #[test]
