@@ -145,7 +145,6 @@ pub fn client(
         "controller.omega_max=1.2".into(),
         format!("backbone.C_from={:?}", from / width),
         format!("backbone.C_to={:?}", to / width),
-        format!("phase_lock.amplitude_max={:?}", 20.0 * width * epsilon),
     ];
     let chain = [format!("chain.snr={snr}"), format!("chain.seed={noise}")];
     let mut scene = scene("[plant]\n[start]\n[excitation]\n", &[&settings[..], &chain].concat())?;

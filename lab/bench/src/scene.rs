@@ -21,7 +21,6 @@ macro_rules! settings {
     };
 }
 
-mod backbone;
 mod chain;
 mod controller;
 mod names;
@@ -35,7 +34,6 @@ use phase_lock::{ConfigError, Number};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 use vines_model::ArgumentError;
 
-pub use backbone::BackboneSettings;
 pub use chain::ChainSettings;
 pub use controller::{ControllerSettings, KEYS, LinearResponse, PhaseLock, key, refusal};
 pub use lovines::Parameters;
@@ -507,6 +505,48 @@ impl RecordSettings {
             "must be at most 20 million",
         )
     }
+}
+
+// The `[backbone]` section: how the backbone is tracked.
+
+settings! {
+    /// How the response amplitude is stepped with the loop closed.
+    pub struct BackboneSettings {
+        /// First level, response amplitude over b.
+        #[serde(rename = "C_from")]
+        c_from: f64 = 0.7,
+        /// Last level, response amplitude over b.
+        #[serde(rename = "C_to")]
+        c_to: f64 = 0.14,
+        /// Number of levels, at equal distances.
+        points: u32 = 29,
+        /// Largest standard uncertainty of the drive E as a share of it, and of the frequency as a share of the half-power bandwidth of a linear rig
+        /// that this drive holds at the largest level: `omega0 E/A`. Noise and transients lengthen the dwell until both are reached.
+        precision: f64 = 9e-4,
+    }
+}
+
+impl BackboneSettings {
+    fn check(&self) -> Result<(), SceneError> {
+        positive("backbone.C_from", self.c_from, "(over b)")?;
+        positive("backbone.C_to", self.c_to, "(over b)")?;
+        positive("backbone.precision", self.precision, "(relative)")?;
+        within("backbone.points", self.points.into(), "(levels)", [1.0, 1e4])
+    }
+
+    /// The levels, amplitudes of the response in m, for the half-width `b`, m, in the order in which they are visited.
+    fn levels(&self, b: f64) -> Vec<f64> {
+        let [from, to] = [self.c_from, self.c_to].map(|level| level * b);
+        let steps = f64::from(self.points.max(2) - 1);
+        (0..self.points)
+            .map(|n| rounded(from + (to - from) * f64::from(n) / steps))
+            .collect()
+    }
+}
+
+/// The value to ten digits, as a person would write it: 0.0068, not 0.0067999999999999996.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.9e}").parse().unwrap_or(value)
 }
 
 // Options of a scene: a number, or `false` or "none". Zero is a number like every other.

@@ -9,12 +9,11 @@ use vines_testbench::experiment::{self, ExperimentError};
 use vines_testbench::identification::{IdentificationError, identify};
 use vines_testbench::record::Record;
 use vines_testbench::rig::{
-    BuiltIn, Command, Controller, ControllerError, Drive, Rig, RigError, RigFault, SensorFault, Sensors, Simulated,
-    faulty,
+    BuiltIn, Command, Controller, ControllerError, Drive, RigError, RigFault, SensorFault, Sensors, Simulated, faulty,
 };
 use vines_testbench::scene::Scene;
 
-use super::{checked as scene, record, tracked};
+use super::{Altered, checked as scene, record, tracked};
 
 /// Time from a fault to a drive of zero, s, and whether the run ended early.
 fn injected(scene: &Scene, fault: RigFault, seconds: f64, tracks: bool) -> (Option<f64>, bool) {
@@ -105,29 +104,6 @@ fn faults_in_the_first_periods_of_the_drive_are_found_within_a_second() {
     assert!(ended && zero.is_some_and(|time| time < 0.06), "{zero:?}");
 }
 
-/// A rig that fails outside at a sample; it keeps the amplitude of the last drive, m.
-struct Lost {
-    rig: Simulated,
-    left: usize,
-    fails: fn() -> Result<(), RigError>,
-    last: f64,
-}
-
-impl Rig for Lost {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.left = self.left.saturating_sub(1);
-        if self.left == 0 {
-            (self.fails)()?;
-        }
-        self.rig.sense()
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.last = drive.amplitude;
-        self.rig.advance(drive, step)
-    }
-}
-
 /// A controller that fails at a sample.
 struct Broken(BuiltIn, usize, fn(Command) -> Result<Command, ControllerError>);
 
@@ -143,12 +119,25 @@ impl Controller for Broken {
 fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() {
     let scene = scene(&[]);
     let ends = |fails: fn() -> Result<(), RigError>, breaks: fn(Command) -> Result<Command, ControllerError>| {
-        let plant = Simulated::new(scene.plant, scene.start).unwrap();
-        let mut rig = Lost { rig: plant, left: 2000, fails, last: f64::NAN };
+        let (mut sample, last) = (0, Cell::new(f64::NAN));
+        let read = |sensors| {
+            sample += 1;
+            if sample == 2000 {
+                fails().map(|()| sensors)
+            } else {
+                Ok(sensors)
+            }
+        };
+        let drive = |drive: Drive, step| {
+            last.set(drive.amplitude);
+            (drive, step)
+        };
+        let rig = Simulated::of(&scene).unwrap();
+        let mut rig = Altered { rig, read: Box::new(read), drive: Box::new(drive) };
         let mut controller = Broken(BuiltIn::new(&scene.controller_config()).unwrap(), 2000, breaks);
         let run = || experiment::run(&mut rig, &mut controller, &scene, |_, _, _| {});
         let ended = catch_unwind(AssertUnwindSafe(run));
-        assert_eq!(rig.last, 0.0);
+        assert_eq!(last.get(), 0.0);
         ended
     };
     let ended = ends(|| Err(RigError::Failed("the connection is lost".into())), Ok);

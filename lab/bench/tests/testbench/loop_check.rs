@@ -1,12 +1,14 @@
 //! Guards the verdicts of the loop check, on random rigs, healthy and with faults, and what it measures; `studies/check.rs` takes more rigs.
 
+use std::f64::consts::TAU;
+
 use lovines::State;
 use vines_testbench::loop_check::{LoopCheck, Verdict, check};
-use vines_testbench::rig::{Chain, Drive, Rig, RigError, RigFault, RigStage, SensorFault, Simulated, faulty};
+use vines_testbench::rig::{Chain, Drive, RigFault, SensorFault, Simulated, faulty};
 use vines_testbench::scene::Scene;
 
 use super::common::{checked_faults, checked_rig, uniform};
-use super::paper;
+use super::{Altered, paper};
 
 /// The default scene with these settings, at rest.
 fn at_rest(settings: &[&str]) -> Scene {
@@ -42,44 +44,27 @@ fn healthy_rigs_pass_and_faults_are_named() {
     }
 }
 
-/// A rig whose drive and clock are not those of the bench.
-struct Altered {
-    plant: Box<dyn Rig>,
-    clock: f64,
-    /// Drive from elsewhere, m.
-    hum: f64,
-    /// Largest drive, m, and phase of the drive, turns.
-    largest: f64,
-    turns: f64,
-}
-
-impl RigStage for Altered {
-    fn inner(&mut self) -> &mut dyn Rig {
-        &mut *self.plant
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.largest = self.largest.max(drive.amplitude).max(drive.displacement.abs());
-        self.turns += drive.omega * step / std::f64::consts::TAU;
-        let amplitude = drive.amplitude + self.hum;
-        self.plant.advance(Drive { amplitude, ..drive }, self.clock * step)
-    }
-}
-
-/// The check of the rig of a scene with another clock and a drive from elsewhere, m.
-fn altered(scene: &Scene, clock: f64, hum: f64) -> (LoopCheck, Altered) {
-    let plant = Simulated::of(scene).unwrap();
-    let mut rig = Altered { plant, clock, hum, largest: 0.0, turns: 0.0 };
-    (check(&mut rig, scene).unwrap(), rig)
+/// The check of the rig of a scene with another clock and a drive from elsewhere, m; the largest drive, m, and its phase at the end, turns.
+fn altered(scene: &Scene, clock: f64, hum: f64) -> (LoopCheck, [f64; 2]) {
+    let (mut largest, mut turns) = (0.0_f64, 0.0);
+    let drive = |drive: Drive, step: f64| {
+        largest = largest.max(drive.amplitude).max(drive.displacement.abs());
+        turns += drive.omega * step / TAU;
+        let amplitude = drive.amplitude + hum;
+        (Drive { amplitude, ..drive }, clock * step)
+    };
+    let rig = Simulated::of(scene).unwrap();
+    let found = check(&mut Altered { rig, read: Box::new(Ok), drive: Box::new(drive) }, scene);
+    (found.unwrap(), [largest, turns])
 }
 
 #[test]
 fn the_check_drives_at_a_hundredth_and_ends_at_the_phase_where_it_began() {
     let scene = at_rest(&[]);
-    let (found, rig) = altered(&scene, 1.0, 0.0);
+    let (found, [largest, turns]) = altered(&scene, 1.0, 0.0);
     assert_eq!(found.verdict, Verdict::Healthy);
-    assert!(rig.largest <= 0.01 * scene.amplitude * (1.0 + 1e-12));
-    assert!((rig.turns - rig.turns.round()).abs() < 1e-9, "{}", rig.turns);
+    assert!(largest <= 0.01 * scene.amplitude * (1.0 + 1e-12));
+    assert!((turns - turns.round()).abs() < 1e-9, "{turns}");
     assert!((found.response.gain - 1.0).abs() < 0.01 && found.response.phase.abs() < 3.0);
 }
 

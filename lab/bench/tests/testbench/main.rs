@@ -10,7 +10,7 @@ mod scenes;
 use vines_testbench::backbone::{Tracked, track};
 use vines_testbench::experiment::{ExperimentError, run};
 use vines_testbench::record::Record;
-use vines_testbench::rig::{BuiltIn, Rig};
+use vines_testbench::rig::{BuiltIn, Drive, Rig, RigError, RigStage, Sensors};
 use vines_testbench::scene::{LinearResponse, Scene};
 
 /// The default scene with these settings.
@@ -23,6 +23,28 @@ fn checked(settings: &[&str]) -> Scene {
     let mut scene = paper(settings);
     scene.measured = Some(LinearResponse::of(&scene));
     scene
+}
+
+/// A rig whose readings, and whose drives with the time to the next sample, s, pass a function each.
+struct Altered<'a> {
+    rig: Box<dyn Rig>,
+    read: Box<dyn FnMut(Sensors) -> Result<Sensors, RigError> + 'a>,
+    drive: Box<dyn FnMut(Drive, f64) -> (Drive, f64) + 'a>,
+}
+
+impl RigStage for Altered<'_> {
+    fn inner(&mut self) -> &mut dyn Rig {
+        &mut *self.rig
+    }
+
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        (self.read)(self.rig.sense()?)
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        let (drive, step) = (self.drive)(drive, step);
+        self.rig.advance(drive, step)
+    }
 }
 
 /// The record of an experiment.

@@ -25,7 +25,7 @@ use vines_testbench::scene::{Dimensionless, LinearResponse, Scene};
 use super::common::{
     self, LOCK_TIME_SETTINGS, LOCK_TIMES, crossings, noisy, periods_to_settle, rig_with_stable_orbit, uniform,
 };
-use super::{checked, paper, record, tracked};
+use super::{Altered, checked, paper, record, tracked};
 
 /// The dimensionless default scene with these settings.
 fn dimensionless(settings: &[&str]) -> Scene {
@@ -153,21 +153,9 @@ fn falsified(settings: &[&str], wrong: &[&str]) -> (SensorsOnly, Scene) {
 
 /// The values in SI units, with all digits.
 fn digits(at: &ResonancePoint) -> String {
-    let ResonancePoint {
-        f_hz,
-        a_m,
-        e_m,
-        u_f_hz,
-        u_a_m,
-        u_e_m,
-        phase_error_deg,
-        u_phase_deg,
-        ..
-    } = at;
-    format!(
-        "{:?}",
-        [f_hz, a_m, e_m, u_f_hz, u_a_m, u_e_m, phase_error_deg, u_phase_deg]
-    )
+    let values = [at.f_hz, at.a_m, at.e_m, at.phase_error_deg];
+    let uncertainties = [at.u_f_hz, at.u_a_m, at.u_e_m, at.u_phase_deg];
+    format!("{values:?} {uncertainties:?}")
 }
 
 /// A tracked backbone and an identification (the lock, and the points along the decay), with all digits.
@@ -329,34 +317,23 @@ fn a_particle_that_sticks_is_counted_and_timed() {
 
 // Foreign tones on the response sensor.
 
-/// A rig without ground truth, whose response sensor reads tones, too: hertz and metres.
-struct Humming<'a> {
-    rig: Box<dyn Rig>,
-    tones: &'a [(f64, f64)],
-    time: f64,
-}
-
-impl Rig for Humming<'_> {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        let sensors = self.rig.sense()?;
-        let tones = self
-            .tones
+/// The rig of a scene without ground truth, whose response sensor reads tones, too: hertz and metres.
+fn rig<'a>(scene: &Scene, tones: &'a [(f64, f64)]) -> Altered<'a> {
+    let (step, mut time) = (scene.sample_time(), 0.0);
+    let read = move |sensors: Sensors| {
+        let tones = tones
             .iter()
-            .map(|(hertz, size)| size * (TAU * hertz * self.time + 1.0).sin());
-        Ok(Sensors { response: sensors.response + tones.sum::<f64>(), ..sensors })
+            .map(|(hertz, size)| size * (TAU * hertz * time + 1.0).sin());
+        let response = sensors.response + tones.sum::<f64>();
+        time += step;
+        Ok(Sensors { response, ..sensors })
+    };
+    let rig = SensorsOnly::around(Simulated::of(scene).unwrap());
+    Altered {
+        rig: Box::new(rig),
+        read: Box::new(read),
+        drive: Box::new(|drive, step| (drive, step)),
     }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.time += step;
-        self.rig.advance(drive, step)
-    }
-}
-
-fn rig<'a>(scene: &Scene, tones: &'a [(f64, f64)]) -> Humming<'a> {
-    let plant = Simulated::new(scene.plant, scene.start)
-        .unwrap()
-        .with_sensors(scene.resonance);
-    Humming { rig: Chain::around(Box::new(plant), scene), tones, time: 0.0 }
 }
 
 /// Mains hum and a ripple with harmonics: hertz, and share of a response of C = 0.55.
@@ -422,25 +399,16 @@ fn no_motion_of_a_particle_is_a_foreign_tone() {
             format!("resonance.sensor={}", ["v", "q1", "acceleration"][n as usize % 3]),
         ];
         let scene = checked(&settings.each_ref().map(String::as_str));
-        let d = scene.dimensionless();
-        let drive = Drive {
-            omega: d.omega(6.0 * share(4) - 3.0),
-            amplitude: scene.amplitude,
-            displacement: 0.0,
-        };
+        let omega = scene.dimensionless().omega(6.0 * share(4) - 3.0);
+        let drive = Drive { omega, amplitude: scene.amplitude, displacement: 0.0 };
         let step = scene.sample_time();
         let mut rig = rig(&scene, &[]);
         let samples: Vec<Sample> = (0..6000)
             .map(|n| {
-                let sensors = rig.sense().unwrap();
+                let (time, sensors) = (step * f64::from(n), rig.sense().unwrap());
                 rig.advance(drive, step).unwrap();
                 let command = Command { drive, ..Command::default() };
-                Sample {
-                    time: step * f64::from(n),
-                    sensors,
-                    command,
-                    ground_truth: None,
-                }
+                Sample { time, sensors, command, ground_truth: None }
             })
             .collect();
         // The first of these windows contains the transient.

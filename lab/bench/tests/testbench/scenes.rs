@@ -264,25 +264,14 @@ fn an_option_is_switched_off_by_none_or_false_and_not_by_zero() {
 
 #[test]
 fn every_effect_of_a_cavity_has_a_key_that_the_plant_checks_and_settings_repeat() {
-    let settings = [
-        "plant.b_plus=0.011",
-        "plant.b_minus=0.009",
-        "plant.theta=0.1",
-        "plant.mu_k=0.05",
-        "plant.mu_s=0.07",
-        "plant.r_law=plastic",
-        "plant.r_plus=0.2",
-        "plant.r_minus=0.3",
-        "plant.r_min=0.1",
-        "plant.r_scatter=0.02",
-        "plant.seed=7",
-    ];
+    let settings = "b_plus=0.011 b_minus=0.009 theta=0.1 mu_k=0.05 mu_s=0.07 r_law=plastic r_plus=0.2 r_minus=0.3 r_min=0.1 r_scatter=0.02";
+    let settings: Vec<String> = settings.split(' ').map(|one| format!("plant.{one}")).collect();
+    let settings: Vec<&str> = settings.iter().map(|one| &**one).chain(["plant.seed=7"]).collect();
     let scene = paper(&settings);
     let written = serde_json::to_value(&scene).unwrap()["plant"].clone();
-    for setting in settings {
-        let (key, value) = setting.split_once('=').unwrap();
-        let text = written[key.trim_start_matches("plant.")].to_string();
-        assert_eq!(text.trim_matches('"'), value, "{key}");
+    for setting in &settings {
+        let (key, value) = setting["plant.".len()..].split_once('=').unwrap();
+        assert_eq!(written[key].to_string().trim_matches('"'), value, "{key}");
     }
     // What is written is a scene again, and what an FMU gets has the same names.
     let plant = plant_keys(&scene.plant).into_iter();
