@@ -24,10 +24,8 @@ def locked(bandwidth: float, seed: int) -> tuple[float, float]:
     scene = vines.Scene(
         controller={
             "bandwidth": bandwidth,
-            "frequency_tolerance": 2e-2,
-            "amplitude_tolerance": 8e-3,
-            "phase_tolerance": 5.0,
         },
+        phase_lock={"lock": {"frequency_drift": 9e-6, "amplitude_drift": 3e-4, "phase_tolerance": 0.0873}},
         chain={"snr": 30.0, "seed": seed},
         record={"decay_periods": 5.0},
     )

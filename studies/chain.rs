@@ -10,7 +10,7 @@
 mod common;
 
 use common::{Failure, scene, write};
-use vines_testbench::experiment::{Plan, run};
+use vines_testbench::experiment::run;
 use vines_testbench::identification::{ResonancePoint, identify};
 use vines_testbench::rig::{BuiltIn, Simulated};
 
@@ -21,11 +21,11 @@ const STAGES: [&str; 18] = [
     "adc_bits=12",
     "adc_bits=8",
     "hold=true reference=false",
-    "hold=true reference=false controller.delay=0",
+    "hold=true reference=false phase_lock.delay=0",
     "hold=true",
     "hold=true reference=false dac_bits=16",
     "delay=1 reference=false",
-    "delay=1 reference=false controller.delay=0",
+    "delay=1 reference=false phase_lock.delay=0",
     "delay=1",
     "delay=5 reference=false",
     "filter=10.0",
@@ -38,7 +38,7 @@ const STAGES: [&str; 18] = [
 
 /// The lock behind a stage, held for 200 periods.
 fn lock(stage: &str) -> Result<ResonancePoint, Failure> {
-    let key = |setting: &str| match setting.starts_with("controller.") {
+    let key = |setting: &str| match setting.starts_with("phase_lock.") {
         true => setting.to_string(),
         false => format!("chain.{setting}"),
     };
@@ -47,7 +47,7 @@ fn lock(stage: &str) -> Result<ResonancePoint, Failure> {
     let scene = scene("", &settings)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
     let mut rig = Simulated::of(&scene)?;
-    let record = run(rig.as_mut(), &mut controller, &Plan::of(&scene), |_, _, _| {})?;
+    let record = run(rig.as_mut(), &mut controller, &scene, |_, _, _| {})?;
     Ok(identify(&record, &scene)?.lock.at)
 }
 

@@ -145,7 +145,6 @@ pub fn client(
         "controller.omega_max=1.2".into(),
         format!("backbone.C_from={:?}", from / width),
         format!("backbone.C_to={:?}", to / width),
-        "backbone.G_max=20".into(),
     ];
     let chain = [format!("chain.snr={snr}"), format!("chain.seed={noise}")];
     let mut scene = scene("[plant]\n[start]\n[excitation]\n", &[&settings[..], &chain].concat())?;
@@ -261,10 +260,10 @@ pub const LOCK_TIMES: [(f64, f64); 5] = [(0.02, 234.0), (0.05, 102.0), (0.1, 55.
 
 /// Only the phase is to settle; the largest bandwidth needs more than a hundred samples per period.
 pub const LOCK_TIME_SETTINGS: [&str; 5] = [
-    "controller.phase_tolerance=2.0",
+    "phase_lock.lock.phase_tolerance=0.034906585",
     "phase_lock.lock.dwell=20",
-    "controller.frequency_tolerance=0.22",
-    "controller.amplitude_tolerance=27.0",
+    "phase_lock.lock.frequency_drift=9.949e-5",
+    "phase_lock.lock.amplitude_drift=1.0177",
     "controller.samples_per_period=200",
 ];
 

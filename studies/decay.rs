@@ -13,7 +13,7 @@ mod common;
 use common::{Failure, arguments, at, crossings, noisy, scene, share, write};
 use vines_model::numerics::{mean, mean_square};
 use vines_testbench::comparison::COMPARED_ABOVE;
-use vines_testbench::experiment::{self, Plan};
+use vines_testbench::experiment;
 use vines_testbench::identification::decay_points;
 use vines_testbench::rig::{BuiltIn, Simulated};
 
@@ -24,20 +24,19 @@ const RATIOS: [f64; 4] = [f64::INFINITY, 60.0, 50.0, 40.0];
 
 fn main() -> Result<(), Failure> {
     let seeds: u64 = arguments().first().map_or(Ok(20), |seeds| seeds.parse())?;
-    let mut scene = scene("", &[""; 0])?;
+    let scene = scene("", &[""; 0])?;
     let mut rig = Simulated::new(scene.plant, scene.start)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let clean = experiment::run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {})?;
+    let clean = experiment::run(&mut rig, &mut controller, &scene, |_, _, _| {})?;
     let truth = crossings(&clean, &scene);
     let mut rows = Vec::new();
     for window in WINDOWS {
-        scene.record.window_periods = window;
-        let points = decay_points(&clean, &scene).points;
+        let points = decay_points(&clean, &scene, window).points;
         let noiseless: Vec<[f64; 2]> = points.iter().map(|point| [point.tau, point.sigma]).collect();
         for ratio in RATIOS {
             let (mut errors, mut pulls) = (Vec::new(), Vec::new());
             for seed in 1..=if ratio.is_finite() { seeds } else { 1 } {
-                let points = decay_points(&noisy(&clean, ratio, seed), &scene).points;
+                let points = decay_points(&noisy(&clean, ratio, seed), &scene, window).points;
                 for point in points.iter().filter(|point| point.c > COMPARED_ABOVE) {
                     errors.extend(at(&truth, point.tau).map(|exact| point.sigma - exact));
                     let noise = at(&noiseless, point.tau).map(|sigma| (point.sigma - sigma).abs());

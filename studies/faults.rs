@@ -14,7 +14,7 @@ use std::{cell::Cell, rc::Rc};
 use common::{Failure, arguments, scene, write};
 use rayon::prelude::*;
 use vines_testbench::backbone::track;
-use vines_testbench::experiment::{self, Plan};
+use vines_testbench::experiment;
 use vines_testbench::rig::{BuiltIn, Rig, RigFault, SensorsOnly, Simulated, faulty};
 use vines_testbench::scene::{LinearResponse, Scene};
 
@@ -26,7 +26,7 @@ fn run(rig: &mut dyn Rig, scene: &Scene, tracks: bool) -> Result<Option<[f64; 2]
         return Ok(found.ended.is_none().then_some([found.periods_to_lock, found.periods]));
     }
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let record = experiment::run(rig, &mut controller, &Plan::of(scene), |_, _, _| {});
+    let record = experiment::run(rig, &mut controller, scene, |_, _, _| {});
     let periods = |samples: usize| samples as f64 / scene.controller.samples_per_period;
     Ok(record.ok().map(|record| [record.settled, record.released].map(periods)))
 }

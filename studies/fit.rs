@@ -25,7 +25,7 @@ use lovines::{Cavity, Restitution};
 use rayon::prelude::*;
 use vines_model::numerics::{Estimate, mean_square};
 use vines_testbench::backbone::{Tracked, track};
-use vines_testbench::experiment::{Plan, run};
+use vines_testbench::experiment::run;
 use vines_testbench::fit::{Effect, Fit, Known, MeasuredPoint, Quantity, Recording, at, explain, fit, parts};
 use vines_testbench::identification::Regime;
 use vines_testbench::rig::{BuiltIn, Chain, SensorsOnly, Simulated};
@@ -335,7 +335,7 @@ fn recorded((rig, noise, scales): &Case, snr: &str) -> Result<Points, Failure> {
     let rig = Simulated::new(truth, scene.start)?;
     let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let record = run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {})?;
+    let record = run(&mut rig, &mut controller, &scene, |_, _, _| {})?;
     let count = record.samples.len();
     let samples = &record.samples[count / 40..count - count / 40];
     let recording = Recording {

@@ -14,7 +14,7 @@ mod common;
 use common::{Failure, Found, STATISTICS, arguments, rig_with_stable_orbit, statistics, uniform, write};
 use rayon::prelude::*;
 use vines_model::orbit::phase_resonant;
-use vines_testbench::experiment::{Plan, run};
+use vines_testbench::experiment::run;
 use vines_testbench::identification::identify;
 use vines_testbench::rig::{BuiltIn, Simulated};
 use vines_testbench::scene::Scene;
@@ -22,12 +22,7 @@ use vines_testbench::scene::Scene;
 /// Locks a rig, and counts it as correct, uncertain or wrong.
 fn lock(scene: &Scene) -> Result<Found, Failure> {
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let record = run(
-        &mut *Simulated::of(scene)?,
-        &mut controller,
-        &Plan::of(scene),
-        |_, _, _| {},
-    )?;
+    let record = run(&mut *Simulated::of(scene)?, &mut controller, scene, |_, _, _| {})?;
     let at = identify(&record, scene)?.lock.at;
     let mut orbits = phase_resonant(&scene.dimensionless());
     orbits.retain(|orbit| orbit.stable || record.held);

@@ -18,7 +18,7 @@ use vines_model::{
 use vines_testbench::{
     backbone::track,
     comparison::{Comparison, TrackedComparison},
-    experiment::{self, Plan},
+    experiment,
     fit::{Found, Known, MeasuredPoint, Part, Recording, find, parts},
     identification,
     rig::{BuiltIn, Simulated, Stoppable},
@@ -52,16 +52,15 @@ fn experiment<T: serde::Serialize>(
 
 #[pyfunction]
 pub fn identify(py: Python<'_>, scene: &Scene, decay: bool) -> PyResult<String> {
-    let scene = &scene.scene;
-    let mut controller = BuiltIn::new(&scene.controller_config()).map_err(invalid)?;
-    let mut plan = Plan::of(scene);
+    let mut scene = scene.scene.clone();
     if !decay {
-        plan.decay = 0;
+        scene.record.decay_periods = Some(0.0);
     }
-    experiment(py, scene, |rig| {
-        let record = experiment::run(rig, &mut controller, &plan, |_, _, _| {})?;
-        let found = identification::identify(&record, scene)?;
-        Ok(Comparison::of(&found, scene))
+    let mut controller = BuiltIn::new(&scene.controller_config()).map_err(invalid)?;
+    experiment(py, &scene, |rig| {
+        let record = experiment::run(rig, &mut controller, &scene, |_, _, _| {})?;
+        let found = identification::identify(&record, &scene)?;
+        Ok(Comparison::of(&found, &scene))
     })
 }
 

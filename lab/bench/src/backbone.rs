@@ -12,7 +12,7 @@ use vines_model::numerics::{Estimate, RANDOM};
 
 use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stage};
 use crate::identification::{
-    Balance, Cycle, Regime, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
+    Cycle, Regime, ResonanceFit, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
 };
 use crate::record::Sample;
 use crate::rig::{Controller, Move, Rig};
@@ -20,7 +20,7 @@ use crate::scene::{LinearResponse, Scene};
 
 // One level: the window of the fit, and the judge of whether the motion is steady.
 //
-// The balances ([`Balance`]) give drive and frequency of phase resonance from any window of periods, with their standard uncertainties.
+// The balances ([`ResonanceFit`]) give drive and frequency of phase resonance from any window of periods, with their standard uncertainties.
 // What is not noise shows as a difference between the two halves of the window beyond their noise; it counts as a part of the
 // uncertainty. A level is settled when the uncertainties are as small as the scene asks: noise lengthens the window, and so does a
 // transient.
@@ -73,7 +73,7 @@ impl Criterion {
     pub fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
         let n = cycles.len();
         let counts = WINDOWS.map(|share| (share * n as f64).round() as usize);
-        let considered = counts.into_iter().filter(|count| *count >= 2 * Balance::FEWEST);
+        let considered = counts.into_iter().filter(|count| *count >= 2 * ResonanceFit::FEWEST);
         considered
             .filter_map(|count| self.of(&cycles[n - count..]))
             .filter(|estimate| estimate.at.iter().all(|one| (one.value + one.uncertainty).is_finite()))
@@ -117,7 +117,7 @@ impl Criterion {
 
     /// The point of a window.
     fn of(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
-        let fit = |cycles: &[Cycle], slopes| Balance::of(cycles, &self.linear, slopes);
+        let fit = |cycles: &[Cycle], slopes| ResonanceFit::of(cycles, &self.linear, slopes);
         let whole = fit(cycles, Slopes::Unknown)?;
         let [base, omega] = whole.at(0.0).map(|one| one.value);
         let known = self.slopes([whole.response.value, base, omega]);
@@ -222,6 +222,8 @@ type Held = [f64; 3];
 const FIRST: usize = 24;
 /// Largest additional drive of a move, as a share of the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
+/// Periods after which a point is taken, settled or not.
+const LONGEST: usize = 150;
 /// Shortest duration of a move, periods.
 const MOVE: f64 = 4.0;
 /// Largest relative difference of the response from its level that counts as reached.
@@ -262,11 +264,9 @@ pub fn track_into(
     scene: &Scene,
     progress: impl FnMut(usize, usize),
 ) -> Result<Tracked, ExperimentError> {
-    experiment::holds_a_phase(scene)?;
-    let limit = (scene.lock_periods() * scene.controller.samples_per_period) as usize;
     let mut quiet = |_, _| {};
     let mut tracker = Tracker {
-        run: experiment::ControlLoop::new(rig, controller, scene, samples, limit, &mut quiet),
+        run: experiment::ControlLoop::new(rig, controller, scene, samples, &mut quiet)?,
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
@@ -327,15 +327,11 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
 
     /// Goes to a level, m, and holds it until the point has settled, or for the longest time allowed.
     fn hold(&mut self, level: f64) -> Result<LevelPoint, ExperimentError> {
-        let (start, settings) = (self.run.periods, &self.scene.backbone);
+        let start = self.run.periods;
         let (to, periods) = self.step(level);
         self.run.controller.hold_response(to, self.target)?;
         self.run.samples.clear();
-        let late = if self.states.is_empty() {
-            FIRST + FOLLOWED
-        } else {
-            FOLLOWED
-        };
+        let late = FOLLOWED + FIRST * usize::from(self.states.is_empty());
         while self.run.periods - start < periods + late as f64 {
             self.cycle()?;
         }
@@ -349,7 +345,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
                 estimate.is_some_and(|estimate| criterion.is_met(&estimate) && is_reached(estimate.response, level));
             // The halves of a transient can agree by chance.
             confirmed = if is_met { confirmed + 1 } else { 0 };
-            if cycles.len() >= settings.dwell_max as usize || confirmed >= CONFIRMED {
+            if cycles.len() >= LONGEST || confirmed >= CONFIRMED {
                 break estimate;
             }
         };

@@ -7,8 +7,8 @@ use vines_model::orbit::{self, ContinuationLimits, Orbit, backbone};
 use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow, free_sigma, resonant};
 
 use crate::backbone::{LevelPoint, Tracked};
-use crate::experiment::Plan;
-use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime, decay_points};
+use crate::experiment::Stage;
+use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime, WINDOW, decay_points};
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Drive, Rig, Simulated};
 use crate::scene::{Dimensionless, Scene};
@@ -73,15 +73,12 @@ impl Comparison {
         let distance = |sigma: f64, c: f64| (sigma - lock.at.sigma).hypot(c - lock.at.c);
         let mut solutions = resonant(&parameters);
         solutions.retain(|point| at_resonance && point.stable());
-        let theory = solutions
-            .into_iter()
-            .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
+        solutions.sort_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
+        let theory = solutions.first().copied();
         let mut orbits = orbit::phase_resonant(&parameters);
         orbits.retain(|_| at_resonance);
-        let exact = orbits
-            .iter()
-            .copied()
-            .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
+        let by_distance = |a: &&Orbit, b: &&Orbit| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c));
+        let exact = orbits.iter().min_by(by_distance).copied();
         let curve = ExactCurve::of(&parameters);
         let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene));
         let decay: Vec<ComparedPoint> = found
@@ -356,7 +353,7 @@ fn predicted(orbit: &Orbit, scene: &Scene) -> Vec<[f64; 3]> {
         Some(sample)
     };
     // The first sample stands for the hold, which gives the frequency at the release.
-    let samples = (0..Plan::of(scene).decay + 1).map_while(&mut sample).collect();
+    let samples = (0..Stage::Decaying.samples(scene) + 1).map_while(&mut sample).collect();
     let record = Record {
         sample_time: step,
         samples,
@@ -364,7 +361,7 @@ fn predicted(orbit: &Orbit, scene: &Scene) -> Vec<[f64; 3]> {
         released: 1,
         held: false,
     };
-    let points = decay_points(&record, scene).points;
+    let points = decay_points(&record, scene, WINDOW).points;
     points.iter().map(|one| [one.c, one.sigma, one.rate]).collect()
 }
 

@@ -16,47 +16,6 @@ use crate::scene::{Resonance, Scene, key};
 
 pub(crate) use search::Search;
 
-/// Durations of the stages, in samples.
-#[derive(Debug, Clone, Copy)]
-pub struct Plan<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// Time from sample to sample, s.
-    pub sample_time: f64,
-    /// Time limit for the lock.
-    pub lock: usize,
-    /// How long the lock is held and recorded once it has settled.
-    pub hold: usize,
-    /// Length of the recorded decay.
-    pub decay: usize,
-}
-
-impl<'a> Plan<'a> {
-    /// The plan of a scene.
-    pub fn of(scene: &'a Scene) -> Self {
-        let sample_time = scene.sample_time();
-        let period = TAU / scene.linear().omega0;
-        let samples = |periods: f64| (periods * period / sample_time).round() as usize;
-        Self {
-            scene,
-            sample_time,
-            lock: samples(scene.lock_periods()),
-            hold: samples(scene.record.hold_periods),
-            decay: samples(decay_periods(scene)),
-        }
-    }
-
-    /// Samples of a stage, at most.
-    fn samples(&self, stage: Stage) -> usize {
-        match stage {
-            Stage::Locking => self.lock,
-            Stage::Holding => self.hold,
-            Stage::Decaying => self.decay,
-            Stage::Tracking => usize::MAX,
-        }
-    }
-}
-
 /// Share of its amplitude to which the response of the linear rig falls in the recorded decay. The 1:1 motion has a smaller range, from symmetry
 /// breaking to the fold, and impacts make the decay faster.
 pub(crate) const DECAYED: f64 = 0.05;
@@ -77,13 +36,25 @@ pub enum Stage {
     Locking,
     /// Phase resonance is held and measured.
     Holding,
-    /// The response is held at one level after another.
-    Tracking,
     /// The drive is off.
     Decaying,
+    /// The response is held at one level after another.
+    Tracking,
 }
 
 impl Stage {
+    /// Samples of the stage in an experiment on a scene, at most: the time limit for the lock, the hold, or the recorded decay.
+    pub fn samples(self, scene: &Scene) -> usize {
+        let (sample_time, period) = (scene.sample_time(), TAU / scene.linear().omega0);
+        let seconds = match self {
+            Self::Locking => scene.lock_time(),
+            Self::Holding => scene.record.hold_periods * period,
+            Self::Decaying => decay_periods(scene) * period,
+            Self::Tracking => f64::INFINITY,
+        };
+        (seconds / sample_time).round() as usize
+    }
+
     /// What the experiment does in it.
     pub fn name(self) -> &'static str {
         match self {
@@ -113,7 +84,7 @@ pub enum ExperimentError {
     Controller(#[from] ControllerError),
     #[error(
         "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s; \
-         see record.lock_periods and the [controller] section",
+         see phase_lock.acquire_timeout and the [controller] section",
         phase_in_words(*phase_error)
     )]
     NoLock {
@@ -155,10 +126,10 @@ pub enum ExperimentError {
 pub fn run(
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
-    plan: &Plan,
+    scene: &Scene,
     progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
-    run_into(&mut Vec::new(), rig, controller, plan, progress)
+    run_into(&mut Vec::new(), rig, controller, scene, progress)
 }
 
 /// [`run`], which leaves what was measured in `samples` if the experiment ends early.
@@ -166,14 +137,14 @@ pub fn run_into(
     samples: &mut Vec<Sample>,
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
-    plan: &Plan,
+    scene: &Scene,
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
-    holds_a_phase(plan.scene)?;
-    let mut report = |stage, taken| progress(stage, taken, plan.samples(stage));
-    let mut bench = ControlLoop::new(rig, controller, plan.scene, samples, plan.lock, &mut report);
-    let held = if plan.scene.controller.is_at_phase_resonance() {
-        Search::new(&mut bench, plan.scene).lock()?
+    let counts = [Stage::Locking, Stage::Holding, Stage::Decaying].map(|stage| stage.samples(scene));
+    let mut report = |stage, taken| progress(stage, taken, counts[stage as usize]);
+    let mut bench = ControlLoop::new(rig, controller, scene, samples, &mut report)?;
+    let held = if scene.controller.is_at_phase_resonance() {
+        Search::new(&mut bench, scene).lock()?
     } else {
         None
     };
@@ -183,27 +154,19 @@ pub fn run_into(
     }
     let settled = bench.taken - 1;
     for stage in [Stage::Holding, Stage::Decaying] {
-        for _ in 0..plan.samples(stage) {
+        for _ in 0..counts[stage as usize] {
             bench.sample(stage)?;
         }
     }
     drop(bench);
     let samples = std::mem::take(samples);
     Ok(Record {
-        sample_time: plan.sample_time,
-        released: samples.len() - plan.decay,
+        sample_time: scene.sample_time(),
+        released: samples.len() - counts[Stage::Decaying as usize],
         samples,
         settled,
         held: held == Some(true),
     })
-}
-
-/// Refuses a scene whose resonance is no phase that a loop can hold.
-pub(crate) fn holds_a_phase(scene: &Scene) -> Result<(), ExperimentError> {
-    match scene.resonance.resonance {
-        Resonance::Phase => Ok(()),
-        Resonance::Peak => Err(ExperimentError::Peak),
-    }
 }
 
 // Rig and controller, sample by sample. Whatever fails, the rig is left with a drive of zero as far as it still takes one.
@@ -241,16 +204,18 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
 pub(crate) type Period = (usize, f64);
 
 impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
-    /// Before the first sample; a lock must have been found after `limit` samples.
+    /// Before the first sample. A scene whose resonance is no phase that a loop can hold is refused.
     pub fn new(
         rig: &'a mut R,
         controller: &'a mut C,
         scene: &'a Scene,
         samples: &'a mut Vec<Sample>,
-        limit: usize,
         progress: &'a mut dyn FnMut(Stage, usize),
-    ) -> Self {
-        Self {
+    ) -> Result<Self, ExperimentError> {
+        if scene.resonance.resonance == Resonance::Peak {
+            return Err(ExperimentError::Peak);
+        }
+        Ok(Self {
             rig,
             controller,
             scene,
@@ -259,11 +224,11 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             taken: 0,
             periods: 0.0,
             last: Command::default(),
-            limit,
+            limit: Stage::Locking.samples(scene),
             progress,
             stage: (Stage::Locking, 0),
             driven: false,
-        }
+        })
     }
 
     /// One sample; in a stage other than the decay, a controller that switches the drive off is an error.
@@ -321,11 +286,8 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         while command.drive.amplitude > 0.0 {
             let asked = self.controller.sample(self.rig.sense()?, true)?;
             // A ramp never rises, whatever the controller says.
-            let amplitude = if asked.drive.amplitude < command.drive.amplitude {
-                asked.drive.amplitude
-            } else {
-                0.0
-            };
+            let falls = |amplitude: &f64| *amplitude < command.drive.amplitude;
+            let amplitude = Some(asked.drive.amplitude).filter(falls).unwrap_or(0.0);
             command = checked(Command { drive: Drive { amplitude, ..asked.drive }, ..asked })?;
             self.advance(command.drive)?;
         }
@@ -333,15 +295,12 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     }
 
     fn tripped(&self, stage: Stage, command: &Command) -> ExperimentError {
-        match command.fault {
-            Some(Fault::TimedOut) => self.no_lock(command),
-            fault => ExperimentError::Tripped {
-                periods: self.periods,
-                stage,
-                fault: fault.unwrap_or(Fault::LockLost),
-                evidence: evidence(self.samples, self.scene, fault.unwrap_or(Fault::LockLost)),
-            },
+        let fault = command.fault.unwrap_or(Fault::LockLost);
+        if fault == Fault::TimedOut {
+            return self.no_lock(command);
         }
+        let evidence = evidence(self.samples, self.scene, fault);
+        ExperimentError::Tripped { periods: self.periods, stage, fault, evidence }
     }
 
     /// The error of a search without a result.
@@ -427,17 +386,12 @@ mod tests {
     #[test]
     fn a_fault_is_stated_with_the_readings_and_the_limit_of_the_scene() {
         let scene = Scene::load(None, &["phase_lock.response_max=0.3".parse().unwrap()]).unwrap();
-        let sample = |n: usize| {
-            let response = if n == 140 { -0.301_234_9 } else { 0.2 };
-            let phase_error = Some(if n < 50 { 9.0 } else { 0.25 });
-            Sample {
-                time: n as f64 * scene.sample_time(),
-                sensors: Sensors { response, reference: Some(0.01) },
-                command: Command { phase_error, ..Command::default() },
-                ground_truth: None,
-            }
-        };
-        let samples: Vec<Sample> = (0..150).map(sample).collect();
+        let mut samples = vec![Sample::default(); 150];
+        for (n, sample) in samples.iter_mut().enumerate() {
+            sample.sensors = Sensors { response: 0.2, reference: Some(0.01) };
+            sample.command.phase_error = Some(if n < 50 { 9.0 } else { 0.25 });
+        }
+        samples[140].sensors.response = -0.301_234_9;
         // The largest reading of the last period, also if the controller switched the drive off a few samples later.
         let read = "the response read 0.2 m, and the base 0.01 m; in the last period at most 0.30123 m";
         for (fault, limit) in [

@@ -1,7 +1,7 @@
 //! What a record says: the locked point, its regime, and the backbone along the free decay.
 
-mod balance;
 mod decay;
+mod resonance_fit;
 mod response;
 
 use std::f64::consts::TAU;
@@ -13,9 +13,9 @@ use vines_model::numerics::{Estimate, RANDOM, SIGNIFICANT, mean, standard_deviat
 use crate::record::{Record, Sample};
 use crate::scene::{Dimensionless, LinearResponse, Scene};
 
-pub use balance::{Balance, Cycle, Slopes};
 pub(crate) use decay::PER_PERIOD;
-pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, decay_points, harmonic};
+pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
+pub use resonance_fit::{Cycle, ResonanceFit, Slopes};
 pub(crate) use response::{ASYMMETRIC, without_tones};
 pub use response::{Tone, classify, foreign_tone, impacts, regime_by_response};
 pub use vines_model::regime::{Impact, Regime};
@@ -34,8 +34,8 @@ pub enum IdentificationError {
     )]
     NoMotion,
     #[error(
-        "the phase was {error:.3} ± {uncertainty:.3} degrees off its target while the lock was held; controller.phase_tolerance allows \
-         {tolerance} degrees. A channel may have become late: `vines check` measures its delay"
+        "the phase was {error:.3} ± {uncertainty:.3} degrees off its target while the lock was held; phase_lock.lock.phase_tolerance allows \
+         {tolerance:.3} degrees. A channel may have become late: `vines check` measures its delay"
     )]
     OffTarget {
         error: f64,
@@ -77,7 +77,7 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
     }
     on_target(&lock, scene)?;
     sensors_after_release(record, scene)?;
-    let decay = decay_points(record, scene);
+    let decay = decay_points(record, scene, WINDOW);
     Ok(Identification { parameters, lock, decay })
 }
 
@@ -169,17 +169,13 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
     let [base, phase_error, response] = means(&held);
     let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
     let [omega, limit] = limits(&approach, &wide, &scene.linear(), command)?;
-    let speeds: Option<Vec<f64>> = hold
-        .iter()
-        .map(|s| s.ground_truth.map(|w| d.speed(w.particle_velocity.abs())))
-        .collect();
+    let speed = |sample: &Sample| Some(d.speed(sample.ground_truth?.particle_velocity.abs()));
+    let speeds: Option<Vec<f64>> = hold.iter().map(speed).collect();
     // The speed belongs to the amplitude of the hold, and changes about as it does.
     let aside = ((limit.value - response.value).abs() + limit.uncertainty) / limit.value;
     let b = speeds.map(|speeds| {
-        let per_period = speeds
-            .chunks(hold.len().div_ceil(held.len()))
-            .map(|c| mean(c.iter().copied()));
-        let speed = Estimate::mean(&per_period.collect::<Vec<f64>>());
+        let periods = speeds.chunks(hold.len().div_ceil(held.len()));
+        let speed = Estimate::mean(&periods.map(|c| mean(c.iter().copied())).collect::<Vec<f64>>());
         Estimate::new(speed.value, &[speed.uncertainty, speed.value * aside])
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
@@ -187,9 +183,11 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
         by_impacts => by_impacts,
     };
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
-    let tone = (!is_simulated)
-        .then(|| foreign_tone(hold, scene, omega.value))
-        .flatten();
+    let tone = if is_simulated {
+        None
+    } else {
+        foreign_tone(hold, scene, omega.value)
+    };
     Some(Lock {
         at: ResonancePoint::new([limit, base, omega, phase_error], d),
         b: b.map(|b| b.value),
@@ -209,12 +207,12 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
 /// A long window has less noise, a late one is nearer to the end. Where even the shortest disagrees, the difference is a part of the
 /// uncertainty.
 fn limits(approach: &[Cycle], wide: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[Estimate; 2]> {
-    let slopes = Balance::of(wide, linear, Slopes::Rising)?.slopes();
+    let slopes = ResonanceFit::of(wide, linear, Slopes::Rising)?.slopes();
     let slopes = slopes.map(|one| Estimate::new(one.value, &[one.uncertainty, BENT * one.value]));
-    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, linear, Slopes::Known(slopes))?.limit(command));
+    let limit = |cycles: &[Cycle]| Some(ResonanceFit::of(cycles, linear, Slopes::Known(slopes))?.limit(command));
     let mut cycles = approach;
     let mut whole = limit(cycles)?;
-    while cycles.len() >= 4 * Balance::FEWEST {
+    while cycles.len() >= 4 * ResonanceFit::FEWEST {
         cycles = &cycles[cycles.len() / 2..];
         let late = limit(cycles)?;
         let beyond = [0, 1].map(|i| ((whole[i].value - late[i].value).abs() - RANDOM * late[i].uncertainty).max(0.0));
@@ -336,7 +334,8 @@ const STEPS: f64 = 8.0;
 
 /// Refuses a lock whose phase is farther from its target than the tolerance of the lock.
 fn on_target(lock: &Lock, scene: &Scene) -> Result<(), IdentificationError> {
-    let (error, tolerance) = (lock.at.phase_error_deg, scene.controller.phase_tolerance);
+    let tolerance = scene.controller_config().lock.phase_tolerance.to_degrees();
+    let error = lock.at.phase_error_deg;
     if error.abs() <= tolerance + SIGNIFICANT * lock.at.u_phase_deg {
         return Ok(());
     }

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use vines_model::regime::{Impact, MEASURED, Regime, end_of_synchrony, one_to_one};
 
 use crate::experiment::DECAYED;
-use crate::identification::{PER_PERIOD, harmonic};
+use crate::identification::{PER_PERIOD, WINDOW, harmonic};
 
 /// Impacts that are kept to determine the regime from.
 const KEPT: usize = 40;
@@ -56,7 +56,7 @@ const LAST: usize = 4;
 
 /// A motion that is nearly harmonic.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Motion {
+pub struct HarmonicMotion {
     /// Frequency, rad/s.
     pub omega: f64,
     /// Amplitude of the response, m.
@@ -78,7 +78,7 @@ pub struct Decay {
     /// Amplitude of the first fit, m.
     first: Option<f64>,
     /// The motion by the last fit; before the first one, as it was at the release.
-    pub motion: Motion,
+    pub motion: HarmonicMotion,
     /// Whether the particle has met both walls in turn, at even intervals, since the release.
     pub synchronous: bool,
     /// Whether there are no further fits: the motion has died out.
@@ -87,22 +87,22 @@ pub struct Decay {
 
 impl Decay {
     /// A sample with a drive, and its motion: what was fitted before is over.
-    pub fn drive(&mut self, motion: Motion) {
+    pub fn drive(&mut self, motion: HarmonicMotion) {
         self.motion = motion;
         if self.window > 0 {
             *self = Self { motion, ..Self::default() };
         }
     }
 
-    /// A sample without a drive: response, m, and speed of the particle, m/s. The window has `periods` periods.
-    pub fn sample(&mut self, response: f64, speed: f64, sample_time: f64, periods: f64) {
+    /// A sample without a drive: response, m, and speed of the particle, m/s.
+    pub fn sample(&mut self, response: f64, speed: f64, sample_time: f64) {
         // A plant that has not been driven yet has no decay.
         if self.motion.omega == 0.0 || self.ended {
             return;
         }
         if self.window == 0 {
             let period = TAU / self.motion.omega / sample_time;
-            self.window = (periods * period).round() as usize + 1;
+            self.window = (WINDOW * period).round() as usize + 1;
             self.stride = ((period / PER_PERIOD).round() as usize).max(1);
             self.synchronous = true;
         }
@@ -114,7 +114,7 @@ impl Decay {
         match harmonic(&self.values, sample_time, self.motion.omega) {
             Some(fit) => {
                 self.ended = fit.amplitude < DECAYED * *self.first.get_or_insert(fit.amplitude);
-                self.motion = Motion {
+                self.motion = HarmonicMotion {
                     omega: fit.omega,
                     amplitude: fit.amplitude,
                     speed: self.speeds.iter().sum::<f64>() / self.speeds.len() as f64,

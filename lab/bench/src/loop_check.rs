@@ -39,24 +39,22 @@ pub struct LoopCheck {
 /// Checks a rig at a hundredth of the drive, after a response that is still falling has come to rest. The phase of the rig's oscillator is
 /// a multiple of 2 pi before and after.
 pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, RigError> {
-    let (omega, amplitude) = drive(scene);
+    let (omega, amplitude) = (scene.controller_config().omega_start, SHARE * scene.amplitude);
     let step = scene.sample_time();
     let samples = |periods: usize| (periods as f64 * TAU / (omega * step)).round() as usize;
     let [quiet, driven, window] = PERIODS.map(samples);
-    let mut rig = OpenLoop {
-        rig,
-        omega,
-        step,
-        phase: 0.0,
-        readings: Vec::new(),
-        has_base: false,
-    };
-    let expected = expected(scene);
-    rig.rest(quiet, samples(WAITS[1]), NOISE * expected[0].norm())?;
+    let (phase, readings, has_base) = (0.0, Vec::new(), false);
+    let mut rig = OpenLoop { rig, step, phase, readings, has_base };
+    let expected = expected(scene, omega, amplitude);
+    rig.rest(omega, quiet, samples(WAITS[1]), NOISE * expected[0].norm())?;
     let begins = rig.readings.len();
-    rig.drive(driven, amplitude)?;
-    rig.end(samples(1))?;
+    rig.drive(driven, omega, amplitude)?;
+    let ends = rig.readings.len();
+    // The phase of the rig's oscillator ends at a multiple of 2 pi.
+    let last = (TAU - rig.phase % TAU) / (samples(1) as f64 * step);
+    rig.drive(samples(1), last, 0.0)?;
     let OpenLoop { mut readings, has_base, .. } = rig;
+    readings.truncate(ends);
     without_drift(&mut readings[begins..]);
     let mut channels = [0, 1].map(|n| {
         let signal = SineFit::of(&readings[begins + driven - window..], n + 1);
@@ -123,14 +121,8 @@ fn without_drift(readings: &mut [[f64; 3]]) {
     }
 }
 
-/// Frequency, rad/s, and amplitude, m, of the drive.
-fn drive(scene: &Scene) -> (f64, f64) {
-    (scene.controller_config().omega_start, SHARE * scene.amplitude)
-}
-
-/// Phasors of response and base, m, at the end of a check of the scene's linear resonator.
-fn expected(scene: &Scene) -> [Complex64; 2] {
-    let (omega, amplitude) = drive(scene);
+/// Phasors of response and base, m, at the end of a check of the scene's linear resonator; frequency of the drive, rad/s, and its amplitude, m.
+fn expected(scene: &Scene, omega: f64, amplitude: f64) -> [Complex64; 2] {
     let LinearResponse { omega0, damping_rate, .. } = scene.linear();
     let time = (PERIODS[1] as f64 - 0.5 * PERIODS[2] as f64) * TAU / omega;
     let rate = Complex64::new(damping_rate, omega - omega0);
@@ -166,19 +158,18 @@ const WAITS: [usize; 2] = [40, 10];
 
 /// A rig whose loop is open, and what it has read: the phase of its oscillator, rad, response and base.
 struct OpenLoop<'a, R: ?Sized> {
-    pub rig: &'a mut R,
-    pub omega: f64,
-    pub step: f64,
-    pub phase: f64,
-    pub readings: Vec<[f64; 3]>,
-    pub has_base: bool,
+    rig: &'a mut R,
+    step: f64,
+    phase: f64,
+    readings: Vec<[f64; 3]>,
+    has_base: bool,
 }
 
 impl<R: Rig + ?Sized> OpenLoop<'_, R> {
-    /// Drives with an amplitude, m, and keeps the readings.
-    pub fn drive(&mut self, samples: usize, amplitude: f64) -> Result<(), RigError> {
+    /// Drives with a frequency, rad/s, and an amplitude, m, and keeps the readings.
+    fn drive(&mut self, samples: usize, omega: f64, amplitude: f64) -> Result<(), RigError> {
         for _ in 0..samples {
-            let (omega, phase) = (self.omega, self.phase);
+            let phase = self.phase;
             let sensors = self.rig.sense()?;
             self.has_base |= sensors.reference.is_some();
             self.readings
@@ -191,25 +182,15 @@ impl<R: Rig + ?Sized> OpenLoop<'_, R> {
     }
 
     /// Waits until the response is at most `enough` (RMS, m) over the last `quiet` samples; looks after every `pause`.
-    pub fn rest(&mut self, quiet: usize, pause: usize, enough: f64) -> Result<(), RigError> {
-        self.drive(quiet, 0.0)?;
+    fn rest(&mut self, omega: f64, quiet: usize, pause: usize, enough: f64) -> Result<(), RigError> {
+        self.drive(quiet, omega, 0.0)?;
         for _ in 0..WAITS[0] {
             let response = scatter(&self.readings[self.readings.len() - quiet..], 1);
             // A sensor that reads no number never rests.
             if response <= enough || response.is_nan() {
                 break;
             }
-            self.drive(pause, 0.0)?;
-        }
-        Ok(())
-    }
-
-    /// Brings the phase of the rig's oscillator to a multiple of 2 pi, with no drive.
-    pub fn end(&mut self, samples: usize) -> Result<(), RigError> {
-        let omega = (TAU - self.phase % TAU) / (samples as f64 * self.step);
-        for _ in 0..samples {
-            self.rig.sense()?;
-            self.rig.advance(Drive { omega, ..Drive::default() }, self.step)?;
+            self.drive(pause, omega, 0.0)?;
         }
         Ok(())
     }
@@ -270,29 +251,17 @@ fn of_response(linear: &Linear, ratio: Complex64, scene: &Scene) -> [CheckedQuan
     let hertz = [linear.omega_0, u, stated.omega0].map(|omega| omega / TAU);
     let damping = [linear.damping_rate, u, stated.damping_rate];
     let phase = [ratio.arg().to_degrees(), linear.u_gain.to_degrees(), 0.0];
-    let late = if ratio.arg() > 0.0 {
-        Verdict::BaseLate
-    } else {
-        Verdict::ResponseLate
-    };
+    let late = [Verdict::ResponseLate, Verdict::BaseLate][usize::from(ratio.arg() > 0.0)];
     let gain = [ratio.norm(), linear.u_gain, 1.0];
+    let (phases, gains) = (
+        "phase of the response to the base, less the expected one",
+        "response over base, over the expected one",
+    );
     [
         quantity("natural frequency", "Hz", hertz, NOTED[0] * hertz[2], None),
         quantity("damping rate", "1/s", damping, NOTED[1] * damping[2], None),
-        quantity(
-            "phase of the response to the base, less the expected one",
-            "degrees",
-            phase,
-            PHASE,
-            Some(late),
-        ),
-        quantity(
-            "response over base, over the expected one",
-            "",
-            gain,
-            FACTOR,
-            Some(Verdict::ResponseGain),
-        ),
+        quantity(phases, "degrees", phase, PHASE, Some(late)),
+        quantity(gains, "", gain, FACTOR, Some(Verdict::ResponseGain)),
     ]
 }
 
@@ -309,16 +278,10 @@ fn of_base((phasor, u): (Complex64, f64), drive: f64, periods: &[Complex64], sce
     // The phases of a window's ends.
     let u_clock = u * (periods.len() as f64).sqrt() / (TAU * (last.len() as f64 - 1.0));
     let clock = [1.0 + turned.arg() / TAU, u_clock, 1.0];
-    let name = "frequency of the base over that of the drive";
+    let (name, gain) = ("frequency of the base over that of the drive", [ratio, u * ratio, 1.0]);
     [
         quantity(name, "", clock, CLOCK, Some(Verdict::Clock)),
-        quantity(
-            "base over drive",
-            "",
-            [ratio, u * ratio, 1.0],
-            tolerance,
-            Some(Verdict::BaseGain),
-        ),
+        quantity("base over drive", "", gain, tolerance, Some(Verdict::BaseGain)),
     ]
 }
 

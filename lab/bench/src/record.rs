@@ -5,7 +5,7 @@ use std::fmt::Write;
 use crate::rig::{Command, Drive, GroundTruth, Sensors};
 
 /// One sample of the record.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Sample {
     /// Time, s.
     pub time: f64,

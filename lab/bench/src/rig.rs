@@ -304,12 +304,9 @@ impl BuiltIn {
 
 impl From<Output> for Command {
     fn from(output: Output) -> Self {
+        let Output { omega, amplitude, drive: displacement, .. } = output;
         Self {
-            drive: Drive {
-                omega: output.omega,
-                amplitude: output.amplitude,
-                displacement: output.drive,
-            },
+            drive: Drive { omega, amplitude, displacement },
             phase_error: output.phase_error,
             settled: output.settled,
             state: Some(output.state),
@@ -320,15 +317,9 @@ impl From<Output> for Command {
 
 impl Controller for BuiltIn {
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
-        let output = self.lock.process(
-            &mut self.state,
-            Input {
-                response: sensors.response,
-                reference: sensors.reference,
-                active,
-            },
-        );
-        Ok(output.into())
+        let Sensors { response, reference } = sensors;
+        let input = Input { response, reference, active };
+        Ok(self.lock.process(&mut self.state, input).into())
     }
 
     fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {

@@ -21,7 +21,6 @@ macro_rules! settings {
     };
 }
 
-mod backbone;
 mod chain;
 mod controller;
 mod names;
@@ -35,7 +34,6 @@ use phase_lock::{ConfigError, Number};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 use vines_model::ArgumentError;
 
-pub use backbone::BackboneSettings;
 pub use chain::ChainSettings;
 pub use controller::{ControllerSettings, KEYS, LinearResponse, PhaseLock, key, refusal};
 pub use lovines::Parameters;
@@ -204,13 +202,11 @@ impl Excitation {
                 not_negative("excitation.E", e, "m")?;
                 Ok(e)
             }
-            (given, _) => Err(SceneError::Keys {
-                origin: origin.into(),
-                message: format!(
-                    "[excitation] has {} of G (dimensionless) and E (m): give exactly one, with G = E/(b epsilon)",
-                    if given.is_some() { "both" } else { "neither" }
-                ),
-            }),
+            (given, _) => {
+                let given = if given.is_some() { "both" } else { "neither" };
+                let one = "of G (dimensionless) and E (m): give exactly one, with G = E/(b epsilon)";
+                Err(SceneError::text(origin, format!("[excitation] has {given} {one}")))
+            }
         }
     }
 }
@@ -235,12 +231,12 @@ impl Sections {
         };
         scene.controller.check()?;
         scene.backbone.check()?;
-        scene.record.check(&scene.controller, scene.lock_periods())?;
+        scene.record.check(&scene)?;
         scene.chain.check(&scene.controller)?;
         if scene.resonance.reference == Reference::Force && !scene.chain.reference {
             let message = "resonance.reference = \"force\" with chain.reference = false: the force k e + c e' follows from the base \
                            sensor; switch it on, or take the reference \"base\"";
-            return Err(SceneError::Keys { origin: origin.into(), message: message.into() });
+            return Err(SceneError::text(origin, message));
         }
         let fastest = scene.controller.omega_max * scene.dimensionless().omega0;
         lovines::Drive::harmonic(scene.amplitude, fastest)
@@ -348,7 +344,7 @@ impl PlantSection {
     }
 
     fn resolve(&self, origin: &str) -> Result<Parameters, SceneError> {
-        let keys = |message: &str| SceneError::Keys { origin: origin.into(), message: message.into() };
+        let keys = |message: &str| SceneError::text(origin, message);
         let is_si = self.is_si().map_err(keys)?;
         let need = |value: Option<f64>, key: &str| {
             value.ok_or_else(|| {
@@ -483,14 +479,10 @@ fn serialize<S: Serializer>(plant: &Parameters, serializer: S) -> Result<S::Ok, 
 settings! {
     /// Durations of an experiment.
     pub struct RecordSettings {
-        /// Time limit for the lock, natural periods; by default at least 3000, and 20 relaxation times.
-        lock_periods: Option<f64> = None,
         /// How long the settled lock is held and measured, natural periods.
         hold_periods: f64 = 20.0,
         /// Length of the recorded decay, natural periods; by default as long as the linear response takes to fall to 5 %.
         decay_periods: Option<f64> = None,
-        /// Window of the fit along the decay, periods of the motion.
-        window_periods: f64 = 2.5,
     }
 }
 
@@ -498,30 +490,63 @@ settings! {
 const MOST_SAMPLES: f64 = 2e7;
 
 impl RecordSettings {
-    /// `lock_periods` is the time limit for the lock, as set or by default.
-    fn check(&self, controller: &ControllerSettings, lock_periods: f64) -> Result<(), SceneError> {
+    fn check(&self, scene: &Scene) -> Result<(), SceneError> {
         let unit = "(natural periods)";
-        positive("record.lock_periods", lock_periods, unit)?;
         // At least enough to count impacts and measure.
         within("record.hold_periods", self.hold_periods, unit, [3.0, 1e6])?;
         positive("record.decay_periods", self.decay_periods.unwrap_or(1.0), unit)?;
-        let longest = self.decay_periods.unwrap_or(1000.0);
-        within(
-            "record.window_periods",
-            self.window_periods,
-            "(periods)",
-            [0.5, longest],
-        )?;
-        let samples =
-            controller.samples_per_period * (lock_periods + self.hold_periods + self.decay_periods.unwrap_or(0.0));
+        let periods = self.hold_periods + self.decay_periods.unwrap_or(0.0);
+        let samples = scene.lock_time() / scene.sample_time() + scene.controller.samples_per_period * periods;
         check(
-            "samples_per_period times all periods of [record]",
+            "samples of phase_lock.acquire_timeout and of all periods of [record]",
             samples,
             "samples",
             samples <= MOST_SAMPLES,
             "must be at most 20 million",
         )
     }
+}
+
+// The `[backbone]` section: how the backbone is tracked.
+
+settings! {
+    /// How the response amplitude is stepped with the loop closed.
+    pub struct BackboneSettings {
+        /// First level, response amplitude over b.
+        #[serde(rename = "C_from")]
+        c_from: f64 = 0.7,
+        /// Last level, response amplitude over b.
+        #[serde(rename = "C_to")]
+        c_to: f64 = 0.14,
+        /// Number of levels, at equal distances.
+        points: u32 = 29,
+        /// Largest standard uncertainty of the drive E as a share of it, and of the frequency as a share of the half-power bandwidth of a linear rig
+        /// that this drive holds at the largest level: `omega0 E/A`. Noise and transients lengthen the dwell until both are reached.
+        precision: f64 = 9e-4,
+    }
+}
+
+impl BackboneSettings {
+    fn check(&self) -> Result<(), SceneError> {
+        positive("backbone.C_from", self.c_from, "(over b)")?;
+        positive("backbone.C_to", self.c_to, "(over b)")?;
+        positive("backbone.precision", self.precision, "(relative)")?;
+        within("backbone.points", self.points.into(), "(levels)", [1.0, 1e4])
+    }
+
+    /// The levels, amplitudes of the response in m, for the half-width `b`, m, in the order in which they are visited.
+    fn levels(&self, b: f64) -> Vec<f64> {
+        let [from, to] = [self.c_from, self.c_to].map(|level| level * b);
+        let steps = f64::from(self.points.max(2) - 1);
+        (0..self.points)
+            .map(|n| rounded(from + (to - from) * f64::from(n) / steps))
+            .collect()
+    }
+}
+
+/// The value to ten digits, as a person would write it: 0.0068, not 0.0067999999999999996.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.9e}").parse().unwrap_or(value)
 }
 
 // Options of a scene: a number, or `false` or "none". Zero is a number like every other.
@@ -574,8 +599,6 @@ fn within(key: &'static str, value: f64, unit: &'static str, [low, high]: [f64; 
 pub enum SceneError {
     #[error("cannot read the scene {}: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
-    #[error("{origin}: {message}")]
-    Syntax { origin: String, message: String },
     #[error("--set: {0}")]
     Argument(#[from] ArgumentError),
     #[error("--set {argument}: {message}")]
@@ -594,7 +617,14 @@ pub enum SceneError {
     #[error("{}", refusal(.0))]
     Controller(#[from] ConfigError),
     #[error("{origin}: {message}")]
-    Keys { origin: String, message: String },
+    Text { origin: String, message: String },
+}
+
+impl SceneError {
+    /// An error of the text that `origin` names.
+    fn text(origin: &str, message: impl Into<String>) -> Self {
+        Self::Text { origin: origin.into(), message: message.into() }
+    }
 }
 
 /// A message of the TOML reader, without types of Rust.
@@ -608,5 +638,21 @@ fn plain(message: &str) -> String {
         ("expected a map", "expected a table"),
     ];
     let replace = |text: String, (from, to)| text.replace(from, to);
-    words.into_iter().fold(message.trim().to_string(), replace)
+    let plain = words.into_iter().fold(message.trim().to_string(), replace);
+    let former = FORMER
+        .iter()
+        .find(|(key, _)| message.contains(&format!("unknown field `{key}`")));
+    former.map_or(plain.clone(), |(key, now)| format!("{plain}; `{key}` is now {now}"))
 }
+
+/// Keys of former scenes, and what has taken their place.
+const FORMER: [(&str, &str); 8] = [
+    ("phase_tolerance", "phase_lock.lock.phase_tolerance, rad"),
+    ("frequency_tolerance", "phase_lock.lock.frequency_drift"),
+    ("amplitude_tolerance", "phase_lock.lock.amplitude_drift"),
+    ("delay", "phase_lock.delay, s"),
+    ("lock_periods", "phase_lock.acquire_timeout, s"),
+    ("G_max", "phase_lock.amplitude_max, m"),
+    ("dwell_max", "always 150 periods"),
+    ("window_periods", "always 2.5 periods"),
+];

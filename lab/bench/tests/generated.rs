@@ -5,19 +5,8 @@ use std::path::Path;
 use phase_lock::{PARAMETERS, Parameter};
 use vines_testbench::scene::key;
 
-const HEAD: &str = "\
-# Settings of the controller
-
-One table defines every setting of the controller (`controller/src/config.rs`). From it follow `PhaseLock.fmu`, the structure `PhaseLockConfig`
-of the C interface, the keys of a scene, and this page. The name is the name in the FMU; the C structure omits `lock.`. Initial values are those
-of `Config::for_resonance` and `phase_lock_config_for_resonance` for a resonance at `omega` (rad/s) and a base amplitude `amplitude` (m). A scene
-computes some of them from the plant. An option that is absent is \"none\": -1 in the FMU, `none` or `false` in a scene, not `present` in C. Keys
-outside `[phase_lock]` have units that suit any plant, which the file of the scene states. Magnitudes are at most 1e30, and
-above 0 at least 1e-30.
-
-| name | unit | allowed | initial value | key of a scene | meaning |
-|---|---|---|---|---|---|
-";
+/// The end of what stands above the rows.
+const HEAD: &str = "|---|---|---|---|---|---|\n";
 
 /// The initial value as a reader writes it. The compiler chooses the spaces.
 fn initial(parameter: &Parameter) -> String {
@@ -45,12 +34,14 @@ fn the_page_of_the_settings_follows_from_the_table_and_the_keys_of_a_scene() {
         let (initial, key) = (initial(parameter), key(name));
         format!("| `{name}` | {unit} | {allowed} | {initial} | `{key}` | {meaning} |\n")
     });
-    let text = HEAD.to_owned() + &rows.collect::<String>();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/controller-settings.md");
+    let present = std::fs::read_to_string(&path).unwrap();
+    let (head, _) = present.split_once(HEAD).unwrap();
+    let text = format!("{head}{HEAD}{}", rows.collect::<String>());
     if std::env::var_os("UPDATE").is_some() {
         std::fs::write(&path, &text).unwrap();
+        return;
     }
-    let present = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
         present == text,
         "docs/controller-settings.md is out of date: run this test with UPDATE=1"

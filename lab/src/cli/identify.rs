@@ -2,7 +2,7 @@
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::experiment::{Plan, Stage, run_into};
+use vines::experiment::{Stage, run_into};
 use vines::fit::contradiction;
 use vines::identification::{IdentificationError, identify};
 use vines::{advice, comparison::Comparison, report};
@@ -43,11 +43,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let (scene, mut session) = experiment.start("vines identify", arguments.rig.as_ref(), |scene| {
         scene.controller_config()
     })?;
-    let plan = Plan::of(&scene);
-    let bar = progress_bar(plan.lock as u64, "{msg:29} [{wide_bar}] {pos}/{len} samples");
+    let bar = progress_bar(
+        Stage::Locking.samples(&scene) as u64,
+        "{msg:29} [{wide_bar}] {pos}/{len} samples",
+    );
     let mut samples = Vec::new();
     let (rig, controller) = (session.open.rig.as_mut(), session.controller.as_mut());
-    let record = run_into(&mut samples, rig, controller, &plan, |stage, done, of| {
+    let record = run_into(&mut samples, rig, controller, &scene, |stage, done, of| {
         show(&bar, stage, done, of)
     });
     bar.finish_and_clear();

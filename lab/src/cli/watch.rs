@@ -15,7 +15,7 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::{Value, json};
 use vines::curves;
-use vines::live::{Decay, LastImpacts, Motion};
+use vines::live::{Decay, HarmonicMotion, LastImpacts};
 use vines::record::Sample;
 use vines::regime::Impact;
 use vines::rig::{Command, Controller, ControllerError, Move, Rig, Sensors};
@@ -213,12 +213,11 @@ impl View {
         if !follows || driven != was_driven || self.fit.ended {
             let omega0 = self.scene.dimensionless().omega0;
             let omega = if drive.omega > 0.0 { drive.omega } else { omega0 };
-            self.fit.drive(Motion { omega, ..self.fit.motion });
+            self.fit.drive(HarmonicMotion { omega, ..self.fit.motion });
         }
         self.particle(&sample);
         let speed = ground_truth.map_or(f64::NAN, |truth| truth.particle_velocity.abs());
-        self.fit
-            .sample(sensors.response, speed, step, self.scene.record.window_periods);
+        self.fit.sample(sensors.response, speed, step);
         self.fit.watch(&self.impacts, self.phase);
         let mut motion = self.fit.motion;
         if driven {

@@ -9,7 +9,7 @@ use super::table::{Table, number, with_uncertainty};
 use super::{Section, Subject, summary};
 use crate::backbone::track;
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
-use crate::experiment::{self, Plan};
+use crate::experiment;
 use crate::identification::{DecayEnd, identify};
 use crate::map::LIMIT;
 use crate::orbit::{
@@ -43,7 +43,7 @@ fn experiment(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
     let scene = &subject.scene;
     let mut rig = Simulated::of(scene)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let record = experiment::run(rig.as_mut(), &mut controller, &Plan::of(scene), |_, _, _| {});
+    let record = experiment::run(rig.as_mut(), &mut controller, scene, |_, _, _| {});
     let identified = record.map_err(|error| error.to_string()).and_then(|record| {
         let identification = identify(&record, scene).map_err(|error| error.to_string())?;
         Ok((record, Comparison::of(&identification, scene)))

@@ -136,9 +136,7 @@ fn decay(result: &Comparison) -> String {
         DecayEnd::Record => "where the record ends; a larger record.decay_periods shows more",
     };
     match &result.decay[..] {
-        [] => format!(
-            "Free decay: no points, because it is shorter than the window of the fit; it ends {end}. A shorter record.window_periods may help"
-        ),
+        [] => format!("Free decay: no points, because it is shorter than the window of the fit; it ends {end}"),
         points @ [first, ..] => format!(
             "Free decay: {} points from C = {:.4} down to {:.4}, {end}",
             points.len(),

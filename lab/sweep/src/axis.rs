@@ -145,7 +145,7 @@ impl Axis {
             "plant.c" => "N s/m",
             "plant.b" | "excitation.E" | "start.q1" | "start.q2" => "m",
             "start.dq1" | "start.dq2" => "m/s",
-            "controller.phase_target" | "controller.phase_tolerance" => "degree",
+            "controller.phase_target" => "degree",
             "chain.snr" => "dB",
             name => {
                 let parameter = name.strip_prefix("phase_lock.").and_then(Parameter::find);

@@ -137,11 +137,13 @@ impl Cell {
 
 /// The locked point of the scene.
 fn locked(scene: &Scene) -> Result<Lock, Box<dyn Error>> {
-    let plan = experiment::Plan { decay: 0, ..experiment::Plan::of(scene) };
-    let mut rig = Simulated::of(scene)?;
+    // Without a decay.
+    let mut scene = scene.clone();
+    scene.record.decay_periods = Some(0.0);
+    let mut rig = Simulated::of(&scene)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let record = experiment::run(rig.as_mut(), &mut controller, &plan, |_, _, _| {})?;
-    Ok(identification::identify(&record, scene)?.lock)
+    let record = experiment::run(rig.as_mut(), &mut controller, &scene, |_, _, _| {})?;
+    Ok(identification::identify(&record, &scene)?.lock)
 }
 
 /// Code of a cell that is not computed.

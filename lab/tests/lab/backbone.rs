@@ -80,13 +80,13 @@ fn through_40_db_of_sensor_noise_points_lie_within_5e_3_and_within_what_they_sta
 #[test]
 fn a_level_that_the_drive_cannot_hold_is_reported_as_not_reached() {
     let report = tracked(&[
-        "backbone.G_max=1.12",
-        "backbone.C_from=0.7",
+        "phase_lock.amplitude_max=1.092e-2",
+        "backbone.C_from=0.8",
         "backbone.C_to=0.4",
         "backbone.points=2",
     ]);
     assert!(!report.points[0].point.reached && report.points[1].point.reached);
-    assert!(vines::report::summary::tracked(&report).contains("level 0.700 not reached"));
+    assert!(vines::report::summary::tracked(&report).contains("level 0.800 not reached"));
 }
 
 #[test]
@@ -97,7 +97,6 @@ fn beyond_symmetry_breaking_both_ways_of_telling_the_regime_say_so() {
         "backbone.C_to=0.8",
         "backbone.points=3",
         "backbone.precision=1e-6",
-        "backbone.dwell_max=60",
     ]);
     let regimes: Vec<_> = report
         .points
@@ -152,7 +151,7 @@ fn without_evidence_of_impacts_no_point_of_a_rig_is_called_one_to_one() {
     };
     let rigs: [&dyn Fn(&mut Parameters); 2] = [&wide, &jammed];
     for (number, rig) in rigs.into_iter().enumerate() {
-        let loud = &["chain.snr=20", "backbone.dwell_max=30"];
+        let loud = &["chain.snr=20"];
         for settings in [&[][..], &["chain.snr=40"], loud, &["resonance.sensor='q1'"]] {
             // The loop check refuses more noise than 40 dB.
             for checked in [true, false].into_iter().skip(usize::from(settings == loud)) {

@@ -113,7 +113,7 @@ fn a_drive_without_a_stable_orbit_is_told_at_which_drives_one_is_stable() {
     let undamped = [
         "--set=plant.c=0",
         "--set=start.dq2=0.1",
-        "--set=record.lock_periods=500",
+        "--set=phase_lock.acquire_timeout=57",
     ];
     let run = [
         "identify",

@@ -33,7 +33,7 @@ const QUICK: [&str; 8] = [
     "start.dq2=1.0",
     "controller.samples_per_period=50",
     "controller.bandwidth=0.3",
-    "controller.amplitude_tolerance=4e-3",
+    "phase_lock.lock.amplitude_drift=1.5e-4",
     "record.hold_periods=10",
     "record.decay_periods=25",
 ];

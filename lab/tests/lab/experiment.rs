@@ -2,7 +2,7 @@
 //! stable, and experiments that end early.
 
 use vines::comparison::Comparison;
-use vines::experiment::{self, ExperimentError, Plan};
+use vines::experiment::{self, ExperimentError};
 use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
 use vines::record::Record;
 use vines::rig::{
@@ -18,7 +18,7 @@ fn run(
     controller: &mut impl Controller,
     scene: &Scene,
 ) -> Result<Record, ExperimentError> {
-    experiment::run(rig, controller, &Plan::of(scene), |_, _, _| {})
+    experiment::run(rig, controller, scene, |_, _, _| {})
 }
 
 fn measure(scene: &Scene) -> Record {
@@ -48,8 +48,8 @@ fn identified(settings: &[&str]) -> Comparison {
 #[test]
 fn a_longer_wait_brings_the_lock_closer_to_the_exact_orbit() {
     let strict = [
-        "controller.amplitude_tolerance=1e-7",
-        "controller.frequency_tolerance=1e-6",
+        "phase_lock.lock.amplitude_drift=3.8e-9",
+        "phase_lock.lock.frequency_drift=4.5e-10",
     ];
     let found = identified(&strict);
     let exact = found.exact.unwrap();
@@ -158,7 +158,7 @@ fn the_decay_of_the_exact_plant_predicts_the_measured_one_a_hundred_times_better
 
 #[test]
 fn a_decay_too_short_for_points_keeps_the_lock_and_says_that_the_record_ended() {
-    let found = identified(&["record.decay_periods=1", "record.window_periods=1"]);
+    let found = identified(&["record.decay_periods=1"]);
     assert!(found.decay.is_empty() && found.exact.is_some());
     assert_eq!(found.decay_end, DecayEnd::Record);
     assert!(vines::report::summary::identification(&found).contains("no points"));
@@ -231,7 +231,7 @@ fn a_drive_without_a_stable_orbit_ends_the_search_with_a_reason() {
     let mut rig = plant(&scene);
     let mut controller = built_in(&scene);
     let mut samples = Vec::new();
-    let ended = experiment::run_into(&mut samples, &mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {});
+    let ended = experiment::run_into(&mut samples, &mut rig, &mut controller, &scene, |_, _, _| {});
     assert!(
         matches!(
             ended,
@@ -285,13 +285,7 @@ fn noise_is_never_locked_and_ends_the_experiment_with_its_reason() {
     let scene = scene(&[]);
     let mut controller = built_in(&scene);
     let mut samples = Vec::new();
-    let outcome = experiment::run_into(
-        &mut samples,
-        &mut Noise(1),
-        &mut controller,
-        &Plan::of(&scene),
-        |_, _, _| {},
-    );
+    let outcome = experiment::run_into(&mut samples, &mut Noise(1), &mut controller, &scene, |_, _, _| {});
     assert!(matches!(
         outcome,
         Err(ExperimentError::Tripped { fault: Fault::NoSignal, .. })
@@ -305,7 +299,7 @@ fn a_sensor_of_two_bits_has_no_phase_rather_than_a_phase_error_of_zero() {
         "chain.adc_bits=2",
         "phase_lock.signal_timeout='none'",
         "phase_lock.residual_max='none'",
-        "record.lock_periods=5",
+        "phase_lock.acquire_timeout=31.4",
     ]);
     let plant = Simulated::new(scene.plant, scene.start).unwrap();
     let mut rig = Chain::around(Box::new(plant), &scene);
@@ -321,7 +315,7 @@ fn a_response_above_its_limit_ends_the_experiment_at_once_and_keeps_what_was_mea
     let mut rig = plant(&scene);
     let mut controller = built_in(&scene);
     let mut samples = Vec::new();
-    let outcome = experiment::run_into(&mut samples, &mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {});
+    let outcome = experiment::run_into(&mut samples, &mut rig, &mut controller, &scene, |_, _, _| {});
     let Err(error @ ExperimentError::Tripped { periods, fault, .. }) = &outcome else {
         panic!("{outcome:?}");
     };
@@ -355,11 +349,7 @@ impl Controller for OpenLoop {
 
 #[test]
 fn an_experiment_takes_any_controller_and_records_every_stage() {
-    let scene = scene(&[
-        "record.hold_periods=3",
-        "record.decay_periods=2",
-        "record.window_periods=1.5",
-    ]);
+    let scene = scene(&["record.hold_periods=3", "record.decay_periods=2"]);
     let mut rig = plant(&scene);
     let drive = Drive { omega: 1.0, amplitude: 0.01, displacement: 0.0 };
     let record = run(&mut rig, &mut OpenLoop(drive), &scene).unwrap();

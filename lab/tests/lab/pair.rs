@@ -7,7 +7,7 @@ use std::{
 };
 
 use tempfile::TempDir;
-use vines::experiment::{self, Plan};
+use vines::experiment;
 use vines::fmu::{FmuController, FmuRig};
 use vines::identification::identify;
 use vines::pack::{Binary, components, own_libraries, pack_bench};
@@ -134,7 +134,7 @@ impl Rig for NoBase {
 
 /// Detuning at which a run has locked.
 fn locked(rig: &mut impl Rig, controller: &mut impl Controller, scene: &Scene) -> f64 {
-    let record = experiment::run(rig, controller, &Plan::of(scene), |_, _, _| {}).unwrap();
+    let record = experiment::run(rig, controller, scene, |_, _, _| {}).unwrap();
     identify(&record, scene).unwrap().lock.at.sigma
 }
 
@@ -175,7 +175,7 @@ fn fmus_with_other_names_and_units_without_an_oscillator_and_without_settled_loc
 
 #[test]
 fn a_controller_without_the_output_of_its_phase_error_is_not_said_to_measure_none() {
-    let set = ["record.lock_periods=5"].map(|one| one.parse().unwrap());
+    let set = ["phase_lock.acquire_timeout=0.6"].map(|one| one.parse().unwrap());
     let scene = Scene::load(None, &set).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = |name| folder.path().join(name);
@@ -183,7 +183,7 @@ fn a_controller_without_the_output_of_its_phase_error_is_not_said_to_measure_non
     renamed(&path("PhaseLock.fmu"), &path("loop.fmu"), &[("phase_error", "error")]);
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
     let mut controller = FmuController::load(&path("loop.fmu"), &scene.controller_config(), &Names::default()).unwrap();
-    let error = experiment::run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap_err();
+    let error = experiment::run(&mut rig, &mut controller, &scene, |_, _, _| {}).unwrap_err();
     let message = error.to_string();
     assert!(
         message.contains("the controller does not report its phase error"),

@@ -10,7 +10,7 @@ use vines::{
 
 /// Writes a report on a coarse map, after an early lock.
 fn write(out: &Path) {
-    let early = ["controller.amplitude_tolerance=8e-3", "phase_lock.lock.dwell=5"];
+    let early = ["phase_lock.lock.amplitude_drift=3e-4", "phase_lock.lock.dwell=5"];
     let overrides: Vec<Override> = early.iter().map(|s| s.parse().unwrap()).collect();
     let text = include_str!("../../../scenes/dimensionless.toml");
     let subject = Subject {

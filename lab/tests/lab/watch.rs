@@ -132,7 +132,7 @@ fn an_experiment_is_the_same_with_browsers_and_they_get_it_to_its_end() {
 #[test]
 fn an_experiment_that_fails_says_so_on_the_page() {
     let folder = tempfile::tempdir().unwrap();
-    let short = ["--set", "record.lock_periods=30"];
+    let short = ["--set", "phase_lock.acquire_timeout=3.4"];
     let experiment = Watched::start(&identify(folder.path().to_str().unwrap(), &short));
     let events: Vec<Value> = experiment.browser().collect();
     let outcome = &events.last().unwrap()["outcome"];

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use lovines::{Event, Plant, Wall};
 use phase_lock::{Input, Move, Output, PhaseLock, State};
 use vines_model::regime::{Impact, Regime};
-use vines_testbench::live::{Decay, LastImpacts, Motion};
+use vines_testbench::live::{Decay, HarmonicMotion, LastImpacts};
 use vines_testbench::rig::{Command, Drive};
 use vines_testbench::scene::Scene;
 
@@ -30,7 +30,7 @@ pub struct Row {
     /// The drive from this sample on: the controller's, or that of the open loop.
     pub drive: Drive,
     /// Frequency of the drive, amplitude by the controller and present speed of the particle; along a free decay, those of the fit.
-    pub motion: Motion,
+    pub motion: HarmonicMotion,
     /// Whether this is a free decay with two impacts per period, along the backbone.
     pub decays: bool,
 }
@@ -52,7 +52,7 @@ pub struct Bench {
     /// Output of the controller at the last sample.
     pub output: Output,
     /// The motion at the last sample, as in [`Row`].
-    pub motion: Motion,
+    pub motion: HarmonicMotion,
     /// The last impacts.
     pub impacts: LastImpacts,
     /// Phase of the drive since the start, rad.
@@ -81,7 +81,7 @@ impl Bench {
             samples: 0,
             active: true,
             output: lock.idle(),
-            motion: Motion::default(),
+            motion: HarmonicMotion::default(),
             impacts: LastImpacts::default(),
             phase: 0.0,
             tracking: None,
@@ -170,14 +170,13 @@ impl Bench {
         let output = self.lock.process(&mut self.state, input);
         let drive = self.requested(&output);
         let step = self.lock.config().sample_time;
-        let mut motion = Motion {
+        let mut motion = HarmonicMotion {
             omega: drive.omega,
             amplitude: output.response_amplitude,
             speed: self.rig.plant.state().dq2.abs(),
         };
         if drive.amplitude == 0.0 {
-            self.decay
-                .sample(sensors.response, motion.speed, step, self.scene.record.window_periods);
+            self.decay.sample(sensors.response, motion.speed, step);
             self.decay.watch(&self.impacts, self.phase);
             motion = self.decay.motion;
         } else {

@@ -15,7 +15,7 @@ use std::cell::RefCell;
 
 use vines_model::curves;
 use vines_model::regime::Regime;
-use vines_testbench::live::Motion;
+use vines_testbench::live::HarmonicMotion;
 
 use crate::bench::{Bench, regime_at};
 use crate::message::Message;
@@ -192,7 +192,7 @@ pub extern "C" fn status() -> i32 {
     values(|bench, output| {
         let (d, out) = (bench.scene.dimensionless(), bench.output);
         let closed = bench.settings[crate::settings::index::CLOSED] != 0.0;
-        let Motion { omega, amplitude, .. } = bench.motion;
+        let HarmonicMotion { omega, amplitude, .. } = bench.motion;
         let totals = bench.plant().totals();
         let lock = bench.lock.config().lock;
         let yes = |condition: bool| f64::from(u8::from(condition));

@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use vines_live::bench::{Bench, regime_at};
 use vines_live::settings::{default_scene, index, settings_of};
-use vines_testbench::experiment::{Plan, run};
-use vines_testbench::identification::decay_points;
-use vines_testbench::live::Motion;
+use vines_testbench::experiment::run;
+use vines_testbench::identification::{WINDOW, decay_points};
+use vines_testbench::live::HarmonicMotion;
 use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
 
@@ -33,7 +33,7 @@ fn the_default_lock_has_the_bits_of_the_lab_under_a_constant_drive() {
     let scene = paper();
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
     let mut controller = ConstantDrive(BuiltIn::new(&scene.controller_config()).unwrap());
-    let record = run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap();
+    let record = run(&mut rig, &mut controller, &scene, |_, _, _| {}).unwrap();
     let mut bench = Bench::new(Bench::default_settings()).unwrap();
     let mut rows = Vec::new();
     bench.run(record.released, |row| rows.push(*row)).unwrap();
@@ -54,14 +54,14 @@ fn the_free_decay_has_the_bits_of_the_lab() {
     let scene = paper();
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
     let mut controller = ConstantDrive(BuiltIn::new(&scene.controller_config()).unwrap());
-    let record = run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap();
-    let points = decay_points(&record, &scene).points;
+    let record = run(&mut rig, &mut controller, &scene, |_, _, _| {}).unwrap();
+    let points = decay_points(&record, &scene, WINDOW).points;
     assert!(points.len() > 50, "{} points", points.len());
     let mut bench = Bench::new(Bench::default_settings()).unwrap();
     bench.run(record.released, |_| {}).unwrap();
     let released = bench.motion;
     bench.drive(false);
-    let mut fits: Vec<Motion> = Vec::new();
+    let mut fits: Vec<HarmonicMotion> = Vec::new();
     let mut lost = None;
     bench
         .run(record.decay().len(), |row| {
@@ -75,7 +75,7 @@ fn the_free_decay_has_the_bits_of_the_lab() {
         .unwrap();
     // Until the first fit, the motion is that of the release.
     assert_eq!(fits.remove(0), released);
-    for (point, Motion { omega, amplitude, speed }) in points.iter().zip(&fits) {
+    for (point, HarmonicMotion { omega, amplitude, speed }) in points.iter().zip(&fits) {
         assert_eq!(
             (point.f_hz, point.a_m),
             (omega / TAU, *amplitude),

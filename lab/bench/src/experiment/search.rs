@@ -1,7 +1,7 @@
 //! The way to a lock at the requested drive, from rest or with a moving particle.
 //!
 //! While the response A is controlled, the drive `E_R(A)` that holds it is single-valued. The script moves the setpoint of the response in
-//! legs. The one fit ([`Balance`]) gives `E_R` for each leg, and the frequency.
+//! legs. The one fit ([`ResonanceFit`]) gives `E_R` for each leg, and the frequency.
 //!
 //! 1. The loop closes under the requested drive.
 //! 2. The response rises until drive and frequency depart from the linear response: impacts have begun.
@@ -18,7 +18,7 @@ use nalgebra::DVector;
 use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, noise, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, Stage};
-use crate::identification::{ASYMMETRIC, Balance, Cycle, Slopes, without_tones};
+use crate::identification::{ASYMMETRIC, Cycle, ResonanceFit, Slopes, without_tones};
 use crate::rig::{Controller, ControllerError, LoopState, Move, Rig};
 use crate::scene::{LinearResponse, Scene};
 
@@ -286,8 +286,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Measures over `periods`, or until the lock has settled.
     fn measure(&mut self, periods: usize) -> Result<Leg, ExperimentError> {
         let mut begins = Vec::new();
-        while begins.len() < periods.max(Balance::FEWEST)
-            && !(self.bench.last.settled && begins.len() >= Balance::FEWEST)
+        while begins.len() < periods.max(ResonanceFit::FEWEST)
+            && !(self.bench.last.settled && begins.len() >= ResonanceFit::FEWEST)
         {
             begins.push(self.bench.period(Stage::Locking)?);
         }
@@ -308,7 +308,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             harmonics.extend(even_and_odd(two, step * cycle.omega));
             all.push(cycle);
         }
-        let Some(fit) = Balance::of(&all, &self.linear, Slopes::Unknown) else {
+        let Some(fit) = ResonanceFit::of(&all, &self.linear, Slopes::Unknown) else {
             return self.measure(periods);
         };
         // Harmonics above the third count as noise of a period, but do not scatter.

@@ -23,7 +23,7 @@ use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
 
 use super::{Known, MeasuredPoint, Quantity, fit};
 use crate::backbone::{Criterion, LevelEstimate};
-use crate::identification::{Balance, Cycle, Harmonic, harmonic, regime_by_response};
+use crate::identification::{Cycle, Harmonic, ResonanceFit, harmonic, regime_by_response};
 use crate::record::Sample;
 use crate::rig::{Command, Drive, Sensors};
 use crate::scene::{LinearResponse, Parameters, Scene};
@@ -168,7 +168,7 @@ const FEWEST: f64 = 16.0;
 /// Fewest samples in a period: the fit of one has nine unknowns, and the third harmonic must be resolved.
 const COARSEST: f64 = 12.0;
 /// Fewest periods of a window: the fit needs four, and so do its halves, which are compared.
-const LEAST: usize = 2 * Balance::FEWEST;
+const LEAST: usize = 2 * ResonanceFit::FEWEST;
 /// Largest relative distance of the amplitude from the mean of the first [`LEAST`] periods of a window, in these: drive and frequency are nearly
 /// linear in the amplitude there.
 const RANGE: f64 = 0.04;

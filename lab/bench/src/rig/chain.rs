@@ -18,9 +18,11 @@ pub struct Chain {
     rig: Box<dyn Rig>,
     response: InputChannel,
     base: Option<InputChannel>,
-    /// For an output that is held: its converter, unless that is ideal.
-    output: Option<Option<Converter>>,
-    normal: NormalDistribution,
+    /// Whether the output is held, and its converter unless that is ideal.
+    holds: bool,
+    output: Option<Converter>,
+    /// Noise and jitter; reproducible on every machine for the same seed.
+    random: ChaCha8Rng,
     /// Standard deviation of the sampling instants, in samples.
     jitter: f64,
     /// Delay of the present sampling instant relative to its nominal time, in samples.
@@ -39,16 +41,11 @@ struct InputChannel {
 }
 
 impl InputChannel {
-    fn read(&mut self, value: f64, elapsed: f64, normal: &mut NormalDistribution) -> f64 {
-        let noisy = self.sensor.as_mut().map_or(value, |sensor| sensor.read(value, normal));
+    fn read(&mut self, value: f64, elapsed: f64, random: &mut ChaCha8Rng) -> f64 {
+        let noisy = self.sensor.as_mut().map_or(value, |sensor| sensor.read(value, random));
         let filtered = self.filter.as_mut().map_or(noisy, |filter| filter.pass(noisy, elapsed));
-        converted(self.converter.as_ref(), filtered)
+        self.converter.map_or(filtered, |converter| converter.convert(filtered))
     }
-}
-
-/// The value behind a converter, if there is one.
-fn converted(converter: Option<&Converter>, value: f64) -> f64 {
-    converter.map_or(value, |converter| converter.convert(value))
 }
 
 impl Chain {
@@ -63,12 +60,10 @@ impl Chain {
 
     /// The chain of a scene around `rig`.
     pub fn new(rig: Box<dyn Rig>, scene: &Scene) -> Self {
-        let (settings, d) = (&scene.chain, scene.dimensionless());
+        let (settings, snr, d) = (&scene.chain, scene.chain.snr, scene.dimensionless());
         // The power of a signal is averaged over about one period.
         let channel = |range: f64| InputChannel {
-            sensor: settings
-                .snr
-                .map(|snr| NoisySensor::new(snr, scene.controller.samples_per_period)),
+            sensor: snr.map(|snr| NoisySensor::new(snr, scene.controller.samples_per_period)),
             filter: settings.filter.map(|cut_off| LowPass::new(cut_off * d.omega0)),
             converter: settings.adc_bits.map(|bits| Converter::new(bits, range)),
         };
@@ -77,10 +72,9 @@ impl Chain {
             rig,
             response: channel(settings.response_range * d.b),
             base: settings.reference.then(|| channel(base_range)),
-            output: settings
-                .hold
-                .then(|| settings.dac_bits.map(|bits| Converter::new(bits, base_range))),
-            normal: NormalDistribution::new(settings.seed),
+            holds: settings.hold,
+            output: settings.dac_bits.map(|bits| Converter::new(bits, base_range)),
+            random: ChaCha8Rng::seed_from_u64(settings.seed),
             jitter: settings.jitter,
             late: 0.0,
             under_way: vec![Sensors::default(); settings.delay as usize].into(),
@@ -90,11 +84,10 @@ impl Chain {
 
     /// Duration of a sample period of `step` seconds, whose end is not where it should be.
     fn taken(&mut self, step: f64) -> f64 {
-        let late = if self.jitter > 0.0 {
-            self.jitter * self.normal.next()
-        } else {
-            0.0
-        };
+        let mut late = 0.0;
+        if self.jitter > 0.0 {
+            late = self.jitter * normal(&mut self.random);
+        }
         let taken = step * (1.0 + late - self.late);
         self.late = late;
         self.elapsed += taken;
@@ -109,13 +102,10 @@ impl RigStage for Chain {
 
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let sensors = self.rig.sense()?;
-        let (elapsed, normal) = (self.elapsed, &mut self.normal);
-        self.elapsed = 0.0;
-        let response = self.response.read(sensors.response, elapsed, normal);
-        let reference = match (&mut self.base, sensors.reference) {
-            (Some(channel), Some(value)) => Some(channel.read(value, elapsed, normal)),
-            _ => None,
-        };
+        let (elapsed, random) = (std::mem::take(&mut self.elapsed), &mut self.random);
+        let response = self.response.read(sensors.response, elapsed, random);
+        let base = self.base.as_mut().zip(sensors.reference);
+        let reference = base.map(|(channel, value)| channel.read(value, elapsed, random));
         self.under_way.push_back(Sensors { response, reference });
         let mut oldest = self.under_way.pop_front().unwrap_or_default();
         // Until the first delayed reading arrives, the channel reads zero.
@@ -126,7 +116,7 @@ impl RigStage for Chain {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        if self.output.is_some() {
+        if self.holds {
             return RigStage::hold(self, drive, step);
         }
         let taken = self.taken(step);
@@ -135,8 +125,8 @@ impl RigStage for Chain {
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         let taken = self.taken(step);
-        let output = self.output.as_ref().and_then(Option::as_ref);
-        let displacement = converted(output, drive.displacement);
+        let asked = drive.displacement;
+        let displacement = self.output.map_or(asked, |converter| converter.convert(asked));
         self.rig.hold(Drive { displacement, ..drive }, taken)
     }
 }
@@ -203,19 +193,11 @@ impl Converter {
     }
 }
 
-// Sensor noise; reproducible on every machine for the same seed.
+// Sensor noise.
 
-pub struct NormalDistribution(ChaCha8Rng);
-
-impl NormalDistribution {
-    pub fn new(seed: u64) -> Self {
-        Self(ChaCha8Rng::seed_from_u64(seed))
-    }
-
-    /// The next number, with mean 0 and standard deviation 1.
-    pub fn next(&mut self) -> f64 {
-        StandardNormal.sample(&mut self.0)
-    }
+/// A random number with mean 0 and standard deviation 1.
+pub fn normal(random: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(random)
 }
 
 /// Adds white noise to a signal.
@@ -231,16 +213,13 @@ pub struct NoisySensor {
 impl NoisySensor {
     /// A sensor with the signal-to-noise ratio `snr` (dB), relative to the mean power of about the last `memory` samples.
     pub fn new(snr: f64, memory: f64) -> Self {
-        Self {
-            ratio: 10_f64.powf(-snr / 20.0),
-            power: 0.0,
-            follow: 1.0 / memory,
-        }
+        let (ratio, follow) = (10_f64.powf(-snr / 20.0), 1.0 / memory);
+        Self { ratio, power: 0.0, follow }
     }
 
-    pub fn read(&mut self, value: f64, normal: &mut NormalDistribution) -> f64 {
+    pub fn read(&mut self, value: f64, random: &mut ChaCha8Rng) -> f64 {
         self.power += self.follow * (value * value - self.power);
-        value + self.ratio * self.power.sqrt() * normal.next()
+        value + self.ratio * self.power.sqrt() * normal(random)
     }
 }
 
@@ -284,22 +263,15 @@ mod tests {
 
     #[test]
     fn noise_has_the_power_that_was_asked_for() {
-        let (mut sensor, mut normal) = (NoisySensor::new(40.0, 100.0), NormalDistribution::new(7));
+        let (mut sensor, mut random) = (NoisySensor::new(40.0, 100.0), ChaCha8Rng::seed_from_u64(7));
         let mut noise = 0.0;
         for n in 0..200_000 {
             let value = 3.0 * (f64::from(n) * 0.0628).sin();
-            let added = sensor.read(value, &mut normal) - value;
+            let added = sensor.read(value, &mut random) - value;
             noise += if n < 1000 { 0.0 } else { added * added };
         }
         // Of a sine of amplitude 3.
         let ratio = 10.0 * (4.5 / (noise / 199_000.0)).log10();
         assert!((ratio - 40.0).abs() < 0.1, "{ratio} dB");
-    }
-
-    #[test]
-    fn the_same_seed_gives_the_same_noise() {
-        let first = |seed| NormalDistribution::new(seed).next();
-        assert_eq!(first(3), first(3));
-        assert_ne!(first(3), first(4));
     }
 }

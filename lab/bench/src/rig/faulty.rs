@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 
 use lovines::{InvalidValue, Parameters};
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
-use super::chain::NormalDistribution;
+use super::chain::normal;
 use super::{Chain, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated};
 use crate::scene::Scene;
 
@@ -112,7 +113,7 @@ struct Faulty {
     driven: usize,
     /// Healthy readings of response and base, m, the newest last.
     past: VecDeque<[f64; 2]>,
-    normal: NormalDistribution,
+    random: ChaCha8Rng,
     ended: Box<dyn FnMut(Option<f64>)>,
 }
 
@@ -129,12 +130,10 @@ pub fn faulty(
     ended: impl FnMut(Option<f64>) + 'static,
 ) -> Result<SensorsOnly, InvalidValue> {
     let plant = |stiffness: f64| -> Result<Box<dyn Rig>, InvalidValue> {
-        let parameters = Parameters { stiffness, ..scene.plant };
-        Ok(Box::new(
-            Simulated::new(parameters, scene.start)?.with_sensors(scene.resonance),
-        ))
+        let plant = Simulated::new(Parameters { stiffness, ..scene.plant }, scene.start)?;
+        Ok(Box::new(plant.with_sensors(scene.resonance)))
     };
-    let changed = matches!(fault, RigFault::Structure).then(|| plant(STIFFER * scene.plant.stiffness));
+    let changed = (fault == RigFault::Structure).then(|| plant(STIFFER * scene.plant.stiffness));
     let begins = (seconds / scene.sample_time()) as usize;
     let rig = Faulty {
         rig: plant(scene.plant.stiffness)?,
@@ -146,7 +145,7 @@ pub fn faulty(
         taken: 0,
         driven: begins,
         past: VecDeque::new(),
-        normal: NormalDistribution::new(1),
+        random: ChaCha8Rng::seed_from_u64(1),
         ended: Box::new(ended),
     };
     Ok(SensorsOnly::around(Chain::around(Box::new(rig), scene)))
@@ -172,7 +171,7 @@ impl Faulty {
             SensorFault::Stuck => self.range,
             SensorFault::Gain(gain) => gain * value,
             SensorFault::Offset => value + largest,
-            SensorFault::Noisy => value + largest * std::f64::consts::FRAC_1_SQRT_2 * self.normal.next(),
+            SensorFault::Noisy => value + largest * std::f64::consts::FRAC_1_SQRT_2 * normal(&mut self.random),
             SensorFault::Loose if elapsed % 10 < 5 => 0.0,
             SensorFault::Loose => value,
             SensorFault::Value(value) => value,
@@ -189,9 +188,11 @@ impl Faulty {
     ) -> Result<(), RigError> {
         let elapsed = self.elapsed();
         self.taken += 1;
-        if asked != 0.0 {
-            self.driven = self.driven.max(self.taken);
-        }
+        self.driven = if asked == 0.0 {
+            self.driven
+        } else {
+            self.driven.max(self.taken)
+        };
         if let Some(changed) = &mut self.changed {
             apply(&mut **changed, drive)?;
         }
@@ -214,10 +215,8 @@ impl Faulty {
 impl Rig for Faulty {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let elapsed = self.elapsed();
-        let mut sensors = match (&mut self.changed, elapsed) {
-            (Some(changed), Some(_)) => changed.sense()?,
-            _ => self.rig.sense()?,
-        };
+        let changed = self.changed.as_mut().filter(|_| elapsed.is_some());
+        let mut sensors = changed.unwrap_or(&mut self.rig).sense()?;
         self.past
             .push_back([sensors.response, sensors.reference.unwrap_or(0.0)]);
         if self.past.len() > KEPT + elapsed.unwrap_or(0) {
@@ -226,17 +225,15 @@ impl Rig for Faulty {
         let Some(elapsed) = elapsed else {
             return Ok(sensors);
         };
+        let Sensors { response, reference } = &mut sensors;
         match self.fault {
-            RigFault::Response(sensor) => sensors.response = self.read(0, sensor, elapsed),
-            RigFault::Base(sensor) => sensors.reference = Some(self.read(1, sensor, elapsed)),
+            RigFault::Response(sensor) => *response = self.read(0, sensor, elapsed),
+            RigFault::Base(sensor) => *reference = Some(self.read(1, sensor, elapsed)),
             RigFault::Both(sensor) => {
-                sensors.response = self.read(0, sensor, elapsed);
-                sensors.reference = Some(self.read(1, sensor, elapsed));
+                *response = self.read(0, sensor, elapsed);
+                *reference = Some(self.read(1, sensor, elapsed));
             }
-            RigFault::Swapped => {
-                let base = sensors.reference.unwrap_or(0.0);
-                (sensors.response, sensors.reference) = (base, Some(sensors.response));
-            }
+            RigFault::Swapped => (*response, *reference) = (reference.unwrap_or(0.0), Some(*response)),
             RigFault::Shaker(_) | RigFault::Structure | RigFault::Forward(_) => {}
         }
         Ok(sensors)

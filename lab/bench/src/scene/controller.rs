@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
 use vines_model::ArgumentError;
 
-use super::{Law, Scene, SceneError, Sensor, check, not_negative, positive, symbols, within};
+use super::{Law, Scene, SceneError, Sensor, check, positive, symbols, within};
 
 settings! {
     /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
@@ -24,15 +24,6 @@ settings! {
         omega_max: f64 = 1.1,
         /// Phase of the response relative to the base, degrees.
         phase_target: f64 = -90.0,
-        /// Largest phase error that counts as locked, degrees.
-        phase_tolerance: f64 = 0.3,
-        /// Distance from the steady state that counts as settled: of the frequency, over the half-power bandwidth of the linear response, and of
-        /// the response amplitude, relative. Judged by the drift and the rate at which the steady state is approached; noise widens it.
-        frequency_tolerance: f64 = 2e-4,
-        /// As `frequency_tolerance`, for the amplitude.
-        amplitude_tolerance: f64 = 8e-5,
-        /// Delay from the drive to the sensors, samples, used where no sensor reads the base; by default the delay of `[chain]`.
-        delay: Option<f64> = None,
     }
 }
 
@@ -61,19 +52,7 @@ impl ControllerSettings {
     }
 
     pub(super) fn check(&self) -> Result<(), SceneError> {
-        not_negative("controller.delay", self.delay.unwrap_or(0.0), "samples")?;
-        for (key, value, unit) in [
-            ("controller.omega_min", self.omega_min, "(omega0)"),
-            ("controller.phase_tolerance", self.phase_tolerance, "degrees"),
-            (
-                "controller.frequency_tolerance",
-                self.frequency_tolerance,
-                "(bandwidths)",
-            ),
-            ("controller.amplitude_tolerance", self.amplitude_tolerance, "(relative)"),
-        ] {
-            positive(key, value, unit)?;
-        }
+        positive("controller.omega_min", self.omega_min, "(omega0)")?;
         // Two samples per period of the highest harmonic at omega_max.
         let fewest = (2.0 * self.detector().highest_harmonic() as f64 * self.omega_max).floor() + 1.0;
         let samples = self.samples_per_period;
@@ -158,10 +137,7 @@ impl Scene {
         let omega0 = d.omega0;
         let c = &self.controller;
         let period = d.natural_period();
-        let delay = c.delay.map_or_else(
-            || self.chain.total_delay(omega0 * self.sample_time()) / omega0,
-            |samples| samples * self.sample_time(),
-        );
+        let delay = self.chain.total_delay(omega0 * self.sample_time()) / omega0;
         let limits = self.phase_lock.apply(Config {
             amplitude_max: Some(4.0 * self.drive_needed()),
             response_max: Some(4.0 * d.b),
@@ -189,13 +165,12 @@ impl Scene {
 
     /// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.
     fn lock_criterion(&self) -> LockCriterion {
-        let c = &self.controller;
         let bandwidth = self.bandwidth().max(BANDWIDTH_MIN);
         let approached = PI * bandwidth;
         LockCriterion {
-            phase_tolerance: c.phase_tolerance.to_radians(),
-            frequency_drift: c.frequency_tolerance * bandwidth * approached,
-            amplitude_drift: c.amplitude_tolerance * approached,
+            phase_tolerance: PHASE_TOLERANCE.to_radians(),
+            frequency_drift: FREQUENCY_TOLERANCE * bandwidth * approached,
+            amplitude_drift: AMPLITUDE_TOLERANCE * approached,
             ..LockCriterion::default()
         }
     }
@@ -228,26 +203,26 @@ impl Scene {
         1.0 / (PI * self.bandwidth())
     }
 
-    /// Time limit for the lock, natural periods: as set, or at least 3000 and 20 times the relaxation time.
-    pub fn lock_periods(&self) -> f64 {
+    /// Default time limit for the lock, natural periods: at least 3000, and 20 times the relaxation time.
+    fn lock_periods(&self) -> f64 {
         let relaxation = PI * self.relaxation_periods();
         let samples_per_period = self.controller.samples_per_period;
-        self.record
-            .lock_periods
-            .unwrap_or((20.0 * relaxation).max(3000.0).min(1e7 / samples_per_period))
+        (20.0 * relaxation).max(3000.0).min(1e7 / samples_per_period)
     }
 
-    /// Configuration of the controller for tracking: with the largest drive of `[backbone]`, and a bandwidth at which the loops are not coupled.
+    /// Time limit for the lock, s: `acquire_timeout` of the controller; infinite without a limit.
+    pub fn lock_time(&self) -> f64 {
+        self.controller_config().acquire_timeout.unwrap_or(f64::INFINITY)
+    }
+
+    /// Configuration of the controller for tracking: with a larger drive, unless `[phase_lock]` limits it, and a bandwidth at which the loops are
+    /// not coupled.
     pub fn backbone_config(&self) -> Config {
         let config = self.controller_config();
-        let limit = self
-            .phase_lock
-            .sets("amplitude_max")
-            .then_some(config.amplitude_max)
-            .flatten();
-        let largest = self.dimensionless().amplitude(self.backbone.g_max);
+        let is_set = self.phase_lock.sets("amplitude_max");
+        let limit = config.amplitude_max.filter(|_| is_set);
         Config {
-            amplitude_max: Some(largest.min(limit.unwrap_or(f64::INFINITY))),
+            amplitude_max: limit.or(Some(self.dimensionless().amplitude(TRACKED))),
             bandwidth: self.controller.bandwidth.min(self.coupled_bandwidth()) * self.linear().omega0,
             ..config
         }
@@ -261,6 +236,14 @@ impl Scene {
     }
 }
 
+/// Largest phase error that counts as locked, degrees.
+const PHASE_TOLERANCE: f64 = 0.3;
+/// Distances from the steady state that count as settled: of the frequency, over the half-power bandwidth of the linear response, and of the
+/// response amplitude, relative. Judged by the drift and the rate at which the steady state is approached; noise widens them.
+const FREQUENCY_TOLERANCE: f64 = 2e-4;
+const AMPLITUDE_TOLERANCE: f64 = 8e-5;
+/// Largest drive of a tracked backbone, base amplitude over `b epsilon`, without `phase_lock.amplitude_max`.
+const TRACKED: f64 = 4.0;
 /// That bandwidth over the cube root of E/A.
 const COUPLED: f64 = 0.9;
 /// Smallest half-power bandwidth over omega0 that counts for the lock criterion and the largest drive: with less, most of the energy is lost in
@@ -274,18 +257,13 @@ const IMPACTS: f64 = 1.1;
 // The `[phase_lock]` section: parameters of the controller that no other key sets, in SI units and by their names in `PhaseLock.fmu`.
 
 /// The parameters that other keys of a scene set, in units that suit any plant.
-pub const KEYS: [(&str, &str); 12] = [
+pub const KEYS: [(&str, &str); 7] = [
     ("sample_time", "controller.samples_per_period"),
     ("omega_min", "controller.omega_min"),
     ("omega_max", "controller.omega_max"),
     ("amplitude", "excitation.G"),
     ("phase_target", "controller.phase_target"),
     ("bandwidth", "controller.bandwidth"),
-    ("delay", "controller.delay"),
-    ("lock.phase_tolerance", "controller.phase_tolerance"),
-    ("lock.frequency_drift", "controller.frequency_tolerance"),
-    ("lock.amplitude_drift", "controller.amplitude_tolerance"),
-    ("acquire_timeout", "record.lock_periods"),
     ("reference_connected", "chain.reference"),
 ];
 

@@ -50,17 +50,10 @@ impl Name {
     /// # Errors
     /// An unknown unit.
     pub fn with_unit(name: &str, unit: &str) -> Result<Self, ArgumentError> {
-        let factor = UNITS
-            .iter()
-            .find(|(symbol, _)| *symbol == unit)
-            .map(|(_, factor)| *factor);
-        let symbols = || UNITS.map(|(symbol, _)| symbol).join(", ");
-        let factor = factor.ok_or_else(|| {
-            format!(
-                "{name}: the unit {unit} is unknown; known are {}, or give a factor",
-                symbols()
-            )
-        })?;
+        let Some((_, factor)) = UNITS.into_iter().find(|(symbol, _)| *symbol == unit) else {
+            let symbols = UNITS.map(|(symbol, _)| symbol).join(", ");
+            return Err(format!("{name}: the unit {unit} is unknown; known are {symbols}, or give a factor").into());
+        };
         Ok(Self { name: name.into(), factor })
     }
 }
@@ -94,7 +87,7 @@ impl Names {
     /// The variable for `ours`; if it is not mapped, it has the same name, in SI units.
     pub fn of(&self, ours: &str) -> Name {
         let same = || Name { name: ours.into(), factor: 1.0 };
-        self.0.get(ours).cloned().unwrap_or_else(same)
+        self.mapped(ours).cloned().unwrap_or_else(same)
     }
 
     /// The variable for `ours`, if it is mapped.
@@ -110,28 +103,5 @@ impl Names {
     /// A name that is mapped and not among `known`.
     pub fn unknown(&self, known: &[&str]) -> Option<&str> {
         self.0.keys().map(String::as_str).find(|name| !known.contains(name))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_have_units_or_factors_and_mistakes_are_named() {
-        let text = "response = \"y\"\nbase = { name = \"x\", unit = \"mm\" }\nE = { name = \"A\", factor = -0.5 }";
-        let names: Names = toml::from_str(text).unwrap();
-        let seen = ["response", "base", "E", "omega"].map(|ours| names.of(ours));
-        assert_eq!(seen.each_ref().map(|one| one.factor), [1.0, 1e-3, -0.5, 1.0]);
-        assert_eq!(seen.each_ref().map(|one| &*one.name), ["y", "x", "A", "omega"]);
-        assert_eq!(names.unknown(&["response", "base"]), Some("E"));
-        for (text, reason) in [
-            ("a = { name = \"x\", unit = \"furlong\" }", "unknown"),
-            ("a = { name = \"x\", unit = \"m\", factor = 2 }", "not both"),
-            ("a = { name = \"x\", factor = 0.0 }", "other than 0"),
-        ] {
-            let refused = toml::from_str::<Names>(text).unwrap_err().to_string();
-            assert!(refused.contains(reason), "{refused}");
-        }
     }
 }

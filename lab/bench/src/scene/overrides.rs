@@ -88,8 +88,7 @@ pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, S
 
 /// Reads `text` and merges the overrides into it; with the merged table. `origin` names the text in messages.
 pub(super) fn read(origin: &str, text: &str, overrides: &[Override]) -> Result<(Sections, Table), SceneError> {
-    let syntax =
-        |error: toml::de::Error| SceneError::Syntax { origin: origin.into(), message: plain(&error.to_string()) };
+    let syntax = |error: toml::de::Error| SceneError::text(origin, plain(&error.to_string()));
     // The file is checked on its own first, so that an error can name the line.
     toml::from_str::<Sections>(text).map_err(syntax)?;
     let table = merge(toml::from_str(text).map_err(syntax)?, overrides)?;
@@ -119,7 +118,7 @@ impl Family {
 
     /// Lets the number under `section.key` vary too.
     pub fn vary(&mut self, key: &str) -> Result<(), SceneError> {
-        let refused = |message: &str| SceneError::Keys { origin: format!("axis {key}"), message: message.into() };
+        let refused = |message: &str| SceneError::text(&format!("axis {key}"), message);
         let form = || refused("expected sigma or section.key, for instance plant.r");
         let one: Override = format!("{key} = 1").parse().map_err(|_| form())?;
         self.table = merge(self.table.clone(), &[one]).map_err(|error| match error {
@@ -139,9 +138,8 @@ impl Family {
                 section.insert(key.clone(), number(*value));
             }
         }
-        let sections = Sections::deserialize(table)
-            .map_err(|error| SceneError::Keys { origin: self.origin.clone(), message: plain(error.message()) })?;
-        sections.resolve(&self.origin)
+        let refused = |error: toml::de::Error| SceneError::text(&self.origin, plain(error.message()));
+        Sections::deserialize(table).map_err(refused)?.resolve(&self.origin)
     }
 }
 

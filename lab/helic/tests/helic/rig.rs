@@ -6,7 +6,7 @@ use std::io;
 use vines_helic::codec::Frame;
 use vines_helic::{Device, HelicRig, Transport};
 use vines_net::Counters;
-use vines_testbench::experiment::{self, Plan};
+use vines_testbench::experiment;
 use vines_testbench::identification::{Lock, identify};
 use vines_testbench::rig::{BuiltIn, Drive, Rig, RigError, Sensors, Simulated};
 use vines_testbench::scene::{Names, PAPER, Scene};
@@ -91,7 +91,7 @@ fn lock(device: Option<(f64, Fate)>) -> (Lock, Counters) {
     let (mut plant, step) = (Simulated::new(scene.plant, scene.start).unwrap(), scene.sample_time());
     let measure = |rig: &mut dyn Rig| {
         let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-        let record = experiment::run(rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap();
+        let record = experiment::run(rig, &mut controller, &scene, |_, _, _| {}).unwrap();
         identify(&record, &scene).unwrap().lock
     };
     let Some((samples, fate)) = device else {

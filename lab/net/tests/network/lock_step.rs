@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use vines_net::frame::{Frame, Kind};
 use vines_net::{Address, Ended, LinkError, NetController, NetRig, RAMP_SAMPLES, Refusal, Server};
-use vines_testbench::experiment::{self, Plan};
+use vines_testbench::experiment;
 use vines_testbench::rig::{BuiltIn, Chain, Controller, Drive, Rig, RigError, Simulated};
 use vines_testbench::scene::Definition;
 
@@ -15,13 +15,13 @@ use crate::{drive, scene, serve_built_in, serve_rig, service, shake};
 #[test]
 fn an_experiment_across_the_network_gives_the_same_bits_also_with_held_samples() {
     for settings in [
-        &["controller.amplitude_tolerance=8e-3", "controller.bandwidth=0.3"],
+        &["phase_lock.lock.amplitude_drift=3e-4", "controller.bandwidth=0.3"],
         &["chain.hold=true", "chain.dac_bits=12"],
     ] {
         let scene = scene(&[&settings[..], &["record.decay_periods=150"]].concat());
         let measure = |rig: Box<dyn Rig>, controller: &mut dyn Controller| {
             let mut rig = Chain::around(rig, &scene);
-            experiment::run(rig.as_mut(), controller, &Plan::of(&scene), |_, _, _| {}).unwrap()
+            experiment::run(rig.as_mut(), controller, &scene, |_, _, _| {}).unwrap()
         };
         let plant = Simulated::new(scene.plant, scene.start).unwrap();
         let direct = measure(Box::new(plant), &mut BuiltIn::new(&scene.controller_config()).unwrap());

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use vines_net::frame::{Frame, Kind};
 use vines_net::{Address, Counters, Ended, LinkError, NetRig, RAMP_SAMPLES, ReportLost, Session, Timing};
-use vines_testbench::experiment::{self, ExperimentError, Plan};
+use vines_testbench::experiment::{self, ExperimentError};
 use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Rig, Sensors};
 
 use crate::{PATIENT, drive, scene, serve_controller, serve_rig, shake};
@@ -329,7 +329,7 @@ fn a_controller_that_stops_answering_ramps_the_drive_of_the_rig_down() {
     let (rig_server, log) = serve_rig(Address::Udp, &scene, PATIENT);
     let controller_server = serve_controller(&scene, 10.0, || StopsAt(200));
     let (mut rig, mut peer) = (rig_server.rig(&scene), controller_server.controller(&scene, Some(0.5)));
-    let outcome = experiment::run(&mut rig, &mut peer, &Plan::of(&scene), |_, _, _| {});
+    let outcome = experiment::run(&mut rig, &mut peer, &scene, |_, _, _| {});
     let Err(ExperimentError::Controller(error)) = outcome else {
         panic!("{outcome:?}");
     };

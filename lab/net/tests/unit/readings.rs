@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-use vines_testbench::experiment::{self, Plan};
+use vines_testbench::experiment;
 use vines_testbench::rig::{BuiltIn, Chain, Drive, Rig, RigError, Simulated};
 use vines_testbench::scene::{Override, PAPER, Scene};
 
@@ -149,7 +149,7 @@ fn a_run_rides_through_a_gap_of_30_ms_at_any_phase_whoever_makes_the_sine_of_the
             };
             let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
             let mut rig = Chain::around(Box::new(rig), &scene);
-            experiment::run(&mut *rig, &mut controller, &Plan::of(&scene), |_, _, _| {})
+            experiment::run(&mut *rig, &mut controller, &scene, |_, _, _| {})
                 .unwrap_or_else(|error| panic!("{settings:?}, {lost} samples from {from} on: {error}"))
         };
         let whole = run(u64::MAX / 2);

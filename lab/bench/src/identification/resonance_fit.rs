@@ -39,7 +39,7 @@ pub enum Slopes {
 
 /// The two lines, fitted to some periods.
 #[derive(Debug, Clone)]
-pub struct Balance {
+pub struct ResonanceFit {
     /// Mean amplitude of the response, m.
     pub response: Estimate,
     /// Standard uncertainty of the amplitude, m, that drive and frequency belong to: its noise within the integrals.
@@ -71,7 +71,7 @@ const PARABOLA: f64 = 1.2;
 /// of these units.
 const WIDE: f64 = 3.0;
 
-impl Balance {
+impl ResonanceFit {
     /// Fewest periods: one more than the coefficients.
     pub const FEWEST: usize = 4;
 

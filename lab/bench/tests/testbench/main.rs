@@ -1,0 +1,60 @@
+//! Guards the bench without its fit. Each file has the tests of one part; what several of them need is here.
+
+#[path = "../../../../studies/common.rs"]
+mod common;
+mod faults;
+mod loop_check;
+mod measuring;
+mod scenes;
+
+use vines_testbench::backbone::{Tracked, track};
+use vines_testbench::experiment::{ExperimentError, run};
+use vines_testbench::record::Record;
+use vines_testbench::rig::{BuiltIn, Drive, Rig, RigError, RigStage, Sensors};
+use vines_testbench::scene::{LinearResponse, Scene};
+
+/// The default scene with these settings.
+fn paper(settings: &[&str]) -> Scene {
+    common::scene("", settings).unwrap()
+}
+
+/// The default scene with these settings, and a linear response as a loop check finds it.
+fn checked(settings: &[&str]) -> Scene {
+    let mut scene = paper(settings);
+    scene.measured = Some(LinearResponse::of(&scene));
+    scene
+}
+
+/// A rig whose readings, and whose drives with the time to the next sample, s, pass a function each.
+struct Altered<'a> {
+    rig: Box<dyn Rig>,
+    read: Box<dyn FnMut(Sensors) -> Result<Sensors, RigError> + 'a>,
+    drive: Box<dyn FnMut(Drive, f64) -> (Drive, f64) + 'a>,
+}
+
+impl RigStage for Altered<'_> {
+    fn inner(&mut self) -> &mut dyn Rig {
+        &mut *self.rig
+    }
+
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        (self.read)(self.rig.sense()?)
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        let (drive, step) = (self.drive)(drive, step);
+        self.rig.advance(drive, step)
+    }
+}
+
+/// The record of an experiment.
+fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    run(rig, &mut controller, scene, |_, _, _| {})
+}
+
+/// The tracked backbone.
+fn tracked(rig: &mut dyn Rig, scene: &Scene) -> Result<Tracked, ExperimentError> {
+    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
+    track(rig, &mut controller, scene, |_, _| {})
+}
