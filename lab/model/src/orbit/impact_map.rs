@@ -53,6 +53,11 @@ pub(super) type ByAll = SMatrix<f64, 4, 6>;
 /// Derivative of one number by the same.
 pub(super) type RowByAll = RowSVector<f64, 6>;
 
+/// The derivative of unknown `n` by all.
+pub(super) fn unit_row(n: usize) -> RowByAll {
+    RowByAll::from_fn(|_, column| f64::from(u8::from(column == n)))
+}
+
 /// One application of the map.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
@@ -142,7 +147,6 @@ impl ImpactMap {
         fixed.set_column(4, &by_omega);
         fixed.set_column(5, &by_g);
 
-        let unit_row = |n: usize| RowByAll::from_fn(|_, column| f64::from(u8::from(column == n)));
         let (by_q1, by_dq2) = (unit_row(1), unit_row(3));
         // The condition w = wall at the end gives the change of the flight time.
         let by_w = fixed.row(0) - by_q1 - by_dq2 * t;
