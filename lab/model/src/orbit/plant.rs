@@ -15,8 +15,9 @@ use lovines::{Cavity, Drive, Event, InvalidValue, Outcome, Parameters, Plant, Re
 use nalgebra::{Complex, Matrix4, Matrix6, Vector4, Vector6};
 use thiserror::Error;
 
+use super::Orbit;
 use super::periodic::NEAR;
-use super::symmetric::{Candidate, at_amplitude, at_speed, of_orbit, stable_resonant};
+use super::symmetric::{at_amplitude, at_speed, stable_resonant};
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
 use crate::{Definition, Dimensionless, Resonance, Sensor};
 
@@ -137,10 +138,7 @@ pub fn resonant_motion_under(
 ) -> Result<PlantMotion, NoMotion> {
     let conditions = [DriveCondition::PhaseResonance, DriveCondition::Amplitude(amplitude)];
     Solver::new(parameters, definition, 1, conditions)?;
-    let motion = |scene: &Dimensionless| {
-        let g = scene.excitation(amplitude);
-        stable_resonant(&Dimensionless { g, ..*scene }).and_then(|orbit| of_orbit(scene, &orbit))
-    };
+    let motion = |scene: &Dimensionless| stable_resonant(&Dimensionless { g: scene.excitation(amplitude), ..*scene });
     let ideal = Ideal::with(parameters, definition, motion).ok_or(NoMotion::NoIdealMotionUnder(amplitude))?;
     Ideal { amplitude, ..ideal }.continued(parameters, definition, None)
 }
@@ -233,11 +231,7 @@ impl Ideal {
         })
     }
 
-    fn with(
-        p: &Parameters,
-        definition: Definition,
-        motion: impl Fn(&Dimensionless) -> Option<Candidate>,
-    ) -> Option<Self> {
+    fn with(p: &Parameters, definition: Definition, motion: impl Fn(&Dimensionless) -> Option<Orbit>) -> Option<Self> {
         let [plus, minus] = p.gaps();
         let [half_width, middle] = [0.5 * (plus + minus), 0.5 * (plus - minus)];
         let rebound = Rebound::new(p);
@@ -250,7 +244,7 @@ impl Ideal {
             let scene = Dimensionless { definition, ..Dimensionless::of(&plant, 0.0) };
             let motion = motion(&scene)?;
             let (unit, rate, before) = (half_width, half_width * scene.omega0, speed);
-            speed = motion.impact_speed(&scene) * rate;
+            speed = motion.impact_velocity * rate;
             let start = motion.start;
             ideal = Some(Self {
                 speed,
