@@ -21,7 +21,7 @@ pub use continuation::{
     Branch, BranchBifurcation, BranchEnd, ContinuationLimits, branch_off, continue_both_ways, continue_from,
 };
 pub use convergence::{Convergence, Difference, convergence};
-pub use impact_map::{Bounce, ImpactMap};
+pub use impact_map::Bounce;
 pub(crate) use periodic::NEAR;
 pub use periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, periodic_near, settle};
 pub use plant::{

@@ -81,7 +81,7 @@ struct Landed {
 
 /// The map at one frequency and excitation.
 #[derive(Debug, Clone, Copy)]
-pub struct ImpactMap {
+pub(crate) struct ImpactMap {
     epsilon: f64,
     r: f64,
     pub(super) oscillator: ForcedOscillator,
@@ -138,14 +138,11 @@ impl ImpactMap {
         let end = next.phase;
         let propagator = self.oscillator.free.propagator(t);
         let mut fixed = SMatrix::<f64, 2, 6>::zeros();
-        let by_phase = self.oscillator.by_phase(end) - propagator * self.oscillator.by_phase(from.phase);
-        let by_omega = self.oscillator.by_omega(end) + self.oscillator.by_phase(end) * t
-            - propagator * self.oscillator.by_omega(from.phase);
-        let by_g = self.oscillator.by_g(end) - propagator * self.oscillator.by_g(from.phase);
-        fixed.set_column(0, &by_phase);
+        let [[by_phase, by_omega, by_g], before] = [end, from.phase].map(|phase| self.oscillator.derivatives(phase));
+        fixed.set_column(0, &(by_phase - propagator * before[0]));
         fixed.fixed_view_mut::<2, 2>(0, 1).copy_from(&propagator);
-        fixed.set_column(4, &by_omega);
-        fixed.set_column(5, &by_g);
+        fixed.set_column(4, &(by_omega + by_phase * t - propagator * before[1]));
+        fixed.set_column(5, &(by_g - propagator * before[2]));
 
         let (by_q1, by_dq2) = (unit_row(1), unit_row(3));
         // The condition w = wall at the end gives the change of the flight time.
@@ -216,7 +213,7 @@ impl<'a> ParticleFlight<'a> {
             w,
             dw: dq1 - dq2,
             free,
-            curvature: oscillator.acceleration() + free.norm() * (1.0 + 2.0 * oscillator.zeta),
+            curvature: oscillator.acceleration() + free.norm() * (1.0 + 2.0 * oscillator.free.zeta),
         }
     }
 

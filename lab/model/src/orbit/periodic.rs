@@ -177,11 +177,10 @@ impl HarmonicCoefficients {
     /// Each coefficient with its derivative by Omega.
     fn new(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern) -> Self {
         let omega = map.oscillator.omega;
-        let zeta = scene.epsilon * scene.lambda / 2.0;
+        let zeta = map.oscillator.free.zeta;
         let compliance = map.oscillator.free.compliance(omega);
         let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * zeta);
         let force = map.oscillator.free.base_force(omega);
-        let direct = force * compliance * scene.epsilon;
         let direct_by = (Complex::new(0.0, 2.0 * zeta) * compliance + force * compliance_by) * scene.epsilon;
         // (2i/duration) times the response to a force through the oscillator, less the response of a free mass: the impulse on the
         // particle is the opposite one.
@@ -201,7 +200,7 @@ impl HarmonicCoefficients {
         let sensor_by = Complex::new(slope, -reference.phase_slope(damping, omega));
         let read = |[z, by]: [Complex<f64>; 2]| [z * sensor, (by + z * sensor_by) * sensor];
         Self {
-            direct: read([direct, direct_by]),
+            direct: read([map.oscillator.unit[0], direct_by]),
             impulses: read([weight * inner, weight * inner_by + weight / omega * inner]),
         }
     }
