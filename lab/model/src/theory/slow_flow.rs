@@ -365,9 +365,14 @@ fn real_roots(coefficients: &[f64]) -> Vec<f64> {
     let mut ends = vec![-bound];
     ends.extend(real_roots(&derivative));
     ends.push(bound);
-    let mut roots: Vec<f64> = ends
-        .windows(2)
-        .filter_map(|pair| root_between(coefficients, pair[0], pair[1]))
+    let value = |x: f64| coefficients.iter().rev().fold(0.0, |sum, one| sum * x + one);
+    let positive = |x: f64| value(x) > 0.0;
+    let between = ends.windows(2).filter(|pair| positive(pair[0]) != positive(pair[1]));
+    let mut roots: Vec<f64> = between
+        .map(|pair| {
+            let (below, above) = bisection(pair[0], pair[1], positive);
+            below + (above - below) / 2.0
+        })
         .collect();
     // A turning point that touches zero to within rounding.
     let touches = |x: &f64| {
@@ -375,27 +380,12 @@ fn real_roots(coefficients: &[f64]) -> Vec<f64> {
             .iter()
             .rev()
             .fold(0.0, |sum, one| sum * x.abs() + one.abs());
-        value(coefficients, *x).abs() <= 8.0 * f64::EPSILON * size
+        value(*x).abs() <= 8.0 * f64::EPSILON * size
     };
     roots.extend(ends[1..ends.len() - 1].iter().copied().filter(touches));
     roots.sort_by(f64::total_cmp);
     roots.dedup_by(|one, other| (*one - *other).abs() <= 1e-7 * (1.0 + other.abs()));
     roots
-}
-
-fn value(coefficients: &[f64], x: f64) -> f64 {
-    coefficients.iter().rev().fold(0.0, |sum, one| sum * x + one)
-}
-
-/// The root between `a` and `b`, if the sign changes.
-fn root_between(coefficients: &[f64], a: f64, b: f64) -> Option<f64> {
-    let positive = |x| value(coefficients, x) > 0.0;
-    (positive(a) != positive(b)).then(|| midpoint(bisection(a, b, positive)))
-}
-
-/// Rounds to one of two neighbouring doubles.
-fn midpoint((a, b): (f64, f64)) -> f64 {
-    a + (b - a) / 2.0
 }
 
 #[cfg(test)]
