@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 use vines_model::{
     Dimensionless,
     orbit::{
-        Bifurcation, Branch, Condition, ContinuationLimits, ImpactPattern, Orbit, Periodic, backbone_at_speed,
-        branch_off, continue_both_ways, exact_backbone, phase_resonant, settle,
+        Bifurcation, Branch, Condition, ContinuationLimits, Orbit, Periodic, backbone_at_speed, branch_off,
+        continue_both_ways, exact_backbone, phase_resonant, settle,
     },
     theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow},
 };
@@ -15,21 +15,17 @@ use vines_model::{
 mod reference;
 use reference::rows;
 
-/// The orbit closest to the row's sigma.
-fn nearest(row: &reference::Row) -> Orbit {
-    let scene = Dimensionless::new(row.epsilon, row.lambda, row.r, row.g);
-    let distance = |orbit: &Orbit| (orbit.sigma - row.sigma).abs();
-    phase_resonant(&scene)
-        .into_iter()
-        .min_by(|one, other| distance(one).total_cmp(&distance(other)))
-        .expect("an orbit for every row")
-}
-
 #[test]
-fn orbits_match_the_references_to_all_their_digits() {
+fn orbits_match_the_references_to_all_their_digits_and_others_are_on_the_unstable_left_branch() {
     let (mut state, mut multipliers) = (0f64, 0f64);
-    for row in rows() {
-        let orbit = nearest(&row);
+    let rows = rows();
+    for row in &rows {
+        let orbits = phase_resonant(&row.scene());
+        let distance = |orbit: &Orbit| (orbit.sigma - row.sigma).abs();
+        let nearest = orbits
+            .iter()
+            .min_by(|one, other| distance(one).total_cmp(&distance(other)));
+        let orbit = nearest.expect("an orbit for every row");
         for (found, expected) in [(orbit.sigma, row.sigma), (orbit.c, row.c), (orbit.b, row.b)] {
             state = state.max((found - expected).abs());
         }
@@ -37,32 +33,30 @@ fn orbits_match_the_references_to_all_their_digits() {
             multipliers = multipliers.max((found - expected).abs());
         }
         assert_eq!(orbit.stable, row.multipliers[3] < 1.0, "{row:?}");
+        let same_scene = |other: &&reference::Row| other.scene() == row.scene();
+        let listed = |orbit: &Orbit| {
+            rows.iter()
+                .filter(same_scene)
+                .any(|one| (one.sigma - orbit.sigma).abs() < 1e-8)
+        };
+        for orbit in orbits.iter().filter(|orbit| !listed(orbit)) {
+            assert!(orbit.b < Manifold::new(row.r).b_min() && !orbit.stable, "{orbit:?}");
+        }
     }
     assert!(state < 1e-10, "the references have ten digits: {state:e}");
     assert!(multipliers < 6e-7, "the references have six digits: {multipliers:e}");
 }
 
 #[test]
-fn what_is_found_beside_the_references_lies_on_the_unstable_left_branch() {
-    let rows = rows();
-    for row in &rows {
-        let listed = |orbit: &Orbit| {
-            rows.iter()
-                .filter(|other| (other.epsilon, other.r, other.g) == (row.epsilon, row.r, row.g))
-                .any(|other| (other.sigma - orbit.sigma).abs() < 1e-8)
-        };
-        let scene = Dimensionless::new(row.epsilon, row.lambda, row.r, row.g);
-        let b_min = Manifold::new(row.r).b_min();
-        for orbit in phase_resonant(&scene).iter().filter(|orbit| !listed(orbit)) {
-            assert!(orbit.b < b_min && !orbit.stable, "{orbit:?}");
-        }
-    }
+fn no_orbit_is_invented_where_the_excitation_is_too_weak() {
+    assert_eq!(phase_resonant(&scene(0.2)), []);
+    assert_eq!(phase_resonant(&scene(0.0)), []);
 }
 
-#[test]
-fn no_orbit_is_invented_where_the_excitation_is_too_weak() {
-    assert_eq!(phase_resonant(&Dimensionless::new(0.0084, 1.43, 0.65, 0.2)), []);
-    assert_eq!(phase_resonant(&Dimensionless::new(0.0084, 1.43, 0.65, 0.0)), []);
+/// Smallest difference in C and G from the orbits of the exact backbone at a frequency.
+fn from_backbone(scene: &Dimensionless, [omega, c, g]: [f64; 3]) -> f64 {
+    let orbits = exact_backbone(scene, omega).into_iter();
+    orbits.map(|orbit| (orbit.c - c).hypot(orbit.g - g)).fold(1.0, f64::min)
 }
 
 #[test]
@@ -78,13 +72,9 @@ fn the_curve_of_the_backbone_has_an_orbit_of_every_frequency_that_it_passes() {
         let mut before = None;
         for n in 0..2000 {
             let speed = 1.3 + 0.0005 * f64::from(n) * (fold - 1.3);
-            let [omega, c, g] = backbone_at_speed(&scene, speed).unwrap_or_else(|| panic!("{scene:?} {speed}"));
-            let orbits = exact_backbone(&scene, omega);
-            let apart = orbits.iter().map(|orbit| (orbit.c - c).hypot(orbit.g - g));
-            assert!(
-                apart.fold(1.0, f64::min) < 1e-8,
-                "{scene:?} {speed}: {c} {g} {orbits:?}"
-            );
+            let motion = backbone_at_speed(&scene, speed).unwrap_or_else(|| panic!("{scene:?} {speed}"));
+            assert!(from_backbone(&scene, motion) < 1e-8, "{scene:?} {speed}: {motion:?}");
+            let [omega, c, _] = motion;
             let is_smooth = before.is_none_or(|before: [f64; 2]| (c - before[0]).hypot(omega - before[1]) < 0.01);
             assert!(is_smooth, "{scene:?} {speed}: {before:?} {omega}, {c}");
             before = Some([c, omega]);
@@ -98,47 +88,52 @@ fn scene(g: f64) -> Dimensionless {
     Dimensionless::new(0.0084, 1.43, 0.65, g)
 }
 
-fn response(g: f64) -> (Dimensionless, Branch) {
-    let scene = scene(g);
-    let fastest = |one: &vines_model::orbit::Orbit, other: &vines_model::orbit::Orbit| one.b.total_cmp(&other.b);
-    let orbit = phase_resonant(&scene).into_iter().max_by(fastest).unwrap();
-    let conditions = [Condition::Excitation(g), Condition::PhaseResonance];
-    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
-    let branch = continue_both_ways(&scene, &start, Condition::Excitation(g), &ContinuationLimits::default());
-    (scene, branch)
+/// The curve of a condition through an orbit at phase resonance, which another condition selects.
+fn through(
+    orbit: &Orbit,
+    scene: &Dimensionless,
+    by: Condition,
+    along: Condition,
+    limits: ContinuationLimits,
+) -> Branch {
+    let start = orbit.periodic(scene, [by, Condition::PhaseResonance]).unwrap();
+    continue_both_ways(scene, &start, along, &limits)
 }
 
-/// The largest distance of the plant from its own start after each of this number of periods, started on the motion.
-fn distance_of_plant(scene: &Dimensionless, motion: &Periodic, periods: u32) -> f64 {
-    let [q1, dq1, q2, dq2] = motion.start(scene).expect("a state at phase zero");
-    let mut plant = scene.plant([q1, dq1, q2, dq2]).unwrap();
-    let omega = 1.0 + scene.epsilon * motion.sigma;
-    let drive = lovines::Drive::harmonic(scene.epsilon * motion.g, omega);
-    let whole = motion.pattern.periods();
-    (0..periods).fold(0.0, |most, _| {
-        for _ in 0..whole {
-            plant.advance(drive, TAU / omega).unwrap();
+/// The exact response through the orbit with the fastest particle.
+fn response(scene: &Dimensionless) -> Branch {
+    let fastest = |one: &Orbit, other: &Orbit| one.b.total_cmp(&other.b);
+    let orbit = phase_resonant(scene).into_iter().max_by(fastest).unwrap();
+    let excitation = Condition::Excitation(scene.g);
+    through(&orbit, scene, excitation, excitation, ContinuationLimits::default())
+}
+
+/// Requires that the plant, started on every motion at this distance in the branch, is back at its start after each repetition.
+fn repeats_on_the_plant(scene: &Dimensionless, branch: &Branch, distance: usize, repetitions: u32) {
+    for motion in branch.points.iter().step_by(distance) {
+        let [_, start @ ..] = motion.motion(scene, 1)[0];
+        let mut plant = scene.plant(start).unwrap();
+        let drive = Dimensionless { g: motion.g, ..*scene }.drive(motion.sigma);
+        for _ in 0..repetitions {
+            for _ in 0..motion.pattern.periods() {
+                plant.advance(drive, TAU / drive.omega).unwrap();
+            }
+            let now = scene.state(&plant.state());
+            let apart = (0..4).map(|n| (now[n] - start[n]).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-9, "{apart:e} at sigma = {}", motion.sigma);
         }
-        let now = plant.state();
-        let apart = [now.q1 - q1, now.dq1 - dq1, now.q2 - q2, now.dq2 - dq2];
-        apart.iter().fold(most, |most: f64, one| most.max(one.abs()))
-    })
+    }
 }
 
 #[test]
 fn an_exact_response_passes_folds_and_phase_resonance() {
-    let (scene, branch) = response(1.1);
+    let scene = scene(1.1);
+    let branch = response(&scene);
     let sigmas: Vec<f64> = branch.points.iter().map(|one| one.sigma).collect();
-    let turns = sigmas
-        .windows(3)
-        .filter(|s| (s[1] - s[0]) * (s[2] - s[1]) < 0.0)
-        .count();
-    assert!(turns >= 1 && branch.points.iter().any(|one| !one.stable));
-    // Every motion is one that the plant repeats; unstable ones leave slowly.
-    for motion in branch.points.iter().step_by(20) {
-        let apart = distance_of_plant(&scene, motion, 2);
-        assert!(apart < 1e-9, "{apart:e} at sigma = {}", motion.sigma);
-    }
+    let mut turns = sigmas.windows(3).filter(|s| (s[1] - s[0]) * (s[2] - s[1]) < 0.0);
+    assert!(turns.next().is_some() && branch.points.iter().any(|one| !one.stable));
+    // Unstable motions leave slowly.
+    repeats_on_the_plant(&scene, &branch, 20, 2);
     for fold in branch.special.iter().filter(|one| one.kind == Bifurcation::Fold) {
         let nearest = fold.motion.multipliers.iter().map(|[re, im]| (re - 1.0).hypot(*im));
         assert!(nearest.fold(f64::MAX, f64::min) < 1e-4);
@@ -147,79 +142,19 @@ fn an_exact_response_passes_folds_and_phase_resonance() {
 
 #[test]
 fn symmetry_breaks_near_the_theorys_speed_and_asymmetric_motions_leave_it() {
-    let (scene, branch) = response(1.6);
-    let breaking = branch
-        .special
-        .iter()
+    let scene = scene(1.6);
+    let branch = response(&scene);
+    let mut special = branch.special.iter();
+    let breaking = special
         .find(|one| one.kind == Bifurcation::SymmetryBreaking)
         .expect("a symmetry breaking");
     assert!((breaking.motion.b - B_SYMMETRY_BREAKING).abs() < 0.03);
     let limits = ContinuationLimits { points: 60, ..ContinuationLimits::default() };
     let aside = branch_off(&scene, breaking, Condition::Excitation(1.6), &limits).unwrap();
-    let uneven = |one: &Periodic| (one.bounces[1].phase - one.bounces[0].phase - std::f64::consts::PI).abs();
-    let interval = aside.points.iter().map(uneven).fold(0.0, f64::max);
-    assert!(interval > 0.05);
+    let uneven = |one: &Periodic| (one.bounces[1].phase - one.bounces[0].phase - TAU / 2.0).abs();
+    assert!(aside.points.iter().map(uneven).fold(0.0, f64::max) > 0.05);
     assert!(aside.points.iter().any(|one| one.stable));
-    for motion in aside.points.iter().step_by(10) {
-        assert!(distance_of_plant(&scene, motion, 2) < 1e-9);
-    }
-}
-
-#[test]
-fn the_exact_backbone_continued_is_the_closed_form() {
-    let scene = scene(1.1);
-    let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
-    let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
-    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
-    let branch = continue_both_ways(
-        &scene,
-        &start,
-        Condition::PhaseResonance,
-        &ContinuationLimits::default(),
-    );
-    assert!(branch.points.len() > 40, "{}: {:?}", branch.points.len(), branch.ended);
-    for motion in &branch.points {
-        let closed = exact_backbone(&scene, 1.0 + scene.epsilon * motion.sigma);
-        let nearest = closed
-            .iter()
-            .map(|one| (one.c - motion.c).abs().max((one.g - motion.g).abs()))
-            .fold(f64::MAX, f64::min);
-        assert!(
-            nearest < 1e-8,
-            "{nearest:e} at sigma = {}, C = {}",
-            motion.sigma,
-            motion.c
-        );
-    }
-}
-
-#[test]
-fn without_damping_drive_and_loss_the_backbone_is_the_conservative_mode() {
-    let scene = Dimensionless::new(0.0084, 0.0, 1.0, 0.0);
-    let mode = exact_backbone(&scene, 1.0 - 1.0 * scene.epsilon)
-        .into_iter()
-        .find(|one| one.c > 0.2)
-        .unwrap();
-    let conditions = [Condition::Sigma(mode.sigma), Condition::PhaseResonance];
-    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &mode.unknowns(), conditions).unwrap();
-    let limits = ContinuationLimits {
-        sigma: [-3.0, 0.5],
-        points: 200,
-        ..ContinuationLimits::default()
-    };
-    let branch = continue_both_ways(&scene, &start, Condition::PhaseResonance, &limits);
-    assert!(branch.points.len() > 20);
-    let (mut most_g, mut energies) = (0f64, 0f64);
-    for motion in &branch.points {
-        most_g = most_g.max(motion.g.abs());
-        let [q1, dq1, _, dq2] = motion.start(&Dimensionless { g: 0.0, ..scene }).unwrap();
-        let energy = 0.5 * (q1 * q1 + dq1 * dq1 + scene.epsilon * dq2 * dq2);
-        for [_, q1, dq1, _, dq2] in motion.motion(&scene, 40) {
-            let now = 0.5 * (q1 * q1 + dq1 * dq1 + scene.epsilon * dq2 * dq2);
-            energies = energies.max((now / energy - 1.0).abs());
-        }
-    }
-    assert!(most_g < 1e-9 && energies < 1e-9);
+    repeats_on_the_plant(&scene, &aside, 10, 2);
 }
 
 #[test]
@@ -232,7 +167,52 @@ fn a_motion_with_more_impacts_is_followed_like_any_other() {
     let limits = ContinuationLimits { points: 40, ..ContinuationLimits::default() };
     let branch = continue_both_ways(&scene, &motion, Condition::Excitation(2.2), &limits);
     assert!(branch.points.len() > 20);
-    for motion in branch.points.iter().step_by(7) {
-        assert!(distance_of_plant(&scene, motion, 1) < 1e-9);
+    repeats_on_the_plant(&scene, &branch, 7, 1);
+}
+
+#[test]
+fn the_exact_backbone_continued_is_the_closed_form() {
+    let scene = scene(1.1);
+    let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
+    let limits = ContinuationLimits::default();
+    let branch = through(
+        &orbit,
+        &scene,
+        Condition::Excitation(1.1),
+        Condition::PhaseResonance,
+        limits,
+    );
+    assert!(branch.points.len() > 40, "{}: {:?}", branch.points.len(), branch.ended);
+    for motion in &branch.points {
+        let off = from_backbone(&scene, [1.0 + scene.epsilon * motion.sigma, motion.c, motion.g]);
+        assert!(off < 1e-8, "{off:e} at sigma = {}, C = {}", motion.sigma, motion.c);
+    }
+}
+
+#[test]
+fn without_damping_drive_and_loss_the_backbone_is_the_conservative_mode() {
+    let scene = Dimensionless::new(0.0084, 0.0, 1.0, 0.0);
+    let mode = exact_backbone(&scene, 1.0 - scene.epsilon)
+        .into_iter()
+        .find(|one| one.c > 0.2)
+        .unwrap();
+    let limits = ContinuationLimits {
+        sigma: [-3.0, 0.5],
+        points: 200,
+        ..ContinuationLimits::default()
+    };
+    let branch = through(
+        &mode,
+        &scene,
+        Condition::Sigma(mode.sigma),
+        Condition::PhaseResonance,
+        limits,
+    );
+    assert!(branch.points.len() > 20);
+    for motion in &branch.points {
+        let energy = |[_, q1, dq1, _, dq2]: [f64; 5]| 0.5 * (q1 * q1 + dq1 * dq1 + scene.epsilon * dq2 * dq2);
+        let states = motion.motion(&scene, 40);
+        let spread = states.iter().map(|one| (energy(*one) / energy(states[0]) - 1.0).abs());
+        assert!(motion.g.abs() < 1e-9 && spread.fold(0.0, f64::max) < 1e-9);
     }
 }
