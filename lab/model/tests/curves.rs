@@ -26,8 +26,9 @@ fn searched(scene: &Dimensionless) -> FrequencyResponse {
     response(scene, &ContinuationLimits::default(), DOUBLINGS)
 }
 
-fn folds(response: &FrequencyResponse) -> Vec<f64> {
-    let special = response.symmetric().flat_map(|branch| &branch.special);
+/// The detunings of the folds on some branches.
+fn folds<'a>(branches: impl Iterator<Item = &'a Branch>) -> Vec<f64> {
+    let special = branches.flat_map(|branch| &branch.special);
     let folds = special.filter(|one| one.kind == Bifurcation::Fold);
     folds.map(|one| one.motion.sigma).collect()
 }
@@ -76,25 +77,13 @@ fn checked(scene: &Dimensionless) -> FrequencyResponse {
         }
 
         let place = |one: &Periodic| {
-            [
-                one.sigma,
-                one.c * one.gamma.cos(),
-                one.c * one.gamma.sin(),
-                one.b,
-                one.g,
-            ]
+            let (sin, cos) = one.gamma.sin_cos();
+            [one.sigma, one.c * cos, one.c * sin, one.b, one.g]
         };
         let drawn: Vec<_> = branch.drawn().into_iter().map(place).collect();
-        let lines = || drawn.windows(2).map(|pair| (pair[0], pair[1]));
-        let off = |motion| {
-            lines()
-                .map(|(from, to)| beside(place(motion), from, to))
-                .fold(f64::MAX, f64::min)
-        };
-        assert!(
-            points.iter().all(|motion| off(motion) < 1.0001e-4) && drawn.len() <= points.len(),
-            "{name}"
-        );
+        let near = |at, line: &[[f64; 5]]| beside(at, line[0], line[1]) < 1.0001e-4;
+        let is_drawn = |one: &Periodic| drawn.windows(2).any(|line| near(place(one), line));
+        assert!(points.iter().all(is_drawn) && drawn.len() <= points.len(), "{name}");
     }
     found
 }
@@ -110,19 +99,12 @@ fn components_of_responses_are_complete_distinct_and_reach_what_they_join() {
         if g < 1.01 {
             // A closed isola, which turns twice, and beside it the component of slow particles.
             assert!(count("symmetric 1:1") >= 2, "G = {g}");
-            let is_closed = |branch: &&Branch| branch.ended == [BranchEnd::Closed; 2];
-            let closed: Vec<&Branch> = found.symmetric().filter(is_closed).collect();
-            let folds = |branch: &Branch| {
-                branch
-                    .special
-                    .iter()
-                    .filter(|one| one.kind == Bifurcation::Fold)
-                    .count()
+            let closed = || {
+                found
+                    .symmetric()
+                    .filter(|branch| branch.ended == [BranchEnd::Closed; 2])
             };
-            assert!(
-                !closed.is_empty() && closed.into_iter().all(|one| folds(one) == 2),
-                "G = {g}"
-            );
+            assert!(closed().count() > 0 && closed().all(|one| folds([one].into_iter()).len() == 2));
         }
     }
     let found = checked(&Dimensionless::new(0.004, 1.0, 0.5, 1.4982));
@@ -133,14 +115,18 @@ fn components_of_responses_are_complete_distinct_and_reach_what_they_join() {
 #[test]
 fn bifurcations_and_branches_close_together_are_told_apart() {
     // At sigma = 4.0125 a complex pair leaves the unit circle and, at 4.0138, one of the two returns: in one step.
-    let close = folds(&searched(&scene(1.1514)));
+    let close = folds(searched(&scene(1.1514)).symmetric());
     assert!(close.iter().any(|sigma| (sigma - 4.0138).abs() < 1e-3));
     // At G = 0.84278 two branches meet at sigma = -0.435; below, each of them has a fold there, and above none.
     for (g, count) in [(0.84275, 2), (0.8428, 0), (0.84285, 0)] {
         let scene = Dimensionless::new(0.008650812324298334, 1.3523112557067605, 0.9126958726492855, g);
         let limits = ContinuationLimits { sigma: [-5.0, 5.0], ..ContinuationLimits::default() };
         let found = response(&scene, &limits, DOUBLINGS);
-        assert_eq!((folds(&found).len(), found.symmetric().count()), (count, 2), "G = {g}");
+        assert_eq!(
+            (folds(found.symmetric()).len(), found.symmetric().count()),
+            (count, 2),
+            "G = {g}"
+        );
     }
 }
 
@@ -191,11 +177,9 @@ fn no_stable_1_to_1_orbit_from_random_starts_is_missing_from_the_components() {
         let counts = missing(&Dimensionless { g, ..scene }, 60, 100 + n);
         (0..4).for_each(|n| sums[n] += counts[n]);
     }
-    println!(
-        "all: 1:1 {}, others {}, missing {} and {}",
-        sums[0], sums[1], sums[2], sums[3]
-    );
-    assert!(sums[0] > 40 && sums[2] == 0, "{sums:?}");
+    let [motions, others, missing, missing_others] = sums;
+    println!("all: 1:1 {motions}, others {others}, missing {missing} and {missing_others}");
+    assert!(motions > 40 && missing == 0);
 }
 
 // Bifurcation curves
@@ -228,15 +212,14 @@ fn compare(scene: &Dimensionless, levels: &[f64], random: &mut ChaCha8Rng) -> ([
     let curves = bifurcation_curves(scene, &LIMITS);
     let (mut counts, mut largest) = ([0; 2], [0.0_f64; 3]);
     let place = |one: &Periodic| [one.sigma, one.g];
-    let motions: Vec<(Bifurcation, &Periodic)> = curves
+    let curve_motions = curves
         .iter()
-        .flat_map(|curve| curve.branch.points.iter().map(|one| (curve.kind, one)))
-        .collect();
-    let off = motions
-        .iter()
-        .step_by(7)
-        .map(|(kind, motion)| off_circle(*kind, motion));
-    largest[2] = off.fold(0.0, f64::max);
+        .flat_map(|curve| curve.branch.points.iter().map(|one| (curve.kind, one)));
+    let motions: Vec<(Bifurcation, &Periodic)> = curve_motions.collect();
+    let seventh = motions.iter().step_by(7);
+    largest[2] = seventh
+        .map(|(kind, motion)| off_circle(*kind, motion))
+        .fold(0.0, f64::max);
     for special in levels.iter().flat_map(|g| bifurcations(scene, *g)) {
         let same = curves.iter().filter(|curve| curve.kind == special.kind);
         let lines = same.flat_map(|curve| curve.branch.points.windows(2));

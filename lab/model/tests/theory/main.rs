@@ -1,5 +1,7 @@
 //! Guards first-order theory: its identities, the impact sequence, frequency responses and activation, and waveforms.
 
+#[path = "../common/mod.rs"]
+mod common;
 mod identities;
 mod motions;
 #[path = "../reference/mod.rs"]
@@ -9,6 +11,8 @@ mod responses;
 use std::f64::consts::PI;
 
 use vines_model::theory::SlowFlow;
+
+use common::close;
 
 const EPSILON: f64 = 0.0084;
 const LAMBDA: f64 = 1.43;
@@ -50,9 +54,4 @@ fn jacobian(at: [f64; 2], map: impl Fn([f64; 2]) -> [f64; 2]) -> [[f64; 2]; 2] {
         let [plus, minus] = [1.0, -1.0].map(|sign| map([0, 1].map(|i| at[i] + sign * h[i])));
         [0, 1].map(|i| (plus[i] - minus[i]) / (2.0 * H))
     })
-}
-
-fn close(one: f64, other: f64, tolerance: f64) {
-    let size = 1f64.max(one.abs());
-    assert!((one - other).abs() <= tolerance * size, "{one} and {other}");
 }
