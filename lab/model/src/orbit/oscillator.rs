@@ -70,7 +70,7 @@ pub(crate) struct ForcedOscillator {
     pub(super) free: FreeOscillator,
     pub(super) omega: f64,
     epsilon: f64,
-    g: f64,
+    pub(super) g: f64,
     /// Harmonic response of q1 to the base, per G, and its derivative by Omega.
     pub(super) unit: [Complex<f64>; 2],
 }
@@ -95,7 +95,7 @@ impl ForcedOscillator {
 
     /// Bound of the acceleration of the steady response.
     pub(crate) fn acceleration(&self) -> f64 {
-        self.turned(self.unit[0] * self.g, 0.0).norm() * self.omega * self.omega
+        self.driven(self.unit[0] * self.g).norm() * self.omega * self.omega
     }
 
     /// Force of the base on the primary mass.
@@ -106,14 +106,15 @@ impl ForcedOscillator {
 
     /// Harmonic response (q, q') at a phase of the base.
     pub(crate) fn harmonic(&self, phase: f64) -> Vector2<f64> {
-        let z = self.turned(self.unit[0] * self.g, phase);
+        let z = self.driven(self.unit[0] * self.g) * Complex::from_polar(1.0, phase);
         Vector2::new(z.im, self.omega * z.re)
     }
 
     /// Derivatives of the harmonic response by phase, Omega and G.
     pub(super) fn derivatives(&self, phase: f64) -> [Vector2<f64>; 3] {
-        let [z, slope] = self.unit.map(|unit| self.turned(unit * self.g, phase));
-        let per_g = self.turned(self.unit[0], phase);
+        let [unit, unit_by] = self.unit;
+        let turned = [unit * self.g, unit_by * self.g, unit].map(|z| self.driven(z) * Complex::from_polar(1.0, phase));
+        let [z, slope, per_g] = turned;
         [
             Vector2::new(z.re, -self.omega * z.im),
             Vector2::new(slope.im, z.re + self.omega * slope.re),
@@ -121,12 +122,12 @@ impl ForcedOscillator {
         ]
     }
 
-    /// Without excitation the response is zero, even at an undamped resonance.
-    fn turned(&self, z: Complex<f64>, phase: f64) -> Complex<f64> {
+    /// A response to the base: without excitation it is zero, even at an undamped resonance.
+    pub(super) fn driven(&self, z: Complex<f64>) -> Complex<f64> {
         if z.is_nan() && self.g == 0.0 {
             return Complex::new(0.0, 0.0);
         }
-        z * Complex::from_polar(1.0, phase)
+        z
     }
 }
 

@@ -7,7 +7,8 @@ use lovines::{InvalidValue, State};
 use nalgebra::{Complex, Matrix4, Matrix6, SVector, Vector4};
 use serde::Serialize;
 
-use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll, Step, unit_row};
+use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll, unit_row};
+use super::oscillator::ForcedOscillator;
 use crate::{Definition, Dimensionless, Resonance, Sensor};
 
 /// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
@@ -120,7 +121,8 @@ fn follow(
     let map = ImpactMap::new(scene, omega, g);
     let start = Bounce::from_vector(&x.fixed_rows::<4>(0).into(), pattern.walls[0]);
     let mut at = start;
-    let mut by = ByAll::identity();
+    // Derivatives of the state, Omega and G by the unknowns; Omega instead of sigma.
+    let mut by = Matrix6::identity();
     let mut sum = Complex::new(0.0, 0.0);
     let mut sum_by = [RowByAll::zeros(); 2];
     for n in 0..pattern.walls.len() {
@@ -133,8 +135,9 @@ fn follow(
             return None;
         }
         bounce(at, step.duration);
-        let impulse_by;
-        (by, impulse_by) = chained(&step, &by);
+        let impulse_by = step.impulse_by * by;
+        let after = step.by * by;
+        by.fixed_rows_mut::<4>(0).copy_from(&after);
         at = step.next;
         let phasor = Complex::from_polar(1.0, -at.phase);
         sum += phasor * step.impulse;
@@ -144,91 +147,59 @@ fn follow(
     }
 
     let residual = start.apart(&at, pattern.turn(), pattern.sign());
+    let mut by: ByAll = by.fixed_rows::<4>(0).into();
     by.fixed_rows_mut::<3>(1).scale_mut(pattern.sign());
     let monodromy: Matrix4<f64> = by.fixed_columns::<4>(0).into();
     by.fixed_columns_mut::<4>(0)
         .copy_from(&(monodromy - Matrix4::identity()));
+    let (s, mut s_by) = harmonic(scene, &map, pattern, sum, &sum_by);
     by.column_mut(4).scale_mut(scene.epsilon);
-
-    let harmonic = HarmonicCoefficients::new(scene, &map, pattern);
-    let (s, s_by) = harmonic.of(g, sum, &sum_by, scene.epsilon);
+    s_by.iter_mut().for_each(|row| row[4] *= scene.epsilon);
     Some(ReturnMap { residual, by, s, s_by, monodromy })
 }
 
-/// The chain rule: derivatives of a step by the unknowns. The step itself also depends on Omega and G.
-fn chained(step: &Step, by: &ByAll) -> (ByAll, RowByAll) {
-    let state: Matrix4<f64> = step.by.fixed_columns::<4>(0).into();
-    let mut all = state * by;
-    let mut impulse_by = step.impulse_by.fixed_columns::<4>(0) * by;
-    for column in 4..6 {
-        all.set_column(column, &(all.column(column) + step.by.column(column)));
-        impulse_by[column] += step.impulse_by[column];
-    }
-    (all, impulse_by)
-}
+/// The first harmonic of the response relative to the reference, with its derivatives by the state, Omega and G, from the sum of the impulses over the
+/// map as phasors: `S = direct G + impulses sum`, the base through the oscillator, and the impulses through the oscillator and, for v, the particle.
+fn harmonic(
+    scene: &Dimensionless,
+    map: &ImpactMap,
+    pattern: &ImpactPattern,
+    sum: Complex<f64>,
+    sum_by: &[RowByAll; 2],
+) -> (Complex<f64>, [RowByAll; 2]) {
+    // Each coefficient with its derivative by Omega.
+    let ForcedOscillator { free, omega, g, unit: [unit, _], .. } = map.oscillator;
+    let compliance = free.compliance(omega);
+    let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * free.zeta);
+    let unit_by =
+        (Complex::new(0.0, 2.0 * free.zeta) * compliance + free.base_force(omega) * compliance_by) * scene.epsilon;
+    // (2i/duration) times the response to a force through the oscillator, less the response of a free mass: the impulse on the
+    // particle is the opposite one.
+    let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
+    let Definition { sensor, reference, .. } = scene.definition;
+    let particle = f64::from(u8::from(sensor == Sensor::V));
+    let inner = compliance + particle / (omega * omega);
+    let inner_by = compliance_by - 2.0 * particle / omega.powi(3);
+    // The factor of the sensor relative to the reference, and its logarithmic derivative.
+    let damping = scene.epsilon * scene.lambda;
+    let (factor, slope) = if sensor == Sensor::Acceleration {
+        (omega * omega, 2.0 / omega)
+    } else {
+        (1.0, 0.0)
+    };
+    let sensor = Complex::from_polar(factor, -reference.phase(damping, omega));
+    let sensor_by = Complex::new(slope, -reference.phase_slope(damping, omega));
+    let read = |[z, by]: [Complex<f64>; 2]| [z * sensor, (by + z * sensor_by) * sensor];
+    let [direct, direct_by] = read([unit, unit_by]);
+    let [a, a_by] = read([weight * inner, weight * inner_by + weight / omega * inner]);
 
-/// `S = direct G + impulses sum`: the base through the oscillator, and the impulses through the oscillator and, for v, the particle.
-struct HarmonicCoefficients {
-    direct: [Complex<f64>; 2],
-    impulses: [Complex<f64>; 2],
-}
-
-impl HarmonicCoefficients {
-    /// Each coefficient with its derivative by Omega.
-    fn new(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern) -> Self {
-        let omega = map.oscillator.omega;
-        let zeta = map.oscillator.free.zeta;
-        let compliance = map.oscillator.free.compliance(omega);
-        let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * zeta);
-        let force = map.oscillator.free.base_force(omega);
-        let direct_by = (Complex::new(0.0, 2.0 * zeta) * compliance + force * compliance_by) * scene.epsilon;
-        // (2i/duration) times the response to a force through the oscillator, less the response of a free mass: the impulse on the
-        // particle is the opposite one.
-        let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
-        let Definition { sensor, reference, .. } = scene.definition;
-        let particle = f64::from(u8::from(sensor == Sensor::V));
-        let inner = compliance + particle / (omega * omega);
-        let inner_by = compliance_by - 2.0 * particle / omega.powi(3);
-        // The factor of the sensor relative to the reference, and its logarithmic derivative.
-        let damping = scene.epsilon * scene.lambda;
-        let (factor, slope) = if sensor == Sensor::Acceleration {
-            (omega * omega, 2.0 / omega)
-        } else {
-            (1.0, 0.0)
-        };
-        let sensor = Complex::from_polar(factor, -reference.phase(damping, omega));
-        let sensor_by = Complex::new(slope, -reference.phase_slope(damping, omega));
-        let read = |[z, by]: [Complex<f64>; 2]| [z * sensor, (by + z * sensor_by) * sensor];
-        Self {
-            direct: read([map.oscillator.unit[0], direct_by]),
-            impulses: read([weight * inner, weight * inner_by + weight / omega * inner]),
-        }
+    let driven = |z: Complex<f64>| map.oscillator.driven(z * g);
+    let mut by = [sum_by[0] * a.re - sum_by[1] * a.im, sum_by[0] * a.im + sum_by[1] * a.re];
+    for (column, own) in [(4, driven(direct_by) + a_by * sum), (5, direct)] {
+        by[0][column] += own.re;
+        by[1][column] += own.im;
     }
-
-    fn of(&self, g: f64, sum: Complex<f64>, sum_by: &[RowByAll; 2], epsilon: f64) -> (Complex<f64>, [RowByAll; 2]) {
-        let zero_if_undriven = |z: Complex<f64>| {
-            if g == 0.0 && z.is_nan() {
-                Complex::new(0.0, 0.0)
-            } else {
-                z
-            }
-        };
-        let s = zero_if_undriven(self.direct[0] * g) + self.impulses[0] * sum;
-        let a = self.impulses[0];
-        let mut by = [sum_by[0] * a.re - sum_by[1] * a.im, sum_by[0] * a.im + sum_by[1] * a.re];
-        let own = [
-            zero_if_undriven(self.direct[1] * g) + self.impulses[1] * sum,
-            self.direct[0],
-        ];
-        for (column, own) in [4, 5].into_iter().zip(own) {
-            by[0][column] += own.re;
-            by[1][column] += own.im;
-        }
-        for row in &mut by {
-            row[4] *= epsilon;
-        }
-        (s, by)
-    }
+    (driven(direct) + a * sum, by)
 }
 
 /// A phase in (-pi, pi].

@@ -13,7 +13,7 @@ fn responses_consist_of_equilibria_and_cross_a_detuning_as_often_as_there_are_eq
     for (g, sigma) in DRIVES {
         let curves = flow.frequency_responses(g, 4_001);
         for point in curves.iter().flatten() {
-            let rates = rates(&flow, (g, point.sigma), [point.motion.b, point.motion.gamma]);
+            let rates = rates(&flow, (g, point.sigma), [point.b, point.gamma]);
             assert!(rates.iter().all(|rate| rate.abs() <= 1e-7), "{point:?}");
         }
         let crossings = curves.iter().map(|curve| {
