@@ -17,9 +17,7 @@ mod symmetric;
 use crate::Dimensionless;
 use serde::Serialize;
 
-pub use continuation::{
-    Branch, BranchBifurcation, BranchEnd, ContinuationLimits, branch_off, continue_both_ways, continue_from,
-};
+pub use continuation::{Branch, BranchBifurcation, BranchEnd, ContinuationLimits, continue_both_ways};
 pub use convergence::{Convergence, Difference, convergence};
 pub use impact_map::Bounce;
 pub(crate) use periodic::NEAR;

@@ -363,7 +363,7 @@ fn joins(from: &Periodic, to: &Periodic) -> bool {
 }
 
 /// Follows the curve of `condition` from `start` towards `towards`, a direction in the space of the unknowns.
-pub fn continue_from(
+fn continue_from(
     scene: &Dimensionless,
     start: &Periodic,
     condition: Condition,
@@ -434,7 +434,7 @@ const ASIDE: f64 = 1e-3;
 
 /// The branch of motions that leaves a symmetry breaking or a period doubling, along the curve of `condition`. Its mirror image, or
 /// itself one repetition later, leaves in the opposite direction and counts as the same branch.
-pub fn branch_off(
+pub(super) fn branch_off(
     scene: &Dimensionless,
     at: &BranchBifurcation,
     condition: Condition,

@@ -70,15 +70,6 @@ pub(super) struct Step {
     pub impulse_by: RowByAll,
 }
 
-/// The impact that ends a flight.
-struct Landed {
-    duration: f64,
-    /// Velocity of the primary mass and relative velocity just before the impact.
-    dq1: f64,
-    dw: f64,
-    next: Bounce,
-}
-
 /// The map at one frequency and excitation.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ImpactMap {
@@ -100,17 +91,18 @@ impl ImpactMap {
     /// The state just after the next impact; None if there is none within many periods, if it grazes, or if
     /// impacts accumulate.
     pub fn next(&self, from: &Bounce) -> Option<Bounce> {
-        Some(self.landed(&ParticleFlight::new(&self.oscillator, from))?.next)
+        Some(self.landed(&ParticleFlight::new(&self.oscillator, from))?.0)
     }
 
     /// The state just after the first impact that follows from (q1, q1', q2, q2') at a phase of the base, rad, with the
     /// particle inside its cavity; `None` where [`Self::next`] has none.
     pub fn first(&self, phase: f64, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
         let flight = ParticleFlight::between(&self.oscillator, phase, [q1, dq1, q2, dq2], q1 - q2);
-        Some(self.landed(&flight)?.next)
+        Some(self.landed(&flight)?.0)
     }
 
-    fn landed(&self, flight: &ParticleFlight) -> Option<Landed> {
+    /// The state after the impact that ends a flight, the duration of the flight, and the velocity of the primary mass just before the impact.
+    fn landed(&self, flight: &ParticleFlight) -> Option<(Bounce, f64, f64)> {
         let (duration, wall) = flight.contact()?;
         let [q1, dq1] = flight.primary(duration).into();
         let dw = dq1 - flight.dq2;
@@ -122,7 +114,7 @@ impl ImpactMap {
             dq2: flight.dq2 + particle * dw,
             wall,
         };
-        Some(Landed { duration, dq1, dw, next })
+        Some((next, duration, dq1))
     }
 
     /// Jump of the particle's velocity over the relative velocity before the impact.
@@ -132,7 +124,8 @@ impl ImpactMap {
 
     /// The next impact with its derivatives by state, frequency and excitation.
     pub(super) fn step(&self, from: &Bounce) -> Option<Step> {
-        let Landed { duration: t, dq1, dw, next } = self.landed(&ParticleFlight::new(&self.oscillator, from))?;
+        let (next, t, dq1) = self.landed(&ParticleFlight::new(&self.oscillator, from))?;
+        let dw = dq1 - from.dq2;
 
         // (q1, q1') just before the impact, at a fixed time of flight.
         let end = next.phase;

@@ -463,6 +463,11 @@ impl Periodic {
         [self.sigma, self.c * cosine, self.c * sine, self.b, self.g].into()
     }
 
+    /// Distance in these numbers.
+    pub(super) fn distance(&self, other: &Self) -> f64 {
+        (self.invariants() - other.invariants()).norm()
+    }
+
     /// A multiplier whose imaginary part has at least the size `imaginary` is within `distance` of the unit circle.
     pub(super) fn on_circle(&self, imaginary: f64, distance: f64) -> bool {
         let mut pairs = self.multipliers.iter().filter(|[_, im]| im.abs() >= imaginary);

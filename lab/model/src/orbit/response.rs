@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::Orbit;
 use super::continuation::{Branch, BranchBifurcation, ContinuationLimits, branch_off, continue_both_ways};
-use super::periodic::{Bifurcation, Condition, ImpactPattern, LONGEST, Periodic};
+use super::periodic::{Bifurcation, Condition, LONGEST, Periodic};
 use super::symmetric::{exact_backbone, least_excitation, phase_resonant, symmetric_orbits};
 use crate::Dimensionless;
 use crate::numerics::{equally_spaced, golden_section};
@@ -88,12 +88,8 @@ impl Search<'_> {
 
     fn follow(&mut self, branch: Branch, depth: usize) {
         let breaking = [Bifurcation::SymmetryBreaking, Bifurcation::PeriodDoubling];
-        let specials: Vec<_> = branch
-            .special
-            .iter()
-            .filter(|one| breaking.contains(&one.kind))
-            .cloned()
-            .collect();
+        let mut special = branch.special.clone();
+        special.retain(|one| breaking.contains(&one.kind));
         // One that ended early, where continuation failed, may be a part of this one.
         let impacts = branch.points[0].pattern.impacts();
         let part = |old: &Branch| old.typical().all(|one| branch.passes(self.scene, one));
@@ -102,7 +98,7 @@ impl Search<'_> {
         if depth == self.doublings || 2 * impacts > LONGEST {
             return;
         }
-        for special in specials {
+        for special in special {
             let Some(branch) = branch_off(self.scene, &special, self.condition, self.limits) else {
                 continue;
             };
@@ -114,16 +110,16 @@ impl Search<'_> {
     }
 
     fn named(mut self) -> Vec<Component> {
-        let pattern = |branch: &Branch| branch.points[0].pattern.clone();
-        let order = |pattern: ImpactPattern| {
-            (
-                pattern.periods() as usize * pattern.impacts(),
-                pattern.periods(),
-                !pattern.mirrored,
-            )
-        };
-        self.found.sort_by_key(|branch| order(pattern(branch)));
-        let names: Vec<String> = self.found.iter().map(|branch| pattern(branch).name()).collect();
+        self.found.sort_by_key(|branch| {
+            let pattern = &branch.points[0].pattern;
+            let periods = pattern.periods();
+            (periods as usize * pattern.impacts(), periods, !pattern.mirrored)
+        });
+        let names: Vec<String> = self
+            .found
+            .iter()
+            .map(|branch| branch.points[0].pattern.name())
+            .collect();
         let components = self.found.into_iter().enumerate().map(|(n, branch)| {
             let of = names.iter().filter(|name| **name == names[n]).count();
             let number = names[..=n].iter().filter(|name| **name == names[n]).count();
@@ -144,10 +140,6 @@ impl FrequencyResponse {
     pub fn contains(&self, scene: &Dimensionless, motion: &Periodic) -> bool {
         self.components.iter().any(|one| one.branch.passes(scene, motion))
     }
-}
-
-fn apart(one: &Periodic, other: &Periodic) -> f64 {
-    (one.invariants() - other.invariants()).norm()
 }
 
 impl Branch {
@@ -181,13 +173,13 @@ impl Branch {
         self.points.windows(2).any(|pair| {
             let [from, to] = [&pair[0], &pair[1]];
             // Where the curve bends, its points are close together.
-            if apart(from, motion).max(apart(to, motion)) > 1.2 * (apart(from, to) + SAME) {
+            if from.distance(motion).max(to.distance(motion)) > 1.2 * (from.distance(to) + SAME) {
                 return false;
             }
             let part = ((along(motion) - along(from)) / (along(to) - along(from))).clamp(0.0, 1.0);
             let guess = from.unknowns() + (to.unknowns() - from.unknowns()) * if part.is_nan() { 0.5 } else { part };
             // At a fold Newton's method may fail.
-            Periodic::find(scene, &from.pattern, &guess, conditions).is_none_or(|found| apart(&found, motion) < same)
+            Periodic::find(scene, &from.pattern, &guess, conditions).is_none_or(|found| found.distance(motion) < same)
         })
     }
 }
