@@ -312,7 +312,7 @@ impl CellRun {
         let Some((count, recurrence)) = self.recurrence() else {
             return Ok(None);
         };
-        let orbit = periodic_near(&self.scene, self.sigma, 0.0, self.states[n]);
+        let orbit = periodic_near(&self.scene, self.sigma, self.states[n]);
         let (regime, impacts, periods, exponent) = if let Some(orbit) = &orbit {
             let pattern = &orbit.pattern;
             let exponent = (orbit.exponent(), 0.0);

@@ -119,7 +119,7 @@ impl Serialize for Branch {
         };
         let points: Vec<DrawnMotion> = self.drawn().into_iter().map(drawn).collect();
         let mut fields = serializer.serialize_struct("Branch", 4)?;
-        fields.serialize_field("shape", &self.points[0].pattern)?;
+        fields.serialize_field("shape", self.pattern())?;
         fields.serialize_field("points", &points)?;
         fields.serialize_field("special", &self.special)?;
         fields.serialize_field("ended", &self.ended)?;
@@ -148,7 +148,7 @@ impl Branch {
     /// Its motions are not 1:1, and the last ones are unstable.
     fn winds(&self) -> bool {
         let last = self.points.len().checked_sub(UNSTABLE).map(|from| &self.points[from..]);
-        !self.points[0].pattern.is_one_to_one() && last.is_some_and(|last| last.iter().all(|one| !one.stable))
+        !self.pattern().is_one_to_one() && last.is_some_and(|last| last.iter().all(|one| !one.stable))
     }
 }
 

@@ -94,10 +94,10 @@ impl ImpactMap {
         Some(self.landed(&ParticleFlight::new(&self.oscillator, from))?.0)
     }
 
-    /// The state just after the first impact that follows from (q1, q1', q2, q2') at a phase of the base, rad, with the
+    /// The state just after the first impact that follows from (q1, q1', q2, q2') at phase 0 of the base, with the
     /// particle inside its cavity; `None` where [`Self::next`] has none.
-    pub fn first(&self, phase: f64, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
-        let flight = ParticleFlight::between(&self.oscillator, phase, [q1, dq1, q2, dq2], q1 - q2);
+    pub fn first(&self, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
+        let flight = ParticleFlight::between(&self.oscillator, 0.0, [q1, dq1, q2, dq2], q1 - q2);
         Some(self.landed(&flight)?.0)
     }
 

@@ -541,14 +541,14 @@ pub fn settle(
         plant.advance(drive, TAU / drive.omega)?;
     }
     let State { q1, dq1, q2, dq2 } = plant.state();
-    Ok(periodic_near(scene, sigma, 0.0, [q1, dq1, q2, dq2]).filter(|motion| motion.stable))
+    Ok(periodic_near(scene, sigma, [q1, dq1, q2, dq2]).filter(|motion| motion.stable))
 }
 
-/// The periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at a phase of the base, rad; a
+/// The periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at phase 0 of the base; a
 /// stable one rather than an unstable one.
-pub fn periodic_near(scene: &Dimensionless, sigma: f64, phase: f64, state: [f64; 4]) -> Option<Periodic> {
+pub(crate) fn periodic_near(scene: &Dimensionless, sigma: f64, state: [f64; 4]) -> Option<Periodic> {
     let map = ImpactMap::new(scene, 1.0 + scene.epsilon * sigma, scene.g);
-    let first = map.first(phase, state)?;
+    let first = map.first(state)?;
     let Bounce { phase, q1, dq1, dq2, .. } = first;
     let guess = Unknowns::from([phase, q1, dq1, dq2, sigma, scene.g]);
     let conditions = [Condition::Sigma(sigma), Condition::Excitation(scene.g)];
