@@ -1,6 +1,7 @@
 //! Curves of the live bench: manifold, and backbones of theory and of exact orbits.
 
 use crate::Dimensionless;
+use crate::numerics::equally_spaced;
 use crate::orbit::exact_backbone;
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow};
 
@@ -8,14 +9,14 @@ use crate::theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow};
 pub fn manifold(scene: &Dimensionless, b_max: f64, points: usize) -> impl Iterator<Item = [f64; 3]> {
     let manifold = Manifold::new(scene.r);
     let stable = manifold.b_min()..B_SYMMETRY_BREAKING;
-    steps(0.0, b_max, points).map(move |b| [b, manifold.c(b), f64::from(u8::from(stable.contains(&b)))])
+    equally_spaced(0.0, b_max, points).map(move |b| [b, manifold.c(b), f64::from(u8::from(stable.contains(&b)))])
 }
 
 /// `points` points (sigma, C, 1 if stable) of the backbone by first-order theory.
 pub fn backbone(scene: &Dimensionless, points: usize) -> impl Iterator<Item = [f64; 3]> {
     let slow_flow = SlowFlow::new(scene.lambda, scene.r);
     let from = slow_flow.manifold.b_min();
-    steps(from, 1.2 * B_SYMMETRY_BREAKING, points).map(move |b| {
+    equally_spaced(from, 1.2 * B_SYMMETRY_BREAKING, points).map(move |b| {
         let point = slow_flow.backbone_at(b);
         [point.sigma, point.c, f64::from(u8::from(point.stable()))]
     })
@@ -31,8 +32,4 @@ pub fn exact(scene: &Dimensionless, points: usize) -> impl Iterator<Item = [f64;
             .min_by(|one, other| distance(one.c).total_cmp(&distance(other.c)))?;
         Some([nearest.sigma, nearest.c, f64::from(u8::from(nearest.stable)), nearest.g])
     })
-}
-
-fn steps(from: f64, to: f64, points: usize) -> impl Iterator<Item = f64> {
-    (0..points).map(move |i| from + (to - from) * i as f64 / (points - 1).max(1) as f64)
 }

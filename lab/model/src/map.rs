@@ -149,7 +149,11 @@ impl CellRun {
         let mut periods = first.max(FIRST).min(limit);
         loop {
             self.follow(periods)?;
-            if let Some(result) = self.lasting()? {
+            // The regime, if the motion so far shows one that lasts: no impacts, or a stable periodic motion.
+            let lasting = self
+                .without_impacts()
+                .map_or_else(|| self.periodic(), |result| Ok(Some(result)))?;
+            if let Some(result) = lasting {
                 return Ok(result);
             }
             if periods >= limit {
@@ -288,14 +292,6 @@ const ZERO: f64 = 2e-3;
 const CAPTURES: f64 = 0.2;
 
 impl CellRun {
-    /// The regime, if the motion so far shows one that lasts: no impacts, or a stable periodic motion.
-    fn lasting(&self) -> Result<Option<RegimeResult>, InvalidValue> {
-        match self.without_impacts() {
-            None => self.periodic(),
-            result => Ok(result),
-        }
-    }
-
     /// The particle rests, and the primary mass cannot reach it: the free part of its motion only decays.
     fn without_impacts(&self) -> Option<RegimeResult> {
         let n = self.periods();
@@ -316,7 +312,7 @@ impl CellRun {
         let Some((count, recurrence)) = self.recurrence() else {
             return Ok(None);
         };
-        let orbit = periodic_near(&self.scene, self.sigma, 0.0, self.states[n]);
+        let orbit = periodic_near(&self.scene, self.sigma, self.states[n]);
         let (regime, impacts, periods, exponent) = if let Some(orbit) = &orbit {
             let pattern = &orbit.pattern;
             let exponent = (orbit.exponent(), 0.0);

@@ -17,13 +17,11 @@ mod symmetric;
 use crate::Dimensionless;
 use serde::Serialize;
 
-pub use continuation::{
-    Branch, BranchBifurcation, BranchEnd, ContinuationLimits, branch_off, continue_both_ways, continue_from,
-};
+pub use continuation::{Branch, BranchBifurcation, BranchEnd, ContinuationLimits, continue_both_ways};
 pub use convergence::{Convergence, Difference, convergence};
-pub use impact_map::{Bounce, ImpactMap};
-pub(crate) use periodic::NEAR;
-pub use periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, periodic_near, settle};
+pub use impact_map::Bounce;
+pub use periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, settle};
+pub(crate) use periodic::{NEAR, periodic_near};
 pub use plant::{
     DriveCondition, NoMotion, PlantMotion, periodic_motion, resonant_motion, resonant_motion_under, settled_motion,
 };

@@ -13,9 +13,7 @@ mod resonance;
 mod slow_flow;
 
 pub use activation::Activation;
-pub use decay::{DecayPoint, Waveform};
-pub use modulation::{ImpactSequence, Modulation};
+pub use decay::Waveform;
+pub use modulation::Modulation;
 pub use resonance::{backbone, backbone_at_level, free_sigma, reading, resonant};
-pub use slow_flow::{
-    B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, Manifold, ResponsePoint, SlowFlow, impacts_stable,
-};
+pub use slow_flow::{B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, Manifold, SlowFlow, impacts_stable};

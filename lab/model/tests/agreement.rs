@@ -7,11 +7,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use lovines::{Drive, Event, Plant, State};
-use rand_chacha::{
-    ChaCha8Rng,
-    rand_core::{Rng, SeedableRng},
-};
+use lovines::{Drive, Event, Plant};
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
 use vines_model::{
     Dimensionless,
@@ -20,45 +17,16 @@ use vines_model::{
 };
 
 mod common;
-use common::setting;
+use common::{setting, within};
 
-/// A map: its parameters without G, its start, and its ranges of sigma and G.
-struct Case {
-    scene: [f64; 3],
-    start: [f64; 4],
-    sigma: [f64; 2],
-    g: [f64; 2],
-}
+/// A map: epsilon, lambda and r; its start; its ranges of sigma and G.
+type Case = ([f64; 3], [f64; 4], [[f64; 2]; 2]);
 
 const CASES: [Case; 3] = [
-    Case {
-        scene: [0.0084, 1.43, 0.65],
-        start: [0.0, 0.0, 0.0, 0.9],
-        sigma: [-5.0, 5.0],
-        g: [0.1, 3.0],
-    },
-    Case {
-        scene: [0.03, 0.4, 0.8],
-        start: [0.3, 0.0, 0.0, -0.5],
-        sigma: [-4.0, 4.0],
-        g: [0.1, 2.0],
-    },
-    Case {
-        scene: [0.02, 0.8, 0.4],
-        start: [0.0, 0.7, 0.4, 0.3],
-        sigma: [-3.0, 3.0],
-        g: [0.2, 4.0],
-    },
+    ([0.0084, 1.43, 0.65], [0.0, 0.0, 0.0, 0.9], [[-5.0, 5.0], [0.1, 3.0]]),
+    ([0.03, 0.4, 0.8], [0.3, 0.0, 0.0, -0.5], [[-4.0, 4.0], [0.1, 2.0]]),
+    ([0.02, 0.8, 0.4], [0.0, 0.7, 0.4, 0.3], [[-3.0, 3.0], [0.2, 4.0]]),
 ];
-
-fn state(plant: &Plant) -> [f64; 4] {
-    let State { q1, dq1, q2, dq2 } = plant.state();
-    [q1, dq1, q2, dq2]
-}
-
-fn distance(one: &[f64; 4], other: &[f64; 4]) -> f64 {
-    one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
-}
 
 /// Impacts of the half periods from `from` to `to`.
 fn impacts(plant: &mut Plant, drive: Drive, from: usize, to: usize) -> Vec<Impact> {
@@ -99,20 +67,24 @@ fn periodic(impacts: &[Impact]) -> Option<Regime> {
 
 /// Mean growth per period of the distance of a second plant, which is moved close again after every period.
 fn growth(scene: &Dimensionless, drive: Drive, from: [f64; 4], periods: usize) -> f64 {
+    let size = |difference: &[f64; 4]| difference.iter().map(|one| one * one).sum::<f64>().sqrt();
     let (mut here, mut apart, mut sum) = (from, [5e-9; 4], 0.0);
     for _ in 0..periods {
-        let mut one = scene.plant(here).unwrap();
         let shifted = |sign: f64| scene.plant(std::array::from_fn(|n| here[n] + sign * apart[n]));
-        let mut other = shifted(1.0).or_else(|_| shifted(-1.0)).unwrap();
-        let before = distance(&state(&other), &here);
-        for plant in [&mut one, &mut other] {
+        let mut plants = [scene.plant(here), shifted(1.0).or_else(|_| shifted(-1.0))].map(Result::unwrap);
+        let difference = |[one, other]: &[Plant; 2]| {
+            let [one, other] = [one, other].map(|plant| scene.state(&plant.state()));
+            std::array::from_fn(|n| other[n] - one[n])
+        };
+        let before = size(&difference(&plants));
+        for plant in &mut plants {
             plant.advance(drive, TAU / drive.omega).unwrap();
         }
-        here = state(&one);
-        let there = state(&other);
-        let after = distance(&there, &here).max(1e-14);
+        here = scene.state(&plants[0].state());
+        apart = difference(&plants);
+        let after = size(&apart).max(1e-14);
         sum += (after / before).ln();
-        apart = std::array::from_fn(|n| (there[n] - here[n]) * (1e-8 / after));
+        apart = apart.map(|one| one * (1e-8 / after));
     }
     sum / periods as f64
 }
@@ -134,7 +106,7 @@ fn regime_of(scene: &Dimensionless, sigma: f64, start: [f64; 4], halves: usize, 
     if let Some(regime) = periodic(&last[late.unwrap_or(0)..]) {
         return (regime, 0.0);
     }
-    let growth = growth(scene, drive, state(&plant), 4000);
+    let growth = growth(scene, drive, scene.state(&plant.state()), 4000);
     let regime = match (growth > 2e-3, synchrony(&last) < 0.2) {
         (false, _) => Regime::QuasiPeriodic,
         (true, false) => Regime::Modulated,
@@ -143,29 +115,22 @@ fn regime_of(scene: &Dimensionless, sigma: f64, start: [f64; 4], halves: usize, 
     (regime, growth)
 }
 
-/// The detuning and the scene of a random cell.
-fn place(case: &Case, seed: u64) -> (f64, Dimensionless) {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut within = |[low, high]: [f64; 2]| low + (high - low) * (random.next_u64() as f64 / u64::MAX as f64);
-    let (sigma, g) = (within(case.sigma), within(case.g));
-    let [epsilon, lambda, r] = case.scene;
-    (sigma, Dimensionless::new(epsilon, lambda, r, g))
-}
-
-/// A random cell, its regime by the map, that of its motion further on, and that of another plant after so many periods.
+/// A random cell: its regime by the map, that of its motion further on, and that of another plant after a number of periods.
 fn cell(case: &Case, seed: u64, [limit, periods, others]: [usize; 3]) -> (RegimeResult, [Regime; 2], String) {
-    let (sigma, scene) = place(case, seed);
-    let (mut point, different) = observe_confirmed(&scene, sigma, case.start, limit, others).unwrap();
+    let ([epsilon, lambda, r], start, ranges) = *case;
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let [sigma, g] = ranges.map(|range| within(&mut random, range));
+    let scene = Dimensionless::new(epsilon, lambda, r, g);
+    let (mut point, different) = observe_confirmed(&scene, sigma, start, limit, others).unwrap();
     if different.is_some() {
         point.regime = Regime::Undecided;
     }
     let (further, _) = regime_of(&scene, sigma, point.state, FURTHER, FURTHER);
-    let (other, growth) = regime_of(&scene, sigma, case.start, 2 * periods, periods);
+    let (other, growth) = regime_of(&scene, sigma, start, 2 * periods, periods);
     let RegimeResult { regime, followed, transient, exponent, synchrony, .. } = point;
     let text = format!(
-        "sigma = {sigma:.4}, G = {:.4}: {regime} after {followed} (transient {transient}, exponent {exponent:.3?}, synchrony {synchrony:.3}), \
-         further on {further:?}, other plant {other:?} after {periods} (growth {growth:.4})",
-        scene.g
+        "sigma = {sigma:.4}, G = {g:.4}: {regime} after {followed} (transient {transient}, exponent {exponent:.3?}, synchrony {synchrony:.3}), \
+         further on {further:?}, other plant {other:?} after {periods} (growth {growth:.4})"
     );
     (point, [further, other], text)
 }
@@ -184,11 +149,6 @@ fn regimes_agree_with_those_further_on_and_of_another_plant() {
         let regimes = Regime::SIMULATED
             .map(|one| format!("{} {}", count(one), one.name()))
             .join(", ");
-        let repeating = found.iter().filter(|one| one.0.impacts > 0);
-        let mut transients: Vec<f64> = repeating.map(|one| one.0.transient).collect();
-        transients.sort_by(f64::total_cmp);
-        let [median, longest] = [transients.len() / 2, transients.len().saturating_sub(1)]
-            .map(|n| transients.get(n).copied().unwrap_or(0.0));
         found.retain(|one| one.0.regime != Regime::Undecided);
         let decided = found.len();
         found.retain(|(point, others, _)| others.iter().any(|one| *one != point.regime));
@@ -201,13 +161,10 @@ fn regimes_agree_with_those_further_on_and_of_another_plant() {
             .filter(|one| irregular(one.0.regime) != irregular(one.1[1]))
             .count();
         let share = |count: usize| 100.0 * (decided - count) as f64 / decided as f64;
-        let [epsilon, lambda, r] = case.scene;
         println!(
-            "map {}: epsilon = {epsilon}, lambda = {lambda}, r = {r}, start {:?}: of {decided} decided cells {:.2} % agree with their motion \
-             further on, {:.2} % with another plant after {periods} periods; in {ended} of the {} others chaos has ended for one of both; \
-             {regimes}; transients: median {median} periods, longest {longest}",
+            "map {}: {case:?}: of {decided} decided cells {:.2} % agree with their motion further on, {:.2} % with another plant after \
+             {periods} periods; in {ended} of the {} others chaos has ended for one of both; {regimes}",
             n + 1,
-            case.start,
             share(differ(0)),
             share(differ(1)),
             differ(1)

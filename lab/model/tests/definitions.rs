@@ -5,27 +5,22 @@ use vines_model::{
     orbit::{ContinuationLimits, Orbit, convergence, phase_resonant, response, symmetric_orbits},
 };
 
-// The default scene: M = 3.807 kg, k = 11.68e3 N/m, c = 2.53 N s/m, m = 0.032 kg.
-const EPSILON: f64 = 0.032 / 3.807;
-const LAMBDA: f64 = 1.427_381;
-
+/// The default scene: M = 3.807 kg, k = 11.68e3 N/m, c = 2.53 N s/m, m = 0.032 kg.
 fn scene(definition: Definition) -> Dimensionless {
-    Dimensionless { definition, ..Dimensionless::new(EPSILON, LAMBDA, 0.65, 1.1) }
+    Dimensionless {
+        definition,
+        ..Dimensionless::new(0.032 / 3.807, 1.427_381, 0.65, 1.1)
+    }
 }
 
 fn orbit(definition: Definition) -> Orbit {
-    let orbits = phase_resonant(&scene(definition));
-    orbits
-        .into_iter()
-        .filter(|one| one.stable)
-        .max_by(|one, other| one.c.total_cmp(&other.c))
-        .expect("an orbit")
+    let orbits = phase_resonant(&scene(definition)).into_iter().filter(|one| one.stable);
+    orbits.max_by(|one, other| one.c.total_cmp(&other.c)).expect("an orbit")
 }
 
 #[test]
 fn the_peak_is_the_largest_amplitude_of_the_frequency_response() {
-    for sensor in [Sensor::V, Sensor::Q1, Sensor::Acceleration] {
-        let definition = Definition { resonance: Resonance::Peak, sensor, ..Definition::default() };
+    for definition in Definition::all().into_iter().filter(Definition::is_peak) {
         let peak = orbit(definition);
         let fine = ContinuationLimits { step: 0.005, points: 20_000, ..ContinuationLimits::default() };
         let found = response(&scene(definition), &fine, 0);
@@ -38,15 +33,15 @@ fn the_peak_is_the_largest_amplitude_of_the_frequency_response() {
 #[test]
 fn definitions_differ_as_an_independent_computation_says() {
     let with = |resonance, reference, sensor| orbit(Definition { resonance, reference, sensor });
-    let study = with(Resonance::Phase, Reference::Base, Sensor::V);
+    let study = orbit(Definition::default());
     let peak = with(Resonance::Peak, Reference::Base, Sensor::V);
     assert!((study.sigma + 1.1394).abs() < 1e-4 && (peak.sigma + 1.1612).abs() < 1e-4);
     // The same motion, read by the other sensor.
-    let q1 = Definition { sensor: Sensor::Q1, ..Definition::default() };
-    let nearest = |one: &Orbit, other: &Orbit| (one.b - study.b).abs().total_cmp(&(other.b - study.b).abs());
-    let q1 = symmetric_orbits(&scene(q1), study.sigma)
-        .into_iter()
-        .min_by(nearest)
+    let q1 = scene(Definition { sensor: Sensor::Q1, ..Definition::default() });
+    let distance = |one: &Orbit| (one.b - study.b).abs();
+    let orbits = symmetric_orbits(&q1, study.sigma).into_iter();
+    let q1 = orbits
+        .min_by(|one, other| distance(one).total_cmp(&distance(other)))
         .unwrap();
     assert!((study.c - 0.4480).abs() < 1e-4 && (q1.c - 0.4394).abs() < 1e-4);
     // The force leads the base by 0.7 degrees.

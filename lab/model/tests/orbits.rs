@@ -1,13 +1,13 @@
 //! Guards exact orbits: the closed form against independent 40-digit references, and periodic motions by shooting against the closed form,
 //! against the plant, and along their curves.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use vines_model::{
     Dimensionless,
     orbit::{
-        Bifurcation, Branch, Condition, ContinuationLimits, ImpactPattern, Orbit, Periodic, backbone_at_speed,
-        branch_off, continue_both_ways, exact_backbone, phase_resonant, settle,
+        Bifurcation, Branch, BranchBifurcation, Condition, ContinuationLimits, Orbit, Periodic, backbone,
+        backbone_at_speed, continue_both_ways, exact_backbone, phase_resonant, response, settle,
     },
     theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow},
 };
@@ -15,21 +15,17 @@ use vines_model::{
 mod reference;
 use reference::rows;
 
-/// The orbit closest to the row's sigma.
-fn nearest(row: &reference::Row) -> Orbit {
-    let scene = Dimensionless::new(row.epsilon, row.lambda, row.r, row.g);
-    let distance = |orbit: &Orbit| (orbit.sigma - row.sigma).abs();
-    phase_resonant(&scene)
-        .into_iter()
-        .min_by(|one, other| distance(one).total_cmp(&distance(other)))
-        .expect("an orbit for every row")
-}
-
 #[test]
-fn orbits_match_the_references_to_all_their_digits() {
+fn orbits_match_the_references_to_all_their_digits_and_others_are_on_the_unstable_left_branch() {
     let (mut state, mut multipliers) = (0f64, 0f64);
-    for row in rows() {
-        let orbit = nearest(&row);
+    let rows = rows();
+    for row in &rows {
+        let orbits = phase_resonant(&row.scene());
+        let distance = |orbit: &Orbit| (orbit.sigma - row.sigma).abs();
+        let nearest = orbits
+            .iter()
+            .min_by(|one, other| distance(one).total_cmp(&distance(other)));
+        let orbit = nearest.expect("an orbit for every row");
         for (found, expected) in [(orbit.sigma, row.sigma), (orbit.c, row.c), (orbit.b, row.b)] {
             state = state.max((found - expected).abs());
         }
@@ -37,54 +33,49 @@ fn orbits_match_the_references_to_all_their_digits() {
             multipliers = multipliers.max((found - expected).abs());
         }
         assert_eq!(orbit.stable, row.multipliers[3] < 1.0, "{row:?}");
+        let same_scene = |other: &&reference::Row| other.scene() == row.scene();
+        let listed = |orbit: &Orbit| {
+            rows.iter()
+                .filter(same_scene)
+                .any(|one| (one.sigma - orbit.sigma).abs() < 1e-8)
+        };
+        for orbit in orbits.iter().filter(|orbit| !listed(orbit)) {
+            assert!(orbit.b < Manifold::new(row.r).b_min() && !orbit.stable, "{orbit:?}");
+        }
     }
     assert!(state < 1e-10, "the references have ten digits: {state:e}");
     assert!(multipliers < 6e-7, "the references have six digits: {multipliers:e}");
 }
 
 #[test]
-fn what_is_found_beside_the_references_lies_on_the_unstable_left_branch() {
-    let rows = rows();
-    for row in &rows {
-        let listed = |orbit: &Orbit| {
-            rows.iter()
-                .filter(|other| (other.epsilon, other.r, other.g) == (row.epsilon, row.r, row.g))
-                .any(|other| (other.sigma - orbit.sigma).abs() < 1e-8)
-        };
-        let scene = Dimensionless::new(row.epsilon, row.lambda, row.r, row.g);
-        let b_min = Manifold::new(row.r).b_min();
-        for orbit in phase_resonant(&scene).iter().filter(|orbit| !listed(orbit)) {
-            assert!(orbit.b < b_min && !orbit.stable, "{orbit:?}");
-        }
-    }
+fn no_orbit_is_invented_where_the_excitation_is_too_weak() {
+    assert_eq!(phase_resonant(&scene(0.2)), []);
+    assert_eq!(phase_resonant(&scene(0.0)), []);
 }
 
-#[test]
-fn no_orbit_is_invented_where_the_excitation_is_too_weak() {
-    assert_eq!(phase_resonant(&Dimensionless::new(0.0084, 1.43, 0.65, 0.2)), []);
-    assert_eq!(phase_resonant(&Dimensionless::new(0.0084, 1.43, 0.65, 0.0)), []);
+/// Smallest difference in C and G from the orbits of the exact backbone at a frequency.
+fn from_backbone(scene: &Dimensionless, [omega, c, g]: [f64; 3]) -> f64 {
+    let orbits = exact_backbone(scene, omega).into_iter();
+    orbits.map(|orbit| (orbit.c - c).hypot(orbit.g - g)).fold(1.0, f64::min)
 }
 
 #[test]
 fn the_curve_of_the_backbone_has_an_orbit_of_every_frequency_that_it_passes() {
-    for (epsilon, lambda, r) in [
-        (0.0084, 1.43, 0.65),
-        (0.03, 0.4, 0.9),
-        (0.002, 2.5, 0.4),
-        (0.0137, 2.36, 0.86),
-    ] {
+    const SCENES: [[f64; 3]; 4] = [
+        [0.0084, 1.43, 0.65],
+        [0.03, 0.4, 0.9],
+        [0.002, 2.5, 0.4],
+        [0.0137, 2.36, 0.86],
+    ];
+    for [epsilon, lambda, r] in SCENES {
         let scene = Dimensionless::new(epsilon, lambda, r, 1.0);
         let fold = SlowFlow::new(lambda, r).manifold.b_min();
         let mut before = None;
         for n in 0..2000 {
             let speed = 1.3 + 0.0005 * f64::from(n) * (fold - 1.3);
-            let [omega, c, g] = backbone_at_speed(&scene, speed).unwrap_or_else(|| panic!("{scene:?} {speed}"));
-            let orbits = exact_backbone(&scene, omega);
-            let apart = orbits.iter().map(|orbit| (orbit.c - c).hypot(orbit.g - g));
-            assert!(
-                apart.fold(1.0, f64::min) < 1e-8,
-                "{scene:?} {speed}: {c} {g} {orbits:?}"
-            );
+            let motion = backbone_at_speed(&scene, speed).unwrap_or_else(|| panic!("{scene:?} {speed}"));
+            assert!(from_backbone(&scene, motion) < 1e-8, "{scene:?} {speed}: {motion:?}");
+            let [omega, c, _] = motion;
             let is_smooth = before.is_none_or(|before: [f64; 2]| (c - before[0]).hypot(omega - before[1]) < 0.01);
             assert!(is_smooth, "{scene:?} {speed}: {before:?} {omega}, {c}");
             before = Some([c, omega]);
@@ -94,145 +85,104 @@ fn the_curve_of_the_backbone_has_an_orbit_of_every_frequency_that_it_passes() {
 
 // Shooting
 
+/// Detunings from -6 to 6.
+const LIMITS: ContinuationLimits = ContinuationLimits {
+    sigma: [-6.0, 6.0],
+    g: [-1e-6, 10.0],
+    points: 2000,
+    step: 0.05,
+};
+
 fn scene(g: f64) -> Dimensionless {
     Dimensionless::new(0.0084, 1.43, 0.65, g)
 }
 
-fn response(g: f64) -> (Dimensionless, Branch) {
-    let scene = scene(g);
-    let fastest = |one: &vines_model::orbit::Orbit, other: &vines_model::orbit::Orbit| one.b.total_cmp(&other.b);
-    let orbit = phase_resonant(&scene).into_iter().max_by(fastest).unwrap();
-    let conditions = [Condition::Excitation(g), Condition::PhaseResonance];
-    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
-    let branch = continue_both_ways(&scene, &start, Condition::Excitation(g), &ContinuationLimits::default());
-    (scene, branch)
-}
-
-/// The largest distance of the plant from its own start after each of this number of periods, started on the motion.
-fn distance_of_plant(scene: &Dimensionless, motion: &Periodic, periods: u32) -> f64 {
-    let [q1, dq1, q2, dq2] = motion.start(scene).expect("a state at phase zero");
-    let mut plant = scene.plant([q1, dq1, q2, dq2]).unwrap();
-    let omega = 1.0 + scene.epsilon * motion.sigma;
-    let drive = lovines::Drive::harmonic(scene.epsilon * motion.g, omega);
-    let whole = motion.pattern.periods();
-    (0..periods).fold(0.0, |most, _| {
-        for _ in 0..whole {
-            plant.advance(drive, TAU / omega).unwrap();
+/// Requires that the plant, started on every tenth motion of a branch that does not leave at once, is back at its start after each of two
+/// repetitions.
+fn repeats_on_the_plant(scene: &Dimensionless, branch: &Branch) {
+    let slow = branch.points.iter().filter(|motion| motion.moduli()[3] < 10.0);
+    for motion in slow.step_by(10) {
+        let [_, start @ ..] = motion.motion(scene, 1)[0];
+        let mut plant = scene.plant(start).unwrap();
+        let drive = Dimensionless { g: motion.g, ..*scene }.drive(motion.sigma);
+        for n in 1..=2 * motion.pattern.periods() {
+            plant.advance(drive, TAU / drive.omega).unwrap();
+            let now = scene.state(&plant.state());
+            let is_back = (0..4).all(|n| (now[n] - start[n]).abs() < 1e-9);
+            let repeats = n.is_multiple_of(motion.pattern.periods());
+            assert!(is_back || !repeats, "{now:?} {start:?} at sigma = {}", motion.sigma);
         }
-        let now = plant.state();
-        let apart = [now.q1 - q1, now.dq1 - dq1, now.q2 - q2, now.dq2 - dq2];
-        apart.iter().fold(most, |most: f64, one| most.max(one.abs()))
-    })
-}
-
-#[test]
-fn an_exact_response_passes_folds_and_phase_resonance() {
-    let (scene, branch) = response(1.1);
-    let sigmas: Vec<f64> = branch.points.iter().map(|one| one.sigma).collect();
-    let turns = sigmas
-        .windows(3)
-        .filter(|s| (s[1] - s[0]) * (s[2] - s[1]) < 0.0)
-        .count();
-    assert!(turns >= 1 && branch.points.iter().any(|one| !one.stable));
-    // Every motion is one that the plant repeats; unstable ones leave slowly.
-    for motion in branch.points.iter().step_by(20) {
-        let apart = distance_of_plant(&scene, motion, 2);
-        assert!(apart < 1e-9, "{apart:e} at sigma = {}", motion.sigma);
-    }
-    for fold in branch.special.iter().filter(|one| one.kind == Bifurcation::Fold) {
-        let nearest = fold.motion.multipliers.iter().map(|[re, im]| (re - 1.0).hypot(*im));
-        assert!(nearest.fold(f64::MAX, f64::min) < 1e-4);
     }
 }
 
 #[test]
-fn symmetry_breaks_near_the_theorys_speed_and_asymmetric_motions_leave_it() {
-    let (scene, branch) = response(1.6);
-    let breaking = branch
-        .special
-        .iter()
-        .find(|one| one.kind == Bifurcation::SymmetryBreaking)
-        .expect("a symmetry breaking");
-    assert!((breaking.motion.b - B_SYMMETRY_BREAKING).abs() < 0.03);
-    let limits = ContinuationLimits { points: 60, ..ContinuationLimits::default() };
-    let aside = branch_off(&scene, breaking, Condition::Excitation(1.6), &limits).unwrap();
-    let uneven = |one: &Periodic| (one.bounces[1].phase - one.bounces[0].phase - std::f64::consts::PI).abs();
-    let interval = aside.points.iter().map(uneven).fold(0.0, f64::max);
-    assert!(interval > 0.05);
-    assert!(aside.points.iter().any(|one| one.stable));
-    for motion in aside.points.iter().step_by(10) {
-        assert!(distance_of_plant(&scene, motion, 2) < 1e-9);
+fn an_exact_response_passes_folds_breaks_its_symmetry_and_has_motions_that_the_plant_repeats() {
+    for g in [1.1, 1.6] {
+        let found = response(&scene(g), &LIMITS, 1);
+        let branches = || found.components.iter().map(|one| &one.branch);
+        branches().for_each(|branch| repeats_on_the_plant(&scene(g), branch));
+        let points = || branches().flat_map(|branch| &branch.points);
+        assert!(
+            [true, false]
+                .iter()
+                .all(|stable| points().any(|one| one.stable == *stable))
+        );
+        let special = |kind| {
+            found
+                .symmetric()
+                .flat_map(|branch| &branch.special)
+                .filter(move |one| one.kind == kind)
+        };
+        assert!(special(Bifurcation::Fold).next().is_some());
+        for fold in special(Bifurcation::Fold) {
+            let nearest = fold.motion.multipliers.map(|[re, im]| (re - 1.0).hypot(im));
+            assert!(nearest.into_iter().fold(f64::MAX, f64::min) < 1e-4);
+        }
+        // At the larger excitation symmetry breaks near the theory's speed, and stable asymmetric motions leave it.
+        let near = |one: &BranchBifurcation| (one.motion.b - B_SYMMETRY_BREAKING).abs() < 0.03;
+        assert_eq!(special(Bifurcation::SymmetryBreaking).any(near), g == 1.6);
+        let uneven = |one: &Periodic| (one.bounces[1].phase - one.bounces[0].phase - PI).abs() > 0.05;
+        let asymmetric = points().filter(|one| one.pattern.is_one_to_one() && !one.pattern.mirrored);
+        assert_eq!(asymmetric.filter(|one| uneven(one)).any(|one| one.stable), g == 1.6);
     }
+}
+
+#[test]
+fn a_motion_with_more_impacts_is_followed_like_any_other() {
+    let scene = scene(2.2);
+    let settled = settle(&scene, -0.6, [0.0, 0.0, 0.0, 0.9], 800).unwrap();
+    let motion = settled.expect("a pattern");
+    assert!(motion.pattern.impacts() > 2);
+    let limits = ContinuationLimits { points: 40, ..LIMITS };
+    let branch = continue_both_ways(&scene, &motion, Condition::Excitation(2.2), &limits);
+    assert!(branch.points.len() > 20);
+    repeats_on_the_plant(&scene, &branch);
 }
 
 #[test]
 fn the_exact_backbone_continued_is_the_closed_form() {
     let scene = scene(1.1);
-    let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
-    let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
-    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
-    let branch = continue_both_ways(
-        &scene,
-        &start,
-        Condition::PhaseResonance,
-        &ContinuationLimits::default(),
-    );
+    let branch = backbone(&scene, &LIMITS).unwrap();
     assert!(branch.points.len() > 40, "{}: {:?}", branch.points.len(), branch.ended);
     for motion in &branch.points {
-        let closed = exact_backbone(&scene, 1.0 + scene.epsilon * motion.sigma);
-        let nearest = closed
-            .iter()
-            .map(|one| (one.c - motion.c).abs().max((one.g - motion.g).abs()))
-            .fold(f64::MAX, f64::min);
-        assert!(
-            nearest < 1e-8,
-            "{nearest:e} at sigma = {}, C = {}",
-            motion.sigma,
-            motion.c
-        );
+        let off = from_backbone(&scene, [1.0 + scene.epsilon * motion.sigma, motion.c, motion.g]);
+        assert!(off < 1e-8, "{off:e} at sigma = {}, C = {}", motion.sigma, motion.c);
     }
 }
 
 #[test]
 fn without_damping_drive_and_loss_the_backbone_is_the_conservative_mode() {
     let scene = Dimensionless::new(0.0084, 0.0, 1.0, 0.0);
-    let mode = exact_backbone(&scene, 1.0 - 1.0 * scene.epsilon)
-        .into_iter()
-        .find(|one| one.c > 0.2)
-        .unwrap();
-    let conditions = [Condition::Sigma(mode.sigma), Condition::PhaseResonance];
-    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &mode.unknowns(), conditions).unwrap();
-    let limits = ContinuationLimits {
-        sigma: [-3.0, 0.5],
-        points: 200,
-        ..ContinuationLimits::default()
-    };
-    let branch = continue_both_ways(&scene, &start, Condition::PhaseResonance, &limits);
+    let branch = backbone(
+        &scene,
+        &ContinuationLimits { sigma: [-3.0, 0.5], points: 200, ..LIMITS },
+    )
+    .unwrap();
     assert!(branch.points.len() > 20);
-    let (mut most_g, mut energies) = (0f64, 0f64);
     for motion in &branch.points {
-        most_g = most_g.max(motion.g.abs());
-        let [q1, dq1, _, dq2] = motion.start(&Dimensionless { g: 0.0, ..scene }).unwrap();
-        let energy = 0.5 * (q1 * q1 + dq1 * dq1 + scene.epsilon * dq2 * dq2);
-        for [_, q1, dq1, _, dq2] in motion.motion(&scene, 40) {
-            let now = 0.5 * (q1 * q1 + dq1 * dq1 + scene.epsilon * dq2 * dq2);
-            energies = energies.max((now / energy - 1.0).abs());
-        }
-    }
-    assert!(most_g < 1e-9 && energies < 1e-9);
-}
-
-#[test]
-fn a_motion_with_more_impacts_is_followed_like_any_other() {
-    let scene = scene(2.2);
-    let motion = settle(&scene, -0.6, [0.0, 0.0, 0.0, 0.9], 800)
-        .unwrap()
-        .expect("a pattern");
-    assert!(motion.pattern.impacts() > 2);
-    let limits = ContinuationLimits { points: 40, ..ContinuationLimits::default() };
-    let branch = continue_both_ways(&scene, &motion, Condition::Excitation(2.2), &limits);
-    assert!(branch.points.len() > 20);
-    for motion in branch.points.iter().step_by(7) {
-        assert!(distance_of_plant(&scene, motion, 1) < 1e-9);
+        let energy = |[_, q1, dq1, _, dq2]: [f64; 5]| 0.5 * (q1 * q1 + dq1 * dq1 + scene.epsilon * dq2 * dq2);
+        let states = motion.motion(&scene, 40);
+        let mut spread = states.iter().map(|one| (energy(*one) / energy(states[0]) - 1.0).abs());
+        assert!(motion.g.abs() < 1e-9 && spread.all(|one| one < 1e-9));
     }
 }

@@ -327,9 +327,9 @@ fn backbone_decay(p: &Dimensionless, from: f64) -> Vec<Triple> {
     let start = theory::backbone_at_level(p, from);
     let decay = start.and_then(|point| SlowFlow::new(p.lambda, p.r).decay(point.b, POINTS));
     let samples = decay.unwrap_or_default();
-    let samples = samples.iter().map(|point| {
+    let samples = samples.iter().map(|(tau1, point)| {
         let c = point.c * reading(p, point.b, point.sigma);
-        [point.tau1 / (p.epsilon * TAU), c, point.sigma]
+        [tau1 / (p.epsilon * TAU), c, point.sigma]
     });
     samples.collect()
 }
@@ -506,8 +506,8 @@ pub fn responses(p: &Dimensionless, responses: &[FrequencyResponse]) -> Figure {
 fn add_response(panel: &mut Panel, p: &Dimensionless, response: &FrequencyResponse) {
     for curve in SlowFlow::new(p.lambda, p.r).frequency_responses(response.g, 600) {
         let points = curve.iter().map(|point| {
-            let stable = point.motion.impacts_stable && point.motion.slow_flow_stable;
-            let c = point.motion.c * reading(p, point.motion.b, point.sigma);
+            let stable = point.impacts_stable && point.slow_flow_stable;
+            let c = point.c * reading(p, point.b, point.sigma);
             ((point.sigma, c), stable)
         });
         panel.curve(points, 1.0, THEORY, "theory");

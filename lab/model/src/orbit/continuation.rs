@@ -7,11 +7,11 @@
 //! Each kind of bifurcation has a test function of the multipliers that is zero there, and smooth also where multipliers meet. A change of
 //! its sign shows a bifurcation; two of a kind within one step are missed.
 
-use nalgebra::{Matrix4, Matrix6, SVector};
+use nalgebra::{Matrix4, Matrix6};
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
 use super::impact_map::Bounce;
-use super::periodic::{Bifurcation, Condition, Periodic, Returned, Unknowns, follow, newton, wrapped};
+use super::periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, wrapped};
 use crate::Dimensionless;
 use crate::numerics::try_bisection;
 
@@ -104,19 +104,22 @@ struct DrawnMotion {
 
 impl Serialize for Branch {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let drawn = |one: &Periodic| DrawnMotion {
-            g: one.g,
-            sigma: one.sigma,
-            c: one.c,
-            gamma: one.gamma,
-            b: one.b,
-            multipliers: one.multipliers,
-            stable: one.stable,
-            start: one.bounces[0],
+        let drawn = |motion: &Periodic| {
+            let Periodic { g, sigma, c, gamma, b, multipliers, stable, .. } = *motion;
+            DrawnMotion {
+                g,
+                sigma,
+                c,
+                gamma,
+                b,
+                multipliers,
+                stable,
+                start: motion.bounces[0],
+            }
         };
         let points: Vec<DrawnMotion> = self.drawn().into_iter().map(drawn).collect();
         let mut fields = serializer.serialize_struct("Branch", 4)?;
-        fields.serialize_field("shape", &self.points[0].pattern)?;
+        fields.serialize_field("shape", self.pattern())?;
         fields.serialize_field("points", &points)?;
         fields.serialize_field("special", &self.special)?;
         fields.serialize_field("ended", &self.ended)?;
@@ -131,14 +134,9 @@ impl Branch {
         let (mut drawn, mut from) = (vec![&points[0]], 0);
         for to in 1..points.len() {
             let changes = |n: usize| points[n].stable != points[n - 1].stable;
-            let passed = from + 1..to;
+            let is_off = |n: usize| off(&points[n], [&points[from], &points[to]]) > DRAWN;
             let ends = changes(to) || to > 1 && changes(to - 1);
-            if !passed.is_empty()
-                && (ends
-                    || passed
-                        .into_iter()
-                        .any(|n| off(&points[n], [&points[from], &points[to]]) > DRAWN))
-            {
+            if from + 1 < to && (ends || (from + 1..to).any(is_off)) {
                 from = to - 1;
                 drawn.push(&points[from]);
             }
@@ -150,16 +148,13 @@ impl Branch {
     /// Its motions are not 1:1, and the last ones are unstable.
     fn winds(&self) -> bool {
         let last = self.points.len().checked_sub(UNSTABLE).map(|from| &self.points[from..]);
-        !self.points[0].pattern.is_one_to_one() && last.is_some_and(|last| last.iter().all(|one| !one.stable))
+        !self.pattern().is_one_to_one() && last.is_some_and(|last| last.iter().all(|one| !one.stable))
     }
 }
 
 /// Distance of a motion from the line between two others.
 fn off(motion: &Periodic, [from, to]: [&Periodic; 2]) -> f64 {
-    let (chord, beside) = (
-        to.invariants() - from.invariants(),
-        motion.invariants() - from.invariants(),
-    );
+    let [chord, beside] = [to, motion].map(|one| one.invariants() - from.invariants());
     let part = (beside.dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0);
     (beside - chord * part).norm()
 }
@@ -197,7 +192,6 @@ impl BranchBifurcation {
 }
 
 impl ContinuationLimits {
-    /// Whether a motion lies in the ranges.
     fn contain(&self, sigma: f64, g: f64) -> bool {
         let inside = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
         inside(sigma, self.sigma) && inside(g, self.g)
@@ -214,27 +208,28 @@ const APPROACH: f64 = 1.0 / 256.0;
 const FINEST: f64 = 1e-12;
 /// Difference in sigma of a bifurcation that is located twice.
 const SAME: f64 = 1e-9;
+/// Largest rounding error of a test function: in conservative motions, some of these functions are zero everywhere.
+const ROUNDING: f64 = 1e-9;
+/// Largest distance of a multiplier from the circle where a crossing is located.
+const LOCATED: f64 = 1e-4;
 
-struct Continuation<'a> {
+struct Curve<'a> {
     scene: &'a Dimensionless,
-    start: &'a Periodic,
+    pattern: &'a ImpactPattern,
     condition: Condition,
     /// Longest step with which a branch joins another.
     reach: f64,
 }
 
-impl Continuation<'_> {
+impl Curve<'_> {
     /// The direction of the curve, and the sign of its equations' determinant, which is the same all along the curve.
-    fn tangent(&self, x: &Unknowns, towards: &Unknowns) -> Option<(Unknowns, f64)> {
-        let returned = follow(self.scene, &self.start.pattern, x)?;
+    fn tangent(&self, at: &Periodic, towards: &Unknowns) -> Option<(Unknowns, f64)> {
         let mut matrix = Matrix6::zeros();
-        matrix.fixed_rows_mut::<4>(0).copy_from(&returned.by);
-        matrix.set_row(
-            4,
-            &self.condition.value(self.scene, &self.start.pattern, x, &returned).1,
-        );
+        matrix.fixed_rows_mut::<4>(0).copy_from(&at.map.by);
+        let (_, by) = self.condition.value(self.scene, self.pattern, &at.unknowns(), &at.map);
+        matrix.set_row(4, &by);
         matrix.set_row(5, &towards.transpose());
-        let mut right = SVector::<f64, 6>::zeros();
+        let mut right = Unknowns::zeros();
         right[5] = 1.0;
         let lu = matrix.lu();
         let tangent = lu.solve(&right)?;
@@ -243,105 +238,119 @@ impl Continuation<'_> {
     }
 
     /// The intersection of the curve with the plane at the end of a step along the tangent.
-    fn correct(&self, x: &Unknowns, tangent: &Unknowns, step: f64) -> Option<Unknowns> {
-        let ahead = x + tangent * step;
-        let found = newton(self.scene, &self.start.pattern, ahead, |x, returned: &Returned| {
-            let plane = (tangent.dot(&(x - ahead)), tangent.transpose());
-            [
-                self.condition.value(self.scene, &self.start.pattern, x, returned),
-                plane,
-            ]
-        })?;
-        ((found - ahead).norm() <= step.abs()).then_some(found)
+    fn correct(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Periodic> {
+        let through = from.unknowns() + tangent * step;
+        let plane = Condition::Plane { through, normal: *tangent };
+        Periodic::find(self.scene, self.pattern, &through, [self.condition, plane])
+            .filter(|found| (found.unknowns() - through).norm() <= step.abs())
     }
 
-    /// The next point, its tangent and its motion after `last`; None where the step must shrink.
-    fn advance(
-        &self,
-        last: &Periodic,
-        (tangent, sign): (&Unknowns, f64),
-        step: f64,
-    ) -> Option<(Unknowns, Unknowns, Periodic)> {
-        let next = self.correct(&last.unknowns(), tangent, step)?;
+    /// The next motion after `last` and the tangent there; None where the step must shrink.
+    fn advance(&self, last: &Periodic, (tangent, sign): (&Unknowns, f64), step: f64) -> Option<(Periodic, Unknowns)> {
+        let next = self.correct(last, tangent, step)?;
         let (turned, now) = self.tangent(&next, tangent)?;
-        let motion = self.motion(&next)?;
         // Where two curves nearly meet, a long step leads from one to the other, on which the sign is the opposite one. Where a branch
         // passes the motion that it doubles, it changes as well.
-        let same = if joins(last, &motion) {
+        let same = if joins(last, &next) {
             step <= self.reach
         } else {
             now == sign
         };
-        (same && turned.dot(tangent) >= STRAIGHT).then_some((next, turned, motion))
+        (same && turned.dot(tangent) >= STRAIGHT).then_some((next, turned))
     }
 
-    fn motion(&self, x: &Unknowns) -> Option<Periodic> {
-        Periodic::at(self.scene, &self.start.pattern, x)
-    }
-
-    /// Whether the branch ends within a step, before `motion`; the bifurcations in the step are added.
-    fn ends(&self, branch: &mut Branch, tangent: &Unknowns, step: f64, motion: &Periodic) -> bool {
-        let last = branch.points.last().unwrap_or(self.start);
-        if joins(last, motion) {
+    /// Adds the motion `next`, a step after the last one, and the bifurcations between them to the branch, if it does not end before. The reason,
+    /// if the branch ends. `tangents` are those at its first, its last and the next motion.
+    fn add(
+        &self,
+        branch: &mut Branch,
+        next: Periodic,
+        [first, tangent, turned]: [&Unknowns; 3],
+        step: f64,
+        limits: &ContinuationLimits,
+    ) -> Option<BranchEnd> {
+        let last = branch.points.last()?;
+        if joins(last, &next) {
             branch.points.extend(self.joint(last, tangent, step));
-            branch.ended[1] = BranchEnd::Joins;
-            return true;
+            return Some(BranchEnd::Joins);
         }
         match self.condition {
-            Condition::Bifurcation(Bifurcation::Torus) if !motion.on_circle_in_pairs() => {
-                branch.ended[1] = BranchEnd::Resonance;
-                return true;
+            Condition::Bifurcation(Bifurcation::Torus) if !next.on_circle(1e-3, 1e-6) => {
+                return Some(BranchEnd::Resonance);
             }
             Condition::Bifurcation(_) => {}
-            _ => {
-                let found = crossings(self.beside(last.unknowns(), tangent * step), [last, motion]);
-                branch.special.extend(found);
-            }
+            _ => branch.special.extend(self.crossings(tangent * step, [last, &next])),
         }
-        false
+        branch.points.push(next);
+        let [start, .., next] = &branch.points[..] else {
+            return None;
+        };
+        // A phase difference of 2 pi is the same motion.
+        let mut apart = next.unknowns() - start.unknowns();
+        apart[0] = wrapped(apart[0]);
+        if branch.points.len() > 10 && apart.norm() < step && turned.dot(first) > 0.9 {
+            if apart.dot(turned) < 0.0 {
+                // A little beyond the start, which the plane at the end of the step may miss.
+                let beyond = turned * (1.1 * apart.norm());
+                branch.special.extend(self.crossings(beyond, [next, start]));
+            } else if let [first, .., last] = &branch.special[..]
+                && (first.motion.sigma - last.motion.sigma).abs() < SAME
+            {
+                // The last step passed the start, and what is beyond it was known.
+                branch.special.pop();
+            }
+            return Some(BranchEnd::Closed);
+        }
+        // The range of G does not limit a curve at constant G.
+        let free = !matches!(self.condition, Condition::Excitation(_));
+        let inside = |one: &Periodic| limits.contain(one.sigma, if free { one.g } else { limits.g[0] });
+        if !inside(next) {
+            branch.special.retain(|one| inside(&one.motion));
+            return Some(BranchEnd::Range);
+        }
+        if branch.winds() {
+            let stable = branch.points.iter().rposition(|one| one.stable);
+            branch.points.truncate(stable.unwrap_or(0) + 2);
+            return Some(BranchEnd::Unstable);
+        }
+        None
     }
 
     /// The motions of the curve beside `chord`, over the part of its length.
-    fn beside(&self, from: Unknowns, chord: Unknowns) -> impl Fn(f64) -> Option<Periodic> {
+    fn beside(&self, from: &Periodic, chord: Unknowns) -> impl Fn(f64) -> Option<Periodic> {
         let (step, tangent) = (chord.norm(), chord.normalize());
-        move |part| self.motion(&self.correct(&from, &tangent, part * step)?)
-    }
-
-    /// Whether a motion lies in the ranges; the range of G does not limit a curve at constant G.
-    fn within(&self, limits: &ContinuationLimits, sigma: f64, g: f64) -> bool {
-        let free = !matches!(self.condition, Condition::Excitation(_));
-        limits.contain(sigma, if free { g } else { limits.g[0] })
-    }
-
-    /// Whether a step to `next` closes the branch.
-    fn closes(&self, branch: &mut Branch, next: &Unknowns, turned: &Unknowns, step: f64, first: &Unknowns) -> bool {
-        // A phase difference of 2 pi is the same motion.
-        let mut apart = next - self.start.unknowns();
-        apart[0] = wrapped(apart[0]);
-        if branch.points.len() <= 10 || apart.norm() >= step || turned.dot(first) <= 0.9 {
-            return false;
-        }
-        if apart.dot(turned) < 0.0 {
-            // A little beyond the start, which the plane at the end of the step may miss.
-            let beyond = self.beside(*next, turned * (1.1 * apart.norm()));
-            let last = branch.points.last().unwrap_or(self.start);
-            branch.special.extend(crossings(beyond, [last, self.start]));
-        } else if let [first, .., last] = &branch.special[..]
-            && (first.motion.sigma - last.motion.sigma).abs() < SAME
-        {
-            // The last step passed the start, and what is beyond it was known.
-            branch.special.pop();
-        }
-        branch.ended[1] = BranchEnd::Closed;
-        true
+        move |part| self.correct(from, &tangent, part * step)
     }
 
     /// The last motion within a step before the one that the branch doubles.
     fn joint(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Periodic> {
-        let at = self.beside(from.unknowns(), tangent * step);
+        let at = self.beside(from, tangent * step);
         let before = |part: f64| at(part).map(|one| !joins(from, &one)).ok_or(());
         let (end, _) = try_bisection(0.0, 1.0, FINEST, before).ok()?;
         at(end)
+    }
+
+    /// The bifurcations between two neighbouring motions, in order: on the curve beside `chord`, which begins at the first.
+    fn crossings(&self, chord: Unknowns, [from, to]: [&Periodic; 2]) -> Vec<BranchBifurcation> {
+        let at = self.beside(from, chord);
+        let crossing = |kind: Bifurcation| {
+            let [first, last] = [from, to].map(|one| kind.test(&one.map.monodromy));
+            if first * last >= 0.0 || first.abs().max(last.abs()) < ROUNDING {
+                return None;
+            }
+            let like_first = |part: f64| Ok(kind.test(&at(part).ok_or(())?.map.monodromy) * first > 0.0);
+            let (_, beyond) = try_bisection::<()>(0.0, 1.0, FINEST, like_first).ok()?;
+            let motion = at(beyond)?;
+            let of_stable = motion.bounds_stability();
+            // Two real multipliers whose product is one are a neutral saddle, not a bifurcation.
+            let imaginary = if kind == Bifurcation::Torus { LOCATED } else { 0.0 };
+            let is_on_circle = motion.on_circle(imaginary, LOCATED);
+            is_on_circle.then_some((beyond, BranchBifurcation { kind, of_stable, motion }))
+        };
+        let kinds = [Bifurcation::Fold, Bifurcation::flip(self.pattern), Bifurcation::Torus];
+        let mut found: Vec<_> = kinds.into_iter().filter_map(crossing).collect();
+        found.sort_by(|one, other| one.0.total_cmp(&other.0));
+        found.into_iter().map(|one| one.1).collect()
     }
 }
 
@@ -354,59 +363,46 @@ fn joins(from: &Periodic, to: &Periodic) -> bool {
 }
 
 /// Follows the curve of `condition` from `start` towards `towards`, a direction in the space of the unknowns.
-pub fn continue_from(
+fn continue_from(
     scene: &Dimensionless,
     start: &Periodic,
     condition: Condition,
     towards: &Unknowns,
     limits: &ContinuationLimits,
 ) -> Branch {
-    let reach = APPROACH * limits.step;
-    let curve = Continuation { scene, start, condition, reach };
+    let curve = Curve {
+        scene,
+        pattern: &start.pattern,
+        condition,
+        reach: APPROACH * limits.step,
+    };
     let mut branch = Branch {
         points: vec![start.clone()],
         special: Vec::new(),
         ended: [BranchEnd::Graze; 2],
     };
-    let Some((mut tangent, sign)) = curve.tangent(&start.unknowns(), towards) else {
+    let Some((first, sign)) = curve.tangent(start, towards) else {
         return branch;
     };
-    let first_tangent = tangent;
-    let mut step = limits.step / 8.0;
+    let (mut tangent, mut step) = (first, limits.step / 8.0);
     while step >= SHORTEST {
         if branch.points.len() >= limits.points {
             branch.ended[1] = BranchEnd::Points;
-            return branch;
+            break;
         }
         let last = branch.points.last().unwrap_or(start);
-        let Some((next, turned, motion)) = curve.advance(last, (&tangent, sign), step) else {
+        let Some((next, turned)) = curve.advance(last, (&tangent, sign), step) else {
             step /= 2.0;
             continue;
         };
-        if curve.ends(&mut branch, &tangent, step, &motion) {
-            return branch;
+        if let Some(end) = curve.add(&mut branch, next, [&first, &tangent, &turned], step, limits) {
+            branch.ended[1] = end;
+            break;
         }
-        branch.points.push(motion);
-        if curve.closes(&mut branch, &next, &turned, step, &first_tangent) {
-            return branch;
-        }
-        if !curve.within(limits, next[4], next[5]) {
-            let inside = |one: &BranchBifurcation| curve.within(limits, one.motion.sigma, one.motion.g);
-            branch.special.retain(inside);
-            branch.ended[1] = BranchEnd::Range;
-            return branch;
-        }
-        if branch.winds() {
-            let stable = branch.points.iter().rposition(|one| one.stable);
-            branch.points.truncate(stable.unwrap_or(0) + 2);
-            branch.ended[1] = BranchEnd::Unstable;
-            return branch;
-        }
-        let straight = turned.dot(&tangent) > 0.5 * (1.0 + STRAIGHT);
-        tangent = turned;
-        if straight {
+        if turned.dot(&tangent) > 0.5 * (1.0 + STRAIGHT) {
             step = (step * 1.5).min(limits.step);
         }
+        tangent = turned;
     }
     branch
 }
@@ -438,66 +434,21 @@ const ASIDE: f64 = 1e-3;
 
 /// The branch of motions that leaves a symmetry breaking or a period doubling, along the curve of `condition`. Its mirror image, or
 /// itself one repetition later, leaves in the opposite direction and counts as the same branch.
-pub fn branch_off(
+pub(super) fn branch_off(
     scene: &Dimensionless,
     at: &BranchBifurcation,
     condition: Condition,
     limits: &ContinuationLimits,
 ) -> Option<Branch> {
     let from = &at.motion;
-    let returned = follow(scene, &from.pattern, &from.unknowns())?;
     // The eigenvector of the map for the multiplier -1.
-    let flipped = returned.monodromy + Matrix4::identity();
-    let svd = flipped.svd(false, true);
+    let svd = (from.map.monodromy + Matrix4::identity()).svd(false, true);
     let aside = svd.v_t?.row(svd.singular_values.imin()).transpose();
     let mut towards = Unknowns::zeros();
     towards.fixed_rows_mut::<4>(0).copy_from(&aside);
-    let doubled = Periodic { pattern: from.pattern.doubled(), ..from.clone() };
-    let curve = Continuation { scene, start: &doubled, condition, reach: 0.0 };
-    let x = curve.correct(&from.unknowns(), &towards, ASIDE)?;
-    let start = curve.motion(&x)?;
+    let pattern = &from.pattern.doubled();
+    let start = Curve { scene, pattern, condition, reach: 0.0 }.correct(from, &towards, ASIDE)?;
     let mut branch = continue_from(scene, &start, condition, &towards, limits);
     branch.ended[0] = BranchEnd::Joins;
     Some(branch)
-}
-
-/// Largest rounding error of a test function: in conservative motions, some of these functions are zero everywhere.
-const ROUNDING: f64 = 1e-9;
-/// Largest distance of a multiplier from the circle where a crossing is located.
-const LOCATED: f64 = 1e-4;
-
-/// The bifurcations between two neighbouring motions, in order; `beside` has the motions between them, from 0 to 1.
-fn crossings(beside: impl Fn(f64) -> Option<Periodic>, [from, to]: [&Periodic; 2]) -> Vec<BranchBifurcation> {
-    let crossing = |kind: Bifurcation| {
-        let [first, last] = [from, to].map(|one| kind.test(&one.monodromy));
-        if first * last >= 0.0 || first.abs().max(last.abs()) < ROUNDING {
-            return None;
-        }
-        let like_first = |part: f64| Ok(kind.test(&beside(part).ok_or(())?.monodromy) * first > 0.0);
-        let (_, beyond) = try_bisection::<()>(0.0, 1.0, FINEST, like_first).ok()?;
-        let motion = beside(beyond)?;
-        let of_stable = motion.bounds_stability();
-        on_circle(kind, &motion).then_some((beyond, BranchBifurcation { kind, of_stable, motion }))
-    };
-    let mut found: Vec<_> = kinds(from).into_iter().filter_map(crossing).collect();
-    found.sort_by(|one, other| one.0.total_cmp(&other.0));
-    found.into_iter().map(|one| one.1).collect()
-}
-
-fn kinds(motion: &Periodic) -> [Bifurcation; 3] {
-    [
-        Bifurcation::Fold,
-        Bifurcation::flip(&motion.pattern),
-        Bifurcation::Torus,
-    ]
-}
-
-/// Two real multipliers whose product is one are a neutral saddle, not a bifurcation.
-fn on_circle(kind: Bifurcation, motion: &Periodic) -> bool {
-    let complex = kind == Bifurcation::Torus;
-    let mut of_kind = motion
-        .multipliers
-        .iter()
-        .filter(|[_, im]| !complex || im.abs() > LOCATED);
-    of_kind.any(|[re, im]| (re.hypot(*im) - 1.0).abs() < LOCATED)
 }

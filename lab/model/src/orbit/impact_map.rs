@@ -53,6 +53,11 @@ pub(super) type ByAll = SMatrix<f64, 4, 6>;
 /// Derivative of one number by the same.
 pub(super) type RowByAll = RowSVector<f64, 6>;
 
+/// The derivative of unknown `n` by all.
+pub(super) fn unit_row(n: usize) -> RowByAll {
+    RowByAll::from_fn(|_, column| f64::from(u8::from(column == n)))
+}
+
 /// One application of the map.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
@@ -65,18 +70,9 @@ pub(super) struct Step {
     pub impulse_by: RowByAll,
 }
 
-/// The impact that ends a flight.
-struct Landed {
-    duration: f64,
-    /// Velocity of the primary mass and relative velocity just before the impact.
-    dq1: f64,
-    dw: f64,
-    next: Bounce,
-}
-
 /// The map at one frequency and excitation.
 #[derive(Debug, Clone, Copy)]
-pub struct ImpactMap {
+pub(crate) struct ImpactMap {
     epsilon: f64,
     r: f64,
     pub(super) oscillator: ForcedOscillator,
@@ -95,17 +91,18 @@ impl ImpactMap {
     /// The state just after the next impact; None if there is none within many periods, if it grazes, or if
     /// impacts accumulate.
     pub fn next(&self, from: &Bounce) -> Option<Bounce> {
-        Some(self.landed(&ParticleFlight::new(&self.oscillator, from))?.next)
+        Some(self.landed(&ParticleFlight::new(&self.oscillator, from))?.0)
     }
 
-    /// The state just after the first impact that follows from (q1, q1', q2, q2') at a phase of the base, rad, with the
+    /// The state just after the first impact that follows from (q1, q1', q2, q2') at phase 0 of the base, with the
     /// particle inside its cavity; `None` where [`Self::next`] has none.
-    pub fn first(&self, phase: f64, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
-        let flight = ParticleFlight::between(&self.oscillator, phase, [q1, dq1, q2, dq2], q1 - q2);
-        Some(self.landed(&flight)?.next)
+    pub fn first(&self, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
+        let flight = ParticleFlight::between(&self.oscillator, 0.0, [q1, dq1, q2, dq2], q1 - q2);
+        Some(self.landed(&flight)?.0)
     }
 
-    fn landed(&self, flight: &ParticleFlight) -> Option<Landed> {
+    /// The state after the impact that ends a flight, the duration of the flight, and the velocity of the primary mass just before the impact.
+    fn landed(&self, flight: &ParticleFlight) -> Option<(Bounce, f64, f64)> {
         let (duration, wall) = flight.contact()?;
         let [q1, dq1] = flight.primary(duration).into();
         let dw = dq1 - flight.dq2;
@@ -117,7 +114,7 @@ impl ImpactMap {
             dq2: flight.dq2 + particle * dw,
             wall,
         };
-        Some(Landed { duration, dq1, dw, next })
+        Some((next, duration, dq1))
     }
 
     /// Jump of the particle's velocity over the relative velocity before the impact.
@@ -127,22 +124,19 @@ impl ImpactMap {
 
     /// The next impact with its derivatives by state, frequency and excitation.
     pub(super) fn step(&self, from: &Bounce) -> Option<Step> {
-        let Landed { duration: t, dq1, dw, next } = self.landed(&ParticleFlight::new(&self.oscillator, from))?;
+        let (next, t, dq1) = self.landed(&ParticleFlight::new(&self.oscillator, from))?;
+        let dw = dq1 - from.dq2;
 
         // (q1, q1') just before the impact, at a fixed time of flight.
         let end = next.phase;
         let propagator = self.oscillator.free.propagator(t);
         let mut fixed = SMatrix::<f64, 2, 6>::zeros();
-        let by_phase = self.oscillator.by_phase(end) - propagator * self.oscillator.by_phase(from.phase);
-        let by_omega = self.oscillator.by_omega(end) + self.oscillator.by_phase(end) * t
-            - propagator * self.oscillator.by_omega(from.phase);
-        let by_g = self.oscillator.by_g(end) - propagator * self.oscillator.by_g(from.phase);
-        fixed.set_column(0, &by_phase);
+        let [[by_phase, by_omega, by_g], before] = [end, from.phase].map(|phase| self.oscillator.derivatives(phase));
+        fixed.set_column(0, &(by_phase - propagator * before[0]));
         fixed.fixed_view_mut::<2, 2>(0, 1).copy_from(&propagator);
-        fixed.set_column(4, &by_omega);
-        fixed.set_column(5, &by_g);
+        fixed.set_column(4, &(by_omega + by_phase * t - propagator * before[1]));
+        fixed.set_column(5, &(by_g - propagator * before[2]));
 
-        let unit_row = |n: usize| RowByAll::from_fn(|_, column| f64::from(u8::from(column == n)));
         let (by_q1, by_dq2) = (unit_row(1), unit_row(3));
         // The condition w = wall at the end gives the change of the flight time.
         let by_w = fixed.row(0) - by_q1 - by_dq2 * t;
@@ -212,7 +206,7 @@ impl<'a> ParticleFlight<'a> {
             w,
             dw: dq1 - dq2,
             free,
-            curvature: oscillator.acceleration() + free.norm() * (1.0 + 2.0 * oscillator.zeta),
+            curvature: oscillator.acceleration() + free.norm() * (1.0 + 2.0 * oscillator.free.zeta),
         }
     }
 

@@ -7,7 +7,7 @@ use crate::Dimensionless;
 /// The damped oscillator with unit natural frequency; `zeta = epsilon lambda/2`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FreeOscillator {
-    zeta: f64,
+    pub(super) zeta: f64,
 }
 
 impl FreeOscillator {
@@ -68,12 +68,11 @@ impl FreeOscillator {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ForcedOscillator {
     pub(super) free: FreeOscillator,
-    pub(super) zeta: f64,
     pub(super) omega: f64,
     epsilon: f64,
-    g: f64,
+    pub(super) g: f64,
     /// Harmonic response of q1 to the base, per G, and its derivative by Omega.
-    unit: [Complex<f64>; 2],
+    pub(super) unit: [Complex<f64>; 2],
 }
 
 impl ForcedOscillator {
@@ -87,7 +86,6 @@ impl ForcedOscillator {
         let unit_by = (Complex::new(0.0, 2.0 * zeta) * scene.epsilon - unit * stiffness_by) * compliance;
         Self {
             free,
-            zeta,
             omega,
             epsilon: scene.epsilon,
             g,
@@ -97,11 +95,7 @@ impl ForcedOscillator {
 
     /// Bound of the acceleration of the steady response.
     pub(crate) fn acceleration(&self) -> f64 {
-        if self.g == 0.0 {
-            0.0
-        } else {
-            (self.unit[0] * self.g).norm() * self.omega * self.omega
-        }
+        self.driven(self.unit[0] * self.g).norm() * self.omega * self.omega
     }
 
     /// Force of the base on the primary mass.
@@ -112,32 +106,28 @@ impl ForcedOscillator {
 
     /// Harmonic response (q, q') at a phase of the base.
     pub(crate) fn harmonic(&self, phase: f64) -> Vector2<f64> {
-        let z = self.turned(self.unit[0] * self.g, phase);
+        let z = self.driven(self.unit[0] * self.g) * Complex::from_polar(1.0, phase);
         Vector2::new(z.im, self.omega * z.re)
     }
 
-    pub(super) fn by_phase(&self, phase: f64) -> Vector2<f64> {
-        let z = self.turned(self.unit[0] * self.g, phase);
-        Vector2::new(z.re, -self.omega * z.im)
+    /// Derivatives of the harmonic response by phase, Omega and G.
+    pub(super) fn derivatives(&self, phase: f64) -> [Vector2<f64>; 3] {
+        let [unit, unit_by] = self.unit;
+        let turned = [unit * self.g, unit_by * self.g, unit].map(|z| self.driven(z) * Complex::from_polar(1.0, phase));
+        let [z, slope, per_g] = turned;
+        [
+            Vector2::new(z.re, -self.omega * z.im),
+            Vector2::new(slope.im, z.re + self.omega * slope.re),
+            Vector2::new(per_g.im, self.omega * per_g.re),
+        ]
     }
 
-    pub(super) fn by_omega(&self, phase: f64) -> Vector2<f64> {
-        let z = self.turned(self.unit[0] * self.g, phase);
-        let slope = self.turned(self.unit[1] * self.g, phase);
-        Vector2::new(slope.im, z.re + self.omega * slope.re)
-    }
-
-    pub(super) fn by_g(&self, phase: f64) -> Vector2<f64> {
-        let z = self.turned(self.unit[0], phase);
-        Vector2::new(z.im, self.omega * z.re)
-    }
-
-    /// Without excitation the response is zero, even at an undamped resonance.
-    fn turned(&self, z: Complex<f64>, phase: f64) -> Complex<f64> {
+    /// A response to the base: without excitation it is zero, even at an undamped resonance.
+    pub(super) fn driven(&self, z: Complex<f64>) -> Complex<f64> {
         if z.is_nan() && self.g == 0.0 {
             return Complex::new(0.0, 0.0);
         }
-        z * Complex::from_polar(1.0, phase)
+        z
     }
 }
 

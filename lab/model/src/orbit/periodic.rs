@@ -4,10 +4,11 @@
 use std::f64::consts::{PI, TAU};
 
 use lovines::{InvalidValue, State};
-use nalgebra::{Complex, Matrix4, Matrix6, RowSVector, SVector, Vector4};
+use nalgebra::{Complex, Matrix4, Matrix6, SVector, Vector4};
 use serde::Serialize;
 
-use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll, Step};
+use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll, unit_row};
+use super::oscillator::ForcedOscillator;
 use crate::{Definition, Dimensionless, Resonance, Sensor};
 
 /// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
@@ -87,29 +88,31 @@ impl ImpactPattern {
 }
 
 /// Unknowns of a periodic motion: (phase, q1, q1', q2') after its first impact, sigma, G.
-pub type Unknowns = nalgebra::SVector<f64, 6>;
+pub type Unknowns = SVector<f64, 6>;
 
 /// The return map of a pattern from one start.
-#[derive(Debug, Clone)]
-pub(super) struct Returned {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ReturnMap {
     /// Closing error of the motion.
-    pub residual: Vector4<f64>,
+    residual: Vector4<f64>,
     /// Derivative of the residual by the unknowns.
     pub by: ByAll,
     /// First harmonic of the response relative to the reference: `Im(S exp(i phase))`.
-    pub s: Complex<f64>,
+    s: Complex<f64>,
     /// Derivative of S by the unknowns, real and imaginary part.
-    pub s_by: [RowByAll; 2],
-    /// The bounces over the map, with the start and without the return.
-    pub bounces: Vec<Bounce>,
-    /// Time of flight after each.
-    pub durations: Vec<f64>,
+    s_by: [RowByAll; 2],
     /// Derivative of the return map by the state: its eigenvalues are the multipliers.
     pub monodromy: Matrix4<f64>,
 }
 
-/// Follows the pattern from the unknowns `x`; None if the impacts have another pattern or graze.
-pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Returned> {
+/// Follows the pattern from the unknowns `x`: its return map, and `bounce` of each state after an impact, from the start to the last before the return,
+/// with the time of flight after it. None if the impacts have another pattern or graze.
+fn follow(
+    scene: &Dimensionless,
+    pattern: &ImpactPattern,
+    x: &Unknowns,
+    mut bounce: impl FnMut(Bounce, f64),
+) -> Option<ReturnMap> {
     let (sigma, g) = (x[4], x[5]);
     let omega = 1.0 + scene.epsilon * sigma;
     if !(omega > 0.0 && omega.is_finite() && g.is_finite()) {
@@ -118,10 +121,10 @@ pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknown
     let map = ImpactMap::new(scene, omega, g);
     let start = Bounce::from_vector(&x.fixed_rows::<4>(0).into(), pattern.walls[0]);
     let mut at = start;
-    let mut by = ByAll::identity();
+    // Derivatives of the state, Omega and G by the unknowns; Omega instead of sigma.
+    let mut by = Matrix6::identity();
     let mut sum = Complex::new(0.0, 0.0);
     let mut sum_by = [RowByAll::zeros(); 2];
-    let (mut bounces, mut durations) = (Vec::new(), Vec::new());
     for n in 0..pattern.walls.len() {
         let step = map.step(&at)?;
         let wall = match pattern.walls.get(n + 1) {
@@ -131,10 +134,10 @@ pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknown
         if step.next.wall != wall {
             return None;
         }
-        bounces.push(at);
-        durations.push(step.duration);
-        let impulse_by;
-        (by, impulse_by) = chained(&step, &by);
+        bounce(at, step.duration);
+        let impulse_by = step.impulse_by * by;
+        let after = step.by * by;
+        by.fixed_rows_mut::<4>(0).copy_from(&after);
         at = step.next;
         let phasor = Complex::from_polar(1.0, -at.phase);
         sum += phasor * step.impulse;
@@ -144,92 +147,59 @@ pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknown
     }
 
     let residual = start.apart(&at, pattern.turn(), pattern.sign());
+    let mut by: ByAll = by.fixed_rows::<4>(0).into();
     by.fixed_rows_mut::<3>(1).scale_mut(pattern.sign());
     let monodromy: Matrix4<f64> = by.fixed_columns::<4>(0).into();
     by.fixed_columns_mut::<4>(0)
         .copy_from(&(monodromy - Matrix4::identity()));
+    let (s, mut s_by) = harmonic(scene, &map, pattern, sum, &sum_by);
     by.column_mut(4).scale_mut(scene.epsilon);
-
-    let harmonic = HarmonicCoefficients::new(scene, &map, pattern);
-    let (s, s_by) = harmonic.of(g, sum, &sum_by, scene.epsilon);
-    Some(Returned { residual, by, s, s_by, bounces, durations, monodromy })
+    s_by.iter_mut().for_each(|row| row[4] *= scene.epsilon);
+    Some(ReturnMap { residual, by, s, s_by, monodromy })
 }
 
-/// The chain rule: derivatives of a step by the unknowns. The step itself also depends on Omega and G.
-fn chained(step: &Step, by: &ByAll) -> (ByAll, RowByAll) {
-    let state: Matrix4<f64> = step.by.fixed_columns::<4>(0).into();
-    let mut all = state * by;
-    let mut impulse_by = step.impulse_by.fixed_columns::<4>(0) * by;
-    for column in 4..6 {
-        all.set_column(column, &(all.column(column) + step.by.column(column)));
-        impulse_by[column] += step.impulse_by[column];
-    }
-    (all, impulse_by)
-}
+/// The first harmonic of the response relative to the reference, with its derivatives by the state, Omega and G, from the sum of the impulses over the
+/// map as phasors: `S = direct G + impulses sum`, the base through the oscillator, and the impulses through the oscillator and, for v, the particle.
+fn harmonic(
+    scene: &Dimensionless,
+    map: &ImpactMap,
+    pattern: &ImpactPattern,
+    sum: Complex<f64>,
+    sum_by: &[RowByAll; 2],
+) -> (Complex<f64>, [RowByAll; 2]) {
+    // Each coefficient with its derivative by Omega.
+    let ForcedOscillator { free, omega, g, unit: [unit, _], .. } = map.oscillator;
+    let compliance = free.compliance(omega);
+    let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * free.zeta);
+    let unit_by =
+        (Complex::new(0.0, 2.0 * free.zeta) * compliance + free.base_force(omega) * compliance_by) * scene.epsilon;
+    // (2i/duration) times the response to a force through the oscillator, less the response of a free mass: the impulse on the
+    // particle is the opposite one.
+    let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
+    let Definition { sensor, reference, .. } = scene.definition;
+    let particle = f64::from(u8::from(sensor == Sensor::V));
+    let inner = compliance + particle / (omega * omega);
+    let inner_by = compliance_by - 2.0 * particle / omega.powi(3);
+    // The factor of the sensor relative to the reference, and its logarithmic derivative.
+    let damping = scene.epsilon * scene.lambda;
+    let (factor, slope) = if sensor == Sensor::Acceleration {
+        (omega * omega, 2.0 / omega)
+    } else {
+        (1.0, 0.0)
+    };
+    let sensor = Complex::from_polar(factor, -reference.phase(damping, omega));
+    let sensor_by = Complex::new(slope, -reference.phase_slope(damping, omega));
+    let read = |[z, by]: [Complex<f64>; 2]| [z * sensor, (by + z * sensor_by) * sensor];
+    let [direct, direct_by] = read([unit, unit_by]);
+    let [a, a_by] = read([weight * inner, weight * inner_by + weight / omega * inner]);
 
-/// `S = direct G + impulses sum`: the base through the oscillator, and the impulses through the oscillator and, for v, the particle.
-struct HarmonicCoefficients {
-    direct: [Complex<f64>; 2],
-    impulses: [Complex<f64>; 2],
-}
-
-impl HarmonicCoefficients {
-    /// Each coefficient with its derivative by Omega.
-    fn new(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern) -> Self {
-        let omega = map.oscillator.omega;
-        let zeta = scene.epsilon * scene.lambda / 2.0;
-        let compliance = map.oscillator.free.compliance(omega);
-        let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * zeta);
-        let force = map.oscillator.free.base_force(omega);
-        let direct = force * compliance * scene.epsilon;
-        let direct_by = (Complex::new(0.0, 2.0 * zeta) * compliance + force * compliance_by) * scene.epsilon;
-        // (2i/duration) times the response to a force through the oscillator, less the response of a free mass: the impulse on the
-        // particle is the opposite one.
-        let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
-        let Definition { sensor, reference, .. } = scene.definition;
-        let particle = f64::from(u8::from(sensor == Sensor::V));
-        let inner = compliance + particle / (omega * omega);
-        let inner_by = compliance_by - 2.0 * particle / omega.powi(3);
-        // The factor of the sensor relative to the reference, and its logarithmic derivative.
-        let damping = scene.epsilon * scene.lambda;
-        let (factor, slope) = if sensor == Sensor::Acceleration {
-            (omega * omega, 2.0 / omega)
-        } else {
-            (1.0, 0.0)
-        };
-        let sensor = Complex::from_polar(factor, -reference.phase(damping, omega));
-        let sensor_by = Complex::new(slope, -reference.phase_slope(damping, omega));
-        let read = |[z, by]: [Complex<f64>; 2]| [z * sensor, (by + z * sensor_by) * sensor];
-        Self {
-            direct: read([direct, direct_by]),
-            impulses: read([weight * inner, weight * inner_by + weight / omega * inner]),
-        }
+    let driven = |z: Complex<f64>| map.oscillator.driven(z * g);
+    let mut by = [sum_by[0] * a.re - sum_by[1] * a.im, sum_by[0] * a.im + sum_by[1] * a.re];
+    for (column, own) in [(4, driven(direct_by) + a_by * sum), (5, direct)] {
+        by[0][column] += own.re;
+        by[1][column] += own.im;
     }
-
-    fn of(&self, g: f64, sum: Complex<f64>, sum_by: &[RowByAll; 2], epsilon: f64) -> (Complex<f64>, [RowByAll; 2]) {
-        let zero_if_undriven = |z: Complex<f64>| {
-            if g == 0.0 && z.is_nan() {
-                Complex::new(0.0, 0.0)
-            } else {
-                z
-            }
-        };
-        let s = zero_if_undriven(self.direct[0] * g) + self.impulses[0] * sum;
-        let a = self.impulses[0];
-        let mut by = [sum_by[0] * a.re - sum_by[1] * a.im, sum_by[0] * a.im + sum_by[1] * a.re];
-        let own = [
-            zero_if_undriven(self.direct[1] * g) + self.impulses[1] * sum,
-            self.direct[0],
-        ];
-        for (column, own) in [4, 5].into_iter().zip(own) {
-            by[0][column] += own.re;
-            by[1][column] += own.im;
-        }
-        for row in &mut by {
-            row[4] *= epsilon;
-        }
-        (s, by)
-    }
+    (driven(direct) + a * sum, by)
 }
 
 /// A phase in (-pi, pi].
@@ -250,6 +220,13 @@ pub enum Condition {
     Peak,
     /// A multiplier, or a pair of them, is on the unit circle.
     Bifurcation(Bifurcation),
+    /// The unknowns lie in a plane: the end of a step along a curve.
+    Plane {
+        /// A point of the plane.
+        through: Unknowns,
+        /// Its normal, of length 1.
+        normal: Unknowns,
+    },
 }
 
 /// How stability changes at a point.
@@ -268,9 +245,6 @@ pub enum Bifurcation {
     #[serde(rename = "torus")]
     Torus,
 }
-
-/// The value of an equation and its derivative by the unknowns.
-pub(super) type Equation = (f64, RowSVector<f64, 6>);
 
 /// Step of the central differences for conditions on second derivatives of the map. It affects how fast Newton's method converges, not where to.
 const STEP: f64 = 1e-6;
@@ -322,56 +296,46 @@ impl Condition {
         }
     }
 
+    /// The value of the equation and its derivative by the unknowns.
     pub(super) fn value(
         &self,
         scene: &Dimensionless,
         pattern: &ImpactPattern,
         x: &Unknowns,
-        returned: &Returned,
-    ) -> Equation {
-        let mut row = RowSVector::<f64, 6>::zeros();
+        map: &ReturnMap,
+    ) -> (f64, RowByAll) {
         match *self {
-            Condition::Sigma(sigma) => {
-                row[4] = 1.0;
-                (x[4] - sigma, row)
+            Condition::Sigma(sigma) => (x[4] - sigma, unit_row(4)),
+            Condition::Excitation(g) => (x[5] - g, unit_row(5)),
+            Condition::Plane { through, normal } => (normal.dot(&(x - through)), normal.transpose()),
+            Condition::PhaseResonance => (map.s.re, map.s_by[0]),
+            Condition::Peak | Condition::Bifurcation(_) => {
+                let value = |map: &ReturnMap| match *self {
+                    Condition::Bifurcation(kind) => kind.test(&map.monodromy),
+                    _ => slope_of_amplitude(map),
+                };
+                // Central differences; NaN where the pattern ends.
+                let at = |n: usize, step: f64| {
+                    let mut moved = *x;
+                    moved[n] += step;
+                    follow(scene, pattern, &moved, |_, _| {}).map_or(f64::NAN, |map| value(&map))
+                };
+                let slope = |n: usize| (at(n, STEP) - at(n, -STEP)) / (2.0 * STEP);
+                (value(map), RowByAll::from_fn(|_, n| slope(n)))
             }
-            Condition::Excitation(g) => {
-                row[5] = 1.0;
-                (x[5] - g, row)
-            }
-            Condition::PhaseResonance => (returned.s.re, returned.s_by[0]),
-            Condition::Peak => by_differences(scene, pattern, x, returned, slope_of_amplitude),
-            Condition::Bifurcation(kind) => by_differences(scene, pattern, x, returned, |at| kind.test(&at.monodromy)),
         }
     }
 }
 
-/// The value of `f` and its derivative by central differences; NaN where the pattern ends.
-fn by_differences(
-    scene: &Dimensionless,
-    pattern: &ImpactPattern,
-    x: &Unknowns,
-    returned: &Returned,
-    f: impl Fn(&Returned) -> f64,
-) -> Equation {
-    let at = |n: usize, step: f64| {
-        let mut moved = *x;
-        moved[n] += step;
-        follow(scene, pattern, &moved).map_or(f64::NAN, |returned| f(&returned))
-    };
-    let slope = |n: usize| (at(n, STEP) - at(n, -STEP)) / (2.0 * STEP);
-    (f(returned), RowSVector::from_fn(|_, n| slope(n)))
-}
-
 /// The change of half the square of the amplitude along a direction that closes the motion at constant G, by phase, q1, q1', q2' and
 /// sigma. The direction's components are the minors of the closing equations, so that it has no sign to choose.
-fn slope_of_amplitude(returned: &Returned) -> f64 {
-    let by_sigma = returned.by.fixed_columns::<5>(0);
+fn slope_of_amplitude(map: &ReturnMap) -> f64 {
+    let by_sigma = map.by.fixed_columns::<5>(0);
     (0..5)
         .map(|n| {
             let minor: Matrix4<f64> = by_sigma.remove_fixed_columns::<1>(n);
             let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
-            let change = returned.s.re * returned.s_by[0][n] + returned.s.im * returned.s_by[1][n];
+            let change = map.s.re * map.s_by[0][n] + map.s.im * map.s_by[1][n];
             sign * minor.determinant() * change
         })
         .sum()
@@ -402,11 +366,9 @@ pub struct Periodic {
     pub multipliers: [[f64; 2]; 4],
     /// All of them are inside the unit circle.
     pub stable: bool,
+    /// The map with its derivatives.
     #[serde(skip)]
-    pub(super) durations: Vec<f64>,
-    /// Derivative of the map by the state.
-    #[serde(skip)]
-    pub(super) monodromy: Matrix4<f64>,
+    pub(super) map: ReturnMap,
 }
 
 /// Size of the last Newton correction, and the size below which a correction that does not shrink is rounding: small isolas are nearly singular.
@@ -423,52 +385,65 @@ impl Periodic {
         guess: &Unknowns,
         conditions: [Condition; 2],
     ) -> Option<Self> {
-        let x = newton(scene, pattern, *guess, |x, returned| {
-            conditions.map(|one| one.value(scene, pattern, x, returned))
+        let (mut x, mut last) = (*guess, f64::INFINITY);
+        for _ in 0..ROUNDS {
+            let map = follow(scene, pattern, &x, |_, _| {})?;
+            let mut matrix = Matrix6::zeros();
+            let mut right = Unknowns::zeros();
+            matrix.fixed_rows_mut::<4>(0).copy_from(&map.by);
+            right.fixed_rows_mut::<4>(0).copy_from(&map.residual);
+            for (row, condition) in [4, 5].into_iter().zip(conditions) {
+                let (value, by) = condition.value(scene, pattern, &x, &map);
+                matrix.set_row(row, &by);
+                right[row] = value;
+            }
+            let correction = matrix.lu().solve(&right)?;
+            let size = correction.norm();
+            if !size.is_finite() || size > 1e3 {
+                return None;
+            }
+            x -= correction;
+            if size < CONVERGED || size < ROUNDING && size > 0.5 * last {
+                return Self::at(scene, pattern, &x);
+            }
+            last = size;
+        }
+        None
+    }
+
+    /// The motion at unknowns that may satisfy the closing equations; None if they do not.
+    pub(super) fn closed(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
+        Self::at(scene, pattern, x).filter(|motion| motion.map.residual.norm() < EXACT)
+    }
+
+    /// The motion at unknowns that satisfy the closing equations.
+    fn at(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
+        let (mut bounces, mut duration, mut travelled) = (Vec::new(), 0.0, 0.0);
+        let map = follow(scene, pattern, x, |bounce, time| {
+            bounces.push(bounce);
+            duration += time;
+            travelled += bounce.dq2.abs() * time;
         })?;
-        Self::at(scene, pattern, &x)
+        let mut multipliers: [Complex<f64>; 4] = map.monodromy.complex_eigenvalues().into();
+        multipliers.sort_unstable_by(|one, other| one.norm().total_cmp(&other.norm()));
+        Some(Self {
+            g: x[5],
+            sigma: x[4],
+            c: map.s.norm(),
+            gamma: wrapped(map.s.arg()),
+            b: travelled / duration,
+            pattern: pattern.clone(),
+            bounces,
+            multipliers: multipliers.map(|one| [one.re, one.im]),
+            stable: multipliers[3].norm() < 1.0,
+            map,
+        })
     }
 
     /// The unknowns of this motion: (phase, q1, q1', q2') after its first impact, sigma, G.
     pub fn unknowns(&self) -> Unknowns {
         let Bounce { phase, q1, dq1, dq2, .. } = self.bounces[0];
         Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
-    }
-
-    /// The motion at unknowns that may satisfy the closing equations; None if they do not.
-    pub(super) fn closed(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
-        let returned = follow(scene, pattern, x).filter(|returned| returned.residual.norm() < EXACT)?;
-        Some(Self::of(pattern, x, returned))
-    }
-
-    /// The motion at unknowns that satisfy the closing equations.
-    pub(super) fn at(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
-        Some(Self::of(pattern, x, follow(scene, pattern, x)?))
-    }
-
-    fn of(pattern: &ImpactPattern, x: &Unknowns, returned: Returned) -> Self {
-        let mut multipliers: [Complex<f64>; 4] = returned.monodromy.complex_eigenvalues().into();
-        multipliers.sort_unstable_by(|one, other| one.norm().total_cmp(&other.norm()));
-        let total: f64 = returned.durations.iter().sum();
-        let travelled: f64 = returned
-            .bounces
-            .iter()
-            .zip(&returned.durations)
-            .map(|(bounce, duration)| bounce.dq2.abs() * duration)
-            .sum();
-        Self {
-            g: x[5],
-            sigma: x[4],
-            c: returned.s.norm(),
-            gamma: wrapped(returned.s.arg()),
-            b: travelled / total,
-            pattern: pattern.clone(),
-            bounces: returned.bounces,
-            durations: returned.durations,
-            monodromy: returned.monodromy,
-            stable: multipliers[3].norm() < 1.0,
-            multipliers: multipliers.map(|one| [one.re, one.im]),
-        }
     }
 
     /// How far the second half of the motion is from repeating the first one or its mirror image; None for a pattern that is not
@@ -488,10 +463,15 @@ impl Periodic {
         [self.sigma, self.c * cosine, self.c * sine, self.b, self.g].into()
     }
 
-    /// A complex pair of multipliers is on the unit circle.
-    pub(super) fn on_circle_in_pairs(&self) -> bool {
-        let mut pairs = self.multipliers.iter().filter(|[_, im]| im.abs() > 1e-3);
-        pairs.any(|[re, im]| (re.hypot(*im) - 1.0).abs() < 1e-6)
+    /// Distance in these numbers.
+    pub(super) fn distance(&self, other: &Self) -> f64 {
+        (self.invariants() - other.invariants()).norm()
+    }
+
+    /// A multiplier whose imaginary part has at least the size `imaginary` is within `distance` of the unit circle.
+    pub(super) fn on_circle(&self, imaginary: f64, distance: f64) -> bool {
+        let mut pairs = self.multipliers.iter().filter(|[_, im]| im.abs() >= imaginary);
+        pairs.any(|[re, im]| (re.hypot(*im) - 1.0).abs() < distance)
     }
 
     /// No multiplier is outside the unit circle, except for those that a bifurcation places on it.
@@ -512,79 +492,30 @@ impl Periodic {
     /// (tau, q1, q1', q2, q2') at `points` equal steps over one period of the base, from a passage of the base through
     /// zero, upwards; dimensionless. The impacts fall between the points.
     pub fn motion(&self, scene: &Dimensionless, points: usize) -> Vec<[f64; 5]> {
-        let omega = 1.0 + scene.epsilon * self.sigma;
-        let map = ImpactMap::new(scene, omega, self.g);
-        let turn = std::f64::consts::TAU;
-        (0..points)
-            .filter_map(|n| {
-                let phase = turn * n as f64 / points as f64;
-                let [q1, dq1, q2, dq2] = self.state_at(&map, phase)?;
-                Some([phase / omega, q1, dq1, q2, dq2])
-            })
-            .collect()
-    }
-
-    /// (q1, q1', q2, q2') where the base is at `phase`, rad, in the motion's first period.
-    fn state_at(&self, map: &ImpactMap, phase: f64) -> Option<[f64; 4]> {
+        let map = ImpactMap::new(scene, 1.0 + scene.epsilon * self.sigma, self.g);
         // The bounces of the whole period; a mirrored pattern's other half is minus the first.
-        let half = self.pattern.half_periods as f64 * std::f64::consts::PI;
-        let mirror = |bounce: &Bounce| Bounce {
-            phase: bounce.phase + half,
-            q1: -bounce.q1,
-            dq1: -bounce.dq1,
-            dq2: -bounce.dq2,
-            wall: -bounce.wall,
-        };
-        let mut bounces = self.bounces.clone();
-        let mut period = half;
+        let (half, mut bounces, mut period) = (self.pattern.turn(), self.bounces.clone(), self.pattern.turn());
         if self.pattern.mirrored {
-            bounces.extend(self.bounces.iter().map(mirror));
+            bounces.extend(self.bounces.iter().map(|bounce| Bounce {
+                phase: bounce.phase + half,
+                q1: -bounce.q1,
+                dq1: -bounce.dq1,
+                dq2: -bounce.dq2,
+                wall: -bounce.wall,
+            }));
             period = 2.0 * half;
         }
-        let since = |bounce: &Bounce| (phase - bounce.phase).rem_euclid(period);
-        let last = bounces
-            .iter()
-            .min_by(|one, other| since(one).total_cmp(&since(other)))?;
-        Some(map.state(last, since(last) / map.oscillator.omega))
+        let at = |n: usize| {
+            let phase = TAU * n as f64 / points as f64;
+            let since = |bounce: &Bounce| (phase - bounce.phase).rem_euclid(period);
+            let last = bounces
+                .iter()
+                .min_by(|one, other| since(one).total_cmp(&since(other)))?;
+            let [q1, dq1, q2, dq2] = map.state(last, since(last) / map.oscillator.omega);
+            Some([phase / map.oscillator.omega, q1, dq1, q2, dq2])
+        };
+        (0..points).filter_map(at).collect()
     }
-
-    /// (q1, q1', q2, q2') where the base passes through zero, upwards: a start for the plant.
-    pub fn start(&self, scene: &Dimensionless) -> Option<[f64; 4]> {
-        let map = ImpactMap::new(scene, 1.0 + scene.epsilon * self.sigma, self.g);
-        self.state_at(&map, 0.0)
-    }
-}
-
-/// Newton's method for the four closing equations and two more.
-pub(super) fn newton(
-    scene: &Dimensionless,
-    pattern: &ImpactPattern,
-    mut x: Unknowns,
-    conditions: impl Fn(&Unknowns, &Returned) -> [Equation; 2],
-) -> Option<Unknowns> {
-    let mut last = f64::INFINITY;
-    for _ in 0..ROUNDS {
-        let returned = follow(scene, pattern, &x)?;
-        let mut matrix = Matrix6::zeros();
-        let mut right = SVector::<f64, 6>::zeros();
-        matrix.fixed_rows_mut::<4>(0).copy_from(&returned.by);
-        right.fixed_rows_mut::<4>(0).copy_from(&returned.residual);
-        for (n, (value, row)) in conditions(&x, &returned).into_iter().enumerate() {
-            matrix.set_row(4 + n, &row);
-            right[4 + n] = value;
-        }
-        let correction = matrix.lu().solve(&right)?;
-        let size = correction.norm();
-        if !size.is_finite() || size > 1e3 {
-            return None;
-        }
-        x -= correction;
-        if size < CONVERGED || size < ROUNDING && size > 0.5 * last {
-            return Some(x);
-        }
-        last = size;
-    }
-    None
 }
 
 /// Largest distance of a settling motion from itself one repetition later, over b and b omega0, from which Newton's method starts.
@@ -610,14 +541,14 @@ pub fn settle(
         plant.advance(drive, TAU / drive.omega)?;
     }
     let State { q1, dq1, q2, dq2 } = plant.state();
-    Ok(periodic_near(scene, sigma, 0.0, [q1, dq1, q2, dq2]).filter(|motion| motion.stable))
+    Ok(periodic_near(scene, sigma, [q1, dq1, q2, dq2]).filter(|motion| motion.stable))
 }
 
-/// The periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at a phase of the base, rad; a
+/// The periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at phase 0 of the base; a
 /// stable one rather than an unstable one.
-pub fn periodic_near(scene: &Dimensionless, sigma: f64, phase: f64, state: [f64; 4]) -> Option<Periodic> {
+pub(crate) fn periodic_near(scene: &Dimensionless, sigma: f64, state: [f64; 4]) -> Option<Periodic> {
     let map = ImpactMap::new(scene, 1.0 + scene.epsilon * sigma, scene.g);
-    let first = map.first(phase, state)?;
+    let first = map.first(state)?;
     let Bounce { phase, q1, dq1, dq2, .. } = first;
     let guess = Unknowns::from([phase, q1, dq1, dq2, sigma, scene.g]);
     let conditions = [Condition::Sigma(sigma), Condition::Excitation(scene.g)];

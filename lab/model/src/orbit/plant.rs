@@ -15,8 +15,9 @@ use lovines::{Cavity, Drive, Event, InvalidValue, Outcome, Parameters, Plant, Re
 use nalgebra::{Complex, Matrix4, Matrix6, Vector4, Vector6};
 use thiserror::Error;
 
+use super::Orbit;
 use super::periodic::NEAR;
-use super::symmetric::{Candidate, at_amplitude, at_speed, of_orbit, stable_resonant};
+use super::symmetric::{at_amplitude, at_speed, stable_resonant};
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
 use crate::{Definition, Dimensionless, Resonance, Sensor};
 
@@ -100,6 +101,9 @@ pub enum NoMotion {
 /// The motion at phase resonance whose response has the amplitude `response`, m: near `guess` or, without one, continued from the exact
 /// symmetric motion of the ideal cavity while its effects grow to their strength.
 ///
+/// Mostly the ideal motion with the same response serves. Near its bifurcations it may be lost, or lead to an unstable motion beside the one that the
+/// ideal motion becomes: then the effects grow where it is most stable, in the middle of its range, and the response changes afterwards.
+///
 /// # Errors
 /// Invalid parameters, a scatter of the restitution, the peak as resonance, and where no motion is found.
 pub fn resonant_motion(
@@ -108,10 +112,27 @@ pub fn resonant_motion(
     response: f64,
     guess: Option<&PlantMotion>,
 ) -> Result<PlantMotion, NoMotion> {
-    let near_guess = guess.map(|guess| periodic_motion(parameters, definition, guess, at_response(response)));
-    match near_guess {
-        None | Some(Err(NoMotion::NotConverged)) => continued(parameters, definition, response),
-        Some(result) => result,
+    let conditions = [DriveCondition::PhaseResonance, DriveCondition::Response(response)];
+    // Refuses what cannot be solved before anything is computed.
+    Solver::new(parameters, definition, 1, conditions)?;
+    let near_guess = guess.map(|guess| periodic_motion(parameters, definition, guess, conditions));
+    if let Some(result) = near_guess.filter(|result| *result != Err(NoMotion::NotConverged)) {
+        return result;
+    }
+    let of_response = |scene: &Dimensionless| at_amplitude(scene, response / scene.b);
+    // In the middle of the speeds B where the first-order motion is stable.
+    let in_the_middle =
+        |scene: &Dimensionless| at_speed(scene, 0.5 * (Manifold::new(scene.r).b_min() + B_SYMMETRY_BREAKING));
+    let ideal = Ideal::of(parameters, definition, of_response).ok_or(NoMotion::NoIdealMotion(response))?;
+    let motion = Ideal { response, ..ideal }.continued(parameters, definition, Some(response));
+    if motion.as_ref().is_ok_and(PlantMotion::is_stable) {
+        return motion;
+    }
+    let detour = Ideal::of(parameters, definition, in_the_middle)
+        .map(|ideal| ideal.continued(parameters, definition, Some(response)));
+    match detour {
+        Some(Ok(other)) if motion.is_err() || other.is_stable() => Ok(other),
+        _ => motion,
     }
 }
 
@@ -137,11 +158,8 @@ pub fn resonant_motion_under(
 ) -> Result<PlantMotion, NoMotion> {
     let conditions = [DriveCondition::PhaseResonance, DriveCondition::Amplitude(amplitude)];
     Solver::new(parameters, definition, 1, conditions)?;
-    let motion = |scene: &Dimensionless| {
-        let g = scene.excitation(amplitude);
-        stable_resonant(&Dimensionless { g, ..*scene }).and_then(|orbit| of_orbit(scene, &orbit))
-    };
-    let ideal = Ideal::with(parameters, definition, motion).ok_or(NoMotion::NoIdealMotionUnder(amplitude))?;
+    let motion = |scene: &Dimensionless| stable_resonant(&Dimensionless { g: scene.excitation(amplitude), ..*scene });
+    let ideal = Ideal::of(parameters, definition, motion).ok_or(NoMotion::NoIdealMotionUnder(amplitude))?;
     Ideal { amplitude, ..ideal }.continued(parameters, definition, None)
 }
 
@@ -161,41 +179,21 @@ pub fn settled_motion(
     let (mut plant, drive) = (Plant::new(*parameters, start)?, Drive::harmonic(amplitude, omega));
     plant.begin(drive)?;
     plant.advance(drive, settle as f64 * TAU / omega)?;
-    let state = plant.state();
     let scale = scale(parameters);
-    let here = unknowns(&scale, &state, omega, amplitude);
+    let here = unknowns(&scale, &plant.state(), omega, amplitude);
     for periods in 1..=LONGEST {
         plant.advance(drive, TAU / omega)?;
         let apart = (unknowns(&scale, &plant.state(), omega, amplitude) - here).amax();
         if apart < NEAR {
-            let guess = PlantMotion::guess(state, omega, amplitude, periods);
-            match periodic_motion(parameters, definition, &guess, conditions) {
+            match Solver::new(parameters, definition, periods, conditions)?.solve(0.0, here) {
                 // A particle that only slides may slide anywhere: one multiplier is 1.
-                Ok(motion) if motion.multipliers[3].norm() < 1.0 + CENTRAL => return Ok(Some(motion)),
+                Ok((motion, ..)) if motion.multipliers[3].norm() < 1.0 + CENTRAL => return Ok(Some(motion)),
                 Ok(_) | Err(NoMotion::NotConverged) => {}
                 Err(error) => return Err(error),
             }
         }
     }
     Ok(None)
-}
-
-impl PlantMotion {
-    /// A start for [`periodic_motion`]: a state at phase 0 of the base, rad/s and m of the base, and the number of periods.
-    pub fn guess(state: State, omega: f64, amplitude: f64, periods: u32) -> Self {
-        Self {
-            state,
-            omega,
-            amplitude,
-            periods,
-            response: Complex::new(f64::NAN, f64::NAN),
-            multipliers: [Complex::new(f64::NAN, f64::NAN); 4],
-            impacts: 0,
-            rests: 0,
-            sticks: 0,
-            events: Vec::new(),
-        }
-    }
 }
 
 // Continuation from the ideal cavity
@@ -220,24 +218,8 @@ struct Ideal {
 const SPEED_ROUNDS: usize = 8;
 
 impl Ideal {
-    /// The motion whose response has this amplitude, m.
-    fn new(p: &Parameters, definition: Definition, response: f64) -> Option<Self> {
-        let ideal = Self::with(p, definition, |scene| at_amplitude(scene, response / scene.b))?;
-        Some(Self { response, ..ideal })
-    }
-
-    /// The motion in the middle of the speeds B where the first-order motion is stable.
-    fn in_the_middle(p: &Parameters, definition: Definition) -> Option<Self> {
-        Self::with(p, definition, |scene| {
-            at_speed(scene, 0.5 * (Manifold::new(scene.r).b_min() + B_SYMMETRY_BREAKING))
-        })
-    }
-
-    fn with(
-        p: &Parameters,
-        definition: Definition,
-        motion: impl Fn(&Dimensionless) -> Option<Candidate>,
-    ) -> Option<Self> {
+    /// Of the motion that `motion` gives of the scene with the ideal cavity.
+    fn of(p: &Parameters, definition: Definition, motion: impl Fn(&Dimensionless) -> Option<Orbit>) -> Option<Self> {
         let [plus, minus] = p.gaps();
         let [half_width, middle] = [0.5 * (plus + minus), 0.5 * (plus - minus)];
         let rebound = Rebound::new(p);
@@ -250,7 +232,7 @@ impl Ideal {
             let scene = Dimensionless { definition, ..Dimensionless::of(&plant, 0.0) };
             let motion = motion(&scene)?;
             let (unit, rate, before) = (half_width, half_width * scene.omega0, speed);
-            speed = motion.impact_speed(&scene) * rate;
+            speed = motion.impact_velocity * rate;
             let start = motion.start;
             ideal = Some(Self {
                 speed,
@@ -338,30 +320,6 @@ impl Ideal {
 
 /// Smallest increase, of the strength of the effects or of the response towards its value, before the motion counts as lost.
 const SMALLEST_INCREASE: f64 = 1.0 / 64.0;
-
-/// The motion with all effects, continued from the ideal cavity.
-///
-/// Mostly the ideal motion with the same response serves. Near its bifurcations it may be lost, or lead to an unstable motion beside the one that the
-/// ideal motion becomes: then the effects grow where it is most stable, in the middle of its range, and the response changes afterwards.
-fn continued(p: &Parameters, definition: Definition, response: f64) -> Result<PlantMotion, NoMotion> {
-    // Refuses what cannot be solved before anything is computed.
-    Solver::new(p, definition, 1, at_response(response))?;
-    let ideal = Ideal::new(p, definition, response).ok_or(NoMotion::NoIdealMotion(response))?;
-    let motion = ideal.continued(p, definition, Some(response));
-    if motion.as_ref().is_ok_and(PlantMotion::is_stable) {
-        return motion;
-    }
-    let detour = Ideal::in_the_middle(p, definition).map(|ideal| ideal.continued(p, definition, Some(response)));
-    match detour {
-        Some(Ok(other)) if motion.is_err() || other.is_stable() => Ok(other),
-        _ => motion,
-    }
-}
-
-/// At phase resonance with this response, m.
-fn at_response(response: f64) -> [DriveCondition; 2] {
-    [DriveCondition::PhaseResonance, DriveCondition::Response(response)]
-}
 
 // Newton's method
 
@@ -534,15 +492,10 @@ impl<'a> Solver<'a> {
         Some(response * Complex::from_polar(1.0, -self.definition.reference.phase(damping, over_omega0)))
     }
 
-    /// The equations at `x`, all over b or as numbers, and the first harmonic if a condition needs it.
+    /// The equations at `x`, all over b or as numbers.
     fn residual(&mut self, section: &mut Section, x: &Unknowns) -> Option<Unknowns> {
         let end = self.follow(section, x)?;
-        let measured = |condition| !matches!(condition, DriveCondition::Omega(_) | DriveCondition::Amplitude(_));
-        let response = if self.conditions.into_iter().any(measured) {
-            self.harmonic(section, x)? / self.scale[0]
-        } else {
-            Complex::new(0.0, 0.0)
-        };
+        let response = self.harmonic(section, x)? / self.scale[0];
         let mut residual = Unknowns::zeros();
         residual.fixed_rows_mut::<4>(0).copy_from(&(end - x.fixed_rows::<4>(0)));
         for (row, condition) in [4, 5].into_iter().zip(self.conditions) {

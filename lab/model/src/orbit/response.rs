@@ -46,7 +46,8 @@ const SAME: f64 = 1e-6;
 /// `doublings` symmetry breakings and period doublings in a row.
 pub fn response(scene: &Dimensionless, limits: &ContinuationLimits, doublings: usize) -> FrequencyResponse {
     let condition = Condition::Excitation(scene.g);
-    let mut search = Search { scene, limits, condition, doublings, found: Vec::new() };
+    let found = FrequencyResponse { g: scene.g, components: Vec::new() };
+    let mut search = Search { scene, limits, doublings, found };
     let [low, high] = limits.sigma;
     let grid: Vec<f64> = equally_spaced(low, high, GRID).collect();
     let least = |sigma: f64| least_excitation(scene, sigma);
@@ -57,86 +58,73 @@ pub fn response(scene: &Dimensionless, limits: &ContinuationLimits, doublings: u
     let narrow = narrow.map(|near| golden_section(near[0], near[2], least));
     for sigma in grid.iter().copied().chain(narrow) {
         for orbit in symmetric_orbits(scene, sigma) {
-            if let Some(motion) = orbit.periodic(scene, [Condition::Sigma(sigma), condition]) {
-                search.add(&motion);
+            let motion = orbit.periodic(scene, [Condition::Sigma(sigma), condition]);
+            if let Some(motion) = motion.filter(|motion| !search.found.contains(scene, motion)) {
+                search.follow(continue_both_ways(scene, &motion, condition, limits), 0);
             }
         }
     }
-    FrequencyResponse { g: scene.g, components: search.named() }
+    search.numbered()
 }
 
+/// The branches found so far; their names follow when all are found.
 struct Search<'a> {
     scene: &'a Dimensionless,
     limits: &'a ContinuationLimits,
-    condition: Condition,
     doublings: usize,
-    found: Vec<Branch>,
+    found: FrequencyResponse,
 }
 
 impl Search<'_> {
-    /// Follows the component of a motion, and those that branch off it, unless it was found before.
-    fn add(&mut self, motion: &Periodic) {
-        if !self.contains(motion) {
-            let branch = continue_both_ways(self.scene, motion, self.condition, self.limits);
-            self.follow(branch, 0);
-        }
-    }
-
-    fn contains(&self, motion: &Periodic) -> bool {
-        self.found.iter().any(|branch| branch.passes(self.scene, motion))
-    }
-
+    /// Follows a branch, and those that branch off it.
     fn follow(&mut self, branch: Branch, depth: usize) {
         let breaking = [Bifurcation::SymmetryBreaking, Bifurcation::PeriodDoubling];
-        let specials: Vec<_> = branch
-            .special
-            .iter()
-            .filter(|one| breaking.contains(&one.kind))
-            .cloned()
-            .collect();
+        let mut special = branch.special.clone();
+        special.retain(|one| breaking.contains(&one.kind));
         // One that ended early, where continuation failed, may be a part of this one.
-        let impacts = branch.points[0].pattern.impacts();
         let part = |old: &Branch| old.typical().all(|one| branch.passes(self.scene, one));
-        self.found.retain(|old| !part(old));
-        self.found.push(branch);
+        self.found.components.retain(|old| !part(&old.branch));
+        let impacts = branch.pattern().impacts();
+        self.found
+            .components
+            .push(Component { name: branch.pattern().name(), branch });
         if depth == self.doublings || 2 * impacts > LONGEST {
             return;
         }
-        for special in specials {
-            let Some(branch) = branch_off(self.scene, &special, self.condition, self.limits) else {
+        for special in special {
+            let condition = Condition::Excitation(self.scene.g);
+            let Some(branch) = branch_off(self.scene, &special, condition, self.limits) else {
                 continue;
             };
             // A branch that joins two such points is found from both.
-            if branch.points.len() > 1 && !branch.typical().all(|motion| self.contains(motion)) {
+            let is_found = branch.typical().all(|motion| self.found.contains(self.scene, motion));
+            if branch.points.len() > 1 && !is_found {
                 self.follow(branch, depth + 1);
             }
         }
     }
 
-    fn named(mut self) -> Vec<Component> {
-        let pattern = |branch: &Branch| branch.points[0].pattern.clone();
-        let order = |pattern: ImpactPattern| {
-            (
-                pattern.periods() as usize * pattern.impacts(),
-                pattern.periods(),
-                !pattern.mirrored,
-            )
-        };
-        self.found.sort_by_key(|branch| order(pattern(branch)));
-        let names: Vec<String> = self.found.iter().map(|branch| pattern(branch).name()).collect();
-        let components = self.found.into_iter().enumerate().map(|(n, branch)| {
-            let of = names.iter().filter(|name| **name == names[n]).count();
-            let number = names[..=n].iter().filter(|name| **name == names[n]).count();
-            Component { name: format!("{}, {number} of {of}", names[n]), branch }
+    /// The components in order, numbered.
+    fn numbered(mut self) -> FrequencyResponse {
+        let components = &mut self.found.components;
+        components.sort_by_key(|one| {
+            let pattern = one.branch.pattern();
+            let periods = pattern.periods();
+            (periods as usize * pattern.impacts(), periods, !pattern.mirrored)
         });
-        components.collect()
+        let names: Vec<String> = components.iter().map(|one| one.name.clone()).collect();
+        for (n, component) in components.iter_mut().enumerate() {
+            let count = |names: &[String]| names.iter().filter(|name| **name == component.name).count();
+            component.name = format!("{}, {} of {}", component.name, count(&names[..=n]), count(&names));
+        }
+        self.found
     }
 }
 
 impl FrequencyResponse {
     /// The components of symmetric 1:1 motions.
     pub fn symmetric(&self) -> impl Iterator<Item = &Branch> {
-        let symmetric = |one: &&Branch| one.points[0].pattern.is_symmetric();
+        let symmetric = |one: &&Branch| one.pattern().is_symmetric();
         self.components.iter().map(|one| &one.branch).filter(symmetric)
     }
 
@@ -146,11 +134,12 @@ impl FrequencyResponse {
     }
 }
 
-fn apart(one: &Periodic, other: &Periodic) -> f64 {
-    (one.invariants() - other.invariants()).norm()
-}
-
 impl Branch {
+    /// The pattern of its motions.
+    pub fn pattern(&self) -> &ImpactPattern {
+        &self.points[0].pattern
+    }
+
     /// The middle motion of all, and the middle one of the stable motions: a branch that contains both contains this branch.
     fn typical(&self) -> impl Iterator<Item = &Periodic> {
         let stable: Vec<&Periodic> = self.points.iter().filter(|one| one.stable).collect();
@@ -160,8 +149,8 @@ impl Branch {
 
     /// Whether this branch of a frequency response passes a motion or its mirror image.
     pub fn passes(&self, scene: &Dimensionless, motion: &Periodic) -> bool {
-        let pattern = |one: &Periodic| (one.pattern.impacts(), one.pattern.periods(), one.pattern.mirrored);
-        if pattern(&self.points[0]) != pattern(motion) {
+        let kind = |one: &ImpactPattern| (one.impacts(), one.periods(), one.mirrored);
+        if kind(self.pattern()) != kind(&motion.pattern) {
             return false;
         }
         let conditions = [Condition::Sigma(motion.sigma), Condition::Excitation(motion.g)];
@@ -181,13 +170,13 @@ impl Branch {
         self.points.windows(2).any(|pair| {
             let [from, to] = [&pair[0], &pair[1]];
             // Where the curve bends, its points are close together.
-            if apart(from, motion).max(apart(to, motion)) > 1.2 * (apart(from, to) + SAME) {
+            if from.distance(motion).max(to.distance(motion)) > 1.2 * (from.distance(to) + SAME) {
                 return false;
             }
             let part = ((along(motion) - along(from)) / (along(to) - along(from))).clamp(0.0, 1.0);
             let guess = from.unknowns() + (to.unknowns() - from.unknowns()) * if part.is_nan() { 0.5 } else { part };
             // At a fold Newton's method may fail.
-            Periodic::find(scene, &from.pattern, &guess, conditions).is_none_or(|found| apart(&found, motion) < same)
+            Periodic::find(scene, &from.pattern, &guess, conditions).is_none_or(|found| found.distance(motion) < same)
         })
     }
 }
@@ -234,7 +223,7 @@ pub fn bifurcation_curves(scene: &Dimensionless, limits: &ContinuationLimits) ->
     for g in equally_spaced(low, high, LEVELS).filter(|g| *g > 0.0) {
         let scene = Dimensionless { g, ..*scene };
         for component in response(&scene, limits, 1).components {
-            if !component.branch.points[0].pattern.is_one_to_one() {
+            if !component.branch.pattern().is_one_to_one() {
                 continue;
             }
             for special in &component.branch.special {
@@ -246,19 +235,19 @@ pub fn bifurcation_curves(scene: &Dimensionless, limits: &ContinuationLimits) ->
             }
         }
     }
-    found.sort_by_key(|one| (one.kind.name(), !one.branch.points[0].pattern.mirrored));
+    found.sort_by_key(|one| (one.kind.name(), !one.branch.pattern().mirrored));
     found
 }
 
 impl BifurcationCurve {
     /// As in a table: the bifurcation and the motions.
     pub fn name(&self) -> String {
-        format!("{} of {}", self.kind.name(), self.branch.points[0].pattern.name())
+        format!("{} of {}", self.kind.name(), self.branch.pattern().name())
     }
 
     fn passes(&self, scene: &Dimensionless, special: &BranchBifurcation) -> bool {
         let motion = &special.motion;
-        if self.kind != special.kind || self.branch.points[0].pattern.mirrored != motion.pattern.mirrored {
+        if self.kind != special.kind || self.branch.pattern().mirrored != motion.pattern.mirrored {
             return false;
         }
         let conditions = [Condition::Excitation(motion.g), Condition::Bifurcation(self.kind)];

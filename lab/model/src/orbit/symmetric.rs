@@ -15,34 +15,16 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::oscillator::FreeOscillator;
-use super::{AfterImpact, Condition, ImpactPattern, Orbit, Periodic, Unknowns};
+use super::{AfterImpact, Condition, ImpactPattern, Orbit, Periodic};
 use crate::numerics::{bisection, golden_section, quadratic};
 use crate::theory::{BranchSide, Manifold, SlowFlow};
 use crate::{Definition, Dimensionless, Sensor};
-
-/// A symmetric motion that satisfies the impact law and the phase resonance, not yet checked for `|w| <= 1` in flight.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Candidate {
-    /// Angular frequency over omega0.
-    pub omega: f64,
-    /// Speed of the particle; not physical unless positive.
-    pub b: f64,
-    /// Amplitude of the first harmonic of the response.
-    pub c: f64,
-    /// Base amplitude over `b epsilon`.
-    pub g: f64,
-    /// The state just after the impact on the wall w = +1.
-    pub start: AfterImpact,
-    /// Phase of the first harmonic of the response relative to the reference, rad.
-    pub gamma: f64,
-    /// The first harmonic of the response lags the reference by pi/2, rather than leading it.
-    lags: bool,
-}
 
 /// All symmetric motions at one frequency, whatever drives them: everything is linear in B.
 struct SymmetricMotions {
     omega: f64,
     epsilon: f64,
+    r: f64,
     alpha: f64,
     beta: f64,
     /// Difference of the first harmonics of the response (v or q1, by the sensor) and of y, over B.
@@ -74,6 +56,7 @@ impl SymmetricMotions {
         Some(Self {
             omega,
             epsilon,
+            r,
             alpha: 2.0 * epsilon * p_before[0] - FRAC_PI_2 / omega,
             beta: (2.0 * (1.0 + epsilon) / (1.0 + r) - 1.0 + 2.0 * epsilon * p_before[1]) / omega,
             kappa: (oscillator.compliance(omega) * impulse * -2.0 + triangle) * epsilon,
@@ -102,14 +85,14 @@ impl SymmetricMotions {
     }
 
     /// The two motions at phase resonance, each a continuous branch where it exists.
-    fn phase_resonant(&self) -> Option<[Candidate; 2]> {
+    fn phase_resonant(&self) -> Option<[Orbit; 2]> {
         let [square, linear, constant] = self.resonance();
         let speeds = quadratic(square, linear, constant)?;
         Some(speeds.map(|b| self.at(b)))
     }
 
     /// The two motions under the excitation `g`: `|y|^2` is quadratic in B.
-    fn driven(&self, g: f64) -> Option<[Candidate; 2]> {
+    fn driven(&self, g: f64) -> Option<[Orbit; 2]> {
         let Self { alpha, beta, .. } = *self;
         let y = self.epsilon * g / self.base_over_y.norm();
         let speeds = quadratic(alpha * alpha + beta * beta, 2.0 * alpha, 1.0 - y * y)?;
@@ -130,26 +113,29 @@ impl SymmetricMotions {
         self.y(b) + self.kappa * b
     }
 
-    fn at(&self, b: f64) -> Candidate {
+    /// The motion at the particle speed `b`. Whether it is physical, and how stable it is, is not examined: see [`accept`].
+    fn at(&self, b: f64) -> Orbit {
         let (y, v) = (self.y(b), self.response(b));
         let base = y * self.base_over_y;
         let p_before = self.p - Vector2::new(0.0, 1.0);
         let [q1, before] = (Vector2::new(y.im, self.omega * y.re) - p_before * (2.0 * self.epsilon * b)).into();
-        let start = AfterImpact {
-            phase: base.arg(),
-            q1,
-            dq1: before - 2.0 * self.epsilon * b,
-            q2: q1 - 1.0,
-            dq2: b,
-        };
-        Candidate {
+        Orbit {
+            g: base.norm() / self.epsilon,
+            sigma: (self.omega - 1.0) / self.epsilon,
             omega: self.omega,
-            b,
             c: v.norm() * self.scale,
             gamma: (v * (base * self.reference).conj()).arg(),
-            g: base.norm() / self.epsilon,
-            start,
-            lags: (v * (base * self.reference).conj()).im < -1e-12 * v.norm() * base.norm(),
+            b,
+            impact_velocity: 2.0 * b * (1.0 + self.epsilon) / (1.0 + self.r),
+            start: AfterImpact {
+                phase: base.arg(),
+                q1,
+                dq1: before - 2.0 * self.epsilon * b,
+                q2: q1 - 1.0,
+                dq2: b,
+            },
+            multipliers: [f64::NAN; 4],
+            stable: false,
         }
     }
 }
@@ -211,7 +197,7 @@ pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
         .and_then(|motions| motions.driven(scene.g))
         .into_iter()
         .flatten()
-        .filter_map(|candidate| accept(scene, &candidate))
+        .filter_map(|orbit| accept(scene, orbit))
         .collect()
 }
 
@@ -235,34 +221,20 @@ fn grid(epsilon: f64) -> Vec<f64> {
 }
 
 /// The orbits of those candidates whose response lags the base; without dissipation no base motion is needed, and no phase lag is defined.
-fn resonant(scene: &Dimensionless, candidates: &[Candidate]) -> Vec<Orbit> {
-    let resonates = |candidate: &&Candidate| candidate.lags || candidate.g < 1e-12;
-    let orbits = candidates.iter().filter(resonates);
-    orbits.filter_map(|candidate| accept(scene, candidate)).collect()
+fn resonant(scene: &Dimensionless, candidates: &[Orbit]) -> Vec<Orbit> {
+    let lags = |orbit: &Orbit| orbit.gamma.sin() < -1e-12;
+    let orbits = candidates.iter().filter(|orbit| lags(orbit) || orbit.g < 1e-12);
+    orbits.filter_map(|orbit| accept(scene, *orbit)).collect()
 }
 
-/// The candidate as an orbit if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
-fn accept(scene: &Dimensionless, candidate: &Candidate) -> Option<Orbit> {
-    let Candidate { omega, b, c, g, start, .. } = *candidate;
-    let sizes = [b, c, g];
-    if sizes.iter().any(|size| !size.is_finite()) || b <= 0.0 || c <= 1e-12 {
+/// The orbit with its stability, if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
+fn accept(scene: &Dimensionless, orbit: Orbit) -> Option<Orbit> {
+    let sizes = [orbit.b, orbit.c, orbit.g];
+    if sizes.iter().any(|size| !size.is_finite()) || orbit.b <= 0.0 || orbit.c <= 1e-12 {
         return None;
     }
-    let sigma = (omega - 1.0) / scene.epsilon;
-    let unknowns = Unknowns::from([start.phase, start.q1, start.dq1, start.dq2, sigma, g]);
-    let motion = Periodic::closed(scene, &ImpactPattern::symmetric(), &unknowns)?;
-    Some(Orbit {
-        g,
-        sigma,
-        omega,
-        c,
-        gamma: candidate.gamma,
-        b,
-        impact_velocity: candidate.impact_speed(scene),
-        start,
-        multipliers: motion.moduli(),
-        stable: motion.stable,
-    })
+    let motion = Periodic::closed(scene, &ImpactPattern::symmetric(), &orbit.unknowns())?;
+    Some(Orbit { multipliers: motion.moduli(), stable: motion.stable, ..orbit })
 }
 
 /// One of the two branches of candidates, as G over frequency.
@@ -272,7 +244,7 @@ struct CandidateBranch<'a> {
 }
 
 impl CandidateBranch<'_> {
-    fn at(&self, omega: f64) -> Option<Candidate> {
+    fn at(&self, omega: f64) -> Option<Orbit> {
         SymmetricMotions::new(self.scene, omega)?
             .phase_resonant()
             .map(|both| both[self.branch])
@@ -284,7 +256,7 @@ impl CandidateBranch<'_> {
         (!excess.is_nan()).then_some(excess)
     }
 
-    fn frequencies(&self, grid: &[f64]) -> Vec<Candidate> {
+    fn frequencies(&self, grid: &[f64]) -> Vec<Orbit> {
         let points = self.stretches(grid);
         let mut found = Vec::new();
         for pair in points.windows(2) {
@@ -329,7 +301,7 @@ impl CandidateBranch<'_> {
 
     /// The root between two points of opposite sign; None where the sign changes through a gap, or in the rounding errors
     /// of a motion that needs no excitation.
-    fn root(&self, a: f64, b: f64) -> Option<Candidate> {
+    fn root(&self, a: f64, b: f64) -> Option<Orbit> {
         if a.is_nan() || b.is_nan() {
             return None;
         }
@@ -340,7 +312,7 @@ impl CandidateBranch<'_> {
     }
 
     /// Two roots between grid points: the excess has an extremum there that reaches the other sign.
-    fn pair_near_extremum(&self, a: f64, b: f64, sign: f64) -> Vec<Candidate> {
+    fn pair_near_extremum(&self, a: f64, b: f64, sign: f64) -> Vec<Orbit> {
         let distance = |omega| self.excess(omega).map_or(f64::INFINITY, |excess| sign * excess);
         let turn = golden_section(a, b, distance);
         if distance(turn) > 0.0 {
@@ -369,7 +341,7 @@ pub fn backbone_at_speed(scene: &Dimensionless, speed: f64) -> Option<[f64; 3]> 
 }
 
 /// The motion of [`backbone_at_speed`]: Newton's method for the frequency.
-pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Candidate> {
+pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Orbit> {
     let Dimensionless { epsilon, lambda, r, .. } = *scene;
     let flow = SlowFlow::new(lambda, r);
     let mut omega = 1.0 + epsilon * flow.free_detuning(speed);
@@ -404,7 +376,7 @@ pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Candidate> {
 }
 
 /// The motion at phase resonance beyond the fold whose response has the amplitude `c` over b: the secant method over the speed.
-pub(super) fn at_amplitude(scene: &Dimensionless, c: f64) -> Option<Candidate> {
+pub(super) fn at_amplitude(scene: &Dimensionless, c: f64) -> Option<Orbit> {
     let start = Manifold::new(scene.r).b(c, BranchSide::Right)?;
     let at = |speed: f64| Some((speed, at_speed(scene, speed)?));
     let (mut before, mut here) = (at(start)?, at(start * (1.0 + SECANT))?);
@@ -416,16 +388,4 @@ pub(super) fn at_amplitude(scene: &Dimensionless, c: f64) -> Option<Candidate> {
         (before, here) = (here, at(next)?);
     }
     ((here.1.c - c).abs() < CONVERGED).then_some(here.1)
-}
-
-/// The motion of an orbit at phase resonance.
-pub(super) fn of_orbit(scene: &Dimensionless, orbit: &Orbit) -> Option<Candidate> {
-    Some(SymmetricMotions::new(scene, orbit.omega)?.at(orbit.b))
-}
-
-impl Candidate {
-    /// Relative speed just before an impact, over `b omega0`.
-    pub(super) fn impact_speed(&self, scene: &Dimensionless) -> f64 {
-        2.0 * self.b * (1.0 + scene.epsilon) / (1.0 + scene.r)
-    }
 }

@@ -40,7 +40,7 @@ impl SlowFlow {
     pub fn stable_at(&self, sigma: f64, b: f64) -> bool {
         let gamma = (-self.loss(b)).atan2(self.spring(sigma, b));
         let g = self.excitation_at(sigma, b);
-        impacts_stable(&self.manifold, b) && self.equilibrium(g, b, gamma).slow_flow_stable
+        impacts_stable(&self.manifold, b) && self.equilibrium((g, sigma), b, gamma).slow_flow_stable
     }
 
     /// A stable 1:1 motion exists at the excitation `g` and the detuning `sigma`.

@@ -3,42 +3,18 @@
 
 use std::f64::consts::{FRAC_2_PI, PI};
 
-use serde::Serialize;
-
-use super::slow_flow::SlowFlow;
+use super::slow_flow::{BackbonePoint, SlowFlow};
 use crate::Dimensionless;
 use crate::numerics::equally_spaced;
 
-/// One point of the free decay.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct DecayPoint {
-    /// Slow time `epsilon omega0 t` since the release.
-    pub tau1: f64,
-    /// Amplitude of v over b.
-    #[serde(rename = "C")]
-    pub c: f64,
-    /// Particle speed over `b omega0`.
-    #[serde(rename = "B")]
-    pub b: f64,
-    /// Detuning of the motion, equal to the backbone's.
-    pub sigma: f64,
-}
-
 impl SlowFlow {
-    /// `points` points of the free decay from the particle speed `b` on the right branch down to the fold, at equal steps of B; None left of the
-    /// fold, or without dissipation.
-    pub fn decay(&self, b: f64, points: usize) -> Option<Vec<DecayPoint>> {
-        let (dissipates, fold) = (
-            self.lambda > 0.0 || self.manifold.dissipation > 0.0,
-            self.manifold.b_min(),
-        );
+    /// `points` points of the free decay from the particle speed `b` on the right branch down to the fold, at equal steps of B, each with the slow
+    /// time `epsilon omega0 t` since the release; None left of the fold, or without dissipation.
+    pub fn decay(&self, b: f64, points: usize) -> Option<Vec<(f64, BackbonePoint)>> {
+        let fold = self.manifold.b_min();
+        let dissipates = self.lambda > 0.0 || self.manifold.dissipation > 0.0;
         let start = self.time_primitive(b);
-        let point = |b: f64| DecayPoint {
-            tau1: start - self.time_primitive(b),
-            c: self.manifold.c(b),
-            b,
-            sigma: self.free_detuning(b),
-        };
+        let point = |b: f64| (start - self.time_primitive(b), self.backbone_at(b));
         (dissipates && b >= fold).then(|| equally_spaced(b, fold, points).map(point).collect())
     }
 

@@ -64,8 +64,8 @@ impl SlowFlow {
         (g, sigma): (f64, f64),
         (c, gamma): (f64, f64),
         (b, psi): (f64, f64),
-    ) -> ImpactSequence {
-        ImpactSequence {
+    ) -> impl Iterator<Item = Modulation> {
+        let start = Walk {
             rate: Complex::new(self.lambda / 2.0, sigma),
             restitution: (1.0 - self.manifold.dissipation) / (1.0 + self.manifold.dissipation),
             drive: Complex::new(0.0, -g / 2.0),
@@ -76,14 +76,22 @@ impl SlowFlow {
             b,
             psi,
             impacts: 0,
-            lost: false,
-        }
+        };
+        std::iter::successors(Some(start), Walk::next)
+            .skip(1)
+            .map(|walk| Modulation {
+                tau: walk.phase / walk.omega,
+                c: walk.z.norm(),
+                gamma: walk.z.arg(),
+                b: walk.b,
+                psi: walk.psi,
+            })
     }
 }
 
-/// The impacts one by one; made by [`SlowFlow::modulation`].
-#[derive(Debug, Clone)]
-pub struct ImpactSequence {
+/// The motion just after an impact, with what is constant.
+#[derive(Clone, Copy)]
+struct Walk {
     /// `lambda/2 + i sigma`.
     rate: Complex<f64>,
     restitution: f64,
@@ -96,13 +104,12 @@ pub struct ImpactSequence {
     b: f64,
     psi: f64,
     impacts: u32,
-    lost: bool,
 }
 
 /// Steps per period in the search for the next contact.
 const STEPS: u32 = 256;
 
-impl ImpactSequence {
+impl Walk {
     /// Sign of the triangle wave's slope now; the wall ahead.
     fn slope(&self) -> f64 {
         if self.impacts.is_multiple_of(2) { 1.0 } else { -1.0 }
@@ -151,16 +158,9 @@ impl ImpactSequence {
         }
         None
     }
-}
 
-impl Iterator for ImpactSequence {
-    type Item = Modulation;
-
-    fn next(&mut self) -> Option<Modulation> {
-        if self.lost {
-            return None;
-        }
-        self.lost = true;
+    /// After the next impact; None if it does not continue the pattern.
+    fn next(&self) -> Option<Self> {
         let ahead = self.next_contact()?;
         let z = self.z_after(ahead);
         let phase = self.phase + ahead;
@@ -177,10 +177,7 @@ impl Iterator for ImpactSequence {
         if slope * (v_rate - slope * b) >= 0.0 {
             return None;
         }
-        (self.phase, self.z, self.b, self.psi) = (phase, z, b, psi);
-        self.impacts += 1;
-        self.lost = false;
-        Some(Modulation { tau: phase / self.omega, c: z.norm(), gamma: z.arg(), b, psi })
+        Some(Self { phase, z, b, psi, impacts: self.impacts + 1, ..*self })
     }
 }
 

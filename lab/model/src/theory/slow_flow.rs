@@ -120,6 +120,9 @@ pub fn impacts_stable(manifold: &Manifold, b: f64) -> bool {
 /// A steady 1:1 motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Equilibrium {
+    /// Detuning.
+    #[serde(skip)]
+    pub sigma: f64,
     /// Amplitude of v over b.
     #[serde(rename = "C")]
     pub c: f64,
@@ -146,7 +149,7 @@ impl SlowFlow {
             .map(|b| {
                 let sine = -self.loss(b);
                 let cosine = self.spring(sigma, b);
-                self.equilibrium(g, b, sine.atan2(cosine))
+                self.equilibrium((g, sigma), b, sine.atan2(cosine))
             })
             .collect()
     }
@@ -156,8 +159,9 @@ impl SlowFlow {
         2.0 * (self.free_detuning(b) - sigma) * self.manifold.c(b).powi(2)
     }
 
-    pub(super) fn equilibrium(&self, g: f64, b: f64, gamma: f64) -> Equilibrium {
+    pub(super) fn equilibrium(&self, (g, sigma): (f64, f64), b: f64, gamma: f64) -> Equilibrium {
         Equilibrium {
+            sigma,
             c: self.manifold.c(b),
             b,
             gamma,
@@ -281,16 +285,6 @@ impl SlowFlow {
     }
 }
 
-/// One point of a frequency response.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ResponsePoint {
-    /// Detuning.
-    pub sigma: f64,
-    /// The steady motion there.
-    #[serde(flatten)]
-    pub motion: Equilibrium,
-}
-
 impl SlowFlow {
     /// The detunings at which the excitation `g` holds the particle speed `b`, and the phase of v there, rad:
     /// `sigma = sigma_R ± sqrt(G^2 C^2 - loss^2)/(2 C^2)` (docs/theory.md, eq. 15); None if `g` is too small.
@@ -311,7 +305,7 @@ impl SlowFlow {
 
     /// The frequency responses at the excitation `g`: closed curves over all B > 0, each of `points` points from its
     /// smallest C on one side to its largest and back. A curve that reaches B = 0 starts there, at C = 1.
-    pub fn frequency_responses(&self, g: f64, points: usize) -> Vec<Vec<ResponsePoint>> {
+    pub fn frequency_responses(&self, g: f64, points: usize) -> Vec<Vec<Equilibrium>> {
         let mut ends: Vec<f64> = self.equilibrium_speeds(g, None);
         // At B = 0 the loss is lambda and C is 1.
         if g > self.lambda {
@@ -323,7 +317,7 @@ impl SlowFlow {
     }
 
     /// The loop of a response between the two speeds at which it turns.
-    fn loop_between(&self, g: f64, [low, high]: [f64; 2], points: usize) -> Vec<ResponsePoint> {
+    fn loop_between(&self, g: f64, [low, high]: [f64; 2], points: usize) -> Vec<Equilibrium> {
         let steps = points.saturating_sub(1).max(1) as f64;
         (0..points)
             .filter_map(|n| {
@@ -335,8 +329,7 @@ impl SlowFlow {
                     .detunings(g, b)
                     .unwrap_or_else(|| [(self.free_detuning(b), -PI / 2.0); 2]);
                 let (sigma, gamma) = if turn < PI { left } else { right };
-                let motion = self.equilibrium(g, b, gamma);
-                sigma.is_finite().then_some(ResponsePoint { sigma, motion })
+                sigma.is_finite().then(|| self.equilibrium((g, sigma), b, gamma))
             })
             .collect()
     }
@@ -365,9 +358,14 @@ fn real_roots(coefficients: &[f64]) -> Vec<f64> {
     let mut ends = vec![-bound];
     ends.extend(real_roots(&derivative));
     ends.push(bound);
-    let mut roots: Vec<f64> = ends
-        .windows(2)
-        .filter_map(|pair| root_between(coefficients, pair[0], pair[1]))
+    let value = |x: f64| coefficients.iter().rev().fold(0.0, |sum, one| sum * x + one);
+    let positive = |x: f64| value(x) > 0.0;
+    let between = ends.windows(2).filter(|pair| positive(pair[0]) != positive(pair[1]));
+    let mut roots: Vec<f64> = between
+        .map(|pair| {
+            let (below, above) = bisection(pair[0], pair[1], positive);
+            below + (above - below) / 2.0
+        })
         .collect();
     // A turning point that touches zero to within rounding.
     let touches = |x: &f64| {
@@ -375,27 +373,12 @@ fn real_roots(coefficients: &[f64]) -> Vec<f64> {
             .iter()
             .rev()
             .fold(0.0, |sum, one| sum * x.abs() + one.abs());
-        value(coefficients, *x).abs() <= 8.0 * f64::EPSILON * size
+        value(*x).abs() <= 8.0 * f64::EPSILON * size
     };
     roots.extend(ends[1..ends.len() - 1].iter().copied().filter(touches));
     roots.sort_by(f64::total_cmp);
     roots.dedup_by(|one, other| (*one - *other).abs() <= 1e-7 * (1.0 + other.abs()));
     roots
-}
-
-fn value(coefficients: &[f64], x: f64) -> f64 {
-    coefficients.iter().rev().fold(0.0, |sum, one| sum * x + one)
-}
-
-/// The root between `a` and `b`, if the sign changes.
-fn root_between(coefficients: &[f64], a: f64, b: f64) -> Option<f64> {
-    let positive = |x| value(coefficients, x) > 0.0;
-    (positive(a) != positive(b)).then(|| midpoint(bisection(a, b, positive)))
-}
-
-/// Rounds to one of two neighbouring doubles.
-fn midpoint((a, b): (f64, f64)) -> f64 {
-    a + (b - a) / 2.0
 }
 
 #[cfg(test)]

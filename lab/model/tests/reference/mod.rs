@@ -1,6 +1,8 @@
 //! The rows of `tests/reference/orbits.csv`: exact orbits, and the first-order theory beside them.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+use vines_model::Dimensionless;
+
 const ORBITS: &str = include_str!("../../../../tests/reference/orbits.csv");
 
 #[derive(Debug, Clone, Copy)]
@@ -13,9 +15,14 @@ pub struct Row {
     pub c: f64,
     pub b: f64,
     pub multipliers: [f64; 4],
-    pub sigma_theory: f64,
-    pub c_theory: f64,
-    pub b_theory: f64,
+    /// sigma, C and B.
+    pub theory: [f64; 3],
+}
+
+impl Row {
+    pub fn scene(&self) -> Dimensionless {
+        Dimensionless::new(self.epsilon, self.lambda, self.r, self.g)
+    }
 }
 
 pub fn rows() -> Vec<Row> {
@@ -24,36 +31,10 @@ pub fn rows() -> Vec<Row> {
 
 fn row(line: &str) -> Row {
     let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
-    let [
-        epsilon,
-        lambda,
-        r,
-        g,
-        sigma,
-        c,
-        b,
-        m1,
-        m2,
-        m3,
-        m4,
-        sigma_theory,
-        c_theory,
-        b_theory,
-    ] = cells[..]
-    else {
+    let [epsilon, lambda, r, g, sigma, c, b, m1, m2, m3, m4, theory @ ..] = &cells[..] else {
         panic!("fourteen columns expected: {line}")
     };
-    Row {
-        epsilon,
-        lambda,
-        r,
-        g,
-        sigma,
-        c,
-        b,
-        multipliers: [m1, m2, m3, m4],
-        sigma_theory,
-        c_theory,
-        b_theory,
-    }
+    let [epsilon, lambda, r, g, sigma, c, b] = [epsilon, lambda, r, g, sigma, c, b].map(|one| *one);
+    let (multipliers, theory) = ([*m1, *m2, *m3, *m4], theory.try_into().unwrap());
+    Row { epsilon, lambda, r, g, sigma, c, b, multipliers, theory }
 }

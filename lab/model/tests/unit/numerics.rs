@@ -3,16 +3,10 @@
 use super::*;
 
 #[test]
-fn a_small_root_beside_a_large_one_keeps_its_digits() {
+fn roots_of_a_quadratic_keep_their_digits_and_are_continuous_where_the_linear_coefficient_changes_sign() {
     let [large, small] = quadratic(1e-12, 1.0, -1.0).unwrap();
-    assert!((small - (1.0 - 1e-12)).abs() < 1e-15);
-    assert!((large + 1e12).abs() < 2.0);
-}
-
-#[test]
-fn both_roots_are_continuous_where_the_linear_coefficient_changes_sign() {
-    let above = quadratic(1.0, 1e-9, -1.0).unwrap();
-    let below = quadratic(1.0, -1e-9, -1.0).unwrap();
+    assert!((small - (1.0 - 1e-12)).abs() < 1e-15 && (large + 1e12).abs() < 2.0);
+    let [above, below] = [1e-9, -1e-9].map(|linear| quadratic(1.0, linear, -1.0).unwrap());
     assert!((above[0] - below[0]).abs() < 1e-8 && (above[1] - below[1]).abs() < 1e-8);
 }
 
@@ -20,8 +14,7 @@ fn both_roots_are_continuous_where_the_linear_coefficient_changes_sign() {
 fn bisection_ends_between_neighbouring_numbers() {
     let (a, b) = bisection(1.0, 2.0, |x| x * x > 2.0);
     assert!(a * a <= 2.0 && b * b > 2.0 && b - a < 3e-16);
-    let (b, a) = bisection(2.0, 1.0, |x| x * x > 2.0);
-    assert!(a * a <= 2.0 && b * b > 2.0 && b - a < 3e-16);
+    assert_eq!(bisection(2.0, 1.0, |x| x * x > 2.0), (b, a));
 }
 
 #[test]
@@ -30,66 +23,41 @@ fn third_differences_see_noise_and_no_cubic() {
     let smooth: Vec<f64> = (0..200).map(cubic).collect();
     assert!(noise(&smooth) < 1e-12);
     // Alternating signs: every third difference is eight times the amplitude.
-    let rough: Vec<f64> = (0..200)
-        .map(|n| cubic(n) + 0.1 * f64::from(1 - 2 * (n as i32 % 2)))
-        .collect();
-    assert!((noise(&rough) - 0.8 / 20f64.sqrt()).abs() < 1e-9);
+    let rough = (0..200).map(|n| cubic(n) + 0.1 * f64::from(1 - 2 * (n as i32 % 2)));
+    assert!((noise(&rough.collect::<Vec<_>>()) - 0.8 / 20f64.sqrt()).abs() < 1e-9);
     assert_eq!(noise(&[1.0; 5]), 0.0);
-}
-
-fn signal(phases: &[f64]) -> DVector<f64> {
-    let n = phases.len() as f64;
-    DVector::from_iterator(
-        phases.len(),
-        phases.iter().enumerate().map(|(i, phase)| {
-            let t = 2.0 * i as f64 / (n - 1.0) - 1.0;
-            let first = (0.7 + 0.1 * t) * phase.sin() - 0.2 * phase.cos();
-            0.3 + first + 0.05 * (3.0 * phase + 0.4).sin()
-        }),
-    )
 }
 
 #[test]
 fn amplitudes_and_drift_are_found_to_rounding() {
     let phases: Vec<f64> = (0..150).map(|n| 0.1 * f64::from(n)).collect();
+    let values = phases.iter().map(|phase| {
+        let t = phase / 7.45 - 1.0;
+        0.3 + (0.7 + 0.1 * t) * phase.sin() - 0.2 * phase.cos() + 0.05 * (3.0 * phase + 0.4).sin()
+    });
+    let values = DVector::from_iterator(150, values);
     let basis = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(0)]);
-    let values = signal(&phases);
     let fit = basis.fit(&values).unwrap();
     assert!((fit.harmonic(1) - Complex::new(0.7, -0.2)).norm() < 1e-14);
     assert!((fit.drift(1) - Complex::new(0.1, 0.0)).norm() < 1e-14);
     assert!((fit.harmonic(3) - Complex::from_polar(0.05, 0.4)).norm() < 1e-14);
     assert!(basis.residual(&values, &fit).norm() < 1e-13);
-}
-
-#[test]
-fn too_few_or_equal_phases_give_no_fit() {
-    let few = [0.0, 0.1];
-    assert!(
-        HarmonicBasis::new(&few, 0, &[Some(0)])
-            .fit(&DVector::zeros(2))
-            .is_none()
-    );
-    let equal = [0.0; 20];
-    assert!(
-        HarmonicBasis::new(&equal, 0, &[Some(0)])
-            .fit(&DVector::zeros(20))
-            .is_none()
-    );
-}
-
-#[test]
-fn students_factor_is_that_of_the_tables() {
-    // t(0.975) of 4, 10 and 30 degrees of freedom: 2.776, 2.228, 2.042.
-    for (degrees, quantile) in [(4.0, 2.776), (10.0, 2.228), (30.0, 2.042)] {
-        assert!((student_factor(degrees) * NORMAL / quantile - 1.0).abs() < 0.01);
+    // Too few or equal phases give no fit.
+    for phases in [&[0.0, 0.1][..], &[0.0; 20]] {
+        let basis = HarmonicBasis::new(phases, 0, &[Some(0)]);
+        assert!(basis.fit(&DVector::zeros(phases.len())).is_none());
     }
 }
 
 #[test]
-fn a_mean_has_the_uncertainty_of_the_textbook() {
+fn uncertainties_are_those_of_the_textbook() {
+    // t(0.975) of 4, 10 and 30 degrees of freedom.
+    for (degrees, quantile) in [(4.0, 2.776), (10.0, 2.228), (30.0, 2.042)] {
+        assert!((student_factor(degrees) * NORMAL / quantile - 1.0).abs() < 0.01);
+    }
+    // The standard deviation is sqrt(10), for four degrees of freedom.
     let mean = Estimate::mean(&[1.0, 3.0, 5.0, 7.0, 9.0]);
     assert!((mean.value - 5.0).abs() < 1e-12);
-    // The standard deviation is sqrt(10), for four degrees of freedom.
     assert!((mean.uncertainty - (10f64 / 5.0).sqrt() * student_factor(4.0)).abs() < 1e-9);
 }
 
@@ -107,14 +75,11 @@ fn a_wandering_mean_is_less_certain_than_one_of_independent_values() {
 fn a_known_noise_is_the_least_uncertainty_and_a_prior_narrows_it() {
     let columns = [vec![1.0; 8], (0..8).map(f64::from).collect()];
     let values: Vec<f64> = (0..8).map(|n| 2.0 + 0.5 * f64::from(n)).collect();
-    let fit = Regression::fit(&columns, &values, None, 0.1).unwrap();
-    assert!((fit.coefficient(1) - 0.5).abs() < 1e-12 && fit.excess < 1e-9);
-    let free = fit.estimate(&[0.0, 1.0]).uncertainty;
+    let fit = |prior| Regression::fit(&columns, &values, prior, 0.1).unwrap();
+    let free = fit(None).estimate(&[0.0, 1.0]).uncertainty;
+    assert!((fit(None).coefficient(1) - 0.5).abs() < 1e-12 && fit(None).excess < 1e-9);
     assert!((free - 0.1 / 42f64.sqrt()).abs() < 1e-12);
-    let prior = Some((1, Estimate { value: 0.5, uncertainty: free }));
-    let held = Regression::fit(&columns, &values, prior, 0.1)
-        .unwrap()
-        .estimate(&[0.0, 1.0]);
-    assert!((held.uncertainty - free / 2f64.sqrt()).abs() < 1e-9);
+    let held = fit(Some((1, Estimate { value: 0.5, uncertainty: free })));
+    assert!((held.estimate(&[0.0, 1.0]).uncertainty - free / 2f64.sqrt()).abs() < 1e-9);
     assert_eq!(Regression::fit(&[vec![0.0; 3]], &[1.0; 3], None, 0.1), None);
 }
