@@ -7,6 +7,7 @@ use vines_testbench::scene::{Family, Scene, SceneError};
 use crate::{
     axis::{Axis, SIGMA, Values},
     cell::{Cell, Results, variables},
+    monitor::Monitor,
 };
 
 /// Settings of a sweep besides its scene.
@@ -249,7 +250,7 @@ impl Sweep {
     }
 
     pub(crate) fn variables(&self) -> impl Iterator<Item = crate::cell::Variable> {
-        variables(self.settings.results, self.settings.adaptive.is_some())
+        variables(&self.settings.results, self.settings.adaptive.is_some())
     }
 
     /// Number of chunks along each dimension.
@@ -335,11 +336,17 @@ impl Sweep {
     pub(crate) fn cell(&self, index: &[u64]) -> Cell {
         let coordinates = self.coordinates();
         let values: Vec<f64> = coordinates.map(|(_, dimension, at)| at(index[dimension])).collect();
-        let Settings { results, periods, .. } = self.settings;
+        let Settings { results, periods, .. } = &self.settings;
         let computed = self
             .at(&values)
-            .and_then(|(scene, sigma, numbers)| Ok(Cell::compute(&scene, sigma, &numbers, results, periods)?));
+            .and_then(|(scene, sigma, numbers)| Ok(Cell::compute(&scene, sigma, &numbers, results, *periods)?));
         computed.unwrap_or_else(|error| Cell { failure: error.to_string(), ..Cell::default() })
+    }
+
+    /// Computes and counts the cell with these indices; None if the monitor has stopped the sweep.
+    pub(crate) fn counted_cell(&self, index: &[u64], monitor: &Monitor) -> Option<Cell> {
+        let cell = (!monitor.stopped()).then(|| self.cell(index));
+        cell.inspect(|cell| monitor.note(cell))
     }
 
     /// Index of the n-th cell.
