@@ -88,7 +88,7 @@ impl ExperimentArguments {
         let mut open = match rig {
             Some(endpoint) => endpoint.rig(&scene, scope)?,
             None => {
-                let folder = tempfile::tempdir().map_err(Failure::run)?;
+                let folder = tempfile::tempdir()?;
                 Endpoint::Fmu(fmus(folder.path())?.swap_remove(0)).rig(&scene, scope)?
             }
         };
@@ -169,7 +169,7 @@ impl Session {
         }
         let timing = self.open.close();
         if let Some((file, samples)) = &self.record {
-            vines::write_file(file, &vines::record::table(&samples.borrow())).map_err(Failure::run)?;
+            vines::write_file(file, &vines::record::table(&samples.borrow()))?;
         }
         Ok(timing)
     }

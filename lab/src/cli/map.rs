@@ -78,11 +78,11 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let Arguments { x, y, sigma, periods, confirmations, out, .. } = arguments;
-    let map = Map::new(arguments.scene.family()?, x, y, *sigma, *periods).map_err(Failure::input)?;
+    let map = Map::new(arguments.scene.family()?, x, y, *sigma, *periods)?;
     warn_left_out(map.sweep.scene(), "a regime map is");
     writable(out)?;
     let bar = progress_bar(map.sweep.cells(), "mapping regimes [{wide_bar}] {pos}/{len} cells");
-    let map = map.run(*confirmations, || bar.inc(1)).map_err(Failure::input)?;
+    let map = map.run(*confirmations, || bar.inc(1))?;
     bar.finish_and_clear();
     let summary = summary(arguments, &map);
     let files = report::write_map(&map, out)?;

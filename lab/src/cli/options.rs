@@ -134,10 +134,10 @@ impl Endpoint {
         let (mut pace, mut timing) = (None, Arc::default());
         let rig: Box<dyn Rig> = match self {
             Self::BuiltIn => {
-                let plant = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
+                let plant = Simulated::new(scene.plant, scene.start)?;
                 Box::new(plant.with_sensors(scene.resonance))
             }
-            Self::Fmu(file) => Box::new(FmuRig::load(file, scene).map_err(Failure::run)?),
+            Self::Fmu(file) => Box::new(FmuRig::load(file, scene)?),
             Self::Network(address) if address.starts_with("helic://") => Box::new(helic(address, scene, scope)?),
             Self::Network(address) => {
                 let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time(), scope.key())?;
@@ -162,7 +162,7 @@ impl Endpoint {
     ) -> Result<Box<dyn Controller>, Failure> {
         Ok(match self {
             Self::BuiltIn => Box::new(BuiltIn::new(config)?),
-            Self::Fmu(file) => Box::new(FmuController::load(file, config, names).map_err(Failure::run)?),
+            Self::Fmu(file) => Box::new(FmuController::load(file, config, names)?),
             Self::Network(address) => {
                 let Address::Tcp(peer) = Address::parse(address, scope)? else {
                     let rule = "a controller has an address tcp://HOST:PORT";
@@ -185,7 +185,7 @@ fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Netw
         Failure::run(format!("no answer from {address}: {error}; {advice}"))
     })?;
     let samples = scene.controller.samples_per_period;
-    HelicRig::new(network, &scene.rig_names, scene.sample_time(), samples).map_err(Failure::run)
+    Ok(HelicRig::new(network, &scene.rig_names, scene.sample_time(), samples)?)
 }
 
 /// Refuses a key where the protocol has none.

@@ -164,7 +164,7 @@ const SETTLE: usize = 1000;
 /// The motion that the start leads to at one detuning, or its frequency response.
 fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64; 4]) -> Result<String, Failure> {
     positive_frequency(scene, sigma)?;
-    let motion = settle(scene, sigma, start, SETTLE).map_err(Failure::input)?;
+    let motion = settle(scene, sigma, start, SETTLE)?;
     let motion = motion.ok_or_else(|| {
         Failure::run(format!(
             "the scene's start leads to no repeating pattern of impacts at sigma = {sigma} (dimensionless) within {SETTLE} periods; \
@@ -188,11 +188,11 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
 fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure> {
     let (plant, definition, numbers) = (&scene.plant, scene.resonance, scene.dimensionless());
     let motion = match arguments.sigma {
-        None => resonant_motion_under(plant, definition, scene.amplitude).map_err(Failure::run)?,
+        None => resonant_motion_under(plant, definition, scene.amplitude)?,
         Some(sigma) => {
             positive_frequency(&numbers, sigma)?;
             let drive = [numbers.omega(sigma), scene.amplitude];
-            let motion = settled_motion(plant, definition, drive, scene.start, SETTLE).map_err(Failure::run)?;
+            let motion = settled_motion(plant, definition, drive, scene.start, SETTLE)?;
             motion.ok_or_else(|| {
                 Failure::run(format!(
                     "the scene's start leads to no motion that repeats within 32 periods, at sigma = {sigma} (dimensionless) after {SETTLE} \

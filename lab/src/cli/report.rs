@@ -46,7 +46,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     // Invalid settings are refused before anything runs or is written.
     BuiltIn::new(&scene.controller_config())?;
     let (family, [x, y]) = (arguments.scene.family()?, [&arguments.x, &arguments.y]);
-    Map::new(family.clone(), x, y, None, LIMIT).map_err(Failure::input)?;
+    Map::new(family.clone(), x, y, None, LIMIT)?;
     writable(&arguments.out)?;
     let map = [x.clone(), y.clone()];
     let subject = Subject { scene, family, map };

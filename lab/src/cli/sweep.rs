@@ -110,11 +110,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         samples: arguments.samples,
         seed: arguments.seed,
         periods: arguments.periods,
-        results: Results::parse(arguments.results.iter().map(String::as_str)).map_err(Failure::input)?,
+        results: Results::parse(arguments.results.iter().map(String::as_str))?,
         chunk: arguments.chunk,
         adaptive: arguments.adaptive,
     };
-    let sweep = Sweep::new(arguments.scene.family()?, settings).map_err(Failure::input)?;
+    let sweep = Sweep::new(arguments.scene.family()?, settings)?;
     warn_left_out(
         sweep.scene(),
         "regimes, responses and exact orbits of a sweep (not its locked points) are",
@@ -122,7 +122,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if arguments.verify {
         return verify(&sweep, arguments);
     }
-    let estimate = sweep::estimate(&sweep, &AtomicBool::new(false)).map_err(Failure::input)?;
+    let estimate = sweep::estimate(&sweep, &AtomicBool::new(false))?;
     if estimate.is_large() && !arguments.yes && arguments.merge.is_empty() {
         let Estimate { cells, hours, bytes } = estimate;
         return Err(Failure::input(format!(
