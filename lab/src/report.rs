@@ -16,19 +16,8 @@ use figure::Figure;
 pub use files::{ReportError, decay_csv, map_csv, write, write_fit, write_interrupted, write_map, write_tracked};
 pub use table::{Table, number, row, with_uncertainty};
 
-use crate::scene::{Family, Scene};
-use crate::sweep::Axis;
-
-/// The subject of a report.
-#[derive(Debug, Clone)]
-pub struct Subject {
-    /// The scene.
-    pub scene: Scene,
-    /// The scene again, for the sweep behind the regime map.
-    pub family: Family,
-    /// Axes of the regime map, horizontal first.
-    pub map: [Axis; 2],
-}
+use crate::scene::Scene;
+use crate::sweep::Map;
 
 /// A section of the page, with its finding in a sentence or two.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -83,11 +72,11 @@ impl Section {
     }
 }
 
-/// Writes the report on `subject` into `out`: `report.html`, each figure for light and dark backgrounds, and tables. `progress` gets the
-/// name of the section being made, and the fraction of all sections that is done, from 0 to 1. Returns the findings, a sentence per section,
-/// and the files; the page is the first.
+/// Writes the report on the scene of `map` into `out`: `report.html`, each figure for light and dark backgrounds, and tables. The map is
+/// computed. `progress` gets the name of the section being made, and the fraction of all sections that is done, from 0 to 1. Returns the
+/// findings, a sentence per section, and the files; the page is the first.
 pub fn write_report(
-    subject: &Subject,
+    map: &mut Map,
     out: &Path,
     progress: &(dyn Fn(&str, f64) + Sync),
 ) -> Result<(Vec<String>, Vec<PathBuf>), ReportError> {
@@ -95,9 +84,9 @@ pub fn write_report(
     for (n, (name, make)) in sections::SECTIONS.into_iter().enumerate() {
         let at = |part: f64| progress(name, (n as f64 + part) / sections::SECTIONS.len() as f64);
         at(0.0);
-        sections.push(make(subject, &at)?);
+        sections.push(make(map, &at)?);
     }
-    let mut files = vec![("report.html".to_string(), page(&subject.scene, &sections))];
+    let mut files = vec![("report.html".to_string(), page(map.sweep.scene(), &sections))];
     let mut findings = Vec::new();
     for section in sections {
         files.extend(section.files);

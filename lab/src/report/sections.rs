@@ -1,21 +1,22 @@
 //! The sections of the report: each computes its results, describes them, and adds its figures, tables and lines of the error budget.
 
+use std::error::Error;
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::figures;
 use super::files::{ReportError, bifurcations_csv, csv, decay_csv, json, map_csv, tracked_csv};
 use super::table::{Table, number, with_uncertainty};
-use super::{Section, Subject, summary};
+use super::{Section, summary};
 use crate::backbone::track;
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use crate::experiment::{self, Plan};
 use crate::identification::{DecayEnd, identify};
-use crate::map::LIMIT;
 use crate::orbit::{
     Branch, Condition, ContinuationLimits, DOUBLINGS, FrequencyResponse, ImpactPattern, Periodic, backbone,
     convergence, response, stable_resonant,
 };
+use crate::record::Record;
 use crate::regime::Regime;
 use crate::rig::{BuiltIn, Simulated};
 use crate::scene::Dimensionless;
@@ -26,7 +27,7 @@ use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, resonant};
 type Progress<'a> = &'a (dyn Fn(f64) + Sync);
 
 /// Computes one section.
-type Maker = fn(&Subject, Progress) -> Result<Section, ReportError>;
+type Maker = fn(&mut Map, Progress) -> Result<Section, ReportError>;
 
 /// All sections in order, with the names that the progress bar shows.
 pub(super) const SECTIONS: [(&str, Maker); 5] = [
@@ -38,18 +39,18 @@ pub(super) const SECTIONS: [(&str, Maker); 5] = [
 ];
 
 /// Lock, hold, release, decay.
-fn experiment(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
+fn experiment(map: &mut Map, _: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("The experiment");
-    let scene = &subject.scene;
+    let scene = map.sweep.scene();
     let mut rig = Simulated::of(scene)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let record = experiment::run(rig.as_mut(), &mut controller, &Plan::of(scene), |_, _, _| {});
-    let identified = record.map_err(|error| error.to_string()).and_then(|record| {
-        let identification = identify(&record, scene).map_err(|error| error.to_string())?;
+    let mut measure = || -> Result<(Record, Comparison), Box<dyn Error>> {
+        let record = experiment::run(rig.as_mut(), &mut controller, &Plan::of(scene), |_, _, _| {})?;
+        let identification = identify(&record, scene)?;
         Ok((record, Comparison::of(&identification, scene)))
-    });
-    let (record, result) = match identified {
-        Ok(identified) => identified,
+    };
+    let (record, result) = match measure() {
+        Ok(measured) => measured,
         Err(error) => return Ok(section.concluded(format!("The experiment gave no backbone: {error}."))),
     };
     describe(&mut section, &result);
@@ -204,9 +205,9 @@ fn describe_lock(section: &mut Section, result: &Comparison) {
 }
 
 /// The backbone tracked with the loop closed, level by level.
-fn tracking(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
+fn tracking(map: &mut Map, done: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("The backbone, tracked with the loop closed");
-    let scene = &subject.scene;
+    let scene = map.sweep.scene();
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let mut rig = Simulated::of(scene)?;
     let tracked = track(rig.as_mut(), &mut controller, scene, |at, of| {
@@ -247,9 +248,9 @@ fn tracking(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
 }
 
 /// First-order theory: the backbones of several r, activation, and how it approaches the exact orbits.
-fn theory(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
+fn theory(map: &mut Map, _: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("First-order theory and its accuracy");
-    let p = subject.scene.dimensionless();
+    let p = map.sweep.scene().dimensionless();
     let flow = SlowFlow::new(p.lambda, p.r);
     let stable = resonant(&p).into_iter().find(|point| point.stable());
     section.words(format!(
@@ -314,9 +315,9 @@ fn describe_activation(section: &mut Section, scene: &Dimensionless, sigma: f64)
 }
 
 /// Exact frequency responses and backbone, and one period of the locked motion.
-fn curves(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
+fn curves(map: &mut Map, done: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("Exact periodic motions");
-    let p = subject.scene.dimensionless();
+    let p = map.sweep.scene().dimensionless();
     let limits = ContinuationLimits::default();
     let excitations = excitations(&p);
     let mut responses: Vec<FrequencyResponse> = Vec::new();
@@ -438,21 +439,19 @@ fn curves_csv(backbone: &Branch, responses: &[FrequencyResponse]) -> Result<Stri
 }
 
 /// The regime map.
-fn regimes(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
+fn regimes(map: &mut Map, done: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("Regimes of the driven response");
-    let [x, y] = &subject.map;
-    let map = Map::new(subject.family.clone(), x, y, None, LIMIT)?;
     let (count, all) = (AtomicUsize::new(0), map.sweep.cells());
-    let map = map.run(0, || {
+    map.run(0, || {
         let n = count.fetch_add(1, Ordering::Relaxed) + 1;
         done(n as f64 / all as f64);
     })?;
-    describe_map(&mut section, &map, subject);
+    describe_map(&mut section, map);
     section.figure(
         "regimes",
         "The regime map. The black line is the border of the island in which first-order theory has a stable symmetric 1:1 motion. The \
          coloured curves are exact bifurcations of the 1:1 motions, solid where they bound the stability of one.",
-        &figures::regimes(&map),
+        &figures::regimes(map),
     );
     section.budget(
         "regime map",
@@ -460,13 +459,14 @@ fn regimes(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
         "Where several regimes are stable, the start decides. Chaos that ends only after more periods than were simulated counts \
          as lasting; docs/regimes.md says how often that happens.",
     );
-    section.attach("regimes.csv", map_csv(&map)?);
-    section.attach("bifurcations.csv", bifurcations_csv(&map)?);
+    section.attach("regimes.csv", map_csv(map)?);
+    section.attach("bifurcations.csv", bifurcations_csv(map)?);
     Ok(section)
 }
 
-fn describe_map(section: &mut Section, map: &Map, subject: &Subject) {
-    let [x, y] = subject.map.each_ref().map(Axis::short_form);
+fn describe_map(section: &mut Section, map: &Map) {
+    let [x, y] = map.axes().map(Axis::short_form);
+    let limit = map.sweep.settings().periods;
     let all = map.cells.len();
     let inside = map.cells.iter().filter(|cell| cell.theory_stable).count();
     let (_, agree) = map.count(Regime::Symmetric);
@@ -476,11 +476,10 @@ fn describe_map(section: &mut Section, map: &Map, subject: &Subject) {
         percent(agree, inside)
     );
     section.words(format!(
-        "Each cell of the map over {} and {} is one plant, driven from the scene's start at a fixed frequency until it repeats itself, \
-         at most for {} periods. A motion that has not repeated itself by then is chaotic if its largest Lyapunov exponent exceeds zero by \
+        "Each cell of the map over {x} and {y} is one plant, driven from the scene's start at a fixed frequency until it repeats itself, \
+         at most for {limit} periods. A motion that has not repeated itself by then is chaotic if its largest Lyapunov exponent exceeds zero by \
          four standard errors, modulated if also a fifth of its impacts or more are captured into 1:1 resonance for a while, \
-         quasi-periodic if the exponent is zero within its uncertainty, and otherwise undecided.",
-        x, y, LIMIT
+         quasi-periodic if the exponent is zero within its uncertainty, and otherwise undecided."
     ));
     section.table("How often each regime occurs.", &summary::regimes(map));
     section.words(section.finding.clone());

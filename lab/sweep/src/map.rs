@@ -87,7 +87,7 @@ impl Map {
     ///
     /// # Errors
     /// Values that scene or plant refuse.
-    pub fn run(mut self, confirmations: usize, done: impl Fn() + Sync) -> Result<Self, SweepError> {
+    pub fn run(&mut self, confirmations: usize, done: impl Fn() + Sync) -> Result<(), SweepError> {
         let cells = (0..self.sweep.cells()).into_par_iter().map(|n| {
             let place = [self.y.at(n / self.x.points), self.x.at(n % self.x.points)];
             let cell = self.cell(&place, confirmations);
@@ -96,7 +96,7 @@ impl Map {
         });
         self.cells = cells.collect::<Result<_, _>>()?;
         self.curves = self.bifurcations();
-        Ok(self)
+        Ok(())
     }
 
     /// The cell at these values of y and x.
@@ -135,11 +135,16 @@ impl Map {
         bifurcation_curves(&self.sweep.scene().dimensionless(), &limits)
     }
 
+    /// The axes, horizontal first.
+    #[must_use]
+    pub fn axes(&self) -> [&Axis; 2] {
+        [1, 0].map(|n| &self.sweep.settings().axes[n])
+    }
+
     /// Names of the axes, horizontal first: sigma, G, r, or a key of the scene.
     #[must_use]
     pub fn names(&self) -> [&str; 2] {
-        let [y, x] = [0, 1].map(|n| self.sweep.settings().axes[n].short_name());
-        [x, y]
+        self.axes().map(Axis::short_name)
     }
 
     /// First-order theory has a stable symmetric 1:1 motion at a point of the plane.

@@ -3,10 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use vines::{
-    report::{Subject, write_report},
-    scene::{Family, Scene},
-};
+use vines::{map::LIMIT, report::write_report, scene::Family, sweep::Map};
 
 use crate::{overrides, words};
 
@@ -14,12 +11,10 @@ use crate::{overrides, words};
 fn write(out: &Path) {
     let overrides = overrides("controller.amplitude_tolerance=8e-3 phase_lock.lock.dwell=5");
     let text = include_str!("../../../scenes/dimensionless.toml");
-    let subject = Subject {
-        scene: Scene::parse("dimensionless.toml", text, &overrides).unwrap(),
-        family: Family::parse("dimensionless.toml", Some(text), &overrides).unwrap(),
-        map: ["sigma=-2:1:7", "G=0.8:1.8:6"].map(|range| range.parse().unwrap()),
-    };
-    write_report(&subject, out, &|_, _| {}).unwrap();
+    let family = Family::parse("dimensionless.toml", Some(text), &overrides).unwrap();
+    let [x, y] = ["sigma=-2:1:7", "G=0.8:1.8:6"].map(|axis| axis.parse().unwrap());
+    let mut map = Map::new(family, &x, &y, None, LIMIT).unwrap();
+    write_report(&mut map, out, &|_, _| {}).unwrap();
 }
 
 /// Debian's Chromium, if it is here, on a page: what it says on the console, and what it makes of the page.

@@ -16,7 +16,9 @@ fn map(x: &str, y: &str, periods: usize) -> Result<Map, String> {
 }
 
 fn mapped(x: &str, y: &str, periods: usize) -> Map {
-    map(x, y, periods).unwrap().run(0, || {}).unwrap()
+    let mut map = map(x, y, periods).unwrap();
+    map.run(0, || {}).unwrap();
+    map
 }
 
 #[test]
