@@ -101,14 +101,16 @@ impl Server {
 #[test]
 fn built_in_fmu_and_lock_step_network_give_the_same_bits() {
     let [plant, controller] = fmus();
-    let sensors = "--set=resonance.sensor='acceleration' --set=resonance.reference='force'";
-    let results = ["", sensors].map(|settings| {
+    // From rest, the response is held and moved until the motion impacts.
+    let sensors = "--set=resonance.sensor='acceleration' --set=resonance.reference='force' --set=start.dq2=0";
+    let sensors = format!("{sensors} --set=phase_lock.harmonics=4 --set=phase_lock.base_bandwidth=0.5");
+    let results = ["", &sensors].map(|settings| {
         let with = |endpoints: &str| identified(&format!("{endpoints} {settings}"));
         let direct = with("--rig built-in");
         assert_eq!(with(&format!("--rig {plant}")), direct);
         assert_eq!(with(&format!("--rig built-in --controller {controller}")), direct);
         let rig = Server::start(&format!("rig --lock-step {settings}"));
-        let peer = Server::start("controller");
+        let peer = Server::start(&format!("controller {settings}"));
         assert_eq!(with(&format!("--rig {} --controller {}", rig.1, peer.1)), direct);
         for server in [rig, peer] {
             let report = server.report();

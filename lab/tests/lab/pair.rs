@@ -9,22 +9,17 @@ use std::{
 use vines::experiment::{self, ExperimentError, Plan};
 use vines::fmu::{FmuController, FmuRig};
 use vines::identification::identify;
-use vines::rig::{BuiltIn, Controller, Drive, Move, Rig, Simulated};
+use vines::rig::{Controller, Drive, Rig, Simulated};
 use vines::scene::{Names, PAPER, Scene};
 
 use crate::endpoints::fmus;
 use crate::{built_in, overrides, rig};
 
-/// The default scene with other settings.
-fn scene(settings: &str) -> Scene {
-    Scene::load(None, &overrides(settings)).unwrap()
-}
-
 #[test]
 fn the_fmu_has_the_bits_of_the_plant_in_a_real_cavity() {
     let friction = "plant.mu_k=0.1 plant.mu_s=0.2 plant.theta=0.3 start.dq2=0.5";
     let walls = "plant.b_plus=0.011 plant.r_minus=0.6 plant.r_min=0.2 plant.r_scatter=0.1 plant.seed=5";
-    let scene = scene(&format!("{friction} {walls}"));
+    let scene = Scene::load(None, &overrides(&format!("{friction} {walls}"))).unwrap();
     let mut fmu = FmuRig::load(Path::new(&fmus()[0]), &scene).unwrap();
     let mut own = Simulated::new(scene.plant, scene.start).unwrap();
     let drive = Drive {
@@ -41,35 +36,6 @@ fn the_fmu_has_the_bits_of_the_plant_in_a_real_cavity() {
     }
     let truth = own.ground_truth().unwrap().unwrap();
     assert!(truth.impacts > 10, "{truth:?}");
-}
-
-#[test]
-fn the_fmu_moves_the_response_with_the_bits_of_the_built_in_controller() {
-    let scene = scene("phase_lock.harmonics=4 phase_lock.base_bandwidth=0.5");
-    let config = scene.backbone_config();
-    let mut fmu = FmuController::load(Path::new(&fmus()[1]), &config, &Default::default()).unwrap();
-    let mut own = BuiltIn::new(&config).unwrap();
-    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
-    let mut moved = 0.0;
-    for n in 0..6000 {
-        if n == 2000 || n == 4000 {
-            let to = Move {
-                response: (0.8 - 1e-4 * n as f64) * scene.plant.half_width,
-                duration: 2.0,
-                amplitude: -1e-6,
-                omega: 0.01,
-                growth: 0.0,
-            };
-            fmu.hold_response(to, -1.5).unwrap();
-            own.hold_response(to, -1.5).unwrap();
-        }
-        let sensors = rig.sense().unwrap();
-        let command = own.sample(sensors, true).unwrap();
-        assert_eq!(fmu.sample(sensors, true).unwrap(), command, "sample {n}");
-        rig.advance(command.drive, scene.sample_time()).unwrap();
-        moved = command.drive.amplitude;
-    }
-    assert!(moved != config.amplitude);
 }
 
 /// Writes an FMU whose variables have other names.
