@@ -59,12 +59,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let files = report::write_tracked(&result, &experiment.out)?;
     if let Some(ended) = tracked.ended {
         let mut failure = Failure::from(ended);
-        let files = written(&files);
-        failure.message += &format!(
-            "\n{} points were measured before. {}",
-            result.points.len(),
-            files.trim_end()
-        );
+        let (count, files) = (result.points.len(), written(&files));
+        failure.message += &format!("\n{count} points were measured before. {}", files.trim_end());
         return Err(failure);
     }
     let mut text = experiment.result(&result, &summary, &files, timing)?;

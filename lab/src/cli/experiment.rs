@@ -144,16 +144,16 @@ impl ExperimentArguments {
         timing: Closed,
     ) -> Result<String, Failure> {
         let text = output(self.json, result, || format!("{summary}\n{}", written(paths)))?;
-        let doubt = match &timing {
+        let doubt = |share: f64| match &timing {
             None => None,
-            Some(Ok(timing)) => timing.doubt(TOLERATED),
+            Some(Ok(timing)) => timing.doubt(share),
             Some(Err(lost)) => Some(lost.to_string()),
         };
-        if let Some(doubt) = doubt {
+        if let Some(doubt) = doubt(TOLERATED) {
             print(&text)?;
             return Err(Failure::new(LATE, format!("these results are doubtful: {doubt}")));
         }
-        if let Some(reason) = timing.and_then(|timing| timing.ok()?.doubt(0.0)) {
+        if let Some(reason) = doubt(0.0) {
             eprintln!("warning: {reason}");
         }
         Ok(text)
@@ -177,14 +177,14 @@ impl Session {
 
 /// The failure of an experiment that ended early, with the reason that the exact orbits know, and what was measured in a file.
 pub(super) fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &Path) -> Failure {
-    let reason = matches!(
-        error,
+    let reason = match error {
         ExperimentError::NoLock { .. }
-            | ExperimentError::NotReached { .. }
-            | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. }
-    )
-    .then(|| advice::reason(scene, advice::last_regime(samples, scene)))
-    .flatten();
+        | ExperimentError::NotReached { .. }
+        | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. } => {
+            advice::reason(scene, advice::last_regime(samples, scene))
+        }
+        _ => None,
+    };
     kept(Failure::from(error), reason, samples, out)
 }
 
