@@ -9,7 +9,7 @@ use vines::rig::{BuiltIn, ControllerError, Rig, SensorsOnly, Simulated};
 use vines::scene::{Parameters, Scene};
 
 use crate::experiment::ConstantDrive;
-use crate::{rig, scene};
+use crate::{rig, scene, words};
 
 fn tracked_on(rig: &mut dyn Rig, scene: &Scene) -> Result<TrackedComparison, ExperimentError> {
     let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
@@ -156,13 +156,8 @@ fn without_evidence_of_impacts_no_point_of_a_rig_is_called_one_to_one() {
 
 #[test]
 fn impacts_of_other_rigs_are_recognised_from_the_response_with_and_without_noise() {
-    for rig in [
-        "",
-        "plant.r=0.4",
-        "plant.r=0.85",
-        "plant.epsilon=0.003",
-        "plant.lambda=1",
-    ] {
+    let rigs = "plant.r=0.65 plant.r=0.4 plant.r=0.85 plant.epsilon=0.003 plant.lambda=1";
+    for rig in words(rigs) {
         for seed in 0..4 {
             let noise = format!("{rig} chain.snr=40 chain.seed={seed}");
             let (is_noisy, settings) = (seed > 0, if seed > 0 { &noise } else { rig });
@@ -180,8 +175,6 @@ fn impacts_of_other_rigs_are_recognised_from_the_response_with_and_without_noise
 fn a_controller_that_cannot_hold_the_response_is_refused() {
     let scene = scene("");
     let error = track(&mut *rig(&scene), &mut ConstantDrive::new(&scene), &scene, |_, _| {}).unwrap_err();
-    assert!(matches!(
-        error,
-        ExperimentError::Controller(ControllerError::NoResponseLoop)
-    ));
+    let is_refused = matches!(error, ExperimentError::Controller(ControllerError::NoResponseLoop));
+    assert!(is_refused, "{error}");
 }

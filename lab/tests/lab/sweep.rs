@@ -1,6 +1,13 @@
 //! Guards `vines sweep` as a program: kills, signals, a full disk and folders that cannot be written.
 
-use std::{collections::BTreeMap, fs, path::Path, process::Command, thread, time::Duration};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+    thread,
+    time::Duration,
+};
 
 use crate::{PROGRAM, Running, text, vines, words};
 
@@ -18,21 +25,20 @@ fn start(line: &str, out: &Path) -> Running {
     Running::start(&words(&format!("{line} --out {}", out.display())))
 }
 
-fn files(folder: &Path, below: &str, all: &mut BTreeMap<String, Vec<u8>>) {
-    for entry in fs::read_dir(folder.join(below)).unwrap().flatten() {
-        let name = format!("{below}/{}", entry.file_name().display());
-        if entry.path().is_dir() {
-            files(folder, name.trim_start_matches('/'), all);
-        } else {
-            all.insert(name, fs::read(entry.path()).unwrap());
+/// All files below a folder.
+fn content(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let files = entries.flat_map(|path| {
+        let name = PathBuf::from(path.file_name().unwrap());
+        match path.is_dir() {
+            true => content(&path)
+                .into_iter()
+                .map(|(file, content)| (name.join(file), content))
+                .collect(),
+            false => vec![(name, fs::read(&path).unwrap())],
         }
-    }
-}
-
-fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut all = BTreeMap::new();
-    files(folder, "", &mut all);
-    all
+    });
+    files.collect()
 }
 
 #[test]
@@ -102,7 +108,7 @@ fn ctrl_c_keeps_complete_chunks_and_the_same_command_goes_on() {
     let output = sweep.output();
     assert_eq!(output.status.code(), Some(130), "{output:?}");
     assert!(text(&output).contains("the same command continues"), "{output:?}");
-    assert!(content(&out).keys().any(|key| key.starts_with("failure/c/")));
+    assert!(content(&out).keys().any(|key| key.starts_with("failure/c")));
 }
 
 #[test]
@@ -112,19 +118,11 @@ fn a_full_disk_a_folder_that_cannot_be_written_and_a_sweep_that_is_too_large_are
     let large = "sweep --axis=plant.r=0.3:0.9:1000000 --axis=sigma=-5:5:1000000";
     ends(large, &out, 2, &["1000000000000 cells", " h ", "GB", "--yes"]);
     assert!(!out.exists());
-    let proc = Path::new("/proc/store");
-    ends(
-        "sweep --axis plant.r=0.3,0.4",
-        proc,
-        1,
-        &["cannot write to /proc/store"],
-    );
+    let parts = ["cannot write to /proc/store"];
+    ends("sweep --axis plant.r=0.3,0.4", Path::new("/proc/store"), 1, &parts);
     // No file may grow beyond one block: as on a full disk, metadata that fits is written and a larger chunk is not.
-    let arguments = "sweep --axis plant.r=0.3:0.9:400 --periods 100 --sigma=-4 --out";
-    let script = format!(
-        "trap '' XFSZ; ulimit -f 4; exec {PROGRAM} {arguments} {}",
-        out.display()
-    );
+    let sweep = format!("{PROGRAM} sweep --axis plant.r=0.3:0.9:400 --periods 100 --sigma=-4");
+    let script = format!("trap '' XFSZ; ulimit -f 4; exec {sweep} --out {}", out.display());
     let output = Command::new("sh").args(["-c", &script]).output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     for part in ["cannot write to", "continues the sweep"] {

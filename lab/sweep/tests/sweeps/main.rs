@@ -117,15 +117,16 @@ fn counts(monitor: &Monitor) -> (u64, u64) {
 
 /// All files below a folder.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut all = BTreeMap::new();
-    for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
-        let name = path.file_name().unwrap().display().to_string();
-        if path.is_dir() {
-            let below = files(&path).into_iter();
-            all.extend(below.map(|(file, content)| (format!("{name}/{file}"), content)));
-        } else {
-            all.insert(name, fs::read(&path).unwrap());
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap());
+    let files = entries.flat_map(|entry| {
+        let (name, path) = (entry.file_name().into_string().unwrap(), entry.path());
+        match path.is_dir() {
+            true => files(&path)
+                .into_iter()
+                .map(|(file, content)| (format!("{name}/{file}"), content))
+                .collect(),
+            false => vec![(name, fs::read(path).unwrap())],
         }
-    }
-    all
+    });
+    files.collect()
 }
