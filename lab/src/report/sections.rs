@@ -140,25 +140,29 @@ fn describe(section: &mut Section, result: &Comparison) {
 /// The locked point beside exact orbit and theory: a row for each quantity, dimensionless and in SI units.
 fn describe_lock(section: &mut Section, result: &Comparison) {
     let (p, lock, at) = (&result.parameters, &result.lock, &result.lock.at);
-    let b = lock.b.zip(lock.u_b);
-    let measured = [
-        with_uncertainty(at.sigma, at.u_sigma),
-        with_uncertainty(at.f_hz, at.u_f_hz),
-        with_uncertainty(at.c, at.u_c),
-        with_uncertainty(1e3 * at.a_m, 1e3 * at.u_a_m),
-        b.map_or("–".into(), |(b, u)| with_uncertainty(b, u)),
-    ];
     let millimetres = 1e3 * at.a_m / at.c;
-    let computed = |sigma: f64, c: f64, b: f64| [sigma, p.omega(sigma) / TAU, c, millimetres * c, b].map(number);
-    let mut columns = vec![("measured".to_string(), measured)];
+    let measured = [
+        (at.sigma, at.u_sigma),
+        (at.f_hz, at.u_f_hz),
+        (at.c, at.u_c),
+        (1e3 * at.a_m, 1e3 * at.u_a_m),
+        lock.b.zip(lock.u_b).unwrap_or((f64::NAN, f64::NAN)),
+    ];
+    let measured = measured.map(|(value, u)| match value.is_nan() {
+        true => "–".into(),
+        false => with_uncertainty(value, u),
+    });
+    let mut columns = vec![("measured", measured)];
+    let mut add = |name, [sigma, c, b]: [f64; 3]| {
+        let numbers = [sigma, p.omega(sigma) / TAU, c, millimetres * c, b];
+        columns.push((name, numbers.map(number)));
+    };
     let percent = |c: f64, reference: f64| 100.0 * (c / reference - 1.0).abs();
     if let Some(exact) = &result.exact {
-        columns.push(("exact orbit".into(), computed(exact.sigma, exact.c, exact.b)));
-        let others = result.others();
-        columns.extend(others.map(|orbit| {
-            let name = "another stable orbit, not followed".to_string();
-            (name, computed(orbit.sigma, orbit.c, orbit.b))
-        }));
+        add("exact orbit", [exact.sigma, exact.c, exact.b]);
+        for orbit in result.others() {
+            add("another stable orbit, not followed", [orbit.sigma, orbit.c, orbit.b]);
+        }
         let sigma = (at.sigma - exact.sigma).abs();
         section.budget(
             "lock, measured against the exact orbit",
@@ -170,17 +174,17 @@ fn describe_lock(section: &mut Section, result: &Comparison) {
         );
     }
     if let Some(theory) = &result.theory {
-        columns.push(("first-order theory".into(), computed(theory.sigma, theory.c, theory.b)));
-        if let Some(exact) = &result.exact {
-            let sigma = (theory.sigma - exact.sigma).abs();
-            section.budget(
-                "theory against the exact orbit, at the lock",
-                format!("{sigma:.3} in σ, {:.1} % in C", percent(theory.c, exact.c)),
-                "The theory is of first order in ε; the convergence study below shows that the difference shrinks as ε.",
-            );
-        }
+        add("first-order theory", [theory.sigma, theory.c, theory.b]);
     }
-    let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+    if let Some((theory, exact)) = result.theory.zip(result.exact) {
+        let sigma = (theory.sigma - exact.sigma).abs();
+        section.budget(
+            "theory against the exact orbit, at the lock",
+            format!("{sigma:.3} in σ, {:.1} % in C", percent(theory.c, exact.c)),
+            "The theory is of first order in ε; the convergence study below shows that the difference shrinks as ε.",
+        );
+    }
+    let names: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
     let quantities = [
         "detuning σ",
         "frequency, Hz",
@@ -188,10 +192,8 @@ fn describe_lock(section: &mut Section, result: &Comparison) {
         "amplitude, mm",
         "particle speed B",
     ];
-    let rows = (0..).zip(quantities).map(|(n, quantity)| {
-        let cells = columns
-            .iter()
-            .map(|(_, cells): &(String, [String; 5])| cells[n].clone());
+    let rows = quantities.iter().enumerate().map(|(n, quantity)| {
+        let cells = columns.iter().map(|(_, cells)| cells[n].clone());
         std::iter::once(quantity.to_string()).chain(cells).collect::<Vec<_>>()
     });
     section.table(
@@ -277,28 +279,21 @@ fn theory(map: &mut Map, _: Progress) -> Result<Section, ReportError> {
          impacts, the lower the amplitude at the fold.",
         &figures::backbones(&p),
     );
-    match convergence(&p, 6) {
-        Some(study) => {
-            let [s, c, b] = study.slopes;
-            section.finding = format!(
-                "The difference between first-order theory and exact orbit shrinks as ε to the power {s:.2} in σ, {c:.2} in C and {b:.2} in B."
-            );
-            let rows = study
-                .rows
-                .iter()
-                .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|value| format!("{value:.3e}")));
-            section.table(
-                "Theory minus exact orbit at phase resonance; λ, r and G as in the scene.",
-                &Table::new("ε | in σ | in C | in B").rows(rows),
-            );
-            section.words(section.finding.clone());
-            section.attach("convergence.csv", csv("", &study.rows)?);
-        }
-        None => {
-            return Ok(section.concluded("Theory and exact orbits have no common stable phase-resonant motion here."));
-        }
-    }
-    Ok(section)
+    let Some(study) = convergence(&p, 6) else {
+        return Ok(section.concluded("Theory and exact orbits have no common stable phase-resonant motion here."));
+    };
+    let [s, c, b] = study.slopes;
+    let finding = format!(
+        "The difference between first-order theory and exact orbit shrinks as ε to the power {s:.2} in σ, {c:.2} in C and {b:.2} in B."
+    );
+    let rows = study.rows.iter();
+    let rows = rows.map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|value| format!("{value:.3e}")));
+    section.table(
+        "Theory minus exact orbit at phase resonance; λ, r and G as in the scene.",
+        &Table::new("ε | in σ | in C | in B").rows(rows),
+    );
+    section.attach("convergence.csv", csv("", &study.rows)?);
+    Ok(section.concluded(finding))
 }
 
 fn describe_activation(section: &mut Section, scene: &Dimensionless, sigma: f64) {
@@ -360,14 +355,11 @@ fn curves(map: &mut Map, done: Progress) -> Result<Section, ReportError> {
 }
 
 fn describe_backbone(section: &mut Section, curve: &Branch) {
-    let special: Vec<String> = curve
-        .special
-        .iter()
-        .map(|special| {
-            let Periodic { sigma, c, g, .. } = special.motion;
-            format!("{} at σ = {sigma:.4}, C = {c:.4}, G = {g:.4}", special.name())
-        })
-        .collect();
+    let special = curve.special.iter().map(|special| {
+        let Periodic { sigma, c, g, .. } = special.motion;
+        format!("{} at σ = {sigma:.4}, C = {c:.4}, G = {g:.4}", special.name())
+    });
+    let special: Vec<String> = special.collect();
     section.finding = format!(
         "The exact backbone was followed through {} motions; its stability changes in {} place{}.",
         curve.points.len(),
@@ -378,9 +370,10 @@ fn describe_backbone(section: &mut Section, curve: &Branch) {
         "These motions are exact: periodic orbits of the full equations, found by shooting on the impact map. Pseudo-arclength \
          continuation follows them through folds and symmetry breaking, stable or not. There is no first-order approximation.",
     );
-    let places = match special.len() {
-        0 => "nowhere".into(),
-        _ => special.join("; "),
+    let places = if special.is_empty() {
+        "nowhere".into()
+    } else {
+        special.join("; ")
     };
     section.words(format!(
         "Along the exact backbone, stability changes here: {places}. The theory predicts symmetry breaking at \
@@ -425,8 +418,11 @@ fn excitations(p: &Dimensionless) -> Vec<f64> {
 fn curves_csv(backbone: &Branch, responses: &[FrequencyResponse]) -> Result<String, ReportError> {
     let headings = "curve,sigma,G,C,gamma,B,largest_multiplier,stable";
     let components = responses.iter().flat_map(|response| {
-        let components = response.components.iter();
-        components.map(|component| (format!("G={:.4}: {}", response.g, component.name), &component.branch))
+        let name = |name: &str| format!("G={:.4}: {name}", response.g);
+        response
+            .components
+            .iter()
+            .map(move |component| (name(&component.name), &component.branch))
     });
     let curves = std::iter::once(("backbone".to_string(), backbone)).chain(components);
     let rows = curves.flat_map(|(curve, branch)| {
