@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use lovines::InvalidValue;
+use phase_lock::ConfigError;
 use vines::rig::{Interrupted, RigError};
 use vines::scene::{SceneError, refusal};
 use vines::{ArgumentError, experiment::ExperimentError, net::LinkError, pack::PackError, sweep::SweepError};
@@ -41,7 +42,7 @@ impl<E: Error + 'static> From<E> for Failure {
     /// Errors of what a user gives are bad input; all others are failures at run time.
     fn from(error: E) -> Self {
         let any: &(dyn Error + 'static) = &error;
-        if let Some(error) = any.downcast_ref() {
+        if let Some(error) = any.downcast_ref::<ConfigError>() {
             return Self::input(refusal(error));
         }
         let is_of_experiment = match any.downcast_ref() {
