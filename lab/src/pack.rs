@@ -156,7 +156,7 @@ fn fmus(components: &[Component], binaries: &[Binary]) -> Result<Vec<File>, Pack
     // Name and content of the libraries of each component; the GUID in a library determines its component.
     let mut libraries = vec![BTreeMap::new(); components.len()];
     for Binary { platform: [folder, suffix], path } in binaries {
-        let refused = |problem| PackError::Library { path: path.clone(), problem };
+        let refused = |problem: String| PackError::Library { path: path.clone(), problem };
         let content = std::fs::read(path).map_err(|error| refused(format!("cannot be read: {error}")))?;
         let contains = |text: &str| content.windows(text.len()).any(|part| part == text.as_bytes());
         let owner = descriptions.iter().position(|description| contains(&description.guid));
@@ -165,22 +165,25 @@ fn fmus(components: &[Component], binaries: &[Binary]) -> Result<Vec<File>, Pack
         let name = format!("binaries/{folder}/{}{suffix}", components[owner].identifier);
         libraries[owner].insert(name, content);
     }
-    let parts = components.iter().zip(&descriptions).zip(libraries);
-    let fmus = parts.map(|((component, description), libraries)| {
+    let mut fmus = Vec::new();
+    for ((component, description), libraries) in components.iter().zip(&descriptions).zip(libraries) {
         let name = format!("{}.fmu", component.identifier);
         if libraries.is_empty() {
             let problem = "has no library: give one by --binary PLATFORM=FILE, or leave out --only-binaries".into();
             return Err(PackError::Library { path: name.into(), problem });
         }
-        let page = documentation(component, description);
         let entries = [
-            ("modelDescription.xml".to_owned(), component.xml.clone().into_bytes()),
-            ("documentation/index.html".to_owned(), page.into_bytes()),
-            ("model.png".to_owned(), component.png.to_vec()),
+            ("modelDescription.xml", component.xml.clone().into_bytes()),
+            (
+                "documentation/index.html",
+                documentation(component, description).into_bytes(),
+            ),
+            ("model.png", component.png.to_vec()),
         ];
-        archive(name, entries.into_iter().chain(libraries))
-    });
-    fmus.collect()
+        let entries = entries.map(|(name, content)| (name.into(), content));
+        fmus.push(archive(name, entries.into_iter().chain(libraries))?);
+    }
+    Ok(fmus)
 }
 
 /// The zip archive of these files, as a file.
@@ -196,15 +199,13 @@ fn archive(name: String, entries: impl IntoIterator<Item = File>) -> Result<File
 /// The page inside an FMU: its table comes from `modelDescription.xml`, figure, equations and explanations from `pictures/`.
 fn documentation(component: &Component, description: &Description) -> String {
     let rows = description.variables.iter().map(|variable| {
-        let content = variable.content().map(|(_, content)| content.clone());
-        let content = content.unwrap_or_default();
-        vec![
-            variable.name.clone(),
-            content.start.unwrap_or_default(),
-            content.unit.unwrap_or_default(),
-            format!("{:?}, {:?}", variable.causality, variable.variability),
-            variable.description.clone(),
-        ]
+        let content = variable
+            .content()
+            .map(|(_, content)| content.clone())
+            .unwrap_or_default();
+        let kind = format!("{:?}, {:?}", variable.causality, variable.variability);
+        let (start, unit) = (content.start.unwrap_or_default(), content.unit.unwrap_or_default());
+        [variable.name.clone(), start, unit, kind, variable.description.clone()]
     });
     let variables = Table::new("name | start | unit | causality, variability | meaning").rows(rows);
     let page = html! {
@@ -238,46 +239,35 @@ fn system(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
     let stop = PERIODS * scene.dimensionless().natural_period();
     let mut structure = STRUCTURE.to_owned();
     for (attribute, value) in [("stopTime", stop), ("stepSize", step), ("baseStepSize", step)] {
-        structure = structure.replace(
-            &format!(" {attribute}=\"derived\""),
-            &format!(" {attribute}=\"{value}\""),
-        );
+        let [derived, own] = ["derived".into(), value.to_string()].map(|value| format!(" {attribute}=\"{value}\""));
+        structure = structure.replace(&derived, &own);
     }
+    // The start of the plant goes by its parameters: some masters set no start value of an output.
+    let plant = scene.start_values().into_iter().map(|(name, value)| match name {
+        "q1" => ("q1_start", value),
+        "der(q1)" => ("der_q1_start", value),
+        "q2" => ("q2_start", value),
+        "der(q2)" => ("der_q2_start", value),
+        name => (name, value),
+    });
+    // The controller is armed from the start.
+    let config = scene.controller_config();
+    let controller = PARAMETERS
+        .iter()
+        .map(|parameter| (parameter.name, parameter.get(&config)));
+    let controller = controller.chain([("active", Value::Boolean(true))]);
     let entries = [
         ("SystemStructure.ssd".to_owned(), structure.into_bytes()),
-        ("resources/plant.ssv".to_owned(), parameter_set("plant", plant(scene))),
+        ("resources/plant.ssv".to_owned(), parameter_set("plant", plant)),
         (
             "resources/controller.ssv".to_owned(),
-            parameter_set("controller", controller(scene)),
+            parameter_set("controller", controller),
         ),
     ];
     let fmus = fmus
         .iter()
         .map(|(name, content)| (format!("resources/{name}"), content.clone()));
     archive("bench.ssp".into(), entries.into_iter().chain(fmus))
-}
-
-/// Parameters and start of the plant. The start goes by its parameters: some masters set no start value of an output.
-fn plant(scene: &Scene) -> impl Iterator<Item = (&str, Value)> {
-    scene.start_values().into_iter().map(|(name, value)| {
-        let parameter = match name {
-            "q1" => "q1_start",
-            "der(q1)" => "der_q1_start",
-            "q2" => "q2_start",
-            "der(q2)" => "der_q2_start",
-            name => name,
-        };
-        (parameter, value)
-    })
-}
-
-/// Parameters of the controller, which is armed from the start.
-fn controller(scene: &Scene) -> impl Iterator<Item = (&str, Value)> {
-    let config = scene.controller_config();
-    let parameters = PARAMETERS.iter();
-    parameters
-        .map(move |parameter| (parameter.name, parameter.get(&config)))
-        .chain([("active", Value::Boolean(true))])
 }
 
 /// A file of parameter values. Every set has its own name, since some masters merge sets of the same name.

@@ -2,11 +2,11 @@
 //! JSON); and recordings, two channels over time (CSV).
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::fmt::Display;
+use std::path::Path;
 use std::str::FromStr;
 
 use serde_json::Value;
-use thiserror::Error;
 
 use crate::ArgumentError;
 use crate::fit::{MeasuredPoint, Recording};
@@ -49,65 +49,6 @@ impl FromStr for Column {
             .ok_or_else(form)?;
         Ok(Self { quantity, name: Name::with_unit(name.trim(), unit.trim())? })
     }
-}
-
-/// Why points cannot be read.
-#[derive(Debug, Error)]
-#[expect(missing_docs, reason = "the messages explain the variants")]
-pub enum PointsError {
-    #[error("cannot read {}: {reason}", path.display())]
-    Read { path: PathBuf, reason: String },
-    #[error(
-        "{} has no column `{column}`; it has {}. Name the column of {quantity} with --column {quantity}=NAME:UNIT. A fit needs the standard \
-         uncertainties u_f, u_A and u_E as well as f, A and E",
-        path.display(), columns.join(", ")
-    )]
-    NoColumn {
-        path: PathBuf,
-        column: String,
-        quantity: &'static str,
-        columns: Vec<String>,
-    },
-    #[error("{}, row {row}: {column} = `{value}` is not a finite number", path.display())]
-    NotANumber {
-        path: PathBuf,
-        row: usize,
-        column: String,
-        value: String,
-    },
-    #[error(
-        "{} has no channel `{channel}`; it has {}. Name the channel with {option} NAME:UNIT; a recording needs the response and the displacement of \
-         the base",
-        path.display(), channels.join(", ")
-    )]
-    NoChannel {
-        path: PathBuf,
-        channel: String,
-        option: &'static str,
-        channels: Vec<String>,
-    },
-    #[error("{} has no column `time` (s): give the samples a second with --rate", path.display())]
-    NoTime { path: PathBuf },
-    #[error(
-        "{}, row {row}: the time goes from {from} s to {to} s, where a step is {step:.6e} s: the recording is interrupted there. Fit the parts as \
-         files of their own, `vines fit one.csv two.csv`",
-        path.display()
-    )]
-    Uneven {
-        path: PathBuf,
-        row: usize,
-        from: f64,
-        to: f64,
-        step: f64,
-    },
-    #[error(
-        "{}: this program reads recordings as CSV. `python -m vines fit {}` with the same options reads MAT, HDF5, TDMS and UFF58; install it with \
-         `pip install './python[io]'`",
-        path.display(), path.display()
-    )]
-    Python { path: PathBuf },
-    #[error("{} has neither a locked point (`lock`) nor `points`: expected identification.json, tracked.json, or a table (CSV)", path.display())]
-    NoPoints { path: PathBuf },
 }
 
 /// A row of a table: values by the names of the columns.
@@ -155,13 +96,15 @@ pub enum Measurement {
 ///
 /// # Errors
 /// A file that cannot be read, without one of the columns, or with a value that is not a number.
-pub fn read(path: &Path, columns: &[Column], channels: &Channels) -> Result<Measurement, PointsError> {
-    let extension = path
-        .extension()
-        .map(|one| one.to_string_lossy().to_lowercase())
-        .unwrap_or_default();
+pub fn read(path: &Path, columns: &[Column], channels: &Channels) -> Result<Measurement, ArgumentError> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     if PYTHON.contains(&&*extension) {
-        return Err(PointsError::Python { path: path.into() });
+        let file = path.display();
+        return Err(format!(
+            "{file}: this program reads recordings as CSV. `python -m vines fit {file}` with the same options reads MAT, HDF5, TDMS and UFF58; \
+             install it with `pip install './python[io]'`"
+        )
+        .into());
     }
     let is_recording = || -> Option<bool> {
         let headers = csv::Reader::from_path(path).ok()?.headers().ok()?.clone();
@@ -180,9 +123,18 @@ const PYTHON: [&str; 8] = ["mat", "h5", "hdf5", "hdf", "tdms", "uff", "unv", "uf
 /// Largest relative difference of a time step from the mean one.
 const UNEVEN: f64 = 0.01;
 
+fn cannot_read(path: &Path, reason: impl Display) -> ArgumentError {
+    format!("cannot read {}: {reason}", path.display()).into()
+}
+
+fn not_a_number(path: &Path, row: usize, column: &str, value: &str) -> ArgumentError {
+    let file = path.display();
+    format!("{file}, row {row}: {column} = `{value}` is not a finite number").into()
+}
+
 /// Two channels of a table.
-fn recording(path: &Path, channels: &Channels) -> Result<Recording, PointsError> {
-    let failed = |error: csv::Error| PointsError::Read { path: path.into(), reason: error.to_string() };
+fn recording(path: &Path, channels: &Channels) -> Result<Recording, ArgumentError> {
+    let (file, failed) = (path.display(), |error| cannot_read(path, error));
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .from_path(path)
@@ -191,57 +143,54 @@ fn recording(path: &Path, channels: &Channels) -> Result<Recording, PointsError>
     let rows: Vec<csv::StringRecord> = reader.records().collect::<Result<_, _>>().map_err(failed)?;
     let number = |row: usize, column: usize| {
         let text = rows[row].get(column).unwrap_or("");
-        text.parse::<f64>().map_err(|_| PointsError::NotANumber {
-            path: path.into(),
-            row: row + 2,
-            column: headers[column].into(),
-            value: text.into(),
-        })
+        text.parse::<f64>()
+            .map_err(|_| not_a_number(path, row + 2, &headers[column], text))
     };
-    let values = |column: usize, factor: f64| -> Result<Vec<f64>, PointsError> {
+    let values = |column: usize, factor: f64| -> Result<Vec<f64>, ArgumentError> {
         (0..rows.len()).map(|row| Ok(factor * number(row, column)?)).collect()
     };
     let column = |name: &str| headers.iter().position(|one| one == name);
-    let channel = |given: &Option<Channel>, option: &'static str, usual: &str| {
-        let Name { name, factor } = given
-            .clone()
-            .map_or(Name { name: usual.into(), factor: 1.0 }, |one| one.0);
-        let missing = || PointsError::NoChannel {
-            path: path.into(),
-            channel: name.clone(),
-            option,
-            channels: headers.iter().map(String::from).collect(),
-        };
-        Ok((column(&name).ok_or_else(missing)?, factor, name))
+    let channel = |given: &Option<Channel>, option: &str, usual: &str| {
+        let usual = || Name { name: usual.into(), factor: 1.0 };
+        let Name { name, factor } = given.clone().map_or_else(usual, |Channel(name)| name);
+        let column = column(&name).ok_or_else(|| {
+            let names: Vec<&str> = headers.iter().collect();
+            format!(
+                "{file} has no channel `{name}`; it has {}. Name the channel with {option} NAME:UNIT; a recording needs the response and the \
+                 displacement of the base",
+                names.join(", ")
+            )
+        });
+        Ok::<_, ArgumentError>((values(column?, factor)?, name))
     };
     let sample_time = match (channels.rate, column("time")) {
         (Some(rate), _) => 1.0 / rate,
-        (None, None) => return Err(PointsError::NoTime { path: path.into() }),
+        (None, None) => {
+            return Err(format!("{file} has no column `time` (s): give the samples a second with --rate").into());
+        }
         (None, Some(time)) => {
             let times: Vec<f64> = values(time, 1.0)?;
             let last = times.len().saturating_sub(1).max(1);
             let step = (times.last().unwrap_or(&0.0) - times.first().unwrap_or(&0.0)) / last as f64;
             let is_uneven = |pair: &[f64]| ((pair[1] - pair[0]) / step - 1.0).abs() > UNEVEN || step <= 0.0;
             if let Some(n) = times.windows(2).position(is_uneven) {
-                return Err(PointsError::Uneven {
-                    path: path.into(),
-                    row: n + 3,
-                    from: times[n],
-                    to: times[n + 1],
-                    step,
-                });
+                let (row, from, to) = (n + 3, times[n], times[n + 1]);
+                return Err(format!(
+                    "{file}, row {row}: the time goes from {from} s to {to} s, where a step is {step:.6e} s: the recording is interrupted there. \
+                     Fit the parts as files of their own, `vines fit one.csv two.csv`"
+                )
+                .into());
             }
             step
         }
     };
-    let (response, factor, response_name) = channel(&channels.response, "--response", "response")?;
-    let response = values(response, factor)?;
+    let (response, response_name) = channel(&channels.response, "--response", "response")?;
     // A run of `vines` without a base sensor has the drive that was commanded instead.
     let is_silent = |column: usize| rows.iter().all(|row| row.get(column).is_none_or(str::is_empty));
     let reference = column("reference").filter(|column| !is_silent(*column));
     let (drive, drive_name) = match (&channels.drive, reference, column("omega").zip(column("E"))) {
         (None, None, Some((omega, amplitude))) => {
-            let (omegas, amplitudes): (Vec<f64>, Vec<f64>) = (values(omega, 1.0)?, values(amplitude, 1.0)?);
+            let (omegas, amplitudes) = (values(omega, 1.0)?, values(amplitude, 1.0)?);
             let mut phase = 0.0;
             let mut before = amplitudes.first().copied().unwrap_or(0.0);
             let base = omegas.iter().zip(&amplitudes).map(|(omega, amplitude)| {
@@ -251,13 +200,10 @@ fn recording(path: &Path, channels: &Channels) -> Result<Recording, PointsError>
             });
             (base.collect(), "E".into())
         }
-        _ => {
-            let (drive, factor, name) = channel(&channels.drive, "--drive", "reference")?;
-            (values(drive, factor)?, name)
-        }
+        _ => channel(&channels.drive, "--drive", "reference")?,
     };
     Ok(Recording {
-        origin: path.display().to_string(),
+        origin: file.to_string(),
         channels: [response_name, drive_name],
         sample_time,
         response,
@@ -266,20 +212,22 @@ fn recording(path: &Path, channels: &Channels) -> Result<Recording, PointsError>
 }
 
 /// The points of a file, and the number of points that are left out.
-fn points(path: &Path, columns: &[Column]) -> Result<(Vec<MeasuredPoint>, usize), PointsError> {
-    let read = |error: &dyn std::fmt::Display| PointsError::Read { path: path.into(), reason: error.to_string() };
-    let text = std::fs::read_to_string(path).map_err(|error| read(&error))?;
+fn points(path: &Path, columns: &[Column]) -> Result<(Vec<MeasuredPoint>, usize), ArgumentError> {
+    let text = std::fs::read_to_string(path).map_err(|error| cannot_read(path, error))?;
     let rows: Vec<Row> = if text.trim_start().starts_with('{') {
-        let value: Value = serde_json::from_str(&text).map_err(|error| read(&error))?;
-        objects(&value).ok_or_else(|| PointsError::NoPoints { path: path.into() })?
+        let value: Value = serde_json::from_str(&text).map_err(|error| cannot_read(path, error))?;
+        objects(&value).ok_or_else(|| {
+            format!(
+                "{} has neither a locked point (`lock`) nor `points`: expected identification.json, tracked.json, or a table (CSV)",
+                path.display()
+            )
+        })?
     } else {
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
-        reader
-            .deserialize()
-            .collect::<Result<_, _>>()
-            .map_err(|error| read(&error))?
+        let rows = reader.deserialize().collect::<Result<_, _>>();
+        rows.map_err(|error| cannot_read(path, error))?
     };
     let kept: Vec<(usize, &Row)> = rows.iter().enumerate().filter(|(_, row)| is_symmetric(row)).collect();
     let points = kept.iter().map(|(n, row)| point(path, n + 1, row, columns));
@@ -288,15 +236,10 @@ fn points(path: &Path, columns: &[Column]) -> Result<(Vec<MeasuredPoint>, usize)
 
 /// The locked point of `vines identify`, or the points of `vines backbone`.
 fn objects(value: &Value) -> Option<Vec<Row>> {
+    let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), String::from);
     let row = |object: &Value| -> Option<Row> {
-        let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), String::from);
-        Some(
-            object
-                .as_object()?
-                .iter()
-                .map(|(key, value)| (key.clone(), text(value)))
-                .collect(),
-        )
+        let values = object.as_object()?.iter();
+        Some(values.map(|(key, value)| (key.clone(), text(value))).collect())
     };
     match (value.get("lock"), value.get("points")) {
         (Some(lock), _) => Some(vec![row(lock)?]),
@@ -313,31 +256,29 @@ fn is_symmetric(row: &Row) -> bool {
     is_not_false("settled") && is_not_false("reached") && row.get("regime").is_none_or(is_regime)
 }
 
-fn point(path: &Path, number: usize, row: &Row, columns: &[Column]) -> Result<MeasuredPoint, PointsError> {
-    let value = |quantity: &str| -> Result<f64, PointsError> {
-        let (quantity, column, factor) = COLUMNS[COLUMNS.iter().position(|(one, ..)| *one == quantity).unwrap_or(0)];
+fn point(path: &Path, number: usize, row: &Row, columns: &[Column]) -> Result<MeasuredPoint, ArgumentError> {
+    let value = |(quantity, column, factor): (&str, &str, f64)| {
         let named = columns.iter().rfind(|column| column.quantity == quantity);
-        let (column, factor) = named.map_or((column, factor), |named| (&named.name.name, named.name.factor));
-        let text = row.get(column).ok_or_else(|| PointsError::NoColumn {
-            path: path.into(),
-            column: column.into(),
-            quantity,
-            columns: row.keys().cloned().collect(),
+        let (column, factor) = named.map_or((column, factor), |named| (&*named.name.name, named.name.factor));
+        let text = row.get(column).ok_or_else(|| {
+            let names: Vec<&str> = row.keys().map(String::as_str).collect();
+            format!(
+                "{} has no column `{column}`; it has {}. Name the column of {quantity} with --column {quantity}=NAME:UNIT. A fit needs the \
+                 standard uncertainties u_f, u_A and u_E as well as f, A and E",
+                path.display(),
+                names.join(", ")
+            )
         })?;
         let number_of = text.parse::<f64>().ok().filter(|value| value.is_finite());
-        number_of
-            .map(|value| factor * value)
-            .ok_or_else(|| PointsError::NotANumber {
-                path: path.into(),
-                row: number,
-                column: column.into(),
-                value: text.clone(),
-            })
+        let refused = || not_a_number(path, number, column, text);
+        number_of.map(|value| factor * value).ok_or_else(refused)
     };
-    let estimate = |quantity: &str, u: &str| Ok(Estimate { value: value(quantity)?, uncertainty: value(u)? });
-    Ok(MeasuredPoint {
-        omega: estimate("f", "u_f")?,
-        response: estimate("A", "u_A")?,
-        drive: estimate("E", "u_E")?,
-    })
+    let estimate = |n: usize| {
+        Ok::<_, ArgumentError>(Estimate {
+            value: value(COLUMNS[n])?,
+            uncertainty: value(COLUMNS[n + 3])?,
+        })
+    };
+    let [omega, response, drive] = [estimate(0)?, estimate(1)?, estimate(2)?];
+    Ok(MeasuredPoint { omega, response, drive })
 }

@@ -10,25 +10,14 @@ mod theme;
 
 use std::path::{Path, PathBuf};
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{DOCTYPE, PreEscaped, html};
 
 use figure::Figure;
 pub use files::{ReportError, decay_csv, map_csv, write, write_fit, write_interrupted, write_map, write_tracked};
 pub use table::{Table, number, row, with_uncertainty};
 
-use crate::scene::{Family, Scene};
-use crate::sweep::Axis;
-
-/// The subject of a report.
-#[derive(Debug, Clone)]
-pub struct Subject {
-    /// The scene.
-    pub scene: Scene,
-    /// The scene again, for the sweep behind the regime map.
-    pub family: Family,
-    /// Axes of the regime map, horizontal first.
-    pub map: [Axis; 2],
-}
+use crate::scene::Scene;
+use crate::sweep::Map;
 
 /// A section of the page, with its finding in a sentence or two.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -83,11 +72,11 @@ impl Section {
     }
 }
 
-/// Writes the report on `subject` into `out`: `report.html`, each figure for light and dark backgrounds, and tables. `progress` gets the
-/// name of the section being made, and the fraction of all sections that is done, from 0 to 1. Returns the findings, a sentence per section,
-/// and the files; the page is the first.
+/// Writes the report on the scene of `map` into `out`: `report.html`, each figure for light and dark backgrounds, and tables. The map is
+/// computed. `progress` gets the name of the section being made, and the fraction of all sections that is done, from 0 to 1. Returns the
+/// findings, a sentence per section, and the files; the page is the first.
 pub fn write_report(
-    subject: &Subject,
+    map: &mut Map,
     out: &Path,
     progress: &(dyn Fn(&str, f64) + Sync),
 ) -> Result<(Vec<String>, Vec<PathBuf>), ReportError> {
@@ -95,9 +84,9 @@ pub fn write_report(
     for (n, (name, make)) in sections::SECTIONS.into_iter().enumerate() {
         let at = |part: f64| progress(name, (n as f64 + part) / sections::SECTIONS.len() as f64);
         at(0.0);
-        sections.push(make(subject, &at)?);
+        sections.push(make(map, &at)?);
     }
-    let mut files = vec![("report.html".to_string(), page(&subject.scene, &sections))];
+    let mut files = vec![("report.html".to_string(), page(map.sweep.scene(), &sections))];
     let mut findings = Vec::new();
     for section in sections {
         files.extend(section.files);
@@ -106,13 +95,22 @@ pub fn write_report(
     Ok((findings, crate::files::write(out, files)?))
 }
 
+/// Titles of the last two sections.
+const BUDGET: &str = "Error budget";
+const VERSIONS: &str = "Scene and versions";
+
 /// The page: one file of HTML that needs nothing else.
 fn page(scene: &Scene, sections: &[Section]) -> String {
-    let dark = theme::dark_rules();
+    let (p, last) = (scene.dimensionless(), sections.len());
     let style = format!(
-        "{}\n@media screen and (prefers-color-scheme: dark){{{dark}}}\n",
-        include_str!("report/page.css")
+        "{}\n@media screen and (prefers-color-scheme: dark){{{}}}\n",
+        include_str!("report/page.css"),
+        theme::dark_rules()
     );
+    let titles = sections.iter().map(|section| section.title.as_str());
+    let json = serde_json::to_string_pretty(scene).unwrap_or_default();
+    let budget = sections.iter().flat_map(|section| section.budget.clone());
+    let budget = Table::new("quantity | difference | cause").rows(budget);
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -124,74 +122,55 @@ fn page(scene: &Scene, sections: &[Section]) -> String {
                 style { (PreEscaped(style)) }
             }
             body {
-                (body(scene, sections))
+                h1 { "Nonlinear modal test of an oscillator with a vibro-impact nonlinear energy sink" }
+                p.scene {
+                    (format!("ε = {:.6}, λ = {:.4}, r = {}, G = {:.4}; ", p.epsilon, p.lambda, p.r, p.g))
+                    (format!("b = {} m, ω₀ = {:.4} rad/s", p.b, p.omega0))
+                }
+                @if let Some(left_out) = scene.left_out() {
+                    p {
+                        (summary::ideal("Theory, exact orbits and the regime map on this page are", &left_out))
+                        ". The measurements have it."
+                    }
+                }
+                section {
+                    h2 { "What was found" }
+                    ul { @for section in sections { li { (section.finding) } } }
+                }
+                nav {
+                    h2 { "Contents" }
+                    ol {
+                        @for (n, title) in (1..).zip(titles.chain([BUDGET, VERSIONS])) {
+                            li { a href=(format!("#s{n}")) { (title) } }
+                        }
+                    }
+                }
+                @for (n, section) in (1..).zip(sections) {
+                    section id=(format!("s{n}")) {
+                        h2 { (n) " " (section.title) }
+                        (PreEscaped(&section.content))
+                    }
+                }
+                section.budget id=(format!("s{}", last + 1)) {
+                    h2 { (last + 1) " " (BUDGET) }
+                    (budget.html("Differences between results and references, with their causes."))
+                    p {
+                        "M, k, c and m of the default scene are those of a published rig of this kind, because the study that it follows \
+                         takes ε and λ from a reference that was not available; b is this project’s choice, on which no dimensionless \
+                         result depends."
+                    }
+                }
+                section id=(format!("s{}", last + 2)) {
+                    h2 { (last + 2) " " (VERSIONS) }
+                    p {
+                        "vines " (env!("CARGO_PKG_VERSION")) ", " (std::env::consts::ARCH) " on " (std::env::consts::OS)
+                        ". Everything here follows from the scene and the version; the page carries no date, so that the same input \
+                         gives the same bytes."
+                    }
+                    pre { (json) }
+                }
             }
         }
     };
     page.into_string()
-}
-
-/// Titles of the last two sections.
-const BUDGET: &str = "Error budget";
-const VERSIONS: &str = "Scene and versions";
-
-fn body(scene: &Scene, sections: &[Section]) -> Markup {
-    let p = scene.dimensionless();
-    let titles = sections
-        .iter()
-        .map(|section| section.title.as_str())
-        .chain([BUDGET, VERSIONS]);
-    let json = serde_json::to_string_pretty(scene).unwrap_or_default();
-    html! {
-        h1 { "Nonlinear modal test of an oscillator with a vibro-impact nonlinear energy sink" }
-        p.scene {
-            (format!("ε = {:.6}, λ = {:.4}, r = {}, G = {:.4}; ", p.epsilon, p.lambda, p.r, p.g))
-            (format!("b = {} m, ω₀ = {:.4} rad/s", p.b, p.omega0))
-        }
-        @if let Some(left_out) = scene.left_out() {
-            p { (summary::ideal("Theory, exact orbits and the regime map on this page are", &left_out)) ". The measurements have it." }
-        }
-        section {
-            h2 { "What was found" }
-            ul { @for section in sections { li { (section.finding) } } }
-        }
-        nav {
-            h2 { "Contents" }
-            ol {
-                @for (n, title) in (1..).zip(titles) { li { a href=(format!("#s{n}")) { (title) } } }
-            }
-        }
-        @for (n, section) in (1..).zip(sections) {
-            section id=(format!("s{n}")) {
-                h2 { (n) " " (section.title) }
-                (PreEscaped(&section.content))
-            }
-        }
-        (budget(sections))
-        section id=(format!("s{}", sections.len() + 2)) {
-            h2 { (sections.len() + 2) " " (VERSIONS) }
-            p {
-                "vines " (env!("CARGO_PKG_VERSION")) ", " (std::env::consts::ARCH) " on " (std::env::consts::OS)
-                ". Everything here follows from the scene and the version; the page carries no date, so that the same input \
-                 gives the same bytes."
-            }
-            pre { (json) }
-        }
-    }
-}
-
-fn budget(sections: &[Section]) -> Markup {
-    let rows = sections.iter().flat_map(|section| section.budget.clone());
-    let table = Table::new("quantity | difference | cause").rows(rows);
-    html! {
-        section.budget id=(format!("s{}", sections.len() + 1)) {
-            h2 { (sections.len() + 1) " " (BUDGET) }
-            (table.html("Differences between results and references, with their causes."))
-            p {
-                "M, k, c and m of the default scene are those of a published rig of this kind, because the study that it follows \
-                 takes ε and λ from a reference that was not available; b is this project’s choice, on which no dimensionless \
-                 result depends."
-            }
-        }
-    }
 }

@@ -4,7 +4,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use vines::{backbone::track_into, comparison::TrackedComparison, fit::contradiction, report};
 
-use super::experiment::{ExperimentArguments, interrupted};
+use super::experiment::ExperimentArguments;
 use super::failure::Failure;
 use super::options::Endpoint;
 use super::output::{print, written};
@@ -43,28 +43,22 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let experiment = &arguments.experiment;
-    let (scene, mut session) =
-        experiment.start("vines backbone", Some(&arguments.rig), |scene| scene.backbone_config())?;
+    let (scene, session) = experiment.start("vines backbone", Some(&arguments.rig), |scene| scene.backbone_config())?;
     let bar = ProgressBar::new(scene.backbone.points.into());
-    let mut samples = Vec::new();
-    let (rig, controller) = (session.open.rig.as_mut(), session.controller.as_mut());
-    let tracked = track_into(&mut samples, rig, controller, &scene, |done, _| {
-        bar.set_position(done as u64);
+    let measured = session.measure(&scene, &experiment.out, |samples, rig, controller| {
+        track_into(samples, rig, controller, &scene, |done, _| {
+            bar.set_position(done as u64)
+        })
     });
     bar.finish_and_clear();
-    let timing = session.close(&tracked)?;
-    let tracked = tracked.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
+    let (tracked, timing) = measured?;
     let result = TrackedComparison::of(&tracked, &scene);
     let summary = report::summary::tracked(&result);
     let files = report::write_tracked(&result, &experiment.out)?;
     if let Some(ended) = tracked.ended {
         let mut failure = Failure::from(ended);
-        let files = written(&files);
-        failure.message += &format!(
-            "\n{} points were measured before. {}",
-            result.points.len(),
-            files.trim_end()
-        );
+        let (count, files) = (result.points.len(), written(&files));
+        failure.message += &format!("\n{count} points were measured before. {}", files.trim_end());
         return Err(failure);
     }
     let mut text = experiment.result(&result, &summary, &files, timing)?;

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use vines::experiment::ExperimentError;
-use vines::loop_check::{CheckedChannel, LoopCheck, Verdict, check};
+use vines::loop_check::{CheckedChannel, CheckedQuantity, LoopCheck, Verdict, check};
 use vines::report::{Table, number, with_uncertainty};
 
 use super::failure::Failure;
@@ -64,40 +64,29 @@ pub(super) fn described(checked: &LoopCheck) -> String {
     let channels = [("response", Some(&checked.response)), ("base", checked.base.as_ref())];
     let rows = channels.into_iter().filter_map(|(name, channel)| {
         let CheckedChannel { gain, phase, delay, noise, floor, .. } = channel?;
-        Some([
-            name.to_string(),
-            format!("{gain:.3}"),
-            format!("{phase:.1}"),
-            format!("{delay:.1}"),
-            format!("{noise:.1e}"),
-            format!("{floor:.1e}"),
-        ])
+        let noises = [noise, floor].map(|noise| format!("{noise:.1e}"));
+        let numbers = [format!("{gain:.3}"), format!("{phase:.1}"), format!("{delay:.1}")];
+        Some([&[name.to_string()][..], &numbers, &noises].concat())
     });
     let table = Table::new("channel | gain | phase | delay | noise | floor").rows(rows);
     let mut text = format!("{}\n", table.text());
+    let measured = |quantity: &CheckedQuantity| with_uncertainty(quantity.measured, quantity.uncertainty);
     if !checked.quantities.is_empty() {
         let rows = checked.quantities.iter().map(|quantity| {
             let separator = if quantity.unit.is_empty() { "" } else { ", " };
-            [
-                format!("{}{separator}{}", quantity.name, quantity.unit),
-                with_uncertainty(quantity.measured, quantity.uncertainty),
-                number(quantity.expected),
-            ]
+            let name = format!("{}{separator}{}", quantity.name, quantity.unit);
+            [name, measured(quantity), number(quantity.expected)]
         });
         text += &format!("{}\n", Table::new("measured | value | scene").rows(rows).text());
     }
     for quantity in checked.quantities.iter().filter(|quantity| quantity.differs()) {
+        let CheckedQuantity { name, unit, .. } = quantity;
+        let (measured, expected) = (measured(quantity), number(quantity.expected));
         let consequence = match quantity.verdict {
             Some(_) => format!("more than {} off is refused", quantity.tolerance),
             None => "`vines identify` and `vines backbone` use the measured value".into(),
         };
-        text += &format!(
-            "Different from the scene: {} is {} {}, not {}; {consequence}.\n",
-            quantity.name,
-            with_uncertainty(quantity.measured, quantity.uncertainty),
-            quantity.unit,
-            number(quantity.expected)
-        );
+        text += &format!("Different from the scene: {name} is {measured} {unit}, not {expected}; {consequence}.\n");
     }
     text += &format!("At E = {:.2e} m: {}\n", checked.amplitude, checked.verdict);
     if let Some(linear) = &checked.linear {

@@ -63,8 +63,8 @@ pub(super) type Closed = Option<Result<Timing, ReportLost>>;
 
 /// A rig that has passed its loop check, and a controller, both connected.
 pub(super) struct Session {
-    pub controller: Box<dyn Controller>,
-    pub open: OpenRig,
+    controller: Box<dyn Controller>,
+    rig: OpenRig,
     watch: Option<Watch>,
     /// The file of --record, and the samples for it.
     record: Option<(PathBuf, Rc<RefCell<Vec<Sample>>>)>,
@@ -88,7 +88,7 @@ impl ExperimentArguments {
         let mut open = match rig {
             Some(endpoint) => endpoint.rig(&scene, scope)?,
             None => {
-                let folder = tempfile::tempdir().map_err(Failure::run)?;
+                let folder = tempfile::tempdir()?;
                 Endpoint::Fmu(fmus(folder.path())?.swap_remove(0)).rig(&scene, scope)?
             }
         };
@@ -104,7 +104,7 @@ impl ExperimentArguments {
             let samples: Rc<RefCell<Vec<Sample>>> = Rc::clone(samples);
             open.rig = Tap::around(open.rig, move |sample, _| samples.borrow_mut().push(sample));
         }
-        Ok((scene, Session { controller, open, watch, record }))
+        Ok((scene, Session { controller, rig: open, watch, record }))
     }
 
     /// Checks a rig that is not a simulation, and refuses one that is not as expected. Such a rig starts at rest.
@@ -144,16 +144,16 @@ impl ExperimentArguments {
         timing: Closed,
     ) -> Result<String, Failure> {
         let text = output(self.json, result, || format!("{summary}\n{}", written(paths)))?;
-        let doubt = match &timing {
+        let doubt = |share: f64| match &timing {
             None => None,
-            Some(Ok(timing)) => timing.doubt(TOLERATED),
+            Some(Ok(timing)) => timing.doubt(share),
             Some(Err(lost)) => Some(lost.to_string()),
         };
-        if let Some(doubt) = doubt {
+        if let Some(doubt) = doubt(TOLERATED) {
             print(&text)?;
             return Err(Failure::new(LATE, format!("these results are doubtful: {doubt}")));
         }
-        if let Some(reason) = timing.and_then(|timing| timing.ok()?.doubt(0.0)) {
+        if let Some(reason) = doubt(0.0) {
             eprintln!("warning: {reason}");
         }
         Ok(text)
@@ -161,31 +161,37 @@ impl ExperimentArguments {
 }
 
 impl Session {
-    /// Ends the session after `result`, and writes the file of --record. A rig in real time reports its missed deadlines.
-    pub(super) fn close<T>(mut self, result: &Result<T, ExperimentError>) -> Result<Closed, Failure> {
+    /// Measures, ends the session, and writes the file of --record. A rig in real time reports its missed deadlines. An experiment that ends
+    /// early leaves what was measured in a file, and names the reason that the exact orbits know.
+    pub(super) fn measure<T>(
+        mut self,
+        scene: &Scene,
+        out: &Path,
+        measure: impl FnOnce(&mut Vec<Sample>, &mut dyn Rig, &mut dyn Controller) -> Result<T, ExperimentError>,
+    ) -> Result<(T, Closed), Failure> {
+        let mut samples = Vec::new();
+        let result = measure(&mut samples, self.rig.rig.as_mut(), self.controller.as_mut());
         drop(self.controller);
-        if let (Some(watch), Err(error)) = (&mut self.watch, result) {
+        if let (Some(watch), Err(error)) = (&mut self.watch, &result) {
             watch.failure = Some(error.to_string());
         }
-        let timing = self.open.close();
+        let timing = self.rig.close();
         if let Some((file, samples)) = &self.record {
-            vines::write_file(file, &vines::record::table(&samples.borrow())).map_err(Failure::run)?;
+            vines::write_file(file, &vines::record::table(&samples.borrow()))?;
         }
-        Ok(timing)
+        let result = result.map_err(|error| {
+            let reason = match error {
+                ExperimentError::NoLock { .. }
+                | ExperimentError::NotReached { .. }
+                | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. } => {
+                    advice::reason(scene, advice::last_regime(&samples, scene))
+                }
+                _ => None,
+            };
+            kept(Failure::from(error), reason, &samples, out)
+        });
+        Ok((result?, timing))
     }
-}
-
-/// The failure of an experiment that ended early, with the reason that the exact orbits know, and what was measured in a file.
-pub(super) fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &Path) -> Failure {
-    let reason = matches!(
-        error,
-        ExperimentError::NoLock { .. }
-            | ExperimentError::NotReached { .. }
-            | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. }
-    )
-    .then(|| advice::reason(scene, advice::last_regime(samples, scene)))
-    .flatten();
-    kept(Failure::from(error), reason, samples, out)
 }
 
 /// The failure with its reason, and what was measured in a file.

@@ -1,14 +1,16 @@
 //! How a command ends early: the failure with its message and exit code, and the signals Ctrl-C and SIGTERM.
 
+use std::error::Error;
 use std::fmt::Display;
 use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
+use lovines::InvalidValue;
 use phase_lock::ConfigError;
 use vines::rig::{Interrupted, RigError};
 use vines::scene::{SceneError, refusal};
-use vines::{experiment::ExperimentError, net::LinkError, pack::PackError, report::ReportError};
+use vines::{ArgumentError, experiment::ExperimentError, net::LinkError, pack::PackError, sweep::SweepError};
 
 /// Exit code of a program that a signal ended: 128 and the number of SIGINT.
 pub(super) const INTERRUPTED: u8 = 130;
@@ -36,47 +38,29 @@ impl Failure {
     }
 }
 
-impl From<SceneError> for Failure {
-    fn from(error: SceneError) -> Self {
-        Self::input(error)
-    }
-}
-
-impl From<ConfigError> for Failure {
-    fn from(error: ConfigError) -> Self {
-        Self::input(refusal(&error))
-    }
-}
-
-impl From<ExperimentError> for Failure {
-    fn from(error: ExperimentError) -> Self {
-        match &error {
+impl<E: Error + 'static> From<E> for Failure {
+    /// Errors of what a user gives are bad input; all others are failures at run time.
+    fn from(error: E) -> Self {
+        let any: &(dyn Error + 'static) = &error;
+        if let Some(error) = any.downcast_ref::<ConfigError>() {
+            return Self::input(refusal(error));
+        }
+        let is_of_experiment = match any.downcast_ref() {
+            Some(ExperimentError::Rig(cause)) if cause.cause::<Interrupted>().is_some() => {
+                return Self::new(INTERRUPTED, error);
+            }
             // The plant refuses a drive that comes from the scene.
-            ExperimentError::Peak | ExperimentError::Rig(RigError::Refused(_)) => Self::input(error),
-            ExperimentError::Rig(cause) if cause.cause::<Interrupted>().is_some() => Self::new(INTERRUPTED, error),
-            _ => Self::run(error),
-        }
-    }
-}
-
-impl From<LinkError> for Failure {
-    fn from(error: LinkError) -> Self {
-        match error {
-            LinkError::Address { .. } => Self::input(error),
-            _ => Self::run(error),
-        }
-    }
-}
-
-impl From<ReportError> for Failure {
-    fn from(error: ReportError) -> Self {
-        Self::run(error)
-    }
-}
-
-impl From<PackError> for Failure {
-    fn from(error: PackError) -> Self {
-        Self::input(error)
+            Some(ExperimentError::Peak | ExperimentError::Rig(RigError::Refused(_))) => true,
+            _ => false,
+        };
+        let is_input = is_of_experiment
+            || any.is::<ArgumentError>()
+            || any.is::<InvalidValue>()
+            || any.is::<PackError>()
+            || any.is::<SceneError>()
+            || any.is::<SweepError>()
+            || matches!(any.downcast_ref(), Some(LinkError::Address { .. }));
+        Self::new(if is_input { 2 } else { 1 }, error)
     }
 }
 

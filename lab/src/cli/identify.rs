@@ -7,7 +7,7 @@ use vines::fit::contradiction;
 use vines::identification::{IdentificationError, identify};
 use vines::{advice, comparison::Comparison, report};
 
-use super::experiment::{ExperimentArguments, interrupted, kept};
+use super::experiment::{ExperimentArguments, kept};
 use super::options::Endpoint;
 use super::output::progress_bar;
 use super::{failure::Failure, pack::fmus};
@@ -40,21 +40,20 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let experiment = &arguments.experiment;
-    let (scene, mut session) = experiment.start("vines identify", arguments.rig.as_ref(), |scene| {
+    let (scene, session) = experiment.start("vines identify", arguments.rig.as_ref(), |scene| {
         scene.controller_config()
     })?;
     let bar = progress_bar(
         Stage::Locking.samples(&scene) as u64,
         "{msg:29} [{wide_bar}] {pos}/{len} samples",
     );
-    let mut samples = Vec::new();
-    let (rig, controller) = (session.open.rig.as_mut(), session.controller.as_mut());
-    let record = run_into(&mut samples, rig, controller, &scene, |stage, done, of| {
-        show(&bar, stage, done, of)
+    let measured = session.measure(&scene, &experiment.out, |samples, rig, controller| {
+        run_into(samples, rig, controller, &scene, |stage, done, of| {
+            show(&bar, stage, done, of)
+        })
     });
     bar.finish_and_clear();
-    let timing = session.close(&record)?;
-    let record = record.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
+    let (record, timing) = measured?;
     let identification = identify(&record, &scene).map_err(|error| {
         let reason = match error {
             IdentificationError::Regime { regime, .. } => advice::reason(&scene, Some(regime)),

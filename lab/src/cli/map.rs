@@ -78,22 +78,21 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let Arguments { x, y, sigma, periods, confirmations, out, .. } = arguments;
-    let map = Map::new(arguments.scene.family()?, x, y, *sigma, *periods).map_err(Failure::input)?;
+    let mut map = Map::new(arguments.scene.family()?, x, y, *sigma, *periods)?;
     warn_left_out(map.sweep.scene(), "a regime map is");
     writable(out)?;
     let bar = progress_bar(map.sweep.cells(), "mapping regimes [{wide_bar}] {pos}/{len} cells");
-    let map = map.run(*confirmations, || bar.inc(1)).map_err(Failure::input)?;
+    map.run(*confirmations, || bar.inc(1))?;
     bar.finish_and_clear();
-    let summary = summary(arguments, &map);
+    let summary = summary(&map);
     let files = report::write_map(&map, out)?;
     Ok(format!("{summary}\n{}", written(&files)))
 }
 
-fn summary(arguments: &Arguments, map: &Map) -> String {
+fn summary(map: &Map) -> String {
+    let [x, y] = map.axes().map(Axis::short_form);
     let mut text = format!(
-        "Regimes over {} and {}\n  {}\n\n{}",
-        arguments.x.short_form(),
-        arguments.y.short_form(),
+        "Regimes over {x} and {y}\n  {}\n\n{}",
         parameters(&map.sweep.scene().dimensionless()),
         regimes(map).text()
     );

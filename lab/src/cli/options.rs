@@ -44,14 +44,10 @@ impl SceneArguments {
         let text = self.text()?.unwrap_or_else(|| PAPER.into());
         let (mut lines, mut inside) = (String::new(), false);
         for line in text.lines() {
-            if line.trim_start().starts_with('[') {
-                inside = line.trim_start().starts_with("[plant]");
-                if inside {
-                    lines += &format!("{plant}\n");
-                }
-            }
-            if !inside {
-                lines += &format!("{line}\n");
+            let begins = line.trim_start().starts_with("[plant]");
+            inside = begins || inside && !line.trim_start().starts_with('[');
+            if begins || !inside {
+                lines += &format!("{}\n", if begins { plant } else { line });
             }
         }
         Ok(lines)
@@ -65,10 +61,10 @@ impl SceneArguments {
 
     /// The text of the scene's file.
     fn text(&self) -> Result<Option<String>, SceneError> {
-        let read = |path: &PathBuf| {
-            std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.clone(), source })
-        };
-        self.scene.as_ref().map(read).transpose()
+        let Some(path) = &self.scene else { return Ok(None) };
+        let text = std::fs::read_to_string(path);
+        text.map(Some)
+            .map_err(|source| SceneError::Read { path: path.clone(), source })
     }
 }
 
@@ -99,16 +95,14 @@ impl FromStr for Endpoint {
         if text.contains("://") {
             return Ok(Self::Network(text.into()));
         }
-        let file = PathBuf::from(text);
-        let missing = || {
-            format!(
+        match PathBuf::from(text) {
+            file if file.is_file() => Ok(Self::Fmu(file)),
+            _ => Err(format!(
                 "{text} does not exist; give `built-in`, the path of an FMU, tcp://HOST:PORT, or for a rig in real time \
                  udp://HOST:PORT or helic://HOST[:PORT]"
             )
-        };
-        file.is_file()
-            .then_some(Self::Fmu(file))
-            .ok_or_else(|| missing().into())
+            .into()),
+        }
     }
 }
 
@@ -134,10 +128,10 @@ impl Endpoint {
         let (mut pace, mut timing) = (None, Arc::default());
         let rig: Box<dyn Rig> = match self {
             Self::BuiltIn => {
-                let plant = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
+                let plant = Simulated::new(scene.plant, scene.start)?;
                 Box::new(plant.with_sensors(scene.resonance))
             }
-            Self::Fmu(file) => Box::new(FmuRig::load(file, scene).map_err(Failure::run)?),
+            Self::Fmu(file) => Box::new(FmuRig::load(file, scene)?),
             Self::Network(address) if address.starts_with("helic://") => Box::new(helic(address, scene, scope)?),
             Self::Network(address) => {
                 let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time(), scope.key())?;
@@ -162,7 +156,7 @@ impl Endpoint {
     ) -> Result<Box<dyn Controller>, Failure> {
         Ok(match self {
             Self::BuiltIn => Box::new(BuiltIn::new(config)?),
-            Self::Fmu(file) => Box::new(FmuController::load(file, config, names).map_err(Failure::run)?),
+            Self::Fmu(file) => Box::new(FmuController::load(file, config, names)?),
             Self::Network(address) => {
                 let Address::Tcp(peer) = Address::parse(address, scope)? else {
                     let rule = "a controller has an address tcp://HOST:PORT";
@@ -185,7 +179,7 @@ fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Netw
         Failure::run(format!("no answer from {address}: {error}; {advice}"))
     })?;
     let samples = scene.controller.samples_per_period;
-    HelicRig::new(network, &scene.rig_names, scene.sample_time(), samples).map_err(Failure::run)
+    Ok(HelicRig::new(network, &scene.rig_names, scene.sample_time(), samples)?)
 }
 
 /// Refuses a key where the protocol has none.
@@ -209,11 +203,10 @@ pub(super) struct ReachArguments {
 impl ReachArguments {
     /// Which addresses the network may use.
     pub(super) fn reach(&self) -> Result<BindScope, Failure> {
-        let Some(file) = &self.key else {
-            return Ok(match self.allow_remote {
-                true => BindScope::Remote,
-                false => BindScope::Loopback,
-            });
+        let file = match &self.key {
+            Some(file) => file,
+            None if self.allow_remote => return Ok(BindScope::Remote),
+            None => return Ok(BindScope::Loopback),
         };
         let refused = |reason: String| Failure::input(format!("--key {}: {reason}", file.display()));
         let secret = std::fs::read(file).map_err(|error| refused(error.to_string()))?;

@@ -6,8 +6,8 @@ use clap::Args;
 use lovines::{Event, State};
 use serde_json::json;
 use vines::orbit::{
-    Branch, BranchEnd, Condition, ContinuationLimits, DOUBLINGS, Orbit, Periodic, backbone, continue_both_ways,
-    phase_resonant, resonant_motion_under, response, settle, settled_motion, stable_resonant,
+    Branch, BranchEnd, Condition, ContinuationLimits, DOUBLINGS, Orbit, Periodic, PlantMotion, backbone,
+    continue_both_ways, phase_resonant, resonant_motion_under, response, settle, settled_motion, stable_resonant,
 };
 use vines::report::{
     Table, number, row,
@@ -164,7 +164,7 @@ const SETTLE: usize = 1000;
 /// The motion that the start leads to at one detuning, or its frequency response.
 fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64; 4]) -> Result<String, Failure> {
     positive_frequency(scene, sigma)?;
-    let motion = settle(scene, sigma, start, SETTLE).map_err(Failure::input)?;
+    let motion = settle(scene, sigma, start, SETTLE)?;
     let motion = motion.ok_or_else(|| {
         Failure::run(format!(
             "the scene's start leads to no repeating pattern of impacts at sigma = {sigma} (dimensionless) within {SETTLE} periods; \
@@ -188,11 +188,11 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
 fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure> {
     let (plant, definition, numbers) = (&scene.plant, scene.resonance, scene.dimensionless());
     let motion = match arguments.sigma {
-        None => resonant_motion_under(plant, definition, scene.amplitude).map_err(Failure::run)?,
+        None => resonant_motion_under(plant, definition, scene.amplitude)?,
         Some(sigma) => {
             positive_frequency(&numbers, sigma)?;
             let drive = [numbers.omega(sigma), scene.amplitude];
-            let motion = settled_motion(plant, definition, drive, scene.start, SETTLE).map_err(Failure::run)?;
+            let motion = settled_motion(plant, definition, drive, scene.start, SETTLE)?;
             motion.ok_or_else(|| {
                 Failure::run(format!(
                     "the scene's start leads to no motion that repeats within 32 periods, at sigma = {sigma} (dimensionless) after {SETTLE} \
@@ -219,61 +219,52 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
     });
     let events: Vec<_> = events.collect();
     let State { q1, dq1, q2, dq2 } = motion.state;
+    let PlantMotion {
+        omega, amplitude, response, periods, impacts, rests, sticks, ..
+    } = motion;
+    let (f_hz, sigma) = (omega / TAU, numbers.sigma(omega));
+    let (a_m, phase_deg) = (response.norm(), response.arg().to_degrees());
+    let (roots, stable) = (motion.multipliers.map(|z| [z.re, z.im]), motion.is_stable());
     let mut result = json!({
-        "f_hz": motion.omega / TAU,
-        "sigma": numbers.sigma(motion.omega),
-        "e_m": motion.amplitude,
-        "a_m": motion.response.norm(),
-        "phase_deg": motion.response.arg().to_degrees(),
-        "periods": motion.periods,
-        "impacts": motion.impacts,
-        "rests": motion.rests,
-        "sticks": motion.sticks,
-        "multipliers": motion.multipliers.map(|z| [z.re, z.im]),
-        "stable": motion.is_stable(),
+        "f_hz": f_hz,
+        "sigma": sigma,
+        "e_m": amplitude,
+        "a_m": a_m,
+        "phase_deg": phase_deg,
+        "periods": periods,
+        "impacts": impacts,
+        "rests": rests,
+        "sticks": sticks,
+        "multipliers": roots,
+        "stable": stable,
         "state": [q1, dq1, q2, dq2],
         "events": events.iter().map(|(phase_deg, event, side, velocity)| {
             json!({ "phase_deg": phase_deg, "event": event, "side": side, "velocity": velocity })
         }).collect::<Vec<_>>(),
     });
-    if let Some((left_out, orbit)) = &ideal {
-        result["ideal"] = json!([left_out, orbit.sigma, orbit.c * numbers.b]);
+    let ideal = ideal.map(|(left_out, orbit)| (left_out, orbit.sigma, orbit.c * numbers.b));
+    if let Some(ideal) = &ideal {
+        result["ideal"] = json!(ideal);
     }
     let title = "Periodic motion of the plant with all effects of its cavity";
     shown(&numbers, title, &result, arguments.json, || {
         let rows = events.iter().map(|(phase, event, side, velocity)| {
             let side = side.map_or("-".into(), |side| format!("{side:+}"));
-            vec![
-                number(*phase),
-                event.to_string(),
-                side,
-                velocity.map_or("-".into(), number),
-            ]
+            let velocity = velocity.map_or("-".into(), number);
+            [number(*phase), event.to_string(), side, velocity]
         });
-        let ideal = ideal.as_ref().map(|(left_out, orbit)| {
-            let (sigma, a_m) = (orbit.sigma, orbit.c * numbers.b);
+        let table = Table::new("phase, degrees | event | side | w' before, m/s").rows(rows);
+        let ideal = ideal.as_ref().map_or(String::new(), |(left_out, sigma, a_m)| {
             let results = format!("sigma = {sigma:.6} and response {a_m:.6e} m are");
             format!("  ({})\n", summary::ideal(&results, left_out))
         });
         format!(
-            "  {:.6} Hz, sigma = {:.6}; base {:.6e} m; response {:.6e} m at {:.4} degrees\n  in {} period{}: impacts {}, at rest on a wall \
-             {}, sticking to the floor {}\n  multipliers {}: {}\n{}\n{}",
-            motion.omega / TAU,
-            numbers.sigma(motion.omega),
-            motion.amplitude,
-            motion.response.norm(),
-            motion.response.arg().to_degrees(),
-            motion.periods,
-            if motion.periods == 1 { "" } else { "s" },
-            motion.impacts,
-            motion.rests,
-            motion.sticks,
-            multipliers(motion.multipliers.map(|z| [z.re, z.im])),
-            if motion.is_stable() { "stable" } else { "unstable" },
-            ideal.unwrap_or_default(),
-            Table::new("phase, degrees | event | side | w' before, m/s")
-                .rows(rows)
-                .text(),
+            "  {f_hz:.6} Hz, sigma = {sigma:.6}; base {amplitude:.6e} m; response {a_m:.6e} m at {phase_deg:.4} degrees\n  in {periods} period{}: \
+             impacts {impacts}, at rest on a wall {rests}, sticking to the floor {sticks}\n  multipliers {}: {}\n{ideal}\n{}",
+            if periods == 1 { "" } else { "s" },
+            multipliers(roots),
+            if stable { "stable" } else { "unstable" },
+            table.text(),
         )
     })
 }

@@ -57,11 +57,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 /// Packs this program's FMUs into a folder; the plant is the first.
 pub(super) fn fmus(out: &Path) -> Result<Vec<PathBuf>, Failure> {
     let components = components();
-    Ok(pack(
-        &components,
-        &own_libraries(&components, &beside_this_program()?)?,
-        out,
-    )?)
+    let libraries = own_libraries(&components, &beside_this_program()?)?;
+    Ok(pack(&components, &libraries, out)?)
 }
 
 fn beside_this_program() -> Result<PathBuf, Failure> {

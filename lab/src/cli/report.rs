@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use vines::map::LIMIT;
-use vines::report::{Subject, write_report};
+use vines::report::write_report;
 use vines::rig::BuiltIn;
 use vines::sweep::{Axis, Map};
 
@@ -42,16 +42,12 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let scene = arguments.scene.load()?;
+    let mut map = Map::new(arguments.scene.family()?, &arguments.x, &arguments.y, None, LIMIT)?;
     // Invalid settings are refused before anything runs or is written.
-    BuiltIn::new(&scene.controller_config())?;
-    let (family, [x, y]) = (arguments.scene.family()?, [&arguments.x, &arguments.y]);
-    Map::new(family.clone(), x, y, None, LIMIT).map_err(Failure::input)?;
+    BuiltIn::new(&map.sweep.scene().controller_config())?;
     writable(&arguments.out)?;
-    let map = [x.clone(), y.clone()];
-    let subject = Subject { scene, family, map };
     let bar = progress_bar(1000, "{msg:10} [{wide_bar}] {percent} %");
-    let report = write_report(&subject, &arguments.out, &|section, done| {
+    let report = write_report(&mut map, &arguments.out, &|section, done| {
         if bar.message() != section {
             bar.set_message(section.to_string());
         }

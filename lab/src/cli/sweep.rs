@@ -1,7 +1,8 @@
 //! `vines sweep`: any parameters of a scene over grids, lists and random samples, to a Zarr store.
 
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::{path::PathBuf, thread, time::Duration};
+use std::{thread, time::Duration};
 
 use clap::Args;
 use vines::ArgumentError;
@@ -96,13 +97,6 @@ pub(super) struct Arguments {
     yes: bool,
 }
 
-impl Arguments {
-    /// The part that this process computes.
-    fn part(&self) -> Shard {
-        self.shard.unwrap_or(Shard::ALL)
-    }
-}
-
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let settings = Settings {
         axes: arguments.axis.clone(),
@@ -110,19 +104,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         samples: arguments.samples,
         seed: arguments.seed,
         periods: arguments.periods,
-        results: Results::parse(arguments.results.iter().map(String::as_str)).map_err(Failure::input)?,
+        results: Results::parse(arguments.results.iter().map(String::as_str))?,
         chunk: arguments.chunk,
         adaptive: arguments.adaptive,
     };
-    let sweep = Sweep::new(arguments.scene.family()?, settings).map_err(Failure::input)?;
+    let sweep = Sweep::new(arguments.scene.family()?, settings)?;
     warn_left_out(
         sweep.scene(),
         "regimes, responses and exact orbits of a sweep (not its locked points) are",
     );
+    let part = arguments.shard.unwrap_or(Shard::ALL);
     if arguments.verify {
-        return verify(&sweep, arguments);
+        return verify(&sweep, &arguments.out, part);
     }
-    let estimate = sweep::estimate(&sweep, &AtomicBool::new(false)).map_err(Failure::input)?;
+    let estimate = sweep::estimate(&sweep, &AtomicBool::new(false))?;
     if estimate.is_large() && !arguments.yes && arguments.merge.is_empty() {
         let Estimate { cells, hours, bytes } = estimate;
         return Err(Failure::input(format!(
@@ -134,32 +129,29 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if !arguments.merge.is_empty() {
         sweep::collect(&sweep, &arguments.out, &arguments.merge, &monitor).map_err(Failure::input)?;
     }
-    let work = || sweep::run(&sweep, &arguments.out, arguments.part(), &monitor);
+    let work = || sweep::run(&sweep, &arguments.out, part, &monitor);
     let complete = watched(&sweep, "sweeping", &monitor, work)?;
-    let (found, computed, failed) = (
-        monitor.found.load(Relaxed),
-        monitor.computed.load(Relaxed),
-        monitor.failed.load(Relaxed),
-    );
+    let [found, computed, failed, inferred] =
+        [&monitor.found, &monitor.computed, &monitor.failed, &monitor.inferred].map(|count| count.load(Relaxed));
+    let (cells, out) = (sweep.cells(), arguments.out.display());
     let mut text = format!(
-        "{} cells (chunks: {}): {found} already complete, {computed} computed, {failed} of these failed\n",
-        sweep.cells(),
+        "{cells} cells (chunks: {}): {found} already complete, {computed} computed, {failed} of these failed\n",
         sweep.chunks()
     );
-    let inferred = monitor.inferred.load(Relaxed);
     if inferred > 0 {
-        let share = 100.0 * inferred as f64 / sweep.cells() as f64;
+        let share = 100.0 * inferred as f64 / cells as f64;
         text += &format!("{inferred} cells ({share:.1} %) were inferred from their neighbours\n");
     }
-    let damage = damage(&monitor, "Their chunks were copied or computed again");
+    let damage = monitor.damage().map_or(String::new(), |damage| {
+        format!("{damage}. Their chunks were copied or computed again\n")
+    });
     text += &damage;
     if let Some(reason) = monitor.reason.get() {
         text += &format!("First failure: {reason}\n");
     }
     if complete {
-        return Ok(format!("{text}Written: {}\n", arguments.out.display()));
+        return Ok(format!("{text}Written: {out}\n"));
     }
-    let out = arguments.out.display();
     let message = format!("{damage}interrupted; {out} has the complete chunks, and the same command continues");
     Err(Failure::new(INTERRUPTED, message))
 }
@@ -175,22 +167,17 @@ fn shard(text: &str) -> Result<Shard, ArgumentError> {
     }
 }
 
-fn verify(sweep: &Sweep, arguments: &Arguments) -> Result<String, Failure> {
+fn verify(sweep: &Sweep, out: &Path, part: Shard) -> Result<String, Failure> {
     let monitor = Monitor::default();
-    let (out, part) = (arguments.out.display(), arguments.part());
-    let complete = watched(sweep, "verifying", &monitor, || {
-        sweep::verify(sweep, &arguments.out, part, &monitor)
-    })?;
+    let work = || sweep::verify(sweep, out, part, &monitor);
+    let complete = watched(sweep, "verifying", &monitor, work)?;
     if !complete {
-        return Err(Failure::new(
-            INTERRUPTED,
-            "interrupted; nothing was written".to_string(),
-        ));
+        return Err(Failure::new(INTERRUPTED, "interrupted; nothing was written"));
     }
     let (found, cells) = (monitor.found.load(Relaxed), part.cells(sweep));
     let undamaged = format!("{found} of {cells} cells are complete and undamaged");
     match monitor.damage() {
-        None if found == cells => Ok(format!("{undamaged}\nVerified: {out}\n")),
+        None if found == cells => Ok(format!("{undamaged}\nVerified: {}\n", out.display())),
         damage => {
             let damage = damage.map_or(String::new(), |damage| format!("{damage}. "));
             Err(Failure::run(format!(
@@ -198,12 +185,6 @@ fn verify(sweep: &Sweep, arguments: &Arguments) -> Result<String, Failure> {
             )))
         }
     }
-}
-
-/// A line about damaged files, and what became of them.
-fn damage(monitor: &Monitor, consequence: &str) -> String {
-    let damage = monitor.damage();
-    damage.map_or(String::new(), |damage| format!("{damage}. {consequence}\n"))
 }
 
 /// Does some work with a bar that shows the progress, until it is complete or a signal stops it.
@@ -235,7 +216,7 @@ fn watched(
         }
         bar.finish_and_clear();
         match work.join() {
-            Ok(result) => result.map_err(Failure::run),
+            Ok(result) => Ok(result?),
             Err(panic) => std::panic::resume_unwind(panic),
         }
     })

@@ -44,13 +44,6 @@ pub(super) struct WatchArguments {
     watch: Option<u16>,
 }
 
-impl WatchArguments {
-    /// Starts the server, if it is asked for.
-    pub(super) fn start(&self, title: &str, scene: &Scene) -> Result<Option<Watch>, Failure> {
-        self.watch.map(|port| Watch::start(port, title, scene)).transpose()
-    }
-}
-
 /// The server of the page.
 pub(super) struct Watch {
     sender: SyncSender<Message>,
@@ -77,29 +70,32 @@ struct Numbered {
     step: f64,
 }
 
-impl Watch {
-    fn start(port: u16, title: &str, scene: &Scene) -> Result<Self, Failure> {
-        let refused = |error: io::Error| {
+impl WatchArguments {
+    /// Starts the server, if it is asked for.
+    pub(super) fn start(&self, title: &str, scene: &Scene) -> Result<Option<Watch>, Failure> {
+        let Some(port) = self.watch else { return Ok(None) };
+        let listen = || {
+            let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+            listener.set_nonblocking(true)?;
+            let address = listener.local_addr()?;
+            Ok((listener, address))
+        };
+        let (listener, address) = listen().map_err(|error: io::Error| {
             Failure::run(format!(
                 "--watch={port}: cannot listen on 127.0.0.1:{port}: {error}; --watch alone takes a free port"
             ))
-        };
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(refused)?;
-        listener.set_nonblocking(true).map_err(refused)?;
-        let address = listener.local_addr().map_err(refused)?;
+        })?;
         let table = table(title, scene).to_string();
         let (sender, receiver) = sync_channel(CHANNEL);
         let view = View::new(scene.clone(), 0);
         let thread = thread::spawn(move || serve(&listener, address, &receiver, view, &table));
         eprintln!("Watch it at http://{address}/");
-        Ok(Self {
-            sender,
-            command: Rc::default(),
-            thread: Some(thread),
-            failure: None,
-        })
+        let (command, thread) = (Rc::default(), Some(thread));
+        Ok(Some(Watch { sender, command, thread, failure: None }))
     }
+}
 
+impl Watch {
     /// The rig, with its samples shown.
     pub(super) fn rig(&self, rig: Box<dyn Rig>) -> Box<dyn Rig> {
         let (sender, command, mut number) = (self.sender.clone(), Rc::clone(&self.command), 0);
@@ -317,28 +313,17 @@ fn table(title: &str, scene: &Scene) -> Value {
 
 /// The files of the page: path and content.
 macro_rules! files {
-    ($($name:literal),*) => {
-        [$((concat!("/", $name), include_str!(concat!("../../../live/page/", $name)))),*]
+    ($($name:ident . $kind:ident)*) => {
+        &[$((
+            concat!("/", stringify!($name), ".", stringify!($kind)),
+            include_str!(concat!("../../../live/page/", stringify!($name), ".", stringify!($kind)))
+        )),*]
     };
 }
-const FILES: [(&str, &str); 16] = files![
-    "index.html",
-    "style.css",
-    "controls.js",
-    "link.js",
-    "main.js",
-    "map.js",
-    "module.js",
-    "page.js",
-    "pictures.js",
-    "plots.js",
-    "record.js",
-    "rig.js",
-    "sound.js",
-    "story.js",
-    "strip.js",
-    "watch.js"
-];
+const FILES: &[(&str, &str)] = files!(
+    index.html style.css controls.js link.js main.js map.js module.js page.js pictures.js plots.js record.js rig.js sound.js story.js strip.js
+    watch.js
+);
 
 /// The type of a file.
 fn kind(name: &str) -> &'static str {

@@ -34,10 +34,7 @@ const ENTRY: (f64, f64) = (21.0, 32.0);
 const APART: f64 = 0.4;
 
 /// A figure: panels side by side or one above the other.
-pub struct Figure {
-    pub size: (f64, f64),
-    pub panels: Vec<Panel>,
-}
+pub struct Figure(pub Vec<Panel>);
 
 /// Place of a legend.
 #[derive(Clone, Copy, PartialEq)]
@@ -69,8 +66,6 @@ struct Series {
     /// The name of the colour, in the table of styles.
     colour: &'static str,
     label: String,
-    /// Whether lines have a halo: they are on a map.
-    halo: bool,
 }
 
 /// How a series is drawn; widths, radii and sizes in px.
@@ -96,23 +91,20 @@ pub enum Shape {
 }
 
 impl Figure {
-    /// A figure of one panel of the usual size.
-    pub fn single(panel: Panel) -> Self {
-        Self { size: SIZE, panels: vec![panel] }
-    }
-
     /// The figure as SVG, for white paper.
     pub fn svg(&self) -> String {
-        let (width, height) = self.size;
-        let mut svg = Svg(format!(
+        let corners = self.0.iter().map(|Panel { area: [x, y, w, h], .. }| [x + w, y + h]);
+        let [width, height] = corners.fold([0.0, 0.0], |[w, h], [x, y]| [f64::max(w, x), f64::max(h, y)]);
+        let drawing = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
              font-family=\"{FONT}\">\n"
-        ));
+        );
+        let mut svg = Svg { drawing, halo: false };
         svg.rectangle([0.0, 0.0, width, height], PAPER, "");
-        for panel in &self.panels {
+        for panel in &self.0 {
             panel.draw(&mut svg);
         }
-        svg.0 + "</svg>\n"
+        svg.drawing + "</svg>\n"
     }
 }
 
@@ -147,41 +139,33 @@ impl Panel {
 
     /// Adds a series, unless it has nothing to draw: the legend does not name what is not there.
     pub fn add(&mut self, shape: Shape, places: impl IntoIterator<Item = Place>, colour: &'static str, label: &str) {
-        let halo = matches!(shape, Shape::Border(_));
-        self.series(shape, places.into_iter().collect(), colour, label, halo);
-    }
-
-    fn series(&mut self, shape: Shape, places: Vec<Place>, colour: &'static str, label: &str, halo: bool) {
+        let (places, label) = (Vec::from_iter(places), label.into());
         if !places.is_empty() {
-            let label = label.into();
-            self.series.push(Series { shape, places, colour, label, halo });
+            self.series.push(Series { shape, places, colour, label });
         }
     }
 
     /// A curve of motions, solid where they are stable and dashed where they are not.
     pub fn curve(&mut self, points: impl IntoIterator<Item = Marked>, width: f64, colour: &'static str, name: &str) {
-        let points: Vec<Marked> = points.into_iter().collect();
-        // The stable pieces first, and so in the legend.
-        for run in runs(&points, true) {
-            self.add(Shape::Line(width), run, colour, &format!("{name}, stable"));
-        }
-        for run in runs(&points, false) {
-            self.add(
-                Shape::Dashed(width),
-                run,
-                unstable(colour),
-                &format!("{name}, unstable"),
-            );
-        }
+        let labels = ["stable", "unstable"].map(|kind| format!("{name}, {kind}"));
+        self.labelled_curve(points, width, colour, labels);
     }
 
-    /// A curve of motions on a map.
-    pub fn curve_on_map(&mut self, points: impl IntoIterator<Item = Marked>, colour: &'static str) {
-        let points: Vec<Marked> = points.into_iter().collect();
-        for (shape, stable) in [(Shape::Line(2.2), true), (Shape::Dashed(2.2), false)] {
-            for run in runs(&points, stable) {
-                self.series(shape, run, colour, colour, true);
-            }
+    /// A curve of motions with the labels of its stable and unstable pieces.
+    pub fn labelled_curve(
+        &mut self,
+        points: impl IntoIterator<Item = Marked>,
+        width: f64,
+        colour: &'static str,
+        [stable, dashed]: [String; 2],
+    ) {
+        let points = Vec::from_iter(points);
+        // The stable pieces first, and so in the legend.
+        for run in runs(&points, true) {
+            self.add(Shape::Line(width), run, colour, &stable);
+        }
+        for run in runs(&points, false) {
+            self.add(Shape::Dashed(width), run, unstable(colour), &dashed);
         }
     }
 
@@ -203,15 +187,18 @@ impl Panel {
         let longest = entries.iter().map(|entry| text_width(&entry.label, SMALL + 1.0));
         let longest = longest.fold(0.0, f64::max);
         let key = [ENTRY.1 + 26.0 + longest, ENTRY.0 * entries.len() as f64 + 10.0];
-        let beside = if let Legend::Beside(width) = self.legend {
-            width
-        } else {
-            0.0
+        let beside = match self.legend {
+            Legend::Beside(width) => width,
+            _ => 0.0,
         };
         let head = match self.title.is_empty() {
             true => 14.0,
             false => 42.0 + 18.0 * self.captions.len() as f64,
         };
+        svg.halo = self
+            .series
+            .iter()
+            .any(|series| matches!(series.shape, Shape::Cells(..)));
         let frame = Frame {
             place: [left + MARGINS[0], top + head],
             size: [width - MARGINS[0] - MARGINS[2] - beside, height - head - MARGINS[1]],
@@ -226,12 +213,12 @@ impl Panel {
         }
         frame.draw(svg, &self.labels);
         // Curves end at the axes; marks are whole.
-        svg.0 += &format!(
+        svg.drawing += &format!(
             "<svg x=\"{x:.2}\" y=\"{y:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" viewBox=\"{x:.2} {y:.2} {w:.2} {h:.2}\">\n"
         );
         let (marks, curves): (Vec<&Series>, Vec<&Series>) = self.series.iter().partition(|series| series.is_mark());
         curves.iter().for_each(|series| series.draw(svg, &frame));
-        svg.0 += "</svg>\n";
+        svg.drawing += "</svg>\n";
         marks.iter().for_each(|series| series.draw(svg, &frame));
         if entries.is_empty() || self.legend == Legend::None {
             return;
@@ -296,9 +283,9 @@ impl Frame {
         let [middle, below] = [left + width / 2.0, bottom + 42.0];
         svg.text(&labels[0], [middle, below], LABEL, INK, "middle");
         let [x, y] = [left - 46.0, top + height / 2.0];
-        svg.0 += &format!("<g transform=\"rotate(-90 {x:.2} {y:.2})\">");
+        svg.drawing += &format!("<g transform=\"rotate(-90 {x:.2} {y:.2})\">");
         svg.text(&labels[1], [x, y], LABEL, INK, "middle");
-        svg.0 += "</g>\n";
+        svg.drawing += "</g>\n";
     }
 }
 
@@ -389,8 +376,8 @@ impl Series {
             Shape::Dashed(_) => " stroke-dasharray=\"7 5\"",
             _ => "",
         };
-        for line in lines.iter().filter(|_| self.halo) {
-            svg.line(line, width + 2.8, HALO, "");
+        if svg.halo {
+            lines.iter().for_each(|line| svg.line(line, width + 2.8, HALO, ""));
         }
         for line in lines {
             svg.line(line, width, self.colour, dashes);
@@ -402,9 +389,9 @@ impl Series {
         let circle = |radius, style: &str| format!("<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius}\" {style}/>\n");
         match self.shape {
             Shape::Circle(r) => {
-                svg.0 += &circle(r, &format!("fill=\"none\" stroke=\"{shade}\" stroke-width=\"1.5\""));
+                svg.drawing += &circle(r, &format!("fill=\"none\" stroke=\"{shade}\" stroke-width=\"1.5\""));
             }
-            Shape::Dot(r) => svg.0 += &circle(r, &format!("fill=\"{shade}\"")),
+            Shape::Dot(r) => svg.drawing += &circle(r, &format!("fill=\"{shade}\"")),
             Shape::Square => svg.rectangle([x - 4.5, y - 4.5, 9.0, 9.0], self.colour, ""),
             _ => {
                 for d in [4.0, -4.0] {
@@ -429,26 +416,31 @@ fn runs(points: &[Marked], wanted: bool) -> Vec<Vec<Place>> {
 }
 
 /// The drawing so far. Colours are names of the table of styles.
-struct Svg(String);
+struct Svg {
+    drawing: String,
+    /// Whether curves have a halo: they are on a map.
+    halo: bool,
+}
 
 impl Svg {
     fn line(&mut self, points: &[[f64; 2]], width: f64, name: &str, more: &str) {
         let points: Vec<String> = points.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
         let (points, colour) = (points.join(" "), colour(name));
-        self.0 += &format!(
+        self.drawing += &format!(
             "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"{more}/>\n"
         );
     }
 
     fn rectangle(&mut self, [x, y, width, height]: [f64; 4], name: &str, more: &str) {
         let (place, colour) = (format!("x=\"{x:.2}\" y=\"{y:.2}\""), colour(name));
-        self.0 += &format!("<rect {place} width=\"{width:.2}\" height=\"{height:.2}\" fill=\"{colour}\"{more}/>\n");
+        self.drawing +=
+            &format!("<rect {place} width=\"{width:.2}\" height=\"{height:.2}\" fill=\"{colour}\"{more}/>\n");
     }
 
     fn text(&mut self, words: &str, [x, y]: [f64; 2], size: f64, name: &str, anchor: &str) {
         let (words, colour) = (maud::html! { (words) }.into_string(), colour(name));
         let place = format!("x=\"{x:.2}\" y=\"{y:.2}\" text-anchor=\"{anchor}\"");
-        self.0 += &format!("<text {place} font-size=\"{size}\" fill=\"{colour}\">{words}</text>\n");
+        self.drawing += &format!("<text {place} font-size=\"{size}\" fill=\"{colour}\">{words}</text>\n");
     }
 }
 
@@ -503,7 +495,7 @@ mod tests {
         let stable = [(0.0, 2.0, "orbits, stable"), (3.0, 3.0, "orbits, stable")];
         assert_eq!(spans[..2], stable);
         assert_eq!(spans[2..], [(2.0, 3.0, "orbits, unstable")]);
-        let svg = Figure::single(panel).svg();
+        let svg = Figure(vec![panel]).svg();
         // The piece and its sample in the legend.
         assert_eq!(svg.matches("stroke-dasharray").count(), 2);
         assert_eq!(svg.matches("orbits, unstable</text>").count(), 1);

@@ -32,6 +32,16 @@ const FIRST_ORDER: &str = "first-order theory";
 /// Error bars shorter than this fraction of an axis are hidden by the mark at their place.
 const VISIBLE: f64 = 0.02;
 
+/// A range with a margin on both sides, as a part of its length.
+fn widened((low, high): (f64, f64), part: f64) -> (f64, f64) {
+    let margin = part * (high - low);
+    (low - margin, high + margin)
+}
+
+fn marked(point: &BackbonePoint) -> Marked {
+    ((point.sigma, point.c), point.stable())
+}
+
 fn circles(panel: &mut Panel, points: impl Iterator<Item = Place>, label: &str) {
     panel.add(Shape::Circle(3.5), points, MEASURED, label);
 }
@@ -51,23 +61,18 @@ fn theory_backbone(p: &Dimensionless, top: f64) -> Vec<Marked> {
     let manifold = SlowFlow::new(p.lambda, p.r).manifold;
     let last = manifold.b(top, BranchSide::Right).unwrap_or(1.0);
     let points = theory::backbone(p, manifold.b_min(), last, POINTS);
-    let places = points.iter().map(|point| ((point.sigma, point.c), point.stable()));
-    places.collect()
+    points.iter().map(marked).collect()
 }
 
 /// Adds the right branch of the backbone, by theory and exact, each with its stability.
 fn add_backbones(panel: &mut Panel, p: &Dimensionless, theory: Vec<Marked>) {
     let fold = SlowFlow::new(p.lambda, p.r).manifold.b_min();
     let branch = orbit::backbone(p, &ContinuationLimits::default());
-    let motions = branch.iter().flat_map(|branch| &branch.points);
-    let exact = motions.filter(|motion| motion.b >= fold);
+    let exact = branch.iter().flat_map(|branch| &branch.points);
+    let exact = exact.filter(|motion| motion.b >= fold);
     panel.curve(theory, 2.0, THEORY, FIRST_ORDER);
-    panel.curve(
-        exact.map(|motion| ((motion.sigma, motion.c), motion.stable)),
-        1.6,
-        EXACT,
-        "exact orbits",
-    );
+    let exact = exact.map(|motion| ((motion.sigma, motion.c), motion.stable));
+    panel.curve(exact, 1.6, EXACT, "exact orbits");
 }
 
 /// The identified backbone beside theory and exact orbits: amplitude over detuning.
@@ -81,8 +86,7 @@ pub fn backbone(result: &Comparison) -> Figure {
     let sigmas = theory.iter().map(|((sigma, _), _)| *sigma);
     let sigmas = sigmas.chain(decay().filter(|point| point.c >= fold).map(|point| point.sigma));
     let (low, high) = range((f64::MAX, f64::MIN), sigmas);
-    let margin = 0.06 * (high - low);
-    let (low, high) = (low - margin, high + margin);
+    let (low, high) = widened((low, high), 0.06);
 
     let title = match p.definition == Definition::default() {
         true => "Backbone: phase resonance of the centre of mass".into(),
@@ -103,7 +107,7 @@ pub fn backbone(result: &Comparison) -> Figure {
         error_bars(&mut panel, std::iter::once((place, uncertainty)), vertical, range);
     }
     panel.add(Shape::Square, [place], MEASURED, "locked, measured");
-    Figure::single(panel)
+    Figure(vec![panel])
 }
 
 /// Range of the particle speed on figures of the manifold: beyond the stable range.
@@ -136,22 +140,19 @@ pub fn manifold(result: &Comparison) -> Figure {
     if let Some(b) = lock.b {
         panel.add(Shape::Square, [(b, lock.at.c)], MEASURED, "locked, measured");
     }
-    Figure::single(panel)
+    Figure(vec![panel])
 }
 
 /// The tracked backbone on the exact and the first-order curve; points that are not settled are crossed.
 pub fn tracked(tracked: &TrackedComparison) -> Figure {
-    Figure::single(tracked_amplitude(tracked))
+    Figure(vec![tracked_amplitude(tracked)])
 }
 
 /// The tracked backbone, and beside it the drive over amplitude.
 pub fn tracked_with_drive(tracked: &TrackedComparison) -> Figure {
     let (width, height) = SIZE;
     let drive = tracked_drive(tracked).at([width, 0.0, width, height]);
-    Figure {
-        size: (2.0 * width, height),
-        panels: vec![tracked_amplitude(tracked), drive],
-    }
+    Figure(vec![tracked_amplitude(tracked), drive])
 }
 
 /// The top of the axis of the tracked amplitudes.
@@ -164,7 +165,7 @@ fn tracked_amplitude(tracked: &TrackedComparison) -> Panel {
     let (p, top) = (&tracked.parameters, top_of(tracked));
     let points = || tracked.points.iter().map(|compared| compared.point);
     let (low, high) = range((-1.6, 0.6), points().map(|point| point.at.sigma));
-    let x = (low - 0.1 * (high - low), high + 0.1 * (high - low));
+    let x = widened((low, high), 0.1);
     let (least, most) = range((f64::MAX, f64::MIN), points().map(|point| point.at.g));
     let text = caption(p, most).replace(&format!("G = {most:.3}"), &format!("G from {least:.3} to {most:.3}"));
     let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
@@ -209,27 +210,19 @@ fn tracked_drive(tracked: &TrackedComparison) -> Panel {
 /// The places of the fit are those nearest to the points, with the effects of the cavity that it names.
 pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Option<&str>) -> Figure {
     let p = scene.dimensionless();
-    let used: Vec<&MeasuredPoint> = (0..points.len())
-        .filter(|n| !fit.left_out.contains(n))
-        .map(|n| &points[n])
-        .collect();
+    let used = (0..points.len()).filter(|n| !fit.left_out.contains(n));
+    let used: Vec<(&MeasuredPoint, _)> = used.map(|n| &points[n]).zip(&fit.residuals).collect();
     let place = |point: &MeasuredPoint| (1e3 * point.response.value, point.omega.value / TAU);
-    let mut model: Vec<Place> = used
-        .iter()
-        .zip(&fit.residuals)
-        .map(|(point, residual)| {
-            let at = |measured: Estimate, over_u: f64| measured.value + over_u * measured.uncertainty;
-            (
-                1e3 * at(point.response, residual[0]),
-                at(point.omega, residual[1]) / TAU,
-            )
-        })
-        .collect();
+    let at = |measured: Estimate, over_u: f64| measured.value + over_u * measured.uncertainty;
+    let model = used.iter().map(|(point, residual)| {
+        let amplitude = 1e3 * at(point.response, residual[0]);
+        (amplitude, at(point.omega, residual[1]) / TAU)
+    });
+    let mut model: Vec<Place> = model.collect();
     model.sort_by(|place, next| place.0.total_cmp(&next.0));
     let [amplitudes, frequencies] = [|place: Place| place.0, |place: Place| place.1]
         .map(|part| range((f64::MAX, f64::MIN), points.iter().map(|point| part(place(point)))));
-    let margin = 0.06 * (amplitudes.1 - amplitudes.0);
-    let x = (amplitudes.0 - margin, amplitudes.1 + margin);
+    let x = widened(amplitudes, 0.06);
     let exact = ExactCurve::of(&p);
     let expected: Vec<Place> = exact
         .places()
@@ -270,23 +263,18 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
     for limit in [-1.96, 1.96] {
         below.add(Shape::Dashed(1.0), [(x.0, limit), (x.1, limit)], INK, "±1.96 u");
     }
-    for (n, (shape, colour, name)) in [
+    let quantities = [
         (Shape::Dot(3.0), PARTICLE, "amplitude"),
         (Shape::Circle(3.5), MEASURED, "frequency"),
         (Shape::Square, EXACT, "drive"),
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        let places = used.iter().zip(&fit.residuals);
-        below.add(
-            shape,
-            places.map(|(point, residual)| (place(point).0, residual[n])),
-            colour,
-            name,
-        );
+    ];
+    for (n, (shape, colour, name)) in (0..).zip(quantities) {
+        let places = used
+            .iter()
+            .map(|(point, residual): &(_, &[f64; 3])| (place(point).0, residual[n as usize]));
+        below.add(shape, places, colour, name);
     }
-    Figure { size: (width, 2.0 * height), panels: vec![backbone, below] }
+    Figure(vec![backbone, below])
 }
 
 /// A time (periods), an amplitude and a detuning.
@@ -306,12 +294,12 @@ pub fn history(record: &Record, scene: &Scene, result: &Comparison) -> Figure {
     let points: Vec<Triple> = points.collect();
 
     let (_, top) = range((0.0, lock.at.c), driven.iter().map(|triple| triple[1]));
-    let (low, high) = range((-1.5, 0.5), driven.iter().chain(&points).map(|triple| triple[2]));
-    let margin = 0.1 * (high - low);
+    let detunings = driven.iter().chain(&points).map(|triple| triple[2]);
+    let detunings = widened(range((-1.5, 0.5), detunings), 0.1);
     let (width, upper, lower, left) = (WIDE, 350.0, 290.0, 450.0);
     let rows = [
         (1, (0.0, top * 1.35), amplitude(p), [0.0, upper]),
-        (2, (low - margin, high + margin), "detuning σ", [upper, lower]),
+        (2, detunings, "detuning σ", [upper, lower]),
     ];
     let panels = rows.into_iter().flat_map(|(row, range, label, [y, height])| {
         [
@@ -319,7 +307,7 @@ pub fn history(record: &Record, scene: &Scene, result: &Comparison) -> Figure {
             decay_panel(&theory, &points, row, range).at([left, y, width - left, height]),
         ]
     });
-    Figure { size: (width, upper + lower), panels: panels.collect() }
+    Figure(panels.collect())
 }
 
 /// The decay along the manifold by first-order theory, from an amplitude.
@@ -419,7 +407,7 @@ pub fn approach(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
     let free = sequence(0.0, (lock.b, lock.c));
     panel.add(Shape::Circle(3.5), free, MODULATION, "without drive");
     panel.add(Shape::Square, [(lock.b, lock.c)], INK, "phase resonance");
-    Figure::single(panel)
+    Figure(vec![panel])
 }
 
 /// Backbones of first-order theory for several coefficients of restitution, the scene's own emphasised.
@@ -442,7 +430,7 @@ pub fn backbones(p: &Dimensionless) -> Figure {
         let points: Vec<Marked> = theory::backbone(&Dimensionless { r, ..*p }, 1e-3, 1.5 * B_SYMMETRY_BREAKING, 500)
             .into_iter()
             .filter(|point| point.c <= top && (x.0..=x.1).contains(&point.sigma))
-            .map(|point| ((point.sigma, point.c), point.stable()))
+            .map(|point| marked(&point))
             .collect();
         // Without loss at the impacts C vanishes at the fold, and sigma jumps from one side to the other there.
         for piece in points.chunk_by(|place, next| (place.0.0 - next.0.0).abs() < 1.0) {
@@ -460,7 +448,7 @@ pub fn backbones(p: &Dimensionless) -> Figure {
         };
         panel.add(Shape::TextOnCurve(size), [place], INK, &format!("r = {r}"));
     }
-    Figure::single(panel)
+    Figure(vec![panel])
 }
 
 /// Frequency responses at several excitations, exact and first-order, with the backbone near their maxima.
@@ -497,9 +485,8 @@ pub fn responses(p: &Dimensionless, responses: &[FrequencyResponse]) -> Figure {
         }
     }
     let backbone = theory::backbone(p, fold, 1.4 * B_SYMMETRY_BREAKING, 600);
-    let backbone = backbone.iter().map(|point| ((point.sigma, point.c), point.stable()));
-    panel.curve(backbone, 2.6, THEORY, "backbone");
-    Figure { size: (WIDE, SIZE.1), panels: vec![panel] }
+    panel.curve(backbone.iter().map(marked), 2.6, THEORY, "backbone");
+    Figure(vec![panel])
 }
 
 /// One frequency response, by theory and exact.
@@ -527,11 +514,10 @@ pub fn period(p: &Dimensionless, motion: &Periodic, theory: Option<&BackbonePoin
     let rows = motion.motion(p, POINTS);
     let impacts = impacts(motion);
     let (width, upper, lower) = (SIZE.0, 290.0, 270.0);
-    let panels = vec![
+    Figure(vec![
         displacements(p, motion, &rows, &impacts).at([0.0, 0.0, width, upper]),
         coordinates(p, &rows, &impacts, theory).at([0.0, upper, width, lower]),
-    ];
-    Figure { size: (width, upper + lower), panels }
+    ])
 }
 
 fn part(n: usize) -> f64 {

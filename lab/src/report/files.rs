@@ -106,56 +106,34 @@ pub(super) fn csv<T: Serialize>(headings: &str, rows: impl IntoIterator<Item = T
 
 /// The points along a decay, as CSV: the columns are the keys of their JSON.
 pub fn decay_csv(result: &Comparison) -> Result<String, ReportError> {
-    let points = result.decay.iter().map(serde_json::to_value);
-    let points = points.collect::<Result<Vec<Value>, _>>()?;
-    let points: Vec<_> = points.iter().filter_map(Value::as_object).collect();
-    let Some(first) = points.first() else {
-        return Ok(String::new());
-    };
-    let headings: Vec<&str> = first.keys().map(String::as_str).collect();
-    csv(
-        &headings.join(","),
-        points.iter().map(|point| point.values().collect::<Vec<_>>()),
-    )
+    let points = serde_json::to_value(&result.decay)?;
+    let points: Vec<_> = points
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_object)
+        .collect();
+    let headings: Vec<&str> = points
+        .first()
+        .into_iter()
+        .flat_map(|point| point.keys())
+        .map(String::as_str)
+        .collect();
+    let rows = points.iter().map(|point| point.values().collect::<Vec<_>>());
+    csv(&headings.join(","), rows)
 }
 
 /// The points of a tracked backbone.
 pub(super) fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
-    #[derive(Serialize)]
-    struct Row {
-        level: f64,
-        periods: f64,
-        averaged: usize,
-        settled: bool,
-        reached: bool,
-        regime: Regime,
-        regime_by_impacts: Option<Regime>,
-        #[serde(rename = "tone_Hz")]
-        tone_hz: Option<f64>,
-        tone_share: Option<f64>,
-        distance: Option<f64>,
-        sigma_less_exact: Option<f64>,
-        #[serde(rename = "G_less_exact")]
-        g_less_exact: Option<f64>,
-    }
-    let row = |TrackedPoint { point, exact }: &TrackedPoint| {
-        let row = Row {
-            level: point.level,
-            periods: point.periods,
-            averaged: point.averaged,
-            settled: point.settled,
-            reached: point.reached,
-            regime: point.regime,
-            regime_by_impacts: point.regime_by_impacts,
-            tone_hz: point.tone.map(|tone| tone.hertz),
-            tone_share: point.tone.map(|tone| tone.share),
-            distance: exact.map(|exact| exact.nearest),
-            sigma_less_exact: exact.and_then(|exact| exact.sigma),
-            g_less_exact: exact.and_then(|exact| exact.g),
-        };
-        (point.at, row)
-    };
-    csv("", result.points.iter().map(row))
+    let headings = "f_Hz,A_m,E_m,u_f_Hz,u_A_m,u_E_m,sigma,C,G,phase_error_deg,u_sigma,u_C,u_G,u_phase_deg,level,periods,averaged,settled,\
+                    reached,regime,regime_by_impacts,tone_Hz,tone_share,distance,sigma_less_exact,G_less_exact";
+    let rows = result.points.iter().map(|TrackedPoint { point, exact }| {
+        let motion = (point.level, point.periods, point.averaged, point.settled, point.reached);
+        let tone = point.tone.map(|tone| (tone.hertz, tone.share)).unzip();
+        let exact = exact.map_or((None, None, None), |exact| (Some(exact.nearest), exact.sigma, exact.g));
+        (point.at, motion, point.regime, point.regime_by_impacts, tone, exact)
+    });
+    csv(headings, rows)
 }
 
 /// The cells of a map, as CSV.
@@ -163,25 +141,14 @@ pub fn map_csv(map: &Map) -> Result<String, ReportError> {
     const HEADINGS: &str = "sigma,G,r,regime,followed,transient,recurrence,exponent,exponent_error,synchrony,impacts_per_period,impacts,\
                             periods,sticks_per_period,theory_stable,coexisting";
     // Axes that are not among the first three columns come before them.
-    let own = map
-        .names()
-        .map(|name| HEADINGS.split(',').all(|heading| heading != name));
-    let names = map
-        .names()
-        .into_iter()
-        .zip(own)
-        .filter(|(_, own)| *own)
-        .map(|(name, _)| name);
-    let headings: Vec<&str> = names.chain([HEADINGS]).collect();
+    let own: Vec<usize> = (0..2)
+        .filter(|n| HEADINGS.split(',').all(|heading| heading != map.names()[*n]))
+        .collect();
+    let headings: Vec<&str> = own.iter().map(|n| map.names()[*n]).chain([HEADINGS]).collect();
     let row = |(n, cell): (u64, &MapCell)| {
         let MapCell { sigma, g, r, result, theory_stable, .. } = *cell;
         let place = [map.x.at(n % map.x.points), map.y.at(n / map.x.points)];
-        let place: Vec<f64> = place
-            .into_iter()
-            .zip(own)
-            .filter(|(_, own)| *own)
-            .map(|(value, _)| value)
-            .collect();
+        let place: Vec<f64> = own.iter().map(|n| place[*n]).collect();
         let coexisting: Vec<&str> = cell.coexisting.iter().map(Regime::name).collect();
         (place, [sigma, g, r], result, theory_stable, coexisting.join("; "))
     };

@@ -1,21 +1,22 @@
 //! The sections of the report: each computes its results, describes them, and adds its figures, tables and lines of the error budget.
 
+use std::error::Error;
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::figures;
 use super::files::{ReportError, bifurcations_csv, csv, decay_csv, json, map_csv, tracked_csv};
 use super::table::{Table, number, with_uncertainty};
-use super::{Section, Subject, summary};
+use super::{Section, summary};
 use crate::backbone::track;
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use crate::experiment;
 use crate::identification::{DecayEnd, identify};
-use crate::map::LIMIT;
 use crate::orbit::{
     Branch, Condition, ContinuationLimits, DOUBLINGS, FrequencyResponse, ImpactPattern, Periodic, backbone,
     convergence, response, stable_resonant,
 };
+use crate::record::Record;
 use crate::regime::Regime;
 use crate::rig::{BuiltIn, Simulated};
 use crate::scene::Dimensionless;
@@ -26,7 +27,7 @@ use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, resonant};
 type Progress<'a> = &'a (dyn Fn(f64) + Sync);
 
 /// Computes one section.
-type Maker = fn(&Subject, Progress) -> Result<Section, ReportError>;
+type Maker = fn(&mut Map, Progress) -> Result<Section, ReportError>;
 
 /// All sections in order, with the names that the progress bar shows.
 pub(super) const SECTIONS: [(&str, Maker); 5] = [
@@ -38,18 +39,18 @@ pub(super) const SECTIONS: [(&str, Maker); 5] = [
 ];
 
 /// Lock, hold, release, decay.
-fn experiment(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
+fn experiment(map: &mut Map, _: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("The experiment");
-    let scene = &subject.scene;
+    let scene = map.sweep.scene();
     let mut rig = Simulated::of(scene)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let record = experiment::run(rig.as_mut(), &mut controller, scene, |_, _, _| {});
-    let identified = record.map_err(|error| error.to_string()).and_then(|record| {
-        let identification = identify(&record, scene).map_err(|error| error.to_string())?;
+    let mut measure = || -> Result<(Record, Comparison), Box<dyn Error>> {
+        let record = experiment::run(rig.as_mut(), &mut controller, scene, |_, _, _| {})?;
+        let identification = identify(&record, scene)?;
         Ok((record, Comparison::of(&identification, scene)))
-    });
-    let (record, result) = match identified {
-        Ok(identified) => identified,
+    };
+    let (record, result) = match measure() {
+        Ok(measured) => measured,
         Err(error) => return Ok(section.concluded(format!("The experiment gave no backbone: {error}."))),
     };
     describe(&mut section, &result);
@@ -139,25 +140,29 @@ fn describe(section: &mut Section, result: &Comparison) {
 /// The locked point beside exact orbit and theory: a row for each quantity, dimensionless and in SI units.
 fn describe_lock(section: &mut Section, result: &Comparison) {
     let (p, lock, at) = (&result.parameters, &result.lock, &result.lock.at);
-    let b = lock.b.zip(lock.u_b);
-    let measured = [
-        with_uncertainty(at.sigma, at.u_sigma),
-        with_uncertainty(at.f_hz, at.u_f_hz),
-        with_uncertainty(at.c, at.u_c),
-        with_uncertainty(1e3 * at.a_m, 1e3 * at.u_a_m),
-        b.map_or("–".into(), |(b, u)| with_uncertainty(b, u)),
-    ];
     let millimetres = 1e3 * at.a_m / at.c;
-    let computed = |sigma: f64, c: f64, b: f64| [sigma, p.omega(sigma) / TAU, c, millimetres * c, b].map(number);
-    let mut columns = vec![("measured".to_string(), measured)];
+    let measured = [
+        (at.sigma, at.u_sigma),
+        (at.f_hz, at.u_f_hz),
+        (at.c, at.u_c),
+        (1e3 * at.a_m, 1e3 * at.u_a_m),
+        lock.b.zip(lock.u_b).unwrap_or((f64::NAN, f64::NAN)),
+    ];
+    let measured = measured.map(|(value, u)| match value.is_nan() {
+        true => "–".into(),
+        false => with_uncertainty(value, u),
+    });
+    let mut columns = vec![("measured", measured)];
+    let mut add = |name, [sigma, c, b]: [f64; 3]| {
+        let numbers = [sigma, p.omega(sigma) / TAU, c, millimetres * c, b];
+        columns.push((name, numbers.map(number)));
+    };
     let percent = |c: f64, reference: f64| 100.0 * (c / reference - 1.0).abs();
     if let Some(exact) = &result.exact {
-        columns.push(("exact orbit".into(), computed(exact.sigma, exact.c, exact.b)));
-        let others = result.others();
-        columns.extend(others.map(|orbit| {
-            let name = "another stable orbit, not followed".to_string();
-            (name, computed(orbit.sigma, orbit.c, orbit.b))
-        }));
+        add("exact orbit", [exact.sigma, exact.c, exact.b]);
+        for orbit in result.others() {
+            add("another stable orbit, not followed", [orbit.sigma, orbit.c, orbit.b]);
+        }
         let sigma = (at.sigma - exact.sigma).abs();
         section.budget(
             "lock, measured against the exact orbit",
@@ -169,17 +174,17 @@ fn describe_lock(section: &mut Section, result: &Comparison) {
         );
     }
     if let Some(theory) = &result.theory {
-        columns.push(("first-order theory".into(), computed(theory.sigma, theory.c, theory.b)));
-        if let Some(exact) = &result.exact {
-            let sigma = (theory.sigma - exact.sigma).abs();
-            section.budget(
-                "theory against the exact orbit, at the lock",
-                format!("{sigma:.3} in σ, {:.1} % in C", percent(theory.c, exact.c)),
-                "The theory is of first order in ε; the convergence study below shows that the difference shrinks as ε.",
-            );
-        }
+        add("first-order theory", [theory.sigma, theory.c, theory.b]);
     }
-    let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+    if let Some((theory, exact)) = result.theory.zip(result.exact) {
+        let sigma = (theory.sigma - exact.sigma).abs();
+        section.budget(
+            "theory against the exact orbit, at the lock",
+            format!("{sigma:.3} in σ, {:.1} % in C", percent(theory.c, exact.c)),
+            "The theory is of first order in ε; the convergence study below shows that the difference shrinks as ε.",
+        );
+    }
+    let names: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
     let quantities = [
         "detuning σ",
         "frequency, Hz",
@@ -187,10 +192,8 @@ fn describe_lock(section: &mut Section, result: &Comparison) {
         "amplitude, mm",
         "particle speed B",
     ];
-    let rows = (0..).zip(quantities).map(|(n, quantity)| {
-        let cells = columns
-            .iter()
-            .map(|(_, cells): &(String, [String; 5])| cells[n].clone());
+    let rows = quantities.iter().enumerate().map(|(n, quantity)| {
+        let cells = columns.iter().map(|(_, cells)| cells[n].clone());
         std::iter::once(quantity.to_string()).chain(cells).collect::<Vec<_>>()
     });
     section.table(
@@ -204,9 +207,9 @@ fn describe_lock(section: &mut Section, result: &Comparison) {
 }
 
 /// The backbone tracked with the loop closed, level by level.
-fn tracking(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
+fn tracking(map: &mut Map, done: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("The backbone, tracked with the loop closed");
-    let scene = &subject.scene;
+    let scene = map.sweep.scene();
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let mut rig = Simulated::of(scene)?;
     let tracked = track(rig.as_mut(), &mut controller, scene, |at, of| {
@@ -247,9 +250,9 @@ fn tracking(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
 }
 
 /// First-order theory: the backbones of several r, activation, and how it approaches the exact orbits.
-fn theory(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
+fn theory(map: &mut Map, _: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("First-order theory and its accuracy");
-    let p = subject.scene.dimensionless();
+    let p = map.sweep.scene().dimensionless();
     let flow = SlowFlow::new(p.lambda, p.r);
     let stable = resonant(&p).into_iter().find(|point| point.stable());
     section.words(format!(
@@ -276,28 +279,21 @@ fn theory(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
          impacts, the lower the amplitude at the fold.",
         &figures::backbones(&p),
     );
-    match convergence(&p, 6) {
-        Some(study) => {
-            let [s, c, b] = study.slopes;
-            section.finding = format!(
-                "The difference between first-order theory and exact orbit shrinks as ε to the power {s:.2} in σ, {c:.2} in C and {b:.2} in B."
-            );
-            let rows = study
-                .rows
-                .iter()
-                .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|value| format!("{value:.3e}")));
-            section.table(
-                "Theory minus exact orbit at phase resonance; λ, r and G as in the scene.",
-                &Table::new("ε | in σ | in C | in B").rows(rows),
-            );
-            section.words(section.finding.clone());
-            section.attach("convergence.csv", csv("", &study.rows)?);
-        }
-        None => {
-            return Ok(section.concluded("Theory and exact orbits have no common stable phase-resonant motion here."));
-        }
-    }
-    Ok(section)
+    let Some(study) = convergence(&p, 6) else {
+        return Ok(section.concluded("Theory and exact orbits have no common stable phase-resonant motion here."));
+    };
+    let [s, c, b] = study.slopes;
+    let finding = format!(
+        "The difference between first-order theory and exact orbit shrinks as ε to the power {s:.2} in σ, {c:.2} in C and {b:.2} in B."
+    );
+    let rows = study.rows.iter();
+    let rows = rows.map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|value| format!("{value:.3e}")));
+    section.table(
+        "Theory minus exact orbit at phase resonance; λ, r and G as in the scene.",
+        &Table::new("ε | in σ | in C | in B").rows(rows),
+    );
+    section.attach("convergence.csv", csv("", &study.rows)?);
+    Ok(section.concluded(finding))
 }
 
 fn describe_activation(section: &mut Section, scene: &Dimensionless, sigma: f64) {
@@ -314,9 +310,9 @@ fn describe_activation(section: &mut Section, scene: &Dimensionless, sigma: f64)
 }
 
 /// Exact frequency responses and backbone, and one period of the locked motion.
-fn curves(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
+fn curves(map: &mut Map, done: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("Exact periodic motions");
-    let p = subject.scene.dimensionless();
+    let p = map.sweep.scene().dimensionless();
     let limits = ContinuationLimits::default();
     let excitations = excitations(&p);
     let mut responses: Vec<FrequencyResponse> = Vec::new();
@@ -359,14 +355,11 @@ fn curves(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
 }
 
 fn describe_backbone(section: &mut Section, curve: &Branch) {
-    let special: Vec<String> = curve
-        .special
-        .iter()
-        .map(|special| {
-            let Periodic { sigma, c, g, .. } = special.motion;
-            format!("{} at σ = {sigma:.4}, C = {c:.4}, G = {g:.4}", special.name())
-        })
-        .collect();
+    let special = curve.special.iter().map(|special| {
+        let Periodic { sigma, c, g, .. } = special.motion;
+        format!("{} at σ = {sigma:.4}, C = {c:.4}, G = {g:.4}", special.name())
+    });
+    let special: Vec<String> = special.collect();
     section.finding = format!(
         "The exact backbone was followed through {} motions; its stability changes in {} place{}.",
         curve.points.len(),
@@ -377,9 +370,10 @@ fn describe_backbone(section: &mut Section, curve: &Branch) {
         "These motions are exact: periodic orbits of the full equations, found by shooting on the impact map. Pseudo-arclength \
          continuation follows them through folds and symmetry breaking, stable or not. There is no first-order approximation.",
     );
-    let places = match special.len() {
-        0 => "nowhere".into(),
-        _ => special.join("; "),
+    let places = if special.is_empty() {
+        "nowhere".into()
+    } else {
+        special.join("; ")
     };
     section.words(format!(
         "Along the exact backbone, stability changes here: {places}. The theory predicts symmetry breaking at \
@@ -424,8 +418,11 @@ fn excitations(p: &Dimensionless) -> Vec<f64> {
 fn curves_csv(backbone: &Branch, responses: &[FrequencyResponse]) -> Result<String, ReportError> {
     let headings = "curve,sigma,G,C,gamma,B,largest_multiplier,stable";
     let components = responses.iter().flat_map(|response| {
-        let components = response.components.iter();
-        components.map(|component| (format!("G={:.4}: {}", response.g, component.name), &component.branch))
+        let name = |name: &str| format!("G={:.4}: {name}", response.g);
+        response
+            .components
+            .iter()
+            .map(move |component| (name(&component.name), &component.branch))
     });
     let curves = std::iter::once(("backbone".to_string(), backbone)).chain(components);
     let rows = curves.flat_map(|(curve, branch)| {
@@ -438,21 +435,19 @@ fn curves_csv(backbone: &Branch, responses: &[FrequencyResponse]) -> Result<Stri
 }
 
 /// The regime map.
-fn regimes(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
+fn regimes(map: &mut Map, done: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("Regimes of the driven response");
-    let [x, y] = &subject.map;
-    let map = Map::new(subject.family.clone(), x, y, None, LIMIT)?;
     let (count, all) = (AtomicUsize::new(0), map.sweep.cells());
-    let map = map.run(0, || {
+    map.run(0, || {
         let n = count.fetch_add(1, Ordering::Relaxed) + 1;
         done(n as f64 / all as f64);
     })?;
-    describe_map(&mut section, &map, subject);
+    describe_map(&mut section, map);
     section.figure(
         "regimes",
         "The regime map. The black line is the border of the island in which first-order theory has a stable symmetric 1:1 motion. The \
          coloured curves are exact bifurcations of the 1:1 motions, solid where they bound the stability of one.",
-        &figures::regimes(&map),
+        &figures::regimes(map),
     );
     section.budget(
         "regime map",
@@ -460,13 +455,14 @@ fn regimes(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
         "Where several regimes are stable, the start decides. Chaos that ends only after more periods than were simulated counts \
          as lasting; docs/regimes.md says how often that happens.",
     );
-    section.attach("regimes.csv", map_csv(&map)?);
-    section.attach("bifurcations.csv", bifurcations_csv(&map)?);
+    section.attach("regimes.csv", map_csv(map)?);
+    section.attach("bifurcations.csv", bifurcations_csv(map)?);
     Ok(section)
 }
 
-fn describe_map(section: &mut Section, map: &Map, subject: &Subject) {
-    let [x, y] = subject.map.each_ref().map(Axis::short_form);
+fn describe_map(section: &mut Section, map: &Map) {
+    let [x, y] = map.axes().map(Axis::short_form);
+    let limit = map.sweep.settings().periods;
     let all = map.cells.len();
     let inside = map.cells.iter().filter(|cell| cell.theory_stable).count();
     let (_, agree) = map.count(Regime::Symmetric);
@@ -476,11 +472,10 @@ fn describe_map(section: &mut Section, map: &Map, subject: &Subject) {
         percent(agree, inside)
     );
     section.words(format!(
-        "Each cell of the map over {} and {} is one plant, driven from the scene's start at a fixed frequency until it repeats itself, \
-         at most for {} periods. A motion that has not repeated itself by then is chaotic if its largest Lyapunov exponent exceeds zero by \
+        "Each cell of the map over {x} and {y} is one plant, driven from the scene's start at a fixed frequency until it repeats itself, \
+         at most for {limit} periods. A motion that has not repeated itself by then is chaotic if its largest Lyapunov exponent exceeds zero by \
          four standard errors, modulated if also a fifth of its impacts or more are captured into 1:1 resonance for a while, \
-         quasi-periodic if the exponent is zero within its uncertainty, and otherwise undecided.",
-        x, y, LIMIT
+         quasi-periodic if the exponent is zero within its uncertainty, and otherwise undecided."
     ));
     section.table("How often each regime occurs.", &summary::regimes(map));
     section.words(section.finding.clone());

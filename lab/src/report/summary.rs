@@ -54,16 +54,14 @@ pub fn identification(result: &Comparison) -> String {
     let (lock, at) = (&result.lock, &result.lock.at);
     let [hertz, response, base] = in_si(at);
     let b = lock.b.zip(lock.u_b).map_or("-".into(), |(b, u)| with_uncertainty(b, u));
-    let measured = [
-        "measured at the lock".to_string(),
-        with_uncertainty(at.sigma, at.u_sigma),
-        with_uncertainty(at.c, at.u_c),
-        b,
-    ];
-    let exact = result.exact.iter();
-    let exact = exact.map(|orbit| row("exact orbit", [orbit.sigma, orbit.c, orbit.b]));
-    let theory = result.theory.iter();
-    let theory = theory.map(|point| row("theory, first order", [point.sigma, point.c, point.b]));
+    let [sigma, c] = [(at.sigma, at.u_sigma), (at.c, at.u_c)].map(|(value, u)| with_uncertainty(value, u));
+    let measured = ["measured at the lock".to_string(), sigma, c, b];
+    let exact = result
+        .exact
+        .map(|orbit| row("exact orbit", [orbit.sigma, orbit.c, orbit.b]));
+    let theory = result
+        .theory
+        .map(|point| row("theory, first order", [point.sigma, point.c, point.b]));
     let table = Table::new(" | sigma | C | B").rows([measured]).rows(exact).rows(theory);
     let held = match lock.held {
         true => " (the response is held by control: a constant drive would not hold it)",
@@ -161,11 +159,9 @@ fn agreement(result: &Comparison) -> String {
 
 /// The points of a tracked backbone, and the periods that they took. A rig that does not report impacts has columns in SI units.
 pub fn tracked(result: &TrackedComparison) -> String {
-    let in_metres = result
-        .points
-        .iter()
-        .all(|compared| compared.point.regime_by_impacts.is_none());
-    let rows = result.points.iter().map(|TrackedPoint { point, exact }| {
+    let points = || result.points.iter();
+    let in_metres = points().all(|compared| compared.point.regime_by_impacts.is_none());
+    let rows = points().map(|TrackedPoint { point, exact }| {
         let at = &point.at;
         let mut remarks = point.regime.to_string();
         if let Some(by_impacts) = point.regime_by_impacts {
@@ -180,21 +176,18 @@ pub fn tracked(result: &TrackedComparison) -> String {
         if let Some(tone) = point.tone {
             remarks += &format!("; {tone}");
         }
-        let mut cells = Vec::new();
-        if in_metres {
-            cells.extend(in_si(at));
-        }
+        let si = in_metres.then(|| in_si(at)).into_iter().flatten();
         let pairs = [(at.c, at.u_c), (at.sigma, at.u_sigma), (at.g, at.u_g)];
-        cells.extend(pairs.map(|(value, u)| with_uncertainty(value, u)));
+        let pairs = pairs.map(|(value, u)| with_uncertainty(value, u));
         let error = exact.and_then(|exact| Some(exact.sigma?.abs().max(exact.g?.abs())));
-        cells.extend([
+        let others = [
             format!("{:+.2}°", at.phase_error_deg),
             format!("{:.1}", point.periods),
             point.averaged.to_string(),
             error.map_or("-".into(), |error| format!("{error:.1e}")),
             remarks,
-        ]);
-        cells
+        ];
+        si.chain(pairs).chain(others).collect::<Vec<_>>()
     });
     let si = match in_metres {
         true => "frequency, Hz | response, m | base, m | ",
@@ -202,17 +195,16 @@ pub fn tracked(result: &TrackedComparison) -> String {
     };
     let headings = "C | sigma | G | off target | periods | averaged | error | regime by response / by impacts";
     let table = Table::new(&format!("{si}{headings}")).rows(rows);
-    let worst = result.worst().map_or(String::new(), |worst| {
+    let mut worst = result.worst().map_or(String::new(), |worst| {
         format!(
             "Largest error of a settled point, in sigma or G against the exact backbone at the same C: {:.1e} (distance from the nearest \
              place of the curve: {:.1e})\n",
             worst.at_equal_c, worst.nearest
         )
     });
-    let worst = match &result.left_out {
-        Some(left_out) => format!("{worst}({})\n", ideal("the exact backbone is", left_out)),
-        None => worst,
-    };
+    if let Some(left_out) = &result.left_out {
+        worst += &format!("({})\n", ideal("the exact backbone is", left_out));
+    }
     format!(
         "{}\n\n{}\n{} points in {:.0} periods, {:.1} of which before the loop held the response: {:.1} periods per point\n{worst}",
         rig(&result.parameters),

@@ -14,7 +14,7 @@ use crate::{
     cell::{ABSENT, Cell, FAILED},
     monitor::Monitor,
     store::{ROUNDS, Store, StoreError},
-    sweep::Sweep,
+    sweep::{Shard, Sweep},
 };
 
 /// Smallest number of cells of the first grid along a side, roughly.
@@ -84,35 +84,31 @@ fn results(
         monitor.found.fetch_add(cells.len() as u64, Relaxed);
         return Ok(Some(codes));
     }
-    let compute = |n: &usize| {
-        let cell = (!monitor.stopped()).then(|| sweep.cell(&sweep.cell_index(*n as u64)))?;
-        monitor.note(&cell);
-        Some(cell.code())
-    };
-    let codes: Option<Vec<u8>> = cells.par_iter().map(compute).collect();
+    let cells = cells
+        .par_iter()
+        .map(|n| sweep.counted_cell(&sweep.cell_index(*n as u64), monitor));
+    let codes: Option<Vec<u8>> = cells.map(|cell| Some(cell?.code())).collect();
     codes.iter().try_for_each(|codes| store.write(key, codes))?;
     Ok(codes)
 }
 
 /// Writes all chunks. False if the monitor stopped it.
 fn write(sweep: &Sweep, store: &Store, codes: &[u8], computed: &[bool], monitor: &Monitor) -> Result<bool, StoreError> {
-    let cell = |index: Vec<u64>| {
+    let cell = |index: &[u64]| {
         let n = (index[0] * sweep.shape[1] + index[1]) as usize;
         let failure = match (codes[n], computed[n]) {
-            (FAILED, true) => sweep.cell(&index).failure,
+            (FAILED, true) => sweep.cell(index).failure,
             (FAILED, false) => "not computed, as a neighbouring cell failed".into(),
             _ => String::new(),
         };
         let regime = Regime::SIMULATED.get(usize::from(codes[n])).copied();
-        Cell { regime, inferred: !computed[n], failure, ..Cell::default() }
+        let cell = Cell { regime, inferred: !computed[n], failure, ..Cell::default() };
+        (!monitor.stopped()).then_some(cell)
     };
-    for index in (0..sweep.chunks()).map(|n| sweep.chunk_index(n)) {
-        if monitor.stopped() {
+    for index in Shard::ALL.chunks(sweep) {
+        if !store.fill(&index, cell)? {
             return Ok(false);
         }
-        let indices = (0..sweep.chunk_size()).map(|n| sweep.chunk_cell(&index, n));
-        let cells: Vec<Cell> = indices.map(|index| index.map_or_else(Cell::default, cell)).collect();
-        store.write_chunk(&index, &cells)?;
     }
     let inferred = computed.iter().map(|computed| u64::from(!computed)).sum();
     monitor.inferred.store(inferred, Relaxed);

@@ -16,49 +16,43 @@ use vines_testbench::{
     scene::Scene,
 };
 
-/// What is computed of every cell besides its regime.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Results {
-    /// Amplitude, and the powers that impacts and damper dissipate. The motion is followed further for them.
-    pub response: bool,
-    /// The exact symmetric 1:1 orbits at the drive of the cell, and their stability.
-    pub orbits: bool,
-    /// The locked point: the experiment of `vines identify` without its decay.
-    pub lock: bool,
+/// Groups of results, in the order of the store. `regime` is always there; the motion is followed further for `response`, the amplitude and
+/// the powers that impacts and damper dissipate; `orbits` are the exact symmetric 1:1 orbits at the drive of the cell, and their stability;
+/// `lock` is the locked point, from the experiment of `vines identify` without its decay.
+const GROUPS: [&str; 4] = ["regime", "response", "orbits", "lock"];
+
+/// What is computed of every cell: the names of groups of results. Default: `regime`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Results(Vec<&'static str>);
+
+impl Default for Results {
+    fn default() -> Self {
+        Self(vec!["regime"])
+    }
 }
 
 impl Results {
-    /// What may be asked for besides the regime, in the order of the store.
-    fn groups(&mut self) -> [(&'static str, &mut bool); 3] {
-        [
-            ("response", &mut self.response),
-            ("orbits", &mut self.orbits),
-            ("lock", &mut self.lock),
-        ]
-    }
-
-    /// The names of the groups, in the order of the store.
-    #[must_use]
-    pub fn names(mut self) -> Vec<&'static str> {
-        let asked = self.groups().into_iter().filter(|(_, is_asked)| **is_asked);
-        std::iter::once("regime").chain(asked.map(|(name, _)| name)).collect()
-    }
-
     /// From the names of groups; `regime` is always there.
     ///
     /// # Errors
     /// An unknown name.
     pub fn parse<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Self, ArgumentError> {
-        let mut results = Self::default();
-        for name in names.into_iter().map(str::trim).filter(|name| *name != "regime") {
-            match results.groups().into_iter().find(|(group, _)| *group == name) {
-                Some((_, is_asked)) => *is_asked = true,
-                None => Err(format!(
-                    "unknown results `{name}`; known are regime, response, orbits and lock"
-                ))?,
-            }
+        let names: Vec<&str> = names.into_iter().map(str::trim).collect();
+        if let Some(name) = names.iter().find(|name| !GROUPS.contains(name)) {
+            return Err(format!("unknown results `{name}`; known are regime, response, orbits and lock").into());
         }
-        Ok(results)
+        let asked = |group: &&str| *group == "regime" || names.contains(group);
+        Ok(Self(GROUPS.into_iter().filter(asked).collect()))
+    }
+
+    /// The names of the groups, in the order of the store.
+    #[must_use]
+    pub fn names(&self) -> &[&'static str] {
+        &self.0
+    }
+
+    fn has(&self, group: &str) -> bool {
+        self.0.contains(&group)
     }
 }
 
@@ -85,13 +79,13 @@ impl Cell {
         scene: &Scene,
         sigma: f64,
         numbers: &Dimensionless,
-        results: Results,
+        results: &Results,
         periods: usize,
     ) -> Result<Self, lovines::InvalidValue> {
         let mut run = CellRun::new(numbers, sigma, scene.dimensionless_start())?;
         let result = run.decided(0, periods)?;
-        let response = results.response.then(|| run.response(&result)).transpose()?;
-        let (lock, failure) = match results.lock.then(|| locked(scene)).transpose() {
+        let response = results.has("response").then(|| run.response(&result)).transpose()?;
+        let (lock, failure) = match results.has("lock").then(|| locked(scene)).transpose() {
             Ok(lock) => (lock, String::new()),
             Err(error) => (None, format!("no locked point: {error}")),
         };
@@ -100,7 +94,7 @@ impl Cell {
             inferred: false,
             result: Some(result),
             response,
-            orbits: results.orbits.then(|| symmetric_orbits(numbers, sigma)),
+            orbits: results.has("orbits").then(|| symmetric_orbits(numbers, sigma)),
             power: scene.plant.stiffness * numbers.b * numbers.b * numbers.omega0,
             failure,
             lock,
@@ -122,13 +116,8 @@ impl Cell {
 
     /// The regime as it is stored.
     pub(crate) fn code(&self) -> u8 {
-        let position = |regime| {
-            regime::Regime::SIMULATED
-                .iter()
-                .position(|simulated| *simulated == regime)
-        };
-        match self.regime.and_then(position) {
-            Some(code) => code as u8,
+        match self.regime {
+            Some(regime) => regime as u8,
             None if self.is_known() => FAILED,
             None => ABSENT,
         }
@@ -217,8 +206,14 @@ const VARIABLES: [Variable; 25] = [
 ];
 
 /// The variables of a sweep.
-pub(crate) fn variables(results: Results, is_adaptive: bool) -> impl Iterator<Item = Variable> {
-    let groups = if is_adaptive { vec!["adaptive"] } else { results.names() };
-    let stored = move |variable: &Variable| variable.group.is_empty() || groups.contains(&variable.group);
-    VARIABLES.into_iter().filter(stored)
+pub(crate) fn variables(results: &Results, is_adaptive: bool) -> impl Iterator<Item = Variable> {
+    let is_asked = move |group: &str| {
+        if is_adaptive {
+            group == "adaptive"
+        } else {
+            results.has(group)
+        }
+    };
+    let variables = VARIABLES.into_iter();
+    variables.filter(move |variable| variable.group.is_empty() || is_asked(variable.group))
 }

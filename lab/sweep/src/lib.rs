@@ -19,6 +19,6 @@ pub use axis::{Axis, Grid, SIGMA, Values};
 pub use cell::{ABSENT, FAILED, Results, UNCOUNTED};
 pub use map::{Map, MapCell};
 pub use monitor::Monitor;
-pub use run::{Estimate, EstimateError, collect, estimate, run, verify};
+pub use run::{Estimate, collect, estimate, run, verify};
 pub use store::StoreError;
 pub use sweep::{Settings, Shard, Sweep, SweepError};

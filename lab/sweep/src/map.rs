@@ -1,7 +1,6 @@
 //! A regime map: a sweep over two grids in memory, with the bifurcation curves of the 1:1 motions.
 
 use rayon::prelude::*;
-use serde::Serialize;
 use vines_model::{
     map::{RegimeResult, observe_confirmed},
     orbit::{BifurcationCurve, ContinuationLimits, bifurcation_curves},
@@ -19,17 +18,15 @@ use crate::{
 const MOST: u64 = 2000;
 
 /// One cell of a map.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MapCell {
     /// Detuning.
     pub sigma: f64,
     /// Base amplitude over `b epsilon`.
-    #[serde(rename = "G")]
     pub g: f64,
     /// Restitution coefficient.
     pub r: f64,
     /// Result.
-    #[serde(flatten)]
     pub result: RegimeResult,
     /// First-order theory has a stable symmetric 1:1 motion here.
     pub theory_stable: bool,
@@ -90,26 +87,23 @@ impl Map {
     ///
     /// # Errors
     /// Values that scene or plant refuse.
-    pub fn run(mut self, confirmations: usize, done: impl Fn() + Sync) -> Result<Self, SweepError> {
+    pub fn run(&mut self, confirmations: usize, done: impl Fn() + Sync) -> Result<(), SweepError> {
         let cells = (0..self.sweep.cells()).into_par_iter().map(|n| {
-            let cell = self.cell(
-                self.x.at(n % self.x.points),
-                self.y.at(n / self.x.points),
-                confirmations,
-            );
+            let place = [self.y.at(n / self.x.points), self.x.at(n % self.x.points)];
+            let cell = self.cell(&place, confirmations);
             done();
             cell
         });
         self.cells = cells.collect::<Result<_, _>>()?;
         self.curves = self.bifurcations();
-        Ok(self)
+        Ok(())
     }
 
-    fn cell(&self, x: f64, y: f64, confirmations: usize) -> Result<MapCell, SweepError> {
-        let (scene, sigma, numbers) = self.sweep.at(&[y, x])?;
-        let periods = self.sweep.settings().periods;
-        let (mut result, other) =
-            observe_confirmed(&numbers, sigma, scene.dimensionless_start(), periods, confirmations)?;
+    /// The cell at these values of y and x.
+    fn cell(&self, place: &[f64; 2], confirmations: usize) -> Result<MapCell, SweepError> {
+        let (scene, sigma, numbers) = self.sweep.at(place)?;
+        let (periods, start) = (self.sweep.settings().periods, scene.dimensionless_start());
+        let (mut result, other) = observe_confirmed(&numbers, sigma, start, periods, confirmations)?;
         let mut coexisting = Vec::new();
         if let Some(other) = other {
             coexisting.extend([result.regime, other]);
@@ -141,11 +135,16 @@ impl Map {
         bifurcation_curves(&self.sweep.scene().dimensionless(), &limits)
     }
 
+    /// The axes, horizontal first.
+    #[must_use]
+    pub fn axes(&self) -> [&Axis; 2] {
+        [1, 0].map(|n| &self.sweep.settings().axes[n])
+    }
+
     /// Names of the axes, horizontal first: sigma, G, r, or a key of the scene.
     #[must_use]
     pub fn names(&self) -> [&str; 2] {
-        let [y, x] = [0, 1].map(|n| self.sweep.settings().axes[n].short_name());
-        [x, y]
+        self.axes().map(Axis::short_name)
     }
 
     /// First-order theory has a stable symmetric 1:1 motion at a point of the plane.

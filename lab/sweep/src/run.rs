@@ -7,6 +7,7 @@ use std::{
 };
 
 use rayon::prelude::*;
+use vines_model::ArgumentError;
 
 use crate::{
     adaptive,
@@ -43,23 +44,12 @@ pub fn run(sweep: &Sweep, folder: &Path, shard: Shard, monitor: &Monitor) -> Res
 
 /// Computes the chunks of a part that are missing or damaged. False if the monitor stopped it.
 fn compute(sweep: &Sweep, store: &Store, shard: Shard, monitor: &Monitor) -> Result<bool, StoreError> {
-    let cell = |index: &[u64], n: u64| {
-        if monitor.stopped() {
-            return None;
-        }
-        let cell = sweep.chunk_cell(index, n).map(|index| sweep.cell(&index));
-        Some(cell.inspect(|cell| monitor.note(cell)).unwrap_or_default())
-    };
     for index in shard.chunks(sweep) {
         if store.chunk(&index, monitor).is_some() {
             monitor.found.fetch_add(sweep.chunk_count(&index), Relaxed);
-            continue;
-        }
-        let cells = (0..sweep.chunk_size()).into_par_iter().map(|n| cell(&index, n));
-        let Some(cells) = cells.collect::<Option<Vec<Cell>>>() else {
+        } else if !store.fill(&index, |index| sweep.counted_cell(index, monitor))? {
             return Ok(false);
-        };
-        store.write_chunk(&index, &cells)?;
+        }
     }
     // A part without chunks may have been stopped before.
     Ok(!monitor.stopped())
@@ -127,14 +117,6 @@ impl Estimate {
     }
 }
 
-/// All cells of a trial fail; the reason is the first cell's.
-#[derive(Debug, thiserror::Error)]
-#[error("all of {tried} cells that were tried fail: {reason}")]
-pub struct EstimateError {
-    tried: usize,
-    reason: String,
-}
-
 /// Largest number of cells, and duration, of the trial behind an estimate.
 const TRIED: usize = 64;
 const TRIAL: Duration = Duration::from_secs(1);
@@ -143,7 +125,7 @@ const TRIAL: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// If all of them fail: the reason of the first.
-pub fn estimate(sweep: &Sweep, stop: &AtomicBool) -> Result<Estimate, EstimateError> {
+pub fn estimate(sweep: &Sweep, stop: &AtomicBool) -> Result<Estimate, ArgumentError> {
     let (start, cells) = (Instant::now(), sweep.cells());
     // Positions that do not follow a regular grid: the golden ratio.
     let positions = (0..TRIED).map(|n| (0.5 + 0.618_033_988_749_895 * n as f64).fract());
@@ -152,8 +134,8 @@ pub fn estimate(sweep: &Sweep, stop: &AtomicBool) -> Result<Estimate, EstimateEr
         .map(|position| sweep.cell(&sweep.cell_index((position * cells as f64) as u64)))
         .collect();
     if tried.iter().all(|cell| !cell.failure.is_empty()) {
-        let reason = tried[0].failure.clone();
-        return Err(EstimateError { tried: tried.len(), reason });
+        let (tried, reason) = (tried.len(), &tried[0].failure);
+        return Err(format!("all of {tried} cells that were tried fail: {reason}").into());
     }
     let seconds = cells as f64 * start.elapsed().as_secs_f64() / tried.len() as f64;
     let hours = seconds / rayon::current_num_threads() as f64 / 3600.0;

@@ -15,6 +15,7 @@ use flate2::{
     Compression,
     bufread::{GzDecoder, GzEncoder},
 };
+use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use vines_model::regime::Regime;
 
@@ -183,10 +184,20 @@ impl<'a> Store<'a> {
         files.into_iter().collect::<io::Result<_>>().ok()
     }
 
-    /// Writes all variables of a chunk.
-    pub(crate) fn write_chunk(&self, index: &[u64], cells: &[Cell]) -> Result<(), StoreError> {
-        let mut variables = self.variables.iter();
-        variables.try_for_each(|variable| self.write(&chunk_key(variable.name, index), &variable.read.bytes(cells)))
+    /// Writes a chunk of cells, computed on all cores. False if the monitor stopped it: a cell is None.
+    pub(crate) fn fill(&self, index: &[u64], cell: impl Fn(&[u64]) -> Option<Cell> + Sync) -> Result<bool, StoreError> {
+        let cell = |n| match self.sweep.chunk_cell(index, n) {
+            Some(inside) => cell(&inside),
+            None => Some(Cell::default()),
+        };
+        let cells = (0..self.sweep.chunk_size()).into_par_iter().map(cell);
+        let Some(cells) = cells.collect::<Option<Vec<Cell>>>() else {
+            return Ok(false);
+        };
+        for variable in &self.variables {
+            self.write(&chunk_key(variable.name, index), &variable.read.bytes(&cells))?;
+        }
+        Ok(true)
     }
 
     /// Writes the files of a chunk of another store of the same sweep.
@@ -345,38 +356,25 @@ fn attributes(variable: &Variable) -> Value {
 
 /// Why a store cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum StoreError {
-    /// The store belongs to another sweep, or was computed by another version of the program.
     #[error(
         "{} belongs to another sweep, with another {differs}. It stays as it is; write to another folder, or delete it",
         folder.display()
     )]
-    Other {
-        /// The folder.
-        folder: PathBuf,
-        /// What differs.
-        differs: String,
-    },
-    /// The folder holds something else.
+    Other { folder: PathBuf, differs: String },
     #[error(
         "{} is not the store of a sweep: its zarr.json, which says to which sweep it belongs, is missing or damaged. \
          It stays as it is; name another folder",
         .0.display()
     )]
     NotAStore(PathBuf),
-    /// An adaptive sweep in parts.
     #[error(
         "an adaptive sweep cannot be computed in parts: what is computed next depends on all cells. Leave out the part"
     )]
     Part,
-    /// Reading or writing failed.
     #[error("cannot write to {}: {source}. Complete chunks stay; the same command continues the sweep", folder.display())]
-    Write {
-        /// The folder.
-        folder: PathBuf,
-        /// Error of the system.
-        source: io::Error,
-    },
+    Write { folder: PathBuf, source: io::Error },
 }
 
 impl StoreError {

@@ -7,6 +7,7 @@ use vines_testbench::scene::{Family, Scene, SceneError};
 use crate::{
     axis::{Axis, SIGMA, Values},
     cell::{Cell, Results, variables},
+    monitor::Monitor,
 };
 
 /// Settings of a sweep besides its scene.
@@ -82,48 +83,39 @@ impl Settings {
     }
 
     fn check(&self) -> Result<(), SweepError> {
-        let axes = &self.axes;
-        if axes.is_empty() {
-            return refused("a sweep needs at least one axis, for instance plant.r=0.3:1:71");
-        }
-        if let Some(n) = (1..axes.len()).find(|n| axes[..*n].iter().any(|axis| axis.name == axes[*n].name)) {
-            return refused(format!("axis {} is {} again", n + 1, axes[n].name));
-        }
-        if self.sigma.is_some() && self.has(SIGMA) {
-            return refused("sigma is an axis and a constant: give one of them");
-        }
-        if let Some(sigma) = self.sigma.filter(|sigma| !sigma.is_finite()) {
-            return refused(format!("sigma = {sigma} (dimensionless) is not a finite number"));
-        }
-        let most = u32::MAX as usize / 8;
-        if !(100..=most).contains(&self.periods) {
-            return refused(format!("{} periods: from 100 to {most} are allowed", self.periods));
-        }
-        if !(1..=CHUNK).contains(&self.chunk) {
-            return refused(format!(
-                "a chunk of {} cells: from 1 to {CHUNK} are allowed, which must be in memory",
-                self.chunk
-            ));
-        }
-        let Some(stride) = self.adaptive else {
-            return Ok(());
-        };
-        if !stride.is_power_of_two() || !(2..=64).contains(&stride) {
-            return refused(format!(
-                "adaptive refinement from every {stride}-th cell: 2, 4, 8, 16, 32 or 64 are allowed"
-            ));
-        }
-        let points: Option<Vec<u64>> = axes.iter().map(Axis::points).collect();
-        match points.as_deref() {
-            Some([rows, columns]) if rows.checked_mul(*columns).is_none_or(|cells| cells > ADAPTIVE) => refused(
-                format!("adaptive refinement of more than {ADAPTIVE} cells, which must be in memory"),
-            ),
-            Some([_, _]) if self.results != Results::default() => {
-                refused("adaptive refinement has the regime only: leave out other results")
+        let (axes, most) = (&self.axes, u32::MAX as usize / 8);
+        let again = (1..axes.len()).find(|n| axes[..*n].iter().any(|axis| axis.name == axes[*n].name));
+        refused(if axes.is_empty() {
+            "a sweep needs at least one axis, for instance plant.r=0.3:1:71".into()
+        } else if let Some(n) = again {
+            format!("axis {} is {} again", n + 1, axes[n].name)
+        } else if self.sigma.is_some() && self.has(SIGMA) {
+            "sigma is an axis and a constant: give one of them".into()
+        } else if let Some(sigma) = self.sigma.filter(|sigma| !sigma.is_finite()) {
+            format!("sigma = {sigma} (dimensionless) is not a finite number")
+        } else if !(100..=most).contains(&self.periods) {
+            format!("{} periods: from 100 to {most} are allowed", self.periods)
+        } else if !(1..=CHUNK).contains(&self.chunk) {
+            let cells = self.chunk;
+            format!("a chunk of {cells} cells: from 1 to {CHUNK} are allowed, which must be in memory")
+        } else if let Some(stride) = self.adaptive {
+            let points: Option<Vec<u64>> = axes.iter().map(Axis::points).collect();
+            match points.as_deref() {
+                _ if !stride.is_power_of_two() || !(2..=64).contains(&stride) => {
+                    format!("adaptive refinement from every {stride}-th cell: 2, 4, 8, 16, 32 or 64 are allowed")
+                }
+                Some([rows, columns]) if rows.checked_mul(*columns).is_none_or(|cells| cells > ADAPTIVE) => {
+                    format!("adaptive refinement of more than {ADAPTIVE} cells, which must be in memory")
+                }
+                Some([_, _]) if self.results != Results::default() => {
+                    "adaptive refinement has the regime only: leave out other results".into()
+                }
+                Some([_, _]) => return Ok(()),
+                _ => "adaptive refinement needs exactly two axes, each a grid or a list".into(),
             }
-            Some([_, _]) => Ok(()),
-            _ => refused("adaptive refinement needs exactly two axes, each a grid or a list"),
-        }
+        } else {
+            return Ok(());
+        })
     }
 
     /// Names and lengths of the dimensions.
@@ -249,7 +241,7 @@ impl Sweep {
     }
 
     pub(crate) fn variables(&self) -> impl Iterator<Item = crate::cell::Variable> {
-        variables(self.settings.results, self.settings.adaptive.is_some())
+        variables(&self.settings.results, self.settings.adaptive.is_some())
     }
 
     /// Number of chunks along each dimension.
@@ -335,11 +327,17 @@ impl Sweep {
     pub(crate) fn cell(&self, index: &[u64]) -> Cell {
         let coordinates = self.coordinates();
         let values: Vec<f64> = coordinates.map(|(_, dimension, at)| at(index[dimension])).collect();
-        let Settings { results, periods, .. } = self.settings;
+        let Settings { results, periods, .. } = &self.settings;
         let computed = self
             .at(&values)
-            .and_then(|(scene, sigma, numbers)| Ok(Cell::compute(&scene, sigma, &numbers, results, periods)?));
+            .and_then(|(scene, sigma, numbers)| Ok(Cell::compute(&scene, sigma, &numbers, results, *periods)?));
         computed.unwrap_or_else(|error| Cell { failure: error.to_string(), ..Cell::default() })
+    }
+
+    /// Computes and counts the cell with these indices; None if the monitor has stopped the sweep.
+    pub(crate) fn counted_cell(&self, index: &[u64], monitor: &Monitor) -> Option<Cell> {
+        let cell = (!monitor.stopped()).then(|| self.cell(index));
+        cell.inspect(|cell| monitor.note(cell))
     }
 
     /// Index of the n-th cell.

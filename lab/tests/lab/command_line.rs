@@ -2,255 +2,195 @@
 
 use std::time::{Duration, Instant};
 
-use serde_json::Value;
-
-use crate::{fails, vines};
-
-fn json(arguments: &[&str]) -> Value {
-    let output = vines(arguments);
-    assert!(output.status.success(), "{output:?}");
-    serde_json::from_slice(&output.stdout).expect("JSON")
-}
+use crate::{fails, json, vines};
 
 #[test]
-fn orbits_come_as_a_json_array() {
-    let orbits = json(&["orbit", "--json"]);
-    let stable: Vec<_> = orbits
-        .as_array()
-        .expect("an array")
-        .iter()
-        .filter(|orbit| orbit["stable"] == true)
-        .collect();
+fn orbits_curves_and_theory_come_as_json() {
+    let orbits = json("orbit --json");
+    let orbits = orbits.as_array().expect("an array");
+    let stable: Vec<_> = orbits.iter().filter(|orbit| orbit["stable"] == true).collect();
     assert_eq!(stable.len(), 1);
     for key in ["sigma", "C", "B", "Omega", "G", "impact_velocity"] {
         assert!(stable[0][key].is_f64(), "{key}: {}", stable[0]);
     }
     assert_eq!(stable[0]["multipliers"].as_array().map(Vec::len), Some(4));
+    let backbone = json("orbit --backbone --json");
+    assert!(backbone["points"].as_array().map_or(0, Vec::len) > 100);
+    let mode = json("orbit --backbone --json --set=plant.c=0 --set=plant.r=1 --set=excitation.G=0");
+    let points = mode["points"].as_array().unwrap();
+    let is_free = points.iter().all(|one| one["G"].as_f64().unwrap().abs() < 1e-9);
+    assert!(points.len() > 100 && is_free);
+    let response = json("orbit --response --json --set=excitation.G=1.6");
+    let components = response["components"].as_array().unwrap();
+    let names = || components.iter().map(|one| one["name"].as_str().unwrap());
+    let named = |start: &str| names().filter(|name| name.starts_with(start)).count();
+    assert!(components[0]["special"].as_array().map_or(0, Vec::len) >= 3);
+    assert_eq!((named("symmetric 1:1"), named("asymmetric 1:1")), (1, 1));
+    let settled = json("orbit --sigma=-0.6 --json --set excitation.G=2.2");
+    assert_eq!(settled["bounces"].as_array().map(Vec::len), Some(6));
+    let theory = json("theory --sigma=-1 --json --points 50");
+    for (key, count) in [("backbone", 50), ("solutions", 2), ("equilibria", 2)] {
+        assert_eq!(theory[key].as_array().map(Vec::len), Some(count), "{key}");
+    }
+    assert!(theory["manifold"]["C_min"].as_f64().unwrap() > 0.1);
 }
 
 #[test]
 fn the_plants_own_motion_has_the_friction_that_exact_orbits_leave_out() {
-    let friction = ["orbit", "--periodic", "--json", "--set=plant.mu_k=0.05"];
-    let motion = json(&friction);
-    assert_eq!(
-        (motion["impacts"].as_u64(), motion["stable"].as_bool()),
-        (Some(2), Some(true))
-    );
+    let friction = "orbit --periodic --json --set=plant.mu_k=0.05";
+    let motion = json(friction);
+    assert_eq!((motion["impacts"].as_u64(), &motion["stable"]), (Some(2), &true.into()));
     assert!((motion["phase_deg"].as_f64().unwrap() + 90.0).abs() < 1e-6, "{motion}");
     assert_eq!(motion["ideal"][0], "friction");
-    let smaller = motion["a_m"].as_f64() < motion["ideal"][2].as_f64();
+    let amplitude = motion["a_m"].as_f64().unwrap();
+    let smaller = amplitude < motion["ideal"][2].as_f64().unwrap();
     assert!(smaller, "friction takes energy: {motion}");
     // A simulation at the same frequency leads to it.
-    let sigma = format!("--sigma={}", motion["sigma"]);
-    let start = "--set=start.dq2=0.5";
-    let settled = json(&[&friction[..], &[&sigma, start]].concat());
-    assert!(
-        (settled["a_m"].as_f64().unwrap() / motion["a_m"].as_f64().unwrap() - 1.0).abs() < 1e-8,
-        "{settled}"
-    );
-    fails(&["orbit", "--periodic", "--set=plant.r_scatter=0.1"], 1, "set it to 0");
-}
-
-#[test]
-fn theory_comes_as_json_with_as_many_samples_as_asked_for() {
-    let theory = json(&["theory", "--json", "--points", "50"]);
-    assert_eq!(theory["backbone"].as_array().map(Vec::len), Some(50));
-    assert_eq!(theory["solutions"].as_array().map(Vec::len), Some(2));
-    assert!(theory["manifold"]["C_min"].as_f64().unwrap() > 0.1);
+    let settled = json(&format!("{friction} --sigma={} --set=start.dq2=0.5", motion["sigma"]));
+    let is_same = (settled["a_m"].as_f64().unwrap() / amplitude - 1.0).abs() < 1e-8;
+    assert!(is_same, "{settled}");
 }
 
 /// Values that are finite numbers, and with which the plant cannot compute.
 #[test]
 fn extreme_values_of_plant_and_drive_are_refused_at_once() {
-    let commands: [&[&str]; 3] = [&["map"], &["backbone"], &["identify", "--rig", "built-in"]];
+    let refused = |line: &str, part: &str| {
+        let began = Instant::now();
+        fails(line, 2, part);
+        let passed = began.elapsed();
+        assert!(passed < Duration::from_secs(10), "{line}: {passed:?}");
+    };
     for (value, name) in [
         ("plant.c=1e300", "c (damping) = "),
         ("plant.M=1e-300", "M (primary mass) = "),
         ("plant.k=1e101", "k (stiffness) = "),
         ("excitation.E=1e300", "E (amplitude of the base oscillator) = "),
     ] {
-        for command in commands {
-            let began = Instant::now();
-            fails(&[command, &["--set", value]].concat(), 2, name);
-            let passed = began.elapsed();
-            assert!(passed < Duration::from_secs(10), "{command:?}: {passed:?}");
+        for command in ["map", "backbone", "identify --rig built-in"] {
+            refused(&format!("{command} --set {value}"), name);
         }
     }
-    for axes in [["--x", "sigma=0:1e300:3"], ["--y", "G=0.1:1e300:3"]] {
-        fails(&[&["map"][..], &axes].concat(), 2, "is refused");
+    for axis in ["--x sigma=0:1e300:3", "--y G=0.1:1e300:3"] {
+        refused(&format!("map {axis}"), "is refused");
     }
 }
 
 #[test]
 fn a_person_gets_tables() {
-    for command in ["orbit", "theory"] {
-        let output = vines(&[command]);
-        let text = String::from_utf8(output.stdout).unwrap();
-        assert!(text.contains("sigma") && text.contains("stable"), "{text}");
+    for (line, words) in [
+        ("orbit", ["sigma", "stable"]),
+        ("theory", ["sigma", "stable"]),
+        ("orbit --set=excitation.G=0", ["none", "without excitation"]),
+    ] {
+        let text = String::from_utf8(vines(line).stdout).unwrap();
+        assert!(words.iter().all(|word| text.contains(word)), "{line}: {text}");
     }
-    let none = vines(&["orbit", "--set=excitation.G=0"]).stdout;
-    assert!(String::from_utf8(none).unwrap().contains("without excitation"));
 }
 
 #[test]
-fn bad_input_ends_with_code_two_and_one_message() {
-    fails(
-        &["orbit", "--set=plant.r=1.5"],
-        2,
-        "r (coefficient of restitution) = 1.5",
-    );
-    fails(&["orbit", "--set=plant.rr=0.5"], 2, "`rr`");
-    fails(&["orbit", "--set=nonsense"], 2, "section.key=value");
-    fails(&["theory", "--scene", "no-such.toml"], 2, "no-such.toml");
-    fails(&["theory", "--points", "1"], 2, "--points");
-    fails(&["dance"], 2, "dance");
-    fails(&["rig", "--listen", "127.0.0.1:0", "--sessions", "0"], 2, "1..");
+fn input_without_sense_ends_with_one_message_and_code_two_and_without_a_result_with_one() {
+    for (line, code, part) in [
+        ("orbit --set=plant.r=1.5", 2, "r (coefficient of restitution) = 1.5"),
+        ("orbit --set=plant.rr=0.5", 2, "`rr`"),
+        ("orbit --set=nonsense", 2, "section.key=value"),
+        ("theory --scene no-such.toml", 2, "no-such.toml"),
+        ("theory --points 1", 2, "--points"),
+        ("theory --sigma=nan", 2, "finite"),
+        ("dance", 2, "dance"),
+        ("rig --listen 127.0.0.1:0 --sessions 0", 2, "1.."),
+        ("orbit --sigma=-1000", 2, "above 0"),
+        ("orbit --sigma=-1 --set=excitation.G=0.6", 1, "vines map"),
+        ("orbit --response --set=excitation.G=0", 1, "G = 0"),
+        ("orbit --response --range=2:-2", 2, "first below the last"),
+        ("orbit --periodic --set=plant.r_scatter=0.1", 1, "set it to 0"),
+        (
+            "identify --set=phase_lock.amplitude_max=8e-5",
+            2,
+            "phase_lock.amplitude_max",
+        ),
+        ("map --x G=1:2:3 --y G=1:2:3", 2, "axis 2 is excitation.G again"),
+        ("map --sigma=-1.1", 2, "sigma is an axis and a constant"),
+        ("report --x r=0.5:1:3 --y r=0.5:1:3", 2, "axis 2 is plant.r again"),
+        ("pack --out no-such --binary win64", 2, "PLATFORM=PATH"),
+        ("pack --out no-such --binary amiga=x.so", 2, "linux64, linux32"),
+        (
+            "pack --out no-such --set=plant.r=2",
+            2,
+            "r (coefficient of restitution) = 2",
+        ),
+    ] {
+        fails(line, code, part);
+    }
+    // Refused before anything is written.
+    assert!(!std::env::temp_dir().join("no-such").exists());
 }
 
 #[test]
 fn a_drive_without_a_stable_orbit_is_told_at_which_drives_one_is_stable() {
     let folder = tempfile::tempdir().unwrap();
-    let undamped = [
-        "--set=plant.c=0",
-        "--set=start.dq2=0.1",
-        "--set=phase_lock.acquire_timeout=57",
-    ];
-    let run = [
-        "identify",
-        "--rig",
-        "built-in",
-        "--out",
-        folder.path().to_str().unwrap(),
-    ];
+    let undamped = "--set=plant.c=0 --set=start.dq2=0.1 --set=phase_lock.acquire_timeout=57";
     let part = "there is no stable symmetric 1:1 orbit at G = 1.1000; it is stable for G from 0.788 to 0.811";
-    fails(&[&run[..], &undamped].concat(), 1, part);
-}
-
-#[test]
-fn curves_and_settled_orbits_come_as_json_too() {
-    let backbone = json(&["orbit", "--backbone", "--json"]);
-    assert!(backbone["points"].as_array().map_or(0, Vec::len) > 100);
-    let mode = ["--set=plant.c=0", "--set=plant.r=1", "--set=excitation.G=0"];
-    let mode = [&["orbit", "--backbone", "--json"], &mode[..]].concat();
-    let mode = json(&mode);
-    let points = mode["points"].as_array().unwrap();
-    assert!(points.len() > 100 && points.iter().all(|one| one["G"].as_f64().unwrap().abs() < 1e-9));
-    let response = json(&["orbit", "--response", "--json", "--set=excitation.G=1.6"]);
-    let components = response["components"].as_array().unwrap();
-    let named = |name: &str| {
-        components
-            .iter()
-            .filter(|one| one["name"].as_str().unwrap().starts_with(name))
-            .count()
-    };
-    assert!(components[0]["special"].as_array().map_or(0, Vec::len) >= 3);
-    assert_eq!((named("symmetric 1:1"), named("asymmetric 1:1")), (1, 1));
-    let settled = json(&["orbit", "--sigma=-0.6", "--json", "--set", "excitation.G=2.2"]);
-    assert_eq!(settled["bounces"].as_array().map(Vec::len), Some(6));
-    let theory = json(&["theory", "--sigma=-1", "--json"]);
-    assert_eq!(theory["equilibria"].as_array().map(Vec::len), Some(2));
+    let out = folder.path().display();
+    fails(&format!("identify --rig built-in --out {out} {undamped}"), 1, part);
 }
 
 #[test]
 fn a_map_is_written_as_table_and_figures() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_str().unwrap();
-    let output = vines(&[
-        "map",
-        "--x=sigma=-2:1:4",
-        "--y=G=1:1.4:3",
-        "--periods=2000",
-        "--out",
-        out,
-    ]);
+    let out = folder.path().display();
+    let output = vines(&format!(
+        "map --x=sigma=-2:1:4 --y=G=1:1.4:3 --periods=2000 --out {out}"
+    ));
     assert!(output.status.success(), "{output:?}");
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let text = String::from_utf8(output.stdout).unwrap();
     assert!(
         text.contains("symmetric 1:1") && text.contains("map-dark.svg"),
         "{text}"
     );
-    let rows = std::fs::read_to_string(folder.path().join("map.csv")).unwrap();
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    let rows = read("map.csv");
     assert_eq!(rows.lines().count(), 1 + 12);
     assert!(rows.starts_with("sigma,G,r,regime,followed,transient,recurrence,exponent,exponent_error,synchrony,"));
-    let curves = std::fs::read_to_string(folder.path().join("bifurcations.csv")).unwrap();
+    let curves = read("bifurcations.csv");
     assert!(curves.starts_with("curve,bifurcation,sigma,G,C,B,bounds_stability\n") && curves.lines().count() > 20);
-}
-
-#[test]
-fn absurd_curves_and_maps_are_refused() {
-    fails(&["orbit", "--sigma=-1000"], 2, "above 0");
-    fails(&["orbit", "--sigma=-1", "--set=excitation.G=0.6"], 1, "vines map");
-    fails(&["orbit", "--response", "--set=excitation.G=0"], 1, "G = 0");
-    fails(&["orbit", "--response", "--range=2:-2"], 2, "first below the last");
-    fails(&["theory", "--sigma=nan"], 2, "finite");
-    let refused = ["identify", "--set=phase_lock.amplitude_max=8e-5"];
-    fails(&refused, 2, "amplitude_max is phase_lock.amplitude_max");
-    fails(
-        &["map", "--x", "G=1:2:3", "--y", "G=1:2:3"],
-        2,
-        "axis 2 is excitation.G again",
-    );
-    fails(&["map", "--sigma=-1.1"], 2, "sigma is an axis and a constant");
-    fails(
-        &["report", "--x", "r=0.5:1:3", "--y", "r=0.5:1:3"],
-        2,
-        "axis 2 is plant.r again",
-    );
 }
 
 #[test]
 fn a_folder_that_is_a_file_is_refused_as_wrong_usage_before_anything_runs() {
     let file = tempfile::NamedTempFile::new().unwrap();
     let path = file.path().to_str().unwrap();
-    let nobody = ["--rig", "udp://127.0.0.1:9"];
-    for (command, rig) in [
-        ("identify", &nobody[..]),
-        ("backbone", &nobody),
-        ("map", &[]),
-        ("report", &[]),
+    for command in [
+        "identify --rig udp://127.0.0.1:9",
+        "backbone --rig udp://127.0.0.1:9",
+        "map",
+        "report",
     ] {
         let start = Instant::now();
-        fails(&[&[command, "--out", path], rig].concat(), 2, path);
+        fails(&format!("{command} --out {path}"), 2, path);
         assert!(start.elapsed() < Duration::from_secs(5), "{command}");
     }
 }
 
 #[test]
-fn packing_refuses_what_it_cannot_pack_before_it_writes() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("out");
-    let out = out.to_str().unwrap();
-    let pack = |option: &[&'static str]| [&["pack", "--out", out], option].concat();
-    fails(&pack(&["--binary", "win64"]), 2, "PLATFORM=PATH");
-    fails(&pack(&["--binary", "amiga=x.so"]), 2, "linux64, linux32");
-    fails(&pack(&["--set=plant.r=2"]), 2, "r (coefficient of restitution) = 2");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-}
-
-#[test]
 fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_str().unwrap();
-    let tracked = vines(&["backbone", "--set", "backbone.points=8", "--out", out]);
+    let out = folder.path().display();
+    let tracked = vines(&format!("backbone --set backbone.points=8 --out {out}"));
     assert!(tracked.status.success(), "{tracked:?}");
     assert!(!String::from_utf8_lossy(&tracked.stdout).contains("do not belong"));
-    let [points, rig, figure] = ["tracked.csv", "rig.toml", "fit.svg"].map(|name| format!("{out}/{name}"));
-    let known = ["--set=plant.r=0.75", "--known=m=0.032±0.0003"];
-    let fit = vines(&[&["fit", &points, "--out", &rig, "--figure", &figure], &known[..]].concat());
-    let text = String::from_utf8_lossy(&fit.stdout).into_owned();
+    let fit = format!("fit {out}/tracked.csv --out {out}/rig.toml --figure {out}/fit.svg");
+    let fit = vines(&format!("{fit} --set=plant.r=0.75 --known=m=0.032±0.0003"));
+    let text = String::from_utf8_lossy(&fit.stdout);
     assert!(
         fit.status.success() && text.contains("the model describes them"),
         "{fit:?}"
     );
-    let scene = json(&["theory", "--scene", &rig, "--json"])["scene"].clone();
+    let scene = json(&format!("theory --scene {out}/rig.toml --json"))["scene"].clone();
     assert!((scene["r"].as_f64().unwrap() - 0.65).abs() < 2e-3, "{scene}");
-    let drawn = std::fs::read_to_string(figure).unwrap();
+    let drawn = std::fs::read_to_string(folder.path().join("fit.svg")).unwrap();
     for label in ["measured", "scene", "fit", "±1.96 u", ": not rejected"] {
         assert!(drawn.contains(&format!("{label}<")), "{label}");
     }
-    let refused = vines(&["fit", &points, "--column", "A=amplitude:mm"]);
-    assert!(
-        String::from_utf8_lossy(&refused.stderr).contains("has no column `amplitude`"),
-        "{refused:?}"
-    );
+    let missing = "has no column `amplitude`";
+    fails(&format!("fit {out}/tracked.csv --column A=amplitude:mm"), 2, missing);
 }

@@ -10,44 +10,112 @@ mod report;
 mod sweep;
 mod watch;
 
-use std::process::{Command, Output};
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command, Output, Stdio};
 
-use vines::rig::{BuiltIn, Measured, Simulated};
+use serde_json::Value;
+use vines::rig::{BuiltIn, Rig, Simulated};
 use vines::scene::{Override, Scene};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_vines");
 
-fn vines(arguments: &[&str]) -> Output {
-    Command::new(PROGRAM)
-        .args(arguments)
-        .current_dir(std::env::temp_dir())
-        .output()
-        .expect("the program runs")
+/// Runs a command line; its words have no spaces.
+fn vines(line: &str) -> Output {
+    Running::start(&words(line)).output()
+}
+
+fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
+/// The JSON that a command prints.
+fn json(line: &str) -> Value {
+    let output = vines(line);
+    assert!(output.status.success(), "{output:?}");
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+/// All that a program has printed.
+fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
 }
 
 /// The error must be one message on stderr, with nothing on stdout.
-fn fails(arguments: &[&str], code: i32, part: &str) {
-    let output = vines(arguments);
+fn fails(line: &str, code: i32, part: &str) {
+    is_failure(&vines(line), code, part);
+}
+
+fn is_failure(output: &Output, code: i32, part: &str) {
     let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
-    assert!(
-        message.contains("error: ") && !message.contains("panicked"),
-        "{message}"
-    );
+    assert_eq!(output.status.code(), Some(code), "{part}: {message}");
+    let is_one_message = message.contains("error: ") && !message.contains("panicked");
+    assert!(is_one_message, "{message}");
     assert!(message.contains(part), "`{part}` is not in: {message}");
     assert!(output.stdout.is_empty());
 }
 
-/// The dimensionless scene with other settings.
-fn scene(settings: &[&str]) -> Scene {
-    let overrides: Vec<Override> = settings.iter().map(|s| s.parse().unwrap()).collect();
-    let text = include_str!("../../../scenes/dimensionless.toml");
-    Scene::parse("dimensionless.toml", text, &overrides).unwrap()
+/// A program in a process of its own; it ends by itself, or where this is dropped.
+struct Running(Child);
+
+impl Running {
+    fn start(arguments: &[&str]) -> Self {
+        let mut command = Command::new(PROGRAM);
+        command.args(arguments).current_dir(std::env::temp_dir());
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        Self(command.spawn().unwrap())
+    }
+
+    /// The last word of the next line of its stdout.
+    fn word(&mut self) -> String {
+        last_word(self.0.stdout.as_mut().unwrap())
+    }
+
+    /// Sends a signal, if it is still running.
+    fn signal(&mut self, signal: &str) {
+        if self.0.try_wait().unwrap().is_none() {
+            let id = self.0.id().to_string();
+            Command::new("kill").args(["-s", signal, &id]).status().unwrap();
+        }
+    }
+
+    /// All that it has printed since, once it has ended.
+    fn output(mut self) -> Output {
+        let [mut stdout, mut stderr] = [Vec::new(), Vec::new()];
+        // Messages fit into the pipe.
+        self.0.stdout.take().unwrap().read_to_end(&mut stdout).unwrap();
+        self.0.stderr.take().unwrap().read_to_end(&mut stderr).unwrap();
+        let status = self.0.wait().unwrap();
+        Output { status, stdout, stderr }
+    }
 }
 
-fn plant(scene: &Scene) -> Measured<Simulated> {
-    let plant = Simulated::new(scene.plant, scene.start).unwrap();
-    plant.with_sensors(scene.resonance)
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The last word of a line, read without what follows it.
+fn last_word(stream: &mut dyn Read) -> String {
+    let mut line = String::new();
+    BufReader::with_capacity(1, stream).read_line(&mut line).unwrap();
+    line.trim().rsplit(' ').next().unwrap().to_string()
+}
+
+/// The dimensionless scene with other settings.
+fn scene(settings: &str) -> Scene {
+    let text = include_str!("../../../scenes/dimensionless.toml");
+    Scene::parse("dimensionless.toml", text, &overrides(settings)).unwrap()
+}
+
+fn overrides(settings: &str) -> Vec<Override> {
+    words(settings).into_iter().map(|word| word.parse().unwrap()).collect()
+}
+
+/// The plant of a scene behind its measurement chain.
+fn rig(scene: &Scene) -> Box<dyn Rig> {
+    Simulated::of(scene).unwrap()
 }
 
 fn built_in(scene: &Scene) -> BuiltIn {

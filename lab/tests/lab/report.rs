@@ -3,35 +3,26 @@
 use std::path::Path;
 use std::process::Command;
 
-use vines::{
-    report::{Subject, write_report},
-    scene::{Family, Override, Scene},
-};
+use vines::{map::LIMIT, report::write_report, scene::Family, sweep::Map};
+
+use crate::{overrides, words};
 
 /// Writes a report on a coarse map, after an early lock.
 fn write(out: &Path) {
-    let early = ["phase_lock.lock.amplitude_drift=3e-4", "phase_lock.lock.dwell=5"];
-    let overrides: Vec<Override> = early.iter().map(|s| s.parse().unwrap()).collect();
+    let overrides = overrides("phase_lock.lock.amplitude_drift=3e-4 phase_lock.lock.dwell=5");
     let text = include_str!("../../../scenes/dimensionless.toml");
-    let subject = Subject {
-        scene: Scene::parse("dimensionless.toml", text, &overrides).unwrap(),
-        family: Family::parse("dimensionless.toml", Some(text), &overrides).unwrap(),
-        map: ["sigma=-2:1:7", "G=0.8:1.8:6"].map(|range| range.parse().unwrap()),
-    };
-    write_report(&subject, out, &|_, _| {}).unwrap();
+    let family = Family::parse("dimensionless.toml", Some(text), &overrides).unwrap();
+    let [x, y] = ["sigma=-2:1:7", "G=0.8:1.8:6"].map(|axis| axis.parse().unwrap());
+    let mut map = Map::new(family, &x, &y, None, LIMIT).unwrap();
+    write_report(&mut map, out, &|_, _| {}).unwrap();
 }
 
 /// Debian's Chromium, if it is here, on a page: what it says on the console, and what it makes of the page.
 fn browser(page: &Path, arguments: &[&str]) -> Option<(String, String)> {
     let profile = tempfile::tempdir().unwrap();
+    let options = "--headless --no-sandbox --disable-gpu --enable-logging=stderr --virtual-time-budget=2000";
     let output = Command::new("chromium")
-        .args([
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--enable-logging=stderr",
-            "--virtual-time-budget=2000",
-        ])
+        .args(words(options))
         .arg(format!("--user-data-dir={}", profile.path().display()))
         .args(arguments)
         .arg(format!("file://{}", page.display()))
@@ -48,22 +39,15 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
     write(folder.path());
     let page = folder.path().join("report.html");
     let html = std::fs::read_to_string(&page).unwrap();
-    for name in [
-        "history",
-        "tracked-backbone",
-        "approach",
-        "decay-on-sim",
-        "identified-backbone",
-        "backbones",
-        "responses",
-        "period",
-        "regimes",
-    ] {
-        for file in [format!("{name}.svg"), format!("{name}-dark.svg")] {
-            assert!(folder.path().join(&file).is_file(), "{file}");
-        }
+    let figures =
+        words("history tracked-backbone approach decay-on-sim identified-backbone backbones responses period regimes");
+    for file in figures
+        .iter()
+        .flat_map(|name| [format!("{name}.svg"), format!("{name}-dark.svg")])
+    {
+        assert!(folder.path().join(&file).is_file(), "{file}");
     }
-    assert_eq!(html.matches("<figure>").count(), 9);
+    assert_eq!(html.matches("<figure>").count(), figures.len());
     for words in ["What was found", "symmetric 1:1", "Error budget", "published rig"] {
         assert!(html.contains(words), "{words}");
     }

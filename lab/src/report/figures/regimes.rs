@@ -15,9 +15,8 @@ pub fn regimes(map: &Map) -> Figure {
         let half = grid.step() / 2.0;
         ((grid.from - half, grid.to + half), label(name))
     };
-    let size = (WIDE, SIZE.1);
     let mut panel = Panel::new(axis(x, x_name), axis(y, y_name))
-        .at([0.0, 0.0, size.0, size.1])
+        .at([0.0, 0.0, WIDE, SIZE.1])
         .heading("Regimes of the driven response", &caption(map))
         .legend(Legend::Beside(205.0));
     for regime in Regime::SIMULATED {
@@ -31,7 +30,8 @@ pub fn regimes(map: &Map) -> Figure {
         // Solid where it bounds the stability of a motion.
         let motions = curve.branch.points.iter();
         let points = motions.map(|motion| (place(motion), motion.bounds_stability()));
-        panel.curve_on_map(points, curve.kind.name());
+        let name = curve.kind.name();
+        panel.labelled_curve(points, 2.2, name, [name, name].map(String::from));
     }
     let several = (0..).zip(&map.cells).filter(|(_, cell)| !cell.coexisting.is_empty());
     let dots = several.map(|(n, _)| (x.at(n % x.points), y.at(n / x.points)));
@@ -40,18 +40,15 @@ pub fn regimes(map: &Map) -> Figure {
         let (letter, ink) = letter(regime);
         panel.add(Shape::Text(16.0), [place], ink, letter);
     }
-    Figure { size, panels: vec![panel] }
+    Figure(vec![panel])
 }
 
 /// Where a motion lies on a map over sigma and G.
 fn place_on(map: &Map) -> impl Fn(&Periodic) -> Place {
     let swapped = map.names()[1] == SIGMA;
-    move |motion| {
-        if swapped {
-            (motion.g, motion.sigma)
-        } else {
-            (motion.sigma, motion.g)
-        }
+    move |motion| match swapped {
+        true => (motion.g, motion.sigma),
+        false => (motion.sigma, motion.g),
     }
 }
 
@@ -63,10 +60,9 @@ fn caption(map: &Map) -> String {
     let g = free("G").then(|| format!(", G = {g:.3}"));
     let r = free("r").then(|| format!(", r = {r}"));
     let held: String = [sigma, g, r].into_iter().flatten().collect();
-    let dashed = if map.curves.is_empty() {
-        ""
-    } else {
-        "; dashed: of unstable motions"
+    let dashed = match map.curves.is_empty() {
+        true => "",
+        false => "; dashed: of unstable motions",
     };
     format!(
         "ε = {epsilon:.5}, λ = {lambda:.3}{held}\neach cell from the same start, followed until it repeats, at most {} periods{dashed}",
@@ -138,19 +134,15 @@ fn letters(map: &Map) -> Vec<(Regime, Place)> {
         }
     }
     let place = |[column, row]: [usize; 2]| (map.x.at(column as u64), map.y.at(row as u64));
-    letters
-        .into_iter()
-        .map(|(regime, cell)| (regime, place(cell)))
-        .collect()
+    let letters = letters.into_iter().map(|(regime, cell)| (regime, place(cell)));
+    letters.collect()
 }
 
 /// The regimes of the cells, except where a curve passes.
 fn without_curves(map: &Map) -> Vec<Option<Regime>> {
     let mut free: Vec<Option<Regime>> = map.cells.iter().map(|cell| Some(cell.result.regime)).collect();
-    let bifurcations = map.curves.iter().flat_map(|curve| {
-        let place = place_on(map);
-        curve.branch.points.iter().map(place)
-    });
+    let motions = map.curves.iter().flat_map(|curve| &curve.branch.points);
+    let bifurcations = motions.map(place_on(map));
     let (x, y) = (map.x, map.y);
     let index = |grid: Grid, value: f64| {
         let n = ((value - grid.from) / grid.step()).round();
@@ -186,11 +178,8 @@ fn outline(map: &Map) -> Vec<Place> {
         let around = [(0, 0), (1, 0), (1, 1), (0, 1)]
             .map(|(dx, dy)| (place(column + dx, row + dy), corners[row + dy][column + dx]));
         let sides = (0..4).map(|n| (around[n], around[(n + 1) % 4]));
-        let crossings: Vec<Place> = sides
-            .filter(|(from, to)| from.1 != to.1)
-            .map(|(from, to)| border(from, to))
-            .collect();
-        segments.extend(crossings);
+        let crossed = sides.filter(|(from, to)| from.1 != to.1);
+        segments.extend(crossed.map(|(from, to)| border(from, to)));
     }
     segments
 }
