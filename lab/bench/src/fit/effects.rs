@@ -90,9 +90,10 @@ impl Effect {
         matches!(self, Self::Friction | Self::Tilt)
     }
 
-    /// The cavity with this effect: `strength` is the friction, the square of the tilt (the motions are even in it), or nothing; `r` is the
-    /// restitution at the impact speed `speed`, m/s.
-    fn cavity(self, strength: f64, r: f64, speed: f64) -> Cavity {
+    /// The cavity with this effect. `strength` is the friction, or the square of the tilt, rad² (the motions are even in it); a law of restitution
+    /// has the value `r` at the impact speed `speed`, m/s.
+    #[must_use]
+    pub fn cavity(self, strength: f64, r: f64, speed: f64) -> Cavity {
         let both = |law| Cavity { restitution: [Some(law); 2], ..Cavity::IDEAL };
         match self {
             Self::Friction => Cavity { kinetic_friction: strength, ..Cavity::IDEAL },
