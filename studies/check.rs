@@ -4,21 +4,15 @@
 //! damping up to 20 % away from the scene, 30 to 80 dB, 16 to 24 bits, up to 3 samples of delay. Of the healthy ones: relative errors
 //! of the loop's integral gain and of the response gain, and the error of the damping rate in standard uncertainties.
 //!
-//! ```sh
-//! cargo run --release -p vines-testbench --example check -- RIGS SEED    # RIGS of each; writes validation/check.csv
-//! ```
+//! Arguments: RIGS of each, SEED. Writes validation/check.csv.
 
 mod common;
 
-use common::{Failure, arguments, checked_faults, checked_rig, quantile, uniform, write};
+use common::*;
 use phase_lock::Gains;
-use vines_testbench::loop_check::check;
-use vines_testbench::rig::{Simulated, faulty};
 
 fn main() -> Result<(), Failure> {
-    let [rigs, seed] = &arguments()[..] else {
-        return Err("arguments: RIGS SEED".into());
-    };
+    let [rigs, seed] = &arguments(["RIGS", "SEED"])?;
     let mut between = uniform(seed.parse()?);
     let (mut passed, mut named) = (0, 0);
     let mut errors = [const { Vec::new() }; 3];
@@ -46,7 +40,7 @@ fn main() -> Result<(), Failure> {
             println!("{fault:?}, expected {expected:?}: {found:?}");
         }
     }
-    let errors = errors.map(|values| format!("{:.1e},{:.1e}", quantile(&values, 0.5), quantile(&values, 1.0)));
+    let errors = errors.map(|values| ends(&values).map(|error| format!("{error:.1e}")).join(","));
     let header = "rigs,seed,passed,named,integral_gain_median,integral_gain_worst,response_gain_median,response_gain_worst,damping_u_median,damping_u_worst";
     let row = format!("{rigs},{seed},{passed},{named},{}", errors.join(","));
     write("check", header, 2, &[row])

@@ -1,32 +1,38 @@
 //! What the studies and the tests of the bench share: scenes, random rigs and faults, statistics, and the tables in validation/.
 
-#![allow(dead_code, reason = "no study uses everything")]
+#![allow(dead_code, unused_imports, reason = "no study uses everything")]
 
 use std::f64::consts::TAU;
-use std::{fs, path::Path};
+use std::{fmt::Debug, fs, path::Path};
 
-use lovines::Parameters;
+pub use lovines::{Cavity, Parameters, Restitution, cavity::GRAVITY};
+use phase_lock::Config;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
-use vines_model::Dimensionless;
-use vines_model::numerics::{bisection, mean_square};
-use vines_model::orbit::{Orbit, exact_backbone, phase_resonant};
+pub use rayon::prelude::*;
+pub use vines_model::numerics::{Estimate, mean, mean_square, range};
+pub use vines_model::orbit::{exact_backbone, phase_resonant, resonant_motion};
+pub use vines_model::{Definition, Dimensionless};
 use vines_testbench::advice;
-use vines_testbench::backbone::{LevelPoint, Tracked, track};
-use vines_testbench::comparison::ExactCurve;
-use vines_testbench::identification::Regime;
-use vines_testbench::loop_check::Verdict;
-use vines_testbench::record::Record;
-use vines_testbench::rig::{BuiltIn, Chain, Controller, Rig, RigFault, SensorFault, SensorsOnly, Simulated};
-use vines_testbench::scene::{LinearResponse, Override, Scene};
+pub use vines_testbench::backbone::{LevelPoint, Tracked, track};
+pub use vines_testbench::comparison::{COMPARED_ABOVE, ExactCurve};
+use vines_testbench::experiment::{ExperimentError, run};
+pub use vines_testbench::identification::{Regime, ResonancePoint, decay_points, identify};
+pub use vines_testbench::loop_check::{Verdict, check};
+pub use vines_testbench::record::Record;
+pub use vines_testbench::rig::{
+    BuiltIn, Chain, ControllerError, Rig, RigFault, SensorFault, SensorsOnly, Simulated, faulty,
+};
+pub use vines_testbench::scene::{LinearResponse, Override, Scene};
 
 /// Any error of a study.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-/// The arguments of the program.
-pub fn arguments() -> Vec<String> {
-    std::env::args().skip(1).collect()
+/// The arguments of the program, if they are as many as `names`.
+pub fn arguments<const N: usize>(names: [&str; N]) -> Result<[String; N], Failure> {
+    let given: Result<_, Vec<String>> = std::env::args().skip(1).collect::<Vec<_>>().try_into();
+    given.map_err(|_| format!("arguments: {}", names.join(" ")).into())
 }
 
 /// A scene with replaced values; an empty text is the default scene.
@@ -40,18 +46,21 @@ pub fn scene(text: &str, settings: &[impl AsRef<str>]) -> Result<Scene, Failure>
 }
 
 /// Random numbers between two limits.
+pub type Uniform<'a> = &'a mut dyn FnMut(f64, f64) -> f64;
+
+/// Random numbers that begin with a seed.
 pub fn uniform(seed: u64) -> impl FnMut(f64, f64) -> f64 {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     move |low, high| low + (high - low) * (random.next_u64() as f64 / u64::MAX as f64)
 }
 
-/// The value below which this share of the values lies; NaN of none.
-pub fn quantile(values: &[f64], share: f64) -> f64 {
+/// Median and largest of some values; NaN of none.
+pub fn ends(values: &[f64]) -> [f64; 2] {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len().saturating_sub(1);
-    let at = (share * last as f64).round() as usize;
-    sorted.get(at).copied().unwrap_or(f64::NAN)
+    let at = |share: f64| sorted.get((share * last as f64).round() as usize);
+    [0.5, 1.0].map(|share| at(share).copied().unwrap_or(f64::NAN))
 }
 
 /// Share of the values up to a limit.
@@ -68,23 +77,42 @@ pub struct Found {
     pub ratios: Vec<f64>,
     /// Periods that it took, if it succeeded.
     pub periods: Option<f64>,
-    /// What else is counted.
-    pub counts: [usize; 4],
+    /// What else is counted; the fourth is what fails.
+    pub counts: [usize; 6],
+}
+
+/// Draws `count` rigs one after the other, and measures them in parallel. Failures are printed.
+pub fn survey<T: Debug + Sync + Send>(
+    count: &str,
+    draw: impl FnMut(usize) -> Result<T, Failure>,
+    measure: impl Fn(&T) -> Result<Found, Failure> + Sync,
+) -> Result<Vec<Found>, Failure> {
+    let rigs = (0..count.parse()?).map(draw).collect::<Result<Vec<T>, _>>()?;
+    let one = |rig: &T| {
+        measure(rig).unwrap_or_else(|error| {
+            println!("{rig:.4?}: {error}");
+            Found { counts: [0, 0, 0, 1, 0, 0], ..Found::default() }
+        })
+    };
+    Ok(rigs.par_iter().map(one).collect())
 }
 
 /// The columns of [`statistics`].
 pub const STATISTICS: &str = "within_1.96u,within_2u,worst_u,median_error,worst_error,median_periods,worst_periods";
 
-/// Statistics of all rigs, and the sums of their counts.
-pub fn statistics(found: &[Found]) -> (String, [usize; 4]) {
-    let gather = |values: fn(&Found) -> &[f64]| found.iter().flat_map(|one| values(one).to_vec()).collect::<Vec<f64>>();
+/// The sums of the counts.
+pub fn counts(found: &[Found]) -> [usize; 6] {
+    [0, 1, 2, 3, 4, 5].map(|n| found.iter().map(|one| one.counts[n]).sum())
+}
+
+/// Statistics of all rigs.
+pub fn statistics(found: &[Found]) -> String {
+    let gather = |values: fn(&Found) -> &[f64]| found.iter().flat_map(values).copied().collect::<Vec<f64>>();
     let (ratios, errors) = (gather(|one| &one.ratios), gather(|one| &one.errors));
     let periods = gather(|one| one.periods.as_slice());
-    let ends = |values: &[f64]| [quantile(values, 0.5), quantile(values, 1.0)];
-    let ([error, worst], [median, longest]) = (ends(&errors), ends(&periods));
-    let ([within, within_2], most) = ([1.96, 2.0].map(|limit| share(&ratios, limit)), quantile(&ratios, 1.0));
-    let text = format!("{within:.4},{within_2:.4},{most:.1},{error:.1e},{worst:.1e},{median:.1},{longest:.1}");
-    (text, [0, 1, 2, 3].map(|n| found.iter().map(|one| one.counts[n]).sum()))
+    let ([error, worst], [median, longest], [_, most]) = (ends(&errors), ends(&periods), ends(&ratios));
+    let [within, within_2] = [1.96, 2.0].map(|limit| share(&ratios, limit));
+    format!("{within:.4},{within_2:.4},{most:.1},{error:.1e},{worst:.1e},{median:.1},{longest:.1}")
 }
 
 /// Adds rows to validation/`name`.csv; a row replaces an earlier row with equal first `key` cells.
@@ -94,88 +122,77 @@ pub fn write(name: &str, header: &str, key: usize, rows: &[String]) -> Result<()
     let text = fs::read_to_string(&path).unwrap_or_default();
     let begins_alike = |one: &str, other: &str| one.split(',').take(key).eq(other.split(',').take(key));
     let is_kept = |line: &&str| !rows.iter().any(|row| begins_alike(row, line));
-    let kept = text.lines().skip(1).filter(is_kept).map(String::from);
-    let lines: Vec<String> = [header.into()]
-        .into_iter()
-        .chain(kept)
-        .chain(rows.iter().cloned())
-        .collect();
+    let mut lines = vec![header];
+    lines.extend(text.lines().skip(1).filter(is_kept));
+    lines.extend(rows.iter().map(String::as_str));
     println!("{header}\n{}", rows.join("\n"));
     Ok(fs::write(path, lines.join("\n") + "\n")?)
 }
 
-/// The backbone of a rig of these epsilon, lambda and r with M = k = b = 1, tracked from sensor readings alone by a client whose scene differs:
-/// `scales` are its relative errors of k, c, m, b and r. Returns that scene as well.
-pub fn tracked(rig: [f64; 3], noise: u64, snr: &str, scales: [f64; 5]) -> Result<(Tracked, Scene), Failure> {
-    let (truth, scene) = client(rig, noise, snr, scales)?;
-    let rig = Simulated::new(truth, scene.start)?;
-    let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
-    let mut controller = BuiltIn::new(&scene.backbone_config())?;
-    let tracked = track(&mut rig, &mut controller, &scene, |_, _| {})?;
-    Ok((tracked, scene))
+/// The record of the experiment of a scene.
+pub fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
+    let mut controller = BuiltIn::new(&scene.controller_config()).map_err(ControllerError::from)?;
+    run(rig, &mut controller, scene, |_, _, _| {})
 }
 
-/// The rig, and the scene of the client, of [`tracked`].
-pub fn client(
-    [epsilon, lambda, r]: [f64; 3],
-    noise: u64,
-    snr: &str,
-    [k, c, m, b, dr]: [f64; 5],
-) -> Result<(Parameters, Scene), Failure> {
+/// The tracked backbone of a scene, with a drive up to G = `largest`.
+pub fn tracked(rig: &mut dyn Rig, scene: &Scene, largest: f64) -> Result<Tracked, ExperimentError> {
+    let amplitude_max = Some(scene.dimensionless().amplitude(largest));
+    let config = Config { amplitude_max, ..scene.backbone_config() };
+    let mut controller = BuiltIn::new(&config).map_err(ControllerError::from)?;
+    track(rig, &mut controller, scene, |_, _| {})
+}
+
+/// A plant behind the chain of a scene.
+pub fn behind_chain(plant: Parameters, scene: &Scene) -> Result<Box<dyn Rig>, Failure> {
+    Ok(Chain::around(Box::new(Simulated::new(plant, scene.start)?), scene))
+}
+
+/// A rig with M = k = b = 1 and a client: epsilon, lambda and r, the seed of the noise, and the relative errors of k, c, m, b and r in the client's
+/// scene.
+pub type Case = ([f64; 3], u64, [f64; 5]);
+
+/// Largest relative errors of k, c, m, b and r.
+pub const SCALES: [f64; 5] = [0.01, 0.3, 0.2, 0.1, 0.2];
+
+/// The rig, and the scene of the client, who knows the linear response.
+pub fn client(&([epsilon, lambda, r], noise, scales): &Case, snr: &str) -> Result<(Parameters, Scene), Failure> {
+    let [k, c, m, width, dr] = scales.map(|error| 1.0 + error);
     let d = Dimensionless::new(epsilon, lambda, r, 0.0);
-    let [low, high] = advice::stable_range(&d).ok_or("no stable orbit")?;
-    let g = 0.5 * (low + high);
+    let orbits = advice::stable_orbits(&d);
+    let first = orbits.iter().max_by(|one, other| one.c.total_cmp(&other.c));
+    let first = first.ok_or("no stable orbit")?;
+    let (low, high) = range((f64::INFINITY, 0.0), orbits.iter().map(|orbit| orbit.g));
+    // The largest stable response over b, to a twentieth of the distance at which the orbits were searched.
+    let finer = (1..20).flat_map(|n| exact_backbone(&d, 1.0 + epsilon * (first.sigma + 0.005 * f64::from(n) / 20.0)));
+    let stable = finer.filter(|orbit| orbit.stable);
+    let largest = stable.map(|orbit| orbit.c).fold(first.c, f64::max);
     let curve = ExactCurve::of(&d);
-    let stable = largest_stable(&d).ok_or("no stable orbit")?;
     let fold = curve.places().first().ok_or("no backbone")?[0];
-    let (from, to) = (0.95 * stable.min(0.75), 1.05 * fold);
-    // The rig with M = k = b = 1, and the scene of the client in SI units.
-    let truth = rig([epsilon, lambda, r]);
-    let width = 1.0 + b;
-    let settings = [
-        format!("plant.M={:?}", 1.0),
-        format!("plant.k={:?}", 1.0 + k),
-        format!("plant.c={:?}", epsilon * lambda * (1.0 + c)),
-        format!("plant.m={:?}", epsilon * (1.0 + m)),
-        format!("plant.b={width:?}"),
-        format!("plant.r={:?}", r * (1.0 + dr)),
-        format!("excitation.E={:?}", g * epsilon),
-        "start.dq2=0.9".into(),
-        "controller.omega_min=0.8".into(),
-        "controller.omega_max=1.2".into(),
-        format!("backbone.C_from={:?}", from / width),
-        format!("backbone.C_to={:?}", to / width),
-    ];
-    let chain = [format!("chain.snr={snr}"), format!("chain.seed={noise}")];
-    let mut scene = scene("[plant]\n[start]\n[excitation]\n", &[&settings[..], &chain].concat())?;
+    let text = format!(
+        "[plant]\nM = 1.0\nk = {k:?}\nc = {:?}\nm = {:?}\nb = {width:?}\nr = {:?}\n[start]\ndq2 = 0.9\n[excitation]\nE = {:?}\n\
+         [controller]\nomega_min = 0.8\nomega_max = 1.2\n[backbone]\nC_from = {:?}\nC_to = {:?}\n",
+        epsilon * lambda * c,
+        epsilon * m,
+        r * dr,
+        0.5 * (low + high) * epsilon,
+        0.95 * largest.min(0.75) / width,
+        1.05 * fold / width,
+    );
+    let mut scene = scene(&text, &[format!("chain.snr={snr}"), format!("chain.seed={noise}")])?;
     scene.measured = Some(LinearResponse {
         omega0: 1.0,
         damping_rate: 0.5 * epsilon * lambda,
         uncertainty: 0.0,
         gain: LinearResponse::of(&scene).gain,
     });
-    Ok((truth, scene))
+    Ok((Parameters::dimensionless(epsilon, lambda, r), scene))
 }
 
-/// Distance of the detunings at which [`advice::stable_range`] searches for stable orbits, and parts of it in which the end is located.
-const STEP: f64 = 0.005;
-const FINER: i32 = 20;
-
-/// The largest response amplitude over b of the stable symmetric 1:1 orbits at phase resonance, at any drive.
-pub fn largest_stable(d: &Dimensionless) -> Option<f64> {
-    let largest = |orbits: Vec<Orbit>| {
-        let stable = orbits.into_iter().filter(|orbit| orbit.stable);
-        stable.max_by(|one, other| one.c.total_cmp(&other.c))
-    };
-    let first = largest(advice::stable_orbits(d))?;
-    let steps = (1..FINER).map(|n| first.sigma + STEP * f64::from(n) / f64::from(FINER));
-    let finer = steps.filter_map(|sigma| largest(exact_backbone(d, 1.0 + d.epsilon * sigma)));
-    Some(finer.map(|orbit| orbit.c).fold(first.c, f64::max))
-}
-
-/// Whether a point counts as one of the backbone.
-pub fn is_kept(point: &&LevelPoint) -> bool {
-    point.settled && matches!(point.regime, Regime::Symmetric | Regime::Unresolved)
+/// The points that count as points of the backbone.
+pub fn kept(tracked: &Tracked) -> impl Iterator<Item = &LevelPoint> {
+    let is_kept = |point: &&LevelPoint| matches!(point.regime, Regime::Symmetric | Regime::Unresolved);
+    tracked.points.iter().filter(|point| point.settled).filter(is_kept)
 }
 
 /// A record with noise after the release; `ratio`: of the held response to it, dB.
@@ -194,23 +211,26 @@ pub fn noisy(record: &Record, ratio: f64, seed: u64) -> Record {
 /// Time since the release, times omega0, and sigma in every period of a free decay between alternate zero crossings: without a model, exact on
 /// clean data.
 ///
-/// A crossing is located on the cubic through four samples; at a hundred samples per period its error is below 1e-7 of a sample.
+/// A crossing is located on the inverse cubic through four samples; at a hundred samples per period its error is below 1e-6 of a sample.
 /// A period spans two crossings, so that an offset and even harmonics have no effect to first order.
 pub fn crossings(record: &Record, scene: &Scene) -> Vec<[f64; 2]> {
     let values: Vec<f64> = record.decay().iter().map(|sample| sample.sensors.response).collect();
-    let zeros: Vec<f64> = (1..values.len().saturating_sub(2))
-        .filter(|&n| (values[n] > 0.0) != (values[n + 1] > 0.0))
-        .map(|n| n as f64 + zero([values[n - 1], values[n], values[n + 1], values[n + 2]]))
-        .collect();
-    let d = scene.dimensionless();
-    let step = record.sample_time;
-    zeros
-        .windows(3)
-        .map(|span| {
-            let omega = TAU / ((span[2] - span[0]) * step);
-            [0.5 * (span[0] + span[2]) * step * d.omega0, d.sigma(omega)]
-        })
-        .collect()
+    let mut zeros = Vec::new();
+    for (n, y) in values
+        .windows(4)
+        .enumerate()
+        .filter(|(_, y)| (y[1] > 0.0) != (y[2] > 0.0))
+    {
+        let others = |i: usize| (0..4).filter(move |j| *j != i);
+        let weight = |i: usize| others(i).map(|j| y[j] / (y[j] - y[i])).product::<f64>();
+        zeros.push((n + 1) as f64 + weight(2) + 2.0 * weight(3) - weight(0));
+    }
+    let (d, step) = (scene.dimensionless(), record.sample_time);
+    let point = |span: &[f64]| {
+        let omega = TAU / ((span[2] - span[0]) * step);
+        [0.5 * (span[0] + span[2]) * step * d.omega0, d.sigma(omega)]
+    };
+    zeros.windows(3).map(point).collect()
 }
 
 /// Sigma at a time, interpolated linearly; `None` outside the points.
@@ -220,23 +240,9 @@ pub fn at(points: &[[f64; 2]], tau: f64) -> Option<f64> {
     Some(from[1] + (tau - from[0]) / (to[0] - from[0]) * (to[1] - from[1]))
 }
 
-/// Where the cubic through values at -1, 0, 1 and 2 is zero, between 0 and 1.
-fn zero(y: [f64; 4]) -> f64 {
-    let cubic = |x: f64| {
-        -y[0] * x * (x - 1.0) * (x - 2.0) / 6.0 + y[1] * (x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0
-            - y[2] * (x + 1.0) * x * (x - 2.0) / 2.0
-            + y[3] * (x + 1.0) * x * (x - 1.0) / 6.0
-    };
-    let (low, high) = bisection(0.0, 1.0, |x| (cubic(x) > 0.0) == (y[2] > y[1]));
-    0.5 * (low + high)
-}
-
 /// A scene at rest with a drive at which a stable symmetric 1:1 orbit exists within 20 % of omega0: epsilon 0.001 to 0.05, lambda 0.1 to 3
 /// (uniform logarithms), r 0.2 to 0.97.
-pub fn rig_with_stable_orbit(
-    uniform: &mut impl FnMut(f64, f64) -> f64,
-    settings: &[impl AsRef<str>],
-) -> Result<Scene, Failure> {
+pub fn rig_with_stable_orbit(uniform: Uniform, settings: &[impl AsRef<str>]) -> Result<Scene, Failure> {
     loop {
         let epsilon = uniform(1e-3_f64.ln(), 0.05_f64.ln()).exp();
         let lambda = uniform(0.1_f64.ln(), 3_f64.ln()).exp();
@@ -255,36 +261,9 @@ pub fn rig_with_stable_orbit(
     }
 }
 
-/// Bandwidths of the detector, in units of omega0, and the periods that are published for this rule of gains on such a plant.
-pub const LOCK_TIMES: [(f64, f64); 5] = [(0.02, 234.0), (0.05, 102.0), (0.1, 55.0), (0.2, 35.0), (0.5, 25.0)];
-
-/// Only the phase is to settle; the largest bandwidth needs more than a hundred samples per period.
-pub const LOCK_TIME_SETTINGS: [&str; 5] = [
-    "phase_lock.lock.phase_tolerance=0.034906585",
-    "phase_lock.lock.dwell=20",
-    "phase_lock.lock.frequency_drift=9.949e-5",
-    "phase_lock.lock.amplitude_drift=1.0177",
-    "controller.samples_per_period=200",
-];
-
-/// Periods until a loop settles, if that ends the run, at most 800.
-pub fn periods_to_settle(rig: &mut Simulated, scene: &Scene, ends: bool) -> Result<f64, Failure> {
-    let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let (step, mut periods) = (scene.sample_time(), 0.0);
-    while periods < 800.0 {
-        let command = controller.sample(rig.sense()?, true)?;
-        if ends && command.settled {
-            break;
-        }
-        rig.advance(command.drive, step)?;
-        periods += command.drive.omega * step / TAU;
-    }
-    Ok(periods)
-}
-
 /// A random scene for the loop check, and the scene of a rig that differs: mass ratio 0.001 to 0.05, lambda 0.1 to 3, r 0.2 to 0.97, a stiffness
 /// up to 1 % and a damping up to 20 % away, 30 to 80 dB, 16 to 24 bits, up to 3 samples of delay.
-pub fn checked_rig(between: &mut impl FnMut(f64, f64) -> f64) -> Result<[Scene; 2], Failure> {
+pub fn checked_rig(between: Uniform) -> Result<[Scene; 2], Failure> {
     let mut scene = scene("", &["start.dq2=0"])?;
     let epsilon = between(0.001_f64.ln(), 0.05_f64.ln()).exp();
     let lambda = between(0.1_f64.ln(), 3_f64.ln()).exp();
@@ -304,7 +283,7 @@ pub fn checked_rig(between: &mut impl FnMut(f64, f64) -> f64) -> Result<[Scene; 
 }
 
 /// Faults that the loop check names, with random sizes.
-pub fn checked_faults(between: &mut impl FnMut(f64, f64) -> f64) -> [(Verdict, RigFault); 16] {
+pub fn checked_faults(between: Uniform) -> [(Verdict, RigFault); 16] {
     use {RigFault::*, SensorFault::*};
     let strong = Gain(between(1.15_f64.ln(), 1000_f64.ln()).exp());
     let weak = Gain(between(0.25, 0.85));
@@ -327,17 +306,4 @@ pub fn checked_faults(between: &mut impl FnMut(f64, f64) -> f64) -> [(Verdict, R
         (Verdict::ResponseNoisy, Response(Noisy)),
         (Verdict::BaseNoisy, Base(Noisy)),
     ]
-}
-
-/// A rig with M = k = b = 1.
-pub fn rig([epsilon, lambda, r]: [f64; 3]) -> Parameters {
-    Parameters {
-        primary_mass: 1.0,
-        stiffness: 1.0,
-        damping: epsilon * lambda,
-        particle_mass: epsilon,
-        half_width: 1.0,
-        restitution: r,
-        cavity: lovines::Cavity::IDEAL,
-    }
 }

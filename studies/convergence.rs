@@ -4,14 +4,12 @@
 //! Theory minus exact orbit in sigma, C and B at epsilon and its halvings, with constant lambda, r and G. The exponents of epsilon are the
 //! slopes of straight lines through the logarithms.
 //!
-//! ```sh
-//! cargo run --release -p vines-testbench --example convergence    # writes validation/convergence.csv
-//! ```
+//! Writes validation/convergence.csv.
 
 mod common;
 
-use common::{Failure, scene, write};
-use vines_model::{Definition, Dimensionless, orbit::convergence};
+use common::*;
+use vines_model::orbit::convergence;
 
 /// Halvings of epsilon.
 const HALVINGS: u32 = 7;

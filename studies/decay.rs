@@ -4,18 +4,11 @@
 //! points with C > 0.2, against the zero crossings of the clean decay; share of the points within 1.96 of their standard uncertainties
 //! of the same fit without noise.
 //!
-//! ```sh
-//! cargo run --release -p vines-testbench --example decay -- [SEEDS]    # of the noise, 20; writes validation/decay.csv
-//! ```
+//! Arguments: the number of SEEDS of the noise, 20 by default. Writes validation/decay.csv.
 
 mod common;
 
-use common::{Failure, arguments, at, crossings, noisy, scene, share, write};
-use vines_model::numerics::{mean, mean_square};
-use vines_testbench::comparison::COMPARED_ABOVE;
-use vines_testbench::experiment;
-use vines_testbench::identification::decay_points;
-use vines_testbench::rig::{BuiltIn, Simulated};
+use common::*;
 
 /// Windows of the fit, periods.
 const WINDOWS: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0];
@@ -23,11 +16,9 @@ const WINDOWS: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0];
 const RATIOS: [f64; 4] = [f64::INFINITY, 60.0, 50.0, 40.0];
 
 fn main() -> Result<(), Failure> {
-    let seeds: u64 = arguments().first().map_or(Ok(20), |seeds| seeds.parse())?;
+    let seeds: u64 = std::env::args().nth(1).map_or(Ok(20), |seeds| seeds.parse())?;
     let scene = scene("", &[""; 0])?;
-    let mut rig = Simulated::new(scene.plant, scene.start)?;
-    let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let clean = experiment::run(&mut rig, &mut controller, &scene, |_, _, _| {})?;
+    let clean = record(&mut Simulated::new(scene.plant, scene.start)?, &scene)?;
     let truth = crossings(&clean, &scene);
     let mut rows = Vec::new();
     for window in WINDOWS {

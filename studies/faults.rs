@@ -3,32 +3,22 @@
 //! Every fault of `vines rig --fault` begins at some instants, at different phases, while the loop locks, holds and tracks on the default
 //! scene, from sensor readings alone. Longest time from the fault to a drive of zero, ms, and runs in which the fault was missed.
 //!
-//! ```sh
-//! cargo run --release -p vines-testbench --example faults -- INSTANTS [KEY=VALUE ...]    # writes validation/faults.csv
-//! ```
+//! Arguments: INSTANTS, and settings of the scene, `KEY=VALUE`. Writes validation/faults.csv.
 
 mod common;
 
 use std::{cell::Cell, rc::Rc};
 
-use common::{Failure, arguments, scene, write};
-use rayon::prelude::*;
-use vines_testbench::backbone::track;
-use vines_testbench::experiment;
-use vines_testbench::rig::{BuiltIn, Rig, RigFault, SensorsOnly, Simulated, faulty};
-use vines_testbench::scene::{LinearResponse, Scene};
+use common::*;
 
-/// Runs the experiment, or tracks the backbone. Returns the periods to the lock and all of them, if the run does not end early.
-fn run(rig: &mut dyn Rig, scene: &Scene, tracks: bool) -> Result<Option<[f64; 2]>, Failure> {
+/// Periods to the lock and all of them, of an experiment or of a tracked backbone that does not end early.
+fn run(rig: &mut dyn Rig, scene: &Scene, tracks: bool) -> Option<[f64; 2]> {
     if tracks {
-        let mut controller = BuiltIn::new(&scene.backbone_config())?;
-        let found = track(rig, &mut controller, scene, |_, _| {})?;
-        return Ok(found.ended.is_none().then_some([found.periods_to_lock, found.periods]));
+        let found = tracked(rig, scene, 4.0).ok()?;
+        return found.ended.is_none().then_some([found.periods_to_lock, found.periods]);
     }
-    let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let record = experiment::run(rig, &mut controller, scene, |_, _, _| {});
-    let periods = |samples: usize| samples as f64 / scene.controller.samples_per_period;
-    Ok(record.ok().map(|record| [record.settled, record.released].map(periods)))
+    let record = record(rig, scene).ok()?;
+    Some([record.settled, record.released].map(|samples| samples as f64 / scene.controller.samples_per_period))
 }
 
 /// Time from the fault to a drive of zero, s; `None` if it was missed.
@@ -36,21 +26,20 @@ fn zero(scene: &Scene, fault: RigFault, seconds: f64, tracks: bool) -> Option<f6
     let zero = Rc::new(Cell::new(None));
     let report = Rc::clone(&zero);
     let mut rig = faulty(scene, fault, seconds, move |time| report.set(time)).ok()?;
-    let ended = run(&mut rig, scene, tracks).is_ok_and(|ended| ended.is_some());
+    let is_missed = run(&mut rig, scene, tracks).is_some();
     drop(rig);
-    zero.get().filter(|_| !ended)
+    zero.get().filter(|_| !is_missed)
 }
 
 fn main() -> Result<(), Failure> {
-    let [instants, settings @ ..] = &arguments()[..] else {
-        return Err("arguments: INSTANTS [KEY=VALUE ...]".into());
-    };
+    let given: Vec<String> = std::env::args().skip(1).collect();
+    let (instants, settings) = given.split_first().ok_or("arguments: INSTANTS [KEY=VALUE ...]")?;
     let instants: usize = instants.parse()?;
     let mut scene = scene("", settings)?;
     scene.measured = Some(LinearResponse::of(&scene));
     let healthy = |tracks| -> Result<[f64; 2], Failure> {
-        let mut rig = SensorsOnly::around(Simulated::of(&scene)?);
-        run(&mut rig, &scene, tracks)?.ok_or_else(|| "the run without a fault ended early".into())
+        let run = run(&mut SensorsOnly::around(Simulated::of(&scene)?), &scene, tracks);
+        Ok(run.ok_or("the run without a fault ended early")?)
     };
     let ([settled, released], [locked, tracked]) = (healthy(false)?, healthy(true)?);
     // First period and number of periods of each stage.

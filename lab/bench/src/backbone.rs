@@ -59,7 +59,7 @@ pub struct LevelEstimate {
 const BESIDE: f64 = 0.02;
 /// Delay of the impacts behind a change of the amplitude, periods: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
 /// (studies/tracking.rs).
-const LAG: f64 = 1.6;
+pub(crate) const LAG: f64 = 1.6;
 /// Largest scatter of the periods about the fit, over the noise of the sensors: chi-square per degree of freedom is then at most 4.
 const EXCESS: f64 = 2.0;
 /// Relative standard uncertainty of the slope of a straight line through two points: away from the fold the slope changes by less from level to

@@ -88,6 +88,8 @@ impl Quantity {
         Self::Stiffness,
         Self::Damping,
     ];
+    /// Those that a fit determines.
+    pub const FITTED: &[Self] = Self::ALL.split_at(5).0;
 
     /// Symbol and unit.
     #[must_use]
@@ -107,10 +109,7 @@ impl Quantity {
 
     /// Whether the motion shows it only together with another mass, stiffness or damping.
     fn needs_a_scale(self) -> bool {
-        matches!(
-            self,
-            Self::PrimaryMass | Self::ParticleMass | Self::Stiffness | Self::Damping
-        )
+        !Self::FITTED.contains(&self)
     }
 
     /// The value at the unknowns.
@@ -175,10 +174,8 @@ impl FromStr for Known {
             .unwrap_or((numbers, "0"));
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
         let (value, uncertainty) = number(value).zip(number(uncertainty)).ok_or_else(form)?;
-        if uncertainty < 0.0
-            || value < 0.0
-            || (value == 0.0 && quantity != Quantity::Zeta && quantity != Quantity::Damping)
-        {
+        let may_be_0 = matches!(quantity, Quantity::Zeta | Quantity::Damping);
+        if uncertainty < 0.0 || value < 0.0 || (value == 0.0 && !may_be_0) {
             return Err(format!("`{text}`: the value must be positive, and its uncertainty positive or 0").into());
         }
         Ok(Self { quantity, estimate: Estimate { value, uncertainty } })
@@ -222,6 +219,19 @@ fn unknowns(plant: &Parameters) -> Unknowns {
     ])
 }
 
+/// The plant of some unknowns.
+fn plant(x: &Unknowns, cavity: Cavity) -> Parameters {
+    Parameters {
+        primary_mass: Quantity::PrimaryMass.of(x),
+        stiffness: Quantity::Stiffness.of(x),
+        damping: Quantity::Damping.of(x).max(0.0),
+        particle_mass: Quantity::ParticleMass.of(x),
+        half_width: Quantity::B.of(x),
+        restitution: Quantity::R.of(x),
+        cavity,
+    }
+}
+
 /// The gradient of a quantity.
 fn gradient(x: &Unknowns, of: impl Fn(&Unknowns) -> f64) -> Unknowns {
     Unknowns::from_fn(|i, _| {
@@ -230,6 +240,11 @@ fn gradient(x: &Unknowns, of: impl Fn(&Unknowns) -> f64) -> Unknowns {
         let [below, above] = [-step, step].map(|step| of(&shifted(x, i, step)));
         (above - below) / (2.0 * step)
     })
+}
+
+/// Derivative by a step.
+fn slope(at: impl Fn(f64) -> Option<Vector3<f64>>) -> Option<Vector3<f64>> {
+    Some((at(STEP)? - at(-STEP)?) / (2.0 * STEP))
 }
 
 fn shifted(x: &Unknowns, i: usize, step: f64) -> Unknowns {
@@ -314,17 +329,17 @@ impl Fit {
     /// correlation: the points do not separate the two.
     #[must_use]
     pub fn not_separated(&self) -> Vec<(Quantity, Quantity, f64)> {
-        let fitted = &Quantity::ALL[..5];
         let is_uncertain = |quantity: &&Quantity| {
             let estimate = self.estimate(**quantity);
             estimate.is_none_or(|one| one.uncertainty.is_nan() || one.uncertainty > UNCERTAIN * one.value.abs())
         };
         let partner = |one: &Quantity| {
-            let others = fitted.iter().filter(|other| *other != one);
+            let others = Quantity::FITTED.iter().filter(|other| *other != one);
             let correlations = others.map(|other| (*one, *other, self.correlation(*one, *other)));
             correlations.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))
         };
-        fitted.iter().filter(is_uncertain).filter_map(partner).collect()
+        let uncertain = Quantity::FITTED.iter().filter(is_uncertain);
+        uncertain.filter_map(partner).collect()
     }
 
     /// The plant of the fit; without a known mass, stiffness or damping, its primary mass is that of `scene`.
@@ -334,15 +349,7 @@ impl Fit {
         if !self.has_scale {
             x[5] = scene.primary_mass.ln();
         }
-        Parameters {
-            primary_mass: Quantity::PrimaryMass.of(&x),
-            stiffness: Quantity::Stiffness.of(&x),
-            damping: Quantity::Damping.of(&x).max(0.0),
-            particle_mass: Quantity::ParticleMass.of(&x),
-            half_width: Quantity::B.of(&x),
-            restitution: Quantity::R.of(&x),
-            cavity: scene.cavity,
-        }
+        plant(&x, scene.cavity)
     }
 }
 
@@ -366,10 +373,9 @@ pub fn fit(
             return Ok(all);
         }
         let size = |residual: &[f64; 3]| residual.iter().map(|part| part * part).sum::<f64>();
-        let sizes = fit.residuals.iter().map(size).enumerate();
-        let (worst, _) = sizes
-            .max_by(|one, other| one.1.total_cmp(&other.1))
-            .ok_or(FitError::NoMotion)?;
+        let sizes: Vec<f64> = fit.residuals.iter().map(size).collect();
+        let worst = (0..sizes.len()).max_by(|one, other| sizes[*one].total_cmp(&sizes[*other]));
+        let worst = worst.ok_or(FitError::NoMotion)?;
         rest.remove(worst);
         let points = rest.iter().map(|n| points[*n]).collect();
         fit = Problem::new(points, definition, known).fit(expected)?;
@@ -384,11 +390,8 @@ fn checked(points: &[MeasuredPoint]) -> Result<Vec<MeasuredPoint>, FitError> {
         return Err(FitError::TooFew(points.len()));
     }
     for (n, point) in points.iter().enumerate() {
-        for (what, Estimate { value, uncertainty }) in [
-            ("response", point.response),
-            ("frequency", point.omega),
-            ("drive", point.drive),
-        ] {
+        let estimates = [point.response, point.omega, point.drive];
+        for (what, Estimate { value, uncertainty }) in ["response", "frequency", "drive"].into_iter().zip(estimates) {
             let is_positive = |number: f64| number > 0.0 && number.is_finite();
             if !(is_positive(value) && is_positive(uncertainty)) {
                 return Err(FitError::NotPositive { number: n + 1, what, value, uncertainty });
@@ -434,26 +437,18 @@ pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected:
             "the points do not belong to this scene ({chi_square}), nor to the ideal cavity with other parameters; run `vines fit`"
         ));
     }
-    let report = fit.report(expected);
-    let differs = |one: &&FittedParameter| (one.value - one.expected).abs() > SIGNIFICANT * one.uncertainty;
-    let texts: Vec<String> = report
-        .parameters
+    let parameters = fit.report(expected).parameters;
+    let differing = parameters
         .iter()
-        .filter(differs)
-        .map(|one| {
-            let FittedParameter { symbol, unit, value, uncertainty, expected } = one;
-            let unit = if unit.is_empty() {
-                String::new()
-            } else {
-                format!(" {unit}")
-            };
-            format!("{symbol} = {value:.4e} ± {uncertainty:.1e}{unit} fits, the scene says {expected:.4e}")
-        })
-        .collect();
-    let texts = if texts.is_empty() {
-        "several parameters differ a little".into()
-    } else {
-        texts.join("; ")
+        .filter(|one| (one.value - one.expected).abs() > SIGNIFICANT * one.uncertainty);
+    let texts = differing.map(|one| {
+        let FittedParameter { symbol, unit, value, uncertainty, expected } = one;
+        let space = if unit.is_empty() { "" } else { " " };
+        format!("{symbol} = {value:.4e} ± {uncertainty:.1e}{space}{unit} fits, the scene says {expected:.4e}")
+    });
+    let texts = match texts.collect::<Vec<String>>().join("; ") {
+        none if none.is_empty() => "several parameters differ a little".into(),
+        some => some,
     };
     Some(format!(
         "the points do not belong to this scene: {texts}; run `vines fit`"
@@ -502,24 +497,18 @@ impl<'a> Problem<'a> {
 
     /// The smallest of the minima that are reached from the expected rig and from other restitution coefficients.
     fn fit(&self, expected: &Parameters) -> Result<Fit, FitError> {
-        let starts = [expected.restitution].into_iter().chain(STARTS).map(|restitution| {
-            let plant = Parameters { restitution, ..*expected };
-            unknowns(&plant)
-        });
-        let minima = starts.filter_map(|start| self.minimum(start));
+        let starts = [expected.restitution].into_iter().chain(STARTS);
+        let minima = starts.filter_map(|restitution| self.minimum(unknowns(&Parameters { restitution, ..*expected })));
         let (x, sums) = minima
             .min_by(|one, other| one.1.chi_square.total_cmp(&other.1.chi_square))
             .ok_or(FitError::NoMotion)?;
         let fit = self.found(x, sums);
         let is_determined = |estimate: Estimate| estimate.uncertainty.is_finite() && estimate.uncertainty > 0.0;
-        match Quantity::ALL
-            .iter()
-            .filter_map(|one| fit.estimate(*one))
+        let mut estimates = Quantity::ALL.iter().filter_map(|one| fit.estimate(*one));
+        estimates
             .all(is_determined)
-        {
-            true => Ok(fit),
-            false => Err(FitError::Undetermined),
-        }
+            .then_some(fit)
+            .ok_or(FitError::Undetermined)
     }
 
     /// The fit with these unknowns.
@@ -591,12 +580,8 @@ impl<'a> Problem<'a> {
             // The speed follows the parameters: only what is perpendicular to the curve counts.
             let along = by_speed.normalize();
             let mut rows = [Vector3::zeros(); UNKNOWNS];
-            for (i, row) in rows.iter_mut().enumerate() {
-                if i >= 5 {
-                    continue;
-                }
-                let [below, above] = [-STEP, STEP].map(|step| self.residual(&shifted(x, i, step), n, b));
-                let slope = (above? - below?) / (2.0 * STEP);
+            for (i, row) in rows[..5].iter_mut().enumerate() {
+                let slope = slope(|step| self.residual(&shifted(x, i, step), n, b))?;
                 *row = slope - along * along.dot(&slope);
             }
             sums.add(rows, residual - along * along.dot(&residual));
@@ -633,12 +618,9 @@ impl<'a> Problem<'a> {
             manifold.b(c, BranchSide::Right).unwrap_or(1.02 * manifold.b_min())
         };
         let mut speed = start.unwrap_or_else(by_theory);
-        let slope = |speed: f64| {
-            let [below, above] = [-STEP, STEP].map(|step| self.residual(x, point, speed + step));
-            Some((above? - below?) / (2.0 * STEP))
-        };
+        let by = |speed: f64| slope(|step| self.residual(x, point, speed + step));
         let mut residual = self.residual(x, point, speed)?;
-        let mut by_speed = slope(speed)?;
+        let mut by_speed = by(speed)?;
         for _ in 0..ROUNDS {
             let mut step = -by_speed.dot(&residual) / by_speed.norm_squared();
             // Where the curve does not change with the speed, or is not a number, no shorter step would end the search.
@@ -658,7 +640,7 @@ impl<'a> Problem<'a> {
             let gained = residual.norm_squared() - next.norm_squared();
             let is_near = gained < NEAREST * (1.0 + residual.norm_squared());
             (speed, residual) = (speed + step, next);
-            by_speed = slope(speed)?;
+            by_speed = by(speed)?;
             if is_near || step.abs() < 1e-12 {
                 break;
             }
@@ -729,20 +711,19 @@ impl Fit {
     /// The numbers of the fit, beside those of the rig that was expected.
     #[must_use]
     pub fn report(&self, expected: &Parameters) -> FitReport {
-        let fitted = &Quantity::ALL[..5];
         let parameter = |quantity: Quantity| {
             let (Estimate { value, uncertainty }, [symbol, unit]) = (self.estimate(quantity)?, quantity.symbol());
             let expected = quantity.of_plant(expected);
             Some(FittedParameter { symbol, unit, value, uncertainty, expected })
         };
-        let correlations = |one: &Quantity| std::array::from_fn(|n| self.correlation(*one, fitted[n]));
+        let correlations = |one: &Quantity| std::array::from_fn(|n| self.correlation(*one, Quantity::FITTED[n]));
         FitReport {
             describes: !self.is_rejected(),
             chi_square: self.chi_square,
             degrees: self.degrees,
             p_value: self.p_value(),
             parameters: Quantity::ALL.into_iter().filter_map(parameter).collect(),
-            correlations: fitted.iter().map(correlations).collect(),
+            correlations: Quantity::FITTED.iter().map(correlations).collect(),
             residuals: self.residuals.clone(),
             left_out: self.left_out.iter().map(|n| n + 1).collect(),
         }

@@ -1,12 +1,14 @@
 //! `vines fit`: the parameters of a rig from measured points of its backbone.
 
+use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::ProgressBar;
 use serde::Serialize;
-use vines::fit::{Effect, Fit, FitReport, Found, Known, Part, decimals, find, parts};
+use vines::fit::{Effect, Fit, FitReport, Found, Known, MeasuredPoint, Part, decimals, find, parts};
+use vines::numerics::Estimate;
 use vines::points::{Channel, Channels, Column, Measurement, read};
 use vines::report::{Table, write_fit};
 
@@ -137,10 +139,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         } else {
             recorded(&parts)
         };
-        let verdict = verdict
-            .as_ref()
-            .map_or_else(String::new, |verdict| format!("{verdict}\n"));
-        parts + &summary(&report, &fit, points.len(), skipped) + &verdict
+        let verdict = verdict.as_ref().map(|verdict| format!("{verdict}\n"));
+        parts + &summary(&report, &fit, points.len(), skipped) + &verdict.unwrap_or_default()
     })?;
     if let Some(path) = &arguments.figure {
         let file = write_fit(&points, &fit, &scene, verdict.as_deref(), path).map_err(Failure::run)?;
@@ -172,21 +172,15 @@ fn recorded(parts: &[Part]) -> String {
     let rows = parts.iter().map(|part| {
         let [from, to] = part.seconds.map(|time| format!("{time:.2}"));
         let kind = format!("{:?}", part.kind).to_lowercase();
-        let values = part.point.map_or_else(
-            || [String::new(), String::new(), String::new()],
-            |point| {
-                [
-                    point.omega.scaled(1.0 / std::f64::consts::TAU),
-                    point.response.scaled(1e3),
-                    point.drive.scaled(1e3),
-                ]
-                .map(|one| {
-                    let decimals = decimals(one.uncertainty);
-                    format!("{:.decimals$} ± {:.decimals$}", one.value, one.uncertainty)
-                })
-            },
-        );
-        let [f, a, e] = values;
+        let text = |one: Estimate, unit: f64| {
+            let Estimate { value, uncertainty } = one.scaled(unit);
+            let decimals = decimals(uncertainty);
+            format!("{value:.decimals$} ± {uncertainty:.decimals$}")
+        };
+        let values = part.point.map(|MeasuredPoint { response, omega, drive }| {
+            [text(omega, 1.0 / TAU), text(response, 1e3), text(drive, 1e3)]
+        });
+        let [f, a, e] = values.unwrap_or_default();
         [from, to, kind, part.regime.to_string(), f, a, e]
     });
     Table::new("from, s | to, s | part | motion | f, Hz | A, mm | E, mm")
@@ -255,16 +249,12 @@ fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> Stri
 fn plant_section(report: &FitReport, plant: &vines::scene::Parameters, verdict: Option<&str>) -> String {
     let lines = vines::scene::plant_keys(plant).into_iter().map(|(symbol, value)| {
         let fitted = report.parameters.iter().find(|one| one.symbol == symbol);
-        let u = fitted.map_or_else(String::new, |one| format!(" ± {:.2e}", one.uncertainty));
+        let u = fitted.map(|one| format!(" ± {:.2e}", one.uncertainty));
         let is_ideal = ["M", "k", "c", "m", "b", "r"].contains(&symbol);
-        let note = if is_ideal {
-            format!("  # fitted{u}")
-        } else {
-            String::new()
-        };
-        format!("{symbol} = {value}{note}\n")
+        let note = is_ideal.then(|| format!("  # fitted{}", u.unwrap_or_default()));
+        format!("{symbol} = {value}{}\n", note.unwrap_or_default())
     });
-    let verdict = verdict.map_or_else(String::new, |verdict| format!("# {verdict}\n"));
+    let verdict = verdict.map(|verdict| format!("# {verdict}\n")).unwrap_or_default();
     let doubt = if report.describes {
         ""
     } else {

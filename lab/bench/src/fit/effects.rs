@@ -20,7 +20,7 @@ use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_
 
 use super::{
     FEWEST, Fit, FitError, Known, LEFT_OUT, MeasuredPoint, Problem, Quantity, Sums, UNKNOWNS, Unknowns, checked, fit,
-    gradient, shifted,
+    gradient, plant, shifted,
 };
 use crate::scene::Parameters;
 
@@ -90,9 +90,10 @@ impl Effect {
         matches!(self, Self::Friction | Self::Tilt)
     }
 
-    /// The cavity with this effect: `strength` is the friction, the square of the tilt (the motions are even in it), or nothing; `r` is the
-    /// restitution at the impact speed `speed`, m/s.
-    fn cavity(self, strength: f64, r: f64, speed: f64) -> Cavity {
+    /// The cavity with this effect. `strength` is the friction, or the square of the tilt, rad² (the motions are even in it); a law of restitution
+    /// has the value `r` at the impact speed `speed`, m/s.
+    #[must_use]
+    pub fn cavity(self, strength: f64, r: f64, speed: f64) -> Cavity {
         let both = |law| Cavity { restitution: [Some(law); 2], ..Cavity::IDEAL };
         match self {
             Self::Friction => Cavity { kinetic_friction: strength, ..Cavity::IDEAL },
@@ -146,20 +147,18 @@ impl Explanation {
     #[must_use]
     pub fn verdict(&self) -> String {
         let chi_square = |fit: &Fit| format!("{:.0} for {}", fit.chi_square, fit.degrees);
+        let list = |candidates: &mut dyn Iterator<Item = &Candidate>| {
+            let texts = candidates.map(|one| format!("{} ({})", one.effect, chi_square(&one.fit)));
+            texts.collect::<Vec<String>>().join(", ")
+        };
         let Some(best) = self.explains() else {
-            let tried: Vec<String> = self
-                .candidates
-                .iter()
-                .map(|one| format!("{} ({})", one.effect, chi_square(&one.fit)))
-                .collect();
+            let tried = match list(&mut self.candidates.iter()) {
+                none if none.is_empty() => "none of them a motion exists".into(),
+                some => some,
+            };
             return format!(
-                "no single effect of the cavity explains it: chi-square is {} without one, with {}",
-                chi_square(&self.ideal),
-                if tried.is_empty() {
-                    "none of them a motion exists".into()
-                } else {
-                    tried.join(", ")
-                }
+                "no single effect of the cavity explains it: chi-square is {} without one, with {tried}",
+                chi_square(&self.ideal)
             );
         };
         let [symbol, unit] = best.effect.symbol();
@@ -177,14 +176,11 @@ impl Explanation {
                 "; {left_out} points of the smallest responses do not belong to this motion, and are left out"
             );
         }
-        let others = self.candidates[1..]
-            .iter()
-            .filter(|one| one.fit.left_out == best.fit.left_out && one.criterion() - best.criterion() < POSSIBLE);
-        let others: Vec<String> = others
-            .map(|one| format!("{} ({})", one.effect, chi_square(&one.fit)))
-            .collect();
+        let is_possible =
+            |one: &&Candidate| one.fit.left_out == best.fit.left_out && one.criterion() - best.criterion() < POSSIBLE;
+        let others = list(&mut self.candidates[1..].iter().filter(is_possible));
         if !others.is_empty() {
-            text += &format!("; the points do not exclude {}", others.join(", "));
+            text += &format!("; the points do not exclude {others}");
         }
         text
     }
@@ -288,25 +284,19 @@ impl Problem<'_> {
     /// first, and each fit starts the one of more points. A strong effect moves the fold, and the points beyond it belong to another motion: those of
     /// the smallest amplitudes, a fifth at most, are left out if the others agree.
     fn with_effect(&self, effect: Effect, expected: &Parameters) -> Option<Candidate> {
-        let mut order: Vec<usize> = (0..self.points.len()).collect();
-        order.sort_by(|one, other| {
-            self.points[*other]
-                .response
-                .value
-                .total_cmp(&self.points[*one].response.value)
-        });
-        let of = |points: Vec<MeasuredPoint>| Problem::new(points, self.definition, self.known);
+        let order = self.by_falling_response();
         let largest = |share: f64| {
             let mut kept = order[..((share * order.len() as f64).ceil() as usize).max(FEWEST)].to_vec();
             kept.sort_unstable();
             kept
         };
-        let strongest: Vec<MeasuredPoint> = largest(STAGES[0]).into_iter().map(|n| self.points[n]).collect();
-        let starts = [1.0, 5.0]
-            .into_iter()
-            .filter(|factor| *factor == 1.0 || effect.adds_a_parameter());
-        let ideal = of(strongest).fit(expected).ok()?;
-        let found = starts.filter_map(|factor| {
+        let of = |kept: &[usize]| {
+            let points = kept.iter().map(|n| self.points[*n]).collect();
+            Problem::new(points, self.definition, self.known)
+        };
+        let starts: &[f64] = if effect.adds_a_parameter() { &[1.0, 5.0] } else { &[1.0] };
+        let ideal = of(&largest(STAGES[0])).fit(expected).ok()?;
+        let found = starts.iter().filter_map(|factor| {
             let mut x = ideal.x;
             let typical = factor * TYPICAL * x[3].exp() * x[0].exp().powi(2) / GRAVITY;
             x[6] = match effect {
@@ -317,8 +307,7 @@ impl Problem<'_> {
             let mut best: Option<Candidate> = None;
             for share in STAGES {
                 let kept = largest(share);
-                let points = kept.iter().map(|n| self.points[*n]).collect();
-                let Some(mut next) = of(points).with_effect_from(effect, x, &ideal) else {
+                let Some(mut next) = of(&kept).with_effect_from(effect, x, &ideal) else {
                     break;
                 };
                 if next.fit.is_rejected() && best.as_ref().is_some_and(|one| !one.fit.is_rejected()) {
@@ -339,6 +328,14 @@ impl Problem<'_> {
             }
         }
         best
+    }
+
+    /// The numbers of the points, from the largest response on.
+    fn by_falling_response(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.points.len()).collect();
+        let response = |n: usize| self.points[n].response.value;
+        order.sort_by(|one, other| response(*other).total_cmp(&response(*one)));
+        order
     }
 
     /// The fit with an effect, from the unknowns `x`: Gauss and Newton's method, in steps that reduce chi-square.
@@ -422,18 +419,13 @@ impl PlantCurve<'_> {
             near.response.norm() + ahead * tangent[0] * length,
             near.omega + ahead * tangent[1] * rate,
         ];
-        let cavity = self.effect.cavity(x[6], x[2], self.speed);
-        let conditions = [
-            DriveCondition::PhaseResonance,
-            DriveCondition::Across { at, normal: tangent },
-        ];
-        periodic_motion(
-            &Parameters { cavity, ..plant(x) },
-            self.problem.definition,
-            near,
-            conditions,
-        )
-        .ok()
+        let across = DriveCondition::Across { at, normal: tangent };
+        let conditions = [DriveCondition::PhaseResonance, across];
+        periodic_motion(&self.plant(x), self.problem.definition, near, conditions).ok()
+    }
+
+    fn plant(&self, x: &Unknowns) -> Parameters {
+        plant(x, self.effect.cavity(x[6], x[2], self.speed))
     }
 
     fn residual(&self, n: usize, motion: &PlantMotion) -> Vector3<f64> {
@@ -464,17 +456,9 @@ impl PlantCurve<'_> {
     /// The motions with the amplitudes of the points, or at the fold, from the largest one along the curve.
     fn along(&self, x: &Unknowns) -> Option<Vec<Place>> {
         let points = &self.problem.points;
-        let mut order: Vec<usize> = (0..points.len()).collect();
-        order.sort_by(|one, other| points[*other].response.value.total_cmp(&points[*one].response.value));
-        let cavity = self.effect.cavity(x[6], x[2], self.speed);
+        let order = self.problem.by_falling_response();
         let largest = points[order[0]].response.value;
-        let mut near = resonant_motion(
-            &Parameters { cavity, ..plant(x) },
-            self.problem.definition,
-            largest,
-            None,
-        )
-        .ok()?;
+        let mut near = resonant_motion(&self.plant(x), self.problem.definition, largest, None).ok()?;
         let (mut tangent, mut places) = ([1.0, 0.0], Vec::new());
         for n in order {
             let mut place = self.place(x, n, &near, tangent, 0.0)?;
@@ -528,17 +512,4 @@ impl PlantCurve<'_> {
 /// b, m, and epsilon omega0, rad/s.
 fn units(x: &Unknowns) -> [f64; 2] {
     [x[3].exp(), (x[4] + x[0]).exp()]
-}
-
-/// The ideal plant of some unknowns.
-fn plant(x: &Unknowns) -> Parameters {
-    Parameters {
-        primary_mass: Quantity::PrimaryMass.of(x),
-        stiffness: Quantity::Stiffness.of(x),
-        damping: Quantity::Damping.of(x).max(0.0),
-        particle_mass: Quantity::ParticleMass.of(x),
-        half_width: Quantity::B.of(x),
-        restitution: x[2],
-        cavity: Cavity::IDEAL,
-    }
 }

@@ -11,18 +11,18 @@
 //! The impacts follow a change of the amplitude late. The errors by this are alike within a sweep or a decay of n points, so that averaging does
 //! not reduce them: each counts with the factor √n.
 
+use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
-use std::ops::Range;
 
 use num_complex::Complex64;
 use serde::Serialize;
 use thiserror::Error;
-use vines_model::numerics::{Estimate, RANDOM, equally_spaced, mean, slope};
+use vines_model::numerics::{Estimate, RANDOM, equally_spaced, mean, range, slope};
 use vines_model::regime::Regime;
 use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
 
 use super::{Known, MeasuredPoint, Quantity, fit};
-use crate::backbone::{Criterion, LevelEstimate};
+use crate::backbone::{Criterion, LAG, LevelEstimate};
 use crate::identification::{Cycle, Harmonic, ResonanceFit, harmonic, regime_by_response};
 use crate::record::Sample;
 use crate::rig::{Command, Drive, Sensors};
@@ -69,97 +69,10 @@ pub struct Part {
     pub regime: Regime,
 }
 
-/// Why a recording gives no points.
+/// Why a recording gives no points: the message says what is wrong, and what to do.
 #[derive(Debug, Error)]
-#[expect(missing_docs, reason = "the messages explain the variants")]
-pub enum RecordingError {
-    #[error(
-        "{origin}, channel {channel}: sample {sample} ({seconds:.4} s) is not a finite number; cut the recording there, or repair the channel"
-    )]
-    NotANumber {
-        origin: String,
-        channel: String,
-        sample: usize,
-        seconds: f64,
-    },
-    #[error("{origin}: channel {} has {} samples and channel {} has {}; both must have been sampled together", channels[0], lengths[0], channels[1], lengths[1])]
-    Lengths {
-        origin: String,
-        channels: [String; 2],
-        lengths: [usize; 2],
-    },
-    #[error(
-        "{origin}: {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {FEWEST} are needed"
-    )]
-    Short {
-        origin: String,
-        seconds: f64,
-        periods: f64,
-        hertz: f64,
-    },
-    #[error(
-        "{origin}: {rate:.6} samples a second are {per_period:.1} in a period of the scene's natural frequency {hertz:.4} Hz, and at least {COARSEST} \
-         are needed: give the rate with --rate, or the stiffness and the mass with --scene"
-    )]
-    Coarse {
-        origin: String,
-        rate: f64,
-        per_period: f64,
-        hertz: f64,
-    },
-    #[error(
-        "{origin}, channel {channel}: the strongest oscillation has {found:.4} Hz, and the scene's natural frequency is {hertz:.4} Hz. If the rate \
-         of {rate:.6} samples a second is wrong, give it with --rate; if the scene is wrong, give stiffness and mass with --scene"
-    )]
-    Frequency {
-        origin: String,
-        channel: String,
-        found: f64,
-        hertz: f64,
-        rate: f64,
-    },
-    #[error(
-        "{origin}, channel {channel} is clipped: {share:.1} % of its samples are equal to its largest or smallest value, {value:e} m; reduce the gain, and record again"
-    )]
-    Clipped {
-        origin: String,
-        channel: String,
-        share: f64,
-        value: f64,
-    },
-    #[error("{origin}, channel {channel} is constant: is it connected, and is it the right one?")]
-    Constant { origin: String, channel: String },
-    #[error(
-        "{origin}: channel {drive} (base) is {ratio:.1} times as large as channel {response} (response), and at resonance the response is the \
-         larger one: are the channels swapped, or their units different?"
-    )]
-    Swapped {
-        origin: String,
-        response: String,
-        drive: String,
-        ratio: f64,
-    },
-    #[error(
-        "{origin}: the response {response} leads the base {drive} by about a quarter of a period, where it lags on every passive rig: one of the \
-         channels has the wrong sign; give it with a negative factor, for instance --drive {drive}:-1"
-    )]
-    Sign {
-        origin: String,
-        response: String,
-        drive: String,
-    },
-    #[error(
-        "{origin}: no stretch of {} periods near phase resonance is symmetric 1:1 ({found}). A point needs a held response, a slow sweep, or a \
-         decay, where the response {response} lags the base {drive} by a quarter of a period",
-        LEAST
-    )]
-    NoPoints {
-        origin: String,
-        response: String,
-        drive: String,
-        found: String,
-    },
-}
+#[error("{0}")]
+pub struct RecordingError(String);
 
 /// Periods of the fits that make the clock, and of those of a decay.
 const WINDOW: f64 = 2.5;
@@ -172,7 +85,8 @@ const LEAST: usize = 2 * ResonanceFit::FEWEST;
 /// Largest relative distance of the amplitude from the mean of the first [`LEAST`] periods of a window, in these: drive and frequency are nearly
 /// linear in the amplitude there.
 const RANGE: f64 = 0.04;
-/// Largest such distance within a window of more periods, whose response is held.
+/// Largest such distance within a window of more periods, whose response is held. A change by twice this is a sweep; so far apart, two points give a
+/// slope.
 const HELD: f64 = 0.005;
 /// Largest phase error of a period, rad: the balances are of the first order in it.
 const PHASE_RANGE: f64 = 0.1;
@@ -187,16 +101,11 @@ const SEEN: f64 = 8.0;
 const CLIPPED: f64 = 0.06;
 /// Largest relative distance of the frequency from the natural frequency near resonance.
 const FARTHEST: f64 = 0.2;
-/// Most samples in which a frequency is searched for.
+/// Most samples in which a frequency is searched for, and number of frequencies: lines of so many samples are wider than their distance.
 const SEARCHED: usize = 8192;
-/// Relative distance of amplitudes from which on two points give a slope.
-const APART: f64 = 0.01;
-/// Relative change of the amplitude within a window from which on it is a sweep.
-const SWEPT: f64 = 0.01;
+const FREQUENCIES: usize = 4000;
 /// Relative standard uncertainty of the damping that a scene states: three of them are 30 %.
 const DAMPING: f64 = 0.1;
-/// Periods by which the impacts follow a change of the amplitude late.
-const LAG: f64 = 1.6;
 
 /// The parts of each recording. The natural frequency and the damping are those of `scene` first, and then those that fit the points, if these
 /// determine them better.
@@ -247,63 +156,79 @@ impl Recording {
         let mut scene = scene.clone();
         scene.controller.samples_per_period *= scene.sample_time() / self.sample_time;
         let anchors = self.anchors(&linear);
+        let moves = |one: &Anchor| one.response.map(|_| one.drive.is_some());
+        let stretches = anchors.chunk_by(|one, other| moves(one) == moves(other));
+        let of = |base_moves: bool| move |stretch: &&[Anchor]| moves(&stretch[0]) == Some(base_moves);
         let target = scene.controller.phase_target_radians();
-        let runs: Vec<Run> = anchors
-            .chunk_by(|one, other| one.kind() == other.kind())
-            .filter_map(|anchors| match anchors[0].kind()? {
-                Motion::Driven => Some(Run::Driven(self.driven(anchors, target))),
-                Motion::Free => Some(Run::Free(anchors)),
-            })
-            .collect();
-        self.plausible(&runs)?;
-        let mut parts = evaluated(&runs, &scene, self.sample_time);
+        let periods = |stretch: &[Anchor]| {
+            let samples = self.samples(stretch);
+            let cycles = Cycle::all(&samples, self.sample_time, target);
+            (samples, cycles)
+        };
+        let driven: Vec<_> = stretches.clone().filter(of(true)).map(periods).collect();
+        self.plausible(&driven.iter().flat_map(|(_, cycles)| cycles).collect::<Vec<_>>())?;
+        let windows = driven.iter().flat_map(|(samples, cycles)| windows(samples, cycles));
+        let mut parts = evaluated(&windows.collect::<Vec<_>>(), &scene);
+        let decays = stretches.filter(of(false));
+        parts.extend(decays.flat_map(|stretch| decay(stretch, &linear, self.sample_time)));
+        parts.sort_by(|one, other| one.seconds[0].total_cmp(&other.seconds[0]));
         best_of_each_amplitude(&mut parts);
         if parts.iter().all(|part| part.point.is_none()) {
-            return Err(self.nothing(&anchors, &parts, &linear));
+            let is_seen = 2 * anchors.iter().filter(|one| one.response.is_some()).count() >= anchors.len();
+            return Err(self.nothing(is_seen, &parts, &linear));
         }
         Ok(parts)
     }
 
     /// Refuses what is no measurement.
     fn check(&self, linear: &LinearResponse) -> Result<(), RecordingError> {
-        let origin = || self.origin.clone();
-        let (dt, hertz) = (self.sample_time, linear.omega0 / TAU);
+        let Self { origin, channels, sample_time, .. } = self;
+        let refused = |message: String| Err(RecordingError(format!("{origin}{message}")));
+        let hertz = linear.omega0 / TAU;
         let both = [&self.response, &self.drive];
-        let lengths = both.map(Vec::len);
-        if lengths[0] != lengths[1] {
-            let channels = self.channels.clone();
-            return Err(RecordingError::Lengths { origin: origin(), channels, lengths });
+        let [count, other] = both.map(Vec::len);
+        if count != other {
+            let [one, another] = channels;
+            return refused(format!(
+                ": channel {one} has {count} samples and channel {another} has {other}; both must have been sampled together"
+            ));
         }
-        for (values, channel) in both.into_iter().zip(&self.channels) {
+        for (values, channel) in both.into_iter().zip(channels) {
             if let Some(sample) = values.iter().position(|value| !value.is_finite()) {
-                let (channel, seconds) = (channel.clone(), sample as f64 * dt);
-                return Err(RecordingError::NotANumber { origin: origin(), channel, sample: sample + 1, seconds });
+                let (number, seconds) = (sample + 1, sample as f64 * sample_time);
+                return refused(format!(
+                    ", channel {channel}: sample {number} ({seconds:.4} s) is not a finite number; cut the recording there, or repair the channel"
+                ));
             }
         }
-        let per_period = 1.0 / (hertz * dt);
+        let (rate, per_period) = (1.0 / sample_time, 1.0 / (hertz * sample_time));
         if per_period < COARSEST {
-            return Err(RecordingError::Coarse { origin: origin(), rate: 1.0 / dt, per_period, hertz });
+            return refused(format!(
+                ": {rate:.6} samples a second are {per_period:.1} in a period of the scene's natural frequency {hertz:.4} Hz, and at least {COARSEST} \
+                 are needed: give the rate with --rate, or the stiffness and the mass with --scene"
+            ));
         }
-        let seconds = self.response.len() as f64 * dt;
-        if seconds * hertz < FEWEST {
-            let periods = seconds * hertz;
-            return Err(RecordingError::Short { origin: origin(), seconds, periods, hertz });
+        let (seconds, periods) = (count as f64 * sample_time, count as f64 * sample_time * hertz);
+        if periods < FEWEST {
+            return refused(format!(
+                ": {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {FEWEST} are needed"
+            ));
         }
-        for (values, channel) in both.into_iter().zip(&self.channels) {
-            let (low, high) = values
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-                    (low.min(*value), high.max(*value))
-                });
-            let channel = channel.clone();
+        for (values, channel) in both.into_iter().zip(channels) {
+            let (low, high) = range((f64::INFINITY, f64::NEG_INFINITY), values.iter().copied());
             if low == high {
-                return Err(RecordingError::Constant { origin: origin(), channel });
+                return refused(format!(
+                    ", channel {channel} is constant: is it connected, and is it the right one?"
+                ));
             }
             for value in [low, high] {
-                let count = values.iter().filter(|one| **one == value).count();
-                let share = count as f64 / values.len() as f64;
+                let share = values.iter().filter(|one| **one == value).count() as f64 / count as f64;
                 if share > CLIPPED && value != 0.0 {
-                    return Err(RecordingError::Clipped { origin: origin(), channel, share: 100.0 * share, value });
+                    return refused(format!(
+                        ", channel {channel} is clipped: {:.1} % of its samples are equal to its largest or smallest value, {value:e} m; reduce the \
+                         gain, and record again",
+                        100.0 * share
+                    ));
                 }
             }
         }
@@ -336,46 +261,12 @@ impl Recording {
                 }
             })
             .collect();
-        let largest = anchors
-            .iter()
-            .filter_map(|one| one.drive)
-            .map(|one| one.amplitude)
-            .fold(0.0, f64::max);
+        let drives = anchors.iter().filter_map(|one| one.drive);
+        let largest = drives.map(|one| one.amplitude).fold(0.0, f64::max);
         for anchor in &mut anchors {
             anchor.drive = anchor.drive.filter(|one| one.amplitude > RESTS * largest);
         }
         anchors
-    }
-
-    /// The windows of a part in which the base moves: periods of about the same amplitude, near phase resonance.
-    fn driven(&self, run: &[Anchor], target: f64) -> Driven {
-        let samples = self.samples(run);
-        let cycles = Cycle::all(&samples, self.sample_time, target);
-        let (mut windows, mut begin, mut from) = (Vec::new(), 0, 0);
-        while begin < cycles.len() {
-            let rest = &cycles[begin..];
-            let level = mean(rest.iter().take(LEAST).map(Cycle::amplitude));
-            let belongs = |(n, cycle): &(usize, &Cycle)| {
-                let [noise, base_noise] = cycle.noise.map(|variance| 4.0 * variance.sqrt());
-                let phase_noise = (noise / level).hypot(base_noise / cycle.base.norm());
-                let range = if *n < LEAST { RANGE } else { HELD };
-                (cycle.amplitude() - level).abs() <= (range * level).max(noise)
-                    && cycle.phase_error.abs() <= PHASE_RANGE.max(phase_noise)
-            };
-            let length = rest.iter().enumerate().take_while(belongs).count();
-            let taken = rest.iter().take(length.max(1)).map(|one| one.samples).sum::<usize>();
-            if length >= LEAST {
-                // The impacts follow a move late.
-                let late = if length >= 3 * LEAST { LEAST } else { 0 };
-                let left = rest.iter().take(late).map(|one| one.samples).sum::<usize>();
-                windows.push(Window {
-                    cycles: begin + late..begin + length,
-                    samples: from + left..from + taken,
-                });
-            }
-            (begin, from) = (begin + length.max(1), from + taken);
-        }
-        Driven { samples, cycles, windows }
     }
 
     /// The samples of a part in which the base moves, with the command that its fits stand for.
@@ -404,68 +295,59 @@ impl Recording {
         samples
     }
 
-    /// Refuses channels that are swapped, or of which one has the wrong sign.
-    fn plausible(&self, runs: &[Run]) -> Result<(), RecordingError> {
-        let cycles = || {
-            runs.iter().flat_map(|run| match run {
-                Run::Driven(driven) => &driven.cycles[..],
-                Run::Free(_) => &[],
-            })
-        };
-        let [response, drive] = self.channels.clone();
-        let origin = self.origin.clone();
-        let ratio = mean(cycles().map(|one| one.base.norm())) / mean(cycles().map(Cycle::amplitude));
+    /// Refuses channels that are swapped, or of which one has the wrong sign. `cycles`: the periods in which the base moves.
+    fn plausible(&self, cycles: &[&Cycle]) -> Result<(), RecordingError> {
+        let Self { origin, channels: [response, drive], .. } = self;
+        let ratio = mean(cycles.iter().map(|one| one.base.norm())) / mean(cycles.iter().map(|one| one.amplitude()));
         if ratio > 1.0 {
-            return Err(RecordingError::Swapped { origin, response, drive, ratio });
+            return Err(RecordingError(format!(
+                "{origin}: channel {drive} (base) is {ratio:.1} times as large as channel {response} (response), and at resonance the response is the \
+                 larger one: are the channels swapped, or their units different?"
+            )));
         }
-        let near = |phase: f64| {
-            cycles()
-                .filter(|one| (one.phase_error.abs() - phase).abs() < PHASE_RANGE)
-                .count()
-        };
+        let is_near = |one: &Cycle, phase: f64| (one.phase_error.abs() - phase).abs() < PHASE_RANGE;
+        let near = |phase: f64| cycles.iter().filter(|one| is_near(one, phase)).count();
         if near(PI) > near(0.0) {
-            return Err(RecordingError::Sign { origin, response, drive });
+            return Err(RecordingError(format!(
+                "{origin}: the response {response} leads the base {drive} by about a quarter of a period, where it lags on every passive rig: one of \
+                 the channels has the wrong sign; give it with a negative factor, for instance --drive {drive}:-1"
+            )));
         }
         Ok(())
     }
 
-    /// Why there are no points.
-    fn nothing(&self, anchors: &[Anchor], parts: &[Part], linear: &LinearResponse) -> RecordingError {
-        let [response, drive] = self.channels.clone();
-        let (origin, hertz) = (self.origin.clone(), linear.omega0 / TAU);
-        let seen = anchors.iter().filter(|one| one.kind().is_some()).count();
-        let found = self.strongest(linear);
-        if 2 * seen < anchors.len() && (found / hertz - 1.0).abs() > FARTHEST {
-            let rate = 1.0 / self.sample_time;
-            return RecordingError::Frequency { origin, channel: response, found, hertz, rate };
+    /// Why there are no points. `is_seen`: half of the recording has an oscillation near the natural frequency.
+    fn nothing(&self, is_seen: bool, parts: &[Part], linear: &LinearResponse) -> RecordingError {
+        let Self { origin, channels: [response, drive], .. } = self;
+        let (hertz, strongest, rate) = (linear.omega0 / TAU, self.strongest(linear), 1.0 / self.sample_time);
+        if !is_seen && (strongest / hertz - 1.0).abs() > FARTHEST {
+            return RecordingError(format!(
+                "{origin}, channel {response}: the strongest oscillation has {strongest:.4} Hz, and the scene's natural frequency is {hertz:.4} Hz. \
+                 If the rate of {rate:.6} samples a second is wrong, give it with --rate; if the scene is wrong, give stiffness and mass with --scene"
+            ));
         }
-        let mut regimes: Vec<String> = parts.iter().map(|part| part.regime.to_string()).collect();
-        regimes.sort();
-        regimes.dedup();
-        let found = match regimes.join(", ") {
+        let regimes: BTreeSet<String> = parts.iter().map(|part| part.regime.to_string()).collect();
+        let found = match regimes.into_iter().collect::<Vec<_>>().join(", ") {
             none if none.is_empty() => "no such stretch".into(),
             some => format!("found: {some}"),
         };
-        RecordingError::NoPoints { origin, response, drive, found }
+        RecordingError(format!(
+            "{origin}: no stretch of {LEAST} periods near phase resonance is symmetric 1:1 ({found}). A point needs a held response, a slow sweep, or a \
+             decay, where the response {response} lags the base {drive} by a quarter of a period"
+        ))
     }
 
     /// Frequency of the strongest oscillation of the response between a twentieth and twenty times the natural frequency, Hz.
     fn strongest(&self, linear: &LinearResponse) -> f64 {
-        let dt = self.sample_time;
         let last = &self.response[self.response.len().saturating_sub(SEARCHED)..];
         let middle = mean(last.iter().copied());
-        let lowest = (linear.omega0 / 20.0).max(TAU / (last.len() as f64 * dt));
-        let highest = (20.0 * linear.omega0).min(PI / dt);
         let power = |omega: f64| {
-            let sum: Complex64 = last
-                .iter()
-                .enumerate()
-                .map(|(n, value)| Complex64::from_polar(value - middle, omega * n as f64 * dt))
-                .sum();
-            sum.norm()
+            let turn =
+                |(n, value): (usize, &f64)| Complex64::from_polar(value - middle, omega * n as f64 * self.sample_time);
+            last.iter().enumerate().map(turn).sum::<Complex64>().norm()
         };
-        let count = (2.0 * highest * last.len() as f64 * dt / TAU).min(4000.0) as usize;
-        let grid = equally_spaced(lowest, highest, count.max(2));
+        let highest = (20.0 * linear.omega0).min(PI / self.sample_time);
+        let grid = equally_spaced(linear.omega0 / 20.0, highest, FREQUENCIES);
         let best = grid
             .map(|omega| (power(omega), omega))
             .max_by(|one, other| one.0.total_cmp(&other.0));
@@ -473,7 +355,7 @@ impl Recording {
     }
 }
 
-/// Both channels at one time.
+/// Both channels at one time. The base rests, or the response cannot be seen, where there is no oscillation.
 struct Anchor {
     /// In samples.
     middle: f64,
@@ -481,91 +363,73 @@ struct Anchor {
     drive: Option<Harmonic>,
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum Motion {
-    Driven,
-    Free,
+/// Periods of about the same amplitude, near phase resonance, while the base moves.
+struct Window<'a> {
+    cycles: &'a [Cycle],
+    samples: &'a [Sample],
+    /// Change of the amplitude in a period, m; 0 if it is noise.
+    change: f64,
+    /// Amplitude, m, by which the impacts follow the change late. These errors are alike in all windows of a stretch that change the same way.
+    late: f64,
 }
 
-impl Anchor {
-    /// What moves, if anything does.
-    fn kind(&self) -> Option<Motion> {
-        match (self.response, self.drive) {
-            (Some(_), Some(_)) => Some(Motion::Driven),
-            (Some(_), None) => Some(Motion::Free),
-            (None, _) => None,
+/// Number of samples.
+fn count(cycles: &[Cycle]) -> usize {
+    cycles.iter().map(|one| one.samples).sum()
+}
+
+/// The windows of a stretch in which the base moves.
+fn windows<'a>(samples: &'a [Sample], cycles: &'a [Cycle]) -> Vec<Window<'a>> {
+    let (mut windows, mut rest, mut from) = (Vec::new(), cycles, 0);
+    while !rest.is_empty() {
+        let level = mean(rest.iter().take(LEAST).map(Cycle::amplitude));
+        let belongs = |(n, cycle): &(usize, &Cycle)| {
+            let [noise, base_noise] = cycle.noise.map(|variance| 4.0 * variance.sqrt());
+            let phase_noise = (noise / level).hypot(base_noise / cycle.base.norm());
+            let range = if *n < LEAST { RANGE } else { HELD };
+            (cycle.amplitude() - level).abs() <= (range * level).max(noise)
+                && cycle.phase_error.abs() <= PHASE_RANGE.max(phase_noise)
+        };
+        let length = rest.iter().enumerate().take_while(belongs).count();
+        let (taken, later) = rest.split_at(length.max(1));
+        if length >= LEAST {
+            // The impacts follow a move late.
+            let (before, cycles) = taken.split_at(if length >= 3 * LEAST { LEAST } else { 0 });
+            let samples = &samples[from + count(before)..from + count(taken)];
+            windows.push(Window { cycles, samples, change: change(cycles), late: 0.0 });
         }
+        (rest, from) = (later, from + count(taken));
     }
-}
-
-/// Periods of about the same amplitude.
-struct Window {
-    cycles: Range<usize>,
-    samples: Range<usize>,
-}
-
-/// A part in which the base moves.
-struct Driven {
-    samples: Vec<Sample>,
-    cycles: Vec<Cycle>,
-    windows: Vec<Window>,
-}
-
-/// A part of one kind.
-enum Run<'a> {
-    Driven(Driven),
-    Free(&'a [Anchor]),
+    let changes: Vec<f64> = windows.iter().map(|one| one.change).collect();
+    for window in &mut windows {
+        let alike = changes.iter().filter(|change| **change * window.change > 0.0).count() as f64;
+        window.late = LAG * window.change * (alike - 1.0).max(0.0).sqrt();
+    }
+    windows
 }
 
 /// Amplitude of the response, m, drive, m, and frequency, rad/s.
 type Held = [f64; 3];
 
-/// The parts of all runs. Windows in which the base moves are evaluated twice: the points of the first time give the slopes of the second.
-fn evaluated(runs: &[Run], scene: &Scene, sample_time: f64) -> Vec<Part> {
+/// The parts of the windows, which are evaluated twice: the points of the first time give the slopes of the second.
+fn evaluated(windows: &[Window], scene: &Scene) -> Vec<Part> {
     let linear = scene.linear();
-    let estimate = |driven: &Driven, window: &Window, before| {
-        let cycles = &driven.cycles[window.cycles.clone()];
-        let largest = cycles.iter().map(Cycle::amplitude).fold(0.0, f64::max);
-        Criterion { linear, precision: 1.0, largest, before }.best(cycles)
+    let estimate = |window: &Window, before| {
+        let largest = window.cycles.iter().map(Cycle::amplitude).fold(0.0, f64::max);
+        Criterion { linear, precision: 1.0, largest, before }.best(window.cycles)
     };
-    let held = |one: &LevelEstimate| [one.response.value, one.at[0].value, one.at[1].value];
-    let driven = || {
-        runs.iter().filter_map(|run| match run {
-            Run::Driven(driven) => Some(driven),
-            Run::Free(_) => None,
-        })
-    };
-    let windows = driven().flat_map(|one| one.windows.iter().map(move |window| (one, window)));
-    let mut curve: Vec<Held> = windows
-        .filter_map(|(driven, window)| estimate(driven, window, [None; 2]).as_ref().map(held))
+    let held = |one: LevelEstimate| [one.response.value, one.at[0].value, one.at[1].value];
+    let first: Vec<Option<Held>> = windows
+        .iter()
+        .map(|window| estimate(window, [None; 2]).map(held))
         .collect();
+    let mut curve: Vec<Held> = first.iter().copied().flatten().collect();
     curve.sort_by(|one, other| one[0].total_cmp(&other[0]));
-    let mut parts = Vec::new();
-    for run in runs {
-        match run {
-            Run::Free(anchors) => parts.extend(decay(anchors, &linear, sample_time)),
-            Run::Driven(driven) => {
-                let estimates: Vec<Option<LevelEstimate>> = driven
-                    .windows
-                    .iter()
-                    .map(|window| {
-                        let first = held(&estimate(driven, window, [None; 2])?);
-                        estimate(driven, window, neighbours(&curve, first))
-                    })
-                    .collect();
-                let changes: Vec<f64> = driven
-                    .windows
-                    .iter()
-                    .map(|window| change(&driven.cycles[window.cycles.clone()]))
-                    .collect();
-                let alike = |n: usize| (0..changes.len()).filter(|m| changes[*m] * changes[n] > 0.0).count() as f64;
-                for (n, (window, estimate)) in driven.windows.iter().zip(estimates).enumerate() {
-                    parts.push(part(driven, window, estimate, changes[n], alike(n), &curve, scene));
-                }
-            }
-        }
-    }
-    parts
+    let second = windows.iter().zip(first).map(|(window, first)| {
+        let estimate = first.and_then(|first| estimate(window, neighbours(&curve, first)));
+        part(window, estimate, &curve, scene)
+    });
+    second.collect()
 }
 
 /// Leaves of points with about the same amplitude the best one: their errors are alike, whatever their number.
@@ -596,77 +460,53 @@ fn neighbours(curve: &[Held], here: Held) -> [Option<Held>; 2] {
     let mut others: Vec<Held> = curve
         .iter()
         .copied()
-        .filter(|one| (one[0] / here[0] - 1.0).abs() > APART)
+        .filter(|one| (one[0] / here[0] - 1.0).abs() > 2.0 * HELD)
         .collect();
     others.sort_by(|one, other| (one[0] - here[0]).abs().total_cmp(&(other[0] - here[0]).abs()));
     [others.get(1).copied(), others.first().copied()]
 }
 
 /// The part of a window.
-fn part(
-    driven: &Driven,
-    window: &Window,
-    estimate: Option<LevelEstimate>,
-    change: f64,
-    alike: f64,
-    curve: &[Held],
-    scene: &Scene,
-) -> Part {
-    let samples = &driven.samples[window.samples.clone()];
-    let cycles = &driven.cycles[window.cycles.clone()];
+fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], scene: &Scene) -> Part {
+    let Window { cycles, samples, change, late } = *window;
     let seconds = [samples[0].time, samples[samples.len() - 1].time];
-    let target = scene.controller.phase_target_radians();
     let Some(estimate) = estimate else {
-        return Part {
-            seconds,
-            kind: Kind::Held,
-            point: None,
-            regime: Regime::Unknown,
-        };
+        let (kind, regime) = (Kind::Held, Regime::Unknown);
+        return Part { seconds, kind, point: None, regime };
     };
-    let [base, omega] = estimate.at;
-    let level = estimate.response;
-    let averaged = cycles[cycles.len() - estimate.periods..]
-        .iter()
-        .map(|one| one.samples)
-        .sum::<usize>();
-    let samples = &samples[samples.len() - averaged..];
-    let kind = if (change * cycles.len() as f64).abs() > SWEPT * level.value {
+    let ([base, omega], level) = (estimate.at, estimate.response);
+    let samples = &samples[samples.len() - count(&cycles[cycles.len() - estimate.periods..])..];
+    let kind = if (change * cycles.len() as f64).abs() > 2.0 * HELD * level.value {
         Kind::Sweep
     } else {
         Kind::Held
     };
+    let target = scene.controller.phase_target_radians();
     let regime = regime_by_response(samples, scene, base.value, target, omega.value);
     // What the estimate contains once of the lag, and of the phase error in the second order.
     let here = [level.value, base.value, omega.value];
-    let slopes = neighbours(curve, here)[1].map_or([0.0; 2], |other| {
-        [1, 2].map(|i| (other[i] - here[i]) / (other[0] - here[0]))
-    });
-    let late = LAG * change * (alike - 1.0).max(0.0).sqrt();
+    let slopes = neighbours(curve, here)[1].map_or([0.0; 2], |other| slopes(here, other));
     let beside = estimate.phase_error.value.abs() * base.value / level.value;
-    let linear = scene.linear();
+    let aside = beside * (omega.value - scene.linear().omega0);
     let drive = Estimate::new(base.value, &[base.uncertainty, slopes[0] * late, beside * base.value]);
-    let omega = Estimate::new(
-        omega.value,
-        &[
-            omega.uncertainty,
-            slopes[1] * late,
-            beside * (omega.value - linear.omega0),
-        ],
-    );
+    let omega = Estimate::new(omega.value, &[omega.uncertainty, slopes[1] * late, aside]);
     // Beyond the amplitude at which the symmetric motion loses its symmetry, noise hides another motion.
     let manifold = Manifold::new(scene.plant.restitution);
     let largest = manifold.c(B_SYMMETRY_BREAKING) * scene.plant.half_width;
-    let is_point = (regime == Regime::Symmetric || (regime == Regime::Unresolved && level.value < largest))
-        && drive.value > 0.0
-        && drive.uncertainty < VAGUE * drive.value
-        && omega.uncertainty.is_finite();
-    Part {
-        seconds,
-        kind,
-        point: is_point.then_some(MeasuredPoint { response: level, omega, drive }),
-        regime,
-    }
+    let is_symmetric = regime == Regime::Symmetric || (regime == Regime::Unresolved && level.value < largest);
+    let point = point(level, omega, drive).filter(|_| is_symmetric);
+    Part { seconds, kind, point, regime }
+}
+
+/// A point, if it says something.
+fn point(response: Estimate, omega: Estimate, drive: Estimate) -> Option<MeasuredPoint> {
+    let is_known = drive.uncertainty < VAGUE * drive.value && omega.uncertainty.is_finite();
+    (drive.value > 0.0 && is_known).then_some(MeasuredPoint { response, omega, drive })
+}
+
+/// Slopes of drive and frequency over the amplitude.
+fn slopes(here: Held, other: Held) -> [f64; 2] {
+    [1, 2].map(|i| (other[i] - here[i]) / (other[0] - here[0]))
 }
 
 /// The points of a decay, with `E = -A'/g`. The fits do not overlap.
@@ -694,8 +534,8 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
         .windows(2)
         .map(|pair| {
             let [(time, one), (_, other)] = [pair[0], pair[1]];
-            let (here, there) = (held(one), held(other));
-            let slopes = [1, 2].map(|i| (there[i] - here[i]) / (there[0] - here[0]));
+            let here = held(one);
+            let slopes = slopes(here, held(other));
             let late = LAG * one.rate * TAU / one.omega;
             let gain = -one.rate / here[1];
             // What is seen in one balance may be in the other, too.
@@ -705,12 +545,11 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
             let u_rate = u_omega * one.amplitude;
             let drive = Estimate::new(here[1], &[u_rate / gain, systematic]);
             let omega = Estimate::new(one.omega, &[u_omega, systematic / units[1]]);
-            let is_point = drive.value > 0.0 && drive.uncertainty < VAGUE * drive.value;
             let response = Estimate { value: one.amplitude, uncertainty: u_amplitude };
             Part {
                 seconds: [time - half, time + half],
                 kind: Kind::Decay,
-                point: is_point.then_some(MeasuredPoint { response, omega, drive }),
+                point: point(response, omega, drive),
                 regime: Regime::Unresolved,
             }
         })
