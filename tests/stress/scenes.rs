@@ -16,6 +16,15 @@ pub struct Scene {
     pub step: f64,
 }
 
+impl Scene {
+    /// Moves the particle to a wall of the ideal cavity, at rest there.
+    pub fn start_at(&mut self, plus: bool) {
+        let b = self.parameters.half_width;
+        self.start.q2 = self.start.q1 - if plus { b } else { -b };
+        self.start.dq2 = self.start.dq1;
+    }
+}
+
 /// Rigs from feather-light to equal masses; undamped, light, near-critical and over-critical damping; dead to lively; starts that include both
 /// walls.
 pub fn scene(driven: bool) -> impl Strategy<Value = Scene> {
@@ -75,13 +84,11 @@ fn with_any_loss(driven: bool) -> impl Strategy<Value = Scene> {
 /// Free and driven motions, rest on a wall, gaps of 1e-6 to 1e3 amplitudes, signals of order 3.
 pub fn hard() -> BoxedStrategy<Scene> {
     let at_rest = (with_any_loss(true), any::<bool>(), any::<bool>()).prop_map(|(mut s, plus, still)| {
-        let b = s.parameters.half_width;
         if still {
             s.drive = Drive::default();
             (s.start.q1, s.start.dq1) = (0.0, 0.0);
         }
-        s.start.q2 = s.start.q1 - if plus { b } else { -b };
-        s.start.dq2 = s.start.dq1;
+        s.start_at(plus);
         s
     });
     let gaps = (with_any_loss(true), decades(-6.0, 3.0)).prop_map(|(mut s, gap)| {
@@ -116,12 +123,12 @@ pub fn hard() -> BoxedStrategy<Scene> {
 /// Damped rigs, driven or not.
 pub fn damped() -> BoxedStrategy<Scene> {
     let damping = decades(-3.0, 1.0).prop_map(|ratio| 2.0 * ratio);
-    (any::<bool>().prop_flat_map(scene), damping)
-        .prop_map(|(mut s, damping)| {
-            s.parameters.damping = damping;
-            s
-        })
-        .boxed()
+    let drawn = (any::<bool>().prop_flat_map(scene), damping);
+    let scenes = drawn.prop_map(|(mut s, damping)| {
+        s.parameters.damping = damping;
+        s
+    });
+    scenes.boxed()
 }
 
 /// A scene with any of the effects. Gravity is from negligible to overwhelming against the accelerations of the rig.
@@ -148,60 +155,50 @@ pub fn cavity() -> BoxedStrategy<Scene> {
     let gap = || prop_oneof![1 => Just(None), 1 => (0.2..3.0f64).prop_map(Some)];
     let scatter = prop_oneof![2 => Just(0.0), 1 => decades(-3.0, 0.0)];
     let least = prop_oneof![2 => Just(0.0), 1 => 0.0..1.0f64];
-    let cavity = (
-        friction,
-        tilt,
-        (gap(), gap()),
-        (law(), law()),
-        scatter,
-        least,
-        any::<u64>(),
-    );
-    (
-        any::<bool>().prop_flat_map(scene),
-        cavity,
+    let walls = ((gap(), gap()), (law(), law()), scatter, least);
+    let scene = any::<bool>().prop_flat_map(scene);
+    let drawn = (
+        scene,
+        (friction, tilt, walls, any::<u64>()),
         decades(-1.0, 5.0),
         -1.0..1.0f64,
-    )
-        .prop_map(
-            |(mut s, ((mu, held), tilt, (plus, minus), (law, other), scatter, least, seed), stiffness, place)| {
-                // The same motion in another time.
-                let rate = f64::sqrt(stiffness);
-                s.parameters.cavity = Cavity {
-                    b_plus: plus,
-                    b_minus: minus,
-                    tilt,
-                    kinetic_friction: mu,
-                    static_friction: held,
-                    restitution: [law, other].map(|law| match law {
-                        // Below its yield speed a wall takes no energy: slow particles would hop on it for ever.
-                        Some(Restitution::Plastic(v)) => Some(Restitution::Plastic(v * rate)),
-                        law => law,
-                    }),
-                    least_restitution: least,
-                    scatter,
-                    seed,
-                };
-                s.parameters.stiffness = stiffness;
-                s.parameters.damping *= rate;
-                (s.start.dq1, s.start.dq2) = (s.start.dq1 * rate, s.start.dq2 * rate);
-                s.drive.omega *= rate;
-                s.step = s.step.min(10.0) / rate;
-                let [plus, minus] = s.parameters.gaps();
-                let w = if place > 0.95 {
-                    plus
-                } else if place < -0.95 {
-                    -minus
-                } else {
-                    0.5 * (plus - minus)
-                };
-                s.start.q2 = s.start.q1 - w;
-                if s.drive.amplitude == 0.0 {
-                    // Undamped and undriven: the energy is to stay.
-                    (s.drive, s.parameters.damping) = (Drive::default(), 0.0);
-                }
-                s
-            },
-        )
-        .boxed()
+    );
+    let scenes = drawn.prop_map(|(mut s, (friction, tilt, walls, seed), stiffness, place)| {
+        let (gaps, laws, scatter, least_restitution) = walls;
+        // The same motion in another time.
+        let rate = f64::sqrt(stiffness);
+        s.parameters.cavity = Cavity {
+            b_plus: gaps.0,
+            b_minus: gaps.1,
+            tilt,
+            kinetic_friction: friction.0,
+            static_friction: friction.1,
+            restitution: [laws.0, laws.1].map(|law| match law {
+                // Below its yield speed a wall takes no energy: slow particles would hop on it for ever.
+                Some(Restitution::Plastic(v)) => Some(Restitution::Plastic(v * rate)),
+                law => law,
+            }),
+            least_restitution,
+            scatter,
+            seed,
+        };
+        s.parameters.stiffness = stiffness;
+        s.parameters.damping *= rate;
+        (s.start.dq1, s.start.dq2) = (s.start.dq1 * rate, s.start.dq2 * rate);
+        s.drive.omega *= rate;
+        s.step = s.step.min(10.0) / rate;
+        let [plus, minus] = s.parameters.gaps();
+        let w = match place {
+            _ if place > 0.95 => plus,
+            _ if place < -0.95 => -minus,
+            _ => 0.5 * (plus - minus),
+        };
+        s.start.q2 = s.start.q1 - w;
+        if s.drive.amplitude == 0.0 {
+            // Undamped and undriven: the energy is to stay.
+            (s.drive, s.parameters.damping) = (Drive::default(), 0.0);
+        }
+        s
+    });
+    scenes.boxed()
 }
