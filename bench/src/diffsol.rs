@@ -1,11 +1,11 @@
 //! The solver library diffsol: stopped by its root functions, restarted after every impact and at the end of every step.
 
 use diffsol::{NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason};
-use lovines::Parameters;
+use lovines::{Parameters, State};
 
 use crate::method::{Failure, Method};
-use crate::scene::{Scene, Step};
-use crate::solvers::{acceleration, rebound};
+use crate::scene::{Scene, Step, numbers, state};
+use crate::solvers::{acceleration, rebound, stalled};
 
 type Matrix = NalgebraMat<f64>;
 
@@ -21,19 +21,6 @@ struct Flight {
     impacts: u64,
 }
 
-impl Flight {
-    fn new(scene: &Scene, tolerance: f64) -> Self {
-        Self {
-            p: scene.parameters,
-            tolerance,
-            y: scene.start,
-            angle: 0.0,
-            time: 0.0,
-            impacts: 0,
-        }
-    }
-}
-
 macro_rules! method {
     ($(#[$meta:meta])* $name:ident, $solver:ident $(, $linear:ty)?) => {
         $(#[$meta])*
@@ -41,12 +28,14 @@ macro_rules! method {
 
         impl Method for $name {
             fn start(scene: &Scene, setting: f64) -> Result<Self, Failure> {
-                Ok(Self(Flight::new(scene, setting)))
+                let (p, y) = (scene.parameters, numbers(scene.start));
+                Ok(Self(Flight { p, tolerance: setting, y, angle: 0.0, time: 0.0, impacts: 0 }))
             }
 
             fn step(&mut self, step: &Step) -> Result<(), Failure> {
                 let flight = &mut self.0;
                 let (p, y0, angle) = (flight.p, flight.y, flight.angle);
+                let pull = |t: f64, q1: f64, v1: f64| acceleration(&p, &step.drive, angle + step.drive.omega * t, q1, v1);
                 let wrong = |e: diffsol::error::DiffsolError| Failure(e.to_string());
                 let problem = OdeBuilder::<Matrix>::new()
                     .rtol(flight.tolerance)
@@ -54,9 +43,8 @@ macro_rules! method {
                     .h0(0.01 * step.duration.min(1.0))
                     .rhs_implicit(
                         |x, _p, t, y| {
-                            let angle = angle + step.omega * t;
                             y[0] = x[1];
-                            y[1] = acceleration(&p, step.amplitude, step.omega, angle, x[0], x[1]);
+                            y[1] = pull(t, x[0], x[1]);
                             y[2] = x[3];
                             y[3] = 0.0;
                         },
@@ -67,14 +55,7 @@ macro_rules! method {
                             y[3] = 0.0;
                         },
                     )
-                    .init(
-                        |_p, _t, y| {
-                            for (n, value) in y0.into_iter().enumerate() {
-                                y[n] = value;
-                            }
-                        },
-                        4,
-                    )
+                    .init(|_p, _t, y| (0..4).for_each(|n| y[n] = y0[n]), 4)
                     .root(
                         |x, _p, _t, g| {
                             g[0] = p.half_width - (x[0] - x[2]);
@@ -105,12 +86,11 @@ macro_rules! method {
                             let (q1, v1, v3) = (y[0], y[1], y[3]);
                             let dy = &mut *state.dy;
                             dy[0] = v1;
-                            dy[1] = acceleration(&p, step.amplitude, step.omega, angle + step.omega * t, q1, v1);
+                            dy[1] = pull(t, q1, v1);
                             dy[2] = v3;
                             dy[3] = 0.0;
                             if impacts > most {
-                                let at = flight.time + t;
-                                return Err(Failure(format!("stalled at t = {at:.3} after {} impacts", flight.impacts)));
+                                return Err(stalled(flight.time + t, flight.impacts));
                             }
                             if t >= step.duration {
                                 break;
@@ -122,12 +102,12 @@ macro_rules! method {
                 let y = solver.state().y;
                 flight.y = [y[0], y[1], y[2], y[3]];
                 flight.time += step.duration;
-                flight.angle = (angle + step.omega * step.duration) % core::f64::consts::TAU;
+                flight.angle = (angle + step.drive.omega * step.duration) % core::f64::consts::TAU;
                 Ok(())
             }
 
-            fn state(&self) -> [f64; 4] {
-                self.0.y
+            fn state(&self) -> State {
+                state(self.0.y)
             }
 
             fn impacts(&self) -> u64 {

@@ -2,10 +2,10 @@
 
 use core::f64::consts::TAU;
 
-use lovines::Parameters;
+use lovines::{Drive, Parameters, State};
 
 use crate::method::{Failure, Method};
-use crate::scene::{Scene, Step};
+use crate::scene::{Scene, Step, numbers, state};
 
 /// Velocities of primary mass and particle after an impact with the velocities `v1` and `v2`.
 pub fn rebound(p: &Parameters, v1: f64, v2: f64) -> (f64, f64) {
@@ -15,11 +15,16 @@ pub fn rebound(p: &Parameters, v1: f64, v2: f64) -> (f64, f64) {
     (after, after + apart)
 }
 
-/// The acceleration of the primary mass under `e = amplitude sin(angle)`.
-pub fn acceleration(p: &Parameters, amplitude: f64, omega: f64, angle: f64, q1: f64, v1: f64) -> f64 {
+/// The acceleration of the primary mass under the harmonic part of `drive` at the phase `angle`.
+pub fn acceleration(p: &Parameters, drive: &Drive, angle: f64, q1: f64, v1: f64) -> f64 {
     let (sin, cos) = angle.sin_cos();
-    let (e, de) = (amplitude * sin, amplitude * omega * cos);
+    let (e, de) = (drive.amplitude * sin, drive.amplitude * drive.omega * cos);
     (p.stiffness * (e - q1) + p.damping * (de - v1)) / p.primary_mass
+}
+
+/// How a method fails at the end of a chatter.
+pub fn stalled(time: f64, impacts: u64) -> Failure {
+    Failure(format!("stalled at t = {time:.3} after {impacts} impacts"))
 }
 
 /// So many impacts within one step are a stall.
@@ -40,9 +45,7 @@ pub struct Rk4 {
 impl Rk4 {
     fn after(&self, step: &Step, h: f64) -> [f64; 4] {
         let [q1, v1, q2, v2] = self.y;
-        let a = |t: f64, q: f64, v: f64| {
-            acceleration(&self.p, step.amplitude, step.omega, self.angle + step.omega * t, q, v)
-        };
+        let a = |t: f64, q: f64, v: f64| acceleration(&self.p, &step.drive, self.angle + step.drive.omega * t, q, v);
         let (k1, l1) = (v1, a(0.0, q1, v1));
         let (k2, l2) = (v1 + 0.5 * h * l1, a(0.5 * h, q1 + 0.5 * h * k1, v1 + 0.5 * h * l1));
         let (k3, l3) = (v1 + 0.5 * h * l2, a(0.5 * h, q1 + 0.5 * h * k2, v1 + 0.5 * h * l2));
@@ -63,14 +66,14 @@ impl Rk4 {
 
     fn pass(&mut self, step: &Step, h: f64, y: [f64; 4]) {
         self.y = y;
-        self.angle += step.omega * h;
+        self.angle += step.drive.omega * h;
         self.time += h;
     }
 }
 
 impl Method for Rk4 {
     fn start(scene: &Scene, setting: f64) -> Result<Self, Failure> {
-        let (p, y) = (scene.parameters, scene.start);
+        let (p, y) = (scene.parameters, numbers(scene.start));
         Ok(Self {
             p,
             steps_per_period: setting,
@@ -82,7 +85,7 @@ impl Method for Rk4 {
     }
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
-        let fastest = self.p.natural_frequency().max(step.omega);
+        let fastest = self.p.natural_frequency().max(step.drive.omega);
         let count = (step.duration * fastest / TAU * self.steps_per_period).round().max(1.0);
         let h = step.duration / count;
         for _ in 0..count as u64 {
@@ -97,11 +100,11 @@ impl Method for Rk4 {
                 let (mut low, mut high) = (0.0, left);
                 for _ in 0..50 {
                     let middle = 0.5 * (low + high);
-                    if self.beyond(&self.after(step, middle)) {
-                        high = middle;
+                    *(if self.beyond(&self.after(step, middle)) {
+                        &mut high
                     } else {
-                        low = middle;
-                    }
+                        &mut low
+                    }) = middle;
                 }
                 let y = self.after(step, high);
                 self.pass(step, high, y);
@@ -109,10 +112,7 @@ impl Method for Rk4 {
                 self.impacts += 1;
                 impacts += 1;
                 if impacts > MOST_IMPACTS {
-                    return Err(Failure(format!(
-                        "stalled at t = {:.3} after {} impacts",
-                        self.time, self.impacts
-                    )));
+                    return Err(stalled(self.time, self.impacts));
                 }
                 left -= high;
             }
@@ -121,8 +121,8 @@ impl Method for Rk4 {
         Ok(())
     }
 
-    fn state(&self) -> [f64; 4] {
-        self.y
+    fn state(&self) -> State {
+        state(self.y)
     }
 
     fn impacts(&self) -> u64 {
@@ -145,21 +145,24 @@ pub struct Moreau {
 
 impl Method for Moreau {
     fn start(scene: &Scene, setting: f64) -> Result<Self, Failure> {
-        let (p, y) = (scene.parameters, scene.start);
+        let (p, y) = (scene.parameters, numbers(scene.start));
         Ok(Self { p, steps_per_period: setting, y, angle: 0.0, impacts: 0 })
     }
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
         let p = &self.p;
-        let fastest = p.natural_frequency().max(step.omega).max(p.damping / p.primary_mass);
+        let fastest = p
+            .natural_frequency()
+            .max(step.drive.omega)
+            .max(p.damping / p.primary_mass);
         let count = (step.duration * fastest / TAU * self.steps_per_period).round().max(1.0);
         let h = step.duration / count;
         let inverse_mass = 1.0 / p.primary_mass + 1.0 / p.particle_mass;
         let [mut q1, mut v1, mut q2, mut v2] = self.y;
         for _ in 0..count as u64 {
             let (middle1, middle2) = (q1 + 0.5 * h * v1, q2 + 0.5 * h * v2);
-            let angle = self.angle + 0.5 * step.omega * h;
-            let mut free1 = v1 + h * acceleration(p, step.amplitude, step.omega, angle, middle1, v1);
+            let angle = self.angle + 0.5 * step.drive.omega * h;
+            let mut free1 = v1 + h * acceleration(p, &step.drive, angle, middle1, v1);
             let mut free2 = v2;
             let w = middle1 - middle2;
             if w.abs() >= p.half_width {
@@ -175,15 +178,15 @@ impl Method for Moreau {
             }
             (q1, q2) = (middle1 + 0.5 * h * free1, middle2 + 0.5 * h * free2);
             (v1, v2) = (free1, free2);
-            self.angle += step.omega * h;
+            self.angle += step.drive.omega * h;
         }
         self.y = [q1, v1, q2, v2];
         self.angle %= TAU;
         Ok(())
     }
 
-    fn state(&self) -> [f64; 4] {
-        self.y
+    fn state(&self) -> State {
+        state(self.y)
     }
 
     fn impacts(&self) -> u64 {
