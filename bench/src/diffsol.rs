@@ -1,45 +1,28 @@
 //! The solver library diffsol: stopped by its root functions, restarted after every impact and at the end of every step.
 
+use crate::method::Failure;
+use crate::scene::Step;
+use crate::solvers::{Flight, Solver, acceleration, rebound};
 use diffsol::{NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason};
-use lovines::{Parameters, State};
-
-use crate::method::{Failure, Method};
-use crate::scene::{Scene, Step, numbers, state};
-use crate::solvers::{acceleration, rebound, stalled};
 
 type Matrix = NalgebraMat<f64>;
 
 /// So many impacts within a radian of the natural frequency are a stall.
 const MOST_IMPACTS: f64 = 1000.0;
 
-struct Flight {
-    p: Parameters,
-    tolerance: f64,
-    y: [f64; 4],
-    angle: f64,
-    time: f64,
-    impacts: u64,
-}
-
-macro_rules! method {
+macro_rules! solver {
     ($(#[$meta:meta])* $name:ident, $solver:ident $(, $linear:ty)?) => {
         $(#[$meta])*
-        pub struct $name(Flight);
+        pub struct $name;
 
-        impl Method for $name {
-            fn start(scene: &Scene, setting: f64) -> Result<Self, Failure> {
-                let (p, y) = (scene.parameters, numbers(scene.start));
-                Ok(Self(Flight { p, tolerance: setting, y, angle: 0.0, time: 0.0, impacts: 0 }))
-            }
-
-            fn step(&mut self, step: &Step) -> Result<(), Failure> {
-                let flight = &mut self.0;
-                let (p, y0, angle) = (flight.p, flight.y, flight.angle);
-                let pull = |t: f64, q1: f64, v1: f64| acceleration(&p, &step.drive, angle + step.drive.omega * t, q1, v1);
+        impl Solver for $name {
+            fn step(flight: &mut Flight, step: &Step) -> Result<(), Failure> {
+                let (p, y0, angle, omega) = (flight.p, flight.y, flight.angle, step.drive.omega);
+                let pull = |t: f64, q1: f64, v1: f64| acceleration(&p, &step.drive, angle + omega * t, q1, v1);
                 let wrong = |e: diffsol::error::DiffsolError| Failure(e.to_string());
                 let problem = OdeBuilder::<Matrix>::new()
-                    .rtol(flight.tolerance)
-                    .atol([flight.tolerance])
+                    .rtol(flight.setting)
+                    .atol([flight.setting])
                     .h0(0.01 * step.duration.min(1.0))
                     .rhs_implicit(
                         |x, _p, t, y| {
@@ -90,7 +73,8 @@ macro_rules! method {
                             dy[2] = v3;
                             dy[3] = 0.0;
                             if impacts > most {
-                                return Err(stalled(flight.time + t, flight.impacts));
+                                flight.time += t;
+                                return Err(flight.stalled());
                             }
                             if t >= step.duration {
                                 break;
@@ -102,26 +86,18 @@ macro_rules! method {
                 let y = solver.state().y;
                 flight.y = [y[0], y[1], y[2], y[3]];
                 flight.time += step.duration;
-                flight.angle = (angle + step.drive.omega * step.duration) % core::f64::consts::TAU;
+                flight.angle = angle + omega * step.duration;
                 Ok(())
-            }
-
-            fn state(&self) -> State {
-                state(self.0.y)
-            }
-
-            fn impacts(&self) -> u64 {
-                self.0.impacts
             }
         }
     };
 }
 
-method!(
+solver!(
     /// The explicit Runge-Kutta method of order 5.
     Tsit45, tsit45
 );
-method!(
+solver!(
     /// The backward differentiation formulae.
     Bdf, bdf, NalgebraLU<f64>
 );

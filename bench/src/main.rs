@@ -19,7 +19,7 @@ use serde_json::json;
 use vines_bench::baseline::Baseline;
 use vines_bench::method::{Answer, Shell, Stepped, measure};
 use vines_bench::scene::Scene;
-use vines_bench::solvers::{Moreau, Rk4};
+use vines_bench::solvers::{Moreau, Rk4, Solved};
 use vines_bench::{cost, map};
 
 /// The methods by name.
@@ -30,12 +30,12 @@ const METHODS: &[(&str, Measure)] = &[
     ("plant-general", measure::<Stepped<false>>),
     ("c-interface", measure::<Shell>),
     ("brent", measure::<Baseline>),
-    ("rk4", measure::<Rk4>),
-    ("moreau", measure::<Moreau>),
+    ("rk4", measure::<Solved<Rk4>>),
+    ("moreau", measure::<Solved<Moreau>>),
     #[cfg(feature = "diffsol")]
-    ("diffsol-tsit45", measure::<vines_bench::diffsol::Tsit45>),
+    ("diffsol-tsit45", measure::<Solved<vines_bench::diffsol::Tsit45>>),
     #[cfg(feature = "diffsol")]
-    ("diffsol-bdf", measure::<vines_bench::diffsol::Bdf>),
+    ("diffsol-bdf", measure::<Solved<vines_bench::diffsol::Bdf>>),
 ];
 
 /// [`measure`] for one method.

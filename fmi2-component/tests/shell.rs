@@ -1,10 +1,10 @@
 //! Guards the shell through its C functions, with the example component: setting and getting values, the life cycle, FMU states,
 //! instantiation and logging.
 
-use std::ffi::{CStr, CString, c_int};
+use std::ffi::{CStr, CString, c_char, c_int};
 use std::ptr::{null, null_mut, without_provenance_mut};
 
-use fmi2_boundary::{Fmu, Interface, Line, Master, call, callbacks, refused};
+use fmi2_boundary::{Fmu, Interface, Master, call, callbacks, refused};
 use fmi2_component::Status::{self, Discard, Error, Ok, Warning};
 use fmi2_component::abi::{CFmuState, CallbackFunctions};
 
@@ -74,47 +74,30 @@ fn callbacks_may_be_missing() {
     }
 }
 
-/// Lets the tank overflow and answers what was logged of it.
-fn overflow(set_up: impl Fn(&Master) -> Status) -> (Status, Vec<Line>) {
-    let master = ready();
-    let status = set_up(&master);
-    master.set_real(INFLOW, 100.0);
-    assert_eq!(master.step(0.0, 1.0), Ok);
-    (status, master.heard())
-}
-
-fn choose(m: &Master, on: c_int, names: &[&CStr]) -> Status {
-    let names: Vec<_> = names.iter().map(|name| name.as_ptr()).collect();
-    call!(m.fmi2SetDebugLogging(on, names.len(), names.as_ptr()))
-}
-
 #[test]
-fn a_category_is_heard_when_it_is_switched_on() {
-    for names in [
-        &[c"logEvents"][..],
-        &[c"logAll"],
-        &[c"logStatusError", c"logEvents"],
-        &[],
-    ] {
-        let (status, log) = overflow(|m| choose(m, 1, names));
-        assert_eq!((status, log.len()), (Ok, 1));
-        assert_eq!(log[0].category, "logEvents");
+fn a_category_is_heard_when_it_is_switched_on_and_an_unknown_one_is_a_warning() {
+    // Lets the tank overflow; what was logged.
+    let overflow = |on: c_int, names: &[*const c_char], expected: Status| {
+        let m = ready();
+        assert_eq!(call!(m.fmi2SetDebugLogging(on, names.len(), names.as_ptr())), expected);
+        m.set_real(INFLOW, 100.0);
+        m.well(m.step(0.0, 1.0));
+        m.heard()
+    };
+    let [events, all, error, other] = [c"logEvents", c"logAll", c"logStatusError", c"logEverything"].map(CStr::as_ptr);
+    for names in [&[events][..], &[all], &[error, events], &[]] {
+        let log = overflow(1, names, Ok);
+        assert_eq!((log.len(), log[0].category.as_str()), (1, "logEvents"));
         assert_eq!(log[0].text, "A \"tank\" is 100%% full", "a printf format");
     }
-    for (on, names) in [(1, &[c"logStatusError"][..]), (0, &[]), (0, &[c"logEvents"])] {
-        let (status, log) = overflow(|m| choose(m, on, names));
-        assert_eq!((status, log.len()), (Ok, 0));
+    for (on, names) in [(1, &[error][..]), (0, &[]), (0, &[events])] {
+        assert!(overflow(on, names, Ok).is_empty());
     }
-}
-
-#[test]
-fn an_unknown_category_is_a_warning() {
-    let (status, log) = overflow(|m| choose(m, 1, &[c"logEverything", c"logEvents"]));
-    assert_eq!(status, Warning);
-    assert_eq!(log.len(), 2);
-    assert!(log[0].text.contains("logEverything") && log[0].text.contains("logEvents, "));
-    assert_eq!(overflow(|m| call!(m.fmi2SetDebugLogging(1, 1, &null()))).0, Warning);
-    assert_eq!(overflow(|m| call!(m.fmi2SetDebugLogging(1, 1, null()))).0, Error);
+    let log = overflow(1, &[other, events], Warning);
+    assert!(log.len() == 2 && log[0].text.contains("logEverything") && log[0].text.contains("logEvents, "));
+    overflow(1, &[null()], Warning);
+    let m = ready();
+    refused!(m.fmi2SetDebugLogging(1, 1, null()));
 }
 
 type Call = fn(&Master) -> Status;
@@ -279,24 +262,16 @@ fn an_experiment_without_sense_is_refused() {
 }
 
 #[test]
-fn start_values_come_from_the_description() {
-    let master = ready();
-    assert_eq!(master.real(AREA), 2.0);
-    assert_eq!(master.real(LEVEL), 0.5);
-    let mut label = null();
+fn outputs_are_right_in_initialization_mode_however_often_inputs_are_set() {
+    let (master, mut label) = (new(), null());
+    call!(master.fmi2EnterInitializationMode());
+    // Start values come from the description.
+    assert_eq!(master.reals(&[AREA, LEVEL]), [2.0, 0.5]);
     assert_eq!(call!(master.fmi2GetString(&0, 1, &mut label)), Ok);
     assert_eq!(unsafe { CStr::from_ptr(label) }, c"A \"tank\"");
-}
-
-#[test]
-fn outputs_are_right_in_initialization_mode_however_often_inputs_are_set() {
-    let master = new();
-    call!(master.fmi2EnterInitializationMode());
     for (inflow, level) in [(1.0, 0.1), (3.0, 0.9)] {
-        assert_eq!(master.set_real(INFLOW, inflow), Ok);
-        assert_eq!(master.set_real(LEVEL, level), Ok);
-        assert_eq!(master.real(RATE), inflow / 2.0);
-        assert_eq!(master.real(LEVEL), level);
+        assert_eq!(master.set_reals(&[INFLOW, LEVEL], &[inflow, level]), Ok);
+        assert_eq!(master.reals(&[RATE, LEVEL]), [inflow / 2.0, level]);
     }
     // What was set can be read back even where it makes no sense yet.
     assert_eq!(master.set_real(LEVEL, 7.0), Ok);
@@ -328,16 +303,7 @@ fn causality_and_variability_say_when_a_variable_may_be_set() {
 }
 
 #[test]
-fn a_number_that_is_not_finite_is_refused_by_name_and_unit() {
-    let master = ready();
-    for (wrong, text) in [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (f64::NEG_INFINITY, "-inf")] {
-        refused!(master.fmi2SetReal(&INFLOW, 1, &wrong) => "inflow", text, "m3/s", "finite");
-    }
-    assert_eq!(master.real(INFLOW), 0.0);
-}
-
-#[test]
-fn all_values_of_a_call_are_set_or_none() {
+fn all_values_of_a_call_are_set_or_none_and_what_is_refused_is_named_with_its_unit() {
     let (fresh, started) = (new(), ready());
     let unchanged = |master: &Master, call: &dyn Fn(&Master) -> Status, reason: &str| {
         let before = master.bytes();
@@ -373,6 +339,10 @@ fn all_values_of_a_call_are_set_or_none() {
     ] {
         unchanged(&fresh, &|m| set(m, second, text), reason);
     }
+    for (wrong, text) in [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (f64::NEG_INFINITY, "-inf")] {
+        refused!(started.fmi2SetReal(&INFLOW, 1, &wrong) => "inflow", text, "m3/s", "finite");
+    }
+    assert_eq!(started.real(INFLOW), 0.0);
     // Anything that ends in NUL is a text.
     assert_eq!(set(&fresh, 0, text), Ok);
     initialise(&fresh);

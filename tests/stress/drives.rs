@@ -43,13 +43,8 @@ fn change() -> impl Strategy<Value = Change> {
         signal.map(|u| u * size)
     });
     let omega = prop_oneof![1 => Just(0.0), 3 => 0.0..3.0f64, 1 => -2.0..0.0f64];
-    (joint, signal, size(), omega, decades(-2.0, 0.5)).prop_map(|(joint, signal, amplitude, omega, step)| Change {
-        joint,
-        signal,
-        amplitude,
-        omega,
-        step,
-    })
+    let change = |(joint, signal, amplitude, omega, step)| Change { joint, signal, amplitude, omega, step };
+    (joint, signal, size(), omega, decades(-2.0, 0.5)).prop_map(change)
 }
 
 impl Change {

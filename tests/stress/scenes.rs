@@ -28,40 +28,36 @@ impl Scene {
 /// Rigs from feather-light to equal masses; undamped, light, near-critical and over-critical damping; dead to lively; starts that include both
 /// walls.
 pub fn scene(driven: bool) -> impl Strategy<Value = Scene> {
+    let near_critical =
+        (decades(-16.0, -2.0), any::<bool>()).prop_map(|(d, above)| if above { 1.0 + d } else { 1.0 - d });
+    let zeta = prop_oneof![3 => Just(0.0), 3 => decades(-12.0, 1.0), 1 => near_critical];
     let rig = (
         decades(-6.0, 0.0),
-        prop_oneof![
-            3 => Just(0.0),
-            3 => decades(-12.0, 1.0),
-            1 => (decades(-16.0, -2.0), any::<bool>()).prop_map(|(d, above)| if above { 1.0 + d } else { 1.0 - d }),
-        ],
+        zeta,
         prop_oneof![3 => 1e-3..0.98f64, 1 => Just(0.65)],
     );
+    let w = prop_oneof![4 => -1.0..1.0f64, 1 => Just(1.0), 1 => Just(-1.0)];
     let start = (
         -2.0..2.0f64,
         -2.0..2.0f64,
-        prop_oneof![4 => -1.0..1.0f64, 1 => Just(1.0), 1 => Just(-1.0)],
+        w,
         prop_oneof![3 => -2.0..2.0f64, 1 => Just(0.0)],
     );
     let amplitude = if driven { 1.0 } else { 0.0 };
-    let drive = (
-        decades(-6.0, 1.0),
-        prop_oneof![3 => 0.0..3.0f64, 1 => Just(1.0), 1 => -2.0..0.0f64],
-        -1.0..1.0f64,
-    );
+    let omega = prop_oneof![3 => 0.0..3.0f64, 1 => Just(1.0), 1 => -2.0..0.0f64];
+    let drive = (decades(-6.0, 1.0), omega, -1.0..1.0f64);
     (rig, start, drive, decades(-2.0, 2.0)).prop_map(move |(rig, start, drive, step)| {
-        let (epsilon, zeta, r) = rig;
-        let (q1, dq1, w, dw) = start;
-        let (e, omega, held) = drive;
-        let mut parameters = Parameters::dimensionless(epsilon, 1.0, r);
-        parameters.damping = 2.0 * zeta;
+        let ((epsilon, zeta, r), (q1, dq1, w, dw), (e, omega, held)) = (rig, start, drive);
+        let parameters = Parameters {
+            damping: 2.0 * zeta,
+            ..Parameters::dimensionless(epsilon, 1.0, r)
+        };
+        let start = State { q1, dq1, q2: q1 - w, dq2: dq1 - dw };
+        let signal = [amplitude * held, 0.0, 0.0, 0.0];
         Scene {
             parameters,
-            start: State { q1, dq1, q2: q1 - w, dq2: dq1 - dw },
-            drive: Drive {
-                signal: [amplitude * held, 0.0, 0.0, 0.0],
-                ..Drive::harmonic(amplitude * e, omega)
-            },
+            start,
+            drive: Drive { signal, ..Drive::harmonic(amplitude * e, omega) },
             step,
         }
     })
@@ -110,14 +106,8 @@ pub fn hard() -> BoxedStrategy<Scene> {
         s.drive.signal[1..].copy_from_slice(&[u1 / t, u2 / (t * t), u3 / (t * t * t)]);
         s
     });
-    prop_oneof![
-        6 => with_any_loss(false),
-        6 => with_any_loss(true),
-        3 => at_rest,
-        3 => gaps,
-        2 => signals,
-    ]
-    .boxed()
+    let any = prop_oneof![6 => with_any_loss(false), 6 => with_any_loss(true), 3 => at_rest, 3 => gaps, 2 => signals];
+    any.boxed()
 }
 
 /// Damped rigs, driven or not.
@@ -146,12 +136,8 @@ pub fn cavity() -> BoxedStrategy<Scene> {
         3 => decades(-4.0, 0.5).prop_map(|mu| (mu, None)),
         2 => (decades(-4.0, 0.5), 1.0..2.0f64).prop_map(|(mu, more)| (mu, Some(mu * more))),
     ];
-    let tilt = prop_oneof![
-        2 => Just(0.0),
-        1 => Just(core::f64::consts::FRAC_PI_2),
-        2 => -1.5..1.5f64,
-        1 => decades(-9.0, 0.0),
-    ];
+    let upright = Just(core::f64::consts::FRAC_PI_2);
+    let tilt = prop_oneof![2 => Just(0.0), 1 => upright, 2 => -1.5..1.5f64, 1 => decades(-9.0, 0.0)];
     let gap = || prop_oneof![1 => Just(None), 1 => (0.2..3.0f64).prop_map(Some)];
     let scatter = prop_oneof![2 => Just(0.0), 1 => decades(-3.0, 0.0)];
     let least = prop_oneof![2 => Just(0.0), 1 => 0.0..1.0f64];

@@ -79,8 +79,9 @@ fn farthest(s: &Scene) -> Option<f64> {
 /// Walls just before the farthest point of a motion, and just beyond it: in one step, in many, and by the general search alone.
 pub fn graze(s: &Scene, figures: &mut Figures) {
     let Some(farthest) = farthest(s) else { return };
-    let hits = |half_width: f64| {
-        [(true, 1), (true, 150), (false, 1)].map(|(fast, steps)| {
+    // How many of the three ways report an impact, or none.
+    let ways = |half_width: f64, hit: bool| {
+        let hits = [(true, 1), (true, 150), (false, 1)].map(|(fast, steps)| {
             let parameters = Parameters { half_width, ..s.parameters };
             let mut plant = Plant::new(parameters, s.start).expect("a valid scene");
             plant.set_fast_path(fast);
@@ -88,15 +89,15 @@ pub fn graze(s: &Scene, figures: &mut Figures) {
                 let outcome = plant.advance(s.drive, DURATION / f64::from(steps));
                 outcome.expect("a valid step").impacts > 0
             })
-        })
+        });
+        hits.iter().filter(|one| **one == hit).count() as u64
     };
-    let count = |hits: [bool; 3], hit: bool| hits.iter().filter(|one| **one == hit).count() as u64;
     for exponent in 2..=13 {
         let delta = 10f64.powi(-exponent);
-        let missed = count(hits(farthest * (1.0 - delta)), false);
-        let invented = count(hits(farthest * (1.0 + delta)), true);
-        figures.count("overshoots of 1e-2 to 1e-13 of the half-width missed", missed, 0.0);
-        figures.count("undershoots of 1e-2 to 1e-13 of the half-width reported", invented, 0.0);
+        record! { figures:
+            "overshoots of 1e-2 to 1e-13 of the half-width missed" count ways(farthest * (1.0 - delta), false), 0.0;
+            "undershoots of 1e-2 to 1e-13 of the half-width reported" count ways(farthest * (1.0 + delta), true), 0.0;
+        }
     }
 }
 
@@ -127,7 +128,7 @@ pub fn extremes() -> BoxedStrategy<(f64, f64, f64)> {
     let frequency = vec![1e-3, 0.03, 0.3, 1.0, 1.7, 10.0, 30.0, 300.0, 1e3];
     [damping, amplitude, frequency]
         .map(prop::sample::select)
-        .prop_map(|[damping, amplitude, frequency]| (damping, amplitude, frequency))
+        .prop_map(<(f64, f64, f64)>::from)
         .boxed()
 }
 
