@@ -96,25 +96,18 @@ impl Case {
 }
 
 fn cases() -> Vec<Case> {
-    let lock = &period(
-        [-0.438_371_55, 0.007_696_65, -1.003_854_15, -0.878_123_25],
-        1.1,
-        0.990_417,
-    );
+    let at_lock = [-0.438_371_55, 0.007_696_65, -1.003_854_15, -0.878_123_25];
+    let lock = &period(at_lock, 1.1, 0.990_417);
     // A particle so slow that it meets no wall in a thousand periods.
     let quiet = period([0.0, 0.0, 0.0, 1e-6], 0.12, 0.990_417);
     let each_period = ("default lock, a step per period", "impact", "");
+    let longer = ("the same, ten times as long", "impact", "70 ns");
     let mut cases = vec![
         // The first case is the unit of the others.
         Case::long("default lock", "", lock),
         Case::new(each_period, lock, (PERIODS, 1.0), |_, _| ()),
         // What a new plant computes once counts less.
-        Case::new(
-            ("the same, ten times as long", "impact", "70 ns"),
-            lock,
-            (10 * PERIODS, 1.0),
-            |_, _| (),
-        ),
+        Case::new(longer, lock, (10 * PERIODS, 1.0), |_, _| ()),
         Case::sampled("default lock, 100 samples per period", "", lock, |_, _| ()),
         Case::sampled("no impact, 100 samples per period", "", &quiet, |_, _| ()),
     ];
@@ -226,10 +219,8 @@ fn main() {
         }
     }
     let lock = quartiles(&cases[0].pairs, |pair| pair[0])[1] / cases[0].work;
-    println!(
-        "Medians of {} pairs of turns each; a lock is the first cost.",
-        cases[0].pairs.len()
-    );
+    let pairs = cases[0].pairs.len();
+    println!("Medians of {pairs} pairs of turns each; a lock is the first cost.");
     let [case, ns, locks, brent, ratio] = ["case", "ns", "locks", "Brent ns", "Brent/plant"];
     println!(
         "{case:70} {ns:>10} {locks:>8} {brent:>10} {ratio:>12} {:>16}  accepted",

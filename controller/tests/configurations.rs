@@ -1,4 +1,4 @@
-//! Any configuration that is accepted gives finite outputs, whatever the sensors read: in double precision, and, as a test of the package
+//! Guards outputs: any configuration that is accepted gives finite ones, whatever the sensors read. In double precision, and, as a test of the package
 //! `phase-lock-f32`, in single precision.
 
 #[cfg(feature = "f32")]

@@ -48,20 +48,15 @@ fn name_guid_and_interface_are_checked_and_the_resource_location_is_not_read() {
         let m = Master::instantiate(f, name, kind, guid, null());
         assert!(m.c.is_null());
         let heard = m.heard();
-        assert!(
-            heard.len() == 1 && heard[0].status == Error && heard[0].text.contains(reason),
-            "{heard:?}"
-        );
+        let one = heard.len() == 1 && heard[0].status == Error;
+        assert!(one && heard[0].text.contains(reason), "{heard:?}");
     }
 }
 
 #[test]
 fn callbacks_may_be_missing() {
-    let (name, guid, f) = (
-        c"one".as_ptr(),
-        CString::new(Fmu::tank().guid()).unwrap(),
-        Fmu::tank().functions,
-    );
+    let (name, guid) = (c"one".as_ptr(), CString::new(Fmu::tank().guid()).unwrap());
+    let f = Fmu::tank().functions;
     let mute = CallbackFunctions { logger: None, ..callbacks(null_mut()) };
     unsafe {
         assert!((f.fmi2Instantiate)(name, 1, guid.as_ptr(), null(), null(), 0, 1).is_null());
@@ -286,12 +281,8 @@ fn outputs_are_right_in_initialization_mode_however_often_inputs_are_set() {
 #[test]
 fn causality_and_variability_say_when_a_variable_may_be_set() {
     let master = new();
-    let set = |expected: [Status; 5]| {
-        assert_eq!(
-            [AREA, HEIGHT, INFLOW, LEVEL, RATE].map(|vr| master.set_real(vr, 0.5)),
-            expected
-        )
-    };
+    let all = [AREA, HEIGHT, INFLOW, LEVEL, RATE];
+    let set = |expected: [Status; 5]| assert_eq!(all.map(|vr| master.set_real(vr, 0.5)), expected);
     set([Ok, Ok, Ok, Ok, Error]);
     let why = "causality output, variability continuous, initial calculated";
     master.heard();
@@ -391,14 +382,8 @@ fn derivatives_have_orders_and_causalities() {
 
     let (unknown, known, along, mut answer) = ([RATE, LEVEL], [INFLOW, AREA], [4.0, 0.0], [f64::NAN; 2]);
     let (of, by, answers) = (unknown.as_ptr(), known.as_ptr(), answer.as_mut_ptr());
-    m.well(call!(m.fmi2GetDirectionalDerivative(
-        of,
-        2,
-        by,
-        2,
-        along.as_ptr(),
-        answers
-    )));
+    let status = call!(m.fmi2GetDirectionalDerivative(of, 2, by, 2, along.as_ptr(), answers));
+    m.well(status);
     assert_eq!(answer, [2.0, 0.0]);
 }
 

@@ -1,4 +1,4 @@
-//! One scene: the states at and inside its steps, the totals and the energy; and the energy balance with damping and a moving base.
+//! Guards one scene: the states at and inside its steps, the totals and the energy; and the energy balance with damping and a moving base.
 
 use crate::figures::{ANY, Figures};
 use crate::scenes::{Scene, scene};

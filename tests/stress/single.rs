@@ -1,4 +1,4 @@
-//! Single impacts, grazes, motions without loss, extreme values, and extreme lengths of a step.
+//! Guards single impacts, grazes, motions without loss, extreme values, and extreme lengths of a step.
 
 use crate::figures::Figures;
 use crate::follow::states;

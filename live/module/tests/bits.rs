@@ -42,13 +42,9 @@ fn lock_and_free_decay_have_the_bits_of_the_lab_under_a_constant_drive() {
     let record = record_of(&scene);
     bench.run(record.released, |row| rows.push(*row)).unwrap();
     for (n, sample) in record.samples[..record.released].iter().enumerate() {
-        assert_eq!(
-            rows[n].response.to_bits(),
-            sample.sensors.response.to_bits(),
-            "sample {n}"
-        );
-        let omegas = [rows[n].output.omega, sample.command.drive.omega].map(f64::to_bits);
-        assert_eq!(omegas[0], omegas[1], "sample {n}");
+        let live = [rows[n].response, rows[n].output.omega];
+        let lab = [sample.sensors.response, sample.command.drive.omega];
+        assert_eq!(live.map(f64::to_bits), lab.map(f64::to_bits), "sample {n}");
     }
     assert!(bench.output.locked);
     let points = decay_points(&record, &scene).points;
@@ -68,12 +64,7 @@ fn lock_and_free_decay_have_the_bits_of_the_lab_under_a_constant_drive() {
     // Until the first fit, the motion is that of the release.
     assert_eq!(fits.remove(0), released);
     for (point, Motion { omega, amplitude, speed }) in points.iter().zip(&fits) {
-        assert_eq!(
-            (point.f_hz, point.a_m),
-            (omega / TAU, *amplitude),
-            "t = {} s",
-            point.t_s
-        );
+        assert_eq!([point.f_hz, point.a_m], [omega / TAU, *amplitude], "{}", point.t_s);
         let b = scene.dimensionless().speed(*speed);
         assert!((b - point.b.unwrap()).abs() < 1e-12, "B = {b} at t = {} s", point.t_s);
     }
@@ -82,10 +73,7 @@ fn lock_and_free_decay_have_the_bits_of_the_lab_under_a_constant_drive() {
     let period = TAU / record.decay()[0].command.drive.omega;
     let late = (lost.unwrap() - points.last().unwrap().t_s) / period;
     let allowed = 1.25 - 0.625..1.25 + 0.625;
-    assert!(
-        allowed.contains(&late),
-        "synchrony is lost {late} periods after the last point"
-    );
+    assert!(allowed.contains(&late), "lost {late} periods after the last point");
     assert!(fits.len() >= points.len());
 }
 
@@ -101,10 +89,7 @@ fn a_mass_that_is_put_somewhere_starts_from_rest_there() {
         bench.place(true, 2.0 * to).unwrap();
         let moved = bench.plant().state();
         assert_eq!((moved.q1, moved.dq1, moved.dq2), (2.0 * to * b, 0.0, 0.0));
-        assert!(
-            (moved.q2 - moved.q1 - to * b).abs() < 1e-14,
-            "particle with the mass at {to}"
-        );
+        assert!((moved.q2 - moved.q1 - to * b).abs() < 1e-14, "with the mass at {to}");
         bench.run(10, |_| {}).unwrap();
     }
 }

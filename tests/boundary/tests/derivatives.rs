@@ -125,9 +125,8 @@ impl Model {
     /// The change of an unknown over the change of a known, by value reference.
     fn partial(&self, unknown: u32, known: u32) -> f64 {
         let (m, mut slope) = (&self.m, f64::NAN);
-        m.well(call!(
-            m.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &2.0, &mut slope)
-        ));
+        let status = call!(m.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &2.0, &mut slope));
+        m.well(status);
         slope / 2.0
     }
 
@@ -230,10 +229,8 @@ fn outputs_and_derivatives_of_the_plant() {
     let all: Vec<_> = (RIGS.iter())
         .flat_map(|rig| [false, true].map(|stuck| exchanged(rig, stuck)))
         .collect();
-    compare(
-        &all.iter().flat_map(|slopes| slopes.keys().copied()).collect(),
-        &declared,
-    );
+    let seen = all.iter().flat_map(|slopes| slopes.keys().copied());
+    compare(&seen.collect(), &declared);
     // A constant factor is the same in every rig, a fixed one in every instant of one rig: 0 and 1, 2 and 3.
     for (pair, kind) in &declared {
         let alike: &[[usize; 2]] = match kind.as_str() {
@@ -242,10 +239,8 @@ fn outputs_and_derivatives_of_the_plant() {
             _ => continue,
         };
         for factors in alike.iter().map(|two| two.map(|n| all[n][pair])) {
-            assert!(
-                (factors[0] - factors[1]).abs() < 1e-6,
-                "{pair:?} is not {kind}: {factors:?}"
-            );
+            let alike = (factors[0] - factors[1]).abs() < 1e-6;
+            assert!(alike, "{pair:?} is not {kind}: {factors:?}");
         }
     }
 }
@@ -271,12 +266,13 @@ fn in_the_first_event_mode_the_velocity_follows_the_base_and_discrete_outputs_ha
         assert_eq!(p.partial(unknown, 6), slope, "{unknown}");
     }
     let m = Master::ready(&Fmu::plant());
-    for (unknown, known, word) in [
+    let refused = [
         (0, 6, "not an unknown"),
         (9, 13, "not a known"),
         (16, 18, ""),
         (99, 6, ""),
-    ] {
+    ];
+    for (unknown, known, word) in refused {
         refused!(m.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &2.0, &mut 0.0) => word);
     }
 }
