@@ -267,7 +267,8 @@ mod tests {
     fn an_invalid_value_is_named_with_its_unit_and_what_is_allowed() {
         let mass = "m (particle mass) = -0.5 kg is refused; allowed is a number from 1e-100 to 1e100";
         assert_eq!(refused(|p| p.particle_mass = -0.5), mass);
-        let cases: [(&str, fn(&mut Parameters)); 10] = [
+        type Change = fn(&mut Parameters);
+        let cases: [(&str, Change); 10] = [
             ("M (primary mass) = 0 kg is", |p| p.primary_mass = 0.0),
             ("primary mass", |p| p.primary_mass = 1e-300),
             ("at most 1", |p| p.restitution = 1.5),

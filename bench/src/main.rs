@@ -14,8 +14,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context;
-use serde::Deserialize;
-use serde_json::json;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
 use vines_bench::baseline::Baseline;
 use vines_bench::method::{Answer, Shell, Stepped, measure};
 use vines_bench::scene::Scene;
@@ -46,55 +46,42 @@ fn names() -> Vec<&'static str> {
     METHODS.iter().map(|(name, _)| *name).collect()
 }
 
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Request {
-    Run {
-        scene: String,
-        method: String,
-        setting: f64,
-        checks: Vec<usize>,
-        budget: f64,
-        limit: f64,
-    },
-    Growth {
-        growth: String,
-        budget: f64,
-        most: f64,
-    },
-    Record {
-        record: usize,
-    },
-    Loop {
-        closed_loop: usize,
-        budget: f64,
-    },
-    Methods {
-        methods: bool,
-    },
-    Map {
-        map_g: f64,
-        sigmas: Vec<f64>,
-        effort: map::Effort,
-    },
+/// A field of a request.
+fn field<T: DeserializeOwned>(request: &Value, name: &str) -> anyhow::Result<T> {
+    let value = request
+        .get(name)
+        .with_context(|| format!("the request has no {name}"))?;
+    serde_json::from_value(value.clone()).with_context(|| format!("{name} of the request"))
 }
 
-fn answer(folder: &Path, request: &str) -> anyhow::Result<serde_json::Value> {
-    match serde_json::from_str(request)? {
-        Request::Run { scene, method, setting, checks, budget, limit } => {
-            let scene = Scene::load(folder, &scene)?;
-            let (budget, limit) = (Duration::from_secs_f64(budget), Duration::from_secs_f64(limit));
-            let (_, measure) = (METHODS.iter().find(|(name, _)| *name == method))
-                .with_context(|| format!("there is no method {method}; there are {}", names().join(", ")))?;
-            let answer = measure(&scene, setting, &checks, budget, limit);
-            Ok(serde_json::to_value(answer)?)
-        }
-        Request::Growth { growth, budget, most } => cost::growth(folder, &growth, budget, most),
-        Request::Record { record } => Ok(json!({"drives": cost::record(record)})),
-        Request::Loop { closed_loop, budget } => Ok(cost::closed_loop(closed_loop, budget)),
-        Request::Map { map_g, sigmas, effort } => Ok(serde_json::to_value(map::row(map_g, &sigmas, &effort)?)?),
-        Request::Methods { methods } => Ok(json!(methods.then(names))),
-    }
+fn answer(folder: &Path, request: &str) -> anyhow::Result<Value> {
+    let r: &Value = &serde_json::from_str(request)?;
+    let asks = |name| r.get(name).is_some();
+    Ok(if asks("scene") {
+        let (scene, name): (String, String) = (field(r, "scene")?, field(r, "method")?);
+        let unknown = || format!("there is no method {name}; there are {}", names().join(", "));
+        let (_, measure) = METHODS
+            .iter()
+            .find(|(method, _)| *method == name)
+            .with_context(unknown)?;
+        let (scene, checks): (_, Vec<usize>) = (Scene::load(folder, &scene)?, field(r, "checks")?);
+        let [budget, limit] = [field(r, "budget")?, field(r, "limit")?].map(Duration::from_secs_f64);
+        serde_json::to_value(measure(&scene, field(r, "setting")?, &checks, budget, limit))?
+    } else if asks("growth") {
+        let what: String = field(r, "growth")?;
+        cost::growth(folder, &what, field(r, "budget")?, field(r, "most")?)?
+    } else if asks("record") {
+        json!({"drives": cost::record(field(r, "record")?)})
+    } else if asks("closed_loop") {
+        cost::closed_loop(field(r, "closed_loop")?, field(r, "budget")?)
+    } else if asks("map_g") {
+        let (sigmas, effort): (Vec<f64>, map::Effort) = (field(r, "sigmas")?, field(r, "effort")?);
+        serde_json::to_value(map::row(field(r, "map_g")?, &sigmas, &effort)?)?
+    } else if asks("methods") {
+        json!(names())
+    } else {
+        anyhow::bail!("unknown request")
+    })
 }
 
 fn main() -> std::io::Result<()> {
@@ -118,7 +105,7 @@ mod tests {
     fn the_methods_lead_where_40_digit_arithmetic_does() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
         let text = std::fs::read_to_string(folder.join("truth.json")).expect("the truth");
-        let truth: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        let truth: Value = serde_json::from_str(&text).expect("JSON");
         // Largest error at the end of a scene.
         let error = |scene: &str, method: &str, setting: f64| {
             let last = truth[scene]["rows"]
@@ -129,7 +116,7 @@ mod tests {
                 "scene": scene, "method": method, "setting": setting, "checks": [], "budget": 0.0, "limit": 60.0
             });
             let answer = answer(folder, &request.to_string()).expect("an answer");
-            assert_eq!(answer["failure"], serde_json::Value::Null, "{method} in {scene}");
+            assert_eq!(answer["failure"], Value::Null, "{method} in {scene}");
             let error = |n: usize| {
                 let truth: f64 = last[n + 1].as_str().and_then(|x| x.parse().ok()).expect("a number");
                 (answer["states"][0][n].as_f64().expect("a number") - truth).abs()

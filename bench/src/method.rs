@@ -195,17 +195,9 @@ impl Method for Shell {
         static PLANT: OnceLock<Fmu> = OnceLock::new();
         let rig = Master::new(PLANT.get_or_init(Fmu::plant), Interface::CoSimulation);
         let p = &scene.parameters;
-        let Parameters {
-            primary_mass,
-            stiffness,
-            damping,
-            particle_mass,
-            half_width,
-            restitution,
-            ..
-        } = scene.parameters;
-        let rig_values = [primary_mass, stiffness, damping, particle_mass, half_width, restitution];
-        for (vr, value) in (0..).zip(rig_values).chain(STATE.into_iter().zip(numbers(scene.start))) {
+        let masses = [p.primary_mass, p.stiffness, p.damping, p.particle_mass];
+        let all = masses.into_iter().chain([p.half_width, p.restitution]);
+        for (vr, value) in (0..).zip(all).chain(STATE.into_iter().zip(numbers(scene.start))) {
             rig.well(rig.set_real(vr, value));
         }
         let shell = Self { rig, time: 0.0, state: scene.start };

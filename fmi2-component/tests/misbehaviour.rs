@@ -124,7 +124,7 @@ fmi2_component::export!(Person);
 const PERSON: Functions = functions_of!(fmi2_functions);
 
 fn in_mood(mood: i32) -> Master {
-    let master = Master::instantiate(PERSON, c"one".as_ptr(), 1, c"moody".as_ptr(), null());
+    let master = Master::instantiate(PERSON, 1, [c"one".as_ptr(), c"moody".as_ptr(), null()]);
     master.start();
     master.well(master.set_integer(0, mood));
     master
@@ -135,7 +135,8 @@ fn a_panic_and_a_fatal_refusal_are_logged_and_leave_nothing_but_to_free_that_ins
     let other = in_mood(0);
     let get = |m: &Master| call!(m.fmi2GetInteger(&0, 1, &mut 0));
     let step = |m: &Master| m.step(0.0, 1.0);
-    let calls: [(i32, fn(&Master) -> Status, &[&str]); 3] = [
+    type Call = fn(&Master) -> Status;
+    let calls: [(i32, Call, &[&str]); 3] = [
         (
             PANIC_ON_STEP,
             step,

@@ -32,9 +32,9 @@ fn name_guid_and_interface_are_checked_and_the_resource_location_is_not_read() {
     let [plain, braced] = [text.clone(), format!("{{{text}}}")].map(|guid| CString::new(guid).unwrap());
     let (own, one, f) = (plain.as_ptr(), c"one".as_ptr(), Fmu::tank().functions);
     for location in [c"", c"file:///tmp/a%20b", c"file:////tmp", c"/tmp", c"\xff"] {
-        assert!(!Master::instantiate(f, one, 1, own, location.as_ptr()).c.is_null());
+        assert!(!Master::instantiate(f, 1, [one, own, location.as_ptr()]).c.is_null());
     }
-    assert!(!Master::instantiate(f, one, 1, braced.as_ptr(), null()).c.is_null());
+    assert!(!Master::instantiate(f, 1, [one, braced.as_ptr(), null()]).c.is_null());
     for (name, kind, guid, reason) in [
         (null(), 1, own, "instanceName"),
         (c"".as_ptr(), 1, own, "instanceName"),
@@ -45,7 +45,7 @@ fn name_guid_and_interface_are_checked_and_the_resource_location_is_not_read() {
         (one, 1, c"0-0".as_ptr(), &text),
         (one, 1, c"\xff%n".as_ptr(), &text),
     ] {
-        let m = Master::instantiate(f, name, kind, guid, null());
+        let m = Master::instantiate(f, kind, [name, guid, null()]);
         assert!(m.c.is_null());
         let heard = m.heard();
         let one = heard.len() == 1 && heard[0].status == Error;
@@ -188,7 +188,7 @@ fn each_state_has_its_functions_a_call_out_of_order_does_no_harm_and_a_reset_ins
 
 #[test]
 fn null_is_no_instance() {
-    let nobody = Master::instantiate(Fmu::tank().functions, null(), 7, null(), null());
+    let nobody = Master::instantiate(Fmu::tank().functions, 7, [null(), null(), null()]);
     assert!(nobody.c.is_null() && CALLS.iter().all(|(_, call)| call(&nobody) == Error));
     call!(nobody.fmi2FreeInstance());
 }

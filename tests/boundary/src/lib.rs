@@ -198,23 +198,12 @@ impl Master {
     /// An instance with debug logging off.
     pub fn new(fmu: &Fmu, interface: Interface) -> Self {
         let guid = CString::new(fmu.guid()).expect("no NUL in a number");
-        Self::instantiate(
-            fmu.functions,
-            c"rig".as_ptr(),
-            interface as c_int,
-            guid.as_ptr(),
-            null(),
-        )
+        let texts = [c"rig".as_ptr(), guid.as_ptr(), null()];
+        Self::instantiate(fmu.functions, interface as c_int, texts)
     }
 
-    /// An instance, or the refusal of one, of that name, `fmi2Type`, GUID and resource location: NULL or C strings.
-    pub fn instantiate(
-        f: Functions,
-        name: abi::CString,
-        kind: c_int,
-        guid: abi::CString,
-        location: abi::CString,
-    ) -> Self {
+    /// An instance, or the refusal of one, of that `fmi2Type`, and of that name, GUID and resource location: NULL or C strings.
+    pub fn instantiate(f: Functions, kind: c_int, [name, guid, location]: [abi::CString; 3]) -> Self {
         let lines: *mut Vec<Line> = Box::into_raw(Box::default());
         let callbacks = Box::new(callbacks(lines));
         // SAFETY: as the standard asks.
