@@ -11,8 +11,9 @@
 
 use core::f64::consts::TAU;
 use std::env::{args, current_exe};
+use std::error::Error;
 use std::hint::black_box;
-use std::process::{Command, ExitCode};
+use std::process::Command;
 
 use lovines::{Cavity, Drive, Parameters, Plant, Restitution, State};
 
@@ -51,6 +52,10 @@ const PLAIN: Work = Work { plain: true, ..QUIET };
 const LONG: Work = Work { step: 100.0 * PERIOD, ..QUIET };
 
 impl Work {
+    fn changed(self, change: [f64; 3]) -> Self {
+        Self { change, ..self }
+    }
+
     fn run(&self, steps: u32) {
         let parameters = Parameters {
             cavity: self.cavity,
@@ -80,58 +85,47 @@ fn locked_in(cavity: Cavity, impacts: u32) {
     Work { start, cavity, amplitude: 0.0084 * 1.1, step, ..QUIET }.run(1);
 }
 
-const fn walls(law: Restitution) -> Cavity {
-    Cavity { restitution: [Some(law); 2], ..Cavity::IDEAL }
+/// Both walls with this law.
+const fn walls(law: Restitution) -> [Option<Restitution>; 2] {
+    [Some(law); 2]
 }
 
-/// An effect, a cavity that has it, and how much an impact may cost, as a multiple of the ideal lock.
-const EFFECTS: &[(&str, Cavity, f64)] = &[
-    ("none", Cavity::IDEAL, 1.0),
-    (
-        "unequal gaps",
-        Cavity { b_plus: Some(1.01), b_minus: Some(0.99), ..Cavity::IDEAL },
-        1.2,
-    ),
-    ("tilt", Cavity { tilt: 3e-4, ..Cavity::IDEAL }, 1.2),
-    ("friction", Cavity { kinetic_friction: 3e-4, ..Cavity::IDEAL }, 2.0),
-    (
-        "unequal walls",
-        Cavity {
-            restitution: [None, Some(Restitution::Constant(0.66))],
-            ..Cavity::IDEAL
-        },
-        1.2,
-    ),
-    ("viscoelastic restitution", walls(Restitution::Viscoelastic(0.33)), 1.2),
-    ("plastic restitution", walls(Restitution::Plastic(0.33)), 1.2),
+/// Declares the effects: a name, what differs from an ideal cavity, and how much an impact may cost, as a multiple of the ideal lock.
+macro_rules! effects {
+    ($($name:literal: { $($effect:tt)* } $accepted:literal;)*) => {
+        const EFFECTS: &[(&str, Cavity, f64)] = &[$(($name, Cavity { $($effect)* ..Cavity::IDEAL }, $accepted)),*];
+    };
+}
+
+effects! {
+    "none": {} 1.0;
+    "unequal gaps": { b_plus: Some(1.01), b_minus: Some(0.99), } 1.2;
+    "tilt": { tilt: 3e-4, } 1.2;
+    "friction": { kinetic_friction: 3e-4, } 2.0;
+    "unequal walls": { restitution: [None, Some(Restitution::Constant(0.66))], } 1.2;
+    "viscoelastic restitution": { restitution: walls(Restitution::Viscoelastic(0.33)), } 1.2;
+    "plastic restitution": { restitution: walls(Restitution::Plastic(0.33)), } 1.2;
     // No two flights are alike, so that none can be predicted from another, as in an irregular motion.
-    (
-        "scatter of the restitution, irregular flights",
-        Cavity { scatter: 0.01, ..Cavity::IDEAL },
-        2.2,
-    ),
-];
+    "scatter of the restitution, irregular flights": { scatter: 0.01, } 2.2;
+}
 
 /// Steps of a particle on a wall that pushes all the time: stuck, or without loss in hops of 1/300 period.
 fn pressed(hopping: bool, n: u32) {
     // Powers of two: the start is exactly at the wall.
     let half_width = 1024.0;
+    let restitution = if hopping { 1.0 } else { 0.65 };
     let parameters = Parameters {
         half_width,
-        ..Parameters::dimensionless(0.0084, 1.43, if hopping { 1.0 } else { 0.65 })
+        ..Parameters::dimensionless(0.0084, 1.43, restitution)
     };
     let (acceleration, q1) = (-1.0 / 1024.0, 1.0 / 1024.0);
-    let start = State {
-        // Where the spring holds the mass at this acceleration.
-        q1,
-        q2: q1 + half_width,
-        dq2: if hopping {
-            -0.5 * acceleration * PERIOD / 300.0
-        } else {
-            0.0
-        },
-        ..State::default()
+    let dq2 = if hopping {
+        -0.5 * acceleration * PERIOD / 300.0
+    } else {
+        0.0
     };
+    // Where the spring holds the mass at this acceleration.
+    let start = State { q1, q2: q1 + half_width, dq2, ..State::default() };
     let mut plant = Plant::new(parameters, start).expect("a valid scene");
     let mut drive = Drive {
         signal: [0.0, 0.0, 0.5 * acceleration, 0.0],
@@ -146,74 +140,35 @@ fn pressed(hopping: bool, n: u32) {
     assert_eq!(plant.totals().impacts > 0, hopping);
 }
 
-/// Instructions of the work with the number of steps.
+/// The work, that number of steps of it.
 type Run = fn(u32);
 
-/// A shortcut, the unit of work, and the work with it and without it.
-const ROWS: &[(&str, &str, Run, Run)] = &[
-    (
-        "walls out of reach: no root search",
-        "step of 1/100 period",
-        |n| QUIET.run(n),
-        |n| PLAIN.run(n),
-    ),
-    (
-        "the same",
-        LONG_STEP,
-        |n| LONG.run(n),
-        |n| Work { plain: true, ..LONG }.run(n),
-    ),
-    (
-        "no excitation: no forced terms",
-        "step of the plain solver",
-        |n| Work { amplitude: 0.0, ..PLAIN }.run(n),
-        |n| PLAIN.run(n),
-    ),
-    (
-        "the same, fast path",
-        "step of 1/100 period, v and base read",
-        |n| Work { amplitude: 0.0, ..SENSORS }.run(n),
-        |n| SENSORS.run(n),
-    ),
-    (
-        "particle stuck: hops of 1/300 period not followed",
-        "step of 1/100 period",
-        |n| pressed(false, n),
-        |n| pressed(true, n),
-    ),
-    (
-        "drive unchanged: its coefficients reused",
-        "step of 1/100 period",
-        |n| QUIET.run(n),
-        |n| Work { change: [1e-9, 0.0, 0.0], ..QUIET }.run(n),
-    ),
-    (
-        "the same, amplitude alone changed",
-        "step of 1/100 period",
-        |n| QUIET.run(n),
-        |n| Work { change: [0.0, 1e-9, 0.0], ..QUIET }.run(n),
-    ),
-    (
-        "step length unchanged: its coefficients reused",
-        "step of 1/100 period, v and base read",
-        |n| SENSORS.run(n),
-        |n| Work { change: [0.0, 0.0, 1e-9], ..SENSORS }.run(n),
-    ),
-    (
-        "outputs when asked for: none",
-        "step of 1/100 period",
-        |n| QUIET.run(n),
-        |n| Work { read: all, ..QUIET }.run(n),
-    ),
-    (
-        "outputs when asked for: v and base",
-        "step of 1/100 period",
-        |n| SENSORS.run(n),
-        |n| Work { read: all, ..QUIET }.run(n),
-    ),
-];
+/// Declares the shortcuts: a name, the unit of work, the work with the shortcut, and without it.
+macro_rules! shortcuts {
+    ($($name:literal, $unit:expr, |$n:ident| $with:expr => $without:expr;)*) => {
+        const ROWS: &[(&str, &str, Run, Run)] = &[$(($name, $unit, |$n| $with, |$n| $without)),*];
+    };
+}
+
+const SHORT_STEP: &str = "step of 1/100 period";
+const READ_STEP: &str = "step of 1/100 period, v and base read";
 /// A unit of which few are enough.
 const LONG_STEP: &str = "step of 100 periods";
+
+shortcuts! {
+    "walls out of reach: no root search", SHORT_STEP, |n| QUIET.run(n) => PLAIN.run(n);
+    "the same", LONG_STEP, |n| LONG.run(n) => Work { plain: true, ..LONG }.run(n);
+    "no excitation: no forced terms", "step of the plain solver",
+        |n| Work { amplitude: 0.0, ..PLAIN }.run(n) => PLAIN.run(n);
+    "the same, fast path", READ_STEP, |n| Work { amplitude: 0.0, ..SENSORS }.run(n) => SENSORS.run(n);
+    "particle stuck: hops of 1/300 period not followed", SHORT_STEP, |n| pressed(false, n) => pressed(true, n);
+    "drive unchanged: its coefficients reused", SHORT_STEP, |n| QUIET.run(n) => QUIET.changed([1e-9, 0.0, 0.0]).run(n);
+    "the same, amplitude alone changed", SHORT_STEP, |n| QUIET.run(n) => QUIET.changed([0.0, 1e-9, 0.0]).run(n);
+    "step length unchanged: its coefficients reused", READ_STEP,
+        |n| SENSORS.run(n) => SENSORS.changed([0.0, 0.0, 1e-9]).run(n);
+    "outputs when asked for: none", SHORT_STEP, |n| QUIET.run(n) => Work { read: all, ..QUIET }.run(n);
+    "outputs when asked for: v and base", SHORT_STEP, |n| SENSORS.run(n) => Work { read: all, ..QUIET }.run(n);
+}
 
 fn nothing(_: &Plant) {}
 
@@ -228,29 +183,28 @@ fn all(plant: &Plant) {
 }
 
 /// Instructions of a run of this program with these arguments, as valgrind counts them.
-fn counted(arguments: &[&str], n: u32) -> Result<u64, String> {
+fn counted(arguments: &[&str], n: u32) -> Result<u64, Box<dyn Error>> {
     let output = Command::new("valgrind")
         .args(["--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null"])
-        .arg(current_exe().map_err(|e| e.to_string())?)
+        .arg(current_exe()?)
         .args(arguments)
         .arg(n.to_string())
         .output()
         .map_err(|e| format!("valgrind: {e}; install it"))?;
     let text = String::from_utf8_lossy(&output.stderr);
     let count = text.lines().find_map(|line| line.split_once("refs:"));
-    count
-        .and_then(|(_, count)| count.trim().replace(',', "").parse().ok())
-        .ok_or_else(|| format!("valgrind said no count of instructions but: {text}"))
+    let count = count.and_then(|(_, count)| count.trim().replace(',', "").parse().ok());
+    count.ok_or_else(|| format!("valgrind said no count of instructions but: {text}").into())
 }
 
 /// Instructions per unit of work; `few` units are enough to leave the start behind.
-fn per_unit(arguments: &[&str], few: u32) -> Result<f64, String> {
+fn per_unit(arguments: &[&str], few: u32) -> Result<f64, Box<dyn Error>> {
     let many = 6 * few;
     let difference = counted(arguments, many)? - counted(arguments, few)?;
     Ok(difference as f64 / f64::from(many - few))
 }
 
-fn table() -> Result<(), String> {
+fn table() -> Result<(), Box<dyn Error>> {
     println!("| shortcut | unit of work | instructions | without it | saved |\n|---|---|---|---|---|");
     for (row, (skip, unit, ..)) in ROWS.iter().enumerate() {
         let few = if *unit == LONG_STEP { 20 } else { 2000 };
@@ -266,15 +220,13 @@ fn table() -> Result<(), String> {
         let ratio = cost / *ideal.get_or_insert(cost);
         println!("| {effect} | {cost:.0} | {ratio:.2} | {accepted:.1} |");
         if ratio > *accepted {
-            return Err(format!(
-                "{effect}: {ratio:.3} ideal locks per impact; accepted are {accepted}"
-            ));
+            return Err(format!("{effect}: {ratio:.3} ideal locks per impact; accepted are {accepted}").into());
         }
     }
     Ok(())
 }
 
-fn main() -> ExitCode {
+fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = args().collect();
     if let [_, what, row, n] = &arguments[..]
         && let (Ok(row), Ok(n)) = (row.parse::<usize>(), n.parse())
@@ -284,24 +236,14 @@ fn main() -> ExitCode {
             "without" => (ROWS[row].3)(n),
             _ => locked_in(EFFECTS[row].1, n),
         }
-        return ExitCode::SUCCESS;
+        return Ok(());
     }
     // `cargo test --benches` only wants to see each run once.
     if !arguments.iter().any(|argument| argument == "--bench") {
-        for (_, _, with, without) in ROWS {
-            with(100);
-            without(100);
-        }
-        for (_, cavity, _) in EFFECTS {
-            locked_in(*cavity, 100);
-        }
-        return ExitCode::SUCCESS;
+        ROWS.iter()
+            .for_each(|(_, _, with, without)| [with, without].into_iter().for_each(|run| run(100)));
+        EFFECTS.iter().for_each(|(_, cavity, _)| locked_in(*cavity, 100));
+        return Ok(());
     }
-    match table() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(why) => {
-            eprintln!("{why}");
-            ExitCode::FAILURE
-        }
-    }
+    table()
 }

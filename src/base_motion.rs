@@ -227,16 +227,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn the_signal_seen_later_is_the_same_signal() {
-        let base = BaseMotion {
-            drive: Drive { signal: [1.0, -2.0, 0.5, 0.25], ..Drive::default() },
-            phase: Phase::default(),
-        };
-        let direct = base.after(1.5).drive.signal[0];
-        let in_two = base.after(0.7).after(0.8).drive.signal[0];
-        assert!((direct - (1.0 - 3.0 + 0.5 * 2.25 + 0.25 * 3.375)).abs() < 1e-15);
-        assert!((direct - in_two).abs() < 1e-15);
-    }
 }

@@ -226,20 +226,6 @@ mod tests {
     }
 
     #[test]
-    fn the_deviates_are_the_same_on_every_platform() {
-        let values = [(0, 0), (0, 1), (1, 0), (42, 1_000_000)].map(|(seed, n)| deviate(seed, n).to_bits());
-        assert_eq!(values, VALUES);
-    }
-
-    /// By tests/reference/cavity.py.
-    const VALUES: [u64; 4] = [
-        4607718464952031028,
-        4607358664592858913,
-        4602848668514658691,
-        4611386156192265518,
-    ];
-
-    #[test]
     fn every_law_is_limited_to_the_allowed_range() {
         let cavity = Cavity {
             restitution: [Some(Restitution::Viscoelastic(0.5)), Some(Restitution::Plastic(0.1))],
@@ -248,11 +234,16 @@ mod tests {
         };
         let rebound = Rebound::new(&Parameters { cavity, ..Parameters::dimensionless(0.01, 1.0, 0.6) });
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-15, "{a} {b}");
-        near(rebound.mean(Wall::Plus, 1.0), 0.5);
-        near(rebound.mean(Wall::Plus, 1e3), 0.3);
-        near(rebound.mean(Wall::Minus, 0.05), 1.0);
-        near(rebound.mean(Wall::Minus, 1.6), 0.5);
-        near(rebound.mean(Wall::Minus, 1e6), 0.3);
+        let (plus, minus) = (Wall::Plus, Wall::Minus);
+        for (wall, speed, r) in [
+            (plus, 1.0, 0.5),
+            (plus, 1e3, 0.3),
+            (minus, 0.05, 1.0),
+            (minus, 1.6, 0.5),
+            (minus, 1e6, 0.3),
+        ] {
+            near(rebound.mean(wall, speed), r);
+        }
         for scatter in [0.1, 1.0] {
             let rebound = Rebound { scatter, ..rebound };
             for n in 0..1000 {

@@ -265,36 +265,35 @@ mod tests {
 
     #[test]
     fn an_invalid_value_is_named_with_its_unit_and_what_is_allowed() {
-        let message = refused(|p| p.particle_mass = -0.5);
-        assert_eq!(
-            message,
-            "m (particle mass) = -0.5 kg is refused; allowed is a number from 1e-100 to 1e100"
-        );
-        assert!(refused(|p| p.damping = 1e300).starts_with("c (damping) = 1e300 N.s/m is"));
-        assert!(refused(|p| p.primary_mass = 0.0).starts_with("M (primary mass) = 0 kg is"));
-        assert!(refused(|p| p.restitution = 1.5).contains("at most 1"));
-        assert!(refused(|p| p.damping = -1e-9).contains("N.s/m"));
-    }
-
-    #[test]
-    fn rates_beyond_double_precision_are_refused() {
-        assert!(refused(|p| p.damping = 1e300).contains("c (damping)"));
-        assert!(refused(|p| p.damping = 1e99).contains("decay rate"));
-        assert!(refused(|p| p.primary_mass = 1e-300).contains("primary mass"));
-        assert!(refused(|p| p.damping = 2e12).contains("decay rate"));
-        assert!(refused(|p| (p.primary_mass, p.stiffness) = (1e-100, 1e100)).contains("natural frequency"));
-        assert!(refused(|p| p.stiffness = 1e-30).contains("natural frequency"));
-    }
-
-    #[test]
-    fn nan_and_infinity_are_refused_everywhere() {
+        let mass = "m (particle mass) = -0.5 kg is refused; allowed is a number from 1e-100 to 1e100";
+        assert_eq!(refused(|p| p.particle_mass = -0.5), mass);
+        type Change = fn(&mut Parameters);
+        let cases: [(&str, Change); 10] = [
+            ("M (primary mass) = 0 kg is", |p| p.primary_mass = 0.0),
+            ("primary mass", |p| p.primary_mass = 1e-300),
+            ("at most 1", |p| p.restitution = 1.5),
+            ("N.s/m", |p| p.damping = -1e-9),
+            // Rates beyond double precision.
+            ("c (damping) = 1e300 N.s/m is", |p| p.damping = 1e300),
+            ("decay rate", |p| p.damping = 1e99),
+            ("decay rate", |p| p.damping = 2e12),
+            ("natural frequency", |p| (p.primary_mass, p.stiffness) = (1e-100, 1e100)),
+            ("natural frequency", |p| p.stiffness = 1e-30),
+            ("half", |p| p.half_width = 0.0),
+        ];
+        for (part, change) in cases {
+            assert!(refused(change).contains(part), "{part}: {}", refused(change));
+        }
+        let fields: [fn(&mut Parameters) -> &mut f64; 6] = [
+            |p| &mut p.primary_mass,
+            |p| &mut p.stiffness,
+            |p| &mut p.damping,
+            |p| &mut p.particle_mass,
+            |p| &mut p.half_width,
+            |p| &mut p.restitution,
+        ];
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            refused(|p| p.primary_mass = bad);
-            refused(|p| p.stiffness = bad);
-            refused(|p| p.damping = bad);
-            refused(|p| p.particle_mass = bad);
-            refused(|p| p.half_width = bad);
-            refused(|p| p.restitution = bad);
+            fields.iter().for_each(|field| drop(refused(|p| *field(p) = bad)));
         }
     }
 }

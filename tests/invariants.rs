@@ -1,4 +1,4 @@
-//! Guards chosen scenes: a wall that holds, lets go and catches again, a drive that pulls a wall away, jumps of the base, rest for a million
+//! Guards chosen scenes: a wall that holds, lets go and catches again, a drive that pulls a wall away, rest for a million
 //! periods, no loss, other units, invalid values, steps that are cut short, the fast path
 //! against the plain solver. What holds for random scenes is in tests/stress.
 
@@ -6,23 +6,38 @@ use lovines::plant::MOST_IMPACTS;
 use lovines::{Drive, Event, Parameters, Plant, State, Wall};
 use std::f64::consts::TAU;
 
+/// A start near the 1:1 motion of the default rig.
+const LOCK: State = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
+
+/// The default rig, dimensionless.
+fn default_rig() -> Parameters {
+    Parameters::dimensionless(0.0084, 1.43, 0.65)
+}
+
+/// The events of a step.
+fn events(plant: &mut Plant, drive: Drive, duration: f64) -> Vec<Event> {
+    let mut events = Vec::new();
+    plant.advance_with(drive, duration, |event| events.push(event)).unwrap();
+    events
+}
+
 #[test]
 fn a_particle_at_rest_on_the_wall_is_held_let_go_and_caught_again() {
     // The base is dragged: the wall pushes the particle, then draws away from it.
     let parameters = Parameters::dimensionless(0.1, 1.0, 0.3);
     let start = State { q1: 0.0, dq1: 0.0, q2: -1.0, dq2: 0.0 };
     let mut plant = Plant::new(parameters, start).unwrap();
-    let mut events = Vec::new();
-    plant
-        .advance_with(Drive::held(2.0), 60.0, |event| events.push(event))
-        .unwrap();
-    assert!(matches!(events[0], Event::Stuck { t: 0.0, wall: Wall::Plus }));
-    assert!(matches!(events[1], Event::Released { wall: Wall::Plus, .. }));
-    assert!(matches!(events[2], Event::Impact { .. }));
-    // Undamped it would let go when the acceleration of the joint mass is 0, a quarter of its period on; damping delays that.
-    let Event::Released { t, .. } = events[1] else {
-        unreachable!()
+    let events = events(&mut plant, Drive::held(2.0), 60.0);
+    let [
+        Event::Stuck { t: 0.0, wall: Wall::Plus },
+        Event::Released { t, wall: Wall::Plus },
+        Event::Impact { .. },
+        ..,
+    ] = events[..]
+    else {
+        panic!("{events:?}");
     };
+    // Undamped it would let go when the acceleration of the joint mass is 0, a quarter of its period on; damping delays that.
     assert!(t > 1.5 && t < 2.0, "released at {t}");
 }
 
@@ -48,9 +63,8 @@ fn a_wall_that_a_changed_drive_pulls_away_without_a_jump_lets_go_at_once() {
     ] {
         let mut plant = pressed(parameters, before, since);
         let speed = plant.state().dq2;
-        let mut events = Vec::new();
-        (plant.advance_with(after, 0.25, |event| events.push(event))).unwrap();
-        assert_eq!(events, [Event::Released { t: 0.0, wall: Wall::Plus }], "{after:?}");
+        let released = Event::Released { t: 0.0, wall: Wall::Plus };
+        assert_eq!(events(&mut plant, after, 0.25), [released], "{after:?}");
         assert_eq!(plant.state().dq2, speed, "the particle flies on: {after:?}");
     }
 }
@@ -59,14 +73,11 @@ fn a_wall_that_a_changed_drive_pulls_away_without_a_jump_lets_go_at_once() {
 fn a_release_at_the_very_end_of_a_step_says_nothing_about_another_drive_or_other_parameters() {
     let parameters = Parameters { damping: 4.0, ..Parameters::dimensionless(0.1, 0.0, 0.5) };
     let start = pressed(parameters, Drive::held(2.0), 0.0);
-    let mut end = f64::NAN;
-    let mut longer = start;
-    let until = |event| {
-        if let Event::Released { t, .. } = event {
-            end = end.min(t);
-        }
-    };
-    longer.advance_with(Drive::held(2.0), 60.0, until).unwrap();
+    let mut ahead = events(&mut start.clone(), Drive::held(2.0), 60.0).into_iter();
+    let end = ahead
+        .find(|event| matches!(event, Event::Released { .. }))
+        .unwrap()
+        .time();
     let released = || {
         let mut plant = start;
         assert_eq!(plant.advance(Drive::held(2.0), end).unwrap().released, 1);
@@ -87,24 +98,13 @@ fn a_release_at_the_very_end_of_a_step_says_nothing_about_another_drive_or_other
 
 #[test]
 fn at_rest_nothing_happens_for_a_million_periods() {
-    let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
     for q2 in [0.0, 1.0, -1.0] {
         let start = State { q2, ..State::default() };
-        let mut plant = Plant::new(parameters, start).unwrap();
+        let mut plant = Plant::new(default_rig(), start).unwrap();
         plant.advance(Drive::default(), 6.3e6).unwrap();
         assert_eq!(plant.state(), start);
         assert_eq!(plant.totals().impacts, 0);
     }
-}
-
-#[test]
-fn a_jump_of_the_base_kicks_the_primary_mass_by_c_over_m_times_the_jump() {
-    let parameters = Parameters::dimensionless(0.1, 2.0, 0.65);
-    let mut plant = Plant::new(parameters, State::default()).unwrap();
-    plant.advance(Drive::held(0.25), 0.0).unwrap();
-    assert_eq!(plant.state().dq1, 0.0, "where the base starts is no jump");
-    plant.advance(Drive::held(0.75), 0.0).unwrap();
-    assert!((plant.state().dq1 - 0.2 * 0.5).abs() < 1e-16);
 }
 
 /// A particle without loss on a wall that presses on it, leaving it at `speed`.
@@ -136,19 +136,13 @@ fn a_step_that_is_cut_short_reports_how_far_it_came() {
     let mut plant = elastic(1e-9);
     let mut last = 0.0;
     let outcome = plant
-        .advance_with(Drive::held(1.0), 1.0, |event| {
-            if let Event::Impact { t, .. } = event {
-                last = t;
-            }
-        })
+        .advance_with(Drive::held(1.0), 1.0, |event| last = event.time())
         .unwrap();
-    assert!(outcome.cut_short);
-    assert_eq!(outcome.impacts, MOST_IMPACTS);
+    assert_eq!((outcome.cut_short, outcome.impacts), (true, MOST_IMPACTS));
     assert_eq!((outcome.stuck, plant.totals().dissipated), (0, 0.0));
     // 10^7 hops of 2e-9, nearly.
     assert!((outcome.elapsed - 0.02).abs() < 1e-3, "{}", outcome.elapsed);
-    assert_eq!(plant.time(), outcome.elapsed);
-    assert_eq!(last, outcome.elapsed);
+    assert_eq!([plant.time(), last], [outcome.elapsed; 2]);
     // The next step goes on from there.
     let more = plant.advance(Drive::held(1.0), 1e-3).unwrap();
     assert_eq!((more.elapsed, more.cut_short), (1e-3, false));
@@ -156,28 +150,25 @@ fn a_step_that_is_cut_short_reports_how_far_it_came() {
 
 #[test]
 fn an_invalid_drive_or_step_is_refused_and_changes_nothing() {
-    let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
-    let start = State { dq2: 0.5, ..State::default() };
-    let mut plant = Plant::new(parameters, start).unwrap();
+    let mut plant = Plant::new(default_rig(), State { dq2: 0.5, ..State::default() }).unwrap();
     let drive = Drive::harmonic(0.01, 1.0);
     plant.advance(drive, 1.0).unwrap();
-    let before = (plant.state(), *plant.totals(), plant.time(), plant.base());
+    let before = plant.save();
     let signal = |signal| Drive { signal, ..Drive::default() };
-    for (bad, named) in [
-        (Drive::harmonic(0.01, f64::INFINITY), "omega"),
-        (Drive::harmonic(0.01, 1e60), "omega"),
-        (Drive::harmonic(f64::NAN, 1.0), "E (amplitude"),
-        (signal([0.0, f64::NAN, 0.0, 0.0]), "der(e)"),
-        (signal([1e200, 0.0, 0.0, 0.0]), "e (base"),
+    for (drive, duration, named) in [
+        (Drive::harmonic(0.01, f64::INFINITY), 1.0, "omega"),
+        (Drive::harmonic(0.01, 1e60), 1.0, "omega"),
+        (Drive::harmonic(f64::NAN, 1.0), 1.0, "E (amplitude"),
+        (signal([0.0, f64::NAN, 0.0, 0.0]), 1.0, "der(e)"),
+        (signal([1e200, 0.0, 0.0, 0.0]), 1.0, "e (base"),
+        (drive, -1.0, "duration"),
+        (drive, f64::NAN, "duration"),
+        (drive, f64::INFINITY, "duration"),
     ] {
-        let message = plant.advance(bad, 1.0).unwrap_err().to_string();
+        let message = plant.advance(drive, duration).unwrap_err().to_string();
         assert!(message.starts_with(named), "{message}");
     }
-    for duration in [-1.0, f64::NAN, f64::INFINITY] {
-        let message = plant.advance(drive, duration).unwrap_err().to_string();
-        assert!(message.starts_with("duration"), "{message}");
-    }
-    assert_eq!((plant.state(), *plant.totals(), plant.time(), plant.base()), before);
+    assert_eq!(format!("{:?}", plant.save()), format!("{before:?}"));
 }
 
 #[test]
@@ -195,18 +186,19 @@ fn the_motion_is_the_same_in_any_units() {
         let mut plant = Plant::new(parameters, State { q1, q2, dq2: v, dq1: 0.0 }).unwrap();
         plant.set_fast_path(fast);
         for n in 0..400 {
-            let drive = Drive::harmonic(0.02 * length, 0.99 * rate);
+            let step = if n % 2 == 0 { 0.0625 } else { 1.5 } * time;
             plant
-                .advance(drive, if n % 2 == 0 { 0.0625 } else { 1.5 } * time)
+                .advance(Drive::harmonic(0.02 * length, 0.99 * rate), step)
                 .unwrap();
         }
         let State { q1, dq1, q2, dq2 } = plant.state();
         [q1 / length, dq1 / length * time, q2 / length, dq2 / length * time]
     };
-    for (damping, fast) in [0.012, 2.0, 20.0]
+    let cases = [0.012, 2.0, 20.0]
         .into_iter()
-        .flat_map(|damping| [(damping, false), (damping, true)])
-    {
+        .flat_map(|damping| [(damping, false), (damping, true)]);
+    for (damping, fast) in cases {
+        let here = run(1.0, 1.0, damping, fast);
         let (small, large) = (2f64.powi(-35), 2f64.powi(290));
         for (time, length) in [
             (small, large),
@@ -214,11 +206,8 @@ fn the_motion_is_the_same_in_any_units() {
             (1.0 / small, large),
             (1.0 / small, 1.0 / large),
         ] {
-            let (one, other) = (run(1.0, 1.0, damping, fast), run(time, length, damping, fast));
-            assert_eq!(
-                one, other,
-                "time {time:e}, length {length:e}, damping {damping}, fast path {fast}"
-            );
+            let there = run(time, length, damping, fast);
+            assert_eq!(here, there, "time {time:e}, length {length:e}, {damping}, {fast}");
         }
     }
 }
@@ -236,111 +225,66 @@ fn hops_by_the_hundred_thousand_keep_the_energy_without_the_fast_path() {
         plant.advance(Drive::default(), 0.01).unwrap();
         worst = worst.max((plant.energy(0.0) + plant.totals().dissipated - before).abs() / before);
     }
-    assert!(
-        plant.totals().impacts > 100_000 && worst < 2e-15,
-        "{worst:e} {:?}",
-        plant.totals()
-    );
+    assert!(plant.totals().impacts > 100_000 && worst < 2e-15, "{worst:e}");
 }
 
-/// The same plant without its fast path.
-fn plain(plant: &Plant) -> Plant {
-    let mut plain = *plant;
-    plain.set_fast_path(false);
-    plain
-}
-
-fn distance(a: &Plant, b: &Plant) -> f64 {
-    let (a, b) = (a.state(), b.state());
-    [a.q1 - b.q1, a.dq1 - b.dq1, a.q2 - b.q2, a.dq2 - b.dq2]
-        .iter()
-        .fold(0.0f64, |worst, x| worst.max(x.abs()))
+/// Follows the plant with its fast path and with the plain solver, which never differ by more than `most` after a step. Returns the
+/// impacts of both, and their evaluations.
+fn side_by_side(
+    parameters: Parameters,
+    start: State,
+    steps: impl IntoIterator<Item = (Drive, f64)>,
+    most: f64,
+) -> [[u64; 2]; 2] {
+    let mut plants = [Plant::new(parameters, start).unwrap(); 2];
+    plants[1].set_fast_path(false);
+    let mut evaluations = [0; 2];
+    for (drive, step) in steps {
+        for (plant, evaluations) in plants.iter_mut().zip(&mut evaluations) {
+            *evaluations += plant.advance(drive, step).unwrap().evaluations;
+        }
+        let [a, b] = plants.each_ref().map(Plant::state);
+        let off = [a.q1 - b.q1, a.dq1 - b.dq1, a.q2 - b.q2, a.dq2 - b.dq2];
+        assert!(off.iter().all(|x| x.abs() < most), "{drive:?}: {off:?}");
+    }
+    [plants.map(|plant| plant.totals().impacts), evaluations]
 }
 
 #[test]
 fn crossings_meet_the_impacts_of_the_plain_search() {
     for (lambda, r, omega) in [(1.43, 0.65, 0.990_417), (0.8, 0.5, 0.994), (2.0, 0.8, 0.985)] {
+        let step = (Drive::harmonic(0.0084 * 1.1, omega), TAU / omega);
         let parameters = Parameters::dimensionless(0.0084, lambda, r);
-        let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
-        let drive = Drive::harmonic(0.0084 * 1.1, omega);
-        let mut fast = Plant::new(parameters, start).unwrap();
-        let mut searched = plain(&fast);
-        for _ in 0..200 {
-            fast.advance(drive, TAU / omega).unwrap();
-            searched.advance(drive, TAU / omega).unwrap();
-            let off = distance(&fast, &searched);
-            assert!(off < 1e-12, "{off:e} after {:?}", fast.totals());
-        }
-        assert_eq!(fast.totals().impacts, searched.totals().impacts);
-        assert!(fast.totals().impacts > 300);
+        let [impacts, _] = side_by_side(parameters, LOCK, [step; 200], 1e-12);
+        assert!(impacts[0] == impacts[1] && impacts[0] > 300, "{impacts:?}");
     }
 }
 
 #[test]
 fn a_wall_that_is_nearly_touched_makes_only_a_short_part_of_a_long_flight_costly() {
-    let omega = 1.0 - 0.0084 * 4.4;
-    let drive = Drive::harmonic(0.0084 * 1.4, omega);
+    let (omega, periods) = (1.0 - 0.0084 * 4.4, 200.0);
     let start = State { q1: -0.0233, dq1: 0.1524, q2: -0.8405, dq2: 5.8e-4 };
-    let mut fast = Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.65), start).unwrap();
-    let mut searched = plain(&fast);
-    let periods = 200.0;
-    let outcome = fast.advance(drive, periods * TAU / omega).unwrap();
-    let all = searched.advance(drive, periods * TAU / omega).unwrap();
-    assert!(distance(&fast, &searched) < 1e-13 && outcome.impacts == 0);
-    let evaluations = (outcome.evaluations, all.evaluations);
-    assert!(
-        (evaluations.0 as f64) < 0.5 * periods && evaluations.1 as f64 > 2.0 * periods,
-        "{evaluations:?}"
-    );
+    let step = (Drive::harmonic(0.0084 * 1.4, omega), periods * TAU / omega);
+    let [impacts, evaluations] = side_by_side(default_rig(), start, [step], 1e-13);
+    assert_eq!(impacts, [0, 0]);
+    let [fast, plain] = evaluations.map(|n| n as f64);
+    assert!(fast < 0.5 * periods && plain > 2.0 * periods, "{evaluations:?}");
 }
 
 #[test]
 fn equal_steps_follow_a_drive_that_becomes_fast() {
-    let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
     let start = State { q1: 0.3, dq1: 0.1, q2: 0.2, dq2: 0.0 };
-    let mut fast = Plant::new(parameters, start).unwrap();
-    let mut searched = plain(&fast);
-    for omega in [1.0, 1.1, 40.0, 0.9, 300.0] {
-        for _ in 0..5 {
-            let drive = Drive::harmonic(0.01, omega);
-            fast.advance(drive, 0.06).unwrap();
-            searched.advance(drive, 0.06).unwrap();
-            assert!(
-                distance(&fast, &searched) < 1e-13,
-                "{omega}: {:e}",
-                distance(&fast, &searched)
-            );
-        }
-    }
+    let steps = [1.0, 1.1, 40.0, 0.9, 300.0].map(|omega| [(Drive::harmonic(0.01, omega), 0.06); 5]);
+    side_by_side(default_rig(), start, steps.concat(), 1e-13);
 }
 
 #[test]
 fn steps_whose_lengths_have_rounding_errors_are_as_exact_as_equal_ones() {
-    let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
-    let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
-    let signals = [
-        [0.0; 4],
-        [0.01, 0.0, 0.0, 0.0],
-        [0.01, -0.002, 0.0, 0.0],
-        [0.01, -0.002, 1e-4, 0.0],
-    ];
-    for (signal, error) in signals
-        .into_iter()
-        .flat_map(|signal| [1e-15, 1e-12, 9e-10].map(|error| (signal, error)))
-    {
-        let drive = Drive { signal, ..Drive::harmonic(0.0084 * 1.1, 0.990_417) };
-        let mut fast = Plant::new(parameters, start).unwrap();
-        let mut searched = plain(&fast);
-        for n in 0..400 {
-            let step = 0.06 * (1.0 + error * f64::from(n % 5 - 2));
-            fast.advance(drive, step).unwrap();
-            searched.advance(drive, step).unwrap();
-            assert!(
-                distance(&fast, &searched) < 1e-12,
-                "{signal:?} {error:e}: {:e}",
-                distance(&fast, &searched)
-            );
-        }
-        assert_eq!(fast.totals().impacts, searched.totals().impacts);
+    for (order, error) in (0..4).flat_map(|order| [1e-15, 1e-12, 9e-10].map(|error| (order, error))) {
+        let mut drive = Drive::harmonic(0.0084 * 1.1, 0.990_417);
+        drive.signal[..order].copy_from_slice(&[0.01, -0.002, 1e-4][..order]);
+        let steps = (0..400).map(|n| (drive, 0.06 * (1.0 + error * f64::from(n % 5 - 2))));
+        let [impacts, _] = side_by_side(default_rig(), LOCK, steps, 1e-12);
+        assert_eq!(impacts[0], impacts[1]);
     }
 }

@@ -1,71 +1,60 @@
 //! Guards the plant's motion against trajectories in 40-digit arithmetic by independent programs (tests/reference): the ideal cavity, and the real
 //! one with its limits, mirror symmetry and scatter.
 
-use lovines::{Cavity, Drive, Parameters, Plant, Restitution, State, Wall};
+use lovines::{Cavity, Drive, Event, Parameters, Plant, Restitution, State, Wall};
 use serde_json::Value;
 use std::collections::HashMap;
 
-fn number(value: &Value) -> f64 {
-    value.as_str().expect("a decimal string").parse().expect("a number")
-}
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference");
 
-/// Largest error of any state after any step.
-fn worst_error(scene: &str) -> f64 {
-    let path = format!(
-        "{}/tests/reference/trajectories/{scene}.json",
-        env!("CARGO_MANIFEST_DIR")
-    );
-    let text = std::fs::read_to_string(path).expect("reference data");
-    let reference: Value = serde_json::from_str(&text).expect("JSON");
-    let at = |key: &str| number(&reference[key]);
-    let x0: Vec<f64> = reference["x0"].as_array().unwrap().iter().map(number).collect();
-    let parameters = Parameters::dimensionless(at("eps"), at("lam"), at("r"));
-    let start = State { q1: x0[0], dq1: x0[1], q2: x0[2], dq2: x0[3] };
-    let drive = Drive::harmonic(at("eps") * at("G"), at("Om"));
-    let mut plant = Plant::new(parameters, start).unwrap();
-    let mut worst = 0.0f64;
-    for row in reference["rows"].as_array().unwrap() {
-        plant.advance(drive, at("step")).unwrap();
-        let s = plant.state();
-        let mut error = 0.0f64;
-        for (got, want) in [s.q1, s.dq1, s.q2, s.dq2].iter().zip(&row.as_array().unwrap()[1..5]) {
-            error = error.max((got - number(want)).abs());
-        }
-        let stuck = plant.contact().map_or(0.0, Wall::sign);
-        assert_eq!(stuck, row[6].as_f64().unwrap(), "{scene}: contact");
-        if scene != "chatter" {
-            assert_eq!(plant.totals().impacts, row[5].as_u64().unwrap(), "{scene}: impacts");
-        }
-        worst = worst.max(error);
-    }
-    println!("{scene}: worst error of any state after any step {worst:.2e}");
-    worst
-}
-
-#[test]
-fn a_lock_a_chatter_into_sticking_and_secular_growth_at_a_resonance_are_followed_to_1e_11() {
-    for scene in ["lock", "resonance", "chatter"] {
-        assert!(worst_error(scene) < 1e-11, "{scene}");
-    }
-}
-
-/// A scene of tests/reference/cavity.
+/// A scene, and the rows of its reference: number of steps, q1, dq1, q2, dq2, wall, impacts; in the real cavity also sticks, energy lost to
+/// friction, and time stuck.
 struct Scene {
     parameters: Parameters,
     start: State,
     drive: Drive,
     step: f64,
-    /// Number of steps, q1, dq1, q2, dq2, wall, impacts, sticks, energy lost to friction, time stuck.
     rows: Vec<Vec<f64>>,
 }
 
-fn scene(name: &str) -> Scene {
-    let path = format!("{}/tests/reference/cavity/{name}.csv", env!("CARGO_MANIFEST_DIR"));
-    let text = std::fs::read_to_string(path).expect("reference data");
+/// A scene of tests/reference/trajectories, dimensionless, in the ideal cavity.
+fn ideal(name: &str) -> Scene {
+    let text = std::fs::read_to_string(format!("{FOLDER}/trajectories/{name}.json")).expect("reference data");
+    let reference: Value = serde_json::from_str(&text).expect("JSON");
+    let number = |value: &Value| match value.as_str() {
+        Some(text) => text.parse().expect("a number"),
+        None => value.as_f64().expect("a number"),
+    };
+    let list = |value: &Value| -> Vec<f64> { value.as_array().expect("a list").iter().map(number).collect() };
+    let [epsilon, lambda, r, g, omega, step] =
+        ["eps", "lam", "r", "G", "Om", "step"].map(|key| number(&reference[key]));
+    let x0 = list(&reference["x0"]);
+    let rows = reference["rows"]
+        .as_array()
+        .expect("rows")
+        .iter()
+        .zip(1..)
+        .map(|(row, n)| {
+            let row = list(row);
+            vec![f64::from(n), row[1], row[2], row[3], row[4], row[6], row[5]]
+        });
+    Scene {
+        parameters: Parameters::dimensionless(epsilon, lambda, r),
+        start: State { q1: x0[0], dq1: x0[1], q2: x0[2], dq2: x0[3] },
+        drive: Drive::harmonic(epsilon * g, omega),
+        step,
+        rows: rows.collect(),
+    }
+}
+
+/// A scene of tests/reference/cavity.
+fn real(name: &str) -> Scene {
+    let text = std::fs::read_to_string(format!("{FOLDER}/cavity/{name}")).expect("reference data");
     let (header, rows): (Vec<&str>, Vec<&str>) = text.lines().partition(|line| line.starts_with('#'));
-    let given: HashMap<&str, &str> = (header.iter())
-        .map(|line| line[2..].split_once(" = ").expect("a key and a value"))
-        .collect();
+    let given = header
+        .iter()
+        .map(|line| line[2..].split_once(" = ").expect("a key and a value"));
+    let given: HashMap<&str, &str> = given.collect();
     let at = |key: &str| given[key].parse::<f64>().expect("a number");
     let law = |key: &str| match given["law"] {
         "constant" => Restitution::Constant(at(key)),
@@ -93,19 +82,19 @@ fn scene(name: &str) -> Scene {
         restitution: 0.65,
         cavity,
     };
-    let numbers = |line: &str| line.split(',').map(|text| text.parse().expect("a number")).collect();
+    let numbers = |line: &&str| line.split(',').map(|text| text.parse().expect("a number")).collect();
     Scene {
         parameters,
         start: State { q1: at("q1"), dq1: at("dq1"), q2: at("q2"), dq2: at("dq2") },
         drive: Drive::harmonic(at("E"), at("omega")),
         step: at("step"),
-        rows: rows[1..].iter().map(|line| numbers(line)).collect(),
+        rows: rows[1..].iter().map(numbers).collect(),
     }
 }
 
 /// Largest error of any displacement (in half-widths) and velocity (in half-widths times the natural frequency) in any row.
-fn worst_error_in_cavity(name: &str) -> f64 {
-    let Scene { parameters, start, drive, step, rows } = scene(name);
+fn worst_error(name: &str, scene: Scene) -> f64 {
+    let Scene { parameters, start, drive, step, rows } = scene;
     let mut plant = Plant::new(parameters, start).expect("a valid scene");
     let (b, fast) = (parameters.half_width, parameters.natural_frequency());
     let (mut worst, mut done) = (0.0f64, 0);
@@ -115,68 +104,50 @@ fn worst_error_in_cavity(name: &str) -> f64 {
             done += 1;
         }
         let State { q1, dq1, q2, dq2 } = plant.state();
-        let error = [q1 - row[1], (dq1 - row[2]) / fast, q2 - row[3], (dq2 - row[4]) / fast]
-            .map(|error| error.abs() / b)
-            .into_iter()
-            .fold(0.0, f64::max);
-        let totals = plant.totals();
-        println!(
-            "{name} {done}: {error:.1e} {} {} {:e}",
-            totals.impacts,
-            totals.sticks,
-            totals.friction - row[8]
-        );
-        worst = worst.max(error);
-        assert_eq!(
-            plant.contact().map_or(0.0, |wall| wall.sign()),
-            row[5],
-            "{name}, step {done}: contact"
-        );
-        if name != "chatter" && name != "lower_wall" {
-            assert_eq!(totals.impacts, row[6] as u64, "{name}, step {done}: impacts");
+        let errors = [q1 - row[1], (dq1 - row[2]) / fast, q2 - row[3], (dq2 - row[4]) / fast];
+        worst = errors.iter().fold(worst, |worst, error| worst.max(error.abs() / b));
+        let (totals, place) = (plant.totals(), format!("{name}, step {done}"));
+        assert_eq!(plant.contact().map_or(0.0, Wall::sign), row[5], "{place}: contact");
+        // Hops before the end of a chatter are not counted alike.
+        if !name.starts_with("chatter") && name != "lower_wall.csv" {
+            assert_eq!(totals.impacts, row[6] as u64, "{place}: impacts");
         }
-        assert_eq!(totals.sticks, row[7] as u64, "{name}, step {done}: sticks");
-        let energy = parameters.particle_mass * (b * fast) * (b * fast);
-        assert!(
-            (totals.friction - row[8]).abs() < 1e-11 * energy,
-            "{name}, step {done}: friction"
-        );
-        assert!(
-            (totals.stuck_time - row[9]).abs() * fast < 1e-8,
-            "{name}, step {done}: time stuck"
-        );
+        if let [sticks, friction, stuck_time] = row[7..] {
+            let energy = parameters.particle_mass * (b * fast) * (b * fast);
+            assert_eq!(totals.sticks, sticks as u64, "{place}: sticks");
+            assert!((totals.friction - friction).abs() < 1e-11 * energy, "{place}: friction");
+            assert!(
+                (totals.stuck_time - stuck_time).abs() * fast < 1e-8,
+                "{place}: time stuck"
+            );
+        }
     }
-    println!("{name}: worst error {worst:.1e}");
+    println!("{name}: worst error of any state in any row {worst:.2e}");
     worst
 }
 
 #[test]
+fn a_lock_a_chatter_into_sticking_and_secular_growth_at_a_resonance_are_followed_to_1e_11() {
+    for name in ["lock", "resonance", "chatter"] {
+        assert!(worst_error(name, ideal(name)) < 1e-11, "{name}");
+    }
+}
+
+#[test]
 fn friction_tilt_unequal_gaps_and_every_law_of_restitution_are_followed_to_2e_12() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/cavity");
-    let files = std::fs::read_dir(folder).expect("reference data");
-    let names = files.map(|file| {
-        file.expect("a file")
-            .path()
-            .file_stem()
-            .expect("a name")
-            .to_string_lossy()
-            .into_owned()
-    });
-    let worst: Vec<_> = names.map(|name| (worst_error_in_cavity(&name), name)).collect();
-    assert!(
-        worst.len() == 13 && worst.iter().all(|(error, _)| *error < 2e-12),
-        "{worst:?}"
-    );
+    let files = std::fs::read_dir(format!("{FOLDER}/cavity")).expect("reference data");
+    let names = files.map(|file| file.expect("a file").file_name().into_string().expect("a name"));
+    let worst: Vec<_> = names.map(|name| (worst_error(&name, real(&name)), name)).collect();
+    assert_eq!(worst.len(), 13);
+    assert!(worst.iter().all(|(error, _)| *error < 2e-12), "{worst:?}");
 }
 
 /// The default rig near its 1:1 motion, with a cavity.
 fn lock(cavity: Cavity) -> (Plant, Drive) {
     let parameters = Parameters { cavity, ..Parameters::dimensionless(0.0084, 1.43, 0.65) };
     let start = State { q1: -0.4384, dq1: 0.0077, q2: -1.0039, dq2: -0.8781 };
-    (
-        Plant::new(parameters, start).expect("a valid scene"),
-        Drive::harmonic(0.0084 * 1.1, 0.990_417),
-    )
+    let plant = Plant::new(parameters, start).expect("a valid scene");
+    (plant, Drive::harmonic(0.0084 * 1.1, 0.990_417))
 }
 
 /// The largest distance of the lock with a cavity from the ideal lock within 20 periods.
@@ -231,18 +202,12 @@ fn a_mirrored_cavity_has_the_mirrored_motion() {
         restitution: laws,
         ..Cavity::IDEAL
     };
-    let mirrored = Cavity {
-        b_plus: Some(0.9),
-        b_minus: Some(1.1),
-        tilt: -0.01,
-        restitution: [laws[1], laws[0]],
-        ..cavity
-    };
+    let (b_plus, b_minus, restitution) = (cavity.b_minus, cavity.b_plus, [laws[1], laws[0]]);
+    let mirrored = Cavity { b_plus, b_minus, tilt: -cavity.tilt, restitution, ..cavity };
     let ((mut plant, drive), (mut mirror, _)) = (lock(cavity), lock(mirrored));
     let State { q1, dq1, q2, dq2 } = plant.state();
-    mirror
-        .set_state(State { q1: -q1, dq1: -dq1, q2: -q2, dq2: -dq2 })
-        .expect("a valid state");
+    let opposite = State { q1: -q1, dq1: -dq1, q2: -q2, dq2: -dq2 };
+    mirror.set_state(opposite).expect("a valid state");
     let opposite = Drive { amplitude: -drive.amplitude, ..drive };
     for _ in 0..500 {
         plant.advance(drive, 0.37).expect("a valid step");
@@ -266,7 +231,7 @@ fn the_scatter_does_not_depend_on_the_steps_or_on_a_rollback() {
                 plant.restore(&saved);
             }
             let on_event = |event| {
-                if let lovines::Event::Impact { velocity, .. } = event {
+                if let Event::Impact { velocity, .. } = event {
                     velocities.push(velocity);
                 }
             };
@@ -274,15 +239,8 @@ fn the_scatter_does_not_depend_on_the_steps_or_on_a_rollback() {
         }
         velocities
     };
-    let (long, short, back) = (
-        follow(400.0, 1, false),
-        follow(0.1, 4000, false),
-        follow(0.1, 4000, true),
-    );
-    assert!(long.len() > 100);
-    assert_eq!(short, back);
-    assert_eq!(long.len(), short.len());
-    for (a, b) in long.iter().zip(&short) {
-        assert!((a - b).abs() < 1e-11, "{a} {b}");
-    }
+    let (long, short) = (follow(400.0, 1, false), follow(0.1, 4000, false));
+    assert_eq!(short, follow(0.1, 4000, true));
+    assert!(long.len() > 100 && long.len() == short.len());
+    assert!(long.iter().zip(&short).all(|(a, b)| (a - b).abs() < 1e-11));
 }

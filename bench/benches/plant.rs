@@ -11,10 +11,10 @@ use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
 
 use criterion::{BatchSize, Criterion, Throughput};
-use lovines::{Parameters, Plant, State};
+use lovines::{Drive, Parameters};
 use vines_bench::baseline::Baseline;
-use vines_bench::method::{Method, Stepped, measure};
-use vines_bench::scene::{Scene, Step};
+use vines_bench::method::{Method, Stepped, begin, measure};
+use vines_bench::scene::{Scene, Step, state};
 
 /// Duration of the measurement, and of the turns of a case in each round.
 const DURATION: Duration = Duration::from_secs(10);
@@ -40,143 +40,136 @@ struct Case {
     work: f64,
 }
 
-/// A rig in its start and under a harmonic drive; the length of a step is a period.
-#[derive(Clone, Copy)]
-struct Motion {
-    parameters: Parameters,
-    start: [f64; 4],
-    step: Step,
-}
-
-/// The default rig, dimensionless, from `start` under the drive of `G` = `g` at the frequency `omega`.
-fn motion(start: [f64; 4], g: f64, omega: f64) -> Motion {
+/// The default rig, dimensionless, from `start` under the drive of `G` = `g` at the frequency `omega`, for one period.
+fn period(start: [f64; 4], g: f64, omega: f64) -> Scene {
     let step = Step {
-        amplitude: EPSILON * g,
-        omega,
-        signal: [0.0; 4],
+        drive: Drive::harmonic(EPSILON * g, omega),
         duration: TAU / omega,
     };
-    Motion {
-        parameters: Parameters::dimensionless(EPSILON, 1.43, 0.65),
-        start,
-        step,
-    }
+    let parameters = Parameters::dimensionless(EPSILON, 1.43, 0.65);
+    Scene { parameters, start: state(start), steps: vec![step] }
 }
 
 /// The default rig at a detuning and a base amplitude over `b epsilon`, after a thousand periods.
-fn settled(sigma: f64, g: f64) -> Motion {
-    let motion = motion([0.0, 0.0, 0.0, 0.9], g, 1.0 + EPSILON * sigma);
-    let start = State { dq2: 0.9, ..State::default() };
-    let mut plant = Plant::new(motion.parameters, start).expect("a valid scene");
-    plant.begin(motion.step.drive()).expect("a valid drive");
-    plant
-        .advance(motion.step.drive(), 1000.0 * motion.step.duration)
-        .expect("a valid step");
-    let s = plant.state();
-    Motion { start: [s.q1, s.dq1, s.q2, s.dq2], ..motion }
+fn settled(sigma: f64, g: f64) -> Scene {
+    let scene = period([0.0, 0.0, 0.0, 0.9], g, 1.0 + EPSILON * sigma);
+    let Step { drive, duration } = scene.steps[0];
+    let mut plant = begin(&scene).expect("a valid scene");
+    plant.advance(drive, 1000.0 * duration).expect("a valid step");
+    Scene { start: plant.state(), ..scene }
 }
 
-impl Motion {
-    /// A number of steps, each of `part` periods and changed by `change`.
-    fn case(&self, name: &str, unit: &'static str, count: usize, part: f64, change: impl Fn(usize, &mut Step)) -> Case {
+impl Case {
+    /// A number of steps, each of `part` times the scene's only one and changed by `change`.
+    fn new(
+        (name, unit, accepted): (&str, &'static str, &'static str),
+        scene: &Scene,
+        (count, part): (usize, f64),
+        change: impl Fn(usize, &mut Step),
+    ) -> Self {
         let step = |n: usize| {
-            let mut step = Step { duration: part * self.step.duration, ..self.step };
+            let mut step = scene.steps[0];
+            step.duration *= part;
             change(n, &mut step);
             step
         };
-        let steps = (0..count).map(step).collect();
-        Case {
+        let scene = Scene { steps: (0..count).map(step).collect(), ..scene.clone() };
+        Self {
             name: name.to_owned(),
             unit,
-            scene: Scene { parameters: self.parameters, start: self.start, steps },
-            accepted: "",
+            scene,
+            accepted,
             pairs: Vec::new(),
             work: f64::NAN,
         }
     }
 
-    fn long(&self, name: &str) -> Case {
-        self.case(
-            &format!("{name}, one long step"),
-            "impact",
-            1,
-            PERIODS as f64,
-            |_, _| (),
-        )
+    fn long(name: &str, accepted: &'static str, scene: &Scene) -> Self {
+        let name = format!("{name}, one long step");
+        Self::new((&name, "impact", accepted), scene, (1, PERIODS as f64), |_, _| ())
     }
 
-    fn sampled(&self, name: &str, change: impl Fn(usize, &mut Step)) -> Case {
-        self.case(name, "sample", PERIODS * SAMPLES, 1.0 / SAMPLES as f64, change)
+    fn sampled(name: &str, accepted: &'static str, scene: &Scene, change: impl Fn(usize, &mut Step)) -> Self {
+        let steps = (PERIODS * SAMPLES, 1.0 / SAMPLES as f64);
+        Self::new((name, "sample", accepted), scene, steps, change)
     }
 }
 
 fn cases() -> Vec<Case> {
-    let at_lock = motion(
-        [-0.438_371_55, 0.007_696_65, -1.003_854_15, -0.878_123_25],
-        1.1,
-        0.990_417,
-    );
+    let at_lock = [-0.438_371_55, 0.007_696_65, -1.003_854_15, -0.878_123_25];
+    let lock = &period(at_lock, 1.1, 0.990_417);
     // A particle so slow that it meets no wall in a thousand periods.
-    let quiet = motion([0.0, 0.0, 0.0, 1e-6], 0.12, 0.990_417);
+    let quiet = period([0.0, 0.0, 0.0, 1e-6], 0.12, 0.990_417);
+    let each_period = ("default lock, a step per period", "impact", "");
+    let longer = ("the same, ten times as long", "impact", "70 ns");
     let mut cases = vec![
         // The first case is the unit of the others.
-        at_lock.long("default lock"),
-        at_lock.case("default lock, a step per period", "impact", PERIODS, 1.0, |_, _| ()),
+        Case::long("default lock", "", lock),
+        Case::new(each_period, lock, (PERIODS, 1.0), |_, _| ()),
         // What a new plant computes once counts less.
-        Case {
-            accepted: "70 ns",
-            ..at_lock.case("the same, ten times as long", "impact", 10 * PERIODS, 1.0, |_, _| ())
-        },
-        at_lock.sampled("default lock, 100 samples per period", |_, _| ()),
-        quiet.sampled("no impact, 100 samples per period", |_, _| ()),
+        Case::new(longer, lock, (10 * PERIODS, 1.0), |_, _| ()),
+        Case::sampled("default lock, 100 samples per period", "", lock, |_, _| ()),
+        Case::sampled("no impact, 100 samples per period", "", &quiet, |_, _| ()),
     ];
-    for (regime, sigma, g) in [
-        ("symmetric 1:1", -0.5, 1.2),
-        ("symmetric 1:1", 0.0, 1.2),
-        ("symmetric 1:1", 1.0, 1.2),
-        ("symmetric 1:1", -0.5, 1.5),
-        ("symmetric 1:1", 0.0, 1.5),
-        ("symmetric 1:1", 1.0, 1.5),
-        ("asymmetric 1:1", -1.14, 1.5),
-        ("three impacts per period", 0.0, 2.5),
-        ("chaotic", -1.0, 2.6),
-        ("modulated", 0.0, 0.8),
+    for (regime, accepted, sigma, g) in [
+        ("symmetric 1:1", "1.5 locks", -0.5, 1.2),
+        ("symmetric 1:1", "1.5 locks", 0.0, 1.2),
+        ("symmetric 1:1", "1.5 locks", 1.0, 1.2),
+        ("symmetric 1:1", "1.5 locks", -0.5, 1.5),
+        ("symmetric 1:1", "1.5 locks", 0.0, 1.5),
+        ("symmetric 1:1", "1.5 locks", 1.0, 1.5),
+        ("asymmetric 1:1", "4 locks", -1.14, 1.5),
+        ("three impacts per period", "4 locks", 0.0, 2.5),
+        ("chaotic", "4 locks", -1.0, 2.6),
+        ("modulated", "4 locks", 0.0, 0.8),
     ] {
-        let accepted = if regime == "symmetric 1:1" {
-            "1.5 locks"
-        } else {
-            "4 locks"
-        };
-        let case = settled(sigma, g).long(&format!("{regime}, sigma = {sigma}, G = {g}"));
-        cases.push(Case { accepted, ..case });
+        let name = format!("{regime}, sigma = {sigma}, G = {g}");
+        cases.push(Case::long(&name, accepted, &settled(sigma, g)));
     }
     // Amplitude and frequency, as a phase-locked loop near its lock changes them.
-    let retuned = at_lock.sampled("omega and E change at every sample", |n, step| {
-        let small = 1e-5 * ((n as f64 * 0.618_033_988_749_895).fract() - 0.5);
-        (step.amplitude, step.omega) = (step.amplitude * (1.0 + small), step.omega * (1.0 + small));
-    });
+    cases.push(Case::sampled(
+        "omega and E change at every sample",
+        "45 ns",
+        lock,
+        |n, step| {
+            let small = 1e-5 * ((n as f64 * 0.618_033_988_749_895).fract() - 0.5);
+            let Drive { amplitude, omega, .. } = step.drive;
+            step.drive = Drive::harmonic(amplitude * (1.0 + small), omega * (1.0 + small));
+        },
+    ));
     // The base displacement as a signal: held from sample to sample, and with the slope towards the next one.
-    let sample = move |n: usize| at_lock.step.amplitude * (TAU * (n % SAMPLES) as f64 / SAMPLES as f64).sin();
-    let held = at_lock.sampled("held sample on e, new at every sample", |n, step| {
-        (step.amplitude, step.omega, step.signal[0]) = (0.0, 0.0, sample(n));
-    });
-    let sloped = at_lock.sampled("sloped sample on e, new at every sample", |n, step| {
-        let slope = (sample(n + 1) - sample(n)) / step.duration;
-        (step.amplitude, step.omega, step.signal) = (0.0, 0.0, [sample(n), slope, 0.0, 0.0]);
-    });
-    cases.extend([retuned, held, sloped].map(|case| Case { accepted: "45 ns", ..case }));
+    let amplitude = lock.steps[0].drive.amplitude;
+    let sample = |n: usize| amplitude * (TAU * (n % SAMPLES) as f64 / SAMPLES as f64).sin();
+    cases.push(Case::sampled(
+        "held sample on e, new at every sample",
+        "45 ns",
+        lock,
+        |n, step| {
+            step.drive = Drive::held(sample(n));
+        },
+    ));
+    cases.push(Case::sampled(
+        "sloped sample on e, new at every sample",
+        "45 ns",
+        lock,
+        |n, step| {
+            step.drive = Drive::held(sample(n));
+            step.drive.signal[1] = (sample(n + 1) - sample(n)) / step.duration;
+        },
+    ));
     for step in [5e-4, 1e-4, 1e-6] {
         let name = format!("default lock, steps of {step:e} rad");
-        let case = at_lock.case(&name, "step", 10_000, step / at_lock.step.duration, |_, _| ());
-        cases.push(Case { accepted: "25 ns", ..case });
+        let steps = (10_000, step / lock.steps[0].duration);
+        cases.push(Case::new((&name, "step", "25 ns"), lock, steps, |_, _| ()));
     }
     // The baseline stalls there.
-    let chatter = Motion {
-        parameters: Parameters::dimensionless(0.05, 1.0, 0.4),
-        start: [0.1, 0.0, 0.1, 0.3],
-        ..motion([0.0; 4], 1.5 / EPSILON, 0.6)
+    let parameters = Parameters::dimensionless(0.05, 1.0, 0.4);
+    let chatter = Scene {
+        parameters,
+        ..period([0.1, 0.0, 0.1, 0.3], 1.5 / EPSILON, 0.6)
     };
-    cases.push(chatter.case("chatter into sticking and out of it", "period", 20, 1.0, |_, _| ()));
+    let name = ("chatter into sticking and out of it", "period", "");
+    cases.push(Case::new(name, &chatter, (20, 1.0), |_, _| ()));
     cases
 }
 
@@ -208,43 +201,30 @@ fn main() {
     let mut cases = cases();
     absolute(&cases);
     // `cargo test --benches` only wants to see each run once.
-    let measured = std::env::args().any(|argument| argument == "--bench");
-    let (duration, round) = if measured {
-        (DURATION, ROUND)
-    } else {
-        (Duration::ZERO, Duration::ZERO)
-    };
+    let measured = u32::from(std::env::args().any(|argument| argument == "--bench"));
+    let (duration, round) = (measured * DURATION, measured * ROUND);
     let began = Instant::now();
     while cases[0].pairs.is_empty() || began.elapsed() < duration {
         for Case { scene, pairs, work, unit, .. } in &mut cases {
-            let signal = scene.steps.iter().any(|step| step.signal != [0.0; 4]);
+            let signal = scene.steps.iter().any(|step| step.drive.signal != [0.0; 4]);
             let mut answer = measure::<Baseline>(scene, 1e-12, &[], round, LIMIT);
             if signal || answer.failure.is_some() {
                 answer = measure::<Stepped>(scene, 0.0, &[], round, LIMIT);
                 answer.ns.fill(f64::NAN);
             }
-            *work = if *unit == "impact" {
-                answer.impacts as f64
-            } else {
-                scene.steps.len() as f64
-            };
-            pairs.extend(
-                answer
-                    .plant_ns
-                    .iter()
-                    .zip(&answer.ns)
-                    .map(|(plant, brent)| [*plant, *brent]),
-            );
+            let units = [scene.steps.len() as u64, answer.impacts];
+            *work = units[usize::from(*unit == "impact")] as f64;
+            let both = answer.plant_ns.iter().zip(&answer.ns);
+            pairs.extend(both.map(|(plant, brent)| [*plant, *brent]));
         }
     }
     let lock = quartiles(&cases[0].pairs, |pair| pair[0])[1] / cases[0].work;
+    let pairs = cases[0].pairs.len();
+    println!("Medians of {pairs} pairs of turns each; a lock is the first cost.");
+    let [case, ns, locks, brent, ratio] = ["case", "ns", "locks", "Brent ns", "Brent/plant"];
     println!(
-        "Medians of {} pairs of turns each; a lock is the first cost.",
-        cases[0].pairs.len()
-    );
-    println!(
-        "{:70} {:>10} {:>8} {:>10} {:>12} {:>16}  accepted",
-        "case", "ns", "locks", "Brent ns", "Brent/plant", "quartiles"
+        "{case:70} {ns:>10} {locks:>8} {brent:>10} {ratio:>12} {:>16}  accepted",
+        "quartiles"
     );
     for Case { name, unit, accepted, pairs, work, .. } in &cases {
         let [ns, brent] = [0, 1].map(|n| quartiles(pairs, |pair| pair[n])[1] / work);

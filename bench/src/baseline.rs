@@ -4,8 +4,11 @@
 //! It shares no code with the plant but the names of its parameters, carries the phase from step to step, and knows no sticking: at the end of a
 //! chatter it stalls, and it does not see a contact that begins and ends between two points of the grid.
 
-use lovines::Parameters;
+use lovines::{Drive, Parameters, State};
 use roots::{SimpleConvergency, find_root_brent};
+
+use crate::median;
+use crate::solvers::rebound;
 
 /// Points of the grid per radian of the faster of drive and free oscillation: 24 per period.
 const POINTS_PER_RADIAN: f64 = 24.0 / core::f64::consts::TAU;
@@ -25,7 +28,7 @@ enum Free {
 
 /// The motion of the primary mass from an instant on: `M q1'' + c q1' + k q1 = k e + c e'` with `e = amplitude sin(omega t + phase)`.
 #[derive(Clone, Copy, Debug)]
-struct Motion {
+struct Trajectory {
     from: f64,
     free: Free,
     /// Particular solution `p sin + q cos` of `omega t + phase`; times `t` at an undamped resonance.
@@ -36,7 +39,7 @@ struct Motion {
     phase: f64,
 }
 
-impl Motion {
+impl Trajectory {
     fn particular(&self, t: f64) -> (f64, f64) {
         let (sin, cos) = (self.omega * t + self.phase).sin_cos();
         let x = self.p * sin + self.q * cos;
@@ -44,8 +47,10 @@ impl Motion {
         if self.secular { (x * t, v * t + x) } else { (x, v) }
     }
 
-    fn new(rig: &Parameters, amplitude: f64, omega: f64, phase: f64, from: f64, x: f64, v: f64) -> Self {
-        let Parameters { primary_mass: m, stiffness: k, damping: c, .. } = *rig;
+    /// From where the method is, under its drive.
+    fn of(method: &Baseline) -> Self {
+        let Parameters { primary_mass: m, stiffness: k, damping: c, .. } = method.rig;
+        let Baseline { drive: (amplitude, omega), phase, time: from, .. } = *method;
         let (detuning, damping) = (k - m * omega * omega, c * omega);
         let square = detuning * detuning + damping * damping;
         let secular = square == 0.0 && amplitude != 0.0;
@@ -54,25 +59,16 @@ impl Motion {
         } else if secular {
             (0.0, -amplitude * k / (2.0 * m * omega))
         } else {
-            (
-                amplitude * (k * detuning + damping * damping) / square,
-                amplitude * (damping * detuning - k * damping) / square,
-            )
+            let p = amplitude * (k * detuning + damping * damping) / square;
+            (p, amplitude * (damping * detuning - k * damping) / square)
         };
         let delta = 0.5 * c / m;
-        let mut motion = Self {
-            from,
-            free: Free::Under { delta, omega: 0.0, a: 0.0, b: 0.0 },
-            p,
-            q,
-            secular,
-            omega,
-            phase,
-        };
-        let (xp, vp) = motion.particular(from);
-        let (y, dy) = (x - xp, v - vp);
+        let free = Free::Under { delta, omega: 0.0, a: 0.0, b: 0.0 };
+        let mut trajectory = Self { from, free, p, q, secular, omega, phase };
+        let (xp, vp) = trajectory.particular(from);
+        let (y, dy) = (method.state.q1 - xp, method.state.dq1 - vp);
         let square = k / m - delta * delta;
-        motion.free = if square > 0.0 {
+        trajectory.free = if square > 0.0 {
             let omega = square.sqrt();
             Free::Under { delta, omega, a: y, b: (dy + delta * y) / omega }
         } else {
@@ -82,7 +78,7 @@ impl Motion {
             let a = (dy - second * y) / (first - second);
             Free::Over { first, second, a, b: y - a }
         };
-        motion
+        trajectory
     }
 
     /// Position and velocity `h` after it.
@@ -109,14 +105,8 @@ impl Motion {
 pub struct Baseline {
     rig: Parameters,
     tolerance: f64,
-    /// Displacement of the primary mass, m.
-    pub q1: f64,
-    /// Its velocity, m/s.
-    pub dq1: f64,
-    /// Displacement of the particle, m.
-    pub q2: f64,
-    /// Its velocity, m/s.
-    pub dq2: f64,
+    /// Displacements, m, and velocities, m/s, at the end of the last step.
+    pub state: State,
     /// Time since the start, s.
     pub elapsed: f64,
     /// Impacts since the start.
@@ -128,37 +118,38 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    /// At `start` (q1, q1', q2, q2'); impact instants are found to `tolerance` seconds.
-    pub fn new(rig: Parameters, start: [f64; 4], tolerance: f64) -> Self {
-        let [q1, dq1, q2, dq2] = start;
+    /// At `start`; impact instants are found to `tolerance` seconds.
+    pub fn new(rig: Parameters, start: State, tolerance: f64) -> Self {
+        let (elapsed, impacts, time, drive, phase) = (0.0, 0, 0.0, (0.0, 0.0), 0.0);
         Self {
             rig,
             tolerance,
-            q1,
-            dq1,
-            q2,
-            dq2,
-            elapsed: 0.0,
-            impacts: 0,
-            time: 0.0,
-            drive: (0.0, 0.0),
-            phase: 0.0,
+            state: start,
+            elapsed,
+            impacts,
+            time,
+            drive,
+            phase,
         }
     }
 
-    /// Advances by `duration` seconds under `e = amplitude sin(omega t + phase)`, the phase going on.
-    pub fn advance(&mut self, amplitude: f64, omega: f64, duration: f64) -> Result<(), Stalled> {
+    /// Advances by `duration` seconds under the harmonic part of `drive`, the phase going on.
+    ///
+    /// # Errors
+    /// The end of a chatter.
+    pub fn advance(&mut self, drive: Drive, duration: f64) -> Result<(), Stalled> {
+        let Drive { amplitude, omega, .. } = drive;
         self.drive = (amplitude, omega);
         let end = duration;
         let natural = (self.rig.stiffness / self.rig.primary_mass).sqrt();
         let grid = 1.0 / (POINTS_PER_RADIAN * natural.max(omega));
         let b = self.rig.half_width;
-        let mut motion = self.motion();
+        let mut motion = Trajectory::of(self);
         // Time since the flight's start, on a grid.
         let (mut h, mut stalled) = (0.0, 0);
         while h < end - self.time {
             let after = (h + grid).min(end - self.time);
-            let (q2, dq2) = (self.q2, self.dq2);
+            let State { q2, dq2, .. } = self.state;
             let w = |h: f64| motion.at(h).0 - (q2 + dq2 * h);
             let reached = w(after);
             if reached.abs() < b {
@@ -175,7 +166,7 @@ impl Baseline {
             };
             let (x, v) = motion.at(hit);
             self.impact(self.time + hit, x, v, wall);
-            motion = self.motion();
+            motion = Trajectory::of(self);
             h = 0.0;
             stalled += 1;
             if stalled > MOST_IMPACTS {
@@ -183,28 +174,17 @@ impl Baseline {
             }
         }
         let gone = end - self.time;
-        (self.q1, self.dq1) = motion.at(gone);
-        self.q2 += self.dq2 * gone;
+        (self.state.q1, self.state.dq1) = motion.at(gone);
+        self.state.q2 += self.state.dq2 * gone;
         self.time = 0.0;
         self.elapsed += duration;
         self.phase = (self.phase + omega * duration) % core::f64::consts::TAU;
         Ok(())
     }
 
-    fn motion(&self) -> Motion {
-        let (amplitude, omega) = self.drive;
-        Motion::new(&self.rig, amplitude, omega, self.phase, self.time, self.q1, self.dq1)
-    }
-
     fn impact(&mut self, time: f64, x: f64, v: f64, wall: f64) {
-        let Parameters { primary_mass, particle_mass, restitution, .. } = self.rig;
-        let momentum = primary_mass * v + particle_mass * self.dq2;
-        let total = primary_mass + particle_mass;
-        let separation = -restitution * (v - self.dq2);
-        self.q1 = x;
-        self.q2 = x - wall;
-        self.dq1 = (momentum + particle_mass * separation) / total;
-        self.dq2 = self.dq1 - separation;
+        let (dq1, dq2) = rebound(&self.rig, v, self.state.dq2);
+        self.state = State { q1: x, dq1, q2: x - wall, dq2 };
         self.time = time;
         self.impacts += 1;
     }
@@ -224,8 +204,7 @@ pub fn turn<E>(run: &mut impl FnMut() -> Result<(f64, f64), E>) -> Result<f64, E
         gone += ns;
         costs.push(ns / work);
     }
-    let middle = costs.len() / 2;
-    Ok(*costs.select_nth_unstable_by(middle, f64::total_cmp).1)
+    Ok(median(costs))
 }
 
 /// Nanoseconds per unit of work of both programs in the `n`-th pair of turns; each begins every other pair.
@@ -237,11 +216,7 @@ pub fn pair<E>(
     first: &mut impl FnMut() -> Result<(f64, f64), E>,
     second: &mut impl FnMut() -> Result<(f64, f64), E>,
 ) -> Result<[f64; 2], E> {
-    if n.is_multiple_of(2) {
-        let ns = turn(first)?;
-        Ok([ns, turn(second)?])
-    } else {
-        let ns = turn(second)?;
-        Ok([turn(first)?, ns])
-    }
+    let early = if n.is_multiple_of(2) { Some(turn(first)?) } else { None };
+    let second = turn(second)?;
+    Ok([early.map_or_else(|| turn(first), Ok)?, second])
 }

@@ -8,23 +8,23 @@ use lovines::{Drive, Parameters, Plant, State};
 use phase_lock::{Config, Input};
 use serde_json::{Value, json};
 
+use crate::median;
 use crate::method::begin;
 use crate::scene::Scene;
 
 /// Periods that samples are followed for.
 const PERIODS: usize = 100;
 
-/// Median wall time, ns, of repetitions for about `budget` seconds, three at least; and the work of one.
-fn timed(budget: f64, mut run: impl FnMut() -> u64) -> (f64, u64) {
+/// Wall times, ns, of repetitions for about `budget` seconds, `least` of them at least; and the work of one.
+fn timed(budget: f64, least: usize, mut run: impl FnMut() -> u64) -> (Vec<f64>, u64) {
     let began = Instant::now();
     let (mut times, mut work) = (Vec::new(), 0);
-    while times.len() < 3 || began.elapsed().as_secs_f64() < budget {
+    while times.len() < least || began.elapsed().as_secs_f64() < budget {
         let start = Instant::now();
         work = std::hint::black_box(run());
         times.push(start.elapsed().as_nanos() as f64);
     }
-    times.sort_by(f64::total_cmp);
-    (times[times.len() / 2], work)
+    (times, work)
 }
 
 /// Points `[size, ns, units of work]` of the steady scene up to `most` of what grows.
@@ -34,7 +34,7 @@ fn timed(budget: f64, mut run: impl FnMut() -> u64) -> (f64, u64) {
 pub fn growth(folder: &Path, what: &str, budget: f64, most: f64) -> anyhow::Result<Value> {
     let scene = Scene::load(folder, "steady")?;
     let start = begin(&scene).map_err(|failure| anyhow::anyhow!(failure.0))?;
-    let (drive, period) = (scene.steps[0].drive(), scene.steps[0].duration);
+    let (drive, period) = (scene.steps[0].drive, scene.steps[0].duration);
     let step_by_step = |steps: usize, duration: f64| {
         let mut plant = start;
         for _ in 0..steps {
@@ -52,14 +52,14 @@ pub fn growth(folder: &Path, what: &str, budget: f64, most: f64) -> anyhow::Resu
     let mut size = 10.0;
     while size <= most * 1.001 {
         let count = f64::round(size) as usize;
-        let (ns, work) = match what {
-            "periods" => timed(budget, || step_by_step(count, period)),
-            "impacts" => timed(budget, || in_one_step(size)),
-            "samples per period" => timed(budget, || step_by_step(PERIODS * count, period / count as f64)),
+        let (times, work) = match what {
+            "periods" => timed(budget, 3, || step_by_step(count, period)),
+            "impacts" => timed(budget, 3, || in_one_step(size)),
+            "samples per period" => timed(budget, 3, || step_by_step(PERIODS * count, period / count as f64)),
             _ => anyhow::bail!("{what}: there are periods, impacts and samples per period"),
         };
         let grown = if what == "impacts" { work as f64 } else { count as f64 };
-        points.push([grown, ns, work as f64]);
+        points.push([grown, median(times), work as f64]);
         size *= 10f64.sqrt();
     }
     Ok(json!({ "points": points }))
@@ -74,28 +74,23 @@ fn coupled(periods: usize, mut see: impl FnMut(f64, f64)) -> Plant {
     let parameters = Parameters::dimensionless(EPSILON, LAMBDA, 0.65);
     let start = State { dq2: 0.9, ..State::default() };
     let mut plant = Plant::new(parameters, start).expect("the scene makes sense");
-    let lock = Config {
+    let config = Config {
         sample_time: TAU / SAMPLES as f64,
         omega_min: 0.9,
         omega_max: 1.1,
         damping_rate: Some(0.5 * EPSILON * LAMBDA),
         ..Config::for_resonance(1.0, EPSILON * 1.1)
-    }
-    .build()
-    .expect("the settings make sense");
+    };
+    let lock = config.build().expect("the settings make sense");
     let mut state = lock.start();
     for _ in 0..periods * SAMPLES {
-        let input = Input {
-            response: plant.centre(),
-            reference: Some(plant.base_displacement()),
-            active: true,
-        };
+        let reference = Some(plant.base_displacement());
+        let input = Input { response: plant.centre(), reference, active: true };
         let output = lock.process(&mut state, input);
         see(output.amplitude, output.omega);
         let drive = Drive::harmonic(output.amplitude, output.omega);
-        plant
-            .advance(drive, TAU / SAMPLES as f64)
-            .expect("the controller puts out a valid drive");
+        let advanced = plant.advance(drive, config.sample_time);
+        advanced.expect("the controller puts out a valid drive");
     }
     plant
 }
@@ -109,12 +104,10 @@ pub fn record(periods: usize) -> Vec<[f64; 2]> {
 
 /// Nanoseconds per sample of the pair, again and again for about `budget` seconds.
 pub fn closed_loop(periods: usize, budget: f64) -> Value {
-    let began = Instant::now();
-    let mut ns = Vec::new();
-    while ns.is_empty() || began.elapsed().as_secs_f64() < budget {
-        let start = Instant::now();
+    let (times, samples) = timed(budget, 1, || {
         std::hint::black_box(coupled(periods, |_, _| {}));
-        ns.push(start.elapsed().as_nanos() as f64 / (periods * SAMPLES) as f64);
-    }
+        (periods * SAMPLES) as u64
+    });
+    let ns: Vec<f64> = times.into_iter().map(|ns| ns / samples as f64).collect();
     json!({ "ns": ns })
 }

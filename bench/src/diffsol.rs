@@ -1,62 +1,33 @@
 //! The solver library diffsol: stopped by its root functions, restarted after every impact and at the end of every step.
 
+use crate::method::Failure;
+use crate::scene::Step;
+use crate::solvers::{Flight, Solver, acceleration, rebound};
 use diffsol::{NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason};
-use lovines::Parameters;
-
-use crate::method::{Failure, Method};
-use crate::scene::{Scene, Step};
-use crate::solvers::{acceleration, rebound};
 
 type Matrix = NalgebraMat<f64>;
 
 /// So many impacts within a radian of the natural frequency are a stall.
 const MOST_IMPACTS: f64 = 1000.0;
 
-struct Flight {
-    p: Parameters,
-    tolerance: f64,
-    y: [f64; 4],
-    angle: f64,
-    time: f64,
-    impacts: u64,
-}
-
-impl Flight {
-    fn new(scene: &Scene, tolerance: f64) -> Self {
-        Self {
-            p: scene.parameters,
-            tolerance,
-            y: scene.start,
-            angle: 0.0,
-            time: 0.0,
-            impacts: 0,
-        }
-    }
-}
-
-macro_rules! method {
+macro_rules! solver {
     ($(#[$meta:meta])* $name:ident, $solver:ident $(, $linear:ty)?) => {
         $(#[$meta])*
-        pub struct $name(Flight);
+        pub struct $name;
 
-        impl Method for $name {
-            fn start(scene: &Scene, setting: f64) -> Result<Self, Failure> {
-                Ok(Self(Flight::new(scene, setting)))
-            }
-
-            fn step(&mut self, step: &Step) -> Result<(), Failure> {
-                let flight = &mut self.0;
-                let (p, y0, angle) = (flight.p, flight.y, flight.angle);
+        impl Solver for $name {
+            fn step(flight: &mut Flight, step: &Step) -> Result<(), Failure> {
+                let (p, y0, angle, omega) = (flight.p, flight.y, flight.angle, step.drive.omega);
+                let pull = |t: f64, q1: f64, v1: f64| acceleration(&p, &step.drive, angle + omega * t, q1, v1);
                 let wrong = |e: diffsol::error::DiffsolError| Failure(e.to_string());
                 let problem = OdeBuilder::<Matrix>::new()
-                    .rtol(flight.tolerance)
-                    .atol([flight.tolerance])
+                    .rtol(flight.setting)
+                    .atol([flight.setting])
                     .h0(0.01 * step.duration.min(1.0))
                     .rhs_implicit(
                         |x, _p, t, y| {
-                            let angle = angle + step.omega * t;
                             y[0] = x[1];
-                            y[1] = acceleration(&p, step.amplitude, step.omega, angle, x[0], x[1]);
+                            y[1] = pull(t, x[0], x[1]);
                             y[2] = x[3];
                             y[3] = 0.0;
                         },
@@ -67,14 +38,7 @@ macro_rules! method {
                             y[3] = 0.0;
                         },
                     )
-                    .init(
-                        |_p, _t, y| {
-                            for (n, value) in y0.into_iter().enumerate() {
-                                y[n] = value;
-                            }
-                        },
-                        4,
-                    )
+                    .init(|_p, _t, y| (0..4).for_each(|n| y[n] = y0[n]), 4)
                     .root(
                         |x, _p, _t, g| {
                             g[0] = p.half_width - (x[0] - x[2]);
@@ -105,12 +69,12 @@ macro_rules! method {
                             let (q1, v1, v3) = (y[0], y[1], y[3]);
                             let dy = &mut *state.dy;
                             dy[0] = v1;
-                            dy[1] = acceleration(&p, step.amplitude, step.omega, angle + step.omega * t, q1, v1);
+                            dy[1] = pull(t, q1, v1);
                             dy[2] = v3;
                             dy[3] = 0.0;
                             if impacts > most {
-                                let at = flight.time + t;
-                                return Err(Failure(format!("stalled at t = {at:.3} after {} impacts", flight.impacts)));
+                                flight.time += t;
+                                return Err(flight.stalled());
                             }
                             if t >= step.duration {
                                 break;
@@ -122,26 +86,18 @@ macro_rules! method {
                 let y = solver.state().y;
                 flight.y = [y[0], y[1], y[2], y[3]];
                 flight.time += step.duration;
-                flight.angle = (angle + step.omega * step.duration) % core::f64::consts::TAU;
+                flight.angle = angle + omega * step.duration;
                 Ok(())
-            }
-
-            fn state(&self) -> [f64; 4] {
-                self.0.y
-            }
-
-            fn impacts(&self) -> u64 {
-                self.0.impacts
             }
         }
     };
 }
 
-method!(
+solver!(
     /// The explicit Runge-Kutta method of order 5.
     Tsit45, tsit45
 );
-method!(
+solver!(
     /// The backward differentiation formulae.
     Bdf, bdf, NalgebraLU<f64>
 );

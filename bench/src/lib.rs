@@ -10,3 +10,10 @@ pub mod map;
 pub mod method;
 pub mod scene;
 pub mod solvers;
+
+/// The middle value; not a number for no values.
+#[must_use]
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}

@@ -13,12 +13,13 @@ use std::io::{BufRead, Write};
 use std::path::Path;
 use std::time::Duration;
 
-use serde::Deserialize;
-use serde_json::json;
+use anyhow::Context;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
 use vines_bench::baseline::Baseline;
 use vines_bench::method::{Answer, Shell, Stepped, measure};
 use vines_bench::scene::Scene;
-use vines_bench::solvers::{Moreau, Rk4};
+use vines_bench::solvers::{Moreau, Rk4, Solved};
 use vines_bench::{cost, map};
 
 /// The methods by name.
@@ -29,12 +30,12 @@ const METHODS: &[(&str, Measure)] = &[
     ("plant-general", measure::<Stepped<false>>),
     ("c-interface", measure::<Shell>),
     ("brent", measure::<Baseline>),
-    ("rk4", measure::<Rk4>),
-    ("moreau", measure::<Moreau>),
+    ("rk4", measure::<Solved<Rk4>>),
+    ("moreau", measure::<Solved<Moreau>>),
     #[cfg(feature = "diffsol")]
-    ("diffsol-tsit45", measure::<vines_bench::diffsol::Tsit45>),
+    ("diffsol-tsit45", measure::<Solved<vines_bench::diffsol::Tsit45>>),
     #[cfg(feature = "diffsol")]
-    ("diffsol-bdf", measure::<vines_bench::diffsol::Bdf>),
+    ("diffsol-bdf", measure::<Solved<vines_bench::diffsol::Bdf>>),
 ];
 
 /// [`measure`] for one method.
@@ -45,69 +46,47 @@ fn names() -> Vec<&'static str> {
     METHODS.iter().map(|(name, _)| *name).collect()
 }
 
-/// The method of that name.
-///
-/// # Errors
-/// An unknown name.
-fn named(name: &str) -> anyhow::Result<Measure> {
-    let method = METHODS.iter().find(|(other, _)| *other == name);
-    let unknown = || anyhow::anyhow!("there is no method {name}; there are {}", names().join(", "));
-    method.map(|(_, measure)| *measure).ok_or_else(unknown)
+/// A field of a request.
+fn field<T: DeserializeOwned>(request: &Value, name: &str) -> anyhow::Result<T> {
+    let value = request
+        .get(name)
+        .with_context(|| format!("the request has no {name}"))?;
+    serde_json::from_value(value.clone()).with_context(|| format!("{name} of the request"))
 }
 
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Request {
-    Run {
-        scene: String,
-        method: String,
-        setting: f64,
-        checks: Vec<usize>,
-        budget: f64,
-        limit: f64,
-    },
-    Growth {
-        growth: String,
-        budget: f64,
-        most: f64,
-    },
-    Record {
-        record: usize,
-    },
-    Loop {
-        closed_loop: usize,
-        budget: f64,
-    },
-    Methods {
-        methods: bool,
-    },
-    Map {
-        map_g: f64,
-        sigmas: Vec<f64>,
-        effort: map::Effort,
-    },
-}
-
-fn answer(folder: &Path, request: &str) -> anyhow::Result<serde_json::Value> {
-    match serde_json::from_str(request)? {
-        Request::Run { scene, method, setting, checks, budget, limit } => {
-            let scene = Scene::load(folder, &scene)?;
-            let (budget, limit) = (Duration::from_secs_f64(budget), Duration::from_secs_f64(limit));
-            let answer = named(&method)?(&scene, setting, &checks, budget, limit);
-            Ok(serde_json::to_value(answer)?)
-        }
-        Request::Growth { growth, budget, most } => cost::growth(folder, &growth, budget, most),
-        Request::Record { record } => Ok(json!({"drives": cost::record(record)})),
-        Request::Loop { closed_loop, budget } => Ok(cost::closed_loop(closed_loop, budget)),
-        Request::Map { map_g, sigmas, effort } => Ok(serde_json::to_value(map::row(map_g, &sigmas, &effort)?)?),
-        Request::Methods { methods } => Ok(json!(methods.then(names))),
-    }
+fn answer(folder: &Path, request: &str) -> anyhow::Result<Value> {
+    let r: &Value = &serde_json::from_str(request)?;
+    let asks = |name| r.get(name).is_some();
+    Ok(if asks("scene") {
+        let (scene, name): (String, String) = (field(r, "scene")?, field(r, "method")?);
+        let unknown = || format!("there is no method {name}; there are {}", names().join(", "));
+        let (_, measure) = METHODS
+            .iter()
+            .find(|(method, _)| *method == name)
+            .with_context(unknown)?;
+        let (scene, checks): (_, Vec<usize>) = (Scene::load(folder, &scene)?, field(r, "checks")?);
+        let [budget, limit] = [field(r, "budget")?, field(r, "limit")?].map(Duration::from_secs_f64);
+        serde_json::to_value(measure(&scene, field(r, "setting")?, &checks, budget, limit))?
+    } else if asks("growth") {
+        let what: String = field(r, "growth")?;
+        cost::growth(folder, &what, field(r, "budget")?, field(r, "most")?)?
+    } else if asks("record") {
+        json!({"drives": cost::record(field(r, "record")?)})
+    } else if asks("closed_loop") {
+        cost::closed_loop(field(r, "closed_loop")?, field(r, "budget")?)
+    } else if asks("map_g") {
+        let (sigmas, effort): (Vec<f64>, map::Effort) = (field(r, "sigmas")?, field(r, "effort")?);
+        serde_json::to_value(map::row(field(r, "map_g")?, &sigmas, &effort)?)?
+    } else if asks("methods") {
+        json!(names())
+    } else {
+        anyhow::bail!("unknown request")
+    })
 }
 
 fn main() -> std::io::Result<()> {
-    let folder = std::env::args_os()
-        .nth(1)
-        .unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
+    let folder = std::env::args_os().nth(1);
+    let folder = folder.unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
     for line in std::io::stdin().lock().lines() {
         let line = line?;
         let answer = answer(Path::new(&folder), &line).unwrap_or_else(|error| json!({"error": format!("{error:#}")}));
@@ -122,28 +101,29 @@ fn main() -> std::io::Result<()> {
 mod tests {
     use super::*;
 
-    /// Largest error of a method at the end of a scene.
-    fn error_at_the_end(scene: &str, method: &str, setting: f64) -> f64 {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let text = std::fs::read_to_string(folder.join("truth.json")).expect("the truth");
-        let truth: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-        let last = truth[scene]["rows"].as_array().and_then(|rows| rows.last());
-        let last = last.expect("a last row");
-        let loaded = Scene::load(folder, scene).expect("a scene");
-        let (once, limit) = (Duration::ZERO, Duration::from_secs(60));
-        let answer = named(method).expect("a method")(&loaded, setting, &[], once, limit);
-        assert_eq!(answer.failure, None, "{method} in {scene}");
-        let states = answer.states.last().expect("the state at the end");
-        let error = |(n, x): (usize, &f64)| {
-            let truth: f64 = last[n + 1].as_str().and_then(|x| x.parse().ok()).expect("a number");
-            (x - truth).abs()
-        };
-        states.iter().enumerate().map(error).fold(0.0, f64::max)
-    }
-
     #[test]
     fn the_methods_lead_where_40_digit_arithmetic_does() {
-        let scenes = [
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(folder.join("truth.json")).expect("the truth");
+        let truth: Value = serde_json::from_str(&text).expect("JSON");
+        // Largest error at the end of a scene.
+        let error = |scene: &str, method: &str, setting: f64| {
+            let last = truth[scene]["rows"]
+                .as_array()
+                .and_then(|rows| rows.last())
+                .expect("a last row");
+            let request = json!({
+                "scene": scene, "method": method, "setting": setting, "checks": [], "budget": 0.0, "limit": 60.0
+            });
+            let answer = answer(folder, &request.to_string()).expect("an answer");
+            assert_eq!(answer["failure"], Value::Null, "{method} in {scene}");
+            let error = |n: usize| {
+                let truth: f64 = last[n + 1].as_str().and_then(|x| x.parse().ok()).expect("a number");
+                (answer["states"][0][n].as_f64().expect("a number") - truth).abs()
+            };
+            (0..4).map(error).fold(0.0, f64::max)
+        };
+        for scene in [
             "decay",
             "grazing",
             "damped",
@@ -152,16 +132,15 @@ mod tests {
             "asymmetric",
             "three",
             "chaotic",
-        ];
-        for scene in scenes {
+        ] {
             // In the chaotic scene a disturbance grows by 1e5.
             let growth = if scene == "chaotic" { 1e2 } else { 1.0 };
             for (method, setting, limit) in [("plant", 0.0, 1e-11), ("brent", 1e-12, 1e-9)] {
-                let error = error_at_the_end(scene, method, setting);
+                let error = error(scene, method, setting);
                 assert!(error < growth * limit, "{scene}, {method}: {error:e}");
             }
         }
-        assert!(error_at_the_end("decay", "rk4", 1000.0) < 1e-7);
-        assert!(error_at_the_end("chatter", "moreau", 10_000.0) < 1e-2);
+        assert!(error("decay", "rk4", 1000.0) < 1e-7);
+        assert!(error("chatter", "moreau", 10_000.0) < 1e-2);
     }
 }

@@ -13,6 +13,8 @@ use serde::{Deserialize, Serialize};
 use vines_model::{Dimensionless, map::observe, regime::Regime};
 
 use crate::baseline::Baseline;
+use crate::median;
+use crate::scene::{numbers, state};
 
 /// Mass ratio of the default scene (scenes/paper.toml).
 const EPSILON: f64 = 0.032 / 3.807;
@@ -97,43 +99,43 @@ impl Settled {
         Self::from(State { dq2: 0.9027, ..State::default() }, sigma, g)
     }
 
-    fn state(&self) -> [f64; 4] {
-        let State { q1, dq1, q2, dq2 } = self.plant.state();
-        [q1, dq1, q2, dq2]
+    /// The length of some periods of the drive, s.
+    fn periods(&self, count: u32) -> f64 {
+        f64::from(count) * TAU / self.drive.omega
     }
 
     /// Wall time of `periods` in one step with the state read at the end, ns, and what the step met.
     fn timed(&self, periods: u32) -> anyhow::Result<(f64, Outcome)> {
         let mut plant = self.plant;
-        let duration = f64::from(periods) * TAU / self.drive.omega;
         let began = Instant::now();
-        let outcome = plant.advance(black_box(self.drive), duration);
+        let outcome = plant.advance(black_box(self.drive), self.periods(periods));
         black_box(plant.state());
         Ok((began.elapsed().as_nanos() as f64, outcome?))
     }
 
+    fn baseline(&self, tolerance: f64) -> Baseline {
+        Baseline::new(*self.plant.parameters(), self.plant.state(), tolerance)
+    }
+
     /// Nanoseconds of the baseline per impact, or per period of a motion without impacts; none if it stalls.
-    fn baseline(&self, periods: u32) -> Option<f64> {
-        let Drive { amplitude, omega, .. } = self.drive;
-        let mut brent = Baseline::new(*self.plant.parameters(), self.state(), TOLERANCES.1);
+    fn timed_baseline(&self, periods: u32) -> Option<f64> {
+        let mut brent = self.baseline(TOLERANCES.1);
         let began = Instant::now();
-        let ended = brent.advance(black_box(amplitude), omega, f64::from(periods) * TAU / omega);
-        black_box(brent.q1);
+        let ended = brent.advance(black_box(self.drive), self.periods(periods));
+        black_box(brent.state);
         let ns = began.elapsed().as_nanos() as f64;
         ended.is_ok().then_some(ns / units(brent.impacts, periods))
     }
 
     /// Largest difference of plant and baseline after some periods; none if the latter stalls.
     fn difference(&self) -> Option<f64> {
-        let (mut plant, drive) = (self.plant, self.drive);
-        let mut brent = Baseline::new(*plant.parameters(), self.state(), TOLERANCES.0);
+        let (mut plant, mut brent) = (self.plant, self.baseline(TOLERANCES.0));
         for _ in 0..COMPARED {
-            plant.advance(drive, TAU / drive.omega).ok()?;
-            brent.advance(drive.amplitude, drive.omega, TAU / drive.omega).ok()?;
+            plant.advance(self.drive, self.periods(1)).ok()?;
+            brent.advance(self.drive, self.periods(1)).ok()?;
         }
-        let s = plant.state();
-        let off = [brent.q1 - s.q1, brent.dq1 - s.dq1, brent.q2 - s.q2, brent.dq2 - s.dq2];
-        off.into_iter().map(f64::abs).reduce(f64::max)
+        let both = numbers(plant.state()).into_iter().zip(numbers(brent.state));
+        both.map(|(a, b)| (b - a).abs()).reduce(f64::max)
     }
 }
 
@@ -155,30 +157,31 @@ impl Timed {
     fn new(sigma: f64, g: f64) -> anyhow::Result<Self> {
         let settled = Settled::new(sigma, g)?;
         let scene = Dimensionless::of(settled.plant.parameters(), settled.drive.amplitude);
-        let found = observe(&scene, sigma, settled.state(), SETTLING as usize)?;
+        let found = observe(&scene, sigma, numbers(settled.plant.state()), SETTLING as usize)?;
         // What is timed is the regime that was found, not the transient before it, whose length depends on rounding.
-        let [q1, dq1, q2, dq2] = found.state;
-        let settled = Settled::from(State { q1, dq1, q2, dq2 }, sigma, g)?;
+        let settled = Settled::from(state(found.state), sigma, g)?;
+        let impacts_per_period = found.impacts_per_period;
         let repeats = found.periods > 0 || found.regime == Regime::NoImpacts;
-        let rare = 0.0 < found.impacts_per_period && found.impacts_per_period < 1.0;
+        let rare = 0.0 < impacts_per_period && impacts_per_period < 1.0;
         let cell = Cell {
             sigma,
             g,
             regime: if rare { RARE } else { found.regime.name() },
-            impacts_per_period: found.impacts_per_period,
-            unit: if found.impacts_per_period < 1.0 {
-                "period"
-            } else {
-                "impact"
-            },
+            impacts_per_period,
+            unit: if impacts_per_period < 1.0 { "period" } else { "impact" },
             ns: f64::NAN,
             ratio: f64::NAN,
             evaluations: f64::NAN,
             brent_ns: None,
             difference: repeats.then(|| settled.difference()).flatten(),
         };
-        let (lock_ns, ns, brent_ns) = (Vec::new(), Vec::new(), Vec::new());
-        Ok(Self { settled, cell, lock_ns, ns, brent_ns })
+        Ok(Self {
+            settled,
+            cell,
+            lock_ns: Vec::new(),
+            ns: Vec::new(),
+            brent_ns: Vec::new(),
+        })
     }
 
     /// One run of the lock, of the plant, and of the closed form with Brent's method.
@@ -189,7 +192,7 @@ impl Timed {
         let units = units(outcome.impacts, effort.periods);
         self.ns.push(ns / units);
         self.cell.evaluations = outcome.evaluations as f64 / units;
-        self.brent_ns.push(self.settled.baseline(effort.brent_periods));
+        self.brent_ns.push(self.settled.timed_baseline(effort.brent_periods));
         Ok(())
     }
 
@@ -217,44 +220,36 @@ pub fn row(g: f64, sigmas: &[f64], effort: &Effort) -> anyhow::Result<Row> {
         }
     }
     let lock_ns = median(begun.iter().flat_map(|cell| cell.lock_ns.clone()).collect());
-    Ok(Row {
-        cells: begun.into_iter().map(Timed::judge).collect(),
-        lock_ns,
-    })
-}
-
-/// The middle value; not a number for no values.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    let cells = begun.into_iter().map(Timed::judge).collect();
+    Ok(Row { cells, lock_ns })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const SHORT: Effort = Effort { periods: 20, brent_periods: 20, runs: 3 };
-
     #[test]
     fn regimes_are_told_apart_and_the_two_methods_agree_where_motion_repeats() {
-        let expected = [
+        let cell = |g: f64, sigma: f64| {
+            let row = row(g, &[sigma], &Effort { periods: 20, brent_periods: 20, runs: 3 });
+            row.map(|mut row| row.cells.remove(0))
+        };
+        for (g, sigma, name) in [
             (1.2, -3.0, "symmetric 1:1"),
             (1.2, 0.0, "symmetric 1:1"),
             (1.2, 1.0, "symmetric 1:1"),
             (1.5, -1.14, "asymmetric 1:1"),
             (2.5, 0.0, "n impacts"),
-        ];
-        for (g, sigma, name) in expected {
-            let row = row(g, &[sigma], &SHORT).expect("a row");
-            let cell = &row.cells[0];
+        ] {
+            let cell = cell(g, sigma).expect("a row");
             assert_eq!(cell.regime, name, "sigma = {sigma}, G = {g}");
             let difference = cell.difference.expect("a motion that repeats");
             assert!(difference < 1e-11, "{sigma}, {g}: {difference:e}");
             assert!(cell.ratio > 0.0 && cell.brent_ns.is_some());
         }
-        let rare = row(0.1, &[-4.0], &SHORT).expect("a row");
-        assert_eq!((rare.cells[0].regime, rare.cells[0].unit), (RARE, "period"));
-        let refused = row(1.0, &[-200.0], &SHORT).unwrap_err();
+        let rare = cell(0.1, -4.0).expect("a row");
+        assert_eq!((rare.regime, rare.unit), (RARE, "period"));
+        let refused = cell(1.0, -200.0).unwrap_err();
         assert!(refused.to_string().contains("sigma = -200"), "{refused}");
     }
 }

@@ -5,11 +5,11 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use fmi2_boundary::{Fmu, Interface, Master};
-use lovines::Plant;
+use lovines::{Plant, State};
 use serde::Serialize;
 
 use crate::baseline::{self, Baseline};
-use crate::scene::{Scene, Step};
+use crate::scene::{Scene, Step, numbers, state};
 
 /// How a method failed.
 #[derive(Clone, Debug)]
@@ -29,8 +29,8 @@ pub trait Method: Sized {
     /// A step that the method could not finish.
     fn step(&mut self, step: &Step) -> Result<(), Failure>;
 
-    /// q1, q1', q2, q2' now.
-    fn state(&self) -> [f64; 4];
+    /// The state now.
+    fn state(&self) -> State;
 
     /// Impacts so far, as this method counts them.
     fn impacts(&self) -> u64;
@@ -70,21 +70,19 @@ pub fn measure<M: Method>(scene: &Scene, setting: f64, checks: &[usize], budget:
         Ok((ns, 1.0))
     };
     let mut failure = None;
-    while ns.is_empty() || began.elapsed() < budget {
+    while failure.is_none() && (ns.is_empty() || began.elapsed() < budget) {
         match baseline::pair(ns.len(), &mut plant, &mut method) {
             Ok(pair) => {
                 plant_ns.push(pair[0]);
                 ns.push(pair[1]);
             }
-            Err(Failure(how)) => {
-                failure = Some(how);
-                break;
-            }
+            Err(Failure(how)) => failure = Some(how),
         }
     }
     Answer { ns, plant_ns, failure, ..answer }
 }
 
+/// Nanoseconds and impacts of a run; adds the states after the steps in `checks`, or the state at the end if there are none.
 fn run<M: Method>(
     scene: &Scene,
     setting: f64,
@@ -108,20 +106,17 @@ fn run<M: Method>(
             std::hint::black_box(method.state());
         }
         if checks.contains(&stop) {
-            states.push(method.state());
+            states.push(numbers(method.state()));
         }
         done = stop;
         if began.elapsed() > limit {
-            return Err(Failure(format!(
-                "time limit: {:.2} % done after {} s",
-                100.0 * done as f64 / steps.len() as f64,
-                limit.as_secs_f64()
-            )));
+            let (part, limit) = (100.0 * done as f64 / steps.len() as f64, limit.as_secs_f64());
+            return Err(Failure(format!("time limit: {part:.2} % done after {limit} s")));
         }
     }
     let ns = began.elapsed().as_nanos() as f64;
     if states.is_empty() {
-        states.push(method.state());
+        states.push(numbers(method.state()));
     }
     Ok((ns, method.impacts()))
 }
@@ -132,9 +127,9 @@ fn run<M: Method>(
 /// A scene that it refuses.
 pub fn begin(scene: &Scene) -> Result<Plant, Failure> {
     let refused = |error: lovines::InvalidValue| Failure(error.to_string());
-    let mut plant = Plant::new(scene.parameters, scene.state()).map_err(refused)?;
+    let mut plant = Plant::new(scene.parameters, scene.start).map_err(refused)?;
     if let Some(first) = scene.steps.first() {
-        plant.begin(first.drive()).map_err(refused)?;
+        plant.begin(first.drive).map_err(refused)?;
     }
     Ok(plant)
 }
@@ -152,7 +147,7 @@ impl<const FAST: bool, const PARTS: u32, const JOINED: bool> Method for Stepped<
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
         for _ in 0..PARTS {
-            let advanced = self.0.advance(step.drive(), step.duration / f64::from(PARTS));
+            let advanced = self.0.advance(step.drive, step.duration / f64::from(PARTS));
             advanced.map_err(|error| Failure(error.to_string()))?;
             if PARTS > 1 {
                 std::hint::black_box((self.0.centre(), self.0.base_displacement()));
@@ -161,9 +156,8 @@ impl<const FAST: bool, const PARTS: u32, const JOINED: bool> Method for Stepped<
         Ok(())
     }
 
-    fn state(&self) -> [f64; 4] {
-        let s = self.0.state();
-        [s.q1, s.dq1, s.q2, s.dq2]
+    fn state(&self) -> State {
+        self.0.state()
     }
 
     fn impacts(&self) -> u64 {
@@ -182,46 +176,47 @@ impl<const FAST: bool, const PARTS: u32, const JOINED: bool> Method for Stepped<
 pub struct Shell {
     rig: Master,
     time: f64,
-    state: [f64; 4],
+    state: State,
 }
 
 /// Value references of q1, der(q1), q2 and der(q2), and of omega and E.
 const STATE: [u32; 4] = [9, 10, 11, 12];
 const INPUTS: [u32; 2] = [8, 7];
 
+impl Shell {
+    fn set(&self, step: &Step) {
+        let inputs = [step.drive.omega, step.drive.amplitude];
+        self.rig.well(self.rig.set_reals(&INPUTS, &inputs));
+    }
+}
+
 impl Method for Shell {
     fn start(scene: &Scene, _setting: f64) -> Result<Self, Failure> {
         static PLANT: OnceLock<Fmu> = OnceLock::new();
         let rig = Master::new(PLANT.get_or_init(Fmu::plant), Interface::CoSimulation);
         let p = &scene.parameters;
-        let masses = [
-            p.primary_mass,
-            p.stiffness,
-            p.damping,
-            p.particle_mass,
-            p.half_width,
-            p.restitution,
-        ];
-        for (vr, value) in (0..).zip(masses).chain(STATE.into_iter().zip(scene.start)) {
+        let masses = [p.primary_mass, p.stiffness, p.damping, p.particle_mass];
+        let all = masses.into_iter().chain([p.half_width, p.restitution]);
+        for (vr, value) in (0..).zip(all).chain(STATE.into_iter().zip(numbers(scene.start))) {
             rig.well(rig.set_real(vr, value));
         }
+        let shell = Self { rig, time: 0.0, state: scene.start };
         if let Some(first) = scene.steps.first() {
-            rig.well(rig.set_reals(&INPUTS, &[first.omega, first.amplitude]));
+            shell.set(first);
         }
-        rig.start();
-        Ok(Self { rig, time: 0.0, state: scene.start })
+        shell.rig.start();
+        Ok(shell)
     }
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
-        self.rig
-            .well(self.rig.set_reals(&INPUTS, &[step.omega, step.amplitude]));
+        self.set(step);
         self.rig.well(self.rig.step(self.time, step.duration));
         self.time += step.duration;
-        self.state = self.rig.reals(&STATE);
+        self.state = state(self.rig.reals(&STATE));
         Ok(())
     }
 
-    fn state(&self) -> [f64; 4] {
+    fn state(&self) -> State {
         self.state
     }
 
@@ -237,15 +232,15 @@ impl Method for Baseline {
     }
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
-        let ended = self.advance(step.amplitude, step.omega, step.duration);
+        let ended = self.advance(step.drive, step.duration);
         ended.map_err(|_| {
             let (t, n) = (self.elapsed, self.impacts);
             Failure(format!("stalled in the step from t = {t:.3} on, after {n} impacts"))
         })
     }
 
-    fn state(&self) -> [f64; 4] {
-        [self.q1, self.dq1, self.q2, self.dq2]
+    fn state(&self) -> State {
+        self.state
     }
 
     fn impacts(&self) -> u64 {

@@ -18,8 +18,10 @@ fn locks_at_the_natural_frequency_from_ten_percent_off() {
         assert!(relative(output.frequency, OMEGA_0) < 4e-5, "{output:?}");
         assert!(relative(output.response_amplitude, AMPLITUDE / (2.0 * ZETA)) < 5e-3);
         let output = bench.run(400);
-        assert!(relative(output.frequency, OMEGA_0) < 1e-6, "{output:?}");
-        assert!(relative(output.omega, OMEGA_0) < 1e-6, "{output:?}");
+        assert!(
+            relative(output.frequency, OMEGA_0).max(relative(output.omega, OMEGA_0)) < 1e-6,
+            "{output:?}"
+        );
         assert!(output.locked && output.settled);
     }
 }
@@ -51,9 +53,8 @@ fn locked_frequency_with_a_late_sensor(delay_samples: f64, measured_reference: b
     let mut frequency = 0.0;
     for _ in 0..80_000 {
         let now = (bench.resonator.q, bench.resonator.base);
-        frequency = bench
-            .sample_reading(late.0, measured_reference.then_some(late.1))
-            .frequency;
+        let reference = measured_reference.then_some(late.1);
+        frequency = bench.sample_reading(late.0, reference).frequency;
         late = now;
     }
     frequency
@@ -68,23 +69,18 @@ fn a_stated_delay_is_compensated_and_one_common_to_both_sensors_cancels() {
 
 #[test]
 fn follows_a_resonance_that_moves() {
-    let mut bench = Bench::new(config());
-    bench.run_to_lock(2000).expect("a lock");
+    let mut bench = Bench::locked(config());
     for _ in 0..500 * 100 {
         bench.resonator.omega_0 -= 1e-5 * OMEGA_0 / 100.0;
         let output = bench.sample();
-        assert!(
-            output.locked && output.phase_error.is_some_and(|error| error.abs() < 0.02),
-            "{output:?}"
-        );
+        assert!(output.locked && output.phase_error.unwrap().abs() < 0.02, "{output:?}");
     }
     assert!(relative(bench.run(400).frequency, 0.995 * OMEGA_0) < 1e-5);
 }
 
 #[test]
 fn retuning_keeps_the_lock_settles_again_and_leaves_no_trace_of_the_values_before() {
-    let mut bench = Bench::new(config());
-    bench.run_to_lock(2000).expect("a lock");
+    let mut bench = Bench::locked(config());
     let target = config().phase_target;
     bench.retune(0.9 * AMPLITUDE, target);
     let output = bench.sample();
@@ -93,13 +89,8 @@ fn retuning_keeps_the_lock_settles_again_and_leaves_no_trace_of_the_values_befor
     assert!(output.locked && output.settled);
     assert!(relative(output.response_amplitude, 0.9 * AMPLITUDE / (2.0 * ZETA)) < 1e-3);
 
-    let (ramp_rate, release_rate) = (Some(AMPLITUDE), Some(0.1 * AMPLITUDE));
-    let config = Config {
-        ramp_rate,
-        release_rate,
-        amplitude_max: Some(1.0),
-        ..config()
-    };
+    let (ramp_rate, release_rate, amplitude_max) = (Some(AMPLITUDE), Some(0.1 * AMPLITUDE), Some(1.0));
+    let config = Config { ramp_rate, release_rate, amplitude_max, ..config() };
     let mut retuned = config.build().unwrap();
     for amplitude in [100.0 * AMPLITUDE, 0.0, AMPLITUDE] {
         retuned.retune(amplitude, target).unwrap();
@@ -113,8 +104,7 @@ fn the_base_amplitude_is_controlled_if_base_bandwidth_is_set() {
     let mut output = bench.sample();
     for _ in 0..60_000 {
         // A shaker with a gain of 0.8.
-        let (q, base) = (bench.resonator.q, 0.8 * bench.resonator.base);
-        output = bench.sample_reading(q, Some(base));
+        output = bench.sample_through(|q, base| [q, 0.8 * base]);
     }
     assert!(relative(output.amplitude, AMPLITUDE / 0.8) < 1e-6, "{output:?}");
     assert!(output.locked);
@@ -130,9 +120,8 @@ fn locks_through_sensor_noise() {
         let mut locked = None;
         for n in 0..1000 * 100 {
             // Uniform within ±a has the power a²/3.
-            let q = bench.resonator.q + share * amplitude * 1.5_f64.sqrt() * noise.next();
-            let base = bench.resonator.base;
-            let output = bench.sample_reading(q, Some(base));
+            let noise = share * amplitude * 1.5_f64.sqrt() * noise.next();
+            let output = bench.sample_through(|q, base| [q + noise, base]);
             if output.locked {
                 locked.get_or_insert(n / 100);
                 assert!(relative(output.frequency, OMEGA_0) < tolerance);
@@ -172,10 +161,6 @@ fn two_runs_give_the_same_bits() {
         outputs
     };
     let (first, second) = (outputs(), outputs());
-    for (a, b) in first.iter().zip(&second) {
-        assert_eq!(a.omega.to_bits(), b.omega.to_bits());
-        assert_eq!(a.phase_error.map(f64::to_bits), b.phase_error.map(f64::to_bits));
-    }
     assert_eq!(first, second);
     assert_eq!(first[0].state, LoopState::Ramping);
 }
@@ -183,34 +168,20 @@ fn two_runs_give_the_same_bits() {
 #[test]
 fn a_new_phase_target_is_acquired_with_the_drive_on() {
     for change in [-0.5, -0.2, 0.2, 0.5] {
-        let mut bench = Bench::new(config());
-        bench.run_to_lock(3000).expect("a lock");
+        let mut bench = Bench::locked(config());
         let amplitude = bench.controller.config().amplitude;
         let target = bench.controller.config().phase_target + change;
         bench.retune(amplitude, target);
         let output = bench.sample();
         assert!(!output.locked && output.amplitude == amplitude);
         let (_, output) = bench.run_to_lock(3000).expect("a lock");
-        assert!(
-            output.phase_error.is_some_and(|error| error.abs() < 0.01),
-            "{change}: {output:?}"
-        );
+        assert!(output.phase_error.unwrap().abs() < 0.01, "{change}: {output:?}");
         assert_eq!(output.amplitude, amplitude);
     }
 }
 
 #[test]
-fn a_ramp_down_to_zero_has_the_rate_of_the_ramp_up() {
-    let mut bench = Bench::new(Config { ramp_rate: Some(AMPLITUDE), ..config() });
-    bench.run_to_lock(3000).expect("a lock");
-    bench.retune(0.0, bench.controller.config().phase_target);
-    let samples = (1.05 / bench.controller.config().sample_time) as usize;
-    let output = (0..samples).map(|_| bench.sample()).last().unwrap();
-    assert_eq!(output.amplitude, 0.0);
-}
-
-#[test]
-fn ramps_stay_within_their_rates() {
+fn ramps_stay_within_their_rates_and_a_ramp_down_has_the_rate_of_the_ramp_up() {
     let mut bench = Bench::new(Config {
         ramp_rate: Some(0.5 * AMPLITUDE),
         omega_rate: Some(0.5),
@@ -227,6 +198,10 @@ fn ramps_stay_within_their_rates() {
         before = output;
     }
     assert!(before.locked);
+    bench.retune(0.0, bench.controller.config().phase_target);
+    let samples = (2.0 * 1.05 / sample_time) as usize;
+    let outputs: Vec<_> = (0..samples).map(|_| bench.sample()).collect();
+    assert!(outputs[samples / 2].amplitude > 0.4 * amplitude && outputs[samples - 1].amplitude == 0.0);
 }
 
 #[test]
@@ -251,28 +226,18 @@ fn an_invalid_configuration_is_refused_by_name() {
 
 #[test]
 fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
-    let mut bench = Bench::new(Config {
-        amplitude_max: Some(4.0 * AMPLITUDE),
-        damping_rate: Some(ZETA * OMEGA_0),
-        ..config()
-    });
-    bench.run_to_lock(2000).expect("a lock");
+    let (amplitude_max, damping_rate) = (Some(4.0 * AMPLITUDE), Some(ZETA * OMEGA_0));
+    let mut bench = Bench::locked(Config { amplitude_max, damping_rate, ..config() });
     let before = AMPLITUDE / (2.0 * ZETA);
     for (share, drive) in [(0.8, -0.2 * AMPLITUDE), (1.3, 0.0)] {
-        let to = Move {
-            response: share * before,
-            duration: 0.5,
-            amplitude: drive,
-            ..Move::default()
-        };
-        bench.hold(to);
+        let response = share * before;
+        bench.hold(Move { response, duration: 0.5, amplitude: drive, ..Move::default() });
         // A free transient would decay by a factor of 2.6 in 30 periods.
         let output = bench.run(30);
-        println!("{share}: {:.5}", output.response_amplitude / before);
-        assert!(relative(output.response_amplitude, share * before) < 0.02);
-        assert!(output.locked && output.response_target == Some(share * before));
+        assert!(relative(output.response_amplitude, response) < 0.02);
+        assert!(output.locked && output.response_target == Some(response));
         let output = bench.run(200);
-        assert!(relative(output.response_amplitude, share * before) < 1e-5);
+        assert!(relative(output.response_amplitude, response) < 1e-5);
         assert!(relative(output.amplitude, share * AMPLITUDE) < 1e-5);
         assert!(output.settled);
     }
@@ -290,12 +255,12 @@ fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
 #[test]
 fn the_response_cannot_be_controlled_without_a_limit_of_the_drive_or_in_an_open_loop() {
     let to = Move { response: 0.01, ..Move::default() };
-    let mut bench = Bench::new(Config { amplitude_max: None, ..config() });
-    bench.run(10);
     let refusal = |bench: &mut Bench, to| {
         let refused = bench.controller.hold_response(&mut bench.state, to);
         refused.expect_err("must be refused").to_string()
     };
+    let mut bench = Bench::new(Config { amplitude_max: None, ..config() });
+    bench.run(10);
     assert!(refusal(&mut bench, to).starts_with("amplitude_max = none is refused"));
     let mut bench = Bench::new(Config { amplitude_max: Some(1.0), ..config() });
     assert!(refusal(&mut bench, to).starts_with("state = 0 is refused"));

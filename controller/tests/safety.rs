@@ -2,7 +2,7 @@
 
 mod rig;
 
-use phase_lock::{Config, Fault, LockCriterion, LoopState, Move};
+use phase_lock::{Config, Fault, LockCriterion, LoopState, Move, Output};
 use rig::{AMPLITUDE, Bench, Noise, OMEGA_0, config};
 
 #[test]
@@ -27,8 +27,8 @@ fn never_locks_on_a_zero_signal_on_noise_or_without_a_drive() {
     };
     let (mut bench, mut noise) = (Bench::new(Config { lock, ..config() }), Noise(7));
     for _ in 0..200_000 {
-        let base = bench.resonator.base;
-        let output = bench.sample_reading(noise.next(), Some(base));
+        let noise = noise.next();
+        let output = bench.sample_through(|_, base| [noise, base]);
         assert!(!output.locked, "{output:?}");
     }
 }
@@ -37,8 +37,7 @@ fn never_locks_on_a_zero_signal_on_noise_or_without_a_drive() {
 fn an_invalid_reading_ramps_the_drive_down_and_latches() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
         for (response, reference) in [(bad, 0.0), (0.0, bad)] {
-            let mut bench = Bench::new(Config { ramp_rate: Some(AMPLITUDE), ..config() });
-            bench.run_to_lock(2000).expect("a lock");
+            let mut bench = Bench::locked(Config { ramp_rate: Some(AMPLITUDE), ..config() });
             let before = bench.sample().amplitude;
             let output = bench.sample_reading(response, Some(reference));
             assert_eq!((output.state, output.fault), (LoopState::Tripped, Some(Fault::Sensor)));
@@ -57,11 +56,8 @@ fn an_invalid_reading_ramps_the_drive_down_and_latches() {
 #[test]
 fn too_large_a_response_and_a_search_that_lasts_too_long_trip() {
     let mut bench = Bench::new(Config { response_max: Some(50.0 * AMPLITUDE), ..config() });
-    let output = bench.run(400);
-    assert_eq!(
-        (output.state, output.fault),
-        (LoopState::Tripped, Some(Fault::ResponseTooLarge))
-    );
+    let Output { state, fault, .. } = bench.run(400);
+    assert_eq!((state, fault), (LoopState::Tripped, Some(Fault::ResponseTooLarge)));
     // Only the time limit ends a search for a response of zero.
     let mut bench = Bench::new(Config { acquire_timeout: Some(0.5), residual_max: None, ..config() });
     let states: Vec<_> = (0..600).map(|_| bench.sample_reading(0.0, None).state).collect();
@@ -71,20 +67,15 @@ fn too_large_a_response_and_a_search_that_lasts_too_long_trip() {
 
 #[test]
 fn a_lost_lock_is_latched_and_a_disturbance_between_the_two_tolerances_does_not_lose_it() {
-    let mut bench = Bench::new(Config { residual_max: None, ..config() });
-    bench.run_to_lock(2000).expect("a lock");
+    let mut bench = Bench::locked(Config { residual_max: None, ..config() });
     bench.resonator.omega_0 *= 1.1;
-    let output = bench.run(100);
-    assert_eq!(
-        (output.state, output.fault),
-        (LoopState::LockLost, Some(Fault::LockLost))
-    );
+    let Output { state, fault, .. } = bench.run(100);
+    assert_eq!((state, fault), (LoopState::LockLost, Some(Fault::LockLost)));
     bench.resonator.omega_0 /= 1.1;
     let output = bench.run(500);
     assert_eq!((output.state, output.amplitude), (LoopState::LockLost, 0.0));
 
-    let mut bench = Bench::new(config());
-    bench.run_to_lock(2000).expect("a lock");
+    let mut bench = Bench::locked(config());
     bench.resonator.omega_0 *= 1.0005;
     let errors = (0..100 * 100).map(|_| {
         let output = bench.sample();
@@ -113,15 +104,14 @@ fn the_drive_is_switched_off_at_once_or_with_a_ramp_as_configured() {
 
 /// A bench with the response amplitude controlled at half of its value at the lock, and a limited drive.
 fn holding(config: Config) -> Bench {
-    let mut bench = Bench::new(Config { amplitude_max: Some(2.0 * AMPLITUDE), ..config });
-    bench.run_to_lock(2000).expect("a lock");
-    let to = Move {
-        response: 0.5 * bench.sample().response_amplitude,
+    let mut bench = Bench::locked(Config { amplitude_max: Some(2.0 * AMPLITUDE), ..config });
+    let response = 0.5 * bench.sample().response_amplitude;
+    bench.hold(Move {
+        response,
         duration: 1.0,
         amplitude: -0.5 * AMPLITUDE,
         ..Move::default()
-    };
-    bench.hold(to);
+    });
     bench.run(200);
     bench
 }
@@ -144,9 +134,7 @@ fn a_response_that_fades_out_does_not_make_the_drive_exceed_its_limit_or_its_rat
     let mut before = bench.sample().amplitude;
     for n in 0..20_000 {
         // The reading decays to zero.
-        let fading = bench.resonator.q * 0.999_f64.powi(n);
-        let base = bench.resonator.base;
-        let output = bench.sample_reading(fading, Some(base));
+        let output = bench.sample_through(|q, base| [q * 0.999_f64.powi(n), base]);
         assert!((0.0..=2.0 * AMPLITUDE).contains(&output.amplitude));
         assert!((output.amplitude - before).abs() <= step * (1.0 + 1e-9));
         before = output.amplitude;
@@ -161,12 +149,12 @@ fn a_sensor_that_stops_trips_within_half_a_period() {
         let mut bench = holding(Config { residual_max: None, ramp_rate: None, ..config() });
         let stuck = value * bench.resonator.q;
         let tripped = (0..200).find_map(|n| {
-            let (q, base) = (bench.resonator.q, bench.resonator.base);
-            let (response, reference) = (
-                if response_stops { stuck } else { q },
-                if reference_stops { 0.0 } else { base },
-            );
-            let output = bench.sample_reading(response, Some(reference));
+            let output = bench.sample_through(|q, base| {
+                [
+                    if response_stops { stuck } else { q },
+                    if reference_stops { 0.0 } else { base },
+                ]
+            });
             (output.state == LoopState::Tripped).then_some((n, output))
         });
         let (samples, output) = tripped.expect("a trip");
@@ -180,8 +168,8 @@ fn a_sensor_that_reads_only_noise_trips_before_the_lock() {
     let mut bench = Bench::new(Config { response_max: None, residual_max: None, ..config() });
     let mut noise = Noise(7);
     let tripped = (0..100 * 25).find(|_| {
-        let base = bench.resonator.base;
-        bench.sample_reading(0.01 * noise.next(), Some(base)).state == LoopState::Tripped
+        let noise = 0.01 * noise.next();
+        bench.sample_through(|_, base| [noise, base]).state == LoopState::Tripped
     });
     assert!(tripped.is_some());
     assert_eq!(bench.sample().fault, Some(Fault::NoSignal));
@@ -191,13 +179,8 @@ fn a_sensor_that_reads_only_noise_trips_before_the_lock() {
 fn reversed_swapped_and_dead_sensors_trip_within_a_tenth_of_a_period() {
     let faults: [fn(f64, f64) -> [f64; 2]; 4] = [|q, e| [-q, e], |q, e| [q, -e], |q, e| [e, q], |_, e| [0.0, e]];
     for fault in faults {
-        let mut bench = Bench::new(config());
-        bench.run_to_lock(2000).expect("a lock");
-        let tripped = (0..=10).any(|_| {
-            let [response, base] = fault(bench.resonator.q, bench.resonator.base);
-            bench.sample_reading(response, Some(base)).state == LoopState::Tripped
-        });
-        assert!(tripped);
+        let mut bench = Bench::locked(config());
+        assert!((0..=10).any(|_| bench.sample_through(fault).state == LoopState::Tripped));
     }
 }
 
@@ -218,8 +201,7 @@ fn periods_to_trip(from: u32, fault: impl Fn(f64, f64) -> [f64; 2]) -> Option<f6
         bench.sample();
     }
     (0..100 * 20).find_map(|n| {
-        let [response, base] = fault(bench.resonator.q, bench.resonator.base);
-        let output = bench.sample_reading(response, Some(base));
+        let output = bench.sample_through(&fault);
         (output.state == LoopState::Tripped).then_some(f64::from(n) / 100.0)
     })
 }
@@ -266,8 +248,7 @@ fn a_glitch_of_one_sample_is_ignored() {
     for size in [-5.0, 0.0, 5.0] {
         for channel in [0, 1] {
             for phase in [0, 10, 25, 60] {
-                let mut bench = Bench::new(config());
-                bench.run_to_lock(2000).expect("a lock");
+                let mut bench = Bench::locked(config());
                 (0..phase).for_each(|_| assert!(bench.sample().locked));
                 let mut readings = [bench.resonator.q, bench.resonator.base];
                 readings[channel] = size * [bench.sample().response_amplitude, AMPLITUDE][channel];

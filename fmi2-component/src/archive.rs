@@ -57,42 +57,19 @@ impl<'a> Archive<'a> {
 mod tests {
     use super::*;
 
-    type Fields = (f64, u64, i32, bool, String);
-
-    fn bytes_of(mut fields: Fields) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        Archive::writer(&mut bytes).whole(&mut fields).unwrap();
-        bytes
-    }
-
     #[test]
-    fn what_is_written_is_read_bit_by_bit() {
+    fn what_is_written_is_read_bit_by_bit_and_bytes_that_miss_or_are_left_over_are_refused() {
         let nan = f64::from_bits(0x7ff8_0000_0000_1234);
-        let bytes = bytes_of((nan, u64::MAX, -7, true, "µm".into()));
-        let mut read = Fields::default();
-        let mut archive = Archive::reader(&bytes);
-        archive.whole(&mut read).unwrap();
-        archive.finish().unwrap();
-        assert_eq!(read.0.to_bits(), nan.to_bits());
-        assert_eq!((read.1, read.2, read.3), (u64::MAX, -7, true));
-        assert_eq!(read.4, "µm");
-    }
-
-    #[test]
-    fn every_truncation_is_refused() {
-        let bytes = bytes_of((1.0, 2, 3, false, "four".into()));
-        for end in 0..bytes.len() {
-            let mut archive = Archive::reader(&bytes[..end]);
-            assert!(archive.whole(&mut Fields::default()).is_err());
-        }
-    }
-
-    #[test]
-    fn bytes_left_over_are_refused() {
-        let mut bytes = bytes_of(Fields::default());
-        bytes.push(0);
-        let mut archive = Archive::reader(&bytes);
-        archive.whole(&mut Fields::default()).unwrap();
-        assert!(archive.finish().is_err());
+        let (mut fields, mut bytes) = ((nan, u64::MAX, -7, true, "µm".to_owned()), Vec::new());
+        Archive::writer(&mut bytes).whole(&mut fields).unwrap();
+        let read = |bytes: &[u8]| {
+            let (mut read, mut archive) = ((0.0_f64, 0_u64, 0_i32, false, String::new()), Archive::reader(bytes));
+            archive.whole(&mut read).and_then(|()| archive.finish()).map(|()| read)
+        };
+        let same = read(&bytes).unwrap();
+        assert_eq!((same.0.to_bits(), same.1, same.2), (nan.to_bits(), u64::MAX, -7));
+        assert_eq!((same.3, same.4.as_str()), (true, "µm"));
+        assert!((0..bytes.len()).all(|end| read(&bytes[..end]).is_err()));
+        assert!(read(&[&bytes[..], &[0]].concat()).is_err());
     }
 }

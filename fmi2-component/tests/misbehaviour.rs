@@ -1,10 +1,11 @@
 //! Guards the shell against a component that panics and refuses at every opportunity, and a logger that calls back. Its table is written by hand.
 
-use std::ffi::c_void;
-use std::ptr::null_mut;
+use std::ffi::{c_char, c_void};
+use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 
-use fmi2_boundary::{Fmu, Master, call, callbacks, functions_of};
+use fmi2_boundary::{Functions, Master, call, callbacks, functions_of, refused};
+use fmi2_component::abi::CallbackFunctions;
 use fmi2_component::{Causality, Component, Initial, Key, Log, Model, Refusal, Status, Variability, Variable};
 
 struct Moody;
@@ -120,115 +121,83 @@ impl Component for Person {
 
 fmi2_component::export!(Person);
 
-const PERSON: Fmu = Fmu {
-    name: "Moody",
-    functions: functions_of!(fmi2_functions),
-    description: "",
-};
+const PERSON: Functions = functions_of!(fmi2_functions);
 
 fn in_mood(mood: i32) -> Master {
-    let master = Master::at(&PERSON, 1, "moody", None);
+    let master = Master::instantiate(PERSON, 1, [c"one".as_ptr(), c"moody".as_ptr(), null()]);
     master.start();
-    let status = call!(master.fmi2SetInteger(&0, 1, &mood));
-    assert_eq!(status, Status::Ok);
+    master.well(master.set_integer(0, mood));
     master
 }
 
-fn assert_fatal(master: &Master) {
-    let (c, f) = (master.c, master.f);
-    for call in [f.fmi2Reset, f.fmi2Terminate, f.fmi2EnterInitializationMode] {
-        assert_eq!(unsafe { call(c) }, Status::Fatal);
-        master.heard_one(&["only fmi2FreeInstance"]);
-    }
-    assert_eq!(unsafe { (f.fmi2GetInteger)(c, &0, 1, &mut 0) }, Status::Fatal);
-}
-
 #[test]
-fn a_panic_is_logged_and_ends_the_instance_only() {
+fn a_panic_and_a_fatal_refusal_are_logged_and_leave_nothing_but_to_free_that_instance() {
     let other = in_mood(0);
-    let master = in_mood(PANIC_ON_STEP);
-    assert_eq!(master.step(0.0, 1.0), Status::Fatal);
-    master.heard_one(&["fmi2DoStep: the component has panicked (stepped)"]);
-    assert_fatal(&master);
-
-    let master = in_mood(PANIC_ON_GET);
-    assert_eq!(call!(master.fmi2GetInteger(&0, 1, &mut 0)), Status::Fatal);
-    master.heard_one(&["fmi2GetInteger", "got 100%%"]);
-    assert_fatal(&master);
-    assert_eq!(other.step(0.0, 1.0), Status::Ok);
-}
-
-#[test]
-fn a_panic_on_being_dropped_goes_no_further() {
+    let get = |m: &Master| call!(m.fmi2GetInteger(&0, 1, &mut 0));
+    let step = |m: &Master| m.step(0.0, 1.0);
+    type Call = fn(&Master) -> Status;
+    let calls: [(i32, Call, &[&str]); 3] = [
+        (
+            PANIC_ON_STEP,
+            step,
+            &["fmi2DoStep: the component has panicked (stepped)"],
+        ),
+        (PANIC_ON_GET, get, &["fmi2GetInteger", "got 100%%"]),
+        (FATAL_ON_STEP, step, &["all is lost"]),
+    ];
+    for (mood, call, reason) in calls {
+        let m = in_mood(mood);
+        m.expect(call(&m), Status::Fatal, reason);
+        for call in [m.f.fmi2Reset, m.f.fmi2Terminate, m.f.fmi2EnterInitializationMode] {
+            m.expect(unsafe { call(m.c) }, Status::Fatal, &["only fmi2FreeInstance"]);
+        }
+        assert_eq!(get(&m), Status::Fatal);
+    }
+    other.well(other.step(0.0, 1.0));
     drop(in_mood(PANIC_ON_DROP));
 }
 
 #[test]
-fn a_fatal_refusal_leaves_nothing_but_to_free_the_instance() {
-    let master = in_mood(FATAL_ON_STEP);
-    assert_eq!(master.step(0.0, 1.0), Status::Fatal);
-    master.heard_one(&["all is lost"]);
-    assert_fatal(&master);
-}
-
-#[test]
 fn after_an_error_in_a_step_values_can_be_read_and_the_instance_reset() {
-    let master = in_mood(ERROR_ON_STEP);
-    assert_eq!(master.step(0.0, 1.0), Status::Error);
-    master.heard_one(&["cannot go on"]);
-    assert_eq!(call!(master.fmi2GetInteger(&0, 1, &mut 0)), Status::Ok);
-    assert_eq!(master.step(0.0, 1.0), Status::Error);
-    master.heard_one(&["illegal in state error"]);
-    assert_eq!(call!(master.fmi2Reset()), Status::Ok);
-    assert_eq!(call!(master.fmi2EnterInitializationMode()), Status::Ok);
+    let m = in_mood(ERROR_ON_STEP);
+    refused!(m.fmi2DoStep(0.0, 1.0, 1) => "cannot go on");
+    assert_eq!(m.integer(0), ERROR_ON_STEP);
+    refused!(m.fmi2DoStep(0.0, 1.0, 1) => "illegal in state error");
+    m.well(call!(m.fmi2Reset()));
+    m.well(call!(m.fmi2EnterInitializationMode()));
 }
 
 #[test]
 fn what_a_component_does_not_provide_is_refused() {
-    let master = in_mood(0);
+    let m = in_mood(0);
     let (mut state, mut size) = (null_mut(), 0);
-    assert_eq!(call!(master.fmi2GetFMUstate(&mut state)), Status::Ok);
-    assert_eq!(
-        call!(master.fmi2SerializedFMUstateSize(state, &mut size)),
-        Status::Error
-    );
-    master.heard_one(&["cannot be serialised"]);
-    assert_eq!(call!(master.fmi2GetReal(&0, 1, &mut 0.0)), Status::Error);
-    master.heard_one(&[
-        "value reference 0 is unknown",
-        "the model has no variables of type Real",
-    ]);
+    m.well(call!(m.fmi2GetFMUstate(&mut state)));
+    refused!(m.fmi2SerializedFMUstateSize(state, &mut size) => "cannot be serialised");
+    let absent = "the model has no variables of type Real";
+    refused!(m.fmi2GetReal(&0, 1, &mut 0.0) => "value reference 0 is unknown", absent);
 }
 
 #[test]
 fn a_logger_cannot_call_back_into_its_instance() {
     static INSTANCE: AtomicPtr<c_void> = AtomicPtr::new(null_mut());
     static REFUSED: AtomicU32 = AtomicU32::new(0);
-    unsafe extern "C" fn call_back(
-        _: *mut c_void,
-        _: *const std::ffi::c_char,
-        _: Status,
-        _: *const std::ffi::c_char,
-        _: *const std::ffi::c_char,
-    ) {
-        let (c, f) = (INSTANCE.load(Ordering::Relaxed), PERSON.functions);
-        unsafe { (f.fmi2FreeInstance)(c) };
-        if unsafe { (f.fmi2Reset)(c) } == Status::Error {
+    type Text = *const c_char;
+    unsafe extern "C" fn call_back(_: *mut c_void, _: Text, _: Status, _: Text, _: Text) {
+        let c = INSTANCE.load(Ordering::Relaxed);
+        unsafe { (PERSON.fmi2FreeInstance)(c) };
+        if unsafe { (PERSON.fmi2Reset)(c) } == Status::Error {
             REFUSED.fetch_add(1, Ordering::Relaxed);
         }
     }
-    let mut functions = callbacks(null_mut());
     let call_back: unsafe extern "C" fn(_, _, _, _, _) = call_back;
-    // SAFETY: as for the logger of `master`.
-    functions.logger =
-        Some(unsafe { std::mem::transmute::<*const (), fmi2_component::Logger>(call_back as *const ()) });
+    // SAFETY: as for the logger of `Master`.
+    let logger = unsafe { std::mem::transmute::<*const (), fmi2_component::Logger>(call_back as *const ()) };
+    let functions = CallbackFunctions { logger: Some(logger), ..callbacks(null_mut()) };
     unsafe {
-        let (name, guid) = (c"one".as_ptr(), c"moody".as_ptr());
-        let f = PERSON.functions;
-        let c = (f.fmi2Instantiate)(name, 1, guid, std::ptr::null(), &functions, 0, 0);
+        let c = (PERSON.fmi2Instantiate)(c"one".as_ptr(), 1, c"moody".as_ptr(), null(), &functions, 0, 0);
         INSTANCE.store(c, Ordering::Relaxed);
-        assert_eq!((f.fmi2DoStep)(c, 0.0, 1.0, 1), Status::Error);
+        assert_eq!((PERSON.fmi2DoStep)(c, 0.0, 1.0, 1), Status::Error);
         assert_eq!(REFUSED.load(Ordering::Relaxed), 1);
-        (f.fmi2FreeInstance)(c);
+        (PERSON.fmi2FreeInstance)(c);
     }
 }

@@ -4,7 +4,7 @@
 //! in the next sample, and no error grows from sample to sample.
 
 use crate::figures::{ANY, Figures};
-use crate::scenes::{Scene, scene};
+use crate::scenes::{Scene, decades, scene};
 use crate::simulation::Simulation;
 use lovines::{Drive, Event, Plant};
 use proptest::prelude::*;
@@ -36,15 +36,15 @@ enum Joint {
 }
 
 fn change() -> impl Strategy<Value = Change> {
-    let size = || prop_oneof![1 => Just(0.0), 3 => (-4.0..0.5f64).prop_map(|x| 10f64.powf(x))];
+    let size = || prop_oneof![1 => Just(0.0), 3 => decades(-4.0, 0.5)];
     let joint = prop_oneof![2 => Just(Joint::Same), 1 => Just(Joint::Balanced), 1 => Just(Joint::Jump)];
     let signal = (0..=3usize, size(), prop::array::uniform4(-1.0..1.0f64)).prop_map(|(order, size, mut signal)| {
         signal[order + 1..].fill(0.0);
         signal.map(|u| u * size)
     });
     let omega = prop_oneof![1 => Just(0.0), 3 => 0.0..3.0f64, 1 => -2.0..0.0f64];
-    (joint, signal, size(), omega, (-2.0..0.5f64).prop_map(|x| 10f64.powf(x)))
-        .prop_map(|(joint, signal, amplitude, omega, step)| Change { joint, signal, amplitude, omega, step })
+    let change = |(joint, signal, amplitude, omega, step)| Change { joint, signal, amplitude, omega, step };
+    (joint, signal, size(), omega, decades(-2.0, 0.5)).prop_map(change)
 }
 
 impl Change {
@@ -72,22 +72,20 @@ pub fn follow((scene, changes): &(Scene, Vec<Change>), figures: &mut Figures) {
         let runs = [0.0, CHANGE, -CHANGE].map(|c| Simulation::new(scene, &plant, drive, c).run(step));
         let held = plant.contact().is_some();
         let mut let_go = false;
-        let see = |event| {
-            if let Event::Released { t, .. } = event {
-                let_go |= held && t == 0.0;
-            }
-        };
+        let see = |event| let_go |= held && matches!(event, Event::Released { t: 0.0, .. });
         let outcome = plant.advance_with(drive, step, see).expect("a valid drive");
-        figures.count("impacts", outcome.impacts, ANY);
-        figures.count("samples that begin in contact", u64::from(held), ANY);
-        figures.count("of these, walls that let go at once", u64::from(let_go), ANY);
+        record! { figures:
+            "impacts" count outcome.impacts, ANY;
+            "samples that begin in contact" count held, ANY;
+            "of these, walls that let go at once" count let_go, ANY;
+        }
         if let Some(wall) = plant.contact() {
             let now = plant.base().drive;
             let (push, error) = Simulation::new(scene, &plant, now, 0.0).pressing(wall);
-            figures.count("walls that pull at the end of a sample", u64::from(push < -error), 0.0);
+            figures.count("walls that pull at the end of a sample", push < -error, 0.0);
         }
         let [Some(a), Some(b), Some(c)] = runs.each_ref().map(|run| run.as_ref().map(Simulation::result)) else {
-            figures.count("samples with more than 20 000 impacts, left out", 1, ANY);
+            figures.count("samples with more than 20 000 impacts, left out", true, ANY);
             continue;
         };
         let s = plant.state();
@@ -95,10 +93,8 @@ pub fn follow((scene, changes): &(Scene, Vec<Change>), figures: &mut Figures) {
         let [u0, u1, ..] = plant.base().drive.signal;
         let displacements = [s.q1, p.half_width, u0, drive.amplitude];
         let velocities = [s.dq1, s.dq2, u1].map(|v| v / omega0);
-        let size = displacements
-            .into_iter()
-            .chain(velocities)
-            .fold(0.0f64, |size, x| size.max(x.abs()));
+        let sizes = displacements.into_iter().chain(velocities);
+        let size = sizes.fold(0.0f64, |size, x| size.max(x.abs()));
         let units = [size, size * omega0, size, size * omega0];
         let largest = |of: &dyn Fn(usize) -> f64| (0..4).map(|n| of(n).abs() / units[n]).fold(0.0f64, f64::max);
         // The factor by which the sample spreads errors.
@@ -111,19 +107,14 @@ pub fn follow((scene, changes): &(Scene, Vec<Change>), figures: &mut Figures) {
 /// Half of the scenes begin at a wall, with much loss and damping: their particles rest often, and the slope of the base counts.
 pub fn scenes() -> BoxedStrategy<(Scene, Vec<Change>)> {
     let at_wall = (any::<bool>(), 1e-3..0.7f64, -2.0..1.0f64);
-    (
-        scene(true),
-        prop::option::of(at_wall),
-        prop::collection::vec(change(), SAMPLES),
-    )
-        .prop_map(|(mut scene, at_wall, changes)| {
-            if let Some((plus, restitution, ratio)) = at_wall {
-                let p = &mut scene.parameters;
-                (p.restitution, p.damping) = (restitution, 2.0 * 10f64.powf(ratio));
-                scene.start.q2 = scene.start.q1 - if plus { p.half_width } else { -p.half_width };
-                scene.start.dq2 = scene.start.dq1;
-            }
-            (scene, changes)
-        })
-        .boxed()
+    let changes = prop::collection::vec(change(), SAMPLES);
+    let drawn = (scene(true), prop::option::of(at_wall), changes);
+    let scenes = drawn.prop_map(|(mut scene, at_wall, changes)| {
+        if let Some((plus, restitution, ratio)) = at_wall {
+            (scene.parameters.restitution, scene.parameters.damping) = (restitution, 2.0 * 10f64.powf(ratio));
+            scene.start_at(plus);
+        }
+        (scene, changes)
+    });
+    scenes.boxed()
 }

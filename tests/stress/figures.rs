@@ -11,6 +11,13 @@ pub const ANY: f64 = f64::INFINITY;
 /// Scenes followed between two lines about the progress.
 const PORTION: usize = 10_000;
 
+/// Adds figures: the name, `count` or `largest` of the value, and the largest value that is allowed.
+macro_rules! record {
+    ($figures:ident: $($what:literal $kind:ident $value:expr, $allowed:expr;)*) => {$(
+        $figures.$kind($what, $value, $allowed);
+    )*};
+}
+
 /// A count over all scenes, or the largest value and the scene that shows it.
 #[derive(Clone, Debug)]
 struct Figure {
@@ -41,8 +48,8 @@ impl Figures {
     }
 
     /// Adds to a count.
-    pub fn count(&mut self, what: &'static str, n: u64, allowed: f64) {
-        self.add(Figure { what, value: n as f64, allowed, scene: None });
+    pub fn count(&mut self, what: &'static str, n: impl Into<u64>, allowed: f64) {
+        self.add(Figure { what, value: n.into() as f64, allowed, scene: None });
     }
 
     /// Keeps the largest value.
@@ -53,21 +60,17 @@ impl Figures {
     /// Prints the figures that were gathered, and notes those that exceed their limits.
     pub fn print(&mut self, kind: &str, scenes: usize) {
         for Figure { what, value, allowed, scene } in std::mem::take(&mut self.all) {
-            let short = |x: f64| match x {
+            let [short, limit] = [value, allowed].map(|x| match x {
                 _ if x.is_infinite() => "any".to_owned(),
                 _ if x == 0.0 || (1.0..1e7).contains(&x) => format!("{x:.0}"),
                 _ => format!("{x:.1e}"),
-            };
+            });
             let worst = scene.filter(|_| scenes > 1 && value > 0.0);
             let worst = worst.map_or(String::new(), |number| format!("; worst: {number}"));
-            println!(
-                "| {kind}: {what} | {scenes} scenes{worst} | {} | {} |",
-                short(value),
-                short(allowed)
-            );
+            println!("| {kind}: {what} | {scenes} scenes{worst} | {short} | {limit} |");
             if value > allowed || value.is_nan() {
-                self.exceeded
-                    .push(format!("{kind}: {what}: {value:e} is above {allowed:e}"));
+                let row = format!("{kind}: {what}: {value:e} is above {allowed:e}");
+                self.exceeded.push(row);
             }
         }
     }
@@ -75,6 +78,48 @@ impl Figures {
     /// Asserts that all rows have kept their limits.
     pub fn end(self) {
         assert!(self.exceeded.is_empty(), "{:#?}", self.exceeded);
+    }
+
+    /// Follows `n` scenes of a kind and prints a row for each figure; where the environment names a scene, that one alone.
+    pub fn run<T: Debug>(
+        &mut self,
+        kind: &str,
+        n: usize,
+        strategy: fn() -> BoxedStrategy<T>,
+        follow: fn(&T, &mut Self),
+    ) {
+        if let Ok(name) = std::env::var("SCENE") {
+            let (wanted, number) = name.split_once(':').expect("a kind of scenes, a colon and a number");
+            if wanted == kind {
+                let scene = draw(&strategy(), number.parse().expect("a number"));
+                println!("{scene:#?}");
+                follow(&scene, self);
+                self.print(kind, 1);
+            }
+            return;
+        }
+        for begin in (0..n).step_by(PORTION) {
+            let end = n.min(begin + PORTION);
+            let one = |strategy: &mut BoxedStrategy<T>, number| {
+                let (scene, mut figures) = (draw(strategy, number), Self::default());
+                let panics = catch_unwind(AssertUnwindSafe(|| follow(&scene, &mut figures))).is_err();
+                if panics {
+                    eprintln!("{kind} scene {number} panics: {scene:?}");
+                }
+                figures.count("panics", panics, 0.0);
+                for figure in &mut figures.all {
+                    figure.scene = figure.scene.map(|_| number);
+                }
+                figures
+            };
+            let scenes: Vec<Self> = (begin..end).into_par_iter().map_init(strategy, one).collect();
+            let all = scenes.into_iter().flat_map(|scene| scene.all);
+            all.for_each(|figure| self.add(figure));
+            if n > PORTION {
+                eprintln!("{kind}: {end} of {n} scenes");
+            }
+        }
+        self.print(kind, n);
     }
 }
 
@@ -85,48 +130,4 @@ fn draw<T: Debug>(strategy: &BoxedStrategy<T>, number: usize) -> T {
     let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
     let mut runner = TestRunner::new_with_rng(Config::default(), rng);
     strategy.new_tree(&mut runner).expect("a scene").current()
-}
-
-/// Follows `n` scenes of a kind and prints a row for each figure; where the environment names a scene, that one alone.
-pub fn run<T: Debug>(
-    kind: &str,
-    n: usize,
-    strategy: fn() -> BoxedStrategy<T>,
-    follow: fn(&T, &mut Figures),
-    table: &mut Figures,
-) {
-    if let Ok(name) = std::env::var("SCENE") {
-        let (wanted, number) = name.split_once(':').expect("a kind of scenes, a colon and a number");
-        if wanted == kind {
-            let scene = draw(&strategy(), number.parse().expect("a number"));
-            println!("{scene:#?}");
-            follow(&scene, table);
-            table.print(kind, 1);
-        }
-        return;
-    }
-    for begin in (0..n).step_by(PORTION) {
-        let scenes: Vec<Figures> = (begin..n.min(begin + PORTION))
-            .into_par_iter()
-            .map_init(strategy, |strategy, number| {
-                let scene = draw(strategy, number);
-                let mut figures = Figures::default();
-                let end = catch_unwind(AssertUnwindSafe(|| follow(&scene, &mut figures)));
-                if end.is_err() {
-                    eprintln!("{kind} scene {number} panics: {scene:?}");
-                }
-                figures.count("panics", u64::from(end.is_err()), 0.0);
-                for figure in &mut figures.all {
-                    figure.scene = figure.scene.map(|_| number);
-                }
-                figures
-            })
-            .collect();
-        let all = scenes.into_iter().flat_map(|scene| scene.all);
-        all.for_each(|figure| table.add(figure));
-        if n > PORTION {
-            eprintln!("{kind}: {} of {n} scenes", n.min(begin + PORTION));
-        }
-    }
-    table.print(kind, n);
 }

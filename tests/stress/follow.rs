@@ -1,4 +1,4 @@
-//! One scene: the states at and inside its steps, the totals and the energy; and the energy balance with damping and a moving base.
+//! Guards one scene: the states at and inside its steps, the totals and the energy; and the energy balance with damping and a moving base.
 
 use crate::figures::{ANY, Figures};
 use crate::scenes::{Scene, scene};
@@ -25,23 +25,25 @@ pub fn follow(scene: &Scene, figures: &mut Figures) {
     if shortened {
         scene.step = LONGEST_ELASTIC_STEP;
     }
-    figures.count(
-        "scenes without loss whose steps are shortened to 1/omega0",
-        u64::from(shortened),
-        ANY,
-    );
+    record! { figures:
+        "scenes without loss whose steps are shortened to 1/omega0" count shortened, ANY;
+    }
     let plant = once(&scene, false, figures);
     let twice = plant.totals().impacts <= MOST_FOLLOWED_TWICE;
-    figures.count(
-        "scenes followed once only, because of more than 10^6 impacts",
-        u64::from(!twice),
-        ANY,
-    );
+    record! { figures:
+        "scenes followed once only, because of more than 10^6 impacts" count !twice, ANY;
+    }
     if twice {
         let other = once(&scene, true, &mut Figures::default());
         let differs = plant.state() != other.state() || plant.totals() != other.totals();
-        figures.count("runs with other bits without the workspace", u64::from(differs), 0.0);
+        figures.count("runs with other bits without the workspace", differs, 0.0);
     }
+}
+
+/// Displacement and velocity of the primary mass and of the particle.
+pub fn states(plant: &Plant) -> [f64; 4] {
+    let State { q1, dq1, q2, dq2 } = plant.state();
+    [q1, dq1, q2, dq2]
 }
 
 /// How far the particle is outside the cavity, in half-widths, when its relative displacement is `w`.
@@ -87,54 +89,33 @@ fn once(s: &Scene, forgetful: bool, figures: &mut Figures) -> Plant {
                 let drive = if n == 0 { drive } else { looked.base().drive };
                 looked.advance(drive, part * s.step - gone).expect("a valid step");
                 gone = part * s.step;
-                figures.largest(
-                    "outside its cavity inside steps by, in half-widths",
-                    outside_by_displacements(&looked),
-                    1e-12,
-                );
+                let outside = outside_by_displacements(&looked);
+                figures.largest("outside its cavity inside steps by, in half-widths", outside, 1e-12);
             }
         }
         // The same signal seen from now.
         drive = plant.base().drive;
-        let State { q1, dq1, q2, dq2 } = plant.state();
-        let finite = [q1, dq1, q2, dq2].iter().all(|x| x.is_finite());
+        let finite = states(&plant).iter().all(|x| x.is_finite());
         let outside = outside_by(&plant, plant.relative_displacement(), 0.0);
         let fastest = s.parameters.fastest_rate().max(s.drive.omega.abs());
         let events = impacts + outcome.stuck + outcome.released;
         let work = outcome.evaluations as f64 / (events as f64 + 1.0 + fastest * s.step);
         let early = outcome.cut_short && impacts < MOST_IMPACTS;
-        figures.largest("outside its cavity by, in half-widths", outside, 1e-12);
-        figures.count("states that are not numbers", u64::from(!finite), 0.0);
-        figures.count("impacts", impacts, ANY);
-        figures.count(
-            "impacts from behind a wall or not counted",
-            backwards + outcome.impacts.abs_diff(impacts),
-            0.0,
-        );
-        figures.count("advances cut short before their 10^7 impacts", u64::from(early), 0.0);
-        figures.count(
-            "advances that end at 10^7 impacts, and say so",
-            u64::from(outcome.cut_short),
-            ANY,
-        );
-        figures.largest(
-            "impacts in a period, at most",
-            impacts as f64 / (s.step * fastest / TAU).max(1.0),
-            ANY,
-        );
-        figures.largest(
-            "evaluations per event and radian of the fastest rate, at most",
-            work,
-            50.0,
-        );
+        record! { figures:
+            "outside its cavity by, in half-widths" largest outside, 1e-12;
+            "states that are not numbers" count !finite, 0.0;
+            "impacts" count impacts, ANY;
+            "impacts from behind a wall or not counted" count backwards + outcome.impacts.abs_diff(impacts), 0.0;
+            "advances cut short before their 10^7 impacts" count early, 0.0;
+            "advances that end at 10^7 impacts, and say so" count outcome.cut_short, ANY;
+            "impacts in a period, at most" largest impacts as f64 / (s.step * fastest / TAU).max(1.0), ANY;
+            "evaluations per event and radian of the fastest rate, at most" largest work, 50.0;
+        }
         if free && largest > 0.0 {
             let (now, lost) = (plant.energy(0.0), plant.totals().dissipated + plant.totals().friction);
             largest = largest.max(now.abs()).max(lost);
-            figures.largest(
-                "energy grows without excitation by, relative",
-                (now - before) / largest,
-                1e-12,
-            );
+            let growth = (now - before) / largest;
+            figures.largest("energy grows without excitation by, relative", growth, 1e-12);
             if s.parameters.damping == 0.0 {
                 let missing = (now + lost - at_start).abs() / largest;
                 figures.largest("energy and dissipated energy miss, undamped, relative", missing, 1e-12);
@@ -147,11 +128,8 @@ fn once(s: &Scene, forgetful: bool, figures: &mut Figures) -> Plant {
     }
     figures.count("sticks", plant.totals().sticks, ANY);
     if free && ideal && at_start == 0.0 {
-        figures.count(
-            "rigs at rest, particle at a wall, that move",
-            u64::from(plant.state() != s.start),
-            0.0,
-        );
+        let moves = plant.state() != s.start;
+        figures.count("rigs at rest, particle at a wall, that move", moves, 0.0);
     }
     plant
 }
@@ -173,11 +151,7 @@ pub fn agree((s, step, change, which): &Changing, figures: &mut Figures) {
     for n in 0..60 {
         let changed = |number: u32| {
             let part = (f64::from(n * 4 + number) * 0.618_033_988_749_895).fract() - 0.5;
-            if which >> number & 1 == 1 {
-                10f64.powf(*change) * part
-            } else {
-                0.0
-            }
+            f64::from(which >> number & 1) * 10f64.powf(*change) * part
         };
         let drive = Drive {
             signal: [s.drive.signal[0] + 0.1 * changed(0), 0.1 * changed(1), 0.0, 0.0],
@@ -191,10 +165,7 @@ pub fn agree((s, step, change, which): &Changing, figures: &mut Figures) {
         if impacts[0].max(impacts[1]) > 3 {
             break;
         }
-        let [a, b] = [&fast, &searched].map(|plant| {
-            let State { q1, dq1, q2, dq2 } = plant.state();
-            [q1, dq1, q2, dq2]
-        });
+        let [a, b] = [&fast, &searched].map(states);
         let size = 1.0 + b.iter().fold(0.0f64, |size, x| size.max(x.abs()));
         let off = a.iter().zip(b).fold(0.0f64, |off, (a, b)| off.max((a - b).abs()));
         figures.count("impacts of one solver only", impacts[0].abs_diff(impacts[1]), 0.0);
@@ -240,54 +211,43 @@ pub fn balance(scene: &Scene, figures: &mut Figures) {
     let (mut lost, mut done, mut exchanged) = (0.0, 0.0, 0.0);
     let mut largest = at_start.abs();
     let advance = |plant: &mut Plant, duration: f64| {
-        plant
-            .advance(plant.base().drive, duration.max(0.0))
-            .expect("a valid step");
+        let advanced = plant.advance(plant.base().drive, duration.max(0.0));
+        advanced.expect("a valid step");
     };
     for _ in 0..PANELS {
         let mut first = None;
         let mut ahead = plant;
         let see = |event: Event| _ = first.get_or_insert(event.time());
-        ahead
-            .advance_with(plant.base().drive, PANEL / fastest, see)
-            .expect("a valid step");
+        let advanced = ahead.advance_with(plant.base().drive, PANEL / fastest, see);
+        advanced.expect("a valid step");
         let length = first.unwrap_or(PANEL / fastest);
-        let integrate = |plant: &Plant, weight: f64, sums: [&mut f64; 3]| {
+        let mut integrate = |plant: &Plant, weight: f64| {
             let (s, (e, de)) = (plant.state(), base(plant));
             let slip = s.dq1 - de;
-            let (damper, work) = (
-                p.damping * slip * slip,
-                de * (p.stiffness * (e - s.q1) - p.damping * slip),
-            );
-            let parts = [damper, work, damper + work.abs()];
-            sums.into_iter()
-                .zip(parts)
-                .for_each(|(sum, part)| *sum += weight * part);
+            let damper = p.damping * slip * slip;
+            let work = de * (p.stiffness * (e - s.q1) - p.damping * slip);
+            lost += weight * damper;
+            done += weight * work;
+            exchanged += weight * (damper + work.abs());
         };
-        let (below, above) = (
-            NODES.iter().rev().map(|(x, weight)| (-x, *weight)),
-            NODES.iter().copied(),
-        );
+        let below = NODES.iter().rev().map(|(x, weight)| (-x, *weight));
         let mut gone = 0.0;
-        for (x, weight) in below.chain(above) {
+        for (x, weight) in below.chain(NODES) {
             let t = 0.5 * length * (1.0 + x);
             advance(&mut plant, t - gone);
             gone = t;
-            integrate(&plant, 0.5 * length * weight, [&mut lost, &mut done, &mut exchanged]);
-            let outside = outside_by_displacements(&plant);
-            figures.largest(
-                "outside the cavity at the nodes of the quadrature, in half-widths",
-                outside,
-                1e-12,
-            );
+            integrate(&plant, 0.5 * length * weight);
+            record! { figures:
+                "outside the cavity at the nodes of the quadrature, in half-widths" largest outside_by_displacements(&plant), 1e-12;
+            }
         }
         advance(&mut plant, length - gone);
         if first.is_some() {
             // To just behind the event, where the next panel begins. The power hardly changes on the way.
             let behind = 1e-12 / fastest;
             advance(&mut plant, behind);
-            integrate(&plant, behind, [&mut lost, &mut done, &mut exchanged]);
-            figures.count("events", 1, ANY);
+            integrate(&plant, behind);
+            figures.count("events", true, ANY);
         }
         largest = largest.max(plant.energy(base(&plant).0).abs());
     }

@@ -5,14 +5,15 @@
 //! Prints a table. `scripts/stress --plant` runs the long form (`SCENES=100000`), the test suite a short one; validation/stress.csv keeps a
 //! table of 10,000 scenes. `SCENE=hard:17` follows scene 17 of the kind `hard` only.
 
-mod drives;
+#[macro_use]
 mod figures;
+mod drives;
 mod follow;
 mod scenes;
 mod simulation;
 mod single;
 
-use figures::{Figures, run};
+use figures::Figures;
 
 /// Number of scenes.
 fn number_of_scenes() -> usize {
@@ -23,14 +24,14 @@ fn number_of_scenes() -> usize {
 fn hard_scenes_are_survived() {
     let n = number_of_scenes();
     let mut figures = Figures::default();
-    run("hard", n, scenes::hard, follow::follow, &mut figures);
-    run("fast path", 2 * n, follow::changing, follow::agree, &mut figures);
-    run("damped", n / 10, scenes::damped, follow::balance, &mut figures);
-    run("new drives", n / 5, drives::scenes, drives::follow, &mut figures);
-    run("impact", n, single::impacts, single::impact, &mut figures);
-    run("graze", n / 10, single::grazes, single::graze, &mut figures);
-    run("no loss", 7, single::lossless, single::conserves, &mut figures);
-    run("extreme", n / 10, single::extremes, single::work, &mut figures);
+    figures.run("hard", n, scenes::hard, follow::follow);
+    figures.run("fast path", 2 * n, follow::changing, follow::agree);
+    figures.run("damped", n / 10, scenes::damped, follow::balance);
+    figures.run("new drives", n / 5, drives::scenes, drives::follow);
+    figures.run("impact", n, single::impacts, single::impact);
+    figures.run("graze", n / 10, single::grazes, single::graze);
+    figures.run("no loss", 7, single::lossless, single::conserves);
+    figures.run("extreme", n / 10, single::extremes, single::work);
     single::long_steps(n > 10_000);
     single::short_steps(&mut figures);
     figures.end();
@@ -41,13 +42,7 @@ fn hard_scenes_are_survived() {
 fn random_cavities_are_survived() {
     let n = number_of_scenes();
     let mut figures = Figures::default();
-    run("cavity", n, scenes::cavity, follow::follow, &mut figures);
-    run(
-        "balance in a cavity",
-        n / 10,
-        scenes::cavity,
-        follow::balance,
-        &mut figures,
-    );
+    figures.run("cavity", n, scenes::cavity, follow::follow);
+    figures.run("balance in a cavity", n / 10, scenes::cavity, follow::balance);
     figures.end();
 }

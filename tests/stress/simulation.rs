@@ -45,12 +45,6 @@ impl<'a> Simulation<'a> {
         let phase = plant.base().phase.radians();
         let before = plant.base().drive;
         let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * phase.sin();
-        // A base that stays where it is does not jump by rounding.
-        let jump = if (drive.signal[0], drive.amplitude) == (before.signal[0], before.amplitude) {
-            0.0
-        } else {
-            jump
-        };
         let kick = scene.parameters.damping / scene.parameters.primary_mass * jump * up;
         let (w, b) = (plant.relative_displacement(), scene.parameters.half_width);
         let w = if w.abs() < b { (w * up).clamp(-b, b) } else { w };
@@ -149,12 +143,7 @@ impl<'a> Simulation<'a> {
     /// Follows the motion for the given time, s; returns `None` if there are too many impacts.
     pub fn run(mut self, duration: f64) -> Option<Self> {
         let p = self.scene.parameters;
-        let rates = [
-            (p.stiffness / p.primary_mass).sqrt(),
-            p.damping / p.primary_mass,
-            self.drive.omega.abs(),
-        ];
-        let panel = PANEL / rates.into_iter().fold(0.0, f64::max);
+        let panel = PANEL / p.fastest_rate().max(self.drive.omega.abs());
         let mut left = duration;
         while left > 0.0 {
             let h = panel.min(left);
@@ -183,11 +172,7 @@ impl<'a> Simulation<'a> {
                         }
                         first_root(&gap, h).map_or((None, h), |t| (Some(wall), t))
                     });
-                    if gaps[0].1 < gaps[1].1 || gaps[1].0.is_none() {
-                        gaps[0]
-                    } else {
-                        gaps[1]
-                    }
+                    gaps[usize::from(gaps[0].1 >= gaps[1].1 && gaps[1].0.is_some())]
                 }
             };
             self.go(&x, t);

@@ -1,6 +1,7 @@
-//! Single impacts, grazes, motions without loss, extreme values, and extreme lengths of a step.
+//! Guards single impacts, grazes, motions without loss, extreme values, and extreme lengths of a step.
 
 use crate::figures::Figures;
+use crate::follow::states;
 use crate::scenes::{Scene, decades, scene};
 use lovines::base_motion::BaseMotion;
 use lovines::oscillator::Oscillator;
@@ -28,21 +29,11 @@ pub fn impact((scene, v1, v2): &(Scene, f64, f64), figures: &mut Figures) {
     let momentum = m1 * (after.dq1 - v1) + m2 * (after.dq2 - v2);
     let law = (after.dq1 - after.dq2) + p.restitution * approach;
     let energy = plant.energy(0.0) + plant.totals().dissipated - before;
-    figures.largest(
-        "momentum missed, relative",
-        (momentum / (m1 * v1.abs() + m2 * v2.abs())).abs(),
-        2e-15,
-    );
-    figures.largest(
-        "Newton's law missed by, relative",
-        (law / (v1.abs() + v2.abs())).abs(),
-        2e-15,
-    );
-    figures.largest(
-        "energy and dissipated energy missed, relative",
-        (energy / before).abs(),
-        2e-15,
-    );
+    record! { figures:
+        "momentum missed, relative" largest (momentum / (m1 * v1.abs() + m2 * v2.abs())).abs(), 2e-15;
+        "Newton's law missed by, relative" largest (law / (v1.abs() + v2.abs())).abs(), 2e-15;
+        "energy and dissipated energy missed, relative" largest (energy / before).abs(), 2e-15;
+    }
 }
 
 /// How long a motion is followed, in units of `1/omega0`, and in how many looks its farthest point is searched for.
@@ -88,8 +79,9 @@ fn farthest(s: &Scene) -> Option<f64> {
 /// Walls just before the farthest point of a motion, and just beyond it: in one step, in many, and by the general search alone.
 pub fn graze(s: &Scene, figures: &mut Figures) {
     let Some(farthest) = farthest(s) else { return };
-    let hits = |half_width: f64| {
-        [(true, 1), (true, 150), (false, 1)].map(|(fast, steps)| {
+    // How many of the three ways report an impact, or none.
+    let ways = |half_width: f64, hit: bool| {
+        let hits = [(true, 1), (true, 150), (false, 1)].map(|(fast, steps)| {
             let parameters = Parameters { half_width, ..s.parameters };
             let mut plant = Plant::new(parameters, s.start).expect("a valid scene");
             plant.set_fast_path(fast);
@@ -97,15 +89,15 @@ pub fn graze(s: &Scene, figures: &mut Figures) {
                 let outcome = plant.advance(s.drive, DURATION / f64::from(steps));
                 outcome.expect("a valid step").impacts > 0
             })
-        })
+        });
+        hits.iter().filter(|one| **one == hit).count() as u64
     };
-    let count = |hits: [bool; 3], hit: bool| hits.iter().filter(|one| **one == hit).count() as u64;
     for exponent in 2..=13 {
         let delta = 10f64.powi(-exponent);
-        let missed = count(hits(farthest * (1.0 - delta)), false);
-        let invented = count(hits(farthest * (1.0 + delta)), true);
-        figures.count("overshoots of 1e-2 to 1e-13 of the half-width missed", missed, 0.0);
-        figures.count("undershoots of 1e-2 to 1e-13 of the half-width reported", invented, 0.0);
+        record! { figures:
+            "overshoots of 1e-2 to 1e-13 of the half-width missed" count ways(farthest * (1.0 - delta), false), 0.0;
+            "undershoots of 1e-2 to 1e-13 of the half-width reported" count ways(farthest * (1.0 + delta), true), 0.0;
+        }
     }
 }
 
@@ -116,21 +108,14 @@ pub fn lossless() -> BoxedStrategy<f64> {
 
 /// A million elastic impacts without damping and drive: the energy stays.
 pub fn conserves(epsilon: &f64, figures: &mut Figures) {
-    let parameters = Parameters {
-        damping: 0.0,
-        ..Parameters::dimensionless(*epsilon, 0.0, 1.0)
-    };
+    let parameters = Parameters::dimensionless(*epsilon, 0.0, 1.0);
     let start = State { q1: 0.4, dq1: 0.1, q2: 0.2, dq2: -1.1 };
     let mut plant = Plant::new(parameters, start).expect("a valid scene");
     let at_start = plant.energy(0.0);
     while plant.totals().impacts < 1_000_000 {
         plant.advance(Drive::default(), 100.0).expect("a valid step");
-        let energy = plant.energy(0.0) + plant.totals().dissipated;
-        figures.largest(
-            "energy drifts in 10^6 impacts by, relative",
-            (energy - at_start).abs() / at_start,
-            1e-12,
-        );
+        let drift = (plant.energy(0.0) + plant.totals().dissipated - at_start).abs() / at_start;
+        figures.largest("energy drifts in 10^6 impacts by, relative", drift, 1e-12);
     }
 }
 
@@ -143,7 +128,7 @@ pub fn extremes() -> BoxedStrategy<(f64, f64, f64)> {
     let frequency = vec![1e-3, 0.03, 0.3, 1.0, 1.7, 10.0, 30.0, 300.0, 1e3];
     [damping, amplitude, frequency]
         .map(prop::sample::select)
-        .prop_map(|[damping, amplitude, frequency]| (damping, amplitude, frequency))
+        .prop_map(<(f64, f64, f64)>::from)
         .boxed()
 }
 
@@ -165,12 +150,10 @@ pub fn work((zeta, amplitude, ratio): &(f64, f64, f64), figures: &mut Figures) {
     for _ in 0..STEPS {
         let outcome = plant.advance(drive, step * TAU).expect("a valid step");
         let units = (outcome.impacts as f64).max(ratio * step).max(step);
-        let figure = outcome.evaluations as f64 / units;
-        figures.largest(
-            "evaluations per impact, drive cycle or natural period, whichever are the most",
-            figure,
-            100.0,
-        );
+        record! { figures:
+            "evaluations per impact, drive cycle or natural period, whichever are the most"
+                largest outcome.evaluations as f64 / units, 100.0;
+        }
         if plant.totals().impacts > ENOUGH_IMPACTS {
             break;
         }
@@ -199,9 +182,8 @@ pub fn long_steps(all: bool) {
     }
     let start = State { q1: 0.1, q2: 0.1, dq2: 0.3, ..State::default() };
     let mut plant = Plant::new(Parameters::dimensionless(0.05, 1.0, 0.4), start).expect("a valid scene");
-    let outcome = plant
-        .advance(Drive::harmonic(1.5, 0.6), 1e6 * TAU / 0.6)
-        .expect("a valid step");
+    let advanced = plant.advance(Drive::harmonic(1.5, 0.6), 1e6 * TAU / 0.6);
+    let outcome = advanced.expect("a valid step");
     assert!(outcome.impacts <= MOST_IMPACTS, "{outcome:?}");
     // A primary mass that never quite reaches the particle: it would be searched for contacts without end.
     let (g, sigma) = (1.64, 0.715);
@@ -224,9 +206,8 @@ pub fn short_steps(figures: &mut Figures) {
         }
         one.advance(drive, step * f64::from(n)).expect("a valid step");
         assert_eq!(tiny.totals().impacts, one.totals().impacts);
-        let (a, b) = (tiny.state(), one.state());
-        let off = [a.q1 - b.q1, a.dq1 - b.dq1, a.q2 - b.q2, a.dq2 - b.dq2];
-        let off = off.iter().fold(0.0f64, |worst, x| worst.max(x.abs()));
+        let (a, b) = (states(&tiny), states(&one));
+        let off = (0..4).map(|n| (a[n] - b[n]).abs()).fold(0.0, f64::max);
         figures.largest("states differ from those after one step by, at most", off, 1e-12);
     }
     figures.print("steps of 1.5e-10 periods, 1e-6 and 5e-4 rad", 3);

@@ -16,26 +16,25 @@ fn run(command: &mut Command) -> String {
 
 /// Builds the static library as firmware takes it, without the standard library, in a folder of its own.
 fn static_library(folder: &Path, features: &str) -> PathBuf {
-    run(Command::new(env!("CARGO"))
-        .args([
-            "rustc",
-            "--locked",
-            "--quiet",
-            "--release",
-            "--lib",
-            "--no-default-features",
-            "--features",
-            features,
-        ])
-        .args(["--crate-type", "staticlib", "--target-dir"])
-        .arg(folder)
-        .args([
-            "--config",
-            "profile.release.panic=\"abort\"",
-            "--config",
-            "profile.release.lto=false",
-        ])
-        .current_dir(env!("CARGO_MANIFEST_DIR")));
+    let options = [
+        "rustc",
+        "--locked",
+        "--quiet",
+        "--release",
+        "--lib",
+        "--no-default-features",
+        "--features",
+        features,
+    ];
+    let firmware = [
+        "--config",
+        "profile.release.panic=\"abort\"",
+        "--config",
+        "profile.release.lto=false",
+    ];
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(options).args(["--crate-type", "staticlib", "--target-dir"]);
+    run(cargo.arg(folder).args(firmware).current_dir(env!("CARGO_MANIFEST_DIR")));
     folder.join("release/libphase_lock_c.a")
 }
 
@@ -54,13 +53,8 @@ fn by_the_core() -> String {
     let (mut q, mut v, mut drive, mut response) = (0.0_f64, 0.0_f64, 0.0, 0.0);
     for n in 0..60_000 {
         if n == 50_000 {
-            let to = Move {
-                response: 0.5 * response,
-                duration: 1.0,
-                amplitude: -0.5 * amplitude,
-                omega: 0.0,
-                ..Move::default()
-            };
+            let (response, amplitude) = (0.5 * response, -0.5 * amplitude);
+            let to = Move { response, duration: 1.0, amplitude, ..Move::default() };
             controller.hold_response(&mut state, to).unwrap();
         }
         let input = Input { response: q, reference: Some(drive), active: true };
@@ -70,12 +64,11 @@ fn by_the_core() -> String {
         v += h * (omega_0 * omega_0 * (drive - q) - 2.0 * zeta * omega_0 * v);
         q += h * v;
         if n % 500 == 499 {
+            let numbers = [output.omega, output.amplitude, output.phase_error.unwrap_or(0.0)];
+            let [omega, amplitude, error] = numbers.map(f64::to_bits);
             writeln!(
                 text,
-                "{n} {:016x} {:016x} {:016x} {}",
-                output.omega.to_bits(),
-                output.amplitude.to_bits(),
-                output.phase_error.unwrap_or(0.0).to_bits(),
+                "{n} {omega:016x} {amplitude:016x} {error:016x} {}",
                 output.state as u8
             )
             .unwrap();
@@ -90,23 +83,21 @@ fn by_the_library(features: &str, define: &str) -> String {
     let library = static_library(&folder.path().join("target"), features);
     let program = folder.path().join("resonator");
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    run(Command::new("cc")
-        .args([
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            "-O2",
-            "-ffp-contract=off",
-            define,
-        ])
-        .arg("-I")
-        .arg(here.join("include"))
+    let mut cc = Command::new("cc");
+    cc.args([
+        "-std=c99",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-O2",
+        "-ffp-contract=off",
+        define,
+        "-I",
+    ]);
+    cc.arg(here.join("include"))
         .arg(here.join("tests/resonator.c"))
-        .arg(library)
-        .args(["-lm", "-Wl,--gc-sections"])
-        .arg("-o")
-        .arg(&program));
+        .arg(library);
+    run(cc.args(["-lm", "-Wl,--gc-sections", "-o"]).arg(&program));
     run(&mut Command::new(program))
 }
 
@@ -114,10 +105,10 @@ fn by_the_library(features: &str, define: &str) -> String {
 fn a_c_program_locks_a_resonator_with_the_bits_of_the_core() {
     let printed = by_the_library("", "-DDOUBLE");
     let expected = by_the_core();
-    for (c, core) in printed.lines().zip(expected.lines()) {
-        assert_eq!(c, core);
-    }
-    assert_eq!(printed.lines().count(), expected.lines().count());
+    assert_eq!(
+        printed.lines().collect::<Vec<_>>(),
+        expected.lines().collect::<Vec<_>>()
+    );
     // It did lock, and held its response at half.
     let locked = printed.lines().filter(|line| line.ends_with(" 3")).count();
     assert!(locked > 40, "{locked}");
@@ -135,7 +126,10 @@ fn a_c_program_in_single_precision_locks_the_resonator_at_the_same_frequency() {
         omegas(&by_the_core()),
     );
     assert_eq!(single.len(), double.len());
-    for (single, double) in single.iter().zip(&double) {
-        assert!((single / double - 1.0).abs() < 1e-6, "{single}, {double}");
-    }
+    assert!(
+        single
+            .iter()
+            .zip(&double)
+            .all(|(single, double)| (single / double - 1.0).abs() < 1e-6)
+    );
 }

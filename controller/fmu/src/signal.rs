@@ -76,55 +76,36 @@ impl InputSignal {
 mod tests {
     use super::*;
 
-    /// A channel that has read these values at these times.
-    fn read(points: &[CommunicationPoint]) -> InputSignal {
+    /// A channel that has read these values at these times, and reads the last of them for a step of that length; the longest step is 1 s.
+    fn read(points: &[CommunicationPoint], step: f64) -> InputSignal {
         let mut signal = InputSignal::default();
-        for &(time, value) in points {
+        for (n, &(time, value)) in points.iter().enumerate() {
             signal.value = value;
-            signal.begin(time, 0.5, 1.0);
-            signal.end(time);
+            if n + 1 == points.len() {
+                signal.begin(time, step, 1.0);
+            } else {
+                signal.begin(time, 0.5, 1.0);
+                signal.end(time);
+            }
         }
         signal
     }
 
     #[test]
-    fn a_channel_without_a_past_is_held() {
-        let mut signal = read(&[]);
-        signal.value = 2.0;
-        signal.begin(0.0, 0.5, 1.0);
-        assert_eq!(signal.at(0.5), 2.0);
-    }
-
-    #[test]
-    fn two_communication_points_make_a_straight_line() {
-        let mut signal = read(&[(0.0, 0.0)]);
-        signal.value = 1.0;
-        signal.begin(0.5, 0.5, 1.0);
-        assert_eq!(signal.at(0.25), 1.5);
-    }
-
-    #[test]
-    fn three_uneven_communication_points_make_a_parabola() {
-        let parabola = |t: f64| 1.0 - 2.0 * t + 3.0 * t * t;
-        let mut signal = read(&[(0.0, parabola(0.0)), (0.25, parabola(0.25))]);
-        signal.value = parabola(1.0);
-        signal.begin(1.0, 0.5, 1.0);
-        assert!((signal.at(0.5) - parabola(1.5)).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_channel_is_held_where_a_step_is_or_was_long() {
+    fn communication_points_make_a_polynomial_and_a_channel_without_a_past_or_with_a_long_step_is_held() {
+        let parabola = |t: f64| (t, 1.0 - 2.0 * t + 3.0 * t * t);
+        assert_eq!(read(&[(0.0, 2.0)], 0.5).at(0.5), 2.0);
+        assert_eq!(read(&[(0.0, 0.0), (0.5, 1.0)], 0.5).at(0.25), 1.5);
+        let uneven = read(&[0.0, 0.25, 1.0].map(parabola), 0.5).at(0.5);
+        assert!((uneven - parabola(1.5).1).abs() < 1e-12);
         for (time, step) in [(2.0, 0.5), (0.5, 2.0)] {
-            let mut signal = read(&[(0.0, 0.0)]);
-            signal.value = 1.0;
-            signal.begin(time, step, 1.0);
-            assert_eq!(signal.at(0.25), 1.0);
+            assert_eq!(read(&[(0.0, 0.0), (time, 1.0)], step).at(0.25), 1.0);
         }
     }
 
     #[test]
     fn given_derivatives_make_a_polynomial_for_one_step() {
-        let mut signal = read(&[(0.0, 0.0)]);
+        let mut signal = read(&[(0.0, 0.0), (0.25, 0.0)], 0.5);
         signal.value = 1.0;
         for (order, value) in [(1, 2.0), (2, 6.0), (3, 24.0)] {
             signal.set_derivative(order, value);

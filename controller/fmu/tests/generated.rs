@@ -106,11 +106,8 @@ fn the_parameters_of_the_model_description_follow_from_the_settings() {
     let (parameters, after) = rest.split_once("    <ScalarVariable name=\"response\"").unwrap();
     let names = parameters.split("<ScalarVariable name=\"").skip(1);
     let names: Vec<&str> = names.map(|rest| rest.split('"').next().unwrap()).collect();
-    let text = format!(
-        "{before}  <ModelVariables>\n{}    <ScalarVariable name=\"response\"{}",
-        variables(),
-        renumbered(after, &names)
-    );
+    let (ours, after) = (variables(), renumbered(after, &names));
+    let text = format!("{before}  <ModelVariables>\n{ours}    <ScalarVariable name=\"response\"{after}");
     if std::env::var_os("UPDATE").is_some() {
         std::fs::write(&path, &text).unwrap();
     }

@@ -69,13 +69,21 @@ pub struct Bench {
 impl Bench {
     pub fn new(config: Config) -> Self {
         let controller = config.build().expect("a sensible configuration");
+        let state = controller.start();
         Self {
-            state: controller.start(),
             controller,
+            state,
             resonator: Resonator::new(),
             active: true,
             measured_reference: true,
         }
+    }
+
+    /// A bench that has locked.
+    pub fn locked(config: Config) -> Self {
+        let mut bench = Self::new(config);
+        bench.run_to_lock(3000).expect("a lock");
+        bench
     }
 
     /// One sample: the sensor readings, and the drive until the next sample.
@@ -91,6 +99,12 @@ impl Bench {
         let h = self.controller.config().sample_time;
         self.resonator.advance(output.amplitude, output.omega, h);
         output
+    }
+
+    /// One sample with readings of response and base that pass through `fault`.
+    pub fn sample_through(&mut self, fault: impl Fn(f64, f64) -> [f64; 2]) -> Output {
+        let [response, base] = fault(self.resonator.q, self.resonator.base);
+        self.sample_reading(response, Some(base))
     }
 
     /// Controls the response amplitude instead of the drive's, with a move to a new setpoint.

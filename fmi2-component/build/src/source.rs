@@ -214,26 +214,3 @@ const KEYWORDS: &[&str] = &[
     "match", "mod", "move", "mut", "override", "priv", "pub", "ref", "return", "self", "static", "struct", "super",
     "trait", "true", "try", "type", "typeof", "unsafe", "unsized", "use", "virtual", "where", "while", "yield",
 ];
-
-#[cfg(test)]
-mod tests {
-    use super::identifier;
-
-    #[test]
-    fn a_variant_is_named_as_its_variable() {
-        for (name, expected) in [
-            ("M", "M"),
-            ("m", "m"),
-            ("impact_time", "impact_time"),
-            ("der(q1)", "der_q1"),
-            ("der(x[2],3)", "der_x_2_3"),
-            ("rig.motor.speed", "rig_motor_speed"),
-            ("loop", "loop_"),
-            ("2nd", "_2nd"),
-            ("_", "__"),
-            ("'+'", "__"),
-        ] {
-            assert_eq!(identifier(name), expected);
-        }
-    }
-}

@@ -10,133 +10,105 @@ fn change(from: &str, to: &str) -> String {
     TANK.replacen(from, to, 1)
 }
 
+/// Asserts that the table holds parts of entries: a line each, `variable | part`.
 #[track_caller]
-fn refused(from: &str, to: &str, reason: &str) {
-    let error = match source_of(&change(from, to)) {
-        Ok(_) => panic!("{to:?} was accepted"),
-        Err(Error::Description(source)) => source.to_string(),
-        Err(error) => error.to_string(),
-    };
-    assert!(error.contains(reason), "{reason:?} is not in {error:?}");
-}
-
-/// The part of the table that tells of one variable.
-fn entry(source: &str, name: &str) -> String {
-    let start = source.find(&format!("name: {name:?}")).unwrap();
-    let entry = &source[start..];
-    let entry = &entry[..entry.find("},").unwrap()];
-    entry
-        .replace("::core::option::Option::", "")
-        .replace("::fmi2_component::", "")
-}
-
-#[test]
-fn every_attribute_that_the_table_holds_is_read() {
-    let xml = change(
-        r#"<Real unit="m2" start="2" min="0"/>"#,
-        r#"<Real quantity="Area" unit="m2" displayUnit="m2" start="2e3" min="0.5" max="1e4" nominal="3" unbounded="false"/>"#,
-    );
-    let source = source_of(&xml).unwrap();
-    let area = entry(&source, "area");
-    for part in [
-        "value_reference: 0,",
-        "causality: Causality::Parameter,",
-        "variability: Variability::Fixed,",
-        "initial: Some(Initial::Exact),",
-        "start: Some(2000.0),",
-        "min: Some(0.5),",
-        "max: Some(10000.0),",
-        r#"unit: Some("m2"),"#,
-        r#"description: "Area of the ground","#,
-    ] {
-        assert!(area.contains(part), "no {part:?} in {area}");
-    }
-    for (name, part) in [
-        ("level", "initial: Some(Initial::Exact)"),
-        ("inflow", "variability: Variability::Continuous"),
-        ("inflow", "initial: None"),
-        ("full", "variability: Variability::Discrete"),
-        ("full", "initial: Some(Initial::Calculated)"),
-        ("valve", "start: Some(true)"),
-        ("label", r#"start: Some("A \"tank\"")"#),
-    ] {
-        let entry = entry(&source, name);
+fn has(xml: &str, lines: &str) {
+    let source = source_of(xml).unwrap();
+    for line in lines.trim().lines() {
+        let (name, part) = line.trim().split_once(" | ").unwrap();
+        let entry = &source[source.find(&format!("name: {name:?}")).unwrap()..];
+        let entry = entry[..entry.find("},").unwrap()].replace("::core::option::Option::", "");
+        let entry = entry.replace("::fmi2_component::", "");
         assert!(entry.contains(part), "no {part:?} in {entry}");
     }
 }
 
 #[test]
-fn a_declared_type_lends_what_a_variable_does_not_say() {
-    let source = source_of(TANK).unwrap();
-    let level = entry(&source, "level");
-    assert!(level.contains(r#"unit: Some("m")"#) && level.contains("min: Some(0.0)"));
-    refused(
-        r#"declaredType="Length" start="1""#,
-        r#"declaredType="Lenght" start="1""#,
-        "Lenght",
-    );
-}
-
-#[test]
-fn an_enumeration_is_an_integer() {
+fn every_attribute_that_the_table_holds_is_read_a_declared_type_lends_its_own_and_an_enumeration_is_an_integer() {
     let xml = change(
-        r#"<SimpleType name="Length">"#,
-        r#"<SimpleType name="Fill"><Enumeration><Item name="part" value="1"/><Item name="full" value="2"/></Enumeration></SimpleType><SimpleType name="Length">"#,
+        r#"<Real unit="m2" start="2" min="0"/>"#,
+        r#"<Real quantity="Area" unit="m2" displayUnit="m2" start="2e3" min="0.5" max="1e4" nominal="3" unbounded="false"/>"#,
     );
+    has(
+        &xml,
+        r#"
+        area | value_reference: 0,
+        area | causality: Causality::Parameter,
+        area | variability: Variability::Fixed,
+        area | initial: Some(Initial::Exact),
+        area | start: Some(2000.0),
+        area | min: Some(0.5),
+        area | max: Some(10000.0),
+        area | unit: Some("m2"),
+        area | description: "Area of the ground",
+        level | initial: Some(Initial::Exact)
+        level | unit: Some("m")
+        level | min: Some(0.0)
+        inflow | variability: Variability::Continuous
+        inflow | initial: None
+        full | variability: Variability::Discrete
+        full | initial: Some(Initial::Calculated)
+        valve | start: Some(true)
+        label | start: Some("A \"tank\"")
+        "#,
+    );
+    let types = r#"<SimpleType name="Fill"><Enumeration><Item name="part" value="1"/></Enumeration></SimpleType>"#;
+    let xml = change("<TypeDefinitions>", &format!("<TypeDefinitions>{types}"));
     let xml = xml.replace(r#"<Integer/>"#, r#"<Enumeration declaredType="Fill" max="2"/>"#);
-    let source = source_of(&xml).unwrap();
-    assert!(entry(&source, "overflows").contains("max: Some(2)"));
-    assert!(source.contains("pub enum Integer {"));
+    has(&xml, "overflows | max: Some(2)");
+    assert!(source_of(&xml).unwrap().contains("pub enum Integer {"));
 }
 
 #[test]
-fn variants_are_named_as_their_variables() {
-    let source = source_of(TANK).unwrap();
-    for variant in ["\n    area,", "\n    der_level,"] {
-        assert!(source.contains(variant));
-    }
-    refused(
-        r#"name="height""#,
-        r#"name="der.level""#,
-        "would both be the Rust variant der_level",
-    );
-}
-
-#[test]
-fn an_unknown_type_or_value_of_an_attribute_is_refused() {
-    refused("<Integer/>", "<Int/>", "overflows: it needs one of Real, Integer");
-    refused(r#"initial="exact""#, r#"initial="exactly""#, "`approx`");
-    refused(r#"causality="input""#, r#"causality="inputs""#, "calculatedParameter");
-    refused(
-        r#"start="2""#,
-        r#"start="two""#,
-        "start = \"two\" is not a finite value",
-    );
-    refused(r#"start="2""#, r#"start="inf""#, "finite");
-}
-
-#[test]
-fn value_references_are_unique() {
-    refused(
-        r#"name="height" valueReference="1""#,
-        r#"name="height" valueReference="0""#,
-        "same valueReference 0",
-    );
-}
-
-#[test]
-fn a_derivative_has_a_state() {
-    for state in ["0", "44"] {
-        refused(
-            r#"derivative="4""#,
-            &format!("derivative=\"{state}\""),
-            "Derivatives lists index 5",
-        );
+fn a_variant_is_named_as_its_variable() {
+    for (name, variant) in [
+        ("M", "M"),
+        ("impact_time", "impact_time"),
+        ("der(x[2],3)", "der_x_2_3"),
+        ("rig.motor.speed", "rig_motor_speed"),
+        ("loop", "loop_"),
+        ("2nd", "_2nd"),
+        ("_", "__"),
+        ("'+'", "__"),
+    ] {
+        let source = source_of(&change(r#"name="height""#, &format!("name=\"{name}\""))).unwrap();
+        for variant in [variant, "der_level"] {
+            assert!(source.contains(&format!("\n    {variant},")), "{name}");
+        }
     }
 }
 
+/// Text, what replaces it, and parts of the reason why that is refused.
+const REFUSED: &str = r#"
+<Integer/> | <Int/> | overflows: it needs one of Real, Integer
+initial="exact" | initial="exactly" | `approx`
+="input" | ="inputs" | ScalarVariable[2].@causality | `calculatedParameter`
+valueReference="0" | valueReference="-1" | ScalarVariable[0].@valueReference | invalid digit
+start="2" | start="two" | start = "two" is not a finite value
+start="2" | start="inf" | finite
+declaredType="Length" start="1" | declaredType="Lenght" start="1" | Lenght
+name="height" | name="der.level" | would both be the Rust variant der_level
+valueReference="1" | valueReference="0" | same valueReference 0
+derivative="4" | derivative="0" | Derivatives lists index 5
+derivative="4" | derivative="44" | Derivatives lists index 5
+"#;
+
 #[test]
-fn the_guid_follows_the_variables_and_not_the_words() {
+fn what_is_unknown_missing_or_given_twice_is_refused_by_element() {
+    for line in REFUSED.trim().lines() {
+        let parts: Vec<_> = line.split(" | ").collect();
+        let error = match source_of(&change(parts[0], parts[1])) {
+            Ok(_) => panic!("{line} was accepted"),
+            Err(Error::Description(source)) => source.to_string(),
+            Err(error) => error.to_string(),
+        };
+        assert!(parts[2..].iter().all(|part| error.contains(part)), "{line}: {error}");
+    }
+    assert!(["level", "<a/>"].iter().all(|text| source_of(text).is_err()));
+}
+
+#[test]
+fn the_guid_follows_the_variables_and_not_the_words_or_elements_of_other_tools() {
     let guid = guid_of(TANK).unwrap();
     for (from, to) in [
         ("Area of the ground", "Ground area"),
@@ -144,6 +116,11 @@ fn the_guid_follows_the_variables_and_not_the_words() {
         ("\n  <ModelVariables>", "<ModelVariables>"),
     ] {
         assert_eq!(guid_of(&change(from, to)).unwrap(), guid);
+    }
+    let other = "<Annotations><Tool name=\"t\"><a b=\"1\">text</a></Tool></Annotations>";
+    for place in ["<Real", "</ScalarVariable>", "<ModelVariables>"] {
+        let xml = TANK.replace(place, &format!("{other}{place}"));
+        assert_eq!(source_of(&xml).unwrap(), source_of(TANK).unwrap());
     }
     for (from, to) in [
         (r#"start="2""#, r#"start="3""#),
@@ -157,15 +134,10 @@ fn the_guid_follows_the_variables_and_not_the_words() {
 }
 
 #[test]
-fn a_description_to_be_packed_has_the_derived_guid() {
-    let packed = describe(TANK).unwrap();
-    let guid = guid_of(TANK).unwrap();
+fn a_description_to_be_packed_has_the_derived_guid_in_the_place_of_the_only_one() {
+    let (packed, guid) = (describe(TANK).unwrap(), guid_of(TANK).unwrap());
     assert_eq!(packed, change(r#"guid="derived""#, &format!("guid=\"{guid}\"")));
     assert_eq!(guid_of(&packed).unwrap(), guid);
-}
-
-#[test]
-fn a_guid_that_is_missing_or_not_the_only_one_cannot_be_replaced() {
     assert!(describe(&change(r#"guid="derived""#, "guid='derived'")).is_err());
     assert!(describe(&change("<CoSimulation", r#"<CoSimulation guid="derived""#)).is_err());
 }

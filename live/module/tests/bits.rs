@@ -1,22 +1,18 @@
-//! The live bench is the lab's experiment, sample by sample.
+//! Guards the live bench: it is the lab's experiment, sample by sample; its settings, moves and refusals.
 
 use std::f64::consts::TAU;
 
-use vines_live::bench::{Bench, regime_at};
+use vines_live::bench::{Bench, Row, regime_at};
 use vines_live::settings::{default_scene, index, settings_of};
 use vines_testbench::experiment::run;
 use vines_testbench::identification::{WINDOW, decay_points};
 use vines_testbench::live::HarmonicMotion;
+use vines_testbench::record::Record;
 use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
 
 fn paper() -> Scene {
     Scene::parse("paper.toml", PAPER, &[]).unwrap()
-}
-
-#[test]
-fn the_default_scene_is_that_of_the_lab() {
-    assert_eq!(default_scene(), paper());
 }
 
 /// The controller under a constant drive: the live bench has no script.
@@ -28,60 +24,47 @@ impl Controller for ConstantDrive {
     }
 }
 
-#[test]
-fn the_default_lock_has_the_bits_of_the_lab_under_a_constant_drive() {
-    let scene = paper();
+/// The record of the lab's experiment under a constant drive.
+fn record_of(scene: &Scene) -> Record {
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
     let mut controller = ConstantDrive(BuiltIn::new(&scene.controller_config()).unwrap());
-    let record = run(&mut rig, &mut controller, &scene, |_, _, _| {}).unwrap();
-    let mut bench = Bench::new(Bench::default_settings()).unwrap();
-    let mut rows = Vec::new();
-    bench.run(record.released, |row| rows.push(*row)).unwrap();
-    for (n, sample) in record.samples[..record.released].iter().enumerate() {
-        let row = &rows[n];
-        assert_eq!(row.response.to_bits(), sample.sensors.response.to_bits(), "sample {n}");
-        assert_eq!(
-            row.output.omega.to_bits(),
-            sample.command.drive.omega.to_bits(),
-            "sample {n}"
-        );
-    }
-    assert!(bench.output.locked);
+    run(&mut rig, &mut controller, scene, |_, _, _| {}).unwrap()
+}
+
+fn bench() -> Bench {
+    Bench::new(Bench::default_settings()).unwrap()
 }
 
 #[test]
-fn the_free_decay_has_the_bits_of_the_lab() {
-    let scene = paper();
-    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
-    let mut controller = ConstantDrive(BuiltIn::new(&scene.controller_config()).unwrap());
-    let record = run(&mut rig, &mut controller, &scene, |_, _, _| {}).unwrap();
+fn lock_and_free_decay_have_the_bits_of_the_lab_under_a_constant_drive() {
+    let (scene, mut bench, mut rows) = (paper(), bench(), Vec::new());
+    assert_eq!(default_scene(), scene);
+    let record = record_of(&scene);
+    bench.run(record.released, |row| rows.push(*row)).unwrap();
+    for (n, sample) in record.samples[..record.released].iter().enumerate() {
+        let live = [rows[n].response, rows[n].output.omega];
+        let lab = [sample.sensors.response, sample.command.drive.omega];
+        assert_eq!(live.map(f64::to_bits), lab.map(f64::to_bits), "sample {n}");
+    }
+    assert!(bench.output.locked);
     let points = decay_points(&record, &scene, WINDOW).points;
     assert!(points.len() > 50, "{} points", points.len());
-    let mut bench = Bench::new(Bench::default_settings()).unwrap();
-    bench.run(record.released, |_| {}).unwrap();
     let released = bench.motion;
     bench.drive(false);
-    let mut fits: Vec<HarmonicMotion> = Vec::new();
-    let mut lost = None;
-    bench
-        .run(record.decay().len(), |row| {
-            if fits.last() != Some(&row.motion) {
-                fits.push(row.motion);
-            }
-            if !row.decays {
-                lost.get_or_insert(row.time - record.decay()[0].time);
-            }
-        })
-        .unwrap();
+    let (mut fits, mut lost): (Vec<HarmonicMotion>, _) = (Vec::new(), None);
+    let see = |row: &Row| {
+        if fits.last() != Some(&row.motion) {
+            fits.push(row.motion);
+        }
+        if !row.decays {
+            lost.get_or_insert(row.time - record.decay()[0].time);
+        }
+    };
+    bench.run(record.decay().len(), see).unwrap();
     // Until the first fit, the motion is that of the release.
     assert_eq!(fits.remove(0), released);
     for (point, HarmonicMotion { omega, amplitude, speed }) in points.iter().zip(&fits) {
-        assert_eq!(
-            (point.f_hz, point.a_m),
-            (omega / TAU, *amplitude),
-            "t = {} s",
-            point.t_s
-        );
+        assert_eq!([point.f_hz, point.a_m], [omega / TAU, *amplitude], "{}", point.t_s);
         let b = scene.dimensionless().speed(*speed);
         assert!((b - point.b.unwrap()).abs() < 1e-12, "B = {b} at t = {} s", point.t_s);
     }
@@ -89,16 +72,14 @@ fn the_free_decay_has_the_bits_of_the_lab() {
     // that follow: the two agree within the longest interval in synchrony, 1.25 half periods.
     let period = TAU / record.decay()[0].command.drive.omega;
     let late = (lost.unwrap() - points.last().unwrap().t_s) / period;
-    assert!(
-        (1.25 - 0.625..1.25 + 0.625).contains(&late),
-        "synchrony is lost {late} periods after the last point"
-    );
+    let allowed = 1.25 - 0.625..1.25 + 0.625;
+    assert!(allowed.contains(&late), "lost {late} periods after the last point");
     assert!(fits.len() >= points.len());
 }
 
 #[test]
 fn a_mass_that_is_put_somewhere_starts_from_rest_there() {
-    let mut bench = Bench::new(Bench::default_settings()).unwrap();
+    let mut bench = bench();
     bench.run(500, |_| {}).unwrap();
     let b = bench.scene.plant.half_width;
     for to in [-1.0, 0.3, 1.0] {
@@ -108,10 +89,7 @@ fn a_mass_that_is_put_somewhere_starts_from_rest_there() {
         bench.place(true, 2.0 * to).unwrap();
         let moved = bench.plant().state();
         assert_eq!((moved.q1, moved.dq1, moved.dq2), (2.0 * to * b, 0.0, 0.0));
-        assert!(
-            (moved.q2 - moved.q1 - to * b).abs() < 1e-14,
-            "particle with the mass at {to}"
-        );
+        assert!((moved.q2 - moved.q1 - to * b).abs() < 1e-14, "with the mass at {to}");
         bench.run(10, |_| {}).unwrap();
     }
 }
@@ -131,20 +109,15 @@ fn gap_difference_friction_and_tilt_reach_the_plant() {
     assert!(bench.plant().totals().friction > 0.0);
     for (to, w) in [(-2.0, 1.1), (2.0, -0.9)] {
         bench.place(false, to).unwrap();
-        assert!(
-            (bench.plant().relative_displacement() - w * b).abs() < 1e-14,
-            "particle at {to}"
-        );
+        let off = bench.plant().relative_displacement() - w * b;
+        assert!(off.abs() < 1e-14, "particle at {to}");
     }
     // Friction and tilt change while the bench runs, and can be switched off.
     let time = bench.time();
     (settings[index::FRICTION], settings[index::TILT]) = (0.0, 0.0);
     bench.apply(settings).unwrap();
-    let ideal = lovines::Cavity {
-        b_plus: plant.cavity.b_plus,
-        b_minus: plant.cavity.b_minus,
-        ..lovines::Cavity::IDEAL
-    };
+    let lovines::Cavity { b_plus, b_minus, .. } = plant.cavity;
+    let ideal = lovines::Cavity { b_plus, b_minus, ..lovines::Cavity::IDEAL };
     assert_eq!((bench.time(), bench.plant().parameters().cavity), (time, ideal));
     assert_eq!(settings_of(&bench.scene), settings);
     settings[index::GAP_DIFFERENCE] = 0.0;
@@ -154,7 +127,7 @@ fn gap_difference_friction_and_tilt_reach_the_plant() {
 
 #[test]
 fn slow_motion_between_two_samples_ends_at_the_next_one() {
-    let mut bench = Bench::new(Bench::default_settings()).unwrap();
+    let mut bench = bench();
     for _ in 0..500 {
         bench.run(1, |_| {}).unwrap();
         let step = bench.lock.config().sample_time;
@@ -164,7 +137,7 @@ fn slow_motion_between_two_samples_ends_at_the_next_one() {
 
 #[test]
 fn the_tracked_backbone_is_repeated_with_the_same_bits() {
-    let mut bench = Bench::new(Bench::default_settings()).unwrap();
+    let mut bench = bench();
     bench.run(2000, |_| {}).unwrap();
     bench.track().unwrap();
     let points = bench.tracking.as_ref().unwrap().points.clone();
@@ -177,16 +150,12 @@ fn the_tracked_backbone_is_repeated_with_the_same_bits() {
 
 #[test]
 fn a_refused_setting_changes_nothing_and_says_why() {
-    let mut bench = Bench::new(Bench::default_settings()).unwrap();
+    let mut bench = bench();
     let mut settings = bench.settings;
     settings[index::RESTITUTION] = 1.5;
     let message = bench.apply(settings).unwrap_err();
-    assert!(
-        message
-            .text
-            .starts_with("r (coefficient of restitution) = {} is refused"),
-        "{message:?}"
-    );
+    let text = "r (coefficient of restitution) = {} is refused";
+    assert!(message.text.starts_with(text), "{message:?}");
     assert_eq!(message.numbers, [1.5]);
     assert_eq!(bench.scene, paper());
 }

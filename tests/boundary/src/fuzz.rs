@@ -6,15 +6,17 @@ use std::time::{Duration, Instant};
 
 pub use fastrand::Rng;
 use fmi2_component::Status;
-use fmi2_component::abi::EventInfo;
-use fmi2_description::{Description, FmiType};
+use fmi2_component::abi::{CFmuState, EventInfo};
+use fmi2_description::FmiType;
 
-use crate::{Fmu, Interface, Master, Raw};
+use crate::{Fmu, Interface, Master};
 
 /// Calls in a sequence.
 const CALLS: usize = 80;
 /// Elements of an array.
 const MOST: usize = 6;
+const INF: f64 = f64::INFINITY;
+const LEAST: f64 = f64::MIN_POSITIVE;
 /// Values that nobody expects.
 const WILD: [f64; 12] = [
     0.0,
@@ -26,10 +28,18 @@ const WILD: [f64; 12] = [
     -1e300,
     1e-300,
     f64::NAN,
-    f64::INFINITY,
-    f64::NEG_INFINITY,
-    f64::MIN_POSITIVE,
+    INF,
+    -INF,
+    LEAST,
 ];
+
+/// Calls a function of the instance; its name and status. The arguments must be as the standard asks, or such as the shell must refuse: arrays
+/// have `MOST` elements, which is no less than a count that is not absurd.
+macro_rules! call {
+    ($caller:ident.$name:ident($($argument:expr),*)) => {
+        (stringify!($name), unsafe { ($caller.master.f.$name)($caller.master.c, $($argument),*) })
+    };
+}
 
 /// A library under random calls, and what became of them.
 #[derive(Debug)]
@@ -48,10 +58,11 @@ pub struct Fuzzer {
 impl Fuzzer {
     /// No call yet.
     pub fn new(fmu: Fmu) -> Self {
-        let description = Description::parse(fmu.description).expect("the library was built from it");
+        let variables = fmu.parsed().variables;
         let references = [FmiType::Real, FmiType::Integer, FmiType::Boolean].map(|kind| {
-            let variables = description.variables.iter();
-            let of_kind = variables.filter(|v| v.content().is_some_and(|(of, _)| of == kind));
+            let of_kind = variables
+                .iter()
+                .filter(|v| v.content().is_some_and(|(of, _)| of == kind));
             of_kind.map(|v| v.value_reference).chain([u32::MAX]).collect()
         });
         let (statuses, harmless, longest) = ([0; 6], 0, Duration::ZERO);
@@ -69,12 +80,13 @@ impl Fuzzer {
             Interface::CoSimulation
         };
         let master = Master::new(fmu, interface);
+        let (states, blob, references) = ([null_mut(); 3], Vec::new(), &self.references);
         let mut caller = Caller {
             master: &master,
-            states: [null_mut(); 3],
-            blob: Vec::new(),
+            states,
+            blob,
             time: 0.0,
-            references: &self.references,
+            references,
             stage: 0,
             interface,
         };
@@ -141,7 +153,7 @@ fn count(random: &mut Rng) -> usize {
 /// An instance, and what its master has got from it.
 struct Caller<'a> {
     master: &'a Master,
-    states: [Raw; 3],
+    states: [CFmuState; 3],
     blob: Vec<u8>,
     time: f64,
     references: &'a [Vec<u32>; 3],
@@ -159,11 +171,6 @@ impl Caller<'_> {
 
     /// Makes a call; returns its name and status.
     fn call(&mut self, random: &mut Rng) -> (&'static str, Status) {
-        let (c, f) = (self.master.c, self.master.f);
-        // SAFETY: as the standard asks; arrays have MOST elements, which is no less than a count that is not absurd.
-        macro_rules! call {
-            ($name:ident($($argument:expr),*)) => { (stringify!($name), unsafe { (f.$name)(c, $($argument),*) }) };
-        }
         let r = random;
         let wild = one_in(r, 12);
         let (n, m) = (count(r), count(r));
@@ -177,37 +184,31 @@ impl Caller<'_> {
         let exchange = (self.interface == Interface::ModelExchange) != one_in(r, 12);
         match r.usize(..16) {
             0..=3 => match r.usize(..12) {
-                0..=3 => call!(fmi2SetReal(vr, n, if wild { null() } else { x.as_ptr() })),
-                4..=6 => call!(fmi2GetReal(vr, n, if wild { null_mut() } else { x.as_mut_ptr() })),
-                7 => call!(fmi2SetInteger(vi, n, whole.as_ptr())),
-                8 => call!(fmi2GetInteger(vi, n, whole.as_mut_ptr())),
-                9 => call!(fmi2SetBoolean(vb, n, whole.as_ptr())),
-                10 => call!(fmi2GetBoolean(vb, n, whole.as_mut_ptr())),
-                _ if wild => call!(fmi2GetString(vr, n, strings.as_mut_ptr())),
-                _ => call!(fmi2SetString(vr, n, strings.as_ptr())),
+                0..=3 => call!(self.fmi2SetReal(vr, n, if wild { null() } else { x.as_ptr() })),
+                4..=6 => call!(self.fmi2GetReal(vr, n, if wild { null_mut() } else { x.as_mut_ptr() })),
+                7 => call!(self.fmi2SetInteger(vi, n, whole.as_ptr())),
+                8 => call!(self.fmi2GetInteger(vi, n, whole.as_mut_ptr())),
+                9 => call!(self.fmi2SetBoolean(vb, n, whole.as_ptr())),
+                10 => call!(self.fmi2GetBoolean(vb, n, whole.as_mut_ptr())),
+                _ if wild => call!(self.fmi2GetString(vr, n, strings.as_mut_ptr())),
+                _ => call!(self.fmi2SetString(vr, n, strings.as_ptr())),
             },
             4 => self.state(r),
             5..=6 => match r.usize(..3) {
-                0 => call!(fmi2SetRealInputDerivatives(vr, n, whole.as_ptr(), x.as_ptr())),
-                1 => call!(fmi2GetRealOutputDerivatives(vr, n, whole.as_ptr(), x.as_mut_ptr())),
+                0 => call!(self.fmi2SetRealInputDerivatives(vr, n, whole.as_ptr(), x.as_ptr())),
+                1 => call!(self.fmi2GetRealOutputDerivatives(vr, n, whole.as_ptr(), x.as_mut_ptr())),
                 _ => {
                     let (knowns, mut answer) = (self.references(r, 0), [0.0; MOST]);
-                    call!(fmi2GetDirectionalDerivative(
-                        vr,
-                        n,
-                        knowns.as_ptr(),
-                        m,
-                        x.as_ptr(),
-                        answer.as_mut_ptr()
-                    ))
+                    let (known, along, answer) = (knowns.as_ptr(), x.as_ptr(), answer.as_mut_ptr());
+                    call!(self.fmi2GetDirectionalDerivative(vr, n, known, m, along, answer))
                 }
             },
             7 => match r.usize(..5) {
-                0 => call!(fmi2GetStatus(whole[0], &mut Status::Ok)),
-                1 => call!(fmi2GetRealStatus(whole[0], &mut x[0])),
-                2 => call!(fmi2GetIntegerStatus(whole[0], &mut 0)),
-                3 => call!(fmi2GetBooleanStatus(whole[0], null_mut())),
-                _ => call!(fmi2GetStringStatus(whole[0], &mut strings[0])),
+                0 => call!(self.fmi2GetStatus(whole[0], &mut Status::Ok)),
+                1 => call!(self.fmi2GetRealStatus(whole[0], &mut x[0])),
+                2 => call!(self.fmi2GetIntegerStatus(whole[0], &mut 0)),
+                3 => call!(self.fmi2GetBooleanStatus(whole[0], null_mut())),
+                _ => call!(self.fmi2GetStringStatus(whole[0], &mut strings[0])),
             },
             8..=10 => self.life(r),
             _ if exchange => {
@@ -217,19 +218,19 @@ impl Caller<'_> {
                 let at = if one_in(r, 20) { null_mut() } else { x.as_mut_ptr() };
                 let n = pick(r, &[5, 5, 5, 5, 3, 0, usize::MAX]);
                 match r.usize(..12) {
-                    0 => call!(fmi2EnterEventMode()),
-                    1..=2 => call!(fmi2NewDiscreteStates(&mut EventInfo::default())),
-                    3..=4 => call!(fmi2EnterContinuousTimeMode()),
-                    5 => call!(fmi2CompletedIntegratorStep(1, &mut 0, &mut 0)),
-                    6 => call!(fmi2SetTime(x[0])),
-                    7 => call!(fmi2SetContinuousStates(at, n)),
-                    8 => call!(fmi2GetDerivatives(at, n)),
-                    9 => call!(fmi2GetEventIndicators(at, n)),
-                    10 => call!(fmi2GetContinuousStates(at, n)),
-                    _ => call!(fmi2GetNominalsOfContinuousStates(at, n)),
+                    0 => call!(self.fmi2EnterEventMode()),
+                    1..=2 => call!(self.fmi2NewDiscreteStates(&mut EventInfo::default())),
+                    3..=4 => call!(self.fmi2EnterContinuousTimeMode()),
+                    5 => call!(self.fmi2CompletedIntegratorStep(1, &mut 0, &mut 0)),
+                    6 => call!(self.fmi2SetTime(x[0])),
+                    7 => call!(self.fmi2SetContinuousStates(at, n)),
+                    8 => call!(self.fmi2GetDerivatives(at, n)),
+                    9 => call!(self.fmi2GetEventIndicators(at, n)),
+                    10 => call!(self.fmi2GetContinuousStates(at, n)),
+                    _ => call!(self.fmi2GetNominalsOfContinuousStates(at, n)),
                 }
             }
-            _ if one_in(r, 20) => call!(fmi2CancelStep()),
+            _ if one_in(r, 20) => call!(self.fmi2CancelStep()),
             _ => {
                 let step = match r.usize(..12) {
                     0 => pick(r, &WILD),
@@ -237,7 +238,7 @@ impl Caller<'_> {
                     _ => between(r, 0.0, 0.01),
                 };
                 let time = if one_in(r, 12) { pick(r, &WILD) } else { self.time };
-                let done = call!(fmi2DoStep(time, step, 0));
+                let done = call!(self.fmi2DoStep(time, step, 0));
                 if done.1 == Status::Ok {
                     self.time = time + step;
                 }
@@ -248,70 +249,53 @@ impl Caller<'_> {
 
     /// The life cycle: mostly what is in order.
     fn life(&mut self, r: &mut Rng) -> (&'static str, Status) {
-        let (c, f) = (self.master.c, self.master.f);
         let mut time = || if one_in(r, 4) { pick(r, &WILD) } else { 0.0 };
         let [start, stop, tolerance] = [time(), time(), time()];
         let wanted = if one_in(r, 4) { r.usize(..6) } else { self.stage };
         let defined = c_int::from(one_in(r, 6));
         let categories = [c"logAll".as_ptr(), c"\xfe%s".as_ptr(), null()];
         let (on, count) = (c_int::from(r.bool()), r.usize(..4));
-        // SAFETY: as the standard asks.
-        let (name, status) = unsafe {
-            match wanted {
-                0 => {
-                    self.time = start;
-                    let status = (f.fmi2SetupExperiment)(c, 1, tolerance, start, defined, stop);
-                    ("fmi2SetupExperiment", status)
-                }
-                1 => ("fmi2EnterInitializationMode", (f.fmi2EnterInitializationMode)(c)),
-                2 => ("fmi2ExitInitializationMode", (f.fmi2ExitInitializationMode)(c)),
-                3 | 4 => {
-                    let status = (f.fmi2SetDebugLogging)(c, on, count, categories.as_ptr());
-                    ("fmi2SetDebugLogging", status)
-                }
-                _ if one_in(r, 8) => ("fmi2Terminate", (f.fmi2Terminate)(c)),
-                _ => ("fmi2Reset", (f.fmi2Reset)(c)),
+        let done = match wanted {
+            0 => {
+                self.time = start;
+                call!(self.fmi2SetupExperiment(1, tolerance, start, defined, stop))
             }
+            1 => call!(self.fmi2EnterInitializationMode()),
+            2 => call!(self.fmi2ExitInitializationMode()),
+            3 | 4 => call!(self.fmi2SetDebugLogging(on, count, categories.as_ptr())),
+            _ if one_in(r, 8) => call!(self.fmi2Terminate()),
+            _ => call!(self.fmi2Reset()),
         };
-        self.stage = match (name, status) {
+        self.stage = match done {
             ("fmi2Reset", Status::Ok) => 0,
             (_, Status::Ok) if wanted == self.stage => (wanted + 1).min(5),
             // Something is amiss: a reset comes next.
             (_, Status::Error) => 5,
             _ => self.stage,
         };
-        (name, status)
+        done
     }
 
     /// FMU states, handles that were never given out, and damaged bytes.
     fn state(&mut self, r: &mut Rng) -> (&'static str, Status) {
-        let (c, f) = (self.master.c, self.master.f);
         let own = &mut self.states[r.usize(..3)];
         let any = pick(r, &[*own, *own, null_mut(), without_provenance_mut(3)]);
-        // SAFETY: the blob is as long as it is said to be.
-        unsafe {
-            match r.usize(..6) {
-                0 => ("fmi2GetFMUstate", (f.fmi2GetFMUstate)(c, own)),
-                1 => ("fmi2SetFMUstate", (f.fmi2SetFMUstate)(c, any)),
-                2 => ("fmi2FreeFMUstate", (f.fmi2FreeFMUstate)(c, own)),
-                3 => {
-                    let status = (f.fmi2SerializedFMUstateSize)(c, any, &mut 0);
-                    ("fmi2SerializedFMUstateSize", status)
+        match r.usize(..6) {
+            0 => call!(self.fmi2GetFMUstate(own)),
+            1 => call!(self.fmi2SetFMUstate(any)),
+            2 => call!(self.fmi2FreeFMUstate(own)),
+            3 => call!(self.fmi2SerializedFMUstateSize(any, &mut 0)),
+            4 => {
+                self.blob = vec![0; 4000];
+                let size = pick(r, &[0, 10, self.blob.len()]);
+                call!(self.fmi2SerializeFMUstate(any, self.blob.as_mut_ptr().cast(), size))
+            }
+            _ => {
+                if let Some(byte) = self.blob.get_mut(r.usize(..4000)) {
+                    *byte ^= pick(r, &[0, 0, 1, 0x80]);
                 }
-                4 => {
-                    self.blob = vec![0; 4000];
-                    let size = pick(r, &[0, 10, self.blob.len()]);
-                    let status = (f.fmi2SerializeFMUstate)(c, any, self.blob.as_mut_ptr().cast(), size);
-                    ("fmi2SerializeFMUstate", status)
-                }
-                _ => {
-                    if let Some(byte) = self.blob.get_mut(r.usize(..4000)) {
-                        *byte ^= pick(r, &[0, 0, 1, 0x80]);
-                    }
-                    let (bytes, size) = (self.blob.as_ptr().cast(), self.blob.len());
-                    let status = (f.fmi2DeSerializeFMUstate)(c, bytes, size, own);
-                    ("fmi2DeSerializeFMUstate", status)
-                }
+                let (bytes, size) = (self.blob.as_ptr().cast(), self.blob.len());
+                call!(self.fmi2DeSerializeFMUstate(bytes, size, own))
             }
         }
     }

@@ -15,13 +15,19 @@ use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
 
-use fmi2_component::abi::CallbackFunctions;
+use fmi2_component::abi::{self, CComponent, CallbackFunctions};
 use fmi2_component::{Logger, Status};
 use fmi2_description::Description;
-pub use functions::{Functions, Raw};
+pub use functions::Functions;
 use libloading::Library;
 
-/// Description of `LoViNes`, of `PhaseLock`, and of `Tank`, the example of the shell.
+/// Model identifiers, and the names that cargo gives their libraries. `Tank` is the example of the shell.
+const MODELS: [[&str; 2]; 3] = [
+    ["LoViNes", "lovines_fmu"],
+    ["PhaseLock", "phase_lock_fmu"],
+    ["Tank", "fmi2_example_tank"],
+];
+/// Their descriptions.
 const DESCRIPTIONS: [&str; 3] = [
     include_str!("../../../modelDescription.xml"),
     include_str!("../../../controller/fmu/modelDescription.xml"),
@@ -42,67 +48,62 @@ pub struct Fmu {
 impl Fmu {
     /// `LoViNes`, built as this program is.
     pub fn plant() -> Self {
-        Self::load("LoViNes", DESCRIPTIONS[0], &Self::path("LoViNes"))
+        Self::load(0, &Self::path("LoViNes"))
     }
 
     /// `PhaseLock`, built as this program is.
     pub fn controller() -> Self {
-        Self::load("PhaseLock", DESCRIPTIONS[1], &Self::path("PhaseLock"))
+        Self::load(1, &Self::path("PhaseLock"))
     }
 
     /// `Tank`, built as this program is.
     pub fn tank() -> Self {
-        Self::load("Tank", DESCRIPTIONS[2], &Self::path("Tank"))
+        Self::load(2, &Self::path("Tank"))
     }
 
     /// Where cargo puts the library of that name: the folder of this profile's dependencies, for instance `target/debug/deps`.
     pub fn path(name: &str) -> PathBuf {
-        let library = match name {
-            "LoViNes" => "lovines_fmu",
-            "Tank" => "fmi2_example_tank",
-            _ => "phase_lock_fmu",
-        };
-        let program = std::env::current_exe().expect("a program knows where it is");
-        let folder = program.parent().expect("it is in a folder");
-        let folder = if folder.ends_with("deps") {
-            folder.to_owned()
-        } else {
-            folder.join("deps")
-        };
+        let model = MODELS.iter().find(|model| model[0] == name);
+        let library = model.expect("one of the models")[1];
+        let mut folder = std::env::current_exe().expect("a program knows where it is");
+        folder.pop();
+        if !folder.ends_with("deps") {
+            folder.push("deps");
+        }
         folder.join(format!("{DLL_PREFIX}{library}{DLL_SUFFIX}"))
     }
 
-    /// Both libraries as an FMU holds them, `LoViNes` and `PhaseLock` with the platform's suffix, from one folder.
-    pub fn packed(folder: &Path) -> [Self; 2] {
-        let load = |name, description| {
-            // An absolute path: a loader looks for a bare name elsewhere.
-            let path = std::path::absolute(folder.join(format!("{name}{DLL_SUFFIX}")));
-            Self::load(name, description, &path.expect("a folder has a path"))
+    /// Plant and controller, built as this program is, or as an FMU holds them: `LoViNes` and `PhaseLock` with the platform's suffix, in
+    /// one folder.
+    pub fn pair(packed: Option<&Path>) -> [Self; 2] {
+        let Some(folder) = packed else {
+            return [Self::plant(), Self::controller()];
         };
-        [load("LoViNes", DESCRIPTIONS[0]), load("PhaseLock", DESCRIPTIONS[1])]
+        [0, 1].map(|model| {
+            // An absolute path: a loader looks for a bare name elsewhere.
+            let path = std::path::absolute(folder.join(format!("{}{DLL_SUFFIX}", MODELS[model][0])));
+            Self::load(model, &path.expect("a folder has a path"))
+        })
     }
 
-    fn load(name: &'static str, description: &'static str, path: &Path) -> Self {
-        // SAFETY: it is ours, and loading it runs no code of its own.
-        let library = unsafe { Library::new(path) };
-        let library = library.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        // SAFETY: an FMI 2.0 library, which stays loaded since nobody drops it.
-        let functions = unsafe { Functions::load(&library) };
-        std::mem::forget(library);
-        Self {
-            name,
-            functions: functions.unwrap_or_else(|error| panic!("{}: {error}", path.display())),
-            description,
-        }
+    fn load(model: usize, path: &Path) -> Self {
+        let (name, description) = (MODELS[model][0], DESCRIPTIONS[model]);
+        // SAFETY: it is ours, and loading it runs no code of its own. It stays loaded, since nobody drops it.
+        let functions = unsafe { Library::new(path).and_then(|library| Functions::load(Box::leak(Box::new(library)))) };
+        let functions = functions.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        Self { name, functions, description }
+    }
+
+    /// What the description says.
+    pub fn parsed(&self) -> Description {
+        Description::parse(self.description).expect("the library was built from it")
     }
 
     /// The value reference of a variable.
     pub fn reference(&self, name: &str) -> u32 {
-        let description = Description::parse(self.description).expect("the library was built from it");
-        let variable = description.variable(name);
-        variable
-            .unwrap_or_else(|| panic!("{} has no {name}", self.name))
-            .value_reference
+        let description = self.parsed();
+        let variable = description.variable(name).expect("a variable of that name");
+        variable.value_reference
     }
 
     /// The GUID that the library was built with.
@@ -155,6 +156,15 @@ macro_rules! call {
     };
 }
 
+/// Asserts that a call is an error with one line in the log, which contains all of the texts:
+/// `refused!(master.fmi2DoStep(0.0, -0.1, 1) => "at least 0")`.
+#[macro_export]
+macro_rules! refused {
+    ($master:ident.$name:ident($($argument:expr),*) $(=> $($part:expr),*)?) => {
+        $master.expect($crate::call!($master.$name($($argument),*)), Status::Error, &[$($($part),*)?])
+    };
+}
+
 /// Callbacks whose logger appends to `lines`.
 pub fn callbacks(lines: *mut Vec<Line>) -> CallbackFunctions {
     let hear: unsafe extern "C" fn(_, _, _, _, _) = hear;
@@ -174,7 +184,7 @@ pub fn callbacks(lines: *mut Vec<Line>) -> CallbackFunctions {
 #[derive(Debug)]
 pub struct Master {
     /// The instance; NULL where it was refused.
-    pub c: Raw,
+    pub c: CComponent,
     /// The library's functions.
     pub f: Functions,
     lines: *mut Vec<Line>,
@@ -187,98 +197,18 @@ unsafe impl Send for Master {}
 impl Master {
     /// An instance with debug logging off.
     pub fn new(fmu: &Fmu, interface: Interface) -> Self {
-        Self::at(fmu, interface as c_int, &fmu.guid(), None)
+        let guid = CString::new(fmu.guid()).expect("no NUL in a number");
+        let texts = [c"rig".as_ptr(), guid.as_ptr(), null()];
+        Self::instantiate(fmu.functions, interface as c_int, texts)
     }
 
-    /// An instance, or the refusal of one, of that type, GUID and resource location.
-    pub fn at(fmu: &Fmu, kind: c_int, guid: &str, location: Option<&CStr>) -> Self {
+    /// An instance, or the refusal of one, of that `fmi2Type`, and of that name, GUID and resource location: NULL or C strings.
+    pub fn instantiate(f: Functions, kind: c_int, [name, guid, location]: [abi::CString; 3]) -> Self {
         let lines: *mut Vec<Line> = Box::into_raw(Box::default());
-        let guid = CString::new(guid).unwrap();
-        let functions = Box::new(callbacks(lines));
-        let location = location.map_or(null(), CStr::as_ptr);
-        let f = fmu.functions;
+        let callbacks = Box::new(callbacks(lines));
         // SAFETY: as the standard asks.
-        let c = unsafe { (f.fmi2Instantiate)(c"rig".as_ptr(), kind, guid.as_ptr(), location, &*functions, 0, 0) };
-        Self { c, f, lines, _callbacks: functions }
-    }
-
-    /// A co-simulation instance that is ready to step.
-    pub fn ready(fmu: &Fmu) -> Self {
-        let master = Self::new(fmu, Interface::CoSimulation);
-        master.start();
-        master
-    }
-
-    /// Takes the instance into Initialization Mode.
-    pub fn enter_initialization(&self) {
-        // SAFETY: the instance is alive.
-        unsafe {
-            self.well((self.f.fmi2SetupExperiment)(self.c, 0, 0.0, 0.0, 0, 0.0));
-            self.well((self.f.fmi2EnterInitializationMode)(self.c));
-        }
-    }
-
-    /// Takes the instance from its instantiation through initialization.
-    pub fn start(&self) {
-        self.enter_initialization();
-        // SAFETY: the instance is alive.
-        self.well(unsafe { (self.f.fmi2ExitInitializationMode)(self.c) });
-    }
-
-    /// Switches on these categories of the log and no other.
-    pub fn listen(&self, categories: &[&CStr]) {
-        let names: Vec<_> = categories.iter().map(|name| name.as_ptr()).collect();
-        // SAFETY: the instance is alive, and the names outlive the call.
-        self.well(unsafe { (self.f.fmi2SetDebugLogging)(self.c, 1, names.len(), names.as_ptr()) });
-    }
-
-    /// Asserts that a call was done.
-    #[track_caller]
-    pub fn well(&self, status: Status) {
-        assert_eq!(status, Status::Ok, "{:?}", self.heard());
-    }
-
-    /// What was logged since the last call.
-    pub fn heard(&self) -> Vec<Line> {
-        // SAFETY: the list lives as long as the master, and no call is under way.
-        unsafe { std::mem::take(&mut *self.lines) }
-    }
-
-    /// Asserts that one line was logged, and that it contains all of `parts`.
-    #[track_caller]
-    pub fn heard_one(&self, parts: &[&str]) {
-        let heard = self.heard();
-        let [line] = heard.as_slice() else {
-            panic!("not one line: {heard:?}")
-        };
-        for part in parts {
-            assert!(line.text.contains(part), "no {part:?} in {line:?}");
-        }
-    }
-
-    /// The value of a real variable.
-    pub fn real(&self, vr: u32) -> f64 {
-        let [value] = self.reals(&[vr]);
-        value
-    }
-
-    /// The value of an integer or enumeration.
-    pub fn integer(&self, vr: u32) -> i32 {
-        let mut value = -1;
-        // SAFETY: one reference, one place.
-        self.well(unsafe { (self.f.fmi2GetInteger)(self.c, &vr, 1, &mut value) });
-        value
-    }
-
-    /// Sets an integer or enumeration.
-    pub fn set_integer(&self, vr: u32, value: i32) -> Status {
-        // SAFETY: one reference, one value.
-        unsafe { (self.f.fmi2SetInteger)(self.c, &vr, 1, &value) }
-    }
-
-    /// The plant's count of impacts.
-    pub fn impacts(&self) -> i32 {
-        self.integer(18)
+        let c = unsafe { (f.fmi2Instantiate)(name, kind, guid, location, &*callbacks, 0, 0) };
+        Self { c, f, lines, _callbacks: callbacks }
     }
 
     /// An instance that is not initialized, with these values set.
@@ -290,50 +220,127 @@ impl Master {
         master
     }
 
-    /// Sets a real variable.
-    pub fn set_real(&self, vr: u32, value: f64) -> Status {
-        self.set_reals(&[vr], &[value])
+    /// An initialized instance, with these values set before: for co-simulation ready to step, for model exchange in Event Mode.
+    pub fn started(fmu: &Fmu, interface: Interface, values: &[(u32, f64)]) -> Self {
+        let master = Self::with(fmu, interface, values);
+        master.start();
+        master
+    }
+
+    /// A co-simulation instance that is ready to step.
+    pub fn ready(fmu: &Fmu) -> Self {
+        Self::started(fmu, Interface::CoSimulation, &[])
+    }
+
+    /// Takes the instance into Initialization Mode.
+    pub fn enter_initialization(&self) {
+        self.well(call!(self.fmi2SetupExperiment(0, 0.0, 0.0, 0, 0.0)));
+        self.well(call!(self.fmi2EnterInitializationMode()));
+    }
+
+    /// Takes the instance from its instantiation through initialization.
+    pub fn start(&self) {
+        self.enter_initialization();
+        self.well(call!(self.fmi2ExitInitializationMode()));
+    }
+
+    /// Asserts that a call was done.
+    #[track_caller]
+    pub fn well(&self, status: Status) {
+        assert_eq!(status, Status::Ok, "{:?}", self.heard());
+    }
+
+    /// Asserts the status of a call, and that one line was logged, which contains all of `parts`.
+    #[track_caller]
+    pub fn expect(&self, status: Status, expected: Status, parts: &[&str]) {
+        let heard = self.heard();
+        assert_eq!((status, heard.len()), (expected, 1), "{heard:?}");
+        for part in parts {
+            assert!(heard[0].text.contains(part), "no {part:?} in {heard:?}");
+        }
+    }
+
+    /// What was logged since the last call.
+    pub fn heard(&self) -> Vec<Line> {
+        // SAFETY: the list lives as long as the master, and no call is under way.
+        unsafe { std::mem::take(&mut *self.lines) }
+    }
+
+    /// The value of a real variable.
+    pub fn real(&self, vr: u32) -> f64 {
+        let [value] = self.reals(&[vr]);
+        value
     }
 
     /// Several real variables in one call.
     #[track_caller]
     pub fn reals<const N: usize>(&self, vrs: &[u32; N]) -> [f64; N] {
         let mut values = [f64::NAN; N];
-        // SAFETY: as many places as references.
-        self.well(unsafe { (self.f.fmi2GetReal)(self.c, vrs.as_ptr(), N, values.as_mut_ptr()) });
+        self.well(call!(self.fmi2GetReal(vrs.as_ptr(), N, values.as_mut_ptr())));
         values
+    }
+
+    /// The value of an integer or enumeration.
+    pub fn integer(&self, vr: u32) -> i32 {
+        let mut value = -1;
+        self.well(call!(self.fmi2GetInteger(&vr, 1, &mut value)));
+        value
+    }
+
+    /// The value of a Boolean variable.
+    pub fn boolean(&self, vr: u32) -> bool {
+        let mut value = -1;
+        self.well(call!(self.fmi2GetBoolean(&vr, 1, &mut value)));
+        value == 1
+    }
+
+    /// The plant's count of impacts.
+    pub fn impacts(&self) -> i32 {
+        self.integer(18)
+    }
+
+    /// Sets a real variable.
+    pub fn set_real(&self, vr: u32, value: f64) -> Status {
+        self.set_reals(&[vr], &[value])
     }
 
     /// Sets several real variables in one call.
     pub fn set_reals<const N: usize>(&self, vrs: &[u32; N], values: &[f64; N]) -> Status {
-        // SAFETY: as many values as references.
-        unsafe { (self.f.fmi2SetReal)(self.c, vrs.as_ptr(), N, values.as_ptr()) }
+        call!(self.fmi2SetReal(vrs.as_ptr(), N, values.as_ptr()))
+    }
+
+    /// Sets an integer or enumeration.
+    pub fn set_integer(&self, vr: u32, value: i32) -> Status {
+        call!(self.fmi2SetInteger(&vr, 1, &value))
     }
 
     /// Takes a step.
     pub fn step(&self, time: f64, step: f64) -> Status {
-        // SAFETY: the instance is alive.
-        unsafe { (self.f.fmi2DoStep)(self.c, time, step, 1) }
+        call!(self.fmi2DoStep(time, step, 1))
     }
 
     /// The whole state as bytes, for comparison.
     pub fn bytes(&self) -> Vec<u8> {
         let (mut state, mut size) = (null_mut(), 0);
-        let f = &self.f;
-        // SAFETY: as the standard asks.
-        unsafe {
-            self.well((f.fmi2GetFMUstate)(self.c, &mut state));
-            self.well((f.fmi2SerializedFMUstateSize)(self.c, state, &mut size));
-            let mut bytes = vec![0; size];
-            self.well((f.fmi2SerializeFMUstate)(
-                self.c,
-                state,
-                bytes.as_mut_ptr().cast(),
-                size,
-            ));
-            self.well((f.fmi2FreeFMUstate)(self.c, &mut state));
-            bytes
+        self.well(call!(self.fmi2GetFMUstate(&mut state)));
+        self.well(call!(self.fmi2SerializedFMUstateSize(state, &mut size)));
+        let mut bytes = vec![0; size];
+        let place = bytes.as_mut_ptr().cast();
+        self.well(call!(self.fmi2SerializeFMUstate(state, place, size)));
+        self.well(call!(self.fmi2FreeFMUstate(&mut state)));
+        bytes
+    }
+
+    /// Sets the state that these bytes are of; an error if they are of none.
+    pub fn restore(&self, bytes: &[u8]) -> Status {
+        let mut state = null_mut();
+        let status = call!(self.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &mut state));
+        assert_eq!(status == Status::Ok, !state.is_null());
+        if status == Status::Ok {
+            self.well(call!(self.fmi2SetFMUstate(state)));
+            self.well(call!(self.fmi2FreeFMUstate(&mut state)));
         }
+        status
     }
 }
 

@@ -1,6 +1,6 @@
 //! Plant and controller coupled as a master couples them: the default scene, a digest of every output bit, and the lock.
 
-use fmi2_description::{Causality, Description, FmiType};
+use fmi2_description::{Causality, FmiType};
 use sha2::{Digest, Sha256};
 
 use crate::{Fmu, Interface, Master, call};
@@ -23,8 +23,8 @@ struct Side {
 
 impl Side {
     fn new(fmu: &Fmu, inputs: [&str; 2], given: [&str; 2]) -> Self {
-        let description = Description::parse(fmu.description).expect("the library was built from it");
-        let outputs = description.variables.iter().filter(|variable| {
+        let variables = fmu.parsed().variables;
+        let outputs = variables.iter().filter(|variable| {
             let real = variable.content().is_some_and(|(kind, _)| kind == FmiType::Real);
             real && matches!(variable.causality, Causality::Output | Causality::Local)
         });
@@ -49,18 +49,14 @@ pub struct Pair {
 
 impl Pair {
     /// The default scene: the particle at 0.5 m/s, the controller active.
-    pub fn new(plant: &Fmu, controller: &Fmu) -> Self {
-        let (locked, start, active) = (
-            controller.reference("locked"),
-            plant.reference("der(q2)"),
-            controller.reference("active"),
-        );
+    pub fn new([plant, controller]: &[Fmu; 2]) -> Self {
+        let [locked, active] = ["locked", "active"].map(|name| controller.reference(name));
+        let start = plant.reference("der(q2)");
         let plant = Side::new(plant, ["omega", "E"], ["v", "base"]);
         let controller = Side::new(controller, ["response", "reference"], ["omega", "E"]);
         plant.master.well(plant.master.set_real(start, 0.5));
-        // SAFETY: one reference, one value.
-        let armed = unsafe { (controller.master.f.fmi2SetBoolean)(controller.master.c, &active, 1, &1) };
-        controller.master.well(armed);
+        let m = &controller.master;
+        m.well(call!(m.fmi2SetBoolean(&active, 1, &1)));
         plant.master.start();
         controller.master.start();
         Self { plant, controller, locked, time: 0.0, digest: Sha256::new() }
@@ -102,9 +98,7 @@ impl Pair {
 
     /// Whether the controller reports a lock.
     pub fn is_locked(&self) -> bool {
-        let (m, mut locked) = (&self.controller.master, 0);
-        m.well(call!(m.fmi2GetBoolean(&self.locked, 1, &mut locked)));
-        locked == 1
+        self.controller.master.boolean(self.locked)
     }
 
     /// Runs for some natural periods, in steps that `next` chooses, s. Returns the detuning, as the mean over the last 20 periods.

@@ -4,7 +4,8 @@
 
 use std::path::Path;
 
-use fmi2_boundary::{Fmu, pair};
+use fmi2_boundary::Fmu;
+use fmi2_boundary::pair::{Pair, SAMPLE_TIME};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -13,19 +14,12 @@ fn main() {
         eprintln!("usage: couple [samples] [folder of LoViNes and PhaseLock as packed]");
         std::process::exit(2);
     };
-    let [plant, controller] = match &folder {
-        Some(folder) => Fmu::packed(Path::new(folder)),
-        None => [Fmu::plant(), Fmu::controller()],
-    };
-    let mut pair = pair::Pair::new(&plant, &controller);
+    let mut pair = Pair::new(&Fmu::pair(folder.as_deref().map(Path::new)));
     for _ in 0..samples {
-        pair.step(pair::SAMPLE_TIME);
+        pair.step(SAMPLE_TIME);
         pair.digest();
     }
-    println!(
-        "{samples} samples, {} impacts, locked: {}",
-        pair.impacts(),
-        pair.is_locked()
-    );
+    let (impacts, locked) = (pair.impacts(), pair.is_locked());
+    println!("{samples} samples, {impacts} impacts, locked: {locked}");
     println!("sha256 {}", pair.hash());
 }

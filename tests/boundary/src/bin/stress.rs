@@ -18,10 +18,7 @@ fn main() {
         }
     };
     let (sequences, seed) = (next(100_000), next(1));
-    let libraries = match arguments.next() {
-        Some(folder) => Fmu::packed(Path::new(&folder)),
-        None => [Fmu::plant(), Fmu::controller()],
-    };
+    let libraries = Fmu::pair(arguments.next().as_deref().map(Path::new));
     println!("{sequences} sequences of calls, seed {seed}, on each library");
     println!("library    sequences     calls        ok  warning  discard     error  harmless  longest call  time");
     for fmu in libraries {
