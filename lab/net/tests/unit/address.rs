@@ -16,14 +16,7 @@ fn loopback_is_always_allowed_and_other_addresses_only_with_permission() {
 
 #[test]
 fn text_that_is_not_an_address_is_named() {
-    for text in [
-        "",
-        "udp://",
-        "tcp://127.0.0.1",
-        "udp://127.0.0.1:99999",
-        "http://127.0.0.1:1",
-        "127.0.0.1:1",
-    ] {
+    for text in " udp:// tcp://127.0.0.1 udp://127.0.0.1:99999 http://127.0.0.1:1 127.0.0.1:1".split(' ') {
         let refused = Address::parse(text, BindScope::Remote).unwrap_err().to_string();
         assert!(refused.contains("HOST:PORT"), "{refused}");
     }

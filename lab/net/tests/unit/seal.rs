@@ -22,11 +22,8 @@ fn a_drive_is_valid_in_its_session_only() {
     let [mut client, mut server] = pair();
     let hello = client.encode(&Frame::new(Kind::Hello, 7));
     assert!(server.decode(&hello).is_ok());
-    assert_eq!(
-        client.encode(&drive(7)).len(),
-        SIZE,
-        "no code without the server's number"
-    );
+    // No code without the server's number.
+    assert_eq!(client.encode(&drive(7)).len(), SIZE);
     let drawn = server.draw().unwrap();
     assert_ne!(drawn, server.draw().unwrap());
     client.begin(7, drawn);
