@@ -68,14 +68,8 @@ impl Network {
         }
         let ((watchdog, signs), channel) = (mpsc::channel(), control.try_clone()?);
         thread::Builder::new().spawn(move || watch(&signs, channel, silence))?;
-        Ok(Self {
-            control,
-            answer: Vec::new(),
-            stream,
-            silence,
-            watchdog,
-            alive: None,
-        })
+        let (answer, alive) = (Vec::new(), None);
+        Ok(Self { control, answer, stream, silence, watchdog, alive })
     }
 
     /// Calls what waits for the device; its errors say for how long.
@@ -226,7 +220,7 @@ impl<T: Transport> HelicRig<T> {
             driven: 0,
             counters: Counters::default(),
         };
-        rig.set_up(names, samples_per_period).map_err(RigError::Failed)?;
+        rig.set_up(names, samples_per_period)?;
         Ok(rig)
     }
 
@@ -268,19 +262,16 @@ impl<T: Transport> HelicRig<T> {
                 .insert(name, (index, code, u16::from_le_bytes([low, high])));
         }
         let answer = self.request(Frame::new(message::GET_SOURCES, []), "GetSources")?;
-        let (mut rest, mut sources) = (&answer[..], Vec::new());
-        while !rest.is_empty() {
-            sources.push([take_text(&mut rest)?, take_text(&mut rest)?]);
-        }
-        let all: Vec<String> = sources.iter().map(|[name, unit]| format!("{name} [{unit}]")).collect();
-        let defaults = ["response", "base", ""]
-            .into_iter()
-            .zip(["response", "reference", "phase"]);
-        for (ours, name) in defaults {
+        let answer = String::from_utf8_lossy(&answer);
+        let sources: Vec<&str> = answer.split_terminator('\0').collect();
+        let sources = sources.chunks_exact(2);
+        for ours in ["response", "base", "phase"] {
             // Of `vines rig --protocol helic`: mm, and mm per volt.
-            let (name, factor) = names.mapped(ours).map_or((name, 1e-3), |own| (&own.name, own.factor));
+            let (own, mapped) = (ours.replace("base", "reference"), names.mapped(ours));
+            let (name, factor) = mapped.map_or((&own, 1e-3), |mapped| (&mapped.name, mapped.factor));
             if !name.is_empty() {
-                let index = sources.iter().position(|[own, _]| own == name).ok_or_else(|| {
+                let index = sources.clone().position(|entry| entry[0] == name).ok_or_else(|| {
+                    let all: Vec<String> = sources.clone().map(|entry| entry.join(" [") + "]").collect();
                     let (all, maps) = (all.join(", "), "[rig.names] of the scene maps response and base");
                     format!("the helic device has no source \"{name}\"; it has: {all}; {maps}")
                 })?;
@@ -345,26 +336,6 @@ impl<T: Transport> HelicRig<T> {
         }
         let reason = "it has tripped, or was disarmed; the drive is zero";
         Err(format!("the output of the helic device is off (safety = {safety}): {reason}").into())
-    }
-
-    /// The reading of the present sample.
-    fn reading(&mut self) -> Result<Sensors, Cause> {
-        if !self.is_streaming {
-            // Not earlier: readings that nobody takes only wait.
-            let ([d, e], count) = (self.decimation.to_le_bytes(), self.sources.len() as u8);
-            let setup = [&[d, e, 0, 0, 0, 0, count], &self.sources[..]].concat();
-            self.request(Frame::new(message::STREAM_SETUP, setup), "StreamSetup")?;
-            let (port, _) = self.transport.stream();
-            self.request(Frame::new(message::STREAM_START, port.to_le_bytes()), "StreamStart")?;
-            self.is_streaming = true;
-        }
-        loop {
-            if let Some(taken) = self.readings.take(&mut self.counters) {
-                return Ok(taken.sensors);
-            }
-            self.command()?;
-            self.receive()?;
-        }
     }
 
     /// Waits for the next packet.
@@ -437,7 +408,22 @@ impl<T: Transport> HelicRig<T> {
 
 impl<T: Transport> Rig for HelicRig<T> {
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.reading().map_err(RigError::Failed)
+        if !self.is_streaming {
+            // Not earlier: readings that nobody takes only wait.
+            let ([d, e], count) = (self.decimation.to_le_bytes(), self.sources.len() as u8);
+            let setup = [&[d, e, 0, 0, 0, 0, count], &self.sources[..]].concat();
+            self.request(Frame::new(message::STREAM_SETUP, setup), "StreamSetup")?;
+            let (port, _) = self.transport.stream();
+            self.request(Frame::new(message::STREAM_START, port.to_le_bytes()), "StreamStart")?;
+            self.is_streaming = true;
+        }
+        loop {
+            if let Some(taken) = self.readings.take(&mut self.counters) {
+                return Ok(taken.sensors);
+            }
+            self.command()?;
+            self.receive()?;
+        }
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
@@ -445,9 +431,10 @@ impl<T: Transport> Rig for HelicRig<T> {
         self.phase = self.readings.phase();
         self.readings.advance(drive.omega * step / TAU);
         // A drive of zero is not delayed.
-        let is_urgent = drive.amplitude == 0.0 && self.driven > 0;
-        let sent = if is_urgent { self.command() } else { Ok(()) };
-        sent.map_err(RigError::Failed)
+        if drive.amplitude == 0.0 && self.driven > 0 {
+            self.command()?;
+        }
+        Ok(())
     }
 }
 

@@ -126,8 +126,19 @@ impl Frame {
     pub fn read(stream: &mut impl Read, bytes: &mut Vec<u8>) -> io::Result<Self> {
         let mut more = [0; 2048];
         loop {
-            if let Some(frame) = Self::take(bytes).map_err(io::Error::other)? {
-                return Ok(frame);
+            let length = match bytes[..] {
+                [_, _, _, _, low, high, ..] => usize::from(u16::from_le_bytes([low, high])),
+                _ => 0,
+            };
+            let whole = bytes.get(..length + 8).and_then(<[u8]>::split_last_chunk);
+            let is_damaged = whole.is_some_and(|(frame, sum)| CHECKSUM.checksum(&frame[2..]).to_le_bytes() != *sum);
+            if !MAGIC.starts_with(&bytes[..bytes.len().min(2)]) || length > MAX_PAYLOAD || is_damaged {
+                return Err(io::Error::other(ErrorCode::BadFrame));
+            }
+            if let Some((frame, _)) = whole {
+                let (kind, sequence, payload) = (frame[2], frame[3], frame[6..].into());
+                bytes.drain(..length + 8);
+                return Ok(Self { kind, sequence, payload });
             }
             match stream.read(&mut more) {
                 Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
@@ -136,27 +147,6 @@ impl Frame {
                 size => bytes.extend(&more[..size?]),
             }
         }
-    }
-
-    /// Takes the first frame from the bytes that a connection has received; None if more bytes are needed.
-    pub fn take(bytes: &mut Vec<u8>) -> Result<Option<Self>, ErrorCode> {
-        let is_ours = MAGIC.starts_with(&bytes[..bytes.len().min(2)]);
-        let length = match bytes[..] {
-            [_, _, _, _, low, high, ..] => usize::from(u16::from_le_bytes([low, high])),
-            _ => 0,
-        };
-        if !is_ours || length > MAX_PAYLOAD {
-            return Err(ErrorCode::BadFrame);
-        }
-        let Some((frame, checksum)) = bytes.get(..length + 8).and_then(<[u8]>::split_last_chunk) else {
-            return Ok(None);
-        };
-        if CHECKSUM.checksum(&frame[2..]).to_le_bytes() != *checksum {
-            return Err(ErrorCode::BadFrame);
-        }
-        let (kind, sequence, payload) = (frame[2], frame[3], frame[6..].into());
-        bytes.drain(..length + 8);
-        Ok(Some(Self { kind, sequence, payload }))
     }
 }
 

@@ -36,69 +36,6 @@ const EPOCH: u32 = 1 << 24;
 /// Longest time before a packet is sent, s (protocol, "Stream channel").
 const FLUSH: f64 = 0.005;
 
-/// The stream: what the host has set up, and the packet that is being filled.
-#[derive(Debug, Default)]
-struct Stream {
-    sources: Vec<u8>,
-    /// Records, or 0 for a stream without an end.
-    count: u32,
-    /// Port of the host while the stream runs.
-    port: Option<u16>,
-    /// Samples since the start.
-    samples: u64,
-    packet: Packet,
-}
-
-impl Stream {
-    /// Sets the stream up: `decimation u16, count u32, n u8, source u8 × n`; `all` is the number of sources.
-    fn set_up(&mut self, mut payload: &[u8], all: usize) -> Result<(), ErrorCode> {
-        let decimation = u16::from_le_bytes(take(&mut payload)?);
-        let count = u32::from_le_bytes(take(&mut payload)?);
-        let [width] = take(&mut payload)?;
-        let sources_exist = payload.iter().all(|source| usize::from(*source) < all);
-        require(payload.len() == usize::from(width), ErrorCode::BadLength)?;
-        require(self.port.is_none(), ErrorCode::Busy)?;
-        require(decimation > 0 && width > 0 && sources_exist, ErrorCode::BadValue)?;
-        (self.count, self.sources) = (count, payload.into());
-        self.packet = Packet { decimation, width, ..Packet::default() };
-        Ok(())
-    }
-
-    /// Starts the stream to a port of the host.
-    fn start(&mut self, port: u16) -> Result<(), ErrorCode> {
-        require(self.port.is_none(), ErrorCode::Busy)?;
-        require(port > 0 && !self.sources.is_empty(), ErrorCode::BadValue)?;
-        (self.port, self.samples, self.packet.sequence) = (Some(port), 0, 0);
-        self.packet.values.clear();
-        Ok(())
-    }
-
-    /// Takes the values of all sources at sample `index`; returns a packet that is full, complete or `flush` samples old, and its port.
-    fn record(&mut self, index: u32, values: &[f64], flush: f64) -> Option<(u16, Vec<u8>)> {
-        let (port, packet) = (self.port?, &mut self.packet);
-        let decimation = u64::from(packet.decimation);
-        let (records, since) = (self.samples / decimation + 1, self.samples % decimation);
-        if since == 0 {
-            packet.first = if packet.values.is_empty() { index } else { packet.first };
-            packet
-                .values
-                .extend(self.sources.iter().map(|source| values[usize::from(*source)] as f32));
-        }
-        self.samples += 1;
-        let is_complete = records == self.count.into();
-        let is_full = packet.values.len() + self.sources.len() > MAX_VALUES;
-        let is_due = f64::from(index.wrapping_sub(packet.first) + 2) > flush;
-        if packet.values.is_empty() || !(is_complete || is_full || is_due) {
-            return None;
-        }
-        let bytes = packet.encode();
-        packet.sequence = packet.sequence.wrapping_add(1);
-        packet.values.clear();
-        self.port.take_if(|_| is_complete);
-        Some((port, bytes))
-    }
-}
-
 fn require(is_met: bool, otherwise: ErrorCode) -> Result<(), ErrorCode> {
     is_met.then_some(()).ok_or(otherwise)
 }
@@ -116,12 +53,9 @@ impl Parameter {
     fn of(entry: &'static str) -> Self {
         let (name, form) = entry.split_once(' ').expect("a name and a type");
         let (code, count) = (form.as_bytes()[0], form[1..].parse().unwrap_or(1));
-        Self {
-            name: name.trim_end_matches('*'),
-            code,
-            is_writable: name.ends_with('*'),
-            values: vec![0.0; count],
-        }
+        let (is_writable, values) = (name.ends_with('*'), vec![0.0; count]);
+        let name = name.trim_end_matches('*');
+        Self { name, code, is_writable, values }
     }
 }
 
@@ -130,13 +64,19 @@ pub struct Device {
     rig: Box<dyn Rig>,
     sample_rate: f64,
     parameters: Vec<Parameter>,
+    /// Names and units.
     sources: String,
-    stream: Stream,
+    /// The sources of the stream, the number of its records, or 0 for a stream without an end, and the packet that is being filled.
+    streamed: Vec<u8>,
+    count: u32,
+    packet: Packet,
+    /// Port of the host while the stream runs, and samples since its start.
+    port: Option<u16>,
+    samples: u64,
     /// Phase of the oscillator, 2^-32 turns.
     phase: u32,
     ticks: u32,
-    /// Commands since the last sample, and up to it.
-    commands: u32,
+    /// Number of commands.
     epoch: u32,
     /// Samples since the last request.
     silence: u32,
@@ -145,20 +85,19 @@ pub struct Device {
 impl Device {
     /// The rig `rig` as a device, sampled every `sample_time`, s; its output is limited to `max_amplitude`, m.
     pub fn new(mut rig: Box<dyn Rig>, sample_time: f64, max_amplitude: f64) -> Result<Self, RigError> {
-        let absent = if rig.sense()?.reference.is_some() {
-            "\0\0"
-        } else {
-            "reference\0mm\0"
-        };
+        let absent = ["reference\0mm\0", "\0\0"][usize::from(rig.sense()?.reference.is_some())];
         let mut device = Self {
             rig,
             sample_rate: 1.0 / sample_time,
             parameters: PARAMETERS.split(", ").map(Parameter::of).collect(),
             sources: SOURCES.replace(absent, ""),
-            stream: Stream::default(),
+            streamed: Vec::new(),
+            count: 0,
+            packet: Packet::default(),
+            port: None,
+            samples: 0,
             phase: 0,
             ticks: 0,
-            commands: 0,
             epoch: 0,
             silence: 0,
         };
@@ -180,7 +119,7 @@ impl Device {
 
     /// The host has left: output and stream stop.
     pub fn disconnect(&mut self) {
-        self.stream.port = None;
+        self.port = None;
         self.values("arm")[0] = 0.0;
     }
 
@@ -213,10 +152,10 @@ impl Device {
             message::GET_SOURCES => Ok(self.sources.clone().into()),
             message::GET_PAR => self.read(payload),
             message::SET_PAR => self.set(payload).map(done),
-            message::STREAM_SETUP => self.stream.set_up(payload, all).map(done),
-            message::STREAM_START => self.stream.start(u16::from_le_bytes(take(&mut payload)?)).map(done),
+            message::STREAM_SETUP => self.set_up(payload, all).map(done),
+            message::STREAM_START => self.start(u16::from_le_bytes(take(&mut payload)?)).map(done),
             message::STREAM_STOP => {
-                self.stream.port = None;
+                self.port = None;
                 Ok(Vec::new())
             }
             message::STATUS => {
@@ -268,7 +207,7 @@ impl Device {
         let values = of_bytes(parameter.code, payload);
         let (is_command, is_allowed) = match parameter.name {
             "freq" => (true, (0.0..highest).contains(&values[0])),
-            "target_coeffs" | "forcing_coeffs" => (true, amplitude(&values) <= largest),
+            "target_coeffs" | "forcing_coeffs" => (true, series(&values, 0)[1] <= largest),
             // There is no waveform table.
             "table_mode" => (true, values[0] == 0.0),
             "arm" => (false, values[0] <= 1.0),
@@ -277,27 +216,84 @@ impl Device {
         };
         require(is_allowed, ErrorCode::BadValue)?;
         parameter.values = values;
-        self.commands += u32::from(is_command);
+        self.epoch = (self.epoch + u32::from(is_command)) % EPOCH;
         Ok(())
+    }
+
+    /// Sets the stream up: `decimation u16, count u32, n u8, source u8 × n`; `all` is the number of sources.
+    fn set_up(&mut self, mut payload: &[u8], all: usize) -> Result<(), ErrorCode> {
+        let decimation = u16::from_le_bytes(take(&mut payload)?);
+        let count = u32::from_le_bytes(take(&mut payload)?);
+        let [width] = take(&mut payload)?;
+        let sources_exist = payload.iter().all(|source| usize::from(*source) < all);
+        require(payload.len() == usize::from(width), ErrorCode::BadLength)?;
+        require(self.port.is_none(), ErrorCode::Busy)?;
+        require(decimation > 0 && width > 0 && sources_exist, ErrorCode::BadValue)?;
+        (self.count, self.streamed) = (count, payload.into());
+        self.packet = Packet { decimation, width, ..Packet::default() };
+        Ok(())
+    }
+
+    /// Starts the stream to a port of the host.
+    fn start(&mut self, port: u16) -> Result<(), ErrorCode> {
+        require(self.port.is_none(), ErrorCode::Busy)?;
+        require(port > 0 && !self.streamed.is_empty(), ErrorCode::BadValue)?;
+        (self.port, self.samples, self.packet.sequence) = (Some(port), 0, 0);
+        self.packet.values.clear();
+        Ok(())
+    }
+
+    /// Takes the values of all sources at the present sample; returns a packet that is full, complete or old enough, and its port.
+    fn record(&mut self, values: &[f64]) -> Option<(u16, Vec<u8>)> {
+        let (port, packet) = (self.port?, &mut self.packet);
+        let decimation = u64::from(packet.decimation);
+        let (records, since) = (self.samples / decimation + 1, self.samples % decimation);
+        if since == 0 {
+            packet.first = if packet.values.is_empty() {
+                self.ticks
+            } else {
+                packet.first
+            };
+            let read = |source: &u8| values[usize::from(*source)] as f32;
+            packet.values.extend(self.streamed.iter().map(read));
+        }
+        self.samples += 1;
+        let is_complete = records == self.count.into();
+        let is_full = packet.values.len() + self.streamed.len() > MAX_VALUES;
+        let is_due = f64::from(self.ticks.wrapping_sub(packet.first) + 2) > FLUSH * self.sample_rate;
+        if packet.values.is_empty() || !(is_complete || is_full || is_due) {
+            return None;
+        }
+        let bytes = packet.encode();
+        packet.sequence = packet.sequence.wrapping_add(1);
+        packet.values.clear();
+        self.port.take_if(|_| is_complete);
+        Some((port, bytes))
     }
 
     /// One sample: reads the sensors, drives the rig until the next sample, and returns a packet for a port of the host if one is complete.
     pub fn tick(&mut self) -> Result<Option<(u16, Vec<u8>)>, RigError> {
         let Sensors { response, reference } = self.rig.sense()?;
         let (step, phase) = (1.0 / self.sample_rate, self.phase);
-        self.epoch = (self.epoch + std::mem::take(&mut self.commands)) % EPOCH;
         self.silence = self.silence.saturating_add(1);
         let watchdog = self.values(WATCHDOG)[0];
         if watchdog > 0.0 && f64::from(self.silence) * step > watchdog {
             self.values("arm")[0] = 0.0;
         }
-        let [target, forcing] = ["target_coeffs", "forcing_coeffs"].map(|name| value(self.values(name), phase));
-        let out = self.gate(target + forcing);
+        let [target, forcing] = ["target_coeffs", "forcing_coeffs"].map(|name| series(self.values(name), phase)[0]);
+        // The output is zero unless armed, and never more than the limit.
+        let (wanted, largest) = (target + forcing, self.values("rig_out_max")[0]);
+        let is_quiet = !self.is_driven() || !wanted.is_finite();
+        let out = if is_quiet { 0.0 } else { wanted.clamp(-largest, largest) };
+        // Bits: 0 armed, 1 tripped (nothing trips here), 2 limited, 3 quiet.
+        let (is_armed, is_limited) = (self.is_driven(), !is_quiet && out != wanted);
+        let safety = u8::from(is_armed) | u8::from(is_limited) << 2 | u8::from(is_quiet) << 3;
+        self.values("safety")[0] = safety.into();
         let (turns, epoch) = (f64::from(phase) / TURN, f64::from(self.epoch));
         let sensors = [Some(response), reference].into_iter().flatten();
         let sensors = sensors.map(|length| length / MILLI);
         let values: Vec<f64> = sensors.chain([target, forcing, 0.0, turns, out, epoch]).collect();
-        let packet = self.stream.record(self.ticks, &values, FLUSH * self.sample_rate);
+        let packet = self.record(&values);
         let displacement = out * GAIN * MILLI;
         self.rig.hold(Drive { displacement, ..Drive::default() }, step)?;
         let turn = self.values("freq")[0] * step * TURN;
@@ -308,38 +304,20 @@ impl Device {
         self.values("impacts")[0] = impacts as f64;
         Ok(packet)
     }
-
-    /// The output, V: zero unless armed, and never more than the limit.
-    fn gate(&mut self, wanted: f64) -> f64 {
-        let (is_armed, largest) = (self.is_driven(), self.values("rig_out_max")[0]);
-        let is_quiet = !is_armed || !wanted.is_finite();
-        let out = if is_quiet { 0.0 } else { wanted.clamp(-largest, largest) };
-        let is_limited = !is_quiet && out != wanted;
-        // Bits: 0 armed, 1 tripped (nothing trips here), 2 limited, 3 quiet.
-        let safety = u8::from(is_armed) | u8::from(is_limited) << 2 | u8::from(is_quiet) << 3;
-        self.values("safety")[0] = safety.into();
-        out
-    }
 }
 
-/// Cosine and sine coefficients of a Fourier series, after its mean.
-fn harmonics(coefficients: &[f64]) -> impl Iterator<Item = (f64, f64)> {
+/// Value of a Fourier series at a phase of its fundamental, and its upper bound.
+fn series(coefficients: &[f64], phase: u32) -> [f64; 2] {
     let (cosines, sines) = coefficients[1..].split_at(HARMONICS);
-    cosines.iter().copied().zip(sines.iter().copied())
-}
-
-/// Upper bound of a Fourier series.
-fn amplitude(coefficients: &[f64]) -> f64 {
-    coefficients[0].abs() + harmonics(coefficients).map(|(a, b)| a.hypot(b)).sum::<f64>()
-}
-
-/// Value of a Fourier series at a phase of its fundamental.
-fn value(coefficients: &[f64], phase: u32) -> f64 {
-    let values = (1..).zip(harmonics(coefficients)).map(|(k, (a, b))| {
-        let (sine, cosine) = (TAU * f64::from(phase.wrapping_mul(k)) / TURN).sin_cos();
-        a * cosine + b * sine
-    });
-    coefficients[0] + values.sum::<f64>()
+    let (mut value, mut bound) = (coefficients[0], coefficients[0].abs());
+    for (k, (a, b)) in (1..).zip(cosines.iter().zip(sines)) {
+        if (*a, *b) != (0.0, 0.0) {
+            let (sine, cosine) = (TAU * f64::from(phase.wrapping_mul(k)) / TURN).sin_cos();
+            value += a * cosine + b * sine;
+            bound += a.hypot(*b);
+        }
+    }
+    [value, bound]
 }
 
 /// Port of the control channel; the stream has the next one.

@@ -1,5 +1,7 @@
 //! Guards the codec: the vectors of the protocol, version 3 (`docs/protocol.md` of helic-daq, "Known-answer vectors").
 
+use std::io::ErrorKind;
+
 use vines_helic::codec::{CHECKSUM, Frame, Packet, message, take_text};
 
 use super::host::{device, scene};
@@ -25,12 +27,12 @@ fn every_frame_of_the_published_vectors_is_encoded_and_decoded() {
         let (kind, sequence, payload) = (whole[2], whole[3], whole[6..whole.len() - 2].to_vec());
         let frame = Frame { kind, sequence, payload };
         assert_eq!(frame.encode(), whole, "{vector}");
-        let mut followed = [&whole[..], b"HL"].concat();
-        assert_eq!(Frame::take(&mut followed), Ok(Some(frame)));
-        assert_eq!(followed, b"HL");
+        let (followed, mut rest) = ([&whole[..], b"HL"].concat(), Vec::new());
+        assert_eq!(Frame::read(&mut &followed[..], &mut rest).unwrap(), frame);
+        assert_eq!(rest, b"HL");
         for cut in 0..whole.len() {
-            let taken = Frame::take(&mut whole[..cut].to_vec());
-            assert_eq!(taken, Ok(None), "{cut} bytes of {vector}");
+            let kind = Frame::read(&mut &whole[..cut], &mut Vec::new()).unwrap_err().kind();
+            assert_eq!(kind, ErrorKind::UnexpectedEof, "{cut} bytes of {vector}");
         }
     }
 }

@@ -197,35 +197,6 @@ fn mutated_frames_never_drive_a_rig_in_lock_step() {
 /// Frames that the attacker remembers.
 const HEARD: usize = 4096;
 
-/// Passes all frames between a client and a server until it is `over`, and sends `frames` forged or repeated ones from the client's address;
-/// then sets `finished`. Returns the number of forged frames.
-fn attack([front, back]: [UdpSocket; 2], mut noise: Noise, frames: u64, [finished, over]: [&AtomicBool; 2]) -> u64 {
-    let (mut client, mut heard, mut bytes, mut done) = (None, Vec::new(), [0; 256], 0);
-    while !over.load(Ordering::Relaxed) {
-        let mut is_idle = true;
-        while let Ok((length, from)) = front.recv_from(&mut bytes) {
-            (client, is_idle) = (Some(from), false);
-            let _ = back.send(&bytes[..length]);
-            if heard.len() == HEARD {
-                heard.swap_remove(noise.below(HEARD));
-            }
-            heard.push(bytes[..length].to_vec());
-        }
-        while let (Ok(length), Some(client)) = (back.recv(&mut bytes), client) {
-            is_idle = false;
-            let _ = front.send_to(&bytes[..length], client);
-        }
-        if done < frames {
-            let forged = (0..16).filter_map(|_| forge(heard.get(noise.below(heard.len()))?.clone(), &mut noise));
-            done += forged.inspect(|forged| drop(back.send(forged))).count() as u64;
-        } else if is_idle {
-            finished.store(true, Ordering::Relaxed);
-            thread::sleep(Duration::from_micros(50));
-        }
-    }
-    done
-}
-
 /// A drive as it was, one with another content and a correct checksum, or a mutated frame.
 fn forge(mut forged: Vec<u8>, noise: &mut Noise) -> Option<Vec<u8>> {
     match (noise.below(3), Frame::decode(&forged[..SIZE])) {
@@ -246,34 +217,55 @@ fn forge(mut forged: Vec<u8>, noise: &mut Noise) -> Option<Vec<u8>> {
     Some(forged)
 }
 
-/// With a key, not even a frame with a correct checksum, session and number is taken, nor one of another session.
+/// With a key, not even a frame with a correct checksum, session and number is taken, nor one of another session: between a client and the
+/// server, an attacker passes all frames, and sends forged or repeated ones from the client's address.
 #[test]
 fn with_a_key_forged_and_replayed_datagrams_never_drive_a_rig() {
     let ((frames, seed), key) = (size(), Key::of(b"a shared secret of the fuzzer"));
-    let (target, mut noise) = (Target::start(Address::Udp, key), Noise(seed ^ 3));
-    let sockets = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
-    sockets.iter().for_each(|socket| socket.set_nonblocking(true).unwrap());
-    sockets[1].connect(target.address).unwrap();
-    let address = Address::Udp(sockets[0].local_addr().unwrap());
-    let (own, [over, finished]) = (Noise(noise.next()), [const { AtomicBool::new(false) }; 2]);
-    let (mut sessions, mut done) = (0, 0);
-    thread::scope(|scope| {
-        let attacker = scope.spawn(|| attack(sockets, own, frames, [&finished, &over]));
-        for attempt in 0..3 + frames / 100_000 {
-            if attempt > 1 && finished.load(Ordering::Relaxed) {
-                break;
-            }
-            let Ok(mut rig) = NetRig::connect(address, SAMPLE_TIME, key) else {
-                continue;
-            };
-            sessions += 1;
-            let _ = (0..(frames / 40).clamp(100, 5000)).try_for_each(|_| {
-                rig.sense()?;
-                rig.advance(target.drive(&mut noise), SAMPLE_TIME)
-            });
-        }
-        over.store(true, Ordering::Relaxed);
-        done = attacker.join().unwrap();
+    let (target, [mut noise, mut own]) = (Target::start(Address::Udp, key), [3, 6].map(|salt| Noise(seed ^ salt)));
+    let [front, back] = [(); 2].map(|()| {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.set_nonblocking(true).unwrap();
+        socket
     });
-    target.end(&format!("{done} frames in {sessions} sessions with a key"));
+    back.connect(target.address).unwrap();
+    let (address, finished) = (Address::Udp(front.local_addr().unwrap()), AtomicBool::new(false));
+    let (mut peer, mut heard, mut bytes, mut done) = (None, Vec::new(), [0; 256], 0);
+    thread::scope(|scope| {
+        let client = scope.spawn(|| {
+            for attempt in 0..3 + frames / 100_000 {
+                if attempt > 1 && finished.load(Ordering::Relaxed) {
+                    break;
+                }
+                let Ok(mut rig) = NetRig::connect(address, SAMPLE_TIME, key) else {
+                    continue;
+                };
+                let _ = (0..(frames / 40).clamp(100, 5000)).try_for_each(|_| {
+                    rig.sense()?;
+                    rig.advance(target.drive(&mut noise), SAMPLE_TIME)
+                });
+            }
+        });
+        while !client.is_finished() {
+            while let Ok((length, from)) = front.recv_from(&mut bytes) {
+                peer = Some(from);
+                let _ = back.send(&bytes[..length]);
+                if heard.len() == HEARD {
+                    heard.swap_remove(own.below(HEARD));
+                }
+                heard.push(bytes[..length].to_vec());
+            }
+            while let (Ok(length), Some(peer)) = (back.recv(&mut bytes), peer) {
+                let _ = front.send_to(&bytes[..length], peer);
+            }
+            if done < frames {
+                let forged = (0..16).filter_map(|_| forge(heard.get(own.below(heard.len()))?.clone(), &mut own));
+                done += forged.inspect(|forged| drop(back.send(forged))).count() as u64;
+            } else {
+                finished.store(true, Ordering::Relaxed);
+                thread::sleep(Duration::from_micros(50));
+            }
+        }
+    });
+    target.end(&format!("{done} frames with a key"));
 }

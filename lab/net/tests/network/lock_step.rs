@@ -15,14 +15,11 @@ use crate::{drive, link_error, scene, serve_built_in, serve_rig, service, shake}
 #[test]
 fn an_experiment_across_the_network_gives_the_same_bits_also_with_held_samples() {
     for settings in [
-        [
-            "controller.amplitude_tolerance=8e-3",
-            "controller.bandwidth=0.3",
-            "record.decay_periods=150",
-        ],
-        ["chain.hold=true", "chain.dac_bits=12", "record.decay_periods=150"],
+        ["controller.amplitude_tolerance=8e-3", "controller.bandwidth=0.3"],
+        ["chain.hold=true", "chain.dac_bits=12"],
     ] {
-        let scene = scene(&settings);
+        let mut scene = scene(&settings);
+        scene.record.decay_periods = Some(150.0);
         let measure = |rig: Box<dyn Rig>, controller: &mut dyn Controller| {
             let mut rig = Chain::around(rig, &scene);
             experiment::run(rig.as_mut(), controller, &Plan::of(&scene), |_, _, _| {}).unwrap()
