@@ -10,7 +10,7 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use vines_net::{CONNECT, Counters, Readings, is_loopback};
+use vines_net::{CONNECT, Counters, Reading, Readings, is_loopback};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 use vines_testbench::scene::Names;
 
@@ -147,7 +147,8 @@ const SAME_RATE: f64 = 1e-6;
 /// Largest relative difference between the commanded frequency and the present one of the device at which the drive begins: an error of the
 /// phase that the next packet corrects.
 const RUNNING: f64 = 0.01;
-/// Time of the drive from which on the device is asked at every packet whether its output is on, as a share of the longest silence.
+/// Interval at which the device is asked whether its output is on, as a share of the longest silence: a trip ends the run before the silence
+/// of a device that has stopped would.
 const CHECKED: f64 = 0.25;
 
 type Cause = Box<dyn Error + Send + Sync>;
@@ -161,7 +162,7 @@ fn lost(what: &str) -> impl Fn(io::Error) -> String {
 /// A device as a rig.
 ///
 /// The device samples on its own clock, and its readings arrive in packets. A drive is sent when all readings that have arrived are used
-/// up, so that there is one command per packet at most. A command takes effect at a sample that the host does not know; but the stream
+/// up, so that there is one command per packet. A command takes effect at a sample that the host does not know; but the stream
 /// contains the phase of the device's oscillator. The coefficients of the forcing turn it to the phase of the host's drive.
 #[derive(Debug)]
 pub struct HelicRig<T: Transport> {
@@ -181,7 +182,7 @@ pub struct HelicRig<T: Transport> {
     gain: f64,
     /// Samples of the device per sample of the scene.
     decimation: u16,
-    readings: Readings<()>,
+    readings: Readings,
     /// Number of the device's sample that the first packet began with.
     origin: Option<u32>,
     is_streaming: bool,
@@ -191,7 +192,7 @@ pub struct HelicRig<T: Transport> {
     device_turn: f64,
     phase: f64,
     wanted: Drive,
-    /// Number of readings since the drive began; 0 if there is none.
+    /// Number of readings since the drive began, or the device was last asked whether its output is on; 0 if there is no drive.
     driven: u32,
     /// Packets that have arrived, and samples that were reconstructed.
     pub counters: Counters,
@@ -367,7 +368,8 @@ impl<T: Transport> HelicRig<T> {
             let read = |n: usize| self.factors[n] * f64::from(record[n]);
             let (reference, phase) = ((width > 2).then(|| read(1)), f64::from(record[width - 1]));
             let sensors = Sensors { response: read(0), reference };
-            let lost = self.readings.arrive(number, sensors, (), &mut self.counters);
+            let reading = Reading { sensors, ground_truth: None };
+            let lost = self.readings.arrive(number, reading, &mut self.counters);
             let turn = (phase - self.device_phase).rem_euclid(1.0);
             (self.device_phase, self.device_turn) = (phase, if lost == 0 { turn } else { f64::NAN });
             self.driven += u32::from(self.driven > 0);
@@ -386,7 +388,9 @@ impl<T: Transport> HelicRig<T> {
             self.transport.guard(&self.stop);
         }
         self.set("freq", &[omega / TAU])?;
-        if f64::from(self.driven) * self.sample_time > CHECKED * self.transport.stream().1.as_secs_f64() {
+        let unchecked = f64::from(self.driven) * self.sample_time;
+        if unchecked > CHECKED * self.transport.stream().1.as_secs_f64() || (was_driven && !drives) {
+            self.driven = 1;
             self.check_output()?;
         }
         if was_driven || drives {

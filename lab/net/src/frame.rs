@@ -157,8 +157,10 @@ impl Frame {
 
 /// Readings of a sample.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Reading {
+pub struct Reading {
+    /// What the sensors read, or its reconstruction.
     pub sensors: Sensors,
+    /// The ground truth, if the rig is a simulation.
     pub ground_truth: Option<GroundTruth>,
 }
 

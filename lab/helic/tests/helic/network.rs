@@ -140,7 +140,10 @@ fn a_stream_a_host_and_a_control_channel_that_hang_end_the_drive_and_say_so() {
         "no answer for 0.",
     ] {
         let (server, dead) = (Served::start(), Arc::new(AtomicBool::new(false)));
-        let mut rig = connect(carrier(server.address, Arc::clone(&dead)), SHORT);
+        let carried = message
+            .starts_with("no answer")
+            .then(|| carrier(server.address, Arc::clone(&dead)));
+        let mut rig = connect(carried.unwrap_or(server.address), SHORT);
         drive(&mut rig, 200).unwrap();
         assert!(!server.is_off());
         match &message[..4] {

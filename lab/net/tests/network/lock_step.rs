@@ -13,29 +13,26 @@ use vines_testbench::scene::Definition;
 use crate::{drive, link_error, scene, serve_built_in, serve_rig, service, shake};
 
 #[test]
-fn an_experiment_across_the_network_gives_the_same_bits_also_with_held_samples() {
-    for settings in [
-        ["controller.amplitude_tolerance=8e-3", "controller.bandwidth=0.3"],
-        ["chain.hold=true", "chain.dac_bits=12"],
-    ] {
-        let mut scene = scene(&settings);
-        scene.record.decay_periods = Some(150.0);
-        let measure = |rig: Box<dyn Rig>, controller: &mut dyn Controller| {
-            let mut rig = Chain::around(rig, &scene);
-            experiment::run(rig.as_mut(), controller, &Plan::of(&scene), |_, _, _| {}).unwrap()
-        };
-        let plant = Simulated::new(scene.plant, scene.start).unwrap();
-        let direct = measure(Box::new(plant), &mut BuiltIn::new(&scene.controller_config()).unwrap());
-        let ((rig, _), peer) = (serve_rig(Address::Tcp, &scene, 5.0), serve_built_in(&scene));
-        let client = rig.rig(&scene);
-        assert_eq!(client.pace(), None);
-        assert_eq!(measure(Box::new(client), &mut peer.controller(&scene, None)), direct);
-        for session in [rig.session(), peer.session()] {
-            assert_eq!(
-                (session.ended, session.samples),
-                (Ended::Farewell, direct.samples.len() as u64)
-            );
-        }
+fn an_experiment_with_held_samples_across_the_network_gives_the_same_bits() {
+    let mut scene = scene(&[
+        "chain.hold=true",
+        "chain.dac_bits=12",
+        "controller.amplitude_tolerance=8e-3",
+    ]);
+    scene.record.decay_periods = Some(150.0);
+    let measure = |rig: Box<dyn Rig>, controller: &mut dyn Controller| {
+        let mut rig = Chain::around(rig, &scene);
+        experiment::run(rig.as_mut(), controller, &Plan::of(&scene), |_, _, _| {}).unwrap()
+    };
+    let plant = Simulated::new(scene.plant, scene.start).unwrap();
+    let direct = measure(Box::new(plant), &mut BuiltIn::new(&scene.controller_config()).unwrap());
+    let ((rig, _), peer) = (serve_rig(Address::Tcp, &scene, 5.0), serve_built_in(&scene));
+    let client = rig.rig(&scene);
+    assert_eq!(client.pace(), None);
+    assert_eq!(measure(Box::new(client), &mut peer.controller(&scene, None)), direct);
+    for session in [rig.session(), peer.session()] {
+        let samples = direct.samples.len() as u64;
+        assert_eq!((session.ended, session.samples), (Ended::Farewell, samples));
     }
 }
 

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use vines_testbench::experiment::{self, Plan};
-use vines_testbench::rig::{BuiltIn, Chain, Drive, Rig, RigError, Simulated};
+use vines_testbench::rig::{BuiltIn, Chain, Drive, GroundTruth, Rig, RigError, Simulated};
 use vines_testbench::scene::{Override, PAPER, Scene};
 
 use super::*;
@@ -16,21 +16,26 @@ fn motion(n: u64) -> Sensors {
     Sensors { response, reference: Some(0.1 * (TAU * turns).cos()) }
 }
 
+/// A reading that has arrived.
+fn measured(sensors: Sensors) -> Reading {
+    Reading { sensors, ground_truth: Some(GroundTruth::default()) }
+}
+
 /// The readings after a gap of `lost` ones after `known` ones, by their numbers; the drive turns by `turn`.
 fn bridged(known: u64, lost: u64, turn: f64, motion: fn(u64) -> Sensors) -> Vec<(u64, Sensors)> {
     let (mut readings, mut counters) = (Readings::default(), Counters::default());
     let sample = |n| {
         if n < known {
-            assert_eq!(readings.arrive(n, motion(n), n, &mut counters), 0);
+            assert_eq!(readings.arrive(n, measured(motion(n)), &mut counters), 0);
         } else if n == known {
             let later = known + lost;
-            assert_eq!(readings.arrive(later, motion(later), n, &mut counters), lost);
-            assert_eq!(readings.arrive(known, motion(known), n, &mut counters), 0);
+            assert_eq!(readings.arrive(later, measured(motion(later)), &mut counters), lost);
+            assert_eq!(readings.arrive(known, measured(motion(known)), &mut counters), 0);
             assert_eq!(counters.late, 1, "a reading after a later one");
         }
         let taken = readings.take(&mut counters).unwrap();
         assert_eq!(counters.longest, if n < known { 0 } else { lost });
-        assert_eq!(taken.with.is_none(), (known..known + lost).contains(&n));
+        assert_eq!(taken.ground_truth.is_none(), (known..known + lost).contains(&n));
         readings.advance(turn);
         (n, taken.sensors)
     };
@@ -69,7 +74,7 @@ fn a_gap_of_any_length_in_a_periodic_motion_is_bridged_with_its_harmonics_and_wi
 /// A rig whose readings and drives are lost in a gap. Until its end the rig has the last drive; a base of held samples stands still.
 struct Interrupted {
     rig: Box<dyn Rig>,
-    readings: Readings<()>,
+    readings: Readings,
     gap: Range<u64>,
     at: u64,
     drive: (Drive, bool, f64),
@@ -104,9 +109,11 @@ impl Rig for Interrupted {
                 self.rig.sense()?;
                 self.apply()?;
             }
-            self.readings.arrive(self.gap.end, self.rig.sense()?, (), &mut counters);
+            let reading = measured(self.rig.sense()?);
+            self.readings.arrive(self.gap.end, reading, &mut counters);
         } else if !self.gap.contains(&self.at) && self.at != self.gap.end {
-            self.readings.arrive(self.at, self.rig.sense()?, (), &mut counters);
+            let reading = measured(self.rig.sense()?);
+            self.readings.arrive(self.at, reading, &mut counters);
         }
         Ok(self.readings.take(&mut counters).expect("there is a reading").sensors)
     }
