@@ -181,7 +181,7 @@ type Cause = Box<dyn Error + Send + Sync>;
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum RigError {
     #[error("the rig: {0}")]
-    Failed(#[source] Cause),
+    Failed(#[from] Cause),
     #[error("the rig: {0}")]
     Refused(#[from] InvalidValue),
     #[error(

@@ -1,47 +1,30 @@
-//! A rig as a device: its parameters, its stream, the requests of the host, and one sample after another.
+//! A rig as a device: its parameters, its stream, the requests of the host, and one sample after another; and its server.
 
 use std::f64::consts::TAU;
+use std::io::{self, ErrorKind, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::thread;
+use std::time::Instant;
 
+use vines_net::{Ended, POLL, RealTimeClock, ServerError, Session, is_loopback};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 
 use crate::codec::{
-    COEFFICIENTS, ErrorCode, Frame, HARMONICS, MAX_PAYLOAD, Packet, VERSION, message, of_bytes, size, take, to_bytes,
+    ErrorCode, Frame, HARMONICS, MAX_PAYLOAD, MAX_VALUES, Packet, VERSION, message, of_bytes, size, take, to_bytes,
 };
 
 /// Longest silence of the host, s, before the output is disarmed; 0: no limit.
 pub(crate) const WATCHDOG: &str = "rig_watchdog";
-/// Names, type and number of values of the parameters, in the order of version 3; then come those of the rig. A host may set those with an
-/// asterisk. What has no value here belongs to the waveform table or to the statistics of the processor, and stays 0.
-const PARAMETERS: &[(&str, u8, usize)] = &[
-    ("firmware experiment", b'c', 16),
-    ("sample_freq", b'f', 1),
-    ("ticks loop_time_last loop_time_max clock_jitter overruns", b'I', 1),
-    ("tick_timeouts records_dropped", b'I', 1),
-    ("freq*", b'f', 1),
-    ("target_coeffs* forcing_coeffs*", b'f', COEFFICIENTS),
-    ("table", b'f', 4096),
-    ("table_len", b'H', 1),
-    ("table_freq table_gain", b'f', 1),
-    ("table_interp table_mode* table_mult", b'I', 1),
-    ("table_phase", b'f', 1),
-    ("table_trigger wake_phase_min wake_phase_max t_measure_max", b'I', 1),
-    ("t_actuate_max t_rest_max diag_reset* cmd_backlog_max", b'I', 1),
-    ("arm* safety mcu_reboot", b'I', 1),
-    ("rig_gain rig_out_max", b'f', 1),
-    ("rig_watchdog*", b'f', 1),
-    ("impacts", b'I', 1),
-];
-/// Sources of a stream, with their units. A rig without a base sensor has no `reference`.
-const SOURCES: [(&str, &str); 8] = [
-    ("response", "mm"),
-    ("reference", "mm"),
-    ("target", "V"),
-    ("forcing", "V"),
-    ("table", "V"),
-    ("phase", "turns"),
-    ("out", "V"),
-    ("cmd_epoch", "count"),
-];
+/// The parameters in the order of version 3, then those of the rig: name, type, and number of values if it is not 1. A host may set those
+/// with an asterisk. What has no value here belongs to the waveform table or to the statistics of the processor, and stays 0.
+const PARAMETERS: &str = "firmware c16, experiment c16, sample_freq f, ticks I, loop_time_last I, loop_time_max I, clock_jitter I, overruns I, \
+    tick_timeouts I, records_dropped I, freq* f, target_coeffs* f33, forcing_coeffs* f33, table f4096, table_len H, table_freq f, table_gain f, \
+    table_interp I, table_mode* I, table_mult I, table_phase f, table_trigger I, wake_phase_min I, wake_phase_max I, t_measure_max I, \
+    t_actuate_max I, t_rest_max I, diag_reset* I, cmd_backlog_max I, arm* I, safety I, mcu_reboot I, rig_gain f, rig_out_max f, \
+    rig_watchdog* f, impacts I";
+/// The sources of a stream, with their units, as GetSources answers. A rig without a base sensor has no `reference`.
+const SOURCES: &str =
+    "response\0mm\0reference\0mm\0target\0V\0forcing\0V\0table\0V\0phase\0turns\0out\0V\0cmd_epoch\0count\0";
 /// Base displacement per volt of the output, mm.
 const GAIN: f64 = 1.0;
 /// m per mm.
@@ -53,75 +36,8 @@ const EPOCH: u32 = 1 << 24;
 /// Longest time before a packet is sent, s (protocol, "Stream channel").
 const FLUSH: f64 = 0.005;
 
-/// The stream: what the host has set up, and the packet that is being filled.
-#[derive(Debug, Default)]
-struct Stream {
-    sources: Vec<u8>,
-    decimation: u16,
-    /// Records, or 0 for a stream without an end.
-    count: u32,
-    /// Port of the host while the stream runs.
-    port: Option<u16>,
-    /// Samples and records since the start.
-    samples: u64,
-    records: u32,
-    packet: Packet,
-}
-
-impl Stream {
-    /// Sets the stream up: `decimation u16, count u32, n u8, source u8 × n`; `all` is the number of sources.
-    fn set_up(&mut self, mut payload: &[u8], all: usize) -> Result<(), ErrorCode> {
-        let [d, e, a, b, c, f, n] = take(&mut payload).map_err(|_| ErrorCode::BadLength)?;
-        let decimation = u16::from_le_bytes([d, e]);
-        let sources_exist = payload.iter().all(|source| usize::from(*source) < all);
-        match () {
-            () if payload.len() != usize::from(n) => return Err(ErrorCode::BadLength),
-            () if self.port.is_some() => return Err(ErrorCode::Busy),
-            () if decimation == 0 || n == 0 || !sources_exist => return Err(ErrorCode::BadValue),
-            () => {}
-        }
-        (self.decimation, self.count, self.sources) = (decimation, u32::from_le_bytes([a, b, c, f]), payload.into());
-        Ok(())
-    }
-
-    /// Starts the stream to a port of the host.
-    fn start(&mut self, payload: &[u8]) -> Result<(), ErrorCode> {
-        let port = u16::from_le_bytes(payload.try_into().map_err(|_| ErrorCode::BadLength)?);
-        match () {
-            () if self.port.is_some() => return Err(ErrorCode::Busy),
-            () if port == 0 || self.sources.is_empty() => return Err(ErrorCode::BadValue),
-            () => {}
-        }
-        (self.port, self.samples, self.records) = (Some(port), 0, 0);
-        let (decimation, width) = (self.decimation, self.sources.len() as u8);
-        self.packet = Packet { decimation, width, ..Packet::default() };
-        Ok(())
-    }
-
-    /// Takes the values of all sources at sample `index`; returns a packet that is full, complete or `flush` samples old, and its port.
-    fn record(&mut self, index: u32, values: &[f64], flush: f64) -> Option<(u16, Vec<u8>)> {
-        let (port, packet) = (self.port?, &mut self.packet);
-        if self.samples.is_multiple_of(self.decimation.into()) {
-            if packet.values.is_empty() {
-                packet.first = index;
-            }
-            let record = self.sources.iter().map(|source| values[usize::from(*source)] as f32);
-            packet.values.extend(record);
-            self.records += 1;
-        }
-        self.samples += 1;
-        let is_complete = self.records == self.count;
-        let is_full = packet.values.len() >= self.sources.len() * Packet::capacity(self.sources.len());
-        let is_due = f64::from(index.wrapping_sub(packet.first) + 2) > flush;
-        if packet.values.is_empty() || !(is_complete || is_full || is_due) {
-            return None;
-        }
-        let bytes = packet.encode();
-        packet.sequence = packet.sequence.wrapping_add(1);
-        packet.values.clear();
-        self.port.take_if(|_| is_complete);
-        Some((port, bytes))
-    }
+fn require(is_met: bool, otherwise: ErrorCode) -> Result<(), ErrorCode> {
+    is_met.then_some(()).ok_or(otherwise)
 }
 
 /// A parameter. Its type is a letter as in Python's `struct`.
@@ -132,18 +48,35 @@ struct Parameter {
     values: Vec<f64>,
 }
 
+impl Parameter {
+    /// The parameter of an entry in [`PARAMETERS`].
+    fn of(entry: &'static str) -> Self {
+        let (name, form) = entry.split_once(' ').expect("a name and a type");
+        let (code, count) = (form.as_bytes()[0], form[1..].parse().unwrap_or(1));
+        let (is_writable, values) = (name.ends_with('*'), vec![0.0; count]);
+        let name = name.trim_end_matches('*');
+        Self { name, code, is_writable, values }
+    }
+}
+
 /// A device. Everything in it happens at a sample or between two of them, in the order of the calls.
 pub struct Device {
     rig: Box<dyn Rig>,
-    has_reference: bool,
     sample_rate: f64,
     parameters: Vec<Parameter>,
-    stream: Stream,
+    /// Names and units.
+    sources: String,
+    /// The sources of the stream, the number of its records, or 0 for a stream without an end, and the packet that is being filled.
+    streamed: Vec<u8>,
+    count: u32,
+    packet: Packet,
+    /// Port of the host while the stream runs, and samples since its start.
+    port: Option<u16>,
+    samples: u64,
     /// Phase of the oscillator, 2^-32 turns.
     phase: u32,
     ticks: u32,
-    /// Commands since the last sample, and up to it.
-    commands: u32,
+    /// Number of commands.
     epoch: u32,
     /// Samples since the last request.
     silence: u32,
@@ -152,31 +85,25 @@ pub struct Device {
 impl Device {
     /// The rig `rig` as a device, sampled every `sample_time`, s; its output is limited to `max_amplitude`, m.
     pub fn new(mut rig: Box<dyn Rig>, sample_time: f64, max_amplitude: f64) -> Result<Self, RigError> {
-        let all = PARAMETERS.iter().flat_map(|&(names, code, count)| {
-            names.split(' ').map(move |name| {
-                let is_writable = name.ends_with('*');
-                let name = name.trim_end_matches('*');
-                Parameter { name, code, is_writable, values: vec![0.0; count] }
-            })
-        });
+        let absent = ["reference\0mm\0", "\0\0"][usize::from(rig.sense()?.reference.is_some())];
         let mut device = Self {
-            has_reference: rig.sense()?.reference.is_some(),
             rig,
             sample_rate: 1.0 / sample_time,
-            parameters: all.collect(),
-            stream: Stream::default(),
+            parameters: PARAMETERS.split(", ").map(Parameter::of).collect(),
+            sources: SOURCES.replace(absent, ""),
+            streamed: Vec::new(),
+            count: 0,
+            packet: Packet::default(),
+            port: None,
+            samples: 0,
             phase: 0,
             ticks: 0,
-            commands: 0,
             epoch: 0,
             silence: 0,
         };
-        for (name, text) in [
-            ("firmware", concat!("vines ", env!("CARGO_PKG_VERSION"))),
-            ("experiment", "vines"),
-        ] {
-            let letters = device.values(name).iter_mut().zip(text.bytes());
-            letters.for_each(|(value, letter)| *value = letter.into());
+        let firmware = concat!("vines ", env!("CARGO_PKG_VERSION"));
+        for (name, text) in [("firmware", firmware), ("experiment", "vines")] {
+            device.values(name).splice(..text.len(), text.bytes().map(f64::from));
         }
         device.values("sample_freq")[0] = device.sample_rate;
         device.values("rig_gain")[0] = GAIN;
@@ -192,19 +119,13 @@ impl Device {
 
     /// The host has left: output and stream stop.
     pub fn disconnect(&mut self) {
-        self.stream.port = None;
+        self.port = None;
         self.values("arm")[0] = 0.0;
     }
 
     /// Whether the output may be other than zero.
     pub fn is_driven(&mut self) -> bool {
         self.values("arm")[0] == 1.0
-    }
-
-    fn sources(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
-        let has_reference = self.has_reference;
-        let all = SOURCES.into_iter();
-        all.filter(move |(name, _)| has_reference || *name != "reference")
     }
 
     /// Answers a request. `uptime` in ms.
@@ -218,33 +139,29 @@ impl Device {
         Frame { kind, sequence, payload }
     }
 
-    fn answer(&mut self, kind: u8, payload: &[u8], uptime: u32) -> Result<Vec<u8>, ErrorCode> {
-        if matches!(kind, message::GET_SOURCES | message::STREAM_STOP | message::STATUS) && !payload.is_empty() {
-            return Err(ErrorCode::BadLength);
-        }
-        let empty = |()| Vec::new();
+    fn answer(&mut self, kind: u8, mut payload: &[u8], uptime: u32) -> Result<Vec<u8>, ErrorCode> {
+        let (all, done) = (self.sources.matches('\0').count() / 2, |()| Vec::new());
+        let length = match kind {
+            message::GET_SOURCES | message::STREAM_STOP | message::STATUS => 0,
+            message::GET_PARAMS | message::STREAM_START => 2,
+            _ => payload.len(),
+        };
+        require(payload.len() == length, ErrorCode::BadLength)?;
         match kind {
-            message::GET_PARAMS => {
-                let start = payload.try_into().map_err(|_| ErrorCode::BadLength)?;
-                self.page(u16::from_le_bytes(start))
-            }
-            message::GET_SOURCES => {
-                let entry = |(name, unit): (&str, &str)| format!("{name}\0{unit}\0").into_bytes();
-                Ok(self.sources().flat_map(entry).collect())
-            }
+            message::GET_PARAMS => self.page(u16::from_le_bytes(take(&mut payload)?)),
+            message::GET_SOURCES => Ok(self.sources.clone().into()),
             message::GET_PAR => self.read(payload),
-            message::SET_PAR => self.set(payload).map(empty),
-            message::STREAM_SETUP => self.stream.set_up(payload, self.sources().count()).map(empty),
-            message::STREAM_START => self.stream.start(payload).map(empty),
+            message::SET_PAR => self.set(payload).map(done),
+            message::STREAM_SETUP => self.set_up(payload, all).map(done),
+            message::STREAM_START => self.start(u16::from_le_bytes(take(&mut payload)?)).map(done),
             message::STREAM_STOP => {
-                self.stream.port = None;
+                self.port = None;
                 Ok(Vec::new())
             }
             message::STATUS => {
                 let [low, high] = (self.parameters.len() as u16).to_le_bytes();
-                let head = [VERSION, low, high, self.sources().count() as u8];
-                let sample_rate = self.sample_rate as f32;
-                Ok([head, sample_rate.to_le_bytes(), uptime.to_le_bytes()].concat())
+                let sample_rate = (self.sample_rate as f32).to_le_bytes();
+                Ok([[VERSION, low, high, all as u8], sample_rate, uptime.to_le_bytes()].concat())
             }
             _ => Err(ErrorCode::UnknownType),
         }
@@ -276,56 +193,107 @@ impl Device {
             bytes.extend(to_bytes(*code, values));
         }
         let is_allowed = !indices.is_empty() && rest.is_empty() && bytes.len() <= MAX_PAYLOAD;
-        is_allowed.then_some(bytes).ok_or(ErrorCode::BadLength)
+        require(is_allowed, ErrorCode::BadLength).map(|()| bytes)
     }
 
     /// Sets a parameter: `index u16, values`.
-    fn set(&mut self, payload: &[u8]) -> Result<(), ErrorCode> {
-        let (index, bytes) = payload.split_first_chunk().ok_or(ErrorCode::BadLength)?;
+    fn set(&mut self, mut payload: &[u8]) -> Result<(), ErrorCode> {
+        let index = u16::from_le_bytes(take(&mut payload)?);
         let (highest, largest) = (0.5 * self.sample_rate, self.values("rig_out_max")[0]);
-        let parameter = self.parameters.get_mut(usize::from(u16::from_le_bytes(*index)));
-        let parameter = parameter.ok_or(ErrorCode::BadIndex)?;
-        if !parameter.is_writable {
-            return Err(ErrorCode::ReadOnly);
-        }
-        if bytes.len() != parameter.values.len() * size(parameter.code) {
-            return Err(ErrorCode::BadLength);
-        }
-        let values = of_bytes(parameter.code, bytes);
+        let parameter = self.parameters.get_mut(usize::from(index)).ok_or(ErrorCode::BadIndex)?;
+        require(parameter.is_writable, ErrorCode::ReadOnly)?;
+        let length = parameter.values.len() * size(parameter.code);
+        require(payload.len() == length, ErrorCode::BadLength)?;
+        let values = of_bytes(parameter.code, payload);
         let (is_command, is_allowed) = match parameter.name {
             "freq" => (true, (0.0..highest).contains(&values[0])),
-            "target_coeffs" | "forcing_coeffs" => (true, amplitude(&values) <= largest),
+            "target_coeffs" | "forcing_coeffs" => (true, series(&values, 0)[1] <= largest),
             // There is no waveform table.
             "table_mode" => (true, values[0] == 0.0),
             "arm" => (false, values[0] <= 1.0),
             WATCHDOG => (false, values[0] >= 0.0 && values[0].is_finite()),
             _ => (false, true),
         };
-        if !is_allowed {
-            return Err(ErrorCode::BadValue);
-        }
+        require(is_allowed, ErrorCode::BadValue)?;
         parameter.values = values;
-        self.commands += u32::from(is_command);
+        self.epoch = (self.epoch + u32::from(is_command)) % EPOCH;
         Ok(())
+    }
+
+    /// Sets the stream up: `decimation u16, count u32, n u8, source u8 × n`; `all` is the number of sources.
+    fn set_up(&mut self, mut payload: &[u8], all: usize) -> Result<(), ErrorCode> {
+        let decimation = u16::from_le_bytes(take(&mut payload)?);
+        let count = u32::from_le_bytes(take(&mut payload)?);
+        let [width] = take(&mut payload)?;
+        let sources_exist = payload.iter().all(|source| usize::from(*source) < all);
+        require(payload.len() == usize::from(width), ErrorCode::BadLength)?;
+        require(self.port.is_none(), ErrorCode::Busy)?;
+        require(decimation > 0 && width > 0 && sources_exist, ErrorCode::BadValue)?;
+        (self.count, self.streamed) = (count, payload.into());
+        self.packet = Packet { decimation, width, ..Packet::default() };
+        Ok(())
+    }
+
+    /// Starts the stream to a port of the host.
+    fn start(&mut self, port: u16) -> Result<(), ErrorCode> {
+        require(self.port.is_none(), ErrorCode::Busy)?;
+        require(port > 0 && !self.streamed.is_empty(), ErrorCode::BadValue)?;
+        (self.port, self.samples, self.packet.sequence) = (Some(port), 0, 0);
+        self.packet.values.clear();
+        Ok(())
+    }
+
+    /// Takes the values of all sources at the present sample; returns a packet that is full, complete or old enough, and its port.
+    fn record(&mut self, values: &[f64]) -> Option<(u16, Vec<u8>)> {
+        let (port, packet) = (self.port?, &mut self.packet);
+        let decimation = u64::from(packet.decimation);
+        let (records, since) = (self.samples / decimation + 1, self.samples % decimation);
+        if since == 0 {
+            packet.first = if packet.values.is_empty() {
+                self.ticks
+            } else {
+                packet.first
+            };
+            let read = |source: &u8| values[usize::from(*source)] as f32;
+            packet.values.extend(self.streamed.iter().map(read));
+        }
+        self.samples += 1;
+        let is_complete = records == self.count.into();
+        let is_full = packet.values.len() + self.streamed.len() > MAX_VALUES;
+        let is_due = f64::from(self.ticks.wrapping_sub(packet.first) + 2) > FLUSH * self.sample_rate;
+        if packet.values.is_empty() || !(is_complete || is_full || is_due) {
+            return None;
+        }
+        let bytes = packet.encode();
+        packet.sequence = packet.sequence.wrapping_add(1);
+        packet.values.clear();
+        self.port.take_if(|_| is_complete);
+        Some((port, bytes))
     }
 
     /// One sample: reads the sensors, drives the rig until the next sample, and returns a packet for a port of the host if one is complete.
     pub fn tick(&mut self) -> Result<Option<(u16, Vec<u8>)>, RigError> {
         let Sensors { response, reference } = self.rig.sense()?;
         let (step, phase) = (1.0 / self.sample_rate, self.phase);
-        self.epoch = (self.epoch + std::mem::take(&mut self.commands)) % EPOCH;
         self.silence = self.silence.saturating_add(1);
         let watchdog = self.values(WATCHDOG)[0];
         if watchdog > 0.0 && f64::from(self.silence) * step > watchdog {
             self.values("arm")[0] = 0.0;
         }
-        let [target, forcing] = ["target_coeffs", "forcing_coeffs"].map(|name| value(self.values(name), phase));
-        let out = self.gate(target + forcing);
+        let [target, forcing] = ["target_coeffs", "forcing_coeffs"].map(|name| series(self.values(name), phase)[0]);
+        // The output is zero unless armed, and never more than the limit.
+        let (wanted, largest) = (target + forcing, self.values("rig_out_max")[0]);
+        let is_quiet = !self.is_driven() || !wanted.is_finite();
+        let out = if is_quiet { 0.0 } else { wanted.clamp(-largest, largest) };
+        // Bits: 0 armed, 1 tripped (nothing trips here), 2 limited, 3 quiet.
+        let (is_armed, is_limited) = (self.is_driven(), !is_quiet && out != wanted);
+        let safety = u8::from(is_armed) | u8::from(is_limited) << 2 | u8::from(is_quiet) << 3;
+        self.values("safety")[0] = safety.into();
         let (turns, epoch) = (f64::from(phase) / TURN, f64::from(self.epoch));
         let sensors = [Some(response), reference].into_iter().flatten();
         let sensors = sensors.map(|length| length / MILLI);
         let values: Vec<f64> = sensors.chain([target, forcing, 0.0, turns, out, epoch]).collect();
-        let packet = self.stream.record(self.ticks, &values, FLUSH * self.sample_rate);
+        let packet = self.record(&values);
         let displacement = out * GAIN * MILLI;
         self.rig.hold(Drive { displacement, ..Drive::default() }, step)?;
         let turn = self.values("freq")[0] * step * TURN;
@@ -336,36 +304,119 @@ impl Device {
         self.values("impacts")[0] = impacts as f64;
         Ok(packet)
     }
+}
 
-    /// The output, V: zero unless armed, and never more than the limit.
-    fn gate(&mut self, wanted: f64) -> f64 {
-        let (is_armed, largest) = (self.is_driven(), self.values("rig_out_max")[0]);
-        let is_quiet = !is_armed || !wanted.is_finite();
-        let out = if is_quiet { 0.0 } else { wanted.clamp(-largest, largest) };
-        let is_limited = !is_quiet && out != wanted;
-        // Bits: 0 armed, 1 tripped (nothing trips here), 2 limited, 3 quiet.
-        let safety = u8::from(is_armed) | u8::from(is_limited) << 2 | u8::from(is_quiet) << 3;
-        self.values("safety")[0] = safety.into();
-        out
+/// Value of a Fourier series at a phase of its fundamental, and its upper bound.
+fn series(coefficients: &[f64], phase: u32) -> [f64; 2] {
+    let (cosines, sines) = coefficients[1..].split_at(HARMONICS);
+    let (mut value, mut bound) = (coefficients[0], coefficients[0].abs());
+    for (k, (a, b)) in (1..).zip(cosines.iter().zip(sines)) {
+        if (*a, *b) != (0.0, 0.0) {
+            let (sine, cosine) = (TAU * f64::from(phase.wrapping_mul(k)) / TURN).sin_cos();
+            value += a * cosine + b * sine;
+            bound += a.hypot(*b);
+        }
+    }
+    [value, bound]
+}
+
+/// Port of the control channel; the stream has the next one.
+pub const DEFAULT_PORT: u16 = 2350;
+
+/// The server of a device, one host at a time.
+pub struct HelicServer {
+    control: TcpListener,
+    stream: UdpSocket,
+    device: Device,
+    sample_time: f64,
+}
+
+/// The connection to a host: what has arrived of its next request, and since when it is there.
+struct Connection {
+    control: TcpStream,
+    peer: SocketAddr,
+    request: Vec<u8>,
+    opened: Instant,
+}
+
+impl Connection {
+    /// Answers the requests that have arrived, until none is left or the host has sent bytes that are not a frame, or has left.
+    fn exchange(&mut self, device: &mut Device, uptime: u32) -> io::Result<()> {
+        loop {
+            let request = Frame::read(&mut self.control, &mut self.request)?;
+            self.control.write_all(&device.handle(&request, uptime).encode())?;
+        }
     }
 }
 
-/// Upper bound of a Fourier series: mean, cosines, sines.
-fn amplitude(coefficients: &[f64]) -> f64 {
-    let (cosines, sines) = coefficients[1..].split_at(HARMONICS);
-    let harmonics = cosines.iter().zip(sines).map(|(a, b)| a.hypot(*b));
-    coefficients[0].abs() + harmonics.sum::<f64>()
-}
+impl HelicServer {
+    /// Listens on `address` (TCP), and sends the stream from the next port. With port 0 the system chooses both ports.
+    pub fn listen(address: SocketAddr, device: Device, sample_time: f64) -> io::Result<Self> {
+        let control = TcpListener::bind(address)?;
+        control.set_nonblocking(true)?;
+        // A host on this machine may use the next port itself.
+        let any_port = address.port() == 0 || is_loopback(address.ip());
+        let port = if any_port { 0 } else { address.port().saturating_add(1) };
+        let stream = UdpSocket::bind((address.ip(), port))?;
+        stream.set_nonblocking(true)?;
+        Ok(Self { control, stream, device, sample_time })
+    }
 
-/// Value of a Fourier series at a phase of its fundamental.
-fn value(coefficients: &[f64], phase: u32) -> f64 {
-    let (cosines, sines) = coefficients[1..].split_at(HARMONICS);
-    let harmonics = (1..).zip(cosines.iter().zip(sines));
-    let values = harmonics
-        .filter(|(_, (a, b))| **a != 0.0 || **b != 0.0)
-        .map(|(k, (a, b))| {
-            let (sine, cosine) = (TAU * f64::from(phase.wrapping_mul(k)) / TURN).sin_cos();
-            a * cosine + b * sine
-        });
-    coefficients[0] + values.sum::<f64>()
+    /// Address of the control channel.
+    pub fn address(&self) -> io::Result<SocketAddr> {
+        self.control.local_addr()
+    }
+
+    /// Serves until `stop` returns true. `report` receives the report when a host has left.
+    pub fn serve(
+        &mut self,
+        mut stop: impl FnMut() -> bool,
+        mut report: impl FnMut(&Session),
+    ) -> Result<(), ServerError> {
+        let Self { control, stream, device, sample_time } = self;
+        let mut clock = RealTimeClock::start(*sample_time);
+        let mut host: Option<Connection> = None;
+        let mut tick = 0;
+        loop {
+            let stopped = stop();
+            if host.is_none()
+                && let Ok((control, peer)) = control.accept()
+            {
+                control.set_nodelay(true)?;
+                control.set_nonblocking(true)?;
+                clock.forget();
+                let (request, opened) = (Vec::new(), Instant::now());
+                host = Some(Connection { control, peer, request, opened });
+            }
+            let uptime = clock.due(0).elapsed().as_millis() as u32;
+            let failed = host.as_mut().and_then(|host| host.exchange(device, uptime).err());
+            let left = failed.is_some_and(|error| error.kind() != ErrorKind::WouldBlock);
+            if let Some(Connection { peer, opened, .. }) = host.take_if(|_| left || stopped) {
+                device.disconnect();
+                let timing = clock.timing(0);
+                report(&Session {
+                    peer,
+                    ended: if left { Ended::Farewell } else { Ended::Stopped },
+                    samples: timing.samples,
+                    sample_time: *sample_time,
+                    seconds: opened.elapsed().as_secs_f64(),
+                    timing: Some(timing),
+                    histogram: clock.classes(),
+                    counters: None,
+                });
+            }
+            if stopped {
+                return Ok(());
+            }
+            while Instant::now() >= clock.due(tick + 1) {
+                tick += 1;
+                clock.serve(tick);
+                if let (Some((port, bytes)), Some(host)) = (device.tick()?, &host) {
+                    // A packet that cannot be sent now counts as lost in the network.
+                    let _ = stream.send_to(&bytes, (host.peer.ip(), port));
+                }
+            }
+            thread::sleep(clock.due(tick + 1).saturating_duration_since(Instant::now()).min(POLL));
+        }
+    }
 }

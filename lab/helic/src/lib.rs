@@ -8,10 +8,6 @@
 mod client;
 pub mod codec;
 mod device;
-mod network;
-mod server;
 
-pub use client::HelicRig;
-pub use device::Device;
-pub use network::{LONGEST_SILENCE, Network, Transport};
-pub use server::{DEFAULT_PORT, HelicServer};
+pub use client::{HelicRig, LONGEST_SILENCE, Network, Transport};
+pub use device::{DEFAULT_PORT, Device, HelicServer};

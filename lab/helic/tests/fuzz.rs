@@ -1,66 +1,40 @@
 //! Guards device and host against random and mutated frames: a device that gets mutated frames beside genuine ones does what one does that gets the genuine ones only.
 
+#[expect(dead_code, reason = "the other tests use it, too")]
+#[path = "helic/host.rs"]
+mod host;
 #[path = "../../net/tests/fuzz/noise.rs"]
 mod noise;
 
 use std::io;
-use std::sync::{Arc, Mutex};
 
 use vines_helic::codec::{Frame, Packet, message};
 use vines_helic::{Device, HelicRig, Transport};
-use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
+use vines_testbench::rig::{Drive, Rig};
 use vines_testbench::scene::Names;
 
+use host::{Base, scene};
 use noise::{Noise, size};
 
 /// m
 const LARGEST: f64 = 5e-3;
 
-type Log = Arc<Mutex<f64>>;
-
-/// A rig that says how it is driven.
-struct Spy(Log);
-
-impl Rig for Spy {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        Ok(Sensors { response: 1e-3, reference: Some(0.0) })
-    }
-
-    fn advance(&mut self, _: Drive, _: f64) -> Result<(), RigError> {
-        unreachable!()
-    }
-
-    fn hold(&mut self, drive: Drive, _: f64) -> Result<(), RigError> {
-        *self.0.lock().unwrap() = drive.displacement;
-        Ok(())
-    }
-}
-
-fn device() -> (Device, Log) {
-    let log = Log::default();
-    (
-        Device::new(Box::new(Spy(Arc::clone(&log))), 1e-3, LARGEST).unwrap(),
-        log,
-    )
-}
-
 /// A request that makes sense, or one of the right form with random content.
 fn request(noise: &mut Noise) -> Frame {
-    let index = |noise: &mut Noise, first, count| ((first + noise.below(count)) as u16).to_le_bytes().to_vec();
-    let mut payload = match noise.below(4) {
+    let mut payload = (noise.below(50) as u16).to_le_bytes().to_vec();
+    match noise.below(4) {
         0 => {
             let length = noise.below(40);
-            noise.bytes(length)
+            payload = noise.bytes(length);
         }
         // A small integer, a float, and the series of forcing or target.
-        1 => [index(noise, 0, 50), (noise.below(3) as u32).to_le_bytes().into()].concat(),
-        2 => [index(noise, 0, 50), (noise.below(9) as f32 / 8.0).to_le_bytes().into()].concat(),
+        1 => payload.extend((noise.below(3) as u32).to_le_bytes()),
+        2 => payload.extend((noise.below(9) as f32 / 8.0).to_le_bytes()),
         _ => {
-            let mut series = index(noise, 11, 2);
-            (0..33).for_each(|_| series.extend((noise.below(100) as f32 / 1000.0).to_le_bytes()));
-            series
+            payload = vec![11 + noise.below(2) as u8, 0];
+            payload.extend((0..33).flat_map(|_| (noise.below(100) as f32 / 1000.0).to_le_bytes()));
         }
-    };
+    }
     let kind = match noise.below(3) {
         0 => noise.below(13) as u8,
         _ => message::SET_PAR,
@@ -68,21 +42,22 @@ fn request(noise: &mut Noise) -> Frame {
     if kind == message::GET_PARAMS {
         payload.truncate(2);
     }
-    Frame { kind, sequence: noise.next() as u8, payload }
+    Frame { sequence: noise.next() as u8, ..Frame::new(kind, payload) }
 }
 
 #[test]
 fn mutated_frames_never_drive_a_helic_device() {
     let (frames, seed) = size();
     let mut noise = Noise(seed ^ 4);
-    let ((mut attacked, moved), (mut clean, expected)) = (device(), device());
+    let [moved, expected] = [(); 2].map(|()| Base::default());
+    let (mut attacked, mut clean) = (moved.device(LARGEST), expected.device(LARGEST));
     let (mut collisions, mut driven) = (0u64, 0u64);
     for n in 0..frames {
         let genuine = request(&mut noise);
         let mut bytes = genuine.encode();
         noise.mutate(&mut bytes);
         if bytes != genuine.encode()
-            && let Ok(Some(frame)) = Frame::take(&mut bytes)
+            && let Ok(frame) = Frame::read(&mut &bytes[..], &mut Vec::new())
         {
             // The checksum has 16 bits: such a frame is as good as sent.
             collisions += 1;
@@ -90,10 +65,9 @@ fn mutated_frames_never_drive_a_helic_device() {
         }
         if n % 8 == 0 {
             assert_eq!(attacked.handle(&genuine, 0), clean.handle(&genuine, 0));
-            let (mine, theirs) = (attacked.tick().unwrap(), clean.tick().unwrap());
-            assert_eq!(mine, theirs);
-            let out = *moved.lock().unwrap();
-            assert_eq!(out, *expected.lock().unwrap());
+            assert_eq!(attacked.tick().unwrap(), clean.tick().unwrap());
+            let out = moved.get();
+            assert_eq!(out, expected.get());
             assert!(out.abs() <= LARGEST && (out == 0.0 || attacked.is_driven()));
             driven += u64::from(out != 0.0);
         }
@@ -117,46 +91,39 @@ impl Transport for Damaged {
     }
 
     fn datagram(&mut self) -> io::Result<Vec<u8>> {
-        for _ in 0..100 {
-            if let Some((_, mut bytes)) = self.0.tick().unwrap() {
-                if self.1.below(2) == 0 {
-                    self.1.mutate(&mut bytes);
-                    let length = self.1.below(2 * bytes.len());
-                    bytes.resize(length, 0);
-                }
-                return Ok(bytes);
-            }
+        let packet = (0..100).find_map(|_| self.0.tick().unwrap());
+        let (_, mut bytes) = packet.ok_or(io::ErrorKind::TimedOut)?;
+        if self.1.below(2) == 0 {
+            self.1.mutate(&mut bytes);
+            let length = self.1.below(2 * bytes.len());
+            bytes.resize(length, 0);
         }
-        Err(io::ErrorKind::TimedOut.into())
-    }
-
-    fn port(&self) -> io::Result<u16> {
-        Ok(1)
+        Ok(bytes)
     }
 }
 
 #[test]
 fn damaged_answers_and_packets_never_make_the_host_panic() {
     let (frames, seed) = size();
-    let mut noise = Noise(seed ^ 5);
+    let (mut noise, step) = (Noise(seed ^ 5), scene().sample_time());
     let (mut packets, mut runs) = (0, 0);
     while packets < frames / 10 {
-        runs += 1;
-        let transport = Damaged(device().0, Noise(noise.next()));
-        packets += 1;
-        let Ok(mut rig) = HelicRig::new(transport, &Names::default(), 1e-3, 100.0) else {
+        (runs, packets) = (runs + 1, packets + 1);
+        let transport = Damaged(Base::default().device(LARGEST), Noise(noise.next()));
+        let Ok(mut rig) = HelicRig::new(transport, &Names::default(), step, 100.0) else {
             continue;
         };
-        for n in 0..1000 {
-            let drive = Drive {
-                omega: 50.0 + f64::from(n),
-                amplitude: 1e-4,
-                displacement: 0.0,
-            };
-            if rig.sense().and_then(|_| rig.advance(drive, 1e-3)).is_err() {
-                break;
-            }
-        }
+        let _ = (0..1000).try_for_each(|n| {
+            rig.sense()?;
+            rig.advance(
+                Drive {
+                    omega: 50.0 + f64::from(n),
+                    amplitude: 1e-4,
+                    displacement: 0.0,
+                },
+                step,
+            )
+        });
         packets += rig.counters.received + rig.counters.malformed;
     }
     for _ in 0..frames {
@@ -165,7 +132,7 @@ fn damaged_answers_and_packets_never_make_the_host_panic() {
         if length > 3 {
             bytes[..3].copy_from_slice(b"HL\x03");
         }
-        let _ = (Packet::decode(&bytes), Frame::take(&mut bytes));
+        let _ = (Packet::decode(&bytes), Frame::read(&mut &bytes[..], &mut Vec::new()));
     }
     println!("helic host: {packets} packets, half of them damaged, in {runs} runs; {frames} random datagrams decoded");
 }

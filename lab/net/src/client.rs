@@ -170,7 +170,7 @@ impl Drop for Client {
 #[derive(Debug)]
 pub struct NetRig {
     client: Client,
-    readings: Readings<Option<GroundTruth>>,
+    readings: Readings,
     /// The last one that has arrived.
     ground_truth: Option<GroundTruth>,
     timing: Arc<OnceLock<Result<Timing, ReportLost>>>,
@@ -221,14 +221,13 @@ impl NetRig {
         let end = Instant::now() + self.client.silence;
         loop {
             if let Some(taken) = self.readings.take(&mut self.client.counters) {
-                self.ground_truth = taken.with.unwrap_or(self.ground_truth);
+                self.ground_truth = taken.ground_truth.or(self.ground_truth);
                 return Ok(taken.sensors);
             }
             let frame = self.client.receive(end)?.ok_or_else(|| self.client.silent())?;
             if frame.kind == Kind::Sensors {
-                let Reading { sensors, ground_truth } = read_reading(&frame);
-                let counters = &mut self.client.counters;
-                let samples = self.readings.arrive(frame.sequence, sensors, ground_truth, counters);
+                let (reading, counters) = (read_reading(&frame), &mut self.client.counters);
+                let samples = self.readings.arrive(frame.sequence, reading, counters);
                 let Client { peer, sample_time, silence, .. } = self.client;
                 let (seconds, allowed) = (samples as f64 * sample_time, silence.as_secs_f64());
                 if seconds > allowed {

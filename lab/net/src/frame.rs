@@ -79,24 +79,18 @@ pub struct Frame {
     pub values: [f64; VALUES],
 }
 
-/// Reason why a datagram is not a frame.
-#[expect(missing_docs, reason = "the messages explain the variants")]
+/// Reason why there is no frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum FrameError {
-    #[error("not a frame of this protocol")]
-    Magic,
+    /// The bytes are not a frame of this protocol, are damaged, or are not authenticated with the key.
+    #[error("not a frame of this protocol, or damaged, or of another key")]
+    Malformed,
+    /// Another version of the protocol.
     #[error("version {0} of the protocol")]
     Version(u16),
-    #[error("{0} bytes instead of {SIZE}")]
-    Size(usize),
-    #[error("wrong checksum")]
-    Checksum,
-    #[error("not authenticated with the key")]
-    Tag,
+    /// The connection is closed.
     #[error("the connection is closed")]
     Closed,
-    #[error("unknown kind {0}")]
-    Kind(u8),
 }
 
 impl Frame {
@@ -135,28 +129,23 @@ impl Frame {
 
     /// Reads a datagram.
     pub fn decode(bytes: &[u8]) -> Result<Self, FrameError> {
-        if bytes.len() < 6 || bytes[..4] != MAGIC {
-            return Err(FrameError::Magic);
-        }
-        let version = u16::from_le_bytes([bytes[4], bytes[5]]);
+        let version = bytes.strip_prefix(&MAGIC).and_then(|rest| rest.first_chunk());
+        let version = u16::from_le_bytes(*version.ok_or(FrameError::Malformed)?);
         if version != VERSION {
             return Err(FrameError::Version(version));
         }
-        if bytes.len() != SIZE {
-            return Err(FrameError::Size(bytes.len()));
-        }
-        if crc32fast::hash(&bytes[..CHECKSUM_AT]).to_le_bytes() != bytes[CHECKSUM_AT..] {
-            return Err(FrameError::Checksum);
-        }
-        let mut words = bytes[8..CHECKSUM_AT].chunks_exact(8).map(|word| {
-            let word = word.try_into().expect("eight bytes");
-            u64::from_le_bytes(word)
-        });
+        let is_whole =
+            bytes.len() == SIZE && crc32fast::hash(&bytes[..CHECKSUM_AT]).to_le_bytes() == bytes[CHECKSUM_AT..];
+        let kind = KINDS.get(usize::from(*bytes.get(6).unwrap_or(&0)).wrapping_sub(1));
+        let kind = *kind.filter(|_| is_whole).ok_or(FrameError::Malformed)?;
+        let mut words = bytes[8..CHECKSUM_AT]
+            .as_chunks()
+            .0
+            .iter()
+            .map(|word| u64::from_le_bytes(*word));
         let mut word = || words.next().expect("nine words");
         Ok(Self {
-            kind: *KINDS
-                .get(usize::from(bytes[6]).wrapping_sub(1))
-                .ok_or(FrameError::Kind(bytes[6]))?,
+            kind,
             flags: bytes[7],
             session: word(),
             sequence: word(),
@@ -168,8 +157,10 @@ impl Frame {
 
 /// Readings of a sample.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Reading {
+pub struct Reading {
+    /// What the sensors read, or its reconstruction.
     pub sensors: Sensors,
+    /// The ground truth, if the rig is a simulation.
     pub ground_truth: Option<GroundTruth>,
 }
 

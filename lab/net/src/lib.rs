@@ -21,9 +21,9 @@ mod timing;
 
 pub use address::{Address, BindScope, LinkError, ServerError, is_loopback, resolve};
 pub use client::{CONNECT, NetController, NetRig};
-pub use frame::Refusal;
+pub use frame::{Reading, Refusal};
 pub use link::POLL;
-pub use readings::{Readings, Taken};
+pub use readings::Readings;
 pub use seal::Key;
 pub use server::{RAMP_SAMPLES, Role, Served, Server, Service};
 pub use timing::{Counters, Ended, RealTimeClock, ReportLost, Session, Timing};

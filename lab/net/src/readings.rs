@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use vines_testbench::rig::Sensors;
 
+use crate::frame::Reading;
 use crate::timing::Counters;
 
 /// Largest number of readings that are kept: more than two periods of the finest sampling of a scene.
@@ -11,14 +12,14 @@ const MOST: usize = 1 << 18;
 
 /// The readings that arrive by their numbers, in order: a lost one is reconstructed. It repeats the reading a period of the drive before it;
 /// for the response plus a straight line that meets the readings on both sides of the gap. Before the end of the first period, or with a
-/// drive without a frequency, only the line is left. What arrives with a reading, `T`, is not reconstructed.
+/// drive without a frequency, only the line is left. The ground truth of a lost reading is not known.
 #[derive(Debug, Clone, Default)]
-pub struct Readings<T> {
+pub struct Readings {
     /// Number of the present sample, and its reading if it has been taken.
     at: u64,
-    now: Option<Taken<T>>,
+    now: Option<Reading>,
     /// Readings of the present and of later samples, in order, and the number after them.
-    arrived: VecDeque<(u64, Sensors, T)>,
+    arrived: VecDeque<(u64, Reading)>,
     next: u64,
     /// Phase of the drive at the present sample, and its last step, turns.
     phase: f64,
@@ -27,41 +28,34 @@ pub struct Readings<T> {
     past: VecDeque<(f64, Sensors)>,
 }
 
-/// The reading of a sample.
-#[derive(Debug, Clone, Copy)]
-pub struct Taken<T> {
-    /// What the sensors read, or a reconstruction.
-    pub sensors: Sensors,
-    /// What arrived with the reading; None if it was lost.
-    pub with: Option<T>,
-}
-
-impl<T: Copy> Readings<T> {
+impl Readings {
     /// A reading has arrived; one that came twice, or after a later one, is not used. Returns the number of readings lost before it.
-    pub fn arrive(&mut self, number: u64, sensors: Sensors, with: T, counters: &mut Counters) -> u64 {
+    pub fn arrive(&mut self, number: u64, reading: Reading, counters: &mut Counters) -> u64 {
         let Some(lost) = number.checked_sub(self.next) else {
             counters.late += 1;
             return 0;
         };
         self.next = number.saturating_add(1);
-        self.arrived.push_back((number, sensors, with));
+        self.arrived.push_back((number, reading));
         lost
     }
 
     /// The reading of the present sample; None if neither it nor a later one has arrived.
-    pub fn take(&mut self, counters: &mut Counters) -> Option<Taken<T>> {
+    pub fn take(&mut self, counters: &mut Counters) -> Option<Reading> {
         if self.now.is_none() {
-            let (number, sensors, with) = *self.arrived.front()?;
+            let (number, mut reading) = *self.arrived.front()?;
             let ahead = number - self.at;
-            let taken = if ahead == 0 {
+            if ahead == 0 {
                 self.arrived.pop_front();
-                Taken { sensors, with: Some(with) }
             } else {
                 counters.hold(ahead);
-                Taken { sensors: self.fill(&sensors, ahead), with: None }
-            };
-            self.keep(taken.sensors);
-            self.now = Some(taken);
+                reading = Reading {
+                    sensors: self.fill(&reading.sensors, ahead),
+                    ground_truth: None,
+                };
+            }
+            self.keep(reading.sensors);
+            self.now = Some(reading);
         }
         self.now
     }

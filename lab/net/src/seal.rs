@@ -87,13 +87,14 @@ impl Seal {
         }
         let (bytes, tag) = bytes.split_at(bytes.len().min(SIZE));
         let frame = Frame::decode(bytes)?;
-        let from = match self.side {
-            Side::Client => Side::Server,
-            Side::Server => Side::Client,
+        let from = if self.side == Side::Client {
+            Side::Server
+        } else {
+            Side::Client
         };
-        let mac = self.mac(&frame, bytes, from).ok_or(FrameError::Tag)?;
+        let mac = self.mac(&frame, bytes, from).ok_or(FrameError::Malformed)?;
         // In constant time.
-        mac.verify_slice(tag).map_err(|_| FrameError::Tag)?;
+        mac.verify_slice(tag).map_err(|_| FrameError::Malformed)?;
         Ok(frame)
     }
 

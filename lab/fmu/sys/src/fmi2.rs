@@ -158,31 +158,19 @@ functions! {
     fn fmi2ExitInitializationMode(c: fmi2Component) -> fmi2Status;
     fn fmi2Terminate(c: fmi2Component) -> fmi2Status;
     fn fmi2Reset(c: fmi2Component) -> fmi2Status;
-    fn fmi2GetReal(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *mut fmi2Real) -> fmi2Status;
-    fn fmi2GetInteger(
-        c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *mut fmi2Integer,
-    ) -> fmi2Status;
-    fn fmi2GetBoolean(
-        c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *mut fmi2Boolean,
-    ) -> fmi2Status;
-    fn fmi2GetString(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *mut fmi2String) -> fmi2Status;
-    fn fmi2SetReal(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *const fmi2Real) -> fmi2Status;
-    fn fmi2SetInteger(
-        c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *const fmi2Integer,
-    ) -> fmi2Status;
-    fn fmi2SetBoolean(
-        c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *const fmi2Boolean,
-    ) -> fmi2Status;
-    fn fmi2SetString(
-        c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *const fmi2String,
-    ) -> fmi2Status;
+    fn fmi2GetReal(c: fmi2Component, r: *const fmi2ValueReference, n: usize, v: *mut fmi2Real) -> fmi2Status;
+    fn fmi2GetInteger(c: fmi2Component, r: *const fmi2ValueReference, n: usize, v: *mut fmi2Integer) -> fmi2Status;
+    fn fmi2GetBoolean(c: fmi2Component, r: *const fmi2ValueReference, n: usize, v: *mut fmi2Boolean) -> fmi2Status;
+    fn fmi2GetString(c: fmi2Component, r: *const fmi2ValueReference, n: usize, v: *mut fmi2String) -> fmi2Status;
+    fn fmi2SetReal(c: fmi2Component, r: *const fmi2ValueReference, n: usize, v: *const fmi2Real) -> fmi2Status;
+    fn fmi2SetInteger(c: fmi2Component, r: *const fmi2ValueReference, n: usize, v: *const fmi2Integer) -> fmi2Status;
+    fn fmi2SetBoolean(c: fmi2Component, r: *const fmi2ValueReference, n: usize, v: *const fmi2Boolean) -> fmi2Status;
+    fn fmi2SetString(c: fmi2Component, r: *const fmi2ValueReference, n: usize, v: *const fmi2String) -> fmi2Status;
     fn fmi2GetFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> fmi2Status;
     fn fmi2SetFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status;
     fn fmi2FreeFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> fmi2Status;
     fn fmi2SerializedFMUstateSize(c: fmi2Component, FMUstate: fmi2FMUstate, size: *mut usize) -> fmi2Status;
-    fn fmi2SerializeFMUstate(
-        c: fmi2Component, FMUstate: fmi2FMUstate, serializedState: *mut fmi2Byte, size: usize,
-    ) -> fmi2Status;
+    fn fmi2SerializeFMUstate(c: fmi2Component, state: fmi2FMUstate, bytes: *mut fmi2Byte, size: usize) -> fmi2Status;
     fn fmi2DeSerializeFMUstate(
         c: fmi2Component, serializedState: *const fmi2Byte, size: usize, FMUstate: *mut fmi2FMUstate,
     ) -> fmi2Status;
@@ -203,13 +191,10 @@ functions! {
     fn fmi2GetEventIndicators(c: fmi2Component, eventIndicators: *mut fmi2Real, ni: usize) -> fmi2Status;
     fn fmi2GetContinuousStates(c: fmi2Component, x: *mut fmi2Real, nx: usize) -> fmi2Status;
     fn fmi2GetNominalsOfContinuousStates(c: fmi2Component, x_nominal: *mut fmi2Real, nx: usize) -> fmi2Status;
-    fn fmi2DoStep(
-        c: fmi2Component, currentCommunicationPoint: fmi2Real, communicationStepSize: fmi2Real,
-        noSetFMUStatePriorToCurrentPoint: fmi2Boolean,
-    ) -> fmi2Status;
+    fn fmi2DoStep(c: fmi2Component, time: fmi2Real, step: fmi2Real, is_final: fmi2Boolean) -> fmi2Status;
     fn fmi2CancelStep(c: fmi2Component) -> fmi2Status;
-    fn fmi2GetStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Status) -> fmi2Status;
-    fn fmi2GetRealStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Real) -> fmi2Status;
-    fn fmi2GetBooleanStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Boolean) -> fmi2Status;
-    fn fmi2GetStringStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2String) -> fmi2Status;
+    fn fmi2GetStatus(c: fmi2Component, s: fmi2StatusKind, v: *mut fmi2Status) -> fmi2Status;
+    fn fmi2GetRealStatus(c: fmi2Component, s: fmi2StatusKind, v: *mut fmi2Real) -> fmi2Status;
+    fn fmi2GetBooleanStatus(c: fmi2Component, s: fmi2StatusKind, v: *mut fmi2Boolean) -> fmi2Status;
+    fn fmi2GetStringStatus(c: fmi2Component, s: fmi2StatusKind, v: *mut fmi2String) -> fmi2Status;
 }

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io;
+use std::mem::swap;
 
 use vines_helic::codec::Frame;
 use vines_helic::{Device, HelicRig, Transport};
@@ -13,39 +14,38 @@ use vines_testbench::scene::{Names, PAPER, Scene};
 
 use super::host::{Host, device, scene};
 
-/// A device that takes its samples when a datagram is asked for; `fate` says how often a datagram arrives. The last `under_way` datagrams
-/// have not arrived yet.
-struct Direct<F> {
+/// How often the n-th datagram arrives.
+type Fate = fn(usize) -> usize;
+
+/// A device that takes its samples when a datagram is asked for. The last `under_way` datagrams have not arrived yet.
+struct Direct {
     device: Device,
-    fate: F,
+    fate: Fate,
     number: usize,
     waiting: VecDeque<Vec<u8>>,
     under_way: usize,
 }
 
-impl<F: FnMut(usize) -> usize> Direct<F> {
-    fn new(fate: F) -> Self {
-        Self {
-            device: device(),
-            fate,
-            number: 0,
-            waiting: VecDeque::new(),
-            under_way: 0,
-        }
+impl Direct {
+    fn new(device: Device, fate: Fate, under_way: usize) -> Self {
+        Self { device, fate, number: 0, waiting: VecDeque::new(), under_way }
+    }
+
+    /// As a rig, with this many samples per sample of a device with the rate of the scene.
+    fn rig(self, names: &Names, ratio: f64) -> Result<HelicRig<Self>, RigError> {
+        HelicRig::new(self, names, ratio * scene().sample_time(), 100.0 / ratio)
     }
 }
 
-impl<F: FnMut(usize) -> usize> Transport for Direct<F> {
+impl Transport for Direct {
     fn request(&mut self, request: &Frame) -> io::Result<Frame> {
         Ok(self.device.handle(request, 0))
     }
 
     fn datagram(&mut self) -> io::Result<Vec<u8>> {
         for _ in 0..2000 {
-            if self.waiting.len() > self.under_way
-                && let Some(bytes) = self.waiting.pop_front()
-            {
-                return Ok(bytes);
+            if self.waiting.len() > self.under_way {
+                return Ok(self.waiting.pop_front().unwrap());
             }
             if let Some((_, bytes)) = self.device.tick().unwrap() {
                 let copies = (self.fate)(self.number);
@@ -55,34 +55,22 @@ impl<F: FnMut(usize) -> usize> Transport for Direct<F> {
         }
         Err(io::ErrorKind::TimedOut.into())
     }
-
-    fn port(&self) -> io::Result<u16> {
-        Ok(1)
-    }
 }
 
-fn connect<F: FnMut(usize) -> usize>(fate: F) -> HelicRig<Direct<F>> {
-    let scene = scene();
-    let samples = scene.controller.samples_per_period;
-    HelicRig::new(Direct::new(fate), &Names::default(), scene.sample_time(), samples).unwrap()
-}
-
-fn drive() -> Drive {
-    Drive { omega: 55.0, amplitude: 9e-5, displacement: 0.0 }
+fn connect(fate: Fate) -> HelicRig<Direct> {
+    Direct::new(device(), fate, 0).rig(&Names::default(), 1.0).unwrap()
 }
 
 /// Drives the rig for some samples, and returns its readings.
-fn shake<T: Transport>(rig: &mut HelicRig<T>, samples: usize, step: f64) -> Result<Vec<Sensors>, RigError> {
+fn shake(rig: &mut HelicRig<Direct>, samples: usize) -> Result<Vec<Sensors>, RigError> {
+    let drive = Drive { omega: 55.0, amplitude: 9e-5, displacement: 0.0 };
     let mut sample = || {
         let sensors = rig.sense()?;
-        rig.advance(drive(), step)?;
+        rig.advance(drive, scene().sample_time())?;
         Ok(sensors)
     };
     (0..samples).map(|_| sample()).collect()
 }
-
-/// How often the n-th datagram arrives.
-type Fate = fn(usize) -> usize;
 
 /// The locked point of the default scene, on the plant or on a device with this many samples per sample of the scene.
 fn lock(device: Option<(f64, Fate)>) -> (Lock, Counters) {
@@ -98,8 +86,7 @@ fn lock(device: Option<(f64, Fate)>) -> (Lock, Counters) {
         return (measure(&mut plant), Counters::default());
     };
     let device = Device::new(Box::new(plant), step / samples, scene.plant.half_width).unwrap();
-    let direct = Direct { device, ..Direct::new(fate) };
-    let mut rig = HelicRig::new(direct, &Names::default(), step, 100.0).unwrap();
+    let mut rig = HelicRig::new(Direct::new(device, fate, 0), &Names::default(), step, 100.0).unwrap();
     (measure(&mut rig), rig.counters)
 }
 
@@ -132,15 +119,14 @@ fn the_experiment_on_a_device_gives_the_backbone_of_the_plant_also_through_lost_
 
 #[test]
 fn lost_and_repeated_datagrams_are_counted_and_bridged() {
-    let step = scene().sample_time();
     // Every seventh is lost, every fifth comes twice.
     let mut rig = connect(|n| if n % 7 == 3 { 0 } else { 1 + usize::from(n % 5 == 2) });
-    let readings = shake(&mut rig, 4000, step).unwrap();
+    let readings = shake(&mut rig, 4000).unwrap();
     println!("{}", rig.counters);
     assert!(rig.counters.held > 400 && rig.counters.late > 100, "{}", rig.counters);
     // The samples keep their times, and those that were lost repeat the period before.
     for (n, sensors) in readings.iter().enumerate().skip(300) {
-        let expected = 9e-5 * (55.0 * (n - 1) as f64 * step).sin();
+        let expected = 9e-5 * (55.0 * (n - 1) as f64 * scene().sample_time()).sin();
         let error = (sensors.reference.unwrap() - expected).abs();
         assert!(error < 2e-3 * 9e-5, "{n}: {error}");
     }
@@ -148,64 +134,65 @@ fn lost_and_repeated_datagrams_are_counted_and_bridged() {
 
 #[test]
 fn a_longer_blackout_or_a_device_that_has_tripped_ends_the_run_and_says_so() {
-    let step = scene().sample_time();
     let mut rig = connect(|n| usize::from(!(100..140).contains(&n)));
-    let message = shake(&mut rig, 1000, step).unwrap_err().to_string();
-    let parts = [
+    let message = shake(&mut rig, 1000).unwrap_err().to_string();
+    for part in [
         "samples of the helic device did not arrive, 0.1",
         "up to 0.15 s are bridged",
-    ];
-    assert!(parts.iter().all(|part| message.contains(part)), "{message}");
-
+    ] {
+        assert!(message.contains(part), "{message}");
+    }
     let mut rig = connect(|_| 1);
-    shake(&mut rig, 50, step).unwrap();
+    shake(&mut rig, 50).unwrap();
     let mut host = Host::new(device());
-    std::mem::swap(&mut host.device, &mut rig.transport().device);
-    assert_eq!(host.number("safety"), 1);
+    swap(&mut host.device, &mut rig.transport.device);
+    assert_eq!(host.get("safety"), 1);
     host.set("arm", &[0.0]).unwrap();
-    std::mem::swap(&mut host.device, &mut rig.transport().device);
-    let message = shake(&mut rig, 1000, step).unwrap_err().to_string();
+    swap(&mut host.device, &mut rig.transport.device);
+    let message = shake(&mut rig, 1000).unwrap_err().to_string();
     assert!(message.contains("output of the helic device is off"), "{message}");
 }
 
 #[test]
 fn names_and_rates_that_do_not_fit_are_explained_and_a_slower_scene_uses_every_second_sample() {
-    let step = scene().sample_time();
-    let names = |text: &str| {
-        let text = format!("{PAPER}\n[rig.names]\n{text}");
-        Scene::parse("mapped.toml", &text, &[]).unwrap().rig_names
-    };
-    let refused = |names: Names, step: f64| {
-        let rig = HelicRig::new(Direct::new(|_| 1), &names, step, 70.0);
-        rig.err().unwrap().to_string()
-    };
-    let missing = refused(names("response = { name = \"laser\", unit = \"mm\" }"), step);
-    assert!(
-        missing.contains("no source \"laser\"") && missing.contains("response [mm]"),
-        "{missing}"
-    );
-    assert!(refused(names("force = \"F\""), step).contains("maps `force`"));
-    let rate = refused(Names::default(), 0.7 * step);
-    assert!(rate.contains("controller.samples_per_period"), "{rate}");
-    let mut rig = HelicRig::new(Direct::new(|_| 1), &Names::default(), 2.0 * step, 50.0).unwrap();
-    shake(&mut rig, 100, 2.0 * step).unwrap();
+    let direct = || Direct::new(device(), |_| 1, 0);
+    for (name, ratio, parts) in [
+        (
+            "response = { name = \"laser\", unit = \"mm\" }",
+            1.0,
+            ["no source \"laser\"", "response [mm]"],
+        ),
+        ("force = \"F\"", 1.0, ["maps `force`", "there are response, base and E"]),
+        (
+            "",
+            0.7,
+            ["set controller.samples_per_period", "(or that over an integer)"],
+        ),
+    ] {
+        let text = format!("{PAPER}\n[rig.names]\n{name}");
+        let names = Scene::parse("mapped.toml", &text, &[]).unwrap().rig_names;
+        let refused = direct().rig(&names, ratio).err().unwrap().to_string();
+        assert!(parts.iter().all(|part| refused.contains(part)), "{refused}");
+    }
+    let mut rig = direct().rig(&Names::default(), 2.0).unwrap();
+    shake(&mut rig, 100).unwrap();
     assert!(!rig.counters.is_troubled());
 }
 
 #[test]
 fn the_drive_has_the_phase_of_the_host_however_late_its_commands_are() {
-    let step = scene().sample_time();
     for under_way in [0, 10, 30] {
-        let mut direct = Direct { under_way, ..Direct::new(|_| 1) };
-        let mut host = Host::new(direct.device);
+        let mut host = Host::new(device());
         host.set("freq", &[37.0]).unwrap();
-        (0..777).for_each(|_| drop(host.device.tick().unwrap()));
-        direct.device = host.device;
-        let mut rig = HelicRig::new(direct, &Names::default(), step, 100.0).unwrap();
+        host.tick(777);
+        let mut rig = Direct::new(host.device, |_| 1, under_way)
+            .rig(&Names::default(), 1.0)
+            .unwrap();
         let mut driven = 0;
-        for (n, sensors) in (-1..).zip(shake(&mut rig, 600, step).unwrap()) {
+        for (n, sensors) in (-1..).zip(shake(&mut rig, 600).unwrap()) {
             // The base is held from the sample before.
-            let (base, expected) = (sensors.reference.unwrap(), 9e-5 * (55.0 * step * f64::from(n)).sin());
+            let expected = 9e-5 * (55.0 * scene().sample_time() * f64::from(n)).sin();
+            let base = sensors.reference.unwrap();
             driven += u32::from(base != 0.0);
             assert!(
                 base == 0.0 || (base - expected).abs() < 1e-9,

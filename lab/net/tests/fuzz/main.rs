@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use vines_net::frame::{Frame, Kind, SIZE};
+use vines_net::frame::{Frame, Kind, SIZE, flag};
 use vines_net::{Address, Key, NetRig, Role, Served, Server, Service};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 use vines_testbench::scene::Definition;
@@ -42,7 +42,7 @@ impl Rig for Oracle {
 }
 
 struct Target {
-    address: Address,
+    address: SocketAddr,
     stop: Arc<AtomicBool>,
     thread: JoinHandle<u64>,
     sent: Sent,
@@ -50,22 +50,19 @@ struct Target {
 
 impl Target {
     fn start(address: fn(SocketAddr) -> Address, key: Option<Key>) -> Self {
-        let sensors = Definition::default();
-        let role = Role::Rig { max_amplitude: LARGEST, sensors };
+        let role = Role::Rig { max_amplitude: LARGEST, sensors: Definition::default() };
         let service = Service { role, sample_time: SAMPLE_TIME, silence: 2.0 };
-        let address = address(([127, 0, 0, 1], 0).into());
-        let mut server = Server::listen(address, service, key).unwrap();
-        let address = server.address().unwrap();
+        let mut server = Server::listen(address(([127, 0, 0, 1], 0).into()), service, key).unwrap();
+        let address = server.address().unwrap().socket();
         let (stop, sent) = (Arc::new(AtomicBool::new(false)), Sent::default());
         let (flag, known) = (Arc::clone(&stop), Arc::clone(&sent));
         let thread = thread::spawn(move || {
             let mut refused = 0;
             let make = || Ok(Served::Rig(Box::new(Oracle(Arc::clone(&known)))));
-            let stop = || flag.load(Ordering::Relaxed);
-            let tell = |session: &vines_net::Session| {
+            let report = |session: &vines_net::Session| {
                 refused += session.counters.map_or(0, |all| all.malformed + all.foreign + all.late);
             };
-            server.serve(make, stop, tell).unwrap();
+            server.serve(make, || flag.load(Ordering::Relaxed), report).unwrap();
             refused
         });
         Self { address, stop, thread, sent }
@@ -80,154 +77,121 @@ impl Target {
     }
 
     /// Ends the server; a panic of it fails the test.
-    fn end(self) -> u64 {
+    fn end(self, what: &str) {
+        let sent = self.sent.lock().unwrap().len();
         self.stop.store(true, Ordering::Relaxed);
-        self.thread.join().unwrap()
+        let refused = self.thread.join().unwrap();
+        println!("{what} beside {sent} drives, {refused} counted by the server");
+        assert!(sent > 0);
     }
 }
 
-/// Drive `number` of a session as this protocol has it.
-fn frame(session: u64, number: u64, drive: Drive) -> Frame {
-    let mut frame = Frame::new(Kind::Drive, session);
-    (frame.sequence, frame.time) = (number, number as f64 * SAMPLE_TIME);
-    frame.values[..2].copy_from_slice(&[drive.omega, drive.amplitude]);
+/// A frame of a session as this protocol has it, with its first values.
+fn frame(kind: Kind, session: u64, sequence: u64, values: [f64; 2]) -> Frame {
+    let mut frame = Frame {
+        sequence,
+        time: sequence as f64 * SAMPLE_TIME,
+        ..Frame::new(kind, session)
+    };
+    frame.values[..2].copy_from_slice(&values);
     frame
 }
 
-fn hello(session: u64) -> Frame {
-    let mut hello = Frame::new(Kind::Hello, session);
-    hello.values[0] = SAMPLE_TIME;
-    hello
+/// The client's end of a connection, and another sender of datagrams.
+enum Wire {
+    Udp([UdpSocket; 2]),
+    Tcp(TcpStream),
 }
 
-/// A mutated frame, or one of any length.
-fn noise_like(noise: &mut Noise, like: &Frame, same_length: bool) -> Vec<u8> {
-    let mut bytes = like.encode().to_vec();
-    noise.mutate(&mut bytes);
-    // Over TCP, a frame of another version ends the session; most are to be read in one.
-    if same_length && noise.below(4000) != 0 {
-        bytes[..6].copy_from_slice(&like.encode()[..6]);
+impl Wire {
+    fn connect(to: SocketAddr, is_tcp: bool) -> Self {
+        let wait = Some(Duration::from_secs(5));
+        if is_tcp {
+            let stream = TcpStream::connect(to).expect("the server has not ended");
+            stream.set_read_timeout(wait).unwrap();
+            return Self::Tcp(stream);
+        }
+        Self::Udp([(); 2].map(|()| {
+            let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+            socket.set_read_timeout(wait).unwrap();
+            socket.connect(to).unwrap();
+            socket
+        }))
     }
-    if !same_length && noise.below(8) == 0 {
-        let length = noise.below(2 * SIZE);
-        bytes.resize(length, 0);
+
+    /// Sends bytes; a datagram also as another sender. Returns whether the connection is open.
+    fn send(&mut self, bytes: &[u8], as_stranger: bool) -> bool {
+        match self {
+            Self::Udp(sockets) => sockets[usize::from(as_stranger)].send(bytes).is_ok(),
+            Self::Tcp(stream) => stream.write_all(bytes).is_ok(),
+        }
     }
-    bytes
+
+    /// The next frame of a session; None if there is none any more.
+    fn receive(&mut self, session: u64) -> Option<Frame> {
+        let mut bytes = [0; SIZE];
+        loop {
+            match self {
+                Self::Udp(sockets) => drop(sockets[0].recv(&mut bytes).ok()?),
+                Self::Tcp(stream) => stream.read_exact(&mut bytes).ok()?,
+            }
+            if let Some(frame) = Frame::decode(&bytes).ok().filter(|frame| frame.session == session) {
+                return Some(frame);
+            }
+        }
+    }
+}
+
+/// Sends mutated copies of every drive before it.
+fn mutated_frames_never_drive_a_rig(address: fn(SocketAddr) -> Address, is_tcp: bool) {
+    let ((frames, seed), target) = (size(), Target::start(address, None));
+    let (mut noise, mut done, mut sessions) = (Noise(seed ^ u64::from(is_tcp)), 0, 0);
+    while done < frames {
+        let mut wire = Wire::connect(target.address, is_tcp);
+        let session = noise.next();
+        sessions += 1;
+        wire.send(&frame(Kind::Hello, session, 0, [SAMPLE_TIME, 0.0]).encode(), false);
+        // A frame that is cut, or refused, ends the session.
+        while done < frames
+            && let Some(answer) = wire.receive(session)
+        {
+            match answer.kind {
+                Kind::Welcome => continue,
+                Kind::Sensors if !answer.has(flag::SHUT_DOWN) => {}
+                _ => break,
+            }
+            let drive = target.drive(&mut noise);
+            let genuine = frame(Kind::Drive, session, answer.sequence, [drive.omega, drive.amplitude]).encode();
+            for _ in 0..64 {
+                let mut bytes = genuine.to_vec();
+                noise.mutate(&mut bytes);
+                // Over TCP, a frame of another version ends the session, and one of another length all frames after it.
+                if is_tcp && noise.below(4000) != 0 {
+                    bytes[..6].copy_from_slice(&genuine[..6]);
+                } else if noise.below(8) == 0 {
+                    bytes.resize(noise.below(2 * SIZE), 0);
+                }
+                done += 1;
+                wire.send(&bytes, noise.below(4) == 0);
+            }
+            if !wire.send(&genuine, false) {
+                break;
+            }
+        }
+        // The server gives up a session that has no end.
+        wire.send(&frame(Kind::Farewell, session, 0, [0.0; 2]).encode(), false);
+    }
+    target.end(&format!("{done} frames in {sessions} sessions"));
 }
 
 #[test]
 fn mutated_datagrams_never_drive_a_rig_in_real_time() {
-    let ((frames, seed), target) = (size(), Target::start(Address::Udp, None));
-    let (mut noise, peer) = (Noise(seed), target.address.socket());
-    let [client, stranger] = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
-    client.set_nonblocking(true).unwrap();
-    let (mut session, mut number, mut last) = (noise.next(), 0, None);
-    client.send_to(&hello(session).encode(), peer).unwrap();
-    let mut done = 0;
-    while done < frames {
-        let like = last.unwrap_or(hello(session));
-        for _ in 0..32 {
-            let bytes = noise_like(&mut noise, &like, false);
-            let from = if noise.below(4) == 0 { &stranger } else { &client };
-            let _ = from.send_to(&bytes, peer);
-            done += 1;
-        }
-        let mut bytes = [0; 256];
-        while let Ok(length) = client.recv(&mut bytes) {
-            match Frame::decode(&bytes[..length]) {
-                Ok(frame) if frame.session == session && frame.kind == Kind::Sensors && !frame.has(16) => {
-                    number = frame.sequence;
-                    last = Some(self::frame(session, number, target.drive(&mut noise)));
-                    client.send_to(&last.unwrap().encode(), peer).unwrap();
-                }
-                Ok(frame) if frame.session == session && frame.has(16) => {
-                    (session, last) = (noise.next(), None);
-                    client.send_to(&hello(session).encode(), peer).unwrap();
-                }
-                _ => {}
-            }
-        }
-    }
-    let sent = target.sent.lock().unwrap().len();
-    println!(
-        "UDP: {done} frames sent, {} counted by the server beside {sent} drives, sample {number}",
-        target.end()
-    );
-    assert!(sent > 0);
+    mutated_frames_never_drive_a_rig(Address::Udp, false);
 }
 
 #[test]
 fn mutated_frames_never_drive_a_rig_in_lock_step() {
-    let ((frames, seed), target) = (size(), Target::start(Address::Tcp, None));
-    let (mut noise, peer) = (Noise(seed ^ 2), target.address.socket());
-    let (mut done, mut sessions) = (0, 0u64);
-    while done < frames {
-        let mut stream = TcpStream::connect(peer).expect("the server has not ended");
-        stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
-        let session = noise.next();
-        sessions += 1;
-        let mut answer = [0; SIZE];
-        let mut number = 0;
-        let mut send = hello(session);
-        // A frame that is cut, or refused, ends the session.
-        while done < frames && stream.write_all(&send.encode()).is_ok() {
-            let answers = if number == 0 { 2 } else { 1 };
-            if (0..answers).any(|_| stream.read_exact(&mut answer).is_err()) {
-                break;
-            }
-            let good = Frame::decode(&answer).is_ok_and(|frame| matches!(frame.kind, Kind::Welcome | Kind::Sensors));
-            if !good {
-                break;
-            }
-            send = frame(session, number, target.drive(&mut noise));
-            number += 1;
-            let many: Vec<u8> = (0..64).flat_map(|_| noise_like(&mut noise, &send, true)).collect();
-            done += 64;
-            let cut = if noise.below(4000) == 0 { noise.below(SIZE) } else { 0 };
-            if stream.write_all(&many[cut..]).is_err() || cut > 0 {
-                break;
-            }
-        }
-    }
-    let sent = target.sent.lock().unwrap().len();
-    println!("TCP: {done} frames in {sessions} sessions beside {sent} drives");
-    target.end();
-    assert!(sent > 0);
-}
-
-/// Passes all frames between a client and a server until it is `over`, and sends `frames` forged or repeated ones from the client's address;
-/// then sets `finished`. Returns the number of forged frames.
-fn attack(
-    [front, back]: [UdpSocket; 2],
-    mut noise: Noise,
-    frames: u64,
-    finished: &AtomicBool,
-    over: &AtomicBool,
-) -> u64 {
-    let (mut client, mut heard, mut bytes, mut done) = (None, Vec::new(), [0; 256], 0);
-    while !over.load(Ordering::Relaxed) {
-        let mut is_idle = true;
-        while let Ok((length, from)) = front.recv_from(&mut bytes) {
-            (client, is_idle) = (Some(from), false);
-            let _ = back.send(&bytes[..length]);
-            if heard.len() == HEARD {
-                heard.swap_remove(noise.below(HEARD));
-            }
-            heard.push(bytes[..length].to_vec());
-        }
-        while let (Ok(length), Some(client)) = (back.recv(&mut bytes), client) {
-            is_idle = false;
-            let _ = front.send_to(&bytes[..length], client);
-        }
-        if done < frames {
-            let forged = (0..16).filter_map(|_| forge(heard.get(noise.below(heard.len()))?.clone(), &mut noise));
-            done += forged.inspect(|forged| drop(back.send(forged))).count() as u64;
-        } else if is_idle {
-            finished.store(true, Ordering::Relaxed);
-            thread::sleep(Duration::from_micros(50));
-        }
-    }
-    done
+    mutated_frames_never_drive_a_rig(Address::Tcp, true);
 }
 
 /// Frames that the attacker remembers.
@@ -253,40 +217,55 @@ fn forge(mut forged: Vec<u8>, noise: &mut Noise) -> Option<Vec<u8>> {
     Some(forged)
 }
 
-/// With a key, not even a frame with a correct checksum, session and number is taken, nor one of another session.
+/// With a key, not even a frame with a correct checksum, session and number is taken, nor one of another session: between a client and the
+/// server, an attacker passes all frames, and sends forged or repeated ones from the client's address.
 #[test]
 fn with_a_key_forged_and_replayed_datagrams_never_drive_a_rig() {
     let ((frames, seed), key) = (size(), Key::of(b"a shared secret of the fuzzer"));
-    let (target, mut noise) = (Target::start(Address::Udp, key), Noise(seed ^ 3));
-    let sockets = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
-    sockets.iter().for_each(|socket| socket.set_nonblocking(true).unwrap());
-    sockets[1].connect(target.address.socket()).unwrap();
-    let address = Address::Udp(sockets[0].local_addr().unwrap());
-    let (own, [over, finished]) = (Noise(noise.next()), [(); 2].map(|()| Arc::new(AtomicBool::new(false))));
-    let flags = [Arc::clone(&finished), Arc::clone(&over)];
-    let attacker = thread::spawn(move || attack(sockets, own, frames, &flags[0], &flags[1]));
-    let mut sessions = 0;
-    for attempt in 0..3 + frames / 100_000 {
-        if attempt > 1 && finished.load(Ordering::Relaxed) {
-            break;
-        }
-        let Ok(mut rig) = NetRig::connect(address, SAMPLE_TIME, key) else {
-            continue;
-        };
-        sessions += 1;
-        for _ in 0..(frames / 40).clamp(100, 5000) {
-            let drive = target.drive(&mut noise);
-            if rig.sense().and_then(|_| rig.advance(drive, SAMPLE_TIME)).is_err() {
-                break;
+    let (target, [mut noise, mut own]) = (Target::start(Address::Udp, key), [3, 6].map(|salt| Noise(seed ^ salt)));
+    let [front, back] = [(); 2].map(|()| {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.set_nonblocking(true).unwrap();
+        socket
+    });
+    back.connect(target.address).unwrap();
+    let (address, finished) = (Address::Udp(front.local_addr().unwrap()), AtomicBool::new(false));
+    let (mut peer, mut heard, mut bytes, mut done) = (None, Vec::new(), [0; 256], 0);
+    thread::scope(|scope| {
+        let client = scope.spawn(|| {
+            for attempt in 0..3 + frames / 100_000 {
+                if attempt > 1 && finished.load(Ordering::Relaxed) {
+                    break;
+                }
+                let Ok(mut rig) = NetRig::connect(address, SAMPLE_TIME, key) else {
+                    continue;
+                };
+                let _ = (0..(frames / 40).clamp(100, 5000)).try_for_each(|_| {
+                    rig.sense()?;
+                    rig.advance(target.drive(&mut noise), SAMPLE_TIME)
+                });
+            }
+        });
+        while !client.is_finished() {
+            while let Ok((length, from)) = front.recv_from(&mut bytes) {
+                peer = Some(from);
+                let _ = back.send(&bytes[..length]);
+                if heard.len() == HEARD {
+                    heard.swap_remove(own.below(HEARD));
+                }
+                heard.push(bytes[..length].to_vec());
+            }
+            while let (Ok(length), Some(peer)) = (back.recv(&mut bytes), peer) {
+                let _ = front.send_to(&bytes[..length], peer);
+            }
+            if done < frames {
+                let forged = (0..16).filter_map(|_| forge(heard.get(own.below(heard.len()))?.clone(), &mut own));
+                done += forged.inspect(|forged| drop(back.send(forged))).count() as u64;
+            } else {
+                finished.store(true, Ordering::Relaxed);
+                thread::sleep(Duration::from_micros(50));
             }
         }
-    }
-    over.store(true, Ordering::Relaxed);
-    let done = attacker.join().unwrap();
-    let sent = target.sent.lock().unwrap().len();
-    let refused = target.end();
-    println!(
-        "UDP with a key: {done} frames beside {sent} drives in {sessions} sessions, {refused} counted by the server"
-    );
-    assert!(sent > 0);
+    });
+    target.end(&format!("{done} frames with a key"));
 }

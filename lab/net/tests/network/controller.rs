@@ -5,7 +5,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use vines_net::{Ended, LinkError};
-use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Move, Rig, Sensors, Simulated};
+use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, LoopState, Move, Rig, Sensors, Simulated};
 use vines_testbench::scene::Scene;
 
 use crate::{PATIENT, drive, scene, serve_built_in, serve_controller};
@@ -15,6 +15,7 @@ fn reading(n: usize) -> Sensors {
 }
 
 /// A controller that logs its readings, and answers with their number; every tenth answer takes the stated time.
+#[derive(Clone)]
 struct Echo(Arc<Mutex<Vec<f64>>>, Duration);
 
 impl Controller for Echo {
@@ -31,9 +32,8 @@ impl Controller for Echo {
 
 #[test]
 fn beside_a_rig_in_real_time_the_last_answer_replaces_a_late_one_and_no_reading_is_missing() {
-    let (scene, asked) = (scene(&[]), Arc::default());
-    let (log, late) = (Arc::clone(&asked), Duration::from_millis(5));
-    let server = serve_controller(&scene, PATIENT, move || Echo(Arc::clone(&log), late));
+    let (scene, echo) = (scene(&[]), Echo(Arc::default(), Duration::from_millis(5)));
+    let server = serve_controller(&scene, PATIENT, echo.clone());
     let mut peer = server.controller(&scene, Some(PATIENT));
     let answers: Vec<Command> = (0..200).map(|n| peer.sample(reading(n), true).unwrap()).collect();
     println!("{}", peer.counters());
@@ -43,28 +43,31 @@ fn beside_a_rig_in_real_time_the_last_answer_replaces_a_late_one_and_no_reading_
         let own = answer.drive == drive(n);
         assert!(own || (!answer.settled && answer.drive.omega < drive(n).omega));
     }
+    // It is zero when the drive is not requested.
     let held = peer.sample(reading(200), false).unwrap();
-    assert!(
-        held.settled || held.drive.amplitude == 0.0,
-        "a held drive is zero when the drive is not requested"
-    );
+    assert!(held.settled || held.drive.amplitude == 0.0);
     drop(peer);
-    server.session(1);
-    let asked = asked.lock().unwrap();
+    server.session();
+    let asked = echo.0.lock().unwrap();
     assert!(asked.iter().enumerate().all(|(n, reading)| n as f64 == *reading));
 }
 
 #[test]
-fn a_controller_that_stops_answering_is_a_permanent_error() {
+fn a_controller_that_stops_answering_is_a_permanent_error_and_a_client_that_was_silent_gets_no_drive() {
     let scene = scene(&[]);
     for pace in [None, Some(0.2)] {
-        let stuck = Duration::from_secs(1);
-        let server = serve_controller(&scene, 0.3, move || Echo(Arc::default(), stuck));
+        let server = serve_controller(&scene, 0.3, Echo(Arc::default(), Duration::from_secs(1)));
         let mut peer = server.controller(&scene, pace);
         let error = (0..5000).find_map(|n| peer.sample(reading(n), true).err()).unwrap();
         assert!(matches!(error.cause(), Some(LinkError::Silent { .. })), "{error}");
         assert!(peer.sample(reading(0), true).is_err());
     }
+    let server = serve_controller(&scene, 0.2, Echo(Arc::default(), Duration::ZERO));
+    let mut peer = server.controller(&scene, None);
+    peer.sample(reading(0), true).unwrap();
+    assert_eq!(server.session().ended, Ended::Silence);
+    let error = peer.sample(reading(1), true).unwrap_err();
+    assert!(matches!(error.cause(), Some(LinkError::Closed { .. })), "{error}");
 }
 
 /// A controller that answers always the same.
@@ -78,58 +81,39 @@ impl Controller for Constant {
 }
 
 #[test]
-fn an_answer_that_is_not_finite_is_an_error() {
+fn an_answer_that_is_not_finite_is_an_error_and_the_bench_judges_the_lock_of_a_controller_that_reports_no_state() {
     let scene = scene(&[]);
     let broken = Command { phase_error: Some(f64::NAN), ..Command::default() };
-    let server = serve_controller(&scene, PATIENT, move || Constant(broken));
+    let server = serve_controller(&scene, PATIENT, Constant(broken));
     let error = server.controller(&scene, None).sample(reading(0), true).unwrap_err();
     assert!(matches!(error.cause(), Some(LinkError::Invalid { .. })), "{error}");
-}
 
-#[test]
-fn the_bench_judges_the_lock_of_a_controller_that_reports_no_state() {
-    let scene = scene(&[]);
     let locked = Command {
         drive: drive(0),
         phase_error: Some(1e-4),
         ..Command::default()
     };
-    let state = vines_testbench::rig::LoopState::of_number(2);
+    let state = LoopState::of_number(2);
     let silent = Command { phase_error: None, ..locked };
     let samples = (f64::from(scene.controller_config().lock.dwell) + 1.0) * scene.controller.samples_per_period;
     for (command, expected) in [(locked, true), (Command { state, ..locked }, false), (silent, false)] {
-        let server = serve_controller(&scene, PATIENT, move || Constant(command));
+        let server = serve_controller(&scene, PATIENT, Constant(command));
         let mut peer = server.controller(&scene, None);
-        let mut settled = |active| {
-            let samples = 0..(1.2 * samples) as usize;
-            samples
-                .map(|n| peer.sample(reading(n), active).unwrap().settled)
-                .filter(|settled| *settled)
-                .count()
-        };
-        assert_eq!(settled(false), 0);
-        let settled = settled(true) as f64;
-        assert_eq!(settled > 0.0, expected, "{command:?}");
-        assert!(settled < 0.5 * samples, "{settled} of {samples} samples settled");
+        let [inactive, active] = [false, true].map(|active| {
+            let mut settled = (0..(1.2 * samples) as usize).map(|n| peer.sample(reading(n), active).unwrap().settled);
+            settled.by_ref().filter(|settled| *settled).count() as f64
+        });
+        assert_eq!((inactive, active > 0.0), (0.0, expected), "{command:?}");
+        assert!(active < 0.5 * samples, "{active} of {samples} samples settled");
     }
-}
-
-#[test]
-fn a_client_that_was_silent_for_too_long_gets_no_drive() {
-    let scene = scene(&[]);
-    let server = serve_controller(&scene, 0.2, || Echo(Arc::default(), Duration::ZERO));
-    let mut peer = server.controller(&scene, None);
-    peer.sample(reading(0), true).unwrap();
-    assert_eq!(server.session(1).ended, Ended::Silence);
-    let error = peer.sample(reading(1), true).unwrap_err();
-    assert!(matches!(error.cause(), Some(LinkError::Closed { .. })), "{error}");
 }
 
 /// Drives the plant with a controller, moves the response at half the samples, and returns the commands.
 fn moved(scene: &Scene, controller: &mut dyn Controller, samples: usize) -> Vec<Command> {
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let response = 0.6 * scene.plant.half_width;
     let to = Move {
-        response: 0.6 * scene.plant.half_width,
+        response,
         duration: 2.0,
         amplitude: -1e-6,
         omega: 0.01,
@@ -161,13 +145,8 @@ fn a_move_that_the_controller_cannot_make_ends_the_session_with_the_reason() {
     let scene = scene(&[]);
     let server = serve_built_in(&scene);
     // The loop is open.
-    for (response, reason) in [
-        (0.0, "not above 0: 0"),
-        (
-            0.1,
-            "closed loop only, state 2 (acquiring) or 3 (locked), and is in this state: 0",
-        ),
-    ] {
+    let open = "closed loop only, state 2 (acquiring) or 3 (locked), and is in this state: 0";
+    for (response, reason) in [(0.0, "not above 0: 0"), (0.1, open)] {
         let mut peer = server.controller(&scene, None);
         peer.sample(reading(0), false).unwrap();
         peer.hold_response(Move { response, ..Move::default() }, 0.0).unwrap();

@@ -7,18 +7,17 @@ mod real_time;
 
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Receiver};
 use std::sync::{Arc, Mutex};
-use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::thread;
+use std::time::Duration;
 
-use vines_net::{Address, NetController, NetRig, Role, Served as Offered, Server, Service, Session};
-use vines_testbench::rig::{BuiltIn, Controller, Drive, GroundTruth, Rig, RigError, RigStage, Sensors, Simulated};
+use vines_net::{Address, LinkError, NetController, NetRig, Role, Served as Offered, Server, Service, Session};
+use vines_testbench::rig::{BuiltIn, Controller, Drive, Rig, RigError, RigStage, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
 
 /// A free port of this machine.
 const ANYWHERE: ([u8; 4], u16) = ([127, 0, 0, 1], 0);
-/// Time limit of a server.
-const LONGEST: Duration = Duration::from_secs(60);
 /// A silence, s, longer than the pauses of a busy machine.
 const PATIENT: f64 = 2.0;
 
@@ -32,8 +31,7 @@ fn scene(settings: &[&str]) -> Scene {
 struct Served {
     address: Address,
     stop: Arc<AtomicBool>,
-    sessions: Arc<Mutex<Vec<Session>>>,
-    thread: Option<JoinHandle<()>>,
+    sessions: Receiver<Session>,
 }
 
 impl Served {
@@ -43,35 +41,22 @@ impl Served {
         mut make: impl FnMut() -> Offered + Send + 'static,
     ) -> Self {
         let mut server = Server::listen(address(ANYWHERE.into()), service, None).unwrap();
-        let address = server.address().unwrap();
-        let (stop, sessions) = (Arc::new(AtomicBool::new(false)), Arc::<Mutex<Vec<Session>>>::default());
-        let (flag, list) = (Arc::clone(&stop), Arc::clone(&sessions));
-        let end = Instant::now() + LONGEST;
-        let thread = thread::spawn(move || {
-            let stop = || flag.load(Ordering::Relaxed) || Instant::now() >= end;
-            let report = |session: &Session| list.lock().unwrap().push(session.clone());
-            server.serve(|| Ok(make()), stop, report).unwrap();
+        let (stop, (ended, sessions)) = (Arc::new(AtomicBool::new(false)), mpsc::channel());
+        let (address, flag) = (server.address().unwrap(), Arc::clone(&stop));
+        thread::spawn(move || {
+            let report = |session: &Session| drop(ended.send(session.clone()));
+            server
+                .serve(|| Ok(make()), || flag.load(Ordering::Relaxed), report)
+                .unwrap();
         });
-        Self { address, stop, sessions, thread: Some(thread) }
+        Self { address, stop, sessions }
     }
 
-    /// Stops the server and returns its sessions.
-    fn stop(mut self) -> Vec<Session> {
-        self.stop.store(true, Ordering::Relaxed);
-        self.thread.take().unwrap().join().unwrap();
-        self.sessions.lock().unwrap().clone()
-    }
-
-    /// Waits for the end of session `number`, from 1, and returns its report.
-    fn session(&self, number: usize) -> Session {
-        let end = Instant::now() + LONGEST;
-        loop {
-            if let Some(session) = self.sessions.lock().unwrap().get(number - 1) {
-                return session.clone();
-            }
-            assert!(Instant::now() < end, "the session does not end");
-            thread::sleep(Duration::from_millis(5));
-        }
+    /// Waits for the end of the next session, and returns its report.
+    fn session(&self) -> Session {
+        self.sessions
+            .recv_timeout(Duration::from_secs(60))
+            .expect("the session does not end")
     }
 
     /// A client of the rig.
@@ -101,30 +86,36 @@ fn service(scene: &Scene, silence: f64) -> Service {
 /// Serves the plant of the scene, in lock-step over TCP or in real time over UDP; the log contains every drive of the plant.
 fn serve_rig(address: fn(SocketAddr) -> Address, scene: &Scene, silence: f64) -> (Served, Log) {
     let (plant, log) = (Simulated::new(scene.plant, scene.start).unwrap(), Log::default());
-    let copy = Arc::clone(&log);
-    let make = move || Offered::Rig(Box::new(Spy(plant.clone(), Arc::clone(&copy))));
+    let copy = log.clone();
+    let make = move || Offered::Rig(Box::new(Spy(plant.clone(), copy.clone())));
     (Served::start(address, service(scene, silence), make), log)
 }
 
 /// Serves any controller.
-fn serve_controller<C: Controller + 'static>(
-    scene: &Scene,
-    silence: f64,
-    mut make: impl FnMut() -> C + Send + 'static,
-) -> Served {
+fn serve_controller<C: Controller + Clone + Send + 'static>(scene: &Scene, silence: f64, controller: C) -> Served {
     let (role, sample_time) = (Role::Controller, scene.sample_time());
-    let make = move || Offered::Controller(Box::new(make()));
+    let make = move || Offered::Controller(Box::new(controller.clone()));
     Served::start(Address::Tcp, Service { role, sample_time, silence }, make)
 }
 
 /// Serves the controller of the scene.
 fn serve_built_in(scene: &Scene) -> Served {
-    let controller = BuiltIn::new(&scene.controller_config()).unwrap();
-    serve_controller(scene, 5.0, move || controller.clone())
+    serve_controller(scene, 5.0, BuiltIn::new(&scene.controller_config()).unwrap())
 }
 
 /// The drives of a rig.
-type Log = Arc<Mutex<Vec<Drive>>>;
+#[derive(Clone, Default)]
+struct Log(Arc<Mutex<Vec<Drive>>>);
+
+impl Log {
+    fn all(&self) -> Vec<Drive> {
+        self.0.lock().unwrap().clone()
+    }
+
+    fn last(&self) -> Drive {
+        *self.all().last().unwrap()
+    }
+}
 
 /// A plant that logs its drives.
 struct Spy(Simulated, Log);
@@ -135,32 +126,32 @@ impl RigStage for Spy {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.1.lock().unwrap().push(drive);
+        self.1.0.lock().unwrap().push(drive);
         self.0.advance(drive, step)
     }
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.1.lock().unwrap().push(drive);
+        self.1.0.lock().unwrap().push(drive);
         self.0.hold(drive, step)
     }
 }
 
 /// A drive whose frequency identifies its sample.
 fn drive(sample: usize) -> Drive {
-    Drive {
-        omega: 50.0 + sample as f64 / 1024.0,
-        amplitude: 1e-4,
-        displacement: 0.0,
-    }
+    let omega = 50.0 + sample as f64 / 1024.0;
+    Drive { omega, amplitude: 1e-4, displacement: 0.0 }
 }
 
-/// Drives a rig in open loop for some samples. Returns all readings.
-fn shake(rig: &mut dyn Rig, scene: &Scene, samples: usize) -> Result<Vec<(Sensors, Option<GroundTruth>)>, RigError> {
-    (0..samples)
-        .map(|n| {
-            let reading = (rig.sense()?, rig.ground_truth()?);
-            rig.advance(drive(n), scene.sample_time())?;
-            Ok(reading)
-        })
-        .collect()
+/// Drives a rig in open loop for some samples.
+fn shake(rig: &mut dyn Rig, scene: &Scene, samples: usize) -> Result<(), RigError> {
+    (0..samples).try_for_each(|n| {
+        rig.sense()?;
+        rig.ground_truth()?;
+        rig.advance(drive(n), scene.sample_time())
+    })
+}
+
+/// The error of the connection in the error of a rig.
+fn link_error(error: &RigError) -> &LinkError {
+    error.cause().unwrap_or_else(|| panic!("{error}"))
 }

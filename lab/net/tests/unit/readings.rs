@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use vines_testbench::experiment;
-use vines_testbench::rig::{BuiltIn, Chain, Drive, Rig, RigError, Simulated};
+use vines_testbench::rig::{BuiltIn, Chain, Drive, GroundTruth, Rig, RigError, Simulated};
 use vines_testbench::scene::{Override, PAPER, Scene};
 
 use super::*;
@@ -16,66 +16,65 @@ fn motion(n: u64) -> Sensors {
     Sensors { response, reference: Some(0.1 * (TAU * turns).cos()) }
 }
 
-/// The readings after a gap of `lost` ones after `known` ones; the drive turns by `turn`.
-fn bridged(known: u64, lost: u64, turn: f64, motion: fn(u64) -> Sensors) -> Vec<Sensors> {
+/// A reading that has arrived.
+fn measured(sensors: Sensors) -> Reading {
+    Reading { sensors, ground_truth: Some(GroundTruth::default()) }
+}
+
+/// The readings after a gap of `lost` ones after `known` ones, by their numbers; the drive turns by `turn`.
+fn bridged(known: u64, lost: u64, turn: f64, motion: fn(u64) -> Sensors) -> Vec<(u64, Sensors)> {
     let (mut readings, mut counters) = (Readings::default(), Counters::default());
-    (0..=known + lost)
-        .filter_map(|n| {
-            if n < known {
-                assert_eq!(readings.arrive(n, motion(n), n, &mut counters), 0);
-            } else if n == known {
-                assert_eq!(
-                    readings.arrive(known + lost, motion(known + lost), n, &mut counters),
-                    lost
-                );
-                assert_eq!(readings.arrive(known, motion(known), n, &mut counters), 0);
-                assert_eq!(counters.late, 1, "a reading after a later one");
-            }
-            let taken = readings.take(&mut counters).unwrap();
-            assert_eq!(counters.longest, if n < known { 0 } else { lost });
-            assert_eq!(taken.with.is_none(), (known..known + lost).contains(&n));
-            readings.advance(turn);
-            (n >= known).then_some(taken.sensors)
-        })
-        .collect()
-}
-
-/// The largest errors of response and reference over a gap of `lost` readings after `known` ones.
-fn errors(known: u64, lost: u64) -> [f64; 2] {
-    let mut worst = [0.0_f64; 2];
-    for (n, filled) in (known..).zip(bridged(known, lost, 0.0103, motion)) {
-        let expected = motion(n);
-        worst[0] = worst[0].max((filled.response - expected.response).abs());
-        worst[1] = worst[1].max((filled.reference.unwrap() - expected.reference.unwrap()).abs());
-    }
-    worst
+    let sample = |n| {
+        if n < known {
+            assert_eq!(readings.arrive(n, measured(motion(n)), &mut counters), 0);
+        } else if n == known {
+            let later = known + lost;
+            assert_eq!(readings.arrive(later, measured(motion(later)), &mut counters), lost);
+            assert_eq!(readings.arrive(known, measured(motion(known)), &mut counters), 0);
+            assert_eq!(counters.late, 1, "a reading after a later one");
+        }
+        let taken = readings.take(&mut counters).unwrap();
+        assert_eq!(counters.longest, if n < known { 0 } else { lost });
+        assert_eq!(taken.ground_truth.is_none(), (known..known + lost).contains(&n));
+        readings.advance(turn);
+        (n, taken.sensors)
+    };
+    (0..=known + lost).map(sample).skip(known as usize).collect()
 }
 
 #[test]
-fn a_gap_of_any_length_in_a_periodic_motion_is_bridged_with_its_harmonics() {
-    for lost in [1, 4, 27, 90, 250] {
-        let [response, reference] = errors(600, lost);
-        assert!(response < 0.01 && reference < 1e-4, "{lost}: {response} {reference}");
+fn a_gap_of_any_length_in_a_periodic_motion_is_bridged_with_its_harmonics_and_without_a_period_by_a_line() {
+    for (known, lost, allowed) in [
+        (600, 1, [0.01, 1e-4]),
+        (600, 4, [0.01, 1e-4]),
+        (600, 27, [0.01, 1e-4]),
+        (600, 90, [0.01, 1e-4]),
+        (600, 250, [0.01, 1e-4]),
+        (10, 4, [0.03, 1e-3]),
+    ] {
+        for (n, filled) in bridged(known, lost, 0.0103, motion) {
+            let expected = motion(n);
+            let response = (filled.response - expected.response).abs();
+            let reference = (filled.reference.unwrap() - expected.reference.unwrap()).abs();
+            assert!(
+                response < allowed[0] && reference < allowed[1],
+                "{lost}: {response} {reference}"
+            );
+        }
     }
-}
-
-#[test]
-fn without_a_period_before_it_a_gap_is_bridged_by_a_line() {
-    let [response, reference] = errors(10, 4);
-    assert!(response < 0.03 && reference < 1e-3, "{response} {reference}");
     // Nothing at all before the gap, and no frequency.
-    assert_eq!(bridged(0, 3, 0.0, motion)[0], motion(3));
+    assert_eq!(bridged(0, 3, 0.0, motion)[0].1, motion(3));
     let line = |n: u64| Sensors {
         response: 1.0 + 2.0 * n.saturating_sub(5) as f64,
         reference: None,
     };
-    assert_eq!(bridged(6, 1, 0.0, line)[0].response, 3.0);
+    assert_eq!(bridged(6, 1, 0.0, line)[0].1.response, 3.0);
 }
 
 /// A rig whose readings and drives are lost in a gap. Until its end the rig has the last drive; a base of held samples stands still.
 struct Interrupted {
     rig: Box<dyn Rig>,
-    readings: Readings<()>,
+    readings: Readings,
     gap: Range<u64>,
     at: u64,
     drive: (Drive, bool, f64),
@@ -110,11 +109,11 @@ impl Rig for Interrupted {
                 self.rig.sense()?;
                 self.apply()?;
             }
-            let next = self.rig.sense()?;
-            self.readings.arrive(self.gap.end, next, (), &mut counters);
+            let reading = measured(self.rig.sense()?);
+            self.readings.arrive(self.gap.end, reading, &mut counters);
         } else if !self.gap.contains(&self.at) && self.at != self.gap.end {
-            let reading = self.rig.sense()?;
-            self.readings.arrive(self.at, reading, (), &mut counters);
+            let reading = measured(self.rig.sense()?);
+            self.readings.arrive(self.at, reading, &mut counters);
         }
         Ok(self.readings.take(&mut counters).expect("there is a reading").sensors)
     }

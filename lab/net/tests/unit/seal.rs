@@ -22,11 +22,8 @@ fn a_drive_is_valid_in_its_session_only() {
     let [mut client, mut server] = pair();
     let hello = client.encode(&Frame::new(Kind::Hello, 7));
     assert!(server.decode(&hello).is_ok());
-    assert_eq!(
-        client.encode(&drive(7)).len(),
-        SIZE,
-        "no code without the server's number"
-    );
+    // No code without the server's number.
+    assert_eq!(client.encode(&drive(7)).len(), SIZE);
     let drawn = server.draw().unwrap();
     assert_ne!(drawn, server.draw().unwrap());
     client.begin(7, drawn);
@@ -35,11 +32,11 @@ fn a_drive_is_valid_in_its_session_only() {
     assert_eq!(bytes.len(), server.size());
     assert_eq!(server.decode(&bytes), Ok(drive(7)));
     // Sent back to its sender, in another session with the same number, and after the session.
-    assert_eq!(client.decode(&bytes), Err(FrameError::Tag));
+    assert_eq!(client.decode(&bytes), Err(FrameError::Malformed));
     server.begin(7, server.draw().unwrap());
-    assert_eq!(server.decode(&bytes), Err(FrameError::Tag));
+    assert_eq!(server.decode(&bytes), Err(FrameError::Malformed));
     server.begin(8, drawn);
-    assert_eq!(server.decode(&bytes), Err(FrameError::Tag));
+    assert_eq!(server.decode(&bytes), Err(FrameError::Malformed));
 }
 
 #[test]
@@ -47,8 +44,8 @@ fn another_key_a_changed_byte_and_a_missing_code_are_refused() {
     let [client, server] = pair();
     let bytes = client.encode(&Frame::new(Kind::Hello, 1));
     let other = Seal::new(Key::of(b"fedcba9876543210"), Side::Server);
-    assert_eq!(other.decode(&bytes), Err(FrameError::Tag));
-    assert_eq!(server.decode(&bytes[..SIZE]), Err(FrameError::Tag));
+    assert_eq!(other.decode(&bytes), Err(FrameError::Malformed));
+    assert_eq!(server.decode(&bytes[..SIZE]), Err(FrameError::Malformed));
     for at in 0..bytes.len() {
         let mut changed = bytes.clone();
         changed[at] ^= 1;
