@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use std::{fs, path::Path};
 
 use lovines::Parameters;
+use phase_lock::Config;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -13,12 +14,12 @@ use vines_model::Dimensionless;
 use vines_model::numerics::{bisection, mean_square};
 use vines_model::orbit::{Orbit, exact_backbone, phase_resonant};
 use vines_testbench::advice;
-use vines_testbench::backbone::{LevelPoint, Tracked, track};
+use vines_testbench::backbone::LevelPoint;
 use vines_testbench::comparison::ExactCurve;
 use vines_testbench::identification::Regime;
 use vines_testbench::loop_check::Verdict;
 use vines_testbench::record::Record;
-use vines_testbench::rig::{BuiltIn, Chain, Controller, Rig, RigFault, SensorFault, SensorsOnly, Simulated};
+use vines_testbench::rig::{BuiltIn, Controller, Rig, RigFault, SensorFault, Simulated};
 use vines_testbench::scene::{LinearResponse, Override, Scene};
 
 /// Any error of a study.
@@ -104,18 +105,13 @@ pub fn write(name: &str, header: &str, key: usize, rows: &[String]) -> Result<()
     Ok(fs::write(path, lines.join("\n") + "\n")?)
 }
 
-/// The backbone of a rig of these epsilon, lambda and r with M = k = b = 1, tracked from sensor readings alone by a client whose scene differs:
-/// `scales` are its relative errors of k, c, m, b and r. Returns that scene as well.
-pub fn tracked(rig: [f64; 3], noise: u64, snr: &str, scales: [f64; 5]) -> Result<(Tracked, Scene), Failure> {
-    let (truth, scene) = client(rig, noise, snr, scales)?;
-    let rig = Simulated::new(truth, scene.start)?;
-    let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
-    let mut controller = BuiltIn::new(&scene.backbone_config())?;
-    let tracked = track(&mut rig, &mut controller, &scene, |_, _| {})?;
-    Ok((tracked, scene))
+/// Configuration of the controller for a tracked backbone, with a drive up to G = 20: errors of the scene and noise need more than usual.
+pub fn tracking_config(scene: &Scene) -> Config {
+    let amplitude_max = Some(scene.dimensionless().amplitude(20.0));
+    Config { amplitude_max, ..scene.backbone_config() }
 }
 
-/// The rig, and the scene of the client, of [`tracked`].
+/// A rig of these epsilon, lambda and r with M = k = b = 1, and the scene of a client who differs: relative errors of k, c, m, b and r.
 pub fn client(
     [epsilon, lambda, r]: [f64; 3],
     noise: u64,

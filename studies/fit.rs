@@ -20,7 +20,7 @@ mod common;
 
 use std::time::Instant;
 
-use common::{Failure, arguments, client, is_kept, quantile, rig, share, uniform, write};
+use common::{Failure, arguments, client, is_kept, quantile, rig, share, tracking_config, uniform, write};
 use lovines::{Cavity, Restitution};
 use rayon::prelude::*;
 use vines_model::numerics::{Estimate, mean_square};
@@ -309,7 +309,7 @@ impl Hidden {
 fn tracked(truth: Parameters, scene: &Scene) -> Result<Tracked, Failure> {
     let rig = Simulated::new(truth, scene.start)?;
     let mut rig = Chain::around(Box::new(rig), scene);
-    let mut controller = BuiltIn::new(&scene.backbone_config())?;
+    let mut controller = BuiltIn::new(&tracking_config(scene))?;
     Ok(track(&mut *rig, &mut controller, scene, |_, _| {})?)
 }
 

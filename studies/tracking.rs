@@ -11,7 +11,9 @@
 
 mod common;
 
-use common::{Failure, Found, STATISTICS, arguments, client, is_kept, quantile, statistics, uniform, write};
+use common::{
+    Failure, Found, STATISTICS, arguments, client, is_kept, quantile, statistics, tracking_config, uniform, write,
+};
 use lovines::{Cavity, Restitution, cavity::GRAVITY};
 use rayon::prelude::*;
 use vines_model::orbit::resonant_motion;
@@ -70,7 +72,7 @@ fn run(([epsilon, lambda, r], noise, scales, effects): Drawn, snr: &str) -> Resu
     };
     let plant = Box::new(Simulated::new(rig, scene.start)?);
     let mut chain = SensorsOnly::around(Chain::around(plant, &scene));
-    let mut controller = BuiltIn::new(&scene.backbone_config())?;
+    let mut controller = BuiltIn::new(&tracking_config(&scene))?;
     let tracked = track(&mut chain, &mut controller, &scene, |_, _| {})?;
     let own = scene.dimensionless();
     let (mut found, mut settled, mut without) = (Found::default(), 0, 0);
