@@ -22,10 +22,8 @@ exact = next(orbit.sigma for orbit in vines.orbits() if orbit.stable)
 def locked(bandwidth: float, seed: int) -> tuple[float, float]:
     """Return the error of sigma and the periods to the lock; NaN without a lock."""
     scene = vines.Scene(
-        controller={
-            "bandwidth": bandwidth,
-        },
-        phase_lock={"lock": {"frequency_drift": 9e-6, "amplitude_drift": 3e-4, "phase_tolerance": 0.0873}},
+        controller={"bandwidth": bandwidth},
+        phase_lock={"lock.frequency_drift": 9e-6, "lock.amplitude_drift": 3e-4, "lock.phase_tolerance": 0.0873},
         chain={"snr": 30.0, "seed": seed},
         record={"decay_periods": 5.0},
     )

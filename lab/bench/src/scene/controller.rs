@@ -236,6 +236,8 @@ impl Scene {
     }
 }
 
+/// That bandwidth over the cube root of E/A.
+const COUPLED: f64 = 0.9;
 /// Largest phase error that counts as locked, degrees.
 const PHASE_TOLERANCE: f64 = 0.3;
 /// Distances from the steady state that count as settled: of the frequency, over the half-power bandwidth of the linear response, and of the
@@ -244,8 +246,6 @@ const FREQUENCY_TOLERANCE: f64 = 2e-4;
 const AMPLITUDE_TOLERANCE: f64 = 8e-5;
 /// Largest drive of a tracked backbone, base amplitude over `b epsilon`, without `phase_lock.amplitude_max`.
 const TRACKED: f64 = 4.0;
-/// That bandwidth over the cube root of E/A.
-const COUPLED: f64 = 0.9;
 /// Smallest half-power bandwidth over omega0 that counts for the lock criterion and the largest drive: with less, most of the energy is lost in
 /// impacts.
 const BANDWIDTH_MIN: f64 = 1e-4;
