@@ -33,11 +33,7 @@ fn each_regime_is_found_where_it_is_known_to_be() {
         (0.9, -1.1, MOVING, Regime::Modulated, 0),
     ] {
         let result = at(g, sigma, start);
-        assert_eq!(
-            (result.regime, result.impacts),
-            (regime, impacts),
-            "G = {g}, sigma = {sigma}"
-        );
+        assert_eq!((result.regime, result.impacts), (regime, impacts), "G = {g}");
         assert!(regime != Regime::Modulated || result.synchrony > 0.2 && result.exponent.unwrap() > 0.0);
         assert!(regime != Regime::Chaotic || result.exponent.unwrap() > 10.0 * result.exponent_error.unwrap());
     }
@@ -59,10 +55,7 @@ fn a_particle_that_is_pressed_to_its_wall_sticks() {
     // Slowly shaken with hardly any rebound, the particle rides on the walls.
     let scene = Dimensionless::new(0.1, 1.0, 0.05, 60.0);
     let result = observe(&scene, -6.0, MOVING, 2000).unwrap();
-    assert!(
-        result.sticks_per_period > 0.5 && result.regime != Regime::Undecided,
-        "{result:?}"
-    );
+    assert!(result.sticks_per_period > 0.5 && result.regime != Regime::Undecided);
     // A motion that sticks and repeats itself has a negative exponent.
     let scene = Dimensionless::new(0.02, 0.8, 0.4, 0.8463);
     let result = observe(&scene, -2.8639, [0.0, 0.7, 0.4, 0.3], 4000).unwrap();
@@ -85,9 +78,7 @@ fn the_exponent_of_a_stable_orbit_is_that_of_its_multipliers() {
         let expected = 2.0 * motion.moduli()[3].ln() / f64::from(motion.pattern.half_periods);
         let result = at(g, sigma, MOVING);
         let (found, error) = (result.exponent.unwrap(), result.exponent_error.unwrap());
-        assert!(
-            (found - expected).abs() < 0.02 * expected.abs() + 2.0 * error,
-            "{found} {expected}"
-        );
+        let tolerance = 0.02 * expected.abs() + 2.0 * error;
+        assert!((found - expected).abs() < tolerance, "{found} {expected}");
     }
 }

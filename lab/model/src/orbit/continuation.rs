@@ -213,6 +213,7 @@ const ROUNDING: f64 = 1e-9;
 /// Largest distance of a multiplier from the circle where a crossing is located.
 const LOCATED: f64 = 1e-4;
 
+/// The curve of the motions of one pattern that satisfy a condition.
 struct Curve<'a> {
     scene: &'a Dimensionless,
     pattern: &'a ImpactPattern,

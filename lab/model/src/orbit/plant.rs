@@ -331,6 +331,8 @@ const CENTRAL: f64 = 6e-6;
 const CLOSED: f64 = 1e-13;
 /// Largest residual of a solution where rounding lets it fall no further.
 const NEARLY_CLOSED: f64 = 1e-10;
+/// Angular frequency, rad/s, of a base at rest that takes the phase to the section in hardly any time.
+const AT_ONCE: f64 = 1e9;
 /// Iterations, and halvings of a step that does not reduce the residual.
 const ITERATIONS: usize = 25;
 const HALVINGS: usize = 6;
@@ -351,6 +353,9 @@ fn unknowns(scale: &Unknowns, state: &State, omega: f64, amplitude: f64) -> Unkn
     Unknowns::from([q1, dq1, q2, dq2, omega, amplitude]).component_div(scale)
 }
 
+/// A plant at the section, its drive, and the duration of the motion, s.
+type Start = (Plant, Drive, f64);
+
 struct Solver<'a> {
     parameters: &'a Parameters,
     definition: Definition,
@@ -360,15 +365,6 @@ struct Solver<'a> {
     /// Phase of the base at the section, rad.
     phase: f64,
     events: Vec<(f64, Event)>,
-}
-
-/// The plant at the section under one drive: states are set on it.
-struct Section {
-    plant: Plant,
-    at: lovines::plant::Saved,
-    drive: Drive,
-    /// Duration of the motion, s.
-    duration: f64,
 }
 
 impl<'a> Solver<'a> {
@@ -396,41 +392,28 @@ impl<'a> Solver<'a> {
         })
     }
 
-    fn state(&self, x: &Unknowns) -> State {
-        let [q1, dq1, q2, dq2, ..]: [f64; 6] = x.component_mul(&self.scale).into();
-        State { q1, dq1, q2, dq2 }
-    }
-
-    fn drive(&self, x: &Unknowns) -> Drive {
-        Drive::harmonic(x[5] * self.scale[5], x[4] * self.scale[4])
-    }
-
-    /// The plant at the section under the drive of `x`.
-    fn section(&self, x: &Unknowns) -> Option<Section> {
-        let drive = self.drive(x);
-        if !(drive.omega > 0.0 && drive.omega.is_finite()) {
+    /// The plant at the section in the state and under the drive of `x`.
+    fn start(&self, x: &Unknowns) -> Option<Start> {
+        let [q1, dq1, q2, dq2, omega, amplitude] = x.component_mul(&self.scale).into();
+        if !(omega > 0.0 && omega.is_finite()) {
             return None;
         }
-        let mut plant = Plant::new(*self.parameters, self.state(x)).ok()?;
-        // A base at rest takes the phase to the section; the masses do not move in no time.
-        const AT_ONCE: f64 = 1e9;
-        plant.begin(Drive::harmonic(0.0, AT_ONCE)).ok()?;
-        plant
-            .advance(Drive::harmonic(0.0, AT_ONCE), self.phase / AT_ONCE)
-            .ok()?;
+        let (drive, still) = (Drive::harmonic(amplitude, omega), Drive::harmonic(0.0, AT_ONCE));
+        let state = State { q1, dq1, q2, dq2 };
+        let mut plant = Plant::new(*self.parameters, state).ok()?;
+        plant.begin(still).ok()?;
+        plant.advance(still, self.phase / AT_ONCE).ok()?;
         plant.begin(drive).ok()?;
-        let duration = TAU * f64::from(self.periods) / drive.omega;
-        Some(Section { at: plant.save(), plant, drive, duration })
+        plant.set_state(state).ok()?;
+        Some((plant, drive, TAU * f64::from(self.periods) / omega))
     }
 
     /// The period map: the state after the motion. The events are kept.
-    fn follow(&mut self, section: &mut Section, x: &Unknowns) -> Option<Vector4<f64>> {
-        section.start(self.state(x))?;
+    fn follow(&mut self, (mut plant, drive, duration): Start) -> Option<Vector4<f64>> {
         let events = &mut self.events;
         events.clear();
-        let Section { plant, drive, duration, .. } = section;
         let Outcome { cut_short, .. } = plant
-            .advance_with(*drive, *duration, |event| events.push((event.time(), event)))
+            .advance_with(drive, duration, |event| events.push((event.time(), event)))
             .ok()?;
         let State { q1, dq1, q2, dq2 } = plant.state();
         let scale = self.scale.fixed_rows::<4>(0);
@@ -438,25 +421,23 @@ impl<'a> Solver<'a> {
     }
 
     /// First harmonic of the response relative to the reference over the motion whose events were kept, in m.
-    fn harmonic(&self, section: &mut Section, x: &Unknowns) -> Option<Complex<f64>> {
-        section.start(self.state(x))?;
-        let Section { plant, drive, duration, .. } = section;
-        let Drive { omega, amplitude, .. } = *drive;
+    fn harmonic(&self, (mut plant, drive, duration): Start) -> Option<Complex<f64>> {
+        let Drive { omega, amplitude, .. } = drive;
         let stays = |event: &Event| matches!(event, Event::Stuck { .. } | Event::Sticking { .. });
         let ends = self.events.iter().map(|(t, event)| (*t, stays(event)));
         let (mut now, mut from, mut at_rest, mut sum) = (0.0, 0.0, false, Complex::new(0.0, 0.0));
         let mut go_to = |plant: &mut Plant, t: f64| {
-            plant.advance(*drive, (t - now).max(0.0)).ok()?;
+            plant.advance(drive, (t - now).max(0.0)).ok()?;
             now = t;
             Some(plant.state())
         };
-        for (to, rests_then) in ends.chain([(*duration, false)]) {
+        for (to, rests_then) in ends.chain([(duration, false)]) {
             let middle = 0.5 * (from + to);
             // A flight is the parabola through its middle.
             let (flight, acceleration) = if at_rest {
                 (State::default(), 0.0)
             } else {
-                let state = go_to(plant, middle)?;
+                let state = go_to(&mut plant, middle)?;
                 let (gravity, friction) = plant.constant_accelerations();
                 (state, gravity + friction)
             };
@@ -466,7 +447,7 @@ impl<'a> Solver<'a> {
                 for (node, weight) in gauss() {
                     let t = from + half * ((2 * piece + 1) as f64 + node);
                     let q2 = if at_rest {
-                        go_to(plant, t)?.q2
+                        go_to(&mut plant, t)?.q2
                     } else {
                         let s = t - middle;
                         flight.q2 + s * (flight.dq2 + 0.5 * acceleration * s)
@@ -477,7 +458,7 @@ impl<'a> Solver<'a> {
             (from, at_rest) = (to, rests_then);
         }
         // q2 = Im(Q2 exp(i phase)) makes the integral of q2 exp(-i phase) equal to -i Q2/2 times the duration.
-        let q2 = sum * Complex::from_polar(2.0 / *duration, FRAC_PI_2 - self.phase);
+        let q2 = sum * Complex::from_polar(2.0 / duration, FRAC_PI_2 - self.phase);
         let p = self.parameters;
         let square = omega * omega;
         let base = Complex::new(p.stiffness, p.damping * omega);
@@ -493,9 +474,10 @@ impl<'a> Solver<'a> {
     }
 
     /// The equations at `x`, all over b or as numbers.
-    fn residual(&mut self, section: &mut Section, x: &Unknowns) -> Option<Unknowns> {
-        let end = self.follow(section, x)?;
-        let response = self.harmonic(section, x)? / self.scale[0];
+    fn residual(&mut self, x: &Unknowns) -> Option<Unknowns> {
+        let start = self.start(x)?;
+        let end = self.follow(start)?;
+        let response = self.harmonic(start)? / self.scale[0];
         let mut residual = Unknowns::zeros();
         residual.fixed_rows_mut::<4>(0).copy_from(&(end - x.fixed_rows::<4>(0)));
         for (row, condition) in [4, 5].into_iter().zip(self.conditions) {
@@ -513,17 +495,13 @@ impl<'a> Solver<'a> {
     }
 
     /// Derivative of the equations by forward differences, or by backward ones where a wall forbids them.
-    fn jacobian(&mut self, section: &mut Section, x: &Unknowns, residual: &Unknowns) -> Option<Matrix6<f64>> {
+    fn jacobian(&mut self, x: &Unknowns, residual: &Unknowns) -> Option<Matrix6<f64>> {
         let mut jacobian = Matrix6::zeros();
         for column in 0..6 {
             let mut at = |step: f64| {
                 let mut x = *x;
                 x[column] += step;
-                if column < 4 {
-                    return self.residual(section, &x);
-                }
-                let mut section = self.section(&x)?;
-                self.residual(&mut section, &x)
+                self.residual(&x)
             };
             let slope = match at(FORWARD) {
                 Some(above) => (above - residual) / FORWARD,
@@ -535,13 +513,13 @@ impl<'a> Solver<'a> {
     }
 
     /// Derivative of the period map by central differences, or by one-sided ones at a wall.
-    fn monodromy(&mut self, section: &mut Section, x: &Unknowns) -> Option<Matrix4<f64>> {
+    fn monodromy(&mut self, x: &Unknowns) -> Option<Matrix4<f64>> {
         let mut monodromy = Matrix4::zeros();
         for column in 0..4 {
             let [below, above] = [-CENTRAL, CENTRAL].map(|step| {
                 let mut x = *x;
                 x[column] += step;
-                Some((step, self.follow(section, &x)?))
+                Some((step, self.follow(self.start(&x)?)?))
             });
             let here = (0.0, x.fixed_rows::<4>(0).into_owned());
             let ((from, below), (to, above)) = (below.unwrap_or(here), above.unwrap_or(here));
@@ -552,9 +530,9 @@ impl<'a> Solver<'a> {
 
     /// Moves the section to the middle of the longest flight of the motion from `x`; with `if_near`, only if it is much nearer to an event now.
     fn centre(&mut self, x: &mut Unknowns, if_near: bool) -> Option<()> {
-        let mut section = self.section(x)?;
-        self.follow(&mut section, x)?;
-        let duration = section.duration;
+        let start = self.start(x)?;
+        self.follow(start)?;
+        let (mut plant, drive, duration) = start;
         let times = self.events.iter().map(|(t, _)| *t);
         let ends: Vec<f64> = [0.0].into_iter().chain(times).chain([duration]).collect();
         let [.., last, _] = ends[..] else { return None };
@@ -563,20 +541,19 @@ impl<'a> Solver<'a> {
         } else {
             0.0
         };
-        section.start(self.state(x))?;
         let (mut now, mut best) = (0.0, None);
         for pair in ends.windows(2) {
             let (middle, half) = (0.5 * (pair[0] + pair[1]), 0.5 * (pair[1] - pair[0]));
-            section.plant.advance(section.drive, (middle - now).max(0.0)).ok()?;
+            plant.advance(drive, (middle - now).max(0.0)).ok()?;
             now = middle;
-            let is_flight = section.plant.contact().is_none() && !section.plant.sticks();
+            let is_flight = plant.contact().is_none() && !plant.sticks();
             if is_flight && half > distance {
                 distance = half;
-                best = Some((middle, section.plant.state()));
+                best = Some((middle, plant.state()));
             }
         }
         if let Some((t, state)) = best {
-            let Drive { omega, amplitude, .. } = section.drive;
+            let Drive { omega, amplitude, .. } = drive;
             self.phase = (self.phase + omega * t).rem_euclid(TAU);
             *x = unknowns(&self.scale, &state, omega, amplitude);
         }
@@ -594,10 +571,9 @@ impl<'a> Solver<'a> {
     /// Newton's method.
     fn converge(&mut self, x: &mut Unknowns) -> Option<()> {
         self.centre(x, false)?;
-        let mut section = self.section(x)?;
-        let mut residual = self.residual(&mut section, x)?;
+        let mut residual = self.residual(x)?;
         for _ in 0..ITERATIONS {
-            let jacobian = self.jacobian(&mut section, x, &residual)?;
+            let jacobian = self.jacobian(x, &residual)?;
             // The least change where the equations leave a coordinate free.
             let factors = jacobian.svd(true, true);
             let change = factors
@@ -607,14 +583,11 @@ impl<'a> Solver<'a> {
             let next = (0..HALVINGS).find_map(|_| {
                 let next = *x - change * share;
                 share *= 0.5;
-                let mut section = self.section(&next)?;
-                let smaller = self
-                    .residual(&mut section, &next)
-                    .filter(|r| r.norm() < residual.norm())?;
-                Some((next, section, smaller))
+                let smaller = self.residual(&next).filter(|r| r.norm() < residual.norm())?;
+                Some((next, smaller))
             });
             match next {
-                Some(next) => (*x, section, residual) = next,
+                Some(next) => (*x, residual) = next,
                 None if residual.norm() < NEARLY_CLOSED => return Some(()),
                 None => return None,
             }
@@ -625,8 +598,7 @@ impl<'a> Solver<'a> {
                 let before = self.phase;
                 self.centre(x, true)?;
                 if self.phase != before {
-                    section = self.section(x)?;
-                    residual = self.residual(&mut section, x)?;
+                    residual = self.residual(x)?;
                 }
             }
         }
@@ -635,21 +607,20 @@ impl<'a> Solver<'a> {
 
     /// The motion at the solution `x`.
     fn motion(&mut self, x: &Unknowns) -> Option<PlantMotion> {
-        let mut section = self.section(x)?;
-        let monodromy = self.monodromy(&mut section, x)?;
+        let monodromy = self.monodromy(x)?;
         let mut multipliers: [Complex<f64>; 4] = monodromy.complex_eigenvalues().into();
         multipliers.sort_by(|one, other| one.norm().total_cmp(&other.norm()));
-        self.follow(&mut section, x)?;
-        let response = self.harmonic(&mut section, x)?;
-        let Drive { omega, amplitude, .. } = section.drive;
+        let start = self.start(x)?;
+        self.follow(start)?;
+        let response = self.harmonic(start)?;
+        let (mut plant, drive, duration) = start;
+        let Drive { omega, amplitude, .. } = drive;
         // A particle at rest in the section has settled on its wall, without the residual of the solution, where the phase is 0.
-        section.start(self.state(x))?;
-        let Section { plant, drive, duration, .. } = &mut section;
-        plant.advance(*drive, (TAU - self.phase) / omega).ok()?;
+        plant.advance(drive, (TAU - self.phase) / omega).ok()?;
         let state = plant.state();
         let mut events = Vec::new();
         let record = |event: Event| events.push((omega * event.time(), event));
-        plant.advance_with(*drive, *duration, record).ok()?;
+        plant.advance_with(drive, duration, record).ok()?;
         let count = |is: fn(&Event) -> bool| events.iter().filter(|(_, event)| is(event)).count();
         Some(PlantMotion {
             state,
@@ -663,14 +634,6 @@ impl<'a> Solver<'a> {
             sticks: count(|event| matches!(event, Event::Sticking { .. })),
             events,
         })
-    }
-}
-
-impl Section {
-    /// Puts the masses into `state` at the section; what the plant has computed before is used again.
-    fn start(&mut self, state: State) -> Option<()> {
-        self.plant.restore(&self.at);
-        self.plant.set_state(state).ok()
     }
 }
 

@@ -84,11 +84,10 @@ impl SymmetricMotions {
         ]
     }
 
-    /// The two motions at phase resonance, each a continuous branch where it exists.
-    fn phase_resonant(&self) -> Option<[Orbit; 2]> {
+    /// Speeds of the two motions at phase resonance, each a continuous branch where it exists.
+    fn phase_resonant(&self) -> Option<[f64; 2]> {
         let [square, linear, constant] = self.resonance();
-        let speeds = quadratic(square, linear, constant)?;
-        Some(speeds.map(|b| self.at(b)))
+        quadratic(square, linear, constant)
     }
 
     /// The two motions under the excitation `g`: `|y|^2` is quadratic in B.
@@ -107,6 +106,11 @@ impl SymmetricMotions {
     /// First harmonic y at the particle speed `b`, and of the response but for the factor of the sensor.
     fn y(&self, b: f64) -> Complex<f64> {
         Complex::new(self.beta * b, 1.0 + self.alpha * b)
+    }
+
+    /// G of the motion at the particle speed `b`.
+    fn excitation(&self, b: f64) -> f64 {
+        (self.y(b) * self.base_over_y).norm() / self.epsilon
     }
 
     fn response(&self, b: f64) -> Complex<f64> {
@@ -173,7 +177,8 @@ pub fn stable_resonant(scene: &Dimensionless) -> Option<Orbit> {
 ///
 /// Without damping and with r = 1 these are the conservative nonlinear mode, with G = 0.
 pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
-    let candidates = SymmetricMotions::new(scene, omega).and_then(|motions| motions.phase_resonant());
+    let candidates =
+        SymmetricMotions::new(scene, omega).and_then(|motions| Some(motions.phase_resonant()?.map(|b| motions.at(b))));
     let orbits = resonant(scene, candidates.as_slice().as_flattened());
     if scene.definition.is_peak() {
         let peak = |orbit: &Orbit| peak(scene, orbit, Condition::Sigma(orbit.sigma));
@@ -245,14 +250,14 @@ struct CandidateBranch<'a> {
 
 impl CandidateBranch<'_> {
     fn at(&self, omega: f64) -> Option<Orbit> {
-        SymmetricMotions::new(self.scene, omega)?
-            .phase_resonant()
-            .map(|both| both[self.branch])
+        let motions = SymmetricMotions::new(self.scene, omega)?;
+        Some(motions.at(motions.phase_resonant()?[self.branch]))
     }
 
     /// G of the branch minus the scene's G.
     fn excess(&self, omega: f64) -> Option<f64> {
-        let excess = self.at(omega)?.g - self.scene.g;
+        let motions = SymmetricMotions::new(self.scene, omega)?;
+        let excess = motions.excitation(motions.phase_resonant()?[self.branch]) - self.scene.g;
         (!excess.is_nan()).then_some(excess)
     }
 

@@ -78,11 +78,10 @@ fn phase_resonance_is_the_equilibrium_at_minus_a_quarter_turn_with_the_largest_a
         let points = flow.phase_resonant(g);
         for point in &points {
             close(point.g, g, 1e-12);
-            let same = flow.equilibria(g, point.sigma).into_iter();
-            let equilibrium = same
-                .min_by(|a, b| (a.b - point.b).abs().total_cmp(&(b.b - point.b).abs()))
-                .unwrap();
-            close(equilibrium.gamma, -FRAC_PI_2, 1e-6);
+            let mut equilibria = flow.equilibria(g, point.sigma).into_iter();
+            let same = equilibria.find(|one| (one.b - point.b).abs() < 1e-7);
+            let equilibrium = same.expect("an equilibrium at the backbone's detuning");
+            close(equilibrium.gamma + FRAC_PI_2, 0.0, 1e-6);
             assert_eq!(equilibrium.slow_flow_stable, point.slow_flow_stable);
         }
         // Largest among all equilibria beyond the fold, which know nothing of phase resonance.

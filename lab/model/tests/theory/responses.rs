@@ -21,11 +21,8 @@ fn responses_consist_of_equilibria_and_cross_a_detuning_as_often_as_there_are_eq
             let sides = sigmas.windows(2);
             sides.filter(|pair| (pair[0] > sigma) != (pair[1] > sigma)).count()
         });
-        assert_eq!(
-            crossings.sum::<usize>(),
-            flow.equilibria(g, sigma).len(),
-            "G = {g}, sigma = {sigma}"
-        );
+        let (crossings, equilibria) = (crossings.sum::<usize>(), flow.equilibria(g, sigma).len());
+        assert_eq!(crossings, equilibria, "G = {g}, sigma = {sigma}");
     }
 }
 
@@ -37,15 +34,9 @@ fn the_activation_thresholds_are_where_equilibria_begin() {
         let stable = activation.stable.expect("a stable motion at some G");
         assert!(activation.existence <= stable);
         for (off, exists) in [(-1.0, false), (1.0, true)] {
-            assert_eq!(
-                flow.equilibria(activation.existence + 1e-6 * off, sigma).is_empty(),
-                !exists
-            );
-            assert_eq!(
-                flow.has_stable_motion(stable + 1e-4 * off, sigma),
-                exists,
-                "sigma = {sigma}"
-            );
+            let beside = flow.equilibria(activation.existence + 1e-6 * off, sigma);
+            let is_stable = flow.has_stable_motion(stable + 1e-4 * off, sigma);
+            assert_eq!([!beside.is_empty(), is_stable], [exists; 2], "sigma = {sigma}");
         }
     }
     // From rest the linear resonance must reach the wall: C = G/lambda = 1.
@@ -88,10 +79,8 @@ fn impacts_begin_from_rest_where_the_program_says() {
         assert!((found.from_rest - known).abs() <= digit, "{found:?}");
         let beat = 1.0 / (epsilon * sigma.abs());
         let after = [beat, 2.0 * beat, 20_000.0].map(|periods| first_impact(&scene, sigma, 0.0, periods));
-        assert!(
-            after.iter().all(|one| (one - found.from_rest).abs() < 1e-6),
-            "{after:?}"
-        );
+        let is_same = |one: &f64| (one - found.from_rest).abs() < 1e-6;
+        assert!(after.iter().all(is_same), "{after:?}");
         let phases = (0..8).map(|n| first_impact(&scene, sigma, f64::from(n) * PI / 8.0, 2.0 * beat));
         let (least, any) = (phases.fold(f64::MAX, f64::min), found.from_rest_any_phase);
         assert!(any <= least + 1e-6 && least < 1.005 * any, "{least}");
