@@ -202,4 +202,16 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn an_opening_gap_is_open_for_the_whole_window() {
+        let g = Gap { gap: 0.1, closing: -1.0, acceleration: -0.5, jerk: 0.0 };
+        assert_eq!(g.certainly_open(0.2, |_| 1.0), 0.2);
+    }
+
+    #[test]
+    fn a_start_at_rest_on_the_wall_that_draws_away_is_clear_at_once() {
+        let g = Gap { gap: 0.0, closing: 0.0, acceleration: -0.5, jerk: 0.0 };
+        assert!(g.certainly_open(2.0, |_| 1.0) > 0.5);
+    }
 }
