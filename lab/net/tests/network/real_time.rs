@@ -121,6 +121,8 @@ fn the_rig_keeps_its_rate_and_reports_the_lateness_of_its_samples() {
     assert_eq!(drives.last().unwrap().amplitude, 0.0);
     let steps = drives.windows(2).map(|pair| pair[0].amplitude - pair[1].amplitude);
     assert!(steps.fold(0.0, f64::max) < 1.5e-4 / f64::from(RAMP_SAMPLES));
+    let text = Session { samples: 0, seconds: 0.0, ..session }.to_string();
+    assert!(text.contains("0 samples in 0.000 s: 0.0 per second"), "{text}");
 }
 
 #[test]
