@@ -2,6 +2,8 @@
 //!
 //! `scripts/stress --network` runs this with 10^7 frames per connection; FRAMES and SEED set both. The suite takes a small part.
 
+#[path = "../fixture/mod.rs"]
+mod fixture;
 mod noise;
 
 use std::collections::HashMap;
@@ -9,14 +11,15 @@ use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::thread::{self, JoinHandle};
+use std::thread;
 use std::time::Duration;
 
 use vines_net::frame::{Frame, Kind, SIZE, flag};
-use vines_net::{Address, Key, NetRig, Role, Served, Server, Service};
+use vines_net::{Address, Key, NetRig, Role, Served, Service};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 use vines_testbench::scene::Definition;
 
+use fixture::{Running, socket};
 use noise::{Noise, size};
 
 const SAMPLE_TIME: f64 = 1e-3;
@@ -42,9 +45,7 @@ impl Rig for Oracle {
 }
 
 struct Target {
-    address: SocketAddr,
-    stop: Arc<AtomicBool>,
-    thread: JoinHandle<u64>,
+    server: Running,
     sent: Sent,
 }
 
@@ -52,38 +53,29 @@ impl Target {
     fn start(address: fn(SocketAddr) -> Address, key: Option<Key>) -> Self {
         let role = Role::Rig { max_amplitude: LARGEST, sensors: Definition::default() };
         let service = Service { role, sample_time: SAMPLE_TIME, silence: 2.0 };
-        let mut server = Server::listen(address(([127, 0, 0, 1], 0).into()), service, key).unwrap();
-        let address = server.address().unwrap().socket();
-        let (stop, sent) = (Arc::new(AtomicBool::new(false)), Sent::default());
-        let (flag, known) = (Arc::clone(&stop), Arc::clone(&sent));
-        let thread = thread::spawn(move || {
-            let mut refused = 0;
-            let make = || Ok(Served::Rig(Box::new(Oracle(Arc::clone(&known)))));
-            let report = |session: &vines_net::Session| {
-                refused += session.counters.map_or(0, |all| all.malformed + all.foreign + all.late);
-            };
-            server.serve(make, || flag.load(Ordering::Relaxed), report).unwrap();
-            refused
-        });
-        Self { address, stop, thread, sent }
-    }
-
-    /// A drive that no mutation of another one gives.
-    fn drive(&self, noise: &mut Noise) -> Drive {
-        let unit = (noise.next() >> 11) as f64 / (1u64 << 53) as f64;
-        let drive = Drive { omega: 100.0 + unit, amplitude: 1e-4, displacement: 0.0 };
-        self.sent.lock().unwrap().insert(drive.omega.to_bits(), drive.amplitude);
-        drive
+        let sent = Sent::default();
+        let known = Arc::clone(&sent);
+        let make = move || Served::Rig(Box::new(Oracle(Arc::clone(&known))));
+        Self { server: Running::start(address, service, key, make), sent }
     }
 
     /// Ends the server; a panic of it fails the test.
-    fn end(self, what: &str) {
+    fn end(mut self, what: &str) {
+        self.server.end();
+        let counters = self.server.sessions.try_iter().filter_map(|session| session.counters);
+        let refused: u64 = counters.map(|all| all.malformed + all.foreign + all.late).sum();
         let sent = self.sent.lock().unwrap().len();
-        self.stop.store(true, Ordering::Relaxed);
-        let refused = self.thread.join().unwrap();
         println!("{what} beside {sent} drives, {refused} counted by the server");
         assert!(sent > 0);
     }
+}
+
+/// A drive that no mutation of another one gives.
+fn unique_drive(sent: &Sent, noise: &mut Noise) -> Drive {
+    let unit = (noise.next() >> 11) as f64 / (1u64 << 53) as f64;
+    let drive = Drive { omega: 100.0 + unit, amplitude: 1e-4, displacement: 0.0 };
+    sent.lock().unwrap().insert(drive.omega.to_bits(), drive.amplitude);
+    drive
 }
 
 /// A frame of a session as this protocol has it, with its first values.
@@ -105,15 +97,13 @@ enum Wire {
 
 impl Wire {
     fn connect(to: SocketAddr, is_tcp: bool) -> Self {
-        let wait = Some(Duration::from_secs(5));
         if is_tcp {
             let stream = TcpStream::connect(to).expect("the server has not ended");
-            stream.set_read_timeout(wait).unwrap();
+            stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
             return Self::Tcp(stream);
         }
         Self::Udp([(); 2].map(|()| {
-            let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-            socket.set_read_timeout(wait).unwrap();
+            let socket = socket();
             socket.connect(to).unwrap();
             socket
         }))
@@ -147,7 +137,7 @@ fn mutated_frames_never_drive_a_rig(address: fn(SocketAddr) -> Address, is_tcp: 
     let ((frames, seed), target) = (size(), Target::start(address, None));
     let (mut noise, mut done, mut sessions) = (Noise(seed ^ u64::from(is_tcp)), 0, 0);
     while done < frames {
-        let mut wire = Wire::connect(target.address, is_tcp);
+        let mut wire = Wire::connect(target.server.address.socket(), is_tcp);
         let session = noise.next();
         sessions += 1;
         wire.send(&frame(Kind::Hello, session, 0, [SAMPLE_TIME, 0.0]).encode(), false);
@@ -160,7 +150,7 @@ fn mutated_frames_never_drive_a_rig(address: fn(SocketAddr) -> Address, is_tcp: 
                 Kind::Sensors if !answer.has(flag::SHUT_DOWN) => {}
                 _ => break,
             }
-            let drive = target.drive(&mut noise);
+            let drive = unique_drive(&target.sent, &mut noise);
             let genuine = frame(Kind::Drive, session, answer.sequence, [drive.omega, drive.amplitude]).encode();
             for _ in 0..64 {
                 let mut bytes = genuine.to_vec();
@@ -224,11 +214,11 @@ fn with_a_key_forged_and_replayed_datagrams_never_drive_a_rig() {
     let ((frames, seed), key) = (size(), Key::of(b"a shared secret of the fuzzer"));
     let (target, [mut noise, mut own]) = (Target::start(Address::Udp, key), [3, 6].map(|salt| Noise(seed ^ salt)));
     let [front, back] = [(); 2].map(|()| {
-        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let socket = socket();
         socket.set_nonblocking(true).unwrap();
         socket
     });
-    back.connect(target.address).unwrap();
+    back.connect(target.server.address.socket()).unwrap();
     let (address, finished) = (Address::Udp(front.local_addr().unwrap()), AtomicBool::new(false));
     let (mut peer, mut heard, mut bytes, mut done) = (None, Vec::new(), [0; 256], 0);
     thread::scope(|scope| {
@@ -242,7 +232,7 @@ fn with_a_key_forged_and_replayed_datagrams_never_drive_a_rig() {
                 };
                 let _ = (0..(frames / 40).clamp(100, 5000)).try_for_each(|_| {
                     rig.sense()?;
-                    rig.advance(target.drive(&mut noise), SAMPLE_TIME)
+                    rig.advance(unique_drive(&target.sent, &mut noise), SAMPLE_TIME)
                 });
             }
         });

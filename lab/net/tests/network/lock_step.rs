@@ -1,7 +1,7 @@
 //! Guards lock-step: every bit equals that of the built-in plant, and a frame that is not allowed is answered at once. Refused sessions say
 //! what to do.
 
-use std::net::{TcpStream, UdpSocket};
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use vines_net::frame::{Frame, Kind};
@@ -10,7 +10,8 @@ use vines_testbench::experiment;
 use vines_testbench::rig::{BuiltIn, Chain, Controller, Drive, Rig, Simulated};
 use vines_testbench::scene::Definition;
 
-use crate::{drive, link_error, scene, serve_built_in, serve_rig, service, shake};
+use crate::fixture::socket;
+use crate::{SCENE, drive, link_error, scene, serve_built_in, serve_rig, service, shake};
 
 #[test]
 fn an_experiment_with_held_samples_across_the_network_gives_the_same_bits() {
@@ -26,10 +27,10 @@ fn an_experiment_with_held_samples_across_the_network_gives_the_same_bits() {
     };
     let plant = Simulated::new(scene.plant, scene.start).unwrap();
     let direct = measure(Box::new(plant), &mut BuiltIn::new(&scene.controller_config()).unwrap());
-    let ((rig, _), peer) = (serve_rig(Address::Tcp, &scene, 5.0), serve_built_in(&scene));
-    let client = rig.rig(&scene);
+    let (rig, peer) = (serve_rig(Address::Tcp, &scene, 5.0), serve_built_in(&scene));
+    let client = rig.rig();
     assert_eq!(client.pace(), None);
-    assert_eq!(measure(Box::new(client), &mut peer.controller(&scene, None)), direct);
+    assert_eq!(measure(Box::new(client), &mut peer.controller(None)), direct);
     for session in [rig.session(), peer.session()] {
         let samples = direct.samples.len() as u64;
         assert_eq!((session.ended, session.samples), (Ended::Farewell, samples));
@@ -38,31 +39,26 @@ fn an_experiment_with_held_samples_across_the_network_gives_the_same_bits() {
 
 #[test]
 fn the_drive_of_a_client_that_has_left_ramps_to_zero() {
-    let scene = scene(&[]);
-    let (server, log) = serve_rig(Address::Tcp, &scene, 5.0);
-    shake(&mut server.rig(&scene), &scene, 20).unwrap();
+    let server = serve_rig(Address::Tcp, &SCENE, 5.0);
+    shake(&mut server.rig(), 20).unwrap();
     assert_eq!(server.session().samples, 20);
-    assert_eq!(
-        (log.all().len(), log.last().amplitude),
-        (20 + RAMP_SAMPLES as usize, 0.0)
-    );
+    let left = 20 + RAMP_SAMPLES as usize;
+    assert_eq!((server.drives().len(), server.last().amplitude), (left, 0.0));
     // A base of held samples, too.
-    let mut rig = server.rig(&scene);
+    let (mut rig, base) = (server.rig(), Drive { displacement: 1e-3, ..Drive::default() });
     rig.sense().unwrap();
-    rig.hold(Drive { displacement: 1e-3, ..Drive::default() }, scene.sample_time())
-        .unwrap();
+    rig.hold(base, SCENE.sample_time()).unwrap();
     rig.sense().unwrap();
     drop(rig);
     server.session();
-    let ramp = log.all().split_off(20 + RAMP_SAMPLES as usize);
+    let ramp = server.drives().split_off(left);
     assert!(ramp.windows(2).all(|pair| pair[1].displacement < pair[0].displacement));
-    assert_eq!((ramp[0].displacement, log.last().displacement), (1e-3, 0.0));
+    assert_eq!((ramp[0], server.last().displacement), (base, 0.0));
 }
 
 #[test]
 fn a_drive_above_a_limit_is_refused_at_once_with_the_value_and_the_limit() {
-    let scene = scene(&[]);
-    let limit = scene.plant.half_width;
+    let limit = SCENE.plant.half_width;
     for (index, bad) in [
         (0, Drive { omega: f64::NAN, ..drive(3) }),
         (0, Drive { omega: 1e9, ..drive(3) }),
@@ -70,49 +66,41 @@ fn a_drive_above_a_limit_is_refused_at_once_with_the_value_and_the_limit() {
         (1, Drive { amplitude: -1e-9, ..drive(3) }),
         (2, Drive { displacement: -1e3, ..drive(3) }),
     ] {
-        let (server, log) = serve_rig(Address::Tcp, &scene, 5.0);
-        let mut rig = server.rig(&scene);
-        shake(&mut rig, &scene, 3).unwrap();
+        let server = serve_rig(Address::Tcp, &SCENE, 5.0);
+        let mut rig = server.rig();
+        shake(&mut rig, 3).unwrap();
         let start = Instant::now();
         rig.sense().unwrap();
-        let error = rig
-            .advance(bad, scene.sample_time())
-            .and_then(|()| rig.sense())
-            .unwrap_err();
+        let driven = rig.advance(bad, SCENE.sample_time());
+        let error = driven.and_then(|()| rig.sense()).unwrap_err();
         assert!(start.elapsed() < Duration::from_secs(1));
-        let Refusal::Drive { index: named, .. } = refused(link_error(&error)) else {
-            panic!("{error}");
-        };
-        assert!(
-            named == index && error.to_string().contains("allowed is up to"),
-            "{error}"
-        );
+        let is_named = matches!(refused(link_error(&error)), Refusal::Drive { index: named, .. } if named == index);
+        assert!(is_named && error.to_string().contains("allowed is up to"), "{error}");
         assert_eq!(server.session().ended, Ended::Refused);
         // The rig never had it.
-        assert!(log.all().iter().all(|had| had.amplitude <= 1e-4 && had.omega < 51.0));
+        let mut drives = server.drives().into_iter();
+        assert!(drives.all(|had| had.amplitude <= 1e-4 && had.omega < 51.0));
     }
 }
 
 #[test]
 fn a_silence_ramps_the_drive_down_and_a_client_that_returns_is_informed() {
-    let scene = scene(&[]);
-    let (server, log) = serve_rig(Address::Tcp, &scene, 0.2);
-    let mut rig = server.rig(&scene);
-    shake(&mut rig, &scene, 20).unwrap();
-    assert_eq!(server.session().ended, Ended::Silence);
-    assert_eq!(log.last().amplitude, 0.0);
-    let error = shake(&mut rig, &scene, 2).unwrap_err();
+    let server = serve_rig(Address::Tcp, &SCENE, 0.2);
+    let mut rig = server.rig();
+    shake(&mut rig, 20).unwrap();
+    assert_eq!((server.session().ended, server.last().amplitude), (Ended::Silence, 0.0));
+    let error = shake(&mut rig, 2).unwrap_err();
     assert!(matches!(link_error(&error), LinkError::Closed { .. }), "{error}");
     // Only another session arms the rig again.
-    shake(&mut server.rig(&scene), &scene, 20).unwrap();
+    shake(&mut server.rig(), 20).unwrap();
 }
 
 #[test]
 fn a_missing_server_is_reported_with_the_command_that_starts_it() {
-    let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let silent = socket();
     let (start, place) = (Instant::now(), silent.local_addr().unwrap());
     let rig = |address| NetRig::connect(address, 1e-3, None).unwrap_err();
-    let controller = NetController::connect(place, &scene(&[]).controller_config(), None, None).unwrap_err();
+    let controller = NetController::connect(place, &SCENE.controller_config(), None, None).unwrap_err();
     for (error, command) in [
         (rig(Address::Udp(place)), "vines rig --listen"),
         (rig(Address::Tcp(place)), "vines rig --lock-step --listen"),
@@ -126,17 +114,12 @@ fn a_missing_server_is_reported_with_the_command_that_starts_it() {
 
 #[test]
 fn another_version_is_named_with_both_numbers_and_a_client_without_a_sample_time_is_refused() {
-    let [other, client] = [(); 2].map(|()| {
-        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-        socket.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
-        socket
-    });
+    let [other, client] = [(); 2].map(|()| socket());
     let address = Address::Udp(other.local_addr().unwrap());
     let newer = std::thread::spawn(move || {
         let (_, from) = other.recv_from(&mut [0; 256]).unwrap();
-        other
-            .send_to(b"VINE\x03\x00 and what follows in version 3", from)
-            .unwrap();
+        let answer = b"VINE\x03\x00 and what follows in version 3";
+        other.send_to(answer, from).unwrap();
     });
     let error = NetRig::connect(address, 1e-3, None).unwrap_err();
     newer.join().unwrap();
@@ -144,7 +127,7 @@ fn another_version_is_named_with_both_numbers_and_a_client_without_a_sample_time
     let text = error.to_string();
     assert!(text.contains("version 3") && text.contains("version 2"), "{text}");
 
-    let (server, _) = serve_rig(Address::Udp, &scene(&[]), 1.0);
+    let server = serve_rig(Address::Udp, &SCENE, 1.0);
     let mut hello = Frame::new(Kind::Hello, 1);
     hello.values[0] = f64::NAN;
     for (bytes, code) in [
@@ -169,66 +152,53 @@ fn refused(error: &LinkError) -> Refusal {
 #[test]
 fn another_role_another_sample_time_and_other_sensors_are_refused() {
     let scene = scene(&["resonance.sensor='q1'"]);
-    let ((rig, _), peer) = (serve_rig(Address::Tcp, &scene, 5.0), serve_built_in(&scene));
+    let (rig, peer) = (serve_rig(Address::Tcp, &scene, 5.0), serve_built_in(&scene));
     let (step, config) = (scene.sample_time(), scene.controller_config());
     let connect = |address, step| NetRig::connect(address, step, None).unwrap_err();
     let controller = NetController::connect(rig.address.socket(), &config, None, None).unwrap_err();
+    let role = "it is a rig where a controller is needed, or the reverse";
+    let other = connect(rig.address, 2.0 * step);
     for (error, reason, part) in [
-        (
-            connect(peer.address, step),
-            Refusal::Role,
-            "it is a rig where a controller is needed",
-        ),
-        (controller, Refusal::Role, "or the reverse"),
-        (
-            connect(rig.address, 2.0 * step),
-            Refusal::SampleTime(step),
-            "same scene",
-        ),
+        (connect(peer.address, step), Refusal::Role, role),
+        (controller, Refusal::Role, role),
+        (other, Refusal::SampleTime(step), "same scene"),
     ] {
         assert_eq!(refused(&error), reason);
         assert!(error.to_string().contains(part), "{error}");
     }
-    assert!(rig.rig(&scene).with_sensors(scene.resonance).is_ok());
-    let error = rig.rig(&scene).with_sensors(Definition::default()).unwrap_err();
+    assert!(rig.rig().with_sensors(scene.resonance).is_ok());
+    let error = rig.rig().with_sensors(Definition::default()).unwrap_err();
     let message = "measures q1 and e, the [resonance] section of the scene needs v and e";
     assert!(error.to_string().contains(message), "{error}");
 }
 
 #[test]
 fn a_second_client_is_refused_and_silent_connections_keep_nobody_waiting() {
-    let scene = scene(&[]);
+    let [other, busy] = [
+        "it has another client or another key",
+        "it has another client; sessions are served one at a time",
+    ];
     // A client gives up after 2 s.
-    for (address, silent, reason) in [
-        (Address::Tcp as fn(_) -> _, 130, "it has another client or another key"),
-        (
-            Address::Udp,
-            0,
-            "it has another client; sessions are served one at a time",
-        ),
-    ] {
-        let (server, _) = serve_rig(address, &scene, 10.0);
-        let _silent: Vec<_> = (0..silent)
-            .map(|_| TcpStream::connect(server.address.socket()).unwrap())
-            .collect();
-        let mut first = server.rig(&scene);
-        let error = NetRig::connect(server.address, scene.sample_time(), None).unwrap_err();
+    for (address, silent, reason) in [(Address::Tcp as fn(_) -> _, 130, other), (Address::Udp, 0, busy)] {
+        let server = serve_rig(address, &SCENE, 10.0);
+        let connect = |_| TcpStream::connect(server.address.socket()).unwrap();
+        let _silent: Vec<_> = (0..silent).map(connect).collect();
+        let mut first = server.rig();
+        let error = NetRig::connect(server.address, SCENE.sample_time(), None).unwrap_err();
         assert!(error.to_string().contains(reason), "{error}");
-        shake(&mut first, &scene, 10).unwrap();
+        shake(&mut first, 10).unwrap();
     }
 }
 
 #[test]
 fn a_port_in_use_is_named_and_a_server_that_is_stopped_reports_its_session() {
-    let scene = scene(&[]);
-    let (server, _) = serve_rig(Address::Tcp, &scene, 5.0);
-    let error = Server::listen(server.address, service(&scene, 1.0), None)
-        .err()
-        .unwrap();
+    let server = serve_rig(Address::Tcp, &SCENE, 5.0);
+    let second = Server::listen(server.address, service(&SCENE, 1.0), None);
+    let error = second.err().unwrap();
     assert!(matches!(error, LinkError::Listen { .. }));
     assert!(error.to_string().contains(&server.address.to_string()), "{error}");
-    let mut rig = server.rig(&scene);
-    shake(&mut rig, &scene, 10).unwrap();
-    server.stop.store(true, std::sync::atomic::Ordering::Relaxed);
+    let mut rig = server.rig();
+    shake(&mut rig, 10).unwrap();
+    server.running.stop.store(true, std::sync::atomic::Ordering::Relaxed);
     assert_eq!(server.session().ended, Ended::Stopped);
 }

@@ -2,77 +2,67 @@
 //! late and missing answers of a controller, and refused sessions.
 
 mod controller;
+#[path = "../fixture/mod.rs"]
+mod fixture;
 mod lock_step;
 mod real_time;
 
 use std::net::SocketAddr;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{self, Receiver};
-use std::sync::{Arc, Mutex};
-use std::thread;
+use std::sync::{Arc, LazyLock, Mutex};
 use std::time::Duration;
 
-use vines_net::{Address, LinkError, NetController, NetRig, Role, Served as Offered, Server, Service, Session};
-use vines_testbench::rig::{BuiltIn, Controller, Drive, Rig, RigError, RigStage, Simulated};
+use vines_net::{Address, LinkError, NetController, NetRig, Role, Served as Offered, Service, Session};
+use vines_testbench::rig::{
+    BuiltIn, Command, Controller, ControllerError, Drive, Rig, RigError, RigStage, Sensors, Simulated,
+};
 use vines_testbench::scene::{PAPER, Scene};
 
-/// A free port of this machine.
-const ANYWHERE: ([u8; 4], u16) = ([127, 0, 0, 1], 0);
+use fixture::Running;
+
 /// A silence, s, longer than the pauses of a busy machine.
 const PATIENT: f64 = 2.0;
 
-/// The default scene, 882 samples a second, with settings.
+/// The default scene, 882 samples a second.
+static SCENE: LazyLock<Scene> = LazyLock::new(|| scene(&[]));
+
+/// The default scene with settings.
 fn scene(settings: &[&str]) -> Scene {
     let overrides: Vec<_> = settings.iter().map(|setting| setting.parse().unwrap()).collect();
     Scene::parse("paper.toml", PAPER, &overrides).unwrap()
 }
 
-/// A running server.
+/// A running server for a scene; `drives` contains every drive of its rig.
 struct Served {
+    running: Running,
     address: Address,
-    stop: Arc<AtomicBool>,
-    sessions: Receiver<Session>,
+    scene: Scene,
+    drives: Arc<Mutex<Vec<Drive>>>,
 }
 
 impl Served {
-    fn start(
-        address: fn(SocketAddr) -> Address,
-        service: Service,
-        mut make: impl FnMut() -> Offered + Send + 'static,
-    ) -> Self {
-        let mut server = Server::listen(address(ANYWHERE.into()), service, None).unwrap();
-        let (stop, (ended, sessions)) = (Arc::new(AtomicBool::new(false)), mpsc::channel());
-        let (address, flag) = (server.address().unwrap(), Arc::clone(&stop));
-        thread::spawn(move || {
-            let report = |session: &Session| drop(ended.send(session.clone()));
-            server
-                .serve(|| Ok(make()), || flag.load(Ordering::Relaxed), report)
-                .unwrap();
-        });
-        Self { address, stop, sessions }
-    }
-
     /// Waits for the end of the next session, and returns its report.
     fn session(&self) -> Session {
-        self.sessions
-            .recv_timeout(Duration::from_secs(60))
-            .expect("the session does not end")
+        let ended = self.running.sessions.recv_timeout(Duration::from_secs(60));
+        ended.expect("the session does not end")
     }
 
     /// A client of the rig.
-    fn rig(&self, scene: &Scene) -> NetRig {
-        NetRig::connect(self.address, scene.sample_time(), None).unwrap()
+    fn rig(&self) -> NetRig {
+        NetRig::connect(self.address, self.scene.sample_time(), None).unwrap()
     }
 
     /// A client of the controller, beside a rig of this `pace`.
-    fn controller(&self, scene: &Scene, pace: Option<f64>) -> NetController {
-        NetController::connect(self.address.socket(), &scene.controller_config(), pace, None).unwrap()
+    fn controller(&self, pace: Option<f64>) -> NetController {
+        NetController::connect(self.address.socket(), &self.scene.controller_config(), pace, None).unwrap()
     }
-}
 
-impl Drop for Served {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
+    fn drives(&self) -> Vec<Drive> {
+        self.drives.lock().unwrap().clone()
+    }
+
+    /// The last drive of the rig.
+    fn last(&self) -> Drive {
+        *self.drives().last().unwrap()
     }
 }
 
@@ -83,19 +73,27 @@ fn service(scene: &Scene, silence: f64) -> Service {
     Service { role, sample_time: scene.sample_time(), silence }
 }
 
-/// Serves the plant of the scene, in lock-step over TCP or in real time over UDP; the log contains every drive of the plant.
-fn serve_rig(address: fn(SocketAddr) -> Address, scene: &Scene, silence: f64) -> (Served, Log) {
-    let (plant, log) = (Simulated::new(scene.plant, scene.start).unwrap(), Log::default());
-    let copy = log.clone();
-    let make = move || Offered::Rig(Box::new(Spy(plant.clone(), copy.clone())));
-    (Served::start(address, service(scene, silence), make), log)
+/// Serves the plant of a scene, in lock-step over TCP or in real time over UDP.
+fn serve_rig(address: fn(SocketAddr) -> Address, scene: &Scene, silence: f64) -> Served {
+    let (plant, drives) = (Simulated::new(scene.plant, scene.start).unwrap(), Arc::default());
+    let log = Arc::clone(&drives);
+    let make = move || Offered::Rig(Box::new(Spy(plant.clone(), Arc::clone(&log))));
+    let running = Running::start(address, service(scene, silence), None, make);
+    Served {
+        address: running.address,
+        running,
+        scene: scene.clone(),
+        drives,
+    }
 }
 
 /// Serves any controller.
-fn serve_controller<C: Controller + Clone + Send + 'static>(scene: &Scene, silence: f64, controller: C) -> Served {
-    let (role, sample_time) = (Role::Controller, scene.sample_time());
+fn serve_controller(scene: &Scene, silence: f64, controller: impl Controller + Clone + Send + 'static) -> Served {
+    let service = Service { role: Role::Controller, ..service(scene, silence) };
     let make = move || Offered::Controller(Box::new(controller.clone()));
-    Served::start(Address::Tcp, Service { role, sample_time, silence }, make)
+    let running = Running::start(Address::Tcp, service, None, make);
+    let (scene, drives) = (scene.clone(), Arc::default());
+    Served { address: running.address, running, scene, drives }
 }
 
 /// Serves the controller of the scene.
@@ -103,22 +101,18 @@ fn serve_built_in(scene: &Scene) -> Served {
     serve_controller(scene, 5.0, BuiltIn::new(&scene.controller_config()).unwrap())
 }
 
-/// The drives of a rig.
-#[derive(Clone, Default)]
-struct Log(Arc<Mutex<Vec<Drive>>>);
+/// A controller that answers with a function of the response.
+#[derive(Clone)]
+struct Answers<F>(F);
 
-impl Log {
-    fn all(&self) -> Vec<Drive> {
-        self.0.lock().unwrap().clone()
-    }
-
-    fn last(&self) -> Drive {
-        *self.all().last().unwrap()
+impl<F: FnMut(f64) -> Command> Controller for Answers<F> {
+    fn sample(&mut self, sensors: Sensors, _: bool) -> Result<Command, ControllerError> {
+        Ok(self.0(sensors.response))
     }
 }
 
 /// A plant that logs its drives.
-struct Spy(Simulated, Log);
+struct Spy(Simulated, Arc<Mutex<Vec<Drive>>>);
 
 impl RigStage for Spy {
     fn inner(&mut self) -> &mut dyn Rig {
@@ -126,12 +120,12 @@ impl RigStage for Spy {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.1.0.lock().unwrap().push(drive);
+        self.1.lock().unwrap().push(drive);
         self.0.advance(drive, step)
     }
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.1.0.lock().unwrap().push(drive);
+        self.1.lock().unwrap().push(drive);
         self.0.hold(drive, step)
     }
 }
@@ -142,12 +136,12 @@ fn drive(sample: usize) -> Drive {
     Drive { omega, amplitude: 1e-4, displacement: 0.0 }
 }
 
-/// Drives a rig in open loop for some samples.
-fn shake(rig: &mut dyn Rig, scene: &Scene, samples: usize) -> Result<(), RigError> {
+/// Drives a rig in open loop for some samples of the default scene.
+fn shake(rig: &mut dyn Rig, samples: usize) -> Result<(), RigError> {
     (0..samples).try_for_each(|n| {
         rig.sense()?;
         rig.ground_truth()?;
-        rig.advance(drive(n), scene.sample_time())
+        rig.advance(drive(n), SCENE.sample_time())
     })
 }
 

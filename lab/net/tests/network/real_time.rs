@@ -2,7 +2,7 @@
 //!
 //! A busy machine misses deadlines now and then. The tests assert only what must hold nevertheless.
 
-use std::net::{SocketAddr, UdpSocket};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, sleep};
@@ -11,38 +11,35 @@ use std::time::Duration;
 use vines_net::frame::{Frame, Kind};
 use vines_net::{Address, Counters, Ended, LinkError, NetRig, RAMP_SAMPLES, ReportLost, Session, Timing};
 use vines_testbench::experiment::{self, ExperimentError};
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Rig, Sensors};
+use vines_testbench::rig::{Command, Drive, Rig};
 
-use crate::{PATIENT, drive, link_error, scene, serve_controller, serve_rig, shake};
+use crate::fixture::socket;
+use crate::{Answers, PATIENT, SCENE, drive, link_error, serve_controller, serve_rig, shake};
 
 /// Treatment of a datagram by a proxy.
 #[derive(Clone, Copy)]
 enum Fate {
-    Pass,
-    Lose,
-    Repeat,
+    /// Passes as so many datagrams; 0: it is lost.
+    Pass(u64),
     /// Delayed until the next one in the same direction has passed.
     Swap,
     /// Some bits are inverted.
     Corrupt,
     /// Passes; another sender sends a copy, too.
     Copy,
-    /// Passes with changed content and a correct checksum.
-    Rewrite(fn(&mut Frame)),
 }
 
-/// A proxy before `server` that ends when the second value is dropped. `fate` determines the treatment of the n-th frame in a direction;
-/// handshake and farewell pass.
-fn proxy(server: SocketAddr, mut fate: impl FnMut(Kind, u64) -> Fate + Send + 'static) -> (Address, Arc<()>) {
-    let [front, back, stranger] = [(); 3].map(|()| {
-        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+/// A proxy before `server` that ends when the second value is dropped. `fate` determines the treatment of the n-th frame in a direction, and
+/// may change its content; the checksum is then correct. Handshake and farewell pass.
+fn proxy(server: SocketAddr, mut fate: impl FnMut(&mut Frame, u64) -> Fate + Send + 'static) -> (Address, Arc<()>) {
+    let [front, back, stranger] = [(); 3].map(|()| socket());
+    for socket in [&front, &back] {
         socket.set_nonblocking(true).unwrap();
-        socket
-    });
+    }
     let (address, used) = (Address::Udp(front.local_addr().unwrap()), Arc::new(()));
     let is_used = Arc::clone(&used);
     thread::spawn(move || {
-        let (mut client, mut count, mut kept) = (server, [0; 2], [None, None]);
+        let (mut client, mut count, mut kept) = (server, [0; 2], [None; 2]);
         while Arc::strong_count(&is_used) > 1 {
             for (direction, at, via) in [(0, &front, &back), (1, &back, &front)] {
                 let mut bytes = [0; 256];
@@ -50,34 +47,24 @@ fn proxy(server: SocketAddr, mut fate: impl FnMut(Kind, u64) -> Fate + Send + 's
                     continue;
                 };
                 client = if direction == 0 { from } else { client };
-                let (to, bytes) = (if direction == 0 { server } else { client }, &mut bytes[..size]);
-                let send = |bytes: &[u8]| assert_eq!(via.send_to(bytes, to).unwrap(), bytes.len());
-                let mut frame = Frame::decode(bytes).unwrap();
-                if !matches!(frame.kind, Kind::Sensors | Kind::Drive | Kind::Report) {
-                    send(bytes);
-                    continue;
+                let to = if direction == 0 { server } else { client };
+                let mut frame = Frame::decode(&bytes[..size]).unwrap();
+                let (mut treatment, mut held) = (Fate::Pass(1), None);
+                if matches!(frame.kind, Kind::Sensors | Kind::Drive | Kind::Report) {
+                    (treatment, held) = (fate(&mut frame, count[direction]), kept[direction].take());
+                    count[direction] += 1;
                 }
-                let held: Option<Vec<u8>> = kept[direction].take();
-                match fate(frame.kind, count[direction]) {
-                    Fate::Pass => send(bytes),
-                    Fate::Lose => {}
-                    Fate::Repeat => (0..2).for_each(|_| send(bytes)),
-                    Fate::Swap => kept[direction] = Some(bytes.to_vec()),
-                    Fate::Corrupt => {
-                        bytes[37] ^= 0x50;
-                        send(bytes);
-                    }
-                    Fate::Copy => {
-                        stranger.send_to(bytes, to).unwrap();
-                        send(bytes);
-                    }
-                    Fate::Rewrite(change) => {
-                        change(&mut frame);
-                        send(&frame.encode());
-                    }
+                let mut bytes = frame.encode();
+                let mut copies = 1;
+                match treatment {
+                    Fate::Pass(number) => copies = number,
+                    Fate::Swap => (copies, kept[direction]) = (0, Some(bytes)),
+                    Fate::Corrupt => bytes[37] ^= 0x50,
+                    Fate::Copy => drop(stranger.send_to(&bytes, to).unwrap()),
                 }
-                count[direction] += 1;
-                held.iter().for_each(|held| send(held));
+                for bytes in (0..copies).map(|_| bytes).chain(held) {
+                    assert_eq!(via.send_to(&bytes, to).unwrap(), bytes.len());
+                }
             }
             sleep(Duration::from_micros(20));
         }
@@ -94,15 +81,14 @@ struct Run {
 }
 
 impl Run {
-    fn through(fate: impl FnMut(Kind, u64) -> Fate + Send + 'static) -> Self {
-        let scene = scene(&[]);
-        let (server, log) = serve_rig(Address::Udp, &scene, PATIENT);
+    fn through(fate: impl FnMut(&mut Frame, u64) -> Fate + Send + 'static) -> Self {
+        let server = serve_rig(Address::Udp, &SCENE, PATIENT);
         let (address, _used) = proxy(server.address.socket(), fate);
-        let mut rig = NetRig::connect(address, scene.sample_time(), None).unwrap();
-        shake(&mut rig, &scene, 400).unwrap();
+        let mut rig = NetRig::connect(address, SCENE.sample_time(), None).unwrap();
+        shake(&mut rig, 400).unwrap();
         let (client, timing) = (rig.counters(), rig.timing());
         drop(rig);
-        let (session, drives) = (server.session(), log.all());
+        let (session, drives) = (server.session(), server.drives());
         println!("client: {client}\n{session}\n{timing:?}");
         assert_eq!(session.ended, Ended::Farewell);
         assert!(session.samples >= 399);
@@ -117,7 +103,7 @@ impl Run {
 
 #[test]
 fn the_rig_keeps_its_rate_and_reports_the_lateness_of_its_samples() {
-    let Run { session, drives, report, .. } = Run::through(|_, _| Fate::Pass);
+    let Run { session, drives, report, .. } = Run::through(|_, _| Fate::Pass(1));
     let timing = session.timing.unwrap();
     // However busy the machine is, the samples are as late as the report says.
     let late = session.seconds - session.samples as f64 * session.sample_time;
@@ -135,18 +121,20 @@ fn the_rig_keeps_its_rate_and_reports_the_lateness_of_its_samples() {
     assert_eq!(drives.last().unwrap().amplitude, 0.0);
     let steps = drives.windows(2).map(|pair| pair[0].amplitude - pair[1].amplitude);
     assert!(steps.fold(0.0, f64::max) < 1.5e-4 / f64::from(RAMP_SAMPLES));
+    let text = Session { samples: 0, seconds: 0.0, ..session }.to_string();
+    assert!(text.contains("0 samples in 0.000 s: 0.0 per second"), "{text}");
 }
 
 #[test]
 fn lost_late_repeated_corrupted_and_foreign_frames_are_counted_and_what_is_missing_is_held() {
-    let run = Run::through(|kind, n| match (kind, n % 16) {
-        (Kind::Report, _) => Fate::Pass,
-        (_, 2) => Fate::Lose,
+    let run = Run::through(|frame, n| match (frame.kind, n % 16) {
+        (Kind::Report, _) => Fate::Pass(1),
+        (_, 2) => Fate::Pass(0),
         (_, 5) => Fate::Swap,
-        (_, 8) => Fate::Repeat,
+        (_, 8) => Fate::Pass(2),
         (_, 11) => Fate::Corrupt,
         (_, 14) => Fate::Copy,
-        _ => Fate::Pass,
+        _ => Fate::Pass(1),
     });
     let [client, server] = run.counters;
     for Counters { late, malformed, held, .. } in [client, server] {
@@ -161,12 +149,10 @@ fn a_report_that_is_lost_is_sent_again_even_after_the_session_and_one_that_never
     // Twelve repetitions take 0.6 s; the session ends after a ramp of 0.11 s.
     let report = |lost: u64| {
         let mut reports = 0;
-        let run = Run::through(move |kind, _| {
-            reports += u64::from(kind == Kind::Report);
-            match kind {
-                Kind::Report if reports <= lost => Fate::Lose,
-                _ => Fate::Pass,
-            }
+        let run = Run::through(move |frame, _| {
+            let is_report = frame.kind == Kind::Report;
+            reports += u64::from(is_report);
+            Fate::Pass(u64::from(!is_report || reports > lost))
         });
         run.report.unwrap()
     };
@@ -176,13 +162,16 @@ fn a_report_that_is_lost_is_sent_again_even_after_the_session_and_one_that_never
 
 #[test]
 fn an_invalid_drive_or_one_of_a_future_sample_is_refused_and_the_last_valid_one_held() {
-    let run = Run::through(|kind, n| match (kind, n % 30) {
-        (Kind::Drive, 5) => Fate::Rewrite(|frame| frame.values[1] = f64::NAN),
-        (Kind::Drive, 10) => Fate::Rewrite(|frame| frame.values[1] = 1e3),
-        (Kind::Drive, 15) => Fate::Rewrite(|frame| frame.values[0] = 1e9),
-        (Kind::Drive, 20) => Fate::Rewrite(|frame| frame.sequence = u64::MAX),
-        (Kind::Drive, 25) => Fate::Rewrite(|frame| frame.sequence += 1000),
-        _ => Fate::Pass,
+    let run = Run::through(|frame, n| {
+        match (frame.kind, n % 30) {
+            (Kind::Drive, 5) => frame.values[1] = f64::NAN,
+            (Kind::Drive, 10) => frame.values[1] = 1e3,
+            (Kind::Drive, 15) => frame.values[0] = 1e9,
+            (Kind::Drive, 20) => frame.sequence = u64::MAX,
+            (Kind::Drive, 25) => frame.sequence += 1000,
+            _ => {}
+        }
+        Fate::Pass(1)
     });
     let [_, server] = run.counters;
     assert!(server.malformed >= 60 && server.held >= 60, "{server}");
@@ -192,22 +181,17 @@ fn an_invalid_drive_or_one_of_a_future_sample_is_refused_and_the_last_valid_one_
 
 #[test]
 fn neither_garbage_nor_a_repeated_hello_keeps_a_session_without_a_drive() {
-    let scene = scene(&[]);
-    let (server, _) = serve_rig(Address::Udp, &scene, PATIENT);
-    let client = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let server = serve_rig(Address::Udp, &SCENE, PATIENT);
+    let client = socket();
     client.connect(server.address.socket()).unwrap();
     let mut hello = Frame::new(Kind::Hello, 1);
-    hello.values[0] = scene.sample_time();
+    hello.values[0] = SCENE.sample_time();
     let stop = AtomicBool::new(false);
     let session = thread::scope(|scope| {
         scope.spawn(|| {
             for n in (0_u64..).take_while(|_| !stop.load(Ordering::Relaxed)) {
-                let bytes = if n.is_multiple_of(1000) {
-                    hello.encode()
-                } else {
-                    [0; 84]
-                };
-                let _ = client.send(&bytes);
+                let is_hello = n.is_multiple_of(1000);
+                let _ = client.send(&if is_hello { hello.encode() } else { [0; 84] });
                 sleep(Duration::from_micros(500));
             }
         });
@@ -221,99 +205,82 @@ fn neither_garbage_nor_a_repeated_hello_keeps_a_session_without_a_drive() {
 
 #[test]
 fn a_silence_shuts_the_drive_down_until_another_session_and_a_client_that_returns_is_informed() {
-    let scene = scene(&[]);
-    let (server, log) = serve_rig(Address::Udp, &scene, 0.3);
-    let mut rig = server.rig(&scene);
-    shake(&mut rig, &scene, 50).unwrap();
+    let server = serve_rig(Address::Udp, &SCENE, 0.3);
+    let mut rig = server.rig();
+    shake(&mut rig, 50).unwrap();
     let session = server.session();
     assert_eq!(session.ended, Ended::Silence);
     assert!(session.counters.unwrap().held as f64 * session.sample_time > 0.3);
-    let drives = log.all();
+    let drives = server.drives();
     let held = drives.iter().filter(|given| **given == drive(49)).count();
     assert!(held as f64 * session.sample_time > 0.29, "{held}");
-    assert_eq!(drives.last().unwrap().amplitude, 0.0);
+    assert_eq!(server.last().amplitude, 0.0);
 
-    let error = (0..).find_map(|_| shake(&mut rig, &scene, 1).err()).unwrap();
-    let informed = matches!(
-        link_error(&error),
-        LinkError::ShutDown { .. } | LinkError::Silent { .. }
-    );
+    let error = (0..).find_map(|_| shake(&mut rig, 1).err()).unwrap();
+    let cause = link_error(&error);
+    let informed = matches!(cause, LinkError::ShutDown { .. } | LinkError::Silent { .. });
     assert!(informed && error.to_string().contains("0.3 s"), "{error}");
     // Latched: no frame of this client moves the rig again.
-    let _ = rig.advance(drive(51), scene.sample_time());
+    let _ = rig.advance(drive(51), SCENE.sample_time());
     sleep(Duration::from_millis(50));
-    assert_eq!(log.all().len(), drives.len());
+    assert_eq!(server.drives().len(), drives.len());
     // Another session does.
-    let mut next = server.rig(&scene);
-    shake(&mut next, &scene, 20).unwrap();
-    assert_eq!(log.all()[drives.len()], drive(0));
+    let mut next = server.rig();
+    shake(&mut next, 20).unwrap();
+    assert_eq!(server.drives()[drives.len()], drive(0));
     drop(next);
     assert_eq!(server.session().ended, Ended::Farewell);
 }
 
 #[test]
 fn a_rig_that_stops_answering_ends_the_experiment() {
-    let scene = scene(&[]);
-    let (server, _) = serve_rig(Address::Udp, &scene, 0.3);
-    let (address, _used) = proxy(server.address.socket(), |kind, n| match kind {
-        Kind::Sensors if n >= 50 => Fate::Lose,
-        _ => Fate::Pass,
-    });
-    let mut rig = NetRig::connect(address, scene.sample_time(), None).unwrap();
-    let error = shake(&mut rig, &scene, 100).unwrap_err();
+    let server = serve_rig(Address::Udp, &SCENE, 0.3);
+    let answers = |frame: &mut Frame, n| Fate::Pass(u64::from(frame.kind != Kind::Sensors || n < 50));
+    let (address, _used) = proxy(server.address.socket(), answers);
+    let mut rig = NetRig::connect(address, SCENE.sample_time(), None).unwrap();
+    let error = shake(&mut rig, 100).unwrap_err();
     assert!(matches!(link_error(&error), LinkError::Silent { .. }), "{error}");
 }
 
 #[test]
 fn a_client_that_falls_behind_is_shut_down_and_no_drive_older_than_the_silence_is_applied() {
-    let (scene, silence) = (scene(&[]), 0.2);
-    let (server, log) = serve_rig(Address::Udp, &scene, silence);
-    let mut rig = server.rig(&scene);
+    let (step, silence) = (SCENE.sample_time(), 0.2);
+    let server = serve_rig(Address::Udp, &SCENE, silence);
+    let mut rig = server.rig();
     // Every answer is valid and arrives soon after the one before, but each takes two sample periods.
-    let slow = Duration::from_secs_f64(2.0 * scene.sample_time());
     let outcome = (0..2000).try_for_each(|n| {
         rig.sense()?;
-        sleep(slow);
-        rig.advance(drive(n), scene.sample_time())
+        sleep(Duration::from_secs_f64(2.0 * step));
+        rig.advance(drive(n), step)
     });
     let error = outcome.unwrap_err();
     assert!(matches!(link_error(&error), LinkError::ShutDown { .. }), "{error}");
     assert_eq!(server.session().ended, Ended::Silence);
-    let oldest = (silence / scene.sample_time()).ceil() + 1.0;
-    for (n, had) in log.all().iter().enumerate() {
+    let oldest = (silence / step).ceil() + 1.0;
+    for (n, had) in server.drives().iter().enumerate() {
         let age = n as f64 - 1024.0 * (had.omega - 50.0);
         assert!(had.amplitude < 1e-4 || age <= oldest, "sample {n}: {age} samples old");
     }
 }
 
-/// A controller that answers this many readings, and hangs at the next.
-#[derive(Clone, Copy)]
-struct StopsAt(usize);
-
-impl Controller for StopsAt {
-    fn sample(&mut self, _: Sensors, _: bool) -> Result<Command, ControllerError> {
-        if self.0 == 0 {
-            sleep(Duration::from_secs(2));
-        }
-        self.0 = self.0.saturating_sub(1);
-        Ok(Command { drive: drive(self.0), ..Command::default() })
-    }
-}
-
 #[test]
 fn a_controller_that_stops_answering_ramps_the_drive_of_the_rig_down() {
-    let scene = scene(&[]);
-    let (rig_server, log) = serve_rig(Address::Udp, &scene, PATIENT);
-    let controller_server = serve_controller(&scene, 10.0, StopsAt(200));
-    let (mut rig, mut peer) = (rig_server.rig(&scene), controller_server.controller(&scene, Some(0.5)));
-    let outcome = experiment::run(&mut rig, &mut peer, &scene, |_, _, _| {});
-    let Err(ExperimentError::Controller(error)) = outcome else {
-        panic!("{outcome:?}");
-    };
-    println!("{error}");
-    drop(rig);
+    let rig_server = serve_rig(Address::Udp, &SCENE, PATIENT);
+    // It answers 200 readings, and hangs at the next.
+    let mut left = 200_usize;
+    let stops = Answers(move |_| {
+        if left == 0 {
+            sleep(Duration::from_secs(2));
+        }
+        left = left.saturating_sub(1);
+        Command { drive: drive(left), ..Command::default() }
+    });
+    let controller_server = serve_controller(&SCENE, 10.0, stops);
+    let (mut rig, mut peer) = (rig_server.rig(), controller_server.controller(Some(0.5)));
+    let outcome = experiment::run(&mut rig, &mut peer, &SCENE, |_, _, _| {});
+    assert!(matches!(outcome, Err(ExperimentError::Controller(_))), "{outcome:?}");
+    drop((rig, peer));
     assert_eq!(rig_server.session().ended, Ended::Farewell);
-    let drives = log.all();
-    assert!(drives.iter().any(|had| had.amplitude > 9e-5));
-    assert_eq!(drives.last().unwrap().amplitude, 0.0);
+    assert!(rig_server.drives().iter().any(|had| had.amplitude > 9e-5));
+    assert_eq!(rig_server.last().amplitude, 0.0);
 }

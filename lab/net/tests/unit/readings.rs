@@ -93,27 +93,24 @@ impl Interrupted {
         self.drive = (drive, holds, step);
         self.readings.advance(drive.omega * step / TAU);
         self.at += 1;
-        if self.gap.contains(&(self.at - 1)) {
-            Ok(())
-        } else {
-            self.apply()
-        }
+        let is_lost = self.gap.contains(&(self.at - 1));
+        if is_lost { Ok(()) } else { self.apply() }
     }
 }
 
 impl Rig for Interrupted {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let mut counters = Counters::default();
-        if self.at == self.gap.start {
-            for _ in self.gap.clone() {
+        let Range { start, end } = self.gap;
+        if self.at == start {
+            for _ in start..end {
                 self.rig.sense()?;
                 self.apply()?;
             }
-            let reading = measured(self.rig.sense()?);
-            self.readings.arrive(self.gap.end, reading, &mut counters);
-        } else if !self.gap.contains(&self.at) && self.at != self.gap.end {
-            let reading = measured(self.rig.sense()?);
-            self.readings.arrive(self.at, reading, &mut counters);
+        }
+        if self.at <= start || self.at > end {
+            let number = if self.at == start { end } else { self.at };
+            self.readings.arrive(number, measured(self.rig.sense()?), &mut counters);
         }
         Ok(self.readings.take(&mut counters).expect("there is a reading").sensors)
     }
