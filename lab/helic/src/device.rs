@@ -25,9 +25,7 @@ const PARAMETERS: &str = "firmware c16, experiment c16, sample_freq f, ticks I, 
 /// The sources of a stream, with their units, as GetSources answers. A rig without a base sensor has no `reference`.
 const SOURCES: &str =
     "response\0mm\0reference\0mm\0target\0V\0forcing\0V\0table\0V\0phase\0turns\0out\0V\0cmd_epoch\0count\0";
-/// Base displacement per volt of the output, mm.
-const GAIN: f64 = 1.0;
-/// m per mm.
+/// m per mm, and base displacement, m, per volt of the output: `rig_gain` is 1 mm/V.
 const MILLI: f64 = 1e-3;
 /// Turns of the phase accumulator per turn of the phase.
 const TURN: f64 = 4_294_967_296.0;
@@ -106,8 +104,8 @@ impl Device {
             device.values(name).splice(..text.len(), text.bytes().map(f64::from));
         }
         device.values("sample_freq")[0] = device.sample_rate;
-        device.values("rig_gain")[0] = GAIN;
-        device.values("rig_out_max")[0] = max_amplitude / (GAIN * MILLI);
+        device.values("rig_gain")[0] = 1.0;
+        device.values("rig_out_max")[0] = max_amplitude / MILLI;
         Ok(device)
     }
 
@@ -139,29 +137,26 @@ impl Device {
         Frame { kind, sequence, payload }
     }
 
-    fn answer(&mut self, kind: u8, mut payload: &[u8], uptime: u32) -> Result<Vec<u8>, ErrorCode> {
+    fn answer(&mut self, kind: u8, payload: &[u8], uptime: u32) -> Result<Vec<u8>, ErrorCode> {
         let (all, done) = (self.sources.matches('\0').count() / 2, |()| Vec::new());
-        let length = match kind {
-            message::GET_SOURCES | message::STREAM_STOP | message::STATUS => 0,
-            message::GET_PARAMS | message::STREAM_START => 2,
-            _ => payload.len(),
-        };
-        require(payload.len() == length, ErrorCode::BadLength)?;
-        match kind {
-            message::GET_PARAMS => self.page(u16::from_le_bytes(take(&mut payload)?)),
-            message::GET_SOURCES => Ok(self.sources.clone().into()),
-            message::GET_PAR => self.read(payload),
-            message::SET_PAR => self.set(payload).map(done),
-            message::STREAM_SETUP => self.set_up(payload, all).map(done),
-            message::STREAM_START => self.start(u16::from_le_bytes(take(&mut payload)?)).map(done),
-            message::STREAM_STOP => {
+        match (kind, payload) {
+            (message::GET_PARAMS, &[low, high]) => self.page(u16::from_le_bytes([low, high])),
+            (message::GET_SOURCES, []) => Ok(self.sources.clone().into()),
+            (message::GET_PAR, indices) => self.read(indices),
+            (message::SET_PAR, setting) => self.set(setting).map(done),
+            (message::STREAM_SETUP, setup) => self.set_up(setup, all).map(done),
+            (message::STREAM_START, &[low, high]) => self.start(u16::from_le_bytes([low, high])).map(done),
+            (message::STREAM_STOP, []) => {
                 self.port = None;
                 Ok(Vec::new())
             }
-            message::STATUS => {
+            (message::STATUS, []) => {
                 let [low, high] = (self.parameters.len() as u16).to_le_bytes();
                 let sample_rate = (self.sample_rate as f32).to_le_bytes();
                 Ok([[VERSION, low, high, all as u8], sample_rate, uptime.to_le_bytes()].concat())
+            }
+            (message::GET_PARAMS | message::GET_SOURCES | message::STREAM_START..=message::STATUS, _) => {
+                Err(ErrorCode::BadLength)
             }
             _ => Err(ErrorCode::UnknownType),
         }
@@ -249,11 +244,9 @@ impl Device {
         let decimation = u64::from(packet.decimation);
         let (records, since) = (self.samples / decimation + 1, self.samples % decimation);
         if since == 0 {
-            packet.first = if packet.values.is_empty() {
-                self.ticks
-            } else {
-                packet.first
-            };
+            if packet.values.is_empty() {
+                packet.first = self.ticks;
+            }
             let read = |source: &u8| values[usize::from(*source)] as f32;
             packet.values.extend(self.streamed.iter().map(read));
         }
@@ -294,7 +287,7 @@ impl Device {
         let sensors = sensors.map(|length| length / MILLI);
         let values: Vec<f64> = sensors.chain([target, forcing, 0.0, turns, out, epoch]).collect();
         let packet = self.record(&values);
-        let displacement = out * GAIN * MILLI;
+        let displacement = out * MILLI;
         self.rig.hold(Drive { displacement, ..Drive::default() }, step)?;
         let turn = self.values("freq")[0] * step * TURN;
         self.phase = phase.wrapping_add(turn.round() as u32);
@@ -323,14 +316,6 @@ fn series(coefficients: &[f64], phase: u32) -> [f64; 2] {
 /// Port of the control channel; the stream has the next one.
 pub const DEFAULT_PORT: u16 = 2350;
 
-/// The server of a device, one host at a time.
-pub struct HelicServer {
-    control: TcpListener,
-    stream: UdpSocket,
-    device: Device,
-    sample_time: f64,
-}
-
 /// The connection to a host: what has arrived of its next request, and since when it is there.
 struct Connection {
     control: TcpStream,
@@ -349,74 +334,70 @@ impl Connection {
     }
 }
 
-impl HelicServer {
-    /// Listens on `address` (TCP), and sends the stream from the next port. With port 0 the system chooses both ports.
-    pub fn listen(address: SocketAddr, device: Device, sample_time: f64) -> io::Result<Self> {
-        let control = TcpListener::bind(address)?;
-        control.set_nonblocking(true)?;
-        // A host on this machine may use the next port itself.
-        let any_port = address.port() == 0 || is_loopback(address.ip());
-        let port = if any_port { 0 } else { address.port().saturating_add(1) };
-        let stream = UdpSocket::bind((address.ip(), port))?;
-        stream.set_nonblocking(true)?;
-        Ok(Self { control, stream, device, sample_time })
-    }
+/// The sockets of a server: the control channel listens on `address` (TCP), and the stream is sent from the next port. With port 0 the
+/// system chooses both ports.
+pub fn listen(address: SocketAddr) -> io::Result<(TcpListener, UdpSocket)> {
+    let control = TcpListener::bind(address)?;
+    control.set_nonblocking(true)?;
+    // A host on this machine may use the next port itself.
+    let any_port = address.port() == 0 || is_loopback(address.ip());
+    let port = if any_port { 0 } else { address.port().saturating_add(1) };
+    let stream = UdpSocket::bind((address.ip(), port))?;
+    stream.set_nonblocking(true)?;
+    Ok((control, stream))
+}
 
-    /// Address of the control channel.
-    pub fn address(&self) -> io::Result<SocketAddr> {
-        self.control.local_addr()
-    }
-
-    /// Serves until `stop` returns true. `report` receives the report when a host has left.
-    pub fn serve(
-        &mut self,
-        mut stop: impl FnMut() -> bool,
-        mut report: impl FnMut(&Session),
-    ) -> Result<(), ServerError> {
-        let Self { control, stream, device, sample_time } = self;
-        let mut clock = RealTimeClock::start(*sample_time);
-        let mut host: Option<Connection> = None;
-        let mut tick = 0;
-        loop {
-            let stopped = stop();
-            if host.is_none()
-                && let Ok((control, peer)) = control.accept()
-            {
-                control.set_nodelay(true)?;
-                control.set_nonblocking(true)?;
-                clock.forget();
-                let (request, opened) = (Vec::new(), Instant::now());
-                host = Some(Connection { control, peer, request, opened });
-            }
-            let uptime = clock.due(0).elapsed().as_millis() as u32;
-            let failed = host.as_mut().and_then(|host| host.exchange(device, uptime).err());
-            let left = failed.is_some_and(|error| error.kind() != ErrorKind::WouldBlock);
-            if let Some(Connection { peer, opened, .. }) = host.take_if(|_| left || stopped) {
-                device.disconnect();
-                let timing = clock.timing(0);
-                report(&Session {
-                    peer,
-                    ended: if left { Ended::Farewell } else { Ended::Stopped },
-                    samples: timing.samples,
-                    sample_time: *sample_time,
-                    seconds: opened.elapsed().as_secs_f64(),
-                    timing: Some(timing),
-                    histogram: clock.classes(),
-                    counters: None,
-                });
-            }
-            if stopped {
-                return Ok(());
-            }
-            while Instant::now() >= clock.due(tick + 1) {
-                tick += 1;
-                clock.serve(tick);
-                if let (Some((port, bytes)), Some(host)) = (device.tick()?, &host) {
-                    // A packet that cannot be sent now counts as lost in the network.
-                    let _ = stream.send_to(&bytes, (host.peer.ip(), port));
-                }
-            }
-            thread::sleep(clock.due(tick + 1).saturating_duration_since(Instant::now()).min(POLL));
+/// Serves `device`, sampled every `sample_time`, s, at the sockets of [`listen`] until `stop` returns true, one host at a time. `report`
+/// receives the report when a host has left.
+pub fn serve(
+    (control, stream): (TcpListener, UdpSocket),
+    mut device: Device,
+    sample_time: f64,
+    mut stop: impl FnMut() -> bool,
+    mut report: impl FnMut(&Session),
+) -> Result<(), ServerError> {
+    let mut clock = RealTimeClock::start(sample_time);
+    let mut host: Option<Connection> = None;
+    let mut tick = 0;
+    loop {
+        let stopped = stop();
+        if host.is_none()
+            && let Ok((control, peer)) = control.accept()
+        {
+            control.set_nodelay(true)?;
+            control.set_nonblocking(true)?;
+            clock.forget();
+            let (request, opened) = (Vec::new(), Instant::now());
+            host = Some(Connection { control, peer, request, opened });
         }
+        let uptime = clock.due(0).elapsed().as_millis() as u32;
+        let failed = host.as_mut().and_then(|host| host.exchange(&mut device, uptime).err());
+        let left = failed.is_some_and(|error| error.kind() != ErrorKind::WouldBlock);
+        if let Some(Connection { peer, opened, .. }) = host.take_if(|_| left || stopped) {
+            device.disconnect();
+            let timing = clock.timing(0);
+            report(&Session {
+                peer,
+                ended: if left { Ended::Farewell } else { Ended::Stopped },
+                samples: timing.samples,
+                sample_time,
+                seconds: opened.elapsed().as_secs_f64(),
+                timing: Some(timing),
+                histogram: clock.classes(),
+                counters: None,
+            });
+        }
+        if stopped {
+            return Ok(());
+        }
+        while Instant::now() >= clock.due(tick + 1) {
+            tick += 1;
+            clock.serve(tick);
+            if let (Some((port, bytes)), Some(host)) = (device.tick()?, &host) {
+                // A packet that cannot be sent now counts as lost in the network.
+                let _ = stream.send_to(&bytes, (host.peer.ip(), port));
+            }
+        }
+        thread::sleep(clock.due(tick + 1).saturating_duration_since(Instant::now()).min(POLL));
     }
 }

@@ -1,5 +1,5 @@
 //! The control protocol of [helic-daq](https://github.com/dawbarton/helic-daq), version 3: a rig as one of its devices ([`Device`],
-//! [`HelicServer`]), and its devices as rigs ([`HelicRig`]).
+//! [`serve`]), and its devices as rigs ([`HelicRig`]).
 //!
 //! Source of all facts: `docs/protocol.md` of that project.
 #![doc = include_str!("../README.md")]
@@ -10,4 +10,4 @@ pub mod codec;
 mod device;
 
 pub use client::{HelicRig, LONGEST_SILENCE, Network, Transport};
-pub use device::{DEFAULT_PORT, Device, HelicServer};
+pub use device::{DEFAULT_PORT, Device, listen, serve};

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use vines::ArgumentError;
 use vines::fmu::FmuRig;
-use vines::helic::{Device, HelicServer};
+use vines::helic::{self, Device};
 use vines::net::{Address, LinkError, Role, Served, Server, ServerError, Service, Session, resolve};
 use vines::rig::{BuiltIn, Rig, RigError, RigFault, SensorsOnly, Simulated, faulty};
 
@@ -274,11 +274,11 @@ impl ServingArguments {
         no_key(scope)?;
         let address = resolve(&self.listen, scope)?;
         let listen = |source| LinkError::Listen { address: Address::Tcp(address), source };
-        let mut server = HelicServer::listen(address, device, sample_time).map_err(listen)?;
+        let sockets = helic::listen(address).map_err(listen)?;
         let what = format!("helic device, {:.1} samples per second, on", 1.0 / sample_time);
-        let address = server.address().map_err(Failure::run)?;
+        let address = sockets.0.local_addr().map_err(Failure::run)?;
         self.run(&format!("{what} helic://{address}"), |stop, report_session| {
-            server.serve(stop, report_session)
+            helic::serve(sockets, device, sample_time, stop, report_session)
         })
     }
 

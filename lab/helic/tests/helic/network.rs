@@ -9,7 +9,7 @@ use std::thread::{self, JoinHandle, sleep};
 use std::time::Duration;
 
 use vines_helic::codec::{Frame, message};
-use vines_helic::{HelicRig, HelicServer, Network, Transport};
+use vines_helic::{HelicRig, Network, Transport, listen, serve};
 use vines_net::{Ended, Session};
 use vines_testbench::rig::{Drive, Rig, RigError};
 use vines_testbench::scene::Names;
@@ -34,11 +34,11 @@ impl Served {
         let (flag, rig, (tell, told)) = (Arc::clone(&stop), base.clone(), std::sync::mpsc::channel());
         let thread = thread::spawn(move || {
             let (address, step) = (([127, 0, 0, 1], 0).into(), scene().sample_time());
-            let mut server = HelicServer::listen(address, rig.device(1e-2), step).unwrap();
-            tell.send(server.address().unwrap()).unwrap();
+            let sockets = listen(address).unwrap();
+            tell.send(sockets.0.local_addr().unwrap()).unwrap();
             let mut sessions = Vec::new();
             let report = |session: &Session| sessions.push(session.clone());
-            server.serve(|| flag.load(Ordering::Relaxed), report).unwrap();
+            serve(sockets, rig.device(1e-2), step, || flag.load(Ordering::Relaxed), report).unwrap();
             sessions
         });
         Self { address: told.recv().unwrap(), base, stop, thread }
