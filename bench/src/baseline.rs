@@ -8,7 +8,6 @@ use lovines::{Drive, Parameters, State};
 use roots::{SimpleConvergency, find_root_brent};
 
 use crate::median;
-use crate::solvers::rebound;
 
 /// Points of the grid per radian of the faster of drive and free oscillation: 24 per period.
 const POINTS_PER_RADIAN: f64 = 24.0 / core::f64::consts::TAU;
@@ -18,6 +17,14 @@ const MOST_IMPACTS: u32 = 1000;
 /// The end of a chatter: impacts without end in no time.
 #[derive(Clone, Copy, Debug)]
 pub struct Stalled;
+
+/// Velocities of primary mass and particle after an impact with the velocities `v1` and `v2`.
+pub fn rebound(p: &Parameters, v1: f64, v2: f64) -> (f64, f64) {
+    let (m1, m2) = (p.primary_mass, p.particle_mass);
+    let (momentum, apart) = (m1 * v1 + m2 * v2, p.restitution * (v1 - v2));
+    let after = (momentum - m2 * apart) / (m1 + m2);
+    (after, after + apart)
+}
 
 /// The free oscillation about the particular solution: two amplitudes, by the sign of `zeta - 1`.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,9 @@
 //! The solver library diffsol: stopped by its root functions, restarted after every impact and at the end of every step.
 
+use crate::baseline::rebound;
 use crate::method::Failure;
 use crate::scene::Step;
-use crate::solvers::{Flight, Solver, acceleration, rebound};
+use crate::solvers::{Flight, Solver, acceleration};
 use diffsol::{NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason};
 
 type Matrix = NalgebraMat<f64>;

@@ -5,16 +5,9 @@ use std::marker::PhantomData;
 
 use lovines::{Drive, Parameters, State};
 
+use crate::baseline::rebound;
 use crate::method::{Failure, Method};
 use crate::scene::{Scene, Step, numbers, state};
-
-/// Velocities of primary mass and particle after an impact with the velocities `v1` and `v2`.
-pub fn rebound(p: &Parameters, v1: f64, v2: f64) -> (f64, f64) {
-    let (m1, m2) = (p.primary_mass, p.particle_mass);
-    let (momentum, apart) = (m1 * v1 + m2 * v2, p.restitution * (v1 - v2));
-    let after = (momentum - m2 * apart) / (m1 + m2);
-    (after, after + apart)
-}
 
 /// The acceleration of the primary mass under the harmonic part of `drive` at the phase `angle`.
 pub fn acceleration(p: &Parameters, drive: &Drive, angle: f64, q1: f64, v1: f64) -> f64 {
