@@ -11,7 +11,7 @@ use crate::median;
 
 /// Points of the grid per radian of the faster of drive and free oscillation: 24 per period.
 const POINTS_PER_RADIAN: f64 = 24.0 / core::f64::consts::TAU;
-/// So many impacts between two points of the grid are a stall.
+/// Number of impacts between two points of the grid from which on it is a stall.
 const MOST_IMPACTS: u32 = 1000;
 
 /// The end of a chatter: impacts without end in no time.

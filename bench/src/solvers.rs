@@ -84,7 +84,7 @@ impl<S: Solver> Method for Solved<S> {
     }
 }
 
-/// So many impacts within one step are a stall.
+/// Number of impacts within one step from which on it is a stall.
 const MOST_IMPACTS: usize = 1000;
 
 /// The classical Runge-Kutta method; a step that ends beyond a wall is cut by bisection.

@@ -161,7 +161,7 @@ impl Model {
         slopes
     }
 
-    /// The same for several knowns.
+    /// Derivatives of the unknowns by several knowns, each compared with its difference quotient.
     fn compared_by(&self, knowns: &[usize], unknowns: &[usize]) -> BTreeMap<Pair, f64> {
         let slopes = knowns
             .iter()

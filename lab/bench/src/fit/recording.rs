@@ -101,7 +101,8 @@ const SEEN: f64 = 8.0;
 const CLIPPED: f64 = 0.06;
 /// Largest relative distance of the frequency from the natural frequency near resonance.
 const FARTHEST: f64 = 0.2;
-/// Most samples in which a frequency is searched for, and number of frequencies: lines of so many samples are wider than their distance.
+/// Most samples in which a frequency is searched for, and number of frequencies: a line in the spectrum of these samples is wider than the
+/// distance of two frequencies.
 const SEARCHED: usize = 8192;
 const FREQUENCIES: usize = 4000;
 /// Relative standard uncertainty of the damping that a scene states: three of them are 30 %.

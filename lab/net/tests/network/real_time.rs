@@ -19,7 +19,7 @@ use crate::{Answers, PATIENT, SCENE, drive, link_error, serve_controller, serve_
 /// Treatment of a datagram by a proxy.
 #[derive(Clone, Copy)]
 enum Fate {
-    /// Passes as so many datagrams; 0: it is lost.
+    /// Passes as this number of equal datagrams; 0: it is lost.
     Pass(u64),
     /// Delayed until the next one in the same direction has passed.
     Swap,
