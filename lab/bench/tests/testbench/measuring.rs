@@ -438,8 +438,8 @@ fn no_motion_of_a_particle_is_a_foreign_tone() {
 
 // How fast the phase locks, and single precision.
 
-/// Bandwidths of the detector, in units of omega0, and the periods that are published for this rule of gains on such a plant.
-const LOCK_TIMES: [(f64, f64); 5] = [(0.02, 234.0), (0.05, 102.0), (0.1, 55.0), (0.2, 35.0), (0.5, 25.0)];
+/// Bandwidths of the detector, in units of omega0, and the periods to the lock of a steady motion (validation/lock_times.csv).
+const LOCK_TIMES: [(f64, f64); 5] = [(0.02, 199.0), (0.05, 82.0), (0.1, 42.0), (0.2, 31.0), (0.5, 26.0)];
 
 /// Only the phase is to settle; the largest bandwidth needs more than a hundred samples per period.
 const LOCK_TIME_SETTINGS: [&str; 5] = [
@@ -466,17 +466,19 @@ fn periods_to_settle(rig: &mut Simulated, scene: &Scene, ends: bool) -> f64 {
 }
 
 #[test]
-fn the_phase_of_a_steady_motion_locks_as_fast_as_reported_and_faster_the_wider_the_detector() {
+fn the_phase_of_a_steady_motion_locks_faster_the_wider_the_detector() {
     let mut scene = paper(&LOCK_TIME_SETTINGS);
     let start = Simulated::new(scene.plant, scene.start).unwrap();
     let mut motion = start.clone();
     periods_to_settle(&mut motion, &scene, false);
     let mut before = f64::INFINITY;
-    for (bandwidth, published) in LOCK_TIMES {
+    println!("bandwidth,from_start,from_motion");
+    for (bandwidth, periods) in LOCK_TIMES {
         scene.controller.bandwidth = bandwidth;
         let [from_start, from_motion] = [&start, &motion].map(|rig| periods_to_settle(&mut rig.clone(), &scene, true));
+        println!("{bandwidth},{from_start:.0},{from_motion:.0}");
         // The criterion counts whole periods.
-        assert!(from_motion.round() <= published + 1.0 && from_motion < before);
+        assert!(from_motion.round() <= periods + 1.0 && from_motion < before);
         // From rest the response grows and the impacts find their rhythm first, for about 15 periods.
         assert!((0.0..=20.0).contains(&(from_start - from_motion)));
         before = from_motion;
