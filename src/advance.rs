@@ -328,7 +328,7 @@ const LOWEST_HOP: f64 = 1.0 / (1u64 << 56) as f64;
 /// Relative rounding error of an acceleration that is the sum of a few terms.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Accelerations this small against `omega0² b` are zero: subnormal values carry no significant digits.
-const NOTHING: f64 = 1e-200;
+const SMALLEST_ACCELERATION: f64 = 1e-200;
 
 impl Plant {
     /// The wall that the particle touches.
@@ -436,7 +436,7 @@ impl Plant {
 
     /// Rounding error of the acceleration, m/s².
     pub(crate) fn acceleration_error(&self, velocity: f64) -> f64 {
-        let nothing = NOTHING * self.moving.system.half_width * self.moving.system.free.omega0_squared;
-        ROUNDING * (self.acceleration_bound(velocity) + self.moving.system.forces.size()) + nothing
+        let smallest = SMALLEST_ACCELERATION * self.moving.system.half_width * self.moving.system.free.omega0_squared;
+        ROUNDING * (self.acceleration_bound(velocity) + self.moving.system.forces.size()) + smallest
     }
 }

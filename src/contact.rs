@@ -6,10 +6,10 @@ use crate::parameters::Parameters;
 /// Hops that last less than this fraction of the fastest rate's time are not followed one by one.
 const SHORTEST_HOP: f64 = 1e-9;
 /// Above this coefficient of restitution a chatter has too many hops to be followed to its end.
-const LIVELY: f64 = 0.999;
+const NEARLY_ELASTIC: f64 = 0.999;
 /// Such a particle stays on the wall once its hops last less than this fraction of the fastest rate's time: its position is
 /// then known to 1.3e-13 and its velocity to 5e-7, in units of the wall's acceleration and that time.
-const SHORTEST_LIVELY_HOP: f64 = 1e-6;
+const SHORTEST_ELASTIC_HOP: f64 = 1e-6;
 
 /// A wall of the cavity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -161,7 +161,7 @@ impl ImpactLaw {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(crate) fn certainly_leaves(&self, speed: f64, largest: f64, r: &Resolution) -> bool {
         speed * speed > 2.0 * r.lowest_hop * largest
-            && (self.restitution <= LIVELY || 2.0 * speed * r.fastest > SHORTEST_LIVELY_HOP * largest)
+            && (self.restitution <= NEARLY_ELASTIC || 2.0 * speed * r.fastest > SHORTEST_ELASTIC_HOP * largest)
     }
 
     /// Whether the particle that leaves a wall at `speed` is in truth at rest on it; the wall accelerates towards it with
@@ -170,7 +170,7 @@ impl ImpactLaw {
     /// Its hops are then below resolution (height `u²/(2a)`), and they die out within `2u/(a (1 - r))`. Letting both masses
     /// move as one from now on conserves momentum exactly; what is neglected is the stiffness force on a gap of at most
     /// that height for that time, which is of third order in `u` (docs/accuracy.md). With hardly any loss they would last too
-    /// long: such a particle stays once its hops are shorter than `SHORTEST_LIVELY_HOP`. Without loss they never die out, and
+    /// long: such a particle stays once its hops are shorter than `SHORTEST_ELASTIC_HOP`. Without loss they never die out, and
     /// only a particle with no relative velocity at all is at rest.
     pub fn rests(&self, speed: f64, (pressing, error): (f64, f64), r: &Resolution) -> bool {
         if speed == 0.0 {
@@ -183,7 +183,7 @@ impl ImpactLaw {
         let over_soon = 2.0 * speed / (pressing * (1.0 - self.restitution)) <= r.longest_chatter
             || speed * r.fastest <= SHORTEST_HOP * pressing
             || self.restitution == 1.0;
-        let lively = self.restitution > LIVELY && 2.0 * speed * r.fastest <= SHORTEST_LIVELY_HOP * pressing;
-        lively || (low && over_soon)
+        let elastic = self.restitution > NEARLY_ELASTIC && 2.0 * speed * r.fastest <= SHORTEST_ELASTIC_HOP * pressing;
+        elastic || (low && over_soon)
     }
 }

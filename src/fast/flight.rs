@@ -232,10 +232,10 @@ const SHORTEST: usize = 3;
 const MOST_DIVIDED: u32 = 16;
 /// Longest stretch before a predicted contact that one bound can verify, in stretches.
 const LONGEST_STRETCH: f64 = 2.0;
-/// Up to here after a mark, in distances between points, it serves as its own point.
-const ITSELF: f64 = 0.65;
+/// Up to this time after a mark, in distances between points, the mark itself serves as the point.
+const NEAR_MARK: f64 = 0.65;
 /// Steps of Newton's method for a rough crossing.
-const ROUGHLY: u32 = 2;
+const ROUGH_ITERATIONS: u32 = 2;
 
 /// How a stretch of a march ends.
 enum Stretch {
@@ -318,7 +318,7 @@ impl FastPath {
         let (coefficients, amplitude) = (&self.coefficients, start.base.drive.amplitude);
         // Near the mark the mark itself: it needs no propagator.
         let n = match (t - from.t) / coefficients.spacing {
-            part if part < ITSELF => 0,
+            part if part < NEAR_MARK => 0,
             part => ((part + 0.5) as usize).min(POINTS),
         };
         let increment = match n {
@@ -391,7 +391,7 @@ fn crossing(target: f64, from: [f64; 3], to: [f64; 3]) -> Option<f64> {
     let gap = target - w0;
     // From behind, so that a start on this very wall is not found again.
     let mut s = if gap == 0.0 { 1.0 } else { gap / (w1 - w0) };
-    for _ in 0..ROUGHLY {
+    for _ in 0..ROUGH_ITERATIONS {
         let square = s * s;
         let value = s * ((d0 + s * a0) + square * ((c3 + s * c4) + square * c5)) - gap;
         let slope = (d0 + s * (2.0 * a0)) + square * ((3.0 * c3 + s * (4.0 * c4)) + square * (5.0 * c5));
@@ -406,8 +406,8 @@ fn crossing(target: f64, from: [f64; 3], to: [f64; 3]) -> Option<f64> {
 const MOST_POINTS: u32 = 4;
 /// Steps of Newton's method.
 const MOST_ITERATIONS: u32 = 6;
-/// Largest error that is left, relative to the time since the mark.
-const ENOUGH: f64 = 1e-16;
+/// Largest remaining error, relative to the time since the mark.
+const LARGEST_ERROR: f64 = 1e-16;
 /// Longest last step, in reaches of a Taylor polynomial: what it adds is known to second order.
 const SHORT: f64 = 1e-6;
 
@@ -535,7 +535,7 @@ impl FastPath {
             }
             // Newton's method squares the error.
             let error = ((nearby.c[0] - half) * slowness * (step * step)).abs();
-            if error <= ENOUGH * (at - from.t + h) && step.abs() <= SHORT * self.coefficients.reach {
+            if error <= LARGEST_ERROR * (at - from.t + h) && step.abs() <= SHORT * self.coefficients.reach {
                 let phasor = nearby.phasor(h + step);
                 let (y, dy) = (there.y + (h * nearby.dy + deviation), nearby.dy + gained);
                 let ddw = start.acceleration(&self.coefficients, &PhasePoint { y: from.point.y + y, dy, phasor });

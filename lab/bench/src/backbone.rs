@@ -54,9 +54,9 @@ pub struct LevelEstimate {
     pub steady: bool,
 }
 
-/// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 beside the
+/// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 near the
 /// fold, 0.03 rad change sigma at equal C by 1.1e-3.
-const BESIDE: f64 = 0.02;
+const LARGEST_PHASE_ERROR: f64 = 0.02;
 /// Delay of the impacts behind a change of the amplitude, periods: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
 /// (studies/tracking.rs).
 pub(crate) const LAG: f64 = 1.6;
@@ -83,7 +83,7 @@ impl Criterion {
     /// Whether the uncertainties are small enough, and the phase is near its target.
     pub fn is_met(&self, estimate: &LevelEstimate) -> bool {
         let Estimate { value, uncertainty } = estimate.phase_error;
-        self.size(estimate) <= 1.0 && value.abs() <= BESIDE + RANDOM * uncertainty
+        self.size(estimate) <= 1.0 && value.abs() <= LARGEST_PHASE_ERROR + RANDOM * uncertainty
     }
 
     /// Largest uncertainty over the largest allowed.
@@ -131,7 +131,7 @@ impl Criterion {
             let known = known.map_or(0.0, |slopes| slopes[i].value.abs());
             own[i].value.abs().max(known).hypot(own[i].uncertainty)
         };
-        // What is not noise belongs to the force of the impacts, a phasor: a part that shows in one balance may be in the other, too.
+        // Systematic errors come from the force of the impacts, a phasor: an error that one balance shows can be hidden in the other.
         let (units, change) = ([1.0, amplitude / whole.gain], LAG * whole.change);
         let systematic = [0, 1].map(|i| {
             let noise = first[i].uncertainty.hypot(second[i].uncertainty);

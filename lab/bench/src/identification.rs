@@ -151,11 +151,11 @@ impl Lock {
 
 /// Largest number of periods before the release that are evaluated.
 const MOST: f64 = 240.0;
-/// Relative deviations from the amplitude of the hold, beside noise: up to the first, periods give the lock, and up to the second the slopes of
-/// drive and frequency over the amplitude.
+/// Largest relative deviations from the amplitude of the hold, in addition to noise: of the periods from which the lock is evaluated, and of
+/// those from which the slopes of drive and frequency over the amplitude are evaluated.
 const SPREADS: [f64; 2] = [0.008, 0.1];
 /// Relative uncertainty of these slopes, because the backbone is curved within the second deviation.
-const BENT: f64 = 0.3;
+const SLOPE_UNCERTAINTY: f64 = 0.3;
 /// Largest phase error of a period that is evaluated, rad: the balances are of the first order in it.
 const PHASE_RANGE: f64 = 0.1;
 
@@ -208,7 +208,7 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
 /// uncertainty.
 fn limits(approach: &[Cycle], wide: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[Estimate; 2]> {
     let slopes = ResonanceFit::of(wide, linear, Slopes::Rising)?.slopes();
-    let slopes = slopes.map(|one| Estimate::new(one.value, &[one.uncertainty, BENT * one.value]));
+    let slopes = slopes.map(|one| Estimate::new(one.value, &[one.uncertainty, SLOPE_UNCERTAINTY * one.value]));
     let limit = |cycles: &[Cycle]| Some(ResonanceFit::of(cycles, linear, Slopes::Known(slopes))?.limit(command));
     let mut cycles = approach;
     let mut whole = limit(cycles)?;

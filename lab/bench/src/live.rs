@@ -13,7 +13,7 @@ const KEPT: usize = 40;
 /// Periods without an impact after which there are none.
 const QUIET: f64 = 20.0;
 /// Smallest number of impacts that a regime is determined from.
-const ENOUGH: usize = 12;
+const FEWEST_IMPACTS: usize = 12;
 
 /// The last impacts; times are phases of the drive, rad.
 #[derive(Debug, Default)]
@@ -44,7 +44,7 @@ impl LastImpacts {
         if since > QUIET * TAU {
             return Regime::NoImpacts;
         }
-        if self.0.len() < ENOUGH {
+        if self.0.len() < FEWEST_IMPACTS {
             return Regime::Unknown;
         }
         one_to_one(&self.0, self.per_period(), MEASURED)

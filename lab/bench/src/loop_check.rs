@@ -64,7 +64,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
         channel.at(ratio, omega * step)
     });
     let amplitudes = expected.map(|one| one.norm());
-    // A delay that looks like the opposite sign is at least this long. Until then, the base rests; one of the opposite sign moves.
+    // A delay that looks like the opposite sign is at least this long. Meanwhile a delayed base rests, but a base of the opposite sign moves.
     let first = (samples(1) as f64 * (PI - IN_TIME) / TAU) as usize;
     let begin = &readings[begins..begins + first];
     let rest = mean(readings[begins - quiet..begins].iter().map(|reading| reading[2]));

@@ -224,7 +224,7 @@ impl CellRun {
     /// every period next to the first one, in the direction in which the last period has left it.
     fn exponent(&self) -> Result<(f64, f64), InvalidValue> {
         let states = &self.states[self.periods() - self.observed()..];
-        let (mut plant, mut apart) = (self.scene.plant(states[0])?, [0.5 * BESIDE; 4]);
+        let (mut plant, mut apart) = (self.scene.plant(states[0])?, [0.5 * SEPARATION; 4]);
         plant.begin(self.drive)?;
         let mut growth = Vec::with_capacity(states.len());
         for pair in states.windows(2) {
@@ -237,8 +237,8 @@ impl CellRun {
             let there = numbers(&plant.state());
             let after: [f64; 4] = std::array::from_fn(|n| there[n] - pair[1][n]);
             let size = after.iter().map(|one| one * one).sum::<f64>().sqrt().max(f64::EPSILON);
-            growth.push((size / BESIDE).ln());
-            apart = after.map(|one| one * (BESIDE / size));
+            growth.push((size / SEPARATION).ln());
+            apart = after.map(|one| one * (SEPARATION / size));
         }
         let length = ((growth.len() as f64).sqrt() as usize).max(1);
         let batches: Vec<f64> = growth
@@ -279,7 +279,7 @@ fn state([q1, dq1, q2, dq2]: [f64; 4]) -> State {
 }
 
 /// Distance of the second plant that shows the Lyapunov exponent: far above rounding, far below what separates two motions.
-const BESIDE: f64 = 1e-8;
+const SEPARATION: f64 = 1e-8;
 /// Largest number of periods over which it is followed: an exponent of zero is then known to [`ZERO`].
 const OBSERVED: usize = 5000;
 /// Differences below which it repeats: far above rounding, far below what separates two motions.

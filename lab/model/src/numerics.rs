@@ -6,7 +6,7 @@ use nalgebra::{Complex, DMatrix, DVector, Dyn, linalg::QR};
 
 /// Standard errors from which on a difference is not noise: 0.3 % of normal noise is beyond.
 pub const SIGNIFICANT: f64 = 3.0;
-/// Standard errors of a difference that are taken for noise where what is beyond becomes a part of an uncertainty: 5 % of normal noise.
+/// Standard errors up to which a difference counts as noise, as 95 % of normal noise does; the excess becomes a part of an uncertainty.
 pub const RANDOM: f64 = 2.0;
 
 /// Roots of `a x^2 + b x + c`, without cancellation; each is a continuous function of the coefficients, also through

@@ -36,14 +36,14 @@ const DRAWING: f64 = 0.1;
 const UNREACHED: f64 = 1.5;
 /// Smallest response over the half-width of the search: up to r = 0.9, the fold has a larger one.
 const LOWEST: f64 = 0.05;
-/// Response, over the response where the symmetry was lost or the lock was found, below which the motion is another one; also its inverse. The
-/// stable range of the symmetric motion is wider.
+/// Smallest response, over the response where the symmetry was lost or the lock was found, at which the motion counts as the same; the largest is
+/// its inverse. The stable range of the symmetric motion is wider.
 const LOST: f64 = 0.8;
 /// Smallest departure from the linear response that shows impacts, as a share of the drive: twice the uncertainty of damping and stiffness.
 const DEPARTURE: f64 = 0.2;
 /// Smallest slope of the holding drive over the response under a constant drive, over the slope of the linear response: with less, the motion
 /// takes ten times as long to settle.
-const FIRM: f64 = 0.1;
+const SMALLEST_SLOPE: f64 = 0.1;
 /// Relative error of the drive, or of the response if that is larger, at which the response that the requested drive holds has been found.
 const FOUND: f64 = 1e-4;
 /// Largest number of steps of the interpolation; then the motion is left to settle where it is.
@@ -206,16 +206,16 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 continue;
             };
             passed |= between;
-            let scale = (slope.abs() * leg.response).clamp(FIRM * self.requested, self.requested);
+            let scale = (slope.abs() * leg.response).clamp(SMALLEST_SLOPE * self.requested, self.requested);
             let is_found = (self.requested - leg.drive).abs() < (FOUND * scale).max(leg.noise);
             // The condition of stability under a constant drive.
-            let firm = slope > FIRM * self.damping();
-            if is_found || firm && legs == LEGS {
-                if firm {
+            let is_stable = slope > SMALLEST_SLOPE * self.damping();
+            if is_found || is_stable && legs == LEGS {
+                if is_stable {
                     self.bench.controller.hold_drive()?;
                 }
                 if self.settle(leg)? {
-                    return Ok(Some(!firm));
+                    return Ok(Some(!is_stable));
                 }
                 (points, passed, upwards) = (self.below(leg, step)?, false, false);
             }
@@ -269,7 +269,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Periods for a change of the response, m, so that a share of the holding drive makes it.
     fn periods(&self, change: f64, leg: &Leg) -> usize {
-        let rate = SHARE * self.gain() * leg.drive.max(FIRM * self.requested);
+        let rate = SHARE * self.gain() * leg.drive.max(SMALLEST_SLOPE * self.requested);
         FOLLOWED.max((change.abs() / (rate * self.period)).ceil() as usize)
     }
 

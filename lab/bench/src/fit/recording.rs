@@ -90,11 +90,11 @@ const RANGE: f64 = 0.04;
 const HELD: f64 = 0.005;
 /// Largest phase error of a period, rad: the balances are of the first order in it.
 const PHASE_RANGE: f64 = 0.1;
-/// Largest relative standard uncertainty of the drive of a point: beyond that, it says nothing.
-const VAGUE: f64 = 0.2;
+/// Largest relative standard uncertainty of the drive of a point.
+const LARGEST_DRIVE_UNCERTAINTY: f64 = 0.2;
 /// Base over its largest amplitude below which it rests, unless the noise is larger.
 const RESTS: f64 = 0.02;
-/// Amplitude over its standard uncertainty by which an oscillation is one.
+/// Smallest amplitude of an oscillation over its standard uncertainty.
 const SEEN: f64 = 8.0;
 /// Share of the samples at the same extreme value from which a channel is clipped: a sine that is sampled 100 times a period and rounded to 10
 /// bits has 4 %.
@@ -499,9 +499,9 @@ fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], scene:
     Part { seconds, kind, point, regime }
 }
 
-/// A point, if it says something.
+/// A point, if its uncertainties are small enough.
 fn point(response: Estimate, omega: Estimate, drive: Estimate) -> Option<MeasuredPoint> {
-    let is_known = drive.uncertainty < VAGUE * drive.value && omega.uncertainty.is_finite();
+    let is_known = drive.uncertainty < LARGEST_DRIVE_UNCERTAINTY * drive.value && omega.uncertainty.is_finite();
     (drive.value > 0.0 && is_known).then_some(MeasuredPoint { response, omega, drive })
 }
 

@@ -182,7 +182,7 @@ impl Branch {
 }
 
 /// Detunings at which the backbone is searched for if it has no motion at the scene's G.
-const MET_AT: [f64; 6] = [-1.0, -0.7, -1.4, -0.5, -2.0, 0.0];
+const TRIED_DETUNINGS: [f64; 6] = [-1.0, -0.7, -1.4, -0.5, -2.0, 0.0];
 
 /// The exact backbone, through the scene's phase-resonant motion or, without one, through another (with G = 0 where there is neither
 /// damping nor loss): the one with the fastest particle, on the right branch. Without damping and with r = 1 it is the conservative
@@ -198,7 +198,7 @@ pub fn backbone(scene: &Dimensionless, limits: &ContinuationLimits) -> Option<Br
     };
     let start = fastest(phase_resonant(scene))
         .and_then(|orbit| orbit.periodic(scene, [Condition::Excitation(scene.g), condition]))
-        .or_else(|| MET_AT.into_iter().find_map(at_any_excitation))?;
+        .or_else(|| TRIED_DETUNINGS.into_iter().find_map(at_any_excitation))?;
     Some(continue_both_ways(scene, &start, condition, limits))
 }
 
