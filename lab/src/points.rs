@@ -108,7 +108,7 @@ pub fn read(path: &Path, columns: &[Column], channels: &Channels) -> Result<Meas
     }
     let is_recording = || -> Option<bool> {
         let headers = csv::Reader::from_path(path).ok()?.headers().ok()?.clone();
-        let has = |name: &str| headers.iter().any(|one| one.trim() == name);
+        let has = |name: &str| headers.iter().any(|header| header.trim() == name);
         Some(has("response") && (has("reference") || has("E")))
     };
     if channels.response.is_some() || channels.drive.is_some() || is_recording() == Some(true) {
@@ -149,7 +149,7 @@ fn recording(path: &Path, channels: &Channels) -> Result<Recording, ArgumentErro
     let values = |column: usize, factor: f64| -> Result<Vec<f64>, ArgumentError> {
         (0..rows.len()).map(|row| Ok(factor * number(row, column)?)).collect()
     };
-    let column = |name: &str| headers.iter().position(|one| one == name);
+    let column = |name: &str| headers.iter().position(|header| header == name);
     let channel = |given: &Option<Channel>, option: &str, usual: &str| {
         let usual = || Name { name: usual.into(), factor: 1.0 };
         let Name { name, factor } = given.clone().map_or_else(usual, |Channel(name)| name);

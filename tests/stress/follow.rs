@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 /// Steps for which each scene is followed, and number of impacts after which it is followed no further.
 const STEPS: usize = 30;
-const MOST_IMPACTS: u64 = 100_000;
+const IMPACTS_FOLLOWED: u64 = 100_000;
 /// Instants inside a step at which the particle must be between its walls, as parts of the step.
 const LOOKS: [f64; 3] = [0.181_818, 0.618_034, 0.927_051];
 /// Steps with more impacts are not followed once more for looking inside, and scenes with more are followed once only.
@@ -122,7 +122,7 @@ fn once(s: &Scene, forgetful: bool, figures: &mut Figures) -> Plant {
             }
             before = now;
         }
-        if plant.totals().impacts + outcome.released >= MOST_IMPACTS {
+        if plant.totals().impacts + outcome.released >= IMPACTS_FOLLOWED {
             break;
         }
     }

@@ -76,8 +76,13 @@ impl Criterion {
         let considered = counts.into_iter().filter(|count| *count >= 2 * ResonanceFit::FEWEST);
         considered
             .filter_map(|count| self.of(&cycles[n - count..]))
-            .filter(|estimate| estimate.at.iter().all(|one| (one.value + one.uncertainty).is_finite()))
-            .min_by(|one, other| self.size(one).total_cmp(&self.size(other)))
+            .filter(|estimate| {
+                estimate
+                    .at
+                    .iter()
+                    .all(|part| (part.value + part.uncertainty).is_finite())
+            })
+            .min_by(|first, second| self.size(first).total_cmp(&self.size(second)))
     }
 
     /// Whether the uncertainties are small enough, and the phase is near its target.
@@ -104,7 +109,7 @@ impl Criterion {
     fn slopes(&self, here: [f64; 3]) -> Option<[Estimate; 2]> {
         let [before, last] = self.before;
         let last = last?;
-        let between = |one: [f64; 3], other: [f64; 3]| [1, 2].map(|i| (other[i] - one[i]) / (other[0] - one[0]));
+        let between = |from: [f64; 3], to: [f64; 3]| [1, 2].map(|i| (to[i] - from[i]) / (to[0] - from[0]));
         let line = between(last, here);
         let bend = before.map_or([0.0; 2], |before| {
             let earlier = between(before, last);
@@ -119,7 +124,7 @@ impl Criterion {
     fn of(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
         let fit = |cycles: &[Cycle], slopes| ResonanceFit::of(cycles, &self.linear, slopes);
         let whole = fit(cycles, Slopes::Unknown)?;
-        let [base, omega] = whole.at(0.0).map(|one| one.value);
+        let [base, omega] = whole.at(0.0).map(|value| value.value);
         let known = self.slopes([whole.response.value, base, omega]);
         let slopes = known.map_or(Slopes::Unknown, Slopes::Known);
         let (first, second) = cycles.split_at(cycles.len() / 2);
@@ -143,10 +148,10 @@ impl Criterion {
         let at = [0, 1].map(|i| {
             // The noise of the amplitude moves drive and frequency along their slopes.
             let aside = slope(i) * whole.u_level;
-            let one = estimates[i];
+            let total = estimates[i];
             Estimate::new(
-                one.value,
-                &[one.uncertainty, aside, systematic / units[i], whole.remainders[i]],
+                total.value,
+                &[total.uncertainty, aside, systematic / units[i], whole.remainders[i]],
             )
         });
         let allowed = self.allowed(at[0].value);
@@ -350,7 +355,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             }
         };
         let estimate = estimate.unwrap_or_else(|| LevelEstimate::means(&cycles[cycles.len() / 2..]));
-        let [drive, omega] = estimate.at.map(|one| one.value);
+        let [drive, omega] = estimate.at.map(|quantity| quantity.value);
         if drive.is_finite() && omega.is_finite() {
             self.states.push([estimate.response.value, drive, omega]);
         }
@@ -437,11 +442,11 @@ fn extrapolated(states: &[Held], response: f64) -> Option<[f64; 2]> {
     let weights = points.iter().enumerate().map(|(i, point)| {
         let others = points.iter().enumerate().filter(|(j, _)| *j != i);
         others
-            .map(|(_, other)| (response - other[0]) / (point[0] - other[0]))
+            .map(|(_, previous)| (response - previous[0]) / (point[0] - previous[0]))
             .product::<f64>()
     });
     let expected = points.iter().zip(weights).fold([0.0; 2], |sum, (point, weight)| {
         [sum[0] + weight * point[1], sum[1] + weight * point[2]]
     });
-    (!points.is_empty() && expected.iter().all(|one| one.is_finite())).then_some(expected)
+    (!points.is_empty() && expected.iter().all(|value| value.is_finite())).then_some(expected)
 }

@@ -94,9 +94,9 @@ impl Comparison {
             })
             .collect();
         Self {
-            rms_sigma_error: rms(&decay, |one| Some(one.point.sigma - one.sigma_theory?)),
-            rms_sigma_exact: rms(&decay, |one| Some(one.point.sigma - one.sigma_exact?)),
-            rms_sigma_predicted: rms(&decay, |one| Some(one.point.sigma - one.sigma_predicted?)),
+            rms_sigma_error: rms(&decay, |row| Some(row.point.sigma - row.sigma_theory?)),
+            rms_sigma_exact: rms(&decay, |row| Some(row.point.sigma - row.sigma_exact?)),
+            rms_sigma_predicted: rms(&decay, |row| Some(row.point.sigma - row.sigma_predicted?)),
             parameters,
             left_out: scene.left_out(),
             phase_target_deg: scene.controller.phase_target,
@@ -121,7 +121,7 @@ impl Comparison {
 fn rms(points: &[ComparedPoint], error: impl Fn(&ComparedPoint) -> Option<f64>) -> Option<f64> {
     let errors = points
         .iter()
-        .filter(|one| one.point.c > COMPARED_ABOVE)
+        .filter(|row| row.point.c > COMPARED_ABOVE)
         .filter_map(error);
     let mean_square = mean_square(errors);
     (!mean_square.is_nan()).then(|| mean_square.sqrt())
@@ -169,8 +169,8 @@ impl ExactCurve {
         let fold = (0..points.len()).min_by(|&a, &b| points[a].c.total_cmp(&points[b].c));
         let rising = points.into_iter().skip(fold.unwrap_or(0));
         let places = rising
-            .take_while(|one| one.b < SPEED_MAX)
-            .map(|one| [one.c, one.sigma, one.g]);
+            .take_while(|orbit| orbit.b < SPEED_MAX)
+            .map(|orbit| [orbit.c, orbit.sigma, orbit.g]);
         Self { places: places.collect() }
     }
 
@@ -283,11 +283,11 @@ impl TrackedComparison {
 
     /// Why these points are no backbone of a motion with impacts: a settled point, or all points, without evidence of impacts.
     pub fn doubt(&self) -> Option<String> {
-        let regime = |one: &TrackedPoint| one.point.regime_by_impacts.unwrap_or(one.point.regime);
-        let count = |wanted: Regime| self.points.iter().filter(|one| regime(one) == wanted).count();
+        let regime = |row: &TrackedPoint| row.point.regime_by_impacts.unwrap_or(row.point.regime);
+        let count = |wanted: Regime| self.points.iter().filter(|row| regime(row) == wanted).count();
         let [linear, doubtful] = [Regime::NoImpacts, Regime::NotEstablished].map(count);
         let of = self.points.len();
-        let is_settled = |one: &TrackedPoint| one.point.settled && regime(one) == Regime::NotEstablished;
+        let is_settled = |row: &TrackedPoint| row.point.settled && regime(row) == Regime::NotEstablished;
         if linear == of {
             return Some(format!(
                 "all {of} points are without impacts (the linear mode): the particle does not reach the walls. Check that it moves freely; give \
@@ -305,14 +305,14 @@ impl TrackedComparison {
 
     /// Largest error at equal C, in sigma or G, and largest distance from the exact backbone, of the settled points.
     pub fn worst(&self) -> Option<LargestErrors> {
-        let errors = self.points.iter().filter(|one| one.point.settled).filter_map(|one| {
-            let Distance { nearest, sigma, g } = one.exact?;
+        let errors = self.points.iter().filter(|row| row.point.settled).filter_map(|row| {
+            let Distance { nearest, sigma, g } = row.exact?;
             let at_equal_c = sigma?.abs().max(g?.abs());
             Some(LargestErrors { at_equal_c, nearest })
         });
-        errors.reduce(|one, other| LargestErrors {
-            at_equal_c: one.at_equal_c.max(other.at_equal_c),
-            nearest: one.nearest.max(other.nearest),
+        errors.reduce(|largest, errors| LargestErrors {
+            at_equal_c: largest.at_equal_c.max(errors.at_equal_c),
+            nearest: largest.nearest.max(errors.nearest),
         })
     }
 }
@@ -362,7 +362,7 @@ fn predicted(orbit: &Orbit, scene: &Scene) -> Vec<[f64; 3]> {
         held: false,
     };
     let points = decay_points(&record, scene, WINDOW).points;
-    points.iter().map(|one| [one.c, one.sigma, one.rate]).collect()
+    points.iter().map(|point| [point.c, point.sigma, point.rate]).collect()
 }
 
 /// sigma of the slow flow at the amplitude `c` along the free decay: the backbone's, corrected to the first order in the rate of the decay; `None`

@@ -338,8 +338,11 @@ fn evidence(samples: &[Sample], scene: &Scene, fault: Fault) -> String {
     let config = scene.controller_config();
     let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
     let samples = &samples[samples.len().saturating_sub(period)..];
-    let largest = samples.iter().map(|one| one.sensors.response.abs()).fold(0.0, f64::max);
-    let last = samples.last().map(|one| one.sensors).unwrap_or_default();
+    let largest = samples
+        .iter()
+        .map(|sample| sample.sensors.response.abs())
+        .fold(0.0, f64::max);
+    let last = samples.last().map(|sample| sample.sensors).unwrap_or_default();
     let base = last
         .reference
         .map_or_else(String::new, |base| format!(", and the base {} m", short(base)));
@@ -358,7 +361,7 @@ fn evidence(samples: &[Sample], scene: &Scene, fault: Fault) -> String {
     match fault {
         Fault::ResponseTooLarge => limit("response_max", config.response_max, " m"),
         Fault::LockLost => {
-            let errors: Option<Vec<f64>> = samples.iter().map(|one| one.command.phase_error).collect();
+            let errors: Option<Vec<f64>> = samples.iter().map(|sample| sample.command.phase_error).collect();
             let error = phase_in_words(errors.map(|errors| mean(errors).to_degrees()));
             let tolerance = Some(config.lock.unlock_tolerance);
             format!(

@@ -306,8 +306,8 @@ impl Fit {
 
     /// Correlation of two quantities.
     #[must_use]
-    pub fn correlation(&self, one: Quantity, other: Quantity) -> f64 {
-        let [a, b] = [one, other].map(|quantity| quantity.gradient(&self.x));
+    pub fn correlation(&self, first: Quantity, second: Quantity) -> f64 {
+        let [a, b] = [first, second].map(|quantity| quantity.gradient(&self.x));
         let covariance = |a: &Unknowns, b: &Unknowns| (a.transpose() * self.covariance * b)[0];
         covariance(&a, &b) / (covariance(&a, &a) * covariance(&b, &b)).sqrt()
     }
@@ -331,11 +331,13 @@ impl Fit {
     pub fn not_separated(&self) -> Vec<(Quantity, Quantity, f64)> {
         let is_uncertain = |quantity: &&Quantity| {
             let estimate = self.estimate(**quantity);
-            estimate.is_none_or(|one| one.uncertainty.is_nan() || one.uncertainty > UNCERTAIN * one.value.abs())
+            estimate.is_none_or(|estimate| {
+                estimate.uncertainty.is_nan() || estimate.uncertainty > UNCERTAIN * estimate.value.abs()
+            })
         };
-        let partner = |one: &Quantity| {
-            let others = Quantity::FITTED.iter().filter(|other| *other != one);
-            let correlations = others.map(|other| (*one, *other, self.correlation(*one, *other)));
+        let partner = |quantity: &Quantity| {
+            let others = Quantity::FITTED.iter().filter(|partner| *partner != quantity);
+            let correlations = others.map(|partner| (*quantity, *partner, self.correlation(*quantity, *partner)));
             correlations.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))
         };
         let uncertain = Quantity::FITTED.iter().filter(is_uncertain);
@@ -374,7 +376,7 @@ pub fn fit(
         }
         let size = |residual: &[f64; 3]| residual.iter().map(|part| part * part).sum::<f64>();
         let sizes: Vec<f64> = fit.residuals.iter().map(size).collect();
-        let worst = (0..sizes.len()).max_by(|one, other| sizes[*one].total_cmp(&sizes[*other]));
+        let worst = (0..sizes.len()).max_by(|first, second| sizes[*first].total_cmp(&sizes[*second]));
         let worst = worst.ok_or(FitError::NoMotion)?;
         rest.remove(worst);
         let points = rest.iter().map(|n| points[*n]).collect();
@@ -440,9 +442,9 @@ pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected:
     let parameters = fit.report(expected).parameters;
     let differing = parameters
         .iter()
-        .filter(|one| (one.value - one.expected).abs() > SIGNIFICANT * one.uncertainty);
-    let texts = differing.map(|one| {
-        let FittedParameter { symbol, unit, value, uncertainty, expected } = one;
+        .filter(|parameter| (parameter.value - parameter.expected).abs() > SIGNIFICANT * parameter.uncertainty);
+    let texts = differing.map(|parameter| {
+        let FittedParameter { symbol, unit, value, uncertainty, expected } = parameter;
         let space = if unit.is_empty() { "" } else { " " };
         format!("{symbol} = {value:.4e} ± {uncertainty:.1e}{space}{unit} fits, the scene says {expected:.4e}")
     });
@@ -491,7 +493,7 @@ impl Sums {
 
 impl<'a> Problem<'a> {
     fn new(points: Vec<MeasuredPoint>, definition: Definition, known: &'a [Known]) -> Self {
-        let has_scale = known.iter().any(|one| one.quantity.needs_a_scale());
+        let has_scale = known.iter().any(|known| known.quantity.needs_a_scale());
         Self { points, definition, known, has_scale, free: false }
     }
 
@@ -500,11 +502,11 @@ impl<'a> Problem<'a> {
         let starts = [expected.restitution].into_iter().chain(STARTS);
         let minima = starts.filter_map(|restitution| self.minimum(unknowns(&Parameters { restitution, ..*expected })));
         let (x, sums) = minima
-            .min_by(|one, other| one.1.chi_square.total_cmp(&other.1.chi_square))
+            .min_by(|first, second| first.1.chi_square.total_cmp(&second.1.chi_square))
             .ok_or(FitError::NoMotion)?;
         let fit = self.found(x, sums);
         let is_determined = |estimate: Estimate| estimate.uncertainty.is_finite() && estimate.uncertainty > 0.0;
-        let mut estimates = Quantity::ALL.iter().filter_map(|one| fit.estimate(*one));
+        let mut estimates = Quantity::ALL.iter().filter_map(|quantity| fit.estimate(*quantity));
         estimates
             .all(is_determined)
             .then_some(fit)
@@ -592,10 +594,10 @@ impl<'a> Problem<'a> {
 
     /// Adds what is known from elsewhere, and what makes the matrix regular.
     fn add_known(&self, x: &Unknowns, sums: &mut Sums) {
-        for one in self.known {
-            let Estimate { value, uncertainty } = one.estimate;
+        for known in self.known {
+            let Estimate { value, uncertainty } = known.estimate;
             let u = uncertainty.max(EXACT * value.abs()).max(f64::MIN_POSITIVE);
-            let (residual, row) = ((one.quantity.of(x) - value) / u, one.quantity.gradient(x) / u);
+            let (residual, row) = ((known.quantity.of(x) - value) / u, known.quantity.gradient(x) / u);
             sums.chi_square += residual * residual;
             sums.gradient += row * residual;
             sums.normal += row * row.transpose();
@@ -716,7 +718,7 @@ impl Fit {
             let expected = quantity.of_plant(expected);
             Some(FittedParameter { symbol, unit, value, uncertainty, expected })
         };
-        let correlations = |one: &Quantity| std::array::from_fn(|n| self.correlation(*one, Quantity::FITTED[n]));
+        let correlations = |row: &Quantity| std::array::from_fn(|n| self.correlation(*row, Quantity::FITTED[n]));
         FitReport {
             describes: !self.is_rejected(),
             chi_square: self.chi_square,

@@ -208,7 +208,7 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
 /// uncertainty.
 fn limits(approach: &[Cycle], wide: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[Estimate; 2]> {
     let slopes = ResonanceFit::of(wide, linear, Slopes::Rising)?.slopes();
-    let slopes = slopes.map(|one| Estimate::new(one.value, &[one.uncertainty, SLOPE_UNCERTAINTY * one.value]));
+    let slopes = slopes.map(|slope| Estimate::new(slope.value, &[slope.uncertainty, SLOPE_UNCERTAINTY * slope.value]));
     let limit = |cycles: &[Cycle]| Some(ResonanceFit::of(cycles, linear, Slopes::Known(slopes))?.limit(command));
     let mut cycles = approach;
     let mut whole = limit(cycles)?;

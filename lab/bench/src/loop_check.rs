@@ -63,7 +63,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
         let channel = CheckedChannel { noise: signal.noise, floor, ..CheckedChannel::default() };
         channel.at(ratio, omega * step)
     });
-    let amplitudes = expected.map(|one| one.norm());
+    let amplitudes = expected.map(|response| response.norm());
     // A delay that looks like the opposite sign is at least this long. Meanwhile a delayed base rests, but a base of the opposite sign moves.
     let first = (samples(1) as f64 * (PI - IN_TIME) / TAU) as usize;
     let begin = &readings[begins..begins + first];
@@ -114,7 +114,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
 fn without_drift(readings: &mut [[f64; 3]]) {
     let half = readings.len() / 2;
     let [first, second] =
-        [&readings[..half], &readings[half..2 * half]].map(|part| mean(part.iter().map(|one| one[1])));
+        [&readings[..half], &readings[half..2 * half]].map(|part| mean(part.iter().map(|reading| reading[1])));
     let slope = (second - first) / half as f64;
     for (n, reading) in readings.iter_mut().enumerate() {
         reading[1] -= slope * n as f64;

@@ -29,7 +29,7 @@ pub fn exact(scene: &Dimensionless, points: usize) -> impl Iterator<Item = [f64;
         let distance = |c_exact: f64| (c_exact - c).abs();
         let nearest = orbits
             .into_iter()
-            .min_by(|one, other| distance(one.c).total_cmp(&distance(other.c)))?;
+            .min_by(|first, second| distance(first.c).total_cmp(&distance(second.c)))?;
         Some([nearest.sigma, nearest.c, f64::from(u8::from(nearest.stable)), nearest.g])
     })
 }

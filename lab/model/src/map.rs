@@ -172,8 +172,8 @@ impl CellRun {
     fn counts(&self, n: usize) -> [usize; 2] {
         let phase = TAU * n as f64;
         [
-            self.impacts.partition_point(|one| one.time < phase),
-            self.sticks.partition_point(|one| *one < phase),
+            self.impacts.partition_point(|impact| impact.time < phase),
+            self.sticks.partition_point(|time| *time < phase),
         ]
     }
 
@@ -236,9 +236,9 @@ impl CellRun {
             plant.advance(self.drive, TAU / self.drive.omega)?;
             let there = numbers(&plant.state());
             let after: [f64; 4] = std::array::from_fn(|n| there[n] - pair[1][n]);
-            let size = after.iter().map(|one| one * one).sum::<f64>().sqrt().max(f64::EPSILON);
+            let size = after.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::EPSILON);
             growth.push((size / SEPARATION).ln());
-            apart = after.map(|one| one * (SEPARATION / size));
+            apart = after.map(|x| x * (SEPARATION / size));
         }
         let length = ((growth.len() as f64).sqrt() as usize).max(1);
         let batches: Vec<f64> = growth

@@ -270,7 +270,7 @@ pub fn student_factor(degrees: f64) -> f64 {
 /// order): the effective number of values is smaller than their number.
 fn colour(residuals: &[f64]) -> f64 {
     let neighbours: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();
-    let squares: f64 = residuals.iter().map(|one| one * one).sum();
+    let squares: f64 = residuals.iter().map(|residual| residual * residual).sum();
     // A correlation over more than a twelfth of the record cannot be told from a trend.
     let longest = (1.0 - 12.0 / residuals.len() as f64).clamp(0.0, 0.9);
     let correlation = (neighbours / squares).clamp(0.0, longest);
@@ -340,7 +340,7 @@ impl Regression {
         let coefficients = DVector::from_fn(terms, |i, _| scaled[i] / lengths[i]);
         coefficients
             .iter()
-            .all(|one| one.is_finite())
+            .all(|value| value.is_finite())
             .then_some(Self { coefficients, covariance, excess })
     }
 

@@ -136,7 +136,7 @@ const IN_STEP: f64 = 0.15 * PI;
 /// period apart within 15 %. Times are phases of the base, rad.
 pub fn synchrony(impacts: &[Impact]) -> f64 {
     let in_step =
-        |one: &Impact, other: &Impact| one.on_other_wall(other) && (other.time - one.time - PI).abs() < IN_STEP;
+        |impact: &Impact, next: &Impact| impact.on_other_wall(next) && (next.time - impact.time - PI).abs() < IN_STEP;
     let captured: usize = impacts
         .chunk_by(in_step)
         .map(<[Impact]>::len)

@@ -172,8 +172,8 @@ fn recorded(parts: &[Part]) -> String {
     let rows = parts.iter().map(|part| {
         let [from, to] = part.seconds.map(|time| format!("{time:.2}"));
         let kind = format!("{:?}", part.kind).to_lowercase();
-        let text = |one: Estimate, unit: f64| {
-            let Estimate { value, uncertainty } = one.scaled(unit);
+        let text = |estimate: Estimate, unit: f64| {
+            let Estimate { value, uncertainty } = estimate.scaled(unit);
             let decimals = decimals(uncertainty);
             format!("{value:.decimals$} ± {uncertainty:.decimals$}")
         };
@@ -191,15 +191,15 @@ fn recorded(parts: &[Part]) -> String {
 
 fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> String {
     let doubt = if report.describes { "" } else { " (rejected)" };
-    let rows = report.parameters.iter().map(|one| {
-        let digits = decimals(one.uncertainty);
+    let rows = report.parameters.iter().map(|parameter| {
+        let digits = decimals(parameter.uncertainty);
         let number = |value: f64| format!("{value:.digits$}");
-        let difference = (one.value - one.expected) / one.uncertainty;
+        let difference = (parameter.value - parameter.expected) / parameter.uncertainty;
         [
-            one.symbol.to_string(),
-            format!("{} ± {}{doubt}", number(one.value), number(one.uncertainty)),
-            one.unit.to_string(),
-            number(one.expected),
+            parameter.symbol.to_string(),
+            format!("{} ± {}{doubt}", number(parameter.value), number(parameter.uncertainty)),
+            parameter.unit.to_string(),
+            number(parameter.expected),
             format!("{difference:+.1} u"),
         ]
     });
@@ -236,10 +236,10 @@ fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> Stri
             numbers.join(", ")
         );
     }
-    for (one, other, correlation) in fit.not_separated() {
+    for (first, second, correlation) in fit.not_separated() {
         let _ = writeln!(
             text,
-            "{one} is not determined: {one} and {other} have the correlation {correlation:.3}; give one of them with --known"
+            "{first} is not determined: {first} and {second} have the correlation {correlation:.3}; give one of them with --known"
         );
     }
     text
@@ -248,8 +248,8 @@ fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> Stri
 /// The section `[plant]` of a scene, with the standard uncertainties in comments.
 fn plant_section(report: &FitReport, plant: &vines::scene::Parameters, verdict: Option<&str>) -> String {
     let lines = vines::scene::plant_keys(plant).into_iter().map(|(symbol, value)| {
-        let fitted = report.parameters.iter().find(|one| one.symbol == symbol);
-        let u = fitted.map(|one| format!(" ± {:.2e}", one.uncertainty));
+        let fitted = report.parameters.iter().find(|parameter| parameter.symbol == symbol);
+        let u = fitted.map(|parameter| format!(" ± {:.2e}", parameter.uncertainty));
         let is_ideal = ["M", "k", "c", "m", "b", "r"].contains(&symbol);
         let note = is_ideal.then(|| format!("  # fitted{}", u.unwrap_or_default()));
         format!("{symbol} = {value}{}\n", note.unwrap_or_default())

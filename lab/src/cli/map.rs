@@ -100,9 +100,9 @@ fn summary(map: &Map) -> String {
         text.push('\n');
     }
     for curve in &map.curves {
-        let Branch { points, ended: [one, other], .. } = &curve.branch;
+        let Branch { points, ended: [start, end], .. } = &curve.branch;
         let (name, count) = (curve.name(), points.len());
-        let _ = writeln!(text, "  {name}: {count} points; ends: {}; {}", one.name(), other.name());
+        let _ = writeln!(text, "  {name}: {count} points; ends: {}; {}", start.name(), end.name());
     }
     text
 }

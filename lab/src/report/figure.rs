@@ -490,7 +490,7 @@ mod tests {
         let spans: Vec<(f64, f64, &str)> = panel
             .series
             .iter()
-            .map(|one| (one.places[0].0, one.places.last().unwrap().0, one.label.as_str()))
+            .map(|shape| (shape.places[0].0, shape.places.last().unwrap().0, shape.label.as_str()))
             .collect();
         let stable = [(0.0, 2.0, "orbits, stable"), (3.0, 3.0, "orbits, stable")];
         assert_eq!(spans[..2], stable);

@@ -100,9 +100,9 @@ mod tests {
 
     #[test]
     fn lines_and_letters_stand_out_from_their_background_in_light_and_dark() {
-        let contrast = |one: &str, other: &str| {
-            let [one, other] = [one, other].map(|colour| luminance(colour) + 0.05);
-            one.max(other) / one.min(other)
+        let contrast = |first: &str, second: &str| {
+            let [first, second] = [first, second].map(|colour| luminance(colour) + 0.05);
+            first.max(second) / first.min(second)
         };
         for name in [INK, CAPTION, THEORY, EXACT, MEASURED, PARTICLE, MODULATION] {
             for line in [name, unstable(name)] {

@@ -43,7 +43,7 @@ pub(crate) fn run(sweep: &Sweep, store: &Store, stride: usize, monitor: &Monitor
     loop {
         candidates.sort_unstable();
         candidates.dedup();
-        let differs = |n: &usize| neighbours(*n, stride).any(|other| codes[other] != codes[*n]);
+        let differs = |n: &usize| neighbours(*n, stride).any(|neighbour| codes[neighbour] != codes[*n]);
         candidates.retain(|n| !computed[*n] && (codes[*n] == ABSENT || differs(n)));
         if candidates.is_empty() {
             if stride == 1 {

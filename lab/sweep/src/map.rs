@@ -103,10 +103,10 @@ impl Map {
     fn cell(&self, place: &[f64; 2], confirmations: usize) -> Result<MapCell, SweepError> {
         let (scene, sigma, numbers) = self.sweep.at(place)?;
         let (periods, start) = (self.sweep.settings().periods, scene.dimensionless_start());
-        let (mut result, other) = observe_confirmed(&numbers, sigma, start, periods, confirmations)?;
+        let (mut result, coexisting_regime) = observe_confirmed(&numbers, sigma, start, periods, confirmations)?;
         let mut coexisting = Vec::new();
-        if let Some(other) = other {
-            coexisting.extend([result.regime, other]);
+        if let Some(coexisting_regime) = coexisting_regime {
+            coexisting.extend([result.regime, coexisting_regime]);
             coexisting.sort();
             result.regime = Regime::Undecided;
         }

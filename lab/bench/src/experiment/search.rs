@@ -132,9 +132,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             let period = self.bench.period(Stage::Locking)?;
             let state = self.bench.last.state;
             let closed = state.is_none_or(|state| matches!(state, LoopState::Acquiring | LoopState::Locked));
-            let is_near = self.bench.cycle(period, self.target).is_some_and(|one| {
-                self.setpoint = one.amplitude();
-                one.phase_error.abs() < NEAR
+            let is_near = self.bench.cycle(period, self.target).is_some_and(|cycle| {
+                self.setpoint = cycle.amplitude();
+                cycle.phase_error.abs() < NEAR
             });
             near = if closed && is_near { near + 1 } else { 0 };
         }
@@ -231,8 +231,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Waits until the lock has settled. Returns whether it has; if not, the motion has lost its symmetry.
     fn settle(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
-        let (mut other, mut grown, first) = (0, 0, leg.response);
-        while other < 2 {
+        let (mut asymmetric, mut grown, first) = (0, 0, leg.response);
+        while asymmetric < 2 {
             let before = leg.asymmetry;
             *leg = self.measure(FOLLOWED)?;
             // Beside symmetry breaking the symmetry is lost slowly; noise grows as often in one of 24 cases.
@@ -242,7 +242,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
             // Noise may hide an asymmetry, but not where the motion goes.
             let is_there = (LOST..1.0 / LOST).contains(&(leg.response / first));
-            other = if leg.symmetric && is_there { 0 } else { other + 1 };
+            asymmetric = if leg.symmetric && is_there { 0 } else { asymmetric + 1 };
             self.setpoint = leg.last;
         }
         Ok(false)
@@ -294,7 +294,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         // Two periods tell the harmonics from a drift of the fundamental.
         let from = (begins[0].0 + begins[0].0).saturating_sub(begins[1].0);
         let raw = &self.bench.samples[from..];
-        let mean_omega = mean(raw.iter().map(|one| one.command.drive.omega));
+        let mean_omega = mean(raw.iter().map(|sample| sample.command.drive.omega));
         let cleaned = without_tones(raw, self.scene, mean_omega);
         let samples = cleaned.as_deref().unwrap_or(raw);
         let ends = begins[1..].iter().map(|next| next.0 - from).chain([samples.len()]);
@@ -364,7 +364,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 fn even_and_odd(samples: &[Sample], step: f64) -> Option<[f64; 3]> {
     let phases: Vec<f64> = (0..samples.len()).map(|n| n as f64 * step).collect();
     let basis = HarmonicBasis::new(&phases, 0, &[Some(2), Some(0), Some(0), Some(0), Some(0)]);
-    let values = DVector::from_iterator(samples.len(), samples.iter().map(|one| one.sensors.response));
+    let values = DVector::from_iterator(samples.len(), samples.iter().map(|sample| sample.sensors.response));
     let fit = basis.fit(&values)?;
     let rest = noise(basis.residual(&values, &fit).as_slice());
     let [even, odd] = [2, 3].map(|n| fit.harmonic(n).norm_sqr());
@@ -400,22 +400,22 @@ impl BackbonePoints {
 
     /// Slope of the holding drive over the response.
     fn slope(&self) -> Option<f64> {
-        let [.., two, one] = &self.0[..] else { return None };
-        Some((one.drive - two.drive) / (one.response - two.response))
+        let [.., two, last] = &self.0[..] else { return None };
+        Some((last.drive - two.drive) / (last.response - two.response))
     }
 
     /// The response, m, that this drive, m, holds, on the parabola through the last points over the drive, which has no singularity at the fold;
     /// but at most as far as on the line through the last two, and at least half as far.
     fn at(&self, drive: f64) -> Option<f64> {
-        let [.., two, one] = &self.0[..] else { return None };
+        let [.., two, last] = &self.0[..] else { return None };
         let inverse = |a: &Leg, b: &Leg| (a.response - b.response) / (a.drive - b.drive);
-        let line = inverse(one, two);
+        let line = inverse(last, two);
         let bend = match &self.0[..] {
-            [three, two, one] => (line - inverse(two, three)) / (one.drive - three.drive),
+            [three, two, last] => (line - inverse(two, three)) / (last.drive - three.drive),
             _ => 0.0,
         };
         let share = 1.0 + bend / line * (drive - two.drive);
         let slope = line * share.clamp(0.5, 1.0);
-        Some(one.response + slope * (drive - one.drive))
+        Some(last.response + slope * (drive - last.drive))
     }
 }

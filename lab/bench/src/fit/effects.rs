@@ -148,7 +148,7 @@ impl Explanation {
     pub fn verdict(&self) -> String {
         let chi_square = |fit: &Fit| format!("{:.0} for {}", fit.chi_square, fit.degrees);
         let list = |candidates: &mut dyn Iterator<Item = &Candidate>| {
-            let texts = candidates.map(|one| format!("{} ({})", one.effect, chi_square(&one.fit)));
+            let texts = candidates.map(|candidate| format!("{} ({})", candidate.effect, chi_square(&candidate.fit)));
             texts.collect::<Vec<String>>().join(", ")
         };
         let Some(best) = self.explains() else {
@@ -176,8 +176,9 @@ impl Explanation {
                 "; {left_out} points of the smallest responses do not belong to this motion, and are left out"
             );
         }
-        let is_possible =
-            |one: &&Candidate| one.fit.left_out == best.fit.left_out && one.criterion() - best.criterion() < POSSIBLE;
+        let is_possible = |candidate: &&Candidate| {
+            candidate.fit.left_out == best.fit.left_out && candidate.criterion() - best.criterion() < POSSIBLE
+        };
         let others = list(&mut self.candidates[1..].iter().filter(is_possible));
         if !others.is_empty() {
             text += &format!("; the points do not exclude {others}");
@@ -204,7 +205,7 @@ impl Candidate {
 
     /// The better one first: one that describes the points, that leaves out fewer of them, and then by Akaike's criterion.
     fn order(&self, other: &Self) -> Ordering {
-        let first = |one: &Self| (one.fit.is_rejected(), one.fit.left_out.len());
+        let first = |candidate: &Self| (candidate.fit.is_rejected(), candidate.fit.left_out.len());
         let by_criterion = self.criterion().total_cmp(&other.criterion());
         first(self).cmp(&first(other)).then(by_criterion)
     }
@@ -310,19 +311,19 @@ impl Problem<'_> {
                 let Some(mut next) = of(&kept).with_effect_from(effect, x, &ideal) else {
                     break;
                 };
-                if next.fit.is_rejected() && best.as_ref().is_some_and(|one| !one.fit.is_rejected()) {
+                if next.fit.is_rejected() && best.as_ref().is_some_and(|best| !best.fit.is_rejected()) {
                     break;
                 }
                 next.fit.left_out = (0..self.points.len()).filter(|n| !kept.contains(n)).collect();
                 x = next.fit.x;
                 best = Some(next);
             }
-            best.filter(|one| one.fit.left_out.len() * LEFT_OUT <= self.points.len())
+            best.filter(|best| best.fit.left_out.len() * LEFT_OUT <= self.points.len())
         });
         let mut best: Option<Candidate> = None;
-        for one in found {
-            let describes_all = !one.fit.is_rejected() && one.fit.left_out.is_empty();
-            best = best.into_iter().chain([one]).min_by(Candidate::order);
+        for candidate in found {
+            let describes_all = !candidate.fit.is_rejected() && candidate.fit.left_out.is_empty();
+            best = best.into_iter().chain([candidate]).min_by(Candidate::order);
             if describes_all {
                 break;
             }
@@ -334,7 +335,7 @@ impl Problem<'_> {
     fn by_falling_response(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.points.len()).collect();
         let response = |n: usize| self.points[n].response.value;
-        order.sort_by(|one, other| response(*other).total_cmp(&response(*one)));
+        order.sort_by(|first, second| response(*second).total_cmp(&response(*first)));
         order
     }
 
@@ -447,7 +448,7 @@ impl PlantCurve<'_> {
         let along = (self.residual(n, &next) - residual) / size;
         Some(Place {
             motion,
-            tangent: change.map(|one| one / size),
+            tangent: change.map(|component| component / size),
             residual,
             along,
         })
@@ -484,7 +485,7 @@ impl PlantCurve<'_> {
         sums.chi_square
             + places
                 .iter()
-                .map(|one| one.across(&one.residual).norm_squared())
+                .map(|place| place.across(&place.residual).norm_squared())
                 .sum::<f64>()
     }
 

@@ -118,7 +118,7 @@ pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result
         let scene = Scene { measured: Some(linear), plant, ..scene.clone() };
         recordings
             .iter()
-            .map(|one| one.parts(&scene))
+            .map(|record| record.parts(&scene))
             .collect::<Result<Vec<_>, _>>()
     };
     let stated = scene.linear();
@@ -130,8 +130,8 @@ pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result
     };
     let plant = fit.plant(&scene.plant);
     let omega0 = plant.natural_frequency();
-    let [u_f0, u_zeta] =
-        [Quantity::F0, Quantity::Zeta].map(|one| fit.estimate(one).map_or(f64::NAN, |one| one.uncertainty));
+    let [u_f0, u_zeta] = [Quantity::F0, Quantity::Zeta]
+        .map(|quantity| fit.estimate(quantity).map_or(f64::NAN, |quantity| quantity.uncertainty));
     let fitted = LinearResponse {
         omega0,
         damping_rate: 0.5 * plant.damping / plant.primary_mass,
@@ -157,8 +157,8 @@ impl Recording {
         let mut scene = scene.clone();
         scene.controller.samples_per_period *= scene.sample_time() / self.sample_time;
         let anchors = self.anchors(&linear);
-        let moves = |one: &Anchor| one.response.map(|_| one.drive.is_some());
-        let stretches = anchors.chunk_by(|one, other| moves(one) == moves(other));
+        let moves = |anchor: &Anchor| anchor.response.map(|_| anchor.drive.is_some());
+        let stretches = anchors.chunk_by(|anchor, next| moves(anchor) == moves(next));
         let of = |base_moves: bool| move |stretch: &&[Anchor]| moves(&stretch[0]) == Some(base_moves);
         let target = scene.controller.phase_target_radians();
         let periods = |stretch: &[Anchor]| {
@@ -172,10 +172,10 @@ impl Recording {
         let mut parts = evaluated(&windows.collect::<Vec<_>>(), &scene);
         let decays = stretches.filter(of(false));
         parts.extend(decays.flat_map(|stretch| decay(stretch, &linear, self.sample_time)));
-        parts.sort_by(|one, other| one.seconds[0].total_cmp(&other.seconds[0]));
+        parts.sort_by(|first, second| first.seconds[0].total_cmp(&second.seconds[0]));
         best_of_each_amplitude(&mut parts);
         if parts.iter().all(|part| part.point.is_none()) {
-            let is_seen = 2 * anchors.iter().filter(|one| one.response.is_some()).count() >= anchors.len();
+            let is_seen = 2 * anchors.iter().filter(|anchor| anchor.response.is_some()).count() >= anchors.len();
             return Err(self.nothing(is_seen, &parts, &linear));
         }
         Ok(parts)
@@ -187,11 +187,11 @@ impl Recording {
         let refused = |message: String| Err(RecordingError(format!("{origin}{message}")));
         let hertz = linear.omega0 / TAU;
         let both = [&self.response, &self.drive];
-        let [count, other] = both.map(Vec::len);
-        if count != other {
+        let [count, drives] = both.map(Vec::len);
+        if count != drives {
             let [one, another] = channels;
             return refused(format!(
-                ": channel {one} has {count} samples and channel {another} has {other}; both must have been sampled together"
+                ": channel {one} has {count} samples and channel {another} has {drives}; both must have been sampled together"
             ));
         }
         for (values, channel) in both.into_iter().zip(channels) {
@@ -223,7 +223,7 @@ impl Recording {
                 ));
             }
             for value in [low, high] {
-                let share = values.iter().filter(|one| **one == value).count() as f64 / count as f64;
+                let share = values.iter().filter(|sample| **sample == value).count() as f64 / count as f64;
                 if share > CLIPPED && value != 0.0 {
                     return refused(format!(
                         ", channel {channel} is clipped: {:.1} % of its samples are equal to its largest or smallest value, {value:e} m; reduce the \
@@ -248,12 +248,13 @@ impl Recording {
             .map(|from| {
                 let fit = |values: &[f64], omega| {
                     let found = harmonic(&values[from..from + window], dt, omega);
-                    found.filter(|one| {
-                        one.amplitude > SEEN * one.uncertainties[0] && (one.omega / omega - 1.0).abs() < FARTHEST
+                    found.filter(|harmonic| {
+                        harmonic.amplitude > SEEN * harmonic.uncertainties[0]
+                            && (harmonic.omega / omega - 1.0).abs() < FARTHEST
                     })
                 };
                 let response = fit(&self.response, omega).or_else(|| fit(&self.response, linear.omega0));
-                omega = response.map_or(linear.omega0, |one| one.omega);
+                omega = response.map_or(linear.omega0, |harmonic| harmonic.omega);
                 let drive = fit(&self.drive, omega);
                 Anchor {
                     middle: from as f64 + 0.5 * (window - 1) as f64,
@@ -262,17 +263,17 @@ impl Recording {
                 }
             })
             .collect();
-        let drives = anchors.iter().filter_map(|one| one.drive);
-        let largest = drives.map(|one| one.amplitude).fold(0.0, f64::max);
+        let drives = anchors.iter().filter_map(|anchor| anchor.drive);
+        let largest = drives.map(|drive| drive.amplitude).fold(0.0, f64::max);
         for anchor in &mut anchors {
-            anchor.drive = anchor.drive.filter(|one| one.amplitude > RESTS * largest);
+            anchor.drive = anchor.drive.filter(|drive| drive.amplitude > RESTS * largest);
         }
         anchors
     }
 
     /// The samples of a part in which the base moves, with the command that its fits stand for.
     fn samples(&self, run: &[Anchor]) -> Vec<Sample> {
-        let knots: Vec<(f64, Harmonic)> = run.iter().filter_map(|one| Some((one.middle, one.drive?))).collect();
+        let knots: Vec<(f64, Harmonic)> = run.iter().filter_map(|at| Some((at.middle, at.drive?))).collect();
         let mut samples = Vec::new();
         for pair in knots.windows(2) {
             let [(from, left), (to, right)] = [pair[0], pair[1]];
@@ -299,15 +300,16 @@ impl Recording {
     /// Refuses channels that are swapped, or of which one has the wrong sign. `cycles`: the periods in which the base moves.
     fn plausible(&self, cycles: &[&Cycle]) -> Result<(), RecordingError> {
         let Self { origin, channels: [response, drive], .. } = self;
-        let ratio = mean(cycles.iter().map(|one| one.base.norm())) / mean(cycles.iter().map(|one| one.amplitude()));
+        let ratio =
+            mean(cycles.iter().map(|cycle| cycle.base.norm())) / mean(cycles.iter().map(|cycle| cycle.amplitude()));
         if ratio > 1.0 {
             return Err(RecordingError(format!(
                 "{origin}: channel {drive} (base) is {ratio:.1} times as large as channel {response} (response), and at resonance the response is the \
                  larger one: are the channels swapped, or their units different?"
             )));
         }
-        let is_near = |one: &Cycle, phase: f64| (one.phase_error.abs() - phase).abs() < PHASE_RANGE;
-        let near = |phase: f64| cycles.iter().filter(|one| is_near(one, phase)).count();
+        let is_near = |cycle: &Cycle, phase: f64| (cycle.phase_error.abs() - phase).abs() < PHASE_RANGE;
+        let near = |phase: f64| cycles.iter().filter(|cycle| is_near(cycle, phase)).count();
         if near(PI) > near(0.0) {
             return Err(RecordingError(format!(
                 "{origin}: the response {response} leads the base {drive} by about a quarter of a period, where it lags on every passive rig: one of \
@@ -351,7 +353,7 @@ impl Recording {
         let grid = equally_spaced(linear.omega0 / 20.0, highest, FREQUENCIES);
         let best = grid
             .map(|omega| (power(omega), omega))
-            .max_by(|one, other| one.0.total_cmp(&other.0));
+            .max_by(|first, second| first.0.total_cmp(&second.0));
         best.map_or(f64::NAN, |(_, omega)| omega / TAU)
     }
 }
@@ -376,7 +378,7 @@ struct Window<'a> {
 
 /// Number of samples.
 fn count(cycles: &[Cycle]) -> usize {
-    cycles.iter().map(|one| one.samples).sum()
+    cycles.iter().map(|cycle| cycle.samples).sum()
 }
 
 /// The windows of a stretch in which the base moves.
@@ -401,7 +403,7 @@ fn windows<'a>(samples: &'a [Sample], cycles: &'a [Cycle]) -> Vec<Window<'a>> {
         }
         (rest, from) = (later, from + count(taken));
     }
-    let changes: Vec<f64> = windows.iter().map(|one| one.change).collect();
+    let changes: Vec<f64> = windows.iter().map(|window| window.change).collect();
     for window in &mut windows {
         let alike = changes.iter().filter(|change| **change * window.change > 0.0).count() as f64;
         window.late = LAG * window.change * (alike - 1.0).max(0.0).sqrt();
@@ -419,13 +421,13 @@ fn evaluated(windows: &[Window], scene: &Scene) -> Vec<Part> {
         let largest = window.cycles.iter().map(Cycle::amplitude).fold(0.0, f64::max);
         Criterion { linear, precision: 1.0, largest, before }.best(window.cycles)
     };
-    let held = |one: LevelEstimate| [one.response.value, one.at[0].value, one.at[1].value];
+    let held = |level: LevelEstimate| [level.response.value, level.at[0].value, level.at[1].value];
     let first: Vec<Option<Held>> = windows
         .iter()
         .map(|window| estimate(window, [None; 2]).map(held))
         .collect();
     let mut curve: Vec<Held> = first.iter().copied().flatten().collect();
-    curve.sort_by(|one, other| one[0].total_cmp(&other[0]));
+    curve.sort_by(|first, second| first[0].total_cmp(&second[0]));
     let second = windows.iter().zip(first).map(|(window, first)| {
         let estimate = first.and_then(|first| estimate(window, neighbours(&curve, first)));
         part(window, estimate, &curve, scene)
@@ -438,9 +440,9 @@ fn best_of_each_amplitude(parts: &mut [Part]) {
     let u = |point: &MeasuredPoint| point.drive.uncertainty / point.drive.value;
     let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
     for part in parts {
-        let is_second = |one: &MeasuredPoint| {
-            let better = |other: &MeasuredPoint| {
-                (other.response.value / one.response.value - 1.0).abs() < HELD && u(other) < u(one)
+        let is_second = |point: &MeasuredPoint| {
+            let better = |next: &MeasuredPoint| {
+                (next.response.value / point.response.value - 1.0).abs() < HELD && u(next) < u(point)
             };
             points.iter().any(better)
         };
@@ -452,7 +454,7 @@ fn best_of_each_amplitude(parts: &mut [Part]) {
 fn change(cycles: &[Cycle]) -> f64 {
     let change = slope(&cycles.iter().map(Cycle::amplitude).collect::<Vec<f64>>());
     let n = cycles.len() as f64;
-    let noise = (12.0 * mean(cycles.iter().map(|one| one.noise[0])) / n.powi(3)).sqrt();
+    let noise = (12.0 * mean(cycles.iter().map(|cycle| cycle.noise[0])) / n.powi(3)).sqrt();
     if change.abs() > RANDOM * noise { change } else { 0.0 }
 }
 
@@ -461,9 +463,9 @@ fn neighbours(curve: &[Held], here: Held) -> [Option<Held>; 2] {
     let mut others: Vec<Held> = curve
         .iter()
         .copied()
-        .filter(|one| (one[0] / here[0] - 1.0).abs() > 2.0 * HELD)
+        .filter(|point| (point[0] / here[0] - 1.0).abs() > 2.0 * HELD)
         .collect();
-    others.sort_by(|one, other| (one[0] - here[0]).abs().total_cmp(&(other[0] - here[0]).abs()));
+    others.sort_by(|first, second| (first[0] - here[0]).abs().total_cmp(&(second[0] - here[0]).abs()));
     [others.get(1).copied(), others.first().copied()]
 }
 
@@ -486,7 +488,7 @@ fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], scene:
     let regime = regime_by_response(samples, scene, base.value, target, omega.value);
     // What the estimate contains once of the lag, and of the phase error in the second order.
     let here = [level.value, base.value, omega.value];
-    let slopes = neighbours(curve, here)[1].map_or([0.0; 2], |other| slopes(here, other));
+    let slopes = neighbours(curve, here)[1].map_or([0.0; 2], |neighbour| slopes(here, neighbour));
     let beside = estimate.phase_error.value.abs() * base.value / level.value;
     let aside = beside * (omega.value - scene.linear().omega0);
     let drive = Estimate::new(base.value, &[base.uncertainty, slopes[0] * late, beside * base.value]);
@@ -506,8 +508,8 @@ fn point(response: Estimate, omega: Estimate, drive: Estimate) -> Option<Measure
 }
 
 /// Slopes of drive and frequency over the amplitude.
-fn slopes(here: Held, other: Held) -> [f64; 2] {
-    [1, 2].map(|i| (other[i] - here[i]) / (other[0] - here[0]))
+fn slopes(here: Held, neighbour: Held) -> [f64; 2] {
+    [1, 2].map(|i| (neighbour[i] - here[i]) / (neighbour[0] - here[0]))
 }
 
 /// The points of a decay, with `E = -A'/g`. The fits do not overlap.
@@ -516,37 +518,37 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
     let fits: Vec<(f64, Harmonic)> = anchors
         .iter()
         .step_by(apart)
-        .filter_map(|one| Some((one.middle * sample_time, one.response?)))
+        .filter_map(|anchor| Some((anchor.middle * sample_time, anchor.response?)))
         .collect();
-    let held = |one: &Harmonic| {
-        let gain = 0.5 * linear.omega0 * linear.omega0 / one.omega;
-        [one.amplitude, -one.rate / gain, one.omega]
+    let held = |harmonic: &Harmonic| {
+        let gain = 0.5 * linear.omega0 * linear.omega0 / harmonic.omega;
+        [harmonic.amplitude, -harmonic.rate / gain, harmonic.omega]
     };
     // The impacts have ended where what remains is the damping of the structure.
     let damping = linear.damping_rate;
-    let taken = |one: &Harmonic| -one.rate - damping * one.amplitude;
-    let at_first = fits.first().map_or(0.0, |(_, one)| taken(one));
+    let taken = |harmonic: &Harmonic| -harmonic.rate - damping * harmonic.amplitude;
+    let at_first = fits.first().map_or(0.0, |(_, harmonic)| taken(harmonic));
     // Without impacts nothing is taken but by an error of the damping.
-    let has_impacts = |one: &Harmonic| taken(one) > 0.5 * f64::max(at_first, damping * one.amplitude);
-    let synchronous: Vec<_> = fits.iter().take_while(|(_, one)| has_impacts(one)).collect();
+    let has_impacts = |harmonic: &Harmonic| taken(harmonic) > 0.5 * f64::max(at_first, damping * harmonic.amplitude);
+    let synchronous: Vec<_> = fits.iter().take_while(|(_, harmonic)| has_impacts(harmonic)).collect();
     let count = synchronous.len() as f64;
     let half = 0.5 * WINDOW * TAU / linear.omega0;
     synchronous
         .windows(2)
         .map(|pair| {
-            let [(time, one), (_, other)] = [pair[0], pair[1]];
-            let here = held(one);
-            let slopes = slopes(here, held(other));
-            let late = LAG * one.rate * TAU / one.omega;
-            let gain = -one.rate / here[1];
+            let [(time, harmonic), (_, next)] = [pair[0], pair[1]];
+            let here = held(harmonic);
+            let slopes = slopes(here, held(next));
+            let late = LAG * harmonic.rate * TAU / harmonic.omega;
+            let gain = -harmonic.rate / here[1];
             // What is seen in one balance may be in the other, too.
-            let units = [1.0, one.amplitude / gain];
+            let units = [1.0, harmonic.amplitude / gain];
             let systematic = (slopes[0] * late).hypot(units[1] * slopes[1] * late) * count.sqrt();
-            let [u_amplitude, u_omega] = one.uncertainties;
-            let u_rate = u_omega * one.amplitude;
+            let [u_amplitude, u_omega] = harmonic.uncertainties;
+            let u_rate = u_omega * harmonic.amplitude;
             let drive = Estimate::new(here[1], &[u_rate / gain, systematic]);
-            let omega = Estimate::new(one.omega, &[u_omega, systematic / units[1]]);
-            let response = Estimate { value: one.amplitude, uncertainty: u_amplitude };
+            let omega = Estimate::new(harmonic.omega, &[u_omega, systematic / units[1]]);
+            let response = Estimate { value: harmonic.amplitude, uncertainty: u_amplitude };
             Part {
                 seconds: [time - half, time + half],
                 kind: Kind::Decay,

@@ -84,7 +84,7 @@ impl ResonanceFit {
         let (omega, omega0) = (mean(cycles.iter().map(|cycle| cycle.omega)), linear.omega0);
         let gain = 0.5 * omega0 * omega0 / omega;
         let motion = motion(cycles);
-        let response = mean(motion.iter().map(|one| one.amplitude));
+        let response = mean(motion.iter().map(|cycle| cycle.amplitude));
         let base = mean(cycles.iter().map(|cycle| cycle.base.norm()));
         let phase_error = mean(cycles.iter().map(|cycle| cycle.phase_error));
         let [noise, base_noise] = [0, 1].map(|i| mean(cycles.iter().map(|cycle| cycle.noise[i])).sqrt());
@@ -92,7 +92,7 @@ impl ResonanceFit {
         let noise = noise.max(1e-14 * response);
         let middle = mean(cycles.iter().map(|cycle| cycle.time));
         let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
-        let deviation = integral(&time, motion.iter().map(|one| one.amplitude - response));
+        let deviation = integral(&time, motion.iter().map(|cycle| cycle.amplitude - response));
         let columns = [vec![1.0; cycles.len()], time, deviation];
         let total = |value: fn(&Cycle) -> f64| cycles.iter().map(value).sum::<f64>();
         let calibration = total(|cycle| cycle.base.norm()) / total(|cycle| cycle.commanded[0].norm());
@@ -105,9 +105,12 @@ impl ResonanceFit {
         let balanced = motion
             .into_iter()
             .zip(&drives)
-            .map(|(one, DriveIntegrals { force, work })| {
-                let amplitude = one.amplitude - inertia * force.im - gain * (work.re + beyond(*work));
-                (amplitude, one.phase + (gain * work.im - inertia * force.re) / response)
+            .map(|(cycle, DriveIntegrals { force, work })| {
+                let amplitude = cycle.amplitude - inertia * force.im - gain * (work.re + beyond(*work));
+                (
+                    amplitude,
+                    cycle.phase + (gain * work.im - inertia * force.re) / response,
+                )
             });
         let (amplitudes, phases): (Vec<f64>, Vec<f64>) = balanced.unzip();
         let scale = [base / response, gain * base / (response * response)];
@@ -148,7 +151,7 @@ impl ResonanceFit {
         let drive = self.drive.estimate(&weights).scaled(-1.0 / self.gain);
         let turning = self.turning.estimate(&weights);
         [(drive, self.within[0]), (turning, self.within[1])]
-            .map(|(one, within)| Estimate::new(one.value, &[one.uncertainty, within]))
+            .map(|(estimate, within)| Estimate::new(estimate.value, &[estimate.uncertainty, within]))
     }
 
     /// Slopes of `E_R` and `omega_R` over the amplitude.

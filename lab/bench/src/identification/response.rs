@@ -70,7 +70,7 @@ impl Content {
         // Tones and harmonics are fitted in turn: what a tone has in common with the harmonics remains in the residual.
         while content.is_irregular() && lines.len() < LINES {
             let line = Line::strongest(rest.as_slice());
-            let is_known = |one: &Line| (one.turn - line.turn).abs() < TAU / n as f64;
+            let is_known = |known: &Line| (known.turn - line.turn).abs() < TAU / n as f64;
             if !line.is_foreign(&d, sample_time) && !lines.iter().any(is_known) {
                 break;
             }

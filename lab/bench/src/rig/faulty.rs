@@ -161,7 +161,10 @@ impl Faulty {
     fn read(&mut self, channel: usize, sensor: SensorFault, elapsed: usize) -> f64 {
         let kept = self.past.len();
         let ago = |samples: usize| self.past[kept.saturating_sub(1 + samples)][channel];
-        let largest = self.past.iter().fold(0.0_f64, |most, one| most.max(one[channel].abs()));
+        let largest = self
+            .past
+            .iter()
+            .fold(0.0_f64, |most, past| most.max(past[channel].abs()));
         let value = ago(0);
         match sensor {
             SensorFault::Dead => 0.0,

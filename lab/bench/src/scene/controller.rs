@@ -300,7 +300,9 @@ impl TryFrom<Table> for PhaseLock {
         let mut flat = Table::new();
         for (name, value) in table {
             match value {
-                Value::Table(group) => flat.extend(group.into_iter().map(|(key, one)| (format!("{name}.{key}"), one))),
+                Value::Table(group) => {
+                    flat.extend(group.into_iter().map(|(key, item)| (format!("{name}.{key}"), item)))
+                }
                 value => _ = flat.insert(name, value),
             }
         }
@@ -316,7 +318,7 @@ impl Serialize for PhaseLock {
                 Setting::Real(NONE) => Value::from("none"),
                 Setting::Real(number) => Value::from(number),
                 Setting::Integer(number) => Value::from(number),
-                Setting::Boolean(one) => Value::from(one),
+                Setting::Boolean(value) => Value::from(value),
             };
             (name, value)
         }))
@@ -346,8 +348,8 @@ fn setting(name: &str, value: &Value) -> Result<(&'static str, Setting), Argumen
         return Err(format!("phase_lock.{name} is set by {key}").into());
     }
     let parameter = Parameter::find(name).ok_or_else(|| {
-        let free = PARAMETERS.iter().map(|one| one.name);
-        let free: Vec<&str> = free.filter(|one| KEYS.iter().all(|(name, _)| name != one)).collect();
+        let free = PARAMETERS.iter().map(|parameter| parameter.name);
+        let free: Vec<&str> = free.filter(|key| KEYS.iter().all(|(name, _)| name != key)).collect();
         format!(
             "the controller has no parameter `{name}`; expected one of {}",
             free.join(", ")
@@ -360,7 +362,7 @@ fn setting(name: &str, value: &Value) -> Result<(&'static str, Setting), Argumen
         (Setting::Real(_), Value::String(word)) if word == "none" => Setting::Real(NONE),
         (Setting::Real(_), Value::Boolean(false)) => Setting::Real(NONE),
         (Setting::Integer(_), Value::Integer(number)) => Setting::Integer(i32::try_from(*number).unwrap_or(i32::MAX)),
-        (Setting::Boolean(_), Value::Boolean(one)) => Setting::Boolean(*one),
+        (Setting::Boolean(_), Value::Boolean(value)) => Setting::Boolean(*value),
         _ => {
             let (allowed, given) = (parameter.range.allowed(), value.type_str());
             return Err(format!("phase_lock.{name} is a {given}, which is refused; allowed is {allowed}").into());

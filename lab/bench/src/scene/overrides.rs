@@ -58,9 +58,9 @@ impl Override {
             return Err(self.error(format!("`{}` is not a section", self.section)));
         };
         // Amplitude of the base: the key that is set replaces the other.
-        for [set, other] in [["G", "E"], ["E", "G"]] {
+        for [set, alternative] in [["G", "E"], ["E", "G"]] {
             if self.is("excitation", set) {
-                section.remove(other);
+                section.remove(alternative);
             }
         }
         match (section.get_mut(&self.key), &self.value) {
@@ -74,14 +74,14 @@ impl Override {
 /// `table` with the overrides applied one by one, so that an error names the
 /// argument that caused it.
 pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, SceneError> {
-    let sets = |key| overrides.iter().find(|one| one.is("excitation", key));
+    let sets = |key| overrides.iter().find(|change| change.is("excitation", key));
     if let (Some(_), Some(second)) = (sets("G"), sets("E")) {
         return Err(second.error("excitation.G is set as well: set one of them"));
     }
-    for one in overrides {
-        one.merge_into(&mut table)?;
-        let sections = Sections::deserialize(table.clone()).map_err(|error| one.error(plain(error.message())))?;
-        sections.plant.is_si().map_err(|message| one.error(message))?;
+    for change in overrides {
+        change.merge_into(&mut table)?;
+        let sections = Sections::deserialize(table.clone()).map_err(|error| change.error(plain(error.message())))?;
+        sections.plant.is_si().map_err(|message| change.error(message))?;
     }
     Ok(table)
 }
@@ -120,8 +120,8 @@ impl Family {
     pub fn vary(&mut self, key: &str) -> Result<(), SceneError> {
         let refused = |message: &str| SceneError::text(&format!("axis {key}"), message);
         let form = || refused("expected sigma or section.key, for instance plant.r");
-        let one: Override = format!("{key} = 1").parse().map_err(|_| form())?;
-        self.table = merge(self.table.clone(), &[one]).map_err(|error| match error {
+        let change: Override = format!("{key} = 1").parse().map_err(|_| form())?;
+        self.table = merge(self.table.clone(), &[change]).map_err(|error| match error {
             SceneError::Override { message, .. } => refused(&message),
             error => error,
         })?;

@@ -148,13 +148,13 @@ impl Branch {
     /// Its motions are not 1:1, and the last ones are unstable.
     fn winds(&self) -> bool {
         let last = self.points.len().checked_sub(UNSTABLE).map(|from| &self.points[from..]);
-        !self.pattern().is_one_to_one() && last.is_some_and(|last| last.iter().all(|one| !one.stable))
+        !self.pattern().is_one_to_one() && last.is_some_and(|last| last.iter().all(|motion| !motion.stable))
     }
 }
 
 /// Distance of a motion from the line between two others.
 fn off(motion: &Periodic, [from, to]: [&Periodic; 2]) -> f64 {
-    let [chord, beside] = [to, motion].map(|one| one.invariants() - from.invariants());
+    let [chord, beside] = [to, motion].map(|end| end.invariants() - from.invariants());
     let part = (beside.dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0);
     (beside - chord * part).norm()
 }
@@ -304,13 +304,13 @@ impl Curve<'_> {
         }
         // The range of G does not limit a curve at constant G.
         let free = !matches!(self.condition, Condition::Excitation(_));
-        let inside = |one: &Periodic| limits.contain(one.sigma, if free { one.g } else { limits.g[0] });
+        let inside = |motion: &Periodic| limits.contain(motion.sigma, if free { motion.g } else { limits.g[0] });
         if !inside(next) {
-            branch.special.retain(|one| inside(&one.motion));
+            branch.special.retain(|bifurcation| inside(&bifurcation.motion));
             return Some(BranchEnd::Range);
         }
         if branch.winds() {
-            let stable = branch.points.iter().rposition(|one| one.stable);
+            let stable = branch.points.iter().rposition(|motion| motion.stable);
             branch.points.truncate(stable.unwrap_or(0) + 2);
             return Some(BranchEnd::Unstable);
         }
@@ -326,7 +326,7 @@ impl Curve<'_> {
     /// The last motion within a step before the one that the branch doubles.
     fn joint(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Periodic> {
         let at = self.beside(from, tangent * step);
-        let before = |part: f64| at(part).map(|one| !joins(from, &one)).ok_or(());
+        let before = |part: f64| at(part).map(|end| !joins(from, &end)).ok_or(());
         let (end, _) = try_bisection(0.0, 1.0, FINEST, before).ok()?;
         at(end)
     }
@@ -335,7 +335,7 @@ impl Curve<'_> {
     fn crossings(&self, chord: Unknowns, [from, to]: [&Periodic; 2]) -> Vec<BranchBifurcation> {
         let at = self.beside(from, chord);
         let crossing = |kind: Bifurcation| {
-            let [first, last] = [from, to].map(|one| kind.test(&one.map.monodromy));
+            let [first, last] = [from, to].map(|motion| kind.test(&motion.map.monodromy));
             if first * last >= 0.0 || first.abs().max(last.abs()) < ROUNDING {
                 return None;
             }
@@ -350,15 +350,15 @@ impl Curve<'_> {
         };
         let kinds = [Bifurcation::Fold, Bifurcation::flip(self.pattern), Bifurcation::Torus];
         let mut found: Vec<_> = kinds.into_iter().filter_map(crossing).collect();
-        found.sort_by(|one, other| one.0.total_cmp(&other.0));
-        found.into_iter().map(|one| one.1).collect()
+        found.sort_by(|first, second| first.0.total_cmp(&second.0));
+        found.into_iter().map(|found| found.1).collect()
     }
 }
 
 /// Between two motions, their branch passes the motion that it doubles.
 fn joins(from: &Periodic, to: &Periodic) -> bool {
     match (from.halves_apart(), to.halves_apart()) {
-        (Some(one), Some(other)) => one.dot(&other) < 0.0,
+        (Some(first), Some(second)) => first.dot(&second) < 0.0,
         _ => false,
     }
 }

@@ -44,7 +44,7 @@ pub fn convergence(scene: &Dimensionless, halvings: u32) -> Option<Convergence> 
             let exact = phase_resonant(&scene)
                 .into_iter()
                 .filter(|orbit| orbit.stable)
-                .min_by(|one, other| (one.b - theory.b).abs().total_cmp(&(other.b - theory.b).abs()))?;
+                .min_by(|first, second| (first.b - theory.b).abs().total_cmp(&(second.b - theory.b).abs()))?;
             Some(Difference {
                 epsilon: scene.epsilon,
                 exact: [exact.sigma, exact.c],

@@ -425,7 +425,7 @@ impl Periodic {
             travelled += bounce.dq2.abs() * time;
         })?;
         let mut multipliers: [Complex<f64>; 4] = map.monodromy.complex_eigenvalues().into();
-        multipliers.sort_unstable_by(|one, other| one.norm().total_cmp(&other.norm()));
+        multipliers.sort_unstable_by(|first, second| first.norm().total_cmp(&second.norm()));
         Some(Self {
             g: x[5],
             sigma: x[4],
@@ -434,7 +434,7 @@ impl Periodic {
             b: travelled / duration,
             pattern: pattern.clone(),
             bounces,
-            multipliers: multipliers.map(|one| [one.re, one.im]),
+            multipliers: multipliers.map(|multiplier| [multiplier.re, multiplier.im]),
             stable: multipliers[3].norm() < 1.0,
             map,
         })
@@ -510,7 +510,7 @@ impl Periodic {
             let since = |bounce: &Bounce| (phase - bounce.phase).rem_euclid(period);
             let last = bounces
                 .iter()
-                .min_by(|one, other| since(one).total_cmp(&since(other)))?;
+                .min_by(|first, second| since(first).total_cmp(&since(second)))?;
             let [q1, dq1, q2, dq2] = map.state(last, since(last) / map.oscillator.omega);
             Some([phase / map.oscillator.omega, q1, dq1, q2, dq2])
         };
@@ -567,7 +567,7 @@ pub(crate) fn periodic_near(scene: &Dimensionless, sigma: f64, state: [f64; 4]) 
     };
     // The pattern may be a multiple of the motion's own pattern: near a period doubling the motion settles slowly, in alternation.
     let shortest = patterns(&map, found.bounces[0], EXACT)
-        .take_while(|one| one.walls.len() < found.bounces.len())
+        .take_while(|pattern| pattern.walls.len() < found.bounces.len())
         .next();
     match shortest {
         Some(pattern) => Periodic::find(scene, &pattern, &found.unknowns(), conditions),

@@ -131,7 +131,7 @@ pub fn resonant_motion(
     let detour = Ideal::of(parameters, definition, in_the_middle)
         .map(|ideal| ideal.continued(parameters, definition, Some(response)));
     match detour {
-        Some(Ok(other)) if motion.is_err() || other.is_stable() => Ok(other),
+        Some(Ok(again)) if motion.is_err() || again.is_stable() => Ok(again),
         _ => motion,
     }
 }
@@ -609,7 +609,7 @@ impl<'a> Solver<'a> {
     fn motion(&mut self, x: &Unknowns) -> Option<PlantMotion> {
         let monodromy = self.monodromy(x)?;
         let mut multipliers: [Complex<f64>; 4] = monodromy.complex_eigenvalues().into();
-        multipliers.sort_by(|one, other| one.norm().total_cmp(&other.norm()));
+        multipliers.sort_by(|first, second| first.norm().total_cmp(&second.norm()));
         let start = self.start(x)?;
         self.follow(start)?;
         let response = self.harmonic(start)?;

@@ -80,9 +80,9 @@ impl Search<'_> {
     fn follow(&mut self, branch: Branch, depth: usize) {
         let breaking = [Bifurcation::SymmetryBreaking, Bifurcation::PeriodDoubling];
         let mut special = branch.special.clone();
-        special.retain(|one| breaking.contains(&one.kind));
+        special.retain(|bifurcation| breaking.contains(&bifurcation.kind));
         // One that ended early, where continuation failed, may be a part of this one.
-        let part = |old: &Branch| old.typical().all(|one| branch.passes(self.scene, one));
+        let part = |old: &Branch| old.typical().all(|motion| branch.passes(self.scene, motion));
         self.found.components.retain(|old| !part(&old.branch));
         let impacts = branch.pattern().impacts();
         self.found
@@ -107,12 +107,12 @@ impl Search<'_> {
     /// The components in order, numbered.
     fn numbered(mut self) -> FrequencyResponse {
         let components = &mut self.found.components;
-        components.sort_by_key(|one| {
-            let pattern = one.branch.pattern();
+        components.sort_by_key(|component| {
+            let pattern = component.branch.pattern();
             let periods = pattern.periods();
             (periods as usize * pattern.impacts(), periods, !pattern.mirrored)
         });
-        let names: Vec<String> = components.iter().map(|one| one.name.clone()).collect();
+        let names: Vec<String> = components.iter().map(|component| component.name.clone()).collect();
         for (n, component) in components.iter_mut().enumerate() {
             let count = |names: &[String]| names.iter().filter(|name| **name == component.name).count();
             component.name = format!("{}, {} of {}", component.name, count(&names[..=n]), count(&names));
@@ -124,13 +124,15 @@ impl Search<'_> {
 impl FrequencyResponse {
     /// The components of symmetric 1:1 motions.
     pub fn symmetric(&self) -> impl Iterator<Item = &Branch> {
-        let symmetric = |one: &&Branch| one.pattern().is_symmetric();
-        self.components.iter().map(|one| &one.branch).filter(symmetric)
+        let symmetric = |branch: &&Branch| branch.pattern().is_symmetric();
+        self.components.iter().map(|branch| &branch.branch).filter(symmetric)
     }
 
     /// A motion of the scene lies on one of the components.
     pub fn contains(&self, scene: &Dimensionless, motion: &Periodic) -> bool {
-        self.components.iter().any(|one| one.branch.passes(scene, motion))
+        self.components
+            .iter()
+            .any(|component| component.branch.passes(scene, motion))
     }
 }
 
@@ -142,19 +144,19 @@ impl Branch {
 
     /// The middle motion of all, and the middle one of the stable motions: a branch that contains both contains this branch.
     fn typical(&self) -> impl Iterator<Item = &Periodic> {
-        let stable: Vec<&Periodic> = self.points.iter().filter(|one| one.stable).collect();
+        let stable: Vec<&Periodic> = self.points.iter().filter(|motion| motion.stable).collect();
         let middle = stable.get(stable.len() / 2).copied();
         [self.points.get(self.points.len() / 2), middle].into_iter().flatten()
     }
 
     /// Whether this branch of a frequency response passes a motion or its mirror image.
     pub fn passes(&self, scene: &Dimensionless, motion: &Periodic) -> bool {
-        let kind = |one: &ImpactPattern| (one.impacts(), one.periods(), one.mirrored);
+        let kind = |pattern: &ImpactPattern| (pattern.impacts(), pattern.periods(), pattern.mirrored);
         if kind(self.pattern()) != kind(&motion.pattern) {
             return false;
         }
         let conditions = [Condition::Sigma(motion.sigma), Condition::Excitation(motion.g)];
-        self.leads_to(scene, motion, conditions, |one| one.sigma, SAME)
+        self.leads_to(scene, motion, conditions, |motion| motion.sigma, SAME)
     }
 
     /// Whether Newton's method for `conditions` leads from this branch to a motion, within `same`. `along` is a coordinate that the
@@ -189,11 +191,11 @@ const TRIED_DETUNINGS: [f64; 6] = [-1.0, -0.7, -1.4, -0.5, -2.0, 0.0];
 /// nonlinear mode.
 pub fn backbone(scene: &Dimensionless, limits: &ContinuationLimits) -> Option<Branch> {
     let condition = Condition::backbone(scene);
-    let fastest = |orbits: Vec<Orbit>| orbits.into_iter().max_by(|one, other| one.b.total_cmp(&other.b));
+    let fastest = |orbits: Vec<Orbit>| orbits.into_iter().max_by(|first, second| first.b.total_cmp(&second.b));
     let right = Manifold::new(scene.r).b_min();
     let at_any_excitation = |sigma: f64| {
         let met = exact_backbone(scene, 1.0 + scene.epsilon * sigma);
-        let orbit = fastest(met).filter(|one| one.b > right)?;
+        let orbit = fastest(met).filter(|orbit| orbit.b > right)?;
         orbit.periodic(scene, [Condition::Sigma(sigma), condition])
     };
     let start = fastest(phase_resonant(scene))
@@ -235,7 +237,7 @@ pub fn bifurcation_curves(scene: &Dimensionless, limits: &ContinuationLimits) ->
             }
         }
     }
-    found.sort_by_key(|one| (one.kind.name(), !one.branch.pattern().mirrored));
+    found.sort_by_key(|curve| (curve.kind.name(), !curve.branch.pattern().mirrored));
     found
 }
 
@@ -251,6 +253,6 @@ impl BifurcationCurve {
             return false;
         }
         let conditions = [Condition::Excitation(motion.g), Condition::Bifurcation(self.kind)];
-        self.branch.leads_to(scene, motion, conditions, |one| one.g, 1e-4)
+        self.branch.leads_to(scene, motion, conditions, |motion| motion.g, 1e-4)
     }
 }

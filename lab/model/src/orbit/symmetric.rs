@@ -163,8 +163,8 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
         let peak = |orbit: &Orbit| peak(scene, orbit, Condition::Excitation(scene.g));
         orbits = orbits.iter().filter_map(peak).collect();
     }
-    orbits.sort_unstable_by(|one, other| one.c.total_cmp(&other.c));
-    orbits.dedup_by(|one, other| (one.sigma - other.sigma).abs() < 1e-9 && (one.b - other.b).abs() < 1e-9);
+    orbits.sort_unstable_by(|first, second| first.c.total_cmp(&second.c));
+    orbits.dedup_by(|first, second| (first.sigma - second.sigma).abs() < 1e-9 && (first.b - second.b).abs() < 1e-9);
     orbits
 }
 
@@ -193,7 +193,7 @@ fn peak(scene: &Dimensionless, near: &Orbit, condition: Condition) -> Option<Orb
     let scene = Dimensionless { g: found.g, ..*scene };
     symmetric_orbits(&scene, found.sigma)
         .into_iter()
-        .min_by(|one, other| (one.b - found.b).abs().total_cmp(&(other.b - found.b).abs()))
+        .min_by(|first, second| (first.b - found.b).abs().total_cmp(&(second.b - found.b).abs()))
 }
 
 /// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.

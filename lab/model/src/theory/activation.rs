@@ -47,7 +47,7 @@ impl SlowFlow {
     pub fn has_stable_motion(&self, g: f64, sigma: f64) -> bool {
         self.equilibria(g, sigma)
             .iter()
-            .any(|one| one.impacts_stable && one.slow_flow_stable)
+            .any(|equilibrium| equilibrium.impacts_stable && equilibrium.slow_flow_stable)
     }
 
     /// The activation thresholds at the detuning `sigma`; the mass ratio `epsilon` matters only for those from rest.
@@ -76,7 +76,7 @@ fn smallest((low, high): (f64, f64), wanted: impl Fn(f64) -> bool, f: impl Fn(f6
     let best = (0..GRID)
         .map(|n| low + step * (f64::from(n) + 0.5))
         .filter(|b| wanted(*b))
-        .min_by(|one, other| f(*one).total_cmp(&f(*other)))?;
+        .min_by(|first, second| f(*first).total_cmp(&f(*second)))?;
     // The minimum lies inside the neighbouring cells, or at the edge of the region of interest.
     let edge = |end: f64| {
         let end = end.clamp(low, high);
@@ -125,9 +125,9 @@ fn impacts_from_rest(epsilon: f64, lambda: f64, sigma: f64) -> [f64; 2] {
     let largest = |size: &dyn Fn(f64) -> f64| {
         let times = equally_spaced(0.0, end, (end / step) as usize + 2);
         let sizes: Vec<(f64, f64)> = times.map(|t| (t, size(t))).collect();
-        let most = sizes.iter().fold(0.0, |most: f64, one| most.max(one.1));
+        let most = sizes.iter().fold(0.0, |most: f64, size| most.max(size.1));
         // Between two points a sine of that height grows by no more than this.
-        let near = sizes.iter().filter(|one| one.1 > ROUNDED * most);
+        let near = sizes.iter().filter(|size| size.1 > ROUNDED * most);
         let peaks = near.map(|(t, _)| size(golden_section((t - step).max(0.0), t + step, |t| -size(t))));
         peaks.fold(steady.norm(), f64::max)
     };

@@ -200,7 +200,7 @@ impl SlowFlow {
     fn equilibrium_polynomial(&self, g: f64, sigma: Option<f64>) -> [f64; 5] {
         // C^2 = 1 - pi B + (R^2 + pi^2/4) B^2
         let square = [1.0, -2.0 * FRAC_PI_2, self.manifold.curvature()];
-        let mut loss = square.map(|one| self.lambda * one);
+        let mut loss = square.map(|coefficient| self.lambda * coefficient);
         loss[2] += 2.0 * FRAC_2_PI * self.manifold.dissipation;
         let spring = sigma.map_or([0.0; 3], |sigma| {
             let free = [0.0, 2.0 * FRAC_2_PI, -2.0];
@@ -338,7 +338,7 @@ impl SlowFlow {
 /// All real roots of a polynomial, ascending; coefficients by rising power. A double root counts once. Between two turning points there
 /// is at most one root, so the derivative brackets them all.
 fn real_roots(coefficients: &[f64]) -> Vec<f64> {
-    let Some(degree) = coefficients.iter().rposition(|one| *one != 0.0) else {
+    let Some(degree) = coefficients.iter().rposition(|c| *c != 0.0) else {
         return Vec::new();
     };
     if degree == 0 {
@@ -349,16 +349,16 @@ fn real_roots(coefficients: &[f64]) -> Vec<f64> {
         .iter()
         .enumerate()
         .skip(1)
-        .map(|(power, one)| power as f64 * one)
+        .map(|(power, c)| power as f64 * c)
         .collect();
     // Cauchy's bound: no root is larger.
     let leading = coefficients[degree].abs();
-    let bound = 1.0 + coefficients.iter().fold(0f64, |most, one| most.max(one.abs())) / leading;
+    let bound = 1.0 + coefficients.iter().fold(0f64, |most, c| most.max(c.abs())) / leading;
 
     let mut ends = vec![-bound];
     ends.extend(real_roots(&derivative));
     ends.push(bound);
-    let value = |x: f64| coefficients.iter().rev().fold(0.0, |sum, one| sum * x + one);
+    let value = |x: f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
     let positive = |x: f64| value(x) > 0.0;
     let between = ends.windows(2).filter(|pair| positive(pair[0]) != positive(pair[1]));
     let mut roots: Vec<f64> = between
@@ -369,15 +369,12 @@ fn real_roots(coefficients: &[f64]) -> Vec<f64> {
         .collect();
     // A turning point that touches zero to within rounding.
     let touches = |x: &f64| {
-        let size = coefficients
-            .iter()
-            .rev()
-            .fold(0.0, |sum, one| sum * x.abs() + one.abs());
+        let size = coefficients.iter().rev().fold(0.0, |sum, c| sum * x.abs() + c.abs());
         value(*x).abs() <= 8.0 * f64::EPSILON * size
     };
     roots.extend(ends[1..ends.len() - 1].iter().copied().filter(touches));
     roots.sort_by(f64::total_cmp);
-    roots.dedup_by(|one, other| (*one - *other).abs() <= 1e-7 * (1.0 + other.abs()));
+    roots.dedup_by(|first, second| (*first - *second).abs() <= 1e-7 * (1.0 + second.abs()));
     roots
 }
 

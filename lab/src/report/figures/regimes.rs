@@ -125,8 +125,8 @@ fn letters(map: &Map) -> Vec<(Regime, Place)> {
         // A region in which no square of three by three cells fits gets no letter.
         let enough = cells.first().map_or(0, |deepest| deepest.0 / 2).max(1);
         for (_, place) in cells.into_iter().take_while(|cell| cell.0 >= enough) {
-            let far = |(other, [x, y]): &(Regime, [usize; 2])| {
-                *other != regime || x.abs_diff(place[0]) > columns / 3 || y.abs_diff(place[1]) > rows / 3
+            let far = |(occupied, [x, y]): &(Regime, [usize; 2])| {
+                *occupied != regime || x.abs_diff(place[0]) > columns / 3 || y.abs_diff(place[1]) > rows / 3
             };
             if letters.iter().all(far) {
                 letters.push((regime, place));
