@@ -57,6 +57,7 @@ FILES = {
     ),
     "backbone.csv": ("identify", "the free decay, one row per window of the fit"),
     "backbone.svg": ("identify", "C over sigma: decay, theory, exact orbits"),
+    "history.svg": ("identify", "C and sigma over time: lock, hold and decay, with theory and exact orbit"),
     "sim.svg": ("identify", "the slow invariant manifold with the decay"),
     "tracked.json": ("backbone", "all results of the tracking"),
     "tracked.csv": ("backbone", "one row per level"),

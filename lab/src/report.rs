@@ -13,7 +13,10 @@ use std::path::{Path, PathBuf};
 use maud::{DOCTYPE, PreEscaped, html};
 
 use figure::Figure;
-pub use files::{ReportError, decay_csv, map_csv, write, write_fit, write_interrupted, write_map, write_tracked};
+pub use files::{
+    ReportError, decay_csv, map_csv, write, write_fit, write_interrupted, write_map, write_response, write_theory,
+    write_tracked,
+};
 pub use table::{Table, number, row, with_uncertainty};
 
 use crate::scene::Scene;

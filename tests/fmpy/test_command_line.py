@@ -12,7 +12,7 @@ import pytest
 
 from references import ROOT, orbits
 
-RESULTS = {"LoViNes.fmu", "identification.json", "backbone.csv", "backbone.svg", "sim.svg"}
+RESULTS = {"LoViNes.fmu", "identification.json", "backbone.csv", "backbone.svg", "history.svg", "sim.svg"}
 BAD_INPUT = {
     "plant.rr=0.5": "rr",
     "nonsense": "section.key=value",
@@ -73,7 +73,7 @@ def test_identify_writes_its_results_and_they_keep_their_limits(call, tmp_path, 
 
     check_decay(found["decay"])
     check_csv(folder / "backbone.csv", found["decay"])
-    for picture in ("backbone.svg", "sim.svg"):
+    for picture in ("backbone.svg", "history.svg", "sim.svg"):
         assert ElementTree.parse(folder / picture).getroot().tag.endswith("svg")
 
 

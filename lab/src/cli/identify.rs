@@ -22,7 +22,7 @@ Examples:
   vines identify --record run.csv                  what the sensors read as well, for `vines fit run.csv`
   vines identify --rig udp://127.0.0.1:5510 --watch    the same, shown in a browser while it runs
 
-Writes identification.json, backbone.csv, backbone.svg and sim.svg. Without --rig, the rig is this program's LoViNes.fmu; it is
+Writes identification.json, backbone.csv, backbone.svg, history.svg and sim.svg. Without --rig, the rig is this program's LoViNes.fmu; it is
 written as well, with PhaseLock.fmu.";
 
 /// Lock the plant at phase resonance, let it decay, and identify its backbone
@@ -63,7 +63,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     })?;
     let result = Comparison::of(&identification, &scene);
     let summary = report::summary::identification(&result);
-    let mut files = report::write(&result, &experiment.out)?;
+    let mut files = report::write(&result, &record, &scene, &experiment.out)?;
     if arguments.rig.is_none() {
         files.extend(fmus(&experiment.out)?);
     }

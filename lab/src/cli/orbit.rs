@@ -1,6 +1,7 @@
 //! `vines orbit`: exact orbits at resonance, and their curves.
 
 use std::f64::consts::TAU;
+use std::path::PathBuf;
 
 use clap::Args;
 use lovines::{Event, State};
@@ -12,6 +13,7 @@ use vines::orbit::{
 use vines::report::{
     Table, number, row,
     summary::{self, parameters},
+    write_response,
 };
 use vines::{
     ArgumentError,
@@ -19,7 +21,7 @@ use vines::{
     scene::{Dimensionless, Scene},
 };
 
-use super::output::{output, yes_no};
+use super::output::{output, written, yes_no};
 use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
@@ -41,6 +43,7 @@ Newton's method on the plant's own period map: at phase resonance under the scen
 Examples:
   vines orbit
   vines orbit --response --set excitation.G=1.6
+  vines orbit --response --range=-3:1 --figure response.svg
   vines orbit --backbone --set plant.c=0 --set plant.r=1 --set excitation.G=0
   vines orbit --sigma=-0.6 --set excitation.G=2.2   the orbit that settles there, here six impacts in two periods
   vines orbit --set excitation.G=1.0 --set plant.r=0.7
@@ -78,6 +81,10 @@ pub(super) struct Arguments {
     /// Detunings of --response and --backbone
     #[arg(long, value_name = "FIRST:LAST", default_value = "-6:6", allow_hyphen_values = true, value_parser = detunings)]
     range: [f64; 2],
+
+    /// Write a figure (SVG) of --response: exact and by theory, and the exact backbone
+    #[arg(long, value_name = "FILE", requires = "response", conflicts_with = "sigma")]
+    figure: Option<PathBuf>,
 
     /// Print JSON instead of a table
     #[arg(long)]
@@ -134,7 +141,7 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Continuatio
             scene.g
         )));
     }
-    shown(scene, "Exact frequency response", &response, arguments.json, || {
+    let mut text = shown(scene, "Exact frequency response", &response, arguments.json, || {
         let count = response.components.len();
         let curves = response.components.iter();
         let curves: String = curves
@@ -145,7 +152,14 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Continuatio
             "{count} component{plural}\nComplete: symmetric 1:1 motions and what branches off them. Isolated branches of other patterns are missed; \
              --sigma follows the\none that a start leads to.\n\n{curves}"
         )
-    })
+    })?;
+    if let Some(file) = &arguments.figure {
+        let file = write_response(scene, &response, arguments.range, file)?;
+        if !arguments.json {
+            text += &written(&[file]);
+        }
+    }
+    Ok(text)
 }
 
 /// Parses FIRST:LAST.

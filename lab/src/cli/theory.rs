@@ -1,13 +1,15 @@
 //! `vines theory`: first-order theory of a scene.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use serde_json::json;
 use vines::{
-    report::{Table, row, summary::parameters},
+    report::{Table, row, summary::parameters, write_theory},
     theory::{Activation, B_SYMMETRY_BREAKING, BranchSide, SlowFlow, backbone, resonant},
 };
 
-use super::output::{output, yes_no};
+use super::output::{output, written, yes_no};
 use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
@@ -18,6 +20,7 @@ Examples:
   vines theory
   vines theory --set excitation.G=1.0
   vines theory --sigma=-1.0                       all equilibria at that detuning
+  vines theory --figure theory.svg
   vines theory --points 500 --json > theory.json";
 
 /// Print first-order theory: invariant manifold, solutions at phase resonance, backbone
@@ -35,6 +38,10 @@ pub(super) struct Arguments {
     /// stable solution, or at 0
     #[arg(long, value_name = "SIGMA", allow_negative_numbers = true)]
     sigma: Option<f64>,
+
+    /// Write a figure (SVG): the slow invariant manifold, and backbones for several coefficients of restitution
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
 
     /// Print JSON, with the samples of the backbone, instead of a table
     #[arg(long)]
@@ -72,7 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         "equilibria": equilibria.clone().unwrap_or_default(),
         "backbone": backbone(&scene, highest / points as f64, highest, points),
     });
-    output(arguments.json, &result, || {
+    let mut text = output(arguments.json, &result, || {
         let rows = solutions.iter().map(|point| {
             let stable = [point.impacts_stable, point.slow_flow_stable];
             cells(point.branch, [point.sigma, point.c, point.b], stable)
@@ -96,7 +103,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             text += &format!("\nEquilibria at sigma = {sigma}\n{equilibria}");
         }
         text
-    })
+    })?;
+    if let Some(file) = &arguments.figure {
+        let file = write_theory(&scene, file)?;
+        if !arguments.json {
+            text += &format!("\n{}", written(&[file]));
+        }
+    }
+    Ok(text)
 }
 
 fn thresholds(activation: &Activation, sigma: f64) -> String {

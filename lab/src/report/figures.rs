@@ -410,8 +410,24 @@ pub fn approach(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
     Figure(vec![panel])
 }
 
+/// First-order theory: the slow invariant manifold with the resonant motions at the scene's G, and backbones for several coefficients of
+/// restitution.
+pub fn theory(p: &Dimensionless) -> Figure {
+    let flow = SlowFlow::new(p.lambda, p.r);
+    let mut manifold = Panel::new(((0.0, FASTEST), SPEED), ((0.0, 1.2), amplitude(p)))
+        .heading("Slow invariant manifold", &caption(p, p.g))
+        .legend(Legend::LowerRight);
+    let curve = manifold_curve(&flow, |b, c| c * reading(p, b, flow.free_detuning(b)));
+    manifold.curve(curve, 2.0, THEORY, "manifold");
+    let solutions = theory::resonant(p);
+    let solutions = solutions.iter().map(|point| (point.b, point.c));
+    manifold.add(Shape::Square, solutions, INK, "resonance at this G");
+    let (width, height) = SIZE;
+    Figure(vec![manifold, backbones(p).at([width, 0.0, width, height])])
+}
+
 /// Backbones of first-order theory for several coefficients of restitution, the scene's own emphasised.
-pub fn backbones(p: &Dimensionless) -> Figure {
+fn backbones(p: &Dimensionless) -> Panel {
     let (x, top) = ((-4.0, 4.0), 1.2);
     let others = [0.3, 0.5, 0.8, 1.0].into_iter();
     let mut values: Vec<f64> = others.filter(|r| (r - p.r).abs() > 0.09).collect();
@@ -448,44 +464,26 @@ pub fn backbones(p: &Dimensionless) -> Figure {
         };
         panel.add(Shape::TextOnCurve(size), [place], INK, &format!("r = {r}"));
     }
-    Figure(vec![panel])
+    panel
 }
 
-/// Frequency responses at several excitations, exact and first-order, with the backbone near their maxima.
-pub fn responses(p: &Dimensionless, responses: &[FrequencyResponse]) -> Figure {
+/// The frequency response at the scene's G over a range of sigma, exact and first-order, and the exact backbone.
+pub fn responses(p: &Dimensionless, response: &FrequencyResponse, range: [f64; 2]) -> Figure {
     let fold = SlowFlow::new(p.lambda, p.r).manifold.b_min();
-    let symmetric = responses.iter().flat_map(FrequencyResponse::symmetric);
+    let symmetric = response.symmetric().flat_map(|branch| &branch.points);
     let top = symmetric
-        .flat_map(|branch| &branch.points)
         .filter(|point| point.b > fold)
-        .fold(0.6, |most: f64, point| most.max(1.08 * point.c));
-    let x = (-5.0, 5.0);
-    let list: Vec<String> = responses.iter().map(|response| format!("{:.3}", response.g)).collect();
-    let caption = format!("{}; G = {}; amplitudes over b", rig(p), list.join(", "));
-    let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
-        .heading("Frequency responses and backbone", &caption)
+        .fold(0.6, |most: f64, point| most.max(1.15 * point.c));
+    let mut panel = Panel::new(((range[0], range[1]), DETUNING), ((0.0, top), amplitude(p)))
+        .heading("Frequency response and backbone", &caption(p, response.g))
         .at([0.0, 0.0, WIDE, SIZE.1])
         .legend(Legend::Beside(205.0));
-    for response in responses {
-        add_response(&mut panel, p, response);
-    }
-    for response in responses {
-        // The label is on the left flank, below the peak.
-        let stable = response.symmetric().flat_map(|branch| &branch.points);
-        let stable = stable.filter(|point| point.stable);
-        let stable: Vec<Place> = stable.map(|point| (point.sigma, point.c)).collect();
-        let Some(peak) = stable.iter().copied().max_by(|place, next| place.1.total_cmp(&next.1)) else {
-            continue;
-        };
-        let off = |place: &Place| (place.1 - 0.75 * peak.1).abs();
-        let flank = stable.into_iter().filter(|place| place.0 < peak.0);
-        if let Some((sigma, c)) = flank.min_by(|place, next| off(place).total_cmp(&off(next))) {
-            let label = format!("G = {:.3}", response.g);
-            panel.add(Shape::TextOnCurve(13.0), [(sigma, c)], INK, &label);
-        }
-    }
-    let backbone = theory::backbone(p, fold, 1.4 * B_SYMMETRY_BREAKING, 600);
-    panel.curve(backbone.iter().map(marked), 2.6, THEORY, "backbone");
+    add_response(&mut panel, p, response);
+    let branch = orbit::backbone(p, &ContinuationLimits::default());
+    let points = branch.iter().flat_map(|branch| &branch.points);
+    let points = points.filter(|motion| motion.b >= fold);
+    let points = points.map(|motion| ((motion.sigma, motion.c), motion.stable));
+    panel.curve(points, 1.2, INK, "exact backbone");
     Figure(vec![panel])
 }
 

@@ -8,15 +8,15 @@ use serde::Serialize;
 use serde_json::Value;
 use thiserror::Error;
 
-use super::figures::{backbone, fitted, manifold, regimes, tracked_with_drive};
+use super::figures::{backbone, fitted, history, manifold, regimes, responses, theory, tracked_with_drive};
 use super::theme::dark;
 use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
 use crate::files::{self, FileError};
 use crate::fit::{Fit, MeasuredPoint};
-use crate::orbit::Periodic;
-use crate::record::{Sample, table};
+use crate::orbit::{FrequencyResponse, Periodic};
+use crate::record::{Record, Sample, table};
 use crate::regime::Regime;
-use crate::scene::Scene;
+use crate::scene::{Dimensionless, Scene};
 use crate::sweep::{Map, MapCell, SweepError};
 
 /// Why a report could not be computed, or the files of a run could not be written.
@@ -37,12 +37,13 @@ pub enum ReportError {
     Json(#[from] serde_json::Error),
 }
 
-/// Writes `identification.json`, `backbone.csv`, `backbone.svg` and `sim.svg` into `out` and returns their paths.
-pub fn write(result: &Comparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
+/// Writes `identification.json`, `backbone.csv`, `backbone.svg`, `history.svg` and `sim.svg` into `out` and returns their paths.
+pub fn write(result: &Comparison, record: &Record, scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let files = [
         ("identification.json", json(result)?),
         ("backbone.csv", decay_csv(result)?),
         ("backbone.svg", backbone(result).svg()),
+        ("history.svg", history(record, scene, result).svg()),
         ("sim.svg", manifold(result).svg()),
     ];
     Ok(files::write(out, files)?)
@@ -78,6 +79,21 @@ pub fn write_fit(
     file: &Path,
 ) -> Result<PathBuf, ReportError> {
     Ok(files::write_file(file, &fitted(points, fit, scene, verdict).svg())?)
+}
+
+/// Writes the figure of first-order theory to `file`: the slow invariant manifold, and backbones over r.
+pub fn write_theory(scene: &Dimensionless, file: &Path) -> Result<PathBuf, ReportError> {
+    Ok(files::write_file(file, &theory(scene).svg())?)
+}
+
+/// Writes the figure of a frequency response to `file`: exact, by theory, and the backbone, over a range of sigma.
+pub fn write_response(
+    scene: &Dimensionless,
+    response: &FrequencyResponse,
+    range: [f64; 2],
+    file: &Path,
+) -> Result<PathBuf, ReportError> {
+    Ok(files::write_file(file, &responses(scene, response, range).svg())?)
 }
 
 /// Writes `interrupted.csv`: the samples of an experiment that ended early, or without a motion that can be identified.

@@ -277,7 +277,7 @@ fn theory(map: &mut Map, _: Progress) -> Result<Section, ReportError> {
         "backbones",
         "Backbones of first-order theory. Their shape does not depend on λ, but their stability does. The smaller the loss at the \
          impacts, the lower the amplitude at the fold.",
-        &figures::backbones(&p),
+        &figures::theory(&p),
     );
     let Some(study) = convergence(&p, 6) else {
         return Ok(section.concluded("Theory and exact orbits have no common stable phase-resonant motion here."));
@@ -324,12 +324,12 @@ fn curves(map: &mut Map, done: Progress) -> Result<Section, ReportError> {
         return Ok(section.concluded("There is no exact phase-resonant 1:1 motion at this excitation."));
     };
     describe_backbone(&mut section, &curve);
-    if responses.iter().any(|response| !response.components.is_empty()) {
+    if let Some(response) = responses.iter().find(|response| response.g == p.g) {
         section.figure(
             "responses",
-            "Frequency responses at several excitations: exact, first-order, and the backbone of the theory near their maxima. \
+            "The frequency response: exact, first-order, and the exact backbone near its maximum. \
              Where a response loses its symmetry, the asymmetric motions (blue, beside the dashed curve) take over.",
-            &figures::responses(&p, &responses),
+            &figures::responses(&p, response, [-5.0, 5.0]),
         );
     }
     let changes = changes(&responses);
