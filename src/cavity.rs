@@ -114,6 +114,20 @@ impl Rebound {
         (mean * (1.0 + self.scatter * deviate(self.seed, number))).clamp(self.least, 1.0)
     }
 
+    /// The coefficient `r` of impact number `number` at the speed of approach `v`, m/s, and the derivative of the rebound's speed `r v` by `v`.
+    pub fn with_slope(&self, wall: Wall, v: f64, number: u64) -> (f64, f64) {
+        let r = self.of_impact(wall, v, number);
+        let law = self.laws[wall.index()];
+        // `v r'(v)` over r, where the law is not limited.
+        let steepness = match law {
+            _ if r == self.least || r == 1.0 => 0.0,
+            Restitution::Constant(_) => 0.0,
+            Restitution::Viscoelastic(k) => -0.2 * k * fifth_root(v) / coefficient(law, v),
+            Restitution::Plastic(_) => -0.25,
+        };
+        (r, r * (1.0 + steepness))
+    }
+
     /// Whether a particle that leaves a wall at a speed (m/s) is in truth at rest on it, as [`ImpactLaw::rests`] has it for one constant
     /// acceleration. `free` is the acceleration of the wall towards a particle without any, with its rounding error, m/s².
     ///

@@ -15,8 +15,10 @@ pub mod parameters;
 pub mod plant;
 pub mod segment;
 mod system;
+pub mod variation;
 
 pub use base_motion::{BaseMotion, Drive};
 pub use contact::Wall;
 pub use parameters::{Cavity, InvalidValue, Parameters, Restitution};
 pub use plant::{Event, Outcome, Plant, State, Totals};
+pub use variation::Variation;
