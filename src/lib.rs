@@ -15,6 +15,7 @@ pub mod parameters;
 pub mod plant;
 pub mod segment;
 mod system;
+pub mod table;
 pub mod variation;
 
 pub use base_motion::{BaseMotion, Drive};

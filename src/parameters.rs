@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::table::{self, Range};
+
 /// Fastest rate that is accepted, rad/s: the series of the motion contain its powers, up to the fifteenth.
 pub(crate) const FASTEST: f64 = 1e12;
 
@@ -69,18 +71,7 @@ impl Parameters {
     /// # Errors
     /// The first invalid value, with its unit and the allowed range.
     pub fn validate(&self) -> Result<(), InvalidValue> {
-        let positive = |name, value: f64, unit| {
-            let allowed = "a number from 1e-100 to 1e100";
-            InvalidValue::unless((1e-100..=1e100).contains(&value), name, value, unit, allowed)
-        };
-        positive("M (primary mass)", self.primary_mass, "kg")?;
-        positive("k (stiffness)", self.stiffness, "N/m")?;
-        let (c, allowed) = (self.damping, "a number from 0 to 1e100");
-        InvalidValue::unless((0.0..=1e100).contains(&c), "c (damping)", c, "N.s/m", allowed)?;
-        positive("m (particle mass)", self.particle_mass, "kg")?;
-        positive("b (half-width of the cavity)", self.half_width, "m")?;
-        let (r, allowed) = (self.restitution, "a number above 0 and at most 1");
-        InvalidValue::unless(r > 0.0 && r <= 1.0, "r (coefficient of restitution)", r, "", allowed)?;
+        table::check(self)?;
         let rate = |name, value: f64, least, allowed| {
             InvalidValue::unless((least..=FASTEST).contains(&value), name, value, "rad/s", allowed)
         };
@@ -109,31 +100,20 @@ pub enum Restitution {
 }
 
 impl Restitution {
+    /// Refuses a parameter that is not allowed for this law.
     fn validate(self) -> Result<(), InvalidValue> {
-        let (name, value, unit, (low, high), allowed) = match self {
-            Self::Constant(r) => (
-                "r of a wall (coefficient of restitution)",
-                r,
-                "",
-                (f64::MIN_POSITIVE, 1.0),
-                "a number above 0 and at most 1",
-            ),
+        let (name, value, unit, range) = match self {
+            Self::Constant(r) => ("r of a wall (coefficient of restitution)", r, "", Range::Ratio),
             Self::Viscoelastic(k) => (
                 "k of a wall (viscoelastic restitution)",
                 k,
                 "(s/m)^(1/5)",
-                (0.0, 1e100),
-                "a number from 0 to 1e100",
+                Range::NotNegative,
             ),
-            Self::Plastic(v) => (
-                "v_y of a wall (yield speed)",
-                v,
-                "m/s",
-                (1e-100, 1e100),
-                "a number from 1e-100 to 1e100",
-            ),
+            Self::Plastic(v) => ("v_y of a wall (yield speed)", v, "m/s", Range::Positive),
         };
-        InvalidValue::unless((low..=high).contains(&value), name, value, unit, allowed)
+        let [low, high] = range.bounds();
+        InvalidValue::unless((low..=high).contains(&value), name, value, unit, range.allowed())
     }
 }
 
@@ -175,39 +155,15 @@ impl Cavity {
         seed: 0,
     };
 
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first invalid value, with its unit and the allowed range.
-    pub fn validate(&self) -> Result<(), InvalidValue> {
-        let within = |name, value: f64, unit, (low, high): (f64, f64), allowed| {
-            InvalidValue::unless((low..=high).contains(&value), name, value, unit, allowed)
-        };
-        let (gap, share) = ("a number from 1e-100 to 1e100", "a number from 0 to 1");
-        let (plus, minus) = (
-            "b_plus (gap to the wall w = b_plus)",
-            "b_minus (gap to the wall w = -b_minus)",
-        );
-        within(plus, self.b_plus.unwrap_or(1.0), "m", (1e-100, 1e100), gap)?;
-        within(minus, self.b_minus.unwrap_or(1.0), "m", (1e-100, 1e100), gap)?;
-        let (right, tilt) = (core::f64::consts::FRAC_PI_2, "a number from -pi/2 to pi/2");
-        within("theta (tilt)", self.tilt, "rad", (-right, right), tilt)?;
+    /// Refuses values that contradict each other.
+    fn validate(&self) -> Result<(), InvalidValue> {
         let mu = self.kinetic_friction;
-        within(
-            "mu_k (kinetic friction)",
-            mu,
-            "",
-            (0.0, 100.0),
-            "a number from 0 to 100",
-        )?;
         let (held, allowed) = (self.static_friction.unwrap_or(mu), "a number from mu_k to 100");
-        within("mu_s (static friction)", held, "", (mu, 100.0), allowed)?;
-        for law in self.restitution.into_iter().flatten() {
-            law.validate()?;
-        }
-        let name = "r_min (least coefficient of restitution)";
-        within(name, self.least_restitution, "", (0.0, 1.0), share)?;
-        within("s (scatter of the restitution)", self.scatter, "", (0.0, 1.0), share)
+        InvalidValue::unless(held >= mu, "mu_s (static friction)", held, "", allowed)?;
+        self.restitution
+            .into_iter()
+            .flatten()
+            .try_for_each(Restitution::validate)
     }
 }
 

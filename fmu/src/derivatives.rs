@@ -177,18 +177,6 @@ fn perturbed(now: &Instant<f64>, known: Real, reduced_are_states: bool) -> Resul
     };
     let (u1, u2) = now.reduced_velocities();
     match known {
-        // Only the next event depends on them, or what is constant.
-        Real::b
-        | Real::r
-        | Real::b_plus
-        | Real::b_minus
-        | Real::theta
-        | Real::mu_k
-        | Real::mu_s
-        | Real::r_plus
-        | Real::r_minus
-        | Real::r_min
-        | Real::r_scatter => Ok(instant),
         Real::M
         | Real::k
         | Real::c
@@ -207,6 +195,8 @@ fn perturbed(now: &Instant<f64>, known: Real, reduced_are_states: bool) -> Resul
         } else {
             instant
         }),
+        // Only the next event depends on it, or what is constant.
+        _ if known.variable().causality == Causality::Parameter => Ok(instant),
         _ => Err(Refusal::error(format!(
             "{} is not a known: expected a parameter, an input or a state",
             known.variable().name

@@ -73,6 +73,7 @@ impl ModelExchange for LoViNes {
     }
 
     fn new_discrete_states(&mut self, time: f64, log: &Log) -> Result<Discrete, Refusal> {
+        self.check_settings()?;
         self.progress = Progress::UnderWay;
         let jumped = (self.hybrid_mut()).resolve(time, |event, rest| log::tell_exchange(log, time, event, rest));
         Ok(Discrete { states_changed: jumped, ..Discrete::default() })

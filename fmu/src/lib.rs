@@ -16,10 +16,10 @@ use crate::limits::lost;
 use crate::model_exchange::hybrid::Hybrid;
 use fmi2_component::{Archive, Component, Key, Log, Refusal};
 use lovines::plant::Contact;
+use lovines::table::Values;
 use lovines::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
 use outputs::Outputs;
 use reach::Reach;
-use settings::CavitySettings;
 use std::cell::Cell;
 use variables::{Integer, Model, Real, category};
 
@@ -50,8 +50,9 @@ struct LoViNes {
     /// The longest step that has been found acceptable with these parameters and inputs, s; NaN before.
     #[serde(skip, default = "unknown")]
     longest: Cell<f64>,
+    /// What was set, and the parameters of the rig: those set last that did not contradict each other.
+    values: Values,
     parameters: Parameters,
-    cavity: CavitySettings,
     start: State,
 }
 
@@ -106,7 +107,7 @@ impl Component for LoViNes {
             reach: Reach::default(),
             longest: unknown(),
             parameters,
-            cavity: CavitySettings::default(),
+            values: Values::from(&parameters),
             start,
         }
     }
@@ -142,27 +143,16 @@ impl Component for LoViNes {
             Integer::impacts => i32::try_from(totals.impacts).unwrap_or(i32::MAX),
             Integer::contact => contact.map_or(0, |wall| wall.sign() as i32),
             Integer::sticks => i32::try_from(totals.sticks).unwrap_or(i32::MAX),
-            Integer::r_law => self.cavity.r_law,
-            Integer::seed => self.cavity.seed,
+            parameter => self.whole(parameter),
         }
     }
 
     fn set_integer(&mut self, variable: Integer, value: i32) -> Result<(), Refusal> {
-        let mut cavity = self.cavity;
-        match variable {
-            Integer::r_law if !(0..=2).contains(&value) => {
-                return Err(Refusal::error(format!(
-                    "r_law = {value} is refused; allowed are 0 (constant), 1 (viscoelastic) and 2 (plastic)"
-                )));
-            }
-            Integer::r_law => cavity.r_law = value,
-            Integer::seed => cavity.seed = value,
-            _ => return Err(Refusal::error("this variable is computed, not set")),
-        }
-        self.set_cavity(cavity)
+        self.set_parameter(variable, value.into())
     }
 
     fn initialise(&mut self, start_time: f64, _log: &Log) -> Result<(), Refusal> {
+        self.parameters = self.values.parameters();
         match &mut self.simulation {
             Simulation::Steps(plant) => {
                 *plant = Plant::new(self.parameters, self.start)?;

@@ -49,6 +49,7 @@ impl LoViNes {
     /// Whether a step can be done; steps up to that length need not be checked again.
     #[inline(never)]
     pub(super) fn judge(&self, step: f64) -> Result<(), Refusal> {
+        self.check_settings()?;
         let rate = self.fastest.max(self.drive.omega.abs());
         self.drive.validate()?;
         if step * rate > LONGEST_STEP {
