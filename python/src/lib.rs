@@ -18,6 +18,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<experiments::PhaseLock>()?;
     module.add_class::<sweeps::Sweep>()?;
     for function in [
+        wrap_pyfunction!(plants::plant_table, module)?,
         wrap_pyfunction!(experiments::identify, module)?,
         wrap_pyfunction!(experiments::backbone, module)?,
         wrap_pyfunction!(experiments::fit, module)?,

@@ -6,7 +6,9 @@ use std::{
 };
 
 use lovines::{
-    Cavity, Drive, Event, InvalidValue, Parameters, Plant as OnePlant, Restitution, State, Wall, plant::Saved,
+    Drive, Event, InvalidValue, Parameters, Plant as OnePlant, State, Wall,
+    plant::Saved,
+    table::{COUNT, LAWS, PARAMETERS, Parameter, Values},
 };
 use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ndarray::Array2};
 use pyo3::{
@@ -119,58 +121,23 @@ fn advance(
     Ok(())
 }
 
-/// Values that make a plant, in the order of `_PARAMETERS` and `_CAVITY` in plants.py; NaN where the cavity has its default.
-const VALUES: usize = 17;
+/// The symbols of the parameters with their units, those that must be given first, and the laws of restitution by their codes.
+#[pyfunction]
+pub fn plant_table() -> (
+    Vec<(&'static str, &'static str)>,
+    Vec<(&'static str, &'static str)>,
+    Vec<&'static str>,
+) {
+    let (needed, cavity): (Vec<_>, Vec<_>) = PARAMETERS.iter().partition(|row| row.default.is_none());
+    let names = |rows: Vec<&Parameter>| rows.into_iter().map(|row| (row.symbol, row.unit)).collect();
+    (names(needed), names(cavity), LAWS.to_vec())
+}
 
-fn parameters(values: [f64; VALUES]) -> Parameters {
-    let [
-        primary_mass,
-        stiffness,
-        damping,
-        particle_mass,
-        half_width,
-        restitution,
-        cavity @ ..,
-    ] = values;
-    let cavity: [Option<f64>; 11] = cavity.map(|value| Some(value).filter(|value| !value.is_nan()));
-    let [
-        b_plus,
-        b_minus,
-        theta,
-        mu_k,
-        mu_s,
-        r_law,
-        r_plus,
-        r_minus,
-        r_min,
-        r_scatter,
-        seed,
-    ] = cavity;
-    let law = |parameter| match r_law {
-        Some(1.0) => Restitution::Viscoelastic(parameter),
-        Some(2.0) => Restitution::Plastic(parameter),
-        _ => Restitution::Constant(parameter),
-    };
-    let of = |value: Option<f64>| value.unwrap_or(0.0);
-    Parameters {
-        primary_mass,
-        stiffness,
-        damping,
-        particle_mass,
-        half_width,
-        restitution,
-        cavity: Cavity {
-            b_plus,
-            b_minus,
-            tilt: of(theta),
-            kinetic_friction: of(mu_k),
-            static_friction: mu_s,
-            restitution: [r_plus, r_minus.or(r_plus)].map(|parameter| parameter.map(law)),
-            least_restitution: of(r_min),
-            scatter: of(r_scatter),
-            seed: of(seed) as u64,
-        },
-    }
+/// Parameters from numbers in the order of the plant's table; NaN where the cavity has its default.
+fn parameters(values: [f64; COUNT]) -> Result<Parameters, InvalidValue> {
+    let values = Values(values.map(|value| Some(value).filter(|value| !value.is_nan())));
+    values.given().try_for_each(|(row, value)| row.check(value))?;
+    Ok(values.parameters())
 }
 
 fn state([q1, dq1, q2, dq2]: [f64; 4]) -> State {
@@ -226,8 +193,9 @@ impl Plant {
 impl Plant {
     /// Parameters, and q1, dq1, q2, dq2.
     #[new]
-    fn new(values: [Real; VALUES], start: [Real; 4]) -> PyResult<Self> {
-        let plant = OnePlant::new(parameters(values.map(|one| one.0)), state(start.map(|one| one.0)));
+    fn new(values: [Real; COUNT], start: [Real; 4]) -> PyResult<Self> {
+        let parameters = parameters(values.map(|one| one.0));
+        let plant = parameters.and_then(|parameters| OnePlant::new(parameters, state(start.map(|one| one.0))));
         plant.map(Self::of).map_err(invalid)
     }
 
@@ -462,7 +430,8 @@ impl Plants {
                 parameters(std::array::from_fn(|i| p.get(i).copied().unwrap_or(f64::NAN))),
                 state(std::array::from_fn(|i| s[i])),
             );
-            let plant = OnePlant::new(parameters, start).map_err(|error| invalid(format!("plant {n}: {error}")))?;
+            let plant = parameters.and_then(|parameters| OnePlant::new(parameters, start));
+            let plant = plant.map_err(|error| invalid(format!("plant {n}: {error}")))?;
             plants.push(plant.save());
         }
         Ok(Self::of(plants))

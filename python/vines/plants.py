@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._native import Plant as _Plant
 from ._native import Plants as _Plants
+from ._native import plant_table
 from .datasets import dataset
 from .numbers import reals
 from .results import Result, axes
@@ -19,15 +20,12 @@ from .scenes import Scene
 if TYPE_CHECKING:
     import xarray
 
-_PARAMETERS = ("M", "k", "c", "m", "b", "r")
+_NEEDED, _OF_CAVITY, _LAWS = plant_table()
+_PARAMETERS = tuple(name for name, _ in _NEEDED)
 #: Parameters of a real cavity; what is left out is ideal.
-_CAVITY = (
-    "b_plus", "b_minus", "theta", "mu_k", "mu_s", "r_law", "r_plus", "r_minus", "r_min", "r_scatter", "seed",
-)  # fmt: skip
-#: Laws of restitution, in the order of their codes.
-_LAWS = ("constant", "viscoelastic", "plastic")
+_CAVITY = tuple(name for name, _ in _OF_CAVITY)
 _START = ("q1", "dq1", "q2", "dq2")
-_UNITS = {"M": "kg", "k": "N/m", "c": "N s/m", "m": "kg", "b": "m", "r": "1"}
+_UNITS = {name: unit or "1" for name, unit in _NEEDED}
 _STATE_UNITS = {
     "q1": "m", "dq1": "m/s", "q2": "m", "dq2": "m/s", "time": "s", "impacts": "1", "dissipated": "J",
     "sticks": "1", "stuck_time": "s", "friction_loss": "J",
@@ -303,15 +301,9 @@ class Plant(_Plant):
     Parameters
     ----------
     parameters : Scene or mapping of str to float, optional
-        M (kg), k (N/m), c (N s/m), m (kg), b (m) and r; default: the default scene. A real cavity has, each optional:
-
-        - b_plus, b_minus (m): gaps to the walls at w = b_plus and w = -b_minus; default b;
-        - theta (rad): tilt; gravity accelerates the particle by 9.80665 m/s² sin(theta) along the axis;
-        - mu_k, mu_s: kinetic friction, and static friction, at least mu_k (default mu_k);
-        - r_law: "constant", "viscoelastic" (r = 1 - k v^(1/5)) or "plastic" (r = min(1, (v/v_y)^(-1/4))), with the
-          speed of approach v in m/s; r_plus, r_minus: r, k or v_y (m/s) at the two walls, r_minus by default r_plus;
-        - r_min: least coefficient of restitution;
-        - r_scatter, seed: relative standard deviation of r from impact to impact, and the seed of this scatter.
+        M (kg), k (N/m), c (N s/m), m (kg), b (m) and r; default: the default scene. A real cavity has gaps, tilt,
+        friction and a law of restitution, under the names of the keys in `[plant]` of a scene, which the page
+        "Parameters of the plant" lists.
     **start : float
         q1, q2 (m), dq1, dq2 (m/s).
 
@@ -487,8 +479,6 @@ def _of_cavity(name: str, given: Any) -> NDArray[np.float64]:
     values = reals(name, given)
     if np.isnan(values).any():
         raise ValueError(f"{name} = nan: a number is allowed")
-    if name == "seed" and not ((values >= 0) & (values < 2**31) & (values % 1 == 0)).all():
-        raise ValueError(f"seed = {given!r}: whole numbers from 0 to {2**31 - 1} are allowed")
     return values
 
 

@@ -27,16 +27,20 @@ mod names;
 mod overrides;
 
 use std::f64::consts::TAU;
+use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
+use lovines::table::{LAWS, PARAMETERS, Parameter, Range, Values};
 use lovines::{Cavity, InvalidValue, Restitution, State};
 use phase_lock::{ConfigError, Number};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+use serde::de::{Error, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use vines_model::ArgumentError;
 
 pub use chain::ChainSettings;
 pub use controller::{ControllerSettings, KEYS, LinearResponse, PhaseLock, key, refusal};
-pub use lovines::Parameters;
+pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
 pub use names::{Name, Names};
 pub use overrides::{Family, Override};
 pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
@@ -268,72 +272,80 @@ impl Scene {
 
 // The `[plant]` section, in SI units or dimensionless, and the `[start]` section.
 
-/// The section as written.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// The section as written: rows of the plant's table, or dimensionless numbers.
+#[derive(Debug, Clone, Default)]
 struct PlantSection {
-    #[serde(rename = "M")]
-    mass: Option<f64>,
-    k: Option<f64>,
-    c: Option<f64>,
-    m: Option<f64>,
-    b: Option<f64>,
-    r: Option<f64>,
+    values: Values,
     epsilon: Option<f64>,
     lambda: Option<f64>,
-    // The real cavity, in SI units.
-    b_plus: Option<f64>,
-    b_minus: Option<f64>,
-    #[serde(default)]
-    theta: f64,
-    #[serde(default)]
-    mu_k: f64,
-    mu_s: Option<f64>,
-    #[serde(default)]
-    r_law: Law,
-    r_plus: Option<f64>,
-    r_minus: Option<f64>,
-    #[serde(default)]
-    r_min: f64,
-    #[serde(default)]
-    r_scatter: f64,
-    #[serde(default)]
-    seed: u32,
 }
 
-/// A law of restitution; `r_plus` and `r_minus` are its parameters at the two walls. The numbers are the codes in `LoViNes.fmu`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Law {
-    #[default]
-    Constant,
-    Viscoelastic,
-    Plastic,
+/// Keys of the section: the symbols of the table, and these two after them.
+static PLANT_KEYS: LazyLock<Vec<&str>> = LazyLock::new(|| {
+    let symbols = PARAMETERS.iter().map(|row| row.symbol);
+    symbols.chain(["epsilon", "lambda"]).collect()
+});
+
+/// The place of a key in [`PLANT_KEYS`].
+struct PlantKey(usize);
+
+impl<'de> Deserialize<'de> for PlantKey {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let key = String::deserialize(from)?;
+        let place = PLANT_KEYS.iter().position(|known| *known == key);
+        place
+            .map(Self)
+            .ok_or_else(|| D::Error::unknown_field(&key, &PLANT_KEYS))
+    }
 }
 
-impl Law {
-    /// The law and its parameter.
-    fn of(law: Restitution) -> (Self, f64) {
-        match law {
-            Restitution::Constant(r) => (Self::Constant, r),
-            Restitution::Viscoelastic(k) => (Self::Viscoelastic, k),
-            Restitution::Plastic(speed) => (Self::Plastic, speed),
-        }
-    }
+impl<'de> Deserialize<'de> for PlantSection {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct Section;
 
-    fn with(self, parameter: f64) -> Restitution {
-        match self {
-            Self::Constant => Restitution::Constant(parameter),
-            Self::Viscoelastic => Restitution::Viscoelastic(parameter),
-            Self::Plastic => Restitution::Plastic(parameter),
+        impl<'de> Visitor<'de> for Section {
+            type Value = PlantSection;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a map")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<PlantSection, A::Error> {
+                let mut section = PlantSection::default();
+                while let Some(PlantKey(n)) = map.next_key()? {
+                    let row = PARAMETERS.get(n);
+                    let value = match row.map(|row| row.range) {
+                        Some(Range::Law) => law(&map.next_value::<String>()?)?,
+                        Some(Range::Whole) => map.next_value::<u32>()?.into(),
+                        _ => map.next_value()?,
+                    };
+                    *match n.checked_sub(PARAMETERS.len()) {
+                        None => &mut section.values.0[n],
+                        Some(0) => &mut section.epsilon,
+                        Some(_) => &mut section.lambda,
+                    } = Some(value);
+                }
+                Ok(section)
+            }
         }
+
+        from.deserialize_map(Section)
     }
+}
+
+/// The code of a law of restitution.
+fn law<E: Error>(word: &str) -> Result<f64, E> {
+    let code = LAWS.iter().position(|law| *law == word);
+    code.map(|code| code as f64)
+        .ok_or_else(|| E::unknown_variant(word, &LAWS))
 }
 
 impl PlantSection {
     /// Whether the plant is in SI units. Of two sets of units, one would silently be ignored.
     fn is_si(&self) -> Result<bool, &'static str> {
-        let is_si = [self.mass, self.k, self.c, self.m, self.b].iter().any(Option::is_some);
+        let is_si = ["M", "k", "c", "m", "b"]
+            .iter()
+            .any(|symbol| self.get(symbol).is_some());
         if is_si && (self.epsilon.is_some() || self.lambda.is_some()) {
             return Err(
                 "[plant] mixes SI keys (M, k, c, m, b) with dimensionless ones (epsilon, lambda): \
@@ -341,6 +353,11 @@ impl PlantSection {
             );
         }
         Ok(is_si)
+    }
+
+    /// The number under a symbol of the table.
+    fn get(&self, symbol: &str) -> Option<f64> {
+        self.values.0[Values::place(symbol)?]
     }
 
     fn resolve(&self, origin: &str) -> Result<Parameters, SceneError> {
@@ -353,51 +370,31 @@ impl PlantSection {
                 ))
             })
         };
-        if self.r_law != Law::Constant && self.r_plus.is_none() {
+        if self.get("r_law").is_some_and(|law| law != 0.0) && self.get("r_plus").is_none() {
             return Err(keys(
                 "[plant] has an `r_law` without its parameter: give r_plus, which is k in (s/m)^(1/5) of \"viscoelastic\", or the yield speed in \
                  m/s of \"plastic\"",
             ));
         }
-        // The FMU has a signed seed of 32 bits.
-        within("plant.seed", self.seed.into(), "", [0.0, i32::MAX.into()])?;
-        let cavity = self.cavity();
-        let plant = if is_si {
-            Parameters {
-                primary_mass: need(self.mass, "M")?,
-                stiffness: need(self.k, "k")?,
-                damping: need(self.c, "c")?,
-                particle_mass: need(self.m, "m")?,
-                half_width: need(self.b, "b")?,
-                restitution: need(self.r, "r")?,
-                cavity,
+        for (row, value) in self.values.given() {
+            row.check(value)?;
+        }
+        let mut plant = self.values.parameters();
+        if is_si {
+            for row in PARAMETERS.iter().filter(|row| row.default.is_none()) {
+                need(self.get(row.symbol), row.symbol)?;
             }
         } else {
             let (epsilon, lambda) = (need(self.epsilon, "epsilon")?, need(self.lambda, "lambda")?);
             positive("plant.epsilon", epsilon, "(dimensionless)")?;
             not_negative("plant.lambda", lambda, "(dimensionless)")?;
-            Parameters {
-                cavity,
-                ..Parameters::dimensionless(epsilon, lambda, need(self.r, "r")?)
-            }
-        };
+            plant = Parameters {
+                cavity: plant.cavity,
+                ..Parameters::dimensionless(epsilon, lambda, need(self.get("r"), "r")?)
+            };
+        }
         plant.validate()?;
         Ok(plant)
-    }
-
-    fn cavity(&self) -> Cavity {
-        let law = |parameter: Option<f64>| parameter.map(|parameter| self.r_law.with(parameter));
-        Cavity {
-            b_plus: self.b_plus,
-            b_minus: self.b_minus,
-            tilt: self.theta,
-            kinetic_friction: self.mu_k,
-            static_friction: self.mu_s,
-            restitution: [law(self.r_plus), law(self.r_minus.or(self.r_plus))],
-            least_restitution: self.r_min,
-            scatter: self.r_scatter,
-            seed: self.seed.into(),
-        }
     }
 }
 
@@ -421,42 +418,26 @@ impl StartSection {
     }
 }
 
-/// The parameters under their symbols, which are the keys of a scene in SI units and the names of the FMU's variables; of the cavity those that
-/// are not ideal.
+/// The rows of the plant's table with their numbers; of the cavity those that are not ideal.
+fn given(plant: &Parameters) -> Vec<(&'static Parameter, f64)> {
+    let values = Values::from(plant);
+    let given = values
+        .given()
+        .filter(|(row, value)| row.default.is_none() || *value != 0.0);
+    given.collect()
+}
+
+/// The parameters under their symbols, as a scene in SI units has them.
 fn symbols(plant: &Parameters) -> Vec<(&'static str, toml::Value)> {
-    let Cavity { restitution, seed, .. } = plant.cavity;
-    let [plus, minus] = restitution.map(|law| law.map(Law::of));
-    let law = plus.or(minus).map_or(Law::Constant, |(law, _)| law);
-    let real = |(symbol, value): (_, f64)| (symbol, value.into());
-    let given = |(symbol, value): (_, Option<f64>)| Some(real((symbol, value.filter(|value| *value != 0.0)?)));
-    let plants = [
-        ("M", plant.primary_mass),
-        ("k", plant.stiffness),
-        ("c", plant.damping),
-        ("m", plant.particle_mass),
-        ("b", plant.half_width),
-        ("r", plant.restitution),
-    ];
-    let cavity = [
-        ("b_plus", plant.cavity.b_plus),
-        ("b_minus", plant.cavity.b_minus),
-        ("theta", Some(plant.cavity.tilt)),
-        ("mu_k", Some(plant.cavity.kinetic_friction)),
-        ("mu_s", plant.cavity.static_friction),
-        ("r_plus", plus.map(|(_, parameter)| parameter)),
-        ("r_minus", minus.map(|(_, parameter)| parameter)),
-        ("r_min", Some(plant.cavity.least_restitution)),
-        ("r_scatter", Some(plant.cavity.scatter)),
-    ];
-    let mut symbols: Vec<_> = plants.into_iter().map(real).collect();
-    symbols.extend(cavity.into_iter().filter_map(given));
-    if law != Law::Constant {
-        symbols.push(("r_law", format!("{law:?}").to_lowercase().into()));
-    }
-    if seed != 0 {
-        symbols.push(("seed", (seed as i64).into()));
-    }
-    symbols
+    let value = |(row, value): (&'static Parameter, f64)| {
+        let value = match row.range {
+            Range::Law => LAWS[value as usize].into(),
+            Range::Whole => (value as i64).into(),
+            _ => value.into(),
+        };
+        (row.symbol, value)
+    };
+    given(plant).into_iter().map(value).collect()
 }
 
 /// The keys of the section `[plant]` and their values, as a scene in SI units has them.

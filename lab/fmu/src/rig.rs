@@ -4,14 +4,13 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use vines_testbench::rig::{Drive, FrictionTotals, GroundTruth, Measured, Rig, RigError, Sensors, has_friction};
-use vines_testbench::scene::{Reference as ReferenceSignal, Scene, Sensor};
+use vines_testbench::scene::{PLANT_PARAMETERS, Reference as ReferenceSignal, Scene, Sensor};
 
 use crate::instance::{FmiType, Fmu, FmuError, Variable};
 
 /// The names of this bench that a scene may map.
-const NAMES: &str = "omega, E, e, response, base, impacts, impact_time, impact_velocity, sticks, stuck_time, friction_loss, M, k, c, \
-                     m, b, r, b_plus, b_minus, theta, mu_k, mu_s, r_law, r_plus, r_minus, r_min, r_scatter, seed, q1, der(q1), q2, \
-                     der(q2)";
+const NAMES: &str = "omega, E, e, response, base, impacts, impact_time, impact_velocity, sticks, stuck_time, friction_loss, q1, der(q1), \
+                     q2, der(q2)";
 
 /// A plant FMU, stepped sample by sample.
 ///
@@ -48,7 +47,8 @@ impl FmuRig {
     /// the scene maps them to. It has the sensors of the scene.
     pub fn load(path: &Path, scene: &Scene) -> Result<Measured<Self>, FmuError> {
         let (names, definition) = (&scene.rig_names, scene.resonance);
-        let mut fmu = Fmu::load(path, "plant", names, NAMES)?;
+        let parameters = PLANT_PARAMETERS.each_ref().map(|row| row.symbol).join(", ");
+        let mut fmu = Fmu::load(path, "plant", names, &format!("{NAMES}, {parameters}"))?;
         let [omega, amplitude] = ["omega", "E"].map(|ours| fmu.find(FmiType::Real, ours));
         let inputs = omega?.zip(amplitude?).map(|(omega, amplitude)| [omega, amplitude]);
         let held = match inputs {

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
 use vines_model::ArgumentError;
 
-use super::{Law, Scene, SceneError, Sensor, check, positive, symbols, within};
+use super::{Scene, SceneError, Sensor, check, given, positive, within};
 
 settings! {
     /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
@@ -117,14 +117,13 @@ impl Scene {
     pub fn start_values(&self) -> Vec<(&'static str, Setting)> {
         let State { q1, dq1, q2, dq2 } = self.start;
         let start = [("q1", q1), ("der(q1)", dq1), ("q2", q2), ("der(q2)", dq2)];
-        let plant = symbols(&self.plant).into_iter().map(|(name, value)| {
-            let code = |law: Law| Setting::Integer(law as i32);
-            let setting = match value {
-                Value::Float(number) => Setting::Real(number),
-                Value::Integer(number) => Setting::Integer(number as i32),
-                law => Law::deserialize(law).map_or(Setting::Integer(0), code),
+        let plant = given(&self.plant).into_iter().map(|(row, value)| {
+            let setting = if row.range.is_whole() {
+                Setting::Integer(value as i32)
+            } else {
+                Setting::Real(value)
             };
-            (name, setting)
+            (row.symbol, setting)
         });
         plant
             .chain(start.map(|(name, value)| (name, Setting::Real(value))))
