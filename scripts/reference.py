@@ -63,7 +63,7 @@ FILES = {
     "tracked.csv": ("backbone", "one row per level"),
     "tracked.svg": ("backbone", "C over sigma and over G: points with uncertainties, theory, exact orbits"),
     "map.csv": ("map", "one row per cell"),
-    "map.svg": ("map", "the map on white paper; `map-dark.svg` is for dark pages"),
+    "map.svg": ("map", "the map"),
     "bifurcations.csv": ("map", "curves of bifurcations over sigma and G"),
 }
 
@@ -145,7 +145,7 @@ def outputs(program):
         page += "A value that does not exist is empty in CSV and `null` in JSON.\n\n"
         rows = [[f"`{name}`", f"`vines {command}`", text] for name, (command, text) in FILES.items()]
         missing = {name for name in FILES if not (out / name).is_file()}
-        extra = {file.name for file in out.iterdir()} - FILES.keys() - {"map-dark.svg", "LoViNes.fmu", "PhaseLock.fmu"}
+        extra = {file.name for file in out.iterdir()} - FILES.keys() - {"LoViNes.fmu", "PhaseLock.fmu"}
         assert not missing | extra, f"scripts/reference.py describes other files than are written: {missing | extra}"
         page += table(["file", "written by", "content"], rows)
         for name in ("backbone.csv", "tracked.csv"):

@@ -213,7 +213,7 @@ export class Pictures {
     const { past, ghost, plots: { phase, detuning } } = this;
     const x = [past[0].time, Math.max(past.at(-1).time, past[0].time + 1)];
     const old = ghost.filter((one) => one.time >= x[0] && one.time <= x[1]);
-    for (const [plot, key, name, shade] of [[phase, "error", "phase error", "modulation"], [detuning, "sigma", "detuning", "green"]]) {
+    for (const [plot, key, name, shade] of [[phase, "error", "phase error", "predicted"], [detuning, "sigma", "detuning", "green"]]) {
       const shows = (one) => (key === "error" ? one.G > 0 : onBackbone(one));
       plot.begin(x, extent([...past, ...old].filter(shows).map((one) => one[key]), key === "error" ? 1 : 0.5));
       const values = (run) => run.map((one) => (shows(one) ? [one.time, one[key]] : null));

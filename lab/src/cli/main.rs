@@ -24,6 +24,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use failure::Failure;
 use output::print;
 
 const EXAMPLES: &str = "\
@@ -70,7 +71,18 @@ enum Command {
 /// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input, 3 for results of a rig that missed deadlines,
 /// 130 after Ctrl-C.
 fn main() -> ExitCode {
-    let output = match Cli::parse().command {
+    match dispatch(Cli::parse().command).and_then(|text| print(&text)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("error: {}", failure.message);
+            failure.code.into()
+        }
+    }
+}
+
+/// Runs a command. Returns what it prints.
+fn dispatch(command: Command) -> Result<String, Failure> {
+    match command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Backbone(arguments) => backbone::run(&arguments),
         Command::Fit(arguments) => fit::run(&arguments),
@@ -83,12 +95,5 @@ fn main() -> ExitCode {
         Command::Pack(arguments) => pack::run(&arguments),
         Command::Rig(arguments) => serve::rig(&arguments),
         Command::Controller(arguments) => serve::controller(&arguments),
-    };
-    match output.and_then(|text| print(&text)) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("error: {}", failure.message);
-            failure.code.into()
-        }
     }
 }

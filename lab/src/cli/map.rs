@@ -41,7 +41,7 @@ Examples:
 
 Over sigma and G, the curves on which 1:1 motions bifurcate are followed and drawn, solid where they bound the stability of a motion.
 
-Writes map.csv, map.svg and map-dark.svg, and over sigma and G also bifurcations.csv.";
+Writes map.csv and map.svg, and over sigma and G also bifurcations.csv.";
 
 /// Map the regimes of the response over sigma and G, or two other keys of a scene
 #[derive(Debug, Args)]

@@ -28,6 +28,12 @@ pub(super) struct SceneArguments {
 }
 
 impl SceneArguments {
+    /// These arguments as words of a command line.
+    pub(super) fn words(&self) -> impl Iterator<Item = String> {
+        let scene = self.scene.iter().map(|path| format!("--scene={}", path.display()));
+        scene.chain(self.set.iter().map(|setting| format!("--set={setting}")))
+    }
+
     pub(super) fn load(&self) -> Result<Scene, SceneError> {
         Scene::load(self.scene.as_deref(), &self.set)
     }

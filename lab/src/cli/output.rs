@@ -50,10 +50,11 @@ pub(super) fn writable(folder: &Path) -> Result<(), Failure> {
 
 /// Warnings go to stderr: warnings of connections, and what an FMU logs.
 pub(super) fn log_warnings() {
-    env_logger::Builder::new()
+    // A report runs several commands.
+    let _ = env_logger::Builder::new()
         .filter_level(log::LevelFilter::Warn)
         .format_timestamp(None)
-        .init();
+        .try_init();
 }
 
 /// A progress bar on stderr; indicatif hides it if that is not a terminal.

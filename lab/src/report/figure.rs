@@ -1,8 +1,7 @@
-//! Figures as data: panels with axes and series. [`Figure::svg`] draws all of them, with the colours of [`super::theme`]. The same input
-//! gives the same bytes.
+//! Figures as data: rows of panels with axes and series, and one legend below them. [`Figure::svg`] draws all of them, with the colours of
+//! [`super::theme`]. The same input gives the same bytes.
 
 use super::theme::{CAPTION, GRID, HALO, INK, PAPER, colour, unstable};
-use crate::scene::{Dimensionless, Sensor};
 
 /// A place in a panel, in the units of its axes.
 pub type Place = (f64, f64);
@@ -13,50 +12,34 @@ pub type Marked = (Place, bool);
 /// Range and label of an axis.
 pub type Axis<'a> = ((f64, f64), &'a str);
 
-/// Axis labels that several figures share.
-pub const DETUNING: &str = "detuning σ = (ω/ω₀ − 1)/ε";
-pub const AMPLITUDE_OF_V: &str = "amplitude C of v, over b";
-pub const SPEED: &str = "particle speed B, over b ω₀";
-
-/// Usual size of a figure, px: at a width of 390 px, its labels are 8 px high.
-pub const SIZE: (f64, f64) = (720.0, 500.0);
-
+/// Width of a figure, px.
+const WIDTH: f64 = 760.0;
 const FONT: &str = "Helvetica, Arial, sans-serif";
-/// Font sizes, px: titles, labels of axes and legends, ticks and captions.
+/// Font sizes, px: title, labels of axes, and ticks, captions and legend.
 const TITLE: f64 = 19.0;
 const LABEL: f64 = 15.0;
 const SMALL: f64 = 13.0;
-/// Room around the axes, px: left for ticks and label, below likewise, and right.
-const MARGINS: [f64; 3] = [66.0, 54.0, 16.0];
-/// An entry of a legend, px: height, and width of the sample.
+/// Room around the axes of a panel, px: left and below for ticks and label, right, and above.
+const MARGINS: [f64; 4] = [66.0, 54.0, 16.0, 10.0];
+/// Height of a line of the legend, and width of its sample, px.
 const ENTRY: (f64, f64) = (21.0, 32.0);
 /// Points of a curve that are closer than this, px, are drawn as one.
 const APART: f64 = 0.4;
 
-/// A figure: panels side by side or one above the other.
-pub struct Figure(pub Vec<Panel>);
-
-/// Place of a legend.
-#[derive(Clone, Copy, PartialEq)]
-pub enum Legend {
-    None,
-    UpperRight,
-    LowerRight,
-    /// Right of the axes, with a width in px.
-    Beside(f64),
+/// Rows of panels under a title and lines of a caption.
+pub struct Figure {
+    pub title: String,
+    pub caption: String,
+    /// Height of a row, px.
+    pub height: f64,
+    pub rows: Vec<Vec<Panel>>,
 }
 
 /// One panel with its axes.
 pub struct Panel {
-    /// Left, top, width and height, px.
-    area: [f64; 4],
-    title: String,
-    /// Lines below the title.
-    captions: Vec<String>,
     ranges: [(f64, f64); 2],
     labels: [String; 2],
     series: Vec<Series>,
-    legend: Legend,
 }
 
 /// Something drawn in a panel; the first of each label is in the legend.
@@ -68,73 +51,83 @@ struct Series {
     label: String,
 }
 
-/// How a series is drawn; widths, radii and sizes in px.
+/// How a series is drawn; widths and radii in px.
 #[derive(Clone, Copy)]
 pub enum Shape {
     /// A solid line through the places: measured values, and stable motions.
     Line(f64),
     Dashed(f64),
-    /// Segments, such as error bars: two places each.
-    Bars(f64),
-    /// The border of an area of a map: two places each.
-    Border(f64),
-    /// Cells of a map: two opposite corners each. Letter in the legend, and the name of its colour.
-    Cells(&'static str, &'static str),
+    /// Separate lines, such as error bars: two places each.
+    Segments(f64),
+    /// Cells of a map: two opposite corners each.
+    Cells,
     Circle(f64),
     Dot(f64),
     Square,
     Cross,
-    /// Text with its middle at the place.
-    Text(f64),
-    /// Text that interrupts a curve.
-    TextOnCurve(f64),
 }
 
 impl Figure {
     /// The figure as SVG, for white paper.
     pub fn svg(&self) -> String {
-        let corners = self.0.iter().map(|Panel { area: [x, y, w, h], .. }| [x + w, y + h]);
-        let [width, height] = corners.fold([0.0, 0.0], |[w, h], [x, y]| [f64::max(w, x), f64::max(h, y)]);
-        let drawing = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+        let entries = self.entries();
+        let longest = entries.iter().map(|entry| text_width(&entry.label)).fold(0.0, f64::max);
+        let column = ENTRY.1 + 26.0 + longest;
+        let columns = ((WIDTH - MARGINS[0]) / column).floor().max(1.0) as usize;
+        let head = 40.0 + 18.0 * self.caption.lines().count() as f64;
+        let bottom = head + self.height * self.rows.len() as f64;
+        let height = bottom + ENTRY.0 * entries.len().div_ceil(columns) as f64 + 10.0;
+        let mut svg = Svg(format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" viewBox=\"0 0 {WIDTH} {height}\" \
              font-family=\"{FONT}\">\n"
-        );
-        let mut svg = Svg { drawing, halo: false };
-        svg.rectangle([0.0, 0.0, width, height], PAPER, "");
-        for panel in &self.0 {
-            panel.draw(&mut svg);
+        ));
+        svg.rectangle([0.0, 0.0, WIDTH, height], PAPER, "");
+        svg.text(&self.title, [MARGINS[0], 28.0], TITLE, INK, "start");
+        for (n, line) in (0..).zip(self.caption.lines()) {
+            svg.text(line, [MARGINS[0], 48.0 + 18.0 * f64::from(n)], SMALL, CAPTION, "start");
         }
-        svg.drawing + "</svg>\n"
+        for (row, panels) in (0..).zip(&self.rows) {
+            let width = WIDTH / panels.len() as f64;
+            for (n, panel) in (0..).zip(panels) {
+                panel.draw(
+                    &mut svg,
+                    [
+                        width * f64::from(n),
+                        head + self.height * f64::from(row),
+                        width,
+                        self.height,
+                    ],
+                );
+            }
+        }
+        for (n, entry) in entries.iter().enumerate() {
+            let x = MARGINS[0] + column * (n % columns) as f64;
+            let y = bottom + ENTRY.0 * ((n / columns) as f64 + 0.5);
+            entry.sample(&mut svg, [x, y]);
+            svg.text(&entry.label, [x + ENTRY.1 + 8.0, y + 4.5], SMALL, INK, "start");
+        }
+        svg.0 + "</svg>\n"
+    }
+
+    /// The series of the legend.
+    fn entries(&self) -> Vec<&Series> {
+        let mut entries: Vec<&Series> = Vec::new();
+        for series in self.rows.iter().flatten().flat_map(|panel| &panel.series) {
+            if !series.label.is_empty() && entries.iter().all(|entry| entry.label != series.label) {
+                entries.push(series);
+            }
+        }
+        entries
     }
 }
 
 impl Panel {
-    /// An empty panel over the whole of a figure of the usual size.
     pub fn new(x: Axis, y: Axis) -> Self {
         Self {
-            area: [0.0, 0.0, SIZE.0, SIZE.1],
-            title: String::new(),
-            captions: Vec::new(),
             ranges: [x.0, y.0],
             labels: [x.1, y.1].map(String::from),
             series: Vec::new(),
-            legend: Legend::None,
         }
-    }
-
-    /// At this place of the figure: left, top, width and height, px.
-    pub fn at(self, area: [f64; 4]) -> Self {
-        Self { area, ..self }
-    }
-
-    pub fn heading(mut self, title: &str, caption: &str) -> Self {
-        self.title = title.into();
-        self.captions = caption.lines().map(String::from).collect();
-        self
-    }
-
-    pub fn legend(self, legend: Legend) -> Self {
-        Self { legend, ..self }
     }
 
     /// Adds a series, unless it has nothing to draw: the legend does not name what is not there.
@@ -145,99 +138,56 @@ impl Panel {
         }
     }
 
-    /// A curve of motions, solid where they are stable and dashed where they are not.
+    /// A curve of motions, solid where they are stable, and dashed and paler where they are not.
     pub fn curve(&mut self, points: impl IntoIterator<Item = Marked>, width: f64, colour: &'static str, name: &str) {
-        let labels = ["stable", "unstable"].map(|kind| format!("{name}, {kind}"));
-        self.labelled_curve(points, width, colour, labels);
+        self.pieces(
+            points,
+            width,
+            [colour, unstable(colour)],
+            [name, &format!("{name}, unstable")],
+        );
     }
 
-    /// A curve of motions with the labels of its stable and unstable pieces.
-    pub fn labelled_curve(
+    /// The same in one colour, with one entry of the legend.
+    pub fn branch(&mut self, points: impl IntoIterator<Item = Marked>, width: f64, colour: &'static str, name: &str) {
+        self.pieces(points, width, [colour; 2], [name; 2]);
+    }
+
+    /// The stable pieces first, and so in the legend.
+    fn pieces(
         &mut self,
         points: impl IntoIterator<Item = Marked>,
         width: f64,
-        colour: &'static str,
-        [stable, dashed]: [String; 2],
+        colours: [&'static str; 2],
+        labels: [&str; 2],
     ) {
         let points = Vec::from_iter(points);
-        // The stable pieces first, and so in the legend.
         for run in runs(&points, true) {
-            self.add(Shape::Line(width), run, colour, &stable);
+            self.add(Shape::Line(width), run, colours[0], labels[0]);
         }
         for run in runs(&points, false) {
-            self.add(Shape::Dashed(width), run, unstable(colour), &dashed);
+            self.add(Shape::Dashed(width), run, colours[1], labels[1]);
         }
     }
 
-    /// The series of the legend.
-    fn entries(&self) -> Vec<&Series> {
-        let mut entries: Vec<&Series> = Vec::new();
-        for series in &self.series {
-            let named = !series.label.is_empty() && !matches!(series.shape, Shape::Text(_) | Shape::TextOnCurve(_));
-            if named && entries.iter().all(|entry| entry.label != series.label) {
-                entries.push(series);
-            }
-        }
-        entries
-    }
-
-    fn draw(&self, svg: &mut Svg) {
-        let [left, top, width, height] = self.area;
-        let entries = self.entries();
-        let longest = entries.iter().map(|entry| text_width(&entry.label, SMALL + 1.0));
-        let longest = longest.fold(0.0, f64::max);
-        let key = [ENTRY.1 + 26.0 + longest, ENTRY.0 * entries.len() as f64 + 10.0];
-        let beside = match self.legend {
-            Legend::Beside(width) => width,
-            _ => 0.0,
-        };
-        let head = match self.title.is_empty() {
-            true => 14.0,
-            false => 42.0 + 18.0 * self.captions.len() as f64,
-        };
-        svg.halo = self
-            .series
-            .iter()
-            .any(|series| matches!(series.shape, Shape::Cells(..)));
+    /// Draws the panel in an area: left, top, width and height, px.
+    fn draw(&self, svg: &mut Svg, [left, top, width, height]: [f64; 4]) {
         let frame = Frame {
-            place: [left + MARGINS[0], top + head],
-            size: [width - MARGINS[0] - MARGINS[2] - beside, height - head - MARGINS[1]],
+            place: [left + MARGINS[0], top + MARGINS[3]],
+            size: [width - MARGINS[0] - MARGINS[2], height - MARGINS[1] - MARGINS[3]],
             ranges: self.ranges,
         };
-        let ([x, y], [w, h]) = (frame.place, frame.size);
-        if !self.title.is_empty() {
-            svg.text(&self.title, [x, top + 28.0], TITLE, INK, "start");
-        }
-        for (n, line) in (0..).zip(&self.captions) {
-            svg.text(line, [x, top + 48.0 + 18.0 * f64::from(n)], SMALL, CAPTION, "start");
-        }
         frame.draw(svg, &self.labels);
-        // Curves end at the axes; marks are whole.
-        svg.drawing += &format!(
+        // Curves end at the axes; marks are whole. On a map, curves have a halo.
+        let ([x, y], [w, h]) = (frame.place, frame.size);
+        svg.0 += &format!(
             "<svg x=\"{x:.2}\" y=\"{y:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" viewBox=\"{x:.2} {y:.2} {w:.2} {h:.2}\">\n"
         );
-        let (marks, curves): (Vec<&Series>, Vec<&Series>) = self.series.iter().partition(|series| series.is_mark());
-        curves.iter().for_each(|series| series.draw(svg, &frame));
-        svg.drawing += "</svg>\n";
-        marks.iter().for_each(|series| series.draw(svg, &frame));
-        if entries.is_empty() || self.legend == Legend::None {
-            return;
-        }
-        let right = x + w - key[0] - 8.0;
-        let [x, y] = match self.legend {
-            Legend::LowerRight => [right, y + h - key[1] - 8.0],
-            Legend::Beside(_) => [x + w + 10.0, y],
-            _ => [right, y + 8.0],
-        };
-        if beside == 0.0 {
-            svg.rectangle([x, y, key[0], key[1]], PAPER, " fill-opacity=\"0.9\"");
-        }
-        for (n, entry) in (0..).zip(entries) {
-            let line = y + 5.0 + ENTRY.0 * (f64::from(n) + 0.5);
-            entry.sample(svg, [x + 8.0, line]);
-            let place = [x + ENTRY.1 + 16.0, line + 4.5];
-            svg.text(&entry.label, place, SMALL + 1.0, INK, "start");
-        }
+        let is_map = self.series.iter().any(|series| matches!(series.shape, Shape::Cells));
+        let (marks, curves): (Vec<_>, Vec<_>) = self.series.iter().partition(|series| series.is_mark());
+        curves.iter().for_each(|series| series.draw(svg, &frame, is_map));
+        svg.0 += "</svg>\n";
+        marks.iter().for_each(|series| series.draw(svg, &frame, is_map));
     }
 }
 
@@ -280,12 +230,11 @@ impl Frame {
             svg.text(&label, [left - 7.0, at + 4.5], SMALL, INK, "end");
         }
         svg.line(&[[left, top], [left, bottom], [right, bottom]], 1.0, INK, "");
-        let [middle, below] = [left + width / 2.0, bottom + 42.0];
-        svg.text(&labels[0], [middle, below], LABEL, INK, "middle");
+        svg.text(&labels[0], [left + width / 2.0, bottom + 42.0], LABEL, INK, "middle");
         let [x, y] = [left - 46.0, top + height / 2.0];
-        svg.drawing += &format!("<g transform=\"rotate(-90 {x:.2} {y:.2})\">");
+        svg.0 += &format!("<g transform=\"rotate(-90 {x:.2} {y:.2})\">");
         svg.text(&labels[1], [x, y], LABEL, INK, "middle");
-        svg.drawing += "</g>\n";
+        svg.0 += "</g>\n";
     }
 }
 
@@ -304,16 +253,13 @@ fn ticks((from, to): (f64, f64), most: f64) -> Vec<(f64, String)> {
 }
 
 impl Series {
-    /// Whether it is a mark or a text, which may extend beyond the axes.
+    /// Whether it is a mark, which may extend beyond the axes.
     fn is_mark(&self) -> bool {
         use Shape::*;
-        matches!(
-            self.shape,
-            Circle(_) | Dot(_) | Square | Cross | Text(_) | TextOnCurve(_)
-        )
+        matches!(self.shape, Circle(_) | Dot(_) | Square | Cross)
     }
 
-    fn draw(&self, svg: &mut Svg, frame: &Frame) {
+    fn draw(&self, svg: &mut Svg, frame: &Frame, is_map: bool) {
         let places: Vec<[f64; 2]> = self.places.iter().map(|place| frame.at(*place)).collect();
         match self.shape {
             Shape::Line(_) | Shape::Dashed(_) => {
@@ -324,25 +270,15 @@ impl Series {
                         points.push([x, y]);
                     }
                 }
-                self.stroke(svg, &[&points]);
+                self.stroke(svg, &[&points], is_map);
             }
-            Shape::Bars(_) | Shape::Border(_) => self.stroke(svg, &places.chunks_exact(2).collect::<Vec<_>>()),
-            Shape::Cells(..) => {
+            Shape::Segments(_) => self.stroke(svg, &places.chunks_exact(2).collect::<Vec<_>>(), is_map),
+            Shape::Cells => {
                 for pair in places.chunks_exact(2) {
                     let [[a, b], [c, d]] = [pair[0], pair[1]];
                     let area = [a.min(c), b.min(d), (a - c).abs(), (b - d).abs()];
                     // Cells lie side by side without a seam.
                     svg.rectangle(area, self.colour, " shape-rendering=\"crispEdges\"");
-                }
-            }
-            Shape::Text(size) | Shape::TextOnCurve(size) => {
-                for [x, y] in places {
-                    let width = text_width(&self.label, size);
-                    if matches!(self.shape, Shape::TextOnCurve(_)) {
-                        let area = [x - width / 2.0, y - 0.6 * size, width, 1.2 * size];
-                        svg.rectangle(area, PAPER, " fill-opacity=\"0.85\"");
-                    }
-                    svg.text(&self.label, [x, y + 0.35 * size], size, self.colour, "middle");
                 }
             }
             _ => {
@@ -353,30 +289,28 @@ impl Series {
         }
     }
 
-    /// The sample in a legend.
+    /// The sample in the legend.
     fn sample(&self, svg: &mut Svg, [x, y]: [f64; 2]) {
-        let middle = [x + ENTRY.1 / 2.0, y];
         match self.shape {
-            _ if self.is_mark() => self.mark(svg, middle),
-            Shape::Cells(letter, ink) => {
+            _ if self.is_mark() => self.mark(svg, [x + ENTRY.1 / 2.0, y]),
+            Shape::Cells => {
                 let edge = format!(" stroke=\"{}\"", colour(INK));
-                svg.rectangle([x, y - 8.5, ENTRY.1, 17.0], self.colour, &edge);
-                svg.text(letter, [middle[0], y + 4.5], SMALL, ink, "middle");
+                svg.rectangle([x, y - 7.5, ENTRY.1, 15.0], self.colour, &edge);
             }
-            _ => self.stroke(svg, &[&[[x, y], [x + ENTRY.1, y]]]),
+            _ => self.stroke(svg, &[&[[x, y], [x + ENTRY.1, y]]], false),
         }
     }
 
     /// Lines. The halo of one must not hide its neighbour.
-    fn stroke(&self, svg: &mut Svg, lines: &[&[[f64; 2]]]) {
-        let (Shape::Line(width) | Shape::Dashed(width) | Shape::Bars(width) | Shape::Border(width)) = self.shape else {
+    fn stroke(&self, svg: &mut Svg, lines: &[&[[f64; 2]]], halo: bool) {
+        let (Shape::Line(width) | Shape::Dashed(width) | Shape::Segments(width)) = self.shape else {
             return;
         };
         let dashes = match self.shape {
             Shape::Dashed(_) => " stroke-dasharray=\"7 5\"",
             _ => "",
         };
-        if svg.halo {
+        if halo {
             lines.iter().for_each(|line| svg.line(line, width + 2.8, HALO, ""));
         }
         for line in lines {
@@ -389,9 +323,9 @@ impl Series {
         let circle = |radius, style: &str| format!("<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius}\" {style}/>\n");
         match self.shape {
             Shape::Circle(r) => {
-                svg.drawing += &circle(r, &format!("fill=\"none\" stroke=\"{shade}\" stroke-width=\"1.5\""));
+                svg.0 += &circle(r, &format!("fill=\"none\" stroke=\"{shade}\" stroke-width=\"1.5\""));
             }
-            Shape::Dot(r) => svg.drawing += &circle(r, &format!("fill=\"{shade}\"")),
+            Shape::Dot(r) => svg.0 += &circle(r, &format!("fill=\"{shade}\"")),
             Shape::Square => svg.rectangle([x - 4.5, y - 4.5, 9.0, 9.0], self.colour, ""),
             _ => {
                 for d in [4.0, -4.0] {
@@ -416,56 +350,32 @@ fn runs(points: &[Marked], wanted: bool) -> Vec<Vec<Place>> {
 }
 
 /// The drawing so far. Colours are names of the table of styles.
-struct Svg {
-    drawing: String,
-    /// Whether curves have a halo: they are on a map.
-    halo: bool,
-}
+struct Svg(String);
 
 impl Svg {
     fn line(&mut self, points: &[[f64; 2]], width: f64, name: &str, more: &str) {
         let points: Vec<String> = points.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
         let (points, colour) = (points.join(" "), colour(name));
-        self.drawing += &format!(
+        self.0 += &format!(
             "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"{more}/>\n"
         );
     }
 
     fn rectangle(&mut self, [x, y, width, height]: [f64; 4], name: &str, more: &str) {
         let (place, colour) = (format!("x=\"{x:.2}\" y=\"{y:.2}\""), colour(name));
-        self.drawing +=
-            &format!("<rect {place} width=\"{width:.2}\" height=\"{height:.2}\" fill=\"{colour}\"{more}/>\n");
+        self.0 += &format!("<rect {place} width=\"{width:.2}\" height=\"{height:.2}\" fill=\"{colour}\"{more}/>\n");
     }
 
     fn text(&mut self, words: &str, [x, y]: [f64; 2], size: f64, name: &str, anchor: &str) {
         let (words, colour) = (maud::html! { (words) }.into_string(), colour(name));
         let place = format!("x=\"{x:.2}\" y=\"{y:.2}\" text-anchor=\"{anchor}\"");
-        self.drawing += &format!("<text {place} font-size=\"{size}\" fill=\"{colour}\">{words}</text>\n");
+        self.0 += &format!("<text {place} font-size=\"{size}\" fill=\"{colour}\">{words}</text>\n");
     }
 }
 
-/// Width of a text in a usual font, px.
-fn text_width(text: &str, size: f64) -> f64 {
-    0.56 * size * text.chars().count() as f64
-}
-
-/// The label of an axis of amplitudes as the scene's sensor reads them.
-pub fn amplitude(p: &Dimensionless) -> &'static str {
-    match p.definition.sensor {
-        Sensor::V => AMPLITUDE_OF_V,
-        Sensor::Q1 => "amplitude C of q₁, over b",
-        Sensor::Acceleration => "amplitude C of −q₁″, over b ω₀²",
-    }
-}
-
-/// The caption of a figure that belongs to a scene.
-pub fn caption(p: &Dimensionless, g: f64) -> String {
-    format!("{}, G = {g:.3}; lengths over b, times over 1/ω₀", rig(p))
-}
-
-/// The numbers of a rig, for captions.
-pub fn rig(p: &Dimensionless) -> String {
-    format!("ε = {:.5}, λ = {:.3}, r = {}", p.epsilon, p.lambda, p.r)
+/// Width of a text of the legend in a usual font, px.
+fn text_width(text: &str) -> f64 {
+    0.56 * SMALL * text.chars().count() as f64
 }
 
 #[cfg(test)]
@@ -483,21 +393,22 @@ mod tests {
 
     #[test]
     fn a_curve_is_dashed_exactly_where_it_is_unstable_and_has_no_holes() {
-        let mut panel = Panel::new(((0.0, 4.0), ""), ((0.0, 1.0), "")).legend(Legend::UpperRight);
+        let mut panel = Panel::new(((0.0, 4.0), ""), ((0.0, 1.0), ""));
         let points = [true, true, false, true].into_iter().enumerate();
         let points: Vec<Marked> = points.map(|(n, stable)| ((n as f64, 0.5), stable)).collect();
         panel.curve(points, 2.0, EXACT, "orbits");
         let spans: Vec<(f64, f64, &str)> = panel
             .series
             .iter()
-            .map(|shape| (shape.places[0].0, shape.places.last().unwrap().0, shape.label.as_str()))
+            .map(|one| (one.places[0].0, one.places.last().unwrap().0, one.label.as_str()))
             .collect();
-        let stable = [(0.0, 2.0, "orbits, stable"), (3.0, 3.0, "orbits, stable")];
-        assert_eq!(spans[..2], stable);
+        assert_eq!(spans[..2], [(0.0, 2.0, "orbits"), (3.0, 3.0, "orbits")]);
         assert_eq!(spans[2..], [(2.0, 3.0, "orbits, unstable")]);
-        let svg = Figure(vec![panel]).svg();
+        let (title, caption) = ("a < b".into(), String::new());
+        let svg = Figure { title, caption, height: 300.0, rows: vec![vec![panel]] }.svg();
         // The piece and its sample in the legend.
         assert_eq!(svg.matches("stroke-dasharray").count(), 2);
         assert_eq!(svg.matches("orbits, unstable</text>").count(), 1);
+        assert!(svg.contains(">a &lt; b</text>"));
     }
 }

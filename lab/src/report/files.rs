@@ -8,8 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 use thiserror::Error;
 
-use super::figures::{backbone, fitted, history, manifold, regimes, responses, theory, tracked_with_drive};
-use super::theme::dark;
+use super::figures::{backbone, fitted, history, manifold, regimes, responses, theory, tracked};
 use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
 use crate::files::{self, FileError};
 use crate::fit::{Fit, MeasuredPoint};
@@ -49,14 +48,13 @@ pub fn write(result: &Comparison, record: &Record, scene: &Scene, out: &Path) ->
     Ok(files::write(out, files)?)
 }
 
-/// Writes `map.csv`, `map.svg`, `map-dark.svg` and, over sigma and G, `bifurcations.csv` into `out` and returns their paths.
+/// Writes `map.csv`, `map.svg` and, over sigma and G, `bifurcations.csv` into `out` and returns their paths.
 pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let figure = regimes(map).svg();
     let mut files = vec![("map.csv", map_csv(map)?)];
     if !map.curves.is_empty() {
         files.push(("bifurcations.csv", bifurcations_csv(map)?));
     }
-    files.extend([("map-dark.svg", dark(&figure)), ("map.svg", figure)]);
+    files.push(("map.svg", regimes(map).svg()));
     Ok(files::write(out, files)?)
 }
 
@@ -65,7 +63,7 @@ pub fn write_tracked(result: &TrackedComparison, out: &Path) -> Result<Vec<PathB
     let files = [
         ("tracked.json", json(result)?),
         ("tracked.csv", tracked_csv(result)?),
-        ("tracked.svg", tracked_with_drive(result).svg()),
+        ("tracked.svg", tracked(result).svg()),
     ];
     Ok(files::write(out, files)?)
 }
@@ -101,12 +99,12 @@ pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>,
     Ok(files::write(out, [("interrupted.csv", table(samples))])?)
 }
 
-pub(super) fn json(result: &impl Serialize) -> Result<String, ReportError> {
+fn json(result: &impl Serialize) -> Result<String, ReportError> {
     Ok(serde_json::to_string_pretty(result)? + "\n")
 }
 
 /// A CSV table with a line per row. The headings are the names of the fields; tuples have none, and need `headings`, separated by commas.
-pub(super) fn csv<T: Serialize>(headings: &str, rows: impl IntoIterator<Item = T>) -> Result<String, ReportError> {
+fn csv<T: Serialize>(headings: &str, rows: impl IntoIterator<Item = T>) -> Result<String, ReportError> {
     let own = headings.is_empty();
     let mut writer = csv::WriterBuilder::new().has_headers(own).from_writer(Vec::new());
     if !own {
@@ -121,7 +119,7 @@ pub(super) fn csv<T: Serialize>(headings: &str, rows: impl IntoIterator<Item = T
 }
 
 /// The points along a decay, as CSV: the columns are the keys of their JSON.
-pub fn decay_csv(result: &Comparison) -> Result<String, ReportError> {
+fn decay_csv(result: &Comparison) -> Result<String, ReportError> {
     let points = serde_json::to_value(&result.decay)?;
     let points: Vec<_> = points
         .as_array()
@@ -140,7 +138,7 @@ pub fn decay_csv(result: &Comparison) -> Result<String, ReportError> {
 }
 
 /// The points of a tracked backbone.
-pub(super) fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
+fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
     let headings = "f_Hz,A_m,E_m,u_f_Hz,u_A_m,u_E_m,sigma,C,G,phase_error_deg,u_sigma,u_C,u_G,u_phase_deg,level,periods,averaged,settled,\
                     reached,regime,regime_by_impacts,tone_Hz,tone_share,distance,sigma_less_exact,G_less_exact";
     let rows = result.points.iter().map(|TrackedPoint { point, exact }| {
@@ -153,7 +151,7 @@ pub(super) fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportEr
 }
 
 /// The cells of a map, as CSV.
-pub fn map_csv(map: &Map) -> Result<String, ReportError> {
+fn map_csv(map: &Map) -> Result<String, ReportError> {
     const HEADINGS: &str = "sigma,G,r,regime,followed,transient,recurrence,exponent,exponent_error,synchrony,impacts_per_period,impacts,\
                             periods,sticks_per_period,theory_stable,coexisting";
     // Axes that are not among the first three columns come before them.
@@ -172,7 +170,7 @@ pub fn map_csv(map: &Map) -> Result<String, ReportError> {
 }
 
 /// The points of the bifurcation curves.
-pub(super) fn bifurcations_csv(map: &Map) -> Result<String, ReportError> {
+fn bifurcations_csv(map: &Map) -> Result<String, ReportError> {
     let headings = "curve,bifurcation,sigma,G,C,B,bounds_stability";
     let rows = map.curves.iter().enumerate().flat_map(|(n, curve)| {
         curve.branch.points.iter().map(move |motion| {

@@ -143,10 +143,7 @@ fn a_map_is_written_as_table_and_figures() {
     ));
     assert!(output.status.success(), "{output:?}");
     let text = String::from_utf8(output.stdout).unwrap();
-    assert!(
-        text.contains("symmetric 1:1") && text.contains("map-dark.svg"),
-        "{text}"
-    );
+    assert!(text.contains("symmetric 1:1") && text.contains("map.svg"), "{text}");
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let rows = read("map.csv");
     assert_eq!(rows.lines().count(), 1 + 12);
@@ -193,4 +190,23 @@ fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
     }
     let missing = "has no column `amplitude`";
     fails(&format!("fit {out}/tracked.csv --column A=amplitude:mm"), 2, missing);
+}
+
+#[test]
+fn theory_and_response_are_drawn_for_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display();
+    for (line, labels) in [
+        ("theory", ["manifold, unstable", "backbone, r = 0.65"]),
+        ("orbit --response", ["exact orbits", "exact backbone"]),
+    ] {
+        let done = vines(&format!("{line} --figure {out}/figure.svg"));
+        assert!(done.status.success(), "{done:?}");
+        let drawn = std::fs::read_to_string(folder.path().join("figure.svg")).unwrap();
+        assert!(
+            labels.iter().all(|label| drawn.contains(&format!("{label}<"))),
+            "{line}"
+        );
+    }
+    fails("orbit --figure figure.svg", 2, "--response");
 }

@@ -3,18 +3,16 @@
 use std::path::Path;
 use std::process::Command;
 
-use vines::{map::LIMIT, report::write_report, scene::Family, sweep::Map};
+use crate::{text, vines, words};
 
-use crate::{overrides, words};
-
-/// Writes a report on a coarse map, after an early lock.
-fn write(out: &Path) {
-    let overrides = overrides("phase_lock.lock.amplitude_drift=3e-4 phase_lock.lock.dwell=5");
-    let text = include_str!("../../../scenes/dimensionless.toml");
-    let family = Family::parse("dimensionless.toml", Some(text), &overrides).unwrap();
-    let [x, y] = ["sigma=-2:1:7", "G=0.8:1.8:6"].map(|axis| axis.parse().unwrap());
-    let mut map = Map::new(family, &x, &y, None, LIMIT).unwrap();
-    write_report(&mut map, out, &|_, _| {}).unwrap();
+/// The page of a scene with few levels, on a coarse map.
+fn report(folder: &Path) -> String {
+    let scene = "--scene scenes/dimensionless.toml --set backbone.points=8";
+    let scene = scene.replace("scenes/", concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/"));
+    let out = folder.display();
+    let done = vines(&format!("report {scene} --x sigma=-2:1:7 --y G=0.8:1.8:6 --out {out}"));
+    assert!(done.status.success(), "{}", text(&done));
+    std::fs::read_to_string(folder.join("report.html")).unwrap()
 }
 
 /// Debian's Chromium, if it is here, on a page: what it says on the console, and what it makes of the page.
@@ -36,34 +34,34 @@ fn browser(page: &Path, arguments: &[&str]) -> Option<(String, String)> {
 #[test]
 fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
     let folder = tempfile::tempdir().unwrap();
-    write(folder.path());
     let page = folder.path().join("report.html");
-    let html = std::fs::read_to_string(&page).unwrap();
-    let figures =
-        words("history tracked-backbone approach decay-on-sim identified-backbone backbones responses period regimes");
-    for file in figures
-        .iter()
-        .flat_map(|name| [format!("{name}.svg"), format!("{name}-dark.svg")])
-    {
-        assert!(folder.path().join(&file).is_file(), "{file}");
+    let html = report(folder.path());
+    for words in ["history backbone sim tracked response map fit"].map(words).concat() {
+        assert!(folder.path().join(format!("{words}.svg")).is_file(), "{words}");
     }
-    assert_eq!(html.matches("<figure>").count(), figures.len());
-    for words in ["What was found", "symmetric 1:1", "Error budget", "published rig"] {
+    assert_eq!(html.matches("<figure>").count(), 7);
+    for words in [
+        "measured at the lock",
+        "periods per point",
+        "fold at B",
+        "1 component",
+        "inside the theory",
+        "chi-square",
+    ] {
         assert!(html.contains(words), "{words}");
     }
     // Nothing is fetched: no address but the names of XML's vocabularies.
     let fetched = html.replace("http://www.w3.org/2000/svg", "");
     assert!(!fetched.contains("http://") && !fetched.contains("https://") && !fetched.contains("<script"));
 
-    write(folder.path());
-    assert_eq!(std::fs::read_to_string(&page).unwrap(), html);
+    assert!(report(folder.path()) == html);
 
     let Some((console, seen)) = browser(&page, &["--dump-dom"]) else {
         eprintln!("skipped: chromium is not installed, so the page was opened by no browser");
         return;
     };
     assert!(!console.contains("CONSOLE"), "{console}");
-    assert_eq!(seen.matches("<figcaption>").count(), 9);
+    assert_eq!(seen.matches("<figcaption>").count(), 7);
     let print = folder.path().join("report.pdf");
     let (console, _) = browser(
         &page,
@@ -72,4 +70,20 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
     .unwrap();
     assert!(!console.contains("CONSOLE"), "{console}");
     assert!(std::fs::read(&print).unwrap().starts_with(b"%PDF"));
+}
+
+#[test]
+fn a_report_says_which_commands_failed_and_shows_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display();
+    let idle = "--set start.dq2=0 --set phase_lock.acquire_timeout=3 --x sigma=-2:1:3 --y G=0.8:1.8:3";
+    let done = vines(&format!("report {idle} --out {out}"));
+    assert_eq!(done.status.code(), Some(1));
+    assert!(
+        text(&done).contains("without a result: Lock and free decay"),
+        "{}",
+        text(&done)
+    );
+    let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(html.contains("error: no lock within"));
 }

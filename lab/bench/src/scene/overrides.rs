@@ -1,5 +1,6 @@
 //! `--set section.key=value`: one value of a scene replaced from the command line, written as in TOML; text needs no quotes.
 
+use std::fmt;
 use std::str::FromStr;
 
 use serde::Deserialize;
@@ -39,6 +40,12 @@ impl FromStr for Override {
         };
         let (key, value) = keys.ok_or(expected)?;
         Ok(Self { argument: argument.into(), section, key, value })
+    }
+}
+
+impl fmt::Display for Override {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.argument)
     }
 }
 
