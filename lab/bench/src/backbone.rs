@@ -271,7 +271,7 @@ pub fn track_into(
 ) -> Result<Tracked, ExperimentError> {
     let mut quiet = |_, _| {};
     let mut tracker = Tracker {
-        run: experiment::ControlLoop::new(rig, controller, scene, samples, &mut quiet)?,
+        run: experiment::ControlLoop::new(rig, controller, scene, scene.backbone_config(), samples, &mut quiet)?,
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),

@@ -2,10 +2,12 @@
 //!
 //! It follows the state of the controller: a controller that switches the drive off ends the experiment at once.
 
+mod judge;
 mod search;
 
 use std::f64::consts::TAU;
 
+use phase_lock::Config;
 use thiserror::Error;
 use vines_model::numerics::mean;
 
@@ -14,6 +16,8 @@ use crate::record::{Record, Sample};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Rig, RigError};
 use crate::scene::{Resonance, Scene, key};
 
+use judge::Judge;
+pub use judge::{Scatter, Spread};
 pub(crate) use search::Search;
 
 /// Share of its amplitude to which the response of the linear rig falls in the recorded decay. The 1:1 motion has a smaller range, from symmetry
@@ -74,6 +78,34 @@ fn phase_in_words(error: Option<f64>) -> String {
     )
 }
 
+/// What the lock waits for, in words; `scatter` where the bench judges the lock.
+fn lock_in_words(scatter: Option<Scatter>) -> String {
+    let Some(Scatter { periods, frequency, amplitude }) = scatter else {
+        return "see phase_lock.acquire_timeout and the [controller] section".into();
+    };
+    let beyond = |name: &str, key: &str, Spread { found, allowed }: Spread| {
+        (found > allowed).then(|| {
+            format!(
+                "the {name} varies by {found:.1e} of itself, and the noise of the readings and phase_lock.lock.{key} explain {allowed:.1e}: make the \
+                 loop slower, or set a larger value of that key"
+            )
+        })
+    };
+    let reasons: Vec<String> = [
+        beyond("frequency", "frequency_drift", frequency),
+        beyond("amplitude of the response", "amplitude_drift", amplitude),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    let reason = if reasons.is_empty() {
+        "the mean phase error exceeds phase_lock.lock.phase_tolerance".into()
+    } else {
+        reasons.join("; ")
+    };
+    format!("the bench judges the lock, as the controller does not: over the last {periods} periods {reason}")
+}
+
 /// Why an experiment ended early.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
@@ -83,15 +115,16 @@ pub enum ExperimentError {
     #[error(transparent)]
     Controller(#[from] ControllerError),
     #[error(
-        "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s; \
-         see phase_lock.acquire_timeout and the [controller] section",
-        phase_in_words(*phase_error)
+        "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s; {}",
+        phase_in_words(*phase_error), lock_in_words(*scatter)
     )]
     NoLock {
         periods: f64,
         /// Degrees.
         phase_error: Option<f64>,
         omega: f64,
+        /// Why the bench did not take the motion as settled, if the controller does not judge its lock itself.
+        scatter: Option<Scatter>,
     },
     #[error("the requested drive G = {g:.4} was not reached within {periods:.0} periods: {why}")]
     NotReached { periods: f64, g: f64, why: String },
@@ -118,8 +151,29 @@ pub enum ExperimentError {
          backbone with resonance.definition = \"phase\""
     )]
     Peak,
-    #[error("the controller asked for omega = {} rad/s and E = {} m, which is refused; the drive is off", .0.omega, .0.amplitude)]
-    NotANumber(Drive),
+    #[error("the controller answered {name} = {value} {unit}; it must be {allowed}. The drive is off")]
+    Command {
+        name: &'static str,
+        value: f64,
+        unit: &'static str,
+        allowed: &'static str,
+    },
+    #[error(
+        "the controller asked for E = {} m, and {} allows {} m; the drive is off. E is the amplitude of the base in metres",
+        short(*amplitude), key("amplitude_max"), short(*limit)
+    )]
+    DriveTooLarge { amplitude: f64, limit: f64 },
+    #[error(
+        "the response read {} m, and {} allows {} m, but the controller did not stop; the drive is off",
+        short(*response), key("response_max"), short(*limit)
+    )]
+    ResponseTooLarge { response: f64, limit: f64 },
+    #[error(
+        "the controller asked for omega = {} rad/s; the scene allows {} to {} rad/s ({}, {}), and a factor of 2 pi lies between. omega is an \
+         angular frequency in rad/s, not in Hz; the drive is off",
+        short(*omega), short(allowed[0]), short(allowed[1]), key("omega_min"), key("omega_max")
+    )]
+    Hertz { omega: f64, allowed: [f64; 2] },
 }
 
 /// Runs the whole experiment. `progress` receives the stage, the samples taken in it, and their largest number.
@@ -142,14 +196,15 @@ pub fn run_into(
 ) -> Result<Record, ExperimentError> {
     let counts = [Stage::Locking, Stage::Holding, Stage::Decaying].map(|stage| stage.samples(scene));
     let mut report = |stage, taken| progress(stage, taken, counts[stage as usize]);
-    let mut bench = ControlLoop::new(rig, controller, scene, samples, &mut report)?;
+    let config = scene.controller_config();
+    let mut bench = ControlLoop::new(rig, controller, scene, config, samples, &mut report)?;
     let held = if scene.controller.is_at_phase_resonance() {
         Search::new(&mut bench, scene).lock()?
     } else {
         None
     };
     // A controller that cannot control the response waits for the lock under the constant drive.
-    while held.is_none() && !bench.last.settled {
+    while held.is_none() && !bench.settled {
         bench.sample(Stage::Locking)?;
     }
     let settled = bench.taken - 1;
@@ -181,6 +236,8 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
     rig: &'a mut R,
     pub controller: &'a mut C,
     scene: &'a Scene,
+    /// The limits of the drive and of the response, whatever controls the rig.
+    config: Config,
     /// s
     pub sample_time: f64,
     pub samples: &'a mut Vec<Sample>,
@@ -190,6 +247,9 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
     pub periods: f64,
     /// Latest output of the controller.
     pub last: Command,
+    /// Whether the lock has settled, as the controller says, or else the bench.
+    pub settled: bool,
+    judge: Judge,
     /// Time limit for the lock, samples.
     limit: usize,
     /// Receives the stage and the samples taken in it.
@@ -209,6 +269,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         rig: &'a mut R,
         controller: &'a mut C,
         scene: &'a Scene,
+        config: Config,
         samples: &'a mut Vec<Sample>,
         progress: &'a mut dyn FnMut(Stage, usize),
     ) -> Result<Self, ExperimentError> {
@@ -219,11 +280,14 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             rig,
             controller,
             scene,
+            config,
             sample_time: scene.sample_time(),
             samples,
             taken: 0,
             periods: 0.0,
             last: Command::default(),
+            settled: false,
+            judge: Judge::new(&config),
             limit: Stage::Locking.samples(scene),
             progress,
             stage: (Stage::Locking, 0),
@@ -247,15 +311,43 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         });
         self.taken += 1;
         self.last = command;
+        let is_latched = command.state.is_some_and(LoopState::is_latched);
+        if active && !is_latched {
+            self.guard(sensors.response, command.drive)?;
+        }
         self.advance(command.drive)?;
         self.periods += command.drive.omega * self.sample_time / TAU;
-        if active && command.state.is_some_and(LoopState::is_latched) {
+        if active && is_latched {
             self.ramp_down(command)?;
             return Err(self.tripped(stage, &command));
         }
+        self.settled = match command.settled {
+            None if stage == Stage::Locking => self.judge.sample(self.samples, self.periods),
+            settled => settled == Some(true),
+        };
         (self.progress)(stage, self.taken - self.stage.1);
         if stage == Stage::Locking && self.taken >= self.limit {
             return Err(self.no_lock(&command));
+        }
+        Ok(())
+    }
+
+    /// Refuses a drive or a response beyond the limits of the scene, before the rig gets the drive.
+    fn guard(&self, response: f64, drive: Drive) -> Result<(), ExperimentError> {
+        let Config { amplitude_max, response_max, omega_min, omega_max, .. } = self.config;
+        let Drive { omega, amplitude, .. } = drive;
+        // A controller may compute in single precision.
+        let beyond = |value: f64, limit: Option<f64>| limit.filter(|limit| value > limit * (1.0 + 1e-6));
+        if let Some(limit) = beyond(amplitude, amplitude_max) {
+            return Err(ExperimentError::DriveTooLarge { amplitude, limit });
+        }
+        if let Some(limit) = beyond(response.abs(), response_max) {
+            return Err(ExperimentError::ResponseTooLarge { response, limit });
+        }
+        let allowed = [omega_min, omega_max];
+        let is_allowed = |omega: f64| (omega_min..=omega_max).contains(&omega);
+        if amplitude > 0.0 && !is_allowed(omega) && (is_allowed(omega * TAU) || is_allowed(omega / TAU)) {
+            return Err(ExperimentError::Hertz { omega, allowed });
         }
         Ok(())
     }
@@ -309,6 +401,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             periods: self.periods,
             phase_error: command.phase_error.map(f64::to_degrees),
             omega: command.drive.omega,
+            scatter: self.judge.scatter().filter(|_| command.settled.is_none()),
         }
     }
 }
@@ -323,14 +416,22 @@ impl<R: Rig + ?Sized, C: ?Sized> Drop for ControlLoop<'_, R, C> {
     }
 }
 
-/// A command with a drive that a rig can take.
+/// A command with values that a rig and an identification can take.
 fn checked(command: Command) -> Result<Command, ExperimentError> {
     let Drive { omega, amplitude, displacement } = command.drive;
-    if [omega, amplitude, displacement].iter().all(|value| value.is_finite()) {
-        Ok(command)
-    } else {
-        Err(ExperimentError::NotANumber(command.drive))
-    }
+    let error = |(name, value, unit, allowed)| ExperimentError::Command { name, value, unit, allowed };
+    let positive = [("omega", omega, "rad/s"), ("E", amplitude, "m")]
+        .map(|(name, value, unit)| (name, value, unit, "a finite number, 0 or above"));
+    let finite = [
+        ("drive", displacement, "m"),
+        ("phase_error", command.phase_error.unwrap_or(0.0), "rad"),
+    ]
+    .map(|(name, value, unit)| (name, value, unit, "a finite number"));
+    let refused = positive
+        .into_iter()
+        .find(|(_, value, ..)| !(value.is_finite() && *value >= 0.0))
+        .or_else(|| finite.into_iter().find(|(_, value, ..)| !value.is_finite()));
+    refused.map_or(Ok(command), |refused| Err(error(refused)))
 }
 
 /// What the sensors read in the last period before a fault, and the limit of the scene that was exceeded.

@@ -3,7 +3,6 @@
 
 mod chain;
 mod faulty;
-mod settling;
 mod stages;
 
 use std::error::Error;
@@ -19,7 +18,6 @@ pub use crate::scene::has_friction;
 
 pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
-pub use settling::Settling;
 pub use stages::{Interrupted, Measured, SensorsOnly, Stoppable};
 
 /// What the controller asks of the rig for the coming sample period.
@@ -141,8 +139,9 @@ pub struct Command {
     pub drive: Drive,
     /// Phase of the response relative to the base, less the target, rad; absent if it cannot be measured.
     pub phase_error: Option<f64>,
-    /// Phase, frequency and amplitude have been stationary for the controller's dwell time.
-    pub settled: bool,
+    /// Whether phase, frequency and amplitude have been stationary for the controller's dwell time; absent if it does not say so, and the
+    /// bench judges.
+    pub settled: Option<bool>,
     /// State of the loop; absent if the controller does not report it.
     pub state: Option<LoopState>,
     /// Why the controller switched the drive off.
@@ -308,7 +307,7 @@ impl From<Output> for Command {
         Self {
             drive: Drive { omega, amplitude, displacement },
             phase_error: output.phase_error,
-            settled: output.settled,
+            settled: Some(output.settled),
             state: Some(output.state),
             fault: output.fault,
         }

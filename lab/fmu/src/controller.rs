@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use phase_lock::{Config, MOVE, PARAMETERS};
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Sensors, Settling};
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Sensors};
 use vines_testbench::scene::Names;
 
 use crate::instance::{FmiType, Fmu, FmuError, Variable};
@@ -34,7 +34,6 @@ pub struct FmuController {
     /// Whether the lock has settled, as the controller reports it; otherwise the bench judges, while `locked` is true where the controller has it.
     settled: Option<Variable>,
     locked: Option<Variable>,
-    settling: Settling,
     state: Option<Variable>,
     fault: Option<Variable>,
     /// `phase_target` and the fields of the move, in the order of the core's table, and `hold_response`.
@@ -79,7 +78,6 @@ impl FmuController {
             phase_measured: boolean("phase_measured")?,
             settled,
             locked,
-            settling: Settling::new(config),
             state: fmu.find(FmiType::Integer, "state")?,
             fault: fmu.find(FmiType::Integer, "fault")?,
             response_loop: targets.zip(boolean("hold_response")?),
@@ -106,11 +104,9 @@ impl FmuController {
         let measured = fmu.get_if(self.phase_measured)? != Some(0.0);
         let phase_error = fmu.get_if(self.phase_error.filter(|_| measured))?;
         let settled = match fmu.get_if(self.settled)? {
-            Some(settled) => settled != 0.0,
-            None => {
-                let locked = fmu.get_if(self.locked)? != Some(0.0) && measured;
-                active && self.settling.sample(drive.omega, phase_error.unwrap_or(0.0), locked)
-            }
+            Some(settled) => Some(settled != 0.0),
+            // The bench judges a lock that the controller may have.
+            None => (!measured || fmu.get_if(self.locked)? == Some(0.0)).then_some(false),
         };
         let [state, fault] = [self.state, self.fault].map(|variable| fmu.get_if(variable));
         Ok(Command {

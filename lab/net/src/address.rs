@@ -142,7 +142,7 @@ pub enum LinkError {
     )]
     Closed { peer: Address, time: f64 },
     #[error(
-        "{peer} sent a frame that is damaged, has a value that is not allowed, or is not the answer, at t = {time} s of the experiment"
+        "{peer} sent a frame that is not the answer to a reading, at t = {time} s of the experiment: another kind, or of a later sample"
     )]
     Invalid { peer: Address, time: f64 },
     #[error("the network: {0}")]

@@ -8,9 +8,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use phase_lock::Config;
-use vines_testbench::rig::{
-    Command, Controller, ControllerError, Drive, GroundTruth, Move, Rig, RigError, Sensors, Settling,
-};
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, GroundTruth, Move, Rig, RigError, Sensors};
 use vines_testbench::scene::Definition;
 
 use crate::address::{Address, LinkError};
@@ -308,13 +306,10 @@ pub struct NetController {
     /// The last answer, and the number of samples until then.
     good: Command,
     answered: u64,
-    /// Judges the lock of a controller that does not report the state of its loop.
-    settling: Settling,
 }
 
 impl NetController {
-    /// Opens a session with the controller server at `peer`, which has a configuration of its own: `config` has the sample time, and the lock
-    /// criterion for a controller that does not report the state of its loop.
+    /// Opens a session with the controller server at `peer`, which has a configuration of its own.
     ///
     /// Beside a rig in real time the client waits for an answer for half a sample period, and then holds the last one.
     /// `pace` is the longest silence of such a rig, s; it also limits the silence of the controller. For a rig that waits,
@@ -329,7 +324,6 @@ impl NetController {
             waiting: None,
             good: Command::default(),
             answered: 0,
-            settling: Settling::new(config),
         })
     }
 
@@ -354,7 +348,7 @@ impl NetController {
                 self.client.counters.hold(self.client.at + 1 - self.answered);
                 break self.held(active);
             };
-            self.good = self.read(&frame, active)?;
+            self.good = self.read(&frame)?;
             self.waiting = None;
             self.answered = frame.sequence + 1;
             if frame.sequence == self.client.at {
@@ -374,23 +368,17 @@ impl NetController {
         } else {
             Drive { omega: last.omega, ..Drive::default() }
         };
-        Command { drive, settled: false, ..self.good }
+        let settled = self.good.settled.map(|_| false);
+        Command { drive, settled, ..self.good }
     }
 
     /// The answer to this sample or an earlier one.
-    fn read(&mut self, frame: &Frame, active: bool) -> Result<Command, LinkError> {
-        let mut command = read_command(frame);
-        let Drive { omega, amplitude, .. } = command.drive;
-        let valid = frame.values.iter().all(|x| x.is_finite()) && omega >= 0.0 && amplitude >= 0.0;
-        if !valid || frame.kind != Kind::Drive || frame.sequence > self.client.at {
-            let (peer, time) = (self.client.peer, self.client.time());
-            return Err(LinkError::Invalid { peer, time });
+    fn read(&self, frame: &Frame) -> Result<Command, LinkError> {
+        if frame.kind == Kind::Drive && frame.sequence <= self.client.at {
+            return Ok(read_command(frame));
         }
-        if active && command.state.is_none() {
-            let phase_error = command.phase_error.unwrap_or(0.0);
-            command.settled |= self.settling.sample(omega, phase_error, command.phase_error.is_some());
-        }
-        Ok(command)
+        let (peer, time) = (self.client.peer, self.client.time());
+        Err(LinkError::Invalid { peer, time })
     }
 }
 

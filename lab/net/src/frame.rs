@@ -198,7 +198,7 @@ pub(crate) fn read_reading(frame: &Frame) -> Reading {
 }
 
 pub(crate) fn write_command(frame: Frame, command: &Command) -> Frame {
-    let flags = bit(flag::SETTLED, command.settled) | bit(flag::NO_PHASE, command.phase_error.is_none());
+    let flags = bit(flag::SETTLED, command.settled == Some(true)) | bit(flag::NO_PHASE, command.phase_error.is_none());
     let Drive { omega, amplitude, displacement } = command.drive;
     // The state is counted from 1, so that 0 means that it is not reported.
     let state = command.state.map_or(0.0, |state| f64::from(state as u8) + 1.0);
@@ -210,11 +210,13 @@ pub(crate) fn write_command(frame: Frame, command: &Command) -> Frame {
 
 pub(crate) fn read_command(frame: &Frame) -> Command {
     let [omega, amplitude, displacement, phase_error, state, fault] = frame.values;
+    let (settled, state) = (frame.has(flag::SETTLED), LoopState::of_number(state as i32 - 1));
     Command {
         drive: Drive { omega, amplitude, displacement },
         phase_error: (!frame.has(flag::NO_PHASE)).then_some(phase_error),
-        settled: frame.has(flag::SETTLED),
-        state: LoopState::of_number(state as i32 - 1),
+        // A controller that never says so reports no state either.
+        settled: (settled || state.is_some()).then_some(settled),
+        state,
         fault: Fault::of_number(fault as i32),
     }
 }

@@ -237,7 +237,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             *leg = self.measure(FOLLOWED)?;
             // Beside symmetry breaking the symmetry is lost slowly; noise grows as often in one of 24 cases.
             grown = if leg.asymmetry > before { grown + 1 } else { 0 };
-            if self.bench.last.settled && grown < CONFIRMED {
+            if self.bench.settled && grown < CONFIRMED {
                 return Ok(true);
             }
             // Noise may hide an asymmetry, but not where the motion goes.
@@ -287,7 +287,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     fn measure(&mut self, periods: usize) -> Result<Leg, ExperimentError> {
         let mut begins = Vec::new();
         while begins.len() < periods.max(ResonanceFit::FEWEST)
-            && !(self.bench.last.settled && begins.len() >= ResonanceFit::FEWEST)
+            && !(self.bench.settled && begins.len() >= ResonanceFit::FEWEST)
         {
             begins.push(self.bench.period(Stage::Locking)?);
         }

@@ -2,9 +2,11 @@
 //! a fault which no longer matters to the drive is refused; `studies/faults.rs` takes more instants.
 
 use std::cell::Cell;
+use std::f64::consts::TAU;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 
+use phase_lock::Config;
 use vines_testbench::experiment::{self, ExperimentError};
 use vines_testbench::identification::{IdentificationError, identify};
 use vines_testbench::record::Record;
@@ -149,7 +151,87 @@ fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() 
         let drive = Drive { amplitude: f64::NAN, ..drive };
         Ok(Command { drive, ..Command::default() })
     };
-    assert!(matches!(ends(|| Ok(()), nan), Ok(Err(ExperimentError::NotANumber(_)))));
+    let ended = ends(|| Ok(()), nan);
+    assert!(matches!(ended, Ok(Err(ExperimentError::Command { name: "E", .. }))));
+}
+
+/// The built-in controller with another answer, which does not say whether it has locked.
+struct Foreign(BuiltIn, usize, fn(&mut Command, usize));
+
+impl Controller for Foreign {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
+        let mut command = Command {
+            settled: None,
+            state: None,
+            ..self.0.sample(sensors, active)?
+        };
+        self.1 += 1;
+        (self.2)(&mut command, self.1);
+        Ok(command)
+    }
+}
+
+/// An experiment with such a controller, and the largest drive that reached the rig, m.
+fn foreign(scene: &Scene, change: fn(&mut Command, usize)) -> (Result<Record, ExperimentError>, f64) {
+    let largest = Cell::new(0.0);
+    let drive = |drive: Drive, step| {
+        largest.set(drive.amplitude.max(largest.get()));
+        (drive, step)
+    };
+    let mut rig = Altered {
+        rig: Simulated::of(scene).unwrap(),
+        read: Box::new(Ok),
+        drive: Box::new(drive),
+    };
+    let limits = Config {
+        amplitude_max: None,
+        response_max: None,
+        residual_max: None,
+        ..scene.controller_config()
+    };
+    let mut controller = Foreign(BuiltIn::new(&limits).unwrap(), 0, change);
+    let record = experiment::run(&mut rig, &mut controller, scene, |_, _, _| {});
+    (record, largest.get())
+}
+
+#[test]
+fn the_limits_of_the_scene_guard_the_rig_whatever_controls_it() {
+    let scene = scene(&[]);
+    let limit = scene.controller_config().amplitude_max.unwrap();
+    let refused = |scene: &Scene, change, words: &str| {
+        let (record, largest) = foreign(scene, change);
+        let message = record.unwrap_err().to_string();
+        assert!(message.contains(words) && largest <= limit, "{message} {largest}");
+    };
+    refused(
+        &scene,
+        |command, _| command.drive.amplitude *= 1e3,
+        "phase_lock.amplitude_max allows 0.00052791 m",
+    );
+    refused(&scene, |command, _| command.drive.omega /= TAU, "not in Hz");
+    refused(&scene, |command, _| command.drive.omega *= -1.0, "omega = -55.");
+    refused(
+        &scene,
+        |command, _| command.phase_error = Some(f64::NAN),
+        "phase_error = NaN rad",
+    );
+    let low = self::scene(&["phase_lock.response_max=0.003"]);
+    refused(&low, |_, _| (), "phase_lock.response_max allows 0.003 m");
+}
+
+#[test]
+fn the_bench_judges_a_lock_through_noise_by_what_the_response_shows_of_it() {
+    let settled = |settings: &[&str], change| foreign(&scene(settings), change).0.map(|record| record.settled);
+    let silent = settled(&[], |_, _| ()).unwrap();
+    for snr in ["chain.snr=80", "chain.snr=60", "chain.snr=40"] {
+        let noisy = settled(&[snr], |_, _| ()).unwrap();
+        assert!(noisy < 2 * silent, "{snr}: {noisy} {silent}");
+    }
+    // Noise that hides a modulation of the frequency does not excuse one that the phase of the response would show.
+    let modulated: fn(&mut Command, usize) =
+        |command, sample| command.drive.omega *= 1.0 + 3e-4 * (TAU * sample as f64 / 500.0).sin();
+    let error = settled(&["chain.snr=60", "phase_lock.acquire_timeout=60"], modulated).unwrap_err();
+    assert!(error.to_string().contains("the frequency varies by"), "{error}");
 }
 
 /// Refuses the record of a rig with a fault after some seconds.

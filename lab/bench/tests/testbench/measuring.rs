@@ -456,7 +456,7 @@ fn periods_to_settle(rig: &mut Simulated, scene: &Scene, ends: bool) -> f64 {
     let (step, mut periods) = (scene.sample_time(), 0.0);
     while periods < 800.0 {
         let command = controller.sample(rig.sense().unwrap(), true).unwrap();
-        if ends && command.settled {
+        if ends && command.settled == Some(true) {
             break;
         }
         rig.advance(command.drive, step).unwrap();
@@ -515,7 +515,7 @@ impl Controller for Single {
         let output = self.0.process(&mut self.1, input);
         let [omega, amplitude, displacement] = [output.omega, output.amplitude, output.drive].map(f64::from);
         let drive = Drive { omega, amplitude, displacement };
-        Ok(Command { drive, settled: output.settled, ..Command::default() })
+        Ok(Command { drive, settled: Some(output.settled), ..Command::default() })
     }
 }
 
@@ -529,7 +529,7 @@ fn detuning(scene: &Scene, settle: f64, controller: &mut dyn Controller) -> (f64
         let command = controller.sample(rig.sense().unwrap(), true).unwrap();
         if n >= samples(settle) {
             omega += command.drive.omega / samples(LOOK) as f64;
-            settled &= command.settled;
+            settled &= command.settled == Some(true);
         }
         rig.advance(command.drive, step).unwrap();
     }

@@ -32,6 +32,7 @@ proptest! {
         prop_assert_eq!(read_reading(&Frame::decode(&frame.encode()).unwrap()), reading);
         let drive = Drive { omega, amplitude, displacement };
         let (state, fault) = (LoopState::of_number(state), Fault::of_number(fault));
+        let settled = (settled || state.is_some()).then_some(settled);
         let command = Command { drive, phase_error, settled, state, fault };
         let frame = write_command(Frame::new(Kind::Hello, 1), &command);
         prop_assert_eq!(read_command(&Frame::decode(&frame.encode()).unwrap()), command);
@@ -57,7 +58,13 @@ fn frames_of_every_kind_have_the_recorded_bytes() {
     };
     let drive = Drive { omega: 55.5, amplitude: 9e-5, displacement: -1e-5 };
     let (state, fault) = (LoopState::of_number(3), Fault::of_number(5));
-    let command = Command { drive, phase_error: Some(-1e-3), settled: true, state, fault };
+    let command = Command {
+        drive,
+        phase_error: Some(-1e-3),
+        settled: Some(true),
+        state,
+        fault,
+    };
     let [impact_time, impact_velocity, particle_velocity] = [0.2, -0.3, 0.4];
     let motion = GroundTruth {
         impacts: 12,
