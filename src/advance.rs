@@ -99,13 +99,44 @@ impl Plant {
             (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * self.fast.state.phasor.1;
         let oscillator = &self.moving.system.free;
         let kick = 2.0 * oscillator.delta * jump;
-        if jump != 0.0 {
+        if jump != 0.0 && !self.carries(jump, kick, &before) {
             self.moving.masses.primary = self.moving.masses.primary.plus([0.0, kick]);
             self.moving.masses.dw += kick;
             // The impulse acts on the primary mass alone; contact is decided anew.
             self.status.contact = None;
         }
+        let oscillator = &self.moving.system.free;
         self.fast.state.contact_free.jump(oscillator, &before, drive, kick);
+    }
+
+    /// Whether a jump of the base moves a particle at rest together with the primary mass, as one; they are moved then.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn carries(&mut self, jump: f64, kick: f64, before: &Drive) -> bool {
+        (self.status.contact).is_some_and(|contact| self.carries_along(contact.wall(), (jump, kick), before))
+    }
+
+    /// The same for a particle that is at rest on a wall or on the floor.
+    ///
+    /// A jump within the rounding of the base displacement is none. The sum of a polynomial has this error, and so has what a master
+    /// computes at a time that is itself rounded.
+    #[inline(never)]
+    fn carries_along(&mut self, wall: Option<Wall>, (jump, kick): (f64, f64), before: &Drive) -> bool {
+        let (system, drive) = (&self.moving.system, &self.moving.base.drive);
+        let size = |drive: &Drive| {
+            let [offset, slope, ..] = drive.signal;
+            offset.abs() + drive.amplitude.abs() + (slope * self.status.time).abs()
+        };
+        let is_rounding = jump.abs() <= ROUNDING * (size(drive) + size(before));
+        let acceleration = self.acceleration(self.moving.masses.primary.values[1] + kick);
+        let lowest = LOWEST_HOP * system.half_width;
+        if !is_rounding && !system.forces.carry(wall, kick, acceleration, lowest) {
+            return false;
+        }
+        let both = 2.0 * system.stuck.delta * jump;
+        let masses = &mut self.moving.masses;
+        masses.primary = masses.primary.plus([0.0, both]);
+        masses.particle = masses.primary.values[1];
+        true
     }
 
     /// Follows the motion from event to event to the end of the step. (A call: most steps do not need it, and its code is long.)
@@ -175,11 +206,7 @@ impl Plant {
             None => self.direction(),
         };
         if direction == 0.0 {
-            self.status.contact = Some(Contact::Floor);
-            self.status.totals.sticks += 1;
-            let t = step.now();
-            (step.on_event)(Event::Sticking { t });
-            return;
+            return self.stick(step);
         }
         if slips.is_none() && masses.dw != 0.0 && self.arrives(limit, direction, step) {
             return;
@@ -208,6 +235,14 @@ impl Plant {
                 (step.on_event)(Event::Reversal { t, direction });
             }
         }
+    }
+
+    /// The particle sticks to the floor.
+    fn stick(&mut self, step: &mut Step<impl FnMut(Event)>) {
+        self.status.contact = Some(Contact::Floor);
+        self.status.totals.sticks += 1;
+        let t = step.now();
+        (step.on_event)(Event::Sticking { t });
     }
 
     /// Moves on to the wall ahead, if constant forces act and the fast path finds the contact within `limit` seconds.
@@ -344,14 +379,15 @@ impl Plant {
         let system = &self.moving.system;
         self.moving.masses.w = Sum::from(wall.sign() * system.half_width);
         let left = step.left.value();
-        let touch = if system.is_real {
+        let (touch, contact) = if system.is_real {
             self.real_touch(wall, left)
         } else {
-            system.law.touch(wall, self.velocities(), |primary, speed| {
+            let touch = system.law.touch(wall, self.velocities(), |primary, speed| {
                 let (largest, resolution) = (self.acceleration_bound(primary), self.resolution(left));
                 !system.law.certainly_leaves(speed, largest, &resolution)
                     && system.law.rests(speed, self.pressing(wall, primary), &resolution)
-            })
+            });
+            (touch, Contact::Wall(wall))
         };
         self.moving.masses.primary = self.moving.masses.primary.plus([0.0, touch.kick]);
         self.moving.masses.particle = touch.particle;
@@ -362,16 +398,19 @@ impl Plant {
             step.outcome.impacts += 1;
             (step.on_event)(Event::Impact { t, wall, velocity });
         }
-        if touch.stuck {
-            self.status.contact = Some(Contact::Wall(wall));
+        if touch.stuck && contact == Contact::Floor {
+            self.stick(step);
+        } else if touch.stuck {
+            self.status.contact = Some(contact);
             step.outcome.stuck += 1;
             (step.on_event)(Event::Stuck { t, wall });
         }
     }
 
-    /// The same in a cavity with constant forces or a restitution that varies.
+    /// The same in a cavity with constant forces or a restitution that varies; and what a particle at rest is at rest on. Where friction
+    /// ends its last hop, that is the floor.
     #[inline(never)]
-    fn real_touch(&self, wall: Wall, left: f64) -> Touch {
+    fn real_touch(&self, wall: Wall, left: f64) -> (Touch, Contact) {
         let (system, velocities) = (&self.moving.system, self.velocities());
         let mut law = system.law;
         if system.varies {
@@ -379,17 +418,19 @@ impl Plant {
                 law.with_restitution((system.rebound).of_impact(wall, velocities.2.abs(), self.status.totals.impacts));
         }
         let resolution = Resolution { elastic: !system.varies, ..self.resolution(left) };
-        law.touch(wall, velocities, |primary, speed| {
-            let largest = self.acceleration_bound(primary) + system.forces.joint * system.forces.size();
-            !law.resting_with(1.0).certainly_leaves(speed, largest, &resolution)
-                && (system.rebound).rests(
-                    &law,
-                    &system.forces,
-                    (wall, speed),
-                    self.pressing(wall, primary),
-                    &resolution,
-                )
-        })
+        let (forces, mut contact) = (&system.forces, Contact::Wall(wall));
+        let touch = law.touch(wall, velocities, |primary, speed| {
+            let largest = self.acceleration_bound(primary) + forces.joint * forces.size();
+            if law.resting_with(1.0).certainly_leaves(speed, largest, &resolution) {
+                return false;
+            }
+            let (free, error) = self.pressing(wall, primary);
+            if speed > 0.0 && forces.holding > 0.0 && forces.stop_a_hop(wall, free) {
+                contact = Contact::Floor;
+            }
+            (system.rebound).rests(&law, forces, (wall, speed), (free, error), &resolution)
+        });
+        (touch, contact)
     }
 
     /// Velocities of primary mass and particle, and the relative velocity.

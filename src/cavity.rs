@@ -65,6 +65,21 @@ impl Forces {
         }
     }
 
+    /// Whether a kick, which gives the primary mass alone the velocity `kick` (m/s), carries a particle along that is at rest on `wall`, or
+    /// on the floor: the hop would stay below `lowest`, m. `acceleration` is that of the primary mass while it moves alone and without
+    /// friction, m/s².
+    pub fn carry(&self, wall: Option<Wall>, kick: f64, acceleration: f64, lowest: f64) -> bool {
+        let towards = wall.map_or(-kick.signum(), Wall::sign);
+        let against = towards * (acceleration - self.gravity) + self.joint * self.kinetic;
+        kick == 0.0 || kick * kick <= 2.0 * lowest * against
+    }
+
+    /// Whether friction holds a particle that has hopped off `wall`, which then sticks to the floor beside it; `free` as in
+    /// [`Self::pressing`].
+    pub fn stop_a_hop(&self, wall: Wall, free: f64) -> bool {
+        free - wall.sign() * self.gravity <= self.joint * self.holding
+    }
+
     /// Accelerations of `wall` towards a particle that moves away from it, and towards one that comes back, m/s²: friction adds to the
     /// first and takes from the second. `free` is the acceleration towards a particle without any.
     pub fn pressing(&self, wall: Wall, free: f64) -> (f64, f64) {
@@ -142,15 +157,15 @@ impl Rebound {
         (free, error): (f64, f64),
         resolution: &Resolution,
     ) -> bool {
-        let ((up, down), held) = (forces.pressing(wall, free), forces.joint * forces.holding);
-        let pressing = free - wall.sign() * forces.gravity;
+        let (up, down) = forces.pressing(wall, free);
         if speed == 0.0 {
-            return pressing + held >= -error;
+            let pressing = free - wall.sign() * forces.gravity;
+            return pressing + forces.joint * forces.holding >= -error;
         }
         if up <= 0.0 {
             return false;
         }
-        let (mean, back) = if down > 0.0 && pressing > held {
+        let (mean, back) = if down > 0.0 && !forces.stop_a_hop(wall, free) {
             (2.0 / (1.0 / up + 1.0 / libm::sqrt(up * down)), libm::sqrt(down / up))
         } else {
             (up, 0.0)

@@ -135,7 +135,12 @@ impl Plant {
     /// Relative displacement `w = q1 - q2`, m.
     #[inline]
     pub fn relative_displacement(&self) -> f64 {
-        self.moving.masses.w.value() + self.moving.system.middle
+        let (w, system) = (self.moving.masses.w.value(), &self.moving.system);
+        if w.abs() >= system.half_width {
+            system.at_wall(Wall::ahead(w))
+        } else {
+            w + system.middle
+        }
     }
 
     /// Relative velocity `w'`, m/s.
@@ -213,13 +218,15 @@ fn masses(system: &System, start: State) -> Result<Masses, InvalidValue> {
     finite("der(q2) (velocity of the particle)", start.dq2, "m/s")?;
     let w = (start.q1 - start.q2) - system.middle;
     // The difference of two displacements carries their rounding; a start on the wall means on the wall.
-    let slack = 4.0 * f64::EPSILON * (b + start.q1.abs().max(start.q2.abs()));
+    let farthest = start.q1.abs().max(start.q2.abs());
+    let slack = 4.0 * f64::EPSILON * (b + farthest);
+    let on_wall = w.abs() >= b - f64::EPSILON * (2.0 * b + 0.5 * farthest);
     let name = "w = q1 - q2 (particle outside its cavity)";
     let allowed = "a number from -b_minus to b_plus, which are b unless set";
     InvalidValue::unless(w.abs() <= b + slack, name, w + system.middle, "m", allowed)?;
     Ok(Masses {
         primary: Sums { values: [start.q1, start.dq1], errors: [0.0; 2] },
-        w: Sum::from(w.clamp(-b, b)),
+        w: Sum::from(if on_wall { b.copysign(w) } else { w }),
         dw: start.dq1 - start.dq2,
         particle: start.dq2,
     })

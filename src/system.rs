@@ -51,6 +51,12 @@ impl From<Parameters> for System {
 }
 
 impl System {
+    /// `q1 - q2` at a wall, m: the sum of half-width and middle would miss the gap by its rounding.
+    #[cold]
+    pub fn at_wall(&self, wall: Wall) -> f64 {
+        wall.sign() * self.parameters.gaps()[wall.index()]
+    }
+
     /// Acceleration of the particle by kinetic friction while `w'` has the sign `direction`, m/s².
     pub fn friction(&self, direction: f64) -> f64 {
         self.forces.kinetic * direction

@@ -291,7 +291,8 @@ impl Hybrid {
         self.set_velocities(dq1, dq2);
     }
 
-    /// The impulse of a jump of the base acts on the primary mass alone: a particle at a wall is free to leave it.
+    /// The impulse of a jump of the base acts on the primary mass alone: a particle at a wall is free to leave it. A jump within the
+    /// rounding of the base displacement is none, and one whose hop cannot be resolved moves both masses as one.
     fn base_jump(&mut self) {
         let Some(before) = self.base_before.take() else {
             return;
@@ -300,12 +301,19 @@ impl Hybrid {
         if jump == 0.0 {
             return;
         }
-        if self.contact.is_some() {
-            let total = self.parameters.primary_mass + self.parameters.particle_mass;
-            let both = self.instant().dq1 - self.parameters.damping / total * jump;
+        if let Some(contact) = self.contact {
+            let (p, now) = (&self.parameters, self.instant());
+            let kick = p.damping / p.primary_mass * jump;
+            let both = now.dq1 - p.damping / (p.primary_mass + p.particle_mass) * jump;
+            let alone = Instant { dq1: both + kick, stuck: false, friction: 0.0, ..now };
+            let is_rounding =
+                jump.abs() <= 8.0 * f64::EPSILON * (before.abs() + now.signal.abs() + now.amplitude.abs());
+            let lowest = LOWEST_HOP * self.scales().0;
+            if is_rounding || (self.forces).carry(contact.wall(), kick, alone.acceleration(), lowest) {
+                return;
+            }
             self.contact = None;
-            let alone = both + self.parameters.damping / self.parameters.primary_mass * jump;
-            self.set_velocities(alone, both);
+            self.set_velocities(alone.dq1, both);
         }
         // With the relative velocity, the direction may have changed.
         self.direction = 0.0;
@@ -329,7 +337,7 @@ impl Hybrid {
             fastest: p.fastest_rate(),
             elastic: false,
         };
-        let mut rest = Rest { hop: 0.0, energy: 0.0 };
+        let (mut contact, mut rest) = (Contact::Wall(wall), Rest { hop: 0.0, energy: 0.0 });
         let touch = law.touch(wall, (now.dq1, now.dq2, relative), |primary, speed| {
             let alone = Instant { dq1: primary, stuck: false, friction: 0.0, ..self.instant() };
             let free = wall.sign() * alone.acceleration();
@@ -339,6 +347,9 @@ impl Hybrid {
                 rest = Rest { hop: 0.5 * speed * speed / up, energy };
             }
             let error = 0.5 * DEPTH * fast * fast / b;
+            if speed > 0.0 && self.forces.holding > 0.0 && self.forces.stop_a_hop(wall, free) {
+                contact = Contact::Floor;
+            }
             unresolved && up > 0.0 || rebound.rests(&law, &self.forces, (wall, speed), (free, error), &resolution)
         });
         self.totals.add(&touch, self.time);
@@ -349,8 +360,13 @@ impl Hybrid {
             on_event(Event::Impact { t: 0.0, wall, velocity }, None);
         }
         if touch.stuck {
-            self.contact = Some(Contact::Wall(wall));
-            on_event(Event::Stuck { t: 0.0, wall }, Some(rest));
+            self.contact = Some(contact);
+            self.totals.sticks += u64::from(contact == Contact::Floor);
+            let event = match contact {
+                Contact::Wall(wall) => Event::Stuck { t: 0.0, wall },
+                Contact::Floor => Event::Sticking { t: 0.0 },
+            };
+            on_event(event, Some(rest));
         }
         self.set_velocities(touch.primary, touch.particle);
     }
