@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use nalgebra::{Complex, DMatrix, DVector, Dyn, linalg::QR};
+use nalgebra::{Complex, Const, DMatrix, DVector, DimMin, Dyn, SMatrix, SVector, linalg::QR};
 
 /// Standard errors from which on a difference is not noise: 0.3 % of normal noise is beyond.
 pub const SIGNIFICANT: f64 = 3.0;
@@ -25,6 +25,87 @@ pub fn quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
         Some([c / q, q / a])
     }
 }
+
+/// As many equations as unknowns.
+pub trait Equations<const N: usize> {
+    /// What [`newton`] keeps of the solution beside the unknowns.
+    type At;
+
+    /// The residuals at `x`, their derivatives by the unknowns, and what else was computed; `None` where there are none.
+    fn at(&mut self, x: &SVector<f64, N>) -> Option<(SVector<f64, N>, SMatrix<f64, N, N>, Self::At)>;
+
+    /// Other unknowns for the same solution, if they serve better from here on. Called after full steps.
+    fn restarted(&mut self, _x: &SVector<f64, N>) -> Option<SVector<f64, N>> {
+        None
+    }
+}
+
+/// Size of the last correction of [`newton`] and, where rounding lets it fall no further, the largest. The unknowns are numbers of order one.
+pub const CONVERGED: f64 = 1e-12;
+const ROUNDING: f64 = 1e-10;
+/// Largest number of corrections, and of halvings of one that does not reduce the residuals.
+const ROUNDS: usize = 30;
+const HALVINGS: usize = 6;
+
+/// The solution near `x` by Newton's method, in steps that reduce the norm of the residuals. Where the equations leave a direction free, the
+/// correction is the smallest one.
+pub fn newton<const N: usize, E: Equations<N>>(
+    equations: &mut E,
+    mut x: SVector<f64, N>,
+) -> Option<(SVector<f64, N>, E::At)>
+where
+    Const<N>: DimMin<Const<N>, Output = Const<N>>,
+{
+    let (mut residual, mut jacobian, mut value) = equations.at(&x)?;
+    let mut last = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        let correction = solve(jacobian, &residual)?;
+        let size = correction.norm();
+        let mut shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVINGS);
+        let next = shares.find_map(|share| {
+            let next = x - correction * share;
+            let at = equations.at(&next)?;
+            // The last correction need not reduce what is rounding.
+            let is_nearer = at.0.norm() < residual.norm() || size < CONVERGED;
+            is_nearer.then_some((share, next, at))
+        });
+        let Some((share, next, at)) = next else {
+            return (size < ROUNDING).then_some((x, value));
+        };
+        (x, (residual, jacobian, value)) = (next, at);
+        if size < CONVERGED || size < ROUNDING && size > 0.5 * last {
+            return Some((x, value));
+        }
+        last = size;
+        if share == 1.0
+            && let Some(other) = equations.restarted(&x)
+        {
+            x = other;
+            (residual, jacobian, value) = equations.at(&x)?;
+        }
+    }
+    None
+}
+
+/// The smallest solution of `matrix x = right`.
+fn solve<const N: usize>(matrix: SMatrix<f64, N, N>, right: &SVector<f64, N>) -> Option<SVector<f64, N>>
+where
+    Const<N>: DimMin<Const<N>, Output = Const<N>>,
+{
+    let lu = matrix.lu();
+    let pivots = lu.u().diagonal().abs();
+    // The factors show a free direction as a pivot that is rounding.
+    if pivots.min() > SINGULAR * pivots.max() {
+        return lu.solve(right);
+    }
+    let right = DVector::from_column_slice(right.as_slice());
+    let factors = DMatrix::from_column_slice(N, N, matrix.as_slice()).svd(true, true);
+    let least = factors.solve(&right, SINGULAR * factors.singular_values.max()).ok()?;
+    Some(SVector::from_column_slice(least.as_slice()))
+}
+
+/// Pivots and singular values over the largest that are rounding.
+const SINGULAR: f64 = 1e-14;
 
 /// Neighbouring doubles between `a` and `b` at which `f` differs; the first keeps the value that `f` has at `a`.
 pub fn bisection(a: f64, b: f64, mut f: impl FnMut(f64) -> bool) -> (f64, f64) {

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll, unit_row};
 use super::oscillator::ForcedOscillator;
+use crate::numerics::{Equations, newton};
 use crate::{Definition, Dimensionless, Resonance, Sensor};
 
 /// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
@@ -371,10 +372,29 @@ pub struct Periodic {
     pub(super) map: ReturnMap,
 }
 
-/// Size of the last Newton correction, and the size below which a correction that does not shrink is rounding: small isolas are nearly singular.
-const CONVERGED: f64 = 1e-12;
-const ROUNDING: f64 = 1e-10;
-const ROUNDS: usize = 30;
+/// The equations of a motion: four that close it, and two that select it.
+struct Closing<'a> {
+    scene: &'a Dimensionless,
+    pattern: &'a ImpactPattern,
+    conditions: [Condition; 2],
+}
+
+impl Equations<6> for Closing<'_> {
+    type At = ();
+
+    fn at(&mut self, x: &Unknowns) -> Option<(Unknowns, Matrix6<f64>, ())> {
+        let map = follow(self.scene, self.pattern, x, |_, _| {})?;
+        let (mut residual, mut jacobian) = (Unknowns::zeros(), Matrix6::zeros());
+        jacobian.fixed_rows_mut::<4>(0).copy_from(&map.by);
+        residual.fixed_rows_mut::<4>(0).copy_from(&map.residual);
+        for (row, condition) in [4, 5].into_iter().zip(self.conditions) {
+            let (value, by) = condition.value(self.scene, self.pattern, x, &map);
+            jacobian.set_row(row, &by);
+            residual[row] = value;
+        }
+        Some((residual, jacobian, ()))
+    }
+}
 
 impl Periodic {
     /// The motion with the pattern `pattern` near the unknowns `guess` that satisfies both conditions, by Newton's method with
@@ -385,30 +405,8 @@ impl Periodic {
         guess: &Unknowns,
         conditions: [Condition; 2],
     ) -> Option<Self> {
-        let (mut x, mut last) = (*guess, f64::INFINITY);
-        for _ in 0..ROUNDS {
-            let map = follow(scene, pattern, &x, |_, _| {})?;
-            let mut matrix = Matrix6::zeros();
-            let mut right = Unknowns::zeros();
-            matrix.fixed_rows_mut::<4>(0).copy_from(&map.by);
-            right.fixed_rows_mut::<4>(0).copy_from(&map.residual);
-            for (row, condition) in [4, 5].into_iter().zip(conditions) {
-                let (value, by) = condition.value(scene, pattern, &x, &map);
-                matrix.set_row(row, &by);
-                right[row] = value;
-            }
-            let correction = matrix.lu().solve(&right)?;
-            let size = correction.norm();
-            if !size.is_finite() || size > 1e3 {
-                return None;
-            }
-            x -= correction;
-            if size < CONVERGED || size < ROUNDING && size > 0.5 * last {
-                return Self::at(scene, pattern, &x);
-            }
-            last = size;
-        }
-        None
+        let (x, ()) = newton(&mut Closing { scene, pattern, conditions }, *guess)?;
+        Self::at(scene, pattern, &x)
     }
 
     /// The motion at unknowns that may satisfy the closing equations; None if they do not.

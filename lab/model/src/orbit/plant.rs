@@ -1,7 +1,7 @@
 //! Periodic motions of the plant itself, with all effects of its cavity: Newton's method on the plant's own period map.
 //!
 //! The unknowns are the state at a section, the frequency and the amplitude of the base; the equations are the four that close the motion and
-//! two [`DriveCondition`]s. All derivatives are differences: between events the plant is a closed form, so its map is exact to rounding.
+//! two [`DriveCondition`]s. The plant's map and its derivative ([`Variation`]) are closed forms between events, exact to rounding.
 //! The section is the middle of the longest flight. Events stay away from it, and all four coordinates are free there, also where the particle
 //! sticks later: the map then loses rank, but the map minus the identity does not.
 //!
@@ -11,13 +11,14 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use lovines::cavity::Rebound;
-use lovines::{Cavity, Drive, Event, InvalidValue, Outcome, Parameters, Plant, Restitution, State, Wall};
-use nalgebra::{Complex, Matrix4, Matrix6, Vector4, Vector6};
+use lovines::{Cavity, Drive, Event, InvalidValue, Outcome, Parameters, Plant, Restitution, State, Variation, Wall};
+use nalgebra::{Complex, Matrix6, SMatrix, Vector4, Vector6};
 use thiserror::Error;
 
 use super::Orbit;
 use super::periodic::NEAR;
 use super::symmetric::{at_amplitude, at_speed, stable_resonant};
+use crate::numerics::{Equations, newton};
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
 use crate::{Definition, Dimensionless, Resonance, Sensor};
 
@@ -163,6 +164,8 @@ pub fn resonant_motion_under(
     Ideal { amplitude, ..ideal }.continued(parameters, definition, None)
 }
 
+/// Rounding error of a multiplier that is 1.
+const NEUTRAL: f64 = 1e-9;
 /// Longest motion that is searched, periods of the base.
 const LONGEST: u32 = 32;
 
@@ -187,7 +190,7 @@ pub fn settled_motion(
         if apart < NEAR {
             match Solver::new(parameters, definition, periods, conditions)?.solve(0.0, here) {
                 // A particle that only slides may slide anywhere: one multiplier is 1.
-                Ok((motion, ..)) if motion.multipliers[3].norm() < 1.0 + CENTRAL => return Ok(Some(motion)),
+                Ok((motion, ..)) if motion.multipliers[3].norm() < 1.0 + NEUTRAL => return Ok(Some(motion)),
                 Ok(_) | Err(NoMotion::NotConverged) => {}
                 Err(error) => return Err(error),
             }
@@ -323,20 +326,8 @@ const SMALLEST_INCREASE: f64 = 1.0 / 64.0;
 
 // Newton's method
 
-/// Steps of forward and of central differences, in units of b, b omega0, sigma and G: square and cube root of the rounding error, where rounding
-/// and curvature together contribute least.
-const FORWARD: f64 = 1.5e-8;
-const CENTRAL: f64 = 6e-6;
-/// Largest residual of a solution, in the same units: some ten rounding errors of the period map.
-const CLOSED: f64 = 1e-13;
-/// Largest residual of a solution where rounding lets it fall no further.
-const NEARLY_CLOSED: f64 = 1e-10;
 /// Angular frequency, rad/s, of a base at rest that takes the phase to the section in hardly any time.
 const AT_ONCE: f64 = 1e9;
-/// Iterations, and halvings of a step that does not reduce the residual.
-const ITERATIONS: usize = 25;
-const HALVINGS: usize = 6;
-
 /// The unknowns over their scales: (q1, q1', q2, q2') at the section, frequency, amplitude of the base.
 type Unknowns = Vector6<f64>;
 
@@ -364,7 +355,7 @@ struct Solver<'a> {
     scale: Unknowns,
     /// Phase of the base at the section, rad.
     phase: f64,
-    events: Vec<(f64, Event)>,
+    events: Vec<Event>,
 }
 
 impl<'a> Solver<'a> {
@@ -408,124 +399,89 @@ impl<'a> Solver<'a> {
         Some((plant, drive, TAU * f64::from(self.periods) / omega))
     }
 
-    /// The period map: the state after the motion. The events are kept.
-    fn follow(&mut self, (mut plant, drive, duration): Start) -> Option<Vector4<f64>> {
+    /// The state after the motion. The events are kept.
+    fn follow(&mut self, (mut plant, drive, duration): Start) -> Option<State> {
         let events = &mut self.events;
         events.clear();
-        let Outcome { cut_short, .. } = plant
-            .advance_with(drive, duration, |event| events.push((event.time(), event)))
-            .ok()?;
-        let State { q1, dq1, q2, dq2 } = plant.state();
-        let scale = self.scale.fixed_rows::<4>(0);
-        (!cut_short).then(|| Vector4::new(q1, dq1, q2, dq2).component_div(&scale))
+        let Outcome { cut_short, .. } = plant.advance_with(drive, duration, |event| events.push(event)).ok()?;
+        (!cut_short).then(|| plant.state())
     }
 
-    /// First harmonic of the response relative to the reference over the motion whose events were kept, in m.
-    fn harmonic(&self, (mut plant, drive, duration): Start) -> Option<Complex<f64>> {
-        let Drive { omega, amplitude, .. } = drive;
-        let stays = |event: &Event| matches!(event, Event::Stuck { .. } | Event::Sticking { .. });
-        let ends = self.events.iter().map(|(t, event)| (*t, stays(event)));
-        let (mut now, mut from, mut at_rest, mut sum) = (0.0, 0.0, false, Complex::new(0.0, 0.0));
-        let mut go_to = |plant: &mut Plant, t: f64| {
-            plant.advance(drive, (t - now).max(0.0)).ok()?;
-            now = t;
-            Some(plant.state())
-        };
-        for (to, rests_then) in ends.chain([(duration, false)]) {
-            let middle = 0.5 * (from + to);
-            // A flight is the parabola through its middle.
-            let (flight, acceleration) = if at_rest {
-                (State::default(), 0.0)
-            } else {
-                let state = go_to(&mut plant, middle)?;
-                let (gravity, friction) = plant.constant_accelerations();
-                (state, gravity + friction)
-            };
-            let pieces = (omega * (to - from) / PI).ceil().max(1.0);
-            let half = 0.5 * (to - from) / pieces;
-            for piece in 0..pieces as usize {
-                for (node, weight) in gauss() {
-                    let t = from + half * ((2 * piece + 1) as f64 + node);
-                    let q2 = if at_rest {
-                        go_to(&mut plant, t)?.q2
-                    } else {
-                        let s = t - middle;
-                        flight.q2 + s * (flight.dq2 + 0.5 * acceleration * s)
-                    };
-                    sum += Complex::from_polar(weight * half * q2, -omega * t);
-                }
-            }
-            (from, at_rest) = (to, rests_then);
-        }
-        // q2 = Im(Q2 exp(i phase)) makes the integral of q2 exp(-i phase) equal to -i Q2/2 times the duration.
-        let q2 = sum * Complex::from_polar(2.0 / duration, FRAC_PI_2 - self.phase);
-        let p = self.parameters;
-        let square = omega * omega;
-        let base = Complex::new(p.stiffness, p.damping * omega);
-        let q1 = (base * amplitude + q2 * p.particle_mass * square) / (base - p.primary_mass * square);
-        let over_omega0 = omega / p.natural_frequency();
-        let response = match self.definition.sensor {
-            Sensor::V => q1 + q2 * p.mass_ratio(),
-            Sensor::Q1 => q1,
-            Sensor::Acceleration => q1 * over_omega0.powi(2),
-        };
-        let damping = p.damping / (p.primary_mass * p.natural_frequency());
-        Some(response * Complex::from_polar(1.0, -self.definition.reference.phase(damping, over_omega0)))
-    }
-
-    /// The equations at `x`, all over b or as numbers.
-    fn residual(&mut self, x: &Unknowns) -> Option<Unknowns> {
+    /// The motion from the unknowns `x`, with its derivatives.
+    fn turn(&mut self, x: &Unknowns) -> Option<Turn> {
         let start = self.start(x)?;
         let end = self.follow(start)?;
-        let response = self.harmonic(start)? / self.scale[0];
-        let mut residual = Unknowns::zeros();
-        residual.fixed_rows_mut::<4>(0).copy_from(&(end - x.fixed_rows::<4>(0)));
-        for (row, condition) in [4, 5].into_iter().zip(self.conditions) {
-            residual[row] = match condition {
-                DriveCondition::Omega(omega) => x[4] - omega / self.scale[4],
-                DriveCondition::Amplitude(amplitude) => x[5] - amplitude / self.scale[5],
-                DriveCondition::PhaseResonance => response.re,
-                DriveCondition::Response(amplitude) => response.im + amplitude / self.scale[0],
-                DriveCondition::Across { at: [amplitude, omega], normal } => {
-                    normal[0] * (response.im + amplitude / self.scale[0]) - normal[1] * (x[4] - omega / self.scale[4])
-                }
-            };
+        let (plant, Drive { omega, .. }, duration) = start;
+        let mut variation = Variation::of(&plant);
+        let mut harmonic = ParticleHarmonic {
+            omega,
+            sum: Complex::new(0.0, 0.0),
+            by: [Complex::new(0.0, 0.0); 6],
+        };
+        for event in &self.events {
+            harmonic.add(&variation, event.time() - variation.elapsed());
+            variation.pass(event, 0.0);
         }
-        residual.iter().all(|value| value.is_finite()).then_some(residual)
+        let rest = (duration - variation.elapsed()).max(0.0);
+        harmonic.add(&variation, rest);
+        variation.advance(rest);
+
+        // The duration depends on the frequency.
+        let (rates, shorter) = (variation.rates(), -duration / omega);
+        let mut by = SMatrix::<f64, 6, 4>::from(*variation.derivatives()).transpose();
+        for row in 0..4 {
+            by[(row, 4)] += rates[row] * shorter;
+        }
+        harmonic.by[4] += Complex::from_polar(end.q2, -omega * duration) * shorter;
+        let (response, response_by) = self.response(x, duration, &harmonic);
+        let scale = &self.scale;
+        let by = SMatrix::<f64, 4, 6>::from_fn(|row, column| by[(row, column)] * scale[column] / scale[row]);
+        Some(Turn {
+            apart: unknowns(&self.scale, &end, 0.0, 0.0).fixed_rows::<4>(0) - x.fixed_rows::<4>(0),
+            by,
+            response,
+            response_by: std::array::from_fn(|n| response_by[n] * (scale[n] / scale[0])),
+        })
     }
 
-    /// Derivative of the equations by forward differences, or by backward ones where a wall forbids them.
-    fn jacobian(&mut self, x: &Unknowns, residual: &Unknowns) -> Option<Matrix6<f64>> {
-        let mut jacobian = Matrix6::zeros();
-        for column in 0..6 {
-            let mut at = |step: f64| {
-                let mut x = *x;
-                x[column] += step;
-                self.residual(&x)
-            };
-            let slope = match at(FORWARD) {
-                Some(above) => (above - residual) / FORWARD,
-                None => (residual - at(-FORWARD)?) / FORWARD,
-            };
-            jacobian.set_column(column, &slope);
-        }
-        Some(jacobian)
-    }
+    /// First harmonic of the response relative to the reference, m, and its derivatives by the state, the frequency and the amplitude.
+    fn response(&self, x: &Unknowns, duration: f64, particle: &ParticleHarmonic) -> (Complex<f64>, [Complex<f64>; 6]) {
+        let [omega, amplitude] = [4, 5].map(|n| x[n] * self.scale[n]);
+        // q2 = Im(Q2 exp(i phase)) makes the integral of q2 exp(-i phase) equal to -i Q2/2 times the duration.
+        let factor = Complex::from_polar(2.0 / duration, FRAC_PI_2 - self.phase);
+        let q2 = particle.sum * factor;
+        let mut q2_by = particle.by.map(|by| by * factor);
+        q2_by[4] += q2 / omega;
 
-    /// Derivative of the period map by central differences, or by one-sided ones at a wall.
-    fn monodromy(&mut self, x: &Unknowns) -> Option<Matrix4<f64>> {
-        let mut monodromy = Matrix4::zeros();
-        for column in 0..4 {
-            let [below, above] = [-CENTRAL, CENTRAL].map(|step| {
-                let mut x = *x;
-                x[column] += step;
-                Some((step, self.follow(self.start(&x)?)?))
-            });
-            let here = (0.0, x.fixed_rows::<4>(0).into_owned());
-            let ((from, below), (to, above)) = (below.unwrap_or(here), above.unwrap_or(here));
-            monodromy.set_column(column, &((above - below) / (to - from)));
+        let p = self.parameters;
+        let inertia = p.particle_mass * omega * omega;
+        let base = Complex::new(p.stiffness, p.damping * omega);
+        let stiffness = base - p.primary_mass * omega * omega;
+        let q1 = (base * amplitude + q2 * inertia) / stiffness;
+        let mut q1_by = q2_by.map(|by| by * inertia / stiffness);
+        let base_by = Complex::new(0.0, p.damping);
+        let stiffness_by = base_by - 2.0 * p.primary_mass * omega;
+        q1_by[4] += (base_by * amplitude + q2 * (2.0 * inertia / omega) - q1 * stiffness_by) / stiffness;
+        q1_by[5] += base / stiffness;
+
+        let omega0 = p.natural_frequency();
+        let over_omega0 = omega / omega0;
+        let (of_primary, of_particle) = match self.definition.sensor {
+            Sensor::V => (1.0, p.mass_ratio()),
+            Sensor::Q1 => (1.0, 0.0),
+            Sensor::Acceleration => (over_omega0 * over_omega0, 0.0),
+        };
+        let damping = p.damping / (p.primary_mass * omega0);
+        let reference = self.definition.reference;
+        let turned = Complex::from_polar(1.0, -reference.phase(damping, over_omega0));
+        let read = |q1: Complex<f64>, q2: Complex<f64>| (q1 * of_primary + q2 * of_particle) * turned;
+        let response = read(q1, q2);
+        let mut by: [_; 6] = std::array::from_fn(|n| read(q1_by[n], q2_by[n]));
+        by[4] -= response * Complex::i() * (reference.phase_slope(damping, over_omega0) / omega0);
+        if self.definition.sensor == Sensor::Acceleration {
+            by[4] += response * (2.0 / omega);
         }
-        Some(monodromy).filter(|map| map.iter().all(|value| value.is_finite()))
+        (response, by)
     }
 
     /// Moves the section to the middle of the longest flight of the motion from `x`; with `if_near`, only if it is much nearer to an event now.
@@ -533,7 +489,7 @@ impl<'a> Solver<'a> {
         let start = self.start(x)?;
         self.follow(start)?;
         let (mut plant, drive, duration) = start;
-        let times = self.events.iter().map(|(t, _)| *t);
+        let times = self.events.iter().map(Event::time);
         let ends: Vec<f64> = [0.0].into_iter().chain(times).chain([duration]).collect();
         let [.., last, _] = ends[..] else { return None };
         let mut distance = if if_near {
@@ -563,57 +519,18 @@ impl<'a> Solver<'a> {
     /// The motion near the unknowns `x` at the phase `phase`, with phase and unknowns at its section.
     fn solve(&mut self, phase: f64, mut x: Unknowns) -> Result<(PlantMotion, f64, Unknowns), NoMotion> {
         self.phase = phase.rem_euclid(TAU);
-        self.converge(&mut x).ok_or(NoMotion::NotConverged)?;
-        let motion = self.motion(&x).ok_or(NoMotion::NotConverged)?;
+        let found = self.centre(&mut x, false).and_then(|()| newton(self, x));
+        let (x, turn) = found.ok_or(NoMotion::NotConverged)?;
+        let motion = self.motion(&x, &turn).ok_or(NoMotion::NotConverged)?;
         Ok((motion, self.phase, x))
     }
 
-    /// Newton's method.
-    fn converge(&mut self, x: &mut Unknowns) -> Option<()> {
-        self.centre(x, false)?;
-        let mut residual = self.residual(x)?;
-        for _ in 0..ITERATIONS {
-            let jacobian = self.jacobian(x, &residual)?;
-            // The least change where the equations leave a coordinate free.
-            let factors = jacobian.svd(true, true);
-            let change = factors
-                .solve(&residual, f64::EPSILON * factors.singular_values.max())
-                .ok()?;
-            let mut share = 1.0;
-            let next = (0..HALVINGS).find_map(|_| {
-                let next = *x - change * share;
-                share *= 0.5;
-                let smaller = self.residual(&next).filter(|r| r.norm() < residual.norm())?;
-                Some((next, smaller))
-            });
-            match next {
-                Some(next) => (*x, residual) = next,
-                None if residual.norm() < NEARLY_CLOSED => return Some(()),
-                None => return None,
-            }
-            if residual.norm() < CLOSED {
-                return Some(());
-            }
-            if share == 0.5 {
-                let before = self.phase;
-                self.centre(x, true)?;
-                if self.phase != before {
-                    residual = self.residual(x)?;
-                }
-            }
-        }
-        None
-    }
-
     /// The motion at the solution `x`.
-    fn motion(&mut self, x: &Unknowns) -> Option<PlantMotion> {
-        let monodromy = self.monodromy(x)?;
-        let mut multipliers: [Complex<f64>; 4] = monodromy.complex_eigenvalues().into();
+    fn motion(&mut self, x: &Unknowns, turn: &Turn) -> Option<PlantMotion> {
+        let mut multipliers: [Complex<f64>; 4] =
+            turn.by.fixed_columns::<4>(0).into_owned().complex_eigenvalues().into();
         multipliers.sort_by(|first, second| first.norm().total_cmp(&second.norm()));
-        let start = self.start(x)?;
-        self.follow(start)?;
-        let response = self.harmonic(start)?;
-        let (mut plant, drive, duration) = start;
+        let (mut plant, drive, duration) = self.start(x)?;
         let Drive { omega, amplitude, .. } = drive;
         // A particle at rest in the section has settled on its wall, without the residual of the solution, where the phase is 0.
         plant.advance(drive, (TAU - self.phase) / omega).ok()?;
@@ -627,13 +544,98 @@ impl<'a> Solver<'a> {
             omega,
             amplitude,
             periods: self.periods,
-            response,
+            response: turn.response,
             multipliers,
             impacts: count(|event| matches!(event, Event::Impact { .. })),
             rests: count(|event| matches!(event, Event::Stuck { .. })),
             sticks: count(|event| matches!(event, Event::Sticking { .. })),
             events,
         })
+    }
+}
+
+/// A motion of the plant over its periods, with derivatives by the unknowns.
+struct Turn {
+    /// State at the end less the one at the start.
+    apart: Vector4<f64>,
+    /// Derivative of the state at the end.
+    by: SMatrix<f64, 4, 6>,
+    /// First harmonic of the response relative to the reference, m, and its derivatives over the scale of lengths.
+    response: Complex<f64>,
+    response_by: [Complex<f64>; 6],
+}
+
+impl Equations<6> for Solver<'_> {
+    type At = Turn;
+
+    fn at(&mut self, x: &Unknowns) -> Option<(Unknowns, Matrix6<f64>, Turn)> {
+        let turn = self.turn(x)?;
+        let response = turn.response / self.scale[0];
+        let (mut residual, mut jacobian) = (Unknowns::zeros(), Matrix6::zeros());
+        residual.fixed_rows_mut::<4>(0).copy_from(&turn.apart);
+        let closing = turn.by - SMatrix::<f64, 4, 6>::identity();
+        jacobian.fixed_rows_mut::<4>(0).copy_from(&closing);
+        let unit = |n: usize| Unknowns::from_fn(|column, _| f64::from(u8::from(column == n)));
+        let [in_phase, lagging] = [|z: &Complex<f64>| z.re, |z: &Complex<f64>| z.im]
+            .map(|part| Unknowns::from(turn.response_by.each_ref().map(part)));
+        for (row, condition) in [4, 5].into_iter().zip(self.conditions) {
+            let (value, by) = match condition {
+                DriveCondition::Omega(omega) => (x[4] - omega / self.scale[4], unit(4)),
+                DriveCondition::Amplitude(amplitude) => (x[5] - amplitude / self.scale[5], unit(5)),
+                DriveCondition::PhaseResonance => (response.re, in_phase),
+                DriveCondition::Response(amplitude) => (response.im + amplitude / self.scale[0], lagging),
+                DriveCondition::Across { at: [amplitude, omega], normal } => (
+                    normal[0] * (response.im + amplitude / self.scale[0]) - normal[1] * (x[4] - omega / self.scale[4]),
+                    lagging * normal[0] - unit(4) * normal[1],
+                ),
+            };
+            residual[row] = value;
+            jacobian.set_row(row, &by.transpose());
+        }
+        let is_finite = residual.iter().chain(&jacobian).all(|value| value.is_finite());
+        is_finite.then_some((residual, jacobian, turn))
+    }
+
+    fn restarted(&mut self, x: &Unknowns) -> Option<Unknowns> {
+        let (before, mut x) = (self.phase, *x);
+        self.centre(&mut x, true)?;
+        (self.phase != before).then_some(x)
+    }
+}
+
+/// The integral of `q2 exp(-i omega t)` over a motion, by Gauss's rule from event to event, and its derivatives.
+struct ParticleHarmonic {
+    omega: f64,
+    sum: Complex<f64>,
+    by: [Complex<f64>; 6],
+}
+
+impl ParticleHarmonic {
+    /// Adds a stretch without events, s, from where the motion is.
+    fn add(&mut self, from: &Variation, duration: f64) {
+        let pieces = (self.omega * duration / PI).ceil().max(1.0);
+        let half = 0.5 * duration / pieces;
+        let (start, rates, by) = (from.state(), from.rates(), from.derivatives());
+        for piece in 0..pieces as usize {
+            for (node, weight) in gauss() {
+                let t = half * ((2 * piece + 1) as f64 + node);
+                let (q2, q2_by) = if from.is_flight() {
+                    let q2 = start.q2 + t * (start.dq2 + 0.5 * rates[3] * t);
+                    (q2, std::array::from_fn(|n| by[2][n] + t * by[3][n]))
+                } else {
+                    let mut at = *from;
+                    at.advance(t);
+                    (at.state().q2, at.derivatives()[2])
+                };
+                let since = from.elapsed() + t;
+                let turned = Complex::from_polar(weight * half, -self.omega * since);
+                self.sum += turned * q2;
+                for (sum, by) in self.by.iter_mut().zip(q2_by) {
+                    *sum += turned * by;
+                }
+                self.by[4] += turned * Complex::new(0.0, -since * q2);
+            }
+        }
     }
 }
 
