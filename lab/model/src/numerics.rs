@@ -28,11 +28,8 @@ pub fn quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
 
 /// As many equations as unknowns.
 pub trait Equations<const N: usize> {
-    /// What [`newton`] keeps of the solution beside the unknowns.
-    type At;
-
-    /// The residuals at `x`, their derivatives by the unknowns, and what else was computed; `None` where there are none.
-    fn at(&mut self, x: &SVector<f64, N>) -> Option<(SVector<f64, N>, SMatrix<f64, N, N>, Self::At)>;
+    /// The residuals at `x` and their derivatives by the unknowns; `None` where there are none.
+    fn at(&mut self, x: &SVector<f64, N>) -> Option<(SVector<f64, N>, SMatrix<f64, N, N>)>;
 
     /// Other unknowns for the same solution, if they serve better from here on. Called after full steps.
     fn restarted(&mut self, _x: &SVector<f64, N>) -> Option<SVector<f64, N>> {
@@ -49,39 +46,33 @@ const HALVINGS: usize = 6;
 
 /// The solution near `x` by Newton's method, in steps that reduce the norm of the residuals. Where the equations leave a direction free, the
 /// correction is the smallest one.
-pub fn newton<const N: usize, E: Equations<N>>(
-    equations: &mut E,
-    mut x: SVector<f64, N>,
-) -> Option<(SVector<f64, N>, E::At)>
+pub fn newton<const N: usize>(equations: &mut impl Equations<N>, mut x: SVector<f64, N>) -> Option<SVector<f64, N>>
 where
     Const<N>: DimMin<Const<N>, Output = Const<N>>,
 {
-    let (mut residual, mut jacobian, mut value) = equations.at(&x)?;
+    let (mut residual, mut jacobian) = equations.at(&x)?;
     let mut last = f64::INFINITY;
     for _ in 0..ROUNDS {
         let correction = solve(jacobian, &residual)?;
         let size = correction.norm();
-        let mut shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVINGS);
-        let next = shares.find_map(|share| {
+        if size < CONVERGED || size < ROUNDING && size > 0.5 * last {
+            return Some(x - correction);
+        }
+        let shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVINGS);
+        let next = shares.into_iter().find_map(|share| {
             let next = x - correction * share;
             let at = equations.at(&next)?;
-            // The last correction need not reduce what is rounding.
-            let is_nearer = at.0.norm() < residual.norm() || size < CONVERGED;
-            is_nearer.then_some((share, next, at))
+            (at.0.norm() < residual.norm()).then_some((share, next, at))
         });
         let Some((share, next, at)) = next else {
-            return (size < ROUNDING).then_some((x, value));
+            return (size < ROUNDING).then_some(x);
         };
-        (x, (residual, jacobian, value)) = (next, at);
-        if size < CONVERGED || size < ROUNDING && size > 0.5 * last {
-            return Some((x, value));
-        }
-        last = size;
+        (x, (residual, jacobian), last) = (next, at, size);
         if share == 1.0
             && let Some(other) = equations.restarted(&x)
         {
             x = other;
-            (residual, jacobian, value) = equations.at(&x)?;
+            (residual, jacobian) = equations.at(&x)?;
         }
     }
     None
@@ -93,7 +84,7 @@ where
     Const<N>: DimMin<Const<N>, Output = Const<N>>,
 {
     let lu = matrix.lu();
-    let pivots = lu.u().diagonal().abs();
+    let pivots = lu.lu_internal().diagonal().abs();
     // The factors show a free direction as a pivot that is rounding.
     if pivots.min() > SINGULAR * pivots.max() {
         return lu.solve(right);

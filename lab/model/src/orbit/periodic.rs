@@ -380,9 +380,7 @@ struct Closing<'a> {
 }
 
 impl Equations<6> for Closing<'_> {
-    type At = ();
-
-    fn at(&mut self, x: &Unknowns) -> Option<(Unknowns, Matrix6<f64>, ())> {
+    fn at(&mut self, x: &Unknowns) -> Option<(Unknowns, Matrix6<f64>)> {
         let map = follow(self.scene, self.pattern, x, |_, _| {})?;
         let (mut residual, mut jacobian) = (Unknowns::zeros(), Matrix6::zeros());
         jacobian.fixed_rows_mut::<4>(0).copy_from(&map.by);
@@ -392,7 +390,7 @@ impl Equations<6> for Closing<'_> {
             jacobian.set_row(row, &by);
             residual[row] = value;
         }
-        Some((residual, jacobian, ()))
+        Some((residual, jacobian))
     }
 }
 
@@ -405,7 +403,7 @@ impl Periodic {
         guess: &Unknowns,
         conditions: [Condition; 2],
     ) -> Option<Self> {
-        let (x, ()) = newton(&mut Closing { scene, pattern, conditions }, *guess)?;
+        let x = newton(&mut Closing { scene, pattern, conditions }, *guess)?;
         Self::at(scene, pattern, &x)
     }
 

@@ -520,13 +520,14 @@ impl<'a> Solver<'a> {
     fn solve(&mut self, phase: f64, mut x: Unknowns) -> Result<(PlantMotion, f64, Unknowns), NoMotion> {
         self.phase = phase.rem_euclid(TAU);
         let found = self.centre(&mut x, false).and_then(|()| newton(self, x));
-        let (x, turn) = found.ok_or(NoMotion::NotConverged)?;
-        let motion = self.motion(&x, &turn).ok_or(NoMotion::NotConverged)?;
+        let x = found.ok_or(NoMotion::NotConverged)?;
+        let motion = self.motion(&x).ok_or(NoMotion::NotConverged)?;
         Ok((motion, self.phase, x))
     }
 
     /// The motion at the solution `x`.
-    fn motion(&mut self, x: &Unknowns, turn: &Turn) -> Option<PlantMotion> {
+    fn motion(&mut self, x: &Unknowns) -> Option<PlantMotion> {
+        let turn = self.turn(x)?;
         let mut multipliers: [Complex<f64>; 4] =
             turn.by.fixed_columns::<4>(0).into_owned().complex_eigenvalues().into();
         multipliers.sort_by(|first, second| first.norm().total_cmp(&second.norm()));
@@ -566,9 +567,7 @@ struct Turn {
 }
 
 impl Equations<6> for Solver<'_> {
-    type At = Turn;
-
-    fn at(&mut self, x: &Unknowns) -> Option<(Unknowns, Matrix6<f64>, Turn)> {
+    fn at(&mut self, x: &Unknowns) -> Option<(Unknowns, Matrix6<f64>)> {
         let turn = self.turn(x)?;
         let response = turn.response / self.scale[0];
         let (mut residual, mut jacobian) = (Unknowns::zeros(), Matrix6::zeros());
@@ -593,7 +592,7 @@ impl Equations<6> for Solver<'_> {
             jacobian.set_row(row, &by.transpose());
         }
         let is_finite = residual.iter().chain(&jacobian).all(|value| value.is_finite());
-        is_finite.then_some((residual, jacobian, turn))
+        is_finite.then_some((residual, jacobian))
     }
 
     fn restarted(&mut self, x: &Unknowns) -> Option<Unknowns> {
