@@ -21,14 +21,14 @@ use vines::{
     scene::{Dimensionless, Scene},
 };
 
-use super::output::{output, written, yes_no};
+use super::output::{output, written};
 use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
 Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon sigma:
   C            amplitude of the first harmonic of the response: of v = q1 + epsilon q2, or as resonance.sensor says
   B            speed of the particle in flight
-  multipliers  moduli of the multipliers of the half-period map; stable if all are below 1
+  multipliers  moduli of the multipliers of the half-period map: stable if all are below 1, neutral if the largest is 1
 
 With --backbone or --response, stable and unstable orbits are followed by pseudo-arclength through folds and symmetry breaking; --json
 prints all of them. --response lists the components: all symmetric 1:1 orbits over the whole range, and the branches from symmetry
@@ -330,9 +330,30 @@ fn described(pattern: &str, motion: &Periodic) -> String {
     )
 }
 
+/// Largest distance of a neutral multiplier from the unit circle, where every motion of a system without losses has one: rounding.
+const NEUTRAL: f64 = 1e-9;
+
+/// Whether a motion with this largest modulus of its multipliers is stable.
+fn stability(largest: f64) -> &'static str {
+    match largest {
+        _ if (largest - 1.0).abs() < NEUTRAL => "neutral",
+        _ if largest < 1.0 => "yes",
+        _ => "no",
+    }
+}
+
 /// A curve: its ends, at most 24 of its orbits, its bifurcations.
 fn curve(name: &str, branch: &Branch) -> String {
-    let stable = branch.points.iter().filter(|motion| motion.stable).count();
+    let count = |word: &str| {
+        let points = branch.points.iter();
+        points.filter(|motion| stability(motion.moduli()[3]) == word).count()
+    };
+    let [stable, neutral] = ["yes", "neutral"].map(count);
+    let neutral = if neutral > 0 {
+        format!(" and {neutral} neutral")
+    } else {
+        String::new()
+    };
     let sigmas = branch.points.iter().map(|motion| motion.sigma);
     let (low, high) = range((f64::MAX, f64::MIN), sigmas);
     let ends = match branch.ended {
@@ -340,20 +361,21 @@ fn curve(name: &str, branch: &Branch) -> String {
         [first, last] => format!("ends: {}; {}", first.name(), last.name()),
     };
     let mut text = format!(
-        "{name}: sigma from {low:.4} to {high:.4}, {} orbits, {stable} of them stable; {ends}\n",
+        "{name}: sigma from {low:.4} to {high:.4}, {} orbits, {stable} of them stable{neutral}; {ends}\n",
         branch.points.len()
     );
     let thinned = branch.points.iter().step_by(branch.points.len().div_ceil(24));
     let rows = thinned.map(|motion| {
         let Periodic { sigma, g, c, gamma, b, .. } = *motion;
         let numbers = [sigma, g, c, gamma.to_degrees(), b, motion.moduli()[3]].map(number);
-        [numbers.to_vec(), vec![yes_no(motion.stable)]].concat()
+        [numbers.to_vec(), vec![stability(motion.moduli()[3]).into()]].concat()
     });
     let table = Table::new("sigma | G | C | phase, degrees | B | largest mult. | stable");
     text += &table.rows(rows).text();
     for special in &branch.special {
         let (name, Periodic { sigma, g, c, b, .. }) = (special.name(), &special.motion);
-        text += &format!("  {name} at sigma = {sigma:.6}, G = {g:.6}, C = {c:.6}, B = {b:.6}\n");
+        let g = number(*g);
+        text += &format!("  {name} at sigma = {sigma:.6}, G = {g}, C = {c:.6}, B = {b:.6}\n");
     }
     text + "\n"
 }
@@ -370,7 +392,12 @@ fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
     let rows = orbits.iter().map(|orbit| {
         let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.gamma.to_degrees(), orbit.b];
         let multipliers = orbit.multipliers.map(|modulus| format!("{modulus:.4}"));
-        [&numbers.map(number)[..], &multipliers, &[yes_no(orbit.stable)]].concat()
+        [
+            &numbers.map(number)[..],
+            &multipliers,
+            &[stability(orbit.multipliers[3]).into()],
+        ]
+        .concat()
     });
     Table::new("sigma | Omega | C | phase, degrees | B | mult1 | mult2 | mult3 | mult4 | stable")
         .rows(rows)

@@ -73,9 +73,13 @@ impl Table {
     }
 }
 
-/// A number of a table.
+/// A number of a table; one that rounds to zero has no sign.
 pub fn number(value: f64) -> String {
-    format!("{value:.6}")
+    let text = format!("{value:.6}");
+    match text.as_str() {
+        "-0.000000" => text[1..].into(),
+        _ => text,
+    }
 }
 
 /// A row of a table: a name, then numbers.

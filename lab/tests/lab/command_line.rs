@@ -81,9 +81,14 @@ fn a_person_gets_tables() {
         ("orbit", ["sigma", "stable"]),
         ("theory", ["sigma", "stable"]),
         ("orbit --set=excitation.G=0", ["none", "without excitation"]),
+        (
+            "orbit --backbone --set=plant.c=0 --set=plant.r=1 --set=excitation.G=0",
+            ["neutral", "-90.000000"],
+        ),
     ] {
         let text = String::from_utf8(vines(line).stdout).unwrap();
         assert!(words.iter().all(|word| text.contains(word)), "{line}: {text}");
+        assert!(!text.contains("-0.000000"), "{line}: {text}");
     }
 }
 

@@ -15,6 +15,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::oscillator::FreeOscillator;
+use super::periodic::wrapped;
 use super::{AfterImpact, Condition, ImpactPattern, Orbit, Periodic};
 use crate::numerics::{bisection, golden_section, quadratic};
 use crate::theory::{BranchSide, Manifold, SlowFlow};
@@ -225,11 +226,17 @@ fn grid(epsilon: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The orbits of those candidates whose response lags the base; without dissipation no base motion is needed, and no phase lag is defined.
+/// The orbits of those candidates whose response lags the base; without dissipation no base motion is needed, and its phase is chosen.
 fn resonant(scene: &Dimensionless, candidates: &[Orbit]) -> Vec<Orbit> {
-    let lags = |orbit: &Orbit| orbit.gamma.sin() < -1e-12;
-    let orbits = candidates.iter().filter(|orbit| lags(orbit) || orbit.g < 1e-12);
-    orbits.filter_map(|orbit| accept(scene, *orbit)).collect()
+    let lagging = candidates.iter().filter_map(|orbit| {
+        let mut orbit = *orbit;
+        if orbit.g < 1e-12 {
+            orbit.start.phase = wrapped(orbit.start.phase + orbit.gamma + FRAC_PI_2);
+            orbit.gamma = -FRAC_PI_2;
+        }
+        (orbit.gamma.sin() < -1e-12).then_some(orbit)
+    });
+    lagging.filter_map(|orbit| accept(scene, orbit)).collect()
 }
 
 /// The orbit with its stability, if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
