@@ -101,10 +101,8 @@ fn a_step_that_could_not_end_or_whose_numbers_are_lost_in_rounding_is_not_begun(
 fn a_start_beyond_double_precision_is_refused() {
     let far = ["from -1e100 to 1e100", "2^52 half-widths"];
     for (values, parts) in [
-        // The values themselves, and the rates that follow from them.
-        (&[(K, 1e300)][..], &["N/m is refused"][..]),
-        (&[(C, 1e300)], &["N.s/m is refused"]),
-        (&[(0, 1e-90), (K, 1e100)], &["rad/s is refused"]),
+        // The rates that follow from the values, and the values.
+        (&[(0, 1e-90), (K, 1e100)][..], &["rad/s is refused"][..]),
         (&[(C, 1e60)], &["rad/s is refused"]),
         (&[(OMEGA, -1e300)], &["rad/s is refused"]),
         (&[(DQ1, 1e300)], &["der(q1)", far[0]]),
@@ -116,6 +114,67 @@ fn a_start_beyond_double_precision_is_refused() {
         m.enter_initialization();
         m.expect(call!(m.fmi2ExitInitializationMode()), Status::Error, parts);
     }
+    // What makes no sense with any other value is refused at once.
+    let m = Master::new(&Fmu::plant(), CoSimulation);
+    m.expect(m.set_real(K, 1e300), Status::Error, &["N/m is refused"]);
+    m.expect(m.set_real(C, 1e300), Status::Error, &["N.s/m is refused"]);
+}
+
+/// Value references of tunable parameters of the plant, each with two values; a value of one may contradict a value of another.
+const TUNABLE: [(u32, [f64; 2]); 9] = [
+    (K, [1e4, 2e4]),
+    (C, [2.0, 3.0]),
+    (R, [0.4, 0.8]),
+    // theta, mu_k, mu_s, r_plus, r_minus, r_min.
+    (35, [0.0, 0.1]),
+    (36, [0.1, 0.2]),
+    (37, [0.1, 0.2]),
+    (39, [0.5, 0.6]),
+    (40, [0.5, 0.6]),
+    (41, [0.1, 0.9]),
+];
+
+#[test]
+fn the_order_in_which_parameters_are_set_does_not_matter() {
+    let fmu = Fmu::plant();
+    for (n, (first, from)) in TUNABLE.into_iter().enumerate() {
+        for (second, to) in TUNABLE.into_iter().skip(n + 1) {
+            for (before, after) in [(0, 1), (1, 0)] {
+                let parameters = [first, second];
+                for order in [[0, 1], [1, 0]] {
+                    let values = |which: usize| [from[which], to[which]];
+                    let m = Master::new(&fmu, CoSimulation);
+                    m.well(m.set_reals(&parameters, &values(before)));
+                    m.start();
+                    m.well(m.step(0.0, 0.01));
+                    // A call each, with an output read between them, and one call for both.
+                    for n in order {
+                        m.well(m.set_real(parameters[n], values(after)[n]));
+                        m.reals(&[23]);
+                    }
+                    assert_eq!(m.reals(&parameters), values(after));
+                    m.well(m.step(0.01, 0.01));
+                    m.well(m.set_reals(&order.map(|n| parameters[n]), &order.map(|n| values(before)[n])));
+                    m.well(m.step(0.02, 0.01));
+                }
+            }
+        }
+    }
+    let m = Master::started(&fmu, CoSimulation, &[(37, 0.1), (36, 0.1)]);
+    m.well(m.set_real(36, 0.2));
+    harmless(
+        &m,
+        "mu_s (static friction) = 0.1 is refused; allowed is a number from mu_k to 100",
+        || m.step(0.0, 0.01),
+    );
+    m.well(m.set_real(37, 0.2));
+    m.well(m.step(0.0, 0.01));
+    // The controller has two tunable parameters, and inputs that belong together.
+    let m = Master::ready(&Fmu::controller());
+    for (vr, value) in [(10, -1.5), (5, 1e-4), (5, 2e-4), (10, -1.6)] {
+        m.well(m.set_real(vr, value));
+    }
+    m.well(m.step(0.0, 1e-3));
 }
 
 #[test]
