@@ -7,6 +7,10 @@ use crate::model_exchange::hybrid::Hybrid;
 use fmi2_component::{Discrete, Log, ModelExchange, Refusal};
 use lovines::{Drive, Parameters, State};
 
+/// How far behind a wall an impact may be met without a warning, in half-widths. Masters that look for the zeros of event indicators
+/// stop within 1e-6.
+const FARTHEST: f64 = 1e-3;
+
 impl LoViNes {
     /// A value that was set, or that follows from the equations' state.
     #[inline(never)]
@@ -74,6 +78,17 @@ impl ModelExchange for LoViNes {
 
     fn new_discrete_states(&mut self, time: f64, log: &Log) -> Result<Discrete, Refusal> {
         self.check_settings()?;
+        let behind = self.hybrid().behind_wall();
+        if behind > 1.0 + FARTHEST {
+            log.warn_once(
+                "walls",
+                format_args!(
+                    "the master's steps resolve no impact: the particle is met at |w| = {behind:.2} b at t = {time} s, behind the wall. \
+                     Expected an integrator that finds the zeros of the event indicators, at a tolerance of 1e-8, or shorter steps; in \
+                     co-simulation steps may have any length"
+                ),
+            );
+        }
         self.progress = Progress::UnderWay;
         let jumped = (self.hybrid_mut()).resolve(time, |event, rest| log::tell_exchange(log, time, event, rest));
         Ok(Discrete { states_changed: jumped, ..Discrete::default() })

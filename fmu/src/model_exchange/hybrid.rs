@@ -181,6 +181,15 @@ impl Hybrid {
         self.event_functions().iter().any(|&value| value <= 0.0)
     }
 
+    /// How far the particle is from the middle of the cavity, in half-widths; above 1 it is behind a wall.
+    pub fn behind_wall(&self) -> f64 {
+        let now = self.instant();
+        1.0 - Wall::BOTH
+            .map(|wall| self.gap(wall, &now))
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
+    }
+
     /// Begins an event: until [`Self::resolve`] the base may jump.
     pub fn begin_event(&mut self) {
         self.base_before = Some(self.instant().base());

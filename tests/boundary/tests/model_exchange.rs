@@ -103,6 +103,29 @@ fn a_step_that_has_led_behind_a_wall_asks_for_an_event() {
 }
 
 #[test]
+fn a_master_whose_steps_resolve_no_impact_is_told_so_once() {
+    let m = event_mode(&[]);
+    m.well(call!(m.fmi2SetDebugLogging(1, 0, std::ptr::null())));
+    resolve(&m);
+    let mut warnings = Vec::new();
+    for w in [0.0100000001, 0.0108, 0.0163, 0.0108] {
+        go_on(&m);
+        let mut x = states(&m);
+        x[1] = x[0] - w;
+        m.well(call!(m.fmi2SetContinuousStates(x.as_ptr(), 5)));
+        m.well(call!(m.fmi2EnterEventMode()));
+        resolve(&m);
+        warnings.extend(m.heard().into_iter().filter(|line| line.category == "logStatusWarning"));
+    }
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert!(
+        warnings[0]
+            .text
+            .contains("the master's steps resolve no impact: the particle is met at |w| = 1.08 b")
+    );
+}
+
+#[test]
 fn states_without_sense_are_refused() {
     let m = event_mode(&[]);
     go_on(&m);
