@@ -169,7 +169,7 @@ impl ImpactLaw {
     ///
     /// Its hops are then below resolution (height `u²/(2a)`), and they die out within `2u/(a (1 - r))`. Letting both masses
     /// move as one from now on conserves momentum exactly; what is neglected is the stiffness force on a gap of at most
-    /// that height for that time, which is of third order in `u` (docs/accuracy.md). With hardly any loss they would last too
+    /// that height for that time, which is of third order in `u` (docs/plant.md). With hardly any loss they would last too
     /// long: such a particle stays once its hops are shorter than `SHORTEST_ELASTIC_HOP`. Without loss they never die out, and
     /// only a particle with no relative velocity at all is at rest.
     pub fn rests(&self, speed: f64, (pressing, error): (f64, f64), r: &Resolution) -> bool {

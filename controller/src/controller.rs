@@ -43,7 +43,7 @@ pub struct State {
     lost: bool,
     /// Samples since acquiring began.
     acquiring: u64,
-    /// DriveGenerator amplitude and phase target to which the dwell applies.
+    /// Drive amplitude and phase target to which the dwell applies.
     tuning: (Real, Real),
 }
 

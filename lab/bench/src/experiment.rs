@@ -14,7 +14,7 @@ use vines_model::numerics::mean;
 use crate::identification::Cycle;
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Rig, RigError};
-use crate::scene::{Resonance, Scene, key};
+use crate::scene::{Scene, key};
 
 use judge::Judge;
 pub use judge::{Scatter, Spread};
@@ -146,11 +146,6 @@ pub enum ExperimentError {
         b: f64,
         regime: crate::identification::Regime,
     },
-    #[error(
-        "resonance.definition = \"peak\" is for theory and exact orbits (`vines theory`, `vines orbit`): the loop holds a phase, and measures the \
-         backbone with resonance.definition = \"phase\""
-    )]
-    Peak,
     #[error("the controller answered {name} = {value} {unit}; it must be {allowed}. The drive is off")]
     Command {
         name: &'static str,
@@ -273,9 +268,6 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         samples: &'a mut Vec<Sample>,
         progress: &'a mut dyn FnMut(Stage, usize),
     ) -> Result<Self, ExperimentError> {
-        if scene.resonance.resonance == Resonance::Peak {
-            return Err(ExperimentError::Peak);
-        }
         Ok(Self {
             rig,
             controller,

@@ -43,7 +43,7 @@ pub use controller::{ControllerSettings, KEYS, LinearResponse, PhaseLock, key, r
 pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
 pub use names::{Name, Names};
 pub use overrides::{Family, Override};
-pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
+pub use vines_model::{Definition, Dimensionless, Reference, Sensor};
 
 /// The default scene, embedded so that the program works from any folder.
 pub const PAPER: &str = include_str!("../../../scenes/paper.toml");
@@ -619,21 +619,5 @@ fn plain(message: &str) -> String {
         ("expected a map", "expected a table"),
     ];
     let replace = |text: String, (from, to)| text.replace(from, to);
-    let plain = words.into_iter().fold(message.trim().to_string(), replace);
-    let former = FORMER
-        .iter()
-        .find(|(key, _)| message.contains(&format!("unknown field `{key}`")));
-    former.map_or(plain.clone(), |(key, now)| format!("{plain}; `{key}` is now {now}"))
+    words.into_iter().fold(message.trim().to_string(), replace)
 }
-
-/// Keys of former scenes, and what has taken their place.
-const FORMER: [(&str, &str); 8] = [
-    ("phase_tolerance", "phase_lock.lock.phase_tolerance, rad"),
-    ("frequency_tolerance", "phase_lock.lock.frequency_drift"),
-    ("amplitude_tolerance", "phase_lock.lock.amplitude_drift"),
-    ("delay", "phase_lock.delay, s"),
-    ("lock_periods", "phase_lock.acquire_timeout, s"),
-    ("G_max", "phase_lock.amplitude_max, m"),
-    ("dwell_max", "always 150 periods"),
-    ("window_periods", "always 2.5 periods"),
-];

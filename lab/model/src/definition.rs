@@ -1,29 +1,15 @@
-//! What counts as resonance: the definition of the backbone, the reference of the phase, and the sensor of the response.
+//! What counts as resonance: the first harmonic of a sensor's response lags a reference by a quarter of a period.
 
 use serde::{Deserialize, Serialize};
 
-/// How resonance is defined, and what is measured. The default is the definition of the study.
+/// Reference and sensor that define resonance. The default is the definition of the study.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Definition {
-    /// What singles out the motions of the backbone.
-    #[serde(rename = "definition")]
-    pub resonance: Resonance,
     /// What the phase refers to.
     pub reference: Reference,
     /// What is measured of the response.
     pub sensor: Sensor,
-}
-
-/// What singles out the motions of the backbone.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Resonance {
-    /// The first harmonic of the response lags the reference by a quarter of a period.
-    #[default]
-    Phase,
-    /// Its amplitude is largest along the frequency response at constant G.
-    Peak,
 }
 
 /// What the phase of the response refers to.
@@ -51,29 +37,11 @@ pub enum Sensor {
 }
 
 impl Definition {
-    /// All definitions that differ: at the peak, the reference does not matter.
+    /// All definitions.
     pub fn all() -> Vec<Self> {
         let sensors = [Sensor::V, Sensor::Q1, Sensor::Acceleration];
-        let cases = [
-            (Resonance::Phase, Reference::Base),
-            (Resonance::Phase, Reference::Force),
-            (Resonance::Peak, Reference::Base),
-        ];
-        let with = |(resonance, reference)| sensors.map(|sensor| Self { resonance, reference, sensor });
-        cases.into_iter().flat_map(with).collect()
-    }
-
-    /// Whether resonance is the peak of the response. Without the feature `peak` nothing that finds the peak is compiled.
-    ///
-    /// # Panics
-    /// For a peak without the feature.
-    pub fn is_peak(&self) -> bool {
-        let peak = self.resonance == Resonance::Peak;
-        assert!(
-            !peak || cfg!(feature = "peak"),
-            "the peak of the response needs the feature `peak`"
-        );
-        peak && cfg!(feature = "peak")
+        let with = |reference| sensors.map(|sensor| Self { reference, sensor });
+        [Reference::Base, Reference::Force].into_iter().flat_map(with).collect()
     }
 
     /// Whether the sensors need differences of samples, so that response and reference are read one sample late.
@@ -93,11 +61,7 @@ impl Definition {
 
     /// In words, as in a table.
     pub fn name(&self) -> String {
-        let sensor = self.sensor.name();
-        match self.resonance {
-            Resonance::Peak => format!("peak of {sensor}"),
-            Resonance::Phase => format!("phase of {sensor} to {}", self.reference.name()),
-        }
+        format!("phase of {} to {}", self.sensor.name(), self.reference.name())
     }
 }
 

@@ -13,7 +13,5 @@ mod resonance;
 mod slow_flow;
 
 pub use activation::Activation;
-pub use decay::Waveform;
-pub use modulation::Modulation;
 pub use resonance::{backbone, backbone_at_level, free_sigma, reading, resonant};
 pub use slow_flow::{B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, Manifold, SlowFlow, impacts_stable};

@@ -8,16 +8,12 @@ use vines_model::orbit::{
     DriveCondition, NoMotion, PlantMotion, exact_backbone, periodic_motion, resonant_motion, resonant_motion_under,
     settled_motion,
 };
-use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
+use vines_model::{Definition, Dimensionless, Reference, Sensor};
 
 mod common;
 use common::close;
 
-const STUDY: Definition = Definition {
-    resonance: Resonance::Phase,
-    reference: Reference::Base,
-    sensor: Sensor::V,
-};
+const STUDY: Definition = Definition { reference: Reference::Base, sensor: Sensor::V };
 const FRICTION: Cavity = Cavity { kinetic_friction: 0.03, ..Cavity::IDEAL };
 const GAPS: Cavity = Cavity { b_plus: Some(0.011), b_minus: Some(0.009), ..Cavity::IDEAL };
 
@@ -84,9 +80,6 @@ fn same(p: &Parameters, one: &State, other: &State, sign: f64, tolerance: f64) {
 #[test]
 fn without_effects_the_motion_is_the_exact_orbit() {
     for definition in Definition::all() {
-        if definition.is_peak() {
-            continue;
-        }
         let p = rig(Cavity::IDEAL);
         let motion = resonant(Cavity::IDEAL, definition);
         let scene = Dimensionless { definition, ..Dimensionless::of(&p, motion.amplitude) };
@@ -197,10 +190,8 @@ fn a_motion_is_found_from_another_one_at_a_given_drive_and_by_simulation() {
 #[test]
 fn what_has_no_periodic_motion_is_refused() {
     let error = |cavity, definition, response| resonant_motion(&rig(cavity), definition, response, None).unwrap_err();
-    let peak = Definition { resonance: Resonance::Peak, ..STUDY };
     let scatter = Cavity { scatter: 0.02, ..Cavity::IDEAL };
     assert_eq!(error(scatter, STUDY, RESPONSE), NoMotion::Scatter(0.02));
-    assert_eq!(error(Cavity::IDEAL, peak, RESPONSE), NoMotion::Peak);
     assert_eq!(error(Cavity::IDEAL, STUDY, 1e-5), NoMotion::NoIdealMotion(1e-5));
     let broken = Cavity { kinetic_friction: -1.0, ..Cavity::IDEAL };
     assert!(matches!(error(broken, STUDY, RESPONSE), NoMotion::Invalid(_)));

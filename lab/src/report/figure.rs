@@ -219,12 +219,12 @@ impl Frame {
         let ([left, top], [width, height]) = (self.place, self.size);
         let (right, bottom) = (left + width, top + height);
         let [(x, _), (y, _)] = self.ranges;
-        for (value, label) in ticks(self.ranges[0], width / 75.0) {
+        for (value, label) in ticks(self.ranges[0], width / 50.0) {
             let [at, _] = self.at((value, y));
             svg.line(&[[at, top], [at, bottom]], 1.0, GRID, "");
             svg.text(&label, [at, bottom + 18.0], SMALL, INK, "middle");
         }
-        for (value, label) in ticks(self.ranges[1], height / 45.0) {
+        for (value, label) in ticks(self.ranges[1], height / 40.0) {
             let [_, at] = self.at((x, value));
             svg.line(&[[left, at], [right, at]], 1.0, GRID, "");
             svg.text(&label, [left - 7.0, at + 4.5], SMALL, INK, "end");

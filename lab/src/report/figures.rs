@@ -245,9 +245,9 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
     }
     // The smallest marks last: none hides another.
     let quantities = [
-        (2, Shape::Square, EXACT, "residuals of the drive"),
-        (1, Shape::Circle(3.5), MEASURED, "of the frequency"),
-        (0, Shape::Dot(2.5), PARTICLE, "of the amplitude"),
+        (2, Shape::Square, EXACT, "residual, drive"),
+        (1, Shape::Circle(3.5), MEASURED, "residual, frequency"),
+        (0, Shape::Dot(2.5), PARTICLE, "residual, amplitude"),
     ];
     for (n, shape, colour, name) in quantities {
         let places = used.iter().map(|(point, residual)| (place(point).0, residual[n]));
@@ -293,12 +293,12 @@ pub fn history(record: &Record, scene: &Scene, result: &Comparison) -> Figure {
     let row = |row: usize, range: (f64, f64), label: &str| {
         let place = |triple: &Triple| (triple[0], triple[row]);
         let mut left = Panel::new(((0.0, end), "time, periods"), (range, label));
-        left.add(Shape::Line(1.6), driven.iter().map(place), MEASURED, "measured");
         let level = |value: [f64; 2]| [(0.0, value[row - 1]), (end, value[row - 1])];
         let exact = result.exact.iter().flat_map(|exact| level([exact.c, exact.sigma]));
         left.add(Shape::Line(1.6), exact, EXACT, "exact orbit");
         let first_order = result.theory.iter().flat_map(|theory| level([theory.c, theory.sigma]));
         left.add(Shape::Line(1.2), first_order, THEORY, FIRST_ORDER);
+        left.add(Shape::Line(1.2), driven.iter().map(place), MEASURED, "measured");
         let mut right = Panel::new(((0.0, 1.02 * last), "time since the release, periods"), (range, label));
         right.add(Shape::Line(1.2), theory.iter().map(place), THEORY, FIRST_ORDER);
         circles(&mut right, points.iter().map(place), IDENTIFIED);
@@ -375,7 +375,7 @@ pub fn theory(p: &Dimensionless) -> Figure {
             .map(|point| ((point.sigma, point.c), point.stable()))
             .collect();
         // Without loss at the impacts C vanishes at the fold, and sigma jumps from one side to the other there.
-        for piece in points.chunk_by(|place, next| (place.0.0 - next.0.0).abs() < 1.0) {
+        for piece in points.chunk_by(|place, next| (place.0.0 - next.0.0).abs() < 1.0).rev() {
             backbones.branch(piece.iter().copied(), width, colour, &format!("backbone, r = {r}"));
         }
     }

@@ -47,7 +47,7 @@ impl From<ExperimentError> for Message {
         match error {
             ExperimentError::Rig(RigError::Refused(error)) => error.into(),
             ExperimentError::Controller(ControllerError::Refused(error)) => error.into(),
-            ExperimentError::NoLock { periods, phase_error: Some(error), omega } => Self {
+            ExperimentError::NoLock { periods, phase_error: Some(error), omega, .. } => Self {
                 text: "no lock within {} periods of the drive: the phase error is {}° at {} rad/s".into(),
                 numbers: vec![periods, error, omega],
             },

@@ -291,11 +291,6 @@ impl TryFrom<Table> for PhaseLock {
     type Error = ArgumentError;
 
     fn try_from(table: Table) -> Result<Self, ArgumentError> {
-        if !table.is_empty() && !cfg!(feature = "parameters") {
-            return Err("the section [phase_lock] needs the feature `parameters`"
-                .to_string()
-                .into());
-        }
         let mut flat = Table::new();
         for (name, value) in table {
             match value {
@@ -330,10 +325,9 @@ impl PhaseLock {
         self.0.iter().any(|(given, _)| *given == name)
     }
 
-    /// The configuration with these values. Without the feature `parameters` there are none, and nothing that sets them is compiled.
+    /// The configuration with these values.
     fn apply(&self, mut config: Config) -> Config {
-        let settings = if cfg!(feature = "parameters") { &self.0[..] } else { &[] };
-        for (name, setting) in settings {
+        for (name, setting) in &self.0 {
             // Names, types and whole numbers were checked when the scene was read; `Config::build` checks the rest.
             let _ = Parameter::find(name).map(|parameter| parameter.set(&mut config, *setting));
         }

@@ -4,8 +4,7 @@ use std::path::Path;
 
 use phase_lock::{Config, NONE, PARAMETERS, Parameter, Range, Value};
 use vines_testbench::scene::{
-    ControllerSettings, Definition, KEYS, Override, RecordSettings, Reference, Resonance, Scene, SceneError, Sensor,
-    plant_keys,
+    ControllerSettings, Definition, KEYS, Override, RecordSettings, Reference, Scene, SceneError, Sensor, plant_keys,
 };
 
 use super::paper;
@@ -79,7 +78,7 @@ fn settings_replace_values_and_what_makes_no_sense_is_named_with_unit_and_range(
         "plant.epsilon=0.01 => mixes SI keys (M, k, c, m, b)",
         "plant.mass=1 => --set plant.mass=1 | `mass` | `M` | `r`",
         "plants.r=1 => `plants` | `plant` | `record`",
-        "record.lock_periods=5 => `hold_periods` | `lock_periods` is now phase_lock.acquire_timeout, s",
+        "record.lock_periods=5 => `hold_periods`",
         "plant.M=0 => M (primary mass) = 0 kg | from 1e-100 to 1e100",
         "plant.k=-1 => k (stiffness) = -1 N/m | from 1e-100 to 1e100",
         "plant.m=nan => m (particle mass) = NaN kg | from 1e-100 to 1e100",
@@ -131,13 +130,8 @@ fn a_mistake_in_a_file_is_reported_with_its_line_and_missing_and_mixed_keys_with
 
 #[test]
 fn text_on_the_command_line_needs_no_quotes_and_what_is_no_assignment_is_refused() {
-    let definition = Definition {
-        resonance: Resonance::Peak,
-        reference: Reference::Force,
-        sensor: Sensor::Acceleration,
-    };
+    let definition = Definition { reference: Reference::Force, sensor: Sensor::Acceleration };
     let scene = paper(&[
-        "resonance.definition='peak'",
         "resonance.reference=\"force\"",
         "resonance.sensor=acceleration",
         "chain.adc_bits = none",

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll, unit_row};
 use super::oscillator::ForcedOscillator;
 use crate::numerics::{Equations, newton};
-use crate::{Definition, Dimensionless, Resonance, Sensor};
+use crate::{Definition, Dimensionless, Sensor};
 
 /// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -217,8 +217,6 @@ pub enum Condition {
     Excitation(f64),
     /// The first harmonic of the response lags (or leads) the reference by a quarter of a period.
     PhaseResonance,
-    /// The amplitude of the first harmonic of the response is extreme along the frequency response.
-    Peak,
     /// A multiplier, or a pair of them, is on the unit circle.
     Bifurcation(Bifurcation),
     /// The unknowns lie in a plane: the end of a step along a curve.
@@ -289,14 +287,6 @@ impl Bifurcation {
 }
 
 impl Condition {
-    /// What selects the backbone by the scene's definition.
-    pub fn backbone(scene: &Dimensionless) -> Self {
-        match scene.definition.resonance {
-            Resonance::Phase => Condition::PhaseResonance,
-            Resonance::Peak => Condition::Peak,
-        }
-    }
-
     /// The value of the equation and its derivative by the unknowns.
     pub(super) fn value(
         &self,
@@ -310,11 +300,8 @@ impl Condition {
             Condition::Excitation(g) => (x[5] - g, unit_row(5)),
             Condition::Plane { through, normal } => (normal.dot(&(x - through)), normal.transpose()),
             Condition::PhaseResonance => (map.s.re, map.s_by[0]),
-            Condition::Peak | Condition::Bifurcation(_) => {
-                let value = |map: &ReturnMap| match *self {
-                    Condition::Bifurcation(kind) => kind.test(&map.monodromy),
-                    _ => slope_of_amplitude(map),
-                };
+            Condition::Bifurcation(kind) => {
+                let value = |map: &ReturnMap| kind.test(&map.monodromy);
                 // Central differences; NaN where the pattern ends.
                 let at = |n: usize, step: f64| {
                     let mut moved = *x;
@@ -326,20 +313,6 @@ impl Condition {
             }
         }
     }
-}
-
-/// The change of half the square of the amplitude along a direction that closes the motion at constant G, by phase, q1, q1', q2' and
-/// sigma. The direction's components are the minors of the closing equations, so that it has no sign to choose.
-fn slope_of_amplitude(map: &ReturnMap) -> f64 {
-    let by_sigma = map.by.fixed_columns::<5>(0);
-    (0..5)
-        .map(|n| {
-            let minor: Matrix4<f64> = by_sigma.remove_fixed_columns::<1>(n);
-            let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
-            let change = map.s.re * map.s_by[0][n] + map.s.im * map.s_by[1][n];
-            sign * minor.determinant() * change
-        })
-        .sum()
 }
 
 /// An exact periodic motion.

@@ -20,7 +20,7 @@ use super::periodic::NEAR;
 use super::symmetric::{at_amplitude, at_speed, stable_resonant};
 use crate::numerics::{Equations, newton};
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
-use crate::{Definition, Dimensionless, Resonance, Sensor};
+use crate::{Definition, Dimensionless, Sensor};
 
 /// A periodic motion of the plant, in SI units.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,10 +83,6 @@ pub enum NoMotion {
     Invalid(#[from] InvalidValue),
     #[error("with a scatter of the restitution, here {0}, no motion is periodic: set it to 0 (r_scatter in a scene)")]
     Scatter(f64),
-    #[error(
-        "periodic motions with effects of the cavity are found at phase resonance, not at the peak of the response"
-    )]
-    Peak,
     #[error("the ideal cavity has no symmetric 1:1 motion at resonance with a response of {0} m, from which to start")]
     NoIdealMotion(f64),
     #[error(
@@ -106,7 +102,7 @@ pub enum NoMotion {
 /// ideal motion becomes: then the effects grow where it is most stable, in the middle of its range, and the response changes afterwards.
 ///
 /// # Errors
-/// Invalid parameters, a scatter of the restitution, the peak as resonance, and where no motion is found.
+/// Invalid parameters, a scatter of the restitution, and where no motion is found.
 pub fn resonant_motion(
     parameters: &Parameters,
     definition: Definition,
@@ -368,9 +364,6 @@ impl<'a> Solver<'a> {
         parameters.validate()?;
         if parameters.cavity.scatter > 0.0 {
             return Err(NoMotion::Scatter(parameters.cavity.scatter));
-        }
-        if definition.resonance == Resonance::Peak {
-            return Err(NoMotion::Peak);
         }
         Ok(Self {
             parameters,

@@ -190,7 +190,7 @@ const TRIED_DETUNINGS: [f64; 6] = [-1.0, -0.7, -1.4, -0.5, -2.0, 0.0];
 /// damping nor loss): the one with the fastest particle, on the right branch. Without damping and with r = 1 it is the conservative
 /// nonlinear mode.
 pub fn backbone(scene: &Dimensionless, limits: &ContinuationLimits) -> Option<Branch> {
-    let condition = Condition::backbone(scene);
+    let condition = Condition::PhaseResonance;
     let fastest = |orbits: Vec<Orbit>| orbits.into_iter().max_by(|first, second| first.b.total_cmp(&second.b));
     let right = Manifold::new(scene.r).b_min();
     let at_any_excitation = |sigma: f64| {

@@ -16,7 +16,7 @@ use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::oscillator::FreeOscillator;
 use super::periodic::wrapped;
-use super::{AfterImpact, Condition, ImpactPattern, Orbit, Periodic};
+use super::{AfterImpact, ImpactPattern, Orbit, Periodic};
 use crate::numerics::{bisection, golden_section, quadratic};
 use crate::theory::{BranchSide, Manifold, SlowFlow};
 use crate::{Definition, Dimensionless, Sensor};
@@ -160,10 +160,6 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
         .map(|branch| CandidateBranch { scene, branch }.frequencies(&grid))
         .concat();
     let mut orbits = resonant(scene, &candidates);
-    if scene.definition.is_peak() {
-        let peak = |orbit: &Orbit| peak(scene, orbit, Condition::Excitation(scene.g));
-        orbits = orbits.iter().filter_map(peak).collect();
-    }
     orbits.sort_unstable_by(|first, second| first.c.total_cmp(&second.c));
     orbits.dedup_by(|first, second| (first.sigma - second.sigma).abs() < 1e-9 && (first.b - second.b).abs() < 1e-9);
     orbits
@@ -180,21 +176,7 @@ pub fn stable_resonant(scene: &Dimensionless) -> Option<Orbit> {
 pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
     let candidates =
         SymmetricMotions::new(scene, omega).and_then(|motions| Some(motions.phase_resonant()?.map(|b| motions.at(b))));
-    let orbits = resonant(scene, candidates.as_slice().as_flattened());
-    if scene.definition.is_peak() {
-        let peak = |orbit: &Orbit| peak(scene, orbit, Condition::Sigma(orbit.sigma));
-        return orbits.iter().filter_map(peak).collect();
-    }
-    orbits
-}
-
-/// The orbit near a phase-resonant one whose amplitude is largest along its frequency response.
-fn peak(scene: &Dimensionless, near: &Orbit, condition: Condition) -> Option<Orbit> {
-    let found = near.periodic(scene, [condition, Condition::Peak])?;
-    let scene = Dimensionless { g: found.g, ..*scene };
-    symmetric_orbits(&scene, found.sigma)
-        .into_iter()
-        .min_by(|first, second| (first.b - found.b).abs().total_cmp(&(second.b - found.b).abs()))
+    resonant(scene, candidates.as_slice().as_flattened())
 }
 
 /// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.

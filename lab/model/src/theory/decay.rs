@@ -1,10 +1,8 @@
-//! The free decay along the manifold in closed form (docs/theory.md, eq. 20), and the first-order motion in physical time: a sine for
-//! v, and a sine with a triangle wave for w (eq. 22).
+//! The free decay along the manifold in closed form (docs/theory.md, eq. 20).
 
 use std::f64::consts::{FRAC_2_PI, PI};
 
 use super::slow_flow::{BackbonePoint, SlowFlow};
-use crate::Dimensionless;
 use crate::numerics::equally_spaced;
 
 impl SlowFlow {
@@ -37,49 +35,4 @@ impl SlowFlow {
         let rest = if r > 0.0 { 8.0 * r / a * arc } else { 0.0 };
         k / a * self.loss(b).ln() + rest
     }
-}
-
-/// A motion of the 1:1 regime at one instant of its slow time; displacements in m (docs/theory.md, eq. 22).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Waveform {
-    /// Amplitude of v, m.
-    pub amplitude: f64,
-    /// Particle speed over the angular frequency, m: the triangle wave has the height pi/2 times this.
-    pub triangle: f64,
-    /// Angular frequency, rad/s.
-    pub omega: f64,
-    /// Phase of v at t = 0, rad.
-    pub gamma: f64,
-    /// Phase of the triangle wave at t = 0, rad.
-    pub psi: f64,
-}
-
-impl Waveform {
-    /// The motion at the particle speed `b` on the manifold, the detuning `sigma` and the phase `gamma`, rad; time counts from
-    /// a passage of the base through zero, upwards.
-    pub fn new(scene: &Dimensionless, sigma: f64, b: f64, gamma: f64) -> Self {
-        let flow = SlowFlow::new(scene.lambda, scene.r);
-        Self {
-            amplitude: scene.b * flow.manifold.c(b),
-            triangle: scene.b * b,
-            omega: scene.omega(sigma),
-            gamma,
-            psi: flow.psi(b, gamma),
-        }
-    }
-
-    /// `v = q1 + epsilon q2`, m, at the time `t`, s.
-    pub fn v(&self, t: f64) -> f64 {
-        self.amplitude * (self.omega * t + self.gamma).sin()
-    }
-
-    /// `w = q1 - q2`, m, at the time `t`, s.
-    pub fn w(&self, t: f64) -> f64 {
-        self.v(t) + self.triangle * triangle_wave(self.omega * t + self.psi)
-    }
-}
-
-/// The triangle wave Pi: slope ±1, height pi/2, zero and rising at 0.
-fn triangle_wave(phase: f64) -> f64 {
-    phase.sin().asin()
 }

@@ -1,4 +1,4 @@
-//! Resonance by the scene's definition: the first-order motion read by a sensor, its phase relative to a reference, or its peak.
+//! Resonance by the scene's definition: the first-order motion read by a sensor, and its phase relative to a reference.
 //!
 //! Sensor and reference change phase and amplitude by terms of first order in epsilon, which is also the order of the theory's own error
 //! (validation/convergence.csv).
@@ -9,7 +9,7 @@ use nalgebra::Complex;
 
 use super::slow_flow::{BackbonePoint, BranchSide, SlowFlow};
 use crate::numerics::equally_spaced;
-use crate::{Dimensionless, Resonance, Sensor};
+use crate::{Dimensionless, Sensor};
 
 /// All solutions of first-order theory that are resonant by the scene's definition, at its G, by increasing B. `C` is the amplitude that
 /// the sensor reads.
@@ -46,10 +46,6 @@ pub fn reading(scene: &Dimensionless, b: f64, sigma: f64) -> f64 {
 
 /// Rounds of a fixed-point iteration.
 const ROUNDS: usize = 12;
-/// Largest distance of a peak from phase resonance of v, rad.
-const ASIDE: f64 = 0.3;
-/// Relative step of a difference quotient.
-const STEP: f64 = 1e-5;
 
 struct Reading<'a> {
     scene: &'a Dimensionless,
@@ -118,34 +114,7 @@ impl<'a> Reading<'a> {
     /// Phase of v, rad, at which the motion of the particle speed `b` is resonant.
     fn phase(&self, b: f64) -> f64 {
         let Dimensionless { epsilon, lambda, definition, .. } = *self.scene;
-        match (definition.resonance, definition.sensor) {
-            (Resonance::Phase, _) => {
-                definition.reference.phase(epsilon * lambda, 1.0) - FRAC_PI_2 - self.seen(b, 0.0).arg()
-            }
-            // The amplitude is a function of B alone, which is extreme at phase resonance of v (eq. 15).
-            (Resonance::Peak, Sensor::V | Sensor::Q1) => -FRAC_PI_2,
-            (Resonance::Peak, Sensor::Acceleration) => self.aside(b) - FRAC_PI_2,
-        }
-    }
-
-    /// Distance x of the peak of the acceleration from phase resonance of v, rad. The amplitude is `f(B) (1 + epsilon sigma)^2`, with
-    /// `sigma = sigma_R - (L/2C) tan x`, and the excitation `L(B)/cos x`, with `L = loss/C`. Along a response the excitation is constant,
-    /// and at the peak the amplitude is, too.
-    fn aside(&self, b: f64) -> f64 {
-        let epsilon = self.scene.epsilon;
-        let c = self.flow.manifold.c(b);
-        let mut tangent = 0.0_f64;
-        for _ in 0..ROUNDS {
-            let excitation = |b: f64| self.flow.loss(b) / self.flow.manifold.c(b);
-            let sigma = |b: f64| self.flow.free_detuning(b) - excitation(b) * tangent / (2.0 * self.flow.manifold.c(b));
-            let amplitude = |b: f64| (self.flow.manifold.c(b) * self.seen(b, sigma(b)).norm()).ln();
-            let slope = |f: &dyn Fn(f64) -> f64| (f(b * (1.0 + STEP)) - f(b * (1.0 - STEP))) / (2.0 * STEP * b);
-            let omega = 1.0 + epsilon * sigma(b);
-            let ratio = -epsilon * slope(&excitation) / (c * omega * slope(&amplitude));
-            tangent = ratio * (1.0 + tangent * tangent);
-        }
-        // At the fold, where B is no function of the amplitude, there is no peak.
-        tangent.atan().clamp(-ASIDE, ASIDE)
+        definition.reference.phase(epsilon * lambda, 1.0) - FRAC_PI_2 - self.seen(b, 0.0).arg()
     }
 
     fn resonance(&self, b: f64) -> BackbonePoint {

@@ -7,6 +7,7 @@ mod motions;
 #[path = "../reference/mod.rs"]
 mod reference;
 mod responses;
+mod walk;
 
 use std::f64::consts::PI;
 

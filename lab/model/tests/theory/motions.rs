@@ -1,11 +1,11 @@
-//! Motions off the manifold, impact by impact, and motions in physical time.
+//! Motions off the manifold, impact by impact.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 
-use vines_model::theory::{SlowFlow, Waveform};
-use vines_model::{Dimensionless, orbit::phase_resonant};
+use vines_model::theory::SlowFlow;
 
-use crate::{LAMBDA, R, close, flow, half_period_map, jacobian};
+use crate::walk::modulation;
+use crate::{LAMBDA, close, flow, half_period_map, jacobian};
 
 #[test]
 fn the_jumps_linearised_are_the_half_period_map() {
@@ -14,7 +14,7 @@ fn the_jumps_linearised_are_the_half_period_map() {
         let gamma = 0.3;
         // (B, psi) one impact later at frozen C and gamma: the fast map.
         let map = |[speed, psi]: [f64; 2]| {
-            let mut walk = flow.modulation(0.0, (0.0, 0.0), (flow.manifold.c(b), gamma), (speed, psi));
+            let mut walk = modulation(&flow, 0.0, (0.0, 0.0), (flow.manifold.c(b), gamma), (speed, psi));
             let next = walk.next().expect("an impact");
             [next.b, next.psi]
         };
@@ -28,7 +28,8 @@ fn the_jumps_linearised_are_the_half_period_map() {
 /// Largest distance of the walk's C from the decay on the slow flow, from B 5 % off the manifold, over tau1 from 0.05 to 0.5.
 fn distance_from_slow_flow(epsilon: f64) -> f64 {
     let flow = flow();
-    let walk = flow.modulation(
+    let walk = modulation(
+        &flow,
         epsilon,
         (0.0, 0.0),
         (flow.manifold.c(1.0), 0.0),
@@ -52,7 +53,13 @@ fn past_the_fast_approach_the_impacts_follow_the_slow_flow_to_first_order_down_t
 
     let flow = flow();
     let b = flow.manifold.b_min() + 0.02;
-    let walk = flow.modulation(1e-3, (0.0, 0.0), (flow.manifold.c(b), 0.0), (b, flow.psi(b, 0.0)));
+    let walk = modulation(
+        &flow,
+        1e-3,
+        (0.0, 0.0),
+        (flow.manifold.c(b), 0.0),
+        (b, flow.psi(b, 0.0)),
+    );
     let last = walk.take(100_000).last().unwrap();
     assert!(last.tau < 50_000.0 * PI, "it never ends");
     assert!(last.c < flow.manifold.c_min(), "{last:?}");
@@ -67,8 +74,7 @@ fn a_walk_beside_an_equilibrium_leads_to_it() {
         .unwrap();
     let beside = (one.b, flow.psi(one.b, one.gamma));
     for start in [(one.c, one.gamma), (1.02 * one.c, one.gamma + 0.05)] {
-        let last = flow
-            .modulation(epsilon, drive, start, beside)
+        let last = modulation(&flow, epsilon, drive, start, beside)
             .take(4_000)
             .last()
             .unwrap();
@@ -76,43 +82,4 @@ fn a_walk_beside_an_equilibrium_leads_to_it() {
             close(found, expected, 5.0 * epsilon);
         }
     }
-}
-
-// Physical time
-
-#[test]
-fn a_waveform_meets_its_walls_and_bounces_as_restitution_says() {
-    let scene = Dimensionless {
-        omega0: 55.4,
-        b: 0.01,
-        ..Dimensionless::new(0.0084, LAMBDA, R, 1.1)
-    };
-    for one in flow().equilibria(1.1, -1.0) {
-        let wave = Waveform::new(&scene, -1.0, one.b, one.gamma);
-        let t = (FRAC_PI_2 - wave.psi) / wave.omega;
-        close(wave.w(t) / scene.b, 1.0, 1e-12);
-        close(wave.w(t + PI / wave.omega) / scene.b, -1.0, 1e-12);
-        let h = 1e-6 / wave.omega;
-        close((wave.w(t + h) - wave.w(t)) / (wave.w(t) - wave.w(t - h)), -R, 1e-4);
-    }
-}
-
-#[test]
-fn the_waveform_approaches_the_exact_motion_as_epsilon() {
-    let distance = |epsilon: f64| {
-        let scene = Dimensionless::new(epsilon, LAMBDA, R, 1.1);
-        let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
-        let point = flow().phase_resonant(1.1).into_iter().find(|one| one.stable()).unwrap();
-        let wave = Waveform::new(&scene, point.sigma, point.b, -FRAC_PI_2);
-        // The exact particle's flight from the impact on w = +1, and the waveform's, both from their own impact on.
-        let impact = (FRAC_PI_2 - wave.psi) / wave.omega;
-        let q2 = |t: f64| (wave.v(t) - wave.w(t)) / (1.0 + epsilon);
-        let apart = (1..8).map(|n| {
-            let part = f64::from(n) / 8.0;
-            let exact = orbit.start.q2 + orbit.start.dq2 * part * PI / orbit.omega;
-            (q2(impact + part * PI / wave.omega) - exact).abs()
-        });
-        apart.fold(0.0, f64::max)
-    };
-    close((distance(1e-2) / distance(1e-3)).log10(), 1.0, 0.1);
 }

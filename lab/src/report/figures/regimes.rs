@@ -65,7 +65,7 @@ fn caption(map: &Map) -> String {
         false => "; dashed: of unstable motions",
     };
     format!(
-        "ε = {epsilon:.5}, λ = {lambda:.3}{held}\neach cell from the same start, followed until it repeats, at most {} periods{dashed}",
+        "ε = {epsilon:.5}, λ = {lambda:.3}{held}{dashed}\neach cell from the same start, followed until it repeats, at most {} periods",
         map.sweep.settings().periods
     )
 }
