@@ -98,6 +98,25 @@ where
 /// Pivots and singular values over the largest that are rounding.
 const SINGULAR: f64 = 1e-14;
 
+/// The root of `f` near two guesses by the secant method, whose last step is at most `tolerance`; the error is far below that. `None` where the
+/// steps do not become as small, or where `f` is `None`.
+pub fn secant(mut f: impl FnMut(f64) -> Option<f64>, [mut before, mut here]: [f64; 2], tolerance: f64) -> Option<f64> {
+    let mut at_before = f(before)?;
+    for _ in 0..ROUNDS {
+        let at_here = f(here)?;
+        let step = if at_here == 0.0 {
+            0.0
+        } else {
+            at_here * (here - before) / (at_here - at_before)
+        };
+        (before, at_before, here) = (here, at_here, here - step);
+        if step.abs() <= tolerance {
+            return Some(here);
+        }
+    }
+    None
+}
+
 /// Neighbouring doubles between `a` and `b` at which `f` differs; the first keeps the value that `f` has at `a`.
 pub fn bisection(a: f64, b: f64, mut f: impl FnMut(f64) -> bool) -> (f64, f64) {
     let at_a = f(a);

@@ -17,7 +17,7 @@ use nalgebra::{Complex, Matrix2, Vector2};
 use super::oscillator::FreeOscillator;
 use super::periodic::wrapped;
 use super::{AfterImpact, ImpactPattern, Orbit, Periodic};
-use crate::numerics::{bisection, golden_section, quadratic};
+use crate::numerics::{bisection, golden_section, quadratic, secant};
 use crate::theory::{BranchSide, Manifold, SlowFlow};
 use crate::{Definition, Dimensionless, Sensor};
 
@@ -316,11 +316,9 @@ impl CandidateBranch<'_> {
     }
 }
 
-/// Rounds of Newton's method; each doubles the number of correct digits, from the first-order theory's two.
-const SPEED_ROUNDS: usize = 8;
-/// Largest last change of the frequency, as a share of epsilon.
+/// Largest last step of the frequency, as a share of epsilon, and of the speed.
 const CONVERGED: f64 = 1e-9;
-/// Difference of the frequencies of the secant, as a share of epsilon: far above rounding, far below the curvature.
+/// Difference of the first two frequencies, as a share of epsilon, and of the first two speeds: far above rounding, far below the curvature.
 const SECANT: f64 = 1e-4;
 
 /// `[Omega, C, G]` on the curve of all symmetric 1:1 motions at phase resonance: the frequency over omega0, the amplitude of the response over b,
@@ -334,11 +332,11 @@ pub fn backbone_at_speed(scene: &Dimensionless, speed: f64) -> Option<[f64; 3]> 
     Some([motion.omega, motion.c, motion.g])
 }
 
-/// The motion of [`backbone_at_speed`]: Newton's method for the frequency.
+/// The motion of [`backbone_at_speed`].
 pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Orbit> {
     let Dimensionless { epsilon, lambda, r, .. } = *scene;
     let flow = SlowFlow::new(lambda, r);
-    let mut omega = 1.0 + epsilon * flow.free_detuning(speed);
+    let guess = 1.0 + epsilon * flow.free_detuning(speed);
     // Of the first-order response; the exact one turns through half a circle without dissipation, too.
     let direction = Complex::new((flow.manifold.dissipation + epsilon) * speed, 1.0 - FRAC_PI_2 * speed);
     let motion = |omega: f64| {
@@ -353,33 +351,16 @@ pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Orbit> {
         let [square, linear, constant] = motions.resonance();
         Some((square * b + linear) * b + constant)
     };
-    let mut last = f64::INFINITY;
-    for _ in 0..SPEED_ROUNDS {
-        let here = off(omega)?;
-        let slope = (off(omega + SECANT * epsilon)? - here) / (SECANT * epsilon);
-        last = here / slope;
-        omega -= last;
-        if last.abs() < CONVERGED * epsilon {
-            break;
-        }
-    }
+    let omega = secant(off, [guess * (1.0 + SECANT * epsilon), guess], CONVERGED * epsilon)?;
     let (motions, b) = motion(omega)?;
     let motion = motions.at(b);
     let values = [omega, motion.c, motion.g];
-    (values.iter().all(|value| value.is_finite()) && last.abs() < CONVERGED * epsilon).then_some(motion)
+    values.iter().all(|value| value.is_finite()).then_some(motion)
 }
 
-/// The motion at phase resonance beyond the fold whose response has the amplitude `c` over b: the secant method over the speed.
+/// The motion at phase resonance beyond the fold whose response has the amplitude `c` over b.
 pub(super) fn at_amplitude(scene: &Dimensionless, c: f64) -> Option<Orbit> {
     let start = Manifold::new(scene.r).b(c, BranchSide::Right)?;
-    let at = |speed: f64| Some((speed, at_speed(scene, speed)?));
-    let (mut before, mut here) = (at(start)?, at(start * (1.0 + SECANT))?);
-    for _ in 0..SPEED_ROUNDS {
-        let next = here.0 - (here.1.c - c) * (here.0 - before.0) / (here.1.c - before.1.c);
-        if (here.1.c - c).abs() < CONVERGED || next == here.0 {
-            break;
-        }
-        (before, here) = (here, at(next)?);
-    }
-    ((here.1.c - c).abs() < CONVERGED).then_some(here.1)
+    let excess = |speed: f64| Some(at_speed(scene, speed)?.c - c);
+    at_speed(scene, secant(excess, [start * (1.0 + SECANT), start], CONVERGED)?)
 }

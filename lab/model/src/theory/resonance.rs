@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 use nalgebra::Complex;
 
 use super::slow_flow::{BackbonePoint, BranchSide, SlowFlow};
-use crate::numerics::equally_spaced;
+use crate::numerics::{equally_spaced, secant};
 use crate::{Dimensionless, Sensor};
 
 /// All solutions of first-order theory that are resonant by the scene's definition, at its G, by increasing B. `C` is the amplitude that
@@ -81,23 +81,11 @@ impl<'a> Reading<'a> {
         [g, self.flow.free_detuning(b) - g * gamma.cos() / (2.0 * c)]
     }
 
-    /// The speed near `from` that is resonant under the scene's excitation, by the secant method.
+    /// The speed near `from` that is resonant under the scene's excitation.
     fn speed(&self, from: f64) -> Option<f64> {
         let excess = |b: f64| self.driven(b, self.phase(b))[0] - self.scene.g;
-        let (mut last, mut b) = (from * (1.0 + 1e-4), from);
-        let mut at_last = excess(last);
-        for _ in 0..50 {
-            let at = excess(b);
-            if at.abs() < 1e-13 * self.scene.g {
-                return Some(b);
-            }
-            if at == at_last {
-                break;
-            }
-            let next = b - at * (b - last) / (at - at_last);
-            (last, at_last, b) = (b, at, next);
-        }
-        (excess(b).abs() < 1e-10 * self.scene.g && (b - from).abs() < 0.3 * from).then_some(b)
+        let b = secant(|b| Some(excess(b)), [from * (1.0 + 1e-4), from], 1e-12 * from)?;
+        ((b - from).abs() < 0.3 * from).then_some(b)
     }
 
     /// The speed on the right branch at which the sensor reads the amplitude `c`.
