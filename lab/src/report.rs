@@ -7,7 +7,7 @@ pub mod summary;
 mod table;
 mod theme;
 
-pub use files::{
-    ReportError, write, write_fit, write_interrupted, write_map, write_response, write_theory, write_tracked,
-};
+pub use figure::Figure;
+pub use figures::{fitted, responses, theory};
+pub use files::{ReportError, write, write_interrupted, write_map, write_tracked};
 pub use table::{Table, number, row, with_uncertainty};

@@ -71,7 +71,11 @@ fn checked(scene: &Dimensionless) -> FrequencyResponse {
             let mut joined = ends.filter(|(_, ended)| *ended == BranchEnd::Joins);
             assert!(joined.all(|(end, _)| asymmetry(end).abs() < 0.01), "{name}");
         }
-        for torus in branch.special.iter().filter(|one| one.name().starts_with("torus")) {
+        for torus in branch
+            .special
+            .iter()
+            .filter(|one| one.kind == Bifurcation::NeimarkSacker && one.motion.bounds_stability())
+        {
             let near = |motion: &Periodic| (motion.sigma - torus.motion.sigma).abs() < 0.1;
             assert!(points.iter().any(|one| near(one) && one.stable), "{name}");
         }
@@ -192,7 +196,7 @@ fn off_circle(kind: Bifurcation, motion: &Periodic) -> f64 {
     let distance = |[re, im]: &[f64; 2]| match kind {
         Bifurcation::Fold => (re - 1.0).hypot(*im),
         Bifurcation::SymmetryBreaking | Bifurcation::PeriodDoubling => (re + 1.0).hypot(*im),
-        Bifurcation::Torus => (re.hypot(*im) - 1.0).abs(),
+        Bifurcation::NeimarkSacker => (re.hypot(*im) - 1.0).abs(),
     };
     motion.multipliers.iter().map(distance).fold(f64::MAX, f64::min)
 }

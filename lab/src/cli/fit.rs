@@ -10,7 +10,7 @@ use serde::Serialize;
 use vines::fit::{Effect, Fit, FitReport, Found, Known, MeasuredPoint, Part, decimals, find, parts};
 use vines::numerics::Estimate;
 use vines::points::{Channel, Channels, Column, Measurement, read};
-use vines::report::{Table, write_fit};
+use vines::report::{Table, fitted};
 
 use super::failure::Failure;
 use super::options::{SceneArguments, positive};
@@ -143,7 +143,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         parts + &summary(&report, &fit, points.len(), skipped) + &verdict.unwrap_or_default()
     })?;
     if let Some(path) = &arguments.figure {
-        let file = write_fit(&points, &fit, &scene, verdict.as_deref(), path).map_err(Failure::run)?;
+        let file = vines::write_file(path, &fitted(&points, &fit, &scene, verdict.as_deref()).svg())?;
         if !arguments.json {
             text += &written(&[file]);
         }

@@ -11,9 +11,8 @@ use vines::orbit::{
     continue_both_ways, phase_resonant, resonant_motion_under, response, settle, settled_motion, stable_resonant,
 };
 use vines::report::{
-    Table, number, row,
+    Table, number, responses, row,
     summary::{self, parameters},
-    write_response,
 };
 use vines::{
     ArgumentError,
@@ -154,7 +153,7 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Continuatio
         )
     })?;
     if let Some(file) = &arguments.figure {
-        let file = write_response(scene, &response, arguments.range, file)?;
+        let file = vines::write_file(file, &responses(scene, &response, arguments.range).svg())?;
         if !arguments.json {
             text += &written(&[file]);
         }
@@ -373,7 +372,7 @@ fn curve(name: &str, branch: &Branch) -> String {
     let table = Table::new("sigma | G | C | phase, degrees | B | largest mult. | stable");
     text += &table.rows(rows).text();
     for special in &branch.special {
-        let (name, Periodic { sigma, g, c, b, .. }) = (special.name(), &special.motion);
+        let (name, Periodic { sigma, g, c, b, .. }) = (special.kind.name(), &special.motion);
         let g = number(*g);
         text += &format!("  {name} at sigma = {sigma:.6}, G = {g}, C = {c:.6}, B = {b:.6}\n");
     }

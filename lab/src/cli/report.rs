@@ -1,6 +1,6 @@
 //! `vines report`: the other commands one after another, and what they print and draw on one page.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, Parser};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -46,64 +46,46 @@ pub(super) struct Arguments {
     y: Axis,
 }
 
-/// A section: its title, its command (OUT, X and Y stand for the arguments), and its figures with their captions.
-type Section = (&'static str, &'static str, &'static [(&'static str, &'static str)]);
+/// A section: its title, its command (OUT, X and Y stand for the arguments), what it shows, and its figures.
+type Section = (&'static str, &'static str, &'static str, &'static [&'static str]);
 
 const SECTIONS: [Section; 6] = [
     (
         "Lock and free decay",
         "identify --rig built-in --out OUT",
-        &[
-            (
-                "history.svg",
-                "Left: the loop searches for phase resonance and holds it. Right: the drive is off, and the motion decays along the \
-                 backbone until the impacts lose synchrony at the fold. Times are in periods 2π/ω₀ of the oscillator alone.",
-            ),
-            (
-                "backbone.svg",
-                "Points along the decay, the locked point, the exact backbone and that of first-order theory. The decay lies beside the \
-                 backbone, because the impacts follow a falling amplitude late; the exact plant, released alike, does the same.",
-            ),
-            (
-                "sim.svg",
-                "The decay on the slow invariant manifold, from the locked point down the right branch to the fold.",
-            ),
-        ],
+        "The loop searches for phase resonance and holds it. Then the drive is off, and the motion decays along the manifold until the impacts \
+         lose synchrony at the fold. The decay lies beside the backbone, because the impacts follow a falling amplitude late.",
+        &["history.svg", "sim.svg", "backbone.svg"],
     ),
     (
         "Backbone, level by level",
         "backbone --out OUT",
-        &[(
-            "tracked.svg",
-            "The loop holds the response at one level after another until it has settled, and the amplitude of the drive follows.",
-        )],
+        "The loop holds the response at one level after another until it has settled, and the amplitude of the drive follows.",
+        &["tracked.svg"],
     ),
-    ("First-order theory", "theory", &[]),
+    (
+        "First-order theory",
+        "theory",
+        "The slow invariant manifold, resonance at the scene's G, and the drives from which impacts begin.",
+        &[],
+    ),
     (
         "Frequency response",
         "orbit --response --range=-5:5 --figure OUT/response.svg",
-        &[(
-            "response.svg",
-            "Exact orbits and first-order theory at the scene's G, and the exact backbone near the maximum. Asymmetric motions branch \
-             off where the symmetric ones lose their symmetry.",
-        )],
+        "Exact orbits at the scene's G. Asymmetric motions branch off where the symmetric ones lose their symmetry.",
+        &["response.svg"],
     ),
     (
         "Regimes",
         "map --confirmations 0 --x X --y Y --out OUT",
-        &[(
-            "map.svg",
-            "One start per cell: where several regimes are stable, the start decides. The border is that of the island in which \
-             first-order theory has a stable symmetric 1:1 motion; the curves are exact bifurcations of the 1:1 motions.",
-        )],
+        "One start per cell: where several regimes are stable, the start decides. The curves are exact bifurcations of the 1:1 motions.",
+        &["map.svg"],
     ),
     (
         "Parameters from the backbone",
         "fit OUT/tracked.csv --figure OUT/fit.svg",
-        &[(
-            "fit.svg",
-            "The levels of the tracked backbone beside the scene and the fitted rig.",
-        )],
+        "The levels of the tracked backbone beside the scene and the fitted rig.",
+        &["fit.svg"],
     ),
 ];
 
@@ -115,7 +97,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     writable(&arguments.out)?;
     let mut failed = Vec::new();
     let mut sections = Vec::new();
-    for (title, line, figures) in SECTIONS {
+    for (title, line, shows, figures) in SECTIONS {
         let words = words(arguments, line);
         eprintln!("{}", words.join(" "));
         let text = match dispatch(Cli::try_parse_from(&words).map_err(Failure::input)?.command) {
@@ -126,7 +108,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             }
             Ok(text) => text,
         };
-        sections.push(section(title, &words.join(" "), &text, figures, &arguments.out));
+        let figures = figures
+            .iter()
+            .map(|name| std::fs::read_to_string(arguments.out.join(name)));
+        let lines = text.lines().filter(|line| !line.starts_with("Written: "));
+        sections.push(html! {
+            h2 { (title) }
+            p { (shows) }
+            pre { b { (words.join(" ")) } "\n\n" (lines.collect::<Vec<_>>().join("\n").trim_end()) }
+            // A figure that the command did not write is left out.
+            @for svg in figures.flatten() { figure { (PreEscaped(svg)) } }
+        });
     }
     let page = page(&scene, &sections).into_string();
     let text = written(&[vines::write_file(&arguments.out.join("report.html"), &page)?]);
@@ -147,23 +139,6 @@ fn words(arguments: &Arguments, line: &str) -> Vec<String> {
     };
     let words = ["vines"].into_iter().chain(line.split(' ')).map(word);
     words.chain(scene.words()).collect()
-}
-
-/// A section of the page. A figure that the command did not write is left out.
-fn section(title: &str, line: &str, text: &str, figures: &[(&str, &str)], out: &Path) -> Markup {
-    let lines = text.lines().filter(|line| !line.starts_with("Written: "));
-    let text = lines.collect::<Vec<_>>().join("\n");
-    let drawn = |name: &str| std::fs::read_to_string(out.join(name)).ok();
-    let drawn = figures
-        .iter()
-        .filter_map(|(name, caption)| Some((drawn(name)?, caption)));
-    html! {
-        h2 { (title) }
-        pre { b { (line) } "\n\n" (text.trim_end()) }
-        @for (svg, caption) in drawn {
-            figure { (PreEscaped(svg)) figcaption { (caption) } }
-        }
-    }
 }
 
 /// The page: one file of HTML that needs nothing else.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use vines::{
-    report::{Table, row, summary::parameters, write_theory},
+    report::{Table, row, summary::parameters, theory},
     theory::{Activation, B_SYMMETRY_BREAKING, BranchSide, SlowFlow, backbone, resonant},
 };
 
@@ -21,7 +21,10 @@ Examples:
   vines theory --set excitation.G=1.0
   vines theory --sigma=-1.0                       all equilibria at that detuning
   vines theory --figure theory.svg
-  vines theory --points 500 --json > theory.json";
+  vines theory --json > theory.json";
+
+/// Samples of the backbone in JSON.
+const SAMPLES: usize = 200;
 
 /// Print first-order theory: invariant manifold, solutions at phase resonance, backbone
 #[derive(Debug, Args)]
@@ -29,10 +32,6 @@ Examples:
 pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
-
-    /// Samples of the backbone
-    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(2..=100_000))]
-    points: u32,
 
     /// Detuning at which to list all equilibria and the activation thresholds; without it, the thresholds at the backbone's
     /// stable solution, or at 0
@@ -62,7 +61,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let equilibria = arguments.sigma.map(|sigma| flow.equilibria(scene.g, sigma));
     let activation = flow.activation(scene.epsilon, sigma);
     let (dissipation, b_min, c_min) = (flow.manifold.dissipation, flow.manifold.b_min(), flow.manifold.c_min());
-    let points = arguments.points as usize;
     // From near the end of the left branch, where the particle is at rest, to a little beyond the stable range.
     let highest = 1.2 * B_SYMMETRY_BREAKING;
     let result = json!({
@@ -77,7 +75,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         "sigma": sigma,
         "activation": activation,
         "equilibria": equilibria.clone().unwrap_or_default(),
-        "backbone": backbone(&scene, highest / points as f64, highest, points),
+        "backbone": backbone(&scene, highest / SAMPLES as f64, highest, SAMPLES),
     });
     let mut text = output(arguments.json, &result, || {
         let rows = solutions.iter().map(|point| {
@@ -105,7 +103,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         text
     })?;
     if let Some(file) = &arguments.figure {
-        let file = write_theory(&scene, file)?;
+        let file = vines::write_file(file, &theory(&scene).svg())?;
         if !arguments.json {
             text += &format!("\n{}", written(&[file]));
         }

@@ -309,7 +309,8 @@ fn table(title: &str, scene: &Scene) -> Value {
     table
 }
 
-// The server: GET only, and only what the page needs. HTTP without a library, because one for so few requests would be larger than this.
+// The server: GET only, and only what the page needs. A browser that does not read must not block the end of the experiment; tiny_http has no
+// timeout for writing.
 
 /// The files of the page: path and content.
 macro_rules! files {

@@ -28,11 +28,11 @@ const APART: f64 = 0.4;
 
 /// Rows of panels under a title and lines of a caption.
 pub struct Figure {
-    pub title: String,
-    pub caption: String,
+    pub(super) title: String,
+    pub(super) caption: String,
     /// Height of a row, px.
-    pub height: f64,
-    pub rows: Vec<Vec<Panel>>,
+    pub(super) height: f64,
+    pub(super) rows: Vec<Vec<Panel>>,
 }
 
 /// One panel with its axes.

@@ -8,14 +8,13 @@ use serde::Serialize;
 use serde_json::Value;
 use thiserror::Error;
 
-use super::figures::{backbone, fitted, history, manifold, regimes, responses, theory, tracked};
+use super::figures::{backbone, history, manifold, regimes, tracked};
 use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
 use crate::files::{self, FileError};
-use crate::fit::{Fit, MeasuredPoint};
-use crate::orbit::{FrequencyResponse, Periodic};
+use crate::orbit::Periodic;
 use crate::record::{Record, Sample, table};
 use crate::regime::Regime;
-use crate::scene::{Dimensionless, Scene};
+use crate::scene::Scene;
 use crate::sweep::{Map, MapCell, SweepError};
 
 /// Why a report could not be computed, or the files of a run could not be written.
@@ -66,32 +65,6 @@ pub fn write_tracked(result: &TrackedComparison, out: &Path) -> Result<Vec<PathB
         ("tracked.svg", tracked(result).svg()),
     ];
     Ok(files::write(out, files)?)
-}
-
-/// Writes the figure of a fit to `file`: measured points, scene, fit and residuals.
-pub fn write_fit(
-    points: &[MeasuredPoint],
-    fit: &Fit,
-    scene: &Scene,
-    verdict: Option<&str>,
-    file: &Path,
-) -> Result<PathBuf, ReportError> {
-    Ok(files::write_file(file, &fitted(points, fit, scene, verdict).svg())?)
-}
-
-/// Writes the figure of first-order theory to `file`: the slow invariant manifold, and backbones over r.
-pub fn write_theory(scene: &Dimensionless, file: &Path) -> Result<PathBuf, ReportError> {
-    Ok(files::write_file(file, &theory(scene).svg())?)
-}
-
-/// Writes the figure of a frequency response to `file`: exact, by theory, and the backbone, over a range of sigma.
-pub fn write_response(
-    scene: &Dimensionless,
-    response: &FrequencyResponse,
-    range: [f64; 2],
-    file: &Path,
-) -> Result<PathBuf, ReportError> {
-    Ok(files::write_file(file, &responses(scene, response, range).svg())?)
 }
 
 /// Writes `interrupted.csv`: the samples of an experiment that ended early, or without a motion that can be identified.

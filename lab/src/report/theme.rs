@@ -81,8 +81,8 @@ mod tests {
                 assert!(contrast(line, PAPER) > 3.0, "{line}");
             }
         }
-        use Bifurcation::{Fold, PeriodDoubling, SymmetryBreaking, Torus};
-        let curves = [Fold, SymmetryBreaking, PeriodDoubling, Torus].map(|kind| kind.name());
+        use Bifurcation::{Fold, NeimarkSacker, PeriodDoubling, SymmetryBreaking};
+        let curves = [Fold, SymmetryBreaking, PeriodDoubling, NeimarkSacker].map(|kind| kind.name());
         for curve in curves.into_iter().chain([BORDER]) {
             assert!(contrast(curve, HALO) > 4.5, "{curve}");
         }

@@ -61,7 +61,7 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
         return;
     };
     assert!(!console.contains("CONSOLE"), "{console}");
-    assert_eq!(seen.matches("<figcaption>").count(), 7);
+    assert_eq!(seen.matches("<figure>").count(), 7);
     let print = folder.path().join("report.pdf");
     let (console, _) = browser(
         &page,

@@ -64,8 +64,6 @@ pub enum BranchEnd {
 pub struct BranchBifurcation {
     /// What happens.
     pub kind: Bifurcation,
-    /// The motion is stable on one side.
-    pub of_stable: bool,
     /// The motion there.
     pub motion: Periodic,
 }
@@ -180,17 +178,6 @@ impl Serialize for BranchEnd {
     }
 }
 
-impl BranchBifurcation {
-    /// As in a table. A modulation begins at a torus bifurcation only if the motion was stable before.
-    pub fn name(&self) -> &'static str {
-        match (self.kind, self.of_stable) {
-            (Bifurcation::Torus, true) => "torus (modulation begins)",
-            (Bifurcation::Torus, false) => "Neimark-Sacker of an unstable motion",
-            (kind, _) => kind.name(),
-        }
-    }
-}
-
 impl ContinuationLimits {
     fn contain(&self, sigma: f64, g: f64) -> bool {
         let inside = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
@@ -276,7 +263,7 @@ impl Curve<'_> {
             return Some(BranchEnd::Joins);
         }
         match self.condition {
-            Condition::Bifurcation(Bifurcation::Torus) if !next.on_circle(1e-3, 1e-6) => {
+            Condition::Bifurcation(Bifurcation::NeimarkSacker) if !next.on_circle(1e-3, 1e-6) => {
                 return Some(BranchEnd::Resonance);
             }
             Condition::Bifurcation(_) => {}
@@ -342,13 +329,20 @@ impl Curve<'_> {
             let like_first = |part: f64| Ok(kind.test(&at(part).ok_or(())?.map.monodromy) * first > 0.0);
             let (_, beyond) = try_bisection::<()>(0.0, 1.0, FINEST, like_first).ok()?;
             let motion = at(beyond)?;
-            let of_stable = motion.bounds_stability();
             // Two real multipliers whose product is one are a neutral saddle, not a bifurcation.
-            let imaginary = if kind == Bifurcation::Torus { LOCATED } else { 0.0 };
+            let imaginary = if kind == Bifurcation::NeimarkSacker {
+                LOCATED
+            } else {
+                0.0
+            };
             let is_on_circle = motion.on_circle(imaginary, LOCATED);
-            is_on_circle.then_some((beyond, BranchBifurcation { kind, of_stable, motion }))
+            is_on_circle.then_some((beyond, BranchBifurcation { kind, motion }))
         };
-        let kinds = [Bifurcation::Fold, Bifurcation::flip(self.pattern), Bifurcation::Torus];
+        let kinds = [
+            Bifurcation::Fold,
+            Bifurcation::flip(self.pattern),
+            Bifurcation::NeimarkSacker,
+        ];
         let mut found: Vec<_> = kinds.into_iter().filter_map(crossing).collect();
         found.sort_by(|first, second| first.0.total_cmp(&second.0));
         found.into_iter().map(|found| found.1).collect()

@@ -240,9 +240,9 @@ pub enum Bifurcation {
     /// A multiplier of the whole period passes -1.
     #[serde(rename = "period doubling")]
     PeriodDoubling,
-    /// A complex pair leaves the unit circle (Neimark-Sacker): modulation begins.
-    #[serde(rename = "torus")]
-    Torus,
+    /// A complex pair leaves the unit circle: modulation begins where the motion was stable.
+    #[serde(rename = "Neimark-Sacker")]
+    NeimarkSacker,
 }
 
 /// Step of the central differences for conditions on second derivatives of the map. It affects how fast Newton's method converges, not where to.
@@ -255,7 +255,7 @@ impl Bifurcation {
             Bifurcation::Fold => "fold",
             Bifurcation::SymmetryBreaking => "symmetry breaking",
             Bifurcation::PeriodDoubling => "period doubling",
-            Bifurcation::Torus => "Neimark-Sacker",
+            Bifurcation::NeimarkSacker => "Neimark-Sacker",
         }
     }
 
@@ -274,7 +274,7 @@ impl Bifurcation {
             Bifurcation::Fold => (map - Matrix4::identity()).determinant(),
             Bifurcation::SymmetryBreaking | Bifurcation::PeriodDoubling => (map + Matrix4::identity()).determinant(),
             // The products of two multipliers are the eigenvalues of the second compound matrix.
-            Bifurcation::Torus => {
+            Bifurcation::NeimarkSacker => {
                 let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
                 let minor = |(a, b): (usize, usize), (c, d): (usize, usize)| {
                     map[(a, c)] * map[(b, d)] - map[(a, d)] * map[(b, c)]
