@@ -105,9 +105,13 @@ impl Balance {
         // Impacts take at most about what the largest drive gives.
         let taken = damping * response + gain * drive;
         self.loss = larger(self.loss + work - rise - taken, 0.0);
-        self.linear += given - damping * self.linear;
+        // Nothing answers before the delay. A ramp takes less than the periods in which the response grows.
+        let answered = self.driven - config.delay / config.sample_time * sample.turn;
+        if answered > 0.0 {
+            self.linear += given - damping * self.linear;
+        }
         self.growth - self.initial > GROWTH * drive + SHARE * response
             || self.loss > LOSS * drive + LOSS_SHARE * (response + self.loss)
-            || self.driven < GROWING * TAU && self.linear - response > LOSS * drive + SHARE * self.linear
+            || answered < GROWING * TAU && self.linear - response > LOSS * drive + SHARE * self.linear
     }
 }

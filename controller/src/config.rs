@@ -72,8 +72,8 @@ macro_rules! parameters {
                 bandwidth: Real = 0.1 * omega, "rad/s", Positive;
                 /// Damping rate of the structure (damping ratio times natural frequency); none: unknown, and the gains suit an undamped structure.
                 damping_rate: Option<Real> = None, "rad/s", Optional;
-                /// Delay from the drive to the sample of the sensor, used if no reference is connected; half a sample for a rig that holds the
-                /// samples of drive, 0 for a rig whose own oscillator receives omega.
+                /// Delay from the drive to the sample of the sensor: nothing answers earlier, and it is compensated if no reference is connected;
+                /// half a sample for a rig that holds the samples of drive, 0 for a rig whose own oscillator receives omega.
                 delay: Real = 0.0, "s", NotNegative;
             }
             lock {
@@ -241,6 +241,11 @@ impl Config {
             self.base_bandwidth.is_none_or(|bandwidth| bandwidth <= self.bandwidth),
             "base_bandwidth",
             "above 0 and at most bandwidth, or none",
+        )?;
+        require(
+            self.delay * self.bandwidth <= 1.0,
+            "delay",
+            "0 or above, and at most 1/bandwidth, the lag of the detector for which the gains are made",
         )?;
         // Below a sum of the steps of 1 the adaptive filter converges without oscillation.
         require(

@@ -153,7 +153,7 @@ impl Sensing {
             detector: PhaseDetector::new(config),
             target: Complex::unit(-config.phase_target),
             // A transient of the detector has decayed to exp(-2 pi), 0.2 %.
-            warm_up: larger(TAU / config.bandwidth, GROWING * TAU / config.omega_start),
+            warm_up: config.delay + larger(TAU / config.bandwidth, GROWING * TAU / config.omega_start),
         }
     }
 

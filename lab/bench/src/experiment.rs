@@ -146,6 +146,8 @@ pub enum ExperimentError {
         b: f64,
         regime: crate::identification::Regime,
     },
+    #[error("the scene has no drive, E = 0, so that nothing can lock: set excitation.G or excitation.E above 0")]
+    NoDrive,
     #[error("the controller answered {name} = {value} {unit}; it must be {allowed}. The drive is off")]
     Command {
         name: &'static str,
@@ -268,6 +270,9 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         samples: &'a mut Vec<Sample>,
         progress: &'a mut dyn FnMut(Stage, usize),
     ) -> Result<Self, ExperimentError> {
+        if scene.amplitude == 0.0 {
+            return Err(ExperimentError::NoDrive);
+        }
         Ok(Self {
             rig,
             controller,

@@ -139,6 +139,20 @@ impl Scene {
         })
     }
 
+    /// What is possible, but hardly meant: a value in another unit, such as kN/m, g or mm.
+    pub fn implausible(&self) -> impl Iterator<Item = Implausible> {
+        let d = Dimensionless::of(&self.plant, 0.0);
+        let hertz = d.omega0 / TAU;
+        [
+            ("epsilon = m/M", d.epsilon, "", d.epsilon > 0.3),
+            ("lambda = c/(m omega0)", d.lambda, "", d.lambda > 30.0),
+            ("b", d.b, "m", d.b > 1.0),
+            ("the natural frequency", hertz, "Hz", hertz < 0.1),
+        ]
+        .into_iter()
+        .filter_map(|(name, value, unit, is)| is.then_some(Implausible { name, value, unit }))
+    }
+
     /// Whether a motion of the scene's plant has a mirror image, half a period later, as in an ideal cavity: neither tilt nor walls of
     /// different restitution. Where it has none, the 1:1 motion is asymmetric. (Unequal gaps move the middle of the cavity only.)
     pub fn has_mirror_images(&self) -> bool {
@@ -151,6 +165,15 @@ impl Scene {
     pub fn sample_time(&self) -> f64 {
         TAU / self.plant.natural_frequency() / self.controller.samples_per_period
     }
+}
+
+/// A value of a scene that is possible, but hardly meant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(missing_docs, reason = "the structure explains them")]
+pub struct Implausible {
+    pub name: &'static str,
+    pub value: f64,
+    pub unit: &'static str,
 }
 
 /// Whether there is friction in the cavity.

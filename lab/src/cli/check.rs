@@ -7,7 +7,7 @@ use vines::report::{Table, number, with_uncertainty};
 
 use super::failure::Failure;
 use super::options::{Endpoint, ReachArguments, SceneArguments};
-use super::output::{log_warnings, output, print};
+use super::output::{output, print};
 
 const HELP: &str = "\
 Drives the rig at a hundredth of the drive for 24 periods with the loop open, and compares amplitude and phase of response and base with
@@ -47,7 +47,6 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
-    log_warnings();
     scene.start = Default::default();
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach()?)?;
     let checked = check(open.rig.as_mut(), &scene).map_err(ExperimentError::from)?;

@@ -14,7 +14,7 @@ use vines::rig::{BuiltIn, Controller, Fault, Rig};
 use vines::{advice, loop_check, report, scene::Scene};
 
 use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
-use super::output::{log_warnings, output, print, writable, written};
+use super::output::{output, print, writable, written};
 use super::tap::Tap;
 use super::watch::{Watch, WatchArguments};
 use super::{check, failure::Failure, pack::fmus};
@@ -80,8 +80,7 @@ impl ExperimentArguments {
         config: impl Fn(&Scene) -> Config,
     ) -> Result<(Scene, Session), Failure> {
         let mut scene = self.scene.load()?;
-        log_warnings();
-        let watch = self.watch.start(command, &scene)?;
+            let watch = self.watch.start(command, &scene)?;
         let scope = self.reach.reach()?;
         BuiltIn::new(&config(&scene))?;
         writable(&self.out)?;

@@ -50,7 +50,7 @@ impl<E: Error + 'static> From<E> for Failure {
                 return Self::new(INTERRUPTED, error);
             }
             // The plant refuses a drive that comes from the scene.
-            Some(ExperimentError::Rig(RigError::Refused(_))) => true,
+            Some(ExperimentError::NoDrive | ExperimentError::Rig(RigError::Refused(_))) => true,
             _ => false,
         };
         let is_input = is_of_experiment

@@ -12,9 +12,10 @@ use vines::helic::{DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::report::summary::ideal;
 use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
-use vines::scene::{Family, Names, Override, PAPER, Scene, SceneError};
+use vines::scene::{Family, Implausible, Names, Override, PAPER, Scene, SceneError};
 
 use super::failure::{Failure, stop_flag};
+use super::output::log_warnings;
 
 #[derive(Debug, Args)]
 pub(super) struct SceneArguments {
@@ -34,8 +35,19 @@ impl SceneArguments {
         scene.chain(self.set.iter().map(|setting| format!("--set={setting}")))
     }
 
+    /// The scene; a warning names values that are hardly meant.
     pub(super) fn load(&self) -> Result<Scene, SceneError> {
-        Scene::load(self.scene.as_deref(), &self.set)
+        log_warnings();
+        let scene = Scene::load(self.scene.as_deref(), &self.set)?;
+        let named = scene.implausible().map(|Implausible { name, value, unit }| format!("{name} = {value:.3} {unit}"));
+        let named: Vec<String> = named.map(|text| text.trim_end().into()).collect();
+        if !named.is_empty() {
+            log::warn!(
+                "{}: is this meant? A scene has k in N/m, M and m in kg, c in N s/m, b in m",
+                named.join(", ")
+            );
+        }
+        Ok(scene)
     }
 
     /// The scene, for results of the ideal cavity: a warning says what they leave out.

@@ -105,6 +105,12 @@ fn input_without_sense_ends_with_one_message_and_code_two_and_without_a_result_w
         ("orbit --sigma=-1000", 2, "above 0"),
         ("orbit --sigma=-1 --set=excitation.G=0.6", 1, "vines map"),
         ("orbit --response --set=excitation.G=0", 1, "G = 0"),
+        ("identify --rig built-in --set=excitation.G=0", 2, "no drive"),
+        (
+            "orbit --response --set=excitation.G=0 --set=plant.k=0.1168 --set=plant.m=32 --set=plant.b=10",
+            1,
+            "epsilon = m/M = 8.406, b = 10.000 m, the natural frequency = 0.028 Hz: is this meant?",
+        ),
         ("orbit --response --range=2:-2", 2, "first below the last"),
         ("orbit --periodic --set=plant.r_scatter=0.1", 1, "set it to 0"),
         (

@@ -1,5 +1,7 @@
 //! The `[chain]` section: the measurement chain between rig and controller, off by default.
 
+use std::f64::consts::TAU;
+
 use serde::{Deserialize, Serialize};
 
 use super::{ControllerSettings, SceneError, check, option, positive, within};
@@ -91,6 +93,17 @@ impl ChainSettings {
             [2.0, nyquist],
         )?;
         within("chain.jitter", self.jitter, "samples", [0.0, 0.1])?;
-        within("chain.delay", self.delay.into(), "samples", [0.0, 1000.0])
+        // As the controller checks it; here the keys of a scene are at hand.
+        let longest = controller.samples_per_period / (TAU * controller.bandwidth);
+        check(
+            "chain.delay",
+            self.delay.into(),
+            "samples",
+            f64::from(self.delay) <= longest,
+            format!(
+                "must be at most {longest:.0}: the detector of the bandwidth {} omega0 lags by as much; lower controller.bandwidth",
+                controller.bandwidth
+            ),
+        )
     }
 }

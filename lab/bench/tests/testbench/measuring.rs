@@ -86,6 +86,19 @@ fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most_and_six_bits_s
     assert!((at("chain.delay=1").unwrap().sigma - ideal.sigma).abs() < 1e-6);
 }
 
+#[test]
+fn a_delay_of_more_than_a_period_that_the_controller_knows_does_not_keep_it_from_the_lock() {
+    let ideal = at("").unwrap();
+    for settings in [
+        "chain.delay=120",
+        "chain.delay=120 chain.reference=false",
+        "chain.delay=250 controller.bandwidth=0.06",
+    ] {
+        let late = at(settings).unwrap();
+        assert!((late.sigma - ideal.sigma).abs() < 1e-4, "{settings}: {late:?}");
+    }
+}
+
 /// A rig without an input for samples of the base, counting what it reads.
 struct Counter(f64);
 
