@@ -80,7 +80,7 @@ impl ExperimentArguments {
         config: impl Fn(&Scene) -> Config,
     ) -> Result<(Scene, Session), Failure> {
         let mut scene = self.scene.load()?;
-            let watch = self.watch.start(command, &scene)?;
+        let watch = self.watch.start(command, &scene)?;
         let scope = self.reach.reach()?;
         BuiltIn::new(&config(&scene))?;
         writable(&self.out)?;

@@ -39,7 +39,9 @@ impl SceneArguments {
     pub(super) fn load(&self) -> Result<Scene, SceneError> {
         log_warnings();
         let scene = Scene::load(self.scene.as_deref(), &self.set)?;
-        let named = scene.implausible().map(|Implausible { name, value, unit }| format!("{name} = {value:.3} {unit}"));
+        let named = scene
+            .implausible()
+            .map(|Implausible { name, value, unit }| format!("{name} = {value:.3} {unit}"));
         let named: Vec<String> = named.map(|text| text.trim_end().into()).collect();
         if !named.is_empty() {
             log::warn!(
