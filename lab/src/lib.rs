@@ -5,6 +5,7 @@
 mod files;
 pub mod pack;
 pub mod points;
+pub mod regime_map;
 pub mod report;
 
 pub use files::{FileError, write_file};
@@ -12,7 +13,6 @@ pub use vines_fmu as fmu;
 pub use vines_helic as helic;
 pub use vines_model::{ArgumentError, curves, map, numerics, orbit, regime, theory};
 pub use vines_net as net;
-pub use vines_sweep as sweep;
 pub use vines_testbench::{
-    advice, backbone, comparison, experiment, fit, identification, live, loop_check, record, rig, scene,
+    advice, backbone, cells, comparison, experiment, fit, identification, live, loop_check, record, rig, scene,
 };

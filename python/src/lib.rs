@@ -16,7 +16,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<plants::Plants>()?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<experiments::PhaseLock>()?;
-    module.add_class::<sweeps::Sweep>()?;
+    module.add_class::<sweeps::Cells>()?;
     for function in [
         wrap_pyfunction!(plants::plant_table, module)?,
         wrap_pyfunction!(experiments::identify, module)?,
@@ -27,6 +27,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(experiments::theory, module)?,
         wrap_pyfunction!(experiments::regime, module)?,
         wrap_pyfunction!(sweeps::regimes, module)?,
+        wrap_pyfunction!(sweeps::unit, module)?,
     ] {
         module.add_function(function)?;
     }

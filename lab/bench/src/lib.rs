@@ -6,6 +6,7 @@
 
 pub mod advice;
 pub mod backbone;
+pub mod cells;
 pub mod comparison;
 pub mod experiment;
 pub mod fit;

@@ -8,9 +8,10 @@ use std::sync::{Arc, OnceLock};
 
 use lovines::InvalidValue;
 use phase_lock::ConfigError;
+use vines::cells::CellError;
 use vines::rig::{Interrupted, RigError};
 use vines::scene::{SceneError, refusal};
-use vines::{ArgumentError, experiment::ExperimentError, net::LinkError, pack::PackError, sweep::SweepError};
+use vines::{ArgumentError, experiment::ExperimentError, net::LinkError, pack::PackError};
 
 /// Exit code of a program that a signal ended: 128 and the number of SIGINT.
 pub(super) const INTERRUPTED: u8 = 130;
@@ -58,7 +59,7 @@ impl<E: Error + 'static> From<E> for Failure {
             || any.is::<InvalidValue>()
             || any.is::<PackError>()
             || any.is::<SceneError>()
-            || any.is::<SweepError>()
+            || any.is::<CellError>()
             || matches!(any.downcast_ref(), Some(LinkError::Address { .. }));
         Self::new(if is_input { 2 } else { 1 }, error)
     }

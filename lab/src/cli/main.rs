@@ -15,7 +15,6 @@ mod output;
 mod pack;
 mod report;
 mod serve;
-mod sweep;
 mod tap;
 mod theory;
 mod watch;
@@ -37,7 +36,6 @@ Examples:
   vines orbit --response                       the exact frequency response, stable and unstable
   vines theory --scene scenes/dimensionless.toml --set plant.epsilon=0.0042
   vines map                                    the regimes over sigma and G
-  vines sweep --axis plant.r=0.3:1:71 --axis start.dq2=-1:1:81 --out r.zarr
   vines report --out report                    everything on one page, with figures
   vines pack --out fmus                        write LoViNes.fmu and PhaseLock.fmu
   vines rig --listen 127.0.0.1:5510            serve the plant in real time, for identify --rig udp://127.0.0.1:5510
@@ -61,7 +59,6 @@ enum Command {
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
     Map(map::Arguments),
-    Sweep(sweep::Arguments),
     Report(report::Arguments),
     Pack(pack::Arguments),
     Rig(serve::RigArguments),
@@ -90,7 +87,6 @@ fn dispatch(command: Command) -> Result<String, Failure> {
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),
-        Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Pack(arguments) => pack::run(&arguments),
         Command::Rig(arguments) => serve::rig(&arguments),

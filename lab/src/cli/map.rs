@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use clap::Args;
 use vines::map::{CONFIRMATIONS, LIMIT};
 use vines::orbit::Branch;
+use vines::regime_map::{Axis, Map};
 use vines::report;
 use vines::report::summary::{parameters, regimes};
-use vines::sweep::{Axis, Map};
 
 use super::failure::Failure;
 use super::options::{SceneArguments, warn_left_out};
@@ -29,9 +29,9 @@ the recurrence, the exponent with its standard error, the share of captured impa
 Chaos may end after a random time. A cell is named modulated or chaotic only if all of 1 + --confirmations motions remain so for
 --periods; docs/regimes.md says how often chaos ends later. The column `coexisting` has the regimes of motions that differ.
 Where several regimes are stable, the start decides: a particle at rest may remain at rest where a moving one hits the walls.
-`vines sweep` with random axes such as start.dq2 shows which starts lead to which regime.
+A map over two numbers of the start, such as start.q2 and start.dq2, shows which starts lead to which regime.
 
-A key is sigma, G, r, or section.key of a scene, as in `vines sweep`.
+A key is sigma, G, r, or section.key of a scene. More axes, or a map too large for the memory: `vines.sweep` in Python.
 
 Examples:
   vines map                                               sigma and G, in out/
@@ -79,9 +79,9 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let Arguments { x, y, sigma, periods, confirmations, out, .. } = arguments;
     let mut map = Map::new(arguments.scene.family()?, x, y, *sigma, *periods)?;
-    warn_left_out(map.sweep.scene(), "a regime map is");
+    warn_left_out(map.scene(), "a regime map is");
     writable(out)?;
-    let bar = progress_bar(map.sweep.cells(), "mapping regimes [{wide_bar}] {pos}/{len} cells");
+    let bar = progress_bar(map.size(), "mapping regimes [{wide_bar}] {pos}/{len} cells");
     map.run(*confirmations, || bar.inc(1))?;
     bar.finish_and_clear();
     let summary = summary(&map);
@@ -90,10 +90,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 }
 
 fn summary(map: &Map) -> String {
-    let [x, y] = map.axes().map(Axis::short_form);
+    let Map { x, y, .. } = map;
     let mut text = format!(
         "Regimes over {x} and {y}\n  {}\n\n{}",
-        parameters(&map.sweep.scene().dimensionless()),
+        parameters(&map.scene().dimensionless()),
         regimes(map).text()
     );
     if !map.curves.is_empty() {

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, Parser};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use vines::map::LIMIT;
+use vines::regime_map::{Axis, Map};
 use vines::report::summary::{ideal, parameters};
 use vines::rig::BuiltIn;
 use vines::scene::Scene;
-use vines::sweep::{Axis, Map};
 
 use super::output::{writable, written};
 use super::{Cli, dispatch};

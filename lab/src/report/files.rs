@@ -9,13 +9,14 @@ use serde_json::Value;
 use thiserror::Error;
 
 use super::figures::{backbone, history, manifold, regimes, tracked};
+use crate::cells::CellError;
 use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
 use crate::files::{self, FileError};
 use crate::orbit::Periodic;
 use crate::record::{Record, Sample, table};
 use crate::regime::Regime;
+use crate::regime_map::{Map, MapCell};
 use crate::scene::Scene;
-use crate::sweep::{Map, MapCell, SweepError};
 
 /// Why a report could not be computed, or the files of a run could not be written.
 #[derive(Debug, Error)]
@@ -26,7 +27,7 @@ pub enum ReportError {
     #[error(transparent)]
     Controller(#[from] ConfigError),
     #[error(transparent)]
-    Map(#[from] SweepError),
+    Map(#[from] CellError),
     #[error(transparent)]
     File(#[from] FileError),
     #[error("cannot write a table as CSV: {0}")]

@@ -3,8 +3,8 @@
 use super::table::{Table, row, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use crate::identification::{DecayEnd, Friction, Regime, ResonancePoint};
+use crate::regime_map::Map;
 use crate::scene::{Definition, Dimensionless, Sensor};
-use crate::sweep::Map;
 
 /// The dimensionless numbers of a scene, in one line.
 pub fn parameters(p: &Dimensionless) -> String {

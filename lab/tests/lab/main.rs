@@ -4,10 +4,10 @@ mod backbone;
 mod command_line;
 mod endpoints;
 mod experiment;
+mod map;
 mod packing;
 mod pair;
 mod report;
-mod sweep;
 mod watch;
 
 use std::io::{BufRead, BufReader, Read};

@@ -1,21 +1,22 @@
 //! The regime map: coloured cells, bifurcations, and the theory's stable island.
 
 use super::DETUNING;
+use crate::cells::SIGMA;
 use crate::numerics::bisection;
 use crate::orbit::Periodic;
 use crate::regime::Regime;
+use crate::regime_map::{Axis, Map};
 use crate::report::figure::{Figure, Panel, Place, Shape};
 use crate::report::theme::BORDER;
 use crate::scene::Dimensionless;
-use crate::sweep::{Grid, Map, SIGMA};
 
 pub fn regimes(map: &Map) -> Figure {
-    let (Map { x, y, .. }, [x_name, y_name]) = (map, map.names());
-    let axis = |grid: &Grid, name| {
-        let half = grid.step() / 2.0;
-        ((grid.from - half, grid.to + half), label(name))
+    let Map { x, y, .. } = map;
+    let range = |axis: &Axis| {
+        let half = axis.step() / 2.0;
+        (axis.from - half, axis.to + half)
     };
-    let mut panel = Panel::new(axis(x, x_name), axis(y, y_name));
+    let mut panel = Panel::new((range(x), label(x.name())), (range(y), label(y.name())));
     for regime in Regime::SIMULATED {
         // The number tells apart a regime of few cells, which a curve may hide.
         let name = match map.count(regime).0 {
@@ -53,9 +54,9 @@ fn place_on(map: &Map) -> impl Fn(&Periodic) -> Place {
 }
 
 fn caption(map: &Map) -> String {
-    let numbers = map.sweep.scene().dimensionless();
+    let numbers = map.scene().dimensionless();
     let Dimensionless { epsilon, lambda, g, r, .. } = numbers;
-    let sigma = map.sweep.sigma().map(|sigma| format!(", σ = {sigma:.4}"));
+    let sigma = map.sigma().map(|sigma| format!(", σ = {sigma:.4}"));
     let free = |name: &str| !map.names().contains(&name);
     let g = free("G").then(|| format!(", G = {g:.3}"));
     let r = free("r").then(|| format!(", r = {r}"));
@@ -66,7 +67,7 @@ fn caption(map: &Map) -> String {
     };
     format!(
         "ε = {epsilon:.5}, λ = {lambda:.3}{held}{dashed}\neach cell from the same start, followed until it repeats, at most {} periods",
-        map.sweep.settings().periods
+        map.periods()
     )
 }
 
@@ -81,7 +82,7 @@ fn label(name: &str) -> &str {
 
 /// The cells of a regime, with neighbours in a row merged.
 fn stripes(map: &Map, regime: Regime) -> Vec<Place> {
-    let (x, y) = (map.x, map.y);
+    let Map { x, y, .. } = map;
     let mut corners = Vec::new();
     for (row, cells) in (0..).zip(map.cells.chunks(x.points as usize)) {
         let mut column = 0;
@@ -103,8 +104,8 @@ const PARTS: usize = 100;
 
 /// The border of the region where first-order theory has a stable symmetric 1:1 motion, by marching squares: pairs of ends.
 fn outline(map: &Map) -> Vec<Place> {
-    let along = |grid: Grid, n: usize| grid.from + (grid.to - grid.from) * n as f64 / PARTS as f64;
-    let place = |column: usize, row: usize| (along(map.x, column), along(map.y, row));
+    let along = |axis: &Axis, n: usize| axis.from + (axis.to - axis.from) * n as f64 / PARTS as f64;
+    let place = |column: usize, row: usize| (along(&map.x, column), along(&map.y, row));
     let inside = |(x, y): Place| map.theory_stable(x, y);
     let corners: Vec<Vec<bool>> = (0..=PARTS)
         .map(|row| (0..=PARTS).map(|column| inside(place(column, row))).collect())
