@@ -1,36 +1,45 @@
 """Basins of attraction: from which starts of the primary mass, with the particle at rest, impacts begin and persist.
 
-python examples/basin.py [FOLDER]    writes basin.zarr and basin.svg; continues an interrupted sweep
+python examples/basin.py [FOLDER]    writes basin.svg
 """
 
 import csv
-import json
 import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+import numpy as np
 from matplotlib.colors import ListedColormap
+from matplotlib.patches import Patch
 
 import vines
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
 folder.mkdir(parents=True, exist_ok=True)
 scene = vines.Scene(start={"dq2": 0.0})
-axes = {"start.q1": vines.linspace(-0.0099, 0.0099, 61), "start.dq1": vines.linspace(-0.6, 0.6, 61)}
-cells = vines.sweep(scene, axes, out=folder / "basin.zarr", periods=1000)
-found = [code for code in range(len(vines.REGIMES)) if (cells.regime == code).any()]
-position = cells.regime.copy(data=[[found.index(code) for code in row] for row in cells.regime.values])
-figure, plot = plt.subplots(figsize=(6, 4.5), layout="constrained")
+axes = {"start.q1": np.linspace(-0.0099, 0.0099, 121), "start.dq1": np.linspace(-0.6, 0.6, 121)}
+cells = vines.sweep(scene, axes, periods=1000)
 with (Path(__file__).parent.parent / "lab/src/report/styles.csv").open() as styles:
-    colour = {row["name"]: row["light"] for row in csv.DictReader(styles)}
-colours = ListedColormap([colour[vines.REGIMES[code]] for code in found])
-image = plot.pcolormesh(
-    1e3 * cells["start.q1"], cells["start.dq1"], position.T, cmap=colours, vmin=-0.5, vmax=len(found) - 0.5
+    colours = {row["name"]: row["light"] for row in csv.DictReader(styles)}
+colours = [colours[name] for name in vines.REGIMES]
+plt.rcParams.update({"font.size": 9, "svg.fonttype": "none", "font.family": "sans-serif", "svg.hashsalt": "vines"})
+figure, plot = plt.subplots(figsize=(6.5, 4), layout="constrained")
+plot.pcolormesh(
+    1e3 * cells["start.q1"],
+    cells["start.dq1"],
+    cells.regime.T,
+    cmap=ListedColormap(colours),
+    vmin=-0.5,
+    vmax=len(colours) - 0.5,
+    rasterized=True,
 )
-figure.colorbar(image, ticks=range(len(found))).set_ticklabels([vines.REGIMES[code] for code in found])
+# In the order of the regime map.
+found = [code for code in range(len(colours)) if (cells.regime == code).any()]
+patches = [Patch(facecolor=colours[code], edgecolor="0.6", label=vines.REGIMES[code]) for code in found]
+figure.legend(handles=patches, loc="outside right upper", frameon=False)
 plot.set(
-    xlabel="q1 at the start, mm",
-    ylabel="q1' at the start, m/s",
-    title=f"$\\sigma$ = {json.loads(cells.attrs['vines'])['sigma']:.4f}, G = 1.1",
+    xlabel="displacement of the primary mass at the start, mm",
+    ylabel="velocity at the start, m/s",
+    title="Regimes by start: default scene at phase resonance, particle at rest",
 )
-figure.savefig(folder / "basin.svg")
+figure.savefig(folder / "basin.svg", metadata={"Date": None}, dpi=150)

@@ -99,13 +99,9 @@ pub struct Cells {
 #[pymethods]
 impl Cells {
     #[new]
-    fn new(
-        scene: &Scene,
-        keys: Vec<String>,
-        sigma: Option<f64>,
-        results: Vec<String>,
-        periods: usize,
-    ) -> PyResult<Self> {
+    fn new(scene: &Scene, keys: Vec<String>, sigma: Option<f64>, results: Vec<String>, periods: i64) -> PyResult<Self> {
+        let periods = usize::try_from(periods)
+            .map_err(|_| invalid(format!("{periods} periods: a number of at least 100 is allowed")))?;
         if let Some(name) = results.iter().find(|name| !GROUPS.contains(&name.as_str())) {
             return Err(invalid(format!(
                 "unknown results `{name}`; known are regime, response, orbits and lock"

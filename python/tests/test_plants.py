@@ -162,7 +162,7 @@ def batch(n):
     plants.advance(0.1, amplitude=9.2e-5, omega=54.9)
     return plants.states.tolist()
 def sweep(n):
-    return vines.sweep(None, {"plant.r": [0.5, 0.6]}, out=f"{sys.argv[1]}/{n}", periods=200).sizes["plant.r"]
+    return vines.sweep(None, {"plant.r": [0.5, 0.6]}, store=f"{sys.argv[1]}/{n}", periods=200).sizes["plant.r"]
 def one(n):
     plant = vines.Plant()
     plant.advance(0.1)

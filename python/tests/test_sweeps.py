@@ -1,17 +1,17 @@
-"""Sweeps from Python: the bytes of `vines sweep`, interruptions, and a local cluster of Dask."""
+"""Sweeps from Python: their cells, stores that are killed, damaged and continued, and a local cluster of Dask."""
 
-import errno
+import csv
 import json
 import os
 import signal
 import subprocess
+import sys
 import threading
 import time
 from contextlib import contextmanager
 from pathlib import Path
 
 import dask
-import dask.threaded
 import numpy as np
 import pytest
 import xarray
@@ -19,179 +19,229 @@ from dask.distributed import Client, LocalCluster
 
 import vines
 
-AXES = {"sigma": vines.linspace(-3.0, 3.0, 31), "start.dq2": vines.linspace(-0.6, 0.7, 40)}
-SETTINGS = {"periods": 200, "chunk": 40}
+AXES = {"sigma": np.linspace(-3.0, 3.0, 31), "start.dq2": np.linspace(-0.6, 0.7, 40)}
+SETTINGS = {"periods": 200, "chunks": {"sigma": 1}}
 
 
-def content(folder):
-    return {str(one.relative_to(folder)): one.read_bytes() for one in Path(folder).rglob("*") if one.is_file()}
+def files(folder):
+    """Every file of a store but those that a killed process left under another name, with its content."""
+    found = (file for file in Path(folder).rglob("*") if file.is_file() and file.suffix != ".partial")
+    return {str(file.relative_to(folder)): file.read_bytes() for file in found}
+
+
+def written(folder):
+    """When every file was written."""
+    return {name: (Path(folder) / name).stat().st_mtime_ns for name in files(folder)}
+
+
+def chunks(names):
+    """The chunks of the results among the names of files."""
+    return {tuple(name.split("/")[2:]) for name in names if "/c/" in name and not name.startswith(tuple(AXES))}
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     out = tmp_path_factory.mktemp("whole") / "store"
-    vines.sweep(None, AXES, out=out, **SETTINGS)
-    return content(out)
+    vines.sweep(None, AXES, store=out, **SETTINGS)
+    return files(out)
 
 
-def test_the_store_has_the_bytes_of_the_program(whole, tmp_path):
-    program = os.environ["VINES"]
-    axes = [f"--axis={name}={one.first}:{one.last}:{one.number}" for name, one in AXES.items()]
-    out = tmp_path / "store"
-    subprocess.run([program, "sweep", *axes, "--periods=200", "--chunk=40", f"--out={out}"], check=True)
-    assert content(out) == whole
+def test_in_memory_in_a_store_and_with_the_schedulers_of_dask_the_cells_are_identical(tmp_path):
+    axes = {
+        "sigma": np.linspace(-3.0, 3.0, 5),
+        "plant.r": ("sample", [0.5, 0.6, 0.7]),
+        "start.dq2": ("sample", [0.3] * 3),
+    }
+    settings = {"periods": 200, "results": ["response", "orbits"]}
+    cells = vines.sweep(None, axes, **settings)
+    assert dict(cells.sizes) == {"sigma": 5, "sample": 3}
+    stored = vines.sweep(None, axes, store=tmp_path / "s", chunks={"sample": 2}, **settings)
+    xarray.testing.assert_identical(stored.compute(), cells)
+    lazy = vines.sweep(None, axes, chunks={"sigma": 2, "sample": 2}, **settings)
+    assert dask.is_dask_collection(lazy)
+    for scheduler in ("threads", "synchronous"):
+        xarray.testing.assert_identical(lazy.compute(scheduler=scheduler), cells)
+    with Client(processes=False, dashboard_address=None):
+        lazy = vines.sweep(None, axes, **settings)
+        assert dask.is_dask_collection(lazy)
+        xarray.testing.assert_identical(lazy.compute(), cells)
 
 
-def test_designs_lists_and_results_become_a_dataset_with_units(tmp_path):
-    axes = {"plant.r": [0.5, 0.65], "start.dq2": ("random", -0.6, 0.6), "start.q2": ("random", -0.005, 0.005)}
-    cells = vines.sweep(None, axes, out=tmp_path / "s", samples=8, periods=200, results=["response", "orbits"])
-    assert dict(cells.sizes) == {"plant.r": 2, "sample": 8}
-    assert cells["start.dq2"].dims == ("sample",)
-    assert "start.dq2" in cells.coords
-    assert cells["start.dq2"].attrs["units"] == "m/s"
+def test_axes_are_coordinates_of_xarray_and_results_have_units():
+    values = [0.3, 0.6, 0.9]
+    for given in (values, np.array(values), xarray.DataArray(values), ("sample", values)):
+        cells = vines.sweep(None, {"plant.r": given}, periods=200, results=["response"])
+        assert cells["plant.r"].values.tolist() == values
     assert cells.impact_power.attrs["units"] == "W"
-    assert (cells.failure == "").all()
+    units = {"sigma": "1", "plant.c": "N s/m", "chain.snr": "dB", "phase_lock.base_bandwidth": "rad/s"}
+    for key, unit in units.items():
+        assert vines.sweep(None, {key: [1.0]}, periods=200)[key].attrs["units"] == unit
     assert json.loads(cells.attrs["vines"])["scene"]["plant"]["M"] == 3.807
-
-
-def test_paired_samples_share_a_dimension_and_have_the_cells_of_the_program(tmp_path):
-    r, start = [0.5, 0.65, 0.5], np.array([0.3, 0.4, 0.5])
-    cells = vines.sweep(None, paired={"plant.r": r, "start.dq2": start}, out=tmp_path / "s", periods=200)
-    assert dict(cells.sizes) == {"sample": 3}
-    assert cells["plant.r"].values.tolist() == r
-    assert cells["start.dq2"].values.tolist() == start.tolist()
-    grid = vines.sweep(None, {"plant.r": [0.5, 0.65], "start.dq2": start}, out=tmp_path / "grid", periods=200)
-    for name in ("regime", "followed", "recurrence"):
-        expected = [grid[name].values[0, 0], grid[name].values[1, 1], grid[name].values[0, 2]]
-        assert np.array_equal(cells[name].values, expected, equal_nan=True)
-    axes = ["--axis=plant.r=paired:0.5,0.65,0.5", "--axis=start.dq2=paired:0.3,0.4,0.5"]
-    out = tmp_path / "program"
-    subprocess.run([os.environ["VINES"], "sweep", *axes, "--periods=200", f"--out={out}"], check=True)
-    assert content(out) == content(tmp_path / "s")
-
-
-@pytest.mark.parametrize(
-    ("axes", "paired", "parts"),
-    [
-        ({}, {"plant.r": [0.5, 0.6], "plant.b": [0.01, 0.02, 0.03]}, ["plant.r has 2", "plant.b has 3"]),
-        ({"plant.r": [0.5, 0.6]}, {"plant.r": [0.5, 0.6]}, ["plant.r", "give one of them"]),
-        ({}, {"plant.r": [0.5]}, ["one value"]),
-    ],
-)
-def test_paired_samples_that_do_not_belong_together_are_value_errors(axes, paired, parts, tmp_path):
-    with pytest.raises(ValueError) as error:  # noqa: PT011
-        vines.sweep(None, axes, paired=paired, out=tmp_path / "store")
-    for part in parts:
-        assert part in str(error.value)
-    assert not (tmp_path / "store").exists()
-
-
-def test_a_list_of_three_numbers_is_three_values(tmp_path):
-    for n, values in enumerate(([0.3, 0.6, 0.9], np.array([0.3, 0.6, 0.9]), xarray.DataArray([0.3, 0.6, 0.9]))):
-        cells = vines.sweep(None, {"plant.r": values}, out=tmp_path / str(n), periods=200)
-        assert cells["plant.r"].values.tolist() == [0.3, 0.6, 0.9]
-
-
-def test_codes_of_regimes_have_names_and_a_store_can_be_written_as_netcdf(tmp_path):
-    cells = vines.sweep(None, {"plant.r": [0.5, 0.65]}, out=tmp_path / "s", sigma=-1.1, periods=1000)
-    for r, code in zip([0.5, 0.65], cells.regime.values, strict=True):
-        scene = vines.Scene(plant={"r": r})
-        assert vines.REGIMES[code] == vines.regime(scene, sigma=-1.1, periods=1000).regime
-    meanings = "_".join([*vines.REGIMES, "failed", "not_computed"]).replace(" ", "_")
-    assert cells.regime.attrs["flag_meanings"].replace(" ", "_") == meanings
     allowed = (str, int, float, np.number, np.ndarray, list)
     for one in (cells, *cells.variables.values()):
+        # As netCDF has them.
         assert all(isinstance(value, allowed) and not isinstance(value, bool) for value in one.attrs.values())
 
 
-@pytest.mark.parametrize(
-    ("axes", "parts"),
-    [
-        ({"plant.rr": vines.linspace(0.3, 0.5, 3)}, ["plant.rr", "unknown field"]),
-        ({"plant.r": vines.linspace(0.3, float("nan"), 3)}, ["plant.r", "NaN"]),
-        ({"plant.r": [0.5]}, ["plant.r has one value", 'Scene(plant={"r": 0.5})']),
-        ({"plant.r": 0.5}, ["plant.r = 0.5", "a list of numbers"]),
-        ({"plant.r": ("normal", 0.3, 0.5)}, ["plant.r", "normal", "random"]),
-        (
-            {"plant.r": vines.linspace(0.3, 1.0, 10**6), "sigma": vines.linspace(-5.0, 5.0, 10**6)},
-            ["1000000000000 cells", " h ", "GB", "confirm=True"],
-        ),
-        ({}, ["at least one axis"]),
-        # A range until now, three values for everyone else.
-        ({"plant.r": (0.3, 0.9, 7)}, ["plant.r = (0.3, 0.9, 7)", "vines.linspace", "a list"]),
-        ({"plant.r": (0.3, 0.9)}, ["plant.r = (0.3, 0.9)", "vines.linspace", "a list"]),
-        ({"plant.r": np.ma.masked_array([0.3, 0.5, 0.9], [0, 1, 0])}, ["masked"]),
-        ({"plant.r": [[0.3, 0.5]]}, ["plant.r = [[0.3, 0.5]]", "a list of numbers"]),
-        ({"plant.r": ["0.3", "0.5"]}, ["plant.r", "a list of numbers"]),
-    ],
-)
-def test_bad_axes_are_value_errors_and_write_nothing(axes, parts, tmp_path):
-    with pytest.raises(ValueError) as error:  # noqa: PT011
-        vines.sweep(None, axes, out=tmp_path / "store")
-    for part in parts:
-        assert part in str(error.value)
-    assert not (tmp_path / "store").exists()
+def test_cells_have_the_bits_of_the_map_and_of_the_program(tmp_path):
+    options = "--x sigma=-3:3:7 --y G=0.4:2.4:6 --periods 400 --confirmations 0"
+    subprocess.run(
+        [os.environ["VINES"], "map", *options.split(), "--out", tmp_path], check=True, stdout=subprocess.DEVNULL
+    )
+    with (tmp_path / "map.csv").open() as table:
+        rows = list(csv.DictReader(table))
+    axes = {"excitation.G": 0.4 + np.arange(6) * (2.0 / 5), "sigma": -3.0 + np.arange(7) * 1.0}
+    cells = vines.sweep(None, axes, periods=400)
+    assert [vines.REGIMES[code] for code in cells.regime.values.flat] == [row["regime"] for row in rows]
+    for name, column in (("settling", "transient"), ("exponent", "exponent"), ("recurrence", "recurrence")):
+        expected = [float(row[column] or "nan") for row in rows]
+        assert np.array_equal(cells[name].values.ravel(), expected, equal_nan=True), name
+
+
+def test_on_a_symmetric_motion_the_response_is_that_of_the_exact_orbit():
+    axes = {"sigma": [-1.2, -1.05], "excitation.G": [1.05, 1.15, 1.25]}
+    cells = vines.sweep(None, axes, results=["response", "orbits"])
+    assert abs(cells.C / cells.orbit_C - 1).max() < 1e-5
+    numbers = vines.Scene().dimensionless
+    # The relative velocity of damper and base is that of v within epsilon, and of the base.
+    omega = numbers["omega0"] * (1 + numbers["epsilon"] * cells.sigma)
+    expected = 0.5 * 2.53 * (numbers["b"] * omega * cells.C) ** 2
+    assert abs(cells.damper_power / expected - 1).max() < 0.05
+    assert cells.impact_power.min() > 0
+
+
+def test_a_cell_that_fails_has_its_reason_and_stops_nothing():
+    cells = vines.sweep(None, {"excitation.G": [0.1, 1.1]}, results="lock", periods=200)
+    # As the README shows for the default scene; at G = 0.1, nothing is hit.
+    assert cells.lock_sigma.values == pytest.approx([np.nan, -1.139376], abs=4e-6, nan_ok=True)
+    assert "no locked point" in cells.failure.values[0]
+    assert cells.failure.values[1] == ""
+    cells = vines.sweep(None, {"plant.r": [0.9, 1.2]}, periods=200)
+    assert cells.regime.values[0] < len(vines.REGIMES)
+    assert cells.regime.values[1] == 254
+    assert "restitution" in cells.failure.values[1]
+    assert np.isnan(cells.followed.values[1])
 
 
 @pytest.mark.parametrize(
-    ("setting", "parts"),
+    ("axes", "settings", "parts"),
     [
-        ({"periods": -1}, ["periods = -1", "from 0"]),
-        ({"chunk": 0}, ["0 cells", "from 1 to 1000000"]),
-        ({"seed": 2**64}, ["seed = 18446744073709551616", "2^64 - 1"]),
-        ({"samples": 5}, ["random axis"]),
-        ({"results": "locks"}, ["`locks`", "regime, response, orbits and lock"]),
-        ({"sigma": float("inf")}, ["sigma = inf", "finite"]),
+        ({}, {}, ["at least one axis"]),
+        ({"plant.rr": [0.3, 0.5]}, {}, ["plant.rr", "unknown field"]),
+        ({"plant.r": [0.3, np.nan]}, {}, ["plant.r", "nan", "finite"]),
+        ({"plant.r": 0.5}, {}, ["plant.r = 0.5", "a list of numbers"]),
+        ({"plant.r": []}, {}, ["plant.r = []", "at least one"]),
+        ({"plant.r": (0.3, 0.9, 7)}, {}, ["plant.r = (0.3, 0.9, 7)", "numpy.linspace", "a list"]),
+        ({"plant.r": (0.3, 0.9)}, {}, ["plant.r = (0.3, 0.9)", "numpy.linspace"]),
+        ({"plant.r": np.ma.masked_array([0.3, 0.5], [0, 1])}, {}, ["masked"]),
+        ({"plant.r": [[0.3, 0.5]]}, {}, ["plant.r = [[0.3, 0.5]]", "a list of numbers"]),
+        ({"plant.r": ["0.3", "0.5"]}, {}, ["plant.r", "a list of numbers"]),
+        ({"plant.r": ("n", [0.5]), "plant.b": ("n", [0.01, 0.02])}, {}, ["plant.b has 2 values along n", "1"]),
+        ({"plant.r": [0.5]}, {"periods": -1}, ["-1 periods", "100"]),
+        ({"plant.r": [0.5]}, {"periods": 99}, ["99 periods", "from 100"]),
+        ({"plant.r": [0.5]}, {"chunks": {"plant.r": 0}}, ["{'plant.r': 0}", "at least 1"]),
+        ({"plant.r": [0.5]}, {"chunks": {"sigma": 4}}, ["'sigma'", "plant.r"]),
+        ({"plant.r": [0.5]}, {"results": "locks"}, ["`locks`", "regime, response, orbits and lock"]),
+        ({"plant.r": [0.5]}, {"sigma": float("inf")}, ["sigma = inf", "finite"]),
+        ({"sigma": [0.5]}, {"sigma": 1.0}, ["sigma is an axis and a constant"]),
     ],
 )
-def test_bad_settings_are_value_errors_and_write_nothing(setting, parts, tmp_path):
+def test_bad_axes_and_settings_are_value_errors_and_write_nothing(axes, settings, parts, tmp_path):
     with pytest.raises(ValueError) as error:  # noqa: PT011
-        vines.sweep(None, {"plant.r": [0.5, 0.6]}, out=tmp_path / "store", **setting)
+        vines.sweep(None, axes, store=tmp_path / "store", **settings)
     for part in parts:
         assert part in str(error.value)
-    assert not (tmp_path / "store").exists()
+    assert not any(tmp_path.iterdir())
 
 
-def test_a_store_of_another_sweep_stays_and_a_folder_that_cannot_be_written_is_an_os_error(tmp_path):
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("axes", {"axes": {"plant.r": [0.5, 0.7]}}),
+        ("scene", {"scene": vines.Scene(plant={"b": 0.02})}),
+        ("sigma", {"sigma": -1.0}),
+        ("periods", {"periods": 300}),
+        ("results", {"results": ["orbits"]}),
+        ("chunks", {"chunks": {"plant.r": 1}}),
+    ],
+)
+def test_a_store_of_another_sweep_is_refused_by_what_differs_and_stays(name, change, tmp_path):
+    one = {"scene": None, "axes": {"plant.r": [0.5, 0.6]}, "periods": 200, "store": tmp_path / "store"}
+    vines.sweep(**one)
+    before = written(tmp_path)
+    with pytest.raises(ValueError, match=f"another `{name}`"):
+        vines.sweep(**one | change)
+    assert written(tmp_path) == before
+
+
+def test_a_folder_that_cannot_be_written_or_is_something_else_and_a_full_disk_are_explained(tmp_path):
+    axes = {"plant.r": [0.5, 0.6]}
+    with pytest.raises(OSError, match="/proc/store"):
+        vines.sweep(None, axes, store="/proc/store", periods=200)
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(ValueError, match="is not the store of a sweep"):
+        vines.sweep(None, axes, store=tmp_path, periods=200)
+    with pytest.raises(OSError, match="does not see the store"):
+        vines.sweeps._chunk(str(tmp_path / "elsewhere"), None, (0,), [])
+    # No file may grow beyond 2 kB, which is enough for metadata: as on a full disk.
+    code = f"""
+import resource, signal, numpy, vines
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+vines.sweep(None, {{"plant.r": numpy.linspace(0.3, 0.9, 2000)}}, periods=100, sigma=-4.0, store={str(tmp_path / "s")!r})
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "OSError" in done.stderr
+    assert "complete chunks stay, and the same call continues" in done.stderr
+
+
+def test_damaged_chunks_are_named_and_only_they_and_missing_ones_are_computed(whole, tmp_path):
     out = tmp_path / "store"
-    vines.sweep(None, {"plant.r": [0.5, 0.6]}, out=out, periods=200)
-    before = content(out)
-    with pytest.raises(ValueError, match="another `axes`"):
-        vines.sweep(None, {"plant.r": [0.5, 0.7]}, out=out, periods=200)
-    assert content(out) == before
-    with pytest.raises(OSError, match="/proc/store") as error:
-        vines.sweep(None, {"plant.r": [0.5, 0.6]}, out="/proc/store", periods=200)
-    assert error.value.errno == errno.ENOENT
+    vines.sweep(None, AXES, store=out, **SETTINGS)
+    flipped, cut, axis = (out / name for name in ("exponent/c/3/0", "regime/c/5/0", "start.dq2/c/0"))
+    content = bytearray(flipped.read_bytes())
+    content[len(content) // 2] ^= 1
+    flipped.write_bytes(content)
+    cut.write_bytes(cut.read_bytes()[:-3])
+    axis.write_bytes(b"")
+    (out / "settling" / "c" / "7" / "0").unlink()
+    before = written(out)
+    with pytest.warns(RuntimeWarning) as warned:
+        vines.sweep(None, AXES, store=out, **SETTINGS)
+    message = str(warned[0].message)
+    assert message.startswith("3 damaged chunks")
+    assert all(f"{file} (" in message for file in (flipped, cut, axis)), message
+    after = written(out)
+    assert chunks(name for name in after if after[name] != before.get(name)) == {("3", "0"), ("5", "0"), ("7", "0")}
+    assert files(out) == whole
 
 
-def test_damaged_chunks_are_computed_again_with_a_warning(whole, tmp_path):
-    out = tmp_path / "store"
-    vines.sweep(None, AXES, out=out, **SETTINGS)
-    chunk = out / "impacts" / "c" / "3" / "0"
-    chunk.write_bytes(chunk.read_bytes()[:-4])
-    (out / "settling" / "c" / "5" / "0").unlink()
-    with pytest.warns(RuntimeWarning, match=r"2 damaged .*impacts/c/3/0 is truncated; .*settling/c/5/0 is missing"):
-        vines.sweep(None, AXES, out=out, **SETTINGS)
-    assert content(out) == whole
+WRITER = f"""
+import numpy, vines
+axes = {{"sigma": numpy.linspace(-3.0, 3.0, 31), "start.dq2": numpy.linspace(-0.6, 0.7, 40)}}
+vines.sweep(None, axes, store=input(), **{SETTINGS})
+"""
 
 
-def test_cells_that_are_not_computed_are_recognised_in_xarray(tmp_path):
-    out = tmp_path / "store"
-    arguments = ["--axis=plant.r=0.3:0.9:4", "--periods=100", "--chunk=1", "--shard=1/2", f"--out={out}"]
-    subprocess.run([os.environ["VINES"], "sweep", *arguments], check=True)
-    cells = xarray.open_zarr(out).load()
-    absent = [False, True, False, True]
-    assert (cells.regime == 255).values.tolist() == absent
-    assert (cells.failure == "not computed").values.tolist() == absent
-    assert (cells.failure == "").values.tolist() == [not one for one in absent]
-    for name, variable in cells.data_vars.items():
-        if name not in ("regime", "failure"):
-            assert variable.isnull().values[absent].all(), name
-    for name in ["followed", "impacts", "periods", "settling", "synchrony"]:
-        assert cells[name].isnull().values.tolist() == absent, name
-    meanings = dict(zip(cells.regime.attrs["flag_values"], cells.regime.attrs["flag_meanings"].split(), strict=True))
-    assert meanings[255] == "not_computed"
-    assert meanings[254] == "failed"
+def test_after_a_killed_writer_only_missing_chunks_are_computed_and_the_bytes_are_those_of_an_undisturbed_run(
+    whole, tmp_path
+):
+    for kill_at in (1, 12):
+        out = tmp_path / str(kill_at)
+        writer = subprocess.Popen([sys.executable, "-c", WRITER], stdin=subprocess.PIPE, text=True)
+        writer.stdin.write(f"{out}\n")
+        writer.stdin.close()
+        while writer.poll() is None and len(list((out / "failure").glob("c/*/0"))) < kill_at:
+            time.sleep(0.001)
+        writer.kill()
+        assert writer.wait() == -signal.SIGKILL
+        before = written(out)
+        complete = {name for name in chunks(before) if sum(chunks([one]) == {name} for one in before) == 12}
+        assert kill_at <= len(complete) < 31
+        vines.sweep(None, AXES, store=out, **SETTINGS)
+        after = written(out)
+        assert len(chunks(name for name in after if after[name] != before.get(name))) == 31 - len(complete)
+        assert files(out) == whole
 
 
 @contextmanager
@@ -209,56 +259,41 @@ def after_the_first_chunk(out, action):
     thread.join()
 
 
-def test_ctrl_c_keeps_complete_chunks(tmp_path):
-    sent = []
+@pytest.mark.parametrize("stored", [False, True])
+@pytest.mark.parametrize("results", ["regime", "lock"])
+def test_ctrl_c_ends_a_sweep_within_a_fifth_of_a_second(stored, results, tmp_path):
+    # Minutes of work: it is certainly interrupted.
+    axes, sent, waited = AXES | {"sigma": np.linspace(-3.0, 3.0, 30_001)}, [], []
 
     def interrupt():
         sent.append(time.monotonic())
         os.kill(os.getpid(), signal.SIGINT)
 
-    # Minutes of work: it is certainly interrupted.
-    axes = AXES | {"sigma": vines.linspace(-3.0, 3.0, 30_001)}
-    out = tmp_path / "store"
-    with after_the_first_chunk(out, interrupt), pytest.raises(KeyboardInterrupt):
-        vines.sweep(None, axes, out=out, **SETTINGS)
-    print(f"{time.monotonic() - sent[0]:.3f} s")
-    assert 0 < sum(name.startswith("failure/c/") for name in content(out)) < 30_001
+    # The load of the machine delays some.
+    for n in range(3):
+        timer = threading.Timer(1.0, interrupt)
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            vines.sweep(None, axes, results=results, store=tmp_path / str(n) if stored else None)
+        waited.append(time.monotonic() - sent[-1])
+    assert min(waited) < 0.2, waited
 
 
 def test_nothing_is_printed_and_a_bar_on_request(tmp_path, capfd):
-    vines.sweep(None, {"plant.r": [0.5, 0.6]}, out=tmp_path / "quiet", periods=200)
+    vines.sweep(None, {"plant.r": [0.5, 0.6]}, periods=200)
     assert capfd.readouterr() == ("", "")
-    vines.sweep(None, {"plant.r": [0.5, 0.6]}, out=tmp_path / "bar", periods=200, progress=True)
-    assert "2/2" in capfd.readouterr().err
+    vines.sweep(None, {"plant.r": [0.5, 0.6]}, periods=200, progress=True)
+    vines.sweep(None, {"plant.r": [0.5] * 3}, periods=200, progress=True, store=tmp_path / "s", chunks={"plant.r": 1})
+    printed = capfd.readouterr().err
+    assert "2/2" in printed
+    assert "3/3" in printed
 
 
-def cluster(workers, threads=1):
-    return LocalCluster(n_workers=workers, threads_per_worker=threads, dashboard_address=None)
+def cluster(workers):
+    return LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
 
 
-def test_workers_that_come_later_and_have_many_threads_give_the_same_bytes(whole, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with cluster(0, threads=4) as local, Client(local) as client:
-        # As with a queueing system, whose workers start when it has room for them.
-        threading.Timer(0.2, local.scale, (2,)).start()
-        vines.sweep(None, AXES, out="store", client=client, **SETTINGS)
-    assert content(tmp_path / "store") == whole
-
-
-@pytest.mark.parametrize("scheduler", ["threads", "synchronous", dask.threaded.get])
-def test_other_schedulers_of_dask_give_the_same_bytes(scheduler, whole, tmp_path):
-    vines.sweep(None, AXES, out=tmp_path / "store", client=scheduler, **SETTINGS)
-    assert content(tmp_path / "store") == whole
-
-
-def test_a_worker_that_does_not_see_the_store_says_so(tmp_path):
-    arguments = (vines.Scene(), {"plant.r": [0.5, 0.6]}, {}, str(tmp_path / "elsewhere"))
-    with pytest.raises(OSError, match="elsewhere: this worker does not see the store"):
-        vines.sweeps._chunk(0, 1, *arguments)
-    assert not (tmp_path / "elsewhere").exists()
-
-
-def test_with_dask_a_worker_is_killed_and_one_added_and_the_bytes_are_the_same(whole, tmp_path):
+def test_a_worker_is_killed_and_one_added_and_the_bytes_are_the_same(whole, tmp_path):
     out = tmp_path / "store"
     with cluster(2) as local, Client(local) as client:
         identity = client.run(os.getpid)
@@ -268,30 +303,25 @@ def test_with_dask_a_worker_is_killed_and_one_added_and_the_bytes_are_the_same(w
             local.scale(3)
 
         with after_the_first_chunk(out, disturb):
-            vines.sweep(None, AXES, out=out, client=client, **SETTINGS)
-    assert content(out) == whole
+            vines.sweep(None, AXES, store=out, **SETTINGS)
+    assert files(out) == whole
 
 
 def test_after_the_scheduler_ends_another_one_goes_on(tmp_path):
     # More work than what fits into the time in which a scheduler ends.
-    settings = {"periods": 5000, "chunk": 40}
+    settings = SETTINGS | {"periods": 5000}
     out, whole = tmp_path / "store", tmp_path / "whole"
     with (
         cluster(1) as local,
-        Client(local) as client,
+        Client(local),
         after_the_first_chunk(out, local.close),
         pytest.raises(Exception),  # noqa: B017, PT011  whatever the client notices first
     ):
-        vines.sweep(None, AXES, out=out, client=client, **settings)
-    with cluster(1) as local, Client(local) as client:
-        vines.sweep(None, AXES, out=out, client=client, **settings)
-    vines.sweep(None, AXES, out=whole, **settings)
-    assert content(out) == content(whole)
-
-
-def test_an_adaptive_map_marks_what_it_infers(tmp_path):
-    axes = {"sigma": vines.linspace(-1.6, -0.9, 33), "excitation.G": vines.linspace(0.8, 1.3, 33)}
-    cells = vines.sweep(None, axes, out=tmp_path / "store", periods=200, adaptive=8)
-    assert 0 < int(cells.inferred.sum()) < cells.regime.size
-    with pytest.raises(ValueError, match="one process"):
-        vines.sweep(None, axes, out=tmp_path / "other", adaptive=8, client=object())
+        vines.sweep(None, AXES, store=out, **settings)
+    before = written(out)
+    with cluster(1) as local, Client(local):
+        vines.sweep(None, AXES, store=out, **settings)
+    after = written(out)
+    assert 0 < sum(after[name] == before.get(name) for name in after if name.startswith("failure/c")) < 31
+    vines.sweep(None, AXES, store=whole, **settings)
+    assert files(out) == files(whole)

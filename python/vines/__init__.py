@@ -17,7 +17,7 @@ from .plants import KINDS, Batch, Events, Plant, Trajectory
 from .recordings import Recording, read_recording
 from .regimes import Regime, regime
 from .scenes import Scene
-from .sweeps import REGIMES, Range, linspace, sweep
+from .sweeps import REGIMES, sweep
 
 __all__ = [
     "KINDS",
@@ -31,7 +31,6 @@ __all__ = [
     "Output",
     "PhaseLock",
     "Plant",
-    "Range",
     "Recording",
     "Regime",
     "Scene",
@@ -43,7 +42,6 @@ __all__ = [
     "fit_recordings",
     "fmu",
     "identify",
-    "linspace",
     "orbits",
     "read_recording",
     "regime",

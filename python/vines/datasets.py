@@ -1,8 +1,8 @@
 """Datasets with units."""
 
+import importlib
 import json
 from collections.abc import Mapping
-from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 def dataset(variables: Mapping[str, tuple[Any, Any]], units: Mapping[str, str], **attributes: Any) -> "xarray.Dataset":
     """Return a dataset; units and variables have the same names."""
-    module = _xarray()
+    module = needed("xarray")
     arrays = {
         name: (dimension, values, {"units": units[name]} if name in units else {})
         for name, (dimension, values) in variables.items()
@@ -22,13 +22,6 @@ def dataset(variables: Mapping[str, tuple[Any, Any]], units: Mapping[str, str], 
     return found
 
 
-def opened(store: "str | PathLike[str]") -> "xarray.Dataset":
-    """Return a store of a sweep, opened lazily; its attributes can be written to any format."""
-    found: xarray.Dataset = _xarray().open_zarr(store)
-    found.attrs = {name: _plain(value) for name, value in found.attrs.items()}
-    return found
-
-
 def _plain(value: Any) -> Any:
     """Return an attribute that netCDF has, too: no Boolean, no mapping."""
     if isinstance(value, bool):
@@ -36,14 +29,13 @@ def _plain(value: Any) -> Any:
     return json.dumps(value) if isinstance(value, (dict, list)) else value
 
 
-def _xarray() -> Any:
+def needed(name: str) -> Any:
+    """Return a module that results as datasets, or stores of sweeps, need."""
     try:
-        import xarray
-        import zarr  # noqa: F401
+        return importlib.import_module(name)
     except ImportError as error:
         raise ImportError(
-            f"datasets need xarray and zarr, and {error.name} is missing: pip install xarray zarr, or "
+            f"datasets need xarray and stores zarr, and {error.name} is missing: pip install xarray zarr, or "
             "pip install 'vines-testbench[all]'",
             name=error.name,
         ) from None
-    return xarray

@@ -1,214 +1,250 @@
 """Sweeps over any numbers of a scene and of its start."""
 
-import errno
-import operator
-from collections.abc import Iterable, Mapping, Sequence
+import hashlib
+import itertools
+import json
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
+from math import ceil
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
-from .datasets import opened
-from .numbers import real, reals, scalar
+from .datasets import needed
+from .numbers import real, reals
 from .scenes import Scene, checked
 
 if TYPE_CHECKING:
     import xarray
 
+#: Values of an axis: a list or an array; ("sample", values) for axes that share a dimension; or a DataArray.
+Values: TypeAlias = "Sequence[float] | NDArray[Any] | tuple[str, Sequence[float] | NDArray[Any]] | xarray.DataArray"
+
+#: Names of the regimes, by their code in a dataset.
+REGIMES: tuple[str, ...] = tuple(_native.regimes())
+_CODES = {**dict(enumerate(REGIMES)), 254: "failed", 255: "not computed"}
+
+#: Cells of a chunk: some seconds of work, and files of some ten kilobytes.
+_CELLS = 10_000
+
 
 @dataclass(frozen=True)
-class Range:
-    """Values of an axis at equal distances, as `linspace` makes them."""
+class _Cells:
+    """The cells as a function of the values of the axes: arrays of one shape, as those of a ufunc."""
 
-    first: float
-    last: float
-    number: int
+    scene: Scene
+    keys: tuple[str, ...]
+    sigma: float | None
+    results: tuple[str, ...]
+    periods: int
 
+    def native(self) -> _native.Cells:
+        return _native.Cells(self.scene._native, [*self.keys], self.sigma, [*self.results], self.periods)
 
-def linspace(first: float, last: float, number: int) -> Range:
-    """Return the values of an axis at equal distances; the store keeps first, last and number instead of all values.
+    def dtype(self) -> np.dtype[Any]:
+        """A record per cell: all results as numbers but the code of the regime, and why the cell failed."""
+        numbers = [(name, "u1" if name == "regime" else "f8") for name, _, _ in self.native().variables]
+        return np.dtype([*numbers, ("failure", "O")])
 
-    Parameters
-    ----------
-    first, last : float
-        First and last value; the first is below the last.
-    number : int
-        Number of values, at least 2.
-
-    Returns
-    -------
-    Range
-
-    Raises
-    ------
-    ValueError
-        A number of values that is not allowed.
-
-    Examples
-    --------
-    >>> linspace(0.3, 0.9, 7)
-    Range(first=0.3, last=0.9, number=7)
-    """
-    count = scalar(number)
-    if isinstance(count, bool) or not hasattr(count, "__index__") or count < 2:
-        raise ValueError(f"number of values = {number!r}: a whole number of at least 2 is allowed")
-    return Range(real(first), real(last), operator.index(count))
-
-
-#: Values of an axis: a `linspace`, a list or an array, or ("random", first, last).
-Values: TypeAlias = "Range | Sequence[float] | NDArray[Any] | tuple[str, float, float]"
-
-#: Names of the regimes, by their code in a store.
-REGIMES: tuple[str, ...] = tuple(_native.regimes())
+    def __call__(self, *values: NDArray[np.float64], look: Callable[[int], object] | None = None) -> NDArray[Any]:
+        arrays = np.broadcast_arrays(*values)
+        cells = np.empty(arrays[0].shape, self.dtype())
+        rows = np.stack([array.ravel() for array in arrays], axis=-1)
+        numbers, failures = self.native().compute(rows, look)
+        table = numbers.reshape(cells.size, -1)
+        for n, name in enumerate(cells.dtype.names[:-1]):
+            cells[name] = table[:, n].reshape(cells.shape)
+        cells["failure"] = np.array(failures, dtype=object).reshape(cells.shape)
+        return cells
 
 
 def sweep(
     scene: Scene | None,
-    axes: Mapping[str, Values] | None = None,
+    axes: Mapping[str, Values],
     *,
-    out: str | PathLike[str],
-    paired: Mapping[str, Sequence[float] | NDArray[Any]] | None = None,
-    sigma: float | None = None,
-    samples: int | None = None,
-    seed: int = 0,
-    periods: int = 20_000,
     results: Iterable[str] = (),
-    chunk: int = 4096,
-    adaptive: int | None = None,
-    confirm: bool = False,
+    sigma: float | None = None,
+    periods: int = 20_000,
+    store: str | PathLike[str] | None = None,
+    chunks: Mapping[str, int] | None = None,
     progress: bool = False,
-    client: Any = None,
 ) -> "xarray.Dataset":
-    """Compute one plant per cell, write the results to a Zarr store as they are computed, and open it.
+    """Compute one plant per cell, on all cores, and return the results as a dataset.
 
-    An interrupted store is continued, and damaged chunks are computed again, with a RuntimeWarning that names them.
-    The store has the same bytes as that of `vines sweep`; docs/scale.md describes it.
+    With `chunks`, or a client of Dask, the dataset is lazy: Dask computes it where its values are needed. With `store`,
+    the chunks are written to a Zarr store as they are computed, by the workers of the client or in this process. The
+    same call continues an interrupted store: it reads all chunks, and computes those that are missing or damaged.
 
     Parameters
     ----------
     scene : Scene or None
         None: the default scene.
-    axes : mapping of str to values, optional
-        By name, `"sigma"` or `"section.key"` of a scene: a list or an array, `linspace(first, last, number)`, or a
-        tuple ("random", first, last).
-    out : path-like
-        Folder of the store.
-    paired : mapping of str to sequence of float, optional
-        Samples of your own: by the same names, one value per sample each, all of the same length. They share the
-        dimension `sample`.
-    sigma : float, optional
-        Detuning, if it is not an axis. Without it: that of the scene's stable phase-resonant orbit, or 0.
-    samples : int, optional
-        Number of samples of random axes, which share the dimension `sample`.
-    seed : int
-        Seed of random axes.
-    periods : int
-        Largest number of periods that a cell is followed.
+    axes : mapping of str to values
+        By name, `"sigma"` or `"section.key"` of a scene: what xarray takes as a coordinate. A list or an array has a
+        dimension of its own; `("sample", values)` shares a dimension with others of that name.
     results : iterable of str
         Further results: `"response"`, `"orbits"`, `"lock"`.
-    chunk : int
-        Largest number of cells in a chunk.
-    adaptive : int, optional
-        Only the regime: compute every n-th cell of two grids (16 is usual), then where neighbours differ,
-        and infer the rest; `inferred` marks it. Not with `client`.
-    confirm : bool
-        Confirms a sweep of more than 2 hours or 20 GB.
+    sigma : float, optional
+        Detuning, if it is not an axis. Without it: that of the scene's stable phase-resonant orbit, or 0.
+    periods : int
+        Largest number of periods that a cell is followed.
+    store : path-like, optional
+        Folder of the store. All workers must see it.
+    chunks : mapping of str to int, optional
+        Cells of a chunk along each dimension; others are not divided. Default: chunks of about 10,000 cells.
     progress : bool
-        Whether tqdm shows a bar.
-    client : dask.distributed.Client, str or callable, optional
-        Its workers compute the chunks and write them to the store, whose folder they must all see. Another
-        scheduler of Dask is named as for `dask.compute`: `"processes"`, or its `get`.
+        Whether tqdm shows a bar. A lazy dataset has those of Dask.
 
     Returns
     -------
     xarray.Dataset
-        The store, opened lazily, with units as attributes. `regime` is a code, an index into `vines.REGIMES`; 255 is
-        a cell without one. Mappings among its attributes are JSON texts, so that it can be written as netCDF.
+        With units as attributes. `regime` is a code, an index into `vines.REGIMES`; 254 is a cell that failed, with
+        the reason in `failure`. What does not exist is NaN. The attribute `vines` says in JSON what was computed.
 
     Raises
     ------
     ValueError
-        An unknown axis, a value that is not allowed, a large sweep that is not confirmed, or a store of
-        another sweep, which stays as it is.
+        An unknown axis, a value that is not allowed, or a store of another sweep, which stays as it is.
     OSError
         The store cannot be written. Complete chunks stay.
     KeyboardInterrupt
         Ctrl-C. Complete chunks stay, and the same call continues.
 
+    Warns
+    -----
+    RuntimeWarning
+        Chunks of the store were damaged, and have been computed again; their files are named.
+
     Examples
     --------
-    >>> axes = {"sigma": linspace(-2, 0, 5), "plant.r": [0.5, 0.65]}
-    >>> cells = sweep(None, axes, out=folder / "r.zarr", periods=400)
+    >>> axes = {"sigma": np.linspace(-2, 0, 5), "plant.r": [0.5, 0.65]}
+    >>> cells = sweep(None, axes, periods=400)
     >>> dict(cells.sizes), cells.settling.attrs["units"]
     ({'sigma': 5, 'plant.r': 2}, '1')
     """
-    scene = checked(scene)
-    settings = {
-        "sigma": None if sigma is None else real(sigma),
-        "samples": samples,
-        "seed": seed,
-        "periods": periods,
-        "results": [results] if isinstance(results, str) else list(results),
-        "chunk": chunk,
-        "adaptive": adaptive,
-    }
-    if adaptive is not None and client is not None:
-        raise ValueError("an adaptive sweep runs in one process: leave out adaptive or client")
-    given: dict[str, Any] = {name: _values(name, values) for name, values in (axes or {}).items()}
-    for name, values in (paired or {}).items():
-        if name in given:
-            raise ValueError(f"{name} is in axes and in paired: give one of them")
-        given[name] = (_list(name, values),)
-    # Workers may have another working directory.
-    folder = str(Path(out).absolute())
-    plan = _native.Sweep(scene._native, given, settings)
-    cells = plan.cells
-    hours, size, large = plan.estimate()
-    if large and not confirm:
-        raise ValueError(
-            f"{cells} cells would take about {hours:.1f} h on this machine and {size / 1e9:.1f} GB before compression; "
-            "confirm with confirm=True"
-        )
-    with _bar(cells, progress) as bar:
-        if client is not None:
-            # A part without chunks: it makes the store, so that workers can tell whether they see it.
-            plan.run(folder, (plan.chunks, plan.chunks + 1), None)
-            _distributed(client, (scene, given, settings, folder), plan.chunks, cells, bar)
-        look = None if bar is None or client is not None else lambda complete: bar.update(complete - bar.n)
-        # After workers nothing is left to compute; this removes what a killed one has left.
-        plan.run(folder, (0, 1), look)
-    return opened(out)
+    module = needed("xarray")
+    variables = {name: _axis(name, values) for name, values in axes.items()}
+    if not variables:
+        raise ValueError('a sweep needs at least one axis, for instance {"plant.r": [0.5, 0.65]}')
+    asked = (results,) if isinstance(results, str) else tuple(results)
+    cells = _Cells(checked(scene), tuple(variables), None if sigma is None else real(sigma), asked, periods)
+    attributes = {"title": "Sweep of a linear oscillator with a vibro-impact nonlinear energy sink"}
+    attributes["vines"] = json.dumps(_identity(cells, variables))
+    sizes: dict[str, int] = {}
+    for name, one in variables.items():
+        for dimension, size in one.sizes.items():
+            if sizes.setdefault(str(dimension), size) != size:
+                shared = sizes[str(dimension)]
+                raise ValueError(f"{name} has {size} values along {dimension}, and another axis {shared}")
+    if (client := _client()) is not None or chunks is not None or store is not None:
+        chunks = _lengths(sizes, chunks)
+    if store is not None:
+        plan = _Store(str(Path(store).absolute()), cells, variables, sizes, chunks or {})
+        plan.run(attributes, client, progress)
+        stored: xarray.Dataset = module.open_zarr(plan.folder, consolidated=False)
+        return stored[list(cells.dtype().names or ())]
+    arrays = [module.DataArray(one if chunks is None else one.chunk(chunks)) for one in variables.values()]
+    with _bar(int(np.prod([*sizes.values()])), progress and chunks is None) as bar:
+        look = None if bar is None else lambda complete: bar.update(complete - bar.n)
+        records = module.apply_ufunc(
+            cells, *arrays, kwargs={"look": look}, dask="parallelized", output_dtypes=[cells.dtype()]
+        ).transpose(*sizes)
+    data = {name: (records.dims, _part(records.data, name), about) for name, about in _about(cells)}
+    found: xarray.Dataset = module.Dataset(data, variables, attributes)
+    return found
 
 
-def _values(name: str, values: Any) -> Any:
-    if isinstance(values, Range):
-        return (values.first, values.last, values.number)
+def _axis(name: str, values: Any) -> "xarray.Variable":
+    """Return the values of an axis as a variable of xarray, checked."""
+    dimensions: Any = (name,)
     if isinstance(values, tuple):
-        if len(values) == 3 and isinstance(values[0], str):
-            return (values[0], real(values[1]), real(values[2]))
-        raise ValueError(
-            f"{name} = {values!r}: a tuple could be a range or values; a range is "
-            "vines.linspace(first, last, number), values are a list"
-        )
-    return _list(name, values)
-
-
-def _list(name: str, values: Any) -> list[float]:
+        if len(values) != 2 or not isinstance(values[0], str):
+            raise ValueError(
+                f"{name} = {values!r}: a list of numbers, an array or a tuple (dimension, values) is allowed; "
+                "numpy.linspace(first, last, number) makes a range"
+            )
+        dimensions, values = (values[0],), values[1]
+    dimensions = getattr(values, "dims", dimensions)
     try:
         numbers = reals(name, values)
     except ValueError as error:
-        raise ValueError(f"{error}: {_ALLOWED}") from None
-    if numbers.ndim != 1:
-        raise ValueError(f"{name} = {values!r}: {_ALLOWED}")
-    listed: list[float] = numbers.tolist()
-    return listed
+        raise ValueError(f"{error}: a list of numbers is allowed") from None
+    if numbers.ndim != len(dimensions) or numbers.size == 0:
+        raise ValueError(f"{name} = {values!r}: a list of numbers is allowed, with at least one")
+    if not np.isfinite(numbers).all():
+        raise ValueError(f"{name} = {numbers[~np.isfinite(numbers)][0]}: finite numbers are allowed")
+    found: xarray.Variable = needed("xarray").Variable(
+        dimensions, numbers, {"long_name": name, "units": _native.unit(name)}
+    )
+    return found
 
 
-_ALLOWED = "a list of numbers, linspace(first, last, number) or (sequence, first, last) is allowed"
+def _identity(cells: _Cells, variables: "Mapping[str, xarray.Variable]") -> dict[str, Any]:
+    """Return what determines the cells; of the axes, their dimensions and the SHA-256 of their values."""
+    axes = {
+        name: {"dimensions": one.dims, "sha256": hashlib.sha256(one.values.astype("<f8").tobytes()).hexdigest()}
+        for name, one in variables.items()
+    }
+    return {
+        "version": _native.version,
+        "scene": cells.scene.settings,
+        "sigma": cells.native().sigma,
+        "axes": axes,
+        "periods": cells.periods,
+        "results": sorted({"regime", *cells.results}),
+    }
+
+
+def _about(cells: _Cells) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Return the variables with their attributes."""
+    for name, unit, meaning in cells.native().variables:
+        about: dict[str, Any] = {"long_name": meaning, "units": unit}
+        if name == "regime":
+            about["flag_values"] = [*_CODES]
+            about["flag_meanings"] = " ".join(one.replace(" ", "_") for one in _CODES.values())
+        yield name, about
+    yield "failure", {"long_name": "why the cell failed; empty if it did not; `not computed` if there is no result yet"}
+
+
+def _part(records: Any, name: str) -> Any:
+    # A view of the records would keep all of them.
+    return records[name].copy()
+
+
+def _lengths(sizes: Mapping[str, int], chunks: Mapping[str, int] | None) -> dict[str, int]:
+    """Return the cells of a chunk along each dimension."""
+    if chunks is None:
+        lengths, left = dict(sizes), _CELLS
+        for dimension in reversed(lengths):
+            lengths[dimension] = min(left, lengths[dimension])
+            left = max(1, left // lengths[dimension])
+        return lengths
+    for dimension, length in chunks.items():
+        if dimension not in sizes or length < 1:
+            raise ValueError(
+                f"chunks = {dict(chunks)!r}: a number of at least 1 is allowed for each of {', '.join(sizes)}"
+            )
+    return {dimension: min(size, chunks.get(dimension, size)) for dimension, size in sizes.items()}
+
+
+def _client() -> Any:
+    """Return the current client of Dask, if there is one."""
+    if "distributed" not in sys.modules:
+        return None
+    from distributed import Client
+
+    try:
+        return Client.current()  # type: ignore[no-untyped-call]
+    except ValueError:
+        return None
 
 
 def _bar(cells: int, progress: bool) -> Any:
@@ -219,47 +255,162 @@ def _bar(cells: int, progress: bool) -> Any:
     return tqdm(total=cells, unit="cell")
 
 
-def _chunk(part: int, chunks: int, scene: Scene, axes: Any, settings: Any, out: str) -> int:
-    """Compute one chunk in a worker; only the number of its cells returns."""
-    if not Path(out, "zarr.json").is_file():
+@dataclass(frozen=True)
+class _Store:
+    """A Zarr store, and the sweep that it belongs to."""
+
+    folder: str
+    cells: _Cells
+    variables: "Mapping[str, xarray.Variable]"
+    sizes: Mapping[str, int]
+    chunks: Mapping[str, int]
+
+    def run(self, attributes: Mapping[str, str], client: Any, progress: bool) -> None:
+        """Compute the chunks that are missing or damaged; workers of a client compute and write one each."""
+        counts = [ceil(size / self.chunks[dimension]) for dimension, size in self.sizes.items()]
+        indices = list(itertools.product(*map(range, counts)))
+        damaged: list[str] = []
+        try:
+            self._open(attributes)
+            damaged += self._axes_restored()
+            with _bar(len(indices), progress) as bar:
+                tasks = ((self.folder, self.cells, index, self._values(index)) for index in indices)
+                for found in _local(tasks) if client is None else _distributed(client, tasks):
+                    damaged += found
+                    if bar is not None:
+                        bar.update()
+        except OSError as error:
+            error.add_note(f"cannot write to {self.folder}: complete chunks stay, and the same call continues")
+            raise
+        finally:
+            if damaged:
+                more = "; ..." if len(damaged) > 10 else ""
+                warnings.warn(
+                    f"{len(damaged)} damaged chunks were computed again: {'; '.join(damaged[:10])}{more}",
+                    RuntimeWarning,
+                    stacklevel=3,
+                )
+
+    def _values(self, index: tuple[int, ...]) -> list[NDArray[np.float64]]:
+        """Return the values of the axes in a chunk, in the shape of its dimensions."""
+        inside = {
+            dimension: slice(n * self.chunks[dimension], (n + 1) * self.chunks[dimension])
+            for n, dimension in zip(index, self.sizes, strict=True)
+        }
+        values = (one.isel(inside, missing_dims="ignore") for one in self.variables.values())
+        return [one.set_dims([*self.sizes]).values for one in values]  # type: ignore[no-untyped-call]
+
+    def _open(self, attributes: Mapping[str, str]) -> None:
+        """Create the store, or see that it belongs to this sweep."""
+        zarr, folder = needed("zarr"), Path(self.folder)
+        if not folder.exists() or not any(folder.iterdir()):
+            # Complete or absent: the name is given at the end.
+            with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f"{folder.name}.") as partial:
+                self._create(zarr.open_group(f"{partial}/store", mode="w", attributes=attributes))
+                Path(partial, "store").rename(folder)
+        try:
+            group = zarr.open_group(self.folder, mode="r")
+            found = json.loads(group.attrs["vines"]) | {"chunks": [*group["regime"].chunks]}
+        except (KeyError, ValueError, TypeError):
+            raise ValueError(
+                f"{self.folder} is not the store of a sweep: its zarr.json, which says to which sweep it belongs, is "
+                "missing or damaged. It stays as it is; name another folder"
+            ) from None
+        here = json.loads(attributes["vines"]) | {"chunks": [*self.chunks.values()]}
+        differs = [f"`{key}`" for key, value in here.items() if found.get(key) != value]
+        if differs:
+            raise ValueError(
+                f"{self.folder} belongs to another sweep, with another {', '.join(differs)}. It stays as it is; write "
+                "to another folder, or delete it"
+            )
+
+    def _create(self, group: Any) -> None:
+        """Create the arrays, with a checksum of every chunk."""
+        codecs = needed("zarr.codecs")
+        dtype = self.cells.dtype()
+        kinds = {"u": ("uint8", 255), "f": ("float64", np.nan), "O": ("string", "not computed")}
+        compressors = [codecs.ZstdCodec(level=3), codecs.Crc32cCodec()]
+        for name, about in _about(self.cells):
+            kind, absent = kinds[dtype[name].kind]
+            group.create_array(
+                name,
+                shape=[*self.sizes.values()],
+                chunks=[*self.chunks.values()],
+                dtype=kind,
+                fill_value=absent,
+                compressors=compressors,
+                dimension_names=[*self.sizes],
+                attributes=about,
+            )
+        for name, one in self.variables.items():
+            array = group.create_array(
+                name,
+                shape=one.shape,
+                chunks=one.shape,
+                dtype="float64",
+                compressors=compressors,
+                dimension_names=one.dims,
+                attributes=one.attrs,
+            )
+            array[...] = one.values
+        # By this attribute, xarray knows the axes that share a dimension.
+        group.attrs["coordinates"] = " ".join(name for name, one in self.variables.items() if one.dims != (name,))
+
+    def _axes_restored(self) -> list[str]:
+        group, damaged = needed("zarr").open_group(self.folder, mode="r+"), []
+        for name, one in self.variables.items():
+            state = _state(group[name], self.folder, (0,) * one.ndim)
+            if state is not None:
+                group[name][...] = one.values
+                damaged += [state] if state else []
+        return damaged
+
+
+def _state(array: Any, folder: str, index: tuple[int, ...]) -> str | None:
+    """Return None if a chunk is there and undamaged, "" if it is missing, otherwise its file and the error."""
+    file = Path(folder, array.path, array.metadata.encode_chunk_key(index))
+    if not file.exists():
+        return ""
+    try:
+        array.blocks[index]
+    except OSError:
+        raise
+    except Exception as error:
+        # A chunk of another length, or codecs that cannot decode it: what they raise depends on the damage.
+        return f"{file} ({error})"
+    return None
+
+
+def _chunk(folder: str, cells: _Cells, index: tuple[int, ...], values: list[NDArray[np.float64]]) -> list[str]:
+    """Compute and write a chunk, unless the store has it undamaged; return its damaged files."""
+    if not Path(folder, "zarr.json").exists():
         raise FileNotFoundError(
-            errno.ENOENT, f"{out}: this worker does not see the store; name a folder that client and all workers see"
+            f"{folder}: this worker does not see the store; name a folder that client and all workers see"
         )
-    return _native.Sweep(scene._native, axes, settings).run(out, (part, chunks), None)[0]
+    group = needed("zarr").open_group(folder, mode="r+")
+    names = cells.dtype().names or ()
+    # A chunk that contains only fill values is written, too: it is complete.
+    arrays = {name: group[name].with_config({"write_empty_chunks": True}) for name in names}
+    states = [_state(array, folder, index) for array in arrays.values()]
+    if any(state is not None for state in states):
+        records = cells(*values)
+        for name, array in arrays.items():
+            array.blocks[index] = records[name]
+    return [state for state in states if state]
 
 
-def _distributed(client: Any, arguments: Any, chunks: int, cells: int, bar: Any) -> None:
-    if not hasattr(client, "submit"):
-        from dask.base import compute
-        from dask.delayed import delayed
+def _local(tasks: Iterable[tuple[Any, ...]]) -> Iterator[list[str]]:
+    return (_chunk(*task) for task in tasks)
 
-        tasks = [delayed(_chunk)(part, chunks, *arguments) for part in range(chunks)]
-        compute(*tasks, scheduler=client)  # type: ignore[no-untyped-call]
-        return
 
-    from dask.distributed import as_completed
+def _distributed(client: Any, tasks: Iterable[tuple[Any, ...]]) -> Iterator[list[str]]:
+    from distributed import as_completed
 
-    # The scheduler holds a few tasks per thread at a time, however many chunks there are.
-    waiting = iter(range(chunks))
-
-    def submit() -> Any:
-        part = next(waiting, None)
-        return None if part is None else client.submit(_chunk, part, chunks, *arguments, pure=False)
-
-    running: Any = as_completed([submit()])  # type: ignore[no-untyped-call]
-
-    def fill() -> None:
-        # Workers may come and go, and the first ones after this began.
-        at_once = 4 * max(1, sum(client.nthreads().values()))
-        while running.count() < at_once:
-            further = submit()
-            if further is None:
-                return
-            running.add(further)
-
-    fill()
-    for finished in running:
-        finished.result()
-        if bar is not None:
-            bar.update(cells / chunks)
-        fill()
+    futures = client.map(_chunk, *zip(*tasks, strict=True), pure=False)
+    try:
+        for _, found in as_completed(futures, with_results=True):  # type: ignore[no-untyped-call]
+            yield found
+    finally:
+        # Chunks that have begun end by themselves.
+        if client.status == "running":
+            client.cancel(futures)

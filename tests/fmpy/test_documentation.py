@@ -166,8 +166,7 @@ def test_the_commands_of_a_page_run_in_a_clone_print_what_it_shows_and_leave_the
             language, *flags = kind.split(",")
             if language == "sh" and "norun" not in flags:
                 for line in text.replace("\\\n", " ").splitlines():
-                    # tests of the Python package run the sweeps
-                    if line.strip() and not line.startswith(("#", "vines sweep")):
+                    if line.strip() and not line.startswith("#"):
                         output = shell.run(line, "fails" in flags) + output
             elif language == "text" and output:
                 lines = [" ".join(line.split()) for line in output.splitlines()]

@@ -23,9 +23,7 @@ def test_a_script_prints_the_comment_at_its_top_as_help(name):
         assert start in done.stdout
 
 
-@pytest.mark.parametrize(
-    "name", ["bench", "docs", "live", "rehearse", "stress", "sweep-demo", "test", "test-live", "test-platforms"]
-)
+@pytest.mark.parametrize("name", ["bench", "docs", "live", "rehearse", "stress", "test", "test-live", "test-platforms"])
 def test_a_script_refuses_an_unknown_argument_before_anything_is_built(name):
     done = run(name, "--no-such-option")
     assert done.returncode == 1
