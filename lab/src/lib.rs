@@ -7,6 +7,7 @@ pub mod pack;
 pub mod points;
 pub mod regime_map;
 pub mod report;
+pub mod table;
 
 pub use files::{FileError, write_file};
 pub use vines_fmu as fmu;

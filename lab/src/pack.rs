@@ -13,7 +13,7 @@ use phase_lock::{PARAMETERS, Value};
 use vines_model::ArgumentError;
 use zip::{ZipWriter, result::ZipError, write::SimpleFileOptions};
 
-use crate::{files, report::Table, scene::Scene};
+use crate::{files, scene::Scene, table::Table};
 
 /// What an FMU is packed from.
 #[derive(Debug, Clone)]

@@ -8,6 +8,7 @@ use super::experiment::ExperimentArguments;
 use super::failure::Failure;
 use super::options::Endpoint;
 use super::output::{print, written};
+use super::summary;
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:
@@ -53,7 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     bar.finish_and_clear();
     let (tracked, timing) = measured?;
     let result = TrackedComparison::of(&tracked, &scene);
-    let summary = report::summary::tracked(&result);
+    let summary = summary::tracked(&result);
     let files = report::write_tracked(&result, &experiment.out)?;
     if let Some(ended) = tracked.ended {
         let mut failure = Failure::from(ended);

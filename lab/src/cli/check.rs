@@ -3,7 +3,7 @@
 use clap::Args;
 use vines::experiment::ExperimentError;
 use vines::loop_check::{CheckedChannel, CheckedQuantity, LoopCheck, Verdict, check};
-use vines::report::{Table, number, with_uncertainty};
+use vines::table::{Table, number, with_uncertainty};
 
 use super::failure::Failure;
 use super::options::{Endpoint, ReachArguments, SceneArguments};

@@ -10,7 +10,8 @@ use serde::Serialize;
 use vines::fit::{Effect, Fit, FitReport, Found, Known, MeasuredPoint, Part, decimals, find, parts};
 use vines::numerics::Estimate;
 use vines::points::{Channel, Channels, Column, Measurement, read};
-use vines::report::{Table, fitted};
+use vines::report::fitted;
+use vines::table::Table;
 
 use super::failure::Failure;
 use super::options::{SceneArguments, positive};

@@ -10,6 +10,7 @@ use vines::{advice, comparison::Comparison, report};
 use super::experiment::{ExperimentArguments, kept};
 use super::options::Endpoint;
 use super::output::progress_bar;
+use super::summary;
 use super::{failure::Failure, pack::fmus};
 
 const HELP: &str = "\
@@ -62,7 +63,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         kept(Failure::run(error), reason, &record.samples, &experiment.out)
     })?;
     let result = Comparison::of(&identification, &scene);
-    let summary = report::summary::identification(&result);
+    let summary = summary::identification(&result);
     let mut files = report::write(&result, &record, &scene, &experiment.out)?;
     if arguments.rig.is_none() {
         files.extend(fmus(&experiment.out)?);

@@ -15,6 +15,7 @@ mod output;
 mod pack;
 mod report;
 mod serve;
+mod summary;
 mod tap;
 mod theory;
 mod watch;

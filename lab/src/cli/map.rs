@@ -8,11 +8,11 @@ use vines::map::{CONFIRMATIONS, LIMIT};
 use vines::orbit::Branch;
 use vines::regime_map::{Axis, Map};
 use vines::report;
-use vines::report::summary::{parameters, regimes};
 
 use super::failure::Failure;
 use super::options::{SceneArguments, warn_left_out};
 use super::output::{progress_bar, writable, written};
+use super::summary::{parameters, regimes};
 
 const HELP: &str = "\
 Every cell is one plant, driven at a fixed frequency from the scene's start:

@@ -10,12 +10,12 @@ use vines::ArgumentError;
 use vines::fmu::{FmuController, FmuRig};
 use vines::helic::{DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
-use vines::report::summary::ideal;
 use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
 use vines::scene::{Family, Implausible, Names, Override, PAPER, Scene, SceneError};
 
 use super::failure::{Failure, stop_flag};
 use super::output::log_warnings;
+use super::summary::ideal;
 
 #[derive(Debug, Args)]
 pub(super) struct SceneArguments {

@@ -10,10 +10,8 @@ use vines::orbit::{
     Branch, BranchEnd, Condition, ContinuationLimits, DOUBLINGS, Orbit, Periodic, PlantMotion, backbone,
     continue_both_ways, phase_resonant, resonant_motion_under, response, settle, settled_motion, stable_resonant,
 };
-use vines::report::{
-    Table, number, responses, row,
-    summary::{self, parameters},
-};
+use vines::report::responses;
+use vines::table::{Table, number, row};
 use vines::{
     ArgumentError,
     numerics::range,
@@ -21,6 +19,7 @@ use vines::{
 };
 
 use super::output::{output, written};
+use super::summary::{self, parameters};
 use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\

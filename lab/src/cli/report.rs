@@ -6,11 +6,11 @@ use clap::{Args, Parser};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use vines::map::LIMIT;
 use vines::regime_map::{Axis, Map};
-use vines::report::summary::{ideal, parameters};
 use vines::rig::BuiltIn;
 use vines::scene::Scene;
 
 use super::output::{writable, written};
+use super::summary::{ideal, parameters};
 use super::{Cli, dispatch};
 use super::{
     failure::{Failure, INTERRUPTED},

@@ -5,11 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use vines::{
-    report::{Table, row, summary::parameters, theory},
+    report::theory,
+    table::{Table, row},
     theory::{Activation, B_SYMMETRY_BREAKING, BranchSide, SlowFlow, backbone, resonant},
 };
 
 use super::output::{output, written, yes_no};
+use super::summary::parameters;
 use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\

@@ -78,7 +78,6 @@ fn through_40_db_of_sensor_noise_points_lie_within_5e_3_and_within_what_they_sta
 fn a_level_that_the_drive_cannot_hold_is_reported_as_not_reached() {
     let report = tracked("phase_lock.amplitude_max=1.092e-2 backbone.C_from=0.8 backbone.C_to=0.4 backbone.points=2");
     assert!(!report.points[0].point.reached && report.points[1].point.reached);
-    assert!(vines::report::summary::tracked(&report).contains("level 0.800 not reached"));
 }
 
 #[test]

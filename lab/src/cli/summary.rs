@@ -1,13 +1,13 @@
-//! Summaries for a terminal.
+//! Results in words and tables.
 
-use super::table::{Table, row, with_uncertainty};
-use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
-use crate::identification::{DecayEnd, Friction, Regime, ResonancePoint};
-use crate::regime_map::Map;
-use crate::scene::{Definition, Dimensionless, Sensor};
+use vines::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
+use vines::identification::{DecayEnd, Friction, Regime, ResonancePoint};
+use vines::regime_map::Map;
+use vines::scene::{Definition, Dimensionless, Sensor};
+use vines::table::{Table, row, with_uncertainty};
 
 /// The dimensionless numbers of a scene, in one line.
-pub fn parameters(p: &Dimensionless) -> String {
+pub(super) fn parameters(p: &Dimensionless) -> String {
     let definition = match p.definition == Definition::default() {
         true => String::new(),
         false => format!("; resonance: {}", p.definition.name()),
@@ -31,7 +31,7 @@ fn in_si(at: &ResonancePoint) -> [String; 3] {
 }
 
 /// How often each regime occurs on a map.
-pub fn regimes(map: &Map) -> Table {
+pub(super) fn regimes(map: &Map) -> Table {
     let inside = map.cells.iter().filter(|cell| cell.theory_stable).count();
     let share = |count: usize, of: usize| match of {
         0 => "-".into(),
@@ -50,7 +50,7 @@ const SYMBOLS: &str = "  sigma: detuning (omega/omega0 - 1)/epsilon; C: amplitud
                        over b epsilon\n";
 
 /// An identification: the locked point beside theory and exact orbit, then the decay.
-pub fn identification(result: &Comparison) -> String {
+pub(super) fn identification(result: &Comparison) -> String {
     let (lock, at) = (&result.lock, &result.lock.at);
     let [hertz, response, base] = in_si(at);
     let b = lock.b.zip(lock.u_b).map_or("-".into(), |(b, u)| with_uncertainty(b, u));
@@ -112,12 +112,12 @@ pub fn identification(result: &Comparison) -> String {
 }
 
 /// That `results` of the ideal cavity leave something out.
-pub fn ideal(results: &str, left_out: &str) -> String {
+pub(super) fn ideal(results: &str, left_out: &str) -> String {
     format!("{results} of the ideal cavity, without {left_out}")
 }
 
 /// What friction did, as a sentence.
-pub fn friction_text(friction: &Friction) -> String {
+pub(super) fn friction_text(friction: &Friction) -> String {
     let Friction { sticks_per_period, stuck_time, loss } = friction;
     let sticking = if *sticks_per_period > 0.0 {
         format!("stuck to the floor {sticks_per_period:.3} times, for {stuck_time:.3e} s in all")
@@ -158,7 +158,7 @@ fn agreement(result: &Comparison) -> String {
 }
 
 /// The points of a tracked backbone, and the periods that they took. A rig that does not report impacts has columns in SI units.
-pub fn tracked(result: &TrackedComparison) -> String {
+pub(super) fn tracked(result: &TrackedComparison) -> String {
     let points = || result.points.iter();
     let in_metres = points().all(|compared| compared.point.regime_by_impacts.is_none());
     let rows = points().map(|TrackedPoint { point, exact }| {
