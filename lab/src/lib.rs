@@ -9,7 +9,7 @@ pub mod regime_map;
 pub mod report;
 pub mod table;
 
-pub use files::{FileError, write_file};
+pub use files::{FileError, ResultFolder, create_folder_of, writable, write_file};
 pub use vines_fmu as fmu;
 pub use vines_helic as helic;
 pub use vines_model::{ArgumentError, curves, map, numerics, orbit, regime, theory};

@@ -13,7 +13,7 @@ use phase_lock::{PARAMETERS, Value};
 use vines_model::ArgumentError;
 use zip::{ZipWriter, result::ZipError, write::SimpleFileOptions};
 
-use crate::{files, scene::Scene, table::Table};
+use crate::{scene::Scene, table::Table};
 
 /// What an FMU is packed from.
 #[derive(Debug, Clone)]
@@ -128,29 +128,20 @@ pub enum PackError {
     Description(#[from] fmi2_description::Error),
     #[error(transparent)]
     Archive(#[from] ZipError),
-    #[error(transparent)]
-    Write(#[from] files::FileError),
 }
 
 /// Name and content of a file.
-type File = (String, Vec<u8>);
+pub type File = (String, Vec<u8>);
 
-/// Packs the components into `out`, one `<identifier>.fmu` each, and returns their paths. Of two libraries of a component for a platform, the
-/// later counts.
-///
-/// Nothing is written unless all of them can be; a file is complete or absent.
-pub fn pack(components: &[Component], binaries: &[Binary], out: &Path) -> Result<Vec<PathBuf>, PackError> {
-    Ok(files::write(out, fmus(components, binaries)?)?)
-}
-
-/// Packs plant and controller into `out`, and the two of them coupled as `bench.ssp` with the parameters of the scene.
-pub fn pack_bench(scene: &Scene, binaries: &[Binary], out: &Path) -> Result<Vec<PathBuf>, PackError> {
-    let mut files = fmus(&components(), binaries)?;
+/// Plant and controller, and the two of them coupled as `bench.ssp` with the parameters of the scene.
+pub fn pack_bench(scene: &Scene, binaries: &[Binary]) -> Result<Vec<File>, PackError> {
+    let mut files = pack(&components(), binaries)?;
     files.push(system(scene, &files)?);
-    Ok(files::write(out, files)?)
+    Ok(files)
 }
 
-fn fmus(components: &[Component], binaries: &[Binary]) -> Result<Vec<File>, PackError> {
+/// The FMUs of components, one `<identifier>.fmu` each. Of two libraries of a component for a platform, the later counts.
+pub fn pack(components: &[Component], binaries: &[Binary]) -> Result<Vec<File>, PackError> {
     let descriptions = components.iter().map(|component| Description::parse(&component.xml));
     let descriptions = descriptions.collect::<Result<Vec<_>, _>>()?;
     // Name and content of the libraries of each component; the GUID in a library determines its component.

@@ -7,4 +7,4 @@ mod theme;
 
 pub use figure::Figure;
 pub use figures::{fitted, responses, theory};
-pub use files::{ReportError, write, write_interrupted, write_map, write_tracked};
+pub use files::{ReportError, ResultFile, identification_files, map_files, tracked_files};

@@ -254,6 +254,18 @@ pub struct TrackedPoint {
     pub exact: Option<Distance>,
 }
 
+impl TrackedPoint {
+    /// The regime, by the impacts where the rig reports them.
+    fn regime(&self) -> Regime {
+        self.point.regime_by_impacts.unwrap_or(self.point.regime)
+    }
+
+    /// Whether this is a settled point of a motion with impacts.
+    pub fn is_of_backbone(&self) -> bool {
+        self.point.settled && !matches!(self.regime(), Regime::NoImpacts | Regime::NotEstablished)
+    }
+}
+
 impl TrackedComparison {
     /// Compares the points with the exact backbone of the scene; not where the loop holds another phase than resonance.
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
@@ -281,26 +293,19 @@ impl TrackedComparison {
         self.periods / self.points.len() as f64
     }
 
-    /// Why these points are no backbone of a motion with impacts: a settled point, or all points, without evidence of impacts.
-    pub fn doubt(&self) -> Option<String> {
-        let regime = |row: &TrackedPoint| row.point.regime_by_impacts.unwrap_or(row.point.regime);
-        let count = |wanted: Regime| self.points.iter().filter(|row| regime(row) == wanted).count();
+    /// Why these points are no backbone of a motion with impacts, if they are none.
+    pub fn doubt(&self) -> Option<Doubt> {
+        let count = |wanted: Regime| self.points.iter().filter(|row| row.regime() == wanted).count();
         let [linear, doubtful] = [Regime::NoImpacts, Regime::NotEstablished].map(count);
         let of = self.points.len();
-        let is_settled = |row: &TrackedPoint| row.point.settled && regime(row) == Regime::NotEstablished;
+        let is_vague = |row: &TrackedPoint| row.point.settled && row.regime() == Regime::NotEstablished;
         if linear == of {
-            return Some(format!(
-                "all {of} points are without impacts (the linear mode): the particle does not reach the walls. Check that it moves freely; give \
-                 it a velocity in [start]"
-            ));
+            Some(Doubt::NoImpacts)
+        } else if linear + doubtful == of || self.points.iter().any(is_vague) {
+            Some(Doubt::NotEstablished { points: doubtful })
+        } else {
+            (!self.points.iter().any(TrackedPoint::is_of_backbone)).then_some(Doubt::NotSettled)
         }
-        (linear + doubtful == of || self.points.iter().any(is_settled)).then(|| {
-            format!(
-                "the regime of {doubtful} of {of} points is not established: neither their third harmonic nor a distance from the linear response \
-                 that the loop check measures is evidence of impacts. Check that the particle moves freely; do not skip the loop check; reduce \
-                 noise that hides the harmonic"
-            )
-        })
     }
 
     /// Largest error at equal C, in sigma or G, and largest distance from the exact backbone, of the settled points.
@@ -315,6 +320,20 @@ impl TrackedComparison {
             nearest: largest.nearest.max(errors.nearest),
         })
     }
+}
+
+/// Why tracked points are no backbone of a motion with impacts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Doubt {
+    /// All points are of the linear mode.
+    NoImpacts,
+    /// A settled point, or all points, without evidence of impacts.
+    NotEstablished {
+        /// Number of points without evidence.
+        points: usize,
+    },
+    /// No point is a settled one of a motion with impacts.
+    NotSettled,
 }
 
 /// Largest errors of the points of a tracked backbone.

@@ -17,24 +17,31 @@ pub struct Sample {
     pub ground_truth: Option<GroundTruth>,
 }
 
-/// The samples as a table (CSV): what a run that ended early has measured.
+/// First line of a recording (CSV).
+pub const HEADINGS: &str = "time,response,reference,omega,E,phase_error,state,fault\n";
+
+/// Appends a sample to a recording, as a line.
+pub fn write_row(text: &mut String, sample: &Sample) {
+    let Sample { time, sensors, command, .. } = sample;
+    let Drive { omega, amplitude, .. } = command.drive;
+    let reference = sensors.reference.map_or_else(String::new, |value| value.to_string());
+    let state = command
+        .state
+        .map_or_else(String::new, |state| (state as u8).to_string());
+    let fault = command.fault.map_or(0, |fault| fault as u8);
+    let response = sensors.response;
+    let phase_error = command.phase_error.map_or_else(String::new, |error| error.to_string());
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        text,
+        "{time},{response},{reference},{omega},{amplitude},{phase_error},{state},{fault}"
+    );
+}
+
+/// The samples as a recording.
 pub fn table(samples: &[Sample]) -> String {
-    let mut text = String::from("time,response,reference,omega,E,phase_error,state,fault\n");
-    for Sample { time, sensors, command, .. } in samples {
-        let Drive { omega, amplitude, .. } = command.drive;
-        let reference = sensors.reference.map_or_else(String::new, |value| value.to_string());
-        let state = command
-            .state
-            .map_or_else(String::new, |state| (state as u8).to_string());
-        let fault = command.fault.map_or(0, |fault| fault as u8);
-        let response = sensors.response;
-        let phase_error = command.phase_error.map_or_else(String::new, |error| error.to_string());
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "{time},{response},{reference},{omega},{amplitude},{phase_error},{state},{fault}"
-        );
-    }
+    let mut text = String::from(HEADINGS);
+    samples.iter().for_each(|sample| write_row(&mut text, sample));
     text
 }
 

@@ -2,12 +2,13 @@
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::{backbone::track_into, comparison::TrackedComparison, fit::contradiction, report};
+use vines::comparison::{Doubt, TrackedComparison};
+use vines::{advice, backbone::track_into, fit::contradiction, numerics::range, report, scene::Scene};
 
-use super::experiment::ExperimentArguments;
+use super::experiment::{ExperimentArguments, INTERRUPTED_FILE};
 use super::failure::Failure;
 use super::options::Endpoint;
-use super::output::{print, written};
+use super::output::Results;
 use super::summary;
 
 const HELP: &str = "\
@@ -42,39 +43,71 @@ pub(super) struct Arguments {
     rig: Endpoint,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+/// Results that are written.
+const FILES: [&str; 4] = ["tracked.json", "tracked.csv", "tracked.svg", INTERRUPTED_FILE];
+
+pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let experiment = &arguments.experiment;
-    let (scene, session) = experiment.start("vines backbone", Some(&arguments.rig), |scene| scene.backbone_config())?;
+    let (scene, session) = experiment.start("vines backbone", Some(&arguments.rig), Scene::backbone_config, &FILES)?;
     let bar = ProgressBar::new(scene.backbone.points.into());
-    let measured = session.measure(&scene, &experiment.out, |samples, rig, controller| {
+    let measured = session.measure(&scene, |samples, rig, controller| {
         track_into(samples, rig, controller, &scene, |done, _| {
             bar.set_position(done as u64)
         })
     });
     bar.finish_and_clear();
-    let (tracked, timing) = measured?;
+    let (tracked, ended) = measured?;
     let result = TrackedComparison::of(&tracked, &scene);
-    let summary = summary::tracked(&result);
-    let files = report::write_tracked(&result, &experiment.out)?;
-    if let Some(ended) = tracked.ended {
-        let mut failure = Failure::from(ended);
-        let (count, files) = (result.points.len(), written(&files));
-        failure.message += &format!("\n{count} points were measured before. {}", files.trim_end());
-        return Err(failure);
-    }
-    let mut text = experiment.result(&result, &summary, &files, timing)?;
-    let settled = result.points.iter().filter(|compared| compared.point.settled);
+    let mut text = summary::tracked(&result);
+    let settled = result.points.iter().filter(|compared| compared.is_of_backbone());
     let points: Vec<_> = settled.map(|compared| (&compared.point.at).into()).collect();
-    if let Some(line) =
-        contradiction(&points, scene.resonance, &scene.plant).filter(|_| !experiment.json && result.left_out.is_none())
-    {
-        text += &format!("{line}\n");
+    let (settled, of) = (points.len(), result.points.len());
+    if settled < of {
+        text += &format!("{settled} of {of} points are settled points of a motion with impacts\n");
     }
-    match result.doubt() {
-        Some(reason) => {
-            print(&text)?;
-            Err(Failure::run(reason))
+    if tracked.ended.is_none()
+        && result.left_out.is_none()
+        && let Some(line) = contradiction(&points, scene.resonance, &scene.plant)
+    {
+        text += &format!("\n{line}\n");
+    }
+    let files = report::tracked_files(&result).map_err(Failure::from);
+    let failure = match tracked.ended {
+        Some(error) => {
+            let mut failure = Failure::from(error);
+            failure.message += &format!("\n{of} points were measured before");
+            Some(failure)
         }
-        None => Ok(text),
+        None => result
+            .doubt()
+            .map(|doubt| Failure::run(doubt_in_words(doubt, of, &scene))),
+    };
+    experiment.finish(ended, &result, &text, files, failure)
+}
+
+/// Why the points are no backbone, and what to do.
+fn doubt_in_words(doubt: Doubt, of: usize, scene: &Scene) -> String {
+    match doubt {
+        Doubt::NoImpacts => format!(
+            "all {of} points are without impacts (the linear mode): the particle does not reach the walls. Check that it moves freely; give it \
+             a velocity in [start]"
+        ),
+        Doubt::NotEstablished { points } => format!(
+            "the regime of {points} of {of} points is not established: neither their third harmonic nor a distance from the linear response \
+             that the loop check measures is evidence of impacts. Check that the particle moves freely; do not skip the loop check; reduce \
+             noise that hides the harmonic"
+        ),
+        Doubt::NotSettled => {
+            let levels = advice::stable_orbits(&scene.dimensionless());
+            let (low, high) = range((f64::INFINITY, 0.0), levels.iter().map(|orbit| orbit.c));
+            let stable = match low <= high {
+                true => format!("in the ideal cavity it is stable for C from {low:.3} to {high:.3}"),
+                false => "in the ideal cavity it is nowhere stable".into(),
+            };
+            format!(
+                "none of {of} points is a settled point of a symmetric 1:1 motion: {stable}. Set backbone.C_from and backbone.C_to to \
+                 levels within this range"
+            )
+        }
     }
 }

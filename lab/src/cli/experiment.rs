@@ -1,21 +1,19 @@
 //! What the commands share that drive a rig through an experiment: options, loop check, doubtful results, and what is kept of a failure.
 
-use std::cell::RefCell;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 
 use clap::Args;
 use phase_lock::Config;
 use serde::Serialize;
 use vines::experiment::{ExperimentError, Stage};
 use vines::net::{ReportLost, Timing};
-use vines::record::Sample;
+use vines::record::{Sample, table};
 use vines::rig::{BuiltIn, Controller, Fault, Rig};
-use vines::{advice, loop_check, report, scene::Scene};
+use vines::{FileError, ResultFolder, advice, loop_check, scene::Scene};
 
 use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
-use super::output::{output, print, writable, written};
-use super::tap::Tap;
+use super::output::{Results, Written, output, results, written};
+use super::recording::Recording;
 use super::watch::{Watch, WatchArguments};
 use super::{check, failure::Failure, pack::fmus};
 
@@ -32,7 +30,7 @@ pub(super) struct ExperimentArguments {
 
     /// Folder for the results; created if it does not exist
     #[arg(long, value_name = "DIR", default_value = "out")]
-    pub out: PathBuf,
+    out: PathBuf,
 
     /// The controller: `built-in`, an FMU (for `vines backbone` with the inputs `hold_response` and `move.*` of PhaseLock.fmu), or
     /// tcp://HOST:PORT
@@ -58,37 +56,52 @@ pub(super) struct ExperimentArguments {
     pub json: bool,
 }
 
-/// What a rig in real time reports at the end of a session.
-pub(super) type Closed = Option<Result<Timing, ReportLost>>;
-
 /// A rig that has passed its loop check, and a controller, both connected.
 pub(super) struct Session {
     controller: Box<dyn Controller>,
     rig: OpenRig,
     watch: Option<Watch>,
-    /// The file of --record, and the samples for it.
-    record: Option<(PathBuf, Rc<RefCell<Vec<Sample>>>)>,
+    recording: Option<Recording>,
+    folder: ResultFolder,
 }
 
+/// What remains of a session after the measurement.
+pub(super) struct Ended {
+    folder: ResultFolder,
+    /// The file of --record.
+    recorded: Result<Option<PathBuf>, FileError>,
+    /// What a rig in real time reports.
+    timing: Option<Result<Timing, ReportLost>>,
+}
+
+/// The file of a run that ended without a result.
+pub(super) const INTERRUPTED_FILE: &str = "interrupted.csv";
+
 impl ExperimentArguments {
-    /// Loads the scene and connects rig and controller; without a rig, it is this program's FMU. Invalid settings and a folder that
-    /// cannot be written to are refused before anything is driven.
+    /// Loads the scene and connects rig and controller; without a rig, it is this program's FMU. Invalid settings and files that cannot be
+    /// written are refused before anything is driven. `names`: the results that the command may write.
     pub(super) fn start(
         &self,
         command: &str,
         rig: Option<&Endpoint>,
         config: impl Fn(&Scene) -> Config,
+        names: &'static [&'static str],
     ) -> Result<(Scene, Session), Failure> {
         let mut scene = self.scene.load()?;
         let watch = self.watch.start(command, &scene)?;
         let scope = self.reach.reach()?;
         BuiltIn::new(&config(&scene))?;
-        writable(&self.out)?;
+        let folder = results(&self.out, names)?;
+        let recording = self.record.clone().map(Recording::open).transpose();
+        let recording = recording.map_err(Failure::input)?;
         let mut open = match rig {
             Some(endpoint) => endpoint.rig(&scene, scope)?,
             None => {
-                let folder = tempfile::tempdir()?;
-                Endpoint::Fmu(fmus(folder.path())?.swap_remove(0)).rig(&scene, scope)?
+                let temporary = tempfile::tempdir()?;
+                let (name, content) = fmus()?.swap_remove(0);
+                let plant = temporary.path().join(name);
+                std::fs::write(&plant, content)?;
+                Endpoint::Fmu(plant).rig(&scene, scope)?
             }
         };
         self.check_loop(open.rig.as_mut(), &mut scene)?;
@@ -98,12 +111,10 @@ impl ExperimentArguments {
         if let Some(watch) = &watch {
             (open.rig, controller) = (watch.rig(open.rig), watch.controller(controller));
         }
-        let record = self.record.clone().map(|file| (file, Rc::default()));
-        if let Some((_, samples)) = &record {
-            let samples: Rc<RefCell<Vec<Sample>>> = Rc::clone(samples);
-            open.rig = Tap::around(open.rig, move |sample, _| samples.borrow_mut().push(sample));
+        if let Some(recording) = &recording {
+            open.rig = recording.rig(open.rig);
         }
-        Ok((scene, Session { controller, rig: open, watch, record }))
+        Ok((scene, Session { controller, rig: open, watch, recording, folder }))
     }
 
     /// Checks a rig that is not a simulation, and refuses one that is not as expected. Such a rig starts at rest.
@@ -133,41 +144,52 @@ impl ExperimentArguments {
         }
     }
 
-    /// The result, as JSON or as a summary with the paths that were written. If a rig in real time missed deadlines, or did not get its
-    /// drives in time, stderr says so; more than a few make the results doubtful, and so does a rig that does not report.
-    pub(super) fn result(
+    /// The result, as JSON or as text, and its files, with the `failure` that the result has in spite of them. If a rig in real time missed
+    /// deadlines, or did not get its drives in time, stderr says so; more than a few make the results doubtful, and so does a rig that does
+    /// not report.
+    pub(super) fn finish<N: AsRef<Path> + 'static, C: AsRef<[u8]> + 'static>(
         &self,
+        ended: Ended,
         result: &impl Serialize,
-        summary: &str,
-        paths: &[PathBuf],
-        timing: Closed,
-    ) -> Result<String, Failure> {
-        let text = output(self.json, result, || format!("{summary}\n{}", written(paths)))?;
-        let doubt = |share: f64| match &timing {
-            None => None,
-            Some(Ok(timing)) => timing.doubt(share),
-            Some(Err(lost)) => Some(lost.to_string()),
-        };
-        if let Some(doubt) = doubt(TOLERATED) {
-            print(&text)?;
-            return Err(Failure::new(LATE, format!("these results are doubtful: {doubt}")));
-        }
-        if let Some(reason) = doubt(0.0) {
-            eprintln!("warning: {reason}");
-        }
-        Ok(text)
+        text: &str,
+        files: Result<Vec<(N, C)>, Failure>,
+        failure: Option<Failure>,
+    ) -> Result<Results, Failure> {
+        let json = self.json;
+        let text = output(json, result, || format!("{text}\n"))?;
+        Ok(Results::new(text, move || {
+            let Ended { folder, recorded, timing } = ended;
+            let mut written = Written::default();
+            written.failures.extend(failure);
+            written.add(files.and_then(|files| Ok(folder.replace(files)?)));
+            written.add(recorded);
+            if json {
+                written.paths.clear();
+            }
+            let doubt = |share: f64| match &timing {
+                None => None,
+                Some(Ok(timing)) => timing.doubt(share),
+                Some(Err(lost)) => Some(lost.to_string()),
+            };
+            if let Some(doubt) = doubt(TOLERATED) {
+                let message = format!("these results are doubtful: {doubt}");
+                written.failures.push(Failure::new(LATE, message));
+            } else if let Some(reason) = doubt(0.0) {
+                eprintln!("warning: {reason}");
+            }
+            written
+        }))
     }
 }
 
 impl Session {
-    /// Measures, ends the session, and writes the file of --record. A rig in real time reports its missed deadlines. An experiment that ends
-    /// early leaves what was measured in a file, and names the reason that the exact orbits know.
+    /// Measures, and ends the session. A rig in real time reports its missed deadlines. An experiment that ends early leaves what was
+    /// measured in a file, and names the reason that the exact orbits know.
     pub(super) fn measure<T>(
         mut self,
         scene: &Scene,
-        out: &Path,
         measure: impl FnOnce(&mut Vec<Sample>, &mut dyn Rig, &mut dyn Controller) -> Result<T, ExperimentError>,
-    ) -> Result<(T, Closed), Failure> {
+    ) -> Result<(T, Ended), Failure> {
         let mut samples = Vec::new();
         let result = measure(&mut samples, self.rig.rig.as_mut(), self.controller.as_mut());
         drop(self.controller);
@@ -175,32 +197,50 @@ impl Session {
             watch.failure = Some(error.to_string());
         }
         let timing = self.rig.close();
-        if let Some((file, samples)) = &self.record {
-            vines::write_file(file, &vines::record::table(&samples.borrow()))?;
+        let recorded = self.recording.map_or(Ok(None), Recording::finish);
+        let ended = Ended { folder: self.folder, recorded, timing };
+        match result {
+            Ok(result) => Ok((result, ended)),
+            Err(error) => {
+                let reason = match error {
+                    ExperimentError::NoLock { .. }
+                    | ExperimentError::NotReached { .. }
+                    | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. } => {
+                        advice::reason(scene, advice::last_regime(&samples, scene))
+                    }
+                    _ => None,
+                };
+                Err(ended.without_result(Failure::from(error), reason, &samples))
+            }
         }
-        let result = result.map_err(|error| {
-            let reason = match error {
-                ExperimentError::NoLock { .. }
-                | ExperimentError::NotReached { .. }
-                | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. } => {
-                    advice::reason(scene, advice::last_regime(&samples, scene))
-                }
-                _ => None,
-            };
-            kept(Failure::from(error), reason, &samples, out)
-        });
-        Ok((result?, timing))
     }
 }
 
-/// The failure with its reason, and what was measured in a file.
-pub(super) fn kept(mut failure: Failure, reason: Option<String>, samples: &[Sample], out: &Path) -> Failure {
-    let file = (!samples.is_empty()).then(|| match report::write_interrupted(samples, out) {
-        Ok(files) => written(&files).trim_end().to_string(),
-        Err(error) => error.to_string(),
-    });
-    for line in [reason, file].into_iter().flatten() {
-        failure.message += &format!("\n{line}");
+impl Ended {
+    /// The failure with its reason, and what was measured in a file.
+    pub(super) fn without_result(self, mut failure: Failure, reason: Option<String>, samples: &[Sample]) -> Failure {
+        let mut lines = Vec::from_iter(reason);
+        let mut files = Vec::new();
+        match self.recorded {
+            Ok(file) => files.extend(file),
+            Err(error) => lines.push(error.to_string()),
+        }
+        if !samples.is_empty() {
+            match self.folder.interrupt(INTERRUPTED_FILE, &table(samples)) {
+                Ok((file, previous)) => {
+                    files.insert(0, file);
+                    let moved = |folder: PathBuf| format!("The results of an earlier run are in {}", folder.display());
+                    lines.extend(previous.map(moved));
+                }
+                Err(error) => lines.push(error.to_string()),
+            }
+        }
+        if !files.is_empty() {
+            lines.push(written(&files).trim_end().into());
+        }
+        for line in lines {
+            failure.message += &format!("\n{line}");
+        }
+        failure
     }
-    failure
 }

@@ -33,6 +33,14 @@ impl Failure {
         Self::new(2, message)
     }
 
+    /// The first of some failures, with the messages of all.
+    pub(super) fn first_of(failures: Vec<Self>) -> Option<Self> {
+        failures.into_iter().reduce(|mut first, failure| {
+            first.message += &format!("\n{}", failure.message);
+            first
+        })
+    }
+
     /// A failure at run time.
     pub(super) fn run(message: impl Display) -> Self {
         Self::new(1, message)

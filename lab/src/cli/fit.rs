@@ -15,7 +15,7 @@ use vines::table::Table;
 
 use super::failure::Failure;
 use super::options::{SceneArguments, positive};
-use super::output::{output, written};
+use super::output::{Results, Written, output, writable};
 
 const HELP: &str = "\
 A point has the frequency of phase resonance f, the amplitude A of the response and the amplitude E of the base, each with its standard
@@ -46,7 +46,7 @@ Examples:
   vines fit out/tracked.csv --out rig.toml      a scene with the fitted plant, for every other command";
 
 /// Fit the parameters of a rig to measured points of its backbone
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
     /// Files with points or recordings: CSV, tracked.json or identification.json
@@ -102,8 +102,9 @@ struct Output<'a> {
     parts: Vec<Part>,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let scene = arguments.scene.load()?;
+    writable([&arguments.figure, &arguments.out].into_iter().flatten())?;
     let channels = Channels {
         response: arguments.response.clone(),
         drive: arguments.drive.clone(),
@@ -134,7 +135,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         verdict: verdict.clone(),
         parts: parts.clone(),
     };
-    let mut text = output(arguments.json, &printed, || {
+    let text = output(arguments.json, &printed, || {
         let parts = if parts.is_empty() {
             String::new()
         } else {
@@ -143,29 +144,31 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         let verdict = verdict.as_ref().map(|verdict| format!("{verdict}\n"));
         parts + &summary(&report, &fit, points.len(), skipped) + &verdict.unwrap_or_default()
     })?;
-    if let Some(path) = &arguments.figure {
-        let file = vines::write_file(path, &fitted(&points, &fit, &scene, verdict.as_deref()).svg())?;
-        if !arguments.json {
-            text += &written(&[file]);
+    let Arguments { figure, out, json, .. } = arguments.clone();
+    let scene_text = arguments
+        .scene
+        .with_plant(&plant_section(&report, &plant, verdict.as_deref()))?;
+    Ok(Results::new(text, move || {
+        let mut files = Written::default();
+        if let Some(path) = &figure {
+            let figure = fitted(&points, &fit, &scene, verdict.as_deref()).svg();
+            files.add(vines::write_file(path, &figure).map(Some));
         }
-    }
-    if let Some(path) = &arguments.out {
-        let plant = plant_section(&report, &plant, verdict.as_deref());
-        let scene = arguments.scene.with_plant(&plant)?;
-        let files = vines::write_file(path, &scene).map_err(Failure::run)?;
-        if !arguments.json {
-            text += &written(&[files]);
+        if let Some(path) = &out {
+            files.add(vines::write_file(path, &scene_text).map(Some));
         }
-    }
-    if report.describes {
-        return Ok(text);
-    }
-    super::output::print(&text)?;
-    Err(Failure::run(format!(
-        "the model does not describe the points: chi-square is {:.0} for {} degrees of freedom. Uncertainties that are too small, points of \
-         several branches, or several effects at a time may be the reason",
-        fit.chi_square, fit.degrees
-    )))
+        if json {
+            files.paths.clear();
+        }
+        if !report.describes {
+            files.failures.push(Failure::run(format!(
+                "the model does not describe the points: chi-square is {:.0} for {} degrees of freedom. Uncertainties that are too small, \
+                 points of several branches, or several effects at a time may be the reason",
+                fit.chi_square, fit.degrees
+            )));
+        }
+        files
+    }))
 }
 
 /// The parts of recordings.

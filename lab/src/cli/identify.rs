@@ -5,11 +5,11 @@ use indicatif::ProgressBar;
 use vines::experiment::{Stage, run_into};
 use vines::fit::contradiction;
 use vines::identification::{IdentificationError, identify};
-use vines::{advice, comparison::Comparison, report};
+use vines::{advice, comparison::Comparison, pack::File, report, scene::Scene};
 
-use super::experiment::{ExperimentArguments, kept};
+use super::experiment::{ExperimentArguments, INTERRUPTED_FILE};
 use super::options::Endpoint;
-use super::output::progress_bar;
+use super::output::{Results, progress_bar};
 use super::summary;
 use super::{failure::Failure, pack::fmus};
 
@@ -39,46 +39,65 @@ pub(super) struct Arguments {
     rig: Option<Endpoint>,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+/// Results that are written.
+const FILES: [&str; 6] = [
+    "identification.json",
+    "backbone.csv",
+    "backbone.svg",
+    "history.svg",
+    "sim.svg",
+    INTERRUPTED_FILE,
+];
+
+pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let experiment = &arguments.experiment;
-    let (scene, session) = experiment.start("vines identify", arguments.rig.as_ref(), |scene| {
-        scene.controller_config()
-    })?;
+    let (scene, session) = experiment.start(
+        "vines identify",
+        arguments.rig.as_ref(),
+        Scene::controller_config,
+        &FILES,
+    )?;
     let bar = progress_bar(
         Stage::Locking.samples(&scene) as u64,
         "{msg:29} [{wide_bar}] {pos}/{len} samples",
     );
-    let measured = session.measure(&scene, &experiment.out, |samples, rig, controller| {
+    let measured = session.measure(&scene, |samples, rig, controller| {
         run_into(samples, rig, controller, &scene, |stage, done, of| {
             show(&bar, stage, done, of)
         })
     });
     bar.finish_and_clear();
-    let (record, timing) = measured?;
-    let identification = identify(&record, &scene).map_err(|error| {
-        let reason = match error {
-            IdentificationError::Regime { regime, .. } => advice::reason(&scene, Some(regime)),
-            _ => None,
-        };
-        kept(Failure::run(error), reason, &record.samples, &experiment.out)
-    })?;
+    let (record, ended) = measured?;
+    let identification = match identify(&record, &scene) {
+        Ok(identification) => identification,
+        Err(error) => {
+            let reason = match error {
+                IdentificationError::Regime { regime, .. } => advice::reason(&scene, Some(regime)),
+                _ => None,
+            };
+            return Err(ended.without_result(Failure::run(error), reason, &record.samples));
+        }
+    };
     let result = Comparison::of(&identification, &scene);
-    let summary = summary::identification(&result);
-    let mut files = report::write(&result, &record, &scene, &experiment.out)?;
-    if arguments.rig.is_none() {
-        files.extend(fmus(&experiment.out)?);
-    }
-    let mut text = experiment.result(&result, &summary, &files, timing)?;
+    let mut text = summary::identification(&result);
     // A rig that reports its impacts is a simulation of the scene.
     let is_simulated = !identification.lock.impacts_per_period.is_nan();
     let lock = [(&identification.lock.at).into()];
-    if !is_simulated
-        && !experiment.json
-        && let Some(line) = contradiction(&lock, scene.resonance, &scene.plant)
-    {
-        text += &format!("{line}\n");
+    if !is_simulated && let Some(line) = contradiction(&lock, scene.resonance, &scene.plant) {
+        text += &format!("\n{line}\n");
     }
-    Ok(text)
+    let files = report::identification_files(&result, &record, &scene).map_err(Failure::from);
+    let files = files.and_then(|files| {
+        let mut files: Vec<File> = files
+            .into_iter()
+            .map(|(name, content)| (name.into(), content.into()))
+            .collect();
+        if arguments.rig.is_none() {
+            files.extend(fmus()?);
+        }
+        Ok(files)
+    });
+    experiment.finish(ended, &result, &text, files, None)
 }
 
 fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {

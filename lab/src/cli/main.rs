@@ -13,6 +13,7 @@ mod options;
 mod orbit;
 mod output;
 mod pack;
+mod recording;
 mod report;
 mod serve;
 mod summary;
@@ -25,7 +26,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use failure::Failure;
-use output::print;
+use output::Results;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -69,7 +70,7 @@ enum Command {
 /// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input, 3 for results of a rig that missed deadlines,
 /// 130 after Ctrl-C.
 fn main() -> ExitCode {
-    match dispatch(Cli::parse().command).and_then(|text| print(&text)) {
+    match dispatch(Cli::parse().command).and_then(Results::show) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             eprintln!("error: {}", failure.message);
@@ -78,19 +79,19 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs a command. Returns what it prints.
-fn dispatch(command: Command) -> Result<String, Failure> {
+/// Runs a command.
+fn dispatch(command: Command) -> Result<Results, Failure> {
     match command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Backbone(arguments) => backbone::run(&arguments),
         Command::Fit(arguments) => fit::run(&arguments),
-        Command::Check(arguments) => check::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments).map(Results::from),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),
-        Command::Report(arguments) => report::run(&arguments),
-        Command::Pack(arguments) => pack::run(&arguments),
-        Command::Rig(arguments) => serve::rig(&arguments),
-        Command::Controller(arguments) => serve::controller(&arguments),
+        Command::Report(arguments) => report::run(&arguments).map(Results::from),
+        Command::Pack(arguments) => pack::run(&arguments).map(Results::from),
+        Command::Rig(arguments) => serve::rig(&arguments).map(Results::from),
+        Command::Controller(arguments) => serve::controller(&arguments).map(Results::from),
     }
 }

@@ -11,7 +11,7 @@ use vines::report;
 
 use super::failure::Failure;
 use super::options::{SceneArguments, warn_left_out};
-use super::output::{progress_bar, writable, written};
+use super::output::{Results, Written, progress_bar, results};
 use super::summary::{parameters, regimes};
 
 const HELP: &str = "\
@@ -76,17 +76,23 @@ pub(super) struct Arguments {
     out: PathBuf,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+/// What is written.
+pub(super) const FILES: [&str; 3] = ["map.csv", "map.svg", "bifurcations.csv"];
+
+pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let Arguments { x, y, sigma, periods, confirmations, out, .. } = arguments;
     let mut map = Map::new(arguments.scene.family()?, x, y, *sigma, *periods)?;
     warn_left_out(map.scene(), "a regime map is");
-    writable(out)?;
+    let folder = results(out, &FILES)?;
     let bar = progress_bar(map.size(), "mapping regimes [{wide_bar}] {pos}/{len} cells");
     map.run(*confirmations, || bar.inc(1))?;
     bar.finish_and_clear();
-    let summary = summary(&map);
-    let files = report::write_map(&map, out)?;
-    Ok(format!("{summary}\n{}", written(&files)))
+    Ok(Results::new(format!("{}\n", summary(&map)), move || {
+        let mut written = Written::default();
+        let files = report::map_files(&map).map_err(Failure::from);
+        written.add(files.and_then(|files| Ok(folder.replace(files)?)));
+        written
+    }))
 }
 
 fn summary(map: &Map) -> String {

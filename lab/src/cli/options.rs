@@ -17,7 +17,7 @@ use super::failure::{Failure, stop_flag};
 use super::output::log_warnings;
 use super::summary::ideal;
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(super) struct SceneArguments {
     /// Scene file (TOML); without it, the default scene
     #[arg(long, value_name = "FILE")]

@@ -18,7 +18,7 @@ use vines::{
     scene::{Dimensionless, Scene},
 };
 
-use super::output::{output, written};
+use super::output::{Results, output, writable};
 use super::summary::{self, parameters};
 use super::{failure::Failure, options::SceneArguments};
 
@@ -89,14 +89,15 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
+    writable(&arguments.figure)?;
     if arguments.periodic {
-        return of_the_plant(arguments, &arguments.scene.load()?);
+        return of_the_plant(arguments, &arguments.scene.load()?).map(Results::from);
     }
     let loaded = arguments.scene.load_for("exact orbits are")?;
     let scene = loaded.dimensionless();
     if let Some(sigma) = arguments.sigma {
-        return settled(arguments, &scene, sigma, loaded.dimensionless_start());
+        return settled(arguments, &scene, sigma, loaded.dimensionless_start()).map(Results::from);
     }
     let [lowest, highest] = ContinuationLimits::default().g;
     let limits = ContinuationLimits {
@@ -113,18 +114,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         })?;
         return shown(&scene, "Exact backbone", &branch, arguments.json, || {
             curve("Symmetric 1:1", &branch)
-        });
+        })
+        .map(Results::from);
     }
     if arguments.response {
         return components(arguments, &scene, &limits);
     }
     let orbits = phase_resonant(&scene);
     let title = format!("Exact symmetric 1:1 orbits at resonance: {}", scene.definition.name());
-    shown(&scene, &title, &orbits, arguments.json, || listing(&scene, &orbits))
+    shown(&scene, &title, &orbits, arguments.json, || listing(&scene, &orbits)).map(Results::from)
 }
 
 /// All components of the frequency response.
-fn components(arguments: &Arguments, scene: &Dimensionless, limits: &ContinuationLimits) -> Result<String, Failure> {
+fn components(arguments: &Arguments, scene: &Dimensionless, limits: &ContinuationLimits) -> Result<Results, Failure> {
     let [from, to] = arguments.range;
     if 1.0 + scene.epsilon * from <= 0.0 {
         let rule = "1 + epsilon sigma must be above 0";
@@ -139,7 +141,7 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Continuatio
             scene.g
         )));
     }
-    let mut text = shown(scene, "Exact frequency response", &response, arguments.json, || {
+    let text = shown(scene, "Exact frequency response", &response, arguments.json, || {
         let count = response.components.len();
         let curves = response.components.iter();
         let curves: String = curves
@@ -151,13 +153,10 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Continuatio
              --sigma follows the\none that a start leads to.\n\n{curves}"
         )
     })?;
-    if let Some(file) = &arguments.figure {
-        let file = vines::write_file(file, &responses(scene, &response, arguments.range).svg())?;
-        if !arguments.json {
-            text += &written(&[file]);
-        }
-    }
-    Ok(text)
+    let (figure, json, scene, range) = (arguments.figure.clone(), arguments.json, *scene, arguments.range);
+    Ok(Results::with_figure(text, json, figure, move || {
+        responses(&scene, &response, range).svg()
+    }))
 }
 
 /// Parses FIRST:LAST.

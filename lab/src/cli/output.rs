@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
+use vines::ResultFolder;
 
 use super::failure::Failure;
 
@@ -33,19 +34,95 @@ pub(super) fn yes_no(value: bool) -> String {
     if value { "yes" } else { "no" }.into()
 }
 
+/// What a command has found, and what is left to do once that has been printed: a full disk hides no result.
+pub(super) struct Results {
+    text: String,
+    write: Box<dyn FnOnce() -> Written>,
+}
+
+/// What was written, and what has failed.
+#[derive(Default)]
+pub(super) struct Written {
+    pub paths: Vec<PathBuf>,
+    pub failures: Vec<Failure>,
+}
+
+impl Written {
+    pub(super) fn add<E: Into<Failure>>(&mut self, written: Result<impl IntoIterator<Item = PathBuf>, E>) {
+        match written {
+            Ok(paths) => self.paths.extend(paths),
+            Err(failure) => self.failures.push(failure.into()),
+        }
+    }
+}
+
+impl From<String> for Results {
+    fn from(text: String) -> Self {
+        Self::new(text, Written::default)
+    }
+}
+
+impl Results {
+    pub(super) fn new(text: String, write: impl FnOnce() -> Written + 'static) -> Self {
+        Self { text, write: Box::new(write) }
+    }
+
+    /// With a figure, if there is a file for it.
+    pub(super) fn with_figure(
+        text: String,
+        json: bool,
+        file: Option<PathBuf>,
+        draw: impl FnOnce() -> String + 'static,
+    ) -> Self {
+        Self::new(text, move || {
+            let mut written = Written::default();
+            written.add(file.map(|file| vines::write_file(&file, &draw())).transpose());
+            if json {
+                written.paths.clear();
+            }
+            written
+        })
+    }
+
+    /// Prints the text and the paths of the files, and returns the failures of all steps.
+    pub(super) fn show(self) -> Result<(), Failure> {
+        let printed = print(&self.text);
+        let Written { paths, mut failures } = (self.write)();
+        if !paths.is_empty() {
+            failures.extend(print(&written(&paths)).err());
+        }
+        failures.extend(printed.err());
+        Failure::first_of(failures).map_or(Ok(()), Err)
+    }
+
+    /// The text, and the failures of writing the files.
+    pub(super) fn unseen(self) -> (String, Option<Failure>) {
+        (self.text, Failure::first_of((self.write)().failures))
+    }
+}
+
 /// The paths that were written, in one line.
 pub(super) fn written(paths: &[PathBuf]) -> String {
     let files: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     format!("Written: {}\n", files.join(", "))
 }
 
-/// Checks that files can be written to a folder before anything runs. A folder that does not exist is not created yet: that its parent
-/// can be written to is enough.
-pub(super) fn writable(folder: &Path) -> Result<(), Failure> {
-    let existing = folder.ancestors().find(|path| path.exists());
-    tempfile::tempfile_in(existing.unwrap_or(Path::new(".")))
-        .map(drop)
-        .map_err(|error| Failure::input(format!("cannot write to {}: {error}", folder.display())))
+/// Refuses files that cannot be written, before anything runs.
+pub(super) fn writable<'a>(files: impl IntoIterator<Item = &'a PathBuf>) -> Result<(), Failure> {
+    files
+        .into_iter()
+        .try_for_each(|file| vines::writable(file).map_err(Failure::input))
+}
+
+/// Opens the folder of results before anything runs; `names` are the files that the command may write.
+pub(super) fn results(folder: &Path, names: &'static [&'static str]) -> Result<ResultFolder, Failure> {
+    ResultFolder::open(folder, names).map_err(|error| {
+        let advice = match error.source.kind() {
+            io::ErrorKind::ResourceBusy => "; wait for its end, or choose another folder with --out",
+            _ => "",
+        };
+        Failure::input(format!("{error}{advice}"))
+    })
 }
 
 /// Warnings go to stderr: warnings of connections, and what an FMU logs.

@@ -1,12 +1,12 @@
 //! `vines pack`: the two FMUs, and the two of them coupled.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use vines::pack::{Binary, components, own_libraries, pack, pack_bench};
+use vines::pack::{Binary, File, components, own_libraries, pack, pack_bench};
 use vines::rig::BuiltIn;
 
-use super::{failure::Failure, options::SceneArguments};
+use super::{failure::Failure, options::SceneArguments, output::results};
 
 const HELP: &str = "\
 Examples:
@@ -41,24 +41,28 @@ pub(super) struct Arguments {
     only_binaries: bool,
 }
 
+/// What is written.
+const FILES: [&str; 3] = ["LoViNes.fmu", "PhaseLock.fmu", "bench.ssp"];
+
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     BuiltIn::new(&scene.controller_config())?;
+    let folder = results(&arguments.out, &FILES)?;
     let mut binaries = Vec::new();
     if !arguments.only_binaries {
-        let folder = arguments.libraries.clone().map_or_else(beside_this_program, Ok)?;
-        binaries = own_libraries(&components(), &folder)?;
+        let libraries = arguments.libraries.clone().map_or_else(beside_this_program, Ok)?;
+        binaries = own_libraries(&components(), &libraries)?;
     }
     binaries.extend(arguments.binaries.iter().cloned());
-    let written = pack_bench(&scene, &binaries, &arguments.out)?;
+    let written = folder.replace(pack_bench(&scene, &binaries)?)?;
     Ok(written.iter().map(|path| format!("{}\n", path.display())).collect())
 }
 
-/// Packs this program's FMUs into a folder; the plant is the first.
-pub(super) fn fmus(out: &Path) -> Result<Vec<PathBuf>, Failure> {
+/// This program's FMUs; the plant is the first.
+pub(super) fn fmus() -> Result<Vec<File>, Failure> {
     let components = components();
     let libraries = own_libraries(&components, &beside_this_program()?)?;
-    Ok(pack(&components, &libraries, out)?)
+    Ok(pack(&components, &libraries)?)
 }
 
 fn beside_this_program() -> Result<PathBuf, Failure> {

@@ -1,6 +1,6 @@
 //! `vines report`: the other commands one after another, and what they print and draw on one page.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -9,7 +9,8 @@ use vines::regime_map::{Axis, Map};
 use vines::rig::BuiltIn;
 use vines::scene::Scene;
 
-use super::output::{writable, written};
+use super::experiment::INTERRUPTED_FILE;
+use super::output::{results, written};
 use super::summary::{ideal, parameters};
 use super::{Cli, dispatch};
 use super::{
@@ -89,39 +90,69 @@ const SECTIONS: [Section; 6] = [
     ),
 ];
 
+/// What is written.
+const FILES: [&str; 15] = [
+    "report.html",
+    "identification.json",
+    "backbone.csv",
+    "backbone.svg",
+    "history.svg",
+    "sim.svg",
+    "tracked.json",
+    "tracked.csv",
+    "tracked.svg",
+    "response.svg",
+    "map.csv",
+    "map.svg",
+    "bifurcations.csv",
+    "fit.svg",
+    INTERRUPTED_FILE,
+];
+
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     // Invalid settings are refused before anything runs or is written.
     let scene = arguments.scene.load()?;
     Map::new(arguments.scene.family()?, &arguments.x, &arguments.y, None, LIMIT)?;
     BuiltIn::new(&scene.controller_config())?;
-    writable(&arguments.out)?;
+    let folder = results(&arguments.out, &FILES)?;
+    // The files of all commands are put in place together.
+    let new = tempfile::Builder::new().prefix(".vines-").tempdir_in(&arguments.out)?;
     let mut failed = Vec::new();
     let mut sections = Vec::new();
     for (title, line, shows, figures) in SECTIONS {
-        let words = words(arguments, line);
-        eprintln!("{}", words.join(" "));
-        let text = match dispatch(Cli::try_parse_from(&words).map_err(Failure::input)?.command) {
-            Err(failure) if failure.code == INTERRUPTED => return Err(failure),
-            Err(failure) => {
-                failed.push(title);
-                format!("error: {}", failure.message)
-            }
-            Ok(text) => text,
+        let shown = words(arguments, line, &arguments.out).join(" ");
+        eprintln!("{shown}");
+        let command = Cli::try_parse_from(words(arguments, line, new.path())).map_err(Failure::input)?;
+        let (mut text, failure) = match dispatch(command.command) {
+            Ok(results) => results.unseen(),
+            Err(failure) => (String::new(), Some(failure)),
         };
+        if let Some(failure) = failure {
+            if failure.code == INTERRUPTED {
+                return Err(failure);
+            }
+            failed.push(title);
+            text += &format!("error: {}", failure.message);
+        }
         let figures = figures
             .iter()
-            .map(|name| std::fs::read_to_string(arguments.out.join(name)));
+            .map(|name| std::fs::read_to_string(new.path().join(name)));
         let lines = text.lines().filter(|line| !line.starts_with("Written: "));
         sections.push(html! {
             h2 { (title) }
             p { (shows) }
-            pre { b { (words.join(" ")) } "\n\n" (lines.collect::<Vec<_>>().join("\n").trim_end()) }
+            pre { b { (shown) } "\n\n" (lines.collect::<Vec<_>>().join("\n").trim_end()) }
             // A figure that the command did not write is left out.
             @for svg in figures.flatten() { figure { (PreEscaped(svg)) } }
         });
     }
     let page = page(&scene, &sections).into_string();
-    let text = written(&[vines::write_file(&arguments.out.join("report.html"), &page)?]);
+    let mut files = vec![("report.html".into(), page.into_bytes())];
+    for entry in std::fs::read_dir(new.path())? {
+        let entry = entry?;
+        files.push((entry.file_name(), std::fs::read(entry.path())?));
+    }
+    let text = written(&folder.replace(files)?[..1]);
     match &failed[..] {
         [] => Ok(text),
         titles => Err(Failure::run(format!("{text}without a result: {}", titles.join(", ")))),
@@ -129,8 +160,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 }
 
 /// The words of a command on the scene of the report.
-fn words(arguments: &Arguments, line: &str) -> Vec<String> {
-    let Arguments { scene, out, x, y } = arguments;
+fn words(arguments: &Arguments, line: &str, out: &Path) -> Vec<String> {
+    let Arguments { scene, x, y, .. } = arguments;
     let out = out.display().to_string();
     let word = |word: &str| match word {
         "X" => x.to_string(),

@@ -10,7 +10,7 @@ use vines::{
     theory::{Activation, B_SYMMETRY_BREAKING, BranchSide, SlowFlow, backbone, resonant},
 };
 
-use super::output::{output, written, yes_no};
+use super::output::{Results, output, writable, yes_no};
 use super::summary::parameters;
 use super::{failure::Failure, options::SceneArguments};
 
@@ -49,7 +49,8 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
+    writable(&arguments.figure)?;
     let scene = arguments.scene.load_for("theory is")?.dimensionless();
     let flow = SlowFlow::new(scene.lambda, scene.r);
     if let Some(sigma) = arguments.sigma.filter(|sigma| !sigma.is_finite()) {
@@ -79,7 +80,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         "equilibria": equilibria.clone().unwrap_or_default(),
         "backbone": backbone(&scene, highest / SAMPLES as f64, highest, SAMPLES),
     });
-    let mut text = output(arguments.json, &result, || {
+    let text = output(arguments.json, &result, || {
         let rows = solutions.iter().map(|point| {
             let stable = [point.impacts_stable, point.slow_flow_stable];
             cells(point.branch, [point.sigma, point.c, point.b], stable)
@@ -104,13 +105,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         }
         text
     })?;
-    if let Some(file) = &arguments.figure {
-        let file = vines::write_file(file, &theory(&scene).svg())?;
-        if !arguments.json {
-            text += &format!("\n{}", written(&[file]));
-        }
-    }
-    Ok(text)
+    let (figure, json) = (arguments.figure.clone(), arguments.json);
+    Ok(Results::with_figure(text, json, figure, move || theory(&scene).svg()))
 }
 
 fn thresholds(activation: &Activation, sigma: f64) -> String {

@@ -1,6 +1,4 @@
-//! The files of a run: tables, figures and JSON, each complete or absent.
-
-use std::path::{Path, PathBuf};
+//! The files of a run: tables, figures and JSON.
 
 use lovines::InvalidValue;
 use phase_lock::ConfigError;
@@ -11,9 +9,8 @@ use thiserror::Error;
 use super::figures::{backbone, history, manifold, regimes, tracked};
 use crate::cells::CellError;
 use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
-use crate::files::{self, FileError};
 use crate::orbit::Periodic;
-use crate::record::{Record, Sample, table};
+use crate::record::Record;
 use crate::regime::Regime;
 use crate::regime_map::{Map, MapCell};
 use crate::scene::Scene;
@@ -28,49 +25,47 @@ pub enum ReportError {
     Controller(#[from] ConfigError),
     #[error(transparent)]
     Map(#[from] CellError),
-    #[error(transparent)]
-    File(#[from] FileError),
     #[error("cannot write a table as CSV: {0}")]
     Csv(#[from] csv::Error),
     #[error("cannot write JSON: {0}")]
     Json(#[from] serde_json::Error),
 }
 
-/// Writes `identification.json`, `backbone.csv`, `backbone.svg`, `history.svg` and `sim.svg` into `out` and returns their paths.
-pub fn write(result: &Comparison, record: &Record, scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let files = [
+/// Name and content of a file.
+pub type ResultFile = (&'static str, String);
+
+/// `identification.json`, `backbone.csv`, `backbone.svg`, `history.svg` and `sim.svg`.
+pub fn identification_files(
+    result: &Comparison,
+    record: &Record,
+    scene: &Scene,
+) -> Result<Vec<ResultFile>, ReportError> {
+    Ok(vec![
         ("identification.json", json(result)?),
         ("backbone.csv", decay_csv(result)?),
         ("backbone.svg", backbone(result).svg()),
         ("history.svg", history(record, scene, result).svg()),
         ("sim.svg", manifold(result).svg()),
-    ];
-    Ok(files::write(out, files)?)
+    ])
 }
 
-/// Writes `map.csv`, `map.svg` and, over sigma and G, `bifurcations.csv` into `out` and returns their paths.
-pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
+/// `map.csv`, `map.svg` and, over sigma and G, `bifurcations.csv`.
+pub fn map_files(map: &Map) -> Result<Vec<ResultFile>, ReportError> {
     let mut files = vec![("map.csv", map_csv(map)?)];
     if !map.curves.is_empty() {
         files.push(("bifurcations.csv", bifurcations_csv(map)?));
     }
     files.push(("map.svg", regimes(map).svg()));
-    Ok(files::write(out, files)?)
+    Ok(files)
 }
 
-/// Writes `tracked.json`, `tracked.csv` and `tracked.svg` into `out` and returns their paths.
-pub fn write_tracked(result: &TrackedComparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let files = [
+/// `tracked.json`, `tracked.csv` and `tracked.svg`.
+pub fn tracked_files(result: &TrackedComparison) -> Result<Vec<ResultFile>, ReportError> {
+    Ok(vec![
         ("tracked.json", json(result)?),
         ("tracked.csv", tracked_csv(result)?),
         ("tracked.svg", tracked(result).svg()),
-    ];
-    Ok(files::write(out, files)?)
-}
-
-/// Writes `interrupted.csv`: the samples of an experiment that ended early, or without a motion that can be identified.
-pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    Ok(files::write(out, [("interrupted.csv", table(samples))])?)
+    ])
 }
 
 fn json(result: &impl Serialize) -> Result<String, ReportError> {

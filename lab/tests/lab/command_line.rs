@@ -163,22 +163,6 @@ fn a_map_is_written_as_table_and_figures() {
 }
 
 #[test]
-fn a_folder_that_is_a_file_is_refused_as_wrong_usage_before_anything_runs() {
-    let file = tempfile::NamedTempFile::new().unwrap();
-    let path = file.path().to_str().unwrap();
-    for command in [
-        "identify --rig udp://127.0.0.1:9",
-        "backbone --rig udp://127.0.0.1:9",
-        "map",
-        "report",
-    ] {
-        let start = Instant::now();
-        fails(&format!("{command} --out {path}"), 2, path);
-        assert!(start.elapsed() < Duration::from_secs(5), "{command}");
-    }
-}
-
-#[test]
 fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().display();

@@ -249,7 +249,7 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() 
             many,
             "INT",
             5,
-            "points were measured before. Written: ",
+            "points were measured before",
         ),
     ] {
         let rig = Server::start(&format!("rig --json {mode}"));

@@ -8,6 +8,7 @@ mod map;
 mod packing;
 mod pair;
 mod report;
+mod results;
 mod watch;
 
 use std::io::{BufRead, BufReader, Read};

@@ -3,12 +3,12 @@
 use std::{
     env::consts::{DLL_PREFIX, DLL_SUFFIX},
     fs,
-    io::Read,
+    io::{Cursor, Read},
     path::{Path, PathBuf},
     process::Command,
 };
 
-use vines::pack::{Binary, Component, PackError, own_libraries, pack};
+use vines::pack::{Binary, Component, File, PackError, own_libraries, pack};
 
 const GUID: &str = "0f2e5d6c-3b1a-4a7e-9c58-d40f1e2b7a96";
 
@@ -43,21 +43,19 @@ fn build(folder: &Path, function: &str, guid: &str) {
     assert!(status.success());
 }
 
-/// Packs the libraries of this machine in `folder`, and others, into `folder`/out.
-fn packed(folder: &Path, others: &[Binary]) -> Result<Vec<PathBuf>, PackError> {
+/// Packs the libraries of this machine in `folder`, and others.
+fn packed(folder: &Path, others: &[Binary]) -> Result<Vec<File>, PackError> {
     let own = own_libraries(&[component()], folder)?;
-    pack(&[component()], &[&own, others].concat(), &folder.join("out"))
+    pack(&[component()], &[&own, others].concat())
 }
 
 fn complaint(folder: &Path, others: &[Binary]) -> String {
-    let error = packed(folder, others).expect_err("a mistake");
-    assert!(!folder.join("out").exists(), "nothing is written");
-    error.to_string()
+    packed(folder, others).expect_err("a mistake").to_string()
 }
 
 /// The only library in an FMU: its name, and its size in bytes.
-fn packed_library(fmu: &Path) -> (String, u64) {
-    let mut zip = zip::ZipArchive::new(fs::File::open(fmu).unwrap()).unwrap();
+fn packed_library((_, fmu): &File) -> (String, u64) {
+    let mut zip = zip::ZipArchive::new(Cursor::new(fmu)).unwrap();
     let mut description = String::new();
     let mut entry = zip.by_name("modelDescription.xml").unwrap();
     entry.read_to_string(&mut description).unwrap();
@@ -74,11 +72,9 @@ fn packed_library(fmu: &Path) -> (String, u64) {
 fn a_component_is_packed_with_its_library_or_with_the_one_that_is_given_in_its_place() {
     let folder = tempfile::tempdir().unwrap();
     build(folder.path(), "fmi2Instantiate", GUID);
-    let out = folder.path().join("out");
-    let written = packed(folder.path(), &[]).unwrap();
-    assert_eq!(written, [out.join("Tiny.fmu")]);
-    assert_eq!(fs::read_dir(&out).unwrap().count(), 1, "no temporary file is left");
-    let (name, size) = packed_library(&written[0]);
+    let fmus = packed(folder.path(), &[]).unwrap();
+    assert!(fmus.len() == 1 && fmus[0].0 == "Tiny.fmu");
+    let (name, size) = packed_library(&fmus[0]);
     assert_eq!(size, fs::metadata(library(folder.path())).unwrap().len());
     // The folder of the platform: the FMU crate loads the library from it in the tests of endpoints.
     let platform = name.split('/').nth(1).unwrap();
@@ -87,8 +83,8 @@ fn a_component_is_packed_with_its_library_or_with_the_one_that_is_given_in_its_p
     let content = format!("a library with {GUID}");
     fs::write(&other, &content).unwrap();
     let other: Binary = format!("{platform}={}", other.display()).parse().unwrap();
-    let written = packed(folder.path(), &[other]).unwrap();
-    assert_eq!(packed_library(&written[0]), (name, content.len() as u64));
+    let fmus = packed(folder.path(), &[other]).unwrap();
+    assert_eq!(packed_library(&fmus[0]), (name, content.len() as u64));
 }
 
 #[test]
