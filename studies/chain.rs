@@ -25,8 +25,8 @@ fn lock(stage: &str) -> Result<ResonancePoint, Failure> {
     let mut settings: Vec<String> = stage.split_whitespace().map(key).collect();
     settings.push("record.hold_periods=200".into());
     let scene = scene("", &settings)?;
-    let record = record(&mut *Simulated::of(&scene)?, &scene)?;
-    Ok(identify(&record, &scene)?.lock.at)
+    let record = record(&mut *Simulated::of(&scene)?, &scene.plan())?;
+    Ok(identify(&record, &scene.plan())?.lock.at)
 }
 
 fn main() -> Result<(), Failure> {

@@ -18,7 +18,7 @@ fn main() -> Result<(), Failure> {
     let mut errors = [const { Vec::new() }; 3];
     for _ in 0..rigs.parse()? {
         let [scene, healthy] = checked_rig(&mut between)?;
-        let found = check(&mut *Simulated::of(&healthy)?, &scene)?;
+        let found = check(&mut *Simulated::of(&healthy)?, &scene.plan())?;
         if let Some(linear) = found.linear {
             passed += 1;
             let gain = 0.5 * healthy.plant.natural_frequency();
@@ -33,7 +33,7 @@ fn main() -> Result<(), Failure> {
         let [scene, broken] = checked_rig(&mut between)?;
         let faults = checked_faults(&mut between);
         let (expected, fault) = faults[between(0.0, faults.len() as f64) as usize];
-        let found = check(&mut faulty(&broken, fault, 0.0, |_| {})?, &scene)?;
+        let found = check(&mut faulty(&broken, fault, 0.0, |_| {})?, &scene.plan())?;
         if found.verdict == expected {
             named += 1;
         } else {

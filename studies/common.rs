@@ -20,11 +20,12 @@ pub use vines_testbench::comparison::{COMPARED_ABOVE, ExactCurve};
 use vines_testbench::experiment::{ExperimentError, run};
 pub use vines_testbench::identification::{Regime, ResonancePoint, decay_points, identify};
 pub use vines_testbench::loop_check::{Verdict, check};
+pub use vines_testbench::plan::{LinearResponse, Plan};
 pub use vines_testbench::record::Record;
 pub use vines_testbench::rig::{
     BuiltIn, Chain, ControllerError, Rig, RigFault, SensorFault, SensorsOnly, Simulated, faulty,
 };
-pub use vines_testbench::scene::{LinearResponse, Override, Scene};
+pub use vines_testbench::scene::{Override, Scene};
 
 /// Any error of a study.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -129,18 +130,18 @@ pub fn write(name: &str, header: &str, key: usize, rows: &[String]) -> Result<()
     Ok(fs::write(path, lines.join("\n") + "\n")?)
 }
 
-/// The record of the experiment of a scene.
-pub fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
-    let mut controller = BuiltIn::new(&scene.controller_config()).map_err(ControllerError::from)?;
-    run(rig, &mut controller, scene, |_, _, _| {})
+/// The record of an experiment.
+pub fn record(rig: &mut dyn Rig, plan: &Plan) -> Result<Record, ExperimentError> {
+    let mut controller = BuiltIn::new(&plan.lock).map_err(ControllerError::from)?;
+    run(rig, &mut controller, plan, |_, _, _| {})
 }
 
-/// The tracked backbone of a scene, with a drive up to G = `largest`.
-pub fn tracked(rig: &mut dyn Rig, scene: &Scene, largest: f64) -> Result<Tracked, ExperimentError> {
-    let amplitude_max = Some(scene.dimensionless().amplitude(largest));
-    let config = Config { amplitude_max, ..scene.backbone_config() };
-    let mut controller = BuiltIn::new(&config).map_err(ControllerError::from)?;
-    track(rig, &mut controller, scene, |_, _| {})
+/// The tracked backbone, with a drive up to G = `largest`.
+pub fn tracked(rig: &mut dyn Rig, plan: &Plan, largest: f64) -> Result<Tracked, ExperimentError> {
+    let mut plan = plan.clone();
+    plan.tracking.amplitude_max = Some(plan.knowledge.numbers.amplitude(largest));
+    let mut controller = BuiltIn::new(&plan.tracking).map_err(ControllerError::from)?;
+    track(rig, &mut controller, &plan, |_, _| {})
 }
 
 /// A plant behind the chain of a scene.
@@ -156,7 +157,7 @@ pub type Case = ([f64; 3], u64, [f64; 5]);
 pub const SCALES: [f64; 5] = [0.01, 0.3, 0.2, 0.1, 0.2];
 
 /// The rig, and the scene of the client, who knows the linear response.
-pub fn client(&([epsilon, lambda, r], noise, scales): &Case, snr: &str) -> Result<(Parameters, Scene), Failure> {
+pub fn client(&([epsilon, lambda, r], noise, scales): &Case, snr: &str) -> Result<(Parameters, Scene, Plan), Failure> {
     let [k, c, m, width, dr] = scales.map(|error| 1.0 + error);
     let d = Dimensionless::new(epsilon, lambda, r, 0.0);
     let orbits = advice::stable_orbits(&d);
@@ -179,14 +180,14 @@ pub fn client(&([epsilon, lambda, r], noise, scales): &Case, snr: &str) -> Resul
         0.95 * largest.min(0.75) / width,
         1.05 * fold / width,
     );
-    let mut scene = scene(&text, &[format!("chain.snr={snr}"), format!("chain.seed={noise}")])?;
-    scene.measured = Some(LinearResponse {
+    let scene = scene(&text, &[format!("chain.snr={snr}"), format!("chain.seed={noise}")])?;
+    let linear = LinearResponse {
         omega0: 1.0,
         damping_rate: 0.5 * epsilon * lambda,
-        uncertainty: 0.0,
-        gain: LinearResponse::of(&scene).gain,
-    });
-    Ok((Parameters::dimensionless(epsilon, lambda, r), scene))
+        ..LinearResponse::of(&scene.plant)
+    };
+    let plan = scene.plan_on(scene.knowledge().measured(linear));
+    Ok((Parameters::dimensionless(epsilon, lambda, r), scene, plan))
 }
 
 /// The points that count as points of the backbone.

@@ -18,16 +18,16 @@ const RATIOS: [f64; 4] = [f64::INFINITY, 60.0, 50.0, 40.0];
 fn main() -> Result<(), Failure> {
     let seeds: u64 = std::env::args().nth(1).map_or(Ok(20), |seeds| seeds.parse())?;
     let scene = scene("", &[""; 0])?;
-    let clean = record(&mut Simulated::new(scene.plant, scene.start)?, &scene)?;
+    let clean = record(&mut Simulated::new(scene.plant, scene.start)?, &scene.plan())?;
     let truth = crossings(&clean, &scene);
     let mut rows = Vec::new();
     for window in WINDOWS {
-        let points = decay_points(&clean, &scene, window).points;
+        let points = decay_points(&clean, &scene.knowledge(), window).points;
         let noiseless: Vec<[f64; 2]> = points.iter().map(|point| [point.tau, point.sigma]).collect();
         for ratio in RATIOS {
             let (mut errors, mut pulls) = (Vec::new(), Vec::new());
             for seed in 1..=if ratio.is_finite() { seeds } else { 1 } {
-                let points = decay_points(&noisy(&clean, ratio, seed), &scene, window).points;
+                let points = decay_points(&noisy(&clean, ratio, seed), &scene.knowledge(), window).points;
                 for point in points.iter().filter(|point| point.c > COMPARED_ABOVE) {
                     errors.extend(at(&truth, point.tau).map(|exact| point.sigma - exact));
                     let noise = at(&noiseless, point.tau).map(|sigma| (point.sigma - sigma).abs());

@@ -12,21 +12,21 @@ use std::{cell::Cell, rc::Rc};
 use common::*;
 
 /// Periods to the lock and all of them, of an experiment or of a tracked backbone that does not end early.
-fn run(rig: &mut dyn Rig, scene: &Scene, tracks: bool) -> Option<[f64; 2]> {
+fn run(rig: &mut dyn Rig, plan: &Plan, tracks: bool) -> Option<[f64; 2]> {
     if tracks {
-        let found = tracked(rig, scene, 4.0).ok()?;
+        let found = tracked(rig, plan, 4.0).ok()?;
         return found.ended.is_none().then_some([found.periods_to_lock, found.periods]);
     }
-    let record = record(rig, scene).ok()?;
-    Some([record.settled, record.released].map(|samples| samples as f64 / scene.controller.samples_per_period))
+    let record = record(rig, plan).ok()?;
+    Some([record.settled, record.released].map(|samples| samples as f64 / plan.knowledge.samples(1.0) as f64))
 }
 
 /// Time from the fault to a drive of zero, s; `None` if it was missed.
-fn zero(scene: &Scene, fault: RigFault, seconds: f64, tracks: bool) -> Option<f64> {
+fn zero(scene: &Scene, plan: &Plan, fault: RigFault, seconds: f64, tracks: bool) -> Option<f64> {
     let zero = Rc::new(Cell::new(None));
     let report = Rc::clone(&zero);
     let mut rig = faulty(scene, fault, seconds, move |time| report.set(time)).ok()?;
-    let is_missed = run(&mut rig, scene, tracks).is_some();
+    let is_missed = run(&mut rig, plan, tracks).is_some();
     drop(rig);
     zero.get().filter(|_| !is_missed)
 }
@@ -35,10 +35,10 @@ fn main() -> Result<(), Failure> {
     let given: Vec<String> = std::env::args().skip(1).collect();
     let (instants, settings) = given.split_first().ok_or("arguments: INSTANTS [KEY=VALUE ...]")?;
     let instants: usize = instants.parse()?;
-    let mut scene = scene("", settings)?;
-    scene.measured = Some(LinearResponse::of(&scene));
+    let scene = scene("", settings)?;
+    let plan = scene.plan_on(scene.knowledge().measured(LinearResponse::of(&scene.plant)));
     let healthy = |tracks| -> Result<[f64; 2], Failure> {
-        let run = run(&mut SensorsOnly::around(Simulated::of(&scene)?), &scene, tracks);
+        let run = run(&mut SensorsOnly::around(Simulated::of(&scene)?), &plan, tracks);
         Ok(run.ok_or("the run without a fault ended early")?)
     };
     let ([settled, released], [locked, tracked]) = (healthy(false)?, healthy(true)?);
@@ -58,7 +58,7 @@ fn main() -> Result<(), Failure> {
                 // The phases of the instants fill the period evenly.
                 let periods = (length * n as f64 / instants as f64).floor() + (0.618 * n as f64) % 1.0;
                 let seconds = (from + periods) * scene.dimensionless().natural_period();
-                let time = zero(&scene, fault, seconds, tracks);
+                let time = zero(&scene, &plan, fault, seconds, tracks);
                 missed += usize::from(time.is_none());
                 longest = longest.max(time.unwrap_or(0.0));
             }

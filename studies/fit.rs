@@ -125,7 +125,7 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
     let mut scales = SCALES.map(|range| uniform(-range, range));
     scales[4] = scales[4].min(0.95 / r - 1.0);
     let (noise, size) = (uniform(0.0, 1e6) as u64, uniform(0.1, 1.0));
-    let (ideal, scene) = client(&(ratios, noise, scales), snr)?;
+    let (ideal, scene, plan) = client(&(ratios, noise, scales), snr)?;
     let strength = match effect {
         Some(Effect::Tilt) => (LARGEST[1] * size / GRAVITY).powi(2),
         _ => LARGEST[0] * size / GRAVITY,
@@ -133,11 +133,7 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
     // Laws of restitution have the value r at the speed of impacts of the middle of the stable motions, B = 0.85.
     let speed = 2.0 * 0.85 * (1.0 + epsilon) / (1.0 + r);
     let cavity = effect.map_or(Cavity::IDEAL, |effect| effect.cavity(strength, r, speed));
-    let tracked = tracked(
-        &mut *behind_chain(Parameters { cavity, ..ideal }, &scene)?,
-        &scene,
-        20.0,
-    )?;
+    let tracked = tracked(&mut *behind_chain(Parameters { cavity, ..ideal }, &scene)?, &plan, 20.0)?;
     // Much friction keeps the particle from the walls.
     let regime = tracked.points[0].regime_by_impacts;
     if !matches!(regime, Some(Regime::Symmetric | Regime::Asymmetric)) {
@@ -174,8 +170,8 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
 
 /// The points of a tracked backbone.
 fn points(case: &Case, snr: &str) -> Result<Points, Failure> {
-    let (truth, scene) = client(case, snr)?;
-    let tracked = tracked(&mut *behind_chain(truth, &scene)?, &scene, 20.0)?;
+    let (truth, scene, plan) = client(case, snr)?;
+    let tracked = tracked(&mut *behind_chain(truth, &scene)?, &plan, 20.0)?;
     Ok((measured(&tracked), scene, truth))
 }
 
@@ -185,9 +181,9 @@ fn measured(tracked: &Tracked) -> Vec<MeasuredPoint> {
 
 /// The points of a recording.
 fn recorded(case: &Case, snr: &str) -> Result<Points, Failure> {
-    let (truth, mut scene) = client(case, snr)?;
-    scene.start = lovines::State::default();
-    let record = record(&mut SensorsOnly::around(behind_chain(truth, &scene)?), &scene)?;
+    let (truth, scene, plan) = client(case, snr)?;
+    let scene = scene.at_rest();
+    let record = record(&mut SensorsOnly::around(behind_chain(truth, &scene)?), &plan)?;
     let count = record.samples.len();
     let samples = &record.samples[count / 40..count - count / 40];
     let recording = Recording {
@@ -197,8 +193,7 @@ fn recorded(case: &Case, snr: &str) -> Result<Points, Failure> {
         response: samples.iter().map(|one| one.sensors.response).collect(),
         drive: samples.iter().filter_map(|one| one.sensors.reference).collect(),
     };
-    // The client knows the linear response from its scene only.
-    scene.measured = None;
+    // For the fit, the client knows the linear response from its scene only.
     let parts = parts(&[recording], &scene, &[])?.concat();
     Ok((parts.into_iter().filter_map(|part| part.point).collect(), scene, truth))
 }

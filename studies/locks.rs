@@ -14,8 +14,8 @@ use vines_model::orbit::Orbit;
 
 /// Locks a rig, and counts it as correct, uncertain or wrong.
 fn lock(scene: &Scene) -> Result<Found, Failure> {
-    let record = record(&mut *Simulated::of(scene)?, scene)?;
-    let at = identify(&record, scene)?.lock.at;
+    let record = record(&mut *Simulated::of(scene)?, &scene.plan())?;
+    let at = identify(&record, &scene.plan())?.lock.at;
     let mut orbits = phase_resonant(&scene.dimensionless());
     orbits.retain(|orbit| orbit.stable || record.held);
     let largest = |[sigma, c]: [f64; 2]| sigma.max(c);

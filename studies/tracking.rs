@@ -46,9 +46,9 @@ fn drawn(difference: &str, uniform: Uniform) -> (Case, Cavity) {
 
 /// Counts the points, the settled ones, those whose truth was not found, and whether tracking ended early.
 fn run((case, cavity): &(Case, Cavity), snr: &str) -> Result<Found, Failure> {
-    let (ideal, scene) = client(case, snr)?;
+    let (ideal, scene, plan) = client(case, snr)?;
     let (rig, epsilon) = (Parameters { cavity: *cavity, ..ideal }, case.0[0]);
-    let tracked = tracked(&mut SensorsOnly::around(behind_chain(rig, &scene)?), &scene, 20.0)?;
+    let tracked = tracked(&mut SensorsOnly::around(behind_chain(rig, &scene)?), &plan, 20.0)?;
     let own = scene.dimensionless();
     let (mut found, mut settled, mut without) = (Found::default(), 0, 0);
     for point in kept(&tracked) {

@@ -52,24 +52,26 @@ fn experiment<T: serde::Serialize>(
 
 #[pyfunction]
 pub fn identify(py: Python<'_>, scene: &Scene, decay: bool) -> PyResult<String> {
-    let mut scene = scene.scene.clone();
+    let scene = &scene.scene;
+    let mut plan = scene.plan();
     if !decay {
-        scene.record.decay_periods = Some(0.0);
+        plan.decay = 0;
     }
-    let mut controller = BuiltIn::new(&scene.controller_config()).map_err(invalid)?;
-    experiment(py, &scene, |rig| {
-        let record = experiment::run(rig, &mut controller, &scene, |_, _, _| {})?;
-        let found = identification::identify(&record, &scene)?;
-        Ok(Comparison::of(&found, &scene))
+    let mut controller = BuiltIn::new(&plan.lock).map_err(invalid)?;
+    experiment(py, scene, |rig| {
+        let record = experiment::run(rig, &mut controller, &plan, |_, _, _| {})?;
+        let found = identification::identify(&record, &plan)?;
+        Ok(Comparison::of(&found, scene))
     })
 }
 
 #[pyfunction]
 pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
     let scene = &scene.scene;
-    let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(invalid)?;
+    let plan = scene.plan();
+    let mut controller = BuiltIn::new(&plan.tracking).map_err(invalid)?;
     experiment(py, scene, |rig| {
-        let tracked = track(rig, &mut controller, scene, |_, _| {})?;
+        let tracked = track(rig, &mut controller, &plan, |_, _| {})?;
         Ok(TrackedComparison::of(&tracked, scene))
     })
 }

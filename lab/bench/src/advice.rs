@@ -5,6 +5,7 @@ use vines_model::orbit::{Orbit, exact_backbone, phase_resonant};
 use vines_model::regime::Regime;
 
 use crate::identification::classify;
+use crate::plan::Plan;
 use crate::record::Sample;
 use crate::scene::{Dimensionless, Scene};
 
@@ -26,22 +27,22 @@ pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
     (low <= high).then_some([low, high])
 }
 
-/// Why a run that was expected to lock the symmetric 1:1 motion may not have done so, from the scene and the regime of the last periods.
+/// Why a run that was expected to lock the symmetric 1:1 motion may not have done so, from the scene, the numbers of its rig and the
+/// regime of the last periods.
 /// `None` where the exact orbits give no reason.
-pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
-    let reason = ideal_reason(scene, regime)?;
+pub fn reason(scene: &Scene, d: &Dimensionless, regime: Option<Regime>) -> Option<String> {
+    let reason = ideal_reason(scene, d, regime)?;
     Some(match scene.left_out() {
         Some(left_out) => format!("{reason}. This holds for the ideal cavity, without {left_out}"),
         None => reason,
     })
 }
 
-fn ideal_reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
-    let d = scene.dimensionless();
-    let mut stable = phase_resonant(&d);
+fn ideal_reason(scene: &Scene, d: &Dimensionless, regime: Option<Regime>) -> Option<String> {
+    let mut stable = phase_resonant(d);
     stable.retain(|orbit| orbit.stable);
     if stable.is_empty() {
-        let range = stable_range(&d).map_or_else(
+        let range = stable_range(d).map_or_else(
             || "at no G".into(),
             |[low, high]| {
                 let gaps = if (low..=high).contains(&d.g) { ", with gaps" } else { "" };
@@ -81,9 +82,8 @@ fn ideal_reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
 }
 
 /// The regime of the last periods of a record that did not lock, from the impacts that the rig reports.
-pub fn last_regime(samples: &[Sample], scene: &Scene) -> Option<Regime> {
-    let count = (scene.record.hold_periods * scene.controller.samples_per_period) as usize;
-    let last = &samples[samples.len().saturating_sub(count)..];
+pub fn last_regime(samples: &[Sample], plan: &Plan) -> Option<Regime> {
+    let last = &samples[samples.len().saturating_sub(plan.hold)..];
     let omega = last.last()?.command.drive.omega;
-    Some(classify(last, scene.sample_time(), omega).1)
+    Some(classify(last, plan.knowledge.sample_time, omega).1)
 }

@@ -14,9 +14,9 @@ use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stag
 use crate::identification::{
     Cycle, Regime, ResonanceFit, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
 };
+use crate::plan::{Knowledge, LinearResponse, Plan};
 use crate::record::Sample;
 use crate::rig::{Controller, Move, Rig};
-use crate::scene::{LinearResponse, Scene};
 
 // One level: the window of the fit, and the judge of whether the motion is steady.
 //
@@ -210,6 +210,8 @@ pub struct LevelPoint {
 /// The tracked backbone.
 #[derive(Debug)]
 pub struct Tracked {
+    /// What is known of the rig.
+    pub knowledge: Knowledge,
     /// The points, in the order in which they were taken.
     pub points: Vec<LevelPoint>,
     /// Periods from the start to the closed loop.
@@ -237,7 +239,7 @@ const REACHED: f64 = 0.01;
 /// Rig and controller, read period by period.
 struct Tracker<'a, R: Rig + ?Sized, C: ?Sized> {
     run: experiment::ControlLoop<'a, R, C>,
-    scene: &'a Scene,
+    plan: &'a Plan,
     stage: Stage,
     /// Phase target, rad.
     target: f64,
@@ -248,17 +250,17 @@ struct Tracker<'a, R: Rig + ?Sized, C: ?Sized> {
     points: Vec<LevelPoint>,
 }
 
-/// Tracks the backbone of `scene`.
+/// Tracks the backbone.
 ///
 /// # Errors
 /// A failure of the rig or of the controller, or no lock in the time allowed.
 pub fn track(
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
-    scene: &Scene,
+    plan: &Plan,
     progress: impl FnMut(usize, usize),
 ) -> Result<Tracked, ExperimentError> {
-    track_into(&mut Vec::new(), rig, controller, scene, progress)
+    track_into(&mut Vec::new(), rig, controller, plan, progress)
 }
 
 /// [`track`], which leaves what was measured last in `samples` if it ends before the first point.
@@ -266,15 +268,15 @@ pub fn track_into(
     samples: &mut Vec<Sample>,
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
-    scene: &Scene,
+    plan: &Plan,
     progress: impl FnMut(usize, usize),
 ) -> Result<Tracked, ExperimentError> {
     let mut quiet = |_, _| {};
     let mut tracker = Tracker {
-        run: experiment::ControlLoop::new(rig, controller, scene, scene.backbone_config(), samples, &mut quiet)?,
-        scene,
+        run: experiment::ControlLoop::new(rig, controller, plan, &plan.tracking, samples, &mut quiet)?,
+        plan,
         stage: Stage::Locking,
-        target: scene.controller.phase_target_radians(),
+        target: plan.knowledge.target,
         closed: [0.0; 3],
         states: Vec::new(),
         points: Vec::new(),
@@ -288,7 +290,13 @@ pub fn track_into(
         return Err(error);
     }
     let (points, periods) = (std::mem::take(&mut tracker.points), tracker.run.periods);
-    Ok(Tracked { points, periods_to_lock, periods, ended })
+    Ok(Tracked {
+        knowledge: plan.knowledge,
+        points,
+        periods_to_lock,
+        periods,
+        ended,
+    })
 }
 
 impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
@@ -304,7 +312,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
 
     /// Goes to a symmetric motion with impacts, if there is one.
     fn approach(&mut self) -> Result<(), ExperimentError> {
-        Search::new(&mut self.run, self.scene).impacts()?;
+        Search::new(&mut self.run).impacts()?;
         let cycle = self.cycle()?;
         self.closed = [cycle.amplitude(), cycle.base.norm(), cycle.omega];
         Ok(())
@@ -312,7 +320,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
 
     /// Goes through the levels.
     fn follow(&mut self, mut progress: impl FnMut(usize, usize)) -> Result<(), ExperimentError> {
-        let levels = self.scene.levels();
+        let levels = &self.plan.levels;
         for (n, &level) in levels.iter().enumerate() {
             progress(n, levels.len());
             let before = n
@@ -323,7 +331,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             if let Some((held, Regime::Symmetric | Regime::Unresolved)) = before
                 && matches!(point.regime, Regime::NoImpacts | Regime::Other)
             {
-                let b = self.scene.plant.half_width;
+                let b = self.plan.knowledge.numbers.b;
                 return Err(ExperimentError::MotionLost { held, level, b, regime: point.regime });
             }
         }
@@ -364,7 +372,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
 
     /// The move to a level, m, and its periods: [`MOVE`], or as many as the drive needs for this change of the response.
     fn step(&self, level: f64) -> (Move, f64) {
-        let omega0 = self.scene.linear().omega0;
+        let omega0 = self.plan.knowledge.linear.omega0;
         let [response, drive, omega] = *self.states.last().unwrap_or(&self.closed);
         let slowest = (level - response).abs() / (MOVE_SHARE * 0.5 * drive * TAU);
         // A smooth move is twice as fast in its middle as on average.
@@ -390,13 +398,14 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         cycles: &[Cycle],
         criterion: &Criterion,
     ) -> LevelPoint {
-        let d = self.scene.dimensionless();
+        let knowledge = &self.plan.knowledge;
+        let d = knowledge.numbers;
         let samples = cycles[cycles.len() - estimate.periods..]
             .iter()
             .map(|cycle| cycle.samples);
         let averaged = &self.run.samples[self.run.samples.len() - samples.sum::<usize>()..];
         let [base, omega] = estimate.at;
-        let regime = regime_by_response(averaged, self.scene, base.value, self.target, omega.value);
+        let regime = regime_by_response(averaged, knowledge, base.value, omega.value);
         let reached = is_reached(estimate.response, level);
         LevelPoint {
             at: ResonancePoint::new([estimate.response, base, omega, estimate.phase_error], &d),
@@ -408,14 +417,14 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             // backbone.
             settled: reached
                 && regime != Regime::Other
-                && (regime != Regime::Asymmetric || !self.scene.has_mirror_images())
+                && (regime != Regime::Asymmetric || !knowledge.is_symmetric)
                 && (estimate.steady || criterion.is_met(estimate)),
             reached,
             regime,
             regime_by_impacts: self.run.samples[0]
                 .ground_truth
                 .map(|_| classify(averaged, self.run.sample_time, omega.value).1),
-            tone: foreign_tone(averaged, self.scene, omega.value),
+            tone: foreign_tone(averaged, knowledge, omega.value),
         }
     }
 
@@ -423,9 +432,9 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     fn criterion(&self) -> Criterion {
         let before = |back: usize| self.states.iter().nth_back(back).copied();
         Criterion {
-            linear: self.scene.linear(),
-            precision: self.scene.backbone.precision,
-            largest: self.scene.levels().into_iter().fold(0.0, f64::max),
+            linear: self.plan.knowledge.linear,
+            precision: self.plan.precision,
+            largest: self.plan.levels.iter().copied().fold(0.0, f64::max),
             before: [before(1), before(0)],
         }
     }

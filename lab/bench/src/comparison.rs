@@ -7,8 +7,8 @@ use vines_model::orbit::{self, ContinuationLimits, Orbit, backbone};
 use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow, free_sigma, resonant};
 
 use crate::backbone::{LevelPoint, Tracked};
-use crate::experiment::Stage;
 use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime, WINDOW, decay_points};
+use crate::plan::Plan;
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Drive, Rig, Simulated};
 use crate::scene::{Dimensionless, Scene};
@@ -68,8 +68,8 @@ pub struct ComparedPoint {
 impl Comparison {
     /// Compares what was identified on `scene`.
     pub fn of(found: &Identification, scene: &Scene) -> Self {
-        let (parameters, lock) = (found.parameters, found.lock);
-        let at_resonance = scene.controller.is_at_phase_resonance();
+        let (knowledge, lock) = (found.knowledge, found.lock);
+        let (parameters, at_resonance) = (knowledge.numbers, knowledge.is_at_phase_resonance());
         let distance = |sigma: f64, c: f64| (sigma - lock.at.sigma).hypot(c - lock.at.c);
         let mut solutions = resonant(&parameters);
         solutions.retain(|point| at_resonance && point.stable());
@@ -80,7 +80,7 @@ impl Comparison {
         let by_distance = |a: &&Orbit, b: &&Orbit| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c));
         let exact = orbits.iter().min_by(by_distance).copied();
         let curve = ExactCurve::of(&parameters);
-        let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene));
+        let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene, &scene.plan_on(knowledge)));
         let decay: Vec<ComparedPoint> = found
             .decay
             .points
@@ -269,13 +269,14 @@ impl TrackedPoint {
 impl TrackedComparison {
     /// Compares the points with the exact backbone of the scene; not where the loop holds another phase than resonance.
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
-        let parameters = scene.dimensionless();
+        let knowledge = tracked.knowledge;
+        let parameters = knowledge.numbers;
         let curve = ExactCurve::of(&parameters);
         let exact = |point: &LevelPoint| curve.distance(point.at.c, point.at.sigma, point.at.g);
         let compare = |point: &LevelPoint| TrackedPoint {
             point: *point,
             exact: Some(point)
-                .filter(|_| scene.controller.is_at_phase_resonance())
+                .filter(|_| knowledge.is_at_phase_resonance())
                 .and_then(exact),
         };
         Self {
@@ -349,8 +350,8 @@ pub struct LargestErrors {
 
 /// C, sigma and rate along the decay of the scene's plant from `orbit` on, as it would be identified without noise; empty if the plant refuses
 /// the scene.
-fn predicted(orbit: &Orbit, scene: &Scene) -> Vec<[f64; 3]> {
-    let (d, step) = (scene.dimensionless(), scene.sample_time());
+fn predicted(orbit: &Orbit, scene: &Scene, plan: &Plan) -> Vec<[f64; 3]> {
+    let (d, step) = (plan.knowledge.numbers, plan.knowledge.sample_time);
     let start = orbit.start;
     let [q1, q2] = [start.q1, start.q2].map(|length| length * d.b);
     let [dq1, dq2] = [start.dq1, start.dq2].map(|velocity| velocity * d.b * d.omega0);
@@ -372,7 +373,7 @@ fn predicted(orbit: &Orbit, scene: &Scene) -> Vec<[f64; 3]> {
         Some(sample)
     };
     // The first sample stands for the hold, which gives the frequency at the release.
-    let samples = (0..Stage::Decaying.samples(scene) + 1).map_while(&mut sample).collect();
+    let samples = (0..plan.decay + 1).map_while(&mut sample).collect();
     let record = Record {
         sample_time: step,
         samples,
@@ -380,7 +381,7 @@ fn predicted(orbit: &Orbit, scene: &Scene) -> Vec<[f64; 3]> {
         released: 1,
         held: false,
     };
-    let points = decay_points(&record, scene, WINDOW).points;
+    let points = decay_points(&record, &plan.knowledge, WINDOW).points;
     points.iter().map(|point| [point.c, point.sigma, point.rate]).collect()
 }
 

@@ -12,9 +12,10 @@ use thiserror::Error;
 use vines_model::numerics::mean;
 
 use crate::identification::Cycle;
+use crate::plan::Plan;
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Rig, RigError};
-use crate::scene::{Scene, key};
+use crate::scene::key;
 
 use judge::Judge;
 pub use judge::{Scatter, Spread};
@@ -23,16 +24,6 @@ pub(crate) use search::Search;
 /// Share of its amplitude to which the response of the linear rig falls in the recorded decay. The 1:1 motion has a smaller range, from symmetry
 /// breaking to the fold, and impacts make the decay faster.
 pub(crate) const DECAYED: f64 = 0.05;
-/// Longest recorded decay, natural periods, unless the scene asks for a longer one: a bound for rigs with little damping.
-const LONGEST_DECAY: f64 = 5000.0;
-
-/// Length of the recorded decay, natural periods: `record.decay_periods`, or as long as the linear rig takes to fall to [`DECAYED`].
-fn decay_periods(scene: &Scene) -> f64 {
-    let relaxations = -DECAYED.ln();
-    let periods = scene.record.decay_periods;
-    periods.unwrap_or((relaxations * scene.relaxation_periods()).min(LONGEST_DECAY))
-}
-
 /// The stage an experiment is in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
@@ -47,16 +38,17 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Samples of the stage in an experiment on a scene, at most: the time limit for the lock, the hold, or the recorded decay.
-    pub fn samples(self, scene: &Scene) -> usize {
-        let (sample_time, period) = (scene.sample_time(), TAU / scene.linear().omega0);
-        let seconds = match self {
-            Self::Locking => scene.lock_time(),
-            Self::Holding => scene.record.hold_periods * period,
-            Self::Decaying => decay_periods(scene) * period,
-            Self::Tracking => f64::INFINITY,
-        };
-        (seconds / sample_time).round() as usize
+    /// Samples of the stage in an experiment, at most: the time limit for the lock, the hold, or the recorded decay.
+    pub fn samples(self, plan: &Plan) -> usize {
+        let Plan { lock, hold, decay, .. } = plan;
+        match self {
+            Self::Locking => lock
+                .acquire_timeout
+                .map_or(usize::MAX, |seconds| (seconds / lock.sample_time).round() as usize),
+            Self::Holding => *hold,
+            Self::Decaying => *decay,
+            Self::Tracking => usize::MAX,
+        }
     }
 
     /// What the experiment does in it.
@@ -177,10 +169,10 @@ pub enum ExperimentError {
 pub fn run(
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
-    scene: &Scene,
+    plan: &Plan,
     progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
-    run_into(&mut Vec::new(), rig, controller, scene, progress)
+    run_into(&mut Vec::new(), rig, controller, plan, progress)
 }
 
 /// [`run`], which leaves what was measured in `samples` if the experiment ends early.
@@ -188,15 +180,14 @@ pub fn run_into(
     samples: &mut Vec<Sample>,
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
-    scene: &Scene,
+    plan: &Plan,
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
-    let counts = [Stage::Locking, Stage::Holding, Stage::Decaying].map(|stage| stage.samples(scene));
+    let counts = [Stage::Locking, Stage::Holding, Stage::Decaying].map(|stage| stage.samples(plan));
     let mut report = |stage, taken| progress(stage, taken, counts[stage as usize]);
-    let config = scene.controller_config();
-    let mut bench = ControlLoop::new(rig, controller, scene, config, samples, &mut report)?;
-    let held = if scene.controller.is_at_phase_resonance() {
-        Search::new(&mut bench, scene).lock()?
+    let mut bench = ControlLoop::new(rig, controller, plan, &plan.lock, samples, &mut report)?;
+    let held = if plan.knowledge.is_at_phase_resonance() {
+        Search::new(&mut bench).lock()?
     } else {
         None
     };
@@ -213,7 +204,7 @@ pub fn run_into(
     drop(bench);
     let samples = std::mem::take(samples);
     Ok(Record {
-        sample_time: scene.sample_time(),
+        sample_time: plan.knowledge.sample_time,
         released: samples.len() - counts[Stage::Decaying as usize],
         samples,
         settled,
@@ -232,9 +223,9 @@ pub(crate) const CONFIRMED: u32 = 3;
 pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
     rig: &'a mut R,
     pub controller: &'a mut C,
-    scene: &'a Scene,
-    /// The limits of the drive and of the response, whatever controls the rig.
-    config: Config,
+    pub plan: &'a Plan,
+    /// Of the controller; its limits guard the rig whatever controls it.
+    pub config: &'a Config,
     /// s
     pub sample_time: f64,
     pub samples: &'a mut Vec<Sample>,
@@ -261,31 +252,31 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
 pub(crate) type Period = (usize, f64);
 
 impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
-    /// Before the first sample. A scene whose resonance is no phase that a loop can hold is refused.
+    /// Before the first sample.
     pub fn new(
         rig: &'a mut R,
         controller: &'a mut C,
-        scene: &'a Scene,
-        config: Config,
+        plan: &'a Plan,
+        config: &'a Config,
         samples: &'a mut Vec<Sample>,
         progress: &'a mut dyn FnMut(Stage, usize),
     ) -> Result<Self, ExperimentError> {
-        if scene.amplitude == 0.0 {
+        if plan.amplitude == 0.0 {
             return Err(ExperimentError::NoDrive);
         }
         Ok(Self {
             rig,
             controller,
-            scene,
+            plan,
             config,
-            sample_time: scene.sample_time(),
+            sample_time: plan.knowledge.sample_time,
             samples,
             taken: 0,
             periods: 0.0,
             last: Command::default(),
             settled: false,
-            judge: Judge::new(&config),
-            limit: Stage::Locking.samples(scene),
+            judge: Judge::new(config),
+            limit: Stage::Locking.samples(plan),
             progress,
             stage: (Stage::Locking, 0),
             driven: false,
@@ -331,7 +322,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
 
     /// Refuses a drive or a response beyond the limits of the scene, before the rig gets the drive.
     fn guard(&self, response: f64, drive: Drive) -> Result<(), ExperimentError> {
-        let Config { amplitude_max, response_max, omega_min, omega_max, .. } = self.config;
+        let Config { amplitude_max, response_max, omega_min, omega_max, .. } = *self.config;
         let Drive { omega, amplitude, .. } = drive;
         // A controller may compute in single precision.
         let beyond = |value: f64, limit: Option<f64>| limit.filter(|limit| value > limit * (1.0 + 1e-6));
@@ -388,7 +379,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         if fault == Fault::TimedOut {
             return self.no_lock(command);
         }
-        let evidence = evidence(self.samples, self.scene, fault);
+        let evidence = evidence(self.samples, self.config, fault);
         ExperimentError::Tripped { periods: self.periods, stage, fault, evidence }
     }
 
@@ -432,8 +423,7 @@ fn checked(command: Command) -> Result<Command, ExperimentError> {
 }
 
 /// What the sensors read in the last period before a fault, and the limit of the scene that was exceeded.
-fn evidence(samples: &[Sample], scene: &Scene, fault: Fault) -> String {
-    let config = scene.controller_config();
+fn evidence(samples: &[Sample], config: &Config, fault: Fault) -> String {
     let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
     let samples = &samples[samples.len().saturating_sub(period)..];
     let largest = samples
@@ -483,6 +473,7 @@ fn short(value: f64) -> String {
 mod tests {
     use super::*;
     use crate::rig::Sensors;
+    use crate::scene::Scene;
 
     #[test]
     fn a_fault_is_stated_with_the_readings_and_the_limit_of_the_scene() {
@@ -501,7 +492,7 @@ mod tests {
             (Fault::LockLost, "the phase error is 14.324 degrees"),
             (Fault::Sensor, "`vines check`"),
         ] {
-            let text = evidence(&samples, &scene, fault);
+            let text = evidence(&samples, &scene.controller_config(), fault);
             assert!(text.contains(read) && text.contains(limit), "{text}");
         }
     }

@@ -10,8 +10,9 @@ use serde::Serialize;
 use thiserror::Error;
 use vines_model::numerics::{Estimate, RANDOM, SIGNIFICANT, mean, standard_deviation};
 
+use crate::plan::{Knowledge, LinearResponse, Plan};
 use crate::record::{Record, Sample};
-use crate::scene::{Dimensionless, LinearResponse, Scene};
+use crate::scene::Dimensionless;
 
 pub(crate) use decay::PER_PERIOD;
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
@@ -51,34 +52,34 @@ pub enum IdentificationError {
 /// What a record says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
-    /// The numbers of the scene.
-    pub parameters: Dimensionless,
+    /// What is known of the rig.
+    pub knowledge: Knowledge,
     /// The locked point as measured.
     pub lock: Lock,
     /// The decay, from the release on; without points if it is shorter than the window of the fit.
     pub decay: DecayPoints,
 }
 
-/// Identifies a record of `scene`.
+/// Identifies the record of an experiment.
 ///
 /// # Errors
 /// A lock in another regime than the symmetric 1:1 one, or no motion.
-pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, IdentificationError> {
-    let parameters = scene.dimensionless();
-    let lock = measure(record, scene, &parameters).ok_or(IdentificationError::NoMotion)?;
+pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, IdentificationError> {
+    let knowledge = plan.knowledge;
+    let lock = measure(record, &knowledge).ok_or(IdentificationError::NoMotion)?;
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
     let is_expected = match lock.regime {
         Regime::Symmetric | Regime::Unresolved => true,
-        Regime::Asymmetric => !scene.has_mirror_images(),
+        Regime::Asymmetric => !knowledge.is_symmetric,
         _ => false,
     };
     if !is_expected {
         return Err(IdentificationError::Regime { regime: lock.regime, sigma: lock.at.sigma, c: lock.at.c });
     }
-    on_target(&lock, scene)?;
-    sensors_after_release(record, scene)?;
-    let decay = decay_points(record, scene, WINDOW);
-    Ok(Identification { parameters, lock, decay })
+    on_target(&lock, plan.lock.lock.phase_tolerance)?;
+    sensors_after_release(record, &knowledge)?;
+    let decay = decay_points(record, &knowledge, WINDOW);
+    Ok(Identification { knowledge, lock, decay })
 }
 
 // The locked point.
@@ -160,15 +161,16 @@ const SLOPE_UNCERTAINTY: f64 = 0.3;
 const PHASE_RANGE: f64 = 0.1;
 
 /// The locked point of a record; `None` without a motion.
-fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
+fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
+    let d = &knowledge.numbers;
     let (dt, hold) = (record.sample_time, record.hold());
-    let target = scene.controller.phase_target_radians();
+    let target = knowledge.target;
     let held = Cycle::all(hold, dt, target);
-    let [approach, wide] = SPREADS.map(|spread| approached(record, scene, target, &held, spread));
+    let [approach, wide] = SPREADS.map(|spread| approached(record, knowledge, &held, spread));
     // The drive of the hold decides where the approach ends.
     let [base, phase_error, response] = means(&held);
     let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
-    let [omega, limit] = limits(&approach, &wide, &scene.linear(), command)?;
+    let [omega, limit] = limits(&approach, &wide, &knowledge.linear, command)?;
     let speed = |sample: &Sample| Some(d.speed(sample.ground_truth?.particle_velocity.abs()));
     let speeds: Option<Vec<f64>> = hold.iter().map(speed).collect();
     // The speed belongs to the amplitude of the hold, and changes about as it does.
@@ -179,14 +181,14 @@ fn measure(record: &Record, scene: &Scene, d: &Dimensionless) -> Option<Lock> {
         Estimate::new(speed.value, &[speed.uncertainty, speed.value * aside])
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
-        (count, Regime::Unknown) => (count, regime_by_response(hold, scene, base.value, target, omega.value)),
+        (count, Regime::Unknown) => (count, regime_by_response(hold, knowledge, base.value, omega.value)),
         by_impacts => by_impacts,
     };
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
     let tone = if is_simulated {
         None
     } else {
-        foreign_tone(hold, scene, omega.value)
+        foreign_tone(hold, knowledge, omega.value)
     };
     Some(Lock {
         at: ResonancePoint::new([limit, base, omega, phase_error], d),
@@ -225,10 +227,10 @@ fn limits(approach: &[Cycle], wide: &[Cycle], linear: &LinearResponse, command: 
 }
 
 /// The last periods before the release whose amplitude deviates from the hold by the share `spread` at most; at least as many as the hold has.
-fn approached(record: &Record, scene: &Scene, target: f64, held: &[Cycle], spread: f64) -> Vec<Cycle> {
-    let most = (MOST * scene.controller.samples_per_period) as usize;
+fn approached(record: &Record, knowledge: &Knowledge, held: &[Cycle], spread: f64) -> Vec<Cycle> {
+    let most = knowledge.samples(MOST);
     let samples = &record.samples[record.released.saturating_sub(most.max(record.hold().len()))..record.released];
-    let mut cycles = Cycle::all(samples, record.sample_time, target);
+    let mut cycles = Cycle::all(samples, record.sample_time, knowledge.target);
     let level = mean(held.iter().map(Cycle::amplitude));
     let noise = 4.0 * mean(held.iter().map(|cycle| cycle.noise[0])).sqrt();
     let is_near = |cycle: &&Cycle| {
@@ -332,9 +334,9 @@ const LEFT: f64 = 0.1;
 /// Steps of a converter below which the scatter of a response says nothing.
 const STEPS: f64 = 8.0;
 
-/// Refuses a lock whose phase is farther from its target than the tolerance of the lock.
-fn on_target(lock: &Lock, scene: &Scene) -> Result<(), IdentificationError> {
-    let tolerance = scene.controller_config().lock.phase_tolerance.to_degrees();
+/// Refuses a lock whose phase is farther from its target than the tolerance of the lock, rad.
+fn on_target(lock: &Lock, tolerance: f64) -> Result<(), IdentificationError> {
+    let tolerance = tolerance.to_degrees();
     let error = lock.at.phase_error_deg;
     if error.abs() <= tolerance + SIGNIFICANT * lock.at.u_phase_deg {
         return Ok(());
@@ -343,7 +345,7 @@ fn on_target(lock: &Lock, scene: &Scene) -> Result<(), IdentificationError> {
 }
 
 /// Refuses a decay in which a sensor reads no number, or in which the response is lost within two periods.
-fn sensors_after_release(record: &Record, scene: &Scene) -> Result<(), IdentificationError> {
+fn sensors_after_release(record: &Record, knowledge: &Knowledge) -> Result<(), IdentificationError> {
     let decay = record.decay();
     let failed = |n: usize, what| {
         let seconds = n as f64 * record.sample_time;
@@ -356,12 +358,12 @@ fn sensors_after_release(record: &Record, scene: &Scene) -> Result<(), Identific
     if let Some(n) = decay.iter().position(|sample| !reads_numbers(sample)) {
         return failed(n, "reads no number");
     }
-    let period = scene.controller.samples_per_period.round() as usize;
+    let period = knowledge.samples(1.0);
     let response: Vec<f64> = decay.iter().map(|sample| sample.sensors.response).collect();
     let changes = response.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let step = changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min);
     let scatters: Vec<f64> = response.chunks_exact(period).map(standard_deviation).collect();
-    let linear = scene.linear();
+    let linear = &knowledge.linear;
     let left = LEFT * (-2.0 * TAU * linear.damping_rate / linear.omega0).exp();
     let is_lost = |three: &[f64]| three[0] > STEPS * step && three[2] < left * three[0];
     match scatters.windows(3).position(is_lost) {

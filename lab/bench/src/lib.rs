@@ -13,6 +13,7 @@ pub mod fit;
 pub mod identification;
 pub mod live;
 pub mod loop_check;
+pub mod plan;
 pub mod record;
 pub mod rig;
 pub mod scene;

@@ -11,8 +11,9 @@ use phase_lock::Gains;
 use serde::Serialize;
 use vines_model::numerics::{SIGNIFICANT, mean, mean_square, standard_deviation};
 
+use crate::plan::{LinearResponse, Plan};
 use crate::rig::{Drive, Rig, RigError};
-use crate::scene::{LinearResponse, Reference, Scene};
+use crate::scene::Reference;
 
 /// Drive of the check, over the scene's drive: too small for impacts.
 const SHARE: f64 = 0.01;
@@ -38,14 +39,14 @@ pub struct LoopCheck {
 
 /// Checks a rig at a hundredth of the drive, after a response that is still falling has come to rest. The phase of the rig's oscillator is
 /// a multiple of 2 pi before and after.
-pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, RigError> {
-    let (omega, amplitude) = (scene.controller_config().omega_start, SHARE * scene.amplitude);
-    let step = scene.sample_time();
+pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, RigError> {
+    let (omega, amplitude) = (plan.lock.omega_start, SHARE * plan.amplitude);
+    let step = plan.knowledge.sample_time;
     let samples = |periods: usize| (periods as f64 * TAU / (omega * step)).round() as usize;
     let [quiet, driven, window] = PERIODS.map(samples);
     let (phase, readings, has_base) = (0.0, Vec::new(), false);
     let mut rig = OpenLoop { rig, step, phase, readings, has_base };
-    let expected = expected(scene, omega, amplitude);
+    let expected = expected(plan, omega, amplitude);
     rig.rest(omega, quiet, samples(WAITS[1]), NOISE * expected[0].norm())?;
     let begins = rig.readings.len();
     rig.drive(driven, omega, amplitude)?;
@@ -85,17 +86,17 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
         let periods = readings[begins..].chunks_exact(period);
         periods.map(|readings| SineFit::of(readings, of).phasor).collect()
     };
-    let linear = Linear::of(&phasors(1), base, omega, period, scene);
+    let linear = Linear::of(&phasors(1), base, omega, period, plan);
     let mut quantities = Vec::new();
     if has_base {
-        quantities.extend(of_base(base, amplitude, &phasors(2), scene));
+        quantities.extend(of_base(base, amplitude, &phasors(2), plan));
     }
     if let Some(linear) = &linear {
         // Amplitude and phase of the response for the natural frequency and the damping that the rig has.
         let gain = Complex64::from_polar(linear.response_gain, linear.phase.to_radians());
-        let ratio = gain / linear.expected_gain(omega, scene.resonance.reference);
+        let ratio = gain / linear.expected_gain(omega, plan.knowledge.numbers.definition.reference);
         channels[0] = channels[0].at(ratio * base.0 / expected[1], omega * step);
-        quantities.extend(of_response(linear, ratio, scene));
+        quantities.extend(of_response(linear, ratio, plan));
     }
     let verdict = verdict(&channels, &amplitudes, has_base, waits);
     let refused = quantities.iter().find_map(CheckedQuantity::refusal);
@@ -122,13 +123,13 @@ fn without_drift(readings: &mut [[f64; 3]]) {
 }
 
 /// Phasors of response and base, m, at the end of a check of the scene's linear resonator; frequency of the drive, rad/s, and its amplitude, m.
-fn expected(scene: &Scene, omega: f64, amplitude: f64) -> [Complex64; 2] {
-    let LinearResponse { omega0, damping_rate, .. } = scene.linear();
+fn expected(plan: &Plan, omega: f64, amplitude: f64) -> [Complex64; 2] {
+    let LinearResponse { omega0, damping_rate, .. } = plan.knowledge.linear;
     let time = (PERIODS[1] as f64 - 0.5 * PERIODS[2] as f64) * TAU / omega;
     let rate = Complex64::new(damping_rate, omega - omega0);
     let growth = Complex64::new(0.0, -0.5 * omega0) * (1.0 - (-rate * time).exp()) / rate;
     // A delay that the chain states is expected.
-    let stated = Complex64::from_polar(1.0, -scene.controller_config().delay * omega);
+    let stated = Complex64::from_polar(1.0, -plan.lock.delay * omega);
     [growth * amplitude * stated, stated * amplitude]
 }
 
@@ -245,8 +246,8 @@ impl CheckedQuantity {
 }
 
 /// Natural frequency, damping, and the response over the expected response (`ratio`) of an oscillator that has both.
-fn of_response(linear: &Linear, ratio: Complex64, scene: &Scene) -> [CheckedQuantity; 4] {
-    let stated = LinearResponse::of(scene);
+fn of_response(linear: &Linear, ratio: Complex64, plan: &Plan) -> [CheckedQuantity; 4] {
+    let stated = plan.knowledge.linear;
     let u = linear.u_damping_rate;
     let hertz = [linear.omega_0, u, stated.omega0].map(|omega| omega / TAU);
     let damping = [linear.damping_rate, u, stated.damping_rate];
@@ -267,13 +268,13 @@ fn of_response(linear: &Linear, ratio: Complex64, scene: &Scene) -> [CheckedQuan
 
 /// Amplitude of the base, whose phasor, m, and its relative uncertainty are given, over the amplitude of the drive, and its frequency from its
 /// phasors, period by period.
-fn of_base((phasor, u): (Complex64, f64), drive: f64, periods: &[Complex64], scene: &Scene) -> [CheckedQuantity; 2] {
+fn of_base((phasor, u): (Complex64, f64), drive: f64, periods: &[Complex64], plan: &Plan) -> [CheckedQuantity; 2] {
     // A delay may shift the beginning by some periods.
     let last = &periods[periods.len() / 2..];
     let turned: Complex64 = last.windows(2).map(|pair| pair[0].conj() * pair[1]).sum();
     let ratio = phasor.norm() / drive;
     // A controlled base needs no known shaker.
-    let controlled = scene.controller_config().base_bandwidth.is_some();
+    let controlled = plan.lock.base_bandwidth.is_some();
     let tolerance = if controlled { GAIN - 1.0 } else { FACTOR };
     // The phases of a window's ends.
     let u_clock = u * (periods.len() as f64).sqrt() / (TAU * (last.len() as f64 - 1.0));
@@ -486,9 +487,10 @@ impl Linear {
         (base, u_base): (Complex64, f64),
         omega: f64,
         samples: usize,
-        scene: &Scene,
+        plan: &Plan,
     ) -> Option<Self> {
-        let period = samples as f64 * scene.sample_time();
+        let step = plan.knowledge.sample_time;
+        let period = samples as f64 * step;
         let (mut q, [mut steady, mut initial]) = start(phasors)?;
         let [mut u_q, mut u_gain] = [f64::NAN; 2];
         for _ in 0..ROUNDS {
@@ -520,7 +522,7 @@ impl Linear {
         if !(gain.norm().is_finite() && u_gain < DETERMINED && q.norm() > 0.0 && is_growth) {
             return None;
         }
-        let bandwidth = scene.controller.bandwidth * scene.linear().omega0;
+        let bandwidth = plan.lock.bandwidth;
         let gains = Gains::from_bandwidth(bandwidth, rate.re.max(0.0));
         Some(Self {
             omega_0: (omega - rate.im).hypot(rate.re),
@@ -531,9 +533,7 @@ impl Linear {
             phase: gain.arg().to_degrees(),
             bandwidth,
             gains: [gains.proportional, gains.integral],
-            phase_margin: gains
-                .phase_margin(bandwidth, rate.re.max(0.0), scene.sample_time())
-                .to_degrees(),
+            phase_margin: gains.phase_margin(bandwidth, rate.re.max(0.0), step).to_degrees(),
         })
     }
 

@@ -39,7 +39,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use vines_model::ArgumentError;
 
 pub use chain::ChainSettings;
-pub use controller::{ControllerSettings, KEYS, LinearResponse, PhaseLock, key, refusal};
+pub use controller::{ControllerSettings, KEYS, PhaseLock, key, refusal};
 pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
 pub use names::{Name, Names};
 pub use overrides::{Family, Override};
@@ -76,34 +76,13 @@ pub struct Scene {
     /// What a controller other than the built-in one calls its variables.
     #[serde(skip_serializing_if = "Names::is_empty")]
     pub controller_names: Names,
-    /// The linear response that the loop check has measured on the rig; not part of a file.
-    #[serde(skip)]
-    pub measured: Option<LinearResponse>,
 }
 
 impl Scene {
-    /// The numbers that the dimensionless model, the theory and the exact orbits depend on. Natural frequency and damping are those that
-    /// the loop check has measured, if it has run.
+    /// The numbers that the dimensionless model, the theory and the exact orbits depend on.
     pub fn dimensionless(&self) -> Dimensionless {
-        let stated = Dimensionless {
-            definition: self.resonance,
-            ..Dimensionless::of(&self.plant, self.amplitude)
-        };
-        self.measured.map_or(stated, |measured| Dimensionless {
-            omega0: measured.omega0,
-            lambda: 2.0 * measured.damping_rate.max(0.0) / (stated.epsilon * measured.omega0),
-            ..stated
-        })
-    }
-
-    /// The linear response: as measured, otherwise by the scene's plant.
-    pub fn linear(&self) -> LinearResponse {
-        self.measured.unwrap_or_else(|| LinearResponse::of(self))
-    }
-
-    /// Levels of the tracked backbone, amplitudes of the response, m, in the order in which they are visited.
-    pub fn levels(&self) -> Vec<f64> {
-        self.backbone.levels(self.plant.half_width)
+        let numbers = Dimensionless::of(&self.plant, self.amplitude);
+        Dimensionless { definition: self.resonance, ..numbers }
     }
 
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
@@ -139,6 +118,20 @@ impl Scene {
         })
     }
 
+    /// The scene with everything at rest at the start.
+    #[must_use]
+    pub fn at_rest(self) -> Self {
+        Self { start: State::default(), ..self }
+    }
+
+    /// The scene with this many times the samples.
+    #[must_use]
+    pub fn sampled(self, factor: f64) -> Self {
+        let samples_per_period = factor * self.controller.samples_per_period;
+        let controller = ControllerSettings { samples_per_period, ..self.controller };
+        Self { controller, ..self }
+    }
+
     /// What is possible, but hardly meant: a value in another unit, such as kN/m, g or mm.
     pub fn implausible(&self) -> impl Iterator<Item = Implausible> {
         let d = Dimensionless::of(&self.plant, 0.0);
@@ -151,14 +144,6 @@ impl Scene {
         ]
         .into_iter()
         .filter_map(|(name, value, unit, is)| is.then_some(Implausible { name, value, unit }))
-    }
-
-    /// Whether a motion of the scene's plant has a mirror image, half a period later, as in an ideal cavity: neither tilt nor walls of
-    /// different restitution. Where it has none, the 1:1 motion is asymmetric. (Unequal gaps move the middle of the cavity only.)
-    pub fn has_mirror_images(&self) -> bool {
-        let r = Restitution::Constant(self.plant.restitution);
-        let [plus, minus] = self.plant.cavity.restitution.map(|law| law.unwrap_or(r));
-        self.plant.cavity.tilt == 0.0 && plus == minus
     }
 
     /// The controller's sample time, s: rig and controller agree on it before anything is measured.
@@ -174,6 +159,14 @@ pub struct Implausible {
     pub name: &'static str,
     pub value: f64,
     pub unit: &'static str,
+}
+
+/// Whether a motion of a plant has a mirror image, half a period later, as in an ideal cavity: neither tilt nor walls of different restitution.
+/// Where it has none, the 1:1 motion is asymmetric. (Unequal gaps move the middle of the cavity only.)
+pub(crate) fn has_mirror_images(plant: &Parameters) -> bool {
+    let r = Restitution::Constant(plant.restitution);
+    let [plus, minus] = plant.cavity.restitution.map(|law| law.unwrap_or(r));
+    plant.cavity.tilt == 0.0 && plus == minus
 }
 
 /// Whether there is friction in the cavity.
@@ -254,7 +247,6 @@ impl Sections {
             resonance: self.resonance,
             rig_names: self.rig.names,
             controller_names: self.controller_names,
-            measured: None,
         };
         scene.controller.check()?;
         scene.backbone.check()?;
@@ -500,7 +492,8 @@ impl RecordSettings {
         within("record.hold_periods", self.hold_periods, unit, [3.0, 1e6])?;
         positive("record.decay_periods", self.decay_periods.unwrap_or(1.0), unit)?;
         let periods = self.hold_periods + self.decay_periods.unwrap_or(0.0);
-        let samples = scene.lock_time() / scene.sample_time() + scene.controller.samples_per_period * periods;
+        let longest = scene.controller_config().acquire_timeout.unwrap_or(f64::INFINITY);
+        let samples = longest / scene.sample_time() + scene.controller.samples_per_period * periods;
         check(
             "samples of phase_lock.acquire_timeout and of all periods of [record]",
             samples,
@@ -539,7 +532,7 @@ impl BackboneSettings {
     }
 
     /// The levels, amplitudes of the response in m, for the half-width `b`, m, in the order in which they are visited.
-    fn levels(&self, b: f64) -> Vec<f64> {
+    pub(crate) fn levels(&self, b: f64) -> Vec<f64> {
         let [from, to] = [self.c_from, self.c_to].map(|level| level * b);
         let steps = f64::from(self.points.max(2) - 1);
         (0..self.points)

@@ -182,7 +182,7 @@ fn recording() -> Recording {
     let rig = Simulated::new(RIG, scene.start).unwrap();
     let mut rig = Recorder { rig: Chain::around(Box::new(rig), &scene), read: Vec::new() };
     let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
-    track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
+    track(&mut rig, &mut controller, &scene.plan(), |_, _| {}).unwrap();
     let kept = &rig.read[3000..rig.read.len() - 500];
     Recording {
         origin: "record.csv".into(),
@@ -255,7 +255,7 @@ fn channels_that_are_no_recording_of_a_rig_near_resonance_are_refused_with_what_
     for (damage, words) in cases {
         let mut damaged = good.clone();
         damage(&mut damaged);
-        let message = damaged.parts(&scene).unwrap_err().to_string();
+        let message = damaged.parts(&scene.knowledge()).unwrap_err().to_string();
         let is_complete = words.iter().all(|word| message.contains(word));
         assert!(message.starts_with("record.csv") && is_complete, "{message}");
     }

@@ -46,10 +46,9 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let mut scene = arguments.scene.load()?;
-    scene.start = Default::default();
+    let scene = arguments.scene.load()?.at_rest();
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach()?)?;
-    let checked = check(open.rig.as_mut(), &scene).map_err(ExperimentError::from)?;
+    let checked = check(open.rig.as_mut(), &scene.plan()).map_err(ExperimentError::from)?;
     open.close();
     let text = output(arguments.json, &checked, || described(&checked))?;
     if checked.verdict == Verdict::Healthy {

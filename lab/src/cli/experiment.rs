@@ -6,10 +6,12 @@ use clap::Args;
 use phase_lock::Config;
 use serde::Serialize;
 use vines::experiment::{ExperimentError, Stage};
+use vines::loop_check::{self, Verdict};
 use vines::net::{ReportLost, Timing};
+use vines::plan::Plan;
 use vines::record::{Sample, table};
 use vines::rig::{BuiltIn, Controller, Fault, Rig};
-use vines::{FileError, ResultFolder, advice, loop_check, scene::Scene};
+use vines::{FileError, ResultFolder, advice, scene::Scene};
 
 use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
 use super::output::{Results, Written, output, results, written};
@@ -84,13 +86,13 @@ impl ExperimentArguments {
         &self,
         command: &str,
         rig: Option<&Endpoint>,
-        config: impl Fn(&Scene) -> Config,
+        config: impl Fn(&Plan) -> Config,
         names: &'static [&'static str],
-    ) -> Result<(Scene, Session), Failure> {
-        let mut scene = self.scene.load()?;
+    ) -> Result<(Scene, Plan, Session), Failure> {
+        let scene = self.scene.load()?;
         let watch = self.watch.start(command, &scene)?;
         let scope = self.reach.reach()?;
-        BuiltIn::new(&config(&scene))?;
+        BuiltIn::new(&config(&scene.plan()))?;
         let folder = results(&self.out, names)?;
         let recording = self.record.clone().map(Recording::open).transpose();
         let recording = recording.map_err(Failure::input)?;
@@ -104,44 +106,41 @@ impl ExperimentArguments {
                 Endpoint::Fmu(plant).rig(&scene, scope)?
             }
         };
-        self.check_loop(open.rig.as_mut(), &mut scene)?;
+        let plan = self.checked(open.rig.as_mut(), &scene)?;
         let mut controller = self
             .controller
-            .controller(&config(&scene), &scene.controller_names, scope, open.pace)?;
+            .controller(&config(&plan), &scene.controller_names, scope, open.pace)?;
         if let Some(watch) = &watch {
             (open.rig, controller) = (watch.rig(open.rig), watch.controller(controller));
         }
         if let Some(recording) = &recording {
             open.rig = recording.rig(open.rig);
         }
-        Ok((scene, Session { controller, rig: open, watch, recording, folder }))
+        Ok((scene, plan, Session { controller, rig: open, watch, recording, folder }))
     }
 
-    /// Checks a rig that is not a simulation, and refuses one that is not as expected. Such a rig starts at rest.
-    fn check_loop(&self, rig: &mut dyn Rig, scene: &mut Scene) -> Result<(), Failure> {
+    /// The plan of the experiment, with what the check of a rig that is not a simulation has measured. Refuses a rig that is not as expected.
+    fn checked(&self, rig: &mut dyn Rig, scene: &Scene) -> Result<Plan, Failure> {
+        let plan = scene.plan();
         rig.sense().map_err(ExperimentError::from)?;
-        if rig.ground_truth().map_err(ExperimentError::from)?.is_some() {
-            return Ok(());
+        if rig.ground_truth().map_err(ExperimentError::from)?.is_some() || self.no_check {
+            return Ok(plan);
         }
-        scene.start = Default::default();
-        if self.no_check {
-            return Ok(());
-        }
-        let checked = loop_check::check(rig, scene).map_err(ExperimentError::from)?;
+        let checked = loop_check::check(rig, &plan).map_err(ExperimentError::from)?;
         eprint!("{}", check::described(&checked));
-        scene.measured = checked.linear.map(|linear| linear.response());
-        if let Some(measured) = &scene.measured {
-            eprintln!(
-                "All values of sigma share a standard uncertainty of {:.1e}, that of the natural frequency.",
-                measured.uncertainty / scene.dimensionless().omega_change(1.0)
-            );
-        }
-        match checked.verdict {
-            loop_check::Verdict::Healthy => Ok(()),
-            verdict => Err(Failure::run(format!(
-                "the loop check failed, and the drive is off: {verdict}; --no-check skips it"
-            ))),
-        }
+        let Verdict::Healthy = checked.verdict else {
+            return Err(Failure::run(format!(
+                "the loop check failed, and the drive is off: {}; --no-check skips it",
+                checked.verdict
+            )));
+        };
+        let Some(linear) = checked.linear else { return Ok(plan) };
+        let knowledge = plan.knowledge.measured(linear.response());
+        eprintln!(
+            "All values of sigma share a standard uncertainty of {:.1e}, that of the natural frequency.",
+            knowledge.linear.uncertainty / knowledge.numbers.omega_change(1.0)
+        );
+        Ok(scene.plan_on(knowledge))
     }
 
     /// The result, as JSON or as text, and its files, with the `failure` that the result has in spite of them. If a rig in real time missed
@@ -188,6 +187,7 @@ impl Session {
     pub(super) fn measure<T>(
         mut self,
         scene: &Scene,
+        plan: &Plan,
         measure: impl FnOnce(&mut Vec<Sample>, &mut dyn Rig, &mut dyn Controller) -> Result<T, ExperimentError>,
     ) -> Result<(T, Ended), Failure> {
         let mut samples = Vec::new();
@@ -206,7 +206,7 @@ impl Session {
                     ExperimentError::NoLock { .. }
                     | ExperimentError::NotReached { .. }
                     | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. } => {
-                        advice::reason(scene, advice::last_regime(&samples, scene))
+                        advice::reason(scene, &plan.knowledge.numbers, advice::last_regime(&samples, plan))
                     }
                     _ => None,
                 };

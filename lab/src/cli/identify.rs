@@ -51,28 +51,28 @@ const FILES: [&str; 6] = [
 
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let experiment = &arguments.experiment;
-    let (scene, session) = experiment.start(
+    let (scene, plan, session) = experiment.start(
         "vines identify",
         arguments.rig.as_ref(),
-        Scene::controller_config,
+        |plan| plan.lock,
         &FILES,
     )?;
     let bar = progress_bar(
-        Stage::Locking.samples(&scene) as u64,
+        Stage::Locking.samples(&plan) as u64,
         "{msg:29} [{wide_bar}] {pos}/{len} samples",
     );
-    let measured = session.measure(&scene, |samples, rig, controller| {
-        run_into(samples, rig, controller, &scene, |stage, done, of| {
+    let measured = session.measure(&scene, &plan, |samples, rig, controller| {
+        run_into(samples, rig, controller, &plan, |stage, done, of| {
             show(&bar, stage, done, of)
         })
     });
     bar.finish_and_clear();
     let (record, ended) = measured?;
-    let identification = match identify(&record, &scene) {
+    let identification = match identify(&record, &plan) {
         Ok(identification) => identification,
         Err(error) => {
             let reason = match error {
-                IdentificationError::Regime { regime, .. } => advice::reason(&scene, Some(regime)),
+                IdentificationError::Regime { regime, .. } => advice::reason(&scene, &plan.knowledge.numbers, Some(regime)),
                 _ => None,
             };
             return Err(ended.without_result(Failure::run(error), reason, &record.samples));

@@ -138,10 +138,10 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
     let helic = arguments.protocol == Protocol::Helic;
     if arguments.sensors_only || helic {
         // A device runs on between its hosts.
-        scene.start = Default::default();
+        scene = scene.at_rest();
     }
     if helic {
-        scene.controller.samples_per_period *= f64::from(arguments.oversampling);
+        scene = scene.sampled(f64::from(arguments.oversampling));
     }
     let plant = Simulated::new(scene.plant, scene.start)
         .map_err(Failure::input)?

@@ -5,6 +5,7 @@ use vines::comparison::{TrackedComparison, TrackedPoint};
 use vines::experiment::ExperimentError;
 use vines::identification::Regime;
 use vines::loop_check::check;
+use vines::plan::Plan;
 use vines::rig::{BuiltIn, ControllerError, Rig, SensorsOnly, Simulated};
 use vines::scene::{Parameters, Scene};
 
@@ -12,8 +13,12 @@ use crate::experiment::ConstantDrive;
 use crate::{rig, scene, words};
 
 fn tracked_on(rig: &mut dyn Rig, scene: &Scene) -> Result<TrackedComparison, ExperimentError> {
-    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
-    let tracked = track(rig, &mut controller, scene, |_, _| {})?;
+    tracked_by(rig, scene, &scene.plan())
+}
+
+fn tracked_by(rig: &mut dyn Rig, scene: &Scene, plan: &Plan) -> Result<TrackedComparison, ExperimentError> {
+    let mut controller = BuiltIn::new(&plan.tracking).unwrap();
+    let tracked = track(rig, &mut controller, plan, |_, _| {})?;
     Ok(TrackedComparison::of(&tracked, scene))
 }
 
@@ -105,15 +110,16 @@ fn tracked_from_sensors(
     checked: bool,
 ) -> Result<TrackedComparison, ExperimentError> {
     let few = "start.dq2=0 backbone.points=7 backbone.C_from=0.6 backbone.C_to=0.3";
-    let mut scene = scene(&format!("{few} {settings}"));
+    let scene = scene(&format!("{few} {settings}"));
+    let mut plan = scene.plan();
     let mut other = scene.clone();
     change(&mut other.plant);
     let mut rig = SensorsOnly::around(Simulated::of(&other).unwrap());
     if checked {
-        let linear = check(&mut rig, &scene).unwrap().linear.expect("a linear response");
-        scene.measured = Some(linear.response());
+        let linear = check(&mut rig, &plan).unwrap().linear.expect("a linear response");
+        plan = scene.plan_on(plan.knowledge.measured(linear.response()));
     }
-    tracked_on(&mut rig, &scene)
+    tracked_by(&mut rig, &scene, &plan)
 }
 
 #[test]
@@ -173,7 +179,13 @@ fn impacts_of_other_rigs_are_recognised_from_the_response_with_and_without_noise
 #[test]
 fn a_controller_that_cannot_hold_the_response_is_refused() {
     let scene = scene("");
-    let error = track(&mut *rig(&scene), &mut ConstantDrive::new(&scene), &scene, |_, _| {}).unwrap_err();
+    let error = track(
+        &mut *rig(&scene),
+        &mut ConstantDrive::new(&scene),
+        &scene.plan(),
+        |_, _| {},
+    )
+    .unwrap_err();
     let is_refused = matches!(error, ExperimentError::Controller(ControllerError::NoResponseLoop));
     assert!(is_refused, "{error}");
 }

@@ -5,11 +5,12 @@ use vines::advice;
 use vines::comparison::Comparison;
 use vines::experiment::{self, ExperimentError};
 use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
+use vines::plan::{LinearResponse, Plan};
 use vines::record::{Record, Sample};
 use vines::rig::{
     BuiltIn, Command, Controller, ControllerError, Drive, Fault, Rig, RigError, Sensors, SensorsOnly, Simulated,
 };
-use vines::scene::{LinearResponse, Scene};
+use vines::scene::Scene;
 
 use crate::{built_in, rig, scene, text, vines};
 
@@ -20,7 +21,7 @@ fn run(
     scene: &Scene,
 ) -> Result<Record, (ExperimentError, Vec<Sample>)> {
     let mut samples = Vec::new();
-    let record = experiment::run_into(&mut samples, rig, controller, scene, |_, _, _| {});
+    let record = experiment::run_into(&mut samples, rig, controller, &scene.plan(), |_, _, _| {});
     record.map_err(|error| (error, samples))
 }
 
@@ -50,8 +51,18 @@ fn identified_on(
     controller: &mut dyn Controller,
     scene: &Scene,
 ) -> Result<Comparison, IdentificationError> {
-    let record = run(rig, controller, scene).unwrap();
-    Ok(Comparison::of(&identify(&record, scene)?, scene))
+    identified_by(rig, controller, scene, &scene.plan())
+}
+
+/// What is identified on a rig of which more may be known.
+fn identified_by(
+    rig: &mut dyn Rig,
+    controller: &mut dyn Controller,
+    scene: &Scene,
+    plan: &Plan,
+) -> Result<Comparison, IdentificationError> {
+    let record = experiment::run(rig, controller, plan, |_, _, _| {}).unwrap();
+    Ok(Comparison::of(&identify(&record, plan)?, scene))
 }
 
 fn identified_in(scene: &Scene) -> Comparison {
@@ -94,9 +105,6 @@ fn the_lock_is_the_exact_orbit_for_every_sensor_and_reference_and_nearer_to_it_a
 fn identified_without_ground_truth(scene: &Scene) -> Result<Comparison, IdentificationError> {
     let mut rig = SensorsOnly::around(Box::new(Simulated::new(scene.plant, scene.start).unwrap()));
     assert_eq!(rig.ground_truth().unwrap(), None);
-    if scene.start.dq2 == 0.0 {
-        return identified_on(&mut rig, &mut ConstantDrive::new(scene), scene);
-    }
     identified_on(&mut rig, &mut built_in(scene), scene)
 }
 
@@ -115,12 +123,19 @@ fn a_rig_that_does_not_report_its_impacts_is_identified_from_its_response() {
 #[test]
 fn a_lock_of_the_linear_mode_or_of_an_asymmetric_motion_is_refused() {
     // Under a constant drive nothing ever hits a particle at rest in the middle, and the loop locks all the same, at sigma = 0.
-    let mut rest = scene("start.dq2=0");
+    let rest = scene("start.dq2=0");
     // Only the loop check knows the linear response of such a rig.
-    let checked = Some(LinearResponse::of(&rest));
-    for (measured, expected) in [(None, Regime::NotEstablished), (checked, Regime::NoImpacts)] {
-        rest.measured = measured;
-        let refusal = identified_without_ground_truth(&rest).unwrap_err();
+    let stated = rest.knowledge();
+    let checked = stated.measured(LinearResponse::of(&rest.plant));
+    for (knowledge, expected) in [(stated, Regime::NotEstablished), (checked, Regime::NoImpacts)] {
+        let mut rig = SensorsOnly::around(rig(&rest));
+        let found = identified_by(
+            &mut rig,
+            &mut ConstantDrive::new(&rest),
+            &rest,
+            &rest.plan_on(knowledge),
+        );
+        let refusal = found.unwrap_err();
         let is_expected = matches!(refusal, IdentificationError::Regime { regime, .. } if regime == expected);
         assert!(is_expected, "{refusal}");
     }
@@ -156,7 +171,7 @@ fn a_decay_too_short_for_points_keeps_the_lock_and_says_that_the_record_ended() 
     assert_eq!((record.hold().len(), record.decay().len()), (301, 100));
     let mut drives = record.decay().iter().map(|sample| sample.command.drive);
     assert!(drives.all(|drive| drive.amplitude == 0.0 && drive.displacement == 0.0));
-    let found = Comparison::of(&identify(&record, &scene).unwrap(), &scene);
+    let found = Comparison::of(&identify(&record, &scene.plan()).unwrap(), &scene);
     assert!(found.decay.is_empty() && found.exact.is_some());
     assert_eq!(found.decay_end, DecayEnd::Record);
     let folder = tempfile::tempdir().unwrap();
@@ -178,6 +193,11 @@ fn a_lock_through_30_db_takes_less_than_twice_the_periods_and_states_how_far_off
     assert!((lock.at.c - exact.c).abs() <= 4.0 * lock.at.u_c && lock.at.u_c < 0.01);
 }
 
+/// The advice for a scene's own rig.
+fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
+    advice::reason(scene, &scene.dimensionless(), regime)
+}
+
 #[test]
 fn of_two_stable_orbits_the_one_that_was_not_followed_is_named_and_so_are_gaps_between_them() {
     let settings = "plant.epsilon=0.0038 plant.lambda=0.512 plant.r=0.506 excitation.G=0.93 start.dq2=0";
@@ -187,14 +207,14 @@ fn of_two_stable_orbits_the_one_that_was_not_followed_is_named_and_so_are_gaps_b
     let followed = found.exact.unwrap();
     assert!((found.lock.at.c - followed.c).abs() < 2e-3, "{:?}", found.lock);
     // A motion that is neither of them is told about both.
-    let refused = advice::reason(&scene(settings), Some(Regime::Asymmetric)).unwrap();
+    let refused = reason(&scene(settings), Some(Regime::Asymmetric)).unwrap();
     for orbit in stable {
         let place = format!("sigma = {:.4}, C = {:.4}", orbit.sigma, orbit.c);
         assert!(refused.contains(&place), "{refused}");
         assert_eq!(found.others().any(|other| other == orbit), *orbit != followed);
     }
     let gap = scene("plant.epsilon=0.02 plant.lambda=0.4 plant.r=0.8 excitation.G=0.7");
-    let reason = advice::reason(&gap, None).unwrap();
+    let reason = reason(&gap, None).unwrap();
     let words = "it is stable for G from 0.415 to 0.824, with gaps";
     assert!(reason.ends_with(words), "{reason}");
     // The file names all of them, and the one that was followed.

@@ -63,8 +63,8 @@ fn renamed(fmu: &str, to: &Path, names: &[(&str, &str)]) {
 
 /// Detuning at which a run has locked.
 fn locked(rig: &mut dyn Rig, controller: &mut dyn Controller, scene: &Scene) -> Result<f64, ExperimentError> {
-    let record = experiment::run(rig, controller, scene, |_, _, _| {})?;
-    Ok(identify(&record, scene).unwrap().lock.at.sigma)
+    let record = experiment::run(rig, controller, &scene.plan(), |_, _, _| {})?;
+    Ok(identify(&record, &scene.plan()).unwrap().lock.at.sigma)
 }
 
 #[test]

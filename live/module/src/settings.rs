@@ -44,7 +44,6 @@ pub fn default_scene() -> Scene {
         controller_names: Names::default(),
         chain: ChainSettings::default(),
         resonance: Definition::default(),
-        measured: None,
     }
 }
 

@@ -28,7 +28,7 @@ impl Controller for ConstantDrive {
 fn record_of(scene: &Scene) -> Record {
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
     let mut controller = ConstantDrive(BuiltIn::new(&scene.controller_config()).unwrap());
-    run(&mut rig, &mut controller, scene, |_, _, _| {}).unwrap()
+    run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {}).unwrap()
 }
 
 fn bench() -> Bench {
@@ -47,7 +47,7 @@ fn lock_and_free_decay_have_the_bits_of_the_lab_under_a_constant_drive() {
         assert_eq!(live.map(f64::to_bits), lab.map(f64::to_bits), "sample {n}");
     }
     assert!(bench.output.locked);
-    let points = decay_points(&record, &scene, WINDOW).points;
+    let points = decay_points(&record, &scene.knowledge(), WINDOW).points;
     assert!(points.len() > 50, "{} points", points.len());
     let released = bench.motion;
     bench.drive(false);

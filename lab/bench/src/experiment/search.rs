@@ -19,8 +19,8 @@ use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, noise, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, Stage};
 use crate::identification::{ASYMMETRIC, Cycle, ResonanceFit, Slopes, without_tones};
+use crate::plan::{LinearResponse, Plan};
 use crate::rig::{Controller, ControllerError, LoopState, Move, Rig};
-use crate::scene::{LinearResponse, Scene};
 
 /// Phase error, rad, below which the control of the response begins: the drive then does 94 % of its largest work.
 const NEAR: f64 = 0.35;
@@ -70,7 +70,6 @@ struct Leg {
 /// The search.
 pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     bench: &'b mut ControlLoop<'a, R, C>,
-    scene: &'b Scene,
     linear: LinearResponse,
     /// Half-width of the cavity, and requested drive, m.
     b: f64,
@@ -87,15 +86,15 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
 
 impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// The search on a bench.
-    pub fn new(bench: &'b mut ControlLoop<'a, R, C>, scene: &'b Scene) -> Self {
+    pub fn new(bench: &'b mut ControlLoop<'a, R, C>) -> Self {
+        let Plan { knowledge, amplitude, .. } = bench.plan;
         Self {
+            linear: knowledge.linear,
+            b: knowledge.numbers.b,
+            requested: *amplitude,
+            target: knowledge.target,
+            period: TAU / knowledge.linear.omega0,
             bench,
-            scene,
-            linear: scene.linear(),
-            b: scene.plant.half_width,
-            requested: scene.amplitude,
-            target: scene.controller.phase_target_radians(),
-            period: TAU / scene.linear().omega0,
             setpoint: 0.0,
             held: (f64::INFINITY, 0.0),
         }
@@ -143,7 +142,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Goes to a symmetric motion with impacts: raises the response until they have begun, and lowers it until the motion is symmetric.
     fn symmetric(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
-        let largest = self.scene.controller_config().amplitude_max.unwrap_or(f64::INFINITY);
+        let largest = self.bench.config.amplitude_max.unwrap_or(f64::INFINITY);
         let spare = SHARE * self.gain() * (largest - self.damping() * (1.0 + DRAWING) * self.b);
         let rate = (self.b / (RISE * self.period)).min(spare);
         while !leg.departed || leg.response < (1.0 - DRAWING) * self.b {
@@ -295,7 +294,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let from = (begins[0].0 + begins[0].0).saturating_sub(begins[1].0);
         let raw = &self.bench.samples[from..];
         let mean_omega = mean(raw.iter().map(|sample| sample.command.drive.omega));
-        let cleaned = without_tones(raw, self.scene, mean_omega);
+        let cleaned = without_tones(raw, &self.bench.plan.knowledge, mean_omega);
         let samples = cleaned.as_deref().unwrap_or(raw);
         let ends = begins[1..].iter().map(|next| next.0 - from).chain([samples.len()]);
         let (mut all, mut harmonics) = (Vec::new(), Vec::new());
@@ -326,7 +325,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let doubtful = SIGNIFICANT * noise / (0.5 * all.len() as f64).sqrt();
         let possible = self.setpoint > LOWEST * self.b && response < UNREACHED * self.b;
         // Without mirror images there is no symmetric motion to tell from others.
-        let is_even_small = !self.scene.has_mirror_images() || even <= (ASYMMETRIC * ASYMMETRIC * odd).max(doubtful);
+        let is_even_small =
+            !self.bench.plan.knowledge.is_symmetric || even <= (ASYMMETRIC * ASYMMETRIC * odd).max(doubtful);
         let symmetric = departed && possible && is_even_small;
         if symmetric {
             self.held = range(self.held, [drive.value]);
@@ -344,7 +344,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Why the requested drive was not reached.
     fn not_reached(&self) -> ExperimentError {
-        let d = self.scene.dimensionless();
+        let d = self.bench.plan.knowledge.numbers;
         let why = match self.held {
             (low, high) if low <= high => format!(
                 "the symmetric 1:1 motions that were found need from G = {:.4} to {:.4}, and were lost {SEARCHES} times on the way",

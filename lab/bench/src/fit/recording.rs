@@ -24,9 +24,10 @@ use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
 use super::{Known, MeasuredPoint, Quantity, fit};
 use crate::backbone::{Criterion, LAG, LevelEstimate};
 use crate::identification::{Cycle, Harmonic, ResonanceFit, harmonic, regime_by_response};
+use crate::plan::{Knowledge, LinearResponse};
 use crate::record::Sample;
 use crate::rig::{Command, Drive, Sensors};
-use crate::scene::{LinearResponse, Parameters, Scene};
+use crate::scene::{Parameters, Scene};
 
 /// Two channels of a measurement, sampled at equal distances.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,13 +116,15 @@ const DAMPING: f64 = 0.1;
 /// As [`Recording::parts`].
 pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result<Vec<Vec<Part>>, RecordingError> {
     let all = |linear: LinearResponse, plant: Parameters| {
-        let scene = Scene { measured: Some(linear), plant, ..scene.clone() };
+        let Knowledge { sample_time, target, .. } = scene.knowledge();
+        let stated = Knowledge::of(&plant, scene.resonance, scene.amplitude, sample_time, target);
+        let knowledge = stated.measured(linear);
         recordings
             .iter()
-            .map(|record| record.parts(&scene))
+            .map(|record| record.parts(&knowledge))
             .collect::<Result<Vec<_>, _>>()
     };
-    let stated = scene.linear();
+    let stated = LinearResponse::of(&scene.plant);
     let uncertainty = DAMPING * stated.damping_rate;
     let first = all(LinearResponse { uncertainty, ..stated }, scene.plant)?;
     let points: Vec<MeasuredPoint> = first.iter().flatten().filter_map(|part| part.point).collect();
@@ -145,22 +148,20 @@ pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result
 }
 
 impl Recording {
-    /// The parts of the recording, with their points. `scene` says what the sensors read, and the natural frequency and the damping of the structure
-    /// without impacts.
+    /// The parts of the recording, with their points. `knowledge`: of the rig, with the natural frequency and the damping of the structure without
+    /// impacts.
     ///
     /// # Errors
     /// Channels that cannot be those of a rig near resonance; the message says which, and what to do.
-    pub fn parts(&self, scene: &Scene) -> Result<Vec<Part>, RecordingError> {
-        let linear = scene.linear();
+    pub fn parts(&self, knowledge: &Knowledge) -> Result<Vec<Part>, RecordingError> {
+        let linear = knowledge.linear;
         self.check(&linear)?;
-        // The regime is judged with the sample time of the scene.
-        let mut scene = scene.clone();
-        scene.controller.samples_per_period *= scene.sample_time() / self.sample_time;
+        let knowledge = Knowledge { sample_time: self.sample_time, ..*knowledge };
         let anchors = self.anchors(&linear);
         let moves = |anchor: &Anchor| anchor.response.map(|_| anchor.drive.is_some());
         let stretches = anchors.chunk_by(|anchor, next| moves(anchor) == moves(next));
         let of = |base_moves: bool| move |stretch: &&[Anchor]| moves(&stretch[0]) == Some(base_moves);
-        let target = scene.controller.phase_target_radians();
+        let target = knowledge.target;
         let periods = |stretch: &[Anchor]| {
             let samples = self.samples(stretch);
             let cycles = Cycle::all(&samples, self.sample_time, target);
@@ -169,7 +170,7 @@ impl Recording {
         let driven: Vec<_> = stretches.clone().filter(of(true)).map(periods).collect();
         self.plausible(&driven.iter().flat_map(|(_, cycles)| cycles).collect::<Vec<_>>())?;
         let windows = driven.iter().flat_map(|(samples, cycles)| windows(samples, cycles));
-        let mut parts = evaluated(&windows.collect::<Vec<_>>(), &scene);
+        let mut parts = evaluated(&windows.collect::<Vec<_>>(), &knowledge);
         let decays = stretches.filter(of(false));
         parts.extend(decays.flat_map(|stretch| decay(stretch, &linear, self.sample_time)));
         parts.sort_by(|first, second| first.seconds[0].total_cmp(&second.seconds[0]));
@@ -415,8 +416,8 @@ fn windows<'a>(samples: &'a [Sample], cycles: &'a [Cycle]) -> Vec<Window<'a>> {
 type Held = [f64; 3];
 
 /// The parts of the windows, which are evaluated twice: the points of the first time give the slopes of the second.
-fn evaluated(windows: &[Window], scene: &Scene) -> Vec<Part> {
-    let linear = scene.linear();
+fn evaluated(windows: &[Window], knowledge: &Knowledge) -> Vec<Part> {
+    let linear = knowledge.linear;
     let estimate = |window: &Window, before| {
         let largest = window.cycles.iter().map(Cycle::amplitude).fold(0.0, f64::max);
         Criterion { linear, precision: 1.0, largest, before }.best(window.cycles)
@@ -430,7 +431,7 @@ fn evaluated(windows: &[Window], scene: &Scene) -> Vec<Part> {
     curve.sort_by(|first, second| first[0].total_cmp(&second[0]));
     let second = windows.iter().zip(first).map(|(window, first)| {
         let estimate = first.and_then(|first| estimate(window, neighbours(&curve, first)));
-        part(window, estimate, &curve, scene)
+        part(window, estimate, &curve, knowledge)
     });
     second.collect()
 }
@@ -470,7 +471,7 @@ fn neighbours(curve: &[Held], here: Held) -> [Option<Held>; 2] {
 }
 
 /// The part of a window.
-fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], scene: &Scene) -> Part {
+fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], knowledge: &Knowledge) -> Part {
     let Window { cycles, samples, change, late } = *window;
     let seconds = [samples[0].time, samples[samples.len() - 1].time];
     let Some(estimate) = estimate else {
@@ -484,18 +485,17 @@ fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], scene:
     } else {
         Kind::Held
     };
-    let target = scene.controller.phase_target_radians();
-    let regime = regime_by_response(samples, scene, base.value, target, omega.value);
+    let regime = regime_by_response(samples, knowledge, base.value, omega.value);
     // What the estimate contains once of the lag, and of the phase error in the second order.
     let here = [level.value, base.value, omega.value];
     let slopes = neighbours(curve, here)[1].map_or([0.0; 2], |neighbour| slopes(here, neighbour));
     let beside = estimate.phase_error.value.abs() * base.value / level.value;
-    let aside = beside * (omega.value - scene.linear().omega0);
+    let aside = beside * (omega.value - knowledge.linear.omega0);
     let drive = Estimate::new(base.value, &[base.uncertainty, slopes[0] * late, beside * base.value]);
     let omega = Estimate::new(omega.value, &[omega.uncertainty, slopes[1] * late, aside]);
     // Beyond the amplitude at which the symmetric motion loses its symmetry, noise hides another motion.
-    let manifold = Manifold::new(scene.plant.restitution);
-    let largest = manifold.c(B_SYMMETRY_BREAKING) * scene.plant.half_width;
+    let manifold = Manifold::new(knowledge.numbers.r);
+    let largest = manifold.c(B_SYMMETRY_BREAKING) * knowledge.numbers.b;
     let is_symmetric = regime == Regime::Symmetric || (regime == Regime::Unresolved && level.value < largest);
     let point = point(level, omega, drive).filter(|_| is_symmetric);
     Part { seconds, kind, point, regime }

@@ -9,8 +9,9 @@ use vines_model::numerics::{HarmonicBasis, mean};
 use vines_model::regime::end_of_synchrony;
 
 use super::response::impacts;
+use crate::plan::Knowledge;
 use crate::record::{Record, Sample};
-use crate::scene::{Dimensionless, Scene};
+use crate::scene::Dimensionless;
 
 /// One point along the decay, in SI units, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -81,8 +82,8 @@ const KEPT: f64 = 0.5;
 
 /// The points along the decay of a record, up to the loss of synchrony where the rig reports impacts, otherwise to
 /// the end of the impacts. `window`: length of each fit, periods of the motion, [`WINDOW`] by default.
-pub fn decay_points(record: &Record, scene: &Scene, window: f64) -> DecayPoints {
-    let d = scene.dimensionless();
+pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> DecayPoints {
+    let d = knowledge.numbers;
     let decay = record.decay();
     let dt = record.sample_time;
     let (Some(first), Some(last)) = (decay.first(), decay.last()) else {
@@ -100,7 +101,7 @@ pub fn decay_points(record: &Record, scene: &Scene, window: f64) -> DecayPoints 
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
     let windows = fitted(&values, dt, omega, window);
     // Loss of amplitude by the impacts alone, m/s; the mean over the first period belongs to the 1:1 motion.
-    let damping = scene.linear().damping_rate;
+    let damping = knowledge.linear.damping_rate;
     let taken = |window: &SlidingFit| -window.fit.rate - damping * window.fit.amplitude;
     let at_release = mean(windows.iter().take(PER_PERIOD as usize).map(taken));
     let is_linear = |window: &SlidingFit| !has_impacts && taken(window) < KEPT * at_release;

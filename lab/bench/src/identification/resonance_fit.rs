@@ -23,8 +23,8 @@ use std::f64::consts::TAU;
 use nalgebra::{Complex, DVector};
 use vines_model::numerics::{Estimate, HarmonicBasis, Regression, mean, slope};
 
+use crate::plan::LinearResponse;
 use crate::record::{Sample, drive_phases};
-use crate::scene::LinearResponse;
 
 /// Prior knowledge of the slopes of `E_R` and `omega_R` over the amplitude.
 #[derive(Debug, Clone, Copy, PartialEq)]

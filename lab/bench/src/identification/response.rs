@@ -13,8 +13,9 @@ use serde::Serialize;
 use vines_model::numerics::{HarmonicBasis, golden_section, noise};
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
+use crate::plan::{Knowledge, LinearResponse};
 use crate::record::Sample;
-use crate::scene::{Dimensionless, LinearResponse, Scene, Sensor};
+use crate::scene::{Dimensionless, Sensor};
 
 /// Largest residual of a steady motion, relative to the amplitude, unless it is noise.
 const STEADY: f64 = 3e-3;
@@ -56,8 +57,8 @@ impl Content {
     }
 
     /// Fits the samples; `None` for too few samples or no motion.
-    fn of(samples: &[Sample], scene: &Scene, omega: f64) -> Option<Self> {
-        let (n, sample_time, d) = (samples.len(), scene.sample_time(), scene.dimensionless());
+    fn of(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Self> {
+        let (n, sample_time, d) = (samples.len(), knowledge.sample_time, knowledge.numbers);
         // The phase of the response is more uniform than the phase of a drive that a loop still corrects.
         let phases: Vec<f64> = (0..n).map(|n| n as f64 * sample_time * omega).collect();
         let basis = HarmonicBasis::new(&phases, 1, &HARMONICS);
@@ -105,19 +106,19 @@ impl Content {
 }
 
 /// The largest foreign tone in the response of these samples, if they would be irregular with it. `omega` (rad/s) is the frequency of the motion.
-pub fn foreign_tone(samples: &[Sample], scene: &Scene, omega: f64) -> Option<Tone> {
-    let content = Content::of(samples, scene, omega)?;
+pub fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Tone> {
+    let content = Content::of(samples, knowledge, omega)?;
     let tones = content.tones.iter();
     let largest = tones.max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
     Some(Tone {
-        hertz: largest.turn / (TAU * scene.sample_time()),
+        hertz: largest.turn / (TAU * knowledge.sample_time),
         share: largest.amplitude() / content.amplitude,
     })
 }
 
 /// These samples without the foreign tones in their response; `None` if there are none.
-pub(crate) fn without_tones(samples: &[Sample], scene: &Scene, omega: f64) -> Option<Vec<Sample>> {
-    let tones = Content::of(samples, scene, omega)?.tones;
+pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Vec<Sample>> {
+    let tones = Content::of(samples, knowledge, omega)?.tones;
     let mut cleaned = samples.to_vec();
     for (n, sample) in cleaned.iter_mut().enumerate() {
         sample.sensors.response -= tones.iter().map(|line| line.at(n)).sum::<f64>();
@@ -125,22 +126,22 @@ pub(crate) fn without_tones(samples: &[Sample], scene: &Scene, omega: f64) -> Op
     (!tones.is_empty()).then_some(cleaned)
 }
 
-/// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase `phase` (rad)
-/// of the response to the base, and `omega` (rad/s) its frequency.
+/// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase target,
+/// and `omega` (rad/s) its frequency.
 ///
 /// Impacts need evidence: response over base departs from the linear response. Of a linear response that was measured on the rig, this is
 /// sufficient; with the linear response of the scene in its place, the third harmonic must be significant as well.
-pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, phase: f64, omega: f64) -> Regime {
-    let Some(content) = Content::of(samples, scene, omega) else {
+pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: f64, omega: f64) -> Regime {
+    let Some(content) = Content::of(samples, knowledge, omega) else {
         return Regime::Unknown;
     };
     if content.is_irregular() {
         return Regime::Other;
     }
-    let measured = Complex64::from_polar(content.amplitude / base, phase);
-    let departs = base > 0.0 && !is_linear(&scene.linear(), measured, omega);
+    let measured = Complex64::from_polar(content.amplitude / base, knowledge.target);
+    let departs = base > 0.0 && !is_linear(&knowledge.linear, measured, omega);
     // The parameters of a simulation are known.
-    let is_known = scene.measured.is_some() || samples.iter().any(|sample| sample.ground_truth.is_some());
+    let is_known = knowledge.is_measured || samples.iter().any(|sample| sample.ground_truth.is_some());
     let significant = SIGNIFICANT * content.error;
     match (departs, is_known) {
         (false, true) => Regime::NoImpacts,

@@ -3,11 +3,12 @@
 use std::f64::consts::{PI, TAU};
 
 use lovines::State;
-use num_complex::Complex64;
 use phase_lock::{Config, ConfigError, LockCriterion, NONE, PARAMETERS, Parameter, Value as Setting};
 use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
 use vines_model::ArgumentError;
+
+use crate::plan::{Knowledge, LinearResponse};
 
 use super::{Scene, SceneError, Sensor, check, given, positive, within};
 
@@ -28,11 +29,6 @@ settings! {
 }
 
 impl ControllerSettings {
-    /// The phase target in radians.
-    pub fn phase_target_radians(&self) -> f64 {
-        self.phase_target.to_radians()
-    }
-
     /// Whether the target is phase resonance, for which theory and exact orbits hold.
     pub fn is_at_phase_resonance(&self) -> bool {
         self.phase_target == -90.0
@@ -77,39 +73,6 @@ impl ControllerSettings {
     }
 }
 
-// The linear response of a rig, without impacts.
-
-/// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LinearResponse {
-    /// Natural frequency, rad/s.
-    pub omega0: f64,
-    /// Damping rate, rad/s.
-    pub damping_rate: f64,
-    /// Standard uncertainty of natural frequency and damping rate, rad/s.
-    pub uncertainty: f64,
-    /// Growth rate of the response at resonance per amplitude of the base, 1/s, with its phase relative to the base.
-    pub gain: Complex64,
-}
-
-impl LinearResponse {
-    /// That of the plant of a scene.
-    pub fn of(scene: &Scene) -> Self {
-        let omega0 = scene.dimensionless().omega0;
-        Self {
-            omega0,
-            damping_rate: 0.5 * scene.plant.damping / scene.plant.primary_mass,
-            uncertainty: 0.0,
-            gain: Complex64::new(0.0, -0.5 * omega0),
-        }
-    }
-
-    /// Response over base at the frequency `omega`, rad/s.
-    pub fn at(&self, omega: f64) -> Complex64 {
-        self.gain / Complex64::new(self.damping_rate, omega - self.omega0)
-    }
-}
-
 // A scene's settings in SI units, in the form that plant and controller use.
 
 impl Scene {
@@ -130,108 +93,101 @@ impl Scene {
             .collect()
     }
 
-    /// Configuration of the controller for the scene's excitation.
+    /// Configuration of the controller on a rig of which no more is known than the scene says.
     pub fn controller_config(&self) -> Config {
-        let d = self.dimensionless();
-        let omega0 = d.omega0;
+        self.lock_config(&self.knowledge())
+    }
+
+    /// Configuration of the controller that tracks the backbone of such a rig.
+    pub fn backbone_config(&self) -> Config {
+        self.tracking_config(&self.knowledge())
+    }
+
+    /// Configuration of the controller for the scene's excitation.
+    pub(crate) fn lock_config(&self, knowledge: &Knowledge) -> Config {
+        let LinearResponse { omega0, damping_rate, .. } = knowledge.linear;
         let c = &self.controller;
-        let period = d.natural_period();
-        let delay = self.chain.total_delay(omega0 * self.sample_time()) / omega0;
+        let period = knowledge.numbers.natural_period();
+        let step = knowledge.sample_time;
+        let delay = self.chain.total_delay(omega0 * step) / omega0;
         let limits = self.phase_lock.apply(Config {
-            amplitude_max: Some(4.0 * self.drive_needed()),
-            response_max: Some(4.0 * d.b),
+            amplitude_max: Some(4.0 * self.drive_needed(knowledge)),
+            response_max: Some(4.0 * knowledge.numbers.b),
             ..Config::for_resonance(omega0, self.amplitude)
         });
         self.phase_lock.apply(Config {
-            sample_time: self.sample_time(),
+            sample_time: step,
             omega_min: c.omega_min * omega0,
             omega_max: c.omega_max * omega0,
             bandwidth: c.bandwidth * omega0,
-            damping_rate: Some(self.linear().damping_rate).filter(|rate| *rate > 0.0),
-            phase_target: c.phase_target_radians(),
-            delay: delay + f64::from(u8::from(self.resonance.is_late())) * self.sample_time(),
+            damping_rate: Some(damping_rate).filter(|rate| *rate > 0.0),
+            phase_target: knowledge.target,
+            delay: delay + f64::from(u8::from(self.resonance.is_late())) * step,
             // The velocity of a base that moves with the largest amplitude.
             ramp_rate: limits.amplitude_max.map(|largest| largest * omega0),
             // The range in a period, or in half a time constant of the detector: the loop locks as fast as without a limit.
             omega_rate: Some((c.omega_max - c.omega_min) * omega0 * (2.0 * c.bandwidth * omega0).max(1.0 / period)),
-            acquire_timeout: Some(self.lock_periods() * period),
-            residual_max: Some(self.residual()),
+            acquire_timeout: Some(self.lock_periods(&knowledge.linear) * period),
+            residual_max: Some(self.residual(knowledge)),
             reference_connected: self.chain.reference,
-            lock: self.lock_criterion(),
+            lock: lock_criterion(&knowledge.linear),
             ..limits
         })
     }
 
-    /// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.
-    fn lock_criterion(&self) -> LockCriterion {
-        let bandwidth = self.bandwidth().max(BANDWIDTH_MIN);
-        let approached = PI * bandwidth;
-        LockCriterion {
-            phase_tolerance: PHASE_TOLERANCE.to_radians(),
-            frequency_drift: FREQUENCY_TOLERANCE * bandwidth * approached,
-            amplitude_drift: AMPLITUDE_TOLERANCE * approached,
-            ..LockCriterion::default()
-        }
-    }
-
     /// Largest plausible difference between a reading and its prediction, as a share of the amplitude.
-    fn residual(&self) -> f64 {
+    fn residual(&self, knowledge: &Knowledge) -> f64 {
         let impulse = match self.resonance.sensor {
             // Impacts change the velocity within a sample. Two in a period that balance the base amplitude E have the acceleration
             // omega0^2 E samples/4; frequency and transients take a few times as much. The amplitude of the response is about b.
-            Sensor::Acceleration => self.drive_needed() / self.dimensionless().b * self.controller.samples_per_period,
+            Sensor::Acceleration => {
+                self.drive_needed(knowledge) / knowledge.numbers.b * self.controller.samples_per_period
+            }
             Sensor::V | Sensor::Q1 => 0.0,
         };
         RESIDUAL + impulse
     }
 
     /// The larger of the requested drive, m, and the one that holds the linear mode at the amplitude at which impacts certainly occur.
-    fn drive_needed(&self) -> f64 {
-        let linear = self.bandwidth().max(BANDWIDTH_MIN);
-        self.amplitude.max(IMPACTS * linear * self.dimensionless().b)
-    }
-
-    /// Half-power bandwidth of the linear response over omega0: twice the damping ratio, and base over response at resonance.
-    fn bandwidth(&self) -> f64 {
-        let linear = self.linear();
-        2.0 * linear.damping_rate.max(0.0) / linear.omega0
-    }
-
-    /// Natural periods in which the amplitude of the linear mode falls by a factor of e.
-    pub fn relaxation_periods(&self) -> f64 {
-        1.0 / (PI * self.bandwidth())
+    fn drive_needed(&self, knowledge: &Knowledge) -> f64 {
+        let linear = knowledge.linear.bandwidth().max(BANDWIDTH_MIN);
+        self.amplitude.max(IMPACTS * linear * knowledge.numbers.b)
     }
 
     /// Default time limit for the lock, natural periods: at least 3000, and 20 times the relaxation time.
-    fn lock_periods(&self) -> f64 {
-        let relaxation = PI * self.relaxation_periods();
+    fn lock_periods(&self, linear: &LinearResponse) -> f64 {
+        let relaxation = PI * linear.relaxation_periods();
         let samples_per_period = self.controller.samples_per_period;
         (20.0 * relaxation).max(3000.0).min(1e7 / samples_per_period)
     }
 
-    /// Time limit for the lock, s: `acquire_timeout` of the controller; infinite without a limit.
-    pub fn lock_time(&self) -> f64 {
-        self.controller_config().acquire_timeout.unwrap_or(f64::INFINITY)
-    }
-
     /// Configuration of the controller for tracking: with a larger drive, unless `[phase_lock]` limits it, and a bandwidth at which the loops are
     /// not coupled.
-    pub fn backbone_config(&self) -> Config {
-        let config = self.controller_config();
+    pub(crate) fn tracking_config(&self, knowledge: &Knowledge) -> Config {
+        let config = self.lock_config(knowledge);
         let is_set = self.phase_lock.sets("amplitude_max");
         let limit = config.amplitude_max.filter(|_| is_set);
+        // Largest bandwidth of the loops of phase and amplitude, in units of omega0, at which their coupling is weak. A drive that changes shifts
+        // the phase that the detectors read, and a frequency that changes shifts the amplitude. From loop to loop the gain is the cube of the
+        // bandwidth times A/E, which is largest without impacts: the inverse of twice the damping ratio.
+        let coupled = COUPLED * knowledge.linear.bandwidth().max(f64::MIN_POSITIVE).cbrt();
         Config {
-            amplitude_max: limit.or(Some(self.dimensionless().amplitude(TRACKED))),
-            bandwidth: self.controller.bandwidth.min(self.coupled_bandwidth()) * self.linear().omega0,
+            amplitude_max: limit.or(Some(knowledge.numbers.amplitude(TRACKED))),
+            bandwidth: self.controller.bandwidth.min(coupled) * knowledge.linear.omega0,
             ..config
         }
     }
+}
 
-    /// Largest bandwidth of the loops of phase and amplitude, in units of omega0, at which their coupling is weak. A drive that changes shifts
-    /// the phase that the detectors read, and a frequency that changes shifts the amplitude. From loop to loop the gain is the cube of the
-    /// bandwidth times A/E, which is largest without impacts: the inverse of twice the damping ratio.
-    fn coupled_bandwidth(&self) -> f64 {
-        COUPLED * self.bandwidth().max(f64::MIN_POSITIVE).cbrt()
+/// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.
+fn lock_criterion(linear: &LinearResponse) -> LockCriterion {
+    let bandwidth = linear.bandwidth().max(BANDWIDTH_MIN);
+    let approached = PI * bandwidth;
+    LockCriterion {
+        phase_tolerance: PHASE_TOLERANCE.to_radians(),
+        frequency_drift: FREQUENCY_TOLERANCE * bandwidth * approached,
+        amplitude_drift: AMPLITUDE_TOLERANCE * approached,
+        ..LockCriterion::default()
     }
 }
 

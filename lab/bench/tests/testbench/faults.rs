@@ -15,7 +15,7 @@ use vines_testbench::rig::{
 };
 use vines_testbench::scene::Scene;
 
-use super::{Altered, checked as scene, record, tracked};
+use super::{Altered, checked, paper as scene, record, tracked};
 
 /// Time from a fault to a drive of zero, s, and whether the run ended early.
 fn injected(scene: &Scene, fault: RigFault, seconds: f64, tracks: bool) -> (Option<f64>, bool) {
@@ -137,7 +137,7 @@ fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() 
         let rig = Simulated::of(&scene).unwrap();
         let mut rig = Altered { rig, read: Box::new(read), drive: Box::new(drive) };
         let mut controller = Broken(BuiltIn::new(&scene.controller_config()).unwrap(), 2000, breaks);
-        let run = || experiment::run(&mut rig, &mut controller, &scene, |_, _, _| {});
+        let run = || experiment::run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
         let ended = catch_unwind(AssertUnwindSafe(run));
         assert_eq!(last.get(), 0.0);
         ended
@@ -190,7 +190,7 @@ fn foreign(scene: &Scene, change: fn(&mut Command, usize)) -> (Result<Record, Ex
         ..scene.controller_config()
     };
     let mut controller = Foreign(BuiltIn::new(&limits).unwrap(), 0, change);
-    let record = experiment::run(&mut rig, &mut controller, scene, |_, _, _| {});
+    let record = experiment::run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
     (record, largest.get())
 }
 
@@ -237,7 +237,7 @@ fn the_bench_judges_a_lock_through_noise_by_what_the_response_shows_of_it() {
 /// Refuses the record of a rig with a fault after some seconds.
 fn refused(scene: &Scene, fault: RigFault, seconds: f64) -> IdentificationError {
     let failed = record(&mut faulty(scene, fault, seconds, |_| {}).unwrap(), scene).unwrap();
-    identify(&failed, scene).unwrap_err()
+    identify(&failed, &checked(scene)).unwrap_err()
 }
 
 /// The record of the rig of a scene without faults.
@@ -251,7 +251,7 @@ fn a_sensor_that_dies_after_the_release_or_becomes_late_in_the_hold_is_an_error(
     for settings in [&[][..], &["chain.adc_bits=14"], &["chain.snr=40"]] {
         let scene = scene(settings);
         let healthy = healthy(&scene);
-        identify(&healthy, &scene).unwrap();
+        identify(&healthy, &checked(&scene)).unwrap();
         let release = healthy.released as f64 * healthy.sample_time;
         for fault in [
             Response(Dead),

@@ -20,7 +20,7 @@ fn healthy_rigs_pass_and_faults_are_named() {
     let mut between = uniform(5);
     for n in 0..60 {
         let [scene, rig] = checked_rig(&mut between).unwrap();
-        let found = check(&mut *Simulated::of(&rig).unwrap(), &scene).unwrap();
+        let found = check(&mut *Simulated::of(&rig).unwrap(), &scene.plan()).unwrap();
         assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
         let linear = found.linear.unwrap();
         let rig_damping = 0.5 * rig.plant.damping / rig.plant.primary_mass;
@@ -39,7 +39,7 @@ fn healthy_rigs_pass_and_faults_are_named() {
         assert_eq!(linear.gains[1], integral(linear.damping_rate));
         let faults = checked_faults(&mut between);
         let (expected, fault) = faults[n % faults.len()];
-        let found = check(&mut faulty(&rig, fault, 0.0, |_| {}).unwrap(), &scene).unwrap();
+        let found = check(&mut faulty(&rig, fault, 0.0, |_| {}).unwrap(), &scene.plan()).unwrap();
         assert_eq!(found.verdict, expected, "{fault:?}: {found:?}");
     }
 }
@@ -54,7 +54,10 @@ fn altered(scene: &Scene, clock: f64, hum: f64) -> (LoopCheck, [f64; 2]) {
         (Drive { amplitude, ..drive }, clock * step)
     };
     let rig = Simulated::of(scene).unwrap();
-    let found = check(&mut Altered { rig, read: Box::new(Ok), drive: Box::new(drive) }, scene);
+    let found = check(
+        &mut Altered { rig, read: Box::new(Ok), drive: Box::new(drive) },
+        &scene.plan(),
+    );
     (found.unwrap(), [largest, turns])
 }
 
@@ -109,14 +112,18 @@ fn what_would_falsify_a_measurement_is_refused_with_and_without_noise() {
             (Response(Late(1)), Verdict::ResponseLate),
             (Both(Late(5)), Verdict::Healthy),
         ] {
-            let found = check(&mut faulty(&scene, fault, 0.0, |_| {}).unwrap(), &scene).unwrap();
+            let found = check(&mut faulty(&scene, fault, 0.0, |_| {}).unwrap(), &scene.plan()).unwrap();
             assert_eq!(found.verdict, expected, "{settings:?}, {fault:?}: {found:?}");
         }
     }
     // A delay of both channels cancels; from 40 on, the phase alone looks like the opposite sign.
     let scene = at_rest(&[]);
     for delay in [16, 30, 40, 44, 48] {
-        let found = check(&mut faulty(&scene, Both(Late(delay)), 0.0, |_| {}).unwrap(), &scene).unwrap();
+        let found = check(
+            &mut faulty(&scene, Both(Late(delay)), 0.0, |_| {}).unwrap(),
+            &scene.plan(),
+        )
+        .unwrap();
         assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
         assert!((found.base.unwrap().delay - delay as f64).abs() < 0.5, "{found:?}");
     }
@@ -125,13 +132,13 @@ fn what_would_falsify_a_measurement_is_refused_with_and_without_noise() {
 #[test]
 fn natural_frequency_and_damping_of_the_rig_replace_those_of_the_scene() {
     for settings in [&[][..], &["chain.snr=40"]] {
-        let mut scene = at_rest(settings);
+        let scene = at_rest(settings);
         let stated = scene.dimensionless();
         let mut plant = scene.plant;
         plant.stiffness *= 1.01;
         plant.damping *= 0.7;
         let rig = Simulated::new(plant, scene.start).unwrap();
-        let found = check(&mut *Chain::around(Box::new(rig), &scene), &scene).unwrap();
+        let found = check(&mut *Chain::around(Box::new(rig), &scene), &scene.plan()).unwrap();
         assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
         let differ = found.quantities.iter().filter(|one| one.differs()).map(|one| one.name);
         assert!(differ.eq(["natural frequency", "damping rate"]));
@@ -143,10 +150,9 @@ fn natural_frequency_and_damping_of_the_rig_replace_those_of_the_scene() {
         assert!(linear.u_damping_rate < 3e-4 * omega0);
         assert!((50.0..60.0).contains(&linear.phase_margin));
         let step = scene.sample_time();
-        scene.measured = Some(linear.response());
-        let measured = scene.dimensionless();
-        let config = scene.controller_config();
-        assert_eq!((measured.omega0, scene.sample_time()), (linear.omega_0, step));
+        let plan = scene.plan_on(scene.knowledge().measured(linear.response()));
+        let (measured, config) = (plan.knowledge.numbers, plan.lock);
+        assert_eq!((measured.omega0, config.sample_time), (linear.omega_0, step));
         assert!((config.damping_rate.unwrap() / linear.damping_rate - 1.0).abs() < 1e-12);
         assert!((config.omega_start / linear.omega_0 - 1.0).abs() < 1e-12);
         assert!((config.response_gain - 0.5 * linear.omega_0).abs() < 1e-9);

@@ -9,20 +9,19 @@ mod scenes;
 
 use vines_testbench::backbone::{Tracked, track};
 use vines_testbench::experiment::{ExperimentError, run};
+use vines_testbench::plan::{LinearResponse, Plan};
 use vines_testbench::record::Record;
 use vines_testbench::rig::{BuiltIn, Drive, Rig, RigError, RigStage, Sensors};
-use vines_testbench::scene::{LinearResponse, Scene};
+use vines_testbench::scene::Scene;
 
 /// The default scene with these settings.
 fn paper(settings: &[&str]) -> Scene {
     common::scene("", settings).unwrap()
 }
 
-/// The default scene with these settings, and a linear response as a loop check finds it.
-fn checked(settings: &[&str]) -> Scene {
-    let mut scene = paper(settings);
-    scene.measured = Some(LinearResponse::of(&scene));
-    scene
+/// The experiment on a rig whose linear response is known as a loop check finds it.
+fn checked(scene: &Scene) -> Plan {
+    scene.plan_on(scene.knowledge().measured(LinearResponse::of(&scene.plant)))
 }
 
 /// A rig whose readings, and whose drives with the time to the next sample, s, pass a function each.
@@ -50,11 +49,11 @@ impl RigStage for Altered<'_> {
 /// The record of an experiment.
 fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-    run(rig, &mut controller, scene, |_, _, _| {})
+    run(rig, &mut controller, &scene.plan(), |_, _, _| {})
 }
 
 /// The tracked backbone.
 fn tracked(rig: &mut dyn Rig, scene: &Scene) -> Result<Tracked, ExperimentError> {
     let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
-    track(rig, &mut controller, scene, |_, _| {})
+    track(rig, &mut controller, &checked(scene), |_, _| {})
 }

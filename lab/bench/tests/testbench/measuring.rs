@@ -20,7 +20,7 @@ use vines_testbench::record::{Record, Sample};
 use vines_testbench::rig::{
     BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated,
 };
-use vines_testbench::scene::{Dimensionless, LinearResponse, Scene};
+use vines_testbench::scene::{Dimensionless, Scene};
 
 use super::common::{self, crossings, noisy, rig_with_stable_orbit, uniform};
 use super::{Altered, checked, paper, record, tracked};
@@ -33,7 +33,7 @@ fn dimensionless(settings: &[&str]) -> Scene {
 /// The lock of an experiment with the plant of a scene.
 fn lock(scene: &Scene) -> Lock {
     let record = record(&mut *Simulated::of(scene).unwrap(), scene).unwrap();
-    identify(&record, scene).unwrap().lock
+    identify(&record, &scene.plan()).unwrap().lock
 }
 
 /// The points of a tracked backbone that is complete.
@@ -66,7 +66,7 @@ fn at(settings: &str) -> Result<ResonancePoint, ExperimentError> {
     let settings: Vec<&str> = settings.split_whitespace().chain(["record.hold_periods=200"]).collect();
     let scene = dimensionless(&settings);
     let record = record(&mut *Simulated::of(&scene).unwrap(), &scene)?;
-    Ok(identify(&record, &scene).unwrap().lock.at)
+    Ok(identify(&record, &scene.plan()).unwrap().lock.at)
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04
     });
     let (clean, scene, truth) = &decays[0];
     let rms = |record: &Record| {
-        let points = decay_points(record, scene, WINDOW).points;
+        let points = decay_points(record, &scene.knowledge(), WINDOW).points;
         let above = points.iter().filter(|point| point.c > COMPARED_ABOVE);
         let errors = above.filter_map(|point| Some(point.sigma - common::at(truth, point.tau)?));
         let errors: Vec<f64> = errors.collect();
@@ -147,7 +147,7 @@ fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04
     let [fit, through_noise] = [rms(clean), rms(&noisy(clean, 40.0, 1))];
     assert!(fit <= 0.02 && through_noise <= 0.04);
     // The zero crossings that the fit is compared with do not depend on the sample time.
-    let fitted = decay_points(clean, scene, WINDOW).points;
+    let fitted = decay_points(clean, &scene.knowledge(), WINDOW).points;
     let last = fitted.iter().rfind(|point| point.c > COMPARED_ABOVE).unwrap().tau;
     let above = truth.iter().filter(|[tau, _]| *tau < last);
     let errors = above.filter_map(|[tau, sigma]| Some(sigma - common::at(&decays[1].2, *tau)?));
@@ -190,10 +190,9 @@ fn measured(settings: &[&str], wrong: &[&str]) -> String {
     let (mut rig, scene) = falsified(settings, wrong);
     let points = points(&mut rig, &scene);
     assert!(points.iter().any(|one| one.settled));
-    let (mut rig, mut scene) = falsified(settings, wrong);
-    // As a loop check finds it: without, noise hides the regime.
-    scene.measured = Some(LinearResponse::of(&scene));
-    let found = identify(&record(&mut rig, &scene).unwrap(), &scene).unwrap();
+    let (mut rig, scene) = falsified(settings, wrong);
+    // Without a loop check, noise hides the regime.
+    let found = identify(&record(&mut rig, &scene).unwrap(), &checked(&scene)).unwrap();
     assert!(found.decay.points.len() > 20);
     let point = |one: &LevelPoint| format!("{} {} {} {:?}\n", digits(&one.at), one.periods, one.settled, one.regime);
     let mut text: String = points.iter().map(point).collect();
@@ -232,7 +231,7 @@ fn measurements_in_si_units_have_the_same_bits_whatever_the_scene_says_of_the_pa
     for settings in [&["start.dq2=0"][..], &["start.dq2=0", "chain.snr=40"]] {
         let checked = |wrong: &[&str]| {
             let (mut rig, scene) = falsified(settings, wrong);
-            format!("{:?}", check(&mut rig, &scene).unwrap())
+            format!("{:?}", check(&mut rig, &scene.plan()).unwrap())
         };
         for wrong in FALSE {
             assert_eq!(checked(wrong), checked(&[]), "{settings:?}, {wrong:?}");
@@ -289,7 +288,7 @@ fn presets_of_a_real_cavity_lock_from_rest_as_their_effects_say() {
         let scene = Scene::load(Some(&path), &["record.decay_periods=3".parse().unwrap()]).unwrap();
         assert_eq!(scene.start, State::default(), "{name} does not start from rest");
         let record = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
-        let lock = identify(&record, &scene).unwrap().lock;
+        let lock = identify(&record, &scene.plan()).unwrap().lock;
         let expected = if name == "vertical" {
             Regime::Asymmetric
         } else {
@@ -383,7 +382,7 @@ const RIGS: [&[&str]; 4] = [
 fn through_mains_hum_and_ripple_a_backbone_is_tracked_and_a_lock_identified_which_say_so() {
     for (tones, settings) in TONES.into_iter().zip(RIGS) {
         let few = ["backbone.points=2", "backbone.C_to=0.55", "record.decay_periods=20"];
-        let scene = checked(&[settings, &few].concat());
+        let scene = paper(&[settings, &few].concat());
         let (hertz, share) = tones[0];
         let response = 0.55 * scene.plant.half_width;
         let in_metres: Vec<_> = tones.iter().map(|(hertz, share)| (*hertz, share * response)).collect();
@@ -401,7 +400,7 @@ fn through_mains_hum_and_ripple_a_backbone_is_tracked_and_a_lock_identified_whic
         }
         let [clean, humming] = [&[][..], &in_metres].map(|tones| {
             let record = record(&mut rig(&scene, tones), &scene).unwrap();
-            identify(&record, &scene).unwrap().lock
+            identify(&record, &checked(&scene)).unwrap().lock
         });
         let text = humming.tone.unwrap().to_string();
         assert!(
@@ -425,9 +424,10 @@ fn no_motion_of_a_particle_is_a_foreign_tone() {
             format!("excitation.G={}", between(3, 0.1, 4.0)),
             format!("resonance.sensor={}", ["v", "q1", "acceleration"][n as usize % 3]),
         ];
-        let scene = checked(&settings.each_ref().map(String::as_str));
+        let scene = paper(&settings.each_ref().map(String::as_str));
         let omega = scene.dimensionless().omega(6.0 * share(4) - 3.0);
         let drive = Drive { omega, amplitude: scene.amplitude, displacement: 0.0 };
+        let knowledge = checked(&scene).knowledge;
         let step = scene.sample_time();
         let mut rig = rig(&scene, &[]);
         let samples: Vec<Sample> = (0..6000)
@@ -440,9 +440,8 @@ fn no_motion_of_a_particle_is_a_foreign_tone() {
             .collect();
         // The first of these windows contains the transient.
         for window in [&samples[1000..3000], &samples[4000..]] {
-            assert_eq!(foreign_tone(window, &scene, drive.omega), None, "{settings:?}");
-            let phase = scene.controller.phase_target_radians();
-            let regime = regime_by_response(window, &scene, drive.amplitude, phase, drive.omega);
+            assert_eq!(foreign_tone(window, &knowledge, drive.omega), None, "{settings:?}");
+            let regime = regime_by_response(window, &knowledge, drive.amplitude, drive.omega);
             irregular += usize::from(regime == Regime::Other);
         }
     }

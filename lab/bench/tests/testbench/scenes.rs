@@ -45,7 +45,7 @@ fn the_default_scene_is_the_paper_file() {
     assert_eq!(embedded.controller, ControllerSettings::default());
     assert_eq!(embedded.record, RecordSettings::default());
     assert_eq!(numbers.definition, Definition::default());
-    assert_eq!(paper(&["plant.b=1"]).levels()[..3], [0.7, 0.68, 0.66]);
+    assert_eq!(paper(&["plant.b=1"]).plan().levels[..3], [0.7, 0.68, 0.66]);
 }
 
 #[test]
@@ -300,7 +300,7 @@ fn what_theory_leaves_out_of_a_cavity_is_named_and_of_an_ideal_one_it_is_nothing
     assert_eq!(ideal, paper(&[]));
     let written = serde_json::to_value(&ideal).unwrap();
     assert_eq!(written["plant"].as_object().unwrap().len(), 6);
-    assert_eq!((ideal.left_out(), ideal.has_mirror_images()), (None, true));
+    assert_eq!((ideal.left_out(), ideal.knowledge().is_symmetric), (None, true));
     for (settings, named) in [
         (&["plant.mu_k=0.05"][..], "friction"),
         (
@@ -315,5 +315,5 @@ fn what_theory_leaves_out_of_a_cavity_is_named_and_of_an_ideal_one_it_is_nothing
     ] {
         assert_eq!(paper(settings).left_out().unwrap(), named);
     }
-    assert!(!paper(&["plant.r_minus=0.7"]).has_mirror_images());
+    assert!(!paper(&["plant.r_minus=0.7"]).knowledge().is_symmetric);
 }

@@ -79,8 +79,8 @@ fn lock(device: Option<(f64, Fate)>) -> (Lock, Counters) {
     let (mut plant, step) = (Simulated::new(scene.plant, scene.start).unwrap(), scene.sample_time());
     let measure = |rig: &mut dyn Rig| {
         let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-        let record = experiment::run(rig, &mut controller, &scene, |_, _, _| {}).unwrap();
-        identify(&record, &scene).unwrap().lock
+        let record = experiment::run(rig, &mut controller, &scene.plan(), |_, _, _| {}).unwrap();
+        identify(&record, &scene.plan()).unwrap().lock
     };
     let Some((samples, fate)) = device else {
         return (measure(&mut plant), Counters::default());

@@ -277,7 +277,7 @@ fn a_controller_that_stops_answering_ramps_the_drive_of_the_rig_down() {
     });
     let controller_server = serve_controller(&SCENE, 10.0, stops);
     let (mut rig, mut peer) = (rig_server.rig(), controller_server.controller(Some(0.5)));
-    let outcome = experiment::run(&mut rig, &mut peer, &SCENE, |_, _, _| {});
+    let outcome = experiment::run(&mut rig, &mut peer, &SCENE.plan(), |_, _, _| {});
     assert!(matches!(outcome, Err(ExperimentError::Controller(_))), "{outcome:?}");
     drop((rig, peer));
     assert_eq!(rig_server.session().ended, Ended::Farewell);

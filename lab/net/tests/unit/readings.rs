@@ -145,7 +145,7 @@ fn a_run_rides_through_a_gap_of_30_ms_at_any_phase_whoever_makes_the_sine_of_the
             };
             let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
             let mut rig = Chain::around(Box::new(rig), &scene);
-            experiment::run(&mut *rig, &mut controller, &scene, |_, _, _| {})
+            experiment::run(&mut *rig, &mut controller, &scene.plan(), |_, _, _| {})
                 .unwrap_or_else(|error| panic!("{settings:?}, {lost} samples from {from} on: {error}"))
         };
         let whole = run(u64::MAX / 2);

@@ -1,0 +1,154 @@
+//! What an experiment knows and does, in SI units: made from a scene, and from what was measured on the rig before. A scene does not change.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use num_complex::Complex64;
+use phase_lock::Config;
+
+use crate::experiment::DECAYED;
+use crate::scene::{Definition, Dimensionless, Parameters, Scene, has_mirror_images};
+
+/// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearResponse {
+    /// Natural frequency, rad/s.
+    pub omega0: f64,
+    /// Damping rate, rad/s.
+    pub damping_rate: f64,
+    /// Standard uncertainty of natural frequency and damping rate, rad/s.
+    pub uncertainty: f64,
+    /// Growth rate of the response at resonance per amplitude of the base, 1/s, with its phase relative to the base.
+    pub gain: Complex64,
+}
+
+impl LinearResponse {
+    /// That of a plant.
+    pub fn of(plant: &Parameters) -> Self {
+        let omega0 = plant.natural_frequency();
+        Self {
+            omega0,
+            damping_rate: 0.5 * plant.damping / plant.primary_mass,
+            uncertainty: 0.0,
+            gain: Complex64::new(0.0, -0.5 * omega0),
+        }
+    }
+
+    /// Response over base at the frequency `omega`, rad/s.
+    pub fn at(&self, omega: f64) -> Complex64 {
+        self.gain / Complex64::new(self.damping_rate, omega - self.omega0)
+    }
+
+    /// Half-power bandwidth over omega0: twice the damping ratio, and base over response at resonance.
+    pub fn bandwidth(&self) -> f64 {
+        2.0 * self.damping_rate.max(0.0) / self.omega0
+    }
+
+    /// Natural periods in which the amplitude falls by a factor of e.
+    pub fn relaxation_periods(&self) -> f64 {
+        1.0 / (PI * self.bandwidth())
+    }
+}
+
+/// What measuring knows of a rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Knowledge {
+    /// The linear response.
+    pub linear: LinearResponse,
+    /// Whether the linear response has been measured on the rig; otherwise it is as the scene states it.
+    pub is_measured: bool,
+    /// The numbers by which results become dimensionless, with the definition of resonance.
+    pub numbers: Dimensionless,
+    /// Whether a motion has a mirror image, half a period later; where it has none, the 1:1 motion is asymmetric.
+    pub is_symmetric: bool,
+    /// Time from sample to sample, s: rig and controller agree on it before anything is measured.
+    pub sample_time: f64,
+    /// Phase of the response relative to the reference that the loop holds, rad.
+    pub target: f64,
+}
+
+impl Knowledge {
+    /// A rig that is as its drawing says.
+    pub fn of(plant: &Parameters, definition: Definition, amplitude: f64, sample_time: f64, target: f64) -> Self {
+        Self {
+            linear: LinearResponse::of(plant),
+            is_measured: false,
+            numbers: Dimensionless { definition, ..Dimensionless::of(plant, amplitude) },
+            is_symmetric: has_mirror_images(plant),
+            sample_time,
+            target,
+        }
+    }
+
+    /// With a linear response that was measured on the rig.
+    #[must_use]
+    pub fn measured(self, linear: LinearResponse) -> Self {
+        let (omega0, epsilon) = (linear.omega0, self.numbers.epsilon);
+        let lambda = 2.0 * linear.damping_rate.max(0.0) / (epsilon * omega0);
+        let numbers = Dimensionless { omega0, lambda, ..self.numbers };
+        Self { linear, is_measured: true, numbers, ..self }
+    }
+
+    /// Number of samples in these natural periods.
+    pub fn samples(&self, periods: f64) -> usize {
+        (periods * TAU / self.linear.omega0 / self.sample_time).round() as usize
+    }
+
+    /// Whether the target is phase resonance, for which theory and exact orbits hold.
+    pub fn is_at_phase_resonance(&self) -> bool {
+        self.target == -FRAC_PI_2
+    }
+}
+
+/// An experiment on a rig: what is known of it, and what is done.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// What is known of the rig.
+    pub knowledge: Knowledge,
+    /// Requested amplitude of the base, m.
+    pub amplitude: f64,
+    /// Configuration of the controller for the lock; its limits guard the rig whatever controls it.
+    pub lock: Config,
+    /// Configuration of the controller for the tracked backbone.
+    pub tracking: Config,
+    /// Samples of the hold, and of the recorded decay.
+    pub hold: usize,
+    #[expect(missing_docs, reason = "see above")]
+    pub decay: usize,
+    /// Levels of the tracked backbone, amplitudes of the response, m, in the order in which they are visited.
+    pub levels: Vec<f64>,
+    /// Largest relative uncertainty of a level, as in [`BackboneSettings`](crate::scene::BackboneSettings).
+    pub precision: f64,
+}
+
+/// Longest recorded decay, natural periods, unless the scene asks for a longer one: a bound for rigs with little damping.
+const LONGEST_DECAY: f64 = 5000.0;
+
+impl Scene {
+    /// What the scene says of its rig.
+    pub fn knowledge(&self) -> Knowledge {
+        let target = self.controller.phase_target.to_radians();
+        Knowledge::of(&self.plant, self.resonance, self.amplitude, self.sample_time(), target)
+    }
+
+    /// The experiment on a rig that is as the scene says.
+    pub fn plan(&self) -> Plan {
+        self.plan_on(self.knowledge())
+    }
+
+    /// The experiment on a rig of which this is known.
+    pub fn plan_on(&self, knowledge: Knowledge) -> Plan {
+        // The decay lasts as long as the linear rig takes to fall to the share that is recorded.
+        let relaxed = -DECAYED.ln() * knowledge.linear.relaxation_periods();
+        let decay = self.record.decay_periods.unwrap_or(relaxed.min(LONGEST_DECAY));
+        Plan {
+            knowledge,
+            amplitude: self.amplitude,
+            lock: self.lock_config(&knowledge),
+            tracking: self.tracking_config(&knowledge),
+            hold: knowledge.samples(self.record.hold_periods),
+            decay: knowledge.samples(decay),
+            levels: self.backbone.levels(self.plant.half_width),
+            precision: self.backbone.precision,
+        }
+    }
+}
