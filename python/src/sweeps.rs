@@ -18,6 +18,7 @@ use vines_testbench::{
     cells::{self, Cell},
     experiment,
     identification::{self, Lock},
+    plan::Plan,
     rig::{BuiltIn, Simulated, Stoppable},
     scene::Scene as CheckedScene,
 };
@@ -195,12 +196,11 @@ impl Cells {
 
 /// The locked point of a scene: the experiment of `identify` without its decay.
 fn locked(scene: &CheckedScene, stop: &Arc<AtomicBool>) -> Result<Lock, Box<dyn std::error::Error>> {
-    let mut scene = scene.clone();
-    scene.record.decay_periods = Some(0.0);
-    let mut rig = Stoppable::around(Simulated::of(&scene)?, scene.sample_time(), stop);
-    let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let record = experiment::run(&mut rig, &mut controller, &scene, |_, _, _| {})?;
-    Ok(identification::identify(&record, &scene)?.lock)
+    let plan = Plan { decay: 0, ..scene.plan() };
+    let mut rig = Stoppable::around(Simulated::of(scene)?, scene.sample_time(), stop);
+    let mut controller = BuiltIn::new(&plan.lock)?;
+    let record = experiment::run(&mut rig, &mut controller, &plan, |_, _, _| {})?;
+    Ok(identification::identify(&record, &plan)?.lock)
 }
 
 /// Unit of a number that a sweep varies: `1` for a count, and for what a scene states relative to omega0, b or a period.
