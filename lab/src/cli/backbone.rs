@@ -48,12 +48,11 @@ const FILES: [&str; 4] = ["tracked.json", "tracked.csv", "tracked.svg", INTERRUP
 
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let experiment = &arguments.experiment;
-    let (scene, plan, session) = experiment.start("vines backbone", Some(&arguments.rig), |plan| plan.tracking, &FILES)?;
+    let (scene, plan, session) =
+        experiment.start("vines backbone", Some(&arguments.rig), |plan| plan.tracking, &FILES)?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let measured = session.measure(&scene, &plan, |samples, rig, controller| {
-        track_into(samples, rig, controller, &plan, |done, _| {
-            bar.set_position(done as u64)
-        })
+        track_into(samples, rig, controller, &plan, |done, _| bar.set_position(done as u64))
     });
     bar.finish_and_clear();
     let (tracked, ended) = measured?;

@@ -5,7 +5,7 @@ use indicatif::ProgressBar;
 use vines::experiment::{Stage, run_into};
 use vines::fit::contradiction;
 use vines::identification::{IdentificationError, identify};
-use vines::{advice, comparison::Comparison, pack::File, report, scene::Scene};
+use vines::{advice, comparison::Comparison, pack::File, report};
 
 use super::experiment::{ExperimentArguments, INTERRUPTED_FILE};
 use super::options::Endpoint;
@@ -51,12 +51,8 @@ const FILES: [&str; 6] = [
 
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let experiment = &arguments.experiment;
-    let (scene, plan, session) = experiment.start(
-        "vines identify",
-        arguments.rig.as_ref(),
-        |plan| plan.lock,
-        &FILES,
-    )?;
+    let (scene, plan, session) =
+        experiment.start("vines identify", arguments.rig.as_ref(), |plan| plan.lock, &FILES)?;
     let bar = progress_bar(
         Stage::Locking.samples(&plan) as u64,
         "{msg:29} [{wide_bar}] {pos}/{len} samples",
@@ -72,7 +68,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         Ok(identification) => identification,
         Err(error) => {
             let reason = match error {
-                IdentificationError::Regime { regime, .. } => advice::reason(&scene, &plan.knowledge.numbers, Some(regime)),
+                IdentificationError::Regime { regime, .. } => {
+                    advice::reason(&scene, &plan.knowledge.numbers, Some(regime))
+                }
                 _ => None,
             };
             return Err(ended.without_result(Failure::run(error), reason, &record.samples));
