@@ -1,14 +1,13 @@
 //! `vines backbone`: the backbone, tracked with the loop closed.
 
 use clap::Args;
-use indicatif::ProgressBar;
 use vines::comparison::{Doubt, TrackedComparison};
 use vines::{advice, backbone::track_into, fit::contradiction, numerics::range, report, scene::Scene};
 
 use super::experiment::{ExperimentArguments, INTERRUPTED_FILE};
 use super::failure::Failure;
 use super::options::Endpoint;
-use super::output::Results;
+use super::output::{Results, progress_bar};
 use super::summary;
 
 const HELP: &str = "\
@@ -50,7 +49,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let experiment = &arguments.experiment;
     let (scene, plan, session) =
         experiment.start("vines backbone", Some(&arguments.rig), |plan| plan.tracking, &FILES)?;
-    let bar = ProgressBar::new(scene.backbone.points.into());
+    let bar = progress_bar(scene.backbone.points.into(), "tracking the backbone", "levels");
     let measured = session.measure(&scene, &plan, |samples, rig, controller| {
         track_into(samples, rig, controller, &plan, |done, _| bar.set_position(done as u64))
     });

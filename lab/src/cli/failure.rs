@@ -1,7 +1,7 @@
 //! How a command ends early: the failure with its message and exit code, and the signals Ctrl-C and SIGTERM.
 
-use std::error::Error;
 use std::fmt::Display;
+use std::io;
 use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -9,9 +9,12 @@ use std::sync::{Arc, OnceLock};
 use lovines::InvalidValue;
 use phase_lock::ConfigError;
 use vines::cells::CellError;
-use vines::rig::{Interrupted, RigError};
+use vines::fmu::FmuError;
+use vines::orbit::NoMotion;
+use vines::report::ReportError;
+use vines::rig::{ControllerError, Interrupted, RigError};
 use vines::scene::{SceneError, refusal};
-use vines::{ArgumentError, experiment::ExperimentError, net::LinkError, pack::PackError};
+use vines::{ArgumentError, FileError, experiment::ExperimentError, net::LinkError, pack::PackError};
 
 /// Exit code of a program that a signal ended: 128 and the number of SIGINT.
 pub(super) const INTERRUPTED: u8 = 130;
@@ -47,29 +50,48 @@ impl Failure {
     }
 }
 
-impl<E: Error + 'static> From<E> for Failure {
-    /// Errors of what a user gives are bad input; all others are failures at run time.
-    fn from(error: E) -> Self {
-        let any: &(dyn Error + 'static) = &error;
-        if let Some(error) = any.downcast_ref::<ConfigError>() {
-            return Self::input(refusal(error));
-        }
-        let is_of_experiment = match any.downcast_ref() {
-            Some(ExperimentError::Rig(cause)) if cause.cause::<Interrupted>().is_some() => {
-                return Self::new(INTERRUPTED, error);
+/// The exit code of each type of error.
+macro_rules! exit_codes {
+    ($($code:literal: $($error:ty),+;)+) => {
+        $($(impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::new($code, error)
             }
-            // The plant refuses a drive that comes from the scene.
-            Some(ExperimentError::NoDrive | ExperimentError::Rig(RigError::Refused(_))) => true,
-            _ => false,
+        })+)+
+    };
+}
+
+exit_codes! {
+    2: ArgumentError, CellError, InvalidValue, PackError, SceneError;
+    1: io::Error, ControllerError, FileError, FmuError, NoMotion, ReportError, RigError;
+}
+
+impl From<ConfigError> for Failure {
+    fn from(error: ConfigError) -> Self {
+        Self::input(refusal(&error))
+    }
+}
+
+impl From<LinkError> for Failure {
+    fn from(error: LinkError) -> Self {
+        let code = if matches!(error, LinkError::Address { .. }) {
+            2
+        } else {
+            1
         };
-        let is_input = is_of_experiment
-            || any.is::<ArgumentError>()
-            || any.is::<InvalidValue>()
-            || any.is::<PackError>()
-            || any.is::<SceneError>()
-            || any.is::<CellError>()
-            || matches!(any.downcast_ref(), Some(LinkError::Address { .. }));
-        Self::new(if is_input { 2 } else { 1 }, error)
+        Self::new(code, error)
+    }
+}
+
+impl From<ExperimentError> for Failure {
+    fn from(error: ExperimentError) -> Self {
+        let code = match &error {
+            ExperimentError::Rig(cause) if cause.cause::<Interrupted>().is_some() => INTERRUPTED,
+            // The plant refuses a drive that comes from the scene.
+            ExperimentError::NoDrive | ExperimentError::Rig(RigError::Refused(_)) => 2,
+            _ => 1,
+        };
+        Self::new(code, error)
     }
 }
 

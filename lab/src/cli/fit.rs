@@ -5,7 +5,6 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use indicatif::ProgressBar;
 use serde::Serialize;
 use vines::fit::{Effect, Fit, FitReport, Found, Known, MeasuredPoint, Part, decimals, find, parts};
 use vines::numerics::Estimate;
@@ -15,7 +14,7 @@ use vines::table::Table;
 
 use super::failure::Failure;
 use super::options::{SceneArguments, positive};
-use super::output::{Results, Written, output, writable};
+use super::output::{Results, Written, output, progress_bar, writable};
 
 const HELP: &str = "\
 A point has the frequency of phase resonance f, the amplitude A of the response and the amplitude E of the base, each with its standard
@@ -124,7 +123,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         .map_err(Failure::run)?
         .concat();
     points.extend(parts.iter().filter_map(|part| part.point));
-    let bar = ProgressBar::new(Effect::ALL.len() as u64);
+    let bar = progress_bar(Effect::ALL.len() as u64, "fitting effects of a real cavity", "effects");
     let progress = |done: usize| bar.set_position(done as u64);
     let found = find(&points, scene.resonance, &scene.plant, &arguments.known, progress);
     bar.finish_and_clear();

@@ -53,10 +53,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let experiment = &arguments.experiment;
     let (scene, plan, session) =
         experiment.start("vines identify", arguments.rig.as_ref(), |plan| plan.lock, &FILES)?;
-    let bar = progress_bar(
-        Stage::Locking.samples(&plan) as u64,
-        "{msg:29} [{wide_bar}] {pos}/{len} samples",
-    );
+    let bar = progress_bar(Stage::Locking.samples(&plan) as u64, "", "samples");
     let measured = session.measure(&scene, &plan, |samples, rig, controller| {
         run_into(samples, rig, controller, &plan, |stage, done, of| {
             show(&bar, stage, done, of)

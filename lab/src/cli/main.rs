@@ -16,6 +16,7 @@ mod pack;
 mod recording;
 mod report;
 mod serve;
+mod shell;
 mod summary;
 mod tap;
 mod theory;
@@ -42,7 +43,18 @@ Examples:
   vines pack --out fmus                        write LoViNes.fmu and PhaseLock.fmu
   vines rig --listen 127.0.0.1:5510            serve the plant in real time, for identify --rig udp://127.0.0.1:5510
 
-Without --scene, the default scene built into the program is used; it is scenes/paper.toml.";
+Without --scene, the default scene built into the program is used; it is scenes/paper.toml.
+
+Exit codes:
+    0  success
+    1  no result, a result that is not what was asked for, or a file that could not be written
+    2  wrong usage, a value that is not allowed, or a target that cannot be written: nothing has moved
+    3  results of a rig in real time that are doubtful, because too many samples were late
+  130  ended by Ctrl-C or SIGTERM
+
+`vines completions SHELL` prints completions for bash, elvish, fish, powershell or zsh, and `vines man [COMMAND]` a manual page:
+  vines completions bash > ~/.local/share/bash-completion/completions/vines
+  vines man identify | man -l -";
 
 /// A virtual test bench for a linear oscillator with a vibro-impact nonlinear energy sink
 #[derive(Debug, Parser)]
@@ -65,12 +77,15 @@ enum Command {
     Pack(pack::Arguments),
     Rig(serve::RigArguments),
     Controller(serve::ControllerArguments),
+    #[command(hide = true)]
+    Completions(shell::CompletionsArguments),
+    #[command(hide = true)]
+    Man(shell::ManArguments),
 }
 
-/// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input, 3 for results of a rig that missed deadlines,
-/// 130 after Ctrl-C.
 fn main() -> ExitCode {
-    match dispatch(Cli::parse().command).and_then(Results::show) {
+    let cli = Cli::try_parse().unwrap_or_else(|error| shell::with_commands(error).exit());
+    match dispatch(cli.command).and_then(Results::show) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             eprintln!("error: {}", failure.message);
@@ -93,5 +108,7 @@ fn dispatch(command: Command) -> Result<Results, Failure> {
         Command::Pack(arguments) => pack::run(&arguments).map(Results::from),
         Command::Rig(arguments) => serve::rig(&arguments).map(Results::from),
         Command::Controller(arguments) => serve::controller(&arguments).map(Results::from),
+        Command::Completions(arguments) => Ok(shell::completions(&arguments).into()),
+        Command::Man(arguments) => shell::man(&arguments).map(Results::from),
     }
 }

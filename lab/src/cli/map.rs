@@ -84,7 +84,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let mut map = Map::new(arguments.scene.family()?, x, y, *sigma, *periods)?;
     warn_left_out(map.scene(), "a regime map is");
     let folder = results(out, &FILES)?;
-    let bar = progress_bar(map.size(), "mapping regimes [{wide_bar}] {pos}/{len} cells");
+    let bar = progress_bar(map.size(), "mapping regimes", "cells");
     map.run(*confirmations, || bar.inc(1))?;
     bar.finish_and_clear();
     Ok(Results::new(format!("{}\n", summary(&map)), move || {

@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -134,8 +136,27 @@ pub(super) fn log_warnings() {
         .try_init();
 }
 
-/// A progress bar on stderr; indicatif hides it if that is not a terminal.
-pub(super) fn progress_bar(length: u64, template: &str) -> ProgressBar {
-    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(length).with_style(style)
+/// Time between two lines of progress where stderr is no terminal.
+const PROGRESS: Duration = Duration::from_secs(10);
+
+/// Progress on stderr: a bar in a terminal, else a line every ten seconds.
+pub(super) fn progress_bar(length: u64, message: &'static str, unit: &'static str) -> ProgressBar {
+    let template = format!("{{msg}} [{{wide_bar}}] {{pos}}/{{len}} {unit}");
+    let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(length).with_style(style).with_message(message);
+    if bar.is_hidden() {
+        let watched = bar.downgrade();
+        thread::spawn(move || {
+            loop {
+                thread::sleep(PROGRESS);
+                let Some(bar) = watched.upgrade().filter(|bar| !bar.is_finished()) else {
+                    return;
+                };
+                let (done, of) = (bar.position(), bar.length().unwrap_or_default());
+                // Progress is no result: a closed stderr does not matter.
+                let _ = writeln!(io::stderr(), "{}: {done} of {of} {unit}", bar.message());
+            }
+        });
+    }
+    bar
 }

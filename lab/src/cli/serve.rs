@@ -117,7 +117,12 @@ impl FromStr for Fault {
             .rsplit_once('@')
             .ok_or("expected NAME@SECONDS, for instance \"response sensor dead@60\"")?;
         let seconds = positive(seconds)?;
-        match RigFault::ALL.into_iter().find(|(fault, _)| *fault == name) {
+        // The sign × is on few keyboards.
+        let as_typed = |name: &str| name.replace('×', "x");
+        match RigFault::ALL
+            .into_iter()
+            .find(|(fault, _)| as_typed(fault) == as_typed(name))
+        {
             Some((_, kind)) => Ok(Self { kind, seconds }),
             None => {
                 let names = RigFault::ALL.map(|(name, _)| name).join(", ");

@@ -93,6 +93,22 @@ fn a_person_gets_tables() {
 }
 
 #[test]
+fn shells_and_readers_get_all_commands_from_the_command_line_itself() {
+    let printed = |line: &str| {
+        let output = vines(line);
+        assert!(output.status.success(), "{line}: {output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let script = printed(&format!("completions {shell}"));
+        assert!(script.contains("backbone"), "{shell}");
+        assert!(script.contains("no-check"), "{shell}");
+    }
+    assert!(printed("man").starts_with(".ie") && printed("man").contains("Exit codes"));
+    assert!(printed("man identify").contains(".TH vines-identify 1"));
+}
+
+#[test]
 fn input_without_sense_ends_with_one_message_and_code_two_and_without_a_result_with_one() {
     for (line, code, part) in [
         ("orbit --set=plant.r=1.5", 2, "r (coefficient of restitution) = 1.5"),
@@ -100,7 +116,9 @@ fn input_without_sense_ends_with_one_message_and_code_two_and_without_a_result_w
         ("orbit --set=nonsense", 2, "section.key=value"),
         ("theory --scene no-such.toml", 2, "no-such.toml"),
         ("theory --sigma=nan", 2, "finite"),
-        ("dance", 2, "dance"),
+        ("dance", 2, "commands are identify, backbone, fit"),
+        ("help dance", 2, "commands are identify, backbone, fit"),
+        ("man dance", 2, "commands are identify, backbone, fit"),
         ("rig --listen 127.0.0.1:0 --sessions 0", 2, "1.."),
         ("orbit --sigma=-1000", 2, "above 0"),
         ("orbit --sigma=-1 --set=excitation.G=0.6", 1, "vines map"),

@@ -280,7 +280,7 @@ fn a_rig_with_a_fault_ends_identify_and_backbone_with_its_reason() {
     for (command, fault, part) in [
         ("identify", "sensors swapped@0.001", exchanged),
         ("backbone", "response sensor reversed@0.001", reversed),
-        ("identify", "response sensor × 3@0.001", unexpected),
+        ("identify", "response sensor x 3@0.001", unexpected),
         ("identify", "response sensor dead@0.001", "the response does not answer"),
         ("backbone", "base sensor dead@0.001", "the base sensor does not answer"),
         ("backbone", "response sensor dead@6", "a sensor, the drive"),

@@ -347,7 +347,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let d = self.bench.plan.knowledge.numbers;
         let why = match self.held {
             (low, high) if low <= high => format!(
-                "the symmetric 1:1 motions that were found need from G = {:.4} to {:.4}, and were lost {SEARCHES} times on the way",
+                "with the response under control, symmetric 1:1 motions were held at drives from G = {:.4} to {:.4}, and lost {SEARCHES} times; a \
+                 constant drive does not hold all of them",
                 d.excitation(low),
                 d.excitation(high)
             ),

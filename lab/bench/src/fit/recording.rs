@@ -313,8 +313,8 @@ impl Recording {
         let near = |phase: f64| cycles.iter().filter(|cycle| is_near(cycle, phase)).count();
         if near(PI) > near(0.0) {
             return Err(RecordingError(format!(
-                "{origin}: the response {response} leads the base {drive} by about a quarter of a period, where it lags on every passive rig: one of \
-                 the channels has the wrong sign; give it with a negative factor, for instance --drive {drive}:-1"
+                "{origin}: the response (channel `{response}`) leads the base (channel `{drive}`) by about a quarter of a period, where it lags on \
+                 every passive rig: one of the channels has the wrong sign; give it with a negative factor, for instance --drive {drive}:-1"
             )));
         }
         Ok(())

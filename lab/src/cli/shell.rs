@@ -1,0 +1,58 @@
+//! `vines completions` and `vines man`, and the list of commands after a wrong one: what shells and readers get from the command line itself.
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Args, Command, CommandFactory};
+use clap_complete::Shell;
+
+use super::{Cli, failure::Failure};
+
+/// Print completions for a shell
+#[derive(Debug, Args)]
+pub(super) struct CompletionsArguments {
+    #[arg(value_name = "SHELL")]
+    shell: Shell,
+}
+
+/// Print a manual page (roff)
+#[derive(Debug, Args)]
+pub(super) struct ManArguments {
+    /// Command of the page; without it, the page of the program
+    #[arg(value_name = "COMMAND")]
+    command: Option<String>,
+}
+
+pub(super) fn completions(arguments: &CompletionsArguments) -> String {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut Cli::command(), "vines", &mut script);
+    String::from_utf8_lossy(&script).into_owned()
+}
+
+pub(super) fn man(arguments: &ManArguments) -> Result<String, Failure> {
+    let mut command = Cli::command();
+    // A command then has the name of its page.
+    command.build();
+    if let Some(name) = &arguments.command {
+        let unknown = || Failure::input(format!("`{name}` is not a command; {}", commands()));
+        let found = command.find_subcommand(name).ok_or_else(unknown)?;
+        command = found.clone();
+    }
+    let mut page = Vec::new();
+    clap_mangen::Man::new(command).render(&mut page)?;
+    Ok(String::from_utf8_lossy(&page).into_owned())
+}
+
+/// The error of the command line; if it is a command that does not exist, with a list of those that do.
+pub(super) fn with_commands(mut error: clap::Error) -> clap::Error {
+    if error.kind() == ErrorKind::InvalidSubcommand {
+        let list = vec![commands().into()];
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(list));
+    }
+    error
+}
+
+fn commands() -> String {
+    let command = Cli::command();
+    let visible = command.get_subcommands().filter(|command| !command.is_hide_set());
+    let names: Vec<&str> = visible.map(Command::get_name).collect();
+    format!("commands are {}", names.join(", "))
+}
