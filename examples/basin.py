@@ -17,7 +17,7 @@ import vines
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
 folder.mkdir(parents=True, exist_ok=True)
 scene = vines.Scene(start={"dq2": 0.0})
-axes = {"start.q1": np.linspace(-0.0099, 0.0099, 121), "start.dq1": np.linspace(-0.6, 0.6, 121)}
+axes = {"start.q1": np.linspace(-0.0099, 0.0099, 61), "start.dq1": np.linspace(-0.6, 0.6, 61)}
 cells = vines.sweep(scene, axes, periods=1000)
 with (Path(__file__).parent.parent / "lab/src/report/styles.csv").open() as styles:
     colours = {row["name"]: row["light"] for row in csv.DictReader(styles)}
@@ -40,6 +40,6 @@ figure.legend(handles=patches, loc="outside right upper", frameon=False)
 plot.set(
     xlabel="displacement of the primary mass at the start, mm",
     ylabel="velocity at the start, m/s",
-    title="Regimes by start: default scene at phase resonance, particle at rest",
+    title="Regimes of the default scene at phase resonance",
 )
 figure.savefig(folder / "basin.svg", metadata={"Date": None}, dpi=150)

@@ -227,7 +227,8 @@ def test_a_number_of_any_library_keeps_its_value_at_every_door(number):
     assert vines.Scene().drive(sigma=number) == vines.Scene().drive(sigma=1.5)
     assert vines.orbits(sigma=number) == vines.orbits(sigma=1.5)
     assert vines.PhaseLock().sample(number, number) == vines.PhaseLock().sample(1.5, 1.5)
-    assert vines.linspace(number, 2, np.asarray(3)) == vines.linspace(1.5, 2.0, 3)
+    one, other = (vines.sweep(None, {"excitation.G": [value]}, sigma=value, periods=100) for value in (number, 1.5))
+    assert one.identical(other)
 
 
 @pytest.mark.parametrize(
@@ -254,7 +255,8 @@ def test_what_is_no_number_is_refused_at_every_door(wrong):
         lambda: vines.orbits(sigma=wrong),
         lambda: vines.regime(sigma=wrong),
         lambda: vines.Scene().drive(sigma=wrong),
-        lambda: vines.linspace(wrong, 2.0, 3),
+        lambda: vines.sweep(None, {"plant.r": [0.5]}, sigma=wrong, periods=100),
+        lambda: vines.sweep(None, {"plant.r": [0.5, wrong]}, periods=100),
     ):
         with pytest.raises((TypeError, ValueError)):
             door()

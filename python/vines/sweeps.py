@@ -408,8 +408,8 @@ def _distributed(client: Any, tasks: Iterable[tuple[Any, ...]]) -> Iterator[list
 
     futures = client.map(_chunk, *zip(*tasks, strict=True), pure=False)
     try:
-        for _, found in as_completed(futures, with_results=True):  # type: ignore[no-untyped-call]
-            yield found
+        for finished in as_completed(futures):  # type: ignore[no-untyped-call]
+            yield finished.result()
     finally:
         # Chunks that have begun end by themselves.
         if client.status == "running":
