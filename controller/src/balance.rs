@@ -16,13 +16,20 @@ use crate::config::Config;
 use crate::real::consts::{PI, TAU};
 use crate::real::{Real, larger};
 
-/// Largest growth without work, multiples of the largest drive, beyond `SHARE`: 1.6 times as large as in any of 2400 random rigs, half of which
-/// started with a particle that moves.
+// The limits assume that the structure holds no more energy beside its resonance than a loose body that the drive keeps moving, as in a cavity.
+// Such a body, of the mass ratio epsilon, moves at the speed `B omega b` between walls 2 b apart. An impact changes the amplitude by at most
+// 2 epsilon b B, which is 2 B/G of the drive E = G epsilon b. Steady motions have B up to 1.07, the loss of symmetry, and need a G from about 0.7.
+// A structure with a heavier or faster body, or with a second mode near the first, needs `residual_max` = none.
+
+/// Largest growth without work, multiples of the largest drive, beyond `SHARE`: 2 B/G as above. In 2400 random rigs, half of which started with a
+/// particle that moves, the growth was at most 0.6 of it.
 const GROWTH: Real = 3.0;
-/// Largest loss beyond damping and impacts, and largest distance below the linear response beyond `SHARE`, multiples of the largest drive: four
-/// times the largest loss of 1200 random rigs that started at rest. No response of 210 further rigs at rest is too low.
+/// Largest loss beyond damping and impacts, and largest distance below the linear response beyond `SHARE`, multiples of the largest drive. On
+/// average impacts take at most what the drive gives, but at once: pi/2 E for half a period. Until the next one a detector of a tenth of the
+/// frequency shows the share 1 - exp(-0.1 pi) = 0.27 of it. In 1200 random rigs that started at rest the loss was at most a quarter of this limit.
 const LOSS: Real = 0.4;
-/// Largest loss, as a share of the response before it: four times as large as in any of 1200 random rigs that started at rest.
+/// Largest loss, as a share of the response before it: an allowance for noise and an inexact `g`, which is not derived. In the same rigs it was at
+/// most a quarter of this.
 const LOSS_SHARE: Real = 0.12;
 /// Largest error of growth and linear response, as a share of it: a factor of two. Sensors are calibrated better, and impacts take less.
 const SHARE: Real = 0.5;

@@ -166,11 +166,12 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
     let (dt, hold) = (record.sample_time, record.hold());
     let target = knowledge.target;
     let held = Cycle::all(hold, dt, target);
-    let [approach, wide] = SPREADS.map(|spread| approached(record, knowledge, &held, spread));
+    let cycles = before_release(record, knowledge);
+    let [approach, wide] = SPREADS.map(|spread| approached(&cycles, &held, spread));
     // The drive of the hold decides where the approach ends.
     let [base, phase_error, response] = means(&held);
     let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
-    let [omega, limit] = limits(&approach, &wide, &knowledge.linear, command)?;
+    let [omega, limit] = limits(approach, wide, &knowledge.linear, command)?;
     let speed = |sample: &Sample| Some(d.speed(sample.ground_truth?.particle_velocity.abs()));
     let speeds: Option<Vec<f64>> = hold.iter().map(speed).collect();
     // The speed belongs to the amplitude of the hold, and changes about as it does.
@@ -226,11 +227,15 @@ fn limits(approach: &[Cycle], wide: &[Cycle], linear: &LinearResponse, command: 
     Some(whole)
 }
 
-/// The last periods before the release whose amplitude deviates from the hold by the share `spread` at most; at least as many as the hold has.
-fn approached(record: &Record, knowledge: &Knowledge, held: &[Cycle], spread: f64) -> Vec<Cycle> {
+/// The last periods before the release.
+fn before_release(record: &Record, knowledge: &Knowledge) -> Vec<Cycle> {
     let most = knowledge.samples(MOST);
     let samples = &record.samples[record.released.saturating_sub(most.max(record.hold().len()))..record.released];
-    let mut cycles = Cycle::all(samples, record.sample_time, knowledge.target);
+    Cycle::all(samples, record.sample_time, knowledge.target)
+}
+
+/// Those whose amplitude deviates from the hold by the share `spread` at most; at least as many as the hold has.
+fn approached<'a>(cycles: &'a [Cycle], held: &[Cycle], spread: f64) -> &'a [Cycle] {
     let level = mean(held.iter().map(Cycle::amplitude));
     let noise = 4.0 * mean(held.iter().map(|cycle| cycle.noise[0])).sqrt();
     let is_near = |cycle: &&Cycle| {
@@ -238,8 +243,7 @@ fn approached(record: &Record, knowledge: &Knowledge, held: &[Cycle], spread: f6
         deviation <= (spread * level).max(noise) && cycle.phase_error.abs() <= PHASE_RANGE
     };
     let near = cycles.iter().rev().take_while(is_near).count();
-    cycles.drain(..cycles.len() - near.max(held.len()).min(cycles.len()));
-    cycles
+    &cycles[cycles.len() - near.max(held.len()).min(cycles.len())..]
 }
 
 /// Means over the hold: base amplitude, m, phase error, rad, and response amplitude, m.

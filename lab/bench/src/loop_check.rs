@@ -5,11 +5,11 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use nalgebra::{Matrix3, RowVector3, Vector3};
+use nalgebra::{DVector, Matrix3, RowVector3, Vector3};
 use num_complex::Complex64;
 use phase_lock::Gains;
 use serde::Serialize;
-use vines_model::numerics::{SIGNIFICANT, mean, mean_square, standard_deviation};
+use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, mean_square, standard_deviation};
 
 use crate::plan::{LinearResponse, Plan};
 use crate::rig::{Drive, Rig, RigError};
@@ -58,10 +58,10 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
     readings.truncate(ends);
     without_drift(&mut readings[begins..]);
     let mut channels = [0, 1].map(|n| {
-        let signal = SineFit::of(&readings[begins + driven - window..], n + 1);
-        let ratio = signal.phasor / expected[n];
+        let (phasor, noise) = fitted(&readings[begins + driven - window..], n + 1);
+        let ratio = phasor / expected[n];
         let floor = scatter(&readings[begins - quiet..begins], n + 1);
-        let channel = CheckedChannel { noise: signal.noise, floor, ..CheckedChannel::default() };
+        let channel = CheckedChannel { noise, floor, ..CheckedChannel::default() };
         channel.at(ratio, omega * step)
     });
     let amplitudes = expected.map(|response| response.norm());
@@ -75,7 +75,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
         .map(|[phase, ..]| channels[1].gain * amplitude * phase.sin());
     let waits = moved < 0.5 * mean_square(moves);
     // Without a sensor, the base moves as expected.
-    let SineFit { phasor, noise } = SineFit::of(&readings[begins + driven - window..], 2);
+    let (phasor, noise) = fitted(&readings[begins + driven - window..], 2);
     let base = if has_base {
         (phasor, noise / phasor.norm() * (2.0 / window as f64).sqrt())
     } else {
@@ -84,7 +84,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
     let period = samples(1);
     let phasors = |of: usize| -> Vec<Complex64> {
         let periods = readings[begins..].chunks_exact(period);
-        periods.map(|readings| SineFit::of(readings, of).phasor).collect()
+        periods.map(|readings| fitted(readings, of).0).collect()
     };
     let linear = Linear::of(&phasors(1), base, omega, period, plan);
     let mut quantities = Vec::new();
@@ -133,23 +133,17 @@ fn expected(plan: &Plan, omega: f64, amplitude: f64) -> [Complex64; 2] {
     [growth * amplitude * stated, stated * amplitude]
 }
 
-/// A signal at the frequency of the drive, m, and the rest of it, RMS.
-struct SineFit {
-    phasor: Complex64,
-    noise: f64,
-}
-
-impl SineFit {
-    fn of(readings: &[[f64; 3]], channel: usize) -> Self {
-        let n = readings.len() as f64;
-        let mean = mean(readings.iter().map(|reading| reading[channel]));
-        let phasor: Complex64 = readings
-            .iter()
-            .map(|reading| (reading[channel] - mean) * Complex64::new(reading[0].sin(), reading[0].cos()) * 2.0 / n)
-            .sum();
-        let rest = |reading: &[f64; 3]| reading[channel] - mean - (phasor * Complex64::cis(reading[0])).im;
-        Self { phasor, noise: mean_square(readings.iter().map(rest)).sqrt() }
-    }
+/// A signal at the frequency of the drive, m, and the rest of it, RMS; NaN for readings that are no numbers.
+fn fitted(readings: &[[f64; 3]], channel: usize) -> (Complex64, f64) {
+    let phases: Vec<f64> = readings.iter().map(|reading| reading[0]).collect();
+    let basis = HarmonicBasis::new(&phases, 0, &[Some(0)]);
+    let values = DVector::from_iterator(readings.len(), readings.iter().map(|reading| reading[channel]));
+    basis
+        .fit(&values)
+        .map_or((Complex64::new(f64::NAN, f64::NAN), f64::NAN), |fit| {
+            let rest = basis.residual(&values, &fit);
+            (fit.harmonic(1), mean_square(rest.iter().copied()).sqrt())
+        })
 }
 
 // A rig that is driven with its loop open.

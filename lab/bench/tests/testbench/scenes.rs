@@ -207,7 +207,7 @@ fn every_parameter_of_the_controller_has_exactly_one_key_of_the_scene() {
             ("omega_max" | "amplitude", _) => "1.2".into(),
             ("omega_start", _) => "56.0".into(),
             ("omega_min", _) => "0.8".into(),
-            ("bandwidth" | "lock.phase_tolerance", _) => "0.12".into(),
+            ("bandwidth" | "delay" | "lock.phase_tolerance", _) => "0.12".into(),
             ("acquire_timeout", _) => "2500".into(),
             ("lock.unlock_tolerance" | "lock.coherence_min" | "lock.response_min", _) => "0.3".into(),
             _ => "3.5".to_owned(),
