@@ -1,5 +1,7 @@
 //! The loop over events.
 
+use core::ops::ControlFlow;
+
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::Drive;
 use crate::contact::{Resolution, Touch, Wall};
@@ -25,10 +27,17 @@ pub(crate) struct Step<F> {
     pub on_event: F,
 }
 
-impl<F: FnMut(Event)> Step<F> {
+impl<F: FnMut(Event) -> ControlFlow<()>> Step<F> {
     /// Time since the step began, s.
     pub fn now(&self) -> f64 {
         Sum::from(self.duration).minus(self.left).value()
+    }
+
+    /// Reports an event, which may end the step.
+    fn tell(&mut self, event: Event) {
+        if (self.on_event)(event).is_break() {
+            self.outcome.cut_short = true;
+        }
     }
 
     /// Whether time is left and the step is not to be cut short.
@@ -47,7 +56,7 @@ impl Plant {
     /// An invalid drive or duration; the plant stays as it is.
     #[inline]
     pub fn advance(&mut self, drive: Drive, duration: f64) -> Result<Outcome, InvalidValue> {
-        self.advance_with(drive, duration, |_| {})
+        self.advance_until(drive, duration, |_| ControlFlow::Continue(()))
     }
 
     /// As [`Self::advance`]; calls `on_event` at every event.
@@ -59,7 +68,24 @@ impl Plant {
         &mut self,
         drive: Drive,
         duration: f64,
-        on_event: impl FnMut(Event),
+        mut on_event: impl FnMut(Event),
+    ) -> Result<Outcome, InvalidValue> {
+        self.advance_until(drive, duration, |event| {
+            on_event(event);
+            ControlFlow::Continue(())
+        })
+    }
+
+    /// As [`Self::advance`]; calls `on_event` at every event, which may cut the step short there.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    #[inline]
+    pub fn advance_until(
+        &mut self,
+        drive: Drive,
+        duration: f64,
+        on_event: impl FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Outcome, InvalidValue> {
         if !self.status.begun {
             check_duration(duration)?;
@@ -141,7 +167,7 @@ impl Plant {
 
     /// Follows the motion from event to event to the end of the step. (A call: most steps do not need it, and its code is long.)
     #[inline(never)]
-    fn follow(&mut self, duration: f64, on_event: impl FnMut(Event)) -> Outcome {
+    fn follow(&mut self, duration: f64, on_event: impl FnMut(Event) -> ControlFlow<()>) -> Outcome {
         self.fast.evaluations = 0;
         let mut step = Step {
             duration,
@@ -171,7 +197,7 @@ impl Plant {
                     Next::Search(limit) => self.search(limit, None, &mut step),
                 }
             }
-            step.outcome.cut_short =
+            step.outcome.cut_short |=
                 self.fast.evaluations >= MOST_EVALUATIONS || step.outcome.released >= MOST_RELEASES;
         }
         let left = step.left.value();
@@ -184,7 +210,7 @@ impl Plant {
     /// Follows the flight to its first contact by certified search, or for `limit` seconds; `released` names the wall that has
     /// just ceased to push.
     #[inline(never)]
-    fn search(&mut self, limit: f64, released: Option<Wall>, step: &mut Step<impl FnMut(Event)>) {
+    fn search(&mut self, limit: f64, released: Option<Wall>, step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>) {
         if released.is_none() && self.arrives(limit, 0.0, step) {
             return;
         }
@@ -199,7 +225,7 @@ impl Plant {
     /// Slides to a wall or a reversal, or for `limit` seconds; `slips` is the sign of `w'` where the particle has just been released. A
     /// particle without relative velocity sticks if friction can hold it.
     #[inline(never)]
-    fn slide(&mut self, limit: f64, slips: Option<f64>, step: &mut Step<impl FnMut(Event)>) {
+    fn slide(&mut self, limit: f64, slips: Option<f64>, step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>) {
         let masses = self.moving.masses;
         let direction = match slips {
             Some(direction) => direction,
@@ -232,21 +258,21 @@ impl Plant {
             let direction = self.direction();
             if direction != 0.0 {
                 let t = step.now();
-                (step.on_event)(Event::Reversal { t, direction });
+                step.tell(Event::Reversal { t, direction });
             }
         }
     }
 
     /// The particle sticks to the floor.
-    fn stick(&mut self, step: &mut Step<impl FnMut(Event)>) {
+    fn stick(&mut self, step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>) {
         self.status.contact = Some(Contact::Floor);
         self.status.totals.sticks += 1;
         let t = step.now();
-        (step.on_event)(Event::Sticking { t });
+        step.tell(Event::Sticking { t });
     }
 
     /// Moves on to the wall ahead, if constant forces act and the fast path finds the contact within `limit` seconds.
-    fn arrives(&mut self, limit: f64, direction: f64, step: &mut Step<impl FnMut(Event)>) -> bool {
+    fn arrives(&mut self, limit: f64, direction: f64, step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>) -> bool {
         if !self.moving.system.forces.act() {
             return false;
         }
@@ -263,7 +289,7 @@ impl Plant {
     }
 
     /// Moves on to the end of a flight or of a stretch of sliding, in which the particle has the constant acceleration `pull`, m/s².
-    fn fly(&mut self, end: &FlightEnd, pull: f64, step: &mut Step<impl FnMut(Event)>) {
+    fn fly(&mut self, end: &FlightEnd, pull: f64, step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>) {
         let half_width = self.moving.system.half_width;
         self.fast.evaluations += end.evaluations;
         let masses = &mut self.moving.masses;
@@ -295,7 +321,7 @@ impl Plant {
 
     /// Both masses move as one for at most `left` seconds, until the particle is released; then it goes on. The release is not
     /// remembered beyond this call: another drive or other parameters may hold the particle again.
-    fn stay(&mut self, contact: Contact, left: f64, step: &mut Step<impl FnMut(Event)>) {
+    fn stay(&mut self, contact: Contact, left: f64, step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>) {
         let system = &self.moving.system;
         let start = self.moving.masses.primary.values;
         let wall = contact.wall();
@@ -323,7 +349,7 @@ impl Plant {
             self.status.contact = None;
             step.outcome.released += 1;
             let (t, left) = (step.now(), step.left.value());
-            (step.on_event)(match wall {
+            step.tell(match wall {
                 Some(wall) => Event::Released { t, wall },
                 None => Event::Slip { t, direction },
             });
@@ -375,7 +401,7 @@ impl Plant {
 
     /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave.
     #[inline]
-    fn touch(&mut self, wall: Wall, step: &mut Step<impl FnMut(Event)>) {
+    fn touch(&mut self, wall: Wall, step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>) {
         let system = &self.moving.system;
         self.moving.masses.w = Sum::from(wall.sign() * system.half_width);
         let left = step.left.value();
@@ -396,14 +422,14 @@ impl Plant {
         self.status.totals.add(&touch, self.status.time + t);
         if let Some(velocity) = touch.impact {
             step.outcome.impacts += 1;
-            (step.on_event)(Event::Impact { t, wall, velocity });
+            step.tell(Event::Impact { t, wall, velocity });
         }
         if touch.stuck && contact == Contact::Floor {
             self.stick(step);
         } else if touch.stuck {
             self.status.contact = Some(contact);
             step.outcome.stuck += 1;
-            (step.on_event)(Event::Stuck { t, wall });
+            step.tell(Event::Stuck { t, wall });
         }
     }
 

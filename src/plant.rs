@@ -320,7 +320,7 @@ pub struct Outcome {
     pub released: u64,
     /// Time by which the plant advanced, s: less than the step where it was cut short.
     pub elapsed: f64,
-    /// Whether the step ended early, at the largest number of impacts, releases or evaluations.
+    /// Whether the step ended early, at the largest number of impacts, releases or evaluations, or where an event ended it.
     pub cut_short: bool,
     /// Evaluations of the motion (closed form, propagator or series).
     pub evaluations: u64,

@@ -5,6 +5,7 @@
 use lovines::plant::MOST_IMPACTS;
 use lovines::{Drive, Event, Parameters, Plant, State, Wall};
 use std::f64::consts::TAU;
+use std::ops::ControlFlow;
 
 /// A start near the 1:1 motion of the default rig.
 const LOCK: State = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
@@ -128,6 +129,22 @@ fn without_loss_the_particle_never_sticks_and_nothing_is_dissipated() {
         let drift = (plant.energy(1.0) - before).abs() / before;
         assert!(drift < 1e-11, "{speed}: {drift:e}");
     }
+}
+
+#[test]
+fn an_event_can_end_its_step() {
+    let mut plant = elastic(1e-9);
+    let mut left = 3;
+    let ended = plant.advance_until(Drive::held(1.0), 1.0, |_| {
+        left -= 1;
+        match left {
+            0 => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        }
+    });
+    let ended = ended.unwrap();
+    assert_eq!((ended.cut_short, ended.impacts, left), (true, 3, 0));
+    assert!(plant.time() == ended.elapsed && ended.elapsed < 1e-6);
 }
 
 #[test]

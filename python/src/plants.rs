@@ -1,7 +1,7 @@
 //! Plants: one, or many at once.
 
 use std::{
-    panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
+    ops::ControlFlow,
     sync::atomic::{AtomicBool, Ordering::Relaxed},
 };
 
@@ -70,9 +70,6 @@ type EventArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// What ends a plant's motion at an event, by unwinding.
-struct Stopped;
-
 /// Why a plant did not advance: without an error if it was stopped.
 type Failure = Option<InvalidValue>;
 
@@ -103,19 +100,17 @@ fn advance(
     for _ in 0..stretches as u64 {
         let start = plant.time();
         let record = |event| {
-            if stop.load(Relaxed) {
-                resume_unwind(Box::new(Stopped));
-            }
             if let Some(found) = &mut found {
                 found.push(n, start, event);
             }
+            match stop.load(Relaxed) {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
         };
-        match catch_unwind(AssertUnwindSafe(|| plant.advance_with(drive, step, record))) {
-            Ok(Err(error)) => return Err(Some(error)),
-            Err(payload) if payload.is::<Stopped>() => return Err(None),
-            Err(panic) => resume_unwind(panic),
-            Ok(Ok(_)) if stop.load(Relaxed) => return Err(None),
-            Ok(Ok(_)) => {}
+        plant.advance_until(drive, step, record).map_err(Some)?;
+        if stop.load(Relaxed) {
+            return Err(None);
         }
     }
     Ok(())

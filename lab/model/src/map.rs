@@ -7,6 +7,7 @@
 //! one repetition before.
 
 use std::f64::consts::TAU;
+use std::ops::ControlFlow;
 use std::sync::{
     Arc,
     atomic::{AtomicBool, Ordering::Relaxed},
@@ -138,7 +139,7 @@ impl CellRun {
         })
     }
 
-    /// Ends the thread that follows the motion, by unwinding, soon after `stop` was set: one period of a slow base has millions of events.
+    /// Ends the motion soon after `stop` was set, with an undecided regime: one period of a slow base has millions of events.
     #[must_use]
     pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
         Self { stop, ..self }
@@ -148,7 +149,9 @@ impl CellRun {
     pub fn decided(&mut self, first: usize, limit: usize) -> Result<RegimeResult, InvalidValue> {
         let mut periods = first.max(FIRST).min(limit);
         loop {
-            self.follow(periods)?;
+            if self.follow(periods)?.is_break() {
+                return Ok(self.result(Regime::Undecided, 0));
+            }
             // The regime, if the motion so far shows one that lasts: no impacts, or a stable periodic motion.
             let lasting = self
                 .without_impacts()
@@ -178,32 +181,33 @@ impl CellRun {
     }
 
     /// Follows the motion to the end of period `periods`.
-    fn follow(&mut self, periods: usize) -> Result<(), InvalidValue> {
+    fn follow(&mut self, periods: usize) -> Result<ControlFlow<()>, InvalidValue> {
         let omega = self.drive.omega;
         let Self { plant, states, impacts, sticks, stop, .. } = self;
-        let stopped = || {
-            if stop.load(Relaxed) {
-                std::panic::resume_unwind(Box::new("the motion was stopped"));
-            }
+        let going = || match stop.load(Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
         };
         let steps = (TAU / (omega * STRETCH)).ceil() as u64;
         while states.len() <= periods {
             for step in 0..steps {
-                stopped();
                 let from = TAU * ((states.len() - 1) as f64 + step as f64 / steps as f64);
-                plant.advance_with(self.drive, TAU / (omega * steps as f64), |event| {
-                    stopped();
+                plant.advance_until(self.drive, TAU / (omega * steps as f64), |event| {
                     let time = from + omega * event.time();
                     match event {
                         Event::Impact { velocity, .. } => impacts.push(Impact { time, velocity }),
                         Event::Stuck { .. } => sticks.push(time),
                         _ => {}
                     }
+                    going()
                 })?;
+                if going().is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
             }
             states.push(numbers(&plant.state()));
         }
-        Ok(())
+        Ok(ControlFlow::Continue(()))
     }
 
     /// Distance between the state at the beginning of period `n` and the one `count` periods earlier.
@@ -418,7 +422,8 @@ impl CellRun {
     pub fn response(&mut self, result: &RegimeResult) -> Result<SteadyResponse, InvalidValue> {
         let repeats = result.periods > 0;
         if let Some(exponent) = result.exponent.filter(|exponent| repeats && *exponent < 0.0) {
-            self.follow(self.periods() + (-SHRUNK / exponent).min(WAITED) as usize + 1)?;
+            // A motion that was stopped is read where it is.
+            let _ = self.follow(self.periods() + (-SHRUNK / exponent).min(WAITED) as usize + 1)?;
         }
         let unit = if repeats { result.periods as usize } else { 1 };
         let periods = unit * AVERAGED.div_ceil(unit);
