@@ -248,6 +248,27 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
     driven: bool,
 }
 
+/// One sample of rig and controller, at a time, s, and until the next one a step, s, later: the rig is read, the controller answers, and the rig is
+/// driven. `before_drive` may refuse the drive.
+///
+/// # Errors
+/// A failure of the rig or of the controller, or the refusal.
+pub fn exchange(
+    rig: &mut (impl Rig + ?Sized),
+    controller: &mut (impl Controller + ?Sized),
+    active: bool,
+    [time, step]: [f64; 2],
+    before_drive: impl FnOnce(&Sample) -> Result<(), ExperimentError>,
+) -> Result<Sample, ExperimentError> {
+    let sensors = rig.sense()?;
+    let command = controller.sample(sensors, active)?;
+    let ground_truth = rig.ground_truth()?;
+    let sample = Sample { time, sensors, command, ground_truth };
+    before_drive(&sample)?;
+    rig.advance(command.drive, step)?;
+    Ok(sample)
+}
+
 /// A period of the drive in a record: its first sample, and the phase of the drive there, turns.
 pub(crate) type Period = (usize, f64);
 
@@ -289,23 +310,24 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             self.stage = (stage, self.taken);
         }
         let active = stage != Stage::Decaying;
-        let sensors = self.rig.sense()?;
-        let command = checked(self.controller.sample(sensors, active)?)?;
-        self.samples.push(Sample {
-            time: self.taken as f64 * self.sample_time,
-            sensors,
-            command,
-            ground_truth: self.rig.ground_truth()?,
-        });
+        let clock = [self.taken as f64 * self.sample_time, self.sample_time];
+        let is_latched = |command: &Command| command.state.is_some_and(LoopState::is_latched);
+        let (config, samples, driven) = (self.config, &mut *self.samples, &mut self.driven);
+        let before_drive = |sample: &Sample| {
+            let command = checked(sample.command)?;
+            samples.push(*sample);
+            if active && !is_latched(&command) {
+                guard(config, sample.sensors.response, command.drive)?;
+            }
+            *driven = true;
+            Ok(())
+        };
+        let Sample { command, .. } = exchange(self.rig, self.controller, active, clock, before_drive)?;
+        self.driven = command.drive.amplitude != 0.0;
         self.taken += 1;
         self.last = command;
-        let is_latched = command.state.is_some_and(LoopState::is_latched);
-        if active && !is_latched {
-            self.guard(sensors.response, command.drive)?;
-        }
-        self.advance(command.drive)?;
         self.periods += command.drive.omega * self.sample_time / TAU;
-        if active && is_latched {
+        if active && is_latched(&command) {
             self.ramp_down(command)?;
             return Err(self.tripped(stage, &command));
         }
@@ -316,26 +338,6 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         (self.progress)(stage, self.taken - self.stage.1);
         if stage == Stage::Locking && self.taken >= self.limit {
             return Err(self.no_lock(&command));
-        }
-        Ok(())
-    }
-
-    /// Refuses a drive or a response beyond the limits of the scene, before the rig gets the drive.
-    fn guard(&self, response: f64, drive: Drive) -> Result<(), ExperimentError> {
-        let Config { amplitude_max, response_max, omega_min, omega_max, .. } = *self.config;
-        let Drive { omega, amplitude, .. } = drive;
-        // A controller may compute in single precision.
-        let beyond = |value: f64, limit: Option<f64>| limit.filter(|limit| value > limit * (1.0 + 1e-6));
-        if let Some(limit) = beyond(amplitude, amplitude_max) {
-            return Err(ExperimentError::DriveTooLarge { amplitude, limit });
-        }
-        if let Some(limit) = beyond(response.abs(), response_max) {
-            return Err(ExperimentError::ResponseTooLarge { response, limit });
-        }
-        let allowed = [omega_min, omega_max];
-        let is_allowed = |omega: f64| (omega_min..=omega_max).contains(&omega);
-        if amplitude > 0.0 && !is_allowed(omega) && (is_allowed(omega * TAU) || is_allowed(omega / TAU)) {
-            return Err(ExperimentError::Hertz { omega, allowed });
         }
         Ok(())
     }
@@ -402,6 +404,26 @@ impl<R: Rig + ?Sized, C: ?Sized> Drop for ControlLoop<'_, R, C> {
             let _ = self.rig.advance(Drive::default(), self.sample_time);
         }
     }
+}
+
+/// Refuses a drive or a response beyond the limits of the scene, before the rig gets the drive.
+fn guard(config: &Config, response: f64, drive: Drive) -> Result<(), ExperimentError> {
+    let Config { amplitude_max, response_max, omega_min, omega_max, .. } = *config;
+    let Drive { omega, amplitude, .. } = drive;
+    // A controller may compute in single precision.
+    let beyond = |value: f64, limit: Option<f64>| limit.filter(|limit| value > limit * (1.0 + 1e-6));
+    if let Some(limit) = beyond(amplitude, amplitude_max) {
+        return Err(ExperimentError::DriveTooLarge { amplitude, limit });
+    }
+    if let Some(limit) = beyond(response.abs(), response_max) {
+        return Err(ExperimentError::ResponseTooLarge { response, limit });
+    }
+    let allowed = [omega_min, omega_max];
+    let is_allowed = |omega: f64| (omega_min..=omega_max).contains(&omega);
+    if amplitude > 0.0 && !is_allowed(omega) && (is_allowed(omega * TAU) || is_allowed(omega / TAU)) {
+        return Err(ExperimentError::Hertz { omega, allowed });
+    }
+    Ok(())
 }
 
 /// A command with values that a rig and an identification can take.

@@ -16,7 +16,7 @@ const QUIET: f64 = 20.0;
 const FEWEST_IMPACTS: usize = 12;
 
 /// The last impacts; times are phases of the drive, rad.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct LastImpacts(pub Vec<Impact>);
 
 impl LastImpacts {
@@ -88,10 +88,7 @@ pub struct Decay {
 impl Decay {
     /// A sample with a drive, and its motion: what was fitted before is over.
     pub fn drive(&mut self, motion: HarmonicMotion) {
-        self.motion = motion;
-        if self.window > 0 {
-            *self = Self { motion, ..Self::default() };
-        }
+        *self = Self { motion, synchronous: true, ..Self::default() };
     }
 
     /// A sample without a drive: response, m, and speed of the particle, m/s.
@@ -104,7 +101,6 @@ impl Decay {
             let period = TAU / self.motion.omega / sample_time;
             self.window = (WINDOW * period).round() as usize + 1;
             self.stride = ((period / PER_PERIOD).round() as usize).max(1);
-            self.synchronous = true;
         }
         self.values.push(response);
         self.speeds.push(speed);

@@ -286,18 +286,22 @@ impl Rig for Simulated {
 
 // The built-in phase-locked loop as a controller of the bench.
 
-/// The built-in controller: coefficients and state.
+/// The built-in controller.
 #[derive(Clone)]
 pub struct BuiltIn {
-    lock: PhaseLock,
-    state: phase_lock::State,
+    /// Its coefficients.
+    pub lock: PhaseLock,
+    /// Its state.
+    pub state: phase_lock::State,
+    /// Its output at the last sample.
+    pub output: Output,
 }
 
 impl BuiltIn {
     /// The controller of a configuration, at its start.
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         let lock = config.build()?;
-        Ok(Self { state: lock.start(), lock })
+        Ok(Self { state: lock.start(), output: lock.idle(), lock })
     }
 }
 
@@ -318,7 +322,8 @@ impl Controller for BuiltIn {
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
         let Sensors { response, reference } = sensors;
         let input = Input { response, reference, active };
-        Ok(self.lock.process(&mut self.state, input).into())
+        self.output = self.lock.process(&mut self.state, input);
+        Ok(self.output.into())
     }
 
     fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {

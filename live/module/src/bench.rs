@@ -3,10 +3,11 @@
 use std::f64::consts::{PI, TAU};
 
 use lovines::{Event, Plant, Wall};
-use phase_lock::{Input, Move, Output, PhaseLock, State};
+use phase_lock::Output;
 use vines_model::regime::{Impact, Regime};
+use vines_testbench::experiment::{ExperimentError, exchange};
 use vines_testbench::live::{Decay, HarmonicMotion, LastImpacts};
-use vines_testbench::rig::{Command, Drive};
+use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Sensors};
 use vines_testbench::scene::Scene;
 
 use crate::message::Message;
@@ -42,9 +43,7 @@ pub struct Bench {
     /// The settings that it was made from.
     pub settings: Settings,
     /// The controller.
-    pub lock: PhaseLock,
-    /// State of the controller.
-    pub state: State,
+    pub controller: BuiltIn,
     /// Samples since the start.
     pub samples: u64,
     /// Whether the drive is requested.
@@ -53,14 +52,10 @@ pub struct Bench {
     pub output: Output,
     /// The motion at the last sample, as in [`Row`].
     pub motion: HarmonicMotion,
-    /// The last impacts.
-    pub impacts: LastImpacts,
-    /// Phase of the drive since the start, rad.
-    pub phase: f64,
     /// The tracking of the backbone, while it runs, and the points of one that was ended.
     pub tracking: Option<Tracking>,
     decay: Decay,
-    rig: NoisyRig,
+    pub(crate) rig: NoisyRig,
     /// The plant at the last sample, and the drive from there on.
     before: (Plant, Drive),
 }
@@ -73,17 +68,13 @@ impl Bench {
     pub fn new(settings: Settings) -> Result<Self, Message> {
         let scene = changed(default_scene(), &settings);
         let plant = Plant::new(scene.plant, scene.start)?;
-        let lock = scene.controller_config().build()?;
-        let state = lock.start();
+        let controller = BuiltIn::new(&scene.controller_config())?;
         Ok(Self {
-            lock,
-            state,
             samples: 0,
             active: true,
-            output: lock.idle(),
+            output: controller.output,
+            controller,
             motion: HarmonicMotion::default(),
-            impacts: LastImpacts::default(),
-            phase: 0.0,
             tracking: None,
             decay: Decay::default(),
             rig: NoisyRig::new(plant, settings[index::NOISE] * 0.01 * scene.plant.half_width),
@@ -117,7 +108,7 @@ impl Bench {
         self.rig.plant.set_parameters(scene.plant)?;
         self.rig.noise = settings[index::NOISE] * 0.01 * scene.plant.half_width;
         self.tracking = None;
-        (self.lock, self.scene, self.settings) = (lock, scene, settings);
+        (self.controller.lock, self.scene, self.settings) = (lock, scene, settings);
         Ok(())
     }
 
@@ -135,8 +126,9 @@ impl Bench {
     /// The message of a lab's error, such as no lock; then the bench runs on as before.
     pub fn track(&mut self) -> Result<(), Message> {
         let lock = self.scene.backbone_config().build()?;
-        self.tracking = Some(track(&self.scene, &self.rig, lock, self.state, self.samples)?);
-        self.lock = lock;
+        let controller = BuiltIn { lock, ..self.controller.clone() };
+        self.tracking = Some(track(&self.scene, &self.rig, controller.clone(), self.samples)?);
+        self.controller = controller;
         self.active = true;
         Ok(())
     }
@@ -158,84 +150,60 @@ impl Bench {
     fn sample(&mut self, is_last: bool) -> Result<Row, Message> {
         let due = self.tracking.as_mut().and_then(|tracking| tracking.due(self.samples));
         if let Some((to, phase_target)) = due {
-            self.hold_response(to, phase_target)?;
+            self.controller
+                .hold_response(to, phase_target)
+                .map_err(ExperimentError::from)?;
         }
-        let time = self.time();
-        let sensors = self.rig.read();
-        let input = Input {
-            response: sensors.response,
-            reference: sensors.reference,
-            active: self.active,
-        };
-        let output = self.lock.process(&mut self.state, input);
-        let drive = self.requested(&output);
-        let step = self.lock.config().sample_time;
+        let step = self.controller.lock.config().sample_time;
+        let constant = (self.settings[index::CLOSED] == 0.0).then(|| self.constant_drive());
+        let (time, plant) = (self.time(), &self.rig.plant);
+        let (before, speed) = (is_last.then_some(*plant), plant.state().dq2.abs());
+        let relative = plant.relative_displacement();
+        self.decay.watch(&self.rig.impacts, self.rig.phase);
+        let mut controller = Requested { controller: &mut self.controller, constant };
+        let sample = exchange(&mut self.rig, &mut controller, self.active, [time, step], |_| Ok(()))?;
+        let (Sensors { response, reference }, drive) = (sample.sensors, sample.command.drive);
+        let output = self.controller.output;
         let mut motion = HarmonicMotion {
             omega: drive.omega,
             amplitude: output.response_amplitude,
-            speed: self.rig.plant.state().dq2.abs(),
+            speed,
         };
         if drive.amplitude == 0.0 {
-            self.decay.sample(sensors.response, motion.speed, step);
-            self.decay.watch(&self.impacts, self.phase);
+            self.decay.sample(response, speed, step);
             motion = self.decay.motion;
         } else {
             self.decay.drive(motion);
         }
-        let row = Row {
+        if let Some(plant) = before {
+            self.before = (plant, drive);
+            self.output = output;
+            self.motion = motion;
+        }
+        self.samples += 1;
+        Ok(Row {
             time,
-            base: sensors.reference.unwrap_or_default(),
-            response: sensors.response,
-            relative: self.rig.plant.relative_displacement(),
+            base: reference.unwrap_or_default(),
+            response,
+            relative,
             output,
             drive,
             motion,
             decays: drive.amplitude == 0.0 && self.decay.synchronous,
-        };
-        if is_last {
-            self.before = (self.rig.plant, drive);
-            self.output = output;
-            self.motion = motion;
-        }
-        self.step(drive)?;
-        self.samples += 1;
-        Ok(row)
+        })
     }
 
-    /// What the controller asks for, or the constant drive of the open loop.
-    fn requested(&self, output: &Output) -> Drive {
-        if self.settings[index::CLOSED] != 0.0 {
-            return Command::from(*output).drive;
-        }
+    /// The constant drive of the open loop.
+    fn constant_drive(&self) -> Drive {
         let omega = self.scene.dimensionless().omega(self.settings[index::DETUNING]);
         let amplitude = if self.active { self.scene.amplitude } else { 0.0 };
         Drive { omega, amplitude, ..Drive::default() }
     }
 
-    fn step(&mut self, drive: Drive) -> Result<(), Message> {
-        let (impacts, phase) = (&mut self.impacts, self.phase);
-        let mut count = |event: Event| {
-            if let Event::Impact { t, velocity, .. } = event {
-                impacts.0.push(Impact { time: phase + drive.omega * t, velocity });
-            }
-        };
-        let step = self.lock.config().sample_time;
-        self.rig.step(drive, step, &mut count)?;
-        self.impacts.trim();
-        self.phase += drive.omega * step;
-        Ok(())
-    }
-
-    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), Message> {
-        let amplitude = self.lock.config().amplitude;
-        self.lock.retune(amplitude, phase_target)?;
-        Ok(self.lock.hold_response(&mut self.state, to)?)
-    }
-
     /// Time of the next sample, s.
     #[must_use]
     pub fn time(&self) -> f64 {
-        self.samples as f64 * self.lock.config().sample_time
+        self.samples as f64 * self.controller.lock.config().sample_time
     }
 
     /// The plant `ahead` seconds after the last sample: for slow motion between two samples.
@@ -265,7 +233,7 @@ impl Bench {
         plant
             .advance_with(
                 drive,
-                self.lock.config().sample_time,
+                self.controller.lock.config().sample_time,
                 &mut note as &mut dyn FnMut(Event),
             )
             .ok()?;
@@ -281,7 +249,7 @@ impl Bench {
     /// The regime of the last impacts.
     #[must_use]
     pub fn regime(&self) -> Regime {
-        self.impacts.regime(self.phase)
+        self.rig.impacts.regime(self.rig.phase)
     }
 
     /// Amplitude of the drive, m.
@@ -317,6 +285,19 @@ impl Bench {
     #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.rig.plant
+    }
+}
+
+/// The controller, whose drive is replaced by a constant one while the loop is open.
+struct Requested<'a> {
+    controller: &'a mut BuiltIn,
+    constant: Option<Drive>,
+}
+
+impl Controller for Requested<'_> {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
+        let command = self.controller.sample(sensors, active)?;
+        Ok(Command { drive: self.constant.unwrap_or(command.drive), ..command })
     }
 }
 

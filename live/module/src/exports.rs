@@ -156,7 +156,7 @@ pub extern "C" fn run(samples: u32) -> i32 {
 #[unsafe(no_mangle)]
 pub extern "C" fn look(ahead: f64) -> i32 {
     values(|bench, output| {
-        let step = bench.lock.config().sample_time;
+        let step = bench.controller.lock.config().sample_time;
         let ahead = ahead.clamp(0.0, step);
         let plant = bench.between(ahead);
         let state = plant.state();
@@ -194,11 +194,11 @@ pub extern "C" fn status() -> i32 {
         let closed = bench.settings[crate::settings::index::CLOSED] != 0.0;
         let HarmonicMotion { omega, amplitude, .. } = bench.motion;
         let totals = bench.plant().totals();
-        let lock = bench.lock.config().lock;
+        let lock = bench.controller.lock.config().lock;
         let yes = |condition: bool| f64::from(u8::from(condition));
         output.extend([
             bench.time(),
-            bench.lock.config().sample_time,
+            bench.controller.lock.config().sample_time,
             d.omega0,
             d.sigma(omega),
             amplitude / d.b,
@@ -210,7 +210,7 @@ pub extern "C" fn status() -> i32 {
             f64::from(out.state as u8),
             out.fault.map_or(0.0, |fault| f64::from(fault as u8)),
             totals.impacts as f64,
-            bench.impacts.per_period(),
+            bench.rig.impacts.per_period(),
             totals.dissipated,
             lock.phase_tolerance.to_degrees(),
             lock.unlock_tolerance.to_degrees(),
@@ -282,7 +282,7 @@ pub extern "C" fn track() -> i32 {
 #[unsafe(no_mangle)]
 pub extern "C" fn tracked() -> i32 {
     values(|bench, output| {
-        let step = bench.lock.config().sample_time;
+        let step = bench.controller.lock.config().sample_time;
         for point in bench.tracking.iter().flat_map(|tracking| &tracking.points) {
             let settled = f64::from(u8::from(point.settled));
             output.extend([point.sample as f64 * step, point.sigma, point.c, point.g, settled]);

@@ -3,9 +3,9 @@
 
 use std::cell::Cell;
 
-use phase_lock::{Input, Move, PhaseLock, State};
+use phase_lock::Move;
 use vines_testbench::backbone;
-use vines_testbench::rig::{Command, Controller, ControllerError, Sensors};
+use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors};
 use vines_testbench::scene::Scene;
 
 use crate::message::Message;
@@ -53,8 +53,7 @@ impl Tracking {
 
 /// The controller on a copy of the bench; notes its moves.
 struct Ahead<'a> {
-    lock: PhaseLock,
-    state: State,
+    controller: BuiltIn,
     /// Samples taken, and the frequency at the last one.
     last: &'a Cell<(u64, f64)>,
     moves: Vec<(u64, Move, f64)>,
@@ -62,30 +61,24 @@ struct Ahead<'a> {
 
 impl Controller for Ahead<'_> {
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
-        let input = Input {
-            response: sensors.response,
-            reference: sensors.reference,
-            active,
-        };
-        let output = self.lock.process(&mut self.state, input);
-        self.last.set((self.last.get().0 + 1, output.omega));
-        Ok(output.into())
+        let command = self.controller.sample(sensors, active)?;
+        self.last.set((self.last.get().0 + 1, command.drive.omega));
+        Ok(command)
     }
 
     fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
         self.moves.push((self.last.get().0, to, phase_target));
-        self.lock.retune(self.lock.config().amplitude, phase_target)?;
-        Ok(self.lock.hold_response(&mut self.state, to)?)
+        self.controller.hold_response(to, phase_target)
     }
 }
 
-/// Tracks the backbone with `lock`, from its state before the sample `sample` on, on a copy of the rig.
+/// Tracks the backbone with a controller, from its state before the sample `sample` on, on a copy of the rig.
 ///
 /// # Errors
 /// The message of a lab's error, such as no lock.
-pub fn track(scene: &Scene, rig: &NoisyRig, lock: PhaseLock, state: State, sample: u64) -> Result<Tracking, Message> {
+pub fn track(scene: &Scene, rig: &NoisyRig, controller: BuiltIn, sample: u64) -> Result<Tracking, Message> {
     let last = Cell::new((sample, 0.0));
-    let mut controller = Ahead { lock, state, last: &last, moves: Vec::new() };
+    let mut controller = Ahead { controller, last: &last, moves: Vec::new() };
     let mut begun = Vec::new();
     let tracked = backbone::track(&mut rig.clone(), &mut controller, &scene.plan(), |_, _| {
         begun.push(last.get())

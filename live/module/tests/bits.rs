@@ -130,7 +130,7 @@ fn slow_motion_between_two_samples_ends_at_the_next_one() {
     let mut bench = bench();
     for _ in 0..500 {
         bench.run(1, |_| {}).unwrap();
-        let step = bench.lock.config().sample_time;
+        let step = bench.controller.lock.config().sample_time;
         assert_eq!(bench.between(step).state(), bench.plant().state());
     }
 }
