@@ -116,13 +116,12 @@ fn advance(
     Ok(())
 }
 
+/// Symbol and unit of a parameter.
+type Symbol = (&'static str, &'static str);
+
 /// The symbols of the parameters with their units, those that must be given first, and the laws of restitution by their codes.
 #[pyfunction]
-pub fn plant_table() -> (
-    Vec<(&'static str, &'static str)>,
-    Vec<(&'static str, &'static str)>,
-    Vec<&'static str>,
-) {
+pub fn plant_table() -> (Vec<Symbol>, Vec<Symbol>, Vec<&'static str>) {
     let (needed, cavity): (Vec<_>, Vec<_>) = PARAMETERS.iter().partition(|row| row.default.is_none());
     let names = |rows: Vec<&Parameter>| rows.into_iter().map(|row| (row.symbol, row.unit)).collect();
     (names(needed), names(cavity), LAWS.to_vec())
