@@ -463,10 +463,7 @@ fn evidence(samples: &[Sample], config: &Config, fault: Fault) -> String {
     );
     let limit = |name, value: Option<f64>, unit| {
         let value = value.map_or_else(|| "none".into(), short);
-        format!(
-            "{read}; {} is {value}{unit}. `vines check` looks for the cause",
-            key(name)
-        )
+        format!("{read}; {} is {value}{unit}", key(name))
     };
     match fault {
         Fault::ResponseTooLarge => limit("response_max", config.response_max, " m"),
@@ -481,7 +478,7 @@ fn evidence(samples: &[Sample], config: &Config, fault: Fault) -> String {
         }
         Fault::NoSignal => limit("signal_timeout", config.signal_timeout, " s"),
         Fault::Implausible => limit("residual_max", config.residual_max, " of the amplitude"),
-        Fault::Sensor | Fault::TimedOut => format!("{read}. `vines check` looks for the cause"),
+        Fault::Sensor | Fault::TimedOut => read,
     }
 }
 
@@ -512,7 +509,6 @@ mod tests {
             (Fault::ResponseTooLarge, "phase_lock.response_max is 0.3 m"),
             (Fault::LockLost, "phase_lock.lock.unlock_tolerance is 0.2 rad"),
             (Fault::LockLost, "the phase error is 14.324 degrees"),
-            (Fault::Sensor, "`vines check`"),
         ] {
             let text = evidence(&samples, &scene.controller_config(), fault);
             assert!(text.contains(read) && text.contains(limit), "{text}");

@@ -271,7 +271,7 @@ pub enum FitError {
     )]
     NoMotion,
     #[error(
-        "the points do not determine the five parameters: measure at further amplitudes, or give a parameter that is known (--known)"
+        "the points do not determine the five parameters: measure at further amplitudes, or give a parameter that is known"
     )]
     Undetermined,
 }
@@ -429,14 +429,12 @@ pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected:
     }
     let chi_square = format!("chi-square is {:.0} for {}", scene.chi_square, scene.degrees);
     if points.len() < FEWEST {
-        return Some(format!(
-            "the locked point does not belong to this scene ({chi_square}): track the backbone with `vines backbone`, and run `vines fit`"
-        ));
+        return Some(format!("the locked point does not belong to this scene ({chi_square})"));
     }
     let fit = fit(points, definition, expected, &[]).ok()?;
     if fit.is_rejected() {
         return Some(format!(
-            "the points do not belong to this scene ({chi_square}), nor to the ideal cavity with other parameters; run `vines fit`"
+            "the points do not belong to this scene ({chi_square}), nor to the ideal cavity with other parameters"
         ));
     }
     let parameters = fit.report(expected).parameters;
@@ -452,9 +450,7 @@ pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected:
         none if none.is_empty() => "several parameters differ a little".into(),
         some => some,
     };
-    Some(format!(
-        "the points do not belong to this scene: {texts}; run `vines fit`"
-    ))
+    Some(format!("the points do not belong to this scene: {texts}"))
 }
 
 /// What is minimised.

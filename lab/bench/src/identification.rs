@@ -36,7 +36,7 @@ pub enum IdentificationError {
     NoMotion,
     #[error(
         "the phase was {error:.3} ± {uncertainty:.3} degrees off its target while the lock was held; phase_lock.lock.phase_tolerance allows \
-         {tolerance:.3} degrees. A channel may have become late: `vines check` measures its delay"
+         {tolerance:.3} degrees. A channel may have become late"
     )]
     OffTarget {
         error: f64,

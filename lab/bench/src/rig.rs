@@ -184,8 +184,8 @@ pub enum RigError {
     #[error("the rig: {0}")]
     Refused(#[from] InvalidValue),
     #[error(
-        "the rig accepts frequency and amplitude only, not samples of the base displacement: chain.hold = true needs a rig that does, and so \
-         does `vines rig --protocol helic`"
+        "the rig accepts frequency and amplitude only, not samples of the base displacement: chain.hold = true and \
+         helic devices need a rig that does"
     )]
     NoHold,
 }
@@ -197,7 +197,7 @@ pub enum ControllerError {
     #[error("the controller: {0}")]
     Failed(#[source] Cause),
     #[error(
-        "the controller cannot hold the amplitude of the response; use the built-in controller, PhaseLock.fmu or `vines controller`"
+        "the controller cannot hold the amplitude of the response; use the built-in controller or PhaseLock.fmu, here or across the network"
     )]
     NoResponseLoop,
     #[error("the controller: {0}")]

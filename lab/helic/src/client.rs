@@ -230,7 +230,7 @@ impl<T: Transport> HelicRig<T> {
         if let Some(name) = names.unknown(&["response", "base", "E"]) {
             return Err(format!("[rig.names] maps `{name}`; for a helic device there are response, base and E").into());
         }
-        let advice = "Status (is `vines rig --protocol helic` or the device running, with no other host?)";
+        let advice = "Status (is the device running, with no other host?)";
         let status = self.request(Frame::new(message::STATUS, []), advice)?;
         let mut rest = &status[..];
         let [version, low, high, _] = take(&mut rest)?;

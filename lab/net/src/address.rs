@@ -83,10 +83,7 @@ pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
     let address = addresses.min_by_key(SocketAddr::is_ipv6);
     let address = address.ok_or_else(|| failed("the name has no address".into()))?;
     if scope == BindScope::Loopback && !is_loopback(address.ip()) {
-        return Err(failed(format!(
-            "{address} is not a loopback address. Use --key on both sides; without it, everyone who can reach the address can drive the \
-             rig, so use --allow-remote only on a network where everyone may do so"
-        )));
+        return Err(LinkError::Remote(address));
     }
     Ok(address)
 }
@@ -97,12 +94,15 @@ pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
 pub enum LinkError {
     #[error("{address} cannot be used: {message}")]
     Address { address: String, message: String },
+    #[error("{0} is not a loopback address: everyone who can reach it could drive the rig")]
+    Remote(SocketAddr),
     #[error("cannot listen on {address}: {source}")]
     Listen { address: Address, source: io::Error },
-    #[error("no answer from {peer} within {seconds} s: is `{command}` running there, with the same --key or none?")]
+    #[error("no answer from {peer} within {seconds} s")]
     Unreachable {
         peer: Address,
-        command: String,
+        /// Whether a controller should be there, not a rig.
+        controller: bool,
         seconds: f64,
     },
     #[error("{peer} refuses: {reason}")]

@@ -64,14 +64,8 @@ impl Client {
     }
 
     fn open(peer: Address, controller: bool, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
-        let unreachable = || {
-            let command = match peer {
-                Address::Tcp(place) if controller => format!("vines controller --listen {place}"),
-                Address::Tcp(place) => format!("vines rig --lock-step --listen {place}"),
-                Address::Udp(place) => format!("vines rig --listen {place}"),
-            };
-            LinkError::Unreachable { peer, command, seconds: CONNECT.as_secs_f64() }
-        };
+        let seconds = CONNECT.as_secs_f64();
+        let unreachable = || LinkError::Unreachable { peer, controller, seconds };
         let mut hello = Frame::new(Kind::Hello, RandomState::new().build_hasher().finish());
         hello.flags = bit(flag::CONTROLLER, controller);
         hello.values[0] = sample_time;

@@ -257,7 +257,7 @@ pub enum Refusal {
     Version(u16),
     /// 5: a value, rad/s or m, that is not finite or above its limit: frequency, amplitude, displacement.
     #[error(
-        "the {} of the drive is {value:e}, allowed is up to {limit:e}: half the sample rate, and `vines rig --max-amplitude`",
+        "the {} of the drive is {value:e}, allowed is up to {limit:e}: half the sample rate, and the largest amplitude of the rig",
         ["frequency, rad/s,", "amplitude, m,", "displacement, m,"].get(*index).unwrap_or(&"value")
     )]
     Drive { index: usize, value: f64, limit: f64 },

@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         && result.left_out.is_none()
         && let Some(line) = contradiction(&points, scene.resonance, &scene.plant)
     {
-        text += &format!("\n{line}\n");
+        text += &format!("\n{line}; run `vines fit`\n");
     }
     let files = report::tracked_files(&result).map_err(Failure::from);
     let failure = match tracked.ended {

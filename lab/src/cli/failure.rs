@@ -10,11 +10,17 @@ use lovines::InvalidValue;
 use phase_lock::ConfigError;
 use vines::cells::CellError;
 use vines::fmu::FmuError;
+use vines::identification::IdentificationError;
 use vines::orbit::NoMotion;
 use vines::report::ReportError;
 use vines::rig::{ControllerError, Interrupted, RigError};
 use vines::scene::{SceneError, refusal};
-use vines::{ArgumentError, FileError, experiment::ExperimentError, net::LinkError, pack::PackError};
+use vines::{
+    ArgumentError, FileError,
+    experiment::ExperimentError,
+    net::{Address, LinkError},
+    pack::PackError,
+};
 
 /// Exit code of a program that a signal ended: 128 and the number of SIGINT.
 pub(super) const INTERRUPTED: u8 = 130;
@@ -74,12 +80,23 @@ impl From<ConfigError> for Failure {
 
 impl From<LinkError> for Failure {
     fn from(error: LinkError) -> Self {
-        let code = if matches!(error, LinkError::Address { .. }) {
-            2
-        } else {
-            1
-        };
-        Self::new(code, error)
+        match &error {
+            LinkError::Address { .. } => Self::input(error),
+            LinkError::Remote(_) => Self::input(format!(
+                "{error}. Use --key on both sides; use --allow-remote only on a network where everyone may do so"
+            )),
+            LinkError::Unreachable { peer, controller, .. } => {
+                let command = match peer {
+                    Address::Tcp(place) if *controller => format!("vines controller --listen {place}"),
+                    Address::Tcp(place) => format!("vines rig --lock-step --listen {place}"),
+                    Address::Udp(place) => format!("vines rig --listen {place}"),
+                };
+                Self::run(format!(
+                    "{error}: is `{command}` running there, with the same --key or none?"
+                ))
+            }
+            _ => Self::run(error),
+        }
     }
 }
 
@@ -91,7 +108,21 @@ impl From<ExperimentError> for Failure {
             ExperimentError::NoDrive | ExperimentError::Rig(RigError::Refused(_)) => 2,
             _ => 1,
         };
-        Self::new(code, error)
+        let advice = match error {
+            ExperimentError::Tripped { .. } => ". `vines check` looks for the cause",
+            _ => "",
+        };
+        Self::new(code, format!("{error}{advice}"))
+    }
+}
+
+impl From<IdentificationError> for Failure {
+    fn from(error: IdentificationError) -> Self {
+        let advice = match error {
+            IdentificationError::OffTarget { .. } => ": `vines check` measures its delay",
+            _ => "",
+        };
+        Self::run(format!("{error}{advice}"))
     }
 }
 

@@ -64,13 +64,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let identification = match identify(&record, &plan) {
         Ok(identification) => identification,
         Err(error) => {
-            let reason = match error {
+            let reason = match &error {
                 IdentificationError::Regime { regime, .. } => {
-                    advice::reason(&scene, &plan.knowledge.numbers, Some(regime))
+                    advice::reason(&scene, &plan.knowledge.numbers, Some(*regime))
                 }
                 _ => None,
             };
-            return Err(ended.without_result(Failure::run(error), reason, &record.samples));
+            return Err(ended.without_result(Failure::from(error), reason, &record.samples));
         }
     };
     let result = Comparison::of(&identification, &scene);
@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let is_simulated = !identification.lock.impacts_per_period.is_nan();
     let lock = [(&identification.lock.at).into()];
     if !is_simulated && let Some(line) = contradiction(&lock, scene.resonance, &scene.plant) {
-        text += &format!("\n{line}\n");
+        text += &format!("\n{line}: track the backbone with `vines backbone`, and run `vines fit`\n");
     }
     let files = report::identification_files(&result, &record, &scene).map_err(Failure::from);
     let files = files.and_then(|files| {

@@ -9,7 +9,7 @@ fn loopback_is_always_allowed_other_addresses_only_with_permission_and_text_that
     }
     for beyond in ["0.0.0.0:5000", "192.0.2.1:5000", "[::]:5000", "[2001:db8::1]:1"] {
         let refused = resolve(beyond, BindScope::Loopback).unwrap_err();
-        assert!(refused.to_string().contains("--allow-remote"), "{refused}");
+        assert!(matches!(refused, LinkError::Remote(_)), "{refused}");
         assert!(resolve(beyond, BindScope::Remote).is_ok(), "{beyond}");
     }
     for text in " udp:// tcp://127.0.0.1 udp://127.0.0.1:99999 http://127.0.0.1:1 127.0.0.1:1".split(' ') {
