@@ -17,8 +17,8 @@ use crate::record::{Record, Sample};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Rig, RigError};
 use crate::scene::key;
 
+pub use judge::Condition;
 use judge::Judge;
-pub use judge::{Scatter, Spread};
 pub(crate) use search::Search;
 
 /// Share of its amplitude to which the response of the linear rig falls in the recorded decay. The 1:1 motion has a smaller range, from symmetry
@@ -70,32 +70,15 @@ fn phase_in_words(error: Option<f64>) -> String {
     )
 }
 
-/// What the lock waits for, in words; `scatter` where the bench judges the lock.
-fn lock_in_words(scatter: Option<Scatter>) -> String {
-    let Some(Scatter { periods, frequency, amplitude }) = scatter else {
+/// What the lock waits for, in words; `unmet` where the bench judges it.
+fn lock_in_words(unmet: Option<Condition>) -> String {
+    let Some(Condition { name, key, found, allowed }) = unmet else {
         return "see phase_lock.acquire_timeout and the [controller] section".into();
     };
-    let beyond = |name: &str, key: &str, Spread { found, allowed }: Spread| {
-        (found > allowed).then(|| {
-            format!(
-                "the {name} varies by {found:.1e} of itself, and the noise of the readings and phase_lock.lock.{key} explain {allowed:.1e}: make the \
-                 loop slower, or set a larger value of that key"
-            )
-        })
-    };
-    let reasons: Vec<String> = [
-        beyond("frequency", "frequency_drift", frequency),
-        beyond("amplitude of the response", "amplitude_drift", amplitude),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
-    let reason = if reasons.is_empty() {
-        "the mean phase error exceeds phase_lock.lock.phase_tolerance".into()
-    } else {
-        reasons.join("; ")
-    };
-    format!("the bench judges the lock, as the controller does not: over the last {periods} periods {reason}")
+    format!(
+        "the bench judges the lock, as the controller does not: the {name} is {found:.1e}, and phase_lock.lock.{key} with the noise of the readings \
+         allows {allowed:.1e}; make the loop slower, or set a larger value"
+    )
 }
 
 /// Why an experiment ended early.
@@ -108,15 +91,15 @@ pub enum ExperimentError {
     Controller(#[from] ControllerError),
     #[error(
         "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s; {}",
-        phase_in_words(*phase_error), lock_in_words(*scatter)
+        phase_in_words(*phase_error), lock_in_words(*unmet)
     )]
     NoLock {
         periods: f64,
         /// Degrees.
         phase_error: Option<f64>,
         omega: f64,
-        /// Why the bench did not take the motion as settled, if the controller does not judge its lock itself.
-        scatter: Option<Scatter>,
+        /// What kept the bench from taking the motion as settled, if the controller does not judge its lock itself.
+        unmet: Option<Condition>,
     },
     #[error("the requested drive G = {g:.4} was not reached within {periods:.0} periods: {why}")]
     NotReached { periods: f64, g: f64, why: String },
@@ -391,7 +374,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             periods: self.periods,
             phase_error: command.phase_error.map(f64::to_degrees),
             omega: command.drive.omega,
-            scatter: self.judge.scatter().filter(|_| command.settled.is_none()),
+            unmet: self.judge.unmet().filter(|_| command.settled.is_none()),
         }
     }
 }

@@ -32,22 +32,16 @@ pub(super) struct Judge {
     settled: bool,
 }
 
-/// How far frequency and amplitude varied over the last periods, relative to themselves.
+/// A condition of a settled lock.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scatter {
-    /// Number of periods.
-    pub periods: usize,
-    /// Of the frequency.
-    pub frequency: Spread,
-    /// Of the amplitude of the response.
-    pub amplitude: Spread,
-}
-
-/// A relative range, and the largest that counts as constant.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(missing_docs, reason = "the structure explains them")]
-pub struct Spread {
+pub struct Condition {
+    /// What must be small: a phase in rad, or a relative range.
+    pub name: &'static str,
+    /// The parameter of the lock criterion that bounds it.
+    pub key: &'static str,
+    /// Its value over the last periods, and the largest allowed.
     pub found: f64,
+    #[expect(missing_docs, reason = "see above")]
     pub allowed: f64,
 }
 
@@ -82,69 +76,55 @@ impl Judge {
         self.settled
     }
 
-    /// What varied over the last two dwells; `None` before them.
-    pub fn scatter(&self) -> Option<Scatter> {
-        if self.cycles.len() < 2 * self.config.lock.dwell as usize {
-            return None;
-        }
-        let [frequency, amplitude] = self.spreads(&self.cycles, NOISE_RANGE).map(|[all, parts]| {
-            // The parts decide where the periods do not.
-            if all.found > all.allowed { all } else { parts }
-        });
-        Some(Scatter { periods: self.cycles.len(), frequency, amplitude })
+    /// The condition that the last two dwells do not meet; `None` before them.
+    pub fn unmet(&self) -> Option<Condition> {
+        let is_long = self.cycles.len() == 2 * self.config.lock.dwell as usize;
+        let conditions = is_long.then(|| self.conditions(&self.cycles, NOISE_RANGE));
+        conditions?.into_iter().find(|one| one.found > one.allowed)
     }
 
     fn is_steady(&self, cycles: &[Cycle], noise_range: f64) -> bool {
-        let error = mean(cycles.iter().map(|cycle| cycle.phase_error));
-        let spreads = self.spreads(cycles, noise_range);
-        error.abs() <= self.config.lock.phase_tolerance
-            && spreads.as_flattened().iter().all(|one| one.found <= one.allowed)
+        let conditions = self.conditions(cycles, noise_range);
+        conditions.iter().all(|one| one.found <= one.allowed)
     }
 
-    /// The ranges of frequency and amplitude, each from period to period and from part to part. `noise_range`: range that noise explains, in
-    /// standard deviations.
-    fn spreads(&self, cycles: &[Cycle], noise_range: f64) -> [[Spread; 2]; 2] {
+    /// Of the mean phase error, and of the ranges of frequency and amplitude from period to period and from part to part. `noise_range`: range that
+    /// noise explains, in standard deviations.
+    fn conditions(&self, cycles: &[Cycle], noise_range: f64) -> [Condition; 5] {
         let of = |value: fn(&Cycle) -> f64| mean(cycles.iter().map(value));
         let (response, base) = (of(Cycle::amplitude), of(|cycle| cycle.base.norm()));
         let [noise, base_noise] = [0, 1].map(|i| mean(cycles.iter().map(|cycle| cycle.noise[i])).sqrt());
-        let phase_noise = (noise / response).hypot(base_noise / base);
+        let noise = noise_range * noise / response;
+        let phase_noise = noise.hypot(noise_range * base_noise / base);
         let lock = &self.config.lock;
+        let condition = |name, key, [found, allowed]: [f64; 2]| Condition { name, key, found, allowed };
+        let frequency = ranges(cycles, |cycle| cycle.omega, lock.frequency_drift, phase_noise / TAU);
+        let amplitude = ranges(cycles, Cycle::amplitude, lock.amplitude_drift, noise);
+        let error = [of(|cycle| cycle.phase_error).abs(), lock.phase_tolerance];
+        let (of_frequency, of_amplitude) = ("range of the frequency", "range of the amplitude");
         [
-            spread(
-                cycles,
-                |cycle| cycle.omega,
-                lock.frequency_drift,
-                noise_range * phase_noise / TAU,
-            ),
-            spread(
-                cycles,
-                Cycle::amplitude,
-                lock.amplitude_drift,
-                noise_range * noise / response,
-            ),
+            condition("mean phase error", "phase_tolerance", error),
+            condition(of_frequency, "frequency_drift", frequency[0]),
+            condition(of_frequency, "frequency_drift", frequency[1]),
+            condition(of_amplitude, "amplitude_drift", amplitude[0]),
+            condition(of_amplitude, "amplitude_drift", amplitude[1]),
         ]
     }
 }
 
-/// The ranges of a value from period to period and from part to part; `drift`: allowed relative change per period, `noise`: relative range from
-/// period to period that noise explains.
-fn spread(cycles: &[Cycle], value: fn(&Cycle) -> f64, drift: f64, noise: f64) -> [Spread; 2] {
+/// The relative ranges of a value from period to period and from part to part, each with the largest allowed; `drift`: allowed relative change
+/// per period, `noise`: relative range from period to period that noise explains.
+fn ranges(cycles: &[Cycle], value: fn(&Cycle) -> f64, drift: f64, noise: f64) -> [[f64; 2]; 2] {
     let values: Vec<f64> = cycles.iter().map(value).collect();
-    let parts: Vec<f64> = values
-        .chunks(values.len().div_ceil(PARTS))
-        .map(|part| mean(part.iter().copied()))
-        .collect();
+    let length = values.len().div_ceil(PARTS);
+    let parts: Vec<f64> = values.chunks(length).map(|part| mean(part.iter().copied())).collect();
     let level = mean(values.iter().copied());
-    let relative_range = |values: &[f64]| {
+    let [found, of_parts] = [&values, &parts].map(|values| {
         let (low, high) = range((f64::INFINITY, f64::NEG_INFINITY), values.iter().copied());
         (high - low) / level
-    };
-    let found = relative_range(&values);
+    });
     let drift = drift * (values.len() as f64 - 1.0);
     // Independent deviations from period to period explain this range of the means.
-    let explained = noise.min(found) / (values.len() as f64 / PARTS as f64).sqrt();
-    [
-        Spread { found, allowed: drift + noise },
-        Spread { found: relative_range(&parts), allowed: drift + explained },
-    ]
+    let explained = noise.min(found) / (length as f64).sqrt();
+    [[found, drift + noise], [of_parts, drift + explained]]
 }

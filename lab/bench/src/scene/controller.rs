@@ -29,11 +29,6 @@ settings! {
 }
 
 impl ControllerSettings {
-    /// Whether the target is phase resonance, for which theory and exact orbits hold.
-    pub fn is_at_phase_resonance(&self) -> bool {
-        self.phase_target == -90.0
-    }
-
     /// The detector at the natural frequency omega0 = 1.
     fn detector(&self) -> Config {
         Config {
