@@ -17,7 +17,7 @@ use crate::scene::Dimensionless;
 pub(crate) use decay::PER_PERIOD;
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
 pub use resonance_fit::{Cycle, ResonanceFit, Slopes};
-pub(crate) use response::{ASYMMETRIC, without_tones};
+pub(crate) use response::{ASYMMETRIC, Line, without_tones};
 pub use response::{Tone, classify, foreign_tone, impacts, regime_by_response};
 pub use vines_model::regime::{Impact, Regime};
 

@@ -17,13 +17,13 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 use serde::Serialize;
 use thiserror::Error;
-use vines_model::numerics::{Estimate, RANDOM, equally_spaced, mean, range, slope};
+use vines_model::numerics::{Estimate, RANDOM, mean, range, slope};
 use vines_model::regime::Regime;
 use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
 
 use super::{Known, MeasuredPoint, Quantity, fit};
 use crate::backbone::{Criterion, LAG, LevelEstimate};
-use crate::identification::{Cycle, Harmonic, ResonanceFit, harmonic, regime_by_response};
+use crate::identification::{Cycle, Harmonic, Line, ResonanceFit, harmonic, regime_by_response};
 use crate::plan::{Knowledge, LinearResponse};
 use crate::record::Sample;
 use crate::rig::{Command, Drive, Sensors};
@@ -102,10 +102,6 @@ const SEEN: f64 = 8.0;
 const CLIPPED: f64 = 0.06;
 /// Largest relative distance of the frequency from the natural frequency near resonance.
 const FARTHEST: f64 = 0.2;
-/// Most samples in which a frequency is searched for, and number of frequencies: a line in the spectrum of these samples is wider than the
-/// distance of two frequencies.
-const SEARCHED: usize = 8192;
-const FREQUENCIES: usize = 4000;
 /// Relative standard uncertainty of the damping that a scene states: three of them are 30 %.
 const DAMPING: f64 = 0.1;
 
@@ -323,7 +319,7 @@ impl Recording {
     /// Why there are no points. `is_seen`: half of the recording has an oscillation near the natural frequency.
     fn nothing(&self, is_seen: bool, parts: &[Part], linear: &LinearResponse) -> RecordingError {
         let Self { origin, channels: [response, drive], .. } = self;
-        let (hertz, strongest, rate) = (linear.omega0 / TAU, self.strongest(linear), 1.0 / self.sample_time);
+        let (hertz, strongest, rate) = (linear.omega0 / TAU, self.strongest(), 1.0 / self.sample_time);
         if !is_seen && (strongest / hertz - 1.0).abs() > FARTHEST {
             return RecordingError(format!(
                 "{origin}, channel {response}: the strongest oscillation has {strongest:.4} Hz, and the scene's natural frequency is {hertz:.4} Hz. \
@@ -341,21 +337,11 @@ impl Recording {
         ))
     }
 
-    /// Frequency of the strongest oscillation of the response between a twentieth and twenty times the natural frequency, Hz.
-    fn strongest(&self, linear: &LinearResponse) -> f64 {
-        let last = &self.response[self.response.len().saturating_sub(SEARCHED)..];
-        let middle = mean(last.iter().copied());
-        let power = |omega: f64| {
-            let turn =
-                |(n, value): (usize, &f64)| Complex64::from_polar(value - middle, omega * n as f64 * self.sample_time);
-            last.iter().enumerate().map(turn).sum::<Complex64>().norm()
-        };
-        let highest = (20.0 * linear.omega0).min(PI / self.sample_time);
-        let grid = equally_spaced(linear.omega0 / 20.0, highest, FREQUENCIES);
-        let best = grid
-            .map(|omega| (power(omega), omega))
-            .max_by(|first, second| first.0.total_cmp(&second.0));
-        best.map_or(f64::NAN, |(_, omega)| omega / TAU)
+    /// Frequency of the strongest oscillation at the end of the response, Hz.
+    fn strongest(&self) -> f64 {
+        let middle = mean(self.response.iter().copied());
+        let centred: Vec<f64> = self.response.iter().map(|value| value - middle).collect();
+        Line::strongest(&centred).turn / (TAU * self.sample_time)
     }
 }
 

@@ -194,7 +194,7 @@ impl Display for Tone {
 
 /// A line of a signal.
 #[derive(Debug, Clone, Copy)]
-struct Line {
+pub(crate) struct Line {
     /// Frequency, rad per sample.
     pub turn: f64,
     /// Amplitudes of the cosine and the sine.
