@@ -72,8 +72,8 @@ macro_rules! parameters {
                 bandwidth: Real = 0.1 * omega, "rad/s", Positive;
                 /// Damping rate of the structure (damping ratio times natural frequency); none: unknown, and the gains suit an undamped structure.
                 damping_rate: Option<Real> = None, "rad/s", Optional;
-                /// Delay from the drive to the sample of the sensor: nothing answers earlier, and it is compensated if no reference is connected;
-                /// half a sample for a rig that holds the samples of drive, 0 for a rig whose own oscillator receives omega.
+                /// Delay from the drive to the sample of the sensor; compensated if no reference is connected; half a sample for a rig that holds
+                /// the samples of drive, 0 for a rig whose own oscillator receives omega.
                 delay: Real = 0.0, "s", NotNegative;
             }
             lock {

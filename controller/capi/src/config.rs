@@ -44,9 +44,8 @@ pub struct PhaseLockConfig {
     /// Damping rate of the structure (damping ratio times natural frequency), rad/s; none: unknown, and the
     /// gains suit an undamped structure.
     pub damping_rate: PhaseLockOptional,
-    /// Delay from the drive to the sample of the sensor, s: nothing answers earlier, and it is compensated
-    /// if no reference is connected; half a sample for a rig that holds the samples of drive, 0 for a rig
-    /// whose own oscillator receives omega.
+    /// Delay from the drive to the sample of the sensor, s; compensated if no reference is connected; half
+    /// a sample for a rig that holds the samples of drive, 0 for a rig whose own oscillator receives omega.
     pub delay: PhaseLockReal,
     /// Largest phase error that counts as locked, mean over the dwell, rad.
     pub phase_tolerance: PhaseLockReal,
