@@ -11,39 +11,43 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-// State of the loop.
+// State of the loop. The numbers are those of the FMU's state.
 typedef enum PhaseLockStage {
-  // Not armed.
+  // Not armed; the drive is off, or still ramps down after a fault. The oscillator runs at omega_start.
   PHASE_LOCK_STAGE_IDLE = 0,
-  // The drive ramps up; the loop is open.
+  // The drive ramps up at omega_start; the loop is open.
   PHASE_LOCK_STAGE_RAMPING = 1,
   // The loop is closed, but not yet locked.
   PHASE_LOCK_STAGE_ACQUIRING = 2,
   // Locked at phase resonance.
   PHASE_LOCK_STAGE_LOCKED = 3,
-  // The lock was lost; latched, the drive ramps down.
+  // The lock was lost. The drive ramps down; latched until active becomes false.
   PHASE_LOCK_STAGE_LOCK_LOST = 4,
-  // Another fault; latched, the drive ramps down.
+  // A Fault other than a lost lock. The drive ramps down; latched until active becomes false.
   PHASE_LOCK_STAGE_TRIPPED = 5,
-  // active became false: the drive is released.
+  // active became false: the drive is released, the frequency stays constant.
   PHASE_LOCK_STAGE_SHUT_DOWN = 6,
 } PhaseLockStage;
 
-// Reason why the drive was switched off.
+// Reason why the drive was switched off. The numbers are those of the FMU's fault, where 0 means no
+// fault.
 typedef enum PhaseLockFault {
   // No fault.
   PHASE_LOCK_FAULT_NONE = 0,
-  // A sensor read NaN, infinity, or more than 1e100 m, or the response did not change for a sixth of a period.
+  // A sensor read NaN, infinity, or more than 1e100 m, or a reading did not change for a sixth of a
+  // period.
   PHASE_LOCK_FAULT_SENSOR = 1,
   // The response exceeded response_max.
   PHASE_LOCK_FAULT_RESPONSE_TOO_LARGE = 2,
   // No lock within acquire_timeout.
   PHASE_LOCK_FAULT_TIMED_OUT = 3,
-  // The phase error exceeded unlock_tolerance, or the response was no longer valid.
+  // The phase error exceeded unlock_tolerance, or the response was no longer valid, while locked.
   PHASE_LOCK_FAULT_LOCK_LOST = 4,
-  // No valid measurement for signal_timeout.
+  // No valid measurement for signal_timeout, or none in the first periods of the drive: the amplitude of
+  // a channel is too small, or its noise too large.
   PHASE_LOCK_FAULT_NO_SIGNAL = 5,
-  // A reading differed from its prediction by more than residual_max, or the response contradicts the power of its drive.
+  // A reading differed from its prediction by more than residual_max, or the response contradicts the
+  // power of its drive.
   PHASE_LOCK_FAULT_IMPLAUSIBLE = 6,
 } PhaseLockFault;
 
@@ -164,7 +168,7 @@ typedef struct PhaseLockController {
 typedef struct PhaseLockInput {
   // Response of the structure, m.
   PhaseLockReal response;
-  // Displacement of the base, m; not present: no sensor measures it.
+  // Displacement of the base, m. If it is not present, the internal oscillator is the reference.
   struct PhaseLockOptional reference;
   // Whether the drive is requested. A change from false to true arms the controller, also after a fault.
   bool active;
@@ -172,45 +176,49 @@ typedef struct PhaseLockInput {
 
 // Drive until the next sample, and the controller's estimates.
 typedef struct PhaseLockOutput {
-  // Drive frequency, rad/s.
+  // Drive frequency, rad/s; always between omega_min and omega_max.
   PhaseLockReal omega;
-  // Drive amplitude, m.
+  // Drive amplitude E, m; always between 0 and amplitude_max (where that is set).
   PhaseLockReal amplitude;
-  // Setpoint of the base displacement at this sample, m.
+  // Setpoint of the base displacement at this sample, E sin(phase), m, for a rig that takes samples.
   PhaseLockReal drive;
-  // Phase of the response relative to the reference, minus the target, rad; not present while an amplitude is 0.
+  // Phase of the response relative to the reference, minus the target, rad, in [-pi, pi]. Not present
+  // while one of the two amplitudes is 0, or their product is below the smallest normal number.
   struct PhaseLockOptional phase_error;
   // Amplitude of the response's fundamental, m.
   PhaseLockReal response_amplitude;
-  // Setpoint of the response amplitude, m; not present while the drive amplitude is controlled instead.
+  // Present setpoint of the response amplitude, m. Not present while the drive amplitude is controlled
+  // instead.
   struct PhaseLockOptional response_target;
-  // Amplitude of the reference's fundamental, m.
+  // Amplitude of the reference's fundamental, m: measured, or that of the drive.
   PhaseLockReal reference_amplitude;
-  // Share of the fundamental in the power of the response, 0 to 1.
+  // Power of the response's fundamental over the sum of itself and the detector's residual power, 0 to
+  // 1.
   PhaseLockReal coherence;
-  // Mean frequency over the running dwell, rad/s.
+  // Mean frequency, rad/s, over the complete blocks of the running dwell; omega before the first one.
   PhaseLockReal frequency;
-  // Mean response amplitude over the running dwell, m.
+  // Mean of response_amplitude, m, over the same blocks; response_amplitude before the first one.
   PhaseLockReal response_mean;
+  // Whether the loop is locked: the lock criterion has been met, and the lock has not been lost since.
+  bool locked;
+  // Whether the lock criterion is met now: phase, frequency and amplitude have been stationary for the
+  // whole dwell. A retuned controller is not settled until the new operating point is stationary.
+  bool settled;
   // State of the loop.
   enum PhaseLockStage state;
-  // Reason why the drive was switched off.
+  // Reason why the drive was switched off; kept until the controller is armed again.
   enum PhaseLockFault fault;
-  // Whether the loop is locked.
-  bool locked;
-  // Whether phase, frequency and amplitude have been stationary for the whole dwell.
-  bool settled;
 } PhaseLockOutput;
 
 // A change of the response amplitude's setpoint.
 typedef struct PhaseLockMove {
-  // New setpoint of the response amplitude, m.
+  // New setpoint of the response amplitude, m; above 0.
   PhaseLockReal response;
-  // Duration, s.
+  // Duration, s; 0: step change.
   PhaseLockReal duration;
-  // Expected change of the drive amplitude, m; 0: none.
+  // Expected change of the drive amplitude, m; 0 if unknown.
   PhaseLockReal amplitude;
-  // Expected change of the frequency, rad/s; 0: none.
+  // Expected change of the frequency, rad/s; 0 if unknown.
   PhaseLockReal omega;
   // Growth rate of the setpoint at the end of the move and after it, m/s; 0 to hold it.
   PhaseLockReal growth;

@@ -15,15 +15,12 @@ use core::fmt::{Display, Write};
 
 use phase_lock::{Config, ConfigError, PARAMETERS, Value};
 
-mod config;
+mod generated;
 mod types;
 
-pub use config::PhaseLockConfig;
+pub use generated::{PhaseLockConfig, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOutput, PhaseLockStage};
 use types::Stored;
-pub use types::{
-    PhaseLockController, PhaseLockDetector, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOptional,
-    PhaseLockOutput, PhaseLockReal, PhaseLockStage,
-};
+pub use types::{PhaseLockController, PhaseLockDetector, PhaseLockOptional, PhaseLockReal};
 
 /// Conversions of the configuration in both directions. Every parameter of the table is a field of the same name.
 macro_rules! conversions {
