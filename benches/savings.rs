@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! cargo bench --bench savings
+//! LOVINES_WITHOUT=hop cargo bench --bench savings -- scenes    what scenes cost without a mechanism of the fast path
 //! ```
 //!
 //! Every case is run under valgrind for two lengths; the difference tells what one unit of work costs, without the start of
@@ -73,16 +74,18 @@ impl Work {
     }
 }
 
+/// A start on the steady 1:1 motion.
+const LOCK: State = State {
+    q1: -0.438_371_55,
+    dq1: 0.007_696_65,
+    q2: -1.003_854_15,
+    dq2: -0.878_123_25,
+};
+
 /// The steady 1:1 motion in a cavity: one step with this number of impacts.
 fn locked_in(cavity: Cavity, impacts: u32) {
-    let start = State {
-        q1: -0.438_371_55,
-        dq1: 0.007_696_65,
-        q2: -1.003_854_15,
-        dq2: -0.878_123_25,
-    };
     let step = f64::from(impacts / 2) * PERIOD;
-    Work { start, cavity, amplitude: 0.0084 * 1.1, step, ..QUIET }.run(1);
+    Work { start: LOCK, cavity, amplitude: 0.0084 * 1.1, step, ..QUIET }.run(1);
 }
 
 /// Both walls with this law.
@@ -170,6 +173,51 @@ shortcuts! {
     "outputs when asked for: v and base", SHORT_STEP, |n| SENSORS.run(n) => Work { read: all, ..QUIET }.run(n);
 }
 
+/// Lock under a loop: 100 samples a period, each with a new amplitude and frequency.
+fn controlled(n: u32) {
+    let changes = [1e-9, 1e-9, 0.0];
+    Work { start: LOCK, amplitude: 0.0084 * 1.1, ..SENSORS }
+        .changed(changes)
+        .run(n);
+}
+
+/// Steps from one sample of a clock to the next, which differ by their rounding.
+fn clocked(n: u32) {
+    let mut plant = Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.65), QUIET.start).expect("a valid scene");
+    let at = |n: u32| f64::from(n) * 0.063;
+    for n in 0..n {
+        let drive = black_box(Drive::harmonic(QUIET.amplitude, OMEGA));
+        plant.advance(drive, at(n + 1) - at(n)).expect("a valid step");
+        sensors(&plant);
+    }
+}
+
+/// A chatter into rest on a wall that the spring presses towards the particle, again and again.
+fn chatter(n: u32) {
+    let start = State { q1: -0.5, dq1: 0.0, q2: -1.5, dq2: 0.004 };
+    let mut plant = Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.9), start).expect("a valid scene");
+    for _ in 0..n {
+        plant.set_state(start).expect("a valid state");
+        plant.advance(black_box(Drive::held(0.0)), 0.3).expect("a valid step");
+    }
+    assert!(plant.contact().is_some() && plant.totals().impacts > 100 * u64::from(n));
+}
+
+/// Scenes that the mechanisms of the fast path (`src/fast/`) are for: name, unit of work, the work, that number of units of it.
+const SCENES: &[(&str, &str, Run)] = &[
+    ("short step", READ_STEP, |n| SENSORS.run(n)),
+    ("clock", READ_STEP, clocked),
+    ("loop", READ_STEP, controlled),
+    ("lock", "impact", |n| locked_in(Cavity::IDEAL, n)),
+    ("chatter", "chatter of 133 impacts", chatter),
+    ("irregular flights", "impact", |n| {
+        locked_in(Cavity { scatter: 0.01, ..Cavity::IDEAL }, n)
+    }),
+    ("friction", "impact", |n| {
+        locked_in(Cavity { kinetic_friction: 3e-4, ..Cavity::IDEAL }, n)
+    }),
+];
+
 fn nothing(_: &Plant) {}
 
 fn sensors(plant: &Plant) {
@@ -226,6 +274,20 @@ fn table() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// What the scenes of the fast path cost in this build.
+fn scenes() -> Result<(), Box<dyn Error>> {
+    println!(
+        "| scene | unit of work | instructions without {:?} |\n|---|---|---|",
+        option_env!("LOVINES_WITHOUT")
+    );
+    for (row, (scene, unit, _)) in SCENES.iter().enumerate() {
+        let few = if *scene == "chatter" { 40 } else { 4000 };
+        let cost = per_unit(&["scene", &row.to_string()], few)?;
+        println!("| {scene} | {unit} | {cost:.0} |");
+    }
+    Ok(())
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = args().collect();
     if let [_, what, row, n] = &arguments[..]
@@ -234,6 +296,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         match what.as_str() {
             "with" => (ROWS[row].2)(n),
             "without" => (ROWS[row].3)(n),
+            "scene" => (SCENES[row].2)(n),
             _ => locked_in(EFFECTS[row].1, n),
         }
         return Ok(());
@@ -243,7 +306,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         ROWS.iter()
             .for_each(|(_, _, with, without)| [with, without].into_iter().for_each(|run| run(100)));
         EFFECTS.iter().for_each(|(_, cavity, _)| locked_in(*cavity, 100));
+        SCENES.iter().for_each(|(_, _, run)| run(100));
         return Ok(());
+    }
+    if arguments.iter().any(|argument| argument == "scenes") {
+        return scenes();
     }
     table()
 }

@@ -125,7 +125,8 @@ impl Plant {
             (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * self.fast.state.phasor.1;
         let oscillator = &self.moving.system.free;
         let kick = 2.0 * oscillator.delta * jump;
-        if jump != 0.0 && !self.carries(jump, kick, &before) {
+        let earlier = (before.amplitude, before.signal[1]);
+        if jump != 0.0 && !(self.status.contact).is_some_and(|contact| self.carries(contact, (jump, kick), earlier)) {
             self.moving.masses.primary = self.moving.masses.primary.plus([0.0, kick]);
             self.moving.masses.dw += kick;
             // The impulse acts on the primary mass alone; contact is decided anew.
@@ -135,27 +136,21 @@ impl Plant {
         self.fast.state.contact_free.jump(oscillator, &before, drive, kick);
     }
 
-    /// Whether a jump of the base moves a particle at rest together with the primary mass, as one; they are moved then.
-    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    fn carries(&mut self, jump: f64, kick: f64, before: &Drive) -> bool {
-        (self.status.contact).is_some_and(|contact| self.carries_along(contact.wall(), (jump, kick), before))
-    }
-
-    /// The same for a particle that is at rest on a wall or on the floor.
+    /// Whether a jump of the base moves a particle that is at rest on a wall or on the floor together with the primary mass, as one; they are
+    /// moved then. `amplitude` and `slope` are those of the drive before.
     ///
     /// A jump within the rounding of the base displacement is none. The sum of a polynomial has this error, and so has what a master
     /// computes at a time that is itself rounded.
     #[inline(never)]
-    fn carries_along(&mut self, wall: Option<Wall>, (jump, kick): (f64, f64), before: &Drive) -> bool {
+    fn carries(&mut self, contact: Contact, (jump, kick): (f64, f64), (amplitude, slope): (f64, f64)) -> bool {
         let (system, drive) = (&self.moving.system, &self.moving.base.drive);
-        let size = |drive: &Drive| {
-            let [offset, slope, ..] = drive.signal;
-            offset.abs() + drive.amplitude.abs() + (slope * self.status.time).abs()
-        };
-        let is_rounding = jump.abs() <= ROUNDING * (size(drive) + size(before));
+        let [offset, slope_now, ..] = drive.signal.map(f64::abs);
+        let moved = (slope.abs() + slope_now) * self.status.time.abs();
+        let size = 2.0 * offset + drive.amplitude.abs() + amplitude.abs() + moved;
+        let is_rounding = jump.abs() <= ROUNDING * size;
         let acceleration = self.acceleration(self.moving.masses.primary.values[1] + kick);
         let lowest = LOWEST_HOP * system.half_width;
-        if !is_rounding && !system.forces.carry(wall, kick, acceleration, lowest) {
+        if !is_rounding && !system.forces.carry(contact.wall(), kick, acceleration, lowest) {
             return false;
         }
         let both = 2.0 * system.stuck.delta * jump;
@@ -405,16 +400,16 @@ impl Plant {
         let system = &self.moving.system;
         self.moving.masses.w = Sum::from(wall.sign() * system.half_width);
         let left = step.left.value();
-        let (touch, contact) = if system.is_real {
+        let touch = if system.is_real {
             self.real_touch(wall, left)
         } else {
-            let touch = system.law.touch(wall, self.velocities(), |primary, speed| {
+            system.law.touch(wall, self.velocities(), |primary, speed| {
                 let (largest, resolution) = (self.acceleration_bound(primary), self.resolution(left));
                 !system.law.certainly_leaves(speed, largest, &resolution)
                     && system.law.rests(speed, self.pressing(wall, primary), &resolution)
-            });
-            (touch, Contact::Wall(wall))
+            })
         };
+        let hopped = self.moving.masses.dw != 0.0;
         self.moving.masses.primary = self.moving.masses.primary.plus([0.0, touch.kick]);
         self.moving.masses.particle = touch.particle;
         self.moving.masses.dw = touch.relative;
@@ -424,19 +419,27 @@ impl Plant {
             step.outcome.impacts += 1;
             step.tell(Event::Impact { t, wall, velocity });
         }
-        if touch.stuck && contact == Contact::Floor {
-            self.stick(step);
-        } else if touch.stuck {
-            self.status.contact = Some(contact);
-            step.outcome.stuck += 1;
-            step.tell(Event::Stuck { t, wall });
+        if touch.stuck {
+            self.rest(wall, hopped, step);
         }
     }
 
-    /// The same in a cavity with constant forces or a restitution that varies; and what a particle at rest is at rest on. Where friction
-    /// ends its last hop, that is the floor.
+    /// The particle is at rest at `wall`. If its last hop is ended by friction and not by the wall, it sticks to the floor.
     #[inline(never)]
-    fn real_touch(&self, wall: Wall, left: f64) -> (Touch, Contact) {
+    fn rest(&mut self, wall: Wall, hopped: bool, step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>) {
+        let (forces, velocity) = (&self.moving.system.forces, self.moving.masses.particle);
+        if hopped && forces.holding > 0.0 && forces.stop_a_hop(wall, self.pressing(wall, velocity).0) {
+            return self.stick(step);
+        }
+        let t = step.now();
+        self.status.contact = Some(Contact::Wall(wall));
+        step.outcome.stuck += 1;
+        step.tell(Event::Stuck { t, wall });
+    }
+
+    /// The same in a cavity with constant forces or a restitution that varies.
+    #[inline(never)]
+    fn real_touch(&self, wall: Wall, left: f64) -> Touch {
         let (system, velocities) = (&self.moving.system, self.velocities());
         let mut law = system.law;
         if system.varies {
@@ -444,19 +447,17 @@ impl Plant {
                 law.with_restitution((system.rebound).of_impact(wall, velocities.2.abs(), self.status.totals.impacts));
         }
         let resolution = Resolution { elastic: !system.varies, ..self.resolution(left) };
-        let (forces, mut contact) = (&system.forces, Contact::Wall(wall));
-        let touch = law.touch(wall, velocities, |primary, speed| {
-            let largest = self.acceleration_bound(primary) + forces.joint * forces.size();
-            if law.resting_with(1.0).certainly_leaves(speed, largest, &resolution) {
-                return false;
-            }
-            let (free, error) = self.pressing(wall, primary);
-            if speed > 0.0 && forces.holding > 0.0 && forces.stop_a_hop(wall, free) {
-                contact = Contact::Floor;
-            }
-            (system.rebound).rests(&law, forces, (wall, speed), (free, error), &resolution)
-        });
-        (touch, contact)
+        law.touch(wall, velocities, |primary, speed| {
+            let largest = self.acceleration_bound(primary) + system.forces.joint * system.forces.size();
+            !law.resting_with(1.0).certainly_leaves(speed, largest, &resolution)
+                && (system.rebound).rests(
+                    &law,
+                    &system.forces,
+                    (wall, speed),
+                    self.pressing(wall, primary),
+                    &resolution,
+                )
+        })
     }
 
     /// Velocities of primary mass and particle, and the relative velocity.

@@ -13,6 +13,13 @@ mod flight;
 mod propagator;
 mod verify;
 
+/// Whether a mechanism of the fast path is left out, to measure what it saves: `LOVINES_WITHOUT=hop cargo bench --bench savings -- scenes`.
+/// In any other build this is false at compile time.
+#[inline(always)]
+fn without(mechanism: &str) -> bool {
+    option_env!("LOVINES_WITHOUT").is_some_and(|left_out| left_out == mechanism)
+}
+
 use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive, Phase, shift};
 use crate::contact::Wall;
@@ -210,8 +217,9 @@ impl FastPath {
     /// Whether a bound from the start alone shows that no wall is met within `t`; it may reach further.
     #[inline(never)]
     fn is_contact_free(&mut self, moving: &Moving, t: f64) -> bool {
-        self.state.contact_free = Horizon::ahead(moving, &self.point(moving), t);
-        self.state.contact_free.t >= t
+        let ahead = Horizon::ahead(moving, &self.point(moving), t);
+        self.state.contact_free = if without("horizon") { Horizon::default() } else { ahead };
+        ahead.t >= t
     }
 
     /// Moves on by `t` seconds, in which no wall is met; `duration` is the length of the whole step.
@@ -252,7 +260,7 @@ impl FastPath {
         }
         let again = (duration - self.state.last_duration).abs() <= SAME * duration;
         self.state.last_duration = duration;
-        if again && ShortStep::is_short(oscillator, drive.omega, duration) {
+        if again && !without("short step") && ShortStep::is_short(oscillator, drive.omega, duration) {
             self.cache.step = ShortStep::from(duration);
         }
         duration == self.cache.step.t
@@ -326,7 +334,7 @@ impl Cache {
         oscillator: &Oscillator,
         coefficients: &Coefficients,
     ) -> Option<&Propagator> {
-        if !sequence.regular {
+        if !sequence.regular || without("sequence") {
             return None;
         }
         let (propagator, t) = (

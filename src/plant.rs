@@ -135,12 +135,11 @@ impl Plant {
     /// Relative displacement `w = q1 - q2`, m.
     #[inline]
     pub fn relative_displacement(&self) -> f64 {
-        let (w, system) = (self.moving.masses.w.value(), &self.moving.system);
-        if w.abs() >= system.half_width {
-            system.at_wall(Wall::ahead(w))
-        } else {
-            w + system.middle
+        let w = self.moving.masses.w.value();
+        if self.moving.system.is_skewed {
+            return skewed(w, &self.moving.system);
         }
+        w
     }
 
     /// Relative velocity `w'`, m/s.
@@ -202,6 +201,20 @@ impl Plant {
         let stretch = q1 - displacement;
         0.5 * (p.primary_mass * dq1 * dq1 + p.particle_mass * dq2 * dq2 + p.stiffness * stretch * stretch)
             - p.particle_mass * self.moving.system.forces.gravity * q2
+    }
+}
+
+/// `q1 - q2` for unequal gaps, m, `w` from the middle. On a wall the sum with the middle would miss the gap by its rounding.
+#[cold]
+#[inline(never)]
+fn skewed(w: f64, system: &System) -> f64 {
+    let [plus, minus] = system.parameters.gaps();
+    if w >= system.half_width {
+        plus
+    } else if w <= -system.half_width {
+        -minus
+    } else {
+        w + system.middle
     }
 }
 

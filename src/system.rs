@@ -16,6 +16,8 @@ pub(crate) struct System {
     pub half_width: f64,
     /// The middle between the walls, as a value of `q1 - q2`, m.
     pub middle: f64,
+    /// Whether it is not 0: the gaps are unequal.
+    pub is_skewed: bool,
     /// The law of impacts, where the coefficient of restitution is constant.
     pub law: ImpactLaw,
     /// The coefficient of restitution, where it `varies`.
@@ -37,6 +39,7 @@ impl From<Parameters> for System {
         Self {
             half_width: 0.5 * plus + 0.5 * minus,
             middle: 0.5 * (plus - minus),
+            is_skewed: plus != minus,
             varies,
             rebound,
             forces,
@@ -51,12 +54,6 @@ impl From<Parameters> for System {
 }
 
 impl System {
-    /// `q1 - q2` at a wall, m: the sum of half-width and middle would miss the gap by its rounding.
-    #[cold]
-    pub fn at_wall(&self, wall: Wall) -> f64 {
-        wall.sign() * self.parameters.gaps()[wall.index()]
-    }
-
     /// Acceleration of the particle by kinetic friction while `w'` has the sign `direction`, m/s².
     pub fn friction(&self, direction: f64) -> f64 {
         self.forces.kinetic * direction

@@ -2,7 +2,7 @@
 
 use super::propagator::{Coefficients, Increment, NEAR, Nearby, POINTS, PhasePoint, Propagator, STRETCH, TERMS, angle};
 use super::verify::{Horizon, Mark, RelativeMotion, Start};
-use super::{FastPath, Next};
+use super::{FastPath, Next, without};
 use crate::arithmetic::Sum;
 use crate::base_motion::BaseMotion;
 use crate::contact::Wall;
@@ -65,7 +65,7 @@ impl FastPath {
         let (system, base) = (&moving.system, &moving.base);
         let mut point = self.point(moving);
         point.y -= system.shift(-system.friction(direction));
-        if self.state.disabled || !applies(system, base, &point) {
+        if self.state.disabled || without("forces") || !applies(system, base, &point) {
             return None;
         }
         self.coefficients.prepare(&system.free, base.drive.omega);
@@ -196,7 +196,7 @@ impl FastPath {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn hop(&mut self, start: &Start, left: f64) -> Option<Arrival> {
         let (here, b) = (&start.here.sample, start.system.half_width);
-        if here.w.abs() != b {
+        if here.w.abs() != b || without("hop") {
             return None;
         }
         let s = 1f64.copysign(here.w);
@@ -250,6 +250,9 @@ impl FastPath {
     /// halved, down to [`SHORTEST`].
     #[inline(never)]
     pub(super) fn march(&mut self, start: &Start, left: f64, predicted: Option<&Arrival>) -> FlightEnd {
+        if without("march") {
+            return FlightEnd::Nothing;
+        }
         let mut from = start.here;
         // Points of the grid in the next stretch.
         let mut n = STRETCH;

@@ -186,6 +186,7 @@ pub(crate) struct Horizon {
 impl Horizon {
     /// No contact for `t` seconds under the drive as it is.
     pub fn unchanged(t: f64) -> Self {
+        let t = if super::without("horizon") { 0.0 } else { t };
         Self { t, forcing: f64::NEG_INFINITY, jumps: 0.0 }
     }
 
@@ -207,7 +208,7 @@ impl Horizon {
         let end = 2.0 * gap / (closing + (closing * closing + 2.0 * acceleration * gap).sqrt());
         let far = reach.min(end * (1.0 - 1e-6));
         match [far, t].into_iter().find(|&one| one >= t && open(one)) {
-            Some(t) if !base.drive.is_straight() => Self::unchanged(t),
+            Some(t) if !base.drive.is_straight() => Self { t, forcing: f64::NEG_INFINITY, jumps: 0.0 },
             Some(t) => Self { t, forcing, jumps },
             None => Self::default(),
         }
