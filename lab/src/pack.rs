@@ -2,7 +2,7 @@
 //! SSP 1.0, System Structure and Parameterization. The same input gives the same bytes.
 
 use std::collections::BTreeMap;
-use std::env::consts::{ARCH, DLL_PREFIX, DLL_SUFFIX, OS};
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -10,6 +10,7 @@ use std::str::FromStr;
 use fmi2_description::Description;
 use maud::{DOCTYPE, PreEscaped, html};
 use phase_lock::{PARAMETERS, Value};
+use vines_fmu::{PLATFORMS, own_platforms};
 use vines_model::ArgumentError;
 use zip::{ZipWriter, result::ZipError, write::SimpleFileOptions};
 
@@ -59,19 +60,6 @@ pub fn components() -> [Component; 2] {
     ]
 }
 
-/// Folders below `binaries/`, with their system, processor and suffix of a library. FMI 2.0 names none for ARM except `darwin64`; the names
-/// for ARM are from FMI 3.0.
-const PLATFORMS: [(&str, &str, &str, &str); 8] = [
-    ("linux64", "linux", "x86_64", ".so"),
-    ("linux32", "linux", "x86", ".so"),
-    ("aarch64-linux", "linux", "aarch64", ".so"),
-    ("win64", "windows", "x86_64", ".dll"),
-    ("win32", "windows", "x86", ".dll"),
-    ("aarch64-windows", "windows", "aarch64", ".dll"),
-    ("darwin64", "macos", "x86_64", ".dylib"),
-    ("aarch64-darwin", "macos", "aarch64", ".dylib"),
-];
-
 /// A library for a platform; parse it from `win64=PATH`.
 #[derive(Debug, Clone)]
 pub struct Binary {
@@ -110,10 +98,8 @@ pub fn own_libraries(components: &[Component], folder: &Path) -> Result<Vec<Bina
                  or name its folder with --libraries"
             ),
         })?;
-        // On Apple silicon, masters look into either folder.
-        let own = |os, arch| os == OS && (arch == ARCH || (OS, ARCH) == ("macos", "aarch64"));
-        let own = PLATFORMS.into_iter().filter(|(_, os, arch, _)| own(*os, *arch));
-        binaries.extend(own.map(|(folder, .., suffix)| Binary { platform: [folder, suffix], path: path.clone() }));
+        binaries
+            .extend(own_platforms().map(|(folder, suffix)| Binary { platform: [folder, suffix], path: path.clone() }));
     }
     Ok(binaries)
 }

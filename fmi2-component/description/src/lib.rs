@@ -1,11 +1,13 @@
 //! Reader of `modelDescription.xml` (FMI 2.0, clause 2.2), for the build step, the lab and the tests.
 //!
-//! Elements and attributes that are not fields here are ignored. Whether a description is valid is for a validator to
-//! decide, such as FMPy's.
+//! Every description that the schema accepts is read, in any encoding that it declares. [`Description::left_out`] lists what the schema
+//! does not have. Whether a description is valid is for a validator to decide, such as FMPy's.
 #![forbid(unsafe_code)]
 #![allow(missing_docs)] // the names are those of the standard
 
-use serde::{Deserialize, Deserializer};
+mod schema;
+
+use serde::{Deserialize, Deserializer, de};
 
 /// Structures of elements: `field: type = "@attribute"` or `"Element"`. What may be absent is an `Option`, or has a default.
 macro_rules! elements {
@@ -29,11 +31,15 @@ elements! {
         #[serde(default)]
         version: String = "@version",
         #[serde(default)]
+        generation_tool: String = "@generationTool",
+        #[serde(default)]
         number_of_event_indicators: usize = "@numberOfEventIndicators",
         model_exchange: Option<Interface> = "ModelExchange",
         co_simulation: Option<Interface> = "CoSimulation",
         #[serde(default)]
         default_experiment: DefaultExperiment = "DefaultExperiment",
+        #[serde(default, deserialize_with = "list")]
+        units: Vec<Unit> = "UnitDefinitions",
         #[serde(default, deserialize_with = "list")]
         types: Vec<SimpleType> = "TypeDefinitions",
         #[serde(default, deserialize_with = "list")]
@@ -43,11 +49,38 @@ elements! {
         variables: Vec<ScalarVariable> = "ModelVariables",
         #[serde(default)]
         structure: ModelStructure = "ModelStructure",
+        /// Attributes, elements and bytes that the schema does not have, and that were not read.
+        #[serde(skip)]
+        left_out: Vec<String> = "-",
     }
 
     /// `ModelExchange` or `CoSimulation`.
     Interface {
         model_identifier: String = "@modelIdentifier",
+        #[serde(default, deserialize_with = "truth")]
+        can_handle_variable_communication_step_size: bool = "@canHandleVariableCommunicationStepSize",
+        #[serde(default, deserialize_with = "truth")]
+        needs_execution_tool: bool = "@needsExecutionTool",
+    }
+
+    Unit {
+        name: String = "@name",
+        base: Option<BaseUnit> = "BaseUnit",
+    }
+
+    /// A unit in SI units: exponents, and value in SI units = factor times value + offset.
+    #[serde(default)]
+    BaseUnit {
+        kg: i32 = "@kg",
+        m: i32 = "@m",
+        s: i32 = "@s",
+        ampere: i32 = "@A",
+        kelvin: i32 = "@K",
+        mol: i32 = "@mol",
+        cd: i32 = "@cd",
+        rad: i32 = "@rad",
+        factor: f64 = "@factor",
+        offset: f64 = "@offset",
     }
 
     /// Values as text, s.
@@ -180,8 +213,37 @@ impl Description {
     /// # Errors
     /// Text that is not XML, and a missing or invalid attribute.
     pub fn parse(xml: &str) -> Result<Self, Error> {
-        let reader = &mut serde_xml_rs::Deserializer::new_from_reader(xml.as_bytes());
-        serde_path_to_error::deserialize(reader).map_err(|error| Error(error.to_string()))
+        Self::read(xml.as_bytes())
+    }
+
+    /// Reads a description in the encoding that it declares.
+    ///
+    /// # Errors
+    /// Text that is not XML, an unknown encoding, and a missing or invalid attribute.
+    pub fn read(xml: &[u8]) -> Result<Self, Error> {
+        let (known, left_out) = schema::known(xml)?;
+        let reader = &mut serde_xml_rs::Deserializer::new_from_reader(&*known);
+        let read: Result<Self, _> = serde_path_to_error::deserialize(reader);
+        let description = read.map_err(|error| Error(error.to_string()))?;
+        Ok(Self { left_out, ..description })
+    }
+
+    /// The unit that a variable declares, itself or by its type.
+    #[must_use]
+    pub fn unit_of<'a>(&'a self, variable: &'a ScalarVariable) -> Option<&'a str> {
+        let (kind, own) = variable.content()?;
+        let declared = || {
+            let name = own.declared_type.as_ref()?;
+            let mut types = self.types.iter().filter(|declared| declared.name == *name);
+            types.find_map(|declared| declared.content().filter(|(other, _)| *other == kind)?.1.unit.as_ref())
+        };
+        own.unit.as_ref().or_else(declared).map(String::as_str)
+    }
+
+    /// A defined unit in SI units.
+    #[must_use]
+    pub fn base_unit(&self, name: &str) -> Option<&BaseUnit> {
+        self.units.iter().find(|unit| unit.name == name)?.base.as_ref()
     }
 
     /// The variable of that name.
@@ -197,10 +259,36 @@ fn list<'de, D: Deserializer<'de>, T: Deserialize<'de>>(element: D) -> Result<Ve
     #[derive(Deserialize)]
     struct List<T> {
         #[serde(rename = "ScalarVariable", alias = "SimpleType", alias = "Category")]
-        #[serde(alias = "Unknown", default = "Vec::new")]
+        #[serde(alias = "Unknown", alias = "Unit", default = "Vec::new")]
         elements: Vec<T>,
     }
     List::deserialize(element).map(|list| list.elements)
+}
+
+/// `xs:boolean`.
+fn truth<'de, D: Deserializer<'de>>(attribute: D) -> Result<bool, D::Error> {
+    match &*String::deserialize(attribute)? {
+        "true" | "1" => Ok(true),
+        "false" | "0" => Ok(false),
+        other => Err(de::Error::custom(format!("{other:?} is not true or false"))),
+    }
+}
+
+impl Default for BaseUnit {
+    fn default() -> Self {
+        Self {
+            kg: 0,
+            m: 0,
+            s: 0,
+            ampere: 0,
+            kelvin: 0,
+            mol: 0,
+            cd: 0,
+            rad: 0,
+            factor: 1.0,
+            offset: 0.0,
+        }
+    }
 }
 
 /// Gives access to the element of the type.

@@ -161,12 +161,12 @@ pub trait Controller {
     /// # Errors
     /// A controller that cannot control the response, or cannot do so now.
     fn hold_response(&mut self, _to: Move, _phase_target: f64) -> Result<(), ControllerError> {
-        Err(ControllerError::NoResponseLoop)
+        Err(ControllerError::NoResponseLoop(Vec::new()))
     }
 
     /// Controls the amplitude of the drive again, at its setpoint.
     fn hold_drive(&mut self) -> Result<(), ControllerError> {
-        Err(ControllerError::NoResponseLoop)
+        Err(ControllerError::NoResponseLoop(Vec::new()))
     }
 }
 
@@ -196,12 +196,21 @@ pub enum RigError {
 pub enum ControllerError {
     #[error("the controller: {0}")]
     Failed(#[source] Cause),
+    /// With the names of what it lacks, where these are known.
     #[error(
-        "the controller cannot hold the amplitude of the response; use the built-in controller or PhaseLock.fmu, here or across the network"
+        "the controller cannot hold the amplitude of the response{}; use the built-in controller or PhaseLock.fmu, here or across the network",
+        lacking(.0)
     )]
-    NoResponseLoop,
+    NoResponseLoop(Vec<String>),
     #[error("the controller: {0}")]
     Refused(#[from] ConfigError),
+}
+
+fn lacking(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        names => format!(": it lacks {}", names.join(", ")),
+    }
 }
 
 impl RigError {
@@ -218,6 +227,30 @@ impl ControllerError {
     }
 }
 
+/// Time of a simulation in steps: their number times their length since that has changed. A sum of steps would carry a rounding error of
+/// each, and a component with a clock of its own would now and then make no step, or two.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Clock {
+    origin: f64,
+    count: u32,
+    step: f64,
+}
+
+impl Clock {
+    /// The time, s.
+    pub fn time(&self) -> f64 {
+        self.origin + f64::from(self.count) * self.step
+    }
+
+    /// Goes on by a step, s.
+    pub fn advance(&mut self, step: f64) {
+        if step != self.step {
+            *self = Self { origin: self.time(), count: 0, step };
+        }
+        self.count += 1;
+    }
+}
+
 // The simulated plant as a rig, without an FMU.
 
 /// The plant, stepped directly.
@@ -225,19 +258,27 @@ impl ControllerError {
 pub struct Simulated {
     plant: Plant,
     sensor: Sensor,
+    clock: Clock,
 }
 
 impl Simulated {
     /// A plant at its start; its response is v.
     pub fn new(parameters: Parameters, start: State) -> Result<Self, InvalidValue> {
         let plant = Plant::new(parameters, start)?;
-        Ok(Self { plant, sensor: Sensor::V })
+        Ok(Self { plant, sensor: Sensor::V, clock: Clock::default() })
     }
 
     /// The rig of a scene, with its measurement chain.
     pub fn of(scene: &Scene) -> Result<Box<dyn Rig>, InvalidValue> {
         let plant = Self::new(scene.plant, scene.start)?.with_sensors(scene.resonance);
         Ok(Chain::around(Box::new(plant), scene))
+    }
+
+    fn step(&mut self, drive: lovines::Drive, step: f64) -> Result<(), RigError> {
+        self.plant.set_time(self.clock.time());
+        self.plant.advance(drive, step)?;
+        self.clock.advance(step);
+        Ok(())
     }
 
     /// This plant with the sensors of a definition.
@@ -258,14 +299,11 @@ impl Rig for Simulated {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let drive = lovines::Drive::harmonic(drive.amplitude, drive.omega);
-        self.plant.advance(drive, step)?;
-        Ok(())
+        self.step(lovines::Drive::harmonic(drive.amplitude, drive.omega), step)
     }
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.plant.advance(lovines::Drive::held(drive.displacement), step)?;
-        Ok(())
+        self.step(lovines::Drive::held(drive.displacement), step)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

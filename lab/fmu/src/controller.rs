@@ -6,11 +6,32 @@ use phase_lock::{Config, MOVE, PARAMETERS};
 use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Sensors};
 use vines_testbench::scene::Names;
 
-use crate::instance::{FmiType, Fmu, FmuError, Variable};
+use crate::instance::{Connection, Fmu, FmuError, Variable, unpack};
 
-/// The names of this bench that a scene may map, beside those of the parameters.
-const NAMES: &str = "response, reference, active, omega, E, drive, phase_error, phase_measured, hold_response, \
-                     settled, locked, state, fault";
+/// What the bench uses beside the parameters and the fields of a move, with SI units.
+const NAMES: [(&str, &str); 13] = [
+    ("response", "m"),
+    ("reference", "m"),
+    ("active", ""),
+    ("omega", "rad/s"),
+    ("E", "m"),
+    ("drive", "m"),
+    ("phase_error", "rad"),
+    ("phase_measured", ""),
+    ("hold_response", ""),
+    ("settled", ""),
+    ("locked", ""),
+    ("state", ""),
+    ("fault", ""),
+];
+
+/// All that the bench uses, with SI units.
+fn used() -> Vec<(String, &'static str)> {
+    let parameters = PARAMETERS.iter().map(|parameter| (parameter.name, parameter.unit));
+    let named = NAMES.into_iter().chain(parameters);
+    let moves = MOVE.map(|(name, unit)| (format!("move.{name}"), unit));
+    named.map(|(name, unit)| (name.to_owned(), unit)).chain(moves).collect()
+}
 
 /// A controller FMU, stepped sample by sample.
 ///
@@ -36,55 +57,60 @@ pub struct FmuController {
     locked: Option<Variable>,
     state: Option<Variable>,
     fault: Option<Variable>,
-    /// `phase_target` and the fields of the move, in the order of the core's table, and `hold_response`.
-    response_loop: Option<(Vec<Variable>, Variable)>,
+    /// `hold_response`, `phase_target` and the fields of the move, in the order of the core's table; or the names of those that are missing.
+    response_loop: Result<Vec<Variable>, Vec<String>>,
 }
 
 impl FmuController {
     /// Loads the controller at `path` and initialises it with a configuration.
     pub fn load(path: &Path, config: &Config, names: &Names) -> Result<Self, FmuError> {
-        let moves = MOVE.iter().map(|(name, _)| format!("move.{name}"));
-        let moves: Vec<String> = moves.collect();
-        let parameters = PARAMETERS.iter().map(|parameter| parameter.name);
-        let known = std::iter::once(NAMES)
-            .chain(parameters)
-            .chain(moves.iter().map(String::as_str));
-        let fmu = Fmu::load(path, "controller", names, &known.collect::<Vec<_>>().join(", "))?;
-        let (real, boolean) = (
-            |ours| fmu.find(FmiType::Real, ours),
-            |ours| fmu.find(FmiType::Boolean, ours),
-        );
-        let (settled, locked, phase_error) = (boolean("settled")?, boolean("locked")?, real("phase_error")?);
+        let fmu = Fmu::load(path, "controller", names, &used(), config.sample_time)?;
+        let (settled, locked, phase_error) = (fmu.find("settled"), fmu.find("locked"), fmu.find("phase_error"));
         if settled.is_none() && locked.is_none() && phase_error.is_none() {
             log::warn!(
                 "{} has none of `settled`, `locked` and `phase_error`: its lock is judged by its frequency alone",
                 path.display()
             );
         }
-        let targets = std::iter::once("phase_target").chain(moves.iter().map(String::as_str));
-        let targets: Option<Vec<Variable>> = targets.map(real).collect::<Result<_, _>>()?;
+        let moves = MOVE.map(|(name, _)| format!("move.{name}"));
+        let inputs = ["hold_response", "phase_target"]
+            .into_iter()
+            .map(str::to_owned)
+            .chain(moves);
+        let inputs: Vec<_> = inputs.map(|name| fmu.find(&name).ok_or(format!("`{name}`"))).collect();
+        let missing = inputs.iter().filter_map(|input| input.clone().err()).collect();
+        let inputs: Result<Vec<Variable>, String> = inputs.into_iter().collect();
         let values = PARAMETERS
             .iter()
             .map(|parameter| (parameter.name, parameter.get(config)));
         let mut controller = Self {
             sample_time: config.sample_time,
-            response: fmu.need(FmiType::Real, "response")?,
-            reference: real("reference")?,
-            active: fmu.need(FmiType::Boolean, "active")?,
-            omega: fmu.need(FmiType::Real, "omega")?,
-            amplitude: fmu.need(FmiType::Real, "E")?,
-            displacement: real("drive")?,
+            response: fmu.need("response")?,
+            reference: fmu.find("reference"),
+            active: fmu.need("active")?,
+            omega: fmu.need("omega")?,
+            amplitude: fmu.need("E")?,
+            displacement: fmu.find("drive"),
             phase_error,
-            phase_measured: boolean("phase_measured")?,
+            phase_measured: fmu.find("phase_measured"),
             settled,
             locked,
-            state: fmu.find(FmiType::Integer, "state")?,
-            fault: fmu.find(FmiType::Integer, "fault")?,
-            response_loop: targets.zip(boolean("hold_response")?),
+            state: fmu.find("state"),
+            fault: fmu.find("fault"),
+            response_loop: inputs.map_err(|_| missing),
             fmu,
         };
         controller.fmu.start(&values.collect::<Vec<_>>())?;
         Ok(controller)
+    }
+
+    /// What the bench uses, and what of it the FMU at `path` has.
+    pub fn connections(path: &Path, names: &Names) -> Result<Vec<Connection>, FmuError> {
+        Ok(unpack(path, names, &used())?.1)
+    }
+
+    fn response_loop(&self) -> Result<Vec<Variable>, ControllerError> {
+        self.response_loop.clone().map_err(ControllerError::NoResponseLoop)
     }
 
     fn exchange(&mut self, sensors: Sensors, active: bool) -> Result<Command, FmuError> {
@@ -125,17 +151,17 @@ impl Controller for FmuController {
     }
 
     fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
-        let (inputs, hold) = self.response_loop.as_ref().ok_or(ControllerError::NoResponseLoop)?;
+        let inputs = self.response_loop()?;
         let Move { response, duration, amplitude, omega, growth } = to;
         let values = [phase_target, response, duration, amplitude, omega, growth];
-        for (input, value) in inputs.iter().zip(values) {
+        for (input, value) in inputs[1..].iter().zip(values) {
             self.fmu.set(*input, value)?;
         }
-        Ok(self.fmu.set(*hold, 1.0)?)
+        Ok(self.fmu.set(inputs[0], 1.0)?)
     }
 
     fn hold_drive(&mut self) -> Result<(), ControllerError> {
-        let (_, hold) = self.response_loop.as_ref().ok_or(ControllerError::NoResponseLoop)?;
-        Ok(self.fmu.set(*hold, 0.0)?)
+        let inputs = self.response_loop()?;
+        Ok(self.fmu.set(inputs[0], 0.0)?)
     }
 }

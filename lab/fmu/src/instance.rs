@@ -1,17 +1,16 @@
-//! An FMU as part of the bench: the `fmi` crate loads it; its variables are found by name, and its time is kept.
+//! An FMU as part of the bench: its variables are found by name and converted to SI units, and its time is kept.
 
 use std::path::{Path, PathBuf};
 
-use fmi::fmi2::Fmi2Error;
-use fmi::fmi2::import::Fmi2Import;
-use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
-use fmi::schema::fmi2::ScalarVariableElement;
-use fmi::traits::FmiImport;
-use libloading::Library;
+use fmi2_description::{Description, FmiType, ScalarVariable};
 use phase_lock::Value;
 use thiserror::Error;
-use vines_testbench::rig::{ControllerError, RigError};
+use vines_testbench::rig::{Clock, ControllerError, RigError};
 use vines_testbench::scene::{Name, Names};
+
+use crate::archive::Unpacked;
+use crate::library::Instance;
+use crate::units::{Scale, scale};
 
 /// Reason why an FMU cannot be used, or cannot continue.
 #[derive(Debug, Error)]
@@ -19,18 +18,30 @@ use vines_testbench::scene::{Name, Names};
 pub enum FmuError {
     #[error("cannot load {} as an FMU: {reason}", path.display())]
     Load { path: PathBuf, reason: String },
-    #[error("{} has no {kind:?} variable `{name}`, which the bench needs; [rig.names] and [controller_names] of the scene map names", path.display())]
-    Variable { path: PathBuf, kind: FmiType, name: String },
+    #[error("{} has no variable `{name}` that is a number or a truth value, which the bench needs; [rig.names] and [controller_names] of \
+             the scene map names", path.display())]
+    Variable { path: PathBuf, name: String },
     #[error(
         "[rig.names] or [controller_names] of the scene maps `{name}`, which this bench does not have; it has: {names}"
     )]
     Name { name: String, names: String },
-    #[error("{} refused to {action} at t = {time} s: it returned {status:?}", path.display())]
-    Refused {
+    #[error("{} declares `{name}` in {unit}, which is not converted to {ours}; correct its unit, or map it with one in [rig.names] or \
+             [controller_names] of the scene, such as {name} = {{ name = \"{name}\", factor = 1.0 }}", path.display())]
+    Unit {
         path: PathBuf,
+        name: String,
+        unit: String,
+        ours: &'static str,
+    },
+    #[error("{} makes fixed steps of {fixed} s, and the bench samples every {sample} s, which is not a multiple: multiply \
+             controller.samples_per_period by {} to sample at each of its steps", path.display(), sample / fixed)]
+    Step { path: PathBuf, fixed: f64, sample: f64 },
+    #[error("{file} refused to {action} at t = {time} s: {reason}")]
+    Refused {
+        file: String,
         action: &'static str,
         time: f64,
-        status: Fmi2Error,
+        reason: String,
     },
 }
 
@@ -46,129 +57,133 @@ impl From<FmuError> for ControllerError {
     }
 }
 
-/// Type of a variable in FMI.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the names are those of the standard")]
-pub enum FmiType {
-    Real,
-    Integer,
-    Boolean,
+/// A variable that the bench uses where an FMU has it: its name, its SI unit, and the FMU's variable.
+#[derive(Clone, Debug)]
+pub struct Connection {
+    /// The name on the bench.
+    pub ours: String,
+    /// The SI unit; empty: a number without a unit.
+    pub si: &'static str,
+    /// The name in the FMU, and the unit that it declares; `None`: the FMU lacks the variable.
+    pub theirs: Option<(String, Option<String>)>,
+    /// SI units per unit of the FMU's variable.
+    pub factor: f64,
+    pub(super) variable: Option<Variable>,
 }
 
-impl FmiType {
-    /// The type of a variable, if it is one of the three.
-    fn of(element: &ScalarVariableElement) -> Option<Self> {
-        match element {
-            ScalarVariableElement::Real(_) => Some(Self::Real),
-            ScalarVariableElement::Integer(_) => Some(Self::Integer),
-            ScalarVariableElement::Boolean(_) => Some(Self::Boolean),
-            _ => None,
-        }
-    }
-}
-
-/// A variable: its type, its value reference, and SI units per unit of it.
-#[derive(Clone, Copy)]
+/// A variable: its type, its value reference, and what its values mean.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Variable {
     kind: FmiType,
-    reference: [<Fmi2Import as FmiImport>::ValueRef; 1],
-    factor: f64,
+    reference: u32,
+    scale: Scale,
 }
 
 /// A loaded FMU at its simulated time.
 pub(super) struct Fmu {
     // Dropped before the unpacked library.
-    instance: InstanceCS,
-    /// The description, and the folder with the unpacked FMU.
-    import: Fmi2Import,
+    instance: Instance,
+    _unpacked: Unpacked,
     path: PathBuf,
-    /// What the scene calls its variables.
-    names: Names,
-    time: f64,
+    connections: Vec<Connection>,
+    /// Length of its steps, if that is fixed, s.
+    fixed: Option<f64>,
+    clock: Clock,
 }
 
 impl Fmu {
-    /// Loads the FMU at `path`; `name` is its name in log messages. Of the names of this bench, `names` may map those in `known`, separated by
-    /// commas.
-    pub fn load(path: &Path, name: &str, names: &Names, known: &str) -> Result<Self, FmuError> {
-        let list: Vec<&str> = known.split(", ").collect();
-        if let Some(name) = names.unknown(&list) {
-            return Err(FmuError::Name { name: name.into(), names: known.into() });
+    /// Loads the FMU at `path`; `role` is its name in log messages, and `bench` has the names and SI units of what the bench uses. It is
+    /// stepped by `sample` s.
+    pub fn load(
+        path: &Path,
+        role: &str,
+        names: &Names,
+        bench: &[(String, &'static str)],
+        sample: f64,
+    ) -> Result<Self, FmuError> {
+        let (unpacked, connections) = unpack(path, names, bench)?;
+        let description = &unpacked.description;
+        if !description.left_out.is_empty() {
+            let left_out = description.left_out.join(", ");
+            log::warn!("{}: its description has, beyond FMI 2.0, {left_out}", path.display());
         }
-        let (import, instance) = open(path, name).map_err(|reason| FmuError::Load { path: path.into(), reason })?;
-        let (path, names) = (path.into(), names.clone());
-        Ok(Self { instance, import, path, names, time: 0.0 })
+        let fixed = fixed_step(description);
+        let refused = |reason| FmuError::Load { path: path.into(), reason };
+        let instance = Instance::new(&unpacked, role, &file_name(path)).map_err(refused)?;
+        let (path, clock) = (path.into(), Clock::default());
+        let fmu = Self {
+            instance,
+            _unpacked: unpacked,
+            path,
+            connections,
+            fixed,
+            clock,
+        };
+        fmu.steps(sample)?;
+        Ok(fmu)
     }
 
-    /// The variable of this type for `ours`. A name that the user gave must exist.
-    pub fn find(&self, kind: FmiType, ours: &str) -> Result<Option<Variable>, FmuError> {
-        let Name { name, factor } = self.names.of(ours);
-        let variables = &self.import.model_description().model_variables.variables;
-        let variable = variables
-            .iter()
-            .find(|variable| variable.name == name && FmiType::of(&variable.elem) == Some(kind));
-        match variable {
-            None if self.names.mapped(ours).is_some() => Err(self.missing(kind, &name)),
-            variable => Ok(variable.map(|variable| Variable { kind, reference: [variable.value_reference], factor })),
-        }
+    /// The variable for `ours`.
+    pub fn find(&self, ours: &str) -> Option<Variable> {
+        self.connections.iter().find(|one| one.ours == ours)?.variable
     }
 
     /// A variable that the bench needs.
-    pub fn need(&self, kind: FmiType, ours: &str) -> Result<Variable, FmuError> {
-        self.find(kind, ours)?.ok_or_else(|| self.missing(kind, ours))
+    pub fn need(&self, ours: &str) -> Result<Variable, FmuError> {
+        let missing = || FmuError::Variable { path: self.path.clone(), name: ours.into() };
+        self.find(ours).ok_or_else(missing)
     }
 
-    fn missing(&self, kind: FmiType, name: &str) -> FmuError {
-        FmuError::Variable { path: self.path.clone(), kind, name: name.into() }
-    }
-
-    /// Sets the values that the FMU has variables for, and initialises it at time 0. A warning in the log names the
-    /// others; the FMU keeps its own values for these.
+    /// Sets the values that the FMU has variables for, and initialises it at time 0. It keeps its own values for the others.
     pub fn start(&mut self, values: &[(&str, Value)]) -> Result<(), FmuError> {
-        let mut missing = Vec::new();
         for &(name, value) in values {
-            let (kind, value) = match value {
-                Value::Real(value) => (FmiType::Real, value),
-                Value::Integer(value) => (FmiType::Integer, value.into()),
-                Value::Boolean(value) => (FmiType::Boolean, f64::from(u8::from(value))),
+            let value = match value {
+                Value::Real(value) => value,
+                Value::Integer(value) => value.into(),
+                Value::Boolean(value) => f64::from(u8::from(value)),
             };
-            match self.find(kind, name)? {
-                Some(variable) => self.set(variable, value)?,
-                None => missing.push(format!("`{name}`")),
+            if let Some(variable) = self.find(name) {
+                self.set(variable, value)?;
             }
         }
-        if !missing.is_empty() {
-            let path = self.path.display();
-            log::warn!("{path} has no {}; it uses its own values instead", missing.join(", "));
-        }
-        self.ask("start", |i| {
-            i.setup_experiment(None, 0.0, None)?;
-            i.enter_initialization_mode()?;
-            i.exit_initialization_mode()
-        })
+        let started = self.instance.start();
+        self.refused("start", started)
     }
 
-    /// One step of `step` seconds.
+    /// Steps by `step` seconds: at once, or in its own fixed steps.
     pub fn step(&mut self, step: f64) -> Result<(), FmuError> {
-        let time = self.time;
-        self.ask("advance", |i| i.do_step(time, step, true))?;
-        self.time += step;
+        let (count, length) = self.steps(step)?;
+        for _ in 0..count {
+            let stepped = self.instance.step(self.clock.time(), length);
+            self.refused("advance", stepped)?;
+            self.clock.advance(length);
+        }
         Ok(())
+    }
+
+    /// Number and length of its steps in `step` seconds.
+    fn steps(&self, step: f64) -> Result<(u32, f64), FmuError> {
+        let Some(fixed) = self.fixed else {
+            return Ok((1, step));
+        };
+        let count = (step / fixed).round();
+        // The digits in which a description gives its step.
+        if !(1.0..=1e6).contains(&count) || (count * fixed - step).abs() > 1e-9 * step {
+            return Err(FmuError::Step { path: self.path.clone(), fixed, sample: step });
+        }
+        Ok((count as u32, fixed))
     }
 
     /// Value of a variable, SI units; of a boolean one 0 or 1.
     pub fn get(&mut self, variable: Variable) -> Result<f64, FmuError> {
-        let Variable { kind, reference, factor } = variable;
-        let (mut real, mut whole) = ([0.0], [0]);
-        self.ask("give a value", |i| match kind {
-            FmiType::Real => i.get_real(&reference, &mut real),
-            FmiType::Integer => i.get_integer(&reference, &mut whole),
-            FmiType::Boolean => i.get_boolean(&reference, &mut whole),
-        })?;
-        Ok(match kind {
-            FmiType::Real => real[0] * factor,
-            FmiType::Integer | FmiType::Boolean => whole[0].into(),
-        })
+        let Variable { kind, reference, scale } = variable;
+        let value = match kind {
+            FmiType::Real => self.instance.real(reference),
+            FmiType::Boolean => self.instance.boolean(reference).map(|value| f64::from(u8::from(value))),
+            _ => self.instance.integer(reference).map(f64::from),
+        };
+        let value = self.refused("give a value", value)?;
+        Ok(scale.factor * value + scale.offset)
     }
 
     /// Value of a variable that the FMU may lack.
@@ -178,53 +193,93 @@ impl Fmu {
 
     /// Sets a variable, SI units.
     pub fn set(&mut self, variable: Variable, value: f64) -> Result<(), FmuError> {
-        let Variable { kind, reference, factor } = variable;
-        self.ask("take a value", |i| match kind {
-            FmiType::Real => i.set_real(&reference, &[value / factor]),
-            FmiType::Integer => i.set_integer(&reference, &[value as i32]),
-            FmiType::Boolean => i.set_boolean(&reference, &[i32::from(value != 0.0)]),
-        })
+        let Variable { kind, reference, scale } = variable;
+        let value = (value - scale.offset) / scale.factor;
+        let set = match kind {
+            FmiType::Real => self.instance.set_real(reference, value),
+            FmiType::Boolean => self.instance.set_boolean(reference, value != 0.0),
+            _ => self.instance.set_integer(reference, value.round() as i32),
+        };
+        self.refused("take a value", set)
     }
 
-    /// Calls the FMU; `action` completes the message "refused to …".
-    fn ask<T>(
-        &mut self,
-        action: &'static str,
-        call: impl FnOnce(&mut InstanceCS) -> Result<T, Fmi2Error>,
-    ) -> Result<(), FmuError> {
-        let (path, time) = (&self.path, self.time);
-        let refused = |status| FmuError::Refused { path: path.clone(), action, time, status };
-        call(&mut self.instance).map(drop).map_err(refused)
+    /// The error of a call; `action` completes the message "refused to …".
+    fn refused<T>(&self, action: &'static str, done: Result<T, String>) -> Result<T, FmuError> {
+        let (file, time) = (file_name(&self.path), self.clock.time());
+        done.map_err(|reason| FmuError::Refused { file, action, time, reason })
     }
 }
 
-/// Unpacks the FMU at `path` and instantiates it for co-simulation, with logging on.
-fn open(path: &Path, name: &str) -> Result<(Fmi2Import, InstanceCS), String> {
-    let reason = |error: fmi::Error| error.to_string();
-    // The crate would report another version as an error of the XML.
-    let version = fmi::import::peek_descr_path(path).map_err(reason)?.fmi_version;
-    if version != "2.0" {
-        return Err(format!("it has FMI version {version}; version 2.0 is needed"));
-    }
-    let import: Fmi2Import = fmi::import::from_path(path).map_err(reason)?;
-    let instance = import.instantiate_cs(name, false, true).map_err(reason)?;
-    Ok((import, instance))
+/// The name of a file: the plant's own FMU lies in a temporary folder, whose path says nothing.
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Loads the library, and looks for the function that makes instances.
-///
-/// # Errors
-/// What the system's loader says.
-pub fn check(path: &Path) -> Result<(), String> {
-    // The loader looks for a bare name elsewhere.
-    let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
-    let reason =
-        |error: libloading::Error| std::error::Error::source(&error).map_or(error.to_string(), ToString::to_string);
-    // SAFETY: a library of FMI 2.0 runs nothing of its own when it is loaded.
-    let library = unsafe { Library::new(path) }.map_err(reason)?;
-    // SAFETY: the function is not called.
-    let function = unsafe { library.get::<unsafe extern "C" fn()>(b"fmi2Instantiate") };
-    function.map(drop).map_err(reason)
+/// Unpacks an FMU, and finds what of `bench` it has.
+pub(super) fn unpack(
+    path: &Path,
+    names: &Names,
+    bench: &[(String, &'static str)],
+) -> Result<(Unpacked, Vec<Connection>), FmuError> {
+    let list: Vec<&str> = bench.iter().map(|(name, _)| name.as_str()).collect();
+    if let Some(name) = names.unknown(&list) {
+        return Err(FmuError::Name { name: name.into(), names: list.join(", ") });
+    }
+    let unpacked = Unpacked::new(path).map_err(|reason| FmuError::Load { path: path.into(), reason })?;
+    let connections = bench
+        .iter()
+        .map(|(ours, si)| connect(ours, si, names, &unpacked.description, path));
+    let connections = connections.collect::<Result<_, _>>()?;
+    Ok((unpacked, connections))
+}
+
+/// The variable for `ours`. A name that the user gave must exist.
+fn connect(
+    ours: &str,
+    si: &'static str,
+    names: &Names,
+    description: &Description,
+    path: &Path,
+) -> Result<Connection, FmuError> {
+    let Name { name, factor } = names.of(ours);
+    let is_number = |variable: &&ScalarVariable| {
+        let kind = variable.content().map(|(kind, _)| kind);
+        variable.name == name && kind.is_some_and(|kind| kind != FmiType::String)
+    };
+    let Some((variable, (kind, _))) = description
+        .variables
+        .iter()
+        .find(is_number)
+        .and_then(|variable| Some((variable, variable.content()?)))
+    else {
+        return match names.mapped(ours) {
+            Some(_) => Err(FmuError::Variable { path: path.into(), name }),
+            None => Ok(Connection { ours: ours.into(), si, theirs: None, factor, variable: None }),
+        };
+    };
+    let unit = description.unit_of(variable);
+    let scale = match unit {
+        Some(unit) if !names.is_explicit(ours) => {
+            let scale = scale(unit, description.base_unit(unit), si);
+            let unit = unit.to_owned();
+            scale.ok_or_else(|| FmuError::Unit { path: path.into(), name: ours.into(), unit, ours: si })?
+        }
+        _ => Scale { factor, offset: 0.0 },
+    };
+    Ok(Connection {
+        ours: ours.into(),
+        si,
+        factor: scale.factor,
+        variable: Some(Variable { kind, reference: variable.value_reference, scale }),
+        theirs: Some((name, unit.map(str::to_owned))),
+    })
+}
+
+/// The length of its steps, s, if it can make no others. Where the description does not give it, any constant step will do.
+fn fixed_step(description: &Description) -> Option<f64> {
+    let interface = description.co_simulation.as_ref()?;
+    let step = description.default_experiment.step_size.as_ref()?.trim().parse().ok()?;
+    (!interface.can_handle_variable_communication_step_size && step > 0.0 && f64::is_finite(step)).then_some(step)
 }
 
 #[cfg(test)]
@@ -234,9 +289,12 @@ mod tests {
     #[test]
     fn a_file_that_is_not_an_archive_is_refused() {
         let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"));
-        let message = Fmu::load(path, "rig", &Names::default(), "").err().unwrap().to_string();
+        let message = Fmu::load(path, "rig", &Names::default(), &[], 1.0)
+            .err()
+            .unwrap()
+            .to_string();
         assert!(
-            message.contains("Cargo.toml") && message.contains("Zip archive"),
+            message.contains("Cargo.toml") && message.contains("zip archive"),
             "{message}"
         );
     }

@@ -1,12 +1,15 @@
-//! FMUs on the bench: any FMI 2.0 co-simulation component as a rig or as a controller.
-//!
-//! The `fmi` crate loads them. Its limits are those of the bench: an FMU must not step asynchronously (`fmi2Pending`), and macOS on
-//! ARM is not supported.
+//! FMUs on the bench: any FMI 2.0 co-simulation component as a rig or as a controller. An FMU must not step asynchronously
+//! (`fmi2Pending`).
 
+mod archive;
 mod controller;
 mod instance;
+mod library;
 mod rig;
+mod units;
 
+pub use archive::{PLATFORMS, own_platforms};
 pub use controller::FmuController;
-pub use instance::{FmiType, FmuError, check};
+pub use instance::{Connection, FmuError};
+pub use library::check;
 pub use rig::FmuRig;

@@ -4,13 +4,36 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use vines_testbench::rig::{Drive, FrictionTotals, GroundTruth, Measured, Rig, RigError, Sensors, has_friction};
-use vines_testbench::scene::{PLANT_PARAMETERS, Reference as ReferenceSignal, Scene, Sensor};
+use vines_testbench::scene::{Names, PLANT_PARAMETERS, Reference as ReferenceSignal, Scene, Sensor};
 
-use crate::instance::{FmiType, Fmu, FmuError, Variable};
+use crate::instance::{Connection, Fmu, FmuError, Variable, unpack};
 
-/// The names of this bench that a scene may map.
-const NAMES: &str = "omega, E, e, response, base, impacts, impact_time, impact_velocity, sticks, stuck_time, friction_loss, q1, der(q1), \
-                     q2, der(q2)";
+/// What the bench uses beside the parameters, with SI units.
+const NAMES: [(&str, &str); 16] = [
+    ("omega", "rad/s"),
+    ("E", "m"),
+    ("e", "m"),
+    ("response", "m"),
+    ("v", "m"),
+    ("base", "m"),
+    ("impacts", ""),
+    ("impact_time", "s"),
+    ("impact_velocity", "m/s"),
+    ("sticks", ""),
+    ("stuck_time", "s"),
+    ("friction_loss", "J"),
+    ("q1", "m"),
+    ("der(q1)", "m/s"),
+    ("q2", "m"),
+    ("der(q2)", "m/s"),
+];
+
+/// All that the bench uses, with SI units.
+fn used() -> Vec<(String, &'static str)> {
+    let parameters = PLANT_PARAMETERS.iter().map(|row| (row.symbol, row.unit));
+    let named = NAMES.into_iter().chain(parameters);
+    named.map(|(name, unit)| (name.to_owned(), unit)).collect()
+}
 
 /// A plant FMU, stepped sample by sample.
 ///
@@ -47,42 +70,48 @@ impl FmuRig {
     /// the scene maps them to. It has the sensors of the scene.
     pub fn load(path: &Path, scene: &Scene) -> Result<Measured<Self>, FmuError> {
         let (names, definition) = (&scene.rig_names, scene.resonance);
-        let parameters = PLANT_PARAMETERS.each_ref().map(|row| row.symbol).join(", ");
-        let mut fmu = Fmu::load(path, "plant", names, &format!("{NAMES}, {parameters}"))?;
-        let [omega, amplitude] = ["omega", "E"].map(|ours| fmu.find(FmiType::Real, ours));
-        let inputs = omega?.zip(amplitude?).map(|(omega, amplitude)| [omega, amplitude]);
+        let mut fmu = Fmu::load(path, "plant", names, &used(), scene.sample_time())?;
+        let inputs = fmu
+            .find("omega")
+            .zip(fmu.find("E"))
+            .map(|(omega, amplitude)| [omega, amplitude]);
         let held = match inputs {
-            Some(_) => fmu.find(FmiType::Real, "e")?,
-            None => Some(fmu.need(FmiType::Real, "e")?),
+            Some(_) => fmu.find("e"),
+            None => Some(fmu.need("e")?),
         };
         let ours = match definition.sensor {
             _ if names.mapped("response").is_some() => "response",
             Sensor::V => "v",
             Sensor::Q1 | Sensor::Acceleration => "q1",
         };
-        let response = fmu.need(FmiType::Real, ours)?;
+        let response = fmu.need(ours)?;
         let reference = match definition.reference {
-            ReferenceSignal::Base => fmu.find(FmiType::Real, "base")?,
-            ReferenceSignal::Force => Some(fmu.need(FmiType::Real, "base")?),
+            ReferenceSignal::Base => fmu.find("base"),
+            ReferenceSignal::Force => Some(fmu.need("base")?),
         };
         fmu.start(&scene.start_values())?;
-        let inside = Inside::of(&fmu, has_friction(&scene.plant))?;
+        let inside = Inside::of(&fmu, has_friction(&scene.plant));
         let rig = Self { fmu, inputs, held, phase: 0.0, response, reference, inside };
         Ok(Measured::new(rig, definition, &scene.plant))
+    }
+
+    /// What the bench uses, and what of it the FMU at `path` has.
+    pub fn connections(path: &Path, names: &Names) -> Result<Vec<Connection>, FmuError> {
+        Ok(unpack(path, names, &used())?.1)
     }
 }
 
 impl Inside {
-    fn of(fmu: &Fmu, has_friction: bool) -> Result<Option<Self>, FmuError> {
-        let real = |ours| fmu.find(FmiType::Real, ours);
-        let reals = [real("impact_time")?, real("impact_velocity")?, real("der(q2)")?];
-        let (Some(impacts), [Some(a), Some(b), Some(c)]) = (fmu.find(FmiType::Integer, "impacts")?, reals) else {
-            return Ok(None);
+    fn of(fmu: &Fmu, has_friction: bool) -> Option<Self> {
+        let found = |ours| fmu.find(ours);
+        let reals = [found("impact_time"), found("impact_velocity"), found("der(q2)")];
+        let (Some(impacts), [Some(a), Some(b), Some(c)]) = (found("impacts"), reals) else {
+            return None;
         };
-        let sticks = fmu.find(FmiType::Integer, "sticks")?.filter(|_| has_friction);
-        let losses = real("stuck_time")?.zip(real("friction_loss")?);
+        let sticks = found("sticks").filter(|_| has_friction);
+        let losses = found("stuck_time").zip(found("friction_loss"));
         let friction = sticks.zip(losses).map(|(sticks, (time, loss))| [sticks, time, loss]);
-        Ok(Some(Self { impacts, reals: [a, b, c], friction }))
+        Some(Self { impacts, reals: [a, b, c], friction })
     }
 }
 

@@ -336,7 +336,7 @@ impl From<ControllerError> for Refusal {
                 let index = MOVE.iter().position(|(name, _)| *name == error.name);
                 (index.unwrap_or_default(), error.value.unwrap_or(f64::NAN))
             }
-            ControllerError::NoResponseLoop => (MOVE.len() - 1, 0.0),
+            ControllerError::NoResponseLoop(_) => (MOVE.len() - 1, 0.0),
             ControllerError::Failed(_) => (0, 0.0),
         };
         Self::Move { index, value }

@@ -2,6 +2,7 @@
 
 use clap::Args;
 use vines::experiment::ExperimentError;
+use vines::fmu::{FmuController, FmuRig};
 use vines::loop_check::{CheckedChannel, CheckedQuantity, LoopCheck, Verdict, check};
 use vines::table::{Table, number, with_uncertainty};
 
@@ -19,6 +20,7 @@ those of the scene's linear resonator at rest:
 From the growth of the response follow its natural frequency and damping, and its phase and amplitude beside an oscillator that has both.
 The second table compares the measured values with the scene. Amplitudes 5 %, phases 1 degree and clocks 0.1 % off are refused, beyond three
 standard uncertainties: later measurements would be wrong by as much. A different natural frequency or damping is reported, not refused.
+Of an FMU, as rig or as controller, a table shows which variables the bench uses, in which units they are declared, and how it converts them.
 At the end: the gains that follow from controller.bandwidth, the only tuning parameter, with their phase margin.
 The exit code is 1 if anything is refused. `vines identify` and `vines backbone` check every rig that is not a simulation first, and use
 the natural frequency and the damping that the check has measured.
@@ -37,6 +39,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     rig: Endpoint,
 
+    /// A controller as an FMU, of which the variables and units are shown
+    #[arg(long, value_name = "ENDPOINT")]
+    controller: Option<Endpoint>,
+
     #[command(flatten)]
     reach: ReachArguments,
 
@@ -47,10 +53,19 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?.at_rest();
-    let mut open = arguments.rig.rig(&scene, arguments.reach.reach()?)?;
+    let scope = arguments.reach.reach()?;
+    let mut variables = arguments
+        .rig
+        .variables("rig", |file| FmuRig::connections(file, &scene.rig_names))?;
+    let mut open = arguments.rig.rig(&scene, scope)?;
+    if let Some(controller) = &arguments.controller {
+        let names = &scene.controller_names;
+        variables += &controller.variables("controller", |file| FmuController::connections(file, names))?;
+        controller.controller(&scene.controller_config(), names, scope, open.pace)?;
+    }
     let checked = check(open.rig.as_mut(), &scene.plan()).map_err(ExperimentError::from)?;
     open.close();
-    let text = output(arguments.json, &checked, || described(&checked))?;
+    let text = output(arguments.json, &checked, || variables + &described(&checked))?;
     if checked.verdict == Verdict::Healthy {
         return Ok(text);
     }

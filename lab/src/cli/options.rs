@@ -1,17 +1,18 @@
 //! Options that several commands share: the scene, rigs and controllers, and what the network may reach.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::{Arc, OnceLock};
 
 use clap::Args;
 use phase_lock::Config;
 use vines::ArgumentError;
-use vines::fmu::{FmuController, FmuRig};
+use vines::fmu::{Connection, FmuController, FmuError, FmuRig};
 use vines::helic::{DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
 use vines::scene::{Family, Implausible, Names, Override, PAPER, Scene, SceneError};
+use vines::table::{Table, number};
 
 use super::failure::{Failure, stop_flag};
 use super::output::log_warnings;
@@ -143,6 +144,36 @@ impl OpenRig {
 }
 
 impl Endpoint {
+    /// What the bench uses of an FMU, in words; empty for other endpoints.
+    pub(super) fn variables(
+        &self,
+        role: &str,
+        connections: impl Fn(&Path) -> Result<Vec<Connection>, FmuError>,
+    ) -> Result<String, Failure> {
+        let Self::Fmu(file) = self else {
+            return Ok(String::new());
+        };
+        let (has, lacks): (Vec<_>, Vec<_>) = connections(file)?
+            .into_iter()
+            .partition(|connection| connection.theirs.is_some());
+        let rows = has.iter().filter_map(|Connection { ours, si, theirs, factor, .. }| {
+            let (name, unit) = theirs.as_ref()?;
+            let unit = unit.clone().unwrap_or_else(|| "not declared".into());
+            Some([ours.clone(), si.to_string(), name.clone(), unit, number(*factor)])
+        });
+        let table = Table::new("bench | SI unit | FMU | its unit | SI per unit").rows(rows);
+        let lacks: Vec<_> = lacks.iter().map(|connection| connection.ours.as_str()).collect();
+        let lacks = match lacks.is_empty() {
+            true => "nothing".into(),
+            false => lacks.join(", "),
+        };
+        Ok(format!(
+            "Variables of the {role} {}:\n{}\nIt lacks {lacks}; for these it keeps values of its own.\n\n",
+            file.display(),
+            table.text()
+        ))
+    }
+
     /// The rig of this endpoint.
     pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
         let (mut pace, mut timing) = (None, Arc::default());

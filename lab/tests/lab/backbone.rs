@@ -186,6 +186,6 @@ fn a_controller_that_cannot_hold_the_response_is_refused() {
         |_, _| {},
     )
     .unwrap_err();
-    let is_refused = matches!(error, ExperimentError::Controller(ControllerError::NoResponseLoop));
+    let is_refused = matches!(error, ExperimentError::Controller(ControllerError::NoResponseLoop(_)));
     assert!(is_refused, "{error}");
 }

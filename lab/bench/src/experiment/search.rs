@@ -104,7 +104,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// control it.
     pub fn lock(&mut self) -> Result<Option<bool>, ExperimentError> {
         let mut leg = match self.begin() {
-            Err(ExperimentError::Controller(ControllerError::NoResponseLoop)) => return Ok(None),
+            Err(ExperimentError::Controller(ControllerError::NoResponseLoop(_))) => return Ok(None),
             leg => leg?,
         };
         for search in 0..SEARCHES {

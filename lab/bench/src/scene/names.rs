@@ -33,13 +33,15 @@ pub struct Name {
 }
 
 /// As written: `"name"`, or a table with `name` and one of `unit` and `factor`.
-#[derive(Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, deny_unknown_fields)]
 enum NameSection {
     Plain(String),
     Full {
         name: String,
+        #[serde(skip_serializing_if = "Option::is_none")]
         unit: Option<String>,
+        #[serde(skip_serializing_if = "Option::is_none")]
         factor: Option<f64>,
     },
 }
@@ -78,10 +80,37 @@ impl TryFrom<NameSection> for Name {
     }
 }
 
+/// A variable, and whether the scene gives its unit or factor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "NameSection", into = "NameSection")]
+struct Mapped {
+    name: Name,
+    is_explicit: bool,
+}
+
+impl TryFrom<NameSection> for Mapped {
+    type Error = ArgumentError;
+
+    fn try_from(written: NameSection) -> Result<Self, ArgumentError> {
+        let is_explicit =
+            matches!(&written, NameSection::Full { unit, factor, .. } if unit.is_some() || factor.is_some());
+        Ok(Self { name: written.try_into()?, is_explicit })
+    }
+}
+
+impl From<Mapped> for NameSection {
+    fn from(Mapped { name: Name { name, factor }, is_explicit }: Mapped) -> Self {
+        match is_explicit {
+            true => Self::Full { name, unit: None, factor: Some(factor) },
+            false => Self::Plain(name),
+        }
+    }
+}
+
 /// The names that differ, by the names of this bench.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Names(BTreeMap<String, Name>);
+pub struct Names(BTreeMap<String, Mapped>);
 
 impl Names {
     /// The variable for `ours`; if it is not mapped, it has the same name, in SI units.
@@ -92,7 +121,12 @@ impl Names {
 
     /// The variable for `ours`, if it is mapped.
     pub fn mapped(&self, ours: &str) -> Option<&Name> {
-        self.0.get(ours)
+        self.0.get(ours).map(|mapped| &mapped.name)
+    }
+
+    /// Whether the scene gives the unit or factor of the variable for `ours`, against what a variable may declare itself.
+    pub fn is_explicit(&self, ours: &str) -> bool {
+        self.0.get(ours).is_some_and(|mapped| mapped.is_explicit)
     }
 
     /// Whether nothing is mapped.
