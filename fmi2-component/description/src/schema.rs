@@ -145,7 +145,12 @@ pub(crate) fn known(description: &[u8]) -> Result<(Vec<u8>, Vec<String>), Error>
                     let (key, value) = (&*attribute.name.local_name, &*attribute.value);
                     let unqualified = attribute.name.prefix.is_none();
                     if unqualified && entry(element.values, key).is_some() {
-                        start = start.attr(key, value.trim());
+                        // -0 is a count, too.
+                        let value = value.trim();
+                        let zero = value
+                            .strip_prefix('-')
+                            .filter(|digits| digits.bytes().all(|digit| digit == b'0'));
+                        start = start.attr(key, zero.unwrap_or(value));
                     } else if unqualified && entry(element.texts, key).is_some() {
                         start = start.attr(key, value);
                     } else if attribute.name.namespace.as_deref() != Some(INSTANCE) {

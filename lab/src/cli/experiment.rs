@@ -99,7 +99,14 @@ impl ExperimentArguments {
         let mut open = match rig {
             Some(endpoint) => endpoint.rig(&scene, scope)?,
             None => {
-                let temporary = tempfile::tempdir()?;
+                let temporary = tempfile::tempdir().map_err(|error| {
+                    let place = std::env::temp_dir();
+                    let advice = "set TMPDIR to a folder that can be written to, or use --rig built-in";
+                    Failure::run(format!(
+                        "cannot pack the plant's FMU in {}: {error}; {advice}",
+                        place.display()
+                    ))
+                })?;
                 let (name, content) = fmus()?.swap_remove(0);
                 let plant = temporary.path().join(name);
                 std::fs::write(&plant, content)?;

@@ -153,25 +153,34 @@ impl Endpoint {
         let Self::Fmu(file) = self else {
             return Ok(String::new());
         };
-        let (has, lacks): (Vec<_>, Vec<_>) = connections(file)?
-            .into_iter()
-            .partition(|connection| connection.theirs.is_some());
-        let rows = has.iter().filter_map(|Connection { ours, si, theirs, factor, .. }| {
-            let (name, unit) = theirs.as_ref()?;
-            let unit = unit.clone().unwrap_or_else(|| "not declared".into());
-            Some([ours.clone(), si.to_string(), name.clone(), unit, number(*factor)])
-        });
-        let table = Table::new("bench | SI unit | FMU | its unit | SI per unit").rows(rows);
-        let lacks: Vec<_> = lacks.iter().map(|connection| connection.ours.as_str()).collect();
-        let lacks = match lacks.is_empty() {
-            true => "nothing".into(),
-            false => lacks.join(", "),
-        };
-        Ok(format!(
-            "Variables of the {role} {}:\n{}\nIt lacks {lacks}; for these it keeps values of its own.\n\n",
-            file.display(),
-            table.text()
-        ))
+        let connections = connections(file)?;
+        let [mut same, mut lacks] = [Vec::new(), Vec::new()];
+        let mut rows = Vec::new();
+        for Connection { ours, si, theirs, factor, .. } in &connections {
+            match theirs {
+                None => lacks.push(ours.as_str()),
+                Some((name, unit))
+                    if name == ours && *factor == 1.0 && unit.as_deref().is_none_or(|unit| unit == *si) =>
+                {
+                    same.push(ours.as_str());
+                }
+                Some((name, unit)) => {
+                    let unit = unit.clone().unwrap_or_else(|| "not declared".into());
+                    rows.push([ours.clone(), si.to_string(), name.clone(), unit, number(*factor)]);
+                }
+            }
+        }
+        let mut text = format!("Variables of the {role} {}\n", file.display());
+        for (what, names) in [("as on the bench", same), ("not there", lacks)] {
+            if !names.is_empty() {
+                text += &format!("  {what}: {}\n", names.join(", "));
+            }
+        }
+        if !rows.is_empty() {
+            let table = Table::new("bench | SI unit | FMU | its unit | SI per unit").rows(rows);
+            text += &format!("\n{}", table.text());
+        }
+        Ok(text + "\n")
     }
 
     /// The rig of this endpoint.
