@@ -321,8 +321,8 @@ fn unloadable(error: &libloading::Error, fmu: &Unpacked) -> String {
             place.display()
         )
     } else if reason.contains("undefined symbol: Py") || reason.contains("undefined symbol: _Py") {
-        "; it needs a Python interpreter in this program: set LD_PRELOAD to the library of the Python that has its packages, such as \
-         /usr/lib/x86_64-linux-gnu/libpython3.11.so.1.0, or serve the controller from Python"
+        "; it needs Python in this program: set LD_PRELOAD to the library of that Python, libpython3.X.so, and PYTHONPATH to its packages, or \
+         serve the controller from Python"
             .into()
     } else if reason.contains("cannot open shared object file") {
         "; it needs that library: install it, or export the FMU with its libraries".into()
