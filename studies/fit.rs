@@ -189,6 +189,9 @@ fn recorded(case: &Case, snr: &str) -> Result<Points, Failure> {
     let recording = Recording {
         origin: "the recording".into(),
         channels: ["response".into(), "reference".into()],
+        start: 0.0,
+        is_acceleration: false,
+        notes: Vec::new(),
         sample_time: record.sample_time,
         response: samples.iter().map(|one| one.sensors.response).collect(),
         drive: samples.iter().filter_map(|one| one.sensors.reference).collect(),

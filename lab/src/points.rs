@@ -1,5 +1,5 @@
 //! Measurements in files: points of a backbone, from tables of any program (CSV) and from what `vines identify` and `vines backbone` write (CSV and
-//! JSON); and recordings, two channels over time (CSV).
+//! JSON); and recordings, two channels over time (CSV; [`Table`] reads both).
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -9,7 +9,7 @@ use std::str::FromStr;
 use serde_json::Value;
 
 use crate::ArgumentError;
-use crate::fit::{MeasuredPoint, Recording};
+use crate::fit::{MeasuredPoint, Recording, RecordingError, Selection, Table};
 use crate::identification::Regime;
 use crate::numerics::Estimate;
 use crate::scene::Name;
@@ -54,35 +54,6 @@ impl FromStr for Column {
 /// A row of a table: values by the names of the columns.
 type Row = BTreeMap<String, String>;
 
-/// A channel of a recording; parse it from `y`, `y:mm`, or `y:-0.5`: its name, and its unit or metres per unit.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Channel(Name);
-
-impl FromStr for Channel {
-    type Err = ArgumentError;
-
-    fn from_str(text: &str) -> Result<Self, ArgumentError> {
-        let Some((name, unit)) = text.rsplit_once(':') else {
-            return Ok(Self(Name { name: text.into(), factor: 1.0 }));
-        };
-        Ok(Self(match unit.parse::<f64>() {
-            Ok(factor) if factor.is_finite() && factor != 0.0 => Name { name: name.into(), factor },
-            _ => Name::with_unit(name, unit)?,
-        }))
-    }
-}
-
-/// How a recording is read.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Channels {
-    /// The response; its column is named `response` otherwise.
-    pub response: Option<Channel>,
-    /// The displacement of the base; its column is named `reference` otherwise.
-    pub drive: Option<Channel>,
-    /// Samples a second; otherwise the column `time` has the time in seconds.
-    pub rate: Option<f64>,
-}
-
 /// What a file contains.
 #[derive(Debug)]
 pub enum Measurement {
@@ -92,36 +63,51 @@ pub enum Measurement {
     Recording(Recording),
 }
 
-/// What is measured in a file: a recording if its channels are named, or if it has the columns that `vines` writes.
+/// What is measured in a file: points if it has one of their columns or `columns` names some, otherwise a recording.
 ///
 /// # Errors
 /// A file that cannot be read, without one of the columns, or with a value that is not a number.
-pub fn read(path: &Path, columns: &[Column], channels: &Channels) -> Result<Measurement, ArgumentError> {
+pub fn read(path: &Path, columns: &[Column], selection: &Selection) -> Result<Measurement, ArgumentError> {
+    let file = path.display();
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     if PYTHON.contains(&&*extension) {
-        let file = path.display();
         return Err(format!(
-            "{file}: this program reads recordings as CSV. `python -m vines fit {file}` with the same options reads MAT, HDF5, TDMS and UFF58; \
+            "{file}: this program reads recordings as CSV. `python -m vines fit {file}` with the same options reads MAT, HDF5, TDMS, UFF58 and LVM; \
              install it with `pip install './python[io]'`"
         )
         .into());
     }
-    let is_recording = || -> Option<bool> {
-        let headers = csv::Reader::from_path(path).ok()?.headers().ok()?.clone();
-        let has = |name: &str| headers.iter().any(|header| header.trim() == name);
-        Some(has("response") && (has("reference") || has("E")))
-    };
-    if channels.response.is_some() || channels.drive.is_some() || is_recording() == Some(true) {
-        return Ok(Measurement::Recording(recording(path, channels)?));
+    let refused = |error: RecordingError| ArgumentError::from(error.to_string());
+    let bytes = std::fs::read(path).map_err(|error| cannot_read(path, error))?;
+    if bytes.trim_ascii_start().starts_with(b"{") {
+        let value: Value = serde_json::from_slice(&bytes).map_err(|error| cannot_read(path, error))?;
+        let rows = objects(&value).ok_or_else(|| {
+            format!(
+                "{file} has neither a locked point (`lock`) nor `points`: expected identification.json, tracked.json, or a table (CSV)"
+            )
+        })?;
+        return points(path, &rows, columns);
     }
-    let (points, left_out) = points(path, columns)?;
-    Ok(Measurement::Points(points, left_out))
+    let table = Table::parse(&file.to_string(), &bytes).map_err(refused)?;
+    let is_named = selection.response.is_some() || selection.drive.is_some();
+    let has_points = !columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| table.has(name));
+    if has_points && !is_named {
+        let row = |row: Vec<(&str, String)>| row.into_iter().map(|(name, cell)| (name.to_string(), cell)).collect();
+        return points(path, &table.rows().map(row).collect::<Vec<Row>>(), columns);
+    }
+    let contents = table.contents();
+    if !is_named && !table.has("response") {
+        let names = COLUMNS.map(|(_, name, _)| name).join(", ");
+        return Err(refused(contents.refused(&format!(
+            " has neither the channels of a recording nor columns of points ({names}). Name the channels with --response NAME:UNIT and --drive \
+             NAME:UNIT, or the columns of points with --column"
+        ))));
+    }
+    Ok(Measurement::Recording(contents.recording(selection).map_err(refused)?))
 }
 
 /// Formats that the Python package reads.
-const PYTHON: [&str; 8] = ["mat", "h5", "hdf5", "hdf", "tdms", "uff", "unv", "uf"];
-/// Largest relative difference of a time step from the mean one.
-const UNEVEN: f64 = 0.01;
+const PYTHON: [&str; 9] = ["mat", "h5", "hdf5", "hdf", "tdms", "uff", "unv", "uf", "lvm"];
 
 fn cannot_read(path: &Path, reason: impl Display) -> ArgumentError {
     format!("cannot read {}: {reason}", path.display()).into()
@@ -132,106 +118,14 @@ fn not_a_number(path: &Path, row: usize, column: &str, value: &str) -> ArgumentE
     format!("{file}, row {row}: {column} = `{value}` is not a finite number").into()
 }
 
-/// Two channels of a table.
-fn recording(path: &Path, channels: &Channels) -> Result<Recording, ArgumentError> {
-    let (file, failed) = (path.display(), |error| cannot_read(path, error));
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(failed)?;
-    let headers = reader.headers().map_err(failed)?.clone();
-    let rows: Vec<csv::StringRecord> = reader.records().collect::<Result<_, _>>().map_err(failed)?;
-    let number = |row: usize, column: usize| {
-        let text = rows[row].get(column).unwrap_or("");
-        text.parse::<f64>()
-            .map_err(|_| not_a_number(path, row + 2, &headers[column], text))
-    };
-    let values = |column: usize, factor: f64| -> Result<Vec<f64>, ArgumentError> {
-        (0..rows.len()).map(|row| Ok(factor * number(row, column)?)).collect()
-    };
-    let column = |name: &str| headers.iter().position(|header| header == name);
-    let channel = |given: &Option<Channel>, option: &str, usual: &str| {
-        let usual = || Name { name: usual.into(), factor: 1.0 };
-        let Name { name, factor } = given.clone().map_or_else(usual, |Channel(name)| name);
-        let column = column(&name).ok_or_else(|| {
-            let names: Vec<&str> = headers.iter().collect();
-            format!(
-                "{file} has no channel `{name}`; it has {}. Name the channel with {option} NAME:UNIT; a recording needs the response and the \
-                 displacement of the base",
-                names.join(", ")
-            )
-        });
-        Ok::<_, ArgumentError>((values(column?, factor)?, name))
-    };
-    let sample_time = match (channels.rate, column("time")) {
-        (Some(rate), _) => 1.0 / rate,
-        (None, None) => {
-            return Err(format!("{file} has no column `time` (s): give the samples a second with --rate").into());
-        }
-        (None, Some(time)) => {
-            let times: Vec<f64> = values(time, 1.0)?;
-            let last = times.len().saturating_sub(1).max(1);
-            let step = (times.last().unwrap_or(&0.0) - times.first().unwrap_or(&0.0)) / last as f64;
-            let is_uneven = |pair: &[f64]| ((pair[1] - pair[0]) / step - 1.0).abs() > UNEVEN || step <= 0.0;
-            if let Some(n) = times.windows(2).position(is_uneven) {
-                let (row, from, to) = (n + 3, times[n], times[n + 1]);
-                return Err(format!(
-                    "{file}, row {row}: the time goes from {from} s to {to} s, where a step is {step:.6e} s: the recording is interrupted there. \
-                     Fit the parts as files of their own, `vines fit one.csv two.csv`"
-                )
-                .into());
-            }
-            step
-        }
-    };
-    let (response, response_name) = channel(&channels.response, "--response", "response")?;
-    // A run of `vines` without a base sensor has the drive that was commanded instead.
-    let is_silent = |column: usize| rows.iter().all(|row| row.get(column).is_none_or(str::is_empty));
-    let reference = column("reference").filter(|column| !is_silent(*column));
-    let (drive, drive_name) = match (&channels.drive, reference, column("omega").zip(column("E"))) {
-        (None, None, Some((omega, amplitude))) => {
-            let (omegas, amplitudes) = (values(omega, 1.0)?, values(amplitude, 1.0)?);
-            let mut phase = 0.0;
-            let mut before = amplitudes.first().copied().unwrap_or(0.0);
-            let base = omegas.iter().zip(&amplitudes).map(|(omega, amplitude)| {
-                let value = before * f64::sin(phase);
-                (phase, before) = (phase + omega * sample_time, *amplitude);
-                value
-            });
-            (base.collect(), "E".into())
-        }
-        _ => channel(&channels.drive, "--drive", "reference")?,
-    };
-    Ok(Recording {
-        origin: file.to_string(),
-        channels: [response_name, drive_name],
-        sample_time,
-        response,
-        drive,
-    })
-}
-
 /// The points of a file, and the number of points that are left out.
-fn points(path: &Path, columns: &[Column]) -> Result<(Vec<MeasuredPoint>, usize), ArgumentError> {
-    let text = std::fs::read_to_string(path).map_err(|error| cannot_read(path, error))?;
-    let rows: Vec<Row> = if text.trim_start().starts_with('{') {
-        let value: Value = serde_json::from_str(&text).map_err(|error| cannot_read(path, error))?;
-        objects(&value).ok_or_else(|| {
-            format!(
-                "{} has neither a locked point (`lock`) nor `points`: expected identification.json, tracked.json, or a table (CSV)",
-                path.display()
-            )
-        })?
-    } else {
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .from_reader(text.as_bytes());
-        let rows = reader.deserialize().collect::<Result<_, _>>();
-        rows.map_err(|error| cannot_read(path, error))?
-    };
+fn points(path: &Path, rows: &[Row], columns: &[Column]) -> Result<Measurement, ArgumentError> {
     let kept: Vec<(usize, &Row)> = rows.iter().enumerate().filter(|(_, row)| is_symmetric(row)).collect();
     let points = kept.iter().map(|(n, row)| point(path, n + 1, row, columns));
-    Ok((points.collect::<Result<_, _>>()?, rows.len() - kept.len()))
+    Ok(Measurement::Points(
+        points.collect::<Result<_, _>>()?,
+        rows.len() - kept.len(),
+    ))
 }
 
 /// The locked point of `vines identify`, or the points of `vines backbone`.

@@ -19,7 +19,7 @@ use vines_testbench::{
     backbone::track,
     comparison::{Comparison, TrackedComparison},
     experiment,
-    fit::{Found, Known, MeasuredPoint, Part, Recording, find, parts},
+    fit::{Channel, Contents, Found, Known, MeasuredPoint, Part, Recording, Selection, Table, find, parts},
     identification,
     rig::{BuiltIn, Simulated, Stoppable},
 };
@@ -90,28 +90,97 @@ pub fn fit(py: Python<'_>, scene: &Scene, points: Vec<[f64; 6]>, known: Vec<Stri
     fitted(py, scene, &points, &known, &[])
 }
 
-/// A recording: origin, names of the channels, time from sample to sample (s), response (m) and base (m).
-type Channels = (String, [String; 2], f64, Vec<f64>, Vec<f64>);
+/// A channel: name, unit, samples, and start and step (s) of a clock of its own.
+type ChannelTuple = (String, String, Vec<f64>, Option<[f64; 2]>);
+/// A recording: origin, names of the channels, start and step (s), whether the response is an acceleration, response, base, and notes.
+type RecordingTuple = (String, [String; 2], [f64; 2], bool, Vec<f64>, Vec<f64>, Vec<String>);
+
+/// The recording of two channels of a file: a table as text if `channels` is absent. `options`: response, drive and time.
+#[pyfunction]
+#[pyo3(signature = (path, channels, options, rate))]
+pub fn recording(
+    py: Python<'_>,
+    path: &str,
+    channels: Option<Vec<ChannelTuple>>,
+    options: [Option<String>; 3],
+    rate: Option<f64>,
+) -> PyResult<RecordingTuple> {
+    let [response, drive, time] = options;
+    let selection = Selection { response, drive, time, rate };
+    let channel = |(name, unit, values, clock)| Channel { name, unit, values, clock };
+    let read = || {
+        let contents = match channels {
+            None => Table::read(path.as_ref())?.contents(),
+            Some(channels) => Contents {
+                origin: path.into(),
+                channels: channels.into_iter().map(channel).collect(),
+                ..Contents::default()
+            },
+        };
+        contents.recording(&selection)
+    };
+    let Recording {
+        origin,
+        channels,
+        start,
+        sample_time,
+        is_acceleration,
+        response,
+        drive,
+        notes,
+    } = py.detach(read).map_err(invalid)?;
+    Ok((
+        origin,
+        channels,
+        [start, sample_time],
+        is_acceleration,
+        response,
+        drive,
+        notes,
+    ))
+}
+
+fn recording_of(
+    (origin, channels, [start, sample_time], is_acceleration, response, drive, notes): RecordingTuple,
+) -> Recording {
+    Recording {
+        origin,
+        channels,
+        start,
+        sample_time,
+        is_acceleration,
+        response,
+        drive,
+        notes,
+    }
+}
+
+/// f0 (Hz), zeta, their standard uncertainties, and a sentence; `None` if the recording is not a linear decay.
+#[pyfunction]
+pub fn linear_decay(py: Python<'_>, scene: &Scene, recording: RecordingTuple) -> PyResult<Option<([f64; 4], String)>> {
+    let recording = recording_of(recording);
+    let decay = py
+        .detach(|| recording.linear_decay(&scene.scene.knowledge()))
+        .map_err(invalid)?;
+    Ok(decay.map(|decay| {
+        let (f0, zeta) = (decay.omega.scaled(1.0 / std::f64::consts::TAU), decay.zeta);
+        (
+            [f0.value, f0.uncertainty, zeta.value, zeta.uncertainty],
+            decay.to_string(),
+        )
+    }))
+}
 
 /// The fit of recordings.
 #[pyfunction]
 pub fn fit_recordings(
     py: Python<'_>,
     scene: &Scene,
-    recordings: Vec<Channels>,
+    recordings: Vec<RecordingTuple>,
     known: Vec<String>,
 ) -> PyResult<String> {
     let known = parsed(&known)?;
-    let recordings = recordings
-        .into_iter()
-        .map(|(origin, channels, sample_time, response, drive)| Recording {
-            origin,
-            channels,
-            sample_time,
-            response,
-            drive,
-        });
-    let recordings: Vec<Recording> = recordings.collect();
+    let recordings: Vec<Recording> = recordings.into_iter().map(recording_of).collect();
     let parts = py
         .detach(|| parts(&recordings, &scene.scene, &known))
         .map_err(invalid)?

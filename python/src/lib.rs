@@ -23,6 +23,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(experiments::backbone, module)?,
         wrap_pyfunction!(experiments::fit, module)?,
         wrap_pyfunction!(experiments::fit_recordings, module)?,
+        wrap_pyfunction!(experiments::linear_decay, module)?,
+        wrap_pyfunction!(experiments::recording, module)?,
         wrap_pyfunction!(experiments::orbits, module)?,
         wrap_pyfunction!(experiments::theory, module)?,
         wrap_pyfunction!(experiments::regime, module)?,

@@ -7,15 +7,18 @@
 //! is chi-square; the parameters minimise it (Levenberg and Marquardt). Half of its second derivative, with every B eliminated, is the inverse
 //! of the covariance.
 
+mod channels;
 mod effects;
 mod recording;
+mod table;
 
+use std::cmp::Ordering;
 use std::f64::consts::TAU;
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
 use lovines::Cavity;
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, Matrix3, SMatrix, SVector, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
@@ -27,8 +30,10 @@ use vines_model::{ArgumentError, Definition};
 use crate::identification::ResonancePoint;
 use crate::scene::{Dimensionless, Parameters};
 
+pub use channels::{Channel, Contents, Selection};
 pub use effects::{Candidate, Effect, Explanation, Found, decimals, explain, find};
-pub use recording::{Kind, Part, Recording, RecordingError, parts};
+pub use recording::{Kind, LinearDecay, Part, Recording, RecordingError, parts};
+pub use table::Table;
 
 /// A measured point of phase resonance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -292,6 +297,45 @@ pub struct Fit {
     pub left_out: Vec<usize>,
     /// Particle speeds B of the points.
     speeds: Vec<f64>,
+    /// Chi-square of response, frequency and drive.
+    pub channels: [ChannelTest; 3],
+}
+
+/// Chi-square of one channel: whether its uncertainties have the right size.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct ChannelTest {
+    /// Sum of the squares of the residuals over their standard uncertainties.
+    pub chi_square: f64,
+    /// Its mean if the model and the uncertainties are right.
+    pub expected: f64,
+    /// Probability of a larger one; absent if the points say nothing about this channel.
+    pub p_value: Option<f64>,
+}
+
+impl ChannelTest {
+    /// The test of a channel, from the part of the residuals' covariance that belongs to it (Satterthwaite's approximation: a multiple of a
+    /// chi-square with the same mean and variance).
+    fn new(chi_square: f64, covariance: &DMatrix<f64>) -> Self {
+        let (expected, squares) = (covariance.trace(), covariance.norm_squared());
+        let distribution = ChiSquared::new(expected * expected / squares).ok();
+        let p_value = distribution.map(|one| one.sf(chi_square * expected / squares));
+        Self {
+            chi_square,
+            expected,
+            p_value: p_value.filter(|p| p.is_finite()),
+        }
+    }
+
+    /// What its size says about the uncertainties of this channel, at a probability of 1 % for all channels and both sides.
+    #[must_use]
+    pub fn verdict(&self) -> Option<Ordering> {
+        let limit = REJECTED / 6.0;
+        match self.p_value? {
+            p if p < limit => Some(Ordering::Less),
+            p if p > 1.0 - limit => Some(Ordering::Greater),
+            _ => None,
+        }
+    }
 }
 
 impl Fit {
@@ -310,6 +354,35 @@ impl Fit {
         let [a, b] = [first, second].map(|quantity| quantity.gradient(&self.x));
         let covariance = |a: &Unknowns, b: &Unknowns| (a.transpose() * self.covariance * b)[0];
         covariance(&a, &b) / (covariance(&a, &a) * covariance(&b, &b)).sqrt()
+    }
+
+    /// Standard uncertainties of M, k, c, m, b and r while the others are kept: the digits that a scene needs. With fewer, rounding would move
+    /// what the points determine better than each of these, such as the natural frequency.
+    #[must_use]
+    pub fn conditional_uncertainties(&self) -> [(&'static str, f64); 6] {
+        let quantities = [
+            Quantity::PrimaryMass,
+            Quantity::Stiffness,
+            Quantity::Damping,
+            Quantity::ParticleMass,
+            Quantity::B,
+            Quantity::R,
+        ];
+        let gradients = quantities.map(|one| one.gradient(&self.x));
+        let covariance = SMatrix::<f64, 6, 6>::from_fn(|i, j| {
+            (gradients[i].transpose() * self.covariance * gradients[j])[0]
+                / (self.size(quantities[i]) * self.size(quantities[j]))
+        });
+        let information = covariance.try_inverse();
+        std::array::from_fn(|i| {
+            let relative = information.map_or(f64::NAN, |matrix| matrix[(i, i)].powf(-0.5));
+            (quantities[i].symbol()[0], relative * self.size(quantities[i]))
+        })
+    }
+
+    /// The value of a quantity, or 1 instead of 0.
+    fn size(&self, quantity: Quantity) -> f64 {
+        Some(quantity.of(&self.x)).filter(|value| *value != 0.0).unwrap_or(1.0)
     }
 
     /// The probability of a larger chi-square if the model is right; `None` without a degree of freedom.
@@ -471,11 +544,31 @@ struct Sums {
     normal: Covariance,
     residuals: Vec<[f64; 3]>,
     speeds: Vec<f64>,
+    /// Derivatives of each residual over the unknowns, and what is perpendicular to the curve.
+    rows: Vec<([Vector3<f64>; UNKNOWNS], Matrix3<f64>)>,
 }
 
 impl Sums {
+    /// The test of each channel. `covariance`: that of the unknowns.
+    fn channels(&self, covariance: &Covariance) -> [ChannelTest; 3] {
+        std::array::from_fn(|channel| {
+            // The covariance of the residuals is what remains of the unit matrix beside the directions that the fit can follow.
+            let row = |n: usize| Unknowns::from_fn(|i, _| self.rows[n].0[i][channel]);
+            let remaining = DMatrix::from_fn(self.rows.len(), self.rows.len(), |n, m| {
+                let own = if n == m {
+                    self.rows[n].1[(channel, channel)]
+                } else {
+                    0.0
+                };
+                own - (row(n).transpose() * covariance * row(m))[0]
+            });
+            let chi_square = self.residuals.iter().map(|residual| residual[channel].powi(2)).sum();
+            ChannelTest::new(chi_square, &remaining)
+        })
+    }
+
     /// Adds a point: its residual, and the derivatives over the unknowns.
-    fn add(&mut self, rows: [Vector3<f64>; UNKNOWNS], residual: Vector3<f64>) {
+    fn add(&mut self, rows: [Vector3<f64>; UNKNOWNS], residual: Vector3<f64>, perpendicular: Matrix3<f64>) {
         for i in 0..UNKNOWNS {
             self.gradient[i] += rows[i].dot(&residual);
             for j in 0..UNKNOWNS {
@@ -484,6 +577,7 @@ impl Sums {
         }
         self.chi_square += residual.norm_squared();
         self.residuals.push(residual.into());
+        self.rows.push((rows, perpendicular));
     }
 }
 
@@ -512,12 +606,14 @@ impl<'a> Problem<'a> {
     /// The fit with these unknowns.
     fn found(&self, x: Unknowns, sums: Sums) -> Fit {
         let equations = 2 * self.points.len() + self.known.len();
+        let covariance = sums
+            .normal
+            .cholesky()
+            .map_or(Covariance::from_element(f64::NAN), |matrix| matrix.inverse());
         Fit {
             x,
-            covariance: sums
-                .normal
-                .cholesky()
-                .map_or(Covariance::from_element(f64::NAN), |matrix| matrix.inverse()),
+            covariance,
+            channels: sums.channels(&covariance),
             has_scale: self.has_scale,
             chi_square: sums.chi_square,
             degrees: equations.saturating_sub(5 + usize::from(self.has_scale) + usize::from(self.free)),
@@ -582,7 +678,8 @@ impl<'a> Problem<'a> {
                 let slope = slope(|step| self.residual(&shifted(x, i, step), n, b))?;
                 *row = slope - along * along.dot(&slope);
             }
-            sums.add(rows, residual - along * along.dot(&residual));
+            let perpendicular = Matrix3::identity() - along * along.transpose();
+            sums.add(rows, perpendicular * residual, perpendicular);
         }
         self.add_known(x, &mut sums);
         sums.chi_square.is_finite().then_some(sums)
@@ -682,6 +779,8 @@ pub struct FitReport {
     pub p_value: Option<f64>,
     /// The parameters: first f0, zeta, r, b and epsilon, then, with a known scale, M, m, k and c.
     pub parameters: Vec<FittedParameter>,
+    /// Chi-square of response, frequency and drive.
+    pub channels: [ChannelTest; 3],
     /// Correlations of the first five.
     pub correlations: Vec<[f64; 5]>,
     /// Residuals over their standard uncertainties: response, frequency, drive.
@@ -720,6 +819,7 @@ impl Fit {
             chi_square: self.chi_square,
             degrees: self.degrees,
             p_value: self.p_value(),
+            channels: self.channels,
             parameters: Quantity::ALL.into_iter().filter_map(parameter).collect(),
             correlations: Quantity::FITTED.iter().map(correlations).collect(),
             residuals: self.residuals.clone(),

@@ -25,6 +25,7 @@ mod chain;
 mod controller;
 mod names;
 mod overrides;
+pub mod unit;
 
 use std::f64::consts::TAU;
 use std::fmt;

@@ -187,6 +187,9 @@ fn recording() -> Recording {
     Recording {
         origin: "record.csv".into(),
         channels: ["y".into(), "x".into()],
+        start: 0.0,
+        is_acceleration: false,
+        notes: Vec::new(),
         sample_time: scene.sample_time(),
         response: kept.iter().map(|one| one.response).collect(),
         drive: kept.iter().map(|one| one.reference.unwrap()).collect(),

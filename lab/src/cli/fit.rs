@@ -1,14 +1,15 @@
 //! `vines fit`: the parameters of a rig from measured points of its backbone.
 
+use std::cmp::Ordering;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
-use vines::fit::{Effect, Fit, FitReport, Found, Known, MeasuredPoint, Part, decimals, find, parts};
+use vines::fit::{Effect, Fit, FitReport, Found, Known, MeasuredPoint, Part, Selection, decimals, find, parts};
 use vines::numerics::Estimate;
-use vines::points::{Channel, Channels, Column, Measurement, read};
+use vines::points::{Column, Measurement, read};
 use vines::report::fitted;
 use vines::table::Table;
 
@@ -22,9 +23,10 @@ uncertainty: a locked point of `vines identify` (identification.json), the point
 with the columns f_Hz, A_m, E_m, u_f_Hz, u_A_m and u_E_m, or others that --column names. Points that are not settled, or not symmetric
 1:1, are left out.
 
-A recording has two channels over time, the response and the displacement of the base, as CSV with a column `time` (s) or with --rate; a file
-of `vines` with the columns response and reference needs no options. Held stretches, slow sweeps and decays near phase resonance become points.
-The scene says what the sensor reads, and about which natural frequency and damping the structure has.
+A recording has two channels over time, the response and the displacement of the base. Delimiter, decimal mark, encoding, names and units
+are found; a file of `vines` needs no options. A channel is NAME or NAME:UNIT, with a name or a number of a column, and a unit (mm, µm, m/s², g),
+the sensitivity of a sensor (100mV/g, 8V/mm), or metres per unit. Held stretches, slow sweeps and decays near phase resonance become points.
+A decay without impacts gives f0 and zeta. The scene says what the sensor reads, and about which natural frequency and damping the structure has.
 
 The model is the exact symmetric 1:1 motion of a linear oscillator and a particle between two walls. The fit finds
   f0, zeta    natural frequency and damping ratio of the structure without the particle
@@ -63,15 +65,19 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "QUANTITY=NAME:UNIT")]
     column: Vec<Column>,
 
-    /// Channel of the response in a recording: its name, and its unit or metres per unit
+    /// Channel of the response in a recording
     #[arg(long, value_name = "NAME[:UNIT]")]
-    response: Option<Channel>,
+    response: Option<String>,
 
     /// Channel of the displacement of the base in a recording
     #[arg(long, value_name = "NAME[:UNIT]")]
-    drive: Option<Channel>,
+    drive: Option<String>,
 
-    /// Samples a second of a recording without a column `time`
+    /// Channel of the time in a recording; without it, a channel `time` or `t`
+    #[arg(long, value_name = "NAME[:UNIT]")]
+    time: Option<String>,
+
+    /// Samples a second of a recording
     #[arg(long, value_name = "HZ", value_parser = positive)]
     rate: Option<f64>,
 
@@ -104,20 +110,42 @@ struct Output<'a> {
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let scene = arguments.scene.load()?;
     writable([&arguments.figure, &arguments.out].into_iter().flatten())?;
-    let channels = Channels {
+    let selection = Selection {
         response: arguments.response.clone(),
         drive: arguments.drive.clone(),
+        time: arguments.time.clone(),
         rate: arguments.rate,
     };
     let (mut points, mut skipped, mut recordings) = (Vec::new(), 0, Vec::new());
+    let mut notes = String::new();
     for path in &arguments.points {
-        match read(path, &arguments.column, &channels).map_err(Failure::input)? {
+        match read(path, &arguments.column, &selection).map_err(Failure::input)? {
             Measurement::Points(more, left_out) => {
                 points.extend(more);
                 skipped += left_out;
             }
-            Measurement::Recording(recording) => recordings.push(recording),
+            Measurement::Recording(recording) => {
+                notes.extend(recording.notes.iter().map(|note| format!("{note}\n")));
+                match recording.linear_decay(&scene.knowledge()).map_err(Failure::run)? {
+                    Some(decay) => notes += &format!("{}: {decay}\n", recording.origin),
+                    None => recordings.push(recording),
+                }
+            }
         }
+    }
+    let exact = arguments.known.iter().filter(|one| one.estimate.uncertainty == 0.0);
+    notes.extend(exact.map(|Known { quantity, estimate }| {
+        format!(
+            "{quantity} = {} has no uncertainty and counts as exact; give it as --known {quantity}={0}±U unless it is\n",
+            estimate.value
+        )
+    }));
+    if points.is_empty() && recordings.is_empty() && skipped == 0 && !notes.is_empty() {
+        return Ok(Results::new(notes, Written::default));
+    }
+    if arguments.json {
+        eprint!("{notes}");
+        notes.clear();
     }
     let parts: Vec<Part> = parts(&recordings, &scene, &arguments.known)
         .map_err(Failure::run)?
@@ -141,12 +169,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
             recorded(&parts)
         };
         let verdict = verdict.as_ref().map(|verdict| format!("{verdict}\n"));
-        parts + &summary(&report, &fit, points.len(), skipped) + &verdict.unwrap_or_default()
+        notes
+            + &parts
+            + &summary(&report, &fit, &arguments.known, [points.len(), skipped])
+            + &verdict.unwrap_or_default()
     })?;
     let Arguments { figure, out, json, .. } = arguments.clone();
-    let scene_text = arguments
-        .scene
-        .with_plant(&plant_section(&report, &plant, verdict.as_deref()))?;
+    let plant = plant_section(&fit, &report, &plant, verdict.as_deref());
+    let scene_text = provenance(&arguments.points, &report) + &arguments.scene.with_plant(&plant)?;
     Ok(Results::new(text, move || {
         let mut files = Written::default();
         if let Some(path) = &figure {
@@ -192,18 +222,31 @@ fn recorded(parts: &[Part]) -> String {
         + "\n"
 }
 
-fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> String {
+fn summary(report: &FitReport, fit: &Fit, known: &[Known], [points, skipped]: [usize; 2]) -> String {
     let doubt = if report.describes { "" } else { " (rejected)" };
     let rows = report.parameters.iter().map(|parameter| {
         let digits = decimals(parameter.uncertainty);
         let number = |value: f64| format!("{value:.digits$}");
         let difference = (parameter.value - parameter.expected) / parameter.uncertainty;
+        let is_exact =
+            |known: &Known| known.quantity.symbol()[0] == parameter.symbol && known.estimate.uncertainty == 0.0;
+        let [value, expected, difference] = match known.iter().find(|known| is_exact(known)) {
+            Some(known) => [
+                format!("{} (exact)", known.estimate.value),
+                format!("{:.4}", parameter.expected),
+                String::new(),
+            ],
+            None => {
+                let value = format!("{} ± {}{doubt}", number(parameter.value), number(parameter.uncertainty));
+                [value, number(parameter.expected), format!("{difference:+.1} u")]
+            }
+        };
         [
             parameter.symbol.to_string(),
-            format!("{} ± {}{doubt}", number(parameter.value), number(parameter.uncertainty)),
+            value,
             parameter.unit.to_string(),
-            number(parameter.expected),
-            format!("{difference:+.1} u"),
+            expected,
+            difference,
         ]
     });
     let mut text = Table::new("parameter | value | unit | scene | difference")
@@ -224,6 +267,18 @@ fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> Stri
         report.chi_square,
         report.degrees
     );
+    for (channel, test) in ["responses", "frequencies", "drives"].into_iter().zip(&report.channels) {
+        let size = match test.verdict() {
+            Some(Ordering::Less) => "small",
+            Some(Ordering::Greater) => "large",
+            _ => continue,
+        };
+        let _ = writeln!(
+            text,
+            "the uncertainties of the {channel} are too {size}: their chi-square is {:.1}, and {:.1} is expected",
+            test.chi_square, test.expected
+        );
+    }
     if skipped > 0 {
         let _ = writeln!(
             text,
@@ -248,14 +303,37 @@ fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> Stri
     text
 }
 
+/// Where the plant of a scene comes from.
+fn provenance(files: &[PathBuf], report: &FitReport) -> String {
+    let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+    let p = report.p_value.map_or_else(String::new, |p| format!(", p = {p:.2}"));
+    format!(
+        "# Fitted by vines {} on {} to {} points of {}:\n# chi-square {:.1} for {} degrees of freedom{p}.\n\n",
+        env!("CARGO_PKG_VERSION"),
+        chrono::Utc::now().format("%Y-%m-%d"),
+        report.residuals.len(),
+        files.join(", "),
+        report.chi_square,
+        report.degrees
+    )
+}
+
 /// The section `[plant]` of a scene, with the standard uncertainties in comments.
-fn plant_section(report: &FitReport, plant: &vines::scene::Parameters, verdict: Option<&str>) -> String {
+fn plant_section(fit: &Fit, report: &FitReport, plant: &vines::scene::Parameters, verdict: Option<&str>) -> String {
+    let digits = fit.conditional_uncertainties();
     let lines = vines::scene::plant_keys(plant).into_iter().map(|(symbol, value)| {
-        let fitted = report.parameters.iter().find(|parameter| parameter.symbol == symbol);
-        let u = fitted.map(|parameter| format!(" ± {:.2e}", parameter.uncertainty));
-        let is_ideal = ["M", "k", "c", "m", "b", "r"].contains(&symbol);
-        let note = is_ideal.then(|| format!("  # fitted{}", u.unwrap_or_default()));
-        format!("{symbol} = {value}{}\n", note.unwrap_or_default())
+        let fitted = report.parameters.iter().find(|one| one.symbol == symbol);
+        match digits.iter().find(|(one, _)| *one == symbol) {
+            Some((_, conditional)) => {
+                let decimals = decimals(*conditional);
+                let u = fitted.map_or_else(
+                    || "scaled by the mass of the scene".into(),
+                    |one| format!("± {:.1$}", one.uncertainty, self::decimals(one.uncertainty)),
+                );
+                format!("{symbol} = {value:.decimals$}  # {u}\n")
+            }
+            None => format!("{symbol} = {value}\n"),
+        }
     });
     let verdict = verdict.map(|verdict| format!("# {verdict}\n")).unwrap_or_default();
     let doubt = if report.describes {
@@ -263,5 +341,8 @@ fn plant_section(report: &FitReport, plant: &vines::scene::Parameters, verdict: 
     } else {
         "# Rejected: the model does not describe the points.\n"
     };
-    format!("[plant]\n{verdict}{doubt}{}", lines.collect::<String>())
+    format!(
+        "[plant]\n{verdict}{doubt}# The values are correlated: their digits keep what they determine together, such as k/M.\n{}",
+        lines.collect::<String>()
+    )
 }

@@ -60,14 +60,18 @@ impl SceneArguments {
         Ok(scene)
     }
 
-    /// The text of the scene's file with another section `[plant]`.
+    /// The text of the scene's file with another section `[plant]`, and without comments: they may be about the plant that it had.
     pub(super) fn with_plant(&self, plant: &str) -> Result<String, SceneError> {
         let text = self.text()?.unwrap_or_else(|| PAPER.into());
         let (mut lines, mut inside) = (String::new(), false);
         for line in text.lines() {
+            let is_comment = |(n, _): &(usize, &str)| line[..*n].matches(['"', '\'']).count() % 2 == 0;
+            let comment = line.match_indices('#').find(is_comment);
+            let line = comment.map_or(line, |(n, _)| &line[..n]).trim_end();
             let begins = line.trim_start().starts_with("[plant]");
             inside = begins || inside && !line.trim_start().starts_with('[');
-            if begins || !inside {
+            let is_second_blank = line.is_empty() && (lines.is_empty() || lines.ends_with("\n\n"));
+            if begins || !(inside || is_second_blank) {
                 lines += &format!("{}\n", if begins { plant } else { line });
             }
         }

@@ -13,7 +13,7 @@ use std::fmt::{self, Display, Formatter};
 
 use lovines::cavity::GRAVITY;
 use lovines::{Cavity, Restitution};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use vines_model::Definition;
 use vines_model::numerics::{Estimate, mean};
 use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
@@ -502,7 +502,12 @@ impl PlantCurve<'_> {
                 };
                 rows[i] = at(step).or_else(|| at(-step))?;
             }
-            sums.add(rows.map(|row| place.across(&row)), place.across(&place.residual));
+            let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| place.across(&axis));
+            sums.add(
+                rows.map(|row| place.across(&row)),
+                place.across(&place.residual),
+                Matrix3::from_columns(&axes),
+            );
             all.push(rows);
         }
         self.problem.add_known(x, &mut sums);

@@ -13,15 +13,18 @@
 
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
+use std::fmt::{self, Display, Formatter};
 
+use nalgebra::DVector;
 use num_complex::Complex64;
 use serde::Serialize;
 use thiserror::Error;
-use vines_model::numerics::{Estimate, RANDOM, mean, range, slope};
+use vines_model::Sensor;
+use vines_model::numerics::{Estimate, HarmonicBasis, RANDOM, mean, range, slope};
 use vines_model::regime::Regime;
 use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
 
-use super::{Known, MeasuredPoint, Quantity, fit};
+use super::{Known, MeasuredPoint, Quantity, decimals, fit};
 use crate::backbone::{Criterion, LAG, LevelEstimate};
 use crate::identification::{Cycle, Harmonic, Line, ResonanceFit, harmonic, regime_by_response};
 use crate::plan::{Knowledge, LinearResponse};
@@ -36,12 +39,37 @@ pub struct Recording {
     pub origin: String,
     /// Names of the channels of response and base, for messages.
     pub channels: [String; 2],
+    /// Time of the first sample, s.
+    pub start: f64,
     /// Time from sample to sample, s.
     pub sample_time: f64,
-    /// Response, m.
+    /// Whether the response is an acceleration.
+    pub is_acceleration: bool,
+    /// Response, m or m/s².
     pub response: Vec<f64>,
-    /// Displacement of the base, m.
+    /// Displacement of the base, m; zeros without a channel of the base, whose name is empty then.
     pub drive: Vec<f64>,
+    /// What is to be known of the way it was read: the clock, and what was cut or interpolated.
+    pub notes: Vec<String>,
+}
+
+/// Natural frequency and damping ratio of a structure, from its free decay without impacts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearDecay {
+    /// Natural frequency, rad/s.
+    pub omega: Estimate,
+    /// Damping ratio.
+    pub zeta: Estimate,
+}
+
+impl Display for LinearDecay {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let [f0, zeta] = [self.omega.scaled(1.0 / TAU), self.zeta].map(|Estimate { value, uncertainty }| {
+            let decimals = decimals(uncertainty);
+            format!("{value:.decimals$} ± {uncertainty:.decimals$}")
+        });
+        write!(f, "no impacts: this is a linear decay, f0 = {f0} Hz, zeta = {zeta}")
+    }
 }
 
 /// What a part of a recording is.
@@ -75,6 +103,12 @@ pub struct Part {
 #[error("{0}")]
 pub struct RecordingError(String);
 
+impl RecordingError {
+    pub(super) fn new(message: String) -> Self {
+        Self(message)
+    }
+}
+
 /// Periods of the fits that make the clock, and of those of a decay.
 const WINDOW: f64 = 2.5;
 /// Fewest periods of a recording.
@@ -102,6 +136,8 @@ const SEEN: f64 = 8.0;
 const CLIPPED: f64 = 0.06;
 /// Largest relative distance of the frequency from the natural frequency near resonance.
 const FARTHEST: f64 = 0.2;
+/// Largest ratio of the damping in the two halves of a linear decay, and of its inverse: impacts in 1:1 motion double the loss near the fold.
+const STEADY: f64 = 1.5;
 /// Relative standard uncertainty of the damping that a scene states: three of them are 30 %.
 const DAMPING: f64 = 0.1;
 
@@ -150,10 +186,13 @@ impl Recording {
     /// # Errors
     /// Channels that cannot be those of a rig near resonance; the message says which, and what to do.
     pub fn parts(&self, knowledge: &Knowledge) -> Result<Vec<Part>, RecordingError> {
-        let linear = knowledge.linear;
-        self.check(&linear)?;
         let knowledge = Knowledge { sample_time: self.sample_time, ..*knowledge };
-        let anchors = self.anchors(&linear);
+        self.prepared(&knowledge)?.parts_near_resonance(&knowledge)
+    }
+
+    fn parts_near_resonance(&self, knowledge: &Knowledge) -> Result<Vec<Part>, RecordingError> {
+        let linear = &knowledge.linear;
+        let anchors = self.anchors(linear);
         let moves = |anchor: &Anchor| anchor.response.map(|_| anchor.drive.is_some());
         let stretches = anchors.chunk_by(|anchor, next| moves(anchor) == moves(next));
         let of = |base_moves: bool| move |stretch: &&[Anchor]| moves(&stretch[0]) == Some(base_moves);
@@ -166,16 +205,84 @@ impl Recording {
         let driven: Vec<_> = stretches.clone().filter(of(true)).map(periods).collect();
         self.plausible(&driven.iter().flat_map(|(_, cycles)| cycles).collect::<Vec<_>>())?;
         let windows = driven.iter().flat_map(|(samples, cycles)| windows(samples, cycles));
-        let mut parts = evaluated(&windows.collect::<Vec<_>>(), &knowledge);
+        let mut parts = evaluated(&windows.collect::<Vec<_>>(), knowledge);
         let decays = stretches.filter(of(false));
-        parts.extend(decays.flat_map(|stretch| decay(stretch, &linear, self.sample_time)));
+        parts.extend(decays.flat_map(|stretch| decay(stretch, linear, self.sample_time)));
         parts.sort_by(|first, second| first.seconds[0].total_cmp(&second.seconds[0]));
         best_of_each_amplitude(&mut parts);
         if parts.iter().all(|part| part.point.is_none()) {
             let is_seen = 2 * anchors.iter().filter(|anchor| anchor.response.is_some()).count() >= anchors.len();
-            return Err(self.nothing(is_seen, &parts, &linear));
+            return Err(self.nothing(is_seen, &parts, linear));
         }
         Ok(parts)
+    }
+
+    /// The channels as the bench has them: the response that the scene's sensor reads, and both without their slow drift.
+    fn prepared(&self, knowledge: &Knowledge) -> Result<Self, RecordingError> {
+        let linear = knowledge.linear;
+        self.check(&linear)?;
+        let mut one = self.clone();
+        if self.is_acceleration {
+            if knowledge.numbers.definition.sensor != Sensor::Acceleration {
+                return Err(RecordingError(format!(
+                    "{}: the response {} is an acceleration, and the scene's sensor is none: set resonance.sensor = \"acceleration\" in the scene, or \
+                     integrate the channel twice",
+                    self.origin, self.channels[0]
+                )));
+            }
+            // The sensor of the bench reads -q1''/omega0².
+            one.response
+                .iter_mut()
+                .for_each(|value| *value /= -linear.omega0.powi(2));
+        }
+        for values in [&mut one.response, &mut one.drive] {
+            remove_drift(values, linear.omega0 * self.sample_time);
+        }
+        Ok(one)
+    }
+
+    /// The linear decay, if the base rests all the time and the damping does not depend on the amplitude.
+    ///
+    /// # Errors
+    /// As [`Recording::parts`], and where the base rests and the response does not decay.
+    pub fn linear_decay(&self, knowledge: &Knowledge) -> Result<Option<LinearDecay>, RecordingError> {
+        let (one, linear) = (self.prepared(knowledge)?, knowledge.linear);
+        let anchors = one.anchors(&linear);
+        let fits: Vec<&Harmonic> = anchors.iter().filter_map(|one| one.response.as_ref()).collect();
+        if anchors.iter().any(|one| one.drive.is_some()) || 2 * fits.len() < anchors.len() && self.drive_is_named() {
+            return Ok(None);
+        }
+        let largest = fits.iter().map(|one| one.amplitude).fold(0.0, f64::max);
+        let decaying: Vec<(f64, &Harmonic)> = anchors
+            .iter()
+            .map(|one| (one.middle * self.sample_time, one.response.as_ref()))
+            .skip_while(|(_, one)| one.is_none_or(|one| one.amplitude < largest))
+            .map_while(|(time, one)| Some((time, one?)))
+            .collect();
+        if decaying.len() < LEAST {
+            return Err(one.nothing(2 * fits.len() >= anchors.len(), &[], &linear));
+        }
+        let (first, second) = decaying.split_at(decaying.len() / 2);
+        let [all, first, second] = [&decaying, first, second].map(rate);
+        let mean_omega = omega(&decaying);
+        if all.value < SEEN * all.uncertainty {
+            let Self { origin, channels: [response, drive], .. } = self;
+            let base = if self.drive_is_named() {
+                format!("the base {drive} rests")
+            } else {
+                "no channel of the base is named".into()
+            };
+            return Err(RecordingError(format!(
+                "{origin}: {base}, and the response {response} does not decay. Name the channel of the base with --drive NAME:UNIT; if it is named, is \
+                 it connected?"
+            )));
+        }
+        let is_steady = (1.0 / STEADY..STEADY).contains(&(first.value / second.value));
+        Ok(is_steady.then(|| LinearDecay { omega: mean_omega, zeta: all.scaled(1.0 / mean_omega.value) }))
+    }
+
+    fn drive_is_named(&self) -> bool {
+        !self.channels[1].is_empty()
     }
 
     /// Refuses what is no measurement.
@@ -214,7 +321,8 @@ impl Recording {
         }
         for (values, channel) in both.into_iter().zip(channels) {
             let (low, high) = range((f64::INFINITY, f64::NEG_INFINITY), values.iter().copied());
-            if low == high {
+            // A base may rest.
+            if low == high && std::ptr::eq(values, &raw const self.response) {
                 return refused(format!(
                     ", channel {channel} is constant: is it connected, and is it the right one?"
                 ));
@@ -343,6 +451,68 @@ impl Recording {
         let centred: Vec<f64> = self.response.iter().map(|value| value - middle).collect();
         Line::strongest(&centred).turn / (TAU * self.sample_time)
     }
+}
+
+/// Removes what changes slowly: the constants of fits over [`WINDOW`] periods, between which straight lines lead. `step`: phase from sample to sample
+/// at the natural frequency.
+fn remove_drift(values: &mut [f64], step: f64) {
+    let period = TAU / step;
+    let window = (WINDOW * period).round() as usize + 1;
+    let middle = 0.5 * (window - 1) as f64;
+    let phases: Vec<f64> = (0..window).map(|n| (n as f64 - middle) * step).collect();
+    let basis = HarmonicBasis::new(&phases, 1, &[Some(2), None, Some(1)]);
+    let constant = |(n, values): (usize, &[f64])| {
+        let fit = basis.fit(&DVector::from_column_slice(values))?;
+        Some((n as f64 + middle, fit.constant()))
+    };
+    let windows = values
+        .windows(window)
+        .enumerate()
+        .step_by((period.round() as usize).max(1));
+    let knots: Vec<(f64, f64)> = windows.filter_map(constant).collect();
+    if knots.len() < 2 {
+        return;
+    }
+    for (n, value) in values.iter_mut().enumerate() {
+        let after = knots
+            .partition_point(|knot| knot.0 < n as f64)
+            .clamp(1, knots.len() - 1);
+        let [(from, left), (to, right)] = [knots[after - 1], knots[after]];
+        *value -= left + (right - left) * (n as f64 - from) / (to - from);
+    }
+}
+
+/// Logarithmic rate of a decay, 1/s: the straight line through the logarithms of the amplitudes, weighted by their uncertainties.
+fn rate(fits: &[(f64, &Harmonic)]) -> Estimate {
+    let weight = |one: &Harmonic| (one.amplitude / one.uncertainties[0]).powi(2);
+    let sum =
+        |of: &dyn Fn(f64, &Harmonic) -> f64| fits.iter().map(|(time, one)| weight(one) * of(*time, one)).sum::<f64>();
+    let total = sum(&|_, _| 1.0);
+    let [middle, level] = [sum(&|time, _| time), sum(&|_, one| one.amplitude.ln())].map(|sum| sum / total);
+    let squares = sum(&|time, _| (time - middle).powi(2));
+    let slope = sum(&|time, one| (time - middle) * (one.amplitude.ln() - level)) / squares;
+    let misfit = sum(&|time, one| (one.amplitude.ln() - level - slope * (time - middle)).powi(2));
+    Estimate {
+        value: -slope,
+        uncertainty: uncertainty(misfit, squares, fits.len()),
+    }
+}
+
+/// Weighted mean of the frequencies of a decay.
+fn omega(fits: &[(f64, &Harmonic)]) -> Estimate {
+    let weight = |one: &Harmonic| one.uncertainties[1].powi(-2);
+    let total: f64 = fits.iter().map(|(_, one)| weight(one)).sum();
+    let value = fits.iter().map(|(_, one)| weight(one) * one.omega).sum::<f64>() / total;
+    let misfit = fits
+        .iter()
+        .map(|(_, one)| weight(one) * (one.omega - value).powi(2))
+        .sum();
+    Estimate { value, uncertainty: uncertainty(misfit, total, fits.len()) }
+}
+
+/// Standard uncertainty of a fit with this sum of weights: the fits of neighbouring periods overlap, and their scatter may exceed the noise.
+fn uncertainty(misfit: f64, weights: f64, count: usize) -> f64 {
+    (WINDOW.ceil() * (misfit / count as f64).max(1.0) / weights).sqrt()
 }
 
 /// Both channels at one time. The base rests, or the response cannot be seen, where there is no oscillation.

@@ -1,26 +1,11 @@
 //! `[rig.names]` and `[controller_names]`: the user's names for the variables of a rig or a controller, with their units.
 
 use std::collections::BTreeMap;
-use std::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
 use vines_model::ArgumentError;
 
-/// Units, and SI units per unit.
-const UNITS: [(&str, f64); 12] = [
-    ("m", 1.0),
-    ("mm", 1e-3),
-    ("um", 1e-6),
-    ("m/s", 1.0),
-    ("mm/s", 1e-3),
-    ("s", 1.0),
-    ("ms", 1e-3),
-    ("rad", 1.0),
-    ("deg", PI / 180.0),
-    ("rad/s", 1.0),
-    ("Hz", TAU),
-    ("1/min", TAU / 60.0),
-];
+use super::unit::UNITS;
 
 /// A variable of a rig or a controller.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,8 +37,8 @@ impl Name {
     /// # Errors
     /// An unknown unit.
     pub fn with_unit(name: &str, unit: &str) -> Result<Self, ArgumentError> {
-        let Some((_, factor)) = UNITS.into_iter().find(|(symbol, _)| *symbol == unit) else {
-            let symbols = UNITS.map(|(symbol, _)| symbol).join(", ");
+        let Some((_, factor, _)) = UNITS.into_iter().find(|(symbol, ..)| *symbol == unit) else {
+            let symbols = UNITS.map(|(symbol, ..)| symbol).join(", ");
             return Err(format!("{name}: the unit {unit} is unknown; known are {symbols}, or give a factor").into());
         };
         Ok(Self { name: name.into(), factor })
