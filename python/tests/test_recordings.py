@@ -3,14 +3,42 @@
 import subprocess
 import sys
 
-import h5py
-import nptdms
 import numpy as np
 import pytest
-import pyuff
+import samples
 import scipy.io
 
 import vines
+
+
+@pytest.mark.parametrize("sample", samples.SAMPLES, ids=lambda sample: sample.kind)
+def test_a_file_as_other_programs_write_it_is_read_or_refused_for_the_true_reason(sample, tmp_path):
+    file = tmp_path / sample.name
+    sample.write(file)
+    if sample.refusal:
+        with pytest.raises(ValueError, match=sample.refusal) as caught:
+            samples.read(sample, file)
+        assert file.name in str(caught.value)
+        return
+    read = samples.read(sample, file)
+    assert read.sample_time == pytest.approx(samples.STEP, rel=1e-5)
+    count = len(read.response)
+    assert count == len(read.drive)
+    assert count >= 0.7 * samples.COUNT
+    # The base begins with the file or, where it is cut, a whole number of samples later.
+    times = read.start + read.sample_time * np.arange(count)
+    shift = 1 if "later" in sample.kind else 0
+    times = samples.TIME[shift : shift + count] if "uneven" not in sample.kind else times
+    # The uneven abscissa of UFF58 has six digits.
+    share = 3e-3 if "uneven" in sample.kind else 1e-4
+    assert np.allclose(read.response, 3e-3 * np.sin(55.0 * times - np.pi / 2), atol=3e-3 * share)
+    assert np.allclose(read.drive, 2e-5 * np.sin(55.0 * times), atol=2e-5 * share)
+    if sample.note:
+        assert any(sample.note in note for note in read.notes), read.notes
+
+
+def test_damaged_files_are_read_or_refused():
+    assert samples.damaged(3.0) > 30
 
 
 @pytest.fixture(scope="module")
@@ -24,97 +52,43 @@ def channels():
         given = scene.drive(sigma=orbit.sigma, G=g)
         lag = phase
         for n in range(40 * 64):
-            turn = given["omega"] * n * step
+            turn = lag + given["omega"] * n * step
             time.append(len(time) * step)
-            drive.append(given["amplitude"] * np.sin(lag + turn))
-            response.append(
-                scene.dimensionless["b"] * orbit.C * np.sin(lag + turn + orbit.gamma) + harmonic(lag + turn)
-            )
+            drive.append(given["amplitude"] * np.sin(turn))
+            third = 4e-5 * np.sin(3 * turn + 0.4)
+            response.append(scene.dimensionless["b"] * orbit.C * np.sin(turn + orbit.gamma) + third)
         phase = lag + given["omega"] * 40 * 64 * step
     noise = np.random.default_rng(5).normal(size=(2, len(time)))
     response, drive = np.array(response), np.array(drive)
     return np.array(time), 1e3 * response + 2e-3 * noise[0], 1e6 * drive + 0.05 * noise[1]
 
 
-def harmonic(phase):
-    """Third harmonic of a symmetric motion, m."""
-    return 4e-5 * np.sin(3 * phase + 0.4)
-
-
-def write(file, time, response, drive):
-    step = time[1] - time[0]
-    match file.suffix:
-        case ".csv":
-            table = np.column_stack([time, response, drive])
-            np.savetxt(file, table, delimiter=",", header="time,y,x", comments="", fmt="%.17g")
-        case ".mat" if file.stem == "version73":
-            # HDF5 behind a block of 512 bytes.
-            with h5py.File(file, "w", userblock_size=512) as content:
-                content["t"], content["y"], content["x"] = time, response, drive
-            with file.open("r+b") as content:
-                content.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
-        case ".mat":
-            scipy.io.savemat(file, {"t": time, "y": response, "x": drive.reshape(-1, 1)})
-        case ".h5":
-            with h5py.File(file, "w") as content:
-                content["time"], content["y"], content["x"] = time, response, drive
-        case ".tdms":
-            properties = {"wf_increment": step, "wf_start_offset": 0.0, "wf_samples": len(time)}
-            with nptdms.TdmsWriter(file) as writer:
-                named = [("y", response), ("x", drive)]
-                writer.write_segment([nptdms.ChannelObject("rig", *one, properties=properties) for one in named])
-        case ".uff":
-            both = {"type": 58, "func_type": 1, "rsp_node": 1, "rsp_dir": 1, "ref_node": 1, "ref_dir": 1, "binary": 0}
-            both |= {"abscissa_spacing": 1, "abscissa_spec_data_type": 17, "ordinate_spec_data_type": 8}
-            both |= {"orddenom_spec_data_type": 0, "ref_ent_name": "NONE", "x": time}
-            for name, data in (("y", response), ("x", drive)):
-                pyuff.UFF(str(file)).write_sets(both | {"data": data, "id1": name, "rsp_ent_name": name}, "add")
-
-
-FORMATS = ("record.csv", "record.mat", "version73.mat", "record.h5", "record.tdms", "record.uff")
-
-
-def test_every_format_gives_the_same_fit(channels, tmp_path):
-    rate = 1 / (channels[0][1] - channels[0][0])
+def test_two_formats_give_the_same_fit(channels, tmp_path):
     # Begins and ends in the middle of a held level.
-    cut = [channel[300:-400] for channel in channels]
-    found = {}
-    for name in FORMATS:
-        write(tmp_path / name, *cut)
-        read = vines.read_recording(tmp_path / name, "y:mm", "x:um", rate=rate)
-        fit = vines.fit_recordings(read)
-        found[name] = (read.response, read.drive, fit.parameters["value"], fit.parameters["uncertainty"])
-    first = found.pop("record.csv")
-    # UFF58 has twelve digits; the others have all bits.
-    rounded = found.pop("record.uff")
-    for name, arrays in found.items():
-        assert all(np.array_equal(*pair) for pair in zip(arrays, first, strict=True)), name
-    assert np.allclose(rounded[0], first[0], rtol=1e-9, atol=1e-12)
-    assert np.allclose(rounded[1], first[1], rtol=1e-9, atol=1e-15)
-    apart = (rounded[2] - first[2]) / first[3]
-    assert np.all(np.abs(apart) < 1e-3), apart
+    time, response, drive = (channel[300:-400] for channel in channels)
+    table = np.column_stack([time, response, drive])
+    np.savetxt(tmp_path / "record.csv", table, delimiter=",", header="time,y,x", comments="", fmt="%.17g")
+    scipy.io.savemat(tmp_path / "record.mat", {"t": time, "y": response, "x": drive})
+    names = ("record.csv", "record.mat")
+    fits = [vines.fit_recordings(vines.read_recording(tmp_path / name, "y:mm", "x:um")) for name in names]
+    for name in ("value", "uncertainty"):
+        assert np.array_equal(*(fit.parameters[name] for fit in fits))
+    assert fits[0].channels["expected"].sum() == pytest.approx(fits[0].degrees)
 
 
-def test_the_command_names_what_is_missing(channels, tmp_path):
-    file = tmp_path / "record.mat"
-    write(file, *channels)
-    command = [sys.executable, "-m", "vines", "fit", file, "--response", "y:mm", "--drive", "x:um"]
+def test_a_ring_down_without_a_base_is_a_linear_decay_in_the_package_and_on_the_command_line(tmp_path):
+    time = 1e-3 * np.arange(8000)
+    noise = np.random.default_rng(3).normal(size=time.size)
+    omega, zeta = vines.Scene().dimensionless["omega0"], 0.008
+    response = np.exp(-zeta * omega * time) * np.sin(omega * time) + 1e-3 * noise
+    scipy.io.savemat(tmp_path / "ring.mat", {"t": time, "acc1": response})
+    decay = vines.linear_decay(vines.read_recording(tmp_path / "ring.mat", "acc1:mm"))
+    for (value, uncertainty), truth in ((decay.f0, omega / (2 * np.pi)), (decay.zeta, zeta)):
+        assert abs(value - truth) < 4 * uncertainty < 0.04 * truth
+    command = [sys.executable, "-m", "vines", "fit", tmp_path / "ring.mat", "--response", "acc1:mm"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "no impacts: this is a linear decay" in done.stdout
     done = subprocess.run([*command, "--time", "clock"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert "no channel clock" in done.stderr
-
-
-def test_what_is_missing_is_named(channels, tmp_path):
-    file = tmp_path / "record.csv"
-    write(file, *channels)
-    for words, arguments in (
-        ("no channel z; it has time, y, x", ("z", "x")),
-        ("the unit furlong is unknown", ("y:furlong", "x")),
-    ):
-        with pytest.raises(ValueError, match=words):
-            vines.read_recording(file, *arguments)
-    time = channels[0].copy()
-    time[100:] += 1.0
-    write(file, time, *channels[1:])
-    with pytest.raises(ValueError, match="interrupted there"):
-        vines.read_recording(file, "y:mm", "x:um")
+    assert "no channel `clock`" in done.stderr

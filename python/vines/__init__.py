@@ -14,7 +14,7 @@ from .experiments import Backbone, Identification, Orbit, Theory, backbone, iden
 from .fits import Fit, fit, fit_recordings
 from .phaselock import Output, PhaseLock
 from .plants import KINDS, Batch, Events, Plant, Trajectory
-from .recordings import Recording, read_recording
+from .recordings import LinearDecay, Recording, linear_decay, read_recording
 from .regimes import Regime, regime
 from .scenes import Scene
 from .sweeps import REGIMES, sweep
@@ -27,6 +27,7 @@ __all__ = [
     "Events",
     "Fit",
     "Identification",
+    "LinearDecay",
     "Orbit",
     "Output",
     "PhaseLock",
@@ -42,6 +43,7 @@ __all__ = [
     "fit_recordings",
     "fmu",
     "identify",
+    "linear_decay",
     "orbits",
     "read_recording",
     "regime",

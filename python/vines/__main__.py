@@ -3,18 +3,18 @@
 import argparse
 import sys
 
-from . import Scene, fit_recordings, read_recording
+from . import Scene, fit_recordings, linear_decay, read_recording
 
 
 def main() -> int:
     """Fit a rig to recordings, and print what was found."""
     parser = argparse.ArgumentParser(prog="python -m vines", description=__doc__)
     parser.add_argument("command", choices=["fit"])
-    parser.add_argument("files", nargs="+", metavar="FILE", help="recordings: CSV, MAT, HDF5, TDMS or UFF58")
-    parser.add_argument("--response", default="response", metavar="NAME[:UNIT]", help="channel of the response")
-    parser.add_argument("--drive", default="reference", metavar="NAME[:UNIT]", help="channel of the base")
+    parser.add_argument("files", nargs="+", metavar="FILE", help="recordings: CSV, MAT, HDF5, TDMS, UFF58 or LVM")
+    parser.add_argument("--response", metavar="NAME[:UNIT]", help="channel of the response")
+    parser.add_argument("--drive", metavar="NAME[:UNIT]", help="channel of the base")
     parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second")
-    parser.add_argument("--time", metavar="NAME", help="channel of the time, s")
+    parser.add_argument("--time", metavar="NAME[:UNIT]", help="channel of the time")
     parser.add_argument("--scene", metavar="FILE", help="scene file; without it, the default scene")
     parser.add_argument("--known", action="append", default=[], metavar="SYMBOL=VALUE±U", help="a value from elsewhere")
     given = parser.parse_args()
@@ -22,6 +22,15 @@ def main() -> int:
         scene = Scene(given.scene)
         names = {"response": given.response, "drive": given.drive, "rate": given.rate, "time": given.time}
         recordings = [read_recording(file, **names) for file in given.files]
+        for note in (note for one in recordings for note in one.notes):
+            print(note)
+        decays = [linear_decay(one, scene) for one in recordings]
+        for one, decay in zip(recordings, decays, strict=True):
+            if decay is not None:
+                print(f"{one.origin}: {decay}")
+        recordings = [one for one, decay in zip(recordings, decays, strict=True) if decay is None]
+        if not recordings:
+            return 0
         found = fit_recordings(recordings, scene, known=given.known)
     except (ValueError, OSError, ImportError) as error:
         print(f"error: {error}", file=sys.stderr)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from . import _native
 from .experiments import Table, _table
-from .recordings import Recording
+from .recordings import Recording, linear_decay
 from .results import Result, axes
 from .scenes import Scene, checked
 
@@ -34,6 +34,8 @@ class Fit(Result):
         Chi-square, and the probability of a larger one.
     degrees : int
         Degrees of freedom of chi-square.
+    channels : dict of ndarray
+        Of response, frequency and drive: chi_square, the value expected if the uncertainties are right, and p_value.
     correlations : ndarray
         Of f0, zeta, r, b and epsilon, shape (5, 5).
     residuals : ndarray
@@ -53,6 +55,7 @@ class Fit(Result):
     chi_square: float
     p_value: float | None
     degrees: int
+    channels: Table
     correlations: NDArray[np.float64]
     residuals: NDArray[np.float64]
     left_out: tuple[int, ...]
@@ -153,11 +156,16 @@ def fit_recordings(
     Raises
     ------
     ValueError
-        A recording without a stretch near phase resonance, a channel that is clipped or swapped, or too few points.
+        A linear decay (see `linear_decay`), a recording without a stretch near phase resonance,
+        a channel that is clipped or swapped, or too few points.
     """
     every = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    given = [(one.origin, list(one.channels), one.sample_time, one.response, one.drive) for one in every]
-    return _result(_native.fit_recordings(checked(scene)._native, given, _texts(known)))
+    given = checked(scene)
+    for one in every:
+        decay = linear_decay(one, given)
+        if decay is not None:
+            raise ValueError(f"{one.origin}: {decay}; `linear_decay` returns these, and there are no points to fit")
+    return _result(_native.fit_recordings(given._native, [one._tuple() for one in every], _texts(known)))
 
 
 def _texts(known: Mapping[str, float | tuple[float, float]] | Iterable[str] | None) -> list[str]:
@@ -172,6 +180,7 @@ def _result(text: str) -> Fit:
     report = found["report"]
     return Fit(
         parameters=_table(report["parameters"]),
+        channels=_table(report["channels"]),
         correlations=np.array(report["correlations"]),
         residuals=np.array(report["residuals"]).reshape(-1, 3),
         left_out=tuple(number - 1 for number in report["left_out"]),

@@ -7,7 +7,8 @@ use vines_model::numerics::Estimate;
 use vines_model::orbit::{backbone_at_speed, resonant_motion};
 use vines_testbench::backbone::track;
 use vines_testbench::fit::{
-    Effect, Fit, FitError, Kind, Known, MeasuredPoint, Quantity, Recording, contradiction, explain, fit, parts,
+    Channel, Contents, Effect, Fit, FitError, Kind, Known, MeasuredPoint, Quantity, Recording, RecordingError,
+    Selection, Table, contradiction, explain, fit, parts,
 };
 use vines_testbench::rig::{BuiltIn, Chain, Rig, RigError, RigStage, Sensors, Simulated};
 use vines_testbench::scene::{Definition, Dimensionless, Parameters, Scene};
@@ -248,7 +249,7 @@ fn channels_that_are_no_recording_of_a_rig_near_resonance_are_refused_with_what_
         ),
         (&|one| one.drive.truncate(5999), &["y has 6000 samples", "x has 5999"]),
         (&clip, &["channel y is clipped", "reduce the gain"]),
-        (&|one| one.drive.fill(0.0), &["channel x is constant", "connected"]),
+        (&|one| one.drive.fill(0.0), &["base x rests", "connected"]),
         (&|one| std::mem::swap(&mut one.response, &mut one.drive), &["swapped"]),
         (&reverse, &["wrong sign", "--drive x:-1"]),
         (&|one| one.sample_time *= 3.0, &["strongest oscillation", "--rate"]),
@@ -258,7 +259,9 @@ fn channels_that_are_no_recording_of_a_rig_near_resonance_are_refused_with_what_
     for (damage, words) in cases {
         let mut damaged = good.clone();
         damage(&mut damaged);
-        let message = damaged.parts(&scene.knowledge()).unwrap_err().to_string();
+        let knowledge = scene.knowledge();
+        let parts = damaged.linear_decay(&knowledge).and_then(|_| damaged.parts(&knowledge));
+        let message = parts.unwrap_err().to_string();
         let is_complete = words.iter().all(|word| message.contains(word));
         assert!(message.starts_with("record.csv") && is_complete, "{message}");
     }
@@ -300,4 +303,257 @@ fn unequal_gaps_leave_the_points_as_they_are() {
     let skewed = Cavity { b_plus, b_minus, ..Cavity::IDEAL };
     let [ideal, skewed] = [Cavity::IDEAL, skewed].map(|cavity| motion_at(cavity, 0.5 * half));
     assert!((ideal[1] / skewed[1] - 1.0).abs() < 1e-11 && (ideal[2] / skewed[2] - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_decay_without_impacts_gives_the_natural_frequency_and_the_damping_with_and_without_a_channel_of_the_base() {
+    let scene = wrong_scene();
+    let (omega0, zeta, dt) = (RIG.natural_frequency(), 0.01, 1e-3);
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
+    let response = |n: i32| {
+        let time = dt * f64::from(n);
+        1e-3 * (-zeta * omega0 * time).exp() * (omega0 * time).sin()
+    };
+    let response: Vec<f64> = (0..6000).map(|n| response(n) + 1e-6 * noise()).collect();
+    for name in ["", "x"] {
+        let drive = response
+            .iter()
+            .map(|_| if name.is_empty() { 0.0 } else { 1e-7 * noise() });
+        let record = Recording {
+            channels: ["y".into(), name.into()],
+            sample_time: dt,
+            drive: drive.collect(),
+            response: response.clone(),
+            ..recording()
+        };
+        let decay = record.linear_decay(&scene.knowledge()).unwrap().unwrap();
+        for (estimate, truth) in [(decay.omega, omega0), (decay.zeta, zeta)] {
+            assert!((estimate.value - truth).abs() < 4.0 * estimate.uncertainty, "{decay}");
+            assert!(estimate.uncertainty < 0.01 * truth, "{decay}");
+        }
+    }
+    assert_eq!(recording().linear_decay(&scene.knowledge()).unwrap(), None);
+}
+
+#[test]
+fn a_slow_drift_of_five_amplitudes_leaves_the_fit_as_it_is() {
+    let (scene, still) = (wrong_scene(), recording());
+    let mut drifting = still.clone();
+    let count = still.response.len() as f64;
+    for (n, value) in drifting.response.iter_mut().enumerate() {
+        *value += 0.02 * (n as f64 / count).powi(2);
+    }
+    let [still, drifting] = [still, drifting].map(|one| {
+        let parts = parts(&[one], &scene, &[]).unwrap().concat();
+        let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
+        fit(&points, Definition::default(), &scene.plant, &[]).unwrap()
+    });
+    for quantity in FITTED {
+        let [one, other] = [&still, &drifting].map(|fit| fit.estimate(*quantity).unwrap());
+        assert!(
+            (one.value - other.value).abs() < 0.5 * one.uncertainty,
+            "{quantity}: {one:?} {other:?}"
+        );
+    }
+    assert!(!drifting.is_rejected(), "{}", drifting.chi_square);
+}
+
+#[test]
+fn chi_square_of_each_channel_shows_uncertainties_of_the_wrong_size() {
+    let right = fitted(&points(2e-3, 3), &[]).unwrap();
+    assert!(
+        right.channels.iter().all(|one| one.verdict().is_none()),
+        "{:?}",
+        right.channels
+    );
+    let total: f64 = right.channels.iter().map(|one| one.expected).sum();
+    assert!((total - right.degrees as f64).abs() < 1e-6, "{total} {}", right.degrees);
+    // A point may lie anywhere along the curve: an error of one amplitude shows in the other as well.
+    for (factor, verdict) in [(0.2, std::cmp::Ordering::Less), (5.0, std::cmp::Ordering::Greater)] {
+        let mut points = points(2e-3, 3);
+        for point in &mut points {
+            point.drive.uncertainty *= factor;
+            point.response.uncertainty *= factor;
+        }
+        let tests = fitted(&points, &[]).unwrap().channels;
+        assert!(tests.iter().any(|one| one.verdict() == Some(verdict)), "{tests:?}");
+    }
+}
+
+/// A table with the columns of `text`, read as a recording.
+fn read(text: &[u8], response: &str, drive: &str, time: Option<&str>) -> Result<Recording, RecordingError> {
+    let [response, drive] = [response, drive].map(|name| Some(name.into()));
+    let selection = Selection { response, drive, time: time.map(Into::into), rate: None };
+    Table::parse("mine.csv", text)?.contents().recording(&selection)
+}
+
+#[test]
+fn tables_are_read_as_people_have_them() {
+    let rows = |delimiter: &str, decimal: &str| -> String {
+        let row = |n: i32| {
+            let [time, y, x] = [
+                f64::from(n) * 1e-3,
+                (0.05 * f64::from(n)).sin(),
+                10.0 * (0.05 * f64::from(n)).cos(),
+            ];
+            [time, y, x]
+                .map(|value| value.to_string().replace('.', decimal))
+                .join(delimiter)
+                + "\n"
+        };
+        (0..200).map(row).collect()
+    };
+    let plain = read(format!("time,y,x\n{}", rows(",", ".")).as_bytes(), "y:mm", "x:µm", None).unwrap();
+    assert!((plain.sample_time - 1e-3).abs() < 1e-15 && plain.response.len() == 200);
+    let utf16 = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>();
+    let latin = |text: &str| text.chars().map(|one| one as u8).collect::<Vec<u8>>();
+    let named = |rows: &str| format!("time;y;x\ns;mm;µm\n{rows}");
+    let (y, x) = ("y", "x");
+    let cases: [(Vec<u8>, &str, &str, Option<&str>); 10] = [
+        (named(&rows(";", ",")).into(), y, x, None),
+        (latin(&named(&rows(";", ","))), y, x, None),
+        (utf16(&named(&rows(";", "."))), y, x, None),
+        ([vec![0xff, 0xfe], utf16(&named(&rows(";", ",")))].concat(), y, x, None),
+        (
+            format!(
+                "Rig 3, 2024-03-01\nSamples, 200\n\ntime [s]\ty (mm)\tx [um]\n{}",
+                rows("\t", ".")
+            )
+            .into(),
+            y,
+            x,
+            Some("time [s]"),
+        ),
+        (format!("# time,y,x\n{}", rows(",", ".")).into(), "y:mm", "x:um", None),
+        (
+            format!("% from the logger\n{}", rows("  ", ".")).into(),
+            "2:mm",
+            "3:um",
+            Some("1"),
+        ),
+        (
+            format!("clock,y,x\n{}0.2,0.0", rows(",", ".")).into(),
+            "y:mm",
+            "x:1e-6",
+            Some("clock:s"),
+        ),
+        (
+            format!("\"time\",\"y : top\",x\n{}", rows(",", ".")).into(),
+            "y : top:mm",
+            "x:um",
+            None,
+        ),
+        (
+            format!("time,y,x\n{}# end of the run\n", rows(",", ".")).into(),
+            "y:1V/mm",
+            "x:um",
+            None,
+        ),
+    ];
+    for (text, response, drive, time) in cases {
+        let one = read(&text, response, drive, time).unwrap_or_else(|error| panic!("{error}"));
+        assert!((one.sample_time - plain.sample_time).abs() < 1e-12, "{:?}", one.notes);
+        assert_eq!((&one.response, &one.drive), (&plain.response, &plain.drive));
+    }
+    let dates = |n: i32| format!("2024-03-01T23:59:59.{:03}Z,{n},{n}\n", 5 * n);
+    let dates: String = (0..100).map(dates).collect();
+    let one = read(format!("Time,y,x\n{dates}").as_bytes(), "y", "x", None).unwrap();
+    assert!((one.sample_time - 5e-3).abs() < 1e-9);
+}
+
+#[test]
+fn a_table_that_cannot_be_read_is_refused_with_what_was_understood() {
+    let good = |n: i32| format!("{},{},{}\n", 1e-3 * f64::from(n), n % 7, n % 5);
+    let good: String = (0..50).map(good).collect();
+    let table = |header: &str| format!("{header}\n{good}");
+    let gap = table("time,y,x").replace("0.02,", "0.9,");
+    let cases = [
+        (String::new(), "y", "x", "is empty"),
+        ("just words\nand more".into(), "y", "x", "begins with\n  just words"),
+        (table("time,y,y"), "y", "x", "numbers 2 and 3"),
+        (table("time,y,x"), "z", "x", "has no channel `z`; it has time, y, x"),
+        (table("time,y,x"), "y:furlong", "x", "the unit furlong is unknown"),
+        (table("time,y [V],x"), "y", "x", "the unit V is unknown"),
+        (table("time,y,x"), "y", "x:g", "integrate an acceleration twice"),
+        (table("clock,y,x"), "y", "x", "has no channel with the time"),
+        (gap, "y", "x", "row 22: the time goes from 0.019 s to 0.9 s"),
+    ];
+    for (text, response, drive, words) in cases {
+        let message = read(text.as_bytes(), response, drive, None).unwrap_err().to_string();
+        assert!(message.starts_with("mine.csv") && message.contains(words), "{message}");
+        assert!(
+            text.is_empty() || words.contains("begins") || words.contains("row") || message.contains("1  "),
+            "{message}"
+        );
+    }
+}
+
+#[test]
+fn the_clock_is_fitted_and_the_phase_of_the_base_says_which_times_hold() {
+    let omega = 60.0;
+    let record = |time: &dyn Fn(f64) -> f64, at: &dyn Fn(f64) -> f64| {
+        let row = |n: i32| {
+            let n = f64::from(n);
+            let [y, x] = [0.3, 0.0].map(|lag| f64::sin(omega * at(n) - lag));
+            format!("{},{y},{x}\n", time(n))
+        };
+        let text = (0..4000).map(row).collect::<String>();
+        read(format!("time,y,x\n{text}").as_bytes(), "y", "x", None).unwrap()
+    };
+    let even = |n: f64| 100.0 + 1.133_8e-3 * n;
+    let shaken = |n: f64| even(n) + 3e-4 * (n * n).sin();
+    let rounded = |n: f64| (1e3 * even(n)).round() / 1e3;
+    // Even samples with six digits of time, or with times that are wrong: the fitted clock holds.
+    for time in [&rounded as &dyn Fn(f64) -> f64, &shaken] {
+        let one = record(time, &even);
+        assert!(one.notes[0].contains("rounded"), "{:?}", one.notes);
+        assert!((one.sample_time / 1.133_8e-3 - 1.0).abs() < 1.5e-5 && one.response.len() == 4000);
+    }
+    // Samples that are taken at uneven times are interpolated.
+    let one = record(&shaken, &shaken);
+    assert!(one.notes[0].contains("interpolated"), "{:?}", one.notes);
+    let worst = one
+        .drive
+        .iter()
+        .enumerate()
+        .skip(2)
+        .take(3900)
+        .map(|(n, value)| (value - f64::sin(omega * (one.start + (one.sample_time * n as f64)))).abs());
+    let worst = worst.fold(0.0, f64::max);
+    assert!(worst < 0.05, "{worst}");
+}
+
+#[test]
+fn channels_with_clocks_of_their_own_are_aligned() {
+    let wave = |start: f64, step: f64, count: i32| {
+        (0..count)
+            .map(|n| (50.0 * (start + step * f64::from(n))).sin())
+            .collect()
+    };
+    let channel = |name: &str, start: f64, step: f64, count: i32| Channel {
+        name: name.into(),
+        unit: "mm".into(),
+        values: wave(start, step, count),
+        clock: Some([start, step]),
+    };
+    let channels = vec![
+        channel("rig/y", 0.0, 1e-3, 1000),
+        channel("rig/x", 0.0104, 0.5e-3, 1500),
+    ];
+    let contents = Contents { origin: "a.tdms".into(), channels, ..Contents::default() };
+    let selection = Selection {
+        response: Some("y".into()),
+        drive: Some("x".into()),
+        ..Selection::default()
+    };
+    let one = contents.recording(&selection).unwrap();
+    assert!(one.response.len() == one.drive.len() && one.response.len() > 700 && one.notes[0].contains("begins"));
+    let worst = one
+        .response
+        .iter()
+        .zip(&one.drive)
+        .map(|(y, x)| (y - x).abs())
+        .fold(0.0, f64::max);
+    assert!(worst < 1e-9, "{worst}");
 }

@@ -252,8 +252,14 @@ impl Contents {
 
     /// The channel of the time, s.
     fn time(&self, selection: &Selection) -> Result<Option<Measured>, RecordingError> {
-        let is_usual = |channel: &&Channel| TIMES.contains(&&*channel.name.to_lowercase());
-        let usual = || self.channels.iter().find(is_usual).map(|one| one.name.as_str());
+        let last = |channel: &Channel| channel.name.rsplit(['/', '.']).next().unwrap_or("").to_lowercase();
+        let mut usual = self.channels.iter().filter(|channel| TIMES.contains(&&*last(channel)));
+        let (first, second) = (usual.next(), usual.next());
+        if let (None, Some(first), Some(second)) = (&selection.time, first, second) {
+            let names = format!("{} and {}", first.name, second.name);
+            return Err(self.refused(&format!(" has several times, {names}: name one with `time`")));
+        }
+        let usual = || first.map(|channel| channel.name.as_str());
         let Some(text) = selection.time.as_deref().or_else(usual) else {
             return Ok(None);
         };
@@ -321,11 +327,18 @@ impl Contents {
                 &drive.values
             };
             verdict = "even, because these times are rounded: the base is smoother without them";
-            if is_strict && roughness(&interpolated(times, judge, (0..count).map(even))) <= roughness(judge) {
+            // White noise of variance 1 has fourth differences of variance 70.
+            let is_smooth = roughness(times) / f64::sqrt(70.0) < 0.5 * clock.residual;
+            let is_better = || roughness(&interpolated(times, judge, (0..count).map(even))) <= roughness(judge);
+            if is_strict && (is_smooth || is_better()) {
                 for one in [response, drive] {
                     one.values = interpolated(times, &one.values, (0..count).map(even));
                 }
-                verdict = "interpolated at even times, because the base is smoother at these times";
+                verdict = if is_smooth {
+                    "interpolated at even times, because these times vary smoothly"
+                } else {
+                    "interpolated at even times, because the base is smoother at these times"
+                };
             }
         }
         notes.push(format!(

@@ -259,13 +259,10 @@ impl Recording {
             .skip_while(|(_, one)| one.is_none_or(|one| one.amplitude < largest))
             .map_while(|(time, one)| Some((time, one?)))
             .collect();
-        if decaying.len() < LEAST {
-            return Err(one.nothing(2 * fits.len() >= anchors.len(), &[], &linear));
-        }
         let (first, second) = decaying.split_at(decaying.len() / 2);
         let [all, first, second] = [&decaying, first, second].map(rate);
         let mean_omega = omega(&decaying);
-        if all.value < SEEN * all.uncertainty {
+        if decaying.len() < LEAST || all.value < SEEN * all.uncertainty {
             let Self { origin, channels: [response, drive], .. } = self;
             let base = if self.drive_is_named() {
                 format!("the base {drive} rests")
@@ -273,7 +270,7 @@ impl Recording {
                 "no channel of the base is named".into()
             };
             return Err(RecordingError(format!(
-                "{origin}: {base}, and the response {response} does not decay. Name the channel of the base with --drive NAME:UNIT; if it is named, is \
+                "{origin}: {base}, and the response {response} does not decay for {LEAST} periods. Name the channel of the base with --drive NAME:UNIT; if it is named, is \
                  it connected?"
             )));
         }

@@ -46,7 +46,7 @@ struct Judgement {
     width: usize,
     /// Which columns have numbers in most of these rows.
     is_number: Vec<bool>,
-    /// Share of the cells that are numbers or empty.
+    /// Share of the cells of all rows that are numbers, or empty, in rows of this width.
     share: f64,
 }
 
@@ -276,6 +276,7 @@ fn judged(rows: &[StringRecord], decimal: char) -> Judgement {
         .chunk_by(|one, other| one == other)
         .max_by_key(|alike| alike.len());
     let width = width.map_or(0, |alike| alike[0]);
+    let cells: usize = rows.iter().map(StringRecord::len).sum();
     let rows: Vec<&StringRecord> = rows.iter().filter(|row| row.len() == width).collect();
     let count = |column: usize, is_it: &dyn Fn(&str) -> bool| rows.iter().filter(|row| is_it(&row[column])).count();
     let numbers: Vec<usize> = (0..width)
@@ -285,7 +286,7 @@ fn judged(rows: &[StringRecord], decimal: char) -> Judgement {
     Judgement {
         width,
         is_number: numbers.iter().map(|numbers| 2 * numbers > rows.len()).collect(),
-        share: (numbers.iter().sum::<usize>() + empty) as f64 / (width * rows.len()).max(1) as f64,
+        share: (numbers.iter().sum::<usize>() + empty) as f64 / cells.max(1) as f64,
     }
 }
 
