@@ -318,22 +318,26 @@ fn provenance(files: &[PathBuf], report: &FitReport) -> String {
     )
 }
 
+/// Relative uncertainty below which a value was given as exact.
+const EXACT: f64 = 1e-8;
+
 /// The section `[plant]` of a scene, with the standard uncertainties in comments.
 fn plant_section(fit: &Fit, report: &FitReport, plant: &vines::scene::Parameters, verdict: Option<&str>) -> String {
     let digits = fit.conditional_uncertainties();
     let lines = vines::scene::plant_keys(plant).into_iter().map(|(symbol, value)| {
         let fitted = report.parameters.iter().find(|one| one.symbol == symbol);
-        match digits.iter().find(|(one, _)| *one == symbol) {
-            Some((_, conditional)) => {
-                let decimals = decimals(*conditional);
-                let u = fitted.map_or_else(
-                    || "scaled by the mass of the scene".into(),
-                    |one| format!("± {:.1$}", one.uncertainty, self::decimals(one.uncertainty)),
-                );
-                format!("{symbol} = {value:.decimals$}  # {u}\n")
+        let conditional = digits.iter().find(|(one, _)| *one == symbol);
+        let Some(((_, conditional), value)) = conditional.zip(value.parse::<f64>().ok()) else {
+            return format!("{symbol} = {value}\n");
+        };
+        let note = match fitted {
+            None => "scaled by the mass of the scene".into(),
+            Some(one) if one.uncertainty < EXACT * one.value.abs() => {
+                return format!("{symbol} = {}  # exact\n", value as f32);
             }
-            None => format!("{symbol} = {value}\n"),
-        }
+            Some(one) => format!("± {:.1$}", one.uncertainty, decimals(one.uncertainty)),
+        };
+        format!("{symbol} = {value:.0$}  # {note}\n", decimals(*conditional))
     });
     let verdict = verdict.map(|verdict| format!("# {verdict}\n")).unwrap_or_default();
     let doubt = if report.describes {

@@ -196,6 +196,32 @@ fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
     );
     let scene = json(&format!("theory --scene {out}/rig.toml --json"))["scene"].clone();
     assert!((scene["r"].as_f64().unwrap() - 0.65).abs() < 2e-3, "{scene}");
+    let written = std::fs::read_to_string(folder.path().join("rig.toml")).unwrap();
+    assert!(
+        written.starts_with("# Fitted by vines") && !written.contains("published"),
+        "{written}"
+    );
+    let plant = &json(&format!("fit {out}/tracked.csv --known=m=0.032±0.0003 --json"))["parameters"];
+    for key in ["M", "k", "c"] {
+        let line = written
+            .lines()
+            .find(|line| line.starts_with(&format!("{key} = ")))
+            .unwrap();
+        let value: f64 = line.split_whitespace().nth(2).unwrap().parse().unwrap();
+        let fitted = plant
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|one| one["symbol"] == key)
+            .unwrap();
+        let [fitted, u] = ["value", "uncertainty"].map(|name| fitted[name].as_f64().unwrap());
+        assert!(
+            (value - fitted).abs() < 0.05 * u && line.contains("# ± "),
+            "{line} {fitted}"
+        );
+    }
+    let exact = vines(&format!("fit {out}/tracked.csv --known=m=0.032"));
+    assert!(String::from_utf8_lossy(&exact.stdout).contains("m = 0.032 has no uncertainty and counts as exact"));
     let drawn = std::fs::read_to_string(folder.path().join("fit.svg")).unwrap();
     for label in ["measured", "scene", "fit", "±1.96 u", ": not rejected"] {
         assert!(drawn.contains(&format!("{label}<")), "{label}");
