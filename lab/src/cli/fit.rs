@@ -105,6 +105,9 @@ struct Output<'a> {
     /// Parts of recordings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     parts: Vec<Part>,
+    /// How recordings were read, linear decays, and what counts as exact.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    notes: Vec<String>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
@@ -117,7 +120,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         rate: arguments.rate,
     };
     let (mut points, mut skipped, mut recordings) = (Vec::new(), 0, Vec::new());
-    let mut notes = String::new();
+    let mut notes: Vec<String> = Vec::new();
     for path in &arguments.points {
         match read(path, &arguments.column, &selection).map_err(Failure::input)? {
             Measurement::Points(more, left_out) => {
@@ -125,9 +128,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
                 skipped += left_out;
             }
             Measurement::Recording(recording) => {
-                notes.extend(recording.notes.iter().map(|note| format!("{note}\n")));
+                notes.extend(recording.notes.iter().cloned());
                 match recording.linear_decay(&scene.knowledge()).map_err(Failure::run)? {
-                    Some(decay) => notes += &format!("{}: {decay}\n", recording.origin),
+                    Some(decay) => notes.push(format!("{}: {decay}", recording.origin)),
                     None => recordings.push(recording),
                 }
             }
@@ -136,16 +139,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let exact = arguments.known.iter().filter(|one| one.estimate.uncertainty == 0.0);
     notes.extend(exact.map(|Known { quantity, estimate }| {
         format!(
-            "{quantity} = {} has no uncertainty and counts as exact; give it as --known {quantity}={0}±U unless it is\n",
+            "{quantity} = {} has no uncertainty and counts as exact; give it as --known {quantity}={0}±U unless it is",
             estimate.value
         )
     }));
+    let lines: String = notes.iter().map(|note| format!("{note}\n")).collect();
     if points.is_empty() && recordings.is_empty() && skipped == 0 && !notes.is_empty() {
-        return Ok(Results::new(notes, Written::default));
-    }
-    if arguments.json {
-        eprint!("{notes}");
-        notes.clear();
+        let text = output(arguments.json, &serde_json::json!({ "notes": notes }), || lines)?;
+        return Ok(Results::new(text, Written::default));
     }
     let parts: Vec<Part> = parts(&recordings, &scene, &arguments.known)
         .map_err(Failure::run)?
@@ -161,6 +162,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         report: &report,
         verdict: verdict.clone(),
         parts: parts.clone(),
+        notes,
     };
     let text = output(arguments.json, &printed, || {
         let parts = if parts.is_empty() {
@@ -169,7 +171,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
             recorded(&parts)
         };
         let verdict = verdict.as_ref().map(|verdict| format!("{verdict}\n"));
-        notes
+        lines
             + &parts
             + &summary(&report, &fit, &arguments.known, [points.len(), skipped])
             + &verdict.unwrap_or_default()

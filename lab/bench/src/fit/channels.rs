@@ -37,7 +37,7 @@ pub struct Selection {
     pub response: Option<String>,
     /// The displacement of the base; the channel `reference` otherwise. Without a channel the base rests.
     pub drive: Option<String>,
-    /// The time; otherwise a channel with one of the names in [`TIMES`], in any case.
+    /// The time; otherwise a channel with one of the names `time`, `t`, `timestamp` and `x_value`, in any case.
     pub time: Option<String>,
     /// Samples a second, if the file does not say it.
     pub rate: Option<f64>,
