@@ -237,6 +237,9 @@ pub struct TrackedComparison {
     pub periods_to_lock: f64,
     /// All periods, from the start to the last point.
     pub periods: f64,
+    /// Standard uncertainties of sigma and lambda, which all points and curves share, if the loop check has measured both.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub u_linear: Option<[f64; 2]>,
     /// The points, each beside the exact curve.
     pub points: Vec<TrackedPoint>,
     /// The exact backbone that the points are compared with.
@@ -283,6 +286,10 @@ impl TrackedComparison {
             points: tracked.points.iter().map(compare).collect(),
             periods_to_lock: tracked.periods_to_lock,
             periods: tracked.periods,
+            u_linear: scene.measured.map(|measured| {
+                let u_sigma = measured.uncertainty / (parameters.epsilon * parameters.omega0);
+                [u_sigma, 2.0 * u_sigma]
+            }),
             left_out: scene.left_out(),
             parameters,
             exact: curve,
@@ -307,6 +314,21 @@ impl TrackedComparison {
         } else {
             (!self.points.iter().any(TrackedPoint::is_of_backbone)).then_some(Doubt::NotSettled)
         }
+    }
+
+    /// Number of settled points that are farther from the exact backbone at equal C than 1.96 standard uncertainties of point, natural
+    /// frequency and damping. At equal C, dG/dlambda = C (docs/theory.md, eq. 17).
+    pub fn unexplained(&self) -> usize {
+        let [u_sigma, u_lambda] = self.u_linear.unwrap_or_default();
+        let settled = self.points.iter().filter(|row| row.point.settled);
+        let is_far = |row: &&TrackedPoint| {
+            let at = &row.point.at;
+            let beyond = |error: Option<f64>, u: f64| error.is_some_and(|error| error.abs() > 1.96 * u);
+            row.exact.is_some_and(|exact| {
+                beyond(exact.sigma, at.u_sigma.hypot(u_sigma)) || beyond(exact.g, at.u_g.hypot(u_lambda * at.c))
+            })
+        };
+        settled.filter(is_far).count()
     }
 
     /// Largest error at equal C, in sigma or G, and largest distance from the exact backbone, of the settled points.

@@ -202,6 +202,17 @@ pub(super) fn tracked(result: &TrackedComparison) -> String {
             worst.at_equal_c, worst.nearest
         )
     });
+    if let Some([u_sigma, u_lambda]) = result.u_linear {
+        let measured = format!(
+            "The exact backbone has the measured damping, lambda = {:.3} ± {u_lambda:.3}; all sigma share ± {u_sigma:.3}, from the measured natural \
+             frequency",
+            result.parameters.lambda
+        );
+        worst += &match result.unexplained() {
+            0 => format!("{measured}.\nBoth explain the distance of all settled points (95 %)\n"),
+            count => format!("{measured}.\nBoth do not explain the distance of {count} settled points (95 %)\n"),
+        };
+    }
     if let Some(left_out) = &result.left_out {
         worst += &format!("({})\n", ideal("the exact backbone is", left_out));
     }

@@ -162,14 +162,18 @@ pub fn tracked(tracked: &TrackedComparison) -> Figure {
     let points = || tracked.points.iter().map(|compared| compared.point);
     let top = points().fold(0.5, |most: f64, point| most.max(1.15 * point.at.c));
     let x = widened(range((-1.6, 0.6), points().map(|point| point.at.sigma)), 0.1);
+    let [first_order, orbits] = [FIRST_ORDER, ORBITS].map(|name| match tracked.u_linear {
+        Some([_, u]) => format!("{name}, measured λ = {:.2} ± {u:.2}", p.lambda),
+        None => name.into(),
+    });
     let mut backbone = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)));
     backbone.curve(
         theory_backbone(p, top, |point| (point.sigma, point.c)),
         2.0,
         THEORY,
-        FIRST_ORDER,
+        &first_order,
     );
-    add_exact_backbone(&mut backbone, p, EXACT, ORBITS);
+    add_exact_backbone(&mut backbone, p, EXACT, &orbits);
     let places = || points().map(|point| (point.at.sigma, point.at.c));
     circles(&mut backbone, places(), "tracked");
     let bars = places().zip(points().map(|point| point.at.u_sigma));
@@ -185,10 +189,10 @@ pub fn tracked(tracked: &TrackedComparison) -> Figure {
         theory_backbone(p, top, |point| (point.c, point.g)),
         2.0,
         THEORY,
-        FIRST_ORDER,
+        &first_order,
     );
     let exact = tracked.exact.places().iter().map(|place| (place[0], place[2]));
-    drive.add(Shape::Line(1.6), exact, EXACT, ORBITS);
+    drive.add(Shape::Line(1.6), exact, EXACT, &orbits);
     let places = || points().map(|point| (point.at.c, point.at.g));
     circles(&mut drive, places(), "tracked");
     error_bars(&mut drive, places().zip(points().map(|point| point.at.u_g)), true, high);
