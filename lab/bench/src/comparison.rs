@@ -286,8 +286,8 @@ impl TrackedComparison {
             points: tracked.points.iter().map(compare).collect(),
             periods_to_lock: tracked.periods_to_lock,
             periods: tracked.periods,
-            u_linear: scene.measured.map(|measured| {
-                let u_sigma = measured.uncertainty / (parameters.epsilon * parameters.omega0);
+            u_linear: knowledge.is_measured.then(|| {
+                let u_sigma = knowledge.linear.uncertainty / (parameters.epsilon * parameters.omega0);
                 [u_sigma, 2.0 * u_sigma]
             }),
             left_out: scene.left_out(),
