@@ -209,8 +209,8 @@ pub(super) fn tracked(result: &TrackedComparison) -> String {
             result.parameters.lambda
         );
         worst += &match result.unexplained() {
-            0 => format!("{measured}.\nBoth explain the distance of all settled points (95 %)\n"),
-            count => format!("{measured}.\nBoth do not explain the distance of {count} settled points (95 %)\n"),
+            0 => format!("{measured}.\nThey explain the distance of all settled points (95 %)\n"),
+            count => format!("{measured}.\nThey do not explain the distance of {count} settled points (95 %)\n"),
         };
     }
     if let Some(left_out) = &result.left_out {
