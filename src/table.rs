@@ -1,6 +1,6 @@
 //! The parameters of the plant as users set them: one table.
 //!
-//! To add a parameter, add a field to [`Parameters`] or [`Cavity`](crate::Cavity) with its effect, and a row here. From the row follow the
+//! To add a parameter, add a field to [`Parameters`] or [`Cavity`] with its effect, and a row here. From the row follow the
 //! check of its range, the variable in `modelDescription.xml`, the key in `[plant]` of a scene, the argument in Python, and the row in
 //! docs/plant-parameters.md. Files are compared with the table by tests; `UPDATE=1 cargo test -p lovines-fmu --test table` writes them.
 
