@@ -5,9 +5,9 @@ use vines::comparison::{TrackedComparison, TrackedPoint};
 use vines::experiment::ExperimentError;
 use vines::identification::Regime;
 use vines::loop_check::check;
-use vines::plan::Plan;
+use vines::plan::{LinearResponse, Plan};
 use vines::rig::{BuiltIn, ControllerError, Rig, SensorsOnly, Simulated};
-use vines::scene::{LinearResponse, Parameters, Scene};
+use vines::scene::{Parameters, Scene};
 
 use crate::experiment::ConstantDrive;
 use crate::{rig, scene, words};
