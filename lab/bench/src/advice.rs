@@ -27,57 +27,36 @@ pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
     (low <= high).then_some([low, high])
 }
 
-/// Why a run that was expected to lock the symmetric 1:1 motion may not have done so, from the scene, the numbers of its rig and the
-/// regime of the last periods.
-/// `None` where the exact orbits give no reason.
-pub fn reason(scene: &Scene, d: &Dimensionless, regime: Option<Regime>) -> Option<String> {
-    let reason = ideal_reason(scene, d, regime)?;
-    Some(match scene.left_out() {
-        Some(left_out) => format!("{reason}. This holds for the ideal cavity, without {left_out}"),
-        None => reason,
-    })
+/// Why a run that was expected to lock the symmetric 1:1 motion may not have done so.
+#[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "each variant explains its fields")]
+pub enum Reason {
+    /// No orbit at the drive `g` is stable; the range of drives is that of [`stable_range`].
+    Unstable { g: f64, range: Option<[f64; 2]> },
+    /// The controller may not set the frequency of any of these stable orbits.
+    Excluded { stable: Vec<Orbit> },
+    /// The particle does not reach the walls; under a constant drive, impacts begin at `G = onset`.
+    NoImpacts { stable: Vec<Orbit>, onset: f64 },
+    /// The motion is of this regime, and coexists with these stable orbits.
+    Coexists { stable: Vec<Orbit>, regime: Regime },
 }
 
-fn ideal_reason(scene: &Scene, d: &Dimensionless, regime: Option<Regime>) -> Option<String> {
+/// The reason from the scene, the numbers of its rig and the regime of the last periods; it holds for the ideal cavity.
+/// `None` where the exact orbits give no reason.
+pub fn reason(scene: &Scene, d: &Dimensionless, regime: Option<Regime>) -> Option<Reason> {
     let mut stable = phase_resonant(d);
     stable.retain(|orbit| orbit.stable);
     if stable.is_empty() {
-        let range = stable_range(d).map_or_else(
-            || "at no G".into(),
-            |[low, high]| {
-                let gaps = if (low..=high).contains(&d.g) { ", with gaps" } else { "" };
-                format!("for G from {low:.3} to {high:.3}{gaps}")
-            },
-        );
-        return Some(format!(
-            "there is no stable symmetric 1:1 orbit at G = {:.4}; it is stable {range}",
-            d.g
-        ));
+        return Some(Reason::Unstable { g: d.g, range: stable_range(d) });
     }
-    let place = |orbit: &Orbit| format!("sigma = {:.4}, C = {:.4}", orbit.sigma, orbit.c);
-    let places: Vec<String> = stable.iter().map(place).collect();
-    let place = format!(
-        "at this G, the stable symmetric 1:1 motion is at {}",
-        places.join(" and at ")
-    );
-    let [low, high] = [scene.controller.omega_min, scene.controller.omega_max];
-    if !stable.iter().any(|orbit| (low..=high).contains(&orbit.omega)) {
-        return Some(format!(
-            "{place}, thus at omega = {:.4} omega0, which controller.omega_min = {low} and controller.omega_max = {high} exclude",
-            stable[0].omega
-        ));
+    let allowed = scene.controller.omega_min..=scene.controller.omega_max;
+    if !stable.iter().any(|orbit| allowed.contains(&orbit.omega)) {
+        return Some(Reason::Excluded { stable });
     }
     match regime? {
         Regime::Unknown | Regime::Unresolved | Regime::NotEstablished => None,
-        Regime::NoImpacts => Some(format!(
-            "the particle does not reach the walls: under a constant drive, impacts begin at G = {:.3}; give it a velocity in [start]; {place}",
-            d.lambda
-        )),
-        Regime::Symmetric => Some(place),
-        regime => Some(format!(
-            "the motion is {}, and coexists with the wanted one: {place}. Try another G or another [start]",
-            regime.name()
-        )),
+        Regime::NoImpacts => Some(Reason::NoImpacts { stable, onset: d.lambda }),
+        regime => Some(Reason::Coexists { stable, regime }),
     }
 }
 

@@ -489,10 +489,22 @@ pub fn at(points: &[MeasuredPoint], definition: Definition, plant: &Parameters, 
     })
 }
 
-/// What is to be said where the points contradict the rig `expected`: which parameters fit instead. `None` where they do not, or cannot tell, or
-/// where the rig has effects of a real cavity, which the model has not.
+/// How points contradict the rig that is expected.
+#[derive(Debug, Clone)]
+#[expect(missing_docs, reason = "each variant explains its fields")]
+pub enum Contradiction {
+    /// The points are too few for a fit; their chi-square at the expected rig.
+    TooFew { chi_square: f64, degrees: usize },
+    /// No ideal cavity fits; the chi-square is that at the expected rig.
+    NoFit { chi_square: f64, degrees: usize },
+    /// Other parameters fit; here are those that differ significantly.
+    Parameters(Vec<FittedParameter>),
+}
+
+/// How the points contradict the rig `expected`. `None` where they do not, or cannot tell, or where the rig has effects of a real cavity, which
+/// the model has not.
 #[must_use]
-pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected: &Parameters) -> Option<String> {
+pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected: &Parameters) -> Option<Contradiction> {
     if expected.cavity != Cavity::IDEAL {
         return None;
     }
@@ -500,30 +512,17 @@ pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected:
     if !scene.is_rejected() {
         return None;
     }
-    let chi_square = format!("chi-square is {:.0} for {}", scene.chi_square, scene.degrees);
+    let Fit { chi_square, degrees, .. } = scene;
     if points.len() < FEWEST {
-        return Some(format!("the locked point does not belong to this scene ({chi_square})"));
+        return Some(Contradiction::TooFew { chi_square, degrees });
     }
     let fit = fit(points, definition, expected, &[]).ok()?;
     if fit.is_rejected() {
-        return Some(format!(
-            "the points do not belong to this scene ({chi_square}), nor to the ideal cavity with other parameters"
-        ));
+        return Some(Contradiction::NoFit { chi_square, degrees });
     }
-    let parameters = fit.report(expected).parameters;
-    let differing = parameters
-        .iter()
-        .filter(|parameter| (parameter.value - parameter.expected).abs() > SIGNIFICANT * parameter.uncertainty);
-    let texts = differing.map(|parameter| {
-        let FittedParameter { symbol, unit, value, uncertainty, expected } = parameter;
-        let space = if unit.is_empty() { "" } else { " " };
-        format!("{symbol} = {value:.4e} ± {uncertainty:.1e}{space}{unit} fits, the scene says {expected:.4e}")
-    });
-    let texts = match texts.collect::<Vec<String>>().join("; ") {
-        none if none.is_empty() => "several parameters differ a little".into(),
-        some => some,
-    };
-    Some(format!("the points do not belong to this scene: {texts}"))
+    let mut parameters = fit.report(expected).parameters;
+    parameters.retain(|parameter| (parameter.value - parameter.expected).abs() > SIGNIFICANT * parameter.uncertainty);
+    Some(Contradiction::Parameters(parameters))
 }
 
 /// What is minimised.

@@ -65,9 +65,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     }
     if tracked.ended.is_none()
         && result.left_out.is_none()
-        && let Some(line) = contradiction(&points, scene.resonance, &scene.plant)
+        && let Some(found) = contradiction(&points, scene.resonance, &scene.plant)
     {
-        text += &format!("\n{line}; run `vines fit`\n");
+        text += &format!("\n{}; run `vines fit`\n", summary::contradicts(&found));
     }
     let files = report::tracked_files(&result).map_err(Failure::from);
     let failure = match tracked.ended {

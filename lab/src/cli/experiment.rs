@@ -17,7 +17,7 @@ use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
 use super::output::{Results, Written, output, results, written};
 use super::recording::Recording;
 use super::watch::{Watch, WatchArguments};
-use super::{check, failure::Failure, pack::fmus};
+use super::{check, failure::Failure, pack::fmus, summary};
 
 /// Share of late samples of a rig in real time above which its results are doubtful. A late sample holds the drive for one more sample: at
 /// this share, the default scene has one in every period.
@@ -217,6 +217,7 @@ impl Session {
                     }
                     _ => None,
                 };
+                let reason = reason.map(|reason| summary::not_locked(&reason, scene));
                 Err(ended.without_result(Failure::from(error), reason, &samples))
             }
         }

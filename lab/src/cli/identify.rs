@@ -70,6 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
                 }
                 _ => None,
             };
+            let reason = reason.map(|reason| summary::not_locked(&reason, &scene));
             return Err(ended.without_result(Failure::from(error), reason, &record.samples));
         }
     };
@@ -78,8 +79,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     // A rig that reports its impacts is a simulation of the scene.
     let is_simulated = !identification.lock.impacts_per_period.is_nan();
     let lock = [(&identification.lock.at).into()];
-    if !is_simulated && let Some(line) = contradiction(&lock, scene.resonance, &scene.plant) {
-        text += &format!("\n{line}: track the backbone with `vines backbone`, and run `vines fit`\n");
+    if !is_simulated && let Some(found) = contradiction(&lock, scene.resonance, &scene.plant) {
+        text += &format!(
+            "\n{}: track the backbone with `vines backbone`, and run `vines fit`\n",
+            summary::contradicts(&found)
+        );
     }
     let files = report::identification_files(&result, &record, &scene).map_err(Failure::from);
     let files = files.and_then(|files| {

@@ -1,9 +1,12 @@
 //! Results in words and tables.
 
+use vines::advice::Reason;
 use vines::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
+use vines::fit::{Contradiction, FittedParameter};
 use vines::identification::{DecayEnd, Friction, Regime, ResonancePoint};
+use vines::orbit::Orbit;
 use vines::regime_map::Map;
-use vines::scene::{Definition, Dimensionless, Sensor};
+use vines::scene::{Definition, Dimensionless, Scene, Sensor};
 use vines::table::{Table, row, with_uncertainty};
 
 /// The dimensionless numbers of a scene, in one line.
@@ -28,6 +31,78 @@ fn in_si(at: &ResonancePoint) -> [String; 3] {
         metres(at.a_m, at.u_a_m),
         metres(at.e_m, at.u_e_m),
     ]
+}
+
+/// Why a run of the scene did not lock the symmetric 1:1 motion, and what to do.
+pub(super) fn not_locked(reason: &Reason, scene: &Scene) -> String {
+    let places = |stable: &[Orbit]| {
+        let place = |orbit: &Orbit| format!("sigma = {:.4}, C = {:.4}", orbit.sigma, orbit.c);
+        let places: Vec<String> = stable.iter().map(place).collect();
+        format!(
+            "at this G, the stable symmetric 1:1 motion is at {}",
+            places.join(" and at ")
+        )
+    };
+    let text = match reason {
+        Reason::Unstable { g, range } => {
+            let range = range.map_or_else(
+                || "at no G".into(),
+                |[low, high]| {
+                    let gaps = if (low..=high).contains(g) { ", with gaps" } else { "" };
+                    format!("for G from {low:.3} to {high:.3}{gaps}")
+                },
+            );
+            format!("there is no stable symmetric 1:1 orbit at G = {g:.4}; it is stable {range}")
+        }
+        Reason::Excluded { stable } => format!(
+            "{}, thus at omega = {:.4} omega0, which controller.omega_min = {} and controller.omega_max = {} exclude",
+            places(stable),
+            stable[0].omega,
+            scene.controller.omega_min,
+            scene.controller.omega_max
+        ),
+        Reason::NoImpacts { stable, onset } => format!(
+            "the particle does not reach the walls: under a constant drive, impacts begin at G = {onset:.3}; give it a velocity in [start]; {}",
+            places(stable)
+        ),
+        Reason::Coexists { stable, regime: Regime::Symmetric } => places(stable),
+        Reason::Coexists { stable, regime } => format!(
+            "the motion is {}, and coexists with the wanted one: {}. Try another G or another [start]",
+            regime.name(),
+            places(stable)
+        ),
+    };
+    match scene.left_out() {
+        Some(left_out) => format!("{text}. This holds for the ideal cavity, without {left_out}"),
+        None => text,
+    }
+}
+
+/// How measured points contradict the scene.
+pub(super) fn contradicts(contradiction: &Contradiction) -> String {
+    let parameters = match contradiction {
+        Contradiction::TooFew { chi_square, degrees } => {
+            return format!(
+                "the locked point does not belong to this scene (chi-square is {chi_square:.0} for {degrees})"
+            );
+        }
+        Contradiction::NoFit { chi_square, degrees } => {
+            return format!(
+                "the points do not belong to this scene (chi-square is {chi_square:.0} for {degrees}), nor to the ideal cavity with other \
+                 parameters"
+            );
+        }
+        Contradiction::Parameters(parameters) if parameters.is_empty() => "several parameters differ a little".into(),
+        Contradiction::Parameters(parameters) => {
+            let texts = parameters.iter().map(|parameter| {
+                let FittedParameter { symbol, unit, value, uncertainty, expected } = parameter;
+                let space = if unit.is_empty() { "" } else { " " };
+                format!("{symbol} = {value:.4e} ± {uncertainty:.1e}{space}{unit} fits, the scene says {expected:.4e}")
+            });
+            texts.collect::<Vec<String>>().join("; ")
+        }
+    };
+    format!("the points do not belong to this scene: {parameters}")
 }
 
 /// How often each regime occurs on a map.

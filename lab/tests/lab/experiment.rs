@@ -1,7 +1,7 @@
 //! Guards lock, decay and identification on the simulated plant: accuracy against exact orbits, regimes, advice where several or no orbits are
 //! stable, and experiments that end early.
 
-use vines::advice;
+use vines::advice::{Reason, reason};
 use vines::comparison::Comparison;
 use vines::experiment::{self, ExperimentError};
 use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
@@ -193,11 +193,6 @@ fn a_lock_through_30_db_takes_less_than_twice_the_periods_and_states_how_far_off
     assert!((lock.at.c - exact.c).abs() <= 4.0 * lock.at.u_c && lock.at.u_c < 0.01);
 }
 
-/// The advice for a scene's own rig.
-fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
-    advice::reason(scene, &scene.dimensionless(), regime)
-}
-
 #[test]
 fn of_two_stable_orbits_the_one_that_was_not_followed_is_named_and_so_are_gaps_between_them() {
     let settings = "plant.epsilon=0.0038 plant.lambda=0.512 plant.r=0.506 excitation.G=0.93 start.dq2=0";
@@ -207,16 +202,23 @@ fn of_two_stable_orbits_the_one_that_was_not_followed_is_named_and_so_are_gaps_b
     let followed = found.exact.unwrap();
     assert!((found.lock.at.c - followed.c).abs() < 2e-3, "{:?}", found.lock);
     // A motion that is neither of them is told about both.
-    let refused = reason(&scene(settings), Some(Regime::Asymmetric)).unwrap();
+    let regime = Regime::Asymmetric;
+    let refused = scene(settings);
+    assert_eq!(
+        reason(&refused, &refused.dimensionless(), Some(regime)),
+        Some(Reason::Coexists { stable: stable.iter().map(|orbit| **orbit).collect(), regime })
+    );
     for orbit in stable {
-        let place = format!("sigma = {:.4}, C = {:.4}", orbit.sigma, orbit.c);
-        assert!(refused.contains(&place), "{refused}");
         assert_eq!(found.others().any(|other| other == orbit), *orbit != followed);
     }
     let gap = scene("plant.epsilon=0.02 plant.lambda=0.4 plant.r=0.8 excitation.G=0.7");
-    let reason = reason(&gap, None).unwrap();
-    let words = "it is stable for G from 0.415 to 0.824, with gaps";
-    assert!(reason.ends_with(words), "{reason}");
+    let Some(Reason::Unstable { g: 0.7, range: Some([low, high]) }) = reason(&gap, &gap.dimensionless(), None) else {
+        panic!("an orbit is stable in the gap");
+    };
+    assert!(
+        (low - 0.415).abs() < 5e-4 && (high - 0.824).abs() < 5e-4,
+        "{low} to {high}"
+    );
     // The file names all of them, and the one that was followed.
     let file = serde_json::to_value(&found).unwrap();
     assert_eq!(file["orbits"].as_array().unwrap().len(), found.orbits.len());
