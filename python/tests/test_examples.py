@@ -16,5 +16,5 @@ def test_an_example_draws_its_figure(example, tmp_path):
     assert (tmp_path / f"{example.stem}.svg").stat().st_size > 10_000
 
 
-def test_there_are_three_of_them():
-    assert len(EXAMPLES) == 3
+def test_there_are_four_of_them():
+    assert len(EXAMPLES) == 4

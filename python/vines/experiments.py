@@ -62,6 +62,8 @@ class Identification(Result):
     rms_sigma_error, rms_sigma_exact, rms_sigma_predicted : float or None
         RMS of the decay's sigma minus theory, minus the exact backbone, and minus the decay that the exact plant
         predicts, over C > 0.2.
+    theory : Theory
+        First-order theory of the scene.
     """
 
     lock: dict[str, Any]
@@ -71,14 +73,15 @@ class Identification(Result):
     rms_sigma_error: float | None
     rms_sigma_exact: float | None
     rms_sigma_predicted: float | None
+    theory: "Theory"
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw C over sigma along the decay, and the lock, with matplotlib, and return the axes."""
-        ax = axes(ax)
+        """Draw C over sigma: theory (dashed: unstable), exact orbits, decay and lock. Return the axes of matplotlib."""
+        ax = self.theory.plot(ax)
         if self.decay:
-            ax.plot(self.decay["sigma"], self.decay["C"], label="decay")
-        ax.plot(self.lock["sigma"], self.lock["C"], "o", label="lock")
-        ax.set(xlabel="detuning sigma", ylabel="amplitude C")
+            ax.plot(self.decay["sigma_exact"], self.decay["C"], lw=1, label="exact orbits")
+            ax.plot(self.decay["sigma"], self.decay["C"], "o", ms=3, label="decay")
+        ax.plot(self.lock["sigma"], self.lock["C"], "s", label="lock")
         ax.legend()
         return ax
 
@@ -119,6 +122,7 @@ def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "a
         raise ValueError(f"results = {results!r}: 'all' and 'lock' are allowed")
     found = json.loads(_native.identify(checked(scene)._native, results == "all"))
     return Identification(
+        theory=theory(scene),
         lock=found["lock"],
         exact=Orbit._of(found["exact"]) if found["exact"] else None,
         decay=_table(found["decay"]),
@@ -137,16 +141,20 @@ class Backbone(Result):
         and others.
     periods : float
         All periods, from the start to the last point.
+    theory : Theory
+        First-order theory of the scene.
     """
 
     points: Table
     periods: float
+    theory: "Theory"
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw C over sigma with matplotlib, and return the axes."""
-        ax = axes(ax)
-        ax.plot(self.points["sigma"], self.points["C"], "o-")
-        ax.set(xlabel="detuning sigma", ylabel="amplitude C")
+        """Draw C over sigma: theory (dashed where unstable), and the settled points. Return the axes of matplotlib."""
+        ax = self.theory.plot(ax)
+        settled = self.points["settled"].astype(bool)
+        ax.plot(self.points["sigma"][settled], self.points["C"][settled], "o", label="tracked")
+        ax.legend()
         return ax
 
     def to_xarray(self) -> "xarray.Dataset":
@@ -184,7 +192,7 @@ def backbone(scene: Scene | None = None) -> Backbone:
     points = [
         {**point, **{f"{k}_difference": v for k, v in (point.pop("exact") or {}).items()}} for point in found["points"]
     ]
-    return Backbone(points=_table(points), periods=found["periods"])
+    return Backbone(points=_table(points), periods=found["periods"], theory=theory(scene))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -274,9 +282,11 @@ class Theory(Result):
     C_min: float
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw C over sigma with matplotlib, and return the axes."""
+        """Draw C over sigma, dashed where impacts or slow flow are unstable. Return the axes of matplotlib."""
         ax = axes(ax)
-        ax.plot(self.backbone["sigma"], self.backbone["C"])
+        stable = self.backbone["impacts_stable"] & self.backbone["slow_flow_stable"]
+        for style, where, label in (("-", stable, "theory"), ("--", ~stable, "theory, unstable")):
+            ax.plot(np.where(where, self.backbone["sigma"], np.nan), self.backbone["C"], f"k{style}", lw=1, label=label)
         ax.set(xlabel="detuning sigma", ylabel="amplitude C")
         return ax
 

@@ -694,7 +694,7 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
             let slopes = slopes(here, held(next));
             let late = LAG * harmonic.rate * TAU / harmonic.omega;
             let gain = -harmonic.rate / here[1];
-            // What is seen in one balance may be in the other, too.
+            // A misfit of one balance widens the other one as well: both have the same samples.
             let units = [1.0, harmonic.amplitude / gain];
             let systematic = (slopes[0] * late).hypot(units[1] * slopes[1] * late) * count.sqrt();
             let [u_amplitude, u_omega] = harmonic.uncertainties;
