@@ -26,7 +26,7 @@ z_response = z_base = 0j
 omega = start["omega"]
 history = []
 for _ in range(30_000):
-    # The controller: two adaptive filters x = Re(z exp(i theta)), and a loop that holds the phase between them at -90 degrees.
+    # The controller: two adaptive filters x = Re(z exp(i theta)), and a loop that holds their phase at -90 degrees.
     turn = cmath.exp(1j * theta)
     z_response += 2 * bandwidth * step * (plant.v - (z_response * turn).real) / turn
     z_base += 2 * bandwidth * step * (plant.base - (z_base * turn).real) / turn
