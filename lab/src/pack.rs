@@ -91,12 +91,11 @@ pub fn own_libraries(components: &[Component], folder: &Path) -> Result<Vec<Bina
     let mut binaries = Vec::new();
     for Component { identifier, package, .. } in components {
         let path = folder.join(format!("{DLL_PREFIX}{}{DLL_SUFFIX}", package.replace('-', "_")));
-        vines_fmu::check(&path).map_err(|reason| PackError::Library {
+        vines_fmu::check(&path).map_err(|reason| PackError::NotOwn {
             path: path.clone(),
-            problem: format!(
-                "is not the library of {identifier} for this machine: {reason}; build it with `cargo build --release -p {package}`, \
-                 or name its folder with --libraries"
-            ),
+            identifier,
+            package,
+            reason,
         })?;
         binaries
             .extend(own_platforms().map(|(folder, suffix)| Binary { platform: [folder, suffix], path: path.clone() }));
@@ -104,10 +103,19 @@ pub fn own_libraries(components: &[Component], folder: &Path) -> Result<Vec<Bina
     Ok(binaries)
 }
 
-/// A failure that names the file and what to do.
+/// A failure that names the file.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum PackError {
+    #[error("{} is not the library of {identifier} for this machine: {reason}; build it with `cargo build --release -p {package}`", path.display())]
+    NotOwn {
+        path: PathBuf,
+        identifier: &'static str,
+        package: &'static str,
+        reason: String,
+    },
+    #[error("{0} has no library")]
+    NoLibrary(String),
     #[error("{} {problem}", path.display())]
     Library { path: PathBuf, problem: String },
     #[error("the description cannot be read: {0}")]
@@ -146,8 +154,7 @@ pub fn pack(components: &[Component], binaries: &[Binary]) -> Result<Vec<File>, 
     for ((component, description), libraries) in components.iter().zip(&descriptions).zip(libraries) {
         let name = format!("{}.fmu", component.identifier);
         if libraries.is_empty() {
-            let problem = "has no library: give one by --binary PLATFORM=FILE, or leave out --only-binaries".into();
-            return Err(PackError::Library { path: name.into(), problem });
+            return Err(PackError::NoLibrary(name));
         }
         let entries = [
             ("modelDescription.xml", component.xml.clone().into_bytes()),

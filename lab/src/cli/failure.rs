@@ -68,8 +68,19 @@ macro_rules! exit_codes {
 }
 
 exit_codes! {
-    2: ArgumentError, CellError, InvalidValue, PackError, SceneError;
+    2: ArgumentError, CellError, InvalidValue, SceneError;
     1: io::Error, ControllerError, FileError, FmuError, NoMotion, ReportError, RigError;
+}
+
+impl From<PackError> for Failure {
+    fn from(error: PackError) -> Self {
+        let advice = match error {
+            PackError::NotOwn { .. } => ", or name its folder with --libraries",
+            PackError::NoLibrary(_) => ": give one by --binary PLATFORM=FILE, or leave out --only-binaries",
+            _ => "",
+        };
+        Self::input(format!("{error}{advice}"))
+    }
 }
 
 impl From<ConfigError> for Failure {
