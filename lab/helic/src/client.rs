@@ -117,10 +117,12 @@ impl Transport for Network {
     }
 
     fn guard(&mut self, stop: &[Frame]) {
+        // Before the watchdog's clock starts: when it closes the connection, this time is past for certain.
+        let now = Instant::now();
         // This fails after the watchdog has closed the connection.
         let sent = self.watchdog.send(stop.iter().flat_map(Frame::encode).collect());
         if sent.is_ok() {
-            self.alive = (!stop.is_empty()).then(Instant::now);
+            self.alive = (!stop.is_empty()).then_some(now);
         }
     }
 }
