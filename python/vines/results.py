@@ -37,8 +37,6 @@ def brief(value: Any) -> str:
     match value:
         case bool() | None:
             return str(value)
-        case Result():
-            return f"<{type(value).__name__}>"
         case float():
             return f"{value:.6g}"
         case np.ndarray():
