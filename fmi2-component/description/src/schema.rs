@@ -18,7 +18,7 @@ struct Element {
     elements: &'static str,
     /// Attributes that are text.
     texts: &'static str,
-    /// Attributes that are numbers or truth values: white space around them has no meaning.
+    /// Attributes that are numbers or Booleans: white space around them has no meaning.
     values: &'static str,
 }
 

@@ -110,9 +110,9 @@ pub struct Plan {
     pub lock: Config,
     /// Configuration of the controller for the tracked backbone.
     pub tracking: Config,
-    /// Samples of the hold, and of the recorded decay.
+    /// Samples of the hold.
     pub hold: usize,
-    #[expect(missing_docs, reason = "see above")]
+    /// Samples of the recorded decay.
     pub decay: usize,
     /// Levels of the tracked backbone, amplitudes of the response, m, in the order in which they are visited.
     pub levels: Vec<f64>,

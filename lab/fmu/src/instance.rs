@@ -18,7 +18,7 @@ use crate::units::{Scale, scale};
 pub enum FmuError {
     #[error("cannot load {} as an FMU: {reason}", path.display())]
     Load { path: PathBuf, reason: String },
-    #[error("{} has no variable `{name}` that is a number or a truth value, which the bench needs; [rig.names] and [controller_names] of \
+    #[error("{} has no variable `{name}` that is a number or a Boolean, which the bench needs; [rig.names] and [controller_names] of \
              the scene map names", path.display())]
     Variable { path: PathBuf, name: String },
     #[error(

@@ -179,7 +179,7 @@ impl Instance {
         let path = fmu.library(&interface.model_identifier)?;
         // SAFETY: as the contract of this module.
         let library = unsafe { Library::new(&path) }.map_err(|error| unloadable(&error, fmu))?;
-        // SAFETY: as above.
+        // SAFETY: the contract of this module: the functions have the types of FMI 2.0.
         let functions = unsafe { Functions::of(&library) };
         let log = Box::new(Log { name: file.into(), heard: Mutex::default() });
         let callbacks = Box::new(Callbacks {
@@ -195,7 +195,7 @@ impl Instance {
         let instantiate = functions
             .fmi2Instantiate
             .ok_or("its library has no function fmi2Instantiate")?;
-        // SAFETY: as above. The texts and the callbacks live longer than the call and the instance.
+        // SAFETY: the contract of this module. The texts and the callbacks live longer than the call and the instance.
         let component = unsafe {
             instantiate(
                 name.as_ptr(),

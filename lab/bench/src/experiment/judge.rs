@@ -39,9 +39,9 @@ pub struct Condition {
     pub name: &'static str,
     /// The parameter of the lock criterion that bounds it.
     pub key: &'static str,
-    /// Its value over the last periods, and the largest allowed.
+    /// Its value over the last periods.
     pub found: f64,
-    #[expect(missing_docs, reason = "see above")]
+    /// Largest allowed value.
     pub allowed: f64,
 }
 
