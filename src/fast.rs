@@ -13,7 +13,7 @@ mod flight;
 mod propagator;
 mod verify;
 
-/// Whether a mechanism of the fast path is left out, to measure what it saves: `LOVINES_WITHOUT=hop cargo bench --bench savings -- scenes`.
+/// Whether a mechanism of the fast path is left out, to measure what it saves: `LOVINES_WITHOUT=hop cargo bench -p vines-benchmarks --bench savings -- scenes`.
 /// In any other build this is false at compile time.
 #[inline(always)]
 fn without(mechanism: &str) -> bool {

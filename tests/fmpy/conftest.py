@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bench import SAMPLE_TIME, Pair, Record, Scene, experiment
+from coupling import SAMPLE_TIME, Pair, Record, Scene, experiment
 from component import Component, Fmu
 from references import ROOT
 

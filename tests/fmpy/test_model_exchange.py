@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 
-from bench import PERIOD, Scene
+from coupling import PERIOD, Scene
 from references import trajectory
 
 STATES = ("q1", "der(q1)", "q2", "der(q2)")

@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from bench import HOLD_PERIODS, SAMPLE_TIME, Scene
+from coupling import HOLD_PERIODS, SAMPLE_TIME, Scene
 from identification import decay
 from references import stable_orbit
 from theory import backbone

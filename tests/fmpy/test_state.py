@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench import SAMPLE_TIME, Pair, Scene
+from coupling import SAMPLE_TIME, Pair, Scene
 from component import FMICallException
 
 SCENE = Scene()

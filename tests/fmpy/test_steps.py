@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 
-from bench import SAMPLE_TIME, Scene
+from coupling import SAMPLE_TIME, Scene
 from component import FMICallException
 
 STATES = ("q1", "der(q1)", "q2", "der(q2)")

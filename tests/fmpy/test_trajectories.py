@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench import Scene
+from coupling import Scene
 from references import trajectory
 
 STATES = ("q1", "der(q1)", "q2", "der(q2)")

@@ -16,11 +16,11 @@ use std::time::Duration;
 use anyhow::Context;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
-use vines_bench::baseline::Baseline;
-use vines_bench::method::{Answer, Shell, Stepped, measure};
-use vines_bench::scene::Scene;
-use vines_bench::solvers::{Moreau, Rk4, Solved};
-use vines_bench::{cost, map};
+use vines_benchmarks::baseline::Baseline;
+use vines_benchmarks::method::{Answer, Shell, Stepped, measure};
+use vines_benchmarks::scene::Scene;
+use vines_benchmarks::solvers::{Moreau, Rk4, Solved};
+use vines_benchmarks::{cost, map};
 
 /// The methods by name.
 const METHODS: &[(&str, Measure)] = &[
@@ -33,9 +33,9 @@ const METHODS: &[(&str, Measure)] = &[
     ("rk4", measure::<Solved<Rk4>>),
     ("moreau", measure::<Solved<Moreau>>),
     #[cfg(feature = "diffsol")]
-    ("diffsol-tsit45", measure::<Solved<vines_bench::diffsol::Tsit45>>),
+    ("diffsol-tsit45", measure::<Solved<vines_benchmarks::diffsol::Tsit45>>),
     #[cfg(feature = "diffsol")]
-    ("diffsol-bdf", measure::<Solved<vines_bench::diffsol::Bdf>>),
+    ("diffsol-bdf", measure::<Solved<vines_benchmarks::diffsol::Bdf>>),
 ];
 
 /// [`measure`] for one method.

@@ -1,7 +1,7 @@
 //! What the plant costs in each regime and way of stepping, and how that compares with the closed form and Brent's method in the same run.
 //!
 //! ```text
-//! cargo bench -p vines-bench
+//! cargo bench -p vines-benchmarks
 //! ```
 //!
 //! Absolute times depend on the machine and on what else it does; the ratios in the table at the end hardly do: plant and baseline take short
@@ -12,9 +12,9 @@ use std::time::{Duration, Instant};
 
 use criterion::{BatchSize, Criterion, Throughput};
 use lovines::{Drive, Parameters};
-use vines_bench::baseline::Baseline;
-use vines_bench::method::{Method, Stepped, begin, measure};
-use vines_bench::scene::{Scene, Step, state};
+use vines_benchmarks::baseline::Baseline;
+use vines_benchmarks::method::{Method, Stepped, begin, measure};
+use vines_benchmarks::scene::{Scene, Step, state};
 
 /// Duration of the measurement, and of the turns of a case in each round.
 const DURATION: Duration = Duration::from_secs(10);

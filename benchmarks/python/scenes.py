@@ -148,7 +148,7 @@ def load(file):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--write", type=Path, required=True)
-    parser.add_argument("--worker", required=True, help="the program vines-bench")
+    parser.add_argument("--worker", required=True, help="the program vines-benchmarks")
     options = parser.parse_args()
     request = json.dumps({"record": LOOP_PERIODS}) + "\n"
     answer = subprocess.run([options.worker], input=request, capture_output=True, text=True, check=True).stdout

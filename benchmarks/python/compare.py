@@ -96,7 +96,9 @@ class Bench:
         quick run, that it comes out again."""
         for name, scene in self.scenes.items():
             if self.truth.get(name, {}).get("of") != fingerprint(scene):
-                sys.exit(f"error: bench/truth.json is not of the scene {name}: scripts/bench --truth works it out anew")
+                sys.exit(
+                    f"error: benchmarks/truth.json is not of the scene {name}: scripts/bench --truth works it out anew"
+                )
         script = [sys.executable, HERE / "python/truth.py", "--check", HERE.parent / "tests/reference/trajectories"]
         if not self.options.quick:
             again = [name for name in self.scenes if name not in KEPT_TRUTH]
@@ -249,7 +251,7 @@ def main():
         prog="scripts/bench",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="scripts/bench --truth works bench/truth.json out anew, in a quarter of an hour.",
+        epilog="scripts/bench --truth works benchmarks/truth.json out anew, in a quarter of an hour.",
     )
     parser.add_argument(
         "--quick",

@@ -3,7 +3,7 @@
  * the problem is not stiff. An impact is a root of the gap to a wall; the solver restarts after it. While the drive stays, the
  * solver steps past the communication points and interpolates there.
  *
- * Reads requests from standard input, numbers in text; bench/python/cvode_c.py writes them:
+ * Reads requests from standard input, numbers in text; benchmarks/python/cvode_c.py writes them:
  *   M k c m b r  q1 q1' q2 q2'  tolerance limit budget
  *   number of runs of equal steps, each: amplitude omega duration count
  *   number of checks, each: step after which the state is wanted, counted from 1

@@ -2,8 +2,8 @@
 //! of a real cavity costs, per impact of the default lock.
 //!
 //! ```text
-//! cargo bench --bench savings
-//! LOVINES_WITHOUT=hop cargo bench --bench savings -- scenes    what scenes cost without a mechanism of the fast path
+//! cargo bench -p vines-benchmarks --bench savings
+//! LOVINES_WITHOUT=hop cargo bench -p vines-benchmarks --bench savings -- scenes    what scenes cost without a mechanism of the fast path
 //! ```
 //!
 //! Every case is run under valgrind for two lengths; the difference tells what one unit of work costs, without the start of

@@ -1,4 +1,4 @@
-"""CVODE with its functions in C: compiles bench/c/cvode.c where SUNDIALS is installed, and answers requests.
+"""CVODE with its functions in C: compiles benchmarks/c/cvode.c where SUNDIALS is installed, and answers requests.
 
     python cvode_c.py SCENES.json FOLDER     the program goes into FOLDER
 
@@ -39,7 +39,7 @@ def compiled(folder):
         if done.returncode == 0:
             return program
     lines = done.stderr.strip().splitlines() or ["no message"]
-    sys.exit(f"bench/c/cvode.c could not be compiled: {lines[-1]}")
+    sys.exit(f"benchmarks/c/cvode.c could not be compiled: {lines[-1]}")
 
 
 def request_text(scene, request):

@@ -1,6 +1,6 @@
 """A sample loop, as users write it for a controller of their own: this package against the FMU in FMPy.
 
-scripts/python; .venv-python/bin/python bench/python/sample_loop.py
+scripts/python; .venv-python/bin/python benchmarks/python/sample_loop.py
 
 Both advance the same motion sample by sample and read what a controller needs. Turns alternate; figures are medians.
 """
