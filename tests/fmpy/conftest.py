@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from coupling import SAMPLE_TIME, Pair, Record, Scene, experiment
 from component import Component, Fmu
+from coupling import SAMPLE_TIME, Pair, Record, Scene, experiment
 from references import ROOT
 
 FIGURES = pytest.StashKey[list[tuple[str, str, str]]]()

@@ -2,8 +2,8 @@
 
 import pytest
 
-from coupling import SAMPLE_TIME, Pair, Scene
 from component import FMICallException
+from coupling import SAMPLE_TIME, Pair, Scene
 
 SCENE = Scene()
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 
-from coupling import SAMPLE_TIME, Scene
 from component import FMICallException
+from coupling import SAMPLE_TIME, Scene
 
 STATES = ("q1", "der(q1)", "q2", "der(q2)")
 DRIVE = {"E": Scene().amplitude, "omega": 0.990417}
