@@ -15,5 +15,6 @@ pub use vines_helic as helic;
 pub use vines_model::{ArgumentError, curves, map, numerics, orbit, regime, theory};
 pub use vines_net as net;
 pub use vines_testbench::{
-    advice, backbone, cells, comparison, experiment, fit, identification, live, loop_check, plan, record, rig, scene,
+    advice, backbone, cells, comparison, experiment, fit, identification, linear, live, loop_check, plan, record, rig,
+    scene,
 };

@@ -11,6 +11,7 @@ pub mod comparison;
 pub mod experiment;
 pub mod fit;
 pub mod identification;
+pub mod linear;
 pub mod live;
 pub mod loop_check;
 pub mod plan;
