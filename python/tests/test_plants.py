@@ -190,7 +190,7 @@ print("done")
 def test_a_fork_after_use_is_refused_with_the_way_out_and_one_before_it_computes(tmp_path):
     command = [sys.executable, "-W", "ignore", "-c", ADVANCE_AND_SWEEP, str(tmp_path)]
     # Instead of an error it would wait for ever.
-    found = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    found = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert found.stdout == "done\n", found.stderr
 
 

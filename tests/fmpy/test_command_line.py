@@ -29,7 +29,7 @@ def call(vines, tmp_path):
     """Runs the program in an empty folder."""
 
     def call(*arguments: str) -> subprocess.CompletedProcess:
-        return subprocess.run([vines, *arguments], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+        return subprocess.run([vines, *arguments], cwd=tmp_path, capture_output=True, text=True, timeout=600)
 
     return call
 

@@ -124,7 +124,7 @@ class Shell:
             self.wait_for(next(int(mine) for theirs, mine in self.ports.items() if theirs in line))
             return ""
         done = subprocess.run(
-            ["bash", "-c", self.command(line)], cwd=self.folder, capture_output=True, text=True, timeout=120
+            ["bash", "-c", self.command(line)], cwd=self.folder, capture_output=True, text=True, timeout=600
         )
         assert (done.returncode != 0) == fails, f"{line}\n{done.stdout}{done.stderr}"
         for folder in re.findall(r"(?:^|&& )cd (\S+)", line):
@@ -133,7 +133,7 @@ class Shell:
 
     def wait_for(self, port: int):
         """A connection would be a session: the tables of the system show that the port is open."""
-        end = time.monotonic() + 20
+        end = time.monotonic() + 120
         while time.monotonic() < end:
             tables = (Path("/proc/net/tcp").read_text(), Path("/proc/net/udp").read_text())
             if any(f":{port:04X} " in table for table in tables):

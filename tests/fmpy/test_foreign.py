@@ -150,5 +150,5 @@ def test_a_controller_that_logs_without_end_does_not_stop_the_loop(vines, tmp_pa
     command = [vines, "identify", "--controller", fmu, "--rig", "built-in", "--out", tmp_path / "out"]
     # Nobody reads this pipe while the program runs.
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as loop:
-        assert loop.wait(timeout=60) == 0
+        assert loop.wait(timeout=600) == 0
         assert loop.stderr.read().count(b"noisy.fmu: 000") == 20

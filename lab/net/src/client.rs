@@ -26,8 +26,9 @@ pub const CONNECT: Duration = Duration::from_secs(2);
 /// Time without an answer after which the last datagram is sent again: Hello, the first drive, or the farewell (protocol, "A session"). Also
 /// the interval at which a server is asked again that has another client.
 const RESEND: Duration = Duration::from_millis(50);
-/// Longest time for the report of a rig in real time (protocol, "A session"): twenty repetitions of the farewell.
-const REPORT: Duration = Duration::from_secs(1);
+/// How often a farewell is sent until the report of a rig in real time arrives (protocol, "A session"): for 2 s, as Hello. The number counts
+/// and not the time, so that a client on a busy machine also asks for a report that was lost.
+const FAREWELLS: u32 = 40;
 
 /// A session.
 #[derive(Debug)]
@@ -243,20 +244,23 @@ impl NetRig {
 
     /// Ends the session with a rig in real time. If this fails, the server's watchdog does.
     fn farewell(&mut self) -> Result<(), LinkError> {
-        self.client.send(self.client.frame(Kind::Farewell))?;
-        let end = Instant::now() + REPORT;
-        loop {
-            match self.client.receive(end) {
-                Ok(Some(frame)) if frame.kind == Kind::Report => {
-                    let _ = self.timing.set(Ok(Timing::read(&frame)));
-                    return Ok(());
+        for _ in 0..FAREWELLS {
+            self.client.send(self.client.frame(Kind::Farewell))?;
+            let end = Instant::now() + RESEND;
+            loop {
+                match self.client.receive(end) {
+                    Ok(Some(frame)) if frame.kind == Kind::Report => {
+                        let _ = self.timing.set(Ok(Timing::read(&frame)));
+                        return Ok(());
+                    }
+                    // Readings of the ramp to zero.
+                    Ok(Some(_)) | Err(LinkError::ShutDown { .. }) => {}
+                    Ok(None) => break,
+                    Err(error) => return Err(error),
                 }
-                // Readings of the ramp to zero overtake a report that was lost.
-                Ok(Some(_)) | Err(LinkError::ShutDown { .. }) => {}
-                Ok(None) => return Ok(()),
-                Err(error) => return Err(error),
             }
         }
+        Ok(())
     }
 }
 

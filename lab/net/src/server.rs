@@ -419,15 +419,15 @@ impl Run {
                 let _ = self.drive.apply(rig.as_mut(), self.service.sample_time);
             }
         }
-        let began = self.clock.as_ref().map_or(self.opened, |clock| clock.due(0));
+        let clock = self.clock.as_ref();
         Session {
             peer: self.peer,
             ended: self.ended.unwrap_or(Ended::Stopped),
             samples: self.at,
             sample_time: self.service.sample_time,
-            seconds: began.elapsed().as_secs_f64(),
+            seconds: clock.map_or_else(|| self.opened.elapsed().as_secs_f64(), RealTimeClock::seconds),
             timing: self.timing(),
-            histogram: self.clock.as_ref().map(RealTimeClock::classes).unwrap_or_default(),
+            histogram: clock.map(RealTimeClock::classes).unwrap_or_default(),
             counters: self.real_time.then_some(self.counters),
         }
     }

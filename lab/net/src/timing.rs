@@ -29,6 +29,8 @@ pub struct RealTimeClock {
     missed: u64,
     /// Largest lateness, s.
     worst: f64,
+    /// Time from the start to the last sample.
+    served: Duration,
 }
 
 impl RealTimeClock {
@@ -41,6 +43,7 @@ impl RealTimeClock {
             lateness,
             missed: 0,
             worst: 0.0,
+            served: Duration::ZERO,
         }
     }
 
@@ -51,7 +54,13 @@ impl RealTimeClock {
 
     /// Counts sample `n`, which is served now.
     pub fn serve(&mut self, n: u64) {
-        self.record(self.due(n).elapsed().as_secs_f64());
+        self.served = self.start.elapsed();
+        self.record(self.served.as_secs_f64() - n as f64 * self.period);
+    }
+
+    /// Time from the start to the last sample, s.
+    pub fn seconds(&self) -> f64 {
+        self.served.as_secs_f64()
     }
 
     fn record(&mut self, lateness: f64) {

@@ -58,7 +58,7 @@ fn extreme_values_of_plant_and_drive_are_refused_at_once() {
         let began = Instant::now();
         fails(line, 2, part);
         let passed = began.elapsed();
-        assert!(passed < Duration::from_secs(10), "{line}: {passed:?}");
+        assert!(passed < Duration::from_secs(60), "{line}: {passed:?}");
     };
     for (value, name) in [
         ("plant.c=1e300", "c (damping) = "),

@@ -4,12 +4,11 @@
 use std::path::Path;
 use std::process::Output;
 use std::sync::LazyLock;
-use std::time::Duration;
 
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::{PROGRAM, Running, fails, is_failure, text, vines, words};
+use crate::{PROGRAM, Running, fails, is_failure, text, vines, wait_for_rows, words};
 
 /// The two FMUs, packed once, with the libraries that cargo builds because this package depends on them.
 static FMUS: LazyLock<TempDir> = LazyLock::new(|| {
@@ -238,26 +237,27 @@ fn a_server_ends_in_order_on_a_signal() {
 #[cfg(unix)]
 #[test]
 fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() {
-    // A signal that comes later finds the rig still driven.
+    // Recorded samples tell that the rig is driven, or that points of the backbone are measured. A later signal finds it so, too.
     let long = "identify --set=record.hold_periods=20000";
     let many = "backbone --set=backbone.C_from=0.6 --set=backbone.C_to=0.58 --set=backbone.points=2000";
-    for (mode, command, signal, seconds, part) in [
-        ("--silence 5", long, "INT", 3, "interrupted"),
-        ("--lock-step --silence 30", long, "TERM", 3, "interrupted"),
+    for (mode, command, signal, samples, part) in [
+        ("--silence 5", long, "INT", 1000, "interrupted"),
+        ("--lock-step --silence 30", long, "TERM", 1000, "interrupted"),
         // Between two points of a backbone, the points are kept.
         (
             "--lock-step --silence 30",
             many,
             "INT",
-            5,
+            20_000,
             "points were measured before",
         ),
     ] {
         let rig = Server::start(&format!("rig --json {mode}"));
-        let folder = tempfile::tempdir().unwrap();
-        let line = format!("{command} --out {} --rig {}", folder.path().display(), rig.1);
+        let [folder, other] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+        let (out, record) = (folder.path().display(), other.path().join("run.csv"));
+        let line = format!("{command} --out {out} --rig {} --record {}", rig.1, record.display());
         let mut client = Running::start(&quick(&line));
-        std::thread::sleep(Duration::from_secs(seconds));
+        wait_for_rows(&record, samples);
         client.signal(signal);
         let output = client.output();
         assert_eq!(output.status.code(), Some(130), "{output:?}");

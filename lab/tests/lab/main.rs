@@ -11,8 +11,12 @@ mod report;
 mod results;
 mod watch;
 
+use std::fs;
 use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use vines::rig::{BuiltIn, Rig, Simulated};
@@ -87,6 +91,19 @@ impl Running {
         self.0.stderr.take().unwrap().read_to_end(&mut stderr).unwrap();
         let status = self.0.wait().unwrap();
         Output { status, stdout, stderr }
+    }
+}
+
+/// Waits until a recording that grows has this many rows. A row has about 100 bytes; a generous time catches a run that hangs.
+fn wait_for_rows(file: &Path, rows: u64) {
+    let began = Instant::now();
+    while fs::metadata(file).map_or(0, |file| file.len()) < 100 * rows {
+        assert!(
+            began.elapsed() < Duration::from_secs(120),
+            "{} does not grow",
+            file.display()
+        );
+        sleep(Duration::from_millis(20));
     }
 }
 

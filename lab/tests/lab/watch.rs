@@ -22,8 +22,10 @@ impl Watched {
 
     fn connect(&self, request: &str) -> TcpStream {
         let mut stream = TcpStream::connect(&self.1).unwrap();
-        stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
-        write!(stream, "{request} HTTP/1.1\r\nHost: {}\r\n\r\n", self.1).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(120))).unwrap();
+        // In one piece: the server waits for a request for a short time only.
+        let request = format!("{request} HTTP/1.1\r\nHost: {}\r\n\r\n", self.1);
+        stream.write_all(request.as_bytes()).unwrap();
         stream
     }
 

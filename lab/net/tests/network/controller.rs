@@ -1,5 +1,6 @@
 //! Guards a controller across the network: late and missing answers, moves of the response, and who judges the lock.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::sleep;
 use std::time::Duration;
@@ -14,29 +15,39 @@ fn reading(n: usize) -> Sensors {
     Sensors { response: n as f64, reference: None }
 }
 
-/// Serves a controller that answers with the number of the reading; every tenth answer takes `pause` ms. Its readings are logged.
-fn serve_echo(silence: f64, pause: u64) -> (Served, Arc<Mutex<Vec<f64>>>) {
+/// Serves a controller that answers with the number of the reading. Every tenth answer waits until `done` exceeds that number. Its readings
+/// are logged.
+fn serve_echo(done: &Arc<AtomicUsize>) -> (Served, Arc<Mutex<Vec<f64>>>) {
     let asked = Arc::<Mutex<Vec<f64>>>::default();
-    let log = Arc::clone(&asked);
+    let (log, done) = (Arc::clone(&asked), Arc::clone(done));
     let echo = Answers(move |response| {
-        let mut log = log.lock().unwrap();
-        log.push(response);
-        if log.len() % 10 == 5 {
-            sleep(Duration::from_millis(pause));
+        let number = log.lock().unwrap().len();
+        log.lock().unwrap().push(response);
+        while number % 10 == 4 && done.load(Ordering::Relaxed) <= number {
+            sleep(Duration::from_micros(100));
         }
-        let drive = drive(log.len() - 1);
-        Command { drive, settled: Some(true), ..Command::default() }
+        Command {
+            drive: drive(number),
+            settled: Some(true),
+            ..Command::default()
+        }
     });
-    (serve_controller(&SCENE, silence, echo), asked)
+    (serve_controller(&SCENE, PATIENT, echo), asked)
 }
 
 #[test]
 fn beside_a_rig_in_real_time_the_last_answer_replaces_a_late_one_and_no_reading_is_missing() {
-    let (server, asked) = serve_echo(PATIENT, 5);
+    let done = Arc::default();
+    let (server, asked) = serve_echo(&done);
     let mut peer = server.controller(Some(PATIENT));
-    let answers: Vec<Command> = (0..200).map(|n| peer.sample(reading(n), true).unwrap()).collect();
+    let sample = |n| {
+        let answer = peer.sample(reading(n), true).unwrap();
+        done.store(n + 1, Ordering::Relaxed);
+        answer
+    };
+    let answers: Vec<Command> = (0..200).map(sample).collect();
     println!("{}", peer.counters());
-    assert!(peer.counters().held >= 15);
+    assert!(peer.counters().held >= 20);
     // Until the first answer nothing is driven. A held drive is that of an earlier sample, and never counts as settled.
     let first = answers.iter().position(|answer| *answer != Command::default()).unwrap();
     for (n, answer) in answers.iter().enumerate().skip(first) {
@@ -55,13 +66,15 @@ fn beside_a_rig_in_real_time_the_last_answer_replaces_a_late_one_and_no_reading_
 #[test]
 fn a_controller_that_stops_answering_is_a_permanent_error_and_a_client_that_was_silent_gets_no_drive() {
     for pace in [None, Some(0.2)] {
-        let (server, _) = serve_echo(0.3, 1000);
+        let done = Arc::default();
+        let (server, _) = serve_echo(&done);
         let mut peer = server.controller(pace);
-        let error = (0..5000).find_map(|n| peer.sample(reading(n), true).err()).unwrap();
+        let error = (0..).find_map(|n| peer.sample(reading(n), true).err()).unwrap();
         assert!(matches!(error.cause(), Some(LinkError::Silent { .. })), "{error}");
         assert!(peer.sample(reading(0), true).is_err());
+        done.store(usize::MAX, Ordering::Relaxed);
     }
-    let (server, _) = serve_echo(0.2, 0);
+    let (server, _) = serve_echo(&Arc::default());
     let mut peer = server.controller(None);
     peer.sample(reading(0), true).unwrap();
     assert_eq!(server.session().ended, Ended::Silence);

@@ -1,6 +1,7 @@
 //! Guards a rig in real time: it never waits, holds the last valid drive, and shuts it down after a silence.
 //!
-//! A busy machine misses deadlines now and then. The tests assert only what must hold nevertheless.
+//! A busy machine misses deadlines and delays every thread. The tests assert only what must hold nevertheless; a silence that is not to be
+//! reached is [`PATIENT`].
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -41,11 +42,14 @@ fn proxy(server: SocketAddr, mut fate: impl FnMut(&mut Frame, u64) -> Fate + Sen
     thread::spawn(move || {
         let (mut client, mut count, mut kept) = (server, [0; 2], [None; 2]);
         while Arc::strong_count(&is_used) > 1 {
+            // A pause after every frame would be too slow on a busy machine, and frames would be lost in full buffers.
+            let mut is_idle = true;
             for (direction, at, via) in [(0, &front, &back), (1, &back, &front)] {
                 let mut bytes = [0; 256];
                 let Ok((size, from)) = at.recv_from(&mut bytes) else {
                     continue;
                 };
+                is_idle = false;
                 client = if direction == 0 { from } else { client };
                 let to = if direction == 0 { server } else { client };
                 let mut frame = Frame::decode(&bytes[..size]).unwrap();
@@ -66,7 +70,9 @@ fn proxy(server: SocketAddr, mut fate: impl FnMut(&mut Frame, u64) -> Fate + Sen
                     assert_eq!(via.send_to(&bytes, to).unwrap(), bytes.len());
                 }
             }
-            sleep(Duration::from_micros(20));
+            if is_idle {
+                sleep(Duration::from_micros(20));
+            }
         }
     });
     (address, used)
@@ -105,10 +111,9 @@ impl Run {
 fn the_rig_keeps_its_rate_and_reports_the_lateness_of_its_samples() {
     let Run { session, drives, report, .. } = Run::through(|_, _| Fate::Pass(1));
     let timing = session.timing.unwrap();
-    // However busy the machine is, the samples are as late as the report says.
+    // However busy the machine is, no sample is early, and the last one is at most as late as the report says. (Instants have 1 ns.)
     let late = session.seconds - session.samples as f64 * session.sample_time;
-    let allowed = -2.0 * session.sample_time..timing.worst + 0.1;
-    assert!(allowed.contains(&late), "{late} s, {allowed:?}");
+    assert!((-1e-9..=timing.worst + 1e-9).contains(&late), "{late} s, {timing}");
     assert_eq!(timing.samples, session.samples);
     let counted: u64 = session.histogram.iter().map(|class| class.1).sum();
     assert_eq!(counted, session.samples);
@@ -200,26 +205,30 @@ fn neither_garbage_nor_a_repeated_hello_keeps_a_session_without_a_drive() {
         session
     });
     assert_eq!(session.ended, Ended::Silence);
-    assert!((5.0..8.0).contains(&session.seconds), "{}", session.seconds);
+    assert!(session.seconds >= 5.0, "{}", session.seconds);
 }
 
 #[test]
 fn a_silence_shuts_the_drive_down_until_another_session_and_a_client_that_returns_is_informed() {
-    let server = serve_rig(Address::Udp, &SCENE, 0.3);
+    let server = serve_rig(Address::Udp, &SCENE, PATIENT);
     let mut rig = server.rig();
     shake(&mut rig, 50).unwrap();
     let session = server.session();
     assert_eq!(session.ended, Ended::Silence);
-    assert!(session.counters.unwrap().held as f64 * session.sample_time > 0.3);
+    assert!(session.counters.unwrap().held as f64 * session.sample_time > PATIENT);
     let drives = server.drives();
-    let held = drives.iter().filter(|given| **given == drive(49)).count();
-    assert!(held as f64 * session.sample_time > 0.29, "{held}");
+    // Its silence counts from the sample that the last drive belongs to.
+    let last = drives.iter().rposition(|given| *given == drive(49)).unwrap() - 49;
+    assert!((last as f64 * session.sample_time - PATIENT).abs() < 0.01, "{last}");
     assert_eq!(server.last().amplitude, 0.0);
 
     let error = (0..).find_map(|_| shake(&mut rig, 1).err()).unwrap();
     let cause = link_error(&error);
     let informed = matches!(cause, LinkError::ShutDown { .. } | LinkError::Silent { .. });
-    assert!(informed && error.to_string().contains("0.3 s"), "{error}");
+    assert!(
+        informed && error.to_string().contains(&format!("{PATIENT} s")),
+        "{error}"
+    );
     // Latched: no frame of this client moves the rig again.
     let _ = rig.advance(drive(51), SCENE.sample_time());
     sleep(Duration::from_millis(50));
@@ -234,7 +243,7 @@ fn a_silence_shuts_the_drive_down_until_another_session_and_a_client_that_return
 
 #[test]
 fn a_rig_that_stops_answering_ends_the_experiment() {
-    let server = serve_rig(Address::Udp, &SCENE, 0.3);
+    let server = serve_rig(Address::Udp, &SCENE, PATIENT);
     let answers = |frame: &mut Frame, n| Fate::Pass(u64::from(frame.kind != Kind::Sensors || n < 50));
     let (address, _used) = proxy(server.address.socket(), answers);
     let mut rig = NetRig::connect(address, SCENE.sample_time(), None).unwrap();
@@ -253,8 +262,13 @@ fn a_client_that_falls_behind_is_shut_down_and_no_drive_older_than_the_silence_i
         sleep(Duration::from_secs_f64(2.0 * step));
         rig.advance(drive(n), step)
     });
+    // On a busy machine, the server may be silent as well.
     let error = outcome.unwrap_err();
-    assert!(matches!(link_error(&error), LinkError::ShutDown { .. }), "{error}");
+    let informed = matches!(
+        link_error(&error),
+        LinkError::ShutDown { .. } | LinkError::Silent { .. }
+    );
+    assert!(informed, "{error}");
     assert_eq!(server.session().ended, Ended::Silence);
     let oldest = (silence / step).ceil() + 1.0;
     for (n, had) in server.drives().iter().enumerate() {
@@ -266,18 +280,20 @@ fn a_client_that_falls_behind_is_shut_down_and_no_drive_older_than_the_silence_i
 #[test]
 fn a_controller_that_stops_answering_ramps_the_drive_of_the_rig_down() {
     let rig_server = serve_rig(Address::Udp, &SCENE, PATIENT);
-    // It answers 200 readings, and hangs at the next.
-    let mut left = 200_usize;
+    // It answers 200 readings, and hangs at the next until the experiment is over.
+    let (mut left, is_over) = (200_usize, Arc::new(AtomicBool::new(false)));
+    let ended = Arc::clone(&is_over);
     let stops = Answers(move |_| {
-        if left == 0 {
-            sleep(Duration::from_secs(2));
+        while left == 0 && !ended.load(Ordering::Relaxed) {
+            sleep(Duration::from_millis(1));
         }
         left = left.saturating_sub(1);
         Command { drive: drive(left), ..Command::default() }
     });
     let controller_server = serve_controller(&SCENE, 10.0, stops);
-    let (mut rig, mut peer) = (rig_server.rig(), controller_server.controller(Some(0.5)));
+    let (mut rig, mut peer) = (rig_server.rig(), controller_server.controller(Some(PATIENT)));
     let outcome = experiment::run(&mut rig, &mut peer, &SCENE.plan(), |_, _, _| {});
+    is_over.store(true, Ordering::Relaxed);
     assert!(matches!(outcome, Err(ExperimentError::Controller(_))), "{outcome:?}");
     drop((rig, peer));
     assert_eq!(rig_server.session().ended, Ended::Farewell);
