@@ -190,7 +190,7 @@ fn recorded(case: &Case, snr: &str) -> Result<Points, Failure> {
         origin: "the recording".into(),
         channels: ["response".into(), "reference".into()],
         start: 0.0,
-        is_acceleration: false,
+        measurands: Default::default(),
         notes: Vec::new(),
         sample_time: record.sample_time,
         response: samples.iter().map(|one| one.sensors.response).collect(),

@@ -10,6 +10,7 @@ use pyo3::{
 };
 use serde_json::json;
 use vines_model::{
+    Measurand,
     map::CellRun,
     numerics::Estimate,
     orbit,
@@ -92,8 +93,16 @@ pub fn fit(py: Python<'_>, scene: &Scene, points: Vec<[f64; 6]>, known: Vec<Stri
 
 /// A channel: name, unit, samples, and start and step (s) of a clock of its own.
 type ChannelTuple = (String, String, Vec<f64>, Option<[f64; 2]>);
-/// A recording: origin, names of the channels, start and step (s), whether the response is an acceleration, response, base, and notes.
-type RecordingTuple = (String, [String; 2], [f64; 2], bool, Vec<f64>, Vec<f64>, Vec<String>);
+/// A recording: origin, names of the channels, start and step (s), what both measure, response, base, and notes.
+type RecordingTuple = (
+    String,
+    [String; 2],
+    [f64; 2],
+    [String; 2],
+    Vec<f64>,
+    Vec<f64>,
+    Vec<String>,
+);
 
 /// The recording of two channels of a file: a table as text if `channels` is absent. `options`: response, drive and time.
 #[pyfunction]
@@ -124,7 +133,7 @@ pub fn recording(
         channels,
         start,
         sample_time,
-        is_acceleration,
+        measurands,
         response,
         drive,
         notes,
@@ -133,7 +142,7 @@ pub fn recording(
         origin,
         channels,
         [start, sample_time],
-        is_acceleration,
+        measurands.map(|measurand| measurand.name().into()),
         response,
         drive,
         notes,
@@ -141,24 +150,33 @@ pub fn recording(
 }
 
 fn recording_of(
-    (origin, channels, [start, sample_time], is_acceleration, response, drive, notes): RecordingTuple,
-) -> Recording {
-    Recording {
+    (origin, channels, [start, sample_time], measured, response, drive, notes): RecordingTuple,
+) -> PyResult<Recording> {
+    let measurand = |name: &String| {
+        let mut every = Measurand::ALL.into_iter();
+        every.find(|one| one.name() == name).ok_or_else(|| {
+            PyValueError::new_err(format!(
+                "{origin}: measured {name} is unknown; displacement, velocity and acceleration are known"
+            ))
+        })
+    };
+    let measurands = [measurand(&measured[0])?, measurand(&measured[1])?];
+    Ok(Recording {
         origin,
         channels,
         start,
         sample_time,
-        is_acceleration,
+        measurands,
         response,
         drive,
         notes,
-    }
+    })
 }
 
 /// f0 (Hz), zeta, their standard uncertainties, and a sentence; `None` if the recording is not a linear decay.
 #[pyfunction]
 pub fn linear_decay(py: Python<'_>, scene: &Scene, recording: RecordingTuple) -> PyResult<Option<([f64; 4], String)>> {
-    let recording = recording_of(recording);
+    let recording = recording_of(recording)?;
     let decay = py
         .detach(|| recording.linear_decay(&scene.scene.knowledge()))
         .map_err(invalid)?;
@@ -180,7 +198,10 @@ pub fn fit_recordings(
     known: Vec<String>,
 ) -> PyResult<String> {
     let known = parsed(&known)?;
-    let recordings: Vec<Recording> = recordings.into_iter().map(recording_of).collect();
+    let recordings = recordings
+        .into_iter()
+        .map(recording_of)
+        .collect::<PyResult<Vec<Recording>>>()?;
     let parts = py
         .detach(|| parts(&recordings, &scene.scene, &known))
         .map_err(invalid)?

@@ -35,11 +35,11 @@ class Recording:
     sample_time : float
         Time from sample to sample, s.
     response, drive : ndarray
-        Response, m or m/s², and displacement of the base, m.
+        Response and base, m, m/s or m/s².
     start : float
         Time of the first sample, s.
-    is_acceleration : bool
-        Whether the response is an acceleration.
+    measured : tuple of str
+        What response and base are: "displacement", "velocity" or "acceleration".
     notes : tuple of str
         What is to be known of the way it was read: the clock, and what was cut or interpolated.
     """
@@ -50,13 +50,13 @@ class Recording:
     response: NDArray[np.float64]
     drive: NDArray[np.float64]
     start: float = 0.0
-    is_acceleration: bool = False
+    measured: tuple[str, str] = ("displacement", "displacement")
     notes: tuple[str, ...] = ()
 
     def _tuple(self) -> tuple[Any, ...]:
         clock = [self.start, self.sample_time]
         values = (np.asarray(one, dtype=np.float64).ravel() for one in (self.response, self.drive))
-        return self.origin, list(self.channels), clock, self.is_acceleration, *values, list(self.notes)
+        return self.origin, list(self.channels), clock, list(self.measured), *values, list(self.notes)
 
 
 @dataclass(frozen=True)
@@ -109,9 +109,9 @@ def read_recording(
         A file .csv, .txt, .dat, .mat (5 and 7.3), .h5, .hdf5, .tdms, .uff, .unv or .lvm. All but tables as text need
         `vines-testbench[io]`.
     response, drive : str, optional
-        Channels of the response and of the displacement of the base, by default `response` and `reference`: a name or a
-        number, and after a colon a unit if the file has none (m, mm, µm, m/s², g), the sensitivity of the sensor
-        ("100mV/g"), or metres per unit ("-0.5"). The last part of a path is enough where it is the only one. Without a
+        Channels of the response and of the base, by default `response` and `reference`: a name or a number, and after a
+        colon a unit if the file has none (m, mm, µm, mm/s, m/s², g) or a multiple of it ("-1g"), the sensitivity of the
+        sensor ("100mV/g", "125mm/s/V"), or metres per unit ("-0.5"). The last part of a path is enough where it is the only one. Without a
         channel of the base the base rests.
     rate : float, optional
         Samples a second. Without it the file says it: a channel of the time, or the clock of a channel in TDMS,
@@ -154,10 +154,11 @@ def read_recording(
         if not channels:
             reasons = "; ".join(f"{name}: {reason}" for name, reason in refused.items())
             raise ValueError(f"{file} has no channel of numbers{': ' if reasons else ''}{reasons}")
-    origin, names, (start, step), is_acceleration, y, x, notes = _native.recording(
+    origin, names, (start, step), measured, y, x, notes = _native.recording(
         str(file), channels, [response, drive, time], rate
     )
-    return Recording(origin, (names[0], names[1]), step, np.array(y), np.array(x), start, is_acceleration, tuple(notes))
+    pair = (measured[0], measured[1])
+    return Recording(origin, (names[0], names[1]), step, np.array(y), np.array(x), start, pair, tuple(notes))
 
 
 # A channel of a file: name, samples or the reason why it has none, unit, and start and step of its clock.

@@ -10,7 +10,7 @@ use vines_testbench::scene::{Name, Names};
 
 use crate::archive::Unpacked;
 use crate::library::Instance;
-use crate::units::{Scale, scale};
+use crate::units::{Scale, is_unit_of, scale};
 
 /// Reason why an FMU cannot be used, or cannot continue.
 #[derive(Debug, Error)]
@@ -29,6 +29,15 @@ pub enum FmuError {
              [controller_names] of the scene, such as {name} = {{ name = \"{name}\", factor = 1.0 }}", path.display())]
     Unit {
         path: PathBuf,
+        name: String,
+        unit: String,
+        ours: &'static str,
+    },
+    #[error(
+        "[rig.names] or [controller_names] of the scene gives `{name}` a unit of {unit}, and the bench needs one of {ours}; velocities and \
+             accelerations of response and base are named by resonance.sensor_quantity and resonance.reference_quantity"
+    )]
+    Quantity {
         name: String,
         unit: String,
         ours: &'static str,
@@ -241,7 +250,11 @@ fn connect(
     description: &Description,
     path: &Path,
 ) -> Result<Connection, FmuError> {
-    let Name { name, factor } = names.of(ours);
+    let Name { name, factor, si: given } = names.of(ours);
+    if let Some(unit) = given.filter(|given| !is_unit_of(given, si)) {
+        let unit = unit.into();
+        return Err(FmuError::Quantity { name: ours.into(), unit, ours: si });
+    }
     let is_number = |variable: &&ScalarVariable| {
         let kind = variable.content().map(|(kind, _)| kind);
         variable.name == name && kind.is_some_and(|kind| kind != FmiType::String)

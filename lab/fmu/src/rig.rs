@@ -4,7 +4,9 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use vines_testbench::rig::{Drive, FrictionTotals, GroundTruth, Measured, Rig, RigError, Sensors, has_friction};
-use vines_testbench::scene::{Names, PLANT_PARAMETERS, Reference as ReferenceSignal, Scene, Sensor};
+use vines_testbench::scene::{
+    Definition, Measurand, Names, PLANT_PARAMETERS, Reference as ReferenceSignal, Scene, Sensor,
+};
 
 use crate::instance::{Connection, Fmu, FmuError, Variable, unpack};
 
@@ -28,16 +30,29 @@ const NAMES: [(&str, &str); 16] = [
     ("der(q2)", "m/s"),
 ];
 
-/// All that the bench uses, with SI units.
-fn used() -> Vec<(String, &'static str)> {
+/// All that the bench uses, with SI units: of response and base those of the scene's definition where the scene maps them.
+fn used(names: &Names, definition: Definition) -> Vec<(String, &'static str)> {
     let parameters = PLANT_PARAMETERS.iter().map(|row| (row.symbol, row.unit));
-    let named = NAMES.into_iter().chain(parameters);
-    named.map(|(name, unit)| (name.to_owned(), unit)).collect()
+    let measured = [
+        ("response", definition.sensor_quantity),
+        ("base", definition.reference_quantity),
+    ];
+    let unit = |(name, unit)| {
+        let channel = measured
+            .into_iter()
+            .find(|(ours, _)| *ours == name && names.mapped(name).is_some());
+        (
+            name.to_owned(),
+            channel.map_or(unit, |(_, quantity)| quantity.unit_in_ascii()),
+        )
+    };
+    NAMES.into_iter().chain(parameters).map(unit).collect()
 }
 
 /// A plant FMU, stepped sample by sample.
 ///
-/// It needs the output that the sensor reads, `v` or `q1` (or what the scene maps `response` to), from which an acceleration follows, and
+/// It needs the output that the sensor reads, `v` or `q1`, from which a velocity or an acceleration follows (or what the scene maps `response`
+/// to, which is read as it is), and
 /// the inputs `omega` and `E`, or the input `e` for held samples of the base displacement, or both. Where it has `base`, that is the
 /// reference sensor; where it has `impacts`, `impact_time`, `impact_velocity` and `der(q2)`, it reports its impacts. The parameters `M`,
 /// `k`, `c`, `m`, `b`, `r`, those of the scene's real cavity, and the start `q1`, `der(q1)`, `q2`, `der(q2)` are set as far as the FMU has
@@ -70,7 +85,7 @@ impl FmuRig {
     /// the scene maps them to. It has the sensors of the scene.
     pub fn load(path: &Path, scene: &Scene) -> Result<Measured<Self>, FmuError> {
         let (names, definition) = (&scene.rig_names, scene.resonance);
-        let mut fmu = Fmu::load(path, "plant", names, &used(), scene.sample_time())?;
+        let mut fmu = Fmu::load(path, "plant", names, &used(names, definition), scene.sample_time())?;
         let inputs = fmu
             .find("omega")
             .zip(fmu.find("E"))
@@ -82,7 +97,7 @@ impl FmuRig {
         let ours = match definition.sensor {
             _ if names.mapped("response").is_some() => "response",
             Sensor::V => "v",
-            Sensor::Q1 | Sensor::Acceleration => "q1",
+            Sensor::Q1 => "q1",
         };
         let response = fmu.need(ours)?;
         let reference = match definition.reference {
@@ -92,12 +107,20 @@ impl FmuRig {
         fmu.start(&scene.start_values())?;
         let inside = Inside::of(&fmu, has_friction(&scene.plant));
         let rig = Self { fmu, inputs, held, phase: 0.0, response, reference, inside };
-        Ok(Measured::new(rig, definition, &scene.plant))
+        // A variable that the scene names is what it is measured as; velocities and accelerations of our own variables are differences.
+        let mut differences = definition;
+        if names.mapped("response").is_some() {
+            differences.sensor_quantity = Measurand::Displacement;
+        }
+        if names.mapped("base").is_some() {
+            differences.reference_quantity = Measurand::Displacement;
+        }
+        Ok(Measured::new(rig, differences, &scene.plant))
     }
 
     /// What the bench uses, and what of it the FMU at `path` has.
-    pub fn connections(path: &Path, names: &Names) -> Result<Vec<Connection>, FmuError> {
-        Ok(unpack(path, names, &used())?.1)
+    pub fn connections(path: &Path, names: &Names, definition: Definition) -> Result<Vec<Connection>, FmuError> {
+        Ok(unpack(path, names, &used(names, definition))?.1)
     }
 }
 

@@ -56,6 +56,12 @@ fn dimension(unit: &str) -> Option<Dimension> {
     Some(sum)
 }
 
+/// Whether a quantity in the SI unit `given` can be one in `ours`, as far as both are known.
+pub(crate) fn is_unit_of(given: &str, ours: &str) -> bool {
+    let given = dimension(&given.replace('²', "2"));
+    dimension(ours).is_none_or(|ours| given == Some(ours))
+}
+
 /// The scale of a declared unit, with its definition where the description has one; `ours` is the SI unit of the bench. `None`: the two
 /// cannot be converted into each other. Without a definition, the units of a scene are known; any other is taken as `ours`.
 pub(crate) fn scale(declared: &str, base: Option<&BaseUnit>, ours: &str) -> Option<Scale> {

@@ -1,5 +1,7 @@
 //! What counts as resonance: the first harmonic of a sensor's response lags a reference by a quarter of a period.
 
+use std::f64::consts::FRAC_PI_2;
+
 use serde::{Deserialize, Serialize};
 
 /// Reference and sensor that define resonance. The default is the definition of the study.
@@ -8,8 +10,60 @@ use serde::{Deserialize, Serialize};
 pub struct Definition {
     /// What the phase refers to.
     pub reference: Reference,
-    /// What is measured of the response.
+    /// The point whose displacement is the response.
     pub sensor: Sensor,
+    /// What the sensor of the response measures of it.
+    pub sensor_quantity: Measurand,
+    /// What the sensor of the base measures of it.
+    pub reference_quantity: Measurand,
+}
+
+/// The quantity that a sensor of a motion measures. All results are displacements: a harmonic of the frequency w is divided by `(i w)^n`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Measurand {
+    /// A displacement, m.
+    #[default]
+    Displacement,
+    /// Its first derivative, m/s.
+    Velocity,
+    /// Its second derivative, m/s².
+    Acceleration,
+}
+
+impl Measurand {
+    /// All of them, by their order.
+    pub const ALL: [Self; 3] = [Self::Displacement, Self::Velocity, Self::Acceleration];
+
+    /// How often a displacement is differentiated.
+    pub fn order(self) -> i32 {
+        self as i32
+    }
+
+    /// The SI unit.
+    pub fn unit(self) -> &'static str {
+        ["m", "m/s", "m/s²"][self as usize]
+    }
+
+    /// The SI unit as in an FMU.
+    pub fn unit_in_ascii(self) -> &'static str {
+        ["m", "m/s", "m/s2"][self as usize]
+    }
+
+    /// In words.
+    pub fn name(self) -> &'static str {
+        ["displacement", "velocity", "acceleration"][self as usize]
+    }
+
+    /// The measurand that has this SI unit.
+    pub fn of_unit(unit: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|one| one.unit() == unit)
+    }
+
+    /// Phase by which a harmonic leads its displacement, rad.
+    pub fn lead(self) -> f64 {
+        f64::from(self.order()) * FRAC_PI_2
+    }
 }
 
 /// What the phase of the response refers to.
@@ -32,31 +86,57 @@ pub enum Sensor {
     V,
     /// The displacement of the primary mass.
     Q1,
-    /// The acceleration of the primary mass over omega0^2, with the sign of its displacement: `-q1''`.
-    Acceleration,
 }
 
 impl Definition {
-    /// All definitions.
+    /// All definitions, by displacements.
     pub fn all() -> Vec<Self> {
-        let sensors = [Sensor::V, Sensor::Q1, Sensor::Acceleration];
-        let with = |reference| sensors.map(|sensor| Self { reference, sensor });
+        let with = |reference| [Sensor::V, Sensor::Q1].map(|sensor| Self { reference, sensor, ..Self::default() });
         [Reference::Base, Reference::Force].into_iter().flat_map(with).collect()
+    }
+
+    /// What the two channels measure: response and reference.
+    pub fn measurands(&self) -> [Measurand; 2] {
+        [self.sensor_quantity, self.reference_quantity]
     }
 
     /// Whether the sensors need differences of samples, so that response and reference are read one sample late.
     pub fn is_late(&self) -> bool {
-        self.sensor == Sensor::Acceleration || self.reference == Reference::Force
+        self.measurands() != [Measurand::Displacement; 2] || self.reference == Reference::Force
     }
 
-    /// The channels, as a rig at a network address states them: 0, 1 and 2 for v, q1 and the acceleration, and 4 more for the force.
+    /// The channels, as a rig at a network address states them: 0 and 1 for v and q1, 4 more for the force, 8 more for each derivative of the
+    /// response, and 32 more for each of the base.
     pub fn channels(&self) -> u8 {
-        self.sensor as u8 + 4 * self.reference as u8
+        let Self { reference, sensor, sensor_quantity, reference_quantity } = *self;
+        sensor as u8 + 4 * reference as u8 + 8 * sensor_quantity as u8 + 32 * reference_quantity as u8
+    }
+
+    /// The definition with these [channels](Self::channels).
+    pub fn of_channels(channels: u8) -> Option<Self> {
+        let quantities = |one: Self| {
+            let of_base = move |of_response| {
+                Measurand::ALL.map(|of_base| Self {
+                    sensor_quantity: of_response,
+                    reference_quantity: of_base,
+                    ..one
+                })
+            };
+            Measurand::ALL.into_iter().flat_map(of_base)
+        };
+        let mut every = Self::all().into_iter().flat_map(quantities);
+        every.find(|one| one.channels() == channels)
     }
 
     /// The channels in words: response and reference.
     pub fn channel_names(&self) -> String {
-        format!("{} and {}", self.sensor.name(), self.reference.name())
+        let of = |measurand: Measurand, name: &str| match measurand {
+            Measurand::Displacement => name.to_string(),
+            other => format!("the {} of {name}", other.name()),
+        };
+        let [response, reference] = self.measurands();
+        let response = of(response, self.sensor.name());
+        format!("{response} and {}", of(reference, self.reference.name()))
     }
 
     /// In words, as in a table.
@@ -71,7 +151,6 @@ impl Sensor {
         match self {
             Sensor::V => "v",
             Sensor::Q1 => "q1",
-            Sensor::Acceleration => "acceleration",
         }
     }
 }

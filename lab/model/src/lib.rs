@@ -15,7 +15,7 @@ pub mod orbit;
 pub mod regime;
 pub mod theory;
 
-pub use definition::{Definition, Reference, Sensor};
+pub use definition::{Definition, Measurand, Reference, Sensor};
 pub use dimensionless::Dimensionless;
 
 /// An argument or a setting that cannot be read; the message says what is expected.

@@ -8,12 +8,17 @@ use vines_model::orbit::{
     DriveCondition, NoMotion, PlantMotion, exact_backbone, periodic_motion, resonant_motion, resonant_motion_under,
     settled_motion,
 };
-use vines_model::{Definition, Dimensionless, Reference, Sensor};
+use vines_model::{Definition, Dimensionless, Measurand, Reference, Sensor};
 
 mod common;
 use common::close;
 
-const STUDY: Definition = Definition { reference: Reference::Base, sensor: Sensor::V };
+const STUDY: Definition = Definition {
+    reference: Reference::Base,
+    sensor: Sensor::V,
+    sensor_quantity: Measurand::Displacement,
+    reference_quantity: Measurand::Displacement,
+};
 const FRICTION: Cavity = Cavity { kinetic_friction: 0.03, ..Cavity::IDEAL };
 const GAPS: Cavity = Cavity { b_plus: Some(0.011), b_minus: Some(0.009), ..Cavity::IDEAL };
 

@@ -108,8 +108,8 @@ pub enum LinkError {
     #[error("{peer} refuses: {reason}")]
     Refused { peer: Address, reason: Refusal },
     #[error(
-        "{peer} measures {theirs}, the [resonance] section of the scene needs {ours}: use the same scene for both, or set resonance.sensor \
-         and resonance.reference to what the rig measures"
+        "{peer} measures {theirs}, the [resonance] section of the scene needs {ours}: use the same scene for both, or set resonance.sensor, \
+         resonance.reference and their quantities to what the rig measures"
     )]
     Sensors {
         peer: Address,

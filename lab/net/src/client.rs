@@ -186,9 +186,7 @@ impl NetRig {
         if expected.channels() == channels {
             return Ok(self);
         }
-        let theirs = Definition::all()
-            .into_iter()
-            .find(|sensors| sensors.channels() == channels);
+        let theirs = Definition::of_channels(channels);
         let theirs = theirs.map_or("unknown".into(), |sensors| sensors.channel_names());
         Err(LinkError::Sensors { peer, theirs, ours })
     }

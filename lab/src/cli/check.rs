@@ -54,9 +54,9 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?.at_rest();
     let scope = arguments.reach.reach()?;
-    let mut variables = arguments
-        .rig
-        .variables("rig", |file| FmuRig::connections(file, &scene.rig_names))?;
+    let mut variables = arguments.rig.variables("rig", |file| {
+        FmuRig::connections(file, &scene.rig_names, scene.resonance)
+    })?;
     let mut open = arguments.rig.rig(&scene, scope)?;
     if let Some(controller) = &arguments.controller {
         let names = &scene.controller_names;

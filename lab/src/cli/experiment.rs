@@ -94,7 +94,11 @@ impl ExperimentArguments {
         let scope = self.reach.reach()?;
         BuiltIn::new(&config(&scene.plan()))?;
         let folder = results(&self.out, names)?;
-        let recording = self.record.clone().map(Recording::open).transpose();
+        let recording = self
+            .record
+            .clone()
+            .map(|path| Recording::open(path, scene.resonance.measurands()))
+            .transpose();
         let recording = recording.map_err(Failure::input)?;
         let mut open = match rig {
             Some(endpoint) => endpoint.rig(&scene, scope)?,
@@ -218,7 +222,7 @@ impl Session {
                     _ => None,
                 };
                 let reason = reason.map(|reason| summary::not_locked(&reason, scene));
-                Err(ended.without_result(Failure::from(error), reason, &samples))
+                Err(ended.without_result(Failure::from(error), reason, &samples, plan))
             }
         }
     }
@@ -226,7 +230,13 @@ impl Session {
 
 impl Ended {
     /// The failure with its reason, and what was measured in a file.
-    pub(super) fn without_result(self, mut failure: Failure, reason: Option<String>, samples: &[Sample]) -> Failure {
+    pub(super) fn without_result(
+        self,
+        mut failure: Failure,
+        reason: Option<String>,
+        samples: &[Sample],
+        plan: &Plan,
+    ) -> Failure {
         let mut lines = Vec::from_iter(reason);
         let mut files = Vec::new();
         match self.recorded {
@@ -234,7 +244,10 @@ impl Ended {
             Err(error) => lines.push(error.to_string()),
         }
         if !samples.is_empty() {
-            match self.folder.interrupt(INTERRUPTED_FILE, &table(samples)) {
+            match self
+                .folder
+                .interrupt(INTERRUPTED_FILE, &table(samples, &plan.knowledge.target))
+            {
                 Ok((file, previous)) => {
                     files.insert(0, file);
                     let moved = |folder: PathBuf| format!("The results of an earlier run are in {}", folder.display());

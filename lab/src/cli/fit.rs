@@ -23,9 +23,10 @@ uncertainty: a locked point of `vines identify` (identification.json), the point
 with the columns f_Hz, A_m, E_m, u_f_Hz, u_A_m and u_E_m, or others that --column names. Points that are not settled, or not symmetric
 1:1, are left out.
 
-A recording has two channels over time, the response and the displacement of the base. Delimiter, decimal mark, encoding, names and units
-are found; a file of `vines` needs no options. A channel is NAME or NAME:UNIT, with a name or a number of a column, and a unit (mm, µm, m/s², g),
-the sensitivity of a sensor (100mV/g, 8V/mm), or metres per unit. Held stretches, slow sweeps and decays near phase resonance become points.
+A recording has two channels over time, the response and the base. Delimiter, decimal mark, encoding, names and units
+are found; a file of `vines` needs no options. A channel is NAME or NAME:UNIT, with a name or a number of a column, and a unit (mm, µm, mm/s,
+m/s², g) or a multiple of it (-1g), the sensitivity of a sensor (100mV/g, 8V/mm, 125mm/s/V), or metres per unit. Velocities and accelerations
+become displacements harmonic by harmonic. Held stretches, slow sweeps and decays near phase resonance become points.
 A decay without impacts gives f0 and zeta. The scene says what the sensor reads, and about which natural frequency and damping the structure has.
 
 The model is the exact symmetric 1:1 motion of a linear oscillator and a particle between two walls. The fit finds
@@ -69,7 +70,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME[:UNIT]")]
     response: Option<String>,
 
-    /// Channel of the displacement of the base in a recording
+    /// Channel of the base in a recording
     #[arg(long, value_name = "NAME[:UNIT]")]
     drive: Option<String>,
 

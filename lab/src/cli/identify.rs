@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
                 _ => None,
             };
             let reason = reason.map(|reason| summary::not_locked(&reason, &scene));
-            return Err(ended.without_result(Failure::from(error), reason, &record.samples));
+            return Err(ended.without_result(Failure::from(error), reason, &record.samples, &plan));
         }
     };
     let result = Comparison::of(&identification, &scene);

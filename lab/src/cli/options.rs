@@ -11,7 +11,7 @@ use vines::fmu::{Connection, FmuController, FmuError, FmuRig};
 use vines::helic::{DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
-use vines::scene::{Family, Implausible, Names, Override, PAPER, Scene, SceneError};
+use vines::scene::{Family, Implausible, Measurand, Names, Override, PAPER, Scene, SceneError};
 use vines::table::{Table, number};
 
 use super::failure::{Failure, stop_flag};
@@ -235,6 +235,20 @@ impl Endpoint {
 /// The helic device at `helic://HOST[:PORT]`.
 fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Network>, Failure> {
     no_key(scope)?;
+    let measured = ["response", "base"].into_iter().zip(scene.resonance.measurands());
+    for (ours, measurand) in measured {
+        let stated = match scene.rig_names.mapped(ours) {
+            Some(name) => name.si.unwrap_or(measurand.unit()),
+            None => Measurand::Displacement.unit(),
+        };
+        if stated != measurand.unit() {
+            let (quantity, unit) = (measurand.name(), measurand.unit());
+            return Err(Failure::input(format!(
+                "{address}: the {ours} of the device is in a unit of {stated}, and the scene needs its {quantity}, {unit}: name the channel and its unit in \
+                 [rig.names], and its quantity in [resonance]"
+            )));
+        }
+    }
     let place = address.trim_start_matches("helic://");
     let port = place.rsplit_once(':').and_then(|(_, port)| port.parse::<u16>().ok());
     let place = port.map_or_else(|| format!("{place}:{DEFAULT_PORT}"), |_| place.into());

@@ -7,8 +7,9 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use vines::record::{HEADINGS, Sample, write_row};
+use vines::record::{Sample, headings, write_row};
 use vines::rig::Rig;
+use vines::scene::Measurand;
 use vines::{FileError, create_folder_of};
 
 use super::tap::Tap;
@@ -28,8 +29,8 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    /// Opens the file. It stays as it is until the first sample.
-    pub(super) fn open(path: PathBuf) -> Result<Self, FileError> {
+    /// Opens the file for channels of these quantities. It stays as it is until the first sample.
+    pub(super) fn open(path: PathBuf, measurands: [Measurand; 2]) -> Result<Self, FileError> {
         let is_new = !path.exists();
         let open = || -> io::Result<File> {
             create_folder_of(&path)?;
@@ -42,7 +43,7 @@ impl Recording {
         };
         let file = open().map_err(FileError::at(&path))?;
         let (sender, receiver) = channel();
-        let thread = thread::spawn(move || write(file, &receiver));
+        let thread = thread::spawn(move || write(file, &receiver, &headings(measurands)));
         Ok(Self { path, is_new, sender, thread })
     }
 
@@ -76,7 +77,7 @@ impl Recording {
 }
 
 /// Writes whole rows at intervals, until there is no sender. Returns whether there were any.
-fn write(mut file: File, samples: &Receiver<Sample>) -> io::Result<bool> {
+fn write(mut file: File, samples: &Receiver<Sample>, headings: &str) -> io::Result<bool> {
     let mut has_begun = false;
     loop {
         let mut rows = String::new();
@@ -95,7 +96,7 @@ fn write(mut file: File, samples: &Receiver<Sample>) -> io::Result<bool> {
                 if file.metadata()?.is_file() {
                     file.set_len(0)?;
                 }
-                rows.insert_str(0, HEADINGS);
+                rows.insert_str(0, headings);
                 has_begun = true;
             }
             file.write_all(rows.as_bytes())?;

@@ -10,6 +10,7 @@ use vines::fmu::FmuRig;
 use vines::helic::{self, Device};
 use vines::net::{Address, LinkError, Role, Served, Server, ServerError, Service, Session, resolve};
 use vines::rig::{BuiltIn, Rig, RigError, RigFault, SensorsOnly, Simulated, faulty};
+use vines::scene::Measurand;
 
 use super::failure::{Failure, stop_flag};
 use super::options::{Endpoint, ReachArguments, SceneArguments, no_key, positive};
@@ -144,6 +145,11 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
     if arguments.sensors_only || helic {
         // A device runs on between its hosts.
         scene = scene.at_rest();
+    }
+    if helic && scene.resonance.measurands() != [Measurand::Displacement; 2] {
+        return Err(Failure::input(
+            "--protocol helic: the sensors of the device read displacements; drop resonance.sensor_quantity and resonance.reference_quantity",
+        ));
     }
     if helic {
         scene = scene.sampled(f64::from(arguments.oversampling));

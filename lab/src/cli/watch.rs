@@ -16,6 +16,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use vines::curves;
 use vines::live::{Decay, HarmonicMotion, LastImpacts};
+use vines::plan::Target;
 use vines::record::Sample;
 use vines::regime::Impact;
 use vines::rig::{Command, Controller, ControllerError, Move, Rig, Sensors};
@@ -50,6 +51,7 @@ pub(super) struct Watch {
     /// The last command of the controller, which the stage around the rig sends with its sample.
     command: Rc<Cell<Command>>,
     thread: Option<thread::JoinHandle<()>>,
+    target: Target,
     /// The error that the experiment ended with.
     pub failure: Option<String>,
 }
@@ -87,21 +89,22 @@ impl WatchArguments {
         })?;
         let table = table(title, scene).to_string();
         let (sender, receiver) = sync_channel(CHANNEL);
-        let view = View::new(scene.clone(), 0);
+        let (view, target) = (View::new(scene.clone(), 0), scene.knowledge().target);
         let thread = thread::spawn(move || serve(&listener, address, &receiver, view, &table));
         eprintln!("Watch it at http://{address}/");
         let (command, thread) = (Rc::default(), Some(thread));
-        Ok(Some(Watch { sender, command, thread, failure: None }))
+        Ok(Some(Watch { sender, command, thread, target, failure: None }))
     }
 }
 
 impl Watch {
     /// The rig, with its samples shown.
     pub(super) fn rig(&self, rig: Box<dyn Rig>) -> Box<dyn Rig> {
-        let (sender, command, mut number) = (self.sender.clone(), Rc::clone(&self.command), 0);
+        let (sender, command, target, mut number) = (self.sender.clone(), Rc::clone(&self.command), self.target, 0);
         Tap::around(rig, move |mut sample, step| {
             let drive = sample.command.drive;
             sample.command = Command { drive, ..command.get() };
+            sample.sensors = target.scaled(sample.sensors);
             // The receiver polls, so that this wakes no thread. A full channel, or a server that has ended, drops the sample.
             let _ = sender.try_send(Message::Sample(Numbered { number, sample, step }));
             number += 1;

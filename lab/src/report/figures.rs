@@ -40,7 +40,6 @@ fn amplitude(p: &Dimensionless) -> &'static str {
     match p.definition.sensor {
         Sensor::V => "amplitude C of v, over b",
         Sensor::Q1 => "amplitude C of q₁, over b",
-        Sensor::Acceleration => "amplitude C of −q₁″, over b ω₀²",
     }
 }
 
@@ -131,7 +130,7 @@ const FASTEST: f64 = 1.4;
 /// A panel with the slow invariant manifold: amplitude over particle speed, the axes of the study.
 fn manifold_panel(p: &Dimensionless, top: f64) -> Panel {
     let flow = SlowFlow::new(p.lambda, p.r);
-    let place = |b: f64| (b, flow.manifold.c(b) * reading(p, b, flow.free_detuning(b)));
+    let place = |b: f64| (b, flow.manifold.c(b) * reading(p, b));
     let speeds = equally_spaced(0.0, FASTEST, POINTS);
     let points = speeds.map(|b| (place(b), theory::impacts_stable(&flow.manifold, b)));
     let mut panel = Panel::new(((0.0, FASTEST), SPEED), ((0.0, top), amplitude(p)));
@@ -322,7 +321,7 @@ fn backbone_decay(p: &Dimensionless, from: f64) -> Vec<Triple> {
     let decay = start.and_then(|point| SlowFlow::new(p.lambda, p.r).decay(point.b, POINTS));
     let samples = decay.unwrap_or_default();
     let samples = samples.iter().map(|(tau1, point)| {
-        let c = point.c * reading(p, point.b, point.sigma);
+        let c = point.c * reading(p, point.b);
         [tau1 / (p.epsilon * TAU), c, point.sigma]
     });
     samples.collect()
@@ -402,7 +401,7 @@ pub fn responses(p: &Dimensionless, response: &FrequencyResponse, range: [f64; 2
     let mut panel = Panel::new(((range[0], range[1]), DETUNING), ((0.0, top), amplitude(p)));
     for curve in flow.frequency_responses(response.g, 600) {
         let points = curve.iter().map(|point| {
-            let c = point.c * reading(p, point.b, point.sigma);
+            let c = point.c * reading(p, point.b);
             ((point.sigma, c), point.impacts_stable && point.slow_flow_stable)
         });
         panel.curve(points, 1.0, THEORY, FIRST_ORDER);

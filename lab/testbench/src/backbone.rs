@@ -14,7 +14,7 @@ use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stag
 use crate::identification::{
     Cycle, Regime, ResonanceFit, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
 };
-use crate::plan::{Knowledge, LinearResponse, Plan};
+use crate::plan::{Knowledge, LinearResponse, Plan, Target};
 use crate::record::Sample;
 use crate::rig::{Controller, Move, Rig};
 
@@ -241,8 +241,8 @@ struct Tracker<'a, R: Rig + ?Sized, C: ?Sized> {
     run: experiment::ControlLoop<'a, R, C>,
     plan: &'a Plan,
     stage: Stage,
-    /// Phase target, rad.
-    target: f64,
+    /// Phase target, and what the channels measure.
+    target: Target,
     /// Where the loop was closed.
     closed: Held,
     /// The points so far.
@@ -342,7 +342,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     fn hold(&mut self, level: f64) -> Result<LevelPoint, ExperimentError> {
         let start = self.run.periods;
         let (to, periods) = self.step(level);
-        self.run.controller.hold_response(to, self.target)?;
+        self.run.hold_response(to)?;
         self.run.samples.clear();
         let late = FOLLOWED + FIRST * usize::from(self.states.is_empty());
         while self.run.periods - start < periods + late as f64 {

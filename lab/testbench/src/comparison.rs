@@ -10,7 +10,7 @@ use crate::backbone::{LevelPoint, Tracked};
 use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime, WINDOW, decay_points};
 use crate::plan::Plan;
 use crate::record::{Record, Sample};
-use crate::rig::{Command, Drive, Rig, Simulated};
+use crate::rig::{Command, Drive, Rig, Scaled, Simulated};
 use crate::scene::{Dimensionless, Scene};
 
 /// Amplitudes above which the decay is compared with theory, C.
@@ -381,6 +381,7 @@ fn predicted(orbit: &Orbit, scene: &Scene, plan: &Plan) -> Vec<[f64; 3]> {
         return Vec::new();
     };
     let mut rig = plant.with_sensors(scene.resonance);
+    let mut rig = Scaled::new(&mut rig, plan.knowledge.target);
     let mut sample = |n: usize| -> Option<Sample> {
         let sample = Sample {
             time: n as f64 * step,

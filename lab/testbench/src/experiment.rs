@@ -12,9 +12,9 @@ use thiserror::Error;
 use vines_model::numerics::mean;
 
 use crate::identification::Cycle;
-use crate::plan::Plan;
+use crate::plan::{Plan, Target};
 use crate::record::{Record, Sample};
-use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Rig, RigError};
+use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError, Scaled};
 use crate::scene::key;
 
 pub use judge::Condition;
@@ -204,7 +204,7 @@ pub(crate) const CONFIRMED: u32 = 3;
 
 /// Rig and controller, and the samples so far.
 pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
-    rig: &'a mut R,
+    rig: Scaled<'a, R>,
     pub controller: &'a mut C,
     pub plan: &'a Plan,
     /// Of the controller; its limits guard the rig whatever controls it.
@@ -269,7 +269,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             return Err(ExperimentError::NoDrive);
         }
         Ok(Self {
-            rig,
+            rig: Scaled::new(rig, plan.knowledge.target),
             controller,
             plan,
             config,
@@ -279,7 +279,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             periods: 0.0,
             last: Command::default(),
             settled: false,
-            judge: Judge::new(config),
+            judge: Judge::new(config, plan.knowledge.target),
             limit: Stage::Locking.samples(plan),
             progress,
             stage: (Stage::Locking, 0),
@@ -305,7 +305,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             *driven = true;
             Ok(())
         };
-        let Sample { command, .. } = exchange(self.rig, self.controller, active, clock, before_drive)?;
+        let Sample { command, .. } = exchange(&mut self.rig, self.controller, active, clock, before_drive)?;
         self.driven = command.drive.amplitude != 0.0;
         self.taken += 1;
         self.last = command;
@@ -334,8 +334,20 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         Ok(begin)
     }
 
-    /// The fit of the samples since the beginning of the last period; `None` without a motion. `target`: phase target, rad.
-    pub fn cycle(&self, (begin, turns): Period, target: f64) -> Option<Cycle> {
+    /// Controls the amplitude of the response; the move is one of its displacement.
+    pub fn hold_response(&mut self, to: Move) -> Result<(), ControllerError> {
+        let target = self.plan.knowledge.target;
+        let omega = self.last.drive.omega + to.omega;
+        let to = Move {
+            response: target.reading(to.response, omega),
+            growth: target.reading(to.growth, omega),
+            ..to
+        };
+        self.controller.hold_response(to, target.phase_of_readings())
+    }
+
+    /// The fit of the samples since the beginning of the last period; `None` without a motion.
+    pub fn cycle(&self, (begin, turns): Period, target: Target) -> Option<Cycle> {
         Cycle::of(&self.samples[begin..], self.sample_time, turns * TAU, target)
     }
 

@@ -12,12 +12,12 @@ use vines_model::numerics::{Estimate, RANDOM, SIGNIFICANT, mean, standard_deviat
 
 use crate::plan::{Knowledge, LinearResponse, Plan};
 use crate::record::{Record, Sample};
-use crate::scene::Dimensionless;
+use crate::scene::{Dimensionless, Measurand};
 
 pub(crate) use decay::PER_PERIOD;
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
 pub use resonance_fit::{Cycle, ResonanceFit, Slopes};
-pub(crate) use response::{ASYMMETRIC, Line, without_tones};
+pub(crate) use response::{ASYMMETRIC, Line, degrees, without_tones};
 pub use response::{Tone, classify, foreign_tone, impacts, regime_by_response};
 pub use vines_model::regime::{Impact, Regime};
 
@@ -80,6 +80,18 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
     sensors_after_release(record, &knowledge)?;
     let decay = decay_points(record, &knowledge, WINDOW);
     Ok(Identification { knowledge, lock, decay })
+}
+
+/// Largest number of harmonics that are fitted: a bound of the work.
+const MOST_HARMONICS: usize = 40;
+
+/// Number of harmonics that belong to the motion in a response of which the sensor measures this, `least` of a displacement: an impact makes those of
+/// a velocity fall as 1/n, and those of an acceleration not at all. What is not fitted counts as noise, for which two fifths of the samples remain.
+pub(crate) fn harmonics_of(measurand: Measurand, samples_per_period: f64, least: usize) -> usize {
+    match measurand {
+        Measurand::Displacement => least,
+        _ => ((0.3 * samples_per_period) as usize).clamp(least, MOST_HARMONICS),
+    }
 }
 
 // The locked point.

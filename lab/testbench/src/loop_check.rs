@@ -11,8 +11,8 @@ use phase_lock::Gains;
 use serde::Serialize;
 use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, mean_square, standard_deviation};
 
-use crate::plan::{LinearResponse, Plan};
-use crate::rig::{Drive, Rig, RigError};
+use crate::plan::{LinearResponse, Plan, Target};
+use crate::rig::{Drive, Rig, RigError, Scaled};
 use crate::scene::Reference;
 
 /// Drive of the check, over the scene's drive: too small for impacts.
@@ -45,7 +45,9 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
     let samples = |periods: usize| (periods as f64 * TAU / (omega * step)).round() as usize;
     let [quiet, driven, window] = PERIODS.map(samples);
     let (phase, readings, has_base) = (0.0, Vec::new(), false);
-    let mut rig = OpenLoop { rig, step, phase, readings, has_base };
+    let target = plan.knowledge.target;
+    let mut rig = Scaled::new(rig, target);
+    let mut rig = OpenLoop { rig: &mut rig, step, phase, readings, has_base };
     let expected = expected(plan, omega, amplitude);
     rig.rest(omega, quiet, samples(WAITS[1]), NOISE * expected[0].norm())?;
     let begins = rig.readings.len();
@@ -58,7 +60,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
     readings.truncate(ends);
     without_drift(&mut readings[begins..]);
     let mut channels = [0, 1].map(|n| {
-        let (phasor, noise) = fitted(&readings[begins + driven - window..], n + 1);
+        let (phasor, noise) = fitted(&readings[begins + driven - window..], n + 1, &target, omega);
         let ratio = phasor / expected[n];
         let floor = scatter(&readings[begins - quiet..begins], n + 1);
         let channel = CheckedChannel { noise, floor, ..CheckedChannel::default() };
@@ -72,10 +74,10 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
     let moved = mean_square(begin.iter().map(|reading| reading[2] - rest));
     let moves = begin
         .iter()
-        .map(|[phase, ..]| channels[1].gain * amplitude * phase.sin());
+        .map(|[phase, ..]| channels[1].gain * amplitude * (phase + target.measurands[1].lead()).sin());
     let waits = moved < 0.5 * mean_square(moves);
     // Without a sensor, the base moves as expected.
-    let (phasor, noise) = fitted(&readings[begins + driven - window..], 2);
+    let (phasor, noise) = fitted(&readings[begins + driven - window..], 2, &target, omega);
     let base = if has_base {
         (phasor, noise / phasor.norm() * (2.0 / window as f64).sqrt())
     } else {
@@ -84,7 +86,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
     let period = samples(1);
     let phasors = |of: usize| -> Vec<Complex64> {
         let periods = readings[begins..].chunks_exact(period);
-        periods.map(|readings| fitted(readings, of).0).collect()
+        periods.map(|readings| fitted(readings, of, &target, omega).0).collect()
     };
     let linear = Linear::of(&phasors(1), base, omega, period, plan);
     let mut quantities = Vec::new();
@@ -133,8 +135,9 @@ fn expected(plan: &Plan, omega: f64, amplitude: f64) -> [Complex64; 2] {
     [growth * amplitude * stated, stated * amplitude]
 }
 
-/// A signal at the frequency of the drive, m, and the rest of it, RMS; NaN for readings that are no numbers.
-fn fitted(readings: &[[f64; 3]], channel: usize) -> (Complex64, f64) {
+/// The displacement of a signal at the frequency of the drive, `omega` (rad/s), m, and the rest of it, RMS; NaN for readings that are no numbers.
+fn fitted(readings: &[[f64; 3]], channel: usize, target: &Target, omega: f64) -> (Complex64, f64) {
+    let displacement = target.displacement(channel - 1, omega);
     let phases: Vec<f64> = readings.iter().map(|reading| reading[0]).collect();
     let basis = HarmonicBasis::new(&phases, 0, &[Some(0)]);
     let values = DVector::from_iterator(readings.len(), readings.iter().map(|reading| reading[channel]));
@@ -142,7 +145,8 @@ fn fitted(readings: &[[f64; 3]], channel: usize) -> (Complex64, f64) {
         .fit(&values)
         .map_or((Complex64::new(f64::NAN, f64::NAN), f64::NAN), |fit| {
             let rest = basis.residual(&values, &fit);
-            (fit.harmonic(1), mean_square(rest.iter().copied()).sqrt())
+            let rest = mean_square(rest.iter().copied()).sqrt();
+            (fit.harmonic(1) * displacement, rest * displacement.norm())
         })
 }
 

@@ -6,7 +6,8 @@ use num_complex::Complex64;
 use phase_lock::Config;
 
 use crate::experiment::DECAYED;
-use crate::scene::{Definition, Dimensionless, Parameters, Scene, has_mirror_images};
+use crate::rig::Sensors;
+use crate::scene::{Definition, Dimensionless, Measurand, Parameters, Scene, has_mirror_images};
 
 /// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,6 +50,61 @@ impl LinearResponse {
     }
 }
 
+/// What a loop holds: the phase of the response relative to the reference, both as displacements. The two channels may read velocities and
+/// accelerations. The bench divides these by omega0 and omega0², so that controllers have the same gains and limits for all of them, and shifts
+/// the phase that the controller holds. Amplitudes and phases of displacements follow harmonic by harmonic.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Target {
+    /// Phase of the response relative to the reference, rad.
+    pub phase: f64,
+    /// What response and reference measure.
+    pub measurands: [Measurand; 2],
+    /// The frequency by which readings are divided, rad/s.
+    pub omega0: f64,
+}
+
+impl Target {
+    /// Metres per reading of a channel: 0, the response, or 1, the reference.
+    pub(crate) fn scale(&self, channel: usize) -> f64 {
+        self.omega0.powi(-self.measurands[channel].order())
+    }
+
+    /// What sensors read, in m.
+    pub fn scaled(&self, read: Sensors) -> Sensors {
+        Sensors {
+            response: read.response * self.scale(0),
+            reference: read.reference.map(|value| value * self.scale(1)),
+        }
+    }
+
+    /// What sensors read, in SI units, from [`Target::scaled`].
+    pub fn unscaled(&self, read: Sensors) -> Sensors {
+        Sensors {
+            response: read.response / self.scale(0),
+            reference: read.reference.map(|value| value / self.scale(1)),
+        }
+    }
+
+    /// Displacement over the scaled reading of a channel, at a harmonic of the frequency `omega`, rad/s.
+    pub fn displacement(&self, channel: usize, omega: f64) -> Complex64 {
+        let order = self.measurands[channel].order();
+        let turned = [Complex64::ONE, -Complex64::I, -Complex64::ONE][order as usize];
+        turned * (self.omega0 / omega).powi(order)
+    }
+
+    /// Amplitude of the scaled response whose displacement has this amplitude, m, at the frequency `omega`, rad/s.
+    pub fn reading(&self, amplitude: f64, omega: f64) -> f64 {
+        amplitude / self.displacement(0, omega).norm()
+    }
+
+    /// Phase of the reading of the response relative to the reading of the reference, rad, from -pi to pi.
+    pub fn phase_of_readings(&self) -> f64 {
+        let [response, reference] = self.measurands.map(Measurand::lead);
+        let phase = self.phase + (response - reference);
+        phase - TAU * (phase / TAU).round()
+    }
+}
+
 /// What measuring knows of a rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Knowledge {
@@ -62,15 +118,21 @@ pub struct Knowledge {
     pub is_symmetric: bool,
     /// Time from sample to sample, s: rig and controller agree on it before anything is measured.
     pub sample_time: f64,
-    /// Phase of the response relative to the reference that the loop holds, rad.
-    pub target: f64,
+    /// Phase of the response relative to the reference that the loop holds, and what is measured of both.
+    pub target: Target,
 }
 
 impl Knowledge {
-    /// A rig that is as its drawing says.
-    pub fn of(plant: &Parameters, definition: Definition, amplitude: f64, sample_time: f64, target: f64) -> Self {
+    /// A rig that is as its drawing says; `phase`: target, rad.
+    pub fn of(plant: &Parameters, definition: Definition, amplitude: f64, sample_time: f64, phase: f64) -> Self {
+        let linear = LinearResponse::of(plant);
+        let target = Target {
+            phase,
+            measurands: definition.measurands(),
+            omega0: linear.omega0,
+        };
         Self {
-            linear: LinearResponse::of(plant),
+            linear,
             is_measured: false,
             numbers: Dimensionless { definition, ..Dimensionless::of(plant, amplitude) },
             is_symmetric: has_mirror_images(plant),
@@ -95,7 +157,7 @@ impl Knowledge {
 
     /// Whether the target is phase resonance, for which theory and exact orbits hold.
     pub fn is_at_phase_resonance(&self) -> bool {
-        self.target == -FRAC_PI_2
+        self.target.phase == -FRAC_PI_2
     }
 }
 
@@ -126,8 +188,8 @@ const LONGEST_DECAY: f64 = 5000.0;
 impl Scene {
     /// What the scene says of its rig.
     pub fn knowledge(&self) -> Knowledge {
-        let target = self.controller.phase_target.to_radians();
-        Knowledge::of(&self.plant, self.resonance, self.amplitude, self.sample_time(), target)
+        let phase = self.controller.phase_target.to_radians();
+        Knowledge::of(&self.plant, self.resonance, self.amplitude, self.sample_time(), phase)
     }
 
     /// The experiment on a rig that is as the scene says.

@@ -2,14 +2,16 @@
 
 use std::fmt::Write;
 
+use crate::plan::Target;
 use crate::rig::{Command, Drive, GroundTruth, Sensors};
+use crate::scene::Measurand;
 
 /// One sample of the record.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Sample {
     /// Time, s.
     pub time: f64,
-    /// What the sensors read.
+    /// What the sensors read: in SI units in a recording, otherwise in m, as [`Target::scaled`] says.
     pub sensors: Sensors,
     /// Output of the controller: the drive from this sample to the next.
     pub command: Command,
@@ -17,8 +19,14 @@ pub struct Sample {
     pub ground_truth: Option<GroundTruth>,
 }
 
-/// First line of a recording (CSV).
-pub const HEADINGS: &str = "time,response,reference,omega,E,phase_error,state,fault\n";
+/// First line of a recording (CSV), with the units of channels that are no displacements.
+pub fn headings(measurands: [Measurand; 2]) -> String {
+    let [response, reference] = measurands.map(|measurand| match measurand {
+        Measurand::Displacement => String::new(),
+        other => format!(" [{}]", other.unit()),
+    });
+    format!("time,response{response},reference{reference},omega,E,phase_error,state,fault\n")
+}
 
 /// Appends a sample to a recording, as a line.
 pub fn write_row(text: &mut String, sample: &Sample) {
@@ -38,10 +46,13 @@ pub fn write_row(text: &mut String, sample: &Sample) {
     );
 }
 
-/// The samples as a recording.
-pub fn table(samples: &[Sample]) -> String {
-    let mut text = String::from(HEADINGS);
-    samples.iter().for_each(|sample| write_row(&mut text, sample));
+/// The samples of an experiment as a recording, in SI units.
+pub fn table(samples: &[Sample], target: &Target) -> String {
+    let mut text = headings(target.measurands);
+    for sample in samples {
+        let sensors = target.unscaled(sample.sensors);
+        write_row(&mut text, &Sample { sensors, ..*sample });
+    }
     text
 }
 

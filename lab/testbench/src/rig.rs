@@ -18,7 +18,7 @@ pub use crate::scene::has_friction;
 
 pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
-pub use stages::{Interrupted, Measured, SensorsOnly, Stoppable};
+pub use stages::{Interrupted, Measured, Scaled, SensorsOnly, Stoppable};
 
 /// What the controller asks of the rig for the coming sample period.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -34,9 +34,9 @@ pub struct Drive {
 /// What the sensors of the rig read.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Sensors {
-    /// Response, m.
+    /// Response, m, m/s or m/s², as the definition of resonance says.
     pub response: f64,
-    /// Base displacement, m, where a sensor reads it.
+    /// Motion of the base, m, m/s or m/s², where a sensor reads it.
     pub reference: Option<f64>,
 }
 
@@ -293,7 +293,7 @@ impl Rig for Simulated {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let response = match self.sensor {
             Sensor::V => self.plant.centre(),
-            Sensor::Q1 | Sensor::Acceleration => self.plant.state().q1,
+            Sensor::Q1 => self.plant.state().q1,
         };
         Ok(Sensors { response, reference: Some(self.plant.base_displacement()) })
     }

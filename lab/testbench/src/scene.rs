@@ -44,7 +44,7 @@ pub use controller::{ControllerSettings, KEYS, PhaseLock, key, refusal};
 pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
 pub use names::{Name, Names};
 pub use overrides::{Family, Override};
-pub use vines_model::{Definition, Dimensionless, Reference, Sensor};
+pub use vines_model::{Definition, Dimensionless, Measurand, Reference, Sensor};
 
 /// The default scene, embedded so that the program works from any folder.
 pub const PAPER: &str = include_str!("../../../scenes/paper.toml");
@@ -256,6 +256,23 @@ impl Sections {
         if scene.resonance.reference == Reference::Force && !scene.chain.reference {
             let message = "resonance.reference = \"force\" with chain.reference = false: the force k e + c e' follows from the base \
                            sensor; switch it on, or take the reference \"base\"";
+            return Err(SceneError::text(origin, message));
+        }
+        let Definition { sensor, reference, sensor_quantity, reference_quantity } = scene.resonance;
+        if sensor == Sensor::V && sensor_quantity != Measurand::Displacement {
+            let name = sensor_quantity.name();
+            let message = format!(
+                "resonance.sensor_quantity = \"{name}\" with resonance.sensor = \"v\": v contains the particle, which no sensor of a {name} on the \
+                 structure reads; set resonance.sensor = \"q1\""
+            );
+            return Err(SceneError::text(origin, message));
+        }
+        if reference == Reference::Force && reference_quantity != Measurand::Displacement {
+            let name = reference_quantity.name();
+            let message = format!(
+                "resonance.reference_quantity = \"{name}\" with resonance.reference = \"force\": the force k e + c e' follows from the displacement of \
+                 the base; take the reference \"base\", or the quantity \"displacement\""
+            );
             return Err(SceneError::text(origin, message));
         }
         let fastest = scene.controller.omega_max * scene.dimensionless().omega0;

@@ -11,7 +11,7 @@ use vines_testbench::fit::{
     RecordingError, Selection, Table, contradiction, explain, fit, parts,
 };
 use vines_testbench::rig::{BuiltIn, Chain, Rig, RigError, RigStage, Sensors, Simulated};
-use vines_testbench::scene::{Definition, Dimensionless, Parameters, Scene};
+use vines_testbench::scene::{Definition, Dimensionless, Measurand, Parameters, Scene, Sensor};
 
 /// The rig that the points belong to.
 const RIG: Parameters = Parameters {
@@ -179,8 +179,23 @@ fn points_of_another_rig_contradict_the_scene_and_those_of_its_own_do_not() {
 
 /// A recording of a backbone at 60 dB that is tracked on [`RIG`], and cut in the middle of its first and its last level.
 fn recording() -> Recording {
-    let scene = scene("backbone.C_from=0.65 backbone.C_to=0.25 backbone.points=10 chain.snr=60");
-    let rig = Simulated::new(RIG, scene.start).unwrap();
+    recorded("")
+}
+
+/// That recording by sensors of q1 and the base that measure these quantities.
+fn recorded_as([response, base]: [Measurand; 2]) -> Recording {
+    recorded(&format!(
+        " resonance.sensor=q1 resonance.sensor_quantity={} resonance.reference_quantity={}",
+        response.name(),
+        base.name()
+    ))
+}
+
+fn recorded(settings: &str) -> Recording {
+    let scene = scene(&format!(
+        "backbone.C_from=0.65 backbone.C_to=0.25 backbone.points=10 chain.snr=60{settings}"
+    ));
+    let rig = Simulated::new(RIG, scene.start).unwrap().with_sensors(scene.resonance);
     let mut rig = Recorder { rig: Chain::around(Box::new(rig), &scene), read: Vec::new() };
     let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
     track(&mut rig, &mut controller, &scene.plan(), |_, _| {}).unwrap();
@@ -189,7 +204,7 @@ fn recording() -> Recording {
         origin: "record.csv".into(),
         channels: ["y".into(), "x".into()],
         start: 0.0,
-        is_acceleration: false,
+        measurands: scene.resonance.measurands(),
         notes: Vec::new(),
         sample_time: scene.sample_time(),
         response: kept.iter().map(|one| one.response).collect(),
@@ -474,8 +489,45 @@ fn a_table_that_cannot_be_read_is_refused_with_what_was_understood() {
         (table("time,y,y"), "y", "x", "numbers 2 and 3"),
         (table("time,y,x"), "z", "x", "has no channel `z`; it has time, y, x"),
         (table("time,y,x"), "y:furlong", "x", "the unit furlong is unknown"),
-        (table("time,y [V],x"), "y", "x", "the unit V is unknown"),
-        (table("time,y,x"), "y", "x:g", "integrate an acceleration twice"),
+        (
+            table("time,y [V],x"),
+            "y",
+            "x",
+            "the unit V is a voltage, and says nothing without",
+        ),
+        (
+            table("time,y,x"),
+            "y:N",
+            "x",
+            "the unit N is a force, and this structure is driven",
+        ),
+        (
+            table("time,y,x"),
+            "y",
+            "x:kN",
+            "the unit kN is a force, and this structure is driven",
+        ),
+        (
+            table("time,y [rad/s],x"),
+            "y",
+            "x",
+            "the unit rad/s is one of frequencies",
+        ),
+        (table("time,y [Hz],x"), "y", "x", "the unit Hz is one of frequencies"),
+        (table("time,y (deg),x"), "y", "x", "the unit deg is one of angles"),
+        (table("time,y (ms),x"), "y", "x", "the unit ms is one of times"),
+        (
+            table("time [mm],y,x"),
+            "y",
+            "x",
+            "the unit mm is one of lengths; the time needs s",
+        ),
+        (
+            table("time,y [m/s²],x"),
+            "y:100mV/g",
+            "x",
+            "100mV/g is a sensitivity, and the file states m/s², which is no voltage",
+        ),
         (table("clock,y,x"), "y", "x", "has no channel with the time"),
         (gap, "y", "x", "row 22: the time goes from 0.019 s to 0.9 s"),
     ];
@@ -487,6 +539,92 @@ fn a_table_that_cannot_be_read_is_refused_with_what_was_understood() {
             "{message}"
         );
     }
+}
+
+#[test]
+fn the_unit_of_a_channel_its_multiple_or_the_sensitivity_of_its_sensor_says_what_it_measures() {
+    const G: f64 = 9.806_65;
+    for (header, channel, measurand, factor) in [
+        ("y", "y:m/s²", Measurand::Acceleration, 1.0),
+        ("y", "y:g", Measurand::Acceleration, G),
+        ("y [g]", "y", Measurand::Acceleration, G),
+        ("y [m/s^2]", "y", Measurand::Acceleration, 1.0),
+        ("y", "y:-1g", Measurand::Acceleration, -G),
+        ("y", "y:0.0024g", Measurand::Acceleration, 0.0024 * G),
+        ("y", "y:100mV/g", Measurand::Acceleration, 10.0 * G * 1e-3),
+        ("y [V]", "y:100mV/g", Measurand::Acceleration, 10.0 * G),
+        ("y [V]", "y:9.81m/s²/V", Measurand::Acceleration, 9.81),
+        ("y (mV)", "y:10mV/(m/s²)", Measurand::Acceleration, 0.1),
+        ("y", "y:mm/s", Measurand::Velocity, 1e-3),
+        ("y [V]", "y:125mm/s/V", Measurand::Velocity, 0.125),
+        ("y", "y:µm", Measurand::Displacement, 1e-6),
+        ("y [V]", "y:-8V/mm", Measurand::Displacement, -0.125e-3),
+        ("y [V]", "y:0.5mm/mV", Measurand::Displacement, 0.5),
+        ("y", "y:-0.5", Measurand::Displacement, -0.5),
+    ] {
+        for is_response in [true, false] {
+            let rows: String = (0..50).map(|n| format!("{},{n},{n}\n", 1e-3 * f64::from(n))).collect();
+            let text = format!("time,{header},x\n{rows}");
+            let [response, drive] = if is_response {
+                [channel, "x:m"]
+            } else {
+                ["x:m", channel]
+            };
+            let one = read(text.as_bytes(), response, drive, None).unwrap_or_else(|error| panic!("{error}"));
+            let (of, values) = if is_response {
+                (0, &one.response)
+            } else {
+                (1, &one.drive)
+            };
+            assert_eq!(one.measurands[of], measurand, "{header} {channel}");
+            assert!(
+                (values[7] / (7.0 * factor) - 1.0).abs() < 1e-12,
+                "{header} {channel}: {}",
+                values[7]
+            );
+            assert_eq!(one.notes.len(), 1, "{:?}", one.notes);
+        }
+    }
+    // What is assumed, or contradicts the file, is said.
+    let rows: String = (0..50).map(|n| format!("{},{n},{n}\n", 1e-3 * f64::from(n))).collect();
+    for (header, channel, words) in [
+        ("y", "y", "channel y has no unit and is read in m"),
+        ("y [m/s²]", "y:mm", "read in mm, as given, though the file states m/s²"),
+    ] {
+        let one = read(format!("time,{header},x\n{rows}").as_bytes(), channel, "x:m", None).unwrap();
+        assert!(one.notes[1].contains(words), "{:?}", one.notes);
+    }
+}
+
+#[test]
+fn velocities_and_accelerations_give_the_parameters_that_displacements_give() {
+    let scene = Scene {
+        resonance: Definition { sensor: Sensor::Q1, ..Definition::default() },
+        ..wrong_scene()
+    };
+    for (of_response, of_base) in [(2, 0), (2, 2), (1, 0), (0, 1), (1, 2)] {
+        let measurands = [of_response, of_base].map(|order| Measurand::ALL[order]);
+        let record = recorded_as(measurands);
+        let parts = parts(&[record], &scene, &[]).unwrap().concat();
+        let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
+        let fit = fit(&points, scene.resonance, &scene.plant, &[]).unwrap();
+        let mut estimates = FITTED.iter().map(|quantity| fit.estimate(*quantity).unwrap());
+        let are_narrow = estimates.all(|one| one.uncertainty < 0.2 * one.value);
+        println!(
+            "{measurands:?}: worst {:.2} u, {} points, p {:?}",
+            worst(&fit),
+            points.len(),
+            fit.p_value()
+        );
+        assert!(
+            worst(&fit) < 3.0 && are_narrow && !fit.is_rejected(),
+            "{measurands:?} {fit:?}"
+        );
+    }
+    // The scene's sensor reads v, and no accelerometer does.
+    let message = recorded_as([Measurand::Acceleration, Measurand::Displacement]).parts(&wrong_scene().knowledge());
+    let message = message.unwrap_err().to_string();
+    assert!(message.contains("set resonance.sensor = \"q1\""), "{message}");
 }
 
 #[test]

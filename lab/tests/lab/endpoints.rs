@@ -101,7 +101,7 @@ impl Server {
 fn built_in_fmu_and_lock_step_network_give_the_same_bits() {
     let [plant, controller] = fmus();
     // From rest, the response is held and moved until the motion impacts.
-    let sensors = "--set=resonance.sensor='acceleration' --set=resonance.reference='force' --set=start.dq2=0";
+    let sensors = "--set=resonance.sensor='q1' --set=resonance.sensor_quantity='acceleration' --set=resonance.reference='force' --set=start.dq2=0";
     let sensors = format!("{sensors} --set=phase_lock.harmonics=4 --set=phase_lock.base_bandwidth=0.5");
     let results = ["", &sensors].map(|settings| {
         let with = |endpoints: &str| identified(&format!("{endpoints} {settings}"));

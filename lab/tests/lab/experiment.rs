@@ -84,14 +84,27 @@ fn off(found: &Comparison) -> [f64; 2] {
     [sigma, c].map(f64::abs)
 }
 
+/// What sensors measure.
+const QUANTITIES: [&str; 3] = ["displacement", "velocity", "acceleration"];
+
 #[test]
 fn the_lock_is_the_exact_orbit_for_every_sensor_and_reference_and_nearer_to_it_after_a_longer_wait() {
     for reference in ["resonance.reference='base'", "resonance.reference='force'"] {
-        for sensor in ["v", "q1", "acceleration"] {
+        for sensor in ["v", "q1", "q1' resonance.sensor_quantity='acceleration"] {
             // The impacts leave a ripple on an accelerometer, which averages out over a long hold.
             let settings = format!("{reference} resonance.sensor='{sensor}' record.hold_periods=200");
             let found = identified(&settings);
             assert!(off(&found).iter().all(|off| *off < 2e-3), "{reference} {sensor}");
+        }
+    }
+    for of_response in QUANTITIES {
+        for of_base in QUANTITIES {
+            let settings = format!(
+                "resonance.sensor='q1' resonance.sensor_quantity='{of_response}' resonance.reference_quantity='{of_base}' record.hold_periods=200"
+            );
+            let found = identified(&settings);
+            assert!(off(&found).iter().all(|off| *off < 2e-3), "{settings}");
+            assert!(found.lock.at.phase_error_deg.abs() < 0.3);
         }
     }
     let found = identified("phase_lock.lock.amplitude_drift=3.8e-9 phase_lock.lock.frequency_drift=4.5e-10");
@@ -269,5 +282,10 @@ fn a_response_above_its_limit_ends_the_experiment_at_once_and_keeps_what_was_mea
     }
     let last = samples.last().unwrap();
     assert!(last.sensors.response.abs() > 0.3 && samples.len() > 100);
-    assert_eq!(vines::record::table(&samples).lines().count(), samples.len() + 1);
+    assert_eq!(
+        vines::record::table(&samples, &scene.knowledge().target)
+            .lines()
+            .count(),
+        samples.len() + 1
+    );
 }

@@ -93,7 +93,10 @@ fn a_killed_run_leaves_a_valid_recording_and_a_folder_that_the_next_run_can_use(
     drop(endless);
     let recorded = fs::read_to_string(&file).unwrap();
     let mut rows = recorded.lines();
-    assert_eq!(rows.next(), Some(vines::record::HEADINGS.trim_end()));
+    assert_eq!(
+        rows.next(),
+        Some("time,response,reference,omega,E,phase_error,state,fault")
+    );
     // The system may cut the last write at the end of a page.
     let whole: Vec<&str> = rows.collect();
     let (_, whole) = whole.split_last().unwrap();

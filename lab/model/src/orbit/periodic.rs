@@ -181,16 +181,11 @@ fn harmonic(
     let particle = f64::from(u8::from(sensor == Sensor::V));
     let inner = compliance + particle / (omega * omega);
     let inner_by = compliance_by - 2.0 * particle / omega.powi(3);
-    // The factor of the sensor relative to the reference, and its logarithmic derivative.
+    // The direction of the reference, and its logarithmic derivative.
     let damping = scene.epsilon * scene.lambda;
-    let (factor, slope) = if sensor == Sensor::Acceleration {
-        (omega * omega, 2.0 / omega)
-    } else {
-        (1.0, 0.0)
-    };
-    let sensor = Complex::from_polar(factor, -reference.phase(damping, omega));
-    let sensor_by = Complex::new(slope, -reference.phase_slope(damping, omega));
-    let read = |[z, by]: [Complex<f64>; 2]| [z * sensor, (by + z * sensor_by) * sensor];
+    let turned = Complex::from_polar(1.0, -reference.phase(damping, omega));
+    let turned_by = Complex::new(0.0, -reference.phase_slope(damping, omega));
+    let read = |[z, by]: [Complex<f64>; 2]| [z * turned, (by + z * turned_by) * turned];
     let [direct, direct_by] = read([unit, unit_by]);
     let [a, a_by] = read([weight * inner, weight * inner_by + weight / omega * inner]);
 

@@ -33,8 +33,7 @@ pub struct PlantMotion {
     pub amplitude: f64,
     /// Periods of the base until the motion repeats.
     pub periods: u32,
-    /// First harmonic S of the response relative to the reference, m: the response has the part `Im(S exp(i phase))`. Accelerations are over
-    /// omega0².
+    /// First harmonic S of the response relative to the reference, m: the response has the part `Im(S exp(i phase))`.
     pub response: Complex<f64>,
     /// Floquet multipliers over the whole motion, by rising modulus.
     pub multipliers: [Complex<f64>; 4],
@@ -459,21 +458,17 @@ impl<'a> Solver<'a> {
 
         let omega0 = p.natural_frequency();
         let over_omega0 = omega / omega0;
-        let (of_primary, of_particle) = match self.definition.sensor {
-            Sensor::V => (1.0, p.mass_ratio()),
-            Sensor::Q1 => (1.0, 0.0),
-            Sensor::Acceleration => (over_omega0 * over_omega0, 0.0),
+        let of_particle = match self.definition.sensor {
+            Sensor::V => p.mass_ratio(),
+            Sensor::Q1 => 0.0,
         };
         let damping = p.damping / (p.primary_mass * omega0);
         let reference = self.definition.reference;
         let turned = Complex::from_polar(1.0, -reference.phase(damping, over_omega0));
-        let read = |q1: Complex<f64>, q2: Complex<f64>| (q1 * of_primary + q2 * of_particle) * turned;
+        let read = |q1: Complex<f64>, q2: Complex<f64>| (q1 + q2 * of_particle) * turned;
         let response = read(q1, q2);
         let mut by: [_; 6] = std::array::from_fn(|n| read(q1_by[n], q2_by[n]));
         by[4] -= response * Complex::i() * (reference.phase_slope(damping, over_omega0) / omega0);
-        if self.definition.sensor == Sensor::Acceleration {
-            by[4] += response * (2.0 / omega);
-        }
         (response, by)
     }
 

@@ -30,8 +30,7 @@ struct SymmetricMotions {
     beta: f64,
     /// Difference of the first harmonics of the response (v or q1, by the sensor) and of y, over B.
     kappa: Complex<f64>,
-    /// Factor of the sensor, and direction of the reference in the complex plane.
-    scale: f64,
+    /// Direction of the reference in the complex plane.
     reference: Complex<f64>,
     base_over_y: Complex<f64>,
     p: Vector2<f64>,
@@ -52,7 +51,7 @@ impl SymmetricMotions {
         let Definition { sensor, reference, .. } = scene.definition;
         let triangle = match sensor {
             Sensor::V => Complex::new(0.0, -4.0 / (PI * omega)),
-            Sensor::Q1 | Sensor::Acceleration => Complex::new(0.0, 0.0),
+            Sensor::Q1 => Complex::new(0.0, 0.0),
         };
         Some(Self {
             omega,
@@ -61,11 +60,6 @@ impl SymmetricMotions {
             alpha: 2.0 * epsilon * p_before[0] - FRAC_PI_2 / omega,
             beta: (2.0 * (1.0 + epsilon) / (1.0 + r) - 1.0 + 2.0 * epsilon * p_before[1]) / omega,
             kappa: (oscillator.compliance(omega) * impulse * -2.0 + triangle) * epsilon,
-            scale: if sensor == Sensor::Acceleration {
-                omega * omega
-            } else {
-                1.0
-            },
             reference: Complex::from_polar(1.0, reference.phase(epsilon * scene.lambda, omega)),
             base_over_y: oscillator.stiffness(omega) / oscillator.base_force(omega),
             p,
@@ -104,7 +98,7 @@ impl SymmetricMotions {
         self.base_over_y.norm() / self.epsilon * self.beta.abs() / self.alpha.hypot(self.beta)
     }
 
-    /// First harmonic y at the particle speed `b`, and of the response but for the factor of the sensor.
+    /// First harmonic y at the particle speed `b`.
     fn y(&self, b: f64) -> Complex<f64> {
         Complex::new(self.beta * b, 1.0 + self.alpha * b)
     }
@@ -128,7 +122,7 @@ impl SymmetricMotions {
             g: base.norm() / self.epsilon,
             sigma: (self.omega - 1.0) / self.epsilon,
             omega: self.omega,
-            c: v.norm() * self.scale,
+            c: v.norm(),
             gamma: (v * (base * self.reference).conj()).arg(),
             b,
             impact_velocity: 2.0 * b * (1.0 + self.epsilon) / (1.0 + self.r),

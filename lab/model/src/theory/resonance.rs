@@ -39,9 +39,9 @@ pub fn free_sigma(scene: &Dimensionless, c: f64) -> Option<f64> {
     theory.speed_at_level(c).map(|b| theory.flow.free_detuning(b))
 }
 
-/// The amplitude that the scene's sensor reads over the amplitude of v, at the particle speed `b` and the detuning `sigma`.
-pub fn reading(scene: &Dimensionless, b: f64, sigma: f64) -> f64 {
-    Reading::of(scene).seen(b, sigma).norm()
+/// The amplitude that the scene's sensor reads over the amplitude of v, at the particle speed `b`.
+pub fn reading(scene: &Dimensionless, b: f64) -> f64 {
+    Reading::of(scene).seen(b).norm()
 }
 
 /// Rounds of a fixed-point iteration.
@@ -57,8 +57,8 @@ impl<'a> Reading<'a> {
         Self { scene, flow: SlowFlow::new(scene.lambda, scene.r) }
     }
 
-    /// The harmonic that the sensor reads over the harmonic of v, at the particle speed `b` and the detuning `sigma`.
-    fn seen(&self, b: f64, sigma: f64) -> Complex<f64> {
+    /// The harmonic that the sensor reads over the harmonic of v, at the particle speed `b`.
+    fn seen(&self, b: f64) -> Complex<f64> {
         let Dimensionless { epsilon, definition, .. } = *self.scene;
         if definition.sensor == Sensor::V {
             return Complex::new(1.0, 0.0);
@@ -67,11 +67,7 @@ impl<'a> Reading<'a> {
         let manifold = &self.flow.manifold;
         let c = manifold.c(b);
         let triangle = Complex::new(1.0 - FRAC_PI_2 * b, manifold.dissipation * b) * (2.0 * FRAC_2_PI * b / (c * c));
-        let q1 = (triangle * epsilon + 1.0 + epsilon) / (1.0 + epsilon);
-        match definition.sensor {
-            Sensor::Acceleration => q1 * (1.0 + epsilon * sigma).powi(2),
-            _ => q1,
-        }
+        (triangle * epsilon + 1.0 + epsilon) / (1.0 + epsilon)
     }
 
     /// Base amplitude and detuning at which v has the phase `gamma` at the particle speed `b` (eq. 12).
@@ -94,7 +90,7 @@ impl<'a> Reading<'a> {
         // Sensors differ from v by a factor of 1 + O(epsilon): each round gains as much.
         for _ in 0..ROUNDS {
             let b = self.flow.manifold.b(amplitude, BranchSide::Right)?;
-            amplitude = c / self.seen(b, self.flow.free_detuning(b)).norm();
+            amplitude = c / self.seen(b).norm();
         }
         self.flow.manifold.b(amplitude, BranchSide::Right)
     }
@@ -102,12 +98,12 @@ impl<'a> Reading<'a> {
     /// Phase of v, rad, at which the motion of the particle speed `b` is resonant.
     fn phase(&self, b: f64) -> f64 {
         let Dimensionless { epsilon, lambda, definition, .. } = *self.scene;
-        definition.reference.phase(epsilon * lambda, 1.0) - FRAC_PI_2 - self.seen(b, 0.0).arg()
+        definition.reference.phase(epsilon * lambda, 1.0) - FRAC_PI_2 - self.seen(b).arg()
     }
 
     fn resonance(&self, b: f64) -> BackbonePoint {
         let [g, sigma] = self.driven(b, self.phase(b));
         let point = self.flow.backbone_at(b);
-        BackbonePoint { c: point.c * self.seen(b, sigma).norm(), sigma, g, ..point }
+        BackbonePoint { c: point.c * self.seen(b).norm(), sigma, g, ..point }
     }
 }

@@ -129,7 +129,11 @@ fn a_run_rides_through_a_gap_of_30_ms_at_any_phase_whoever_makes_the_sine_of_the
     for settings in [
         &[][..],
         &["chain.hold=true", "chain.dac_bits=16", "chain.snr=40"],
-        &["resonance.sensor=acceleration", "record.hold_periods=5"],
+        &[
+            "resonance.sensor=q1",
+            "resonance.sensor_quantity=acceleration",
+            "record.hold_periods=5",
+        ],
     ] {
         let overrides: Vec<Override> = settings.iter().map(|setting| setting.parse().unwrap()).collect();
         let scene = Scene::parse("paper.toml", PAPER, &overrides).unwrap();

@@ -7,6 +7,7 @@ use vines_model::numerics::{mean, range};
 
 use super::Period;
 use crate::identification::Cycle;
+use crate::plan::Target;
 use crate::record::Sample;
 
 /// Range of noise, in standard deviations: ten independent normal values exceed it with a probability of 5 % (studentised range).
@@ -26,6 +27,7 @@ const PARTS: usize = 4;
 /// The means of the quarters are compared as well, with the scatter from period to period that is really there: a slow change has little.
 pub(super) struct Judge {
     config: Config,
+    target: Target,
     /// The present period, and the last complete ones: at most two dwells.
     begins: Period,
     cycles: Vec<Cycle>,
@@ -47,9 +49,10 @@ pub struct Condition {
 
 impl Judge {
     /// By the lock criterion of a configuration.
-    pub fn new(config: &Config) -> Self {
+    pub fn new(config: &Config, target: Target) -> Self {
         Self {
             config: *config,
+            target,
             begins: (0, 0.0),
             cycles: Vec::new(),
             settled: false,
@@ -64,7 +67,7 @@ impl Judge {
         }
         self.begins = (samples.len(), turns);
         let period = samples.get(begin..).unwrap_or_default();
-        match Cycle::of(period, self.config.sample_time, before * TAU, self.config.phase_target) {
+        match Cycle::of(period, self.config.sample_time, before * TAU, self.target) {
             Some(cycle) => self.cycles.push(cycle),
             None => self.cycles.clear(),
         }

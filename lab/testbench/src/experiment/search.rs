@@ -18,9 +18,10 @@ use nalgebra::DVector;
 use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, noise, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, Stage};
-use crate::identification::{ASYMMETRIC, Cycle, ResonanceFit, Slopes, without_tones};
-use crate::plan::{LinearResponse, Plan};
+use crate::identification::{ASYMMETRIC, Cycle, ResonanceFit, Slopes, degrees, without_tones};
+use crate::plan::{LinearResponse, Plan, Target};
 use crate::rig::{Controller, ControllerError, LoopState, Move, Rig};
+use crate::scene::Measurand;
 
 /// Phase error, rad, below which the control of the response begins: the drive then does 94 % of its largest work.
 const NEAR: f64 = 0.35;
@@ -74,8 +75,8 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     /// Half-width of the cavity, and requested drive, m.
     b: f64,
     requested: f64,
-    /// Phase target, rad.
-    target: f64,
+    /// Phase target, and what the channels measure.
+    target: Target,
     /// Natural period, s.
     period: f64,
     /// Setpoint of the response, m.
@@ -261,7 +262,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             growth: onward,
             ..Move::default()
         };
-        self.bench.controller.hold_response(to, self.target)?;
+        self.bench.hold_response(to)?;
         self.setpoint = to.response;
         self.measure(periods)
     }
@@ -304,7 +305,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 continue;
             };
             let two = &samples[(2 * begin).saturating_sub(end)..end];
-            harmonics.extend(even_and_odd(two, step * cycle.omega));
+            harmonics.extend(even_and_odd(two, step * cycle.omega, self.target.measurands[0]));
             all.push(cycle);
         }
         let Some(fit) = ResonanceFit::of(&all, &self.linear, Slopes::Unknown) else {
@@ -325,8 +326,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let doubtful = SIGNIFICANT * noise / (0.5 * all.len() as f64).sqrt();
         let possible = self.setpoint > LOWEST * self.b && response < UNREACHED * self.b;
         // Without mirror images there is no symmetric motion to tell from others.
+        // As displacements.
+        let asymmetric = ASYMMETRIC * (2.0_f64 / 3.0).powi(self.target.measurands[0].order());
         let is_even_small =
-            !self.bench.plan.knowledge.is_symmetric || even <= (ASYMMETRIC * ASYMMETRIC * odd).max(doubtful);
+            !self.bench.plan.knowledge.is_symmetric || even <= (asymmetric * asymmetric * odd).max(doubtful);
         let symmetric = departed && possible && is_even_small;
         if symmetric {
             self.held = range(self.held, [drive.value]);
@@ -362,9 +365,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 }
 
 /// Squares of the second and the third harmonic of the response, m², and their mean by noise; `step` is the phase between two samples, rad.
-fn even_and_odd(samples: &[Sample], step: f64) -> Option<[f64; 3]> {
+fn even_and_odd(samples: &[Sample], step: f64, measurand: Measurand) -> Option<[f64; 3]> {
     let phases: Vec<f64> = (0..samples.len()).map(|n| n as f64 * step).collect();
-    let basis = HarmonicBasis::new(&phases, 0, &[Some(2), Some(0), Some(0), Some(0), Some(0)]);
+    let basis = HarmonicBasis::new(&phases, 0, &degrees(measurand, TAU / step));
     let values = DVector::from_iterator(samples.len(), samples.iter().map(|sample| sample.sensors.response));
     let fit = basis.fit(&values)?;
     let rest = noise(basis.residual(&values, &fit).as_slice());

@@ -1,5 +1,7 @@
 //! The channels of a file, and how two of them become a recording: names, units and the clock, whatever the format.
 
+use vines_model::Measurand;
+
 use super::recording::{Recording, RecordingError};
 use crate::scene::unit;
 
@@ -30,12 +32,12 @@ pub struct Contents {
 }
 
 /// Which channels of a file are a recording. A channel is its name, or its number from 1, and after a colon its unit, the sensitivity of its sensor,
-/// or SI units per unit: `y`, `y:mm`, `acc:100mV/g`, `x:-0.5`.
+/// or metres per unit: `y`, `y:mm`, `acc:100mV/g`, `x:-0.5`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Selection {
     /// The response; the channel `response` otherwise.
     pub response: Option<String>,
-    /// The displacement of the base; the channel `reference` otherwise. Without a channel the base rests.
+    /// The motion of the base; the channel `reference` otherwise. Without a channel the base rests.
     pub drive: Option<String>,
     /// The time; otherwise a channel with one of the names `time`, `t`, `timestamp` and `x_value`, in any case.
     pub time: Option<String>,
@@ -72,15 +74,17 @@ impl Contents {
     /// The recording of two channels.
     ///
     /// # Errors
-    /// A channel that is missing, named twice or not in a unit of length or acceleration; a time that is interrupted or says nothing. The message
-    /// has the channels as they were read.
+    /// A channel that is missing, named twice or not in a unit of a motion; a time that is interrupted or says nothing. The message has the channels
+    /// as they were read.
     pub fn recording(&self, selection: &Selection) -> Result<Recording, RecordingError> {
         if selection.rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
             let rate = selection.rate.unwrap_or_default();
             return Err(self.refused(&format!(": the rate is {rate} samples a second; it must be above 0")));
         }
         let response = selection.response.as_deref().unwrap_or("response");
-        let mut response = self.measured(response, "response", &["m", "m/s²"])?;
+        let (mut notes, mut units) = (Vec::new(), Vec::new());
+        let motions = Measurand::ALL.map(Measurand::unit);
+        let mut response = self.measured(response, "response", &motions, &mut units)?;
         let mut drive = match (&selection.drive, self.commanded(selection)?) {
             (None, Some(commanded)) => commanded,
             (None, None) if self.find("reference")?.is_none() => Measured {
@@ -89,10 +93,9 @@ impl Contents {
                 values: vec![0.0; response.values.len()],
                 clock: response.clock,
             },
-            (given, _) => self.measured(given.as_deref().unwrap_or("reference"), "drive", &["m"])?,
+            (given, _) => self.measured(given.as_deref().unwrap_or("reference"), "drive", &motions, &mut units)?,
         };
-        let mut notes = Vec::new();
-        let time = self.time(selection)?;
+        let time = self.time(selection, &mut notes)?;
         let [start, sample_time] = match (&time, selection.rate, response.clock) {
             (Some(time), rate, _) => self.fitted(time, rate, [&mut response, &mut drive], &mut notes)?,
             (None, None, None) => {
@@ -108,12 +111,13 @@ impl Contents {
         if time.is_none() {
             self.align(&mut response, &mut drive, &mut notes)?;
         }
+        notes.append(&mut units);
         Ok(Recording {
             origin: self.origin.clone(),
             channels: [response.name, drive.name],
             start,
             sample_time,
-            is_acceleration: response.unit == "m/s²",
+            measurands: [response.unit, drive.unit].map(|unit| Measurand::of_unit(unit).unwrap_or_default()),
             response: response.values,
             drive: drive.values,
             notes,
@@ -196,7 +200,13 @@ impl Contents {
     }
 
     /// A channel in one of the SI units `allowed`.
-    fn measured(&self, text: &str, option: &str, allowed: &[&str]) -> Result<Measured, RecordingError> {
+    fn measured(
+        &self,
+        text: &str,
+        option: &str,
+        allowed: &[&str],
+        notes: &mut Vec<String>,
+    ) -> Result<Measured, RecordingError> {
         let (channel, given) = self.named(text, option)?;
         let Channel { name, unit: stated, values, clock } = channel;
         let written = given.as_deref().unwrap_or(stated).trim();
@@ -205,22 +215,48 @@ impl Contents {
         } else {
             unit::parse(written, stated)
         };
-        let allowed = |unit: &&str| unit.is_empty() || allowed.contains(unit);
-        let Some((factor, unit)) = found.filter(|(_, unit)| allowed(unit)) else {
-            let advice = if option == "time" {
+        let is_time = option == "time";
+        let is_allowed = |unit: &str| unit.is_empty() || allowed.contains(&unit);
+        let Some((factor, unit)) = found.filter(|(_, unit)| is_allowed(unit)) else {
+            let reason = match found {
+                Some((_, "N")) if !is_time => {
+                    "is a force, and this structure is driven through its base, whose displacement, velocity or acceleration is needed".into()
+                }
+                Some((_, "V")) if !is_time => "is a voltage, and says nothing without the sensitivity of its sensor".into(),
+                Some((_, other)) => format!("is one of {}", quantity(other)),
+                None if unit::parse(written, "").is_some() => {
+                    format!("is a sensitivity, and the file states {stated}, which is no voltage")
+                }
+                None => "is unknown".into(),
+            };
+            let advice = if is_time {
                 "the time needs s, ms, us or min"
-            } else if option == "drive" {
-                "the base needs its displacement, in m, mm, µm or another length; integrate an acceleration twice before"
             } else {
-                "the response needs a length (m, mm, µm), an acceleration (m/s², g), the sensitivity of its sensor (100mV/g, 8V/mm), or metres per \
-                 unit (-0.5)"
+                "give a length (m, mm, µm), a velocity (m/s, mm/s) or an acceleration (m/s², g), a multiple of one (-1mm), the sensitivity of the \
+                 sensor (100mV/g, 8V/mm, 125mm/s/V), or metres per unit (-0.5)"
             };
             return Err(self.refused(&format!(
-                ", channel {name}: the unit {written} is unknown here; {advice}, after a colon: `{name}:UNIT`"
+                ", channel {name}: the unit {written} {reason}; {advice}, after a colon: `{name}:UNIT`"
             )));
         };
+        let of_file = unit::parse(stated, "").map_or("", |(_, unit)| unit);
+        if !is_time && written.is_empty() && !self.is_of_vines() {
+            notes.push(format!("{}: channel {name} has no unit and is read in m", self.origin));
+        } else if ![unit, "", "V"].contains(&of_file) {
+            notes.push(format!(
+                "{}: channel {name} is read in {written}, as given, though the file states {stated}",
+                self.origin
+            ));
+        }
         let values = values.iter().map(|value| factor * value).collect();
         Ok(Measured { name: name.clone(), unit, values, clock: *clock })
+    }
+
+    /// Whether the table has the columns of a recording of `vines`, which is in SI units.
+    fn is_of_vines(&self) -> bool {
+        ["omega", "E"]
+            .into_iter()
+            .all(|name| self.find(name).is_ok_and(|one| one.is_some()))
     }
 
     /// The base that a run of `vines` without a base sensor commanded: from its columns omega and E.
@@ -232,7 +268,7 @@ impl Contents {
         let Some((omega, amplitude)) = self.find("omega")?.zip(self.find("E")?) else {
             return Ok(None);
         };
-        let Some(time) = self.time(selection)? else {
+        let Some(time) = self.time(selection, &mut Vec::new())? else {
             return Ok(None);
         };
         let step = line(&time.values).step;
@@ -251,7 +287,7 @@ impl Contents {
     }
 
     /// The channel of the time, s.
-    fn time(&self, selection: &Selection) -> Result<Option<Measured>, RecordingError> {
+    fn time(&self, selection: &Selection, notes: &mut Vec<String>) -> Result<Option<Measured>, RecordingError> {
         let last = |channel: &Channel| channel.name.rsplit(['/', '.']).next().unwrap_or("").to_lowercase();
         let mut usual = self.channels.iter().filter(|channel| TIMES.contains(&&*last(channel)));
         let (first, second) = (usual.next(), usual.next());
@@ -263,7 +299,7 @@ impl Contents {
         let Some(text) = selection.time.as_deref().or_else(usual) else {
             return Ok(None);
         };
-        Ok(Some(self.measured(text, "time", &["s"])?))
+        Ok(Some(self.measured(text, "time", &["s"], notes)?))
     }
 
     /// Start and step of the clock that fits the times. Samples at uneven times are interpolated.
@@ -412,6 +448,20 @@ impl Contents {
             0 => format!("sample {}", sample + 1),
             first => format!("row {}", first + sample),
         }
+    }
+}
+
+/// What an SI unit measures, in words.
+fn quantity(unit: &str) -> &'static str {
+    match unit {
+        "m" => "lengths",
+        "m/s" => "velocities",
+        "m/s²" => "accelerations",
+        "N" => "forces",
+        "V" => "voltages",
+        "s" => "times",
+        "rad" => "angles",
+        _ => "frequencies",
     }
 }
 

@@ -19,15 +19,15 @@ use nalgebra::DVector;
 use num_complex::Complex64;
 use serde::Serialize;
 use thiserror::Error;
-use vines_model::Sensor;
 use vines_model::numerics::{Estimate, HarmonicBasis, RANDOM, mean, range, slope};
 use vines_model::regime::Regime;
 use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
+use vines_model::{Measurand, Sensor};
 
 use super::{Known, MeasuredPoint, Quantity, decimals, fit};
 use crate::backbone::{Criterion, LAG, LevelEstimate};
 use crate::identification::{Cycle, Harmonic, Line, ResonanceFit, harmonic, regime_by_response};
-use crate::plan::{Knowledge, LinearResponse};
+use crate::plan::{Knowledge, LinearResponse, Target};
 use crate::record::Sample;
 use crate::rig::{Command, Drive, Sensors};
 use crate::scene::{Parameters, Scene};
@@ -43,11 +43,11 @@ pub struct Recording {
     pub start: f64,
     /// Time from sample to sample, s.
     pub sample_time: f64,
-    /// Whether the response is an acceleration.
-    pub is_acceleration: bool,
-    /// Response, m or m/s².
+    /// What response and base measure.
+    pub measurands: [Measurand; 2],
+    /// Response, m, m/s or m/s².
     pub response: Vec<f64>,
-    /// Displacement of the base, m; zeros without a channel of the base, whose name is empty then.
+    /// Motion of the base, m, m/s or m/s²; zeros without a channel of the base, whose name is empty then.
     pub drive: Vec<f64>,
     /// What is to be known of the way it was read: the clock, and what was cut or interpolated.
     pub notes: Vec<String>,
@@ -149,7 +149,7 @@ const DAMPING: f64 = 0.1;
 pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result<Vec<Vec<Part>>, RecordingError> {
     let all = |linear: LinearResponse, plant: Parameters| {
         let Knowledge { sample_time, target, .. } = scene.knowledge();
-        let stated = Knowledge::of(&plant, scene.resonance, scene.amplitude, sample_time, target);
+        let stated = Knowledge::of(&plant, scene.resonance, scene.amplitude, sample_time, target.phase);
         let knowledge = stated.measured(linear);
         recordings
             .iter()
@@ -186,13 +186,19 @@ impl Recording {
     /// # Errors
     /// Channels that cannot be those of a rig near resonance; the message says which, and what to do.
     pub fn parts(&self, knowledge: &Knowledge) -> Result<Vec<Part>, RecordingError> {
-        let knowledge = Knowledge { sample_time: self.sample_time, ..*knowledge };
+        let knowledge = self.knowledge(knowledge);
         self.prepared(&knowledge)?.parts_near_resonance(&knowledge)
+    }
+
+    /// What is known, with the sample time and the channels of this recording.
+    fn knowledge(&self, knowledge: &Knowledge) -> Knowledge {
+        let target = Target { measurands: self.measurands, ..knowledge.target };
+        Knowledge { sample_time: self.sample_time, target, ..*knowledge }
     }
 
     fn parts_near_resonance(&self, knowledge: &Knowledge) -> Result<Vec<Part>, RecordingError> {
         let linear = &knowledge.linear;
-        let anchors = self.anchors(linear);
+        let anchors = self.anchors(knowledge);
         let moves = |anchor: &Anchor| anchor.response.map(|_| anchor.drive.is_some());
         let stretches = anchors.chunk_by(|anchor, next| moves(anchor) == moves(next));
         let of = |base_moves: bool| move |stretch: &&[Anchor]| moves(&stretch[0]) == Some(base_moves);
@@ -217,25 +223,22 @@ impl Recording {
         Ok(parts)
     }
 
-    /// The channels as the bench has them: the response that the scene's sensor reads, and both without their slow drift.
+    /// The channels as the bench has them: in m, and without their slow drift.
     fn prepared(&self, knowledge: &Knowledge) -> Result<Self, RecordingError> {
         let linear = knowledge.linear;
         self.check(&linear)?;
         let mut one = self.clone();
-        if self.is_acceleration {
-            if knowledge.numbers.definition.sensor != Sensor::Acceleration {
-                return Err(RecordingError(format!(
-                    "{}: the response {} is an acceleration, and the scene's sensor is none: set resonance.sensor = \"acceleration\" in the scene, or \
-                     integrate the channel twice",
-                    self.origin, self.channels[0]
-                )));
-            }
-            // The sensor of the bench reads -q1''/omega0².
-            one.response
-                .iter_mut()
-                .for_each(|value| *value /= -linear.omega0.powi(2));
+        let of_response = self.measurands[0];
+        if of_response != Measurand::Displacement && knowledge.numbers.definition.sensor == Sensor::V {
+            let (Self { origin, channels: [response, _], .. }, name) = (self, of_response.name());
+            return Err(RecordingError(format!(
+                "{origin}: the response {response} is one of {name}, and the scene's sensor reads v, which contains the particle: no sensor of a {name} on the \
+                 structure does; set resonance.sensor = \"q1\" in the scene, or with --set"
+            )));
         }
-        for values in [&mut one.response, &mut one.drive] {
+        for (channel, values) in [&mut one.response, &mut one.drive].into_iter().enumerate() {
+            let scale = knowledge.target.scale(channel);
+            values.iter_mut().for_each(|value| *value *= scale);
             remove_drift(values, linear.omega0 * self.sample_time);
         }
         Ok(one)
@@ -246,8 +249,9 @@ impl Recording {
     /// # Errors
     /// As [`Recording::parts`], and where the base rests and the response does not decay.
     pub fn linear_decay(&self, knowledge: &Knowledge) -> Result<Option<LinearDecay>, RecordingError> {
-        let (one, linear) = (self.prepared(knowledge)?, knowledge.linear);
-        let anchors = one.anchors(&linear);
+        let knowledge = self.knowledge(knowledge);
+        let one = self.prepared(&knowledge)?;
+        let anchors = one.anchors(&knowledge);
         let fits: Vec<&Harmonic> = anchors.iter().filter_map(|one| one.response.as_ref()).collect();
         if anchors.iter().any(|one| one.drive.is_some()) || 2 * fits.len() < anchors.len() && self.drive_is_named() {
             return Ok(None);
@@ -316,7 +320,7 @@ impl Recording {
                 ": {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {FEWEST} are needed"
             ));
         }
-        for (values, channel) in both.into_iter().zip(channels) {
+        for ((values, channel), measurand) in both.into_iter().zip(channels).zip(self.measurands) {
             let (low, high) = range((f64::INFINITY, f64::NEG_INFINITY), values.iter().copied());
             // A base may rest.
             if low == high && std::ptr::eq(values, &raw const self.response) {
@@ -328,9 +332,10 @@ impl Recording {
                 let share = values.iter().filter(|sample| **sample == value).count() as f64 / count as f64;
                 if share > CLIPPED && value != 0.0 {
                     return refused(format!(
-                        ", channel {channel} is clipped: {:.1} % of its samples are equal to its largest or smallest value, {value:e} m; reduce the \
+                        ", channel {channel} is clipped: {:.1} % of its samples are equal to its largest or smallest value, {value:e} {}; reduce the \
                          gain, and record again",
-                        100.0 * share
+                        100.0 * share,
+                        measurand.unit()
                     ));
                 }
             }
@@ -338,9 +343,9 @@ impl Recording {
         Ok(())
     }
 
-    /// Both channels at intervals of a period.
-    fn anchors(&self, linear: &LinearResponse) -> Vec<Anchor> {
-        let dt = self.sample_time;
+    /// The displacements of both channels at intervals of a period.
+    fn anchors(&self, knowledge: &Knowledge) -> Vec<Anchor> {
+        let (dt, linear) = (self.sample_time, &knowledge.linear);
         let period = TAU / linear.omega0 / dt;
         let window = (WINDOW * period).round() as usize + 1;
         let step = (period.round() as usize).max(1);
@@ -357,11 +362,12 @@ impl Recording {
                 };
                 let response = fit(&self.response, omega).or_else(|| fit(&self.response, linear.omega0));
                 omega = response.map_or(linear.omega0, |harmonic| harmonic.omega);
-                let drive = fit(&self.drive, omega);
+                let displacement =
+                    |channel| move |harmonic: Harmonic| harmonic.displacement(channel, &knowledge.target);
                 Anchor {
                     middle: from as f64 + 0.5 * (window - 1) as f64,
-                    response,
-                    drive,
+                    response: response.map(displacement(0)),
+                    drive: fit(&self.drive, omega).map(displacement(1)),
                 }
             })
             .collect();

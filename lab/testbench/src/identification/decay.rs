@@ -9,7 +9,7 @@ use vines_model::numerics::{HarmonicBasis, mean};
 use vines_model::regime::end_of_synchrony;
 
 use super::response::impacts;
-use crate::plan::Knowledge;
+use crate::plan::{Knowledge, Target};
 use crate::record::{Record, Sample};
 use crate::scene::Dimensionless;
 
@@ -99,7 +99,10 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
         f64::INFINITY
     };
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
-    let windows = fitted(&values, dt, omega, window);
+    let mut windows = fitted(&values, dt, omega, window);
+    for window in &mut windows {
+        window.fit = window.fit.displacement(0, &knowledge.target);
+    }
     // Loss of amplitude by the impacts alone, m/s; the mean over the first period belongs to the 1:1 motion.
     let damping = knowledge.linear.damping_rate;
     let taken = |window: &SlidingFit| -window.fit.rate - damping * window.fit.amplitude;
@@ -181,6 +184,21 @@ pub struct Harmonic {
     pub rate: f64,
     /// Standard uncertainties of amplitude and frequency by the noise of the samples.
     pub uncertainties: [f64; 2],
+}
+
+impl Harmonic {
+    /// The displacement of which a channel reads this harmonic.
+    #[must_use]
+    pub fn displacement(self, channel: usize, target: &Target) -> Self {
+        let (factor, lag) = target.displacement(channel, self.omega).to_polar();
+        Self {
+            amplitude: self.amplitude * factor,
+            rate: self.rate * factor,
+            phase: self.phase + lag,
+            uncertainties: [self.uncertainties[0] * factor, self.uncertainties[1]],
+            ..self
+        }
+    }
 }
 
 /// Number of fits, each about the frequency that the fit before found; each reduces the error by orders of magnitude.

@@ -23,7 +23,8 @@ use std::f64::consts::TAU;
 use nalgebra::{Complex, DVector};
 use vines_model::numerics::{Estimate, HarmonicBasis, Regression, mean, slope};
 
-use crate::plan::LinearResponse;
+use super::harmonics_of;
+use crate::plan::{LinearResponse, Target};
 use crate::record::{Sample, drive_phases};
 
 /// Prior knowledge of the slopes of `E_R` and `omega_R` over the amplitude.
@@ -217,7 +218,9 @@ fn motion(cycles: &[Cycle]) -> Vec<PeriodResponse> {
             let turning = amplitude * ((phases[to] - phases[from]) / time - 1.0);
             let z = cycles[n].response;
             let drift = Complex::new(growth, turning) * z / amplitude;
-            let correction = Complex::new(0.0, 0.5) * drift.conj() / z;
+            // A sensor of a derivative reads (i omega + s)^n times a displacement that drifts at the complex rate s.
+            let derived = Complex::new(-turning, growth) * (f64::from(cycles[n].order) / amplitude);
+            let correction = Complex::new(0.0, 0.5) * drift.conj() / z + derived;
             PeriodResponse {
                 amplitude: amplitude * (1.0 + correction.re),
                 phase: phases[n] + correction.im,
@@ -298,19 +301,23 @@ pub struct Cycle {
     pub phase_error: f64,
     /// Variances of the fundamental of response and base by the noise of the sensors, m²: of each of its two components.
     pub noise: [f64; 2],
+    /// How often the sensor of the response differentiates the displacement.
+    pub order: i32,
     /// Number of samples.
     pub samples: usize,
     /// Their duration, s.
     pub duration: f64,
 }
 
+/// Harmonics that are fitted to a displacement.
+const HARMONICS: usize = 3;
 /// Offset, sine and cosine of three harmonics, and the drift of the first.
 const TERMS: usize = 9;
 
 impl Cycle {
-    /// The samples of one period; `phase` (rad): phase of the drive at the first, `target` (rad): phase target of the response relative to
-    /// the base. `None` for too few samples.
-    pub fn of(samples: &[Sample], sample_time: f64, phase: f64, target: f64) -> Option<Self> {
+    /// The samples of one period; `phase` (rad): phase of the drive at the first, `target`: phase target of the response relative to the base, and
+    /// what both channels measure. `None` for too few samples.
+    pub fn of(samples: &[Sample], sample_time: f64, phase: f64, target: Target) -> Option<Self> {
         if samples.len() <= TERMS {
             return None;
         }
@@ -322,18 +329,28 @@ impl Cycle {
         let uniform: Vec<f64> = (0..samples.len())
             .map(|n| drive_phase + (n as f64 - middle) * sample_time * mean_omega)
             .collect();
-        let basis = HarmonicBasis::new(&uniform, 0, &[Some(0); 3]);
         // A change of the amplitude within the period is not noise.
-        let drifting = HarmonicBasis::new(&uniform, 0, &[Some(1), Some(0), Some(0)]);
-        let degrees = (samples.len() - TERMS) as f64;
-        let fitted = |value: fn(&Sample) -> f64| {
+        let bases = |count: usize| {
+            let mut degrees = vec![Some(0); count];
+            let basis = HarmonicBasis::new(&uniform, 0, &degrees);
+            degrees[0] = Some(1);
+            [basis, HarmonicBasis::new(&uniform, 0, &degrees)]
+        };
+        let of_base = bases(HARMONICS);
+        let of_response = harmonics_of(target.measurands[0], samples.len() as f64, HARMONICS);
+        let of_response = (of_response != HARMONICS).then(|| bases(of_response));
+        let [basis, drifting] = &of_base;
+        let fitted = |channel: usize, value: fn(&Sample) -> f64| {
+            let displacement = target.displacement(channel, mean_omega);
+            let [basis, drifting] = of_response.as_ref().filter(|_| channel == 0).unwrap_or(&of_base);
             let values = DVector::from_iterator(samples.len(), samples.iter().map(value));
             let fit = basis.fit(&values)?;
             let residual = drifting.residual(&values, &drifting.fit(&values)?);
-            let variance = residual.norm_squared() / degrees;
-            Some((fit.harmonic(1), variance * 2.0 / samples.len() as f64))
+            let variance = residual.norm_squared() / (samples.len() - drifting.terms()) as f64;
+            let variance = variance * 2.0 / samples.len() as f64;
+            Some((fit.harmonic(1) * displacement, variance * displacement.norm_sqr()))
         };
-        let (response, noise) = fitted(|s| s.sensors.response)?;
+        let (response, noise) = fitted(0, |s| s.sensors.response)?;
         let mean = |value: fn(&Sample) -> f64| mean(samples.iter().map(value));
         // The amplitude commanded at a sample begins there; a sensor reads what the one before left.
         let before = |n: usize| samples[n.saturating_sub(1)].command.drive.amplitude;
@@ -343,13 +360,13 @@ impl Cycle {
         let as_read = basis.fit(&motion(&before))?.harmonic(1);
         let measured = samples.iter().all(|s| s.sensors.reference.is_some());
         let (base, base_noise) = if measured {
-            let (base, noise) = fitted(|s| s.sensors.reference.unwrap_or(0.0))?;
+            let (base, noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
             (base * commanded.harmonic(1) / as_read, noise)
         } else {
             (Complex::new(mean(|s| s.command.drive.amplitude), 0.0), 0.0)
         };
         let phase_error = if measured {
-            (response * base.conj() * Complex::from_polar(1.0, -target)).arg()
+            (response * base.conj() * Complex::from_polar(1.0, -target.phase)).arg()
         } else {
             // The controller compensates the delay.
             mean(|s| s.command.phase_error.unwrap_or(0.0))
@@ -363,13 +380,14 @@ impl Cycle {
             base,
             phase_error,
             noise: [noise, base_noise],
+            order: target.measurands[0].order(),
             samples: samples.len(),
             duration: samples.len() as f64 * sample_time,
         })
     }
 
     /// The complete periods of the drive in these samples, in order.
-    pub fn all(samples: &[Sample], sample_time: f64, target: f64) -> Vec<Self> {
+    pub fn all(samples: &[Sample], sample_time: f64, target: Target) -> Vec<Self> {
         let (mut cycles, mut begin, mut turns, mut phase) = (Vec::new(), 0, 0.0, 0.0);
         for (n, sample) in samples.iter().enumerate() {
             turns += sample.command.drive.omega * sample_time / TAU;

@@ -13,9 +13,10 @@ use serde::Serialize;
 use vines_model::numerics::{HarmonicBasis, golden_section, noise};
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
+use super::harmonics_of;
 use crate::plan::{Knowledge, LinearResponse};
 use crate::record::Sample;
-use crate::scene::{Dimensionless, Sensor};
+use crate::scene::{Dimensionless, Measurand, Sensor};
 
 /// Largest residual of a steady motion, relative to the amplitude, unless it is noise.
 const STEADY: f64 = 3e-3;
@@ -29,8 +30,14 @@ const SIGNIFICANT: f64 = 4.0;
 pub(crate) const ASYMMETRIC: f64 = 0.5;
 /// Relative distance from the linear response within which a motion counts as the linear mode, beside the uncertainty of that response.
 const LINEAR: f64 = 0.1;
+/// Harmonics that are fitted to a displacement.
+const HARMONICS: usize = 5;
+
 /// Degrees of the amplitudes of the harmonics in time: quadratic for the fundamental, constant for the others.
-const HARMONICS: [Option<usize>; 5] = [Some(2), Some(0), Some(0), Some(0), Some(0)];
+pub(crate) fn degrees(measurand: Measurand, samples_per_period: f64) -> Vec<Option<usize>> {
+    let count = harmonics_of(measurand, samples_per_period, HARMONICS);
+    [Some(2)].into_iter().chain(vec![Some(0); count - 1]).collect()
+}
 
 /// Harmonic content of the response, relative to its fundamental.
 #[derive(Debug, Clone)]
@@ -61,7 +68,8 @@ impl Content {
         let (n, sample_time, d) = (samples.len(), knowledge.sample_time, knowledge.numbers);
         // The phase of the response is more uniform than the phase of a drive that a loop still corrects.
         let phases: Vec<f64> = (0..n).map(|n| n as f64 * sample_time * omega).collect();
-        let basis = HarmonicBasis::new(&phases, 1, &HARMONICS);
+        let per_period = TAU / (omega * sample_time);
+        let basis = HarmonicBasis::new(&phases, 1, &degrees(knowledge.target.measurands[0], per_period));
         if n < 2 * basis.terms() {
             return None;
         }
@@ -138,15 +146,19 @@ pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: f64, 
     if content.is_irregular() {
         return Regime::Other;
     }
-    let measured = Complex64::from_polar(content.amplitude / base, knowledge.target);
+    let target = knowledge.target;
+    let amplitude = content.amplitude * target.displacement(0, omega).norm();
+    let measured = Complex64::from_polar(amplitude / base, target.phase);
     let departs = base > 0.0 && !is_linear(&knowledge.linear, measured, omega);
     // The parameters of a simulation are known.
     let is_known = knowledge.is_measured || samples.iter().any(|sample| sample.ground_truth.is_some());
     let significant = SIGNIFICANT * content.error;
+    // As displacements.
+    let asymmetric = ASYMMETRIC * (2.0_f64 / 3.0).powi(target.measurands[0].order());
     match (departs, is_known) {
         (false, true) => Regime::NoImpacts,
         (false, false) => Regime::NotEstablished,
-        _ if content.second > significant.max(ASYMMETRIC * content.third) => Regime::Asymmetric,
+        _ if content.second > significant.max(asymmetric * content.third) => Regime::Asymmetric,
         _ if content.third > significant => Regime::Symmetric,
         (true, true) => Regime::Unresolved,
         (true, false) => Regime::NotEstablished,
@@ -163,8 +175,8 @@ fn is_linear(linear: &LinearResponse, measured: Complex64, omega: f64) -> bool {
 //
 // The response belongs to a linear oscillator, which only its base and the particle excite. The particle stays in its cavity: a line of its
 // relative position has at most the amplitude 4b/π, as a square wave has. With x = ω/ω0, a line of the response v therefore has at most
-// the amplitude `4 epsilon b/(π |x² - 1|)`, of q1 x² times as much, and of the acceleration x⁴ times as much, whatever the motion: irregular,
-// period-doubled or quasi-periodic. A larger line comes from a sensor or a cable, for instance from the mains.
+// the amplitude `4 epsilon b/(π |x² - 1|)`, of q1 x² times as much, of its velocity x³ and of its acceleration x⁴ times as much, whatever the
+// motion: irregular, period-doubled or quasi-periodic. A larger line comes from a sensor or a cable, for instance from the mains.
 
 /// Smallest foreign tone, over the largest line of a motion: epsilon and b are known within a factor of two.
 const ABOVE: f64 = 2.0;
@@ -237,8 +249,7 @@ impl Line {
         let square = (self.turn / (sample_time * d.omega0)).powi(2);
         let factor = match d.definition.sensor {
             Sensor::V => 1.0,
-            Sensor::Q1 => square,
-            Sensor::Acceleration => square * square,
+            Sensor::Q1 => square * square.sqrt().powi(d.definition.sensor_quantity.order()),
         };
         let largest = 4.0 / PI * d.epsilon * d.b * factor / (square - 1.0).abs();
         self.amplitude() > ABOVE * largest

@@ -68,10 +68,15 @@ impl Chain {
             converter: settings.adc_bits.map(|bits| Converter::new(bits, range)),
         };
         let base_range = d.amplitude(settings.base_range);
+        // The ranges of velocities and accelerations belong to the natural frequency.
+        let units = scene
+            .resonance
+            .measurands()
+            .map(|measurand| d.omega0.powi(measurand.order()));
         Self {
             rig,
-            response: channel(settings.response_range * d.b),
-            base: settings.reference.then(|| channel(base_range)),
+            response: channel(settings.response_range * d.b * units[0]),
+            base: settings.reference.then(|| channel(base_range * units[1])),
             holds: settings.hold,
             output: settings.dac_bits.map(|bits| Converter::new(bits, base_range)),
             random: ChaCha8Rng::seed_from_u64(settings.seed),

@@ -5,14 +5,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use lovines::Parameters;
 use thiserror::Error;
-use vines_model::{Definition, Reference, Sensor};
+use vines_model::{Definition, Measurand, Reference};
 
 use super::{Drive, GroundTruth, Rig, RigError, RigStage, Sensors};
+use crate::plan::Target;
 
-/// A rig whose response is a displacement and whose reference is the base, with the sensors of a definition of resonance.
+/// A rig whose response and reference are displacements, with the sensors of a definition of resonance.
 ///
-/// An acceleration is the second difference of the displacement: an accelerometer that averages over two sample periods with the weights of
-/// a triangle, which keep the instants of the walls' impulses. The force `k e + c e'` over k takes e' from a difference of e. Both
+/// Velocities and accelerations are differences of displacements: an accelerometer that averages over two sample periods with the weights of a
+/// triangle, which keep the instants of the walls' impulses. The force `k e + c e'` over k takes e' from a difference of e. All
 /// belong to the sample before; then response and reference are both read one sample late.
 #[derive(Debug, Clone)]
 pub struct Measured<R> {
@@ -37,14 +38,22 @@ impl<R: Rig> Measured<R> {
         }
     }
 
-    /// Second difference over the displacement, times `step` (s): at omega0 exact for a sine.
-    fn gain(&self, step: f64) -> f64 {
-        let sine = (0.5 * self.plant[1] * step).sin();
-        4.0 * sine * sine / step
-    }
-
     fn step_begins(&mut self, step: f64) {
         self.before = [(self.now, step), self.before[0]];
+    }
+}
+
+/// The derivative of three values, `late` and `early` seconds apart, at the middle one; exact for a sine of the frequency `omega`, rad/s.
+fn derivative(of: Measurand, [first, middle, now]: [f64; 3], [early, late]: [f64; 2], omega: f64) -> f64 {
+    let step = 0.5 * (early + late);
+    match of {
+        Measurand::Displacement => middle,
+        Measurand::Velocity => (now - first) * 0.5 * omega / (omega * step).sin(),
+        Measurand::Acceleration => {
+            let sine = (0.5 * omega * step).sin();
+            let gain = omega * omega * step / (4.0 * sine * sine);
+            ((now - middle) / late - (middle - first) / early) * gain
+        }
     }
 }
 
@@ -55,25 +64,37 @@ impl<R: Rig> RigStage for Measured<R> {
 
     fn sense(&mut self) -> Result<Sensors, RigError> {
         self.now = self.rig.sense()?;
-        let [(middle, late), (first, early)] = self.before;
-        if !self.definition.is_late() || early == 0.0 {
-            return Ok(if self.definition.is_late() { middle } else { self.now });
+        if !self.definition.is_late() {
+            return Ok(self.now);
         }
-        let [leading, _] = self.plant;
-        let rates = [
-            (self.now.response - middle.response) / late,
-            (middle.response - first.response) / early,
-        ];
-        let response = match self.definition.sensor {
-            Sensor::V | Sensor::Q1 => middle.response,
-            Sensor::Acceleration => (rates[1] - rates[0]) / self.gain(0.5 * (late + early)),
+        let [(middle, late), (first, early)] = self.before;
+        let measurands = self.definition.measurands();
+        let [leading, omega0] = self.plant;
+        if early == 0.0 {
+            // Nothing moves before the first drive.
+            let of = |measurand, value| {
+                if measurand == Measurand::Displacement {
+                    value
+                } else {
+                    0.0
+                }
+            };
+            return Ok(Sensors {
+                response: of(measurands[0], middle.response),
+                reference: middle.reference.map(|value| of(measurands[1], value)),
+            });
+        }
+        let read = |channel: usize, three| derivative(measurands[channel], three, [early, late], omega0);
+        let force = |[first, middle, now]: [f64; 3]| middle + leading * (now - first) / (late + early);
+        let of_base = |three| match self.definition.reference {
+            Reference::Base => read(1, three),
+            Reference::Force => force(three),
         };
-        let force = |((now, middle), first): ((f64, f64), f64)| middle + leading * (now - first) / (late + early);
-        let reference = match self.definition.reference {
-            Reference::Base => middle.reference,
-            Reference::Force => self.now.reference.zip(middle.reference).zip(first.reference).map(force),
-        };
-        Ok(Sensors { response, reference })
+        let base = first.reference.zip(middle.reference).zip(self.now.reference);
+        Ok(Sensors {
+            response: read(0, [first.response, middle.response, self.now.response]),
+            reference: base.map(|((first, middle), now)| of_base([first, middle, now])),
+        })
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
@@ -84,6 +105,39 @@ impl<R: Rig> RigStage for Measured<R> {
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         self.step_begins(step);
         self.rig.hold(drive, step)
+    }
+}
+
+// What the bench makes of the readings of a rig.
+
+/// A rig whose readings are in m, as [`Target::scaled`] says.
+pub struct Scaled<'a, R: ?Sized> {
+    rig: &'a mut R,
+    target: Target,
+}
+
+impl<'a, R: Rig + ?Sized> Scaled<'a, R> {
+    /// The rig `rig` with the channels of `target`.
+    pub fn new(rig: &'a mut R, target: Target) -> Self {
+        Self { rig, target }
+    }
+}
+
+impl<R: Rig + ?Sized> Rig for Scaled<'_, R> {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        Ok(self.target.scaled(self.rig.sense()?))
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.rig.advance(drive, step)
+    }
+
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.rig.hold(drive, step)
+    }
+
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        self.rig.ground_truth()
     }
 }
 

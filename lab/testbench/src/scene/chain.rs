@@ -15,9 +15,9 @@ settings! {
         /// Resolution of the output, bits; absent: ideal. Needs `hold`.
         #[serde(deserialize_with = "option")]
         dac_bits: Option<u32> = None,
-        /// Range of the response channel, ± this value, over b; readings saturate there.
+        /// Range of the response channel, ± this value, over b, `b omega0` or `b omega0²`; readings saturate there.
         response_range: f64 = 2.0,
-        /// Range of the base channel and of the output, ± this value, over `b epsilon`.
+        /// Range of the base channel and of the output, ± this value, over `b epsilon`; of a velocity or an acceleration times omega0 or omega0².
         base_range: f64 = 4.0,
         /// The base follows held samples instead of an oscillator in the rig.
         hold: bool = false,

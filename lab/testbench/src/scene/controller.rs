@@ -10,7 +10,7 @@ use vines_model::ArgumentError;
 
 use crate::plan::{Knowledge, LinearResponse};
 
-use super::{Scene, SceneError, Sensor, check, given, positive, within};
+use super::{Measurand, Scene, SceneError, check, given, positive, within};
 
 settings! {
     /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
@@ -116,7 +116,7 @@ impl Scene {
             omega_max: c.omega_max * omega0,
             bandwidth: c.bandwidth * omega0,
             damping_rate: Some(damping_rate).filter(|rate| *rate > 0.0),
-            phase_target: knowledge.target,
+            phase_target: knowledge.target.phase_of_readings(),
             delay: delay + f64::from(u8::from(self.resonance.is_late())) * step,
             // The velocity of a base that moves with the largest amplitude.
             ramp_rate: limits.amplitude_max.map(|largest| largest * omega0),
@@ -132,13 +132,13 @@ impl Scene {
 
     /// Largest plausible difference between a reading and its prediction, as a share of the amplitude.
     fn residual(&self, knowledge: &Knowledge) -> f64 {
-        let impulse = match self.resonance.sensor {
-            // Impacts change the velocity within a sample. Two in a period that balance the base amplitude E have the acceleration
-            // omega0^2 E samples/4; frequency and transients take a few times as much. The amplitude of the response is about b.
-            Sensor::Acceleration => {
-                self.drive_needed(knowledge) / knowledge.numbers.b * self.controller.samples_per_period
-            }
-            Sensor::V | Sensor::Q1 => 0.0,
+        let relative = self.drive_needed(knowledge) / knowledge.numbers.b;
+        // Impacts change the velocity within a sample. Two in a period that balance the base amplitude E have the velocity pi omega0 E/2 each, and
+        // the acceleration omega0^2 E samples/4; frequency and transients take a few times as much. The amplitude of the response is about b.
+        let impulse = match self.resonance.sensor_quantity {
+            Measurand::Displacement => 0.0,
+            Measurand::Velocity => TAU * relative,
+            Measurand::Acceleration => relative * self.controller.samples_per_period,
         };
         RESIDUAL + impulse
     }

@@ -15,6 +15,9 @@ pub struct Name {
     pub name: String,
     /// SI units per unit of the variable; negative for the opposite sign.
     pub factor: f64,
+    /// The SI unit, if the scene gives a unit.
+    #[serde(skip)]
+    pub si: Option<&'static str>,
 }
 
 /// As written: `"name"`, or a table with `name` and one of `unit` and `factor`.
@@ -37,11 +40,11 @@ impl Name {
     /// # Errors
     /// An unknown unit.
     pub fn with_unit(name: &str, unit: &str) -> Result<Self, ArgumentError> {
-        let Some((_, factor, _)) = UNITS.into_iter().find(|(symbol, ..)| *symbol == unit) else {
+        let Some((_, factor, si)) = UNITS.into_iter().find(|(symbol, ..)| *symbol == unit) else {
             let symbols = UNITS.map(|(symbol, ..)| symbol).join(", ");
             return Err(format!("{name}: the unit {unit} is unknown; known are {symbols}, or give a factor").into());
         };
-        Ok(Self { name: name.into(), factor })
+        Ok(Self { name: name.into(), factor, si: Some(si) })
     }
 }
 
@@ -61,7 +64,7 @@ impl TryFrom<NameSection> for Name {
         if !factor.is_finite() || factor == 0.0 {
             return Err(format!("{name}: the factor {factor} must be a finite number other than 0").into());
         }
-        Ok(Self { name, factor })
+        Ok(Self { name, factor, si: None })
     }
 }
 
@@ -84,7 +87,7 @@ impl TryFrom<NameSection> for Mapped {
 }
 
 impl From<Mapped> for NameSection {
-    fn from(Mapped { name: Name { name, factor }, is_explicit }: Mapped) -> Self {
+    fn from(Mapped { name: Name { name, factor, .. }, is_explicit }: Mapped) -> Self {
         match is_explicit {
             true => Self::Full { name, unit: None, factor: Some(factor) },
             false => Self::Plain(name),
@@ -100,7 +103,7 @@ pub struct Names(BTreeMap<String, Mapped>);
 impl Names {
     /// The variable for `ours`; if it is not mapped, it has the same name, in SI units.
     pub fn of(&self, ours: &str) -> Name {
-        let same = || Name { name: ours.into(), factor: 1.0 };
+        let same = || Name { name: ours.into(), factor: 1.0, si: None };
         self.mapped(ours).cloned().unwrap_or_else(same)
     }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 /// Symbols, SI units per unit, and the SI unit.
-pub(crate) const UNITS: [(&str, f64, &str); 24] = [
+pub(crate) const UNITS: [(&str, f64, &str); 40] = [
     ("m", 1.0, "m"),
     ("cm", 1e-2, "m"),
     ("mm", 1e-3, "m"),
@@ -13,50 +13,89 @@ pub(crate) const UNITS: [(&str, f64, &str); 24] = [
     ("\u{3bc}m", 1e-6, "m"),
     ("nm", 1e-9, "m"),
     ("m/s", 1.0, "m/s"),
+    ("cm/s", 1e-2, "m/s"),
     ("mm/s", 1e-3, "m/s"),
+    ("um/s", 1e-6, "m/s"),
+    ("\u{b5}m/s", 1e-6, "m/s"),
+    ("\u{3bc}m/s", 1e-6, "m/s"),
     ("m/s2", 1.0, "m/s²"),
     ("m/s²", 1.0, "m/s²"),
     ("m/s^2", 1.0, "m/s²"),
+    ("m/s/s", 1.0, "m/s²"),
     ("mm/s2", 1e-3, "m/s²"),
     ("mm/s²", 1e-3, "m/s²"),
+    ("mm/s^2", 1e-3, "m/s²"),
     ("g", 9.806_65, "m/s²"),
+    ("mg", 9.806_65e-3, "m/s²"),
+    ("N", 1.0, "N"),
+    ("mN", 1e-3, "N"),
+    ("kN", 1e3, "N"),
+    ("V", 1.0, "V"),
+    ("mV", 1e-3, "V"),
+    ("\u{b5}V", 1e-6, "V"),
+    ("\u{3bc}V", 1e-6, "V"),
     ("s", 1.0, "s"),
     ("ms", 1e-3, "s"),
     ("us", 1e-6, "s"),
     ("min", 60.0, "s"),
     ("rad", 1.0, "rad"),
     ("deg", PI / 180.0, "rad"),
+    ("\u{b0}", PI / 180.0, "rad"),
     ("rad/s", 1.0, "rad/s"),
     ("Hz", TAU, "rad/s"),
     ("1/min", TAU / 60.0, "rad/s"),
+    ("rpm", TAU / 60.0, "rad/s"),
 ];
 /// Units that tables have beside these: without a sensitivity nothing follows from them.
-const OTHERS: [&str; 14] = [
-    "V", "mV", "\u{b5}V", "A", "mA", "N", "kN", "Pa", "%", "1", "-", "counts", "\u{b0}", "\u{b0}C",
-];
+const OTHERS: [&str; 8] = ["A", "mA", "Pa", "%", "1", "-", "counts", "\u{b0}C"];
 
-/// SI units per unit, and the SI unit, of a unit, of a factor, or of the sensitivity of a sensor such as `100mV/g`. `stated`: the unit of the
-/// file, which says whether it has V or mV; a factor has no unit.
+/// SI units per unit, and the SI unit, of
+/// - a unit, or a multiple of it: `mm`, `0.0024g`, `-1m/s²`;
+/// - the sensitivity of a sensor, or its inverse: `100mV/g`, `8V/mm`, `125mm/s/V`;
+/// - a factor, which has no unit: `-0.5`.
+///
+/// `stated`: the unit of the file. It says whether a channel has V or mV, and excludes a sensitivity if it is no voltage.
 #[must_use]
 pub fn parse(text: &str, stated: &str) -> Option<(f64, &'static str)> {
+    let of = |symbol: &str| UNITS.into_iter().find(|(known, ..)| *known == symbol.trim());
+    let usable = |factor: f64, unit| (factor.is_finite() && factor != 0.0).then_some((factor, unit));
     if let Ok(factor) = text.parse::<f64>() {
-        return (factor.is_finite() && factor != 0.0).then_some((factor, ""));
+        return usable(factor, "");
     }
-    if let Some((_, factor, unit)) = UNITS.into_iter().find(|(symbol, ..)| *symbol == text) {
-        return Some((factor, unit));
+    let multiple = |text: &str| {
+        let (number, symbol) = number_and_rest(text.trim());
+        let (_, factor, unit) = of(symbol.trim_matches(['(', ')']))?;
+        usable(number * factor, unit)
+    };
+    if let Some(found) = multiple(text) {
+        return Some(found);
     }
-    let (sensitivity, per) = text.split_once('/')?;
-    let number = sensitivity.trim_end_matches(char::is_alphabetic);
-    let volts = |unit: &str| match unit.trim() {
-        "V" => Some(1.0),
-        "mV" => Some(1e-3),
+    // The channel has volts as its file says, or as the sensitivity does.
+    let volts = |in_sensitivity: f64| match of(stated) {
+        Some((_, factor, "V")) => Some(factor),
+        None if stated.is_empty() => Some(in_sensitivity),
         _ => None,
     };
-    let volt = volts(&sensitivity[number.len()..])?;
-    let number: f64 = number.trim().parse().ok()?;
-    let (factor, unit) = parse(per.trim_matches(['(', ')']), "").filter(|(_, unit)| !unit.is_empty())?;
-    let factor = factor * volts(stated).unwrap_or(volt) / (number * volt);
-    factor.is_finite().then_some((factor, unit))
+    let is_voltage = |(_, unit): &(f64, &str)| *unit == "V";
+    let inverse = text.rsplit_once('/').and_then(|(quantity, volt)| {
+        let (_, unit_of_volt, _) = of(volt).filter(|(.., unit)| *unit == "V")?;
+        let (factor, unit) = multiple(quantity).filter(|found| !is_voltage(found))?;
+        usable(factor / unit_of_volt * volts(unit_of_volt)?, unit)
+    });
+    inverse.or_else(|| {
+        let (sensitivity, quantity) = text.split_once('/')?;
+        let (volt, _) = multiple(sensitivity).filter(is_voltage)?;
+        let (factor, unit) = multiple(quantity).filter(|found| !is_voltage(found))?;
+        let (number, _) = number_and_rest(sensitivity.trim());
+        usable(factor / volt * volts(volt / number)?, unit)
+    })
+}
+
+/// The number at the beginning of a text, 1 without one, and the rest.
+fn number_and_rest(text: &str) -> (f64, &str) {
+    let mut ends = text.char_indices().map(|(end, _)| end).rev();
+    let split = ends.find_map(|end| Some((text[..end].trim().parse().ok()?, text[end..].trim())));
+    split.unwrap_or((1.0, text))
 }
 
 /// A name and its unit, from `y [mm]` or `y (mm)`.

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use phase_lock::{Config, NONE, PARAMETERS, Parameter, Range, Value};
 use vines_testbench::scene::{
-    ControllerSettings, Definition, KEYS, Override, RecordSettings, Reference, Scene, SceneError, Sensor, plant_keys,
+    ControllerSettings, Definition, KEYS, Measurand, Override, RecordSettings, Reference, Scene, SceneError, Sensor,
+    plant_keys,
 };
 
 use super::paper;
@@ -130,10 +131,16 @@ fn a_mistake_in_a_file_is_reported_with_its_line_and_missing_and_mixed_keys_with
 
 #[test]
 fn text_on_the_command_line_needs_no_quotes_and_what_is_no_assignment_is_refused() {
-    let definition = Definition { reference: Reference::Force, sensor: Sensor::Acceleration };
+    let definition = Definition {
+        reference: Reference::Force,
+        sensor: Sensor::Q1,
+        sensor_quantity: Measurand::Acceleration,
+        ..Definition::default()
+    };
     let scene = paper(&[
         "resonance.reference=\"force\"",
-        "resonance.sensor=acceleration",
+        "resonance.sensor=q1",
+        "resonance.sensor_quantity=acceleration",
         "chain.adc_bits = none",
     ]);
     assert_eq!(
@@ -145,7 +152,9 @@ fn text_on_the_command_line_needs_no_quotes_and_what_is_no_assignment_is_refused
         "plant.r= => plant.r= | expected a number",
         "backbone.points=many => backbone.points=many | expected a whole number from 0",
         "chain.hold=1 => chain.hold=1 | expected true or false",
-        "resonance.sensor=q3 => resonance.sensor=q3 | `q3` | one of `v`, `q1`, `acceleration`",
+        "resonance.sensor=q3 => resonance.sensor=q3 | `q3` | `v` or `q1`",
+        "resonance.sensor_quantity=jerk => `jerk` | `displacement`, `velocity`, `acceleration`",
+        "resonance.sensor_quantity=velocity => which no sensor of a velocity on the structure reads | set resonance.sensor",
         "resonance.sensor=1 => resonance.sensor=1 | expected a word in quotes",
     ]);
     for argument in ["plant.r", "r=0.7", "plant.r=1\nx=2"] {
