@@ -1,9 +1,12 @@
 //! The traits: what the build step generates ([`Model`], [`Key`]), what a component implements ([`Component`]), and its second
 //! interface, for the master's own integrator ([`ModelExchange`]; FMI 2.0, clause 3).
 
+use std::ops::Range;
+
 use crate::archive::Archive;
 use crate::log::Log;
 use crate::refusal::Refusal;
+use crate::resources::Resources;
 use crate::variable::Variable;
 
 /// A model's identity and its variables; implemented by the generated type `Model`.
@@ -12,7 +15,7 @@ pub trait Model: 'static {
     const NAME: &'static str;
     /// `modelIdentifier`: the name of the FMU and of the library in it.
     const IDENTIFIER: &'static str;
-    /// Derived from the variable table: a library meets only the description that it was built with.
+    /// Derived from the variable table: a library meets only the description that it was built with, unless it adopts another model.
     const GUID: &'static str;
     /// The version of the model; a serialised state of another one is refused.
     const VERSION: &'static str;
@@ -92,6 +95,28 @@ pub trait Component: Clone + Send + 'static {
 
     /// A component without any start value: the shell sets those of the variable table right after, by the setters.
     fn new() -> Self;
+
+    /// Makes this component, which has the start values of the table, one of another model: that of the description with this GUID,
+    /// which was written together with the resources. Called once, where the master's GUID is not [`Model::GUID`]; what it has
+    /// become is what a reset leads back to. Such a model is for co-simulation. Its description has variables of the table, with
+    /// the table's value references, and the outputs of [`Component::further`].
+    ///
+    /// # Errors
+    /// A GUID that belongs to no model of this library, and resources that are missing or damaged.
+    fn adopt(&mut self, guid: &str, resources: &Resources) -> Result<(), Refusal> {
+        let _ = resources;
+        Err(foreign::<Self::Model>(guid))
+    }
+
+    /// The value references of real outputs that are not in the table, of an adopted model.
+    fn further(&self) -> Range<u32> {
+        0..0
+    }
+
+    /// The value of one of [`Component::further`].
+    fn get_further(&self, reference: u32) -> f64 {
+        unreachable!("the component has no output with the value reference {reference}")
+    }
 
     /// The value of a real variable.
     fn get_real(&self, variable: RealOf<Self>) -> f64 {
@@ -237,6 +262,15 @@ pub trait Component: Clone + Send + 'static {
         let _ = archive;
         Err(Refusal::error("the component cannot be serialised"))
     }
+}
+
+/// Refusal of a GUID that is not the library's.
+pub fn foreign<M: Model>(guid: &str) -> Refusal {
+    Refusal::error(format!(
+        "fmuGUID is {guid}, but the library of {} was built with {}: modelDescription.xml and library do not belong together",
+        M::IDENTIFIER,
+        M::GUID
+    ))
 }
 
 const fn must_be_absent<K: Key>() {

@@ -105,7 +105,7 @@ macro_rules! export_library {
                 instance_name: CString,
                 fmu_type: c_int,
                 guid: CString,
-                _resource_location: CString,
+                resource_location: CString,
                 functions: *const CallbackFunctions,
                 _visible: CBoolean,
                 logging_on: CBoolean,
@@ -113,7 +113,7 @@ macro_rules! export_library {
                 // SAFETY: the master keeps the contract of the standard; so below.
                 unsafe {
                     $crate::abi::instantiate::<$component>(
-                        instance_name, fmu_type, guid, functions, logging_on, $select,
+                        instance_name, fmu_type, guid, resource_location, functions, logging_on, $select,
                     )
                 }
             }

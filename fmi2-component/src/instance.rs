@@ -21,9 +21,12 @@ const CLOCK_TOLERANCE: f64 = 1e-9;
 /// A component, its log and its FMU states.
 pub(crate) struct Instance<C> {
     pub session: Session<C>,
+    /// As it was instantiated.
+    blank: Session<C>,
+    /// Of the model.
+    guid: String,
     /// End of the experiment, s. It belongs to the instance, so that a state continues in an experiment that ends later.
     stop_time: f64,
-    pub select: Select<C>,
     pub log: Log,
     pub snapshots: Snapshots<C>,
     /// What the last `fmi2GetString` has pointed at.
@@ -31,15 +34,16 @@ pub(crate) struct Instance<C> {
 }
 
 impl<C: Component> Instance<C> {
-    pub fn new(log: Log, select: Select<C>) -> Result<Self, Refusal> {
-        Ok(Self {
-            session: Session::new(select)?,
+    pub fn new(log: Log, guid: &str, blank: Session<C>) -> Self {
+        Self {
+            session: blank.clone(),
+            blank,
+            guid: guid.to_owned(),
             stop_time: f64::INFINITY,
-            select,
             log,
             snapshots: Snapshots::new(),
             strings: Vec::new(),
-        })
+        }
     }
 
     pub fn set_up(&mut self, tolerance: Option<f64>, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
@@ -89,10 +93,19 @@ impl<C: Component> Instance<C> {
         Ok(())
     }
 
-    pub fn reset(&mut self) -> Result<(), Refusal> {
-        self.session = Session::new(self.select)?;
+    pub fn reset(&mut self) {
+        self.session.clone_from(&self.blank);
         self.stop_time = f64::INFINITY;
-        Ok(())
+    }
+
+    /// The bytes of an FMU state.
+    pub fn serialise(&self, handle: usize) -> Result<Vec<u8>, Refusal> {
+        serialise(self.snapshots.get(handle)?, &self.guid)
+    }
+
+    /// The FMU state of such bytes.
+    pub fn deserialise(&self, bytes: &[u8]) -> Result<Session<C>, Refusal> {
+        deserialise(bytes, &self.blank, &self.guid)
     }
 
     /// The variable, if it may be set now, in a state where setting is legal at all.
@@ -292,10 +305,10 @@ const MAGIC: [u8; 8] = *b"FMU2 st3";
 const HEADER: usize = 16;
 
 /// The session as bytes.
-pub(crate) fn serialise<C: Component>(session: &Session<C>) -> Result<Vec<u8>, Refusal> {
+fn serialise<C: Component>(session: &Session<C>, guid: &str) -> Result<Vec<u8>, Refusal> {
     let mut bytes = vec![0; HEADER];
     let mut archive = Archive::writer(&mut bytes);
-    archive.whole(&mut identity::<C>())?;
+    archive.whole(&mut identity::<C>(guid))?;
     session.clone().archive(&mut archive)?;
     let checksum = fnv1a(&bytes[HEADER..]);
     bytes[..8].copy_from_slice(&MAGIC);
@@ -304,7 +317,7 @@ pub(crate) fn serialise<C: Component>(session: &Session<C>) -> Result<Vec<u8>, R
 }
 
 /// The session that `bytes` hold; refuses anything that [`serialise`] of the same model has not written.
-pub(crate) fn deserialise<C: Component>(bytes: &[u8], select: Select<C>) -> Result<Session<C>, Refusal> {
+fn deserialise<C: Component>(bytes: &[u8], blank: &Session<C>, guid: &str) -> Result<Session<C>, Refusal> {
     let Some((header, body)) = bytes.split_at_checked(HEADER) else {
         return Err(Refusal::error(format!(
             "the serialised state has {} bytes; expected more than {HEADER}",
@@ -324,14 +337,14 @@ pub(crate) fn deserialise<C: Component>(bytes: &[u8], select: Select<C>) -> Resu
     let mut archive = Archive::reader(body);
     let mut written = Identity::default();
     archive.whole(&mut written)?;
-    let expected = identity::<C>();
+    let expected = identity::<C>(guid);
     if written != expected {
         return Err(Refusal::error(format!(
             "the serialised state is of another model: its GUID and version are {} and {}, expected {} and {}",
             written.0, written.1, expected.0, expected.1
         )));
     }
-    let mut session = Session::new(select)?;
+    let mut session = blank.clone();
     session.archive(&mut archive)?;
     archive.finish()?;
     Ok(session)
@@ -340,8 +353,8 @@ pub(crate) fn deserialise<C: Component>(bytes: &[u8], select: Select<C>) -> Resu
 /// GUID and version of a model: together they fix what the bytes mean.
 type Identity = (String, String);
 
-fn identity<C: Component>() -> Identity {
-    (C::Model::GUID.to_owned(), C::Model::VERSION.to_owned())
+fn identity<C: Component>(guid: &str) -> Identity {
+    (guid.to_owned(), C::Model::VERSION.to_owned())
 }
 
 /// The 64-bit Fowler–Noll–Vo hash, variant 1a.

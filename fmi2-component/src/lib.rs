@@ -87,7 +87,9 @@
 //! | input and output derivatives, directional derivatives | where the component provides them |
 //! | logging | categories of the description, `logStatusWarning` for warnings; reasons of refused calls always; text is safe as a printf format |
 //! | status queries | what there is to tell after a discarded step |
-//! | allocation callbacks, `visible`, resource location | accepted, not used |
+//! | several models in one library | by [`Component::adopt`]: a model of another GUID, with further outputs, follows from the resources; co-simulation only |
+//! | resource location | as `file:///…`, `file:////…`, `file:/…`, bare path; read by [`Component::adopt`] alone |
+//! | allocation callbacks, `visible` | accepted, not used |
 //! | tolerance | from 0 to 1, not used: a component finds out by itself what an integrator resolves |
 //!
 //! Once set up, setting and getting real values and stepping allocate nothing.
@@ -100,10 +102,12 @@ mod instance;
 mod life_cycle;
 mod log;
 mod refusal;
+mod resources;
 mod variable;
 
 pub use archive::Archive;
-pub use component::{BooleanOf, Component, Discrete, IntegerOf, Key, Model, ModelExchange, RealOf, StringOf};
+pub use component::{BooleanOf, Component, Discrete, IntegerOf, Key, Model, ModelExchange, RealOf, StringOf, foreign};
 pub use log::{Category, Log, Logger};
 pub use refusal::{Refusal, Status};
+pub use resources::{Resources, guid_of};
 pub use variable::{Causality, Initial, Variability, Variable};

@@ -2,6 +2,7 @@
 
 use std::any::TypeId;
 use std::ffi::{CStr, CString as OwnedCString, c_char, c_int};
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr;
 
@@ -10,10 +11,11 @@ use super::{
     input, output, panic_message, place, readings, settings, text,
 };
 use crate::component::{BooleanOf, Component, IntegerOf, Key, Model, ModelExchange, RealOf, StringOf};
-use crate::instance::{Instance, Select, Session, deserialise, serialise};
+use crate::instance::{Instance, Select, Session};
 use crate::life_cycle::{Function, State};
 use crate::log::Log;
 use crate::refusal::Refusal;
+use crate::resources::Resources;
 use crate::variable::Causality;
 
 /// Declares functions of a [`Component`] or of [`ModelExchange`]: the name in Rust, the group of the life cycle, the name in C, the
@@ -62,7 +64,10 @@ functions! {
     };
 
     /// The instance is as if instantiated anew; its FMU states and log categories are kept.
-    reset = Reset "fmi2Reset" () |instance| instance.reset();
+    reset = Reset "fmi2Reset" () |instance| {
+        instance.reset();
+        Ok(())
+    };
 
     /// Whether the master may come back to an earlier point makes no difference here.
     do_step = DoStep "fmi2DoStep" (time: f64, step: f64, _no_set_prior: CBoolean) |instance| instance.do_step(time, step);
@@ -94,11 +99,12 @@ const MODEL_EXCHANGE: c_int = 0;
 const CO_SIMULATION: c_int = 1;
 
 /// `fmi2Instantiate` (FMI 2.0, clause 2.1.5); a component with the interface of model exchange has `select`. The resource location is
-/// not used, so that every notation of it is accepted.
+/// read by a component that adopts another model, and by no other.
 pub unsafe fn instantiate<C: Component>(
     instance_name: CString,
     fmu_type: c_int,
     guid: CString,
+    resource_location: CString,
     functions: *const CallbackFunctions,
     logging_on: CBoolean,
     select: Option<fn(&mut C)>,
@@ -123,11 +129,14 @@ pub unsafe fn instantiate<C: Component>(
             return Err(Refusal::error("instanceName is NULL or empty; expected a name"));
         }
         let select = interface(fmu_type, select)?;
-        // SAFETY: NULL or a C string, by the standard.
-        check_guid::<C>(unsafe { text(guid) }.as_deref())?;
+        // SAFETY: NULL or C strings, by the standard.
+        let (guid, location) = unsafe { (text(guid), text(resource_location)) };
+        // Some masters write the braces of a registry GUID around it.
+        let guid = guid.as_deref().map_or("NULL", |guid| guid.trim_matches(['{', '}']));
+        let session = session::<C>(guid, location.as_deref(), select)?;
         let mut log = log();
         log.enable_all(logging_on != 0);
-        Instance::<C>::new(log, select)
+        Ok(Instance::<C>::new(log, guid, session))
     };
     let (status, reason) = match catch_unwind(AssertUnwindSafe(make)) {
         Ok(Ok(instance)) => return Handle::into_pointer(instance),
@@ -155,29 +164,31 @@ fn interface<C>(fmu_type: c_int, select: Select<C>) -> Result<Select<C>, Refusal
         (_, Some(_)) => Err(Refusal::error(format!(
             "fmuType = {fmu_type} is refused; allowed are {MODEL_EXCHANGE} (model exchange) and {CO_SIMULATION} (co-simulation)"
         ))),
-        (_, None) => Err(Refusal::error(format!(
-            "fmuType = {fmu_type} is refused; the component is for co-simulation ({CO_SIMULATION}) only"
-        ))),
+        (_, None) => Err(co_simulation_only(fmu_type)),
     }
 }
 
-fn check_guid<C: Component>(guid: Option<&str>) -> Result<(), Refusal> {
-    let own = C::Model::GUID;
-    match guid {
-        // Some masters write the braces of a registry GUID around it.
-        Some(given) if given.trim_matches(['{', '}']) == own => Ok(()),
-        given => Err(Refusal::error(format!(
-            "fmuGUID is {}, but the library of {} was built with {own}: modelDescription.xml and library do not belong \
-             together",
-            given.unwrap_or("NULL"),
-            C::Model::IDENTIFIER,
-        ))),
+fn co_simulation_only(fmu_type: c_int) -> Refusal {
+    Refusal::error(format!(
+        "fmuType = {fmu_type} is refused; the component is for co-simulation ({CO_SIMULATION}) only"
+    ))
+}
+
+/// A component at its start values: of the library's own model, or of one that its resources determine.
+fn session<C: Component>(guid: &str, location: Option<&str>, select: Select<C>) -> Result<Session<C>, Refusal> {
+    let mut session = Session::<C>::new(select)?;
+    if guid != C::Model::GUID {
+        session.component.adopt(guid, &Resources::at(location))?;
+        if select.is_some() {
+            return Err(co_simulation_only(MODEL_EXCHANGE));
+        }
     }
+    Ok(session)
 }
 
 /// Declares a getter and a setter of one type (FMI 2.0, clause 2.1.7).
 macro_rules! values {
-    ($get:ident $c_get:literal, $set:ident $c_set:literal, $setting:ident, $key:ident, $c_type:ty, $read:expr, $check:expr, $write:expr) => {
+    ($get:ident $c_get:literal, $set:ident $c_set:literal, $setting:ident, $key:ident, $c_type:ty, $read:expr, $further:expr, $check:expr, $write:expr) => {
         functions! {
             Component:
             $get = GetValues $c_get (references: *const CValueReference, count: usize, values: *mut $c_type) |instance| {
@@ -187,8 +198,11 @@ macro_rules! values {
                     refresh_for::<C, $key<C>>(instance, references)?;
                 }
                 for (&reference, value) in references.iter().zip(values) {
-                    let key = find::<$key<C>>(reference)?;
-                    value.write($read(&instance.session.component, key));
+                    let component = &instance.session.component;
+                    value.write(match $key::<C>::find(reference) {
+                        Some(key) => $read(component, key),
+                        None => $further(component, reference)?,
+                    });
                 }
                 Ok(())
             };
@@ -223,18 +237,21 @@ macro_rules! values {
 values!(
     get_real "fmi2GetReal", set_real "fmi2SetReal", SetReal, RealOf, f64,
     |c: &C, key| c.get_real(key),
+    further,
     |key, value| Instance::<C>::check_finite(key, value),
     |c: &mut C, key, value| c.set_real(key, value)
 );
 values!(
     get_integer "fmi2GetInteger", set_integer "fmi2SetInteger", SetDiscrete, IntegerOf, c_int,
     |c: &C, key| c.get_integer(key),
+    |_, reference| Err(unknown::<IntegerOf<C>>(reference)),
     |_, _| Ok::<_, Refusal>(()),
     |c: &mut C, key, value| c.set_integer(key, value)
 );
 values!(
     get_boolean "fmi2GetBoolean", set_boolean "fmi2SetBoolean", SetDiscrete, BooleanOf, CBoolean,
     |c: &C, key| CBoolean::from(c.get_boolean(key)),
+    |_, reference| Err(unknown::<BooleanOf<C>>(reference)),
     |_, _| Ok::<_, Refusal>(()),
     |c: &mut C, key, value| c.set_boolean(key, value != 0)
 );
@@ -289,11 +306,25 @@ fn refresh_for<C: Component, K: Key>(
     references: &[CValueReference],
 ) -> Result<(), Refusal> {
     for &reference in references {
-        if find::<K>(reference)?.variable().computed() {
+        if K::find(reference).is_none_or(|key| key.variable().computed()) {
             return instance.refresh();
         }
     }
     Ok(())
+}
+
+/// An output that is not in the table.
+#[cold]
+#[inline(never)]
+fn further<C: Component>(component: &C, reference: CValueReference) -> Result<f64, Refusal> {
+    if component.further().contains(&reference) {
+        return Ok(component.get_further(reference));
+    }
+    let mut refusal = unknown::<RealOf<C>>(reference).message().to_owned();
+    if let Range { start, end: end @ 1.. } = component.further() {
+        refusal += &format!(", or from {start} to {}", end - 1);
+    }
+    Err(Refusal::error(refusal))
 }
 
 #[inline]
@@ -354,14 +385,14 @@ functions! {
     };
 
     serialized_fmu_state_size = FMUstate "fmi2SerializedFMUstateSize" (state: CFmuState, size: *mut usize) |instance| {
-        let bytes = serialise(instance.snapshots.get(state.addr())?)?;
+        let bytes = instance.serialise(state.addr())?;
         // SAFETY: one writable place, by contract.
         unsafe { place(size, "size") }?.write(bytes.len());
         Ok(())
     };
 
     serialize_fmu_state = FMUstate "fmi2SerializeFMUstate" (state: CFmuState, bytes: *mut c_char, size: usize) |instance| {
-        let serialised = serialise(instance.snapshots.get(state.addr())?)?;
+        let serialised = instance.serialise(state.addr())?;
         if size < serialised.len() {
             return Err(Refusal::error(format!(
                 "size = {size} is too small; the serialised state needs {} bytes",
@@ -380,7 +411,7 @@ functions! {
         // SAFETY: the array has `size` bytes by contract.
         let bytes = unsafe { input(bytes.cast::<u8>(), size, "serializedState") }?;
         // SAFETY: the contract is passed on.
-        unsafe { keep(instance, state, deserialise(bytes, instance.select)?) }
+        unsafe { keep(instance, state, instance.deserialise(bytes)?) }
     };
 }
 
