@@ -7,6 +7,7 @@
 
 mod continuation;
 mod convergence;
+mod half_period;
 mod impact_map;
 pub(crate) mod oscillator;
 mod periodic;

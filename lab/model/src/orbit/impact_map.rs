@@ -206,7 +206,7 @@ impl<'a> ParticleFlight<'a> {
             w,
             dw: dq1 - dq2,
             free,
-            curvature: oscillator.acceleration() + free.norm() * (1.0 + 2.0 * oscillator.free.zeta),
+            curvature: oscillator.acceleration() + free.norm() * (1.0 + 2.0 * oscillator.free.delta),
         }
     }
 
@@ -219,42 +219,54 @@ impl<'a> ParticleFlight<'a> {
     /// Time and wall of the first contact.
     fn contact(&self) -> Option<(f64, f64)> {
         let horizon = LONGEST * std::f64::consts::TAU / self.oscillator.omega;
-        let k = self.curvature;
-        if !k.is_finite() || k <= 0.0 {
-            return None;
-        }
-        // Time before which the wall at the distance `gap`, approached at `speed`, cannot be reached.
-        let free_for = |gap: f64, speed: f64| {
-            let root = (speed * speed + 2.0 * k * gap).sqrt();
-            if speed > 0.0 {
-                2.0 * gap / (speed + root)
-            } else {
-                (root - speed) / k
-            }
-        };
-        let (mut t, mut w, mut dw) = (0.0, self.w, self.dw);
-        if w.abs() >= 1.0 && w * dw >= 0.0 {
-            return None;
-        }
-        for _ in 0..STEPS {
-            let step = free_for(1.0 - w, dw).min(free_for(1.0 + w, -dw));
-            t += step;
-            if t > horizon {
-                return None;
-            }
+        first_contact([self.w, self.dw], self.curvature, horizon, |t| {
             let primary = self.primary(t);
-            w = primary[0] - self.q2 - self.dq2 * t;
-            dw = primary[1] - self.dq2;
-            let side = dw.signum();
-            let gap = 1.0 - side * w;
-            if gap <= 1e-15 || step <= 1e-16 * (1.0 + t) {
-                let fast = dw.abs() > GRAZING;
-                // A wall is reached in its own direction; the step over the remaining gap corrects the rounding.
-                return fast.then(|| (t + gap / dw.abs(), side));
-            }
-            // Rounding may place w just beyond the wall behind.
-            w = w.clamp(-1.0, 1.0);
-        }
-        None
+            [primary[0] - self.q2 - self.dq2 * t, primary[1] - self.dq2]
+        })
     }
+}
+
+/// Time and wall of the first contact of a flight within `horizon`: from (w, w'), with the bound `curvature` of `|w''|`, and (w, w') after a
+/// time. Lengths are over b, and times over a time of the size of the period.
+pub(super) fn first_contact(
+    [mut w, mut dw]: [f64; 2],
+    curvature: f64,
+    horizon: f64,
+    flight: impl Fn(f64) -> [f64; 2],
+) -> Option<(f64, f64)> {
+    let k = curvature;
+    if !k.is_finite() || k <= 0.0 {
+        return None;
+    }
+    // Time before which the wall at the distance `gap`, approached at `speed`, cannot be reached.
+    let free_for = |gap: f64, speed: f64| {
+        let root = (speed * speed + 2.0 * k * gap).sqrt();
+        if speed > 0.0 {
+            2.0 * gap / (speed + root)
+        } else {
+            (root - speed) / k
+        }
+    };
+    if w.abs() >= 1.0 && w * dw >= 0.0 {
+        return None;
+    }
+    let mut t = 0.0;
+    for _ in 0..STEPS {
+        let step = free_for(1.0 - w, dw).min(free_for(1.0 + w, -dw));
+        t += step;
+        if t > horizon {
+            return None;
+        }
+        [w, dw] = flight(t);
+        let side = dw.signum();
+        let gap = 1.0 - side * w;
+        if gap <= 1e-15 || step <= 1e-16 * (1.0 + t) {
+            let fast = dw.abs() > GRAZING;
+            // A wall is reached in its own direction; the step over the remaining gap corrects the rounding.
+            return fast.then(|| (t + gap / dw.abs(), side));
+        }
+        // Rounding may place w just beyond the wall behind.
+        w = w.clamp(-1.0, 1.0);
+    }
+    None
 }

@@ -1,31 +1,86 @@
-//! The oscillator between impacts, `q'' + 2 zeta q' + q = f`, in closed form for every damping ratio: free, and under the harmonic base.
+//! Second-order sections between impacts, in closed form for every damping ratio; and the study's oscillator, which is one of them, under the
+//! harmonic base.
 
 use nalgebra::{Complex, Matrix2, Vector2};
 
 use crate::Dimensionless;
 
-/// The damped oscillator with unit natural frequency; `zeta = epsilon lambda/2`.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct FreeOscillator {
-    pub(super) zeta: f64,
+/// A section of a host, `x'' + 2 delta x' + omega0² x = c u + d u'` with the drive u. An impulse J on the host at the cavity adds
+/// `kick J` to (x, x'), and the displacement of the host at the cavity is the sum of `a x + b x'`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Section {
+    /// Decay rate, 1/s.
+    pub delta: f64,
+    /// Natural frequency squared, 1/s².
+    pub omega0_squared: f64,
+    /// (c, d).
+    pub drive: [f64; 2],
+    /// Jump of (x, x') per impulse.
+    pub kick: [f64; 2],
+    /// (a, b).
+    pub cavity: [f64; 2],
 }
 
-impl FreeOscillator {
-    pub(crate) fn new(zeta: f64) -> Self {
-        Self { zeta }
+impl Section {
+    /// The study's oscillator on its base, dimensionless: mass and natural frequency are 1, and `damping` is `2 zeta = epsilon lambda`.
+    pub(crate) fn oscillator(damping: f64) -> Self {
+        Self {
+            delta: damping / 2.0,
+            omega0_squared: 1.0,
+            drive: [1.0, damping],
+            kick: [0.0, 1.0],
+            cavity: [1.0, 0.0],
+        }
     }
 
-    /// Maps (q, q') over the time `t` without forcing.
+    /// A free particle as a section of a host whose displacement at the cavity is the relative displacement w.
+    pub(super) fn particle(mass: f64) -> Self {
+        Self {
+            delta: 0.0,
+            omega0_squared: 0.0,
+            drive: [0.0; 2],
+            kick: [0.0, -1.0 / mass],
+            cavity: [-1.0, 0.0],
+        }
+    }
+
+    /// Displacement and velocity of the cavity for (x, x'), without drive.
+    pub(super) fn at_cavity(&self, state: Vector2<f64>) -> Vector2<f64> {
+        Vector2::new(weighed(self.cavity, state), weighed(self.cavity, self.rate(state)))
+    }
+
+    /// (x, x') after one of the unit impulses of alternating sign that the propagator `flow` separates: minus the state after the one before.
+    #[inline(always)]
+    pub(super) fn alternating(&self, flow: &Matrix2<f64>) -> Option<Vector2<f64>> {
+        let sum = Matrix2::identity() + flow;
+        let (determinant, [x, dx]) = (sum.determinant(), self.kick);
+        let solution = Vector2::new(sum.m22 * x - sum.m12 * dx, sum.m11 * dx - sum.m21 * x) / determinant;
+        (determinant != 0.0).then_some(solution)
+    }
+
+    /// x of the response to an impulsive force at the cavity, over the compliance.
+    pub(super) fn kicked(&self, omega: f64) -> Complex<f64> {
+        at_frequency([2.0 * self.delta * self.kick[0] + self.kick[1], self.kick[0]], omega)
+    }
+
+    /// Maps (x, x') over the time `t` without drive.
+    #[inline(always)]
     pub(crate) fn propagator(&self, t: f64) -> Matrix2<f64> {
         let (cosine, sine) = self.envelope(t);
-        let zeta = self.zeta;
-        Matrix2::new(cosine + zeta * sine, sine, -sine, cosine - zeta * sine)
+        let Self { delta, omega0_squared, .. } = *self;
+        Matrix2::new(
+            cosine + delta * sine,
+            sine,
+            -omega0_squared * sine,
+            cosine - delta * sine,
+        )
     }
 
-    /// `exp(-zeta t)` times cos(d t) and sin(d t)/d, with `d^2 = 1 - zeta^2` of either sign or zero.
+    /// `exp(-delta t)` times cos(d t) and sin(d t)/d, with `d² = omega0² - delta²` of either sign or zero.
+    #[inline(always)]
     fn envelope(&self, t: f64) -> (f64, f64) {
-        let square = 1.0 - self.zeta * self.zeta;
-        let decay = (-self.zeta * t).exp();
+        let square = self.omega0_squared - self.delta * self.delta;
+        let decay = (-self.delta * t).exp();
         let x = square * t * t;
         if x.abs() < 1e-4 {
             // Nearly critical: the Taylor series of both, exact to 1e-17 here.
@@ -39,35 +94,50 @@ impl FreeOscillator {
             return (decay * cosine, decay * sine / d);
         }
         // Decaying exponentials only: cosh and sinh alone would overflow long before their product with the decay.
-        let (slow, fast) = (((d - self.zeta) * t).exp(), ((-d - self.zeta) * t).exp());
+        let (slow, fast) = (((d - self.delta) * t).exp(), ((-d - self.delta) * t).exp());
         ((slow + fast) / 2.0, (slow - fast) / (2.0 * d))
     }
 
-    /// Response to the force `exp(i omega t)`: `1/(1 - omega^2 + 2 i zeta omega)`.
+    /// Response of x to the force `exp(i omega t)` on it.
     pub(crate) fn compliance(&self, omega: f64) -> Complex<f64> {
         self.stiffness(omega).inv()
     }
 
-    /// `1 - omega^2 + 2 i zeta omega`.
+    /// `omega0² - omega² + 2 i delta omega`.
     pub(crate) fn stiffness(&self, omega: f64) -> Complex<f64> {
-        Complex::new(1.0 - omega * omega, 2.0 * self.zeta * omega)
+        Complex::new(self.omega0_squared - omega * omega, 2.0 * self.delta * omega)
     }
 
-    /// Force made by the base displacement `exp(i omega t)`: `1 + 2 i zeta omega`, through spring and damper.
-    pub(crate) fn base_force(&self, omega: f64) -> Complex<f64> {
-        Complex::new(1.0, 2.0 * self.zeta * omega)
+    /// Force made by the drive `exp(i omega t)`.
+    pub(crate) fn drive_force(&self, omega: f64) -> Complex<f64> {
+        at_frequency(self.drive, omega)
     }
 
-    /// `-q - 2 zeta q'`: acceleration without forcing.
-    pub(crate) fn free_acceleration(&self, q: f64, dq: f64) -> f64 {
-        -q - 2.0 * self.zeta * dq
+    /// x'' without drive.
+    pub(crate) fn free_acceleration(&self, x: f64, dx: f64) -> f64 {
+        -self.omega0_squared * x - 2.0 * self.delta * dx
     }
+
+    /// The time derivative of (x, x') without drive.
+    pub(super) fn rate(&self, state: Vector2<f64>) -> Vector2<f64> {
+        Vector2::new(state[1], self.free_acceleration(state[0], state[1]))
+    }
+}
+
+/// `a x + b x'`.
+pub(super) fn weighed([a, b]: [f64; 2], state: Vector2<f64>) -> f64 {
+    a * state[0] + b * state[1]
+}
+
+/// `a x + b x'` for `x = exp(i omega t)`.
+pub(super) fn at_frequency([a, b]: [f64; 2], omega: f64) -> Complex<f64> {
+    Complex::new(a, b * omega)
 }
 
 /// The oscillator at one frequency and excitation.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ForcedOscillator {
-    pub(super) free: FreeOscillator,
+    pub(super) free: Section,
     pub(super) omega: f64,
     epsilon: f64,
     pub(super) g: f64,
@@ -78,12 +148,11 @@ pub(crate) struct ForcedOscillator {
 impl ForcedOscillator {
     /// The oscillator of `scene` (except its G) at the frequency `omega` over omega0 and the excitation `g`.
     pub(crate) fn new(scene: &Dimensionless, omega: f64, g: f64) -> Self {
-        let zeta = scene.epsilon * scene.lambda / 2.0;
-        let free = FreeOscillator::new(zeta);
-        let (force, compliance) = (free.base_force(omega), free.compliance(omega));
+        let free = Section::oscillator(scene.epsilon * scene.lambda);
+        let (force, compliance) = (free.drive_force(omega), free.compliance(omega));
         let unit = force * compliance * scene.epsilon;
-        let stiffness_by = Complex::new(-2.0 * omega, 2.0 * zeta);
-        let unit_by = (Complex::new(0.0, 2.0 * zeta) * scene.epsilon - unit * stiffness_by) * compliance;
+        let stiffness_by = Complex::new(-2.0 * omega, 2.0 * free.delta);
+        let unit_by = (Complex::new(0.0, free.drive[1]) * scene.epsilon - unit * stiffness_by) * compliance;
         Self {
             free,
             omega,
@@ -100,7 +169,7 @@ impl ForcedOscillator {
 
     /// Force of the base on the primary mass.
     pub(super) fn force(&self, phase: f64) -> f64 {
-        let amplitude = self.free.base_force(self.omega) * (self.epsilon * self.g);
+        let amplitude = self.free.drive_force(self.omega) * (self.epsilon * self.g);
         (amplitude * Complex::from_polar(1.0, phase)).im
     }
 

@@ -171,9 +171,9 @@ fn harmonic(
     // Each coefficient with its derivative by Omega.
     let ForcedOscillator { free, omega, g, unit: [unit, _], .. } = map.oscillator;
     let compliance = free.compliance(omega);
-    let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * free.zeta);
+    let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * free.delta);
     let unit_by =
-        (Complex::new(0.0, 2.0 * free.zeta) * compliance + free.base_force(omega) * compliance_by) * scene.epsilon;
+        (Complex::new(0.0, free.drive[1]) * compliance + free.drive_force(omega) * compliance_by) * scene.epsilon;
     // (2i/duration) times the response to a force through the oscillator, less the response of a free mass: the impulse on the
     // particle is the opposite one.
     let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
@@ -373,11 +373,6 @@ impl Periodic {
     ) -> Option<Self> {
         let x = newton(&mut Closing { scene, pattern, conditions }, *guess)?;
         Self::at(scene, pattern, &x)
-    }
-
-    /// The motion at unknowns that may satisfy the closing equations; None if they do not.
-    pub(super) fn closed(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
-        Self::at(scene, pattern, x).filter(|motion| motion.map.residual.norm() < EXACT)
     }
 
     /// The motion at unknowns that satisfy the closing equations.

@@ -1,141 +1,251 @@
-//! All symmetric motions at one frequency, in closed form, and the search for the phase-resonant ones over frequency.
+//! All symmetric motions of a host at one frequency, in closed form, and the search for the phase-resonant ones over frequency.
 //!
-//! At phase resonance or under a given excitation, the particle's speed is the root of a quadratic. Time starts at an impact on the wall
-//! w = +1; complex amplitudes Z stand for `Im(Z exp(i Omega tau))`.
+//! The host is a sum of [`Section`]s; the study's oscillator is one section. At phase resonance or under a given drive, the particle's
+//! speed V is the root of a quadratic. Time starts at an impact on the wall w = +b; complex amplitudes Z stand for `Im(Z exp(i omega t))`.
 //!
-//! - The particle turns from -B to +B, so `w'- = 2 B (1 + epsilon)/(1 + r)` and the oscillator's velocity jumps by -2 epsilon B.
-//! - `q2 = -pi B/(2 Omega)` at the impact, because half a period later it is at the opposite point.
-//! - `q1 = y - 2 epsilon B p`, with the harmonic y of amplitude Y and p the periodic response to impulses of alternating sign.
-//! - `w = 1` and `w' = w'-` at the impact then give `Im Y = 1 + alpha B` and `Re Y = beta B`.
-//! - Phase resonance, `Re(V conj(F)) = 0` for the harmonic V of v and the base's harmonic F, is quadratic in B and free of G;
-//!   `G = |F|/epsilon` follows. The exact backbone is therefore parametrised by its frequency.
+//! - The particle turns from -V to +V: the impulse on the host is `J = -2 m V`, and `w'- = 2 V (1 + m S)/(1 + r)` with the velocity S that
+//!   a unit impulse gives the cavity.
+//! - `q2 = -pi V/(2 omega)` at the impact, because half a period later it is at the opposite point.
+//! - Section n is a harmonic and `J p_n`, with the periodic response p to impulses of alternating sign: `p_n = (I + flow_n(T))^-1 kick_n`
+//!   after one of them, `p_n - kick_n` before.
+//! - With the harmonic Y of q1, `w = b` and `w' = w'-` at the impact give `Im Y = b + alpha V` and `Re Y = beta V`.
+//! - The drive is `F = Y/H`, with the response H of the cavity to the drive; the response is linear in Y and V. Phase resonance,
+//!   `Re(D conj(F)) = 0` for its harmonic D, is quadratic in V and free of the size of the drive. The exact backbone is therefore
+//!   parametrised by its frequency.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use nalgebra::{Complex, Matrix2, Vector2};
+use nalgebra::{Complex, Vector2};
 
-use super::oscillator::FreeOscillator;
+use super::half_period::HalfPeriod;
+use super::oscillator::{Section, at_frequency};
 use super::periodic::wrapped;
-use super::{AfterImpact, ImpactPattern, Orbit, Periodic};
+use super::{AfterImpact, Orbit};
 use crate::numerics::{bisection, golden_section, quadratic, secant};
 use crate::theory::{BranchSide, Manifold, SlowFlow};
-use crate::{Definition, Dimensionless, Sensor};
+use crate::{Definition, Dimensionless, Reference, Sensor};
 
-/// All symmetric motions at one frequency, whatever drives them: everything is linear in B.
-struct SymmetricMotions {
+/// A particle in its cavity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Particle {
+    /// Mass, kg.
+    pub mass: f64,
+    /// Half-width b of the cavity, m.
+    pub half_width: f64,
+    /// Restitution coefficient, in (0, 1].
+    pub restitution: f64,
+}
+
+/// What is read of the motion, and its phase at resonance.
+pub(super) struct Reading<'a> {
+    /// Weights (a, b) of every section; `None` for the displacement of the cavity itself.
+    pub sections: Option<&'a [[f64; 2]]>,
+    /// Weight of m q2.
+    pub particle: f64,
+    /// At resonance, the response lags the drive times this by a quarter of a period; only its direction matters.
+    pub reference: Complex<f64>,
+}
+
+/// All symmetric motions at one frequency, whatever drives them: everything is linear in V.
+pub(super) struct SymmetricMotions {
     omega: f64,
-    epsilon: f64,
-    r: f64,
+    particle: Particle,
     alpha: f64,
     beta: f64,
-    /// Difference of the first harmonics of the response (v or q1, by the sensor) and of y, over B.
+    /// Displacement and velocity of the cavity before an impact, per J.
+    before: Vector2<f64>,
+    /// Velocity of the cavity per impulse.
+    mobility: f64,
+    drive_over_y: Complex<f64>,
+    /// The harmonic of the response is `response_over_y Y + kappa V`.
+    response_over_y: Complex<f64>,
     kappa: Complex<f64>,
-    /// Direction of the reference in the complex plane.
     reference: Complex<f64>,
-    base_over_y: Complex<f64>,
-    p: Vector2<f64>,
+}
+
+/// A symmetric motion; time starts at an impact on the wall w = +b.
+pub(super) struct SymmetricMotion {
+    pub omega: f64,
+    /// Speed of the particle.
+    pub speed: f64,
+    /// Impulse on the host, and relative velocity before it.
+    pub impulse: f64,
+    pub impact_velocity: f64,
+    /// Harmonics of the cavity, the drive and the response.
+    pub cavity: Complex<f64>,
+    pub drive: Complex<f64>,
+    pub response: Complex<f64>,
+    /// Phase of the response relative to the reference, rad.
+    pub phase: f64,
+    /// Displacement and velocity of the cavity after the impact.
+    pub after: [f64; 2],
 }
 
 impl SymmetricMotions {
-    fn new(scene: &Dimensionless, omega: f64) -> Option<Self> {
-        let Dimensionless { epsilon, r, .. } = *scene;
-        let oscillator = FreeOscillator::new(epsilon * scene.lambda / 2.0);
+    #[inline(always)]
+    pub(super) fn new(sections: &[Section], particle: Particle, reading: &Reading<'_>, omega: f64) -> Option<Self> {
+        let (mut before, mut mobility) = (Vector2::zeros(), 0.0);
+        let mut drive_over_y = Complex::new(f64::INFINITY, 0.0);
+        let (mut response, mut kicked) = (Complex::<f64>::ZERO, Complex::<f64>::ZERO);
+        for (n, section) in sections.iter().enumerate() {
+            let kick = Vector2::from(section.kick);
+            let p_before = section.alternating(&section.propagator(PI / omega))? - kick;
+            before += section.at_cavity(p_before);
+            mobility += section.at_cavity(kick)[1];
 
-        // Unit impulses at tau = 0, -T, -2T…, alternating: half a period later the state is minus the one before.
-        let flight = oscillator.propagator(PI / omega);
-        let p = (Matrix2::identity() + flight).try_inverse()? * Vector2::new(0.0, 1.0);
-        let p_before = p - Vector2::new(0.0, 1.0);
+            let force = section.drive_force(omega);
+            let stiffness = section.stiffness(omega);
+            let at_cavity = at_frequency(section.cavity, omega);
+            let to_cavity = at_cavity * force;
+            if to_cavity != Complex::ZERO {
+                // The inverse of a sum of compliances; zero also at an undamped resonance.
+                let own = stiffness / to_cavity;
+                drive_over_y = if drive_over_y.re.is_infinite() {
+                    own
+                } else {
+                    own * drive_over_y / (own + drive_over_y)
+                };
+            }
+            let compliance = stiffness.inv();
+            let (mut row, mut at_row) = (section.cavity, at_cavity);
+            if let Some(rows) = reading.sections {
+                row = rows[n];
+                at_row = at_frequency(row, omega);
+                response += at_row * force * compliance;
+            }
+            // What follows an impulse at once is not a part of a x + b x'.
+            kicked += at_row * section.kicked(omega) * compliance - row[1] * kick[0];
+        }
+        let Particle { mass, restitution, .. } = particle;
 
-        // v = y + B kappa in the first harmonic: impulses through the oscillator, and the particle's triangle wave.
+        // Impulses through the host, and the particle's triangle wave.
         let impulse = Complex::new(0.0, 2.0 * omega / PI);
-        let Definition { sensor, reference, .. } = scene.definition;
-        let triangle = match sensor {
-            Sensor::V => Complex::new(0.0, -4.0 / (PI * omega)),
-            Sensor::Q1 => Complex::new(0.0, 0.0),
-        };
+        let triangle = Complex::new(0.0, -4.0 / (PI * omega)) * reading.particle;
         Some(Self {
             omega,
-            epsilon,
-            r,
-            alpha: 2.0 * epsilon * p_before[0] - FRAC_PI_2 / omega,
-            beta: (2.0 * (1.0 + epsilon) / (1.0 + r) - 1.0 + 2.0 * epsilon * p_before[1]) / omega,
-            kappa: (oscillator.compliance(omega) * impulse * -2.0 + triangle) * epsilon,
-            reference: Complex::from_polar(1.0, reference.phase(epsilon * scene.lambda, omega)),
-            base_over_y: oscillator.stiffness(omega) / oscillator.base_force(omega),
-            p,
+            particle,
+            alpha: 2.0 * mass * before[0] - FRAC_PI_2 / omega,
+            beta: (2.0 * (1.0 + mass * mobility) / (1.0 + restitution) - 1.0 + 2.0 * mass * before[1]) / omega,
+            before,
+            mobility,
+            drive_over_y,
+            response_over_y: reading.sections.map_or(Complex::ONE, |_| response * drive_over_y),
+            kappa: (kicked * impulse * -2.0 + triangle) * mass,
+            reference: reading.reference,
         })
     }
 
-    /// Coefficients of B², B and 1 in `Re(V conj(F))`, up to a factor: zero at phase resonance.
+    /// Coefficients of V², V and 1 in `Re(D conj(F))`, up to a factor: zero at phase resonance.
     fn resonance(&self) -> [f64; 3] {
         let Self { alpha, beta, .. } = *self;
-        // Only the direction of the base's harmonic matters for the phase.
-        let d = (self.base_over_y * self.reference).conj();
-        let u = d * self.kappa;
+        let b = self.particle.half_width;
+        // Only the direction of the drive's harmonic matters for the phase.
+        let drive = (self.drive_over_y * self.reference).conj();
+        let d = (drive * self.response_over_y).re;
+        let u = drive * self.kappa;
         [
-            d.re * (alpha * alpha + beta * beta) + u.re * beta + u.im * alpha,
-            2.0 * alpha * d.re + u.im,
-            d.re,
+            d * (alpha * alpha + beta * beta) + u.re * beta + u.im * alpha,
+            (2.0 * alpha * d + u.im) * b,
+            d * b * b,
         ]
     }
 
     /// Speeds of the two motions at phase resonance, each a continuous branch where it exists.
-    fn phase_resonant(&self) -> Option<[f64; 2]> {
+    pub(super) fn phase_resonant(&self) -> Option<[f64; 2]> {
         let [square, linear, constant] = self.resonance();
         quadratic(square, linear, constant)
     }
 
-    /// The two motions under the excitation `g`: `|y|^2` is quadratic in B.
-    fn driven(&self, g: f64) -> Option<[Orbit; 2]> {
+    /// Speeds of the two motions under a drive of the amplitude `drive`: `|Y|²` is quadratic in V.
+    pub(super) fn driven(&self, drive: f64) -> Option<[f64; 2]> {
         let Self { alpha, beta, .. } = *self;
-        let y = self.epsilon * g / self.base_over_y.norm();
-        let speeds = quadratic(alpha * alpha + beta * beta, 2.0 * alpha, 1.0 - y * y)?;
-        Some(speeds.map(|b| self.at(b)))
+        let b = self.particle.half_width;
+        let y = drive / self.drive_over_y.norm();
+        quadratic(alpha * alpha + beta * beta, 2.0 * alpha * b, b * b - y * y)
     }
 
-    /// The smallest excitation under which there is a motion: the discriminant of the quadratic is zero.
-    fn least_excitation(&self) -> f64 {
-        self.base_over_y.norm() / self.epsilon * self.beta.abs() / self.alpha.hypot(self.beta)
+    /// The smallest drive under which there is a motion: the discriminant of the quadratic is zero.
+    fn least_drive(&self) -> f64 {
+        self.drive_over_y.norm() * self.beta.abs() / self.alpha.hypot(self.beta) * self.particle.half_width
     }
 
-    /// First harmonic y at the particle speed `b`.
-    fn y(&self, b: f64) -> Complex<f64> {
-        Complex::new(self.beta * b, 1.0 + self.alpha * b)
+    /// First harmonic Y at the particle speed `speed`.
+    fn y(&self, speed: f64) -> Complex<f64> {
+        Complex::new(self.beta * speed, self.particle.half_width + self.alpha * speed)
     }
 
-    /// G of the motion at the particle speed `b`.
-    fn excitation(&self, b: f64) -> f64 {
-        (self.y(b) * self.base_over_y).norm() / self.epsilon
+    /// Drive of the motion at the particle speed `speed`.
+    fn drive(&self, speed: f64) -> f64 {
+        (self.y(speed) * self.drive_over_y).norm()
     }
 
-    fn response(&self, b: f64) -> Complex<f64> {
-        self.y(b) + self.kappa * b
-    }
-
-    /// The motion at the particle speed `b`. Whether it is physical, and how stable it is, is not examined: see [`accept`].
-    fn at(&self, b: f64) -> Orbit {
-        let (y, v) = (self.y(b), self.response(b));
-        let base = y * self.base_over_y;
-        let p_before = self.p - Vector2::new(0.0, 1.0);
-        let [q1, before] = (Vector2::new(y.im, self.omega * y.re) - p_before * (2.0 * self.epsilon * b)).into();
-        Orbit {
-            g: base.norm() / self.epsilon,
-            sigma: (self.omega - 1.0) / self.epsilon,
+    /// The motion at the particle speed `speed`. Whether it is physical, and how stable it is, is not examined: see [`HalfPeriod`].
+    pub(super) fn at(&self, speed: f64) -> SymmetricMotion {
+        let Particle { mass, restitution, .. } = self.particle;
+        let y = self.y(speed);
+        let response = y * self.response_over_y + self.kappa * speed;
+        let drive = y * self.drive_over_y;
+        let twice = 2.0 * mass * speed;
+        let [q1, before] = (Vector2::new(y.im, self.omega * y.re) - self.before * twice).into();
+        SymmetricMotion {
             omega: self.omega,
-            c: v.norm(),
-            gamma: (v * (base * self.reference).conj()).arg(),
-            b,
-            impact_velocity: 2.0 * b * (1.0 + self.epsilon) / (1.0 + self.r),
-            start: AfterImpact {
-                phase: base.arg(),
-                q1,
-                dq1: before - 2.0 * self.epsilon * b,
-                q2: q1 - 1.0,
-                dq2: b,
-            },
-            multipliers: [f64::NAN; 4],
-            stable: false,
+            speed,
+            impulse: -twice,
+            impact_velocity: 2.0 * speed * (1.0 + mass * self.mobility) / (1.0 + restitution),
+            cavity: y,
+            drive,
+            response,
+            phase: (response * (drive * self.reference).conj()).arg(),
+            after: [q1, before - twice * self.mobility],
         }
+    }
+}
+
+// The study's oscillator
+
+/// The particle of the dimensionless model.
+fn particle(scene: &Dimensionless) -> Particle {
+    Particle { mass: scene.epsilon, half_width: 1.0, restitution: scene.r }
+}
+
+fn section(scene: &Dimensionless) -> Section {
+    Section::oscillator(scene.epsilon * scene.lambda)
+}
+
+/// The motions of the study's oscillator at the frequency `omega` over omega0.
+fn motions(scene: &Dimensionless, omega: f64) -> Option<SymmetricMotions> {
+    let (section, Definition { sensor, reference, .. }) = (section(scene), scene.definition);
+    let reading = Reading {
+        sections: None,
+        particle: f64::from(u8::from(sensor == Sensor::V)),
+        reference: match reference {
+            Reference::Base => Complex::ONE,
+            Reference::Force => section.drive_force(omega),
+        },
+    };
+    SymmetricMotions::new(&[section], particle(scene), &reading, omega)
+}
+
+/// A motion of the study's oscillator, without its stability.
+fn orbit(scene: &Dimensionless, motion: &SymmetricMotion) -> Orbit {
+    let [q1, dq1] = motion.after;
+    Orbit {
+        g: motion.drive.norm() / scene.epsilon,
+        sigma: (motion.omega - 1.0) / scene.epsilon,
+        omega: motion.omega,
+        c: motion.response.norm(),
+        gamma: motion.phase,
+        b: motion.speed,
+        impact_velocity: motion.impact_velocity,
+        start: AfterImpact {
+            phase: motion.drive.arg(),
+            q1,
+            dq1,
+            q2: q1 - 1.0,
+            dq2: motion.speed,
+        },
+        multipliers: [f64::NAN; 4],
+        stable: false,
     }
 }
 
@@ -149,11 +259,10 @@ const GROWTH: f64 = 1.0004;
 /// Frequencies between 0.2 and 3 omega0 are searched on a grid of about 0.001 in the detuning where that is of
 /// order one, and every root is refined to the last bit.
 pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
-    let grid = grid(scene.epsilon);
-    let candidates = [0, 1]
-        .map(|branch| CandidateBranch { scene, branch }.frequencies(&grid))
-        .concat();
-    let mut orbits = resonant(scene, &candidates);
+    let candidates = search(&grid(scene.epsilon), scene.epsilon * scene.g, |omega| {
+        motions(scene, omega)
+    });
+    let mut orbits = resonant(scene, candidates);
     orbits.sort_unstable_by(|first, second| first.c.total_cmp(&second.c));
     orbits.dedup_by(|first, second| (first.sigma - second.sigma).abs() < 1e-9 && (first.b - second.b).abs() < 1e-9);
     orbits
@@ -168,25 +277,23 @@ pub fn stable_resonant(scene: &Dimensionless) -> Option<Orbit> {
 ///
 /// Without damping and with r = 1 these are the conservative nonlinear mode, with G = 0.
 pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
-    let candidates =
-        SymmetricMotions::new(scene, omega).and_then(|motions| Some(motions.phase_resonant()?.map(|b| motions.at(b))));
-    resonant(scene, candidates.as_slice().as_flattened())
+    let candidates = motions(scene, omega).and_then(|motions| Some(motions.phase_resonant()?.map(|b| motions.at(b))));
+    resonant(scene, candidates.into_iter().flatten())
 }
 
 /// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.
 pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
-    SymmetricMotions::new(scene, 1.0 + scene.epsilon * sigma)
-        .and_then(|motions| motions.driven(scene.g))
+    motions(scene, 1.0 + scene.epsilon * sigma)
+        .and_then(|motions| Some(motions.driven(scene.epsilon * scene.g)?.map(|b| motions.at(b))))
         .into_iter()
         .flatten()
-        .filter_map(|orbit| accept(scene, orbit))
+        .filter_map(|motion| accept(scene, &motion, orbit(scene, &motion)))
         .collect()
 }
 
 /// The smallest G under which there is a symmetric 1:1 orbit at the detuning `sigma`, if its flights meet no wall.
 pub(super) fn least_excitation(scene: &Dimensionless, sigma: f64) -> f64 {
-    SymmetricMotions::new(scene, 1.0 + scene.epsilon * sigma)
-        .map_or(f64::INFINITY, |motions| motions.least_excitation())
+    motions(scene, 1.0 + scene.epsilon * sigma).map_or(f64::INFINITY, |motions| motions.least_drive() / scene.epsilon)
 }
 
 /// Frequencies `1 + epsilon (e - 1/e) / 2` for growing e.
@@ -203,48 +310,57 @@ fn grid(epsilon: f64) -> Vec<f64> {
 }
 
 /// The orbits of those candidates whose response lags the base; without dissipation no base motion is needed, and its phase is chosen.
-fn resonant(scene: &Dimensionless, candidates: &[Orbit]) -> Vec<Orbit> {
-    let lagging = candidates.iter().filter_map(|orbit| {
-        let mut orbit = *orbit;
+fn resonant(scene: &Dimensionless, candidates: impl IntoIterator<Item = SymmetricMotion>) -> Vec<Orbit> {
+    let lagging = candidates.into_iter().filter_map(|motion| {
+        let mut orbit = orbit(scene, &motion);
         if orbit.g < 1e-12 {
             orbit.start.phase = wrapped(orbit.start.phase + orbit.gamma + FRAC_PI_2);
             orbit.gamma = -FRAC_PI_2;
         }
-        (orbit.gamma.sin() < -1e-12).then_some(orbit)
+        (orbit.gamma.sin() < -1e-12).then_some((motion, orbit))
     });
-    lagging.filter_map(|orbit| accept(scene, orbit)).collect()
+    lagging
+        .filter_map(|(motion, orbit)| accept(scene, &motion, orbit))
+        .collect()
 }
 
 /// The orbit with its stability, if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
-fn accept(scene: &Dimensionless, orbit: Orbit) -> Option<Orbit> {
+fn accept(scene: &Dimensionless, motion: &SymmetricMotion, orbit: Orbit) -> Option<Orbit> {
     let sizes = [orbit.b, orbit.c, orbit.g];
     if sizes.iter().any(|size| !size.is_finite()) || orbit.b <= 0.0 || orbit.c <= 1e-12 {
         return None;
     }
-    let motion = Periodic::closed(scene, &ImpactPattern::symmetric(), &orbit.unknowns())?;
-    Some(Orbit { multipliers: motion.moduli(), stable: motion.stable, ..orbit })
+    let multipliers = HalfPeriod::new(&[section(scene)], &particle(scene), motion)?.multipliers();
+    let multipliers = std::array::from_fn(|n| multipliers[n].norm());
+    Some(Orbit { multipliers, stable: multipliers[3] < 1.0, ..orbit })
 }
 
-/// One of the two branches of candidates, as G over frequency.
-struct CandidateBranch<'a> {
-    scene: &'a Dimensionless,
+/// The symmetric motions at phase resonance under a drive of the amplitude `drive` at the frequencies of a grid and between them.
+pub(super) fn search(
+    grid: &[f64],
+    drive: f64,
+    motions: impl Fn(f64) -> Option<SymmetricMotions>,
+) -> Vec<SymmetricMotion> {
+    let branches = [0, 1].map(|branch| CandidateBranch { motions: &motions, branch, drive }.search(grid));
+    branches.into_iter().flatten().collect()
+}
+
+/// One of the two branches of candidates, as the drive over frequency.
+struct CandidateBranch<'a, F> {
+    motions: &'a F,
     branch: usize,
+    drive: f64,
 }
 
-impl CandidateBranch<'_> {
-    fn at(&self, omega: f64) -> Option<Orbit> {
-        let motions = SymmetricMotions::new(self.scene, omega)?;
-        Some(motions.at(motions.phase_resonant()?[self.branch]))
-    }
-
-    /// G of the branch minus the scene's G.
+impl<F: Fn(f64) -> Option<SymmetricMotions>> CandidateBranch<'_, F> {
+    /// Drive of the branch minus the drive that is searched for.
     fn excess(&self, omega: f64) -> Option<f64> {
-        let motions = SymmetricMotions::new(self.scene, omega)?;
-        let excess = motions.excitation(motions.phase_resonant()?[self.branch]) - self.scene.g;
+        let motions = (self.motions)(omega)?;
+        let excess = motions.drive(motions.phase_resonant()?[self.branch]) - self.drive;
         (!excess.is_nan()).then_some(excess)
     }
 
-    fn frequencies(&self, grid: &[f64]) -> Vec<Orbit> {
+    fn search(&self, grid: &[f64]) -> Vec<SymmetricMotion> {
         let points = self.stretches(grid);
         let mut found = Vec::new();
         for pair in points.windows(2) {
@@ -288,19 +404,20 @@ impl CandidateBranch<'_> {
     }
 
     /// The root between two points of opposite sign; None where the sign changes through a gap, or in the rounding errors
-    /// of a motion that needs no excitation.
-    fn root(&self, a: f64, b: f64) -> Option<Orbit> {
+    /// of a motion that needs no drive.
+    fn root(&self, a: f64, b: f64) -> Option<SymmetricMotion> {
         if a.is_nan() || b.is_nan() {
             return None;
         }
         let (root, _) = bisection(a, b, |omega| self.excess(omega).is_some_and(|excess| excess > 0.0));
-        let candidate = self.at(root)?;
-        let close = (candidate.g - self.scene.g).abs() < 1e-7 * self.scene.g;
+        let motions = (self.motions)(root)?;
+        let candidate = motions.at(motions.phase_resonant()?[self.branch]);
+        let close = (candidate.drive.norm() - self.drive).abs() < 1e-7 * self.drive;
         close.then_some(candidate)
     }
 
     /// Two roots between grid points: the excess has an extremum there that reaches the other sign.
-    fn pair_near_extremum(&self, a: f64, b: f64, sign: f64) -> Vec<Orbit> {
+    fn pair_near_extremum(&self, a: f64, b: f64, sign: f64) -> Vec<SymmetricMotion> {
         let distance = |omega| self.excess(omega).map_or(f64::INFINITY, |excess| sign * excess);
         let turn = golden_section(a, b, distance);
         if distance(turn) > 0.0 {
@@ -334,9 +451,9 @@ pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Orbit> {
     // Of the first-order response; the exact one turns through half a circle without dissipation, too.
     let direction = Complex::new((flow.manifold.dissipation + epsilon) * speed, 1.0 - FRAC_PI_2 * speed);
     let motion = |omega: f64| {
-        let motions = SymmetricMotions::new(scene, omega)?;
+        let motions = motions(scene, omega)?;
         // The response is i + rate B: it has the direction at this B.
-        let rate = motions.response(1.0) - Complex::i();
+        let rate = motions.y(1.0) + motions.kappa - Complex::i();
         let b = direction.re / (rate.re * direction.im - rate.im * direction.re);
         Some((motions, b))
     };
@@ -347,7 +464,7 @@ pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Orbit> {
     };
     let omega = secant(off, [guess * (1.0 + SECANT * epsilon), guess], CONVERGED * epsilon)?;
     let (motions, b) = motion(omega)?;
-    let motion = motions.at(b);
+    let motion = orbit(scene, &motions.at(b));
     let values = [omega, motion.c, motion.g];
     values.iter().all(|value| value.is_finite()).then_some(motion)
 }

@@ -1,0 +1,114 @@
+//! Half a period of a symmetric motion: whether the particle flies from wall to wall without another impact, and the multipliers.
+//!
+//! The particle is one more section of the host, whose output is then the relative displacement w. A disturbance of the state after an impact
+//! passes the flow over half a period, and the impact, which it meets a little early or late: with the gradient g of w, the impulse
+//! `J = -mu w'-` on the kicks k, and the vector fields f before and after, `R + (f+ - R f-) g/w'-` with `R = 1 - mu k g'` (saltation). The map
+//! of the half period is minus this, because the motion is minus itself there.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Complex, DMatrix, Matrix2, RowVector2, Vector2};
+
+use super::impact_map::first_contact;
+use super::oscillator::Section;
+use super::symmetric::{Particle, SymmetricMotion};
+
+/// Largest difference of the flight from half a period, rad: a slow impact is that ill-defined in time.
+const EXACT: f64 = 1e-8;
+
+/// The map of half a period, and its multipliers.
+pub(super) struct HalfPeriod {
+    /// Derivative of the state (x, x') of every section and of the particle.
+    map: DMatrix<f64>,
+}
+
+/// A section and what the motion has in it.
+struct Part {
+    section: Section,
+    /// The propagator over half a period.
+    flow: Matrix2<f64>,
+    /// (x, x') of the periodic response to the impulses, after the impact.
+    after: Vector2<f64>,
+}
+
+impl HalfPeriod {
+    /// The half period after the impact on the wall w = +b; `None` where the particle does not reach the other wall at its end, and not before.
+    pub(super) fn new(sections: &[Section], particle: &Particle, motion: &SymmetricMotion) -> Option<Self> {
+        let duration = PI / motion.omega;
+        let all = sections.iter().copied().chain([Section::particle(particle.mass)]);
+        let parts: Vec<Part> = all
+            .map(|section| {
+                let flow = section.propagator(duration);
+                let after = section.alternating(&flow)? * motion.impulse;
+                Some(Part { section, flow, after })
+            })
+            .collect::<Option<_>>()?;
+        let (elapsed, wall) = contact(&parts, particle, motion)?;
+        let is_half_a_period = wall < 0.0 && (elapsed - PI).abs() < EXACT;
+        is_half_a_period.then(|| Self { map: map(&parts, motion) })
+    }
+
+    /// The multipliers of the half period, by rising modulus.
+    pub(super) fn multipliers(&self) -> Vec<Complex<f64>> {
+        let mut multipliers: Vec<Complex<f64>> = self.map.complex_eigenvalues().iter().copied().collect();
+        multipliers.sort_unstable_by(|first, second| first.norm().total_cmp(&second.norm()));
+        multipliers
+    }
+}
+
+/// Time and wall of the first contact; phases of the drive stand for times, and lengths are over b.
+fn contact(parts: &[Part], particle: &Particle, motion: &SymmetricMotion) -> Option<(f64, f64)> {
+    let (b, omega) = (particle.half_width, motion.omega);
+    // The energy of the free motion of a section never grows, nor does that of its derivatives.
+    let bound = |part: &Part| {
+        let Part { section, after, .. } = part;
+        let omega0 = section.omega0_squared.sqrt();
+        let rate = section.rate(*after);
+        let ceiling = |state: Vector2<f64>| (2.0 * section.delta + omega0) * state[1].hypot(omega0 * state[0]);
+        section.cavity[0].abs() * ceiling(*after) + section.cavity[1].abs() * ceiling(rate)
+    };
+    let curvature = motion.cavity.norm() * omega * omega + parts.iter().map(bound).sum::<f64>();
+    let (line, sections) = parts.split_last()?;
+    let flight = |phase: f64| {
+        let t = phase / omega;
+        let harmonic = motion.cavity * Complex::from_polar(1.0, phase);
+        let mut w = Vector2::new(
+            harmonic.im - line.after[0] - motion.speed * t,
+            omega * harmonic.re - motion.speed,
+        );
+        for Part { section, after, .. } in sections {
+            w += section.at_cavity(section.propagator(t) * after);
+        }
+        [w[0] / b, w[1] / (b * omega)]
+    };
+    let particle_speed = motion.after[1] - motion.speed;
+    let start = [1.0, particle_speed / (b * omega)];
+    first_contact(start, curvature / (b * omega * omega), 2.0 * PI, flight)
+}
+
+/// The derivative of the state after an impact by the state half a period before, relative to the motion, which has the opposite sign there.
+fn map(parts: &[Part], motion: &SymmetricMotion) -> DMatrix<f64> {
+    let mut acceleration = -motion.omega * motion.omega * motion.cavity.im;
+    for Part { section, after, .. } in parts {
+        let before = after - Vector2::from(section.kick) * motion.impulse;
+        acceleration += section.at_cavity(section.rate(before))[1];
+    }
+    let mu = -motion.impulse / motion.impact_velocity;
+    let mut map = DMatrix::zeros(2 * parts.len(), 2 * parts.len());
+    for (column, Part { section, flow, .. }) in parts.iter().enumerate() {
+        let [a, b] = section.cavity;
+        let by_w = RowVector2::new(a, b) * flow;
+        let by_dw = RowVector2::new(-section.omega0_squared * b, a - 2.0 * section.delta * b) * flow;
+        for (row, Part { section, .. }) in parts.iter().enumerate() {
+            let kick = Vector2::from(section.kick);
+            // The vector field jumps by that of the kick.
+            let early = section.rate(kick) * motion.impulse + kick * (mu * acceleration);
+            let mut block = kick * by_dw * mu - early * by_w / motion.impact_velocity;
+            if row == column {
+                block -= flow;
+            }
+            map.fixed_view_mut::<2, 2>(2 * row, 2 * column).copy_from(&block);
+        }
+    }
+    map
+}
