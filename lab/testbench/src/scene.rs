@@ -25,6 +25,7 @@ mod chain;
 mod controller;
 mod names;
 mod overrides;
+mod structure;
 pub mod unit;
 
 use std::f64::consts::TAU;
@@ -37,6 +38,7 @@ use lovines::{Cavity, InvalidValue, Restitution, State};
 use phase_lock::{ConfigError, Number};
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use structure::StructureSection;
 use vines_model::ArgumentError;
 
 pub use chain::ChainSettings;
@@ -44,6 +46,7 @@ pub use controller::{ControllerSettings, KEYS, PhaseLock, key, refusal};
 pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
 pub use names::{Name, Names};
 pub use overrides::{Family, Override};
+pub use structure::{Excitation, Structure, StructureForm, StructureMode};
 pub use vines_model::{Definition, Dimensionless, Measurand, Reference, Sensor};
 
 /// The default scene, embedded so that the program works from any folder.
@@ -52,12 +55,15 @@ pub const PAPER: &str = include_str!("../../../scenes/paper.toml");
 /// A checked scene in SI units; build one with [`Scene::load`] or [`Scene::parse`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scene {
-    /// The oscillator and its particle, SI units.
+    /// The oscillator and its particle, SI units; with a structure, the oscillator of its driven mode as the cavity has it: M = 1/phi².
     #[serde(serialize_with = "serialize")]
     pub plant: Parameters,
+    /// The structure that takes the oscillator's place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub structure: Option<Structure>,
     /// Where the motion starts, SI units.
     pub start: State,
-    /// Amplitude E of the base displacement, m.
+    /// Amplitude E of the base displacement, m; with a structure, of a base that moves the driven mode's oscillator alike.
     pub amplitude: f64,
     /// The phase-locked loop, in units of omega0 and of the natural period.
     pub controller: ControllerSettings,
@@ -107,6 +113,12 @@ impl Scene {
                 "the restitution of r_law, r_plus, r_minus and r_min",
             ),
             (scatter != 0.0, "the scatter of the restitution"),
+            (
+                self.structure
+                    .as_ref()
+                    .is_some_and(|structure| structure.modes.len() > 1),
+                "the other modes of the structure",
+            ),
         ];
         let effects: Vec<&str> = effects
             .into_iter()
@@ -182,8 +194,9 @@ pub fn has_friction(plant: &Parameters) -> bool {
 #[serde(deny_unknown_fields, default)]
 struct Sections {
     plant: PlantSection,
+    structure: Option<StructureSection>,
     start: StartSection,
-    excitation: Excitation,
+    excitation: ExcitationSection,
     controller: ControllerSettings,
     phase_lock: PhaseLock,
     record: RecordSettings,
@@ -201,31 +214,54 @@ struct RigSection {
     names: Names,
 }
 
-/// The base amplitude; exactly one of the two keys is given.
+/// The amplitude of the drive; exactly one of the keys is given.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Excitation {
+struct ExcitationSection {
     #[serde(rename = "G")]
     g: Option<f64>,
     #[serde(rename = "E")]
     e: Option<f64>,
+    #[serde(rename = "F")]
+    f: Option<f64>,
 }
 
-impl Excitation {
-    /// Amplitude E of the base displacement, m.
-    fn in_metres(&self, origin: &str, d: &Dimensionless) -> Result<f64, SceneError> {
-        match (self.g, self.e) {
-            (Some(g), None) => {
+impl ExcitationSection {
+    /// Amplitude E of the base displacement, m, that moves the oscillator of `plant` alike.
+    fn in_metres(&self, origin: &str, d: &Dimensionless, structure: Option<&Structure>) -> Result<f64, SceneError> {
+        let (excitation, factor) = structure.map_or((Excitation::Base, 1.0), |structure| {
+            (structure.excitation, structure.base_per_drive())
+        });
+        let key = match excitation {
+            Excitation::Base => "E (m)",
+            Excitation::Force => "F (N)",
+        };
+        match (self.g, self.e, self.f, excitation) {
+            (Some(g), None, None, _) => {
                 not_negative("excitation.G", g, "(dimensionless)")?;
                 Ok(d.amplitude(g))
             }
-            (None, Some(e)) => {
+            (None, Some(e), None, Excitation::Base) => {
                 not_negative("excitation.E", e, "m")?;
-                Ok(e)
+                Ok(e * factor)
             }
-            (given, _) => {
-                let given = if given.is_some() { "both" } else { "neither" };
-                let one = "of G (dimensionless) and E (m): give exactly one, with G = E/(b epsilon)";
+            (None, None, Some(f), Excitation::Force) => {
+                not_negative("excitation.F", f, "N")?;
+                Ok(f * factor)
+            }
+            (None, Some(_), None, _) | (None, None, Some(_), _) => Err(SceneError::text(
+                origin,
+                format!(
+                    "[excitation] does not fit the drive: give G (dimensionless) or {key}; E belongs to a base, F to a structure with excitation = \"force\""
+                ),
+            )),
+            (given, ..) => {
+                let given = match [given, self.e, self.f].iter().flatten().count() {
+                    0 => "neither",
+                    2 if structure.is_none() => "both",
+                    _ => "more than one",
+                };
+                let one = format!("of G (dimensionless) and {key}: give exactly one, with G = E/(b epsilon)");
                 Err(SceneError::text(origin, format!("[excitation] has {given} {one}")))
             }
         }
@@ -234,18 +270,41 @@ impl Excitation {
 
 impl Sections {
     fn resolve(self, origin: &str) -> Result<Scene, SceneError> {
-        let plant = self.plant.resolve(origin)?;
+        // Paths are relative to the scene file.
+        let folder = Path::new(origin).parent().unwrap_or(Path::new(""));
+        let structure = self
+            .structure
+            .map(|section| section.resolve(origin, folder))
+            .transpose()?;
+        let mut plant = self.plant;
+        let mut resonance = self.resonance;
+        if let Some(structure) = &structure {
+            plant = plant.of_structure(origin, structure)?;
+            if resonance.reference == Reference::Force {
+                let message = "resonance.reference = \"force\" beside [structure]: its `excitation` is the reference; drop the key";
+                return Err(SceneError::text(origin, message));
+            }
+            if self.start.q1 != 0.0 || self.start.dq1 != 0.0 {
+                return Err(SceneError::text(
+                    origin,
+                    "[start] has q1 or dq1: a structure starts at rest; give q2 and dq2 of the particle only",
+                ));
+            }
+            resonance.sensor = Sensor::Q1;
+        }
+        let plant = plant.resolve(origin)?;
         let d = Dimensionless::of(&plant, 0.0);
         let scene = Scene {
             start: self.start.resolve(&plant)?,
-            amplitude: self.excitation.in_metres(origin, &d)?,
+            amplitude: self.excitation.in_metres(origin, &d, structure.as_ref())?,
             plant,
+            structure,
             controller: self.controller,
             phase_lock: self.phase_lock,
             record: self.record,
             backbone: self.backbone,
             chain: self.chain,
-            resonance: self.resonance,
+            resonance,
             rig_names: self.rig.names,
             controller_names: self.controller_names,
         };
@@ -391,6 +450,27 @@ impl PlantSection {
     /// The number under a symbol of the table.
     fn get(&self, symbol: &str) -> Option<f64> {
         self.values.0[Values::place(symbol)?]
+    }
+
+    /// The section with the oscillator of a structure's driven mode.
+    fn of_structure(mut self, origin: &str, structure: &Structure) -> Result<Self, SceneError> {
+        if let Some(key) = ["M", "k", "c"].into_iter().find(|key| self.get(key).is_some()) {
+            let message =
+                format!("[plant] has `{key}` beside [structure], which takes the place of M, k and c: drop it");
+            return Err(SceneError::text(origin, message));
+        }
+        let mode = structure.mode();
+        let mass = structure.at_cavity(mode).powi(-2);
+        for (symbol, value) in [
+            ("M", mass),
+            ("k", mass * mode.omega * mode.omega),
+            ("c", 2.0 * mode.zeta * mode.omega * mass),
+        ] {
+            if let Some(place) = Values::place(symbol) {
+                self.values.0[place] = Some(value);
+            }
+        }
+        Ok(self)
     }
 
     fn resolve(&self, origin: &str) -> Result<Parameters, SceneError> {

@@ -33,6 +33,7 @@ pub fn default_scene() -> Scene {
     let [q1, dq1, q2, dq2] = START;
     let d = Dimensionless::of(&plant, 0.0);
     Scene {
+        structure: None,
         plant,
         start: State { q1, dq1, q2, dq2 },
         amplitude: d.amplitude(EXCITATION[0]),

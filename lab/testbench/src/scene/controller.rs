@@ -10,7 +10,7 @@ use vines_model::ArgumentError;
 
 use crate::plan::{Knowledge, LinearResponse};
 
-use super::{Measurand, Scene, SceneError, check, given, positive, within};
+use super::{Measurand, Scene, SceneError, Structure, check, given, positive, within};
 
 settings! {
     /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
@@ -105,29 +105,48 @@ impl Scene {
         let period = knowledge.numbers.natural_period();
         let step = knowledge.sample_time;
         let delay = self.chain.total_delay(omega0 * step) / omega0;
-        let limits = self.phase_lock.apply(Config {
-            amplitude_max: Some(4.0 * self.drive_needed(knowledge)),
-            response_max: Some(4.0 * knowledge.numbers.b),
-            ..Config::for_resonance(omega0, self.amplitude)
-        });
-        self.phase_lock.apply(Config {
-            sample_time: step,
-            omega_min: c.omega_min * omega0,
-            omega_max: c.omega_max * omega0,
-            bandwidth: c.bandwidth * omega0,
-            damping_rate: Some(damping_rate).filter(|rate| *rate > 0.0),
-            phase_target: knowledge.target.phase_of_readings(),
-            delay: delay + f64::from(u8::from(self.resonance.is_late())) * step,
-            // The velocity of a base that moves with the largest amplitude.
-            ramp_rate: limits.amplitude_max.map(|largest| largest * omega0),
-            // The range in a period, or in half a time constant of the detector: the loop locks as fast as without a limit.
-            omega_rate: Some((c.omega_max - c.omega_min) * omega0 * (2.0 * c.bandwidth * omega0).max(1.0 / period)),
-            acquire_timeout: Some(self.lock_periods(&knowledge.linear) * period),
-            residual_max: Some(self.residual(knowledge)),
-            reference_connected: self.chain.reference,
-            lock: lock_criterion(&knowledge.linear),
-            ..limits
-        })
+        let units = self.units();
+        let limits = self.phase_lock.apply(
+            units,
+            Config {
+                amplitude_max: Some(4.0 * self.drive_needed(knowledge)),
+                response_max: Some(4.0 * knowledge.numbers.b),
+                ..Config::for_resonance(omega0, self.amplitude)
+            },
+        );
+        self.phase_lock.apply(
+            units,
+            Config {
+                sample_time: step,
+                omega_min: c.omega_min * omega0,
+                omega_max: c.omega_max * omega0,
+                bandwidth: c.bandwidth * omega0,
+                damping_rate: Some(damping_rate).filter(|rate| *rate > 0.0),
+                phase_target: knowledge.target.phase_of_readings(),
+                delay: delay + f64::from(u8::from(self.resonance.is_late())) * step,
+                // The velocity of a base that moves with the largest amplitude.
+                ramp_rate: limits.amplitude_max.map(|largest| largest * omega0),
+                // The range in a period, or in half a time constant of the detector: the loop locks as fast as without a limit.
+                omega_rate: Some((c.omega_max - c.omega_min) * omega0 * (2.0 * c.bandwidth * omega0).max(1.0 / period)),
+                acquire_timeout: Some(self.lock_periods(&knowledge.linear) * period),
+                residual_max: Some(self.residual(knowledge)),
+                reference_connected: self.chain.reference,
+                lock: lock_criterion(&knowledge.linear),
+                ..limits
+            },
+        )
+    }
+
+    /// Base displacement per drive, and displacement at the cavity per displacement at the sensor, of the driven mode's oscillator: the controller
+    /// of a structure works with its oscillator, and limits are given for the drive and for the displacement at the sensor.
+    fn units(&self) -> [f64; 2] {
+        let factors = |structure: &Structure| {
+            [
+                structure.base_per_drive(),
+                structure.reading_per_response().abs().recip(),
+            ]
+        };
+        self.structure.as_ref().map_or([1.0; 2], factors)
     }
 
     /// Largest plausible difference between a reading and its prediction, as a share of the amplitude.
@@ -276,9 +295,18 @@ impl PhaseLock {
         self.0.iter().any(|(given, _)| *given == name)
     }
 
-    /// The configuration with these values.
-    fn apply(&self, mut config: Config) -> Config {
+    /// The configuration with these values; drives and responses are multiplied by the factors `units`.
+    fn apply(&self, [drive, response]: [f64; 2], mut config: Config) -> Config {
         for (name, setting) in &self.0 {
+            let factor = match *name {
+                "amplitude_max" | "ramp_rate" | "release_rate" => drive,
+                "response_max" => response,
+                _ => 1.0,
+            };
+            let setting = &match *setting {
+                Setting::Real(value) if value != NONE && factor != 1.0 => Setting::Real(value * factor),
+                setting => setting,
+            };
             // Names, types and whole numbers were checked when the scene was read; `Config::build` checks the rest.
             let _ = Parameter::find(name).map(|parameter| parameter.set(&mut config, *setting));
         }

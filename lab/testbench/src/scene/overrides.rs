@@ -64,11 +64,10 @@ impl Override {
         let Value::Table(section) = section else {
             return Err(self.error(format!("`{}` is not a section", self.section)));
         };
-        // Amplitude of the base: the key that is set replaces the other.
-        for [set, alternative] in [["G", "E"], ["E", "G"]] {
-            if self.is("excitation", set) {
-                section.remove(alternative);
-            }
+        // Amplitude of the drive: the key that is set replaces the others.
+        const KEYS: [&str; 3] = ["G", "E", "F"];
+        if self.section == "excitation" && KEYS.contains(&self.key.as_str()) {
+            KEYS.iter().for_each(|key| drop(section.remove(*key)));
         }
         match (section.get_mut(&self.key), &self.value) {
             (Some(Value::Table(group)), Value::Table(set)) => group.extend(set.clone()),

@@ -1,0 +1,514 @@
+//! The `[structure]` section: a host with several modes instead of the oscillator M, k, c, by modes, by matrices or by poles and residues.
+
+mod files;
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use num_complex::Complex64;
+use serde::{Deserialize, Serialize};
+
+use super::SceneError;
+use files::{Matrix, Residues};
+
+/// What drives a structure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Excitation {
+    /// The displacement of its base, m.
+    #[default]
+    Base,
+    /// A force at a point, N.
+    Force,
+}
+
+impl Excitation {
+    /// Unit of the drive.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Base => "m",
+            Self::Force => "N",
+        }
+    }
+}
+
+/// A mode of a structure.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StructureMode {
+    /// Natural frequency, rad/s.
+    pub omega: f64,
+    /// Damping ratio.
+    pub zeta: f64,
+    /// Mass-normalised shape at the points, 1/sqrt(kg), in their order. Of a complex mode its part in phase with a real one.
+    pub shape: Vec<f64>,
+    /// Participation of the base, sqrt(kg), or the shape at the force's point, 1/sqrt(kg).
+    pub drive: f64,
+}
+
+/// The equations of a structure, as its section states them.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StructureForm {
+    /// Real modes with modal damping: [`Structure::modes`] says everything.
+    Modes,
+    /// Viscous damping that couples the modes.
+    Matrices {
+        /// Mass, kg.
+        m: DMatrix<f64>,
+        /// Damping, N s/m.
+        c: DMatrix<f64>,
+        /// Stiffness, N/m.
+        k: DMatrix<f64>,
+    },
+    /// Poles with positive imaginary part, and shapes with `receptance(i, j) = sum psi_i psi_j/(s - p) + conjugate` at the points.
+    Poles(Vec<(Complex64, Vec<Complex64>)>),
+}
+
+/// A structure: its equations, its points, what drives it and what is measured.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Structure {
+    /// What drives it.
+    pub excitation: Excitation,
+    /// Names of the points.
+    pub points: Vec<String>,
+    /// The point of the cavity, by its place among the points.
+    pub cavity: usize,
+    /// The point of the force.
+    pub drive: Option<usize>,
+    /// The point of the sensor.
+    pub sensor: usize,
+    /// The driven mode, by its place among the modes.
+    pub driven: usize,
+    /// The modes by rising frequency.
+    pub modes: Vec<StructureMode>,
+    /// Displacement of the points where the base moves by one, for matrices.
+    pub direction: Vec<f64>,
+    /// The equations.
+    #[serde(skip)]
+    pub form: StructureForm,
+}
+
+impl Structure {
+    /// The driven mode.
+    pub fn mode(&self) -> &StructureMode {
+        &self.modes[self.driven]
+    }
+
+    /// Shape of a mode at the cavity, 1/sqrt(kg).
+    pub fn at_cavity(&self, mode: &StructureMode) -> f64 {
+        mode.shape[self.cavity]
+    }
+
+    /// Modal mass ratio `m phi_n²` of a mode for the particle mass `m`, kg.
+    pub fn mass_ratio(&self, mode: &StructureMode, m: f64) -> f64 {
+        m * self.at_cavity(mode).powi(2)
+    }
+
+    /// Displacement of the base, m, that moves the driven mode's oscillator as one unit of the drive does: 1 for one oscillator on a base.
+    pub fn base_per_drive(&self) -> f64 {
+        let mode = self.mode();
+        let per_stiffness = match self.excitation {
+            Excitation::Base => 1.0,
+            Excitation::Force => mode.omega.powi(-2),
+        };
+        (self.at_cavity(mode) * mode.drive).abs() * per_stiffness
+    }
+
+    /// Displacement at the sensor per displacement at the cavity in the driven mode. Its sign is chosen so that the response in resonance lags
+    /// the drive, wherever cavity, drive and sensor are.
+    pub fn reading_per_response(&self) -> f64 {
+        let mode = self.mode();
+        let sign = (mode.shape[self.sensor] * mode.drive).signum();
+        sign * (mode.shape[self.sensor] / self.at_cavity(mode)).abs()
+    }
+}
+
+// The section as written.
+
+/// The section `[structure]`.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct StructureSection {
+    excitation: Excitation,
+    cavity: Option<String>,
+    drive: Option<String>,
+    sensor: Option<String>,
+    /// Number of the driven mode, from 1.
+    mode: Option<usize>,
+    modes: Vec<ModeSection>,
+    #[serde(rename = "M")]
+    m: Option<PathBuf>,
+    #[serde(rename = "C")]
+    c: Option<PathBuf>,
+    #[serde(rename = "K")]
+    k: Option<PathBuf>,
+    direction: Option<BTreeMap<String, f64>>,
+    residues: Option<PathBuf>,
+    reference: Option<String>,
+}
+
+/// A mode as written.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ModeSection {
+    /// Hz
+    frequency: f64,
+    /// Damping ratio.
+    damping: f64,
+    shape: BTreeMap<String, f64>,
+    participation: Option<f64>,
+}
+
+/// Modes with their points, before places and signs are checked.
+struct Parts {
+    points: Vec<String>,
+    modes: Vec<StructureMode>,
+    direction: Vec<f64>,
+    form: StructureForm,
+}
+
+/// Largest relative difference of a matrix from its transpose, and share of a shape at a node: rounding of what a file states to nine digits.
+const ROUNDING: f64 = 1e-9;
+/// Largest difference of the norm of a mass-normalised shape from 1: shapes are measured, or written to three digits.
+const NORM: f64 = 0.02;
+
+impl StructureSection {
+    /// The structure; paths are relative to `folder`.
+    pub(super) fn resolve(self, origin: &str, folder: &Path) -> Result<Structure, SceneError> {
+        self.checked(folder)
+            .map_err(|message| SceneError::text(origin, format!("[structure]: {message}")))
+    }
+
+    fn checked(self, folder: &Path) -> Result<Structure, String> {
+        let forms = [
+            !self.modes.is_empty(),
+            self.c.is_some() || self.k.is_some(),
+            self.residues.is_some(),
+        ];
+        let parts = match forms {
+            [true, false, false] => self.of_modes(folder)?,
+            [false, true, false] => self.of_matrices(folder)?,
+            [false, false, true] => self.of_residues(folder)?,
+            _ => {
+                return Err(
+                    "give exactly one description: `modes`, the matrices `M`, `C` and `K`, or `residues`".into(),
+                );
+            }
+        };
+        let Parts { points, mut modes, direction, form } = parts;
+        let place = |key: &str, name: &str| {
+            points.iter().position(|point| point == name).ok_or_else(|| {
+                format!(
+                    "{key} = \"{name}\" is no point of the structure; its points are {}",
+                    points.join(", ")
+                )
+            })
+        };
+        let required = |key: &str, name: &Option<String>| match name {
+            Some(name) => place(key, name),
+            None => Err(format!(
+                "`{key}` is missing: give one of the points {}",
+                points.join(", ")
+            )),
+        };
+        let cavity = required("cavity", &self.cavity)?;
+        let drive = match (self.excitation, &self.drive) {
+            (Excitation::Force, name) => Some(required("drive", name)?),
+            (Excitation::Base, None) => None,
+            (Excitation::Base, Some(name)) => {
+                return Err(format!(
+                    "drive = \"{name}\" with excitation = \"base\": a base moves all supports; drop it, or take excitation = \"force\""
+                ));
+            }
+        };
+        let sensor = self.sensor.as_ref().map(|name| place("sensor", name)).transpose()?;
+        let sensor = sensor.or(drive).unwrap_or(cavity);
+        if let Some(drive) = drive {
+            modes.iter_mut().for_each(|mode| mode.drive = mode.shape[drive]);
+        }
+        let driven = self.mode.unwrap_or(1);
+        if !(1..=modes.len()).contains(&driven) {
+            return Err(format!(
+                "mode = {driven}: the structure has the modes 1 to {}",
+                modes.len()
+            ));
+        }
+        let structure = Structure {
+            excitation: self.excitation,
+            cavity,
+            drive,
+            sensor,
+            driven: driven - 1,
+            points,
+            modes,
+            direction,
+            form,
+        };
+        structure.check()?;
+        Ok(structure)
+    }
+
+    /// The modes of a table.
+    fn of_modes(&self, folder: &Path) -> Result<Parts, String> {
+        let points: Vec<String> = self.modes[0].shape.keys().cloned().collect();
+        self.only_with("residues", "reference", self.reference.is_some())?;
+        let mass = self
+            .m
+            .as_ref()
+            .map(|file| Matrix::read(folder, "M", file))
+            .transpose()?;
+        if mass.is_none() {
+            self.only_with("M", "direction", self.direction.is_some())?;
+        }
+        if let Some(mass) = &mass {
+            mass.symmetric()?;
+            mass.positive("kg")?;
+        }
+        let mut modes = Vec::new();
+        for (n, mode) in self.modes.iter().enumerate() {
+            let number = n + 1;
+            let ModeSection { frequency, damping, shape, participation } = mode;
+            let numbers = shape.values().chain([frequency, damping]).chain(participation);
+            if !numbers.clone().all(|number| number.is_finite()) || *frequency <= 0.0 || *damping < 0.0 {
+                return Err(format!(
+                    "mode {number} has frequency = {frequency} Hz and damping = {damping}: the frequency must be positive, the damping ratio at \
+                     least 0, and all numbers finite"
+                ));
+            }
+            if shape.len() != points.len() || !shape.keys().eq(points.iter()) {
+                let own: Vec<&str> = shape.keys().map(String::as_str).collect();
+                return Err(format!(
+                    "mode {number} has its shape at the points {}, and mode 1 at {}: all need the same points",
+                    own.join(", "),
+                    points.join(", ")
+                ));
+            }
+            let shape: Vec<f64> = shape.values().copied().collect();
+            let by_mass = match &mass {
+                Some(mass) => Some(self.by_mass(mass, number, &points, &shape)?),
+                None => None,
+            };
+            let drive = match (self.excitation, participation.or(by_mass)) {
+                (Excitation::Force, None) => 0.0,
+                (Excitation::Base, Some(participation)) => participation,
+                (Excitation::Base, None) => {
+                    return Err(format!(
+                        "mode {number} has no participation of the base: give `participation` in sqrt(kg), or `M`, from which it follows"
+                    ));
+                }
+                (Excitation::Force, Some(_)) if participation.is_none() => 0.0,
+                (Excitation::Force, Some(_)) => {
+                    return Err(format!(
+                        "mode {number} has a participation, which belongs to excitation = \"base\": a force acts by the shape at its point"
+                    ));
+                }
+            };
+            modes.push(StructureMode { omega: TAU * frequency, zeta: *damping, shape, drive });
+        }
+        modes.sort_by(|a, b| a.omega.total_cmp(&b.omega));
+        Ok(Parts {
+            points,
+            modes,
+            direction: Vec::new(),
+            form: StructureForm::Modes,
+        })
+    }
+
+    /// Participation of the base in a mode, by the matrix M; refuses a shape that is not mass-normalised.
+    fn by_mass(&self, mass: &Matrix, number: usize, points: &[String], shape: &[f64]) -> Result<f64, String> {
+        let place = |name: &String| {
+            points.iter().position(|point| point == name).ok_or_else(|| {
+                format!(
+                    "mode {number} has no shape at {name}, a degree of freedom of M; its points are {}",
+                    points.join(", ")
+                )
+            })
+        };
+        let places = mass.names.iter().map(place).collect::<Result<Vec<_>, _>>()?;
+        let shape = DVector::from_iterator(places.len(), places.iter().map(|&n| shape[n]));
+        let norm = shape.dot(&(&mass.values * &shape)).sqrt();
+        if (norm - 1.0).abs() > NORM {
+            return Err(format!(
+                "the shape of mode {number} is not mass-normalised: the norm sqrt(phi' M phi) is {norm:.4}, not 1; divide the shape by it"
+            ));
+        }
+        Ok(shape.dot(&(&mass.values * self.direction(&mass.names)?)))
+    }
+
+    /// Displacement of the degrees of freedom where the base moves by one: 1 unless the section says otherwise.
+    fn direction(&self, names: &[String]) -> Result<DVector<f64>, String> {
+        let Some(given) = &self.direction else {
+            return Ok(DVector::from_element(names.len(), 1.0));
+        };
+        if let Some(unknown) = given.keys().find(|key| !names.contains(key)) {
+            return Err(format!(
+                "direction has {unknown}, which is no degree of freedom; these are {}",
+                names.join(", ")
+            ));
+        }
+        let value = |name: &String| given.get(name).copied().unwrap_or(0.0);
+        Ok(DVector::from_iterator(names.len(), names.iter().map(value)))
+    }
+
+    /// The modes of M, C and K.
+    fn of_matrices(&self, folder: &Path) -> Result<Parts, String> {
+        self.only_with("residues", "reference", self.reference.is_some())?;
+        let read = |key: &str, file: &Option<PathBuf>| match file {
+            Some(file) => Matrix::read(folder, key, file),
+            None => Err(format!(
+                "`{key}` is missing: a structure by matrices needs M, C and K, each as a CSV file"
+            )),
+        };
+        let [m, c, k] = [read("M", &self.m)?, read("C", &self.c)?, read("K", &self.k)?];
+        for other in [&c, &k] {
+            if other.names != m.names {
+                return Err(format!(
+                    "{} has the degrees of freedom {}, and {} has {}: all matrices need the same, in the same order",
+                    m.title(),
+                    m.names.join(", "),
+                    other.title(),
+                    other.names.join(", ")
+                ));
+            }
+        }
+        for matrix in [&m, &c, &k] {
+            matrix.symmetric()?;
+        }
+        m.positive("kg")?;
+        k.positive("N/m")?;
+        c.not_negative("N s/m")?;
+        let direction = self.direction(&m.names)?;
+        let (shapes, squares) = modes(&m.values, &k.values)?;
+        let damping = shapes.transpose() * &c.values * &shapes;
+        let base = shapes.transpose() * &m.values * &direction;
+        let modes = squares.iter().enumerate().map(|(n, square)| {
+            let omega = square.sqrt();
+            StructureMode {
+                omega,
+                zeta: 0.5 * damping[(n, n)] / omega,
+                shape: shapes.column(n).iter().copied().collect(),
+                drive: base[n],
+            }
+        });
+        let modes: Vec<StructureMode> = modes.collect();
+        // The coupling of two modes by the damper, over what dampens them.
+        let largest = damping.diagonal().amax();
+        let is_modal = damping
+            .iter()
+            .enumerate()
+            .all(|(n, value)| n % (modes.len() + 1) == 0 || value.abs() <= ROUNDING * largest);
+        let form = match is_modal {
+            true => StructureForm::Modes,
+            false => StructureForm::Matrices { m: m.values, c: c.values, k: k.values },
+        };
+        Ok(Parts {
+            points: m.names,
+            modes,
+            direction: direction.iter().copied().collect(),
+            form,
+        })
+    }
+
+    /// The modes of a table of poles and residues.
+    fn of_residues(&self, folder: &Path) -> Result<Parts, String> {
+        self.only_with("M or M, C and K", "direction", self.direction.is_some())?;
+        self.only_with("modes or C and K", "M", self.m.is_some())?;
+        if self.excitation == Excitation::Base {
+            return Err(
+                "residues of a receptance belong to excitation = \"force\": what a base does follows from modes with a participation, or from M, \
+                 C and K"
+                    .into(),
+            );
+        }
+        let file = self.residues.as_deref().unwrap_or(Path::new(""));
+        let Residues { points, poles } = Residues::read(folder, file, self.reference.as_deref())?;
+        let modes = poles.iter().map(|(pole, shape)| {
+            // A real mode has the residues phi_i phi_j/(2 i omega_d).
+            let real = (Complex64::new(0.0, 2.0 * pole.im)).sqrt();
+            StructureMode {
+                omega: pole.norm(),
+                zeta: -pole.re / pole.norm(),
+                shape: shape.iter().map(|value| (value * real).re).collect(),
+                drive: 0.0,
+            }
+        });
+        let modes = modes.collect();
+        Ok(Parts {
+            points,
+            modes,
+            direction: Vec::new(),
+            form: StructureForm::Poles(poles),
+        })
+    }
+
+    fn only_with(&self, owner: &str, key: &str, is_given: bool) -> Result<(), String> {
+        match is_given {
+            true => Err(format!("`{key}` belongs to a structure by {owner}; drop it")),
+            false => Ok(()),
+        }
+    }
+}
+
+impl Structure {
+    /// Refuses a driven mode that no impact or drive can reach, that the sensor does not see, or that does not oscillate.
+    fn check(&self) -> Result<(), String> {
+        for (n, mode) in self.modes.iter().enumerate() {
+            if mode.zeta >= 1.0 {
+                return Err(format!(
+                    "mode {} has the damping ratio {}: critical or more, and a mode must oscillate; the ratio must be below 1 (it is a number, not \
+                     per cent)",
+                    n + 1,
+                    mode.zeta
+                ));
+            }
+        }
+        let mode = self.mode();
+        let number = self.driven + 1;
+        let largest = mode
+            .shape
+            .iter()
+            .fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let is_node = |point: usize| mode.shape[point].abs() <= ROUNDING * largest;
+        if is_node(self.cavity) {
+            return Err(format!(
+                "the cavity at {} is at a node of the driven mode {number}: no impact can drive it; choose another point or mode",
+                self.points[self.cavity]
+            ));
+        }
+        let is_still = self.drive.map_or(mode.drive == 0.0, is_node);
+        if is_still {
+            let place = self.drive.map_or("the base".into(), |point| {
+                format!("the force at {}", self.points[point])
+            });
+            return Err(format!(
+                "{place} does not drive mode {number}: its shape or participation there is 0"
+            ));
+        }
+        if is_node(self.sensor) {
+            return Err(format!(
+                "the sensor at {} is at a node of the driven mode {number}, and does not read it; choose another point or mode",
+                self.points[self.sensor]
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Mass-normalised shapes, as columns, and squares of the natural frequencies, both rising: `K phi = omega² M phi`.
+fn modes(m: &DMatrix<f64>, k: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<f64>), String> {
+    let n = m.nrows();
+    let factor = m.clone().cholesky().ok_or("M is not positive definite")?;
+    let lower = factor.l();
+    let solved = |right: &DMatrix<f64>| lower.solve_lower_triangular(right).ok_or("M is singular");
+    let reduced = solved(&solved(k)?.transpose())?;
+    let eigen = SymmetricEigen::new((&reduced + reduced.transpose()) * 0.5);
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let sorted = DMatrix::from_fn(n, n, |row, column| eigen.eigenvectors[(row, order[column])]);
+    let shapes = lower
+        .transpose()
+        .solve_upper_triangular(&sorted)
+        .ok_or("M is singular")?;
+    Ok((shapes, order.iter().map(|&n| eigen.eigenvalues[n]).collect()))
+}

@@ -1,0 +1,206 @@
+//! Files of a structure: a matrix, or poles and residues, as CSV with a line of names.
+
+use std::path::Path;
+
+use nalgebra::{DMatrix, SymmetricEigen};
+use num_complex::Complex64;
+
+use super::ROUNDING;
+
+/// Header and rows of numbers of the CSV file under `key`.
+fn table(folder: &Path, key: &str, file: &Path) -> Result<(Vec<String>, Vec<Vec<f64>>), String> {
+    let title = format!("{key} ({})", file.display());
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_path(folder.join(file))
+        .map_err(|error| format!("{title} cannot be read: {error}; paths are relative to the scene file"))?;
+    let unreadable = |error: csv::Error| format!("{title} cannot be read: {error}");
+    let header: Vec<String> = reader.headers().map_err(unreadable)?.iter().map(Into::into).collect();
+    if header.iter().any(|name| name.is_empty() || name.parse::<f64>().is_ok()) {
+        return Err(format!(
+            "{title} has no line of names at its top: give each column the name of its point"
+        ));
+    }
+    let mut rows = Vec::new();
+    for (n, record) in reader.records().enumerate() {
+        let number = |cell: &str| {
+            let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
+            value.ok_or_else(|| format!("{title} has `{cell}` in row {}: expected a finite number", n + 1))
+        };
+        rows.push(
+            record
+                .map_err(unreadable)?
+                .iter()
+                .map(number)
+                .collect::<Result<_, _>>()?,
+        );
+    }
+    Ok((header, rows))
+}
+
+/// A square matrix with the names of its degrees of freedom.
+pub(super) struct Matrix {
+    key: String,
+    file: String,
+    pub names: Vec<String>,
+    pub values: DMatrix<f64>,
+}
+
+impl Matrix {
+    pub(super) fn read(folder: &Path, key: &str, file: &Path) -> Result<Self, String> {
+        let (names, rows) = table(folder, key, file)?;
+        let n = names.len();
+        if rows.len() != n {
+            return Err(format!(
+                "{key} ({}) has {n} columns and {} rows: it must be square",
+                file.display(),
+                rows.len()
+            ));
+        }
+        let values = DMatrix::from_fn(n, n, |row, column| rows[row][column]);
+        Ok(Self {
+            key: key.into(),
+            file: file.display().to_string(),
+            names,
+            values,
+        })
+    }
+
+    pub(super) fn title(&self) -> String {
+        format!("{} ({})", self.key, self.file)
+    }
+
+    pub(super) fn symmetric(&self) -> Result<(), String> {
+        let largest = self.values.amax();
+        let (mut worst, mut place) = (0.0, (0, 0));
+        for row in 0..self.values.nrows() {
+            for column in 0..row {
+                let difference = (self.values[(row, column)] - self.values[(column, row)]).abs();
+                if difference > worst {
+                    (worst, place) = (difference, (row, column));
+                }
+            }
+        }
+        if worst <= ROUNDING * largest {
+            return Ok(());
+        }
+        let (row, column) = place;
+        let [first, second] = [row, column].map(|n| &self.names[n]);
+        let [below, above] = [self.values[(row, column)], self.values[(column, row)]];
+        Err(format!(
+            "{} is not symmetric: its element ({first}, {second}) is {below}, and ({second}, {first}) is {above}",
+            self.title()
+        ))
+    }
+
+    /// Eigenvalues, rising.
+    fn eigenvalues(&self) -> Vec<f64> {
+        let mut values: Vec<f64> = SymmetricEigen::new(self.values.clone())
+            .eigenvalues
+            .iter()
+            .copied()
+            .collect();
+        values.sort_by(f64::total_cmp);
+        values
+    }
+
+    fn above(&self, unit: &str, least: f64, what: &str) -> Result<(), String> {
+        let values = self.eigenvalues();
+        let largest = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        if values[0] > least * largest || (least < 0.0 && largest == 0.0) {
+            return Ok(());
+        }
+        Err(format!(
+            "{} is not positive {what}: eigenvalue 1 of {}, the smallest, is {:.4e} {unit}",
+            self.title(),
+            values.len(),
+            values[0]
+        ))
+    }
+
+    /// Refuses a matrix that is not positive definite, by its smallest eigenvalue.
+    pub(super) fn positive(&self, unit: &str) -> Result<(), String> {
+        self.above(unit, f64::EPSILON, "definite")
+    }
+
+    /// Refuses a matrix that is not positive semidefinite.
+    pub(super) fn not_negative(&self, unit: &str) -> Result<(), String> {
+        self.above(unit, -ROUNDING, "semidefinite")
+    }
+}
+
+/// Poles, and the shapes at the points that the residues have.
+pub(super) struct Residues {
+    pub points: Vec<String>,
+    pub poles: Vec<(Complex64, Vec<Complex64>)>,
+}
+
+impl Residues {
+    /// From the columns `frequency`, Hz, `damping`, the ratio, and `re POINT` and `im POINT`, m/(N s), for every point: the residues of the
+    /// receptance for a force at the point `reference`.
+    pub(super) fn read(folder: &Path, file: &Path, reference: Option<&str>) -> Result<Self, String> {
+        let (header, rows) = table(folder, "residues", file)?;
+        let title = format!("residues ({})", file.display());
+        let column = |name: &str| {
+            header.iter().position(|own| own == name).ok_or_else(|| {
+                format!("{title} has no column `{name}`; needed are frequency (Hz), damping, and `re POINT` and `im POINT` (m/(N s)) for every point")
+            })
+        };
+        let [frequency, damping] = [column("frequency")?, column("damping")?];
+        let points: Vec<String> = header
+            .iter()
+            .filter_map(|name| Some(name.strip_prefix("re ")?.trim().to_string()))
+            .collect();
+        let places = points
+            .iter()
+            .map(|point| Ok([column(&format!("re {point}"))?, column(&format!("im {point}"))?]));
+        let places = places.collect::<Result<Vec<_>, String>>()?;
+        let known = || points.join(", ");
+        let reference = reference.ok_or_else(|| {
+            format!(
+                "`reference` is missing: name the point at which the force of the modal test acted, one of {}",
+                known()
+            )
+        })?;
+        let driven = points.iter().position(|point| point == reference).ok_or_else(|| {
+            format!(
+                "reference = \"{reference}\" is no point of the structure; its points are {}",
+                known()
+            )
+        })?;
+        let mut poles = Vec::new();
+        for (n, row) in rows.iter().enumerate() {
+            let number = n + 1;
+            let (hertz, zeta) = (row[frequency], row[damping]);
+            if zeta >= 1.0 {
+                return Err(format!(
+                    "mode {number} has the damping ratio {zeta}: critical or more, and a mode must oscillate; the ratio must be below 1"
+                ));
+            }
+            if hertz <= 0.0 || zeta < 0.0 {
+                return Err(format!(
+                    "mode {number} of {title} has {hertz} Hz and the damping ratio {zeta}: the frequency must be positive, the ratio at least 0"
+                ));
+            }
+            let omega = std::f64::consts::TAU * hertz;
+            let pole = Complex64::new(-zeta * omega, omega * (1.0 - zeta * zeta).sqrt());
+            let residue = |[re, im]: [usize; 2]| Complex64::new(row[re], row[im]);
+            // By reciprocity R_ij = psi_i psi_j. The branch of the root has the sign of a real, positive shape.
+            let real = Complex64::new(0.0, 2.0 * pole.im);
+            let own = (residue(places[driven]) * real).sqrt() / real.sqrt();
+            if own.norm() == 0.0 {
+                return Err(format!(
+                    "mode {number} of {title} has the residue 0 at the reference {reference}: a force there does not reach it, and its shape does not \
+                     follow; choose another reference"
+                ));
+            }
+            poles.push((pole, places.iter().map(|&place| residue(place) / own).collect()));
+        }
+        if poles.is_empty() {
+            return Err(format!("{title} has no row: give one for every mode"));
+        }
+        poles.sort_by(|a, b| a.0.norm().total_cmp(&b.0.norm()));
+        Ok(Self { points, poles })
+    }
+}

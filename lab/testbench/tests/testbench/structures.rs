@@ -1,0 +1,287 @@
+//! Guards the section `[structure]`: what its three forms say, and a sentence for every mistake.
+
+use std::f64::consts::TAU;
+use std::fs;
+
+use tempfile::TempDir;
+use vines_testbench::scene::{Excitation, Scene, SceneError, StructureForm};
+
+/// A beam by two modes; `changes` are pairs of a text and its replacement.
+fn beam(changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
+    of(&TempDir::new().unwrap(), BEAM, changes)
+}
+
+fn of(folder: &TempDir, text: &str, changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
+    let text = changes.iter().fold(text.to_string(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    });
+    let file = folder.path().join("beam.toml");
+    fs::write(&file, text).unwrap();
+    Scene::load(Some(&file), &[])
+}
+
+const BEAM: &str = "\
+[plant]
+m = 0.032
+b = 0.01
+r = 0.65
+[structure]
+excitation = \"force\"
+cavity = \"tip\"
+drive = \"root\"
+modes = [
+    { frequency = 8.8156, damping = 0.006, shape = { root = 0.1, tip = 0.51252, middle = 0.0 } },
+    { frequency = 55.274, damping = 0.006, shape = { root = 0.3, tip = -0.51252, middle = 0.4 } },
+]
+[excitation]
+F = 1.2
+";
+
+const PLANT: &str = "[plant]\nm = 0.0084\nb = 1\nr = 0.65\n[excitation]\nG = 1.1\n[structure]\ncavity = \"tip\"\n";
+const MATRICES: &str = "M = \"m.csv\"\nC = \"c.csv\"\nK = \"k.csv\"\n";
+
+/// A folder with the matrices M, C and K of two degrees of freedom, each in three numbers: diagonal and coupling.
+fn matrices([m, c, k]: [[f64; 3]; 3]) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    for (name, [a, b, d]) in [("m.csv", m), ("c.csv", c), ("k.csv", k)] {
+        fs::write(folder.path().join(name), format!("tip, root\n{a}, {b}\n{b}, {d}\n")).unwrap();
+    }
+    folder
+}
+
+const GOOD: [[f64; 3]; 3] = [[1.0, 0.0, 2.0], [0.02, -0.01, 0.04], [2.0, -1.0, 4.0]];
+
+/// A refusal is one sentence with these parts, which `|` separates.
+fn says(result: Result<Scene, SceneError>, parts: &str) {
+    let message = result.expect_err(parts).to_string();
+    for part in parts.split(" | ") {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+    assert!(!message.contains('\n'), "{message}");
+}
+
+#[test]
+fn the_driven_mode_of_a_table_is_the_oscillator_of_knowledge_and_plan() {
+    let scene = beam(&[]).unwrap();
+    let structure = scene.structure.as_ref().unwrap();
+    assert_eq!(structure.points, ["middle", "root", "tip"]);
+    assert_eq!(structure.excitation, Excitation::Force);
+    let knowledge = scene.knowledge();
+    assert!((knowledge.linear.omega0 / (TAU * 8.8156) - 1.0).abs() < 1e-14);
+    assert!((knowledge.linear.damping_rate / (0.006 * TAU * 8.8156) - 1.0).abs() < 1e-14);
+    assert!((knowledge.numbers.epsilon - 0.032 * 0.51252_f64.powi(2)).abs() < 1e-15);
+    // F at the drive and a base of the amplitude E move the mode alike; the sensor is at the drive unless it says otherwise.
+    let stiffness = knowledge.linear.omega0.powi(2) / 0.51252;
+    assert!((scene.amplitude * stiffness / (0.1 * 1.2) - 1.0).abs() < 1e-14);
+    assert!((structure.reading_per_response() - 0.1 / 0.51252).abs() < 1e-15);
+    let second = beam(&[("[excitation]", "mode = 2\nsensor = \"middle\"\n[excitation]")]);
+    let second = second.unwrap();
+    assert!((second.knowledge().linear.omega0 / (TAU * 55.274) - 1.0).abs() < 1e-14);
+    // Cavity and drive move in opposite directions: the sensor's sign makes the resonance the same.
+    assert!(second.structure.unwrap().reading_per_response() > 0.0);
+}
+
+#[test]
+fn limits_are_in_newton_and_of_the_displacement_at_the_sensor() {
+    let limits = "[resonance]\nsensor_quantity = \"velocity\"\n[phase_lock]\namplitude_max = 3\nresponse_max = 0.004\n[excitation]";
+    let scene = beam(&[("[excitation]", limits)]).unwrap();
+    let config = scene.controller_config();
+    assert!((config.amplitude_max.unwrap() / (3.0 * scene.amplitude / 1.2) - 1.0).abs() < 1e-14);
+    assert!((config.response_max.unwrap() / (0.004 * 0.51252 / 0.1) - 1.0).abs() < 1e-14);
+    // A velocity at phase resonance is in phase with the force.
+    assert!(config.phase_target.abs() < 1e-15 && scene.knowledge().is_at_phase_resonance());
+}
+
+#[test]
+fn matrices_give_modes_and_the_participation_of_the_base() {
+    let folder = matrices(GOOD);
+    let scene = of(&folder, &format!("{PLANT}{MATRICES}"), &[]).unwrap();
+    let structure = scene.structure.unwrap();
+    // The damping is proportional to the stiffness here: modal.
+    assert_eq!(structure.form, StructureForm::Modes);
+    for mode in &structure.modes {
+        let norm = mode.shape[0].powi(2) + 2.0 * mode.shape[1].powi(2);
+        assert!((norm - 1.0).abs() < 1e-14);
+        assert!((mode.drive - (mode.shape[0] + 2.0 * mode.shape[1])).abs() < 1e-14);
+        assert!((mode.zeta - 0.005 * mode.omega).abs() < 1e-14);
+    }
+    // sum phi Gamma = 1 at every point: the set is complete.
+    let complete: f64 = structure.modes.iter().map(|mode| mode.shape[0] * mode.drive).sum();
+    assert!((complete - 1.0).abs() < 1e-14);
+    let folder = matrices([GOOD[0], [0.02, 0.0, 0.0], GOOD[2]]);
+    let coupled = of(&folder, &format!("{PLANT}{MATRICES}"), &[]).unwrap();
+    assert!(matches!(
+        coupled.structure.unwrap().form,
+        StructureForm::Matrices { .. }
+    ));
+}
+
+#[test]
+fn residues_of_a_real_mode_give_its_mass_normalised_shape() {
+    let folder = TempDir::new().unwrap();
+    let omega = TAU * 8.8156 * (1.0 - 0.006_f64.powi(2)).sqrt();
+    let [tip, root] = [0.51252 * 0.1, 0.1 * 0.1].map(|product| -product / (2.0 * omega));
+    let text = format!("frequency, damping, re tip, im tip, re root, im root\n8.8156, 0.006, 0, {tip}, 0, {root}\n");
+    fs::write(folder.path().join("beam.csv"), text).unwrap();
+    let residues = "excitation = \"force\"\ndrive = \"root\"\nresidues = \"beam.csv\"\nreference = \"root\"\n";
+    let scene = of(&folder, &format!("{PLANT}{residues}"), &[]).unwrap();
+    let structure = scene.structure.unwrap();
+    let mode = structure.mode();
+    assert!(
+        (mode.shape[0] - 0.51252).abs() < 1e-12 && (mode.shape[1] - 0.1).abs() < 1e-12,
+        "{mode:?}"
+    );
+    let without = format!("{PLANT}{}", residues.replace("reference = \"root\"\n", ""));
+    says(of(&folder, &without, &[]), "`reference` is missing | tip, root");
+    says(
+        of(
+            &folder,
+            &format!("{PLANT}{residues}"),
+            &[("\"beam.csv\"", "\"none.csv\"")],
+        ),
+        "residues (none.csv) | relative to the scene",
+    );
+    let base = [("excitation = \"force\"\ndrive = \"root\"\n", "")];
+    says(
+        of(&folder, &format!("{PLANT}{residues}"), &base),
+        "residues of a receptance belong to excitation",
+    );
+}
+
+#[test]
+fn points_that_do_not_exist_are_refused_with_a_list_of_those_that_do() {
+    says(
+        beam(&[("\"tip\"", "\"top\"")]),
+        "cavity = \"top\" is no point | middle, root, tip",
+    );
+    says(
+        beam(&[("\"root\"", "\"end\"")]),
+        "drive = \"end\" is no point | middle, root, tip",
+    );
+    says(beam(&[("cavity = \"tip\"", "")]), "`cavity` is missing");
+    says(beam(&[("drive = \"root\"", "")]), "`drive` is missing");
+}
+
+#[test]
+fn a_cavity_at_a_node_of_the_driven_mode_is_refused_because_no_impact_can_drive_it() {
+    says(
+        beam(&[("cavity = \"tip\"", "cavity = \"middle\"")]),
+        "cavity at middle | node of the driven mode 1 | no impact can drive it",
+    );
+    says(
+        beam(&[("[excitation]", "sensor = \"middle\"\n[excitation]")]),
+        "sensor at middle | node",
+    );
+    says(
+        beam(&[("drive = \"root\"", "drive = \"middle\"")]),
+        "force at middle does not drive mode 1",
+    );
+}
+
+#[test]
+fn damping_above_critical_is_refused_where_a_mode_is_asked_for() {
+    says(
+        beam(&[(
+            "frequency = 8.8156, damping = 0.006",
+            "frequency = 8.8156, damping = 1.2",
+        )]),
+        "mode 1 | 1.2 | below 1",
+    );
+    let folder = matrices([GOOD[0], [8.0, 0.0, 16.0], GOOD[2]]);
+    says(
+        of(&folder, &format!("{PLANT}{MATRICES}"), &[]),
+        "mode 1 has the damping ratio | below 1",
+    );
+}
+
+#[test]
+fn matrices_that_are_not_symmetric_or_not_positive_are_refused_with_the_eigenvalue() {
+    let scene = format!("{PLANT}{MATRICES}");
+    let folder = matrices(GOOD);
+    fs::write(folder.path().join("k.csv"), "tip, root\n2, -1\n-1.1, 4\n").unwrap();
+    says(
+        of(&folder, &scene, &[]),
+        "K (k.csv) is not symmetric | (root, tip) is -1.1 | (tip, root) is -1",
+    );
+    let indefinite = |matrix: [[f64; 3]; 3]| of(&matrices(matrix), &scene, &[]);
+    says(
+        indefinite([GOOD[0], GOOD[1], [1.0, 2.0, 1.0]]),
+        "K (k.csv) is not positive definite | eigenvalue 1 of 2 | -1.0000e0 N/m",
+    );
+    says(
+        indefinite([[1.0, 1.0, 1.0], GOOD[1], GOOD[2]]),
+        "M (m.csv) is not positive definite | kg",
+    );
+    says(
+        indefinite([GOOD[0], [0.0, 0.1, 0.0], GOOD[2]]),
+        "C (c.csv) is not positive semidefinite | -1.0000e-1 N s/m",
+    );
+    fs::write(folder.path().join("k.csv"), "tip, root\n2, -1\n").unwrap();
+    says(of(&folder, &scene, &[]), "2 columns and 1 rows | square");
+    fs::write(folder.path().join("k.csv"), "2, -1\n-1, 4\n").unwrap();
+    says(of(&folder, &scene, &[]), "no line of names");
+    fs::write(folder.path().join("k.csv"), "tip, root\n2, x\n-1, 4\n").unwrap();
+    says(of(&folder, &scene, &[]), "`x` in row 1");
+    fs::write(folder.path().join("k.csv"), "root, tip\n4, -1\n-1, 2\n").unwrap();
+    says(of(&folder, &scene, &[]), "same order");
+}
+
+#[test]
+fn shapes_that_are_not_mass_normalised_are_refused_with_their_norm() {
+    let folder = matrices(GOOD);
+    let modes =
+        "M = \"m.csv\"\nmodes = [{ frequency = 0.2, damping = 0.01, shape = { tip = 0.6, root = 0.565685 } }]\n";
+    let scene = of(&folder, &format!("{PLANT}{modes}"), &[]).unwrap();
+    assert!((scene.structure.unwrap().mode().drive - (0.6 + 2.0 * 0.565685)).abs() < 1e-12);
+    says(
+        of(&folder, &format!("{PLANT}{modes}"), &[("0.565685", "1.2")]),
+        "mode 1 is not mass-normalised | 1.8000",
+    );
+    says(
+        of(&folder, &format!("{PLANT}{modes}"), &[("root =", "side =")]),
+        "no shape at root",
+    );
+}
+
+#[test]
+fn what_contradicts_the_structure_is_refused() {
+    says(
+        beam(&[("m = 0.032", "m = 0.032\nk = 1e4")]),
+        "[plant] has `k` beside [structure]",
+    );
+    says(beam(&[("F = 1.2", "E = 1e-4")]), "[excitation] | F (N)");
+    says(beam(&[("F = 1.2", "F = 1.2\nG = 1")]), "[excitation] has more than one");
+    let reference = "[resonance]\nreference = \"force\"\n[excitation]";
+    says(
+        beam(&[("[excitation]", reference)]),
+        "resonance.reference | beside [structure]",
+    );
+    says(
+        beam(&[("[excitation]", "[start]\nq1 = 0.1\n[excitation]")]),
+        "a structure starts at rest",
+    );
+    says(
+        beam(&[("[excitation]", "mode = 3\n[excitation]")]),
+        "mode = 3 | modes 1 to 2",
+    );
+    says(
+        beam(&[("[excitation]", "M = \"m.csv\"\nK = \"k.csv\"\n[excitation]")]),
+        "exactly one description",
+    );
+    says(
+        beam(&[("excitation = \"force\"", "excitation = \"base\"")]),
+        "no participation",
+    );
+    says(
+        beam(&[(", middle = 0.4", "")]),
+        "mode 2 has its shape at the points root, tip",
+    );
+    says(
+        beam(&[(
+            "damping = 0.006, shape = { root = 0.3",
+            "damping = -1, shape = { root = 0.3",
+        )]),
+        "mode 2 | damping = -1",
+    );
+}
