@@ -10,6 +10,7 @@ pub mod contact;
 mod fast;
 pub mod flight;
 pub mod forcing;
+pub mod host;
 pub mod oscillator;
 pub mod parameters;
 pub mod plant;
@@ -20,6 +21,7 @@ pub mod variation;
 
 pub use base_motion::{BaseMotion, Drive};
 pub use contact::Wall;
+pub use host::{Excitation, Host, InvalidHost, Mode, Section};
 pub use parameters::{Cavity, InvalidValue, Parameters, Restitution};
 pub use plant::{Event, Outcome, Plant, State, Totals};
 pub use variation::Variation;

@@ -74,9 +74,12 @@ impl Transition {
 impl Oscillator {
     /// Coefficients of the oscillator of this mass (kg), stiffness (N/m) and damping (N·s/m).
     pub fn new(mass: f64, stiffness: f64, damping: f64) -> Self {
-        let (rate, rate_error) = quotient(damping, mass);
+        Self::from_rates(quotient(damping, mass), quotient(stiffness, mass))
+    }
+
+    /// The same from `2 delta` (1/s) and `omega0²` (1/s²), each with its rounding error.
+    pub(crate) fn from_rates((rate, rate_error): (f64, f64), (omega0_squared, stiffness_error): (f64, f64)) -> Self {
         let delta = 0.5 * rate;
-        let (omega0_squared, stiffness_error) = quotient(stiffness, mass);
         let omega0 = libm::sqrt(omega0_squared);
         // `omega0² - delta²` with what rounding keeps out of it, so that no digit is lost near critical damping.
         let (square, square_error) = product(delta, delta);

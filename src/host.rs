@@ -1,0 +1,869 @@
+//! The host of the cavity: a linear structure as a sum of second-order sections.
+//!
+//! A section has the state `(x, v)`. The drive `u` (base displacement, m, or force, N) and a force `f` of the particle on the host at the
+//! cavity (N) move it:
+//!
+//! ```text
+//! x' = v + d u + k0 f,    v' = -omega0² x - 2 delta v + (c - 2 delta d) u + k1 f
+//! ```
+//!
+//! Hence `x'' + 2 delta x' + omega0² x = c u + d u'` without the particle, and an impulse `J` (N s) adds `[k0, k1] J` to `(x, v)`. The
+//! displacement of a point is `sum a x + b v`, with a pair `[a, b]` per section: its row. A jump of `u` leaves `(x, v)` as they are.
+//!
+//! - A real mode with the mass-normalised shape `phi` is one section whose `x` is the modal coordinate: `k = [0, phi_cavity]`, row
+//!   `[phi_point, 0]`, and `c = Gamma omega0²`, `d = 2 delta Gamma` for a base with the participation `Gamma`, or `c = psi`, `d = 0` for a
+//!   force at a point with the shape `psi`.
+//! - Without proportional damping, and during persistent contact, modes are complex pairs: then `b` and `d` are not 0. Two real poles make
+//!   one overdamped section.
+//!
+//! Source of the expansion of a symmetric quadratic eigenproblem in its modes: P. Lancaster, "Lambda-matrices and Vibrating Systems",
+//! Pergamon 1966, chapter 4.
+
+use core::fmt;
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use num_complex::Complex64;
+
+use crate::arithmetic::{plus, product, times};
+use crate::oscillator::Oscillator;
+use crate::parameters::FASTEST;
+
+/// What drives a structure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Excitation {
+    /// The displacement of its base, m.
+    Base,
+    /// A force, N.
+    Force,
+}
+
+/// A real mode: its shapes are mass-normalised, 1/sqrt(kg).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Mode {
+    /// Natural frequency without damping, rad/s.
+    pub omega: f64,
+    /// Damping ratio, from 0 to below 1.
+    pub zeta: f64,
+    /// Shape at the cavity, 1/sqrt(kg).
+    pub cavity: f64,
+    /// For a force: shape at the point where it acts, 1/sqrt(kg). For a base: participation factor, sqrt(kg).
+    pub drive: f64,
+}
+
+/// One second-order section.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Section {
+    /// Decay rate and natural frequency.
+    pub oscillator: Oscillator,
+    /// `[c, d]`: `x'' + 2 delta x' + omega0² x = c u + d u'`.
+    pub drive: [f64; 2],
+    /// `[k0, k1]`: what an impulse of 1 N s at the cavity adds to `(x, v)`.
+    pub kick: [f64; 2],
+    /// `[a, b]`: the displacement of the host at the cavity contains `a x + b v`.
+    pub cavity: [f64; 2],
+}
+
+/// A pair `[a, b]` per section: the displacement of a point is the sum of `a x + b v`.
+pub type Row = Vec<[f64; 2]>;
+
+/// Why a host is refused, in one sentence.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InvalidHost(pub String);
+
+impl fmt::Display for InvalidHost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl core::error::Error for InvalidHost {}
+
+/// The matrices of a structure with `n` degrees of freedom, row by row: `M q'' + C q' + K q = K i e + C i e'`, or `= d F`.
+#[derive(Clone, Copy, Debug)]
+pub struct Matrices<'a> {
+    /// `M`, kg.
+    pub mass: &'a [Vec<f64>],
+    /// `C`, N s/m.
+    pub damping: &'a [Vec<f64>],
+    /// `K`, N/m.
+    pub stiffness: &'a [Vec<f64>],
+    /// The row `p` of the cavity: its displacement is `p q`.
+    pub cavity: &'a [f64],
+    /// For a base: the displacements `i` of the structure per displacement of the base. For a force: the row `d` of its point.
+    pub drive: &'a [f64],
+}
+
+/// A linear structure.
+#[derive(Clone, Debug)]
+pub struct Host {
+    excitation: Excitation,
+    /// The sections while the particle is free.
+    sections: Vec<Section>,
+    /// The structure in the coordinates of its modes without damping.
+    pub(crate) modal: Modal,
+    /// Displacements of the degrees of freedom per modal coordinate; `None`: the host was made from modes.
+    shapes: Option<DMatrix<f64>>,
+    /// The modal coordinates from the sections, where the sections are not these coordinates.
+    pub(crate) expansion: Option<Expansion>,
+}
+
+/// `eta'' + Delta eta' + diag(omega²) eta = g u + h u' + phi f`, in mass-normalised modal coordinates.
+#[derive(Clone, Debug)]
+pub(crate) struct Modal {
+    /// `omega²` with its rounding error, 1/s².
+    pub stiffness: Vec<(f64, f64)>,
+    /// `Delta`, 1/s.
+    pub damping: DMatrix<f64>,
+    /// `phi`, 1/sqrt(kg).
+    pub cavity: DVector<f64>,
+    /// `g`.
+    pub drive: DVector<f64>,
+    /// `h`.
+    pub drive_rate: DVector<f64>,
+    /// Displacement of the modal coordinates with the base, sqrt(kg); 0 for a force.
+    #[allow(dead_code)]
+    pub carried: DVector<f64>,
+}
+
+impl Host {
+    /// A host with these modes. Coordinates of its points are the modes: a point is given by its mass-normalised shapes.
+    ///
+    /// # Errors
+    /// No mode; a frequency that is not positive; a damping ratio outside 0 to below 1; a shape that is not finite; a cavity that no mode
+    /// moves.
+    pub fn from_modes(excitation: Excitation, modes: &[Mode]) -> Result<Self, InvalidHost> {
+        for (n, mode) in modes.iter().enumerate() {
+            let n = n + 1;
+            check((1e-12..=FASTEST).contains(&mode.omega), || {
+                format!(
+                    "mode {n} has the frequency {:?} rad/s; allowed is a number from 1e-12 to 1e12 rad/s",
+                    mode.omega
+                )
+            })?;
+            check((0.0..1.0).contains(&mode.zeta), || {
+                format!(
+                    "mode {n} has the damping ratio {:?}; a mode needs a number from 0 to below 1 (critical)",
+                    mode.zeta
+                )
+            })?;
+            check(mode.cavity.abs() <= 1e50 && mode.drive.abs() <= 1e50, || {
+                format!(
+                    "mode {n} has the shapes {:?} at the cavity and {:?} at the drive; allowed are finite numbers from -1e50 to 1e50",
+                    mode.cavity, mode.drive
+                )
+            })?;
+        }
+        let stiffness: Vec<_> = modes.iter().map(|mode| product(mode.omega, mode.omega)).collect();
+        let damping = modes.iter().map(|mode| product(2.0 * mode.zeta, mode.omega)).collect();
+        let cavity = vector(modes.iter().map(|mode| mode.cavity));
+        let drive = vector(modes.iter().map(|mode| mode.drive));
+        Self::from_real_modes(excitation, (stiffness, damping), (cavity, drive), None)
+    }
+
+    /// `damping` is `2 delta` of every mode, 1/s.
+    fn from_real_modes(
+        excitation: Excitation,
+        (stiffness, damping): (Vec<(f64, f64)>, Vec<(f64, f64)>),
+        (cavity, drive): (DVector<f64>, DVector<f64>),
+        shapes: Option<DMatrix<f64>>,
+    ) -> Result<Self, InvalidHost> {
+        let oscillators: Vec<_> = damping
+            .iter()
+            .zip(&stiffness)
+            .map(|(damping, stiffness)| Oscillator::from_rates(*damping, *stiffness))
+            .collect();
+        let force = excitation == Excitation::Force;
+        let section = |(n, oscillator): (usize, &Oscillator)| {
+            let Oscillator { delta, omega0_squared, .. } = *oscillator;
+            let drive = if force {
+                [drive[n], 0.0]
+            } else {
+                [drive[n] * omega0_squared, drive[n] * (2.0 * delta)]
+            };
+            Section {
+                oscillator: *oscillator,
+                drive,
+                kick: [0.0, cavity[n]],
+                cavity: [cavity[n], 0.0],
+            }
+        };
+        let sections: Vec<_> = oscillators.iter().enumerate().map(section).collect();
+        let modal = Modal {
+            stiffness,
+            damping: DMatrix::from_diagonal(&vector(damping.iter().map(|rate| rate.0))),
+            drive: vector(sections.iter().map(|section| section.drive[0])),
+            drive_rate: vector(sections.iter().map(|section| section.drive[1])),
+            carried: if force { 0.0 * &drive } else { drive },
+            cavity,
+        };
+        Self { excitation, sections, modal, shapes, expansion: None }.checked()
+    }
+
+    /// Refuses a cavity that nothing moves.
+    fn checked(self) -> Result<Self, InvalidHost> {
+        check(!self.sections.is_empty(), || {
+            "the structure has no mode; it needs at least one".into()
+        })?;
+        check(self.mobility() > 0.0, || {
+            "the cavity is at a node of every mode; no impact can act on the structure there".into()
+        })?;
+        Ok(self)
+    }
+
+    /// What drives it.
+    pub fn excitation(&self) -> Excitation {
+        self.excitation
+    }
+
+    /// The sections while the particle is free.
+    pub fn sections(&self) -> &[Section] {
+        &self.sections
+    }
+
+    /// Velocity of the host at the cavity per impulse there, `S`, 1/kg: the sum of the squared shapes.
+    pub fn mobility(&self) -> f64 {
+        mobility(&self.sections)
+    }
+}
+
+/// Velocity at the cavity per impulse there, 1/kg.
+pub(crate) fn mobility(sections: &[Section]) -> f64 {
+    sections
+        .iter()
+        .map(|section| section.velocity_per_impulse(section.cavity))
+        .sum()
+}
+
+impl Section {
+    /// Velocity of a point with the pair `[a, b]` per impulse at the cavity, 1/kg.
+    pub fn velocity_per_impulse(&self, [a, b]: [f64; 2]) -> f64 {
+        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
+        let [k0, k1] = self.kick;
+        a * k1 - b * (omega0_squared * k0 + 2.0 * delta * k1)
+    }
+
+    /// Steady `(x, v)` per unit of a harmonic drive with the angular frequency `omega`, rad/s.
+    pub fn steady(&self, omega: f64) -> [Complex64; 2] {
+        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
+        let [c, d] = self.drive;
+        let denominator = Complex64::new(omega0_squared - omega * omega, 2.0 * delta * omega);
+        [
+            Complex64::new(c, d * omega) / denominator,
+            Complex64::new(-d * omega0_squared, (c - 2.0 * delta * d) * omega) / denominator,
+        ]
+    }
+
+    /// Steady `(x, v)` per unit of a harmonic force at the cavity.
+    pub fn steady_of_cavity_force(&self, omega: f64) -> [Complex64; 2] {
+        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
+        let [k0, k1] = self.kick;
+        let denominator = Complex64::new(omega0_squared - omega * omega, 2.0 * delta * omega);
+        [
+            Complex64::new(k1 + 2.0 * delta * k0, k0 * omega) / denominator,
+            Complex64::new(-k0 * omega0_squared, k1 * omega) / denominator,
+        ]
+    }
+}
+
+fn check(valid: bool, message: impl FnOnce() -> String) -> Result<(), InvalidHost> {
+    if valid { Ok(()) } else { Err(InvalidHost(message())) }
+}
+
+fn vector(values: impl ExactSizeIterator<Item = f64>) -> DVector<f64> {
+    DVector::from_iterator(values.len(), values)
+}
+
+// From matrices
+
+/// Tolerance of symmetry, relative to the largest entries of both rows.
+const SYMMETRIC: f64 = 1e-9;
+/// Rounding of a quadratic form, relative to the sum of its terms' magnitudes.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+impl Host {
+    /// A host with these matrices. Coordinates of its points are the degrees of freedom.
+    ///
+    /// # Errors
+    /// Matrices of unequal size, not symmetric, not positive definite (`M`, `K`) or with a negative eigenvalue (`C`); a cavity that nothing
+    /// moves.
+    pub fn from_matrices(excitation: Excitation, matrices: &Matrices) -> Result<Self, InvalidHost> {
+        let n = matrices.mass.len();
+        check(n > 0, || {
+            "the structure has no degree of freedom; it needs at least one".into()
+        })?;
+        let mass = symmetric("M (mass matrix)", matrices.mass, n)?;
+        let damping = symmetric("C (damping matrix)", matrices.damping, n)?;
+        let stiffness = symmetric("K (stiffness matrix)", matrices.stiffness, n)?;
+        for (name, row) in [("the cavity", matrices.cavity), ("the drive", matrices.drive)] {
+            check(row.len() == n && row.iter().all(|entry| entry.abs() <= 1e50), || {
+                format!(
+                    "the row of {name} has {} entries; it needs {n} finite numbers, one per degree of freedom",
+                    row.len()
+                )
+            })?;
+        }
+        positive("M (mass matrix)", "kg", &mass, f64::MIN_POSITIVE)?;
+        positive("K (stiffness matrix)", "N/m", &stiffness, f64::MIN_POSITIVE)?;
+        let size = damping.abs().row_sum().max();
+        positive("C (damping matrix)", "N s/m", &damping, -ROUNDING * n as f64 * size)?;
+
+        let shapes = natural_modes(&mass, &stiffness)?;
+        let column = |n: usize| shapes.column(n);
+        let form = |a: &DMatrix<f64>, i: usize, j: usize| form(a, column(i).as_slice(), column(j).as_slice());
+        let (row, drive) = (
+            DVector::from_row_slice(matrices.cavity),
+            DVector::from_row_slice(matrices.drive),
+        );
+        let project = |x: &DVector<f64>| shapes.tr_mul(x);
+        let natural: Vec<_> = (0..n)
+            .map(|i| {
+                let (k, m) = (form(&stiffness, i, i), form(&mass, i, i));
+                // `k/m`, with `m` near 1.
+                times(k, (1.0 - (m.0 - 1.0), -m.1))
+            })
+            .collect();
+        let rates: Vec<_> = (0..n)
+            .map(|i| {
+                let (c, m) = (form(&damping, i, i), form(&mass, i, i));
+                times(c, (1.0 - (m.0 - 1.0), -m.1))
+            })
+            .collect();
+        let size = |i: usize, j: usize| (column(i).abs().transpose() * damping.abs() * column(j).abs())[0];
+        let modal_damping = DMatrix::from_fn(n, n, |i, j| if i == j { rates[i].0 } else { form(&damping, i, j).0 });
+        let proportional = (0..n)
+            .flat_map(|i| (0..i).map(move |j| (i, j)))
+            .all(|(i, j)| modal_damping[(i, j)].abs() <= ROUNDING * size(i, j));
+        let cavity = project(&row);
+        let force = excitation == Excitation::Force;
+        let participation = if force {
+            project(&drive)
+        } else {
+            project(&(&mass * &drive))
+        };
+        if proportional {
+            return Self::from_real_modes(excitation, (natural, rates), (cavity, participation), Some(shapes));
+        }
+        let zero = DVector::zeros(n);
+        let modal = Modal {
+            drive: if force {
+                participation.clone()
+            } else {
+                project(&(&stiffness * &drive))
+            },
+            drive_rate: if force {
+                zero.clone()
+            } else {
+                project(&(&damping * &drive))
+            },
+            carried: if force { zero } else { participation },
+            stiffness: natural,
+            damping: modal_damping,
+            cavity,
+        };
+        let (sections, expansion) = modal.sections(0.0)?;
+        Self {
+            excitation,
+            sections,
+            modal,
+            shapes: Some(shapes),
+            expansion: Some(expansion),
+        }
+        .checked()
+    }
+
+    /// The row of a point: mass-normalised shapes (1/sqrt(kg)) for a host from modes, the row over the degrees of freedom for one from
+    /// matrices.
+    ///
+    /// # Errors
+    /// A wrong number of entries, or one that is not finite.
+    pub fn row(&self, point: &[f64]) -> Result<Row, InvalidHost> {
+        let n = self.modal.stiffness.len();
+        check(
+            point.len() == n && point.iter().all(|entry| entry.abs() <= 1e50),
+            || {
+                format!(
+                    "a point has {} entries; it needs {n} finite numbers, one per mode or degree of freedom",
+                    point.len()
+                )
+            },
+        )?;
+        let point = DVector::from_row_slice(point);
+        let shape = self
+            .shapes
+            .as_ref()
+            .map_or_else(|| point.clone(), |shapes| shapes.tr_mul(&point));
+        Ok(match &self.expansion {
+            None => shape.iter().map(|phi| [*phi, 0.0]).collect(),
+            Some(expansion) => expansion.row(&shape),
+        })
+    }
+
+    /// Steady displacement of a point per unit of a harmonic drive with the angular frequency `omega`, rad/s.
+    pub fn frequency_response(&self, row: &[[f64; 2]], omega: f64) -> Complex64 {
+        response(row, self.sections.iter().map(|section| section.steady(omega)))
+    }
+
+    /// Steady displacement of a point per unit of a harmonic force at the cavity, m/N.
+    pub fn frequency_response_to_cavity(&self, row: &[[f64; 2]], omega: f64) -> Complex64 {
+        response(
+            row,
+            self.sections
+                .iter()
+                .map(|section| section.steady_of_cavity_force(omega)),
+        )
+    }
+
+    /// The row of the cavity.
+    pub fn cavity(&self) -> Row {
+        self.sections.iter().map(|section| section.cavity).collect()
+    }
+}
+
+fn response(row: &[[f64; 2]], states: impl Iterator<Item = [Complex64; 2]>) -> Complex64 {
+    row.iter().zip(states).map(|([a, b], [x, v])| x * a + v * b).sum()
+}
+
+/// A symmetric matrix, checked.
+fn symmetric(name: &str, rows: &[Vec<f64>], n: usize) -> Result<DMatrix<f64>, InvalidHost> {
+    check(rows.len() == n && rows.iter().all(|row| row.len() == n), || {
+        format!("{name} is not a square of {n} rows and columns, as many as M has rows")
+    })?;
+    let matrix = DMatrix::from_fn(n, n, |i, j| rows[i][j]);
+    check(matrix.iter().all(|entry| entry.abs() <= 1e50), || {
+        format!("{name} has an entry that is not a finite number from -1e50 to 1e50")
+    })?;
+    for i in 0..n {
+        for j in 0..i {
+            let (below, above) = (matrix[(i, j)], matrix[(j, i)]);
+            let size = matrix.row(i).amax().max(matrix.row(j).amax());
+            check((below - above).abs() <= SYMMETRIC * size, || {
+                let (i, j) = (i + 1, j + 1);
+                format!("{name} is not symmetric: entry ({i}, {j}) is {below:?} and entry ({j}, {i}) is {above:?}")
+            })?;
+        }
+    }
+    Ok(DMatrix::from_fn(n, n, |i, j| {
+        0.5 * matrix[(i, j)] + 0.5 * matrix[(j, i)]
+    }))
+}
+
+/// Refuses a matrix with an eigenvalue below `least`.
+fn positive(name: &str, unit: &str, matrix: &DMatrix<f64>, least: f64) -> Result<(), InvalidHost> {
+    let smallest = SymmetricEigen::new(matrix.clone()).eigenvalues.min();
+    check(smallest >= least, || {
+        let needed = if least > 0.0 { "positive" } else { "at least 0" };
+        format!("{name} has the eigenvalue {smallest:.6e} {unit}; all of its eigenvalues must be {needed}")
+    })
+}
+
+/// `x A y` with its rounding error.
+fn form(a: &DMatrix<f64>, x: &[f64], y: &[f64]) -> (f64, f64) {
+    let mut sum = (0.0, 0.0);
+    for (i, x) in x.iter().enumerate() {
+        for (j, y) in y.iter().enumerate() {
+            sum = plus(sum, times(product(*x, a[(i, j)]), (*y, 0.0)));
+        }
+    }
+    sum
+}
+
+/// Mass-normalised modes without damping, as columns, from the lowest frequency on.
+///
+/// The eigenvalues of the symmetric solver are exact to the rounding of the largest only, so that the eigenvectors are refined until all
+/// digits are right (Ogita and Aishima, "Iterative refinement for symmetric eigenvalue decomposition", Japan J. Indust. Appl. Math. 35 (2018)
+/// 1007).
+fn natural_modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Result<DMatrix<f64>, InvalidHost> {
+    let n = mass.nrows();
+    let no_modes = || InvalidHost("the modes of M and K cannot be computed: the matrices are too badly scaled".into());
+    let lower = mass.clone().cholesky().ok_or_else(no_modes)?.l();
+    let inverse = lower.try_inverse().ok_or_else(no_modes)?;
+    let reduced = &inverse * stiffness * inverse.transpose();
+    let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(0.5 * (&reduced + reduced.transpose()));
+    let mut order: Vec<_> = (0..n).collect();
+    order.sort_by(|i, j| eigenvalues[*i].total_cmp(&eigenvalues[*j]));
+    let eigenvectors = inverse.tr_mul(&eigenvectors);
+    let mut x = DMatrix::from_fn(n, n, |i, j| eigenvectors[(i, order[j])]);
+    for _ in 0..4 {
+        let entry = |a: &DMatrix<f64>, i: usize, j: usize| form(a, x.column(i).as_slice(), x.column(j).as_slice());
+        let r = DMatrix::from_fn(n, n, |i, j| {
+            let (value, error) = entry(mass, i, j);
+            (if i == j { 1.0 - value } else { -value }) - error
+        });
+        let s = DMatrix::from_fn(n, n, |i, j| entry(stiffness, i, j).0);
+        let values: Vec<_> = (0..n).map(|i| s[(i, i)] / (1.0 - r[(i, i)])).collect();
+        let correction = DMatrix::from_fn(n, n, |i, j| {
+            let apart = values[j] - values[i];
+            // Modes nearer than rounding share a plane in which every pair serves.
+            if i == j || apart.abs() <= ROUNDING * n as f64 * values[i].abs().max(values[j].abs()) {
+                0.5 * r[(i, j)]
+            } else {
+                (s[(i, j)] + values[j] * r[(i, j)]) / apart
+            }
+        });
+        x = &x + &x * correction;
+    }
+    check(x.iter().all(|entry| entry.is_finite()), || no_modes().0)?;
+    Ok(x)
+}
+
+// Complex pairs and pairs of real poles
+
+/// The modal coordinates and their momenta from the sections of a set, and back. A momentum is `p = eta' - h u`.
+#[derive(Clone, Debug)]
+pub(crate) struct Expansion {
+    /// `(x, v)` of every section from `eta` and `p`, and the part of `u`.
+    pub to_sections: DMatrix<f64>,
+    pub drive_to_sections: DVector<f64>,
+    /// The reverse.
+    pub to_modal: DMatrix<f64>,
+    pub drive_to_modal: DVector<f64>,
+}
+
+impl Expansion {
+    /// The row of a point with these shapes.
+    fn row(&self, shape: &DVector<f64>) -> Row {
+        let n = shape.len();
+        let displacements = self.to_modal.rows(0, n).tr_mul(shape);
+        (0..n)
+            .map(|k| [displacements[2 * k], displacements[2 * k + 1]])
+            .collect()
+    }
+}
+
+/// An eigenvalue and eigenvector of `lambda² (I + m phi phi^T) + lambda Delta + Omega²`.
+struct Pole {
+    lambda: Complex64,
+    vector: DVector<Complex64>,
+    /// `u Q'(lambda) u`: the inverse of `Q(s)` contains `u u^T/(norm (s - lambda))`.
+    norm: Complex64,
+}
+
+impl Modal {
+    /// The sections of the structure that carries the mass `m` (kg) at the cavity.
+    pub fn sections(&self, m: f64) -> Result<(Vec<Section>, Expansion), InvalidHost> {
+        let n = self.stiffness.len();
+        let poles = self.poles(m)?;
+        let (pairs, mut reals): (Vec<_>, Vec<_>) = poles.into_iter().partition(|pole| pole.lambda.im != 0.0);
+        reals.sort_by(|a, b| a.lambda.re.total_cmp(&b.lambda.re));
+        let mut sections = Vec::with_capacity(n);
+        let mut expansion = Expansion {
+            to_sections: DMatrix::zeros(2 * n, 2 * n),
+            drive_to_sections: DVector::zeros(2 * n),
+            to_modal: DMatrix::zeros(2 * n, 2 * n),
+            drive_to_modal: DVector::zeros(2 * n),
+        };
+        // The part of the drive in the momentum: (M^-1 - 1) h u.
+        let slip = self.cavity.dot(&self.drive_rate);
+        let share = m / (1.0 + m * self.cavity.norm_squared());
+        for i in 0..n {
+            expansion.drive_to_modal[n + i] = -share * self.cavity[i] * slip;
+        }
+        // Two poles, and the weights `kappa` with which their coordinates make `x`.
+        let mut add = |poles: [(&Pole, Complex64); 2], oscillator: Oscillator| {
+            let k = 2 * sections.len();
+            let sum = |of: &dyn Fn(&Pole) -> Complex64| {
+                let [x, v] = [0, 1].map(|power| {
+                    (poles.iter())
+                        .map(|(pole, kappa)| kappa * pole.lambda.powi(power) * of(pole))
+                        .sum::<Complex64>()
+                        .re
+                });
+                [x, v]
+            };
+            let along = |pole: &Pole, with: &DVector<f64>| dot(&pole.vector, with);
+            let d = sum(&|pole| along(pole, &self.drive) + pole.lambda * along(pole, &self.drive_rate));
+            let kick = sum(&|pole| along(pole, &self.cavity));
+            for i in 0..n {
+                let eta = sum(&|pole| {
+                    pole.lambda * (pole.vector[i] + m * self.cavity[i] * along(pole, &self.cavity))
+                        + dot(&pole.vector, &self.damping.column(i).into_owned())
+                });
+                let p = sum(&|pole| pole.vector[i] + m * self.cavity[i] * along(pole, &self.cavity));
+                for row in 0..2 {
+                    expansion.to_sections[(k + row, i)] = eta[row];
+                    expansion.to_sections[(k + row, n + i)] = p[row];
+                }
+            }
+            let carried = sum(&|pole| m * along(pole, &self.cavity) * slip);
+            // The coordinates `kappa z` of both poles from `(x, v)`: `z1 + z2 = x`, `lambda1 z1 + lambda2 z2 = v`.
+            let [(one, kappa_one), (two, kappa_two)] = poles;
+            let apart = one.lambda - two.lambda;
+            let inverse = [
+                [-two.lambda / apart / kappa_one, apart.inv() / kappa_one],
+                [one.lambda / apart / kappa_two, -apart.inv() / kappa_two],
+            ];
+            for column in 0..2 {
+                expansion.drive_to_sections[k + column] = carried[column];
+                for i in 0..n {
+                    let part = |pole: &Pole, z: Complex64| pole.vector[i] / pole.norm * z;
+                    let [one_part, two_part] = [part(one, inverse[0][column]), part(two, inverse[1][column])];
+                    expansion.to_modal[(i, k + column)] = (one_part + two_part).re;
+                    expansion.to_modal[(n + i, k + column)] = (one.lambda * one_part + two.lambda * two_part).re;
+                }
+            }
+            let row = |column: usize| {
+                (0..n)
+                    .map(|i| self.cavity[i] * expansion.to_modal[(i, k + column)])
+                    .sum::<f64>()
+            };
+            sections.push(Section {
+                oscillator,
+                drive: [d[1] + 2.0 * oscillator.delta * d[0], d[0]],
+                kick,
+                cavity: [row(0), row(1)],
+            });
+        };
+        for pole in &pairs {
+            let conjugate = Pole {
+                lambda: pole.lambda.conj(),
+                vector: pole.vector.map(|entry| entry.conj()),
+                norm: pole.norm.conj(),
+            };
+            let oscillator = Oscillator::from_rates((-2.0 * pole.lambda.re, 0.0), squared(pole.lambda));
+            // With this weight an impulse at the cavity kicks `v` alone, and a real mode is its modal coordinate.
+            let reference = self.reference(&pole.vector);
+            let size = libm::sqrt(2.0 / (pole.norm.norm() * pole.lambda.im)) * reference.norm();
+            let kappa = Complex64::new(0.0, -0.5 * size) / reference;
+            add([(pole, kappa), (&conjugate, kappa.conj())], oscillator);
+        }
+        for (fast, slow) in reals[..reals.len() / 2].iter().zip(reals.iter().rev()) {
+            let (a, b) = (fast.lambda.re, slow.lambda.re);
+            let oscillator = Oscillator::from_rates(plus((-a, 0.0), (-b, 0.0)), product(a, b));
+            let gap = Complex64::from(b - a);
+            let weight = |pole: &Pole| (self.reference(&pole.vector) * gap).inv();
+            add([(slow, weight(slow)), (fast, -weight(fast))], oscillator);
+        }
+        Ok((sections, expansion))
+    }
+
+    /// What a mode is scaled by: its shape at the cavity, or its largest entry where the cavity is at a node.
+    fn reference(&self, vector: &DVector<Complex64>) -> Complex64 {
+        let (cavity, largest) = (dot(vector, &self.cavity), vector[vector.icamax()]);
+        if cavity.norm() > 1e-6 * largest.norm() * self.cavity.amax() {
+            cavity
+        } else {
+            largest
+        }
+    }
+
+    /// Poles with an imaginary part of 0 or above, refined by Newton's method.
+    fn poles(&self, m: f64) -> Result<Vec<Pole>, InvalidHost> {
+        let n = self.stiffness.len();
+        let omega: Vec<_> = self.stiffness.iter().map(|square| libm::sqrt(square.0)).collect();
+        let share = m / (1.0 + m * self.cavity.norm_squared());
+        let inverse_mass = DMatrix::identity(n, n) - share * &self.cavity * self.cavity.transpose();
+        let damping = &inverse_mass * &self.damping;
+        // In the coordinates (omega eta, eta') all entries have the size of frequencies.
+        let state = DMatrix::from_fn(2 * n, 2 * n, |i, j| match (i < n, j < n) {
+            (true, true) => 0.0,
+            (true, false) => {
+                if j - n == i {
+                    omega[i]
+                } else {
+                    0.0
+                }
+            }
+            (false, true) => -inverse_mass[(i - n, j)] * omega[j],
+            (false, false) => -damping[(i - n, j - n)],
+        });
+        let found = state.complex_eigenvalues();
+        let poles: Vec<_> = found
+            .iter()
+            .filter(|lambda| lambda.im >= 0.0)
+            .map(|lambda| self.refined(*lambda, m))
+            .collect();
+        let count: usize = poles.iter().map(|pole| if pole.lambda.im == 0.0 { 1 } else { 2 }).sum();
+        let apart = |one: &Pole, two: &Pole| (one.lambda - two.lambda).norm() > 1e-13 * one.lambda.norm();
+        let distinct = (0..poles.len()).all(|i| (0..i).all(|j| apart(&poles[i], &poles[j])));
+        check(
+            count == 2 * n
+                && distinct
+                && poles
+                    .iter()
+                    .all(|pole| pole.lambda.is_finite() && pole.norm.norm() > 0.0),
+            || {
+                "the modes with the particle on its wall cannot be told apart; change a frequency or a damping ratio by 1e-6".into()
+            },
+        )?;
+        Ok(poles)
+    }
+
+    /// The pole near `lambda`.
+    fn refined(&self, mut lambda: Complex64, m: f64) -> Pole {
+        let n = self.stiffness.len();
+        let mass = |i: usize, j: usize| f64::from(i == j) + m * self.cavity[i] * self.cavity[j];
+        let stiffness = |i: usize, j: usize| if i == j { self.stiffness[i].0 } else { 0.0 };
+        let q = |lambda: Complex64| {
+            DMatrix::from_fn(n, n, |i, j| {
+                lambda * (lambda * mass(i, j) + self.damping[(i, j)]) + stiffness(i, j)
+            })
+        };
+        let slope = |lambda: Complex64| DMatrix::from_fn(n, n, |i, j| lambda * 2.0 * mass(i, j) + self.damping[(i, j)]);
+        let is_real = lambda.im == 0.0;
+        // Inverse iteration for a start.
+        let beside = lambda * (1.0 + 1e-9);
+        let start = DVector::from_fn(n, |i, _| Complex64::from(self.stiffness[i].0 * (1.0 + 0.1 * i as f64)));
+        let mut vector = q(beside).lu().solve(&start).unwrap_or(start);
+        for _ in 0..6 {
+            vector /= vector[vector.icamax()];
+            let largest = vector.icamax();
+            let (now, along) = (q(lambda), slope(lambda) * &vector);
+            let mut bordered = DMatrix::zeros(n + 1, n + 1);
+            bordered.view_mut((0, 0), (n, n)).copy_from(&now);
+            bordered.view_mut((0, n), (n, 1)).copy_from(&along);
+            bordered[(n, largest)] = Complex64::ONE;
+            let mut right = DVector::zeros(n + 1);
+            right.rows_mut(0, n).copy_from(&-(now * &vector));
+            let Some(step) = bordered.lu().solve(&right) else { break };
+            vector += step.rows(0, n);
+            lambda += step[n];
+            if is_real {
+                lambda.im = 0.0;
+            }
+        }
+        let norm = (vector.transpose() * slope(lambda) * &vector)[0];
+        Pole { lambda, vector, norm }
+    }
+}
+
+/// `|lambda|²` with its rounding error.
+fn squared(lambda: Complex64) -> (f64, f64) {
+    plus(product(lambda.re, lambda.re), product(lambda.im, lambda.im))
+}
+
+fn dot(a: &DVector<Complex64>, b: &DVector<f64>) -> Complex64 {
+    a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three modes, the third with a real pair of poles once the damping couples them.
+    fn modal(coupling: f64, excitation: Excitation) -> Host {
+        let mass = vec![vec![1.0, 0.1, 0.0], vec![0.1, 0.8, 0.05], vec![0.0, 0.05, 0.5]];
+        let stiffness = vec![vec![3.0, -1.0, 0.0], vec![-1.0, 40.0, -20.0], vec![0.0, -20.0, 300.0]];
+        let damping = vec![
+            vec![0.05, -0.02, 0.0],
+            vec![-0.02, 0.3 + coupling, 0.1],
+            vec![0.0, 0.1, 0.2 + 40.0 * coupling],
+        ];
+        let matrices = Matrices {
+            mass: &mass,
+            damping: &damping,
+            stiffness: &stiffness,
+            cavity: &[1.0, 0.2, 0.0],
+            drive: &[1.0, 1.0, 0.3],
+        };
+        Host::from_matrices(excitation, &matrices).unwrap()
+    }
+
+    #[test]
+    fn the_sum_of_the_sections_is_the_response_of_the_matrices() {
+        for (coupling, excitation) in [
+            (0.1, Excitation::Base),
+            (0.1, Excitation::Force),
+            (3.0, Excitation::Base),
+            (3.0, Excitation::Force),
+        ] {
+            let host = modal(coupling, excitation);
+            let overdamped = host
+                .sections
+                .iter()
+                .filter(|s| s.oscillator.delta > s.oscillator.omega0)
+                .count();
+            assert_eq!(overdamped, usize::from(coupling > 1.0), "{coupling}");
+            let point = [0.3, -0.7, 1.0];
+            let row = host.row(&point).unwrap();
+            let shape = host.shapes.as_ref().unwrap().tr_mul(&DVector::from_row_slice(&point));
+            for omega in [0.1, 1.7, 7.0, 60.0] {
+                for m in [0.0, 0.02, 3.0] {
+                    let (sections, expansion) = host.modal.sections(m).unwrap();
+                    let row = if m == 0.0 { row.clone() } else { expansion.row(&shape) };
+                    let s = Complex64::new(0.0, omega);
+                    let Modal { stiffness, damping, cavity, drive, drive_rate, .. } = &host.modal;
+                    let q = DMatrix::from_fn(3, 3, |i, j| {
+                        s * s * (f64::from(i == j) + m * cavity[i] * cavity[j])
+                            + s * damping[(i, j)]
+                            + if i == j { stiffness[i].0 } else { 0.0 }
+                    });
+                    let input = DVector::from_fn(3, |i, _| drive[i] + s * drive_rate[i]);
+                    let expected = dot(&q.lu().solve(&input).unwrap(), &shape);
+                    let got = response(&row, sections.iter().map(|section| section.steady(omega)));
+                    assert!(
+                        (got - expected).norm() < 1e-13 * input.norm(),
+                        "{coupling} {m} {omega}: {got} {expected}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_way_to_the_sections_in_contact_and_back_changes_nothing() {
+        for coupling in [0.0, 0.1, 3.0] {
+            let (sections, expansion) = modal(coupling, Excitation::Base).modal.sections(0.5).unwrap();
+            let there_and_back = &expansion.to_modal * &expansion.to_sections;
+            assert!(
+                (there_and_back - DMatrix::<f64>::identity(6, 6)).amax() < 1e-13,
+                "{coupling}"
+            );
+            let drive = &expansion.to_modal * &expansion.drive_to_sections + &expansion.drive_to_modal;
+            assert!(drive.amax() < 1e-13, "{coupling}: {drive}");
+            assert_eq!(sections.len(), 3);
+        }
+    }
+
+    #[test]
+    fn one_mode_with_the_particle_on_its_wall_is_an_oscillator_with_both_masses() {
+        let (primary, m, k, c) = (3.807, 0.032, 11_680.0, 2.53);
+        let omega = f64::sqrt(k / primary);
+        let mode = Mode {
+            omega,
+            zeta: c / (2.0 * primary * omega),
+            cavity: 1.0 / f64::sqrt(primary),
+            drive: f64::sqrt(primary),
+        };
+        let host = Host::from_modes(Excitation::Base, &[mode]).unwrap();
+        let (sections, _) = host.modal.sections(m).unwrap();
+        let both = Oscillator::new(primary + m, k, c);
+        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 4e-15, "{a} {b}");
+        near(sections[0].oscillator.omega0_squared, both.omega0_squared);
+        near(sections[0].oscillator.delta, both.delta);
+        near(mobility(&sections), 1.0 / (primary + m));
+        near(host.mobility(), 1.0 / primary);
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_structure_is_said_in_one_sentence() {
+        let mode = Mode { omega: 1.0, zeta: 0.01, cavity: 1.0, drive: 1.0 };
+        let refused = |modes: &[Mode]| Host::from_modes(Excitation::Force, modes).unwrap_err().to_string();
+        assert!(refused(&[]).contains("no mode"));
+        assert!(refused(&[mode, Mode { zeta: 1.0, ..mode }]).contains("mode 2 has the damping ratio 1.0"));
+        assert!(refused(&[Mode { omega: 0.0, ..mode }]).contains("rad/s"));
+        assert!(refused(&[Mode { cavity: 0.0, ..mode }]).contains("node"));
+        assert!(refused(&[Mode { cavity: f64::NAN, ..mode }]).contains("finite"));
+        let of = |mass: [[f64; 2]; 2], stiffness: [[f64; 2]; 2], damping: [[f64; 2]; 2]| {
+            let rows = |matrix: [[f64; 2]; 2]| matrix.map(|row| row.to_vec()).to_vec();
+            let (mass, stiffness, damping) = (rows(mass), rows(stiffness), rows(damping));
+            let (cavity, drive) = (&[1.0, 0.0], &[0.0, 1.0]);
+            let matrices = Matrices {
+                mass: &mass,
+                damping: &damping,
+                stiffness: &stiffness,
+                cavity,
+                drive,
+            };
+            Host::from_matrices(Excitation::Force, &matrices)
+                .unwrap_err()
+                .to_string()
+        };
+        let (unit, zero) = ([[1.0, 0.0], [0.0, 1.0]], [[0.0; 2]; 2]);
+        assert!(of([[1.0, 0.1], [0.0, 1.0]], unit, zero).contains("entry (2, 1)"));
+        assert!(of(unit, [[1.0, 2.0], [2.0, 1.0]], zero).contains("eigenvalue -1.000000e0 N/m"));
+        assert!(of(unit, unit, [[0.1, 0.2], [0.2, 0.1]]).contains("C (damping matrix)"));
+        assert!(of([[1.0, 1.0], [1.0, 1.0]], unit, zero).contains("M (mass matrix)"));
+    }
+}
