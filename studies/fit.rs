@@ -78,8 +78,8 @@ fn fitted((points, scene, truth): &Points) -> Result<Found, Failure> {
         Quantity::ALL[..5].iter().map(over).collect::<Vec<f64>>()
     });
     println!(
-        "{truth:.4?}: {ratios:.1?} u, {errors:.1?} bounds, chi-square {:.1} of {}, of the rig {:.1}",
-        fit.chi_square, fit.degrees, bound.chi_square
+        "{truth:.4?}: {ratios:.1?} u, {errors:.1?} bounds, chi-square {:.1} of {}, of the rig {:.1}, left out {:?}",
+        fit.chi_square, fit.degrees, bound.chi_square, fit.left_out
     );
     Ok(match fit.is_rejected() {
         true => Found { counts: [0, 1, 0, 0, 0, 0], ..Found::default() },

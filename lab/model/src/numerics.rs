@@ -1,4 +1,4 @@
-//! Numerical methods that several modules share: roots and minima, statistics, least squares with uncertainties.
+//! Numerical methods that several modules share: roots and minima, statistics, linear and nonlinear least squares with uncertainties.
 
 use std::convert::Infallible;
 
@@ -217,6 +217,143 @@ pub fn slope(values: &[f64]) -> f64 {
     let spread = n * (n * n - 1.0) / 12.0;
     let moment = |(i, value): (usize, &f64)| (i as f64 - middle) * (value - mean);
     values.iter().enumerate().map(moment).sum::<f64>() / spread
+}
+
+/// Residuals over their standard uncertainties, whose sum of squares is to be minimised.
+pub trait Misfit<const N: usize> {
+    /// What an evaluation leaves for the next one nearby: where inner searches ended.
+    type Trace: Clone;
+
+    /// The residuals at `x`; `None` where the model does not exist.
+    fn residuals(&self, x: &SVector<f64, N>, near: &Self::Trace) -> Option<(Vec<f64>, Self::Trace)>;
+
+    /// Derivatives of the residuals by the unknowns. `at`: the trace of the residuals at `x`.
+    fn derivatives(&self, x: &SVector<f64, N>, at: &Self::Trace) -> Option<Vec<SVector<f64, N>>>;
+
+    /// Smallest and largest values of the unknowns.
+    fn limits(&self) -> [[f64; 2]; N] {
+        [[f64::NEG_INFINITY, f64::INFINITY]; N]
+    }
+}
+
+/// A least-squares fit of a nonlinear model.
+#[derive(Debug, Clone)]
+pub struct LeastSquares<const N: usize, T> {
+    /// The unknowns.
+    pub x: SVector<f64, N>,
+    /// Sum of the squares of the residuals.
+    pub chi_square: f64,
+    /// Residuals over their standard uncertainties, and their derivatives.
+    pub residuals: Vec<f64>,
+    /// Derivatives of the residuals by the unknowns.
+    pub derivatives: Vec<SVector<f64, N>>,
+    /// What the last evaluation left.
+    pub trace: T,
+}
+
+/// Largest number of steps of [`LeastSquares::minimum`]; a fit that converges takes about twenty.
+const STEPS: usize = 100;
+
+impl<const N: usize, T: Clone> LeastSquares<N, T>
+where
+    Const<N>: DimMin<Const<N>, Output = Const<N>>,
+{
+    /// The fit at `x`, without a search.
+    pub fn at(model: &impl Misfit<N, Trace = T>, x: SVector<f64, N>, near: &T) -> Option<Self> {
+        Self::of(model, x, model.residuals(&x, near)?)
+    }
+
+    fn of(model: &impl Misfit<N, Trace = T>, x: SVector<f64, N>, (residuals, trace): (Vec<f64>, T)) -> Option<Self> {
+        let derivatives = model.derivatives(&x, &trace)?;
+        let chi_square = squares(&residuals).filter(|sum| sum.is_finite())?;
+        Some(Self { x, chi_square, residuals, derivatives, trace })
+    }
+
+    /// The minimum near `x` by the method of Levenberg and Marquardt, within the limits. It is reached where a further step would reduce the sum
+    /// of squares by less than `tolerance`, relative to one and the sum.
+    pub fn minimum(model: &impl Misfit<N, Trace = T>, x: SVector<f64, N>, near: &T, tolerance: f64) -> Option<Self> {
+        let mut here = Self::at(model, x, near)?;
+        let limits = model.limits();
+        let mut damping = 1e-3;
+        for _ in 0..STEPS {
+            let least = tolerance * (1.0 + here.chi_square);
+            let (normal, gradient) = here.free(&limits);
+            // Where the matrix is singular some direction is free, and has no step.
+            if normal
+                .cholesky()
+                .is_some_and(|one| one.solve(&gradient).dot(&gradient) < least)
+            {
+                break;
+            }
+            let next = loop {
+                let mut damped = normal;
+                for i in 0..N {
+                    damped[(i, i)] *= 1.0 + damping;
+                }
+                let step = damped.cholesky()?.solve(&gradient);
+                let next = SVector::from_fn(|i, _| (here.x[i] - step[i]).clamp(limits[i][0], limits[i][1]));
+                let residuals = model.residuals(&next, &here.trace);
+                let better = residuals.filter(|(values, _)| squares(values).is_some_and(|sum| sum <= here.chi_square));
+                if let Some(better) = better {
+                    damping *= 0.1;
+                    break Self::of(model, next, better);
+                }
+                // A step that rounding hides.
+                if damping > 1e12 {
+                    break None;
+                }
+                damping *= 10.0;
+            };
+            let Some(next) = next else { break };
+            let gained = here.chi_square - next.chi_square;
+            here = next;
+            if gained.abs() < 1e-3 * least {
+                break;
+            }
+        }
+        Some(here)
+    }
+
+    /// Matrix and gradient of the normal equations. An unknown that its limit holds has the equation "no step".
+    fn free(&self, limits: &[[f64; 2]; N]) -> (SMatrix<f64, N, N>, SVector<f64, N>) {
+        let mut gradient: SVector<f64, N> = self
+            .residuals
+            .iter()
+            .zip(&self.derivatives)
+            .map(|(one, row)| row * *one)
+            .sum();
+        let mut normal = self.normal();
+        for i in 0..N {
+            let [low, high] = limits[i];
+            if self.x[i] <= low && gradient[i] > 0.0 || self.x[i] >= high && gradient[i] < 0.0 {
+                normal.row_mut(i).fill(0.0);
+                normal.column_mut(i).fill(0.0);
+                (normal[(i, i)], gradient[i]) = (1.0, 0.0);
+            }
+        }
+        (normal, gradient)
+    }
+
+    fn normal(&self) -> SMatrix<f64, N, N> {
+        let mut normal = SMatrix::<f64, N, N>::zeros();
+        for row in &self.derivatives {
+            normal.ger(1.0, row, row, 1.0);
+        }
+        normal
+    }
+
+    /// Covariance of the unknowns: NaN where the residuals do not determine them.
+    pub fn covariance(&self) -> SMatrix<f64, N, N> {
+        self.normal()
+            .cholesky()
+            .map_or(SMatrix::from_element(f64::NAN), |matrix| matrix.inverse())
+    }
+}
+
+/// Sum of the squares; `None` if it is not finite.
+fn squares(values: &[f64]) -> Option<f64> {
+    let sum: f64 = values.iter().map(|value| value * value).sum();
+    sum.is_finite().then_some(sum)
 }
 
 /// Basis functions at given phases: a polynomial, and harmonics whose amplitudes are polynomials in time.

@@ -18,13 +18,13 @@ use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
 use lovines::Cavity;
-use nalgebra::{DMatrix, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
-use vines_model::numerics::{Estimate, SIGNIFICANT};
+use vines_model::numerics::{Estimate, LeastSquares, Misfit, Regression, SIGNIFICANT, equally_spaced, mean, range};
 use vines_model::orbit::backbone_at_speed;
-use vines_model::theory::{BranchSide, SlowFlow};
+use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, SlowFlow};
 use vines_model::{ArgumentError, Definition};
 
 use crate::identification::ResonancePoint;
@@ -151,6 +151,14 @@ impl Display for Quantity {
     }
 }
 
+impl Known {
+    /// Its standard uncertainty, above rounding.
+    fn uncertainty(&self) -> f64 {
+        let Estimate { value, uncertainty } = self.estimate;
+        uncertainty.max(EXACT * value.abs()).max(f64::MIN_POSITIVE)
+    }
+}
+
 /// A quantity that is known from elsewhere; parse it from `m=0.032±0.0005`, or `r=0.65` for an exact value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Known {
@@ -195,10 +203,25 @@ type Covariance = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
 /// Step of a difference, relative or, of zeta and r, absolute: the curve is exact to 1e-13, and smooth.
 const STEP: f64 = 1e-6;
-/// Rounds of the minimisation; a fit that converges takes about twenty.
-const ROUNDS: usize = 200;
 /// Restitution coefficients from which the minimisation begins, besides the expected one: chi-square may have several minima.
-const STARTS: [f64; 4] = [0.4, 0.55, 0.7, 0.85];
+const STARTS: [f64; 4] = [0.3, 0.5, 0.7, 0.9];
+/// Number of half-widths that are tried at the start of a search.
+const WIDTHS: usize = 8;
+/// Relative error of first-order theory: of the drive, and of the detuning.
+const THEORY: f64 = 0.04;
+/// Gain of a further step, relative to one and chi-square, at which a minimum counts as found.
+const FOUND: f64 = 1e-9;
+/// Smallest and largest values of the unknowns.
+const LIMITS: [[f64; 2]; UNKNOWNS] = {
+    let mut limits = [[f64::NEG_INFINITY, f64::INFINITY]; UNKNOWNS];
+    limits[1] = [0.0, 1.0];
+    limits[2] = [1e-3, 1.0];
+    limits
+};
+/// Numbers of the largest or the smallest responses without which the fit is tried.
+const TRIMMED: [usize; 4] = [1, 2, 4, 8];
+/// Probability at which responses that belong to the motion are left out, for all numbers together.
+const FALSE_ALARM: f64 = 1e-3;
 /// Relative gain of the squared distance from the curve at which the nearest place on it counts as found.
 const NEAREST: f64 = 1e-12;
 /// Relative uncertainty of a value that is known exactly: above rounding.
@@ -338,6 +361,28 @@ impl ChannelTest {
     }
 }
 
+/// The test of each channel. `covariance`: that of the unknowns.
+fn channels<T: Clone>(
+    fit: &LeastSquares<UNKNOWNS, T>,
+    places: &[Nearest],
+    covariance: &Covariance,
+) -> [ChannelTest; 3] {
+    std::array::from_fn(|channel| {
+        // The covariance of the residuals is what remains of the unit matrix beside the directions that the fit can follow.
+        let row = |n: usize| fit.derivatives[3 * n + channel];
+        let remaining = DMatrix::from_fn(places.len(), places.len(), |n, m| {
+            let own = if n == m {
+                1.0 - places[n].along.normalize()[channel].powi(2)
+            } else {
+                0.0
+            };
+            own - (row(n).transpose() * covariance * row(m))[0]
+        });
+        let residuals = (0..places.len()).map(|n| fit.residuals[3 * n + channel]);
+        ChannelTest::new(residuals.map(|one| one * one).sum(), &remaining)
+    })
+}
+
 impl Fit {
     /// A quantity; `None` for a mass, a stiffness or a damping if none of them is known.
     #[must_use]
@@ -428,10 +473,11 @@ impl Fit {
     }
 }
 
-/// Fits the parameters to `points`. The minimisation begins at the rig `expected`, whose resonance the points show as `definition` says.
+/// Fits the parameters to `points`. The rig `expected` is where the search begins; the points show resonance as `definition` says.
 ///
-/// If the model is rejected, the points that contradict it most are left out one by one, at most a fifth of them. If the rest still
-/// contradicts the model, the fit is that of all points, and rejected.
+/// The largest or the smallest responses are left out where the rest fits significantly better without them: the 1:1 motion exists between two
+/// unknown amplitudes. Where the model is rejected all the same, the points that contradict it most are left out one by one instead. If more
+/// than a fifth of the points would have to be left out, the fit is that of all points, and rejected.
 ///
 /// # Errors
 /// Too few points, values that are not positive, points that no motion has, or that do not determine the parameters.
@@ -441,21 +487,23 @@ pub fn fit(
     expected: &Parameters,
     known: &[Known],
 ) -> Result<Fit, FitError> {
-    let all = Problem::new(checked(points)?, definition, known).fit(expected)?;
-    let (mut rest, mut fit) = ((0..points.len()).collect::<Vec<usize>>(), all.clone());
+    let problem = Problem::new(checked(points)?, definition, known);
+    let all = problem.fit(expected)?;
+    let numbers: Vec<usize> = (0..points.len()).collect();
+    let trimmed = problem.trimmed(numbers.clone(), all.clone(), expected);
+    let describes = Some(trimmed).filter(|(_, fit)| !fit.is_rejected());
+    let (mut kept, mut fit) = describes.unwrap_or_else(|| (numbers, all.clone()));
     while fit.is_rejected() {
-        if (points.len() - rest.len() + 1) * LEFT_OUT > points.len() {
-            return Ok(all);
-        }
         let size = |residual: &[f64; 3]| residual.iter().map(|part| part * part).sum::<f64>();
         let sizes: Vec<f64> = fit.residuals.iter().map(size).collect();
         let worst = (0..sizes.len()).max_by(|first, second| sizes[*first].total_cmp(&sizes[*second]));
-        let worst = worst.ok_or(FitError::NoMotion)?;
-        rest.remove(worst);
-        let points = rest.iter().map(|n| points[*n]).collect();
-        fit = Problem::new(points, definition, known).fit(expected)?;
+        kept.remove(worst.ok_or(FitError::NoMotion)?);
+        if !problem.may_keep(kept.len()) {
+            return Ok(all);
+        }
+        fit = problem.of(&kept).fit(expected)?;
     }
-    fit.left_out = (0..points.len()).filter(|n| !rest.contains(n)).collect();
+    fit.left_out = (0..points.len()).filter(|n| !kept.contains(n)).collect();
     Ok(fit)
 }
 
@@ -481,11 +529,10 @@ fn checked(points: &[MeasuredPoint]) -> Result<Vec<MeasuredPoint>, FitError> {
 #[must_use]
 pub fn at(points: &[MeasuredPoint], definition: Definition, plant: &Parameters, known: &[Known]) -> Option<Fit> {
     let problem = Problem::new(points.to_vec(), definition, known);
-    let x = unknowns(plant);
-    let sums = problem.sums(&x, &mut vec![None; points.len()])?;
+    let here = LeastSquares::at(&problem, unknowns(plant), &Vec::new())?;
     Some(Fit {
         degrees: 2 * points.len() + known.len(),
-        ..problem.found(x, sums)
+        ..problem.found(&here, &here.trace)
     })
 }
 
@@ -526,6 +573,7 @@ pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected:
 }
 
 /// What is minimised.
+#[derive(Clone)]
 struct Problem<'a> {
     points: Vec<MeasuredPoint>,
     definition: Definition,
@@ -535,49 +583,71 @@ struct Problem<'a> {
     free: bool,
 }
 
-/// Chi-square at some unknowns, with the gradient and the matrix of its quadratic approximation.
-#[derive(Default)]
-struct Sums {
-    chi_square: f64,
-    gradient: Unknowns,
-    normal: Covariance,
-    residuals: Vec<[f64; 3]>,
-    speeds: Vec<f64>,
-    /// Derivatives of each residual over the unknowns, and what is perpendicular to the curve.
-    rows: Vec<([Vector3<f64>; UNKNOWNS], Matrix3<f64>)>,
+/// Where the curve is nearest to a point: the particle speed, and the direction of the curve in the space of the residuals.
+#[derive(Debug, Clone, Copy)]
+struct Nearest {
+    speed: f64,
+    along: Vector3<f64>,
 }
 
-impl Sums {
-    /// The test of each channel. `covariance`: that of the unknowns.
-    fn channels(&self, covariance: &Covariance) -> [ChannelTest; 3] {
-        std::array::from_fn(|channel| {
-            // The covariance of the residuals is what remains of the unit matrix beside the directions that the fit can follow.
-            let row = |n: usize| Unknowns::from_fn(|i, _| self.rows[n].0[i][channel]);
-            let remaining = DMatrix::from_fn(self.rows.len(), self.rows.len(), |n, m| {
-                let own = if n == m {
-                    self.rows[n].1[(channel, channel)]
-                } else {
-                    0.0
-                };
-                own - (row(n).transpose() * covariance * row(m))[0]
-            });
-            let chi_square = self.residuals.iter().map(|residual| residual[channel].powi(2)).sum();
-            ChannelTest::new(chi_square, &remaining)
-        })
+/// A search for the place of the curve that is nearest to a point.
+struct Distance<'a> {
+    problem: &'a Problem<'a>,
+    x: &'a Unknowns,
+    point: usize,
+}
+
+impl Misfit<1> for Distance<'_> {
+    type Trace = ();
+
+    fn residuals(&self, speed: &SVector<f64, 1>, (): &()) -> Option<(Vec<f64>, ())> {
+        let residual = self.problem.residual(self.x, self.point, speed[0])?;
+        Some((residual.as_slice().to_vec(), ()))
     }
 
-    /// Adds a point: its residual, and the derivatives over the unknowns.
-    fn add(&mut self, rows: [Vector3<f64>; UNKNOWNS], residual: Vector3<f64>, perpendicular: Matrix3<f64>) {
-        for i in 0..UNKNOWNS {
-            self.gradient[i] += rows[i].dot(&residual);
-            for j in 0..UNKNOWNS {
-                self.normal[(i, j)] += rows[i].dot(&rows[j]);
-            }
-        }
-        self.chi_square += residual.norm_squared();
-        self.residuals.push(residual.into());
-        self.rows.push((rows, perpendicular));
+    fn derivatives(&self, speed: &SVector<f64, 1>, (): &()) -> Option<Vec<SVector<f64, 1>>> {
+        let slope = slope(|step| self.problem.residual(self.x, self.point, speed[0] + step))?;
+        Some(slope.iter().map(|one| SVector::from([*one])).collect())
     }
+}
+
+impl Misfit<UNKNOWNS> for Problem<'_> {
+    type Trace = Vec<Nearest>;
+
+    fn residuals(&self, x: &Unknowns, near: &Vec<Nearest>) -> Option<(Vec<f64>, Vec<Nearest>)> {
+        let (mut residuals, mut places) = (Vec::new(), Vec::new());
+        for n in 0..self.points.len() {
+            let (residual, place) = self.nearest(x, n, near.get(n).map(|one| one.speed))?;
+            residuals.extend(across(&place.along, &residual).iter());
+            places.push(place);
+        }
+        residuals.extend(self.known_residuals(x));
+        Some((residuals, places))
+    }
+
+    /// The speed follows the parameters: only what is perpendicular to the curve counts.
+    fn derivatives(&self, x: &Unknowns, at: &Vec<Nearest>) -> Option<Vec<Unknowns>> {
+        let mut rows = Vec::new();
+        for (n, Nearest { speed, along }) in at.iter().enumerate() {
+            let mut columns = [Vector3::zeros(); UNKNOWNS];
+            for (i, column) in columns[..5].iter_mut().enumerate() {
+                *column = across(along, &slope(|step| self.residual(&shifted(x, i, step), n, *speed))?);
+            }
+            rows.extend([0, 1, 2].map(|channel| Unknowns::from_fn(|i, _| columns[i][channel])));
+        }
+        rows.extend(self.known_rows(x));
+        Some(rows)
+    }
+
+    fn limits(&self) -> [[f64; 2]; UNKNOWNS] {
+        LIMITS
+    }
+}
+
+/// What is perpendicular to a direction.
+fn across(along: &Vector3<f64>, value: &Vector3<f64>) -> Vector3<f64> {
+    let along = along.normalize();
+    value - along * along.dot(value)
 }
 
 impl<'a> Problem<'a> {
@@ -586,14 +656,65 @@ impl<'a> Problem<'a> {
         Self { points, definition, known, has_scale, free: false }
     }
 
-    /// The smallest of the minima that are reached from the expected rig and from other restitution coefficients.
+    /// The problem of some of the points.
+    fn of(&self, kept: &[usize]) -> Self {
+        let points = kept.iter().map(|n| self.points[*n]).collect();
+        Self { points, ..self.clone() }
+    }
+
+    /// Whether so many points are enough, and those that are left out no more than a fifth.
+    fn may_keep(&self, count: usize) -> bool {
+        count >= FEWEST && (self.points.len() - count) * LEFT_OUT <= self.points.len()
+    }
+
+    /// The points that remain where the largest or smallest responses of `kept` belong to another motion, and their fit.
+    ///
+    /// Without the k largest or smallest, chi-square falls by a chi-square of 2 k degrees of freedom if all belong to one motion. The number
+    /// whose fall is the least probable is left out, until no fall is significant.
+    fn trimmed(&self, mut kept: Vec<usize>, mut fit: Fit, expected: &Parameters) -> (Vec<usize>, Fit) {
+        let order = self.by_falling_response();
+        loop {
+            let rest: Vec<usize> = order.iter().copied().filter(|n| kept.contains(n)).collect();
+            let tests = TRIMMED.iter().flat_map(|k| [(*k, 0), (0, *k)]);
+            let without = tests
+                .filter(|(high, low)| self.may_keep(rest.len().saturating_sub(high + low)))
+                .filter_map(|(high, low)| {
+                    let mut kept = rest[high..rest.len() - low].to_vec();
+                    kept.sort_unstable();
+                    let problem = self.of(&kept);
+                    let starts = [Some(fit.x), problem.start(&fit.plant(expected))];
+                    let next = problem.fit_from(starts.into_iter().flatten()).ok()?;
+                    let distribution = ChiSquared::new(2.0 * (high + low) as f64).ok()?;
+                    Some((distribution.sf(fit.chi_square - next.chi_square), kept, next))
+                });
+            match without.min_by(|first, second| first.0.total_cmp(&second.0)) {
+                Some((p, rest, next)) if p < FALSE_ALARM / (2 * TRIMMED.len()) as f64 => (kept, fit) = (rest, next),
+                _ => return (kept, fit),
+            }
+        }
+    }
+
+    /// The numbers of the points, from the largest response on.
+    fn by_falling_response(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.points.len()).collect();
+        let response = |n: usize| self.points[n].response.value;
+        order.sort_by(|first, second| response(*second).total_cmp(&response(*first)));
+        order
+    }
+
+    /// The smallest of the minima that are reached from several restitution coefficients.
     fn fit(&self, expected: &Parameters) -> Result<Fit, FitError> {
         let starts = [expected.restitution].into_iter().chain(STARTS);
-        let minima = starts.filter_map(|restitution| self.minimum(unknowns(&Parameters { restitution, ..*expected })));
-        let (x, sums) = minima
-            .min_by(|first, second| first.1.chi_square.total_cmp(&second.1.chi_square))
+        self.fit_from(starts.filter_map(|restitution| self.start(&Parameters { restitution, ..*expected })))
+    }
+
+    /// The smallest of the minima that are reached from these starts.
+    fn fit_from(&self, starts: impl Iterator<Item = Unknowns>) -> Result<Fit, FitError> {
+        let minima = starts.filter_map(|x| LeastSquares::minimum(self, x, &Vec::new(), FOUND));
+        let minimum = minima
+            .min_by(|first, second| first.chi_square.total_cmp(&second.chi_square))
             .ok_or(FitError::NoMotion)?;
-        let fit = self.found(x, sums);
+        let fit = self.found(&minimum, &minimum.trace);
         let is_determined = |estimate: Estimate| estimate.uncertainty.is_finite() && estimate.uncertainty > 0.0;
         let mut estimates = Quantity::ALL.iter().filter_map(|quantity| fit.estimate(*quantity));
         estimates
@@ -602,144 +723,104 @@ impl<'a> Problem<'a> {
             .ok_or(FitError::Undetermined)
     }
 
-    /// The fit with these unknowns.
-    fn found(&self, x: Unknowns, sums: Sums) -> Fit {
+    /// The start of a search at a restitution coefficient: by first-order theory, drive and frequency are linear in zeta, epsilon and f0 if the
+    /// half-width is known. Half-widths are tried from that at which the motion of the largest response loses its symmetry to that at which
+    /// the smallest response is at the fold.
+    fn start(&self, expected: &Parameters) -> Option<Unknowns> {
+        let r = expected.restitution;
+        let undamped = SlowFlow::new(0.0, r);
+        let manifold = undamped.manifold;
+        let (low, high) = range(
+            (f64::INFINITY, 0.0),
+            self.points.iter().map(|point| point.response.value),
+        );
+        let [from, to] = [
+            high / manifold.c(B_SYMMETRY_BREAKING),
+            low / manifold.c(manifold.b_min()),
+        ];
+        let omega = mean(self.points.iter().map(|point| point.omega.value));
+        let fits = equally_spaced(from.ln(), to.ln(), WIDTHS).filter_map(|width| {
+            let b = width.exp();
+            let (mut columns, mut values) = ([const { Vec::new() }; 3], Vec::new());
+            let mut add = |row: [f64; 3], value: f64, u: f64| {
+                columns
+                    .iter_mut()
+                    .zip(row)
+                    .for_each(|(column, one)| column.push(one / u));
+                values.push(value / u);
+            };
+            for MeasuredPoint { response, omega: at, drive } in &self.points {
+                let c = (response.value / b).max(manifold.c(manifold.b_min()));
+                let motion = undamped.backbone_at(manifold.b(c, BranchSide::Right)?);
+                let [u_omega, u_drive] = [expected.mass_ratio() * omega, drive.value].map(|one| THEORY * one);
+                add(
+                    [1.0, 0.0, omega * motion.sigma],
+                    at.value,
+                    at.uncertainty.hypot(u_omega),
+                );
+                add(
+                    [0.0, 2.0 * response.value, b * motion.g],
+                    drive.value,
+                    drive.uncertainty.hypot(u_drive),
+                );
+            }
+            let fit = Regression::fit(&columns, &values, None, 1.0)?;
+            let [omega0, zeta, epsilon] = [0, 1, 2].map(|n| fit.coefficient(n));
+            let at = [omega0, zeta, r, b, epsilon];
+            let is_physical = omega0 > 0.0 && zeta > 0.0 && epsilon > 0.0;
+            is_physical.then_some((fit.excess, at))
+        });
+        let (_, [omega0, zeta, r, b, epsilon]) = fits.min_by(|first, second| first.0.total_cmp(&second.0))?;
+        let mass = expected.primary_mass.ln();
+        Some(Unknowns::from([omega0.ln(), zeta, r, b.ln(), epsilon.ln(), mass, 0.0]))
+    }
+
+    /// The fit of a minimum.
+    fn found<T: Clone>(&self, minimum: &LeastSquares<UNKNOWNS, T>, places: &[Nearest]) -> Fit {
         let equations = 2 * self.points.len() + self.known.len();
-        let covariance = sums
-            .normal
-            .cholesky()
-            .map_or(Covariance::from_element(f64::NAN), |matrix| matrix.inverse());
+        let covariance = minimum.covariance();
         Fit {
-            x,
+            x: minimum.x,
             covariance,
-            channels: sums.channels(&covariance),
+            channels: channels(minimum, places, &covariance),
             has_scale: self.has_scale,
-            chi_square: sums.chi_square,
+            chi_square: minimum.chi_square,
             degrees: equations.saturating_sub(5 + usize::from(self.has_scale) + usize::from(self.free)),
-            residuals: sums.residuals,
+            residuals: minimum.residuals.as_chunks().0[..self.points.len()].to_vec(),
             left_out: Vec::new(),
-            speeds: sums.speeds,
+            speeds: places.iter().map(|place| place.speed).collect(),
         }
     }
 
-    /// The minimum that is reached from `x`.
-    fn minimum(&self, mut x: Unknowns) -> Option<(Unknowns, Sums)> {
-        let mut speeds = vec![None; self.points.len()];
-        let mut here = self.sums(&x, &mut speeds)?;
-        let mut damping = 1e-3;
-        for _ in 0..ROUNDS {
-            // What an undamped step would gain, and what rounding allows to be gained.
-            let least = 1e-9 * (1.0 + here.chi_square);
-            let undamped = here.normal.cholesky().map(|matrix| matrix.solve(&here.gradient));
-            if undamped.is_some_and(|step| step.dot(&here.gradient) < least) {
-                return Some((x, here));
-            }
-            let mut matrix = here.normal;
-            for i in 0..UNKNOWNS {
-                matrix[(i, i)] *= 1.0 + damping;
-            }
-            let step = matrix.cholesky()?.solve(&here.gradient);
-            let (next, mut next_speeds) = (x - step, speeds.clone());
-            match self
-                .sums(&next, &mut next_speeds)
-                .filter(|sums| sums.chi_square <= here.chi_square)
-            {
-                Some(sums) => {
-                    let gained = here.chi_square - sums.chi_square;
-                    (x, here, speeds) = (next, sums, next_speeds);
-                    if gained < 1e-3 * least {
-                        return Some((x, here));
-                    }
-                    damping *= 0.1;
-                }
-                // The smallest step that counts is far below a standard uncertainty.
-                None if damping > 1e12 => return Some((x, here)),
-                None => damping *= 10.0,
-            }
-        }
-        Some((x, here))
+    /// What is known from elsewhere. Unknowns on which nothing depends, the mass without a scale and the strength without an effect, keep their
+    /// values, with a standard uncertainty of 1.
+    fn known_residuals(&self, x: &Unknowns) -> Vec<f64> {
+        let of = |known: &Known| (known.quantity.of(x) - known.estimate.value) / known.uncertainty();
+        self.known.iter().map(of).chain([0.0; 2]).collect()
     }
 
-    /// `None` where the curve does not exist.
-    fn sums(&self, x: &Unknowns, speeds: &mut [Option<f64>]) -> Option<Sums> {
-        if !(0.0 < x[2] && x[2] <= 1.0) {
-            return None;
-        }
-        let mut sums = Sums::default();
-        for (n, speed) in speeds.iter_mut().enumerate() {
-            let (b, residual, by_speed) = self.nearest(x, n, *speed)?;
-            *speed = Some(b);
-            sums.speeds.push(b);
-            // The speed follows the parameters: only what is perpendicular to the curve counts.
-            let along = by_speed.normalize();
-            let mut rows = [Vector3::zeros(); UNKNOWNS];
-            for (i, row) in rows[..5].iter_mut().enumerate() {
-                let slope = slope(|step| self.residual(&shifted(x, i, step), n, b))?;
-                *row = slope - along * along.dot(&slope);
-            }
-            let perpendicular = Matrix3::identity() - along * along.transpose();
-            sums.add(rows, perpendicular * residual, perpendicular);
-        }
-        self.add_known(x, &mut sums);
-        sums.chi_square.is_finite().then_some(sums)
+    fn known_rows(&self, x: &Unknowns) -> Vec<Unknowns> {
+        let of = |known: &Known| known.quantity.gradient(x) / known.uncertainty();
+        let held = |i: usize, is_free: bool| Unknowns::ith(i, f64::from(u8::from(!is_free)));
+        let held = [held(5, self.has_scale), held(6, self.free)];
+        self.known.iter().map(of).chain(held).collect()
     }
 
-    /// Adds what is known from elsewhere, and what makes the matrix regular.
-    fn add_known(&self, x: &Unknowns, sums: &mut Sums) {
-        for known in self.known {
-            let Estimate { value, uncertainty } = known.estimate;
-            let u = uncertainty.max(EXACT * value.abs()).max(f64::MIN_POSITIVE);
-            let (residual, row) = ((known.quantity.of(x) - value) / u, known.quantity.gradient(x) / u);
-            sums.chi_square += residual * residual;
-            sums.gradient += row * residual;
-            sums.normal += row * row.transpose();
-        }
-        if !self.has_scale {
-            // Without a scale the primary mass has no influence.
-            sums.normal[(5, 5)] += 1.0;
-        }
-        if !self.free {
-            sums.normal[(6, 6)] += 1.0;
-        }
-    }
-
-    /// The speed at which the curve is nearest to a point, the residual there, and its derivative by the speed.
-    fn nearest(&self, x: &Unknowns, point: usize, start: Option<f64>) -> Option<(f64, Vector3<f64>, Vector3<f64>)> {
+    /// The residual where the curve is nearest to a point.
+    fn nearest(&self, x: &Unknowns, point: usize, start: Option<f64>) -> Option<(Vector3<f64>, Nearest)> {
         let (b, epsilon) = (x[3].exp(), x[4].exp());
         let manifold = SlowFlow::new(2.0 * x[1] / epsilon, x[2]).manifold;
         let by_theory = || {
             let c = self.points[point].response.value / b;
             manifold.b(c, BranchSide::Right).unwrap_or(1.02 * manifold.b_min())
         };
-        let mut speed = start.unwrap_or_else(by_theory);
-        let by = |speed: f64| slope(|step| self.residual(x, point, speed + step));
-        let mut residual = self.residual(x, point, speed)?;
-        let mut by_speed = by(speed)?;
-        for _ in 0..ROUNDS {
-            let mut step = -by_speed.dot(&residual) / by_speed.norm_squared();
-            // Where the curve does not change with the speed, or is not a number, no shorter step would end the search.
-            if !step.is_finite() {
-                break;
-            }
-            let next = loop {
-                let there = self.residual(x, point, speed + step);
-                match there.filter(|there| there.norm_squared() <= residual.norm_squared()) {
-                    Some(there) => break Some(there),
-                    None if step.abs() < 1e-13 => break None,
-                    None => step *= 0.25,
-                }
-            };
-            let Some(next) = next else { break };
-            // Far from the curve the steps become short, and chi-square does not need the last of them.
-            let gained = residual.norm_squared() - next.norm_squared();
-            let is_near = gained < NEAREST * (1.0 + residual.norm_squared());
-            (speed, residual) = (speed + step, next);
-            by_speed = by(speed)?;
-            if is_near || step.abs() < 1e-12 {
-                break;
-            }
-        }
-        Some((speed, residual, by_speed))
+        let start = SVector::from([start.unwrap_or_else(by_theory)]);
+        let found = LeastSquares::minimum(&Distance { problem: self, x, point }, start, &(), NEAREST)?;
+        let along = Vector3::from_fn(|i, _| found.derivatives[i][0]);
+        Some((
+            Vector3::from_column_slice(&found.residuals),
+            Nearest { speed: found.x[0], along },
+        ))
     }
 
     /// The curve of the ideal cavity at a speed less a point, over its standard uncertainties.

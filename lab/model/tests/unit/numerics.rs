@@ -83,3 +83,37 @@ fn a_known_noise_is_the_least_uncertainty_and_a_prior_narrows_it() {
     assert!((held.estimate(&[0.0, 1.0]).uncertainty - free / 2f64.sqrt()).abs() < 1e-9);
     assert_eq!(Regression::fit(&[vec![0.0; 3]], &[1.0; 3], None, 0.1), None);
 }
+
+/// The valley of Rosenbrock, whose minimum is at (1, 1).
+struct Valley([[f64; 2]; 2]);
+
+impl Misfit<2> for Valley {
+    type Trace = ();
+
+    fn residuals(&self, x: &SVector<f64, 2>, (): &()) -> Option<(Vec<f64>, ())> {
+        // There is no model where the first unknown is below -2.
+        (x[0] > -2.0).then_some((vec![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]], ()))
+    }
+
+    fn derivatives(&self, x: &SVector<f64, 2>, (): &()) -> Option<Vec<SVector<f64, 2>>> {
+        Some(vec![SVector::from([-20.0 * x[0], 10.0]), SVector::from([-1.0, 0.0])])
+    }
+
+    fn limits(&self) -> [[f64; 2]; 2] {
+        self.0
+    }
+}
+
+#[test]
+fn least_squares_follow_a_curved_valley_and_stay_within_the_limits() {
+    let free = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+    let found = LeastSquares::minimum(&Valley(free), SVector::from([-1.2, 1.0]), &(), 1e-12).unwrap();
+    assert!((found.x - SVector::from([1.0, 1.0])).norm() < 1e-6, "{}", found.x);
+    // The inverse of J^T J at (1, 1).
+    assert!((found.covariance() - SMatrix::from([[1.0, 2.0], [2.0, 4.01]])).norm() < 1e-4);
+    // With x at most 0.5 the minimum is on the limit: y = x².
+    let limited = [[f64::NEG_INFINITY, 0.5], free[1]];
+    let found = LeastSquares::minimum(&Valley(limited), SVector::from([-1.2, 1.0]), &(), 1e-12).unwrap();
+    assert!((found.x - SVector::from([0.5, 0.25])).norm() < 1e-6, "{}", found.x);
+    assert!(LeastSquares::minimum(&Valley(free), SVector::from([-3.0, 1.0]), &(), 1e-12).is_none());
+}

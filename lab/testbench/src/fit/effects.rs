@@ -2,7 +2,7 @@
 //!
 //! The points of a rig with an effect lie on a curve of the plant's own periodic motions ([`periodic_motion`]). For given parameters each point has a
 //! motion near it; the distance from the tangent of the curve there, and its derivatives over parameters and strength, are differences between motions
-//! on the line across the curve. Gauss and Newton's method finds the parameters, and moves every motion along its curve to the place nearest to the
+//! on the line across the curve. Every step of the search moves each motion along its curve to the place nearest to the
 //! point.
 //!
 //! Unequal gaps are no candidate: they shift the particle by the middle of the cavity and change nothing that the points contain. The fitted b is
@@ -13,14 +13,14 @@ use std::fmt::{self, Display, Formatter};
 
 use lovines::cavity::GRAVITY;
 use lovines::{Cavity, Restitution};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use vines_model::Definition;
-use vines_model::numerics::{Estimate, mean};
+use vines_model::numerics::{Estimate, LeastSquares, Misfit, mean};
 use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
 
 use super::{
-    FEWEST, Fit, FitError, Known, LEFT_OUT, MeasuredPoint, Problem, Quantity, Sums, UNKNOWNS, Unknowns, checked, fit,
-    gradient, plant, shifted,
+    FEWEST, Fit, FitError, Known, LEFT_OUT, LIMITS, MeasuredPoint, Nearest, Problem, Quantity, UNKNOWNS, Unknowns,
+    across, checked, fit, gradient, plant, shifted,
 };
 use crate::scene::Parameters;
 
@@ -58,9 +58,9 @@ const FARTHEST: f64 = 0.1;
 const NEAR: f64 = 1e-3;
 /// Shares of the points, those of the largest amplitudes, that are fitted one after the other.
 const STAGES: [f64; 3] = [0.5, 0.8, 1.0];
-/// What a further step would take from chi-square, at which the minimum counts as found.
-const FOUND: f64 = 0.02;
-/// Smallest share of a step.
+/// What a further step would take from chi-square, relative to one and chi-square, at which the minimum counts as found.
+const FOUND: f64 = 1e-4;
+/// Smallest strength, over that from which the search begins.
 const SMALLEST: f64 = 1e-3;
 /// Strength from which the search begins, over that which gives the particle the acceleration `b omega0²`: friction and tilt of this size are
 /// about 0.03 and 2 degrees on the default rig.
@@ -291,12 +291,8 @@ impl Problem<'_> {
             kept.sort_unstable();
             kept
         };
-        let of = |kept: &[usize]| {
-            let points = kept.iter().map(|n| self.points[*n]).collect();
-            Problem::new(points, self.definition, self.known)
-        };
         let starts: &[f64] = if effect.adds_a_parameter() { &[1.0, 5.0] } else { &[1.0] };
-        let ideal = of(&largest(STAGES[0])).fit(expected).ok()?;
+        let ideal = self.of(&largest(STAGES[0])).fit(expected).ok()?;
         let found = starts.iter().filter_map(|factor| {
             let mut x = ideal.x;
             let typical = factor * TYPICAL * x[3].exp() * x[0].exp().powi(2) / GRAVITY;
@@ -308,7 +304,7 @@ impl Problem<'_> {
             let mut best: Option<Candidate> = None;
             for share in STAGES {
                 let kept = largest(share);
-                let Some(mut next) = of(&kept).with_effect_from(effect, x, &ideal) else {
+                let Some(mut next) = self.of(&kept).with_effect_from(effect, x, &ideal) else {
                     break;
                 };
                 if next.fit.is_rejected() && best.as_ref().is_some_and(|best| !best.fit.is_rejected()) {
@@ -331,56 +327,25 @@ impl Problem<'_> {
         best
     }
 
-    /// The numbers of the points, from the largest response on.
-    fn by_falling_response(&self) -> Vec<usize> {
-        let mut order: Vec<usize> = (0..self.points.len()).collect();
-        let response = |n: usize| self.points[n].response.value;
-        order.sort_by(|first, second| response(*second).total_cmp(&response(*first)));
-        order
-    }
-
-    /// The fit with an effect, from the unknowns `x`: Gauss and Newton's method, in steps that reduce chi-square.
-    fn with_effect_from(&self, effect: Effect, mut x: Unknowns, ideal: &Fit) -> Option<Candidate> {
+    /// The fit with an effect, from the unknowns `x`.
+    fn with_effect_from(&self, effect: Effect, x: Unknowns, ideal: &Fit) -> Option<Candidate> {
         // The particle turns from -B to B: its speed relative to the wall before the impact is 2 B (1 + epsilon)/(1 + r).
         let particle = mean(ideal.speeds.iter().copied()) * Quantity::B.of(&ideal.x) * ideal.x[0].exp();
         let speed = 2.0 * particle * (1.0 + ideal.x[4].exp()) / (1.0 + ideal.x[2]);
-        let free = effect.adds_a_parameter();
-        let problem = Problem { points: self.points.clone(), free, ..*self };
-        let curve = PlantCurve { problem: &problem, effect, speed };
-        let mut places = curve.along(&x)?;
-        for _ in 0..ROUNDS {
-            let (sums, rows) = curve.sums(&x, &places)?;
-            let step = sums.normal.cholesky()?.solve(&sums.gradient);
-            let gain = step.dot(&sums.gradient);
-            if gain < FOUND {
-                let fit = problem.found(x, sums);
-                let value = |x: &Unknowns| effect.strength_of(&effect.cavity(x[6], x[2], speed));
-                let gradient = gradient(&x, value);
-                let variance = (gradient.transpose() * fit.covariance * gradient)[0];
-                let strength = Estimate { value: value(&x), uncertainty: variance.max(0.0).sqrt() };
-                return Some(Candidate { effect, strength, fit, speed });
-            }
-            let shares =
-                std::iter::successors(Some(1.0), |share| Some(0.4 * share)).take_while(|share| *share > SMALLEST);
-            (x, places) = shares.into_iter().find_map(|share| {
-                let mut next = x - step * share;
-                // Neither friction nor the square of a tilt is negative.
-                next[6] = next[6].max(0.1 * x[6]);
-                let moved: Option<Vec<Place>> = places
-                    .iter()
-                    .enumerate()
-                    .map(|(n, place)| {
-                        let change: Vector3<f64> = (0..UNKNOWNS).map(|i| rows[n][i] * (next - x)[i]).sum();
-                        let expected = place.residual + change;
-                        let ahead = -place.along.dot(&expected) / place.along.norm_squared();
-                        curve.place(&next, n, &place.motion, place.tangent, ahead.clamp(-FARTHEST, FARTHEST))
-                    })
-                    .collect();
-                let moved = moved?;
-                (curve.chi_square(&next, &moved) <= sums.chi_square).then_some((next, moved))
-            })?;
-        }
-        None
+        let problem = Problem { free: effect.adds_a_parameter(), ..self.clone() };
+        let curve = PlantCurve { problem: &problem, effect, speed, smallest: SMALLEST * x[6] };
+        let minimum = LeastSquares::minimum(&curve, x, &curve.along(&x)?, FOUND)?;
+        let places: Vec<Nearest> = minimum
+            .trace
+            .iter()
+            .map(|one| Nearest { speed, along: one.along })
+            .collect();
+        let fit = problem.found(&minimum, &places);
+        let value = |x: &Unknowns| effect.strength_of(&effect.cavity(x[6], x[2], speed));
+        let gradient = gradient(&fit.x, value);
+        let variance = (gradient.transpose() * fit.covariance * gradient)[0];
+        let strength = Estimate { value: value(&fit.x), uncertainty: variance.max(0.0).sqrt() };
+        Some(Candidate { effect, strength, fit, speed })
     }
 }
 
@@ -389,9 +354,12 @@ struct PlantCurve<'a> {
     problem: &'a Problem<'a>,
     effect: Effect,
     speed: f64,
+    /// Smallest strength.
+    smallest: f64,
 }
 
 /// A motion on the curve.
+#[derive(Clone)]
 struct Place {
     motion: PlantMotion,
     /// Direction of the curve: change of the response over b and of the frequency over epsilon omega0, a unit vector.
@@ -399,14 +367,6 @@ struct Place {
     /// The motion less the point, over its standard uncertainties, and the derivative along the curve.
     residual: Vector3<f64>,
     along: Vector3<f64>,
-}
-
-impl Place {
-    /// What is perpendicular to the curve.
-    fn across(&self, value: &Vector3<f64>) -> Vector3<f64> {
-        let along = self.along.normalize();
-        value - along * along.dot(value)
-    }
 }
 
 impl PlantCurve<'_> {
@@ -478,40 +438,51 @@ impl PlantCurve<'_> {
         places.sort_by_key(|(n, _)| *n);
         Some(places.into_iter().map(|(_, place)| place).collect())
     }
+}
 
-    fn chi_square(&self, x: &Unknowns, places: &[Place]) -> f64 {
-        let mut sums = Sums::default();
-        self.problem.add_known(x, &mut sums);
-        sums.chi_square
-            + places
-                .iter()
-                .map(|place| place.across(&place.residual).norm_squared())
-                .sum::<f64>()
+impl Misfit<UNKNOWNS> for PlantCurve<'_> {
+    type Trace = Vec<Place>;
+
+    /// Each motion moves along its curve to the place nearest to the point.
+    fn residuals(&self, x: &Unknowns, near: &Vec<Place>) -> Option<(Vec<f64>, Vec<Place>)> {
+        let moved = near.iter().enumerate().map(|(n, place)| {
+            let here = self.place(x, n, &place.motion, place.tangent, 0.0)?;
+            let ahead = -here.along.dot(&here.residual) / here.along.norm_squared();
+            if ahead.abs() < NEAR {
+                return Some(here);
+            }
+            self.place(x, n, &here.motion, here.tangent, ahead.clamp(-FARTHEST, FARTHEST))
+        });
+        let places: Vec<Place> = moved.collect::<Option<_>>()?;
+        let residuals = places
+            .iter()
+            .flat_map(|one| <[f64; 3]>::from(across(&one.along, &one.residual)));
+        Some((residuals.chain(self.problem.known_residuals(x)).collect(), places))
     }
 
-    /// Chi-square with its derivatives, and the derivatives of the residuals.
-    fn sums(&self, x: &Unknowns, places: &[Place]) -> Option<(Sums, Vec<[Vector3<f64>; UNKNOWNS]>)> {
-        let (mut sums, mut all) = (Sums::default(), Vec::new());
-        for (n, place) in places.iter().enumerate() {
-            let mut rows = [Vector3::zeros(); UNKNOWNS];
+    fn derivatives(&self, x: &Unknowns, at: &Vec<Place>) -> Option<Vec<Unknowns>> {
+        let mut rows = Vec::new();
+        for (n, place) in at.iter().enumerate() {
+            let mut columns = [Vector3::zeros(); UNKNOWNS];
             for i in (0..UNKNOWNS).filter(|i| *i != 5 && (self.problem.free || *i != 6)) {
                 let step = if i == 6 { STEP * x[6] } else { STEP };
                 let at = |step: f64| {
                     let motion = self.motion(&shifted(x, i, step), &place.motion, place.tangent, 0.0)?;
                     Some((self.residual(n, &motion) - place.residual) / step)
                 };
-                rows[i] = at(step).or_else(|| at(-step))?;
+                columns[i] = across(&place.along, &at(step).or_else(|| at(-step))?);
             }
-            let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| place.across(&axis));
-            sums.add(
-                rows.map(|row| place.across(&row)),
-                place.across(&place.residual),
-                Matrix3::from_columns(&axes),
-            );
-            all.push(rows);
+            rows.extend([0, 1, 2].map(|channel| Unknowns::from_fn(|i, _| columns[i][channel])));
         }
-        self.problem.add_known(x, &mut sums);
-        Some((sums, all))
+        rows.extend(self.problem.known_rows(x));
+        Some(rows)
+    }
+
+    /// Neither friction nor the square of a tilt is negative.
+    fn limits(&self) -> [[f64; 2]; UNKNOWNS] {
+        let mut limits = LIMITS;
+        limits[6][0] = self.smallest;
+        limits
     }
 }
 
