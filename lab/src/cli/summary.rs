@@ -6,7 +6,7 @@ use vines::fit::{Contradiction, FittedParameter};
 use vines::identification::{DecayEnd, Friction, Regime, ResonancePoint};
 use vines::orbit::Orbit;
 use vines::regime_map::Map;
-use vines::scene::{Definition, Dimensionless, Measurand, Scene};
+use vines::scene::{Definition, Dimensionless, Scene};
 use vines::table::{Table, row, with_uncertainty};
 
 /// The dimensionless numbers of a scene, in one line.
@@ -163,11 +163,6 @@ pub(super) fn identification(result: &Comparison) -> String {
     }
     if result.exact.is_none() && result.theory.is_none() {
         note("theory and exact orbits are for phase resonance, -90 degrees; there is none to compare with");
-    }
-    if result.parameters.definition.sensor_quantity == Measurand::Acceleration && lock.averaged < 200 {
-        note(
-            "the impacts leave a ripple on an acceleration: hold 200 periods, record.hold_periods, for 1e-3 in sigma and C",
-        );
     }
     if let Some(tone) = lock.tone {
         note(&format!(
