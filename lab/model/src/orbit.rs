@@ -13,6 +13,7 @@ pub(crate) mod oscillator;
 mod periodic;
 mod plant;
 mod response;
+mod structure;
 mod symmetric;
 
 use crate::Dimensionless;
@@ -21,13 +22,18 @@ use serde::Serialize;
 pub use continuation::{Branch, BranchBifurcation, BranchEnd, ContinuationLimits, continue_both_ways};
 pub use convergence::{Convergence, Difference, convergence};
 pub use impact_map::Bounce;
+pub use oscillator::Section;
 pub use periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, settle};
 pub(crate) use periodic::{NEAR, periodic_near};
 pub use plant::{
     DriveCondition, NoMotion, PlantMotion, periodic_motion, resonant_motion, resonant_motion_under, settled_motion,
 };
 pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, backbone, bifurcation_curves, response};
-pub use symmetric::{backbone_at_speed, exact_backbone, phase_resonant, stable_resonant, symmetric_orbits};
+pub use structure::{
+    FirstOrder, ModeFacts, StabilityChange, StructureBranch, StructureOrbit, StructureOrbits, StructureRange,
+    StructureStart,
+};
+pub use symmetric::{Particle, backbone_at_speed, exact_backbone, phase_resonant, stable_resonant, symmetric_orbits};
 
 /// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -18,6 +18,8 @@ const EXACT: f64 = 1e-8;
 
 /// The map of half a period, and its multipliers.
 pub(super) struct HalfPeriod {
+    /// The sections and, last, the particle.
+    parts: Vec<Part>,
     /// Derivative of the state (x, x') of every section and of the particle.
     map: DMatrix<f64>,
 }
@@ -45,7 +47,7 @@ impl HalfPeriod {
             .collect::<Option<_>>()?;
         let (elapsed, wall) = contact(&parts, particle, motion)?;
         let is_half_a_period = wall < 0.0 && (elapsed - PI).abs() < EXACT;
-        is_half_a_period.then(|| Self { map: map(&parts, motion) })
+        is_half_a_period.then(|| Self { map: map(&parts, motion), parts })
     }
 
     /// The multipliers of the half period, by rising modulus.
@@ -53,6 +55,30 @@ impl HalfPeriod {
         let mut multipliers: Vec<Complex<f64>> = self.map.complex_eigenvalues().iter().copied().collect();
         multipliers.sort_unstable_by(|first, second| first.norm().total_cmp(&second.norm()));
         multipliers
+    }
+
+    /// The part of (x, x') of every section after the impact that the impulses make.
+    pub(super) fn impulsive(&self) -> impl Iterator<Item = [f64; 2]> {
+        self.parts.iter().map(|part| part.after.into())
+    }
+
+    /// Shares of every section and, last, of the particle in the energy of the disturbance with a multiplier. `omega` is the frequency of a
+    /// section without a natural one.
+    pub(super) fn shares(&self, multiplier: Complex<f64>, omega: f64) -> Option<Vec<f64>> {
+        let scales = self.parts.iter().flat_map(|part| part.section.energy_scales(omega));
+        let scales: Vec<f64> = scales.collect();
+        let shifted = DMatrix::from_fn(scales.len(), scales.len(), |row, column| {
+            let entry = Complex::from(self.map[(row, column)] * scales[row] / scales[column]);
+            if row == column { entry - multiplier } else { entry }
+        });
+        // The eigenvector is the direction that the map less the multiplier takes to zero.
+        let svd = shifted.svd(false, true);
+        let vector = svd.v_t?.row(svd.singular_values.imin()).clone_owned();
+        let energies = vector
+            .as_slice()
+            .chunks(2)
+            .map(|pair| pair[0].norm_sqr() + pair[1].norm_sqr());
+        Some(energies.collect())
     }
 }
 

@@ -49,6 +49,29 @@ impl Section {
         Vector2::new(weighed(self.cavity, state), weighed(self.cavity, self.rate(state)))
     }
 
+    /// Velocity of the cavity per impulse.
+    pub(super) fn mobility(&self) -> f64 {
+        self.at_cavity(self.kick.into())[1]
+    }
+
+    /// Factors of (x, x') whose squares sum up to twice the energy, up to a factor that all sections have in common: those of a
+    /// mass-normalised mode are omega0 and 1. Without a natural frequency, the displacement counts as at the frequency `omega`.
+    pub(super) fn energy_scales(&self, omega: f64) -> [f64; 2] {
+        let omega0 = if self.omega0_squared > 0.0 {
+            self.omega0_squared.sqrt()
+        } else {
+            omega
+        };
+        let ([a, b], [x, dx]) = (self.cavity, self.kick);
+        let (seen, kicked) = (a.hypot(omega0 * b), dx.hypot(omega0 * x));
+        let scale = if seen > 0.0 && kicked > 0.0 {
+            (seen / kicked).sqrt()
+        } else {
+            1.0
+        };
+        [scale * omega0, scale]
+    }
+
     /// (x, x') after one of the unit impulses of alternating sign that the propagator `flow` separates: minus the state after the one before.
     #[inline(always)]
     pub(super) fn alternating(&self, flow: &Matrix2<f64>) -> Option<Vector2<f64>> {

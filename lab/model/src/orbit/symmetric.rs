@@ -91,7 +91,7 @@ impl SymmetricMotions {
             let kick = Vector2::from(section.kick);
             let p_before = section.alternating(&section.propagator(PI / omega))? - kick;
             before += section.at_cavity(p_before);
-            mobility += section.at_cavity(kick)[1];
+            mobility += section.mobility();
 
             let force = section.drive_force(omega);
             let stiffness = section.stiffness(omega);
@@ -167,6 +167,11 @@ impl SymmetricMotions {
     /// The smallest drive under which there is a motion: the discriminant of the quadratic is zero.
     fn least_drive(&self) -> f64 {
         self.drive_over_y.norm() * self.beta.abs() / self.alpha.hypot(self.beta) * self.particle.half_width
+    }
+
+    /// (alpha, beta): what the host and the particle contribute to the conditions of impact.
+    pub(super) fn impact_conditions(&self) -> Vector2<f64> {
+        Vector2::new(self.alpha, self.beta)
     }
 
     /// First harmonic Y at the particle speed `speed`.

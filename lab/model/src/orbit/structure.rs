@@ -1,0 +1,526 @@
+//! Exact symmetric 1:1 orbits of a structure with several modes, in SI units: under a given drive, at phase resonance, and along the backbone.
+//!
+//! The closed form is the one of the study's oscillator, with sums over the sections. Motions of other patterns are searched on one
+//! oscillator only.
+//!
+//! At one frequency, phase resonance or the drive leave two speeds. Over an interval of frequencies both form a loop, which is closed where
+//! the two are equal: a turning point in frequency. An angle along the loop passes it without a step that would have to adapt.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use nalgebra::Complex;
+use serde::Serialize;
+
+use super::Bifurcation;
+use super::half_period::HalfPeriod;
+use super::oscillator::{Section, at_frequency};
+use super::periodic::wrapped;
+use super::symmetric::{Particle, Reading, SymmetricMotion, SymmetricMotions, search};
+use crate::numerics::{bisection, equally_spaced, try_bisection};
+use crate::{Definition, Dimensionless, Reference, Sensor};
+
+/// An exact symmetric 1:1 orbit of a structure.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StructureOrbit {
+    /// Angular frequency, rad/s.
+    pub omega: f64,
+    /// Amplitude of the drive: m for a base, N for a force.
+    pub drive: f64,
+    /// Amplitude of the first harmonic of the response, m.
+    pub response: f64,
+    /// Phase of this harmonic relative to the drive, rad.
+    pub phase: f64,
+    /// Speed of the particle, m/s.
+    pub speed: f64,
+    /// Relative velocity before an impact, m/s.
+    pub impact_velocity: f64,
+    /// Where the orbit can be started.
+    pub start: StructureStart,
+    /// Multipliers (real, imaginary) of the half-period map by rising modulus: two of every section, and two of the particle.
+    pub multipliers: Vec<[f64; 2]>,
+    /// All of them are inside the unit circle.
+    pub stable: bool,
+}
+
+/// The state just after an impact on the wall w = +b, where the drive is `sin(omega t + phase)` times its amplitude with t counted from that
+/// impact. Half a period later the state is minus this one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StructureStart {
+    /// Phase of the drive, rad, in (-pi, pi].
+    pub phase: f64,
+    /// (x, x') of every section.
+    pub sections: Vec<[f64; 2]>,
+    /// Displacement of the particle, m.
+    pub q2: f64,
+    /// Velocity of the particle, m/s.
+    pub dq2: f64,
+}
+
+impl StructureOrbit {
+    /// Modulus of the largest multiplier of half a period.
+    pub fn growth(&self) -> f64 {
+        self.multipliers.last().map_or(f64::NAN, |[re, im]| re.hypot(*im))
+    }
+
+    /// Number of multipliers on or outside the unit circle.
+    fn unstable(&self) -> usize {
+        let outside = |[re, im]: &&[f64; 2]| re.hypot(*im) >= 1.0;
+        self.multipliers.iter().filter(outside).count()
+    }
+}
+
+/// A curve of symmetric 1:1 orbits of a structure, in order.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StructureBranch {
+    /// Its orbits.
+    pub orbits: Vec<StructureOrbit>,
+    /// Where multipliers leave or enter the unit circle, in order.
+    pub changes: Vec<StabilityChange>,
+    /// It leads back to its first orbit.
+    pub closed: bool,
+}
+
+/// An orbit with a multiplier on the unit circle.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StabilityChange {
+    /// What happens.
+    pub kind: Bifurcation,
+    /// The orbit there.
+    pub orbit: StructureOrbit,
+    /// What each section and, last, the particle contribute to the disturbance that neither grows nor decays there: shares of its energy.
+    pub shares: Vec<f64>,
+}
+
+/// Where curves are followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StructureRange {
+    /// Angular frequencies, rad/s.
+    pub omega: [f64; 2],
+    /// Largest speed of the particle, m/s.
+    pub speed: f64,
+    /// Number of orbits over each interval of frequencies in which there are orbits.
+    pub points: usize,
+}
+
+/// A mode beside the driven one, and what it does to the orbits.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ModeFacts {
+    /// Natural frequency, rad/s.
+    pub omega0: f64,
+    /// Damping ratio.
+    pub zeta: f64,
+    /// Mass ratio `epsilon = m phi²`: mass of the particle over the modal mass at the cavity.
+    pub mass_ratio: f64,
+    /// Natural frequency over the driven mode's.
+    pub ratio: f64,
+    /// The harmonic of the driven mode, 3, 5 or 7, that is nearest to this mode, and the distance over the driven mode's frequency.
+    pub harmonic: (u32, f64),
+    /// What this mode adds to the conditions of impact, alpha and beta, over what they are with the driven mode alone, at the driven mode's
+    /// frequency. Far below 1, the mode leaves the orbits where they are; its effect on their stability is another question.
+    pub influence: f64,
+}
+
+/// First-order theory of one mode of a structure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FirstOrder {
+    /// The dimensionless numbers of the mode alone, without a drive; its response is the displacement of the cavity.
+    pub numbers: Dimensionless,
+    /// Amplitude of the base, m, that drives the oscillator of these numbers as a unit drive does the mode; for a force but for the base's
+    /// damper, which is of second order.
+    pub base_per_drive: f64,
+    /// Amplitude of the response over the amplitude of the cavity.
+    pub response_per_cavity: f64,
+}
+
+/// The symmetric 1:1 orbits of a structure with a particle in a cavity.
+///
+/// By default the response is the displacement of the cavity, and lags the drive by a quarter of a period at resonance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StructureOrbits {
+    sections: Vec<Section>,
+    particle: Particle,
+    response: Option<Vec<[f64; 2]>>,
+    target: f64,
+}
+
+/// Number of frequencies at which orbits are searched over a range.
+const GRID: usize = 4000;
+/// Widths, in the angle along a loop, to which a change of stability and the end of a branch are located.
+const LOCATED: f64 = 1e-11;
+/// Amplitude of the harmonic part of the cavity's motion over b that is rounding: the orbit needs no drive.
+const UNDRIVEN: f64 = 1e-12;
+
+impl StructureOrbits {
+    /// The orbits of a host that consists of `sections`.
+    pub fn new(sections: &[Section], particle: Particle) -> Self {
+        Self {
+            sections: sections.to_vec(),
+            particle,
+            response: None,
+            target: -FRAC_PI_2,
+        }
+    }
+
+    /// With the displacement of another point as the response: the sum of `a x + b x'` with the pair (a, b) of every section.
+    pub fn with_response(mut self, point: &[[f64; 2]]) -> Self {
+        self.response = Some(point.to_vec());
+        self
+    }
+
+    /// With another phase, rad, of the response (a displacement) relative to the drive at resonance.
+    pub fn with_target(mut self, phase: f64) -> Self {
+        self.target = phase;
+        self
+    }
+
+    /// The orbits of a host that has only the sections for which `keep` is true of their number.
+    pub fn with_sections(&self, keep: impl Fn(usize) -> bool) -> Self {
+        fn kept<T: Copy>(all: &[T], keep: &impl Fn(usize) -> bool) -> Vec<T> {
+            let numbered = all.iter().enumerate();
+            numbered.filter(|(n, _)| keep(*n)).map(|(_, one)| *one).collect()
+        }
+        Self {
+            sections: kept(&self.sections, &keep),
+            response: self.response.as_ref().map(|rows| kept(rows, &keep)),
+            ..*self
+        }
+    }
+
+    /// All orbits at the frequency `omega`, rad/s, under a drive of the amplitude `drive`, at any phase: none or up to two.
+    pub fn at(&self, omega: f64, drive: f64) -> Vec<StructureOrbit> {
+        self.both(omega, |motions| motions.driven(drive), |motion| self.accept(motion))
+    }
+
+    /// All orbits at phase resonance at the frequency `omega`, rad/s, under any drive: none or up to two.
+    pub fn at_phase_resonance(&self, omega: f64) -> Vec<StructureOrbit> {
+        let roots = SymmetricMotions::phase_resonant;
+        self.both(omega, roots, |motion| self.accept_resonant(motion))
+    }
+
+    /// All orbits at phase resonance under a drive of the amplitude `drive` with frequencies in a range, rad/s, by rising response.
+    pub fn resonant(&self, drive: f64, [low, high]: [f64; 2]) -> Vec<StructureOrbit> {
+        let grid: Vec<f64> = equally_spaced(low, high, GRID).collect();
+        let found = search(&grid, drive, |omega| self.motions(omega));
+        let mut orbits: Vec<_> = found.iter().filter_map(|motion| self.accept_resonant(motion)).collect();
+        orbits.sort_unstable_by(|first, second| first.response.total_cmp(&second.response));
+        let same = |first: f64, second: f64| (first - second).abs() < 1e-9 * first.abs();
+        orbits.dedup_by(|first, second| same(first.omega, second.omega) && same(first.speed, second.speed));
+        orbits
+    }
+
+    /// The exact backbone: the orbits at phase resonance within `range`, as curves.
+    pub fn backbone(&self, range: &StructureRange) -> Vec<StructureBranch> {
+        let roots = SymmetricMotions::phase_resonant;
+        self.branches(range, roots, |motion| self.accept_resonant(motion))
+    }
+
+    /// The frequency response of the symmetric 1:1 motions under a drive of the amplitude `drive` within `range`, as curves.
+    pub fn frequency_response(&self, drive: f64, range: &StructureRange) -> Vec<StructureBranch> {
+        self.branches(range, |motions| motions.driven(drive), |motion| self.accept(motion))
+    }
+
+    /// What each section and, last, the particle contribute to the disturbance of an orbit that grows fastest or decays slowest: shares
+    /// of its energy.
+    ///
+    /// The disturbance is an eigenvector of the half-period map. The displacement of a section without a natural frequency, as the
+    /// particle is, counts as at the frequency of the orbit.
+    pub fn shares(&self, orbit: &StructureOrbit) -> Option<Vec<f64>> {
+        self.shares_of(orbit, *orbit.multipliers.last()?)
+    }
+
+    /// First-order theory of the section `n` alone; `None` unless it oscillates and the cavity and the drive reach it.
+    pub fn first_order(&self, n: usize) -> Option<FirstOrder> {
+        let section = self.sections.get(n)?;
+        let Particle { mass, half_width, restitution } = self.particle;
+        let omega0 = section.omega0_squared.sqrt();
+        let epsilon = mass * section.mobility();
+        let at_cavity = at_frequency(section.cavity, omega0).norm();
+        let base_per_drive = at_cavity * section.drive[0].abs() / section.omega0_squared;
+        if !(section.delta < omega0 && epsilon > 0.0 && base_per_drive > 0.0) {
+            return None;
+        }
+        let reference = if section.drive[1] == 0.0 {
+            Reference::Force
+        } else {
+            Reference::Base
+        };
+        let row = self.response.as_ref().map_or(section.cavity, |rows| rows[n]);
+        Some(FirstOrder {
+            numbers: Dimensionless {
+                omega0,
+                b: half_width,
+                definition: Definition { reference, sensor: Sensor::Q1, ..Definition::default() },
+                ..Dimensionless::new(epsilon, 2.0 * section.delta / (epsilon * omega0), restitution, 0.0)
+            },
+            base_per_drive,
+            response_per_cavity: at_frequency(row, omega0).norm() / at_cavity,
+        })
+    }
+
+    /// The modes, in the order of the sections, beside the section `driven`.
+    pub fn modes(&self, driven: usize) -> Option<Vec<ModeFacts>> {
+        let omega = self.sections.get(driven)?.omega0_squared.sqrt();
+        let conditions =
+            |keep: &dyn Fn(usize) -> bool| Some(self.with_sections(keep).motions(omega)?.impact_conditions());
+        let alone = conditions(&|n| n == driven)?;
+        let facts = |(n, section): (usize, &Section)| {
+            let omega0 = section.omega0_squared.sqrt();
+            let ratio = omega0 / omega;
+            let distance = |order: &u32| (ratio - f64::from(*order)).abs();
+            let nearest = [3, 5, 7]
+                .into_iter()
+                .min_by(|one, other| distance(one).total_cmp(&distance(other)));
+            let order = nearest.unwrap_or(3);
+            let influence = if n == driven {
+                1.0
+            } else {
+                let with = conditions(&|other| other == n || other == driven)?;
+                (with - alone).norm() / alone.norm()
+            };
+            Some(ModeFacts {
+                omega0,
+                zeta: section.delta / omega0,
+                mass_ratio: self.particle.mass * section.mobility(),
+                ratio,
+                harmonic: (order, distance(&order)),
+                influence,
+            })
+        };
+        self.sections.iter().enumerate().map(facts).collect()
+    }
+
+    fn motions(&self, omega: f64) -> Option<SymmetricMotions> {
+        let reading = Reading {
+            sections: self.response.as_deref(),
+            particle: 0.0,
+            reference: Complex::from_polar(1.0, self.target + FRAC_PI_2),
+        };
+        SymmetricMotions::new(&self.sections, self.particle, &reading, omega)
+    }
+
+    /// Both orbits of a quadratic at one frequency.
+    fn both(
+        &self,
+        omega: f64,
+        roots: impl Fn(&SymmetricMotions) -> Option<[f64; 2]>,
+        accept: impl Fn(&SymmetricMotion) -> Option<StructureOrbit>,
+    ) -> Vec<StructureOrbit> {
+        let motions = self.motions(omega);
+        let both = motions.and_then(|motions| Some(roots(&motions)?.map(|speed| motions.at(speed))));
+        both.iter().flatten().filter_map(accept).collect()
+    }
+
+    /// The orbit with its stability, if the phase of its response has the sign that is wanted.
+    fn accept_resonant(&self, motion: &SymmetricMotion) -> Option<StructureOrbit> {
+        if motion.cavity.norm() < UNDRIVEN * self.particle.half_width {
+            // Without a drive, its phase is free.
+            let turned = wrapped(motion.drive.arg() + motion.phase + FRAC_PI_2);
+            let mut orbit = self.accept(motion)?;
+            orbit.phase = self.target;
+            orbit.start.phase = turned;
+            return Some(orbit);
+        }
+        let resonant = motion.phase.sin() < -1e-12;
+        resonant.then(|| self.accept(motion)).flatten()
+    }
+
+    /// The orbit with its stability, if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
+    fn accept(&self, motion: &SymmetricMotion) -> Option<StructureOrbit> {
+        let sizes = [motion.speed, motion.response.norm(), motion.drive.norm()];
+        if sizes.iter().any(|size| !size.is_finite()) || motion.speed <= 0.0 || sizes[1] == 0.0 {
+            return None;
+        }
+        let half = HalfPeriod::new(&self.sections, &self.particle, motion)?;
+        let multipliers = half.multipliers();
+        let harmonic = |section: &Section| {
+            if sizes[2] == 0.0 {
+                return Complex::ZERO;
+            }
+            motion.drive * section.drive_force(motion.omega) * section.compliance(motion.omega)
+        };
+        let state = |(section, impulsive): (&Section, [f64; 2])| {
+            let harmonic = harmonic(section);
+            [harmonic.im + impulsive[0], motion.omega * harmonic.re + impulsive[1]]
+        };
+        let [q1, _] = motion.after;
+        Some(StructureOrbit {
+            omega: motion.omega,
+            drive: sizes[2],
+            response: sizes[1],
+            phase: wrapped(motion.phase + self.target + FRAC_PI_2),
+            speed: motion.speed,
+            impact_velocity: motion.impact_velocity,
+            start: StructureStart {
+                phase: motion.drive.arg(),
+                sections: self.sections.iter().zip(half.impulsive()).map(state).collect(),
+                q2: q1 - self.particle.half_width,
+                dq2: motion.speed,
+            },
+            stable: multipliers.iter().all(|multiplier| multiplier.norm() < 1.0),
+            multipliers: multipliers
+                .iter()
+                .map(|multiplier| [multiplier.re, multiplier.im])
+                .collect(),
+        })
+    }
+
+    fn shares_of(&self, orbit: &StructureOrbit, [re, im]: [f64; 2]) -> Option<Vec<f64>> {
+        let motion = self.motions(orbit.omega)?.at(orbit.speed);
+        HalfPeriod::new(&self.sections, &self.particle, &motion)?.shares(Complex::new(re, im), orbit.omega)
+    }
+
+    /// The curves of the two roots over frequency that are orbits.
+    fn branches(
+        &self,
+        range: &StructureRange,
+        roots: impl Fn(&SymmetricMotions) -> Option<[f64; 2]>,
+        accept: impl Fn(&SymmetricMotion) -> Option<StructureOrbit>,
+    ) -> Vec<StructureBranch> {
+        let both = |omega: f64| {
+            let motions = self.motions(omega)?;
+            Some(roots(&motions)?.map(|speed| motions.at(speed)))
+        };
+        let mut branches = Vec::new();
+        for Interval { omega: [low, high], turns } in intervals(range.omega, |omega| both(omega).is_some()) {
+            // Angles 0 to pi lead up along the first root, and pi to 2 pi back along the second one.
+            let at = |angle: f64| {
+                let omega = 0.5 * (low + high) - 0.5 * (high - low) * angle.cos();
+                let second = usize::from(angle.rem_euclid(TAU) >= PI);
+                let motion = &both(omega.clamp(low, high))?[second];
+                accept(motion).filter(|orbit| orbit.speed <= range.speed)
+            };
+            let arcs = match turns {
+                [true, true] => vec![[0.0, TAU]],
+                [false, true] => vec![[0.0, TAU]],
+                [true, false] => vec![[PI, 3.0 * PI]],
+                [false, false] => vec![[0.0, PI], [PI, TAU]],
+            };
+            for arc in arcs {
+                branches.extend(self.pieces(arc, turns == [true; 2], range.points, &at));
+            }
+        }
+        branches
+    }
+
+    /// The pieces of an arc that consist of orbits.
+    fn pieces(
+        &self,
+        [from, to]: [f64; 2],
+        is_loop: bool,
+        points: usize,
+        at: &impl Fn(f64) -> Option<StructureOrbit>,
+    ) -> Vec<StructureBranch> {
+        let count = (points as f64 * (to - from) / PI).ceil().max(2.0);
+        let step = (to - from) / count;
+        let angle = |n: usize| from + (n as f64 + 0.5) * step;
+        let mut samples: Vec<(f64, Option<StructureOrbit>)> =
+            (0..count as usize).map(|n| (angle(n), at(angle(n)))).collect();
+        // A loop begins where it is interrupted, or ends where it begins.
+        let closed = is_loop && samples.iter().all(|(_, orbit)| orbit.is_some());
+        if is_loop {
+            let gap = samples.iter().position(|(_, orbit)| orbit.is_none()).unwrap_or(0);
+            for sample in &mut samples[..gap] {
+                sample.0 += TAU;
+            }
+            samples.rotate_left(gap);
+            samples.push((samples[0].0 + TAU, samples[0].1.clone()));
+        }
+        let mut branches: Vec<StructureBranch> = Vec::new();
+        let mut before: Option<&(f64, Option<StructureOrbit>)> = None;
+        for sample in &samples {
+            let last = before.map(|(angle, orbit)| (*angle, orbit.as_ref()));
+            match (last, &sample.1) {
+                (Some((start, Some(orbit))), Some(next)) => {
+                    if let Some(branch) = branches.last_mut() {
+                        branch.changes.extend(self.change(at, [start, sample.0], [orbit, next]));
+                        branch.orbits.push(next.clone());
+                    }
+                }
+                (last, Some(next)) => {
+                    let first = last.and_then(|(start, _)| end(at, sample.0, start));
+                    let orbits = first.into_iter().chain([next.clone()]).collect();
+                    branches.push(StructureBranch { orbits, changes: Vec::new(), closed });
+                }
+                (Some((start, Some(_))), None) => {
+                    if let Some(branch) = branches.last_mut() {
+                        branch.orbits.extend(end(at, start, sample.0));
+                    }
+                }
+                _ => {}
+            }
+            before = Some(sample);
+        }
+        branches
+    }
+
+    /// Where the number of multipliers outside the unit circle changes between two neighbours.
+    fn change(
+        &self,
+        at: &impl Fn(f64) -> Option<StructureOrbit>,
+        [from, to]: [f64; 2],
+        [first, second]: [&StructureOrbit; 2],
+    ) -> Option<StabilityChange> {
+        let outside = first.unstable();
+        if outside == second.unstable() {
+            return None;
+        }
+        let like_first = |angle: f64| at(angle).map(|orbit| orbit.unstable() == outside).ok_or(());
+        let (_, beyond) = try_bisection(from, to, LOCATED, like_first).ok()?;
+        let orbit = at(beyond)?;
+        let from_circle = |[re, im]: &[f64; 2]| (re.hypot(*im) - 1.0).abs();
+        let nearest = orbit
+            .multipliers
+            .iter()
+            .min_by(|one, other| from_circle(one).total_cmp(&from_circle(other)));
+        let multiplier = *nearest?;
+        let kind = match multiplier {
+            [_, im] if im != 0.0 => Bifurcation::NeimarkSacker,
+            [re, _] if re > 0.0 => Bifurcation::Fold,
+            _ => Bifurcation::SymmetryBreaking,
+        };
+        let shares = self.shares_of(&orbit, multiplier)?;
+        Some(StabilityChange { kind, orbit, shares })
+    }
+}
+
+/// The last orbit from `from`, where there is one, towards `to`, where there is none.
+fn end(at: &impl Fn(f64) -> Option<StructureOrbit>, from: f64, to: f64) -> Option<StructureOrbit> {
+    let is_orbit = |angle: f64| Ok::<_, ()>(at(angle).is_some());
+    let (last, _) = try_bisection(from, to, LOCATED, is_orbit).ok()?;
+    (last != from).then(|| at(last)).flatten()
+}
+
+/// An interval of frequencies in which a quadratic has roots, and whether both are equal at its ends.
+struct Interval {
+    omega: [f64; 2],
+    turns: [bool; 2],
+}
+
+/// The intervals of a range in which `exists` is true.
+fn intervals([low, high]: [f64; 2], exists: impl Fn(f64) -> bool) -> Vec<Interval> {
+    let mut found: Vec<Interval> = Vec::new();
+    let mut last: Option<(f64, bool)> = None;
+    for omega in equally_spaced(low, high, GRID) {
+        let now = exists(omega);
+        match last {
+            Some((before, false)) if now => {
+                let (_, first) = bisection(before, omega, &exists);
+                found.push(Interval { omega: [first, omega], turns: [true, false] });
+            }
+            None if now => found.push(Interval { omega: [omega; 2], turns: [false; 2] }),
+            _ => {}
+        }
+        if let Some(interval) = found.last_mut() {
+            match last {
+                Some((before, true)) if !now => {
+                    interval.omega[1] = bisection(before, omega, &exists).0;
+                    interval.turns[1] = true;
+                }
+                _ if now => interval.omega[1] = omega,
+                _ => {}
+            }
+        }
+        last = Some((omega, now));
+    }
+    found
+}

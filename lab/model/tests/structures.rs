@@ -1,0 +1,255 @@
+//! Guards the exact orbits of structures: against figures of an independent computation, against the study's oscillator, and along their curves.
+
+use std::f64::consts::FRAC_PI_2;
+
+use vines_model::{
+    Dimensionless,
+    orbit::{
+        Bifurcation, FirstOrder, Orbit, Particle, Section, StructureOrbit, StructureOrbits, StructureRange,
+        exact_backbone, phase_resonant, symmetric_orbits,
+    },
+};
+
+/// The default scene: mass, stiffness and damping of its oscillator, and the particle.
+const RIG: [f64; 3] = [3.807, 11.68e3, 2.53];
+const PARTICLE: Particle = Particle { mass: 0.032, half_width: 0.01, restitution: 0.65 };
+
+fn omega0() -> f64 {
+    (RIG[1] / RIG[0]).sqrt()
+}
+
+/// The mass-normalised shape of one mode that is the oscillator.
+fn shape() -> f64 {
+    1.0 / RIG[0].sqrt()
+}
+
+/// A mode at `ratio` times the oscillator's frequency with `damping` times its damping ratio, driven by a force.
+fn mode(ratio: f64, damping: f64, [cavity, drive]: [f64; 2]) -> Section {
+    let omega = ratio * omega0();
+    Section {
+        delta: damping * ratio * RIG[2] / (2.0 * RIG[0]),
+        omega0_squared: omega * omega,
+        drive: [drive, 0.0],
+        kick: [0.0, cavity],
+        cavity: [cavity, 0.0],
+    }
+}
+
+/// The same mode on a base with this participation.
+fn on_base(mode: Section, participation: f64) -> Section {
+    Section {
+        drive: [participation * mode.omega0_squared, 2.0 * participation * mode.delta],
+        ..mode
+    }
+}
+
+/// The oscillator, and a second mode with the opposite sign at the cavity; the response is read where the force acts.
+fn two_modes(ratio: f64, damping: f64) -> StructureOrbits {
+    let phi = shape();
+    let second = mode(ratio, damping, [-phi, phi]);
+    StructureOrbits::new(&[mode(1.0, 1.0, [phi; 2]), second], PARTICLE).with_response(&[[phi, 0.0]; 2])
+}
+
+fn one_mode() -> StructureOrbits {
+    StructureOrbits::new(&[mode(1.0, 1.0, [shape(); 2])], PARTICLE)
+}
+
+/// The orbit at phase resonance with the faster particle: the right branch.
+fn right(orbits: &StructureOrbits, omega: f64) -> StructureOrbit {
+    let found = orbits.at_phase_resonance(omega * omega0()).into_iter();
+    found
+        .max_by(|one, other| one.speed.total_cmp(&other.speed))
+        .expect("an orbit")
+}
+
+/// B, C, the force and the modulus of the largest multiplier.
+fn figures(orbit: &StructureOrbit) -> [f64; 4] {
+    let b = PARTICLE.half_width;
+    [
+        orbit.speed / (b * omega0()),
+        orbit.response / b,
+        orbit.drive,
+        orbit.growth(),
+    ]
+}
+
+#[test]
+fn orbits_of_one_and_two_modes_have_the_figures_of_an_independent_computation() {
+    let expected = [
+        (one_mode(), 0.990, [0.8564, 0.4058, 1.0463, 0.9876]),
+        (two_modes(6.27, 1.0), 0.990, [0.8526, 0.4014, 1.0473, 1.1338]),
+        (one_mode(), 0.994, [1.3345, 1.1489, 2.0149, 2.0619]),
+        (two_modes(2.97, 1.0), 0.994, [0.9356, 0.6568, 1.6199, 0.9784]),
+    ];
+    for (orbits, omega, figures_there) in expected {
+        let found = figures(&right(&orbits, omega));
+        let off = (0..4).map(|n| (found[n] - figures_there[n]).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-4, "{found:?} {figures_there:?}");
+    }
+}
+
+#[test]
+fn a_second_mode_takes_the_stability_and_its_damping_gives_some_of_it_back() {
+    let unstable = two_modes(6.27, 1.0);
+    let orbit = right(&unstable, 0.990);
+    let shares = unstable.shares(&orbit).unwrap();
+    assert!(
+        shares[1] > 0.9,
+        "the second mode carries the growing disturbance: {shares:?}"
+    );
+    let [re, im] = orbit.multipliers.last().unwrap();
+    assert!(*re < 0.0 && im.abs() > 0.1, "{re} {im}");
+
+    let damped = two_modes(6.27, 3.0);
+    assert!(right(&damped, 0.990).stable);
+    let growth = right(&damped, 0.9915).growth();
+    assert!((growth - 1.02).abs() < 0.005, "{growth}");
+    let [influences @ .., _] = [6.27, 2.97, 1.0].map(|ratio| two_modes(ratio, 1.0).modes(0).unwrap()[1].influence);
+    assert!(influences[0] < 0.002 && influences[1] > 0.04, "{influences:?}");
+}
+
+/// Largest difference of an orbit of a structure from one of the oscillator, over the units of the latter.
+fn apart(found: &StructureOrbit, scene: &Dimensionless, orbit: &Orbit, base_per_drive: f64) -> f64 {
+    let b = scene.b;
+    let mass_normalised = 1.0 / shape();
+    let start = &found.start;
+    let pairs = [
+        (found.omega / scene.omega0, orbit.omega),
+        (scene.excitation(base_per_drive * found.drive), orbit.g),
+        (found.response / b, orbit.c),
+        (found.phase, orbit.gamma),
+        (scene.speed(found.speed), orbit.b),
+        (scene.speed(found.impact_velocity), orbit.impact_velocity),
+        (start.sections[0][0] / (mass_normalised * b), orbit.start.q1),
+        (scene.speed(start.sections[0][1] / mass_normalised), orbit.start.dq1),
+        (start.q2 / b, orbit.start.q2),
+        (scene.speed(start.dq2), orbit.start.dq2),
+    ];
+    let moduli = found
+        .multipliers
+        .iter()
+        .map(|[re, im]| re.hypot(*im))
+        .zip(orbit.multipliers);
+    let off = |(one, other): (f64, f64)| (one - other).abs();
+    // Two multipliers that nearly meet have half of the digits.
+    let multipliers = moduli.map(off).fold(0.0, f64::max) * 1e-4;
+    pairs.into_iter().map(off).fold(multipliers, f64::max)
+}
+
+#[test]
+fn a_structure_of_one_mode_has_the_orbits_of_the_oscillator() {
+    let mode = mode(1.0, 1.0, [shape(); 2]);
+    let damping = RIG[2] / (RIG[0] * omega0());
+    let mut worst = 0_f64;
+    let mut compare = |found: Vec<StructureOrbit>, expected: Vec<Orbit>, scene: &Dimensionless, per_drive: f64| {
+        assert_eq!(found.len(), expected.len());
+        for (one, other) in found.iter().zip(&expected) {
+            assert_eq!(one.stable, other.stable);
+            worst = worst.max(apart(one, scene, other, per_drive));
+        }
+        found.len()
+    };
+    for (section, is_force) in [(mode, true), (on_base(mode, 1.0 / shape()), false)] {
+        let orbits = StructureOrbits::new(&[section], PARTICLE);
+        let FirstOrder { mut numbers, base_per_drive, .. } = orbits.first_order(0).unwrap();
+        assert!((numbers.epsilon - 0.032 / 3.807).abs() < 1e-15 && (numbers.b - 0.01).abs() < 1e-15);
+        // The base of the oscillator exerts its force through spring and damper.
+        let per_drive = |omega: f64| {
+            if is_force {
+                base_per_drive / 1_f64.hypot(damping * omega)
+            } else {
+                base_per_drive
+            }
+        };
+        let mut count = 0;
+        for n in 0..400 {
+            let omega = 0.97 + 1e-4 * f64::from(n);
+            let (found, expected) = (
+                orbits.at_phase_resonance(omega * omega0()),
+                exact_backbone(&numbers, omega),
+            );
+            count += compare(found, expected, &numbers, per_drive(omega));
+        }
+        assert!(count > 200, "{count}");
+        if !is_force {
+            numbers.g = 1.1;
+            let drive = numbers.amplitude(numbers.g) / base_per_drive;
+            for n in 0..100 {
+                let sigma = -3.0 + 0.04 * f64::from(n);
+                let found = orbits.at(numbers.omega(sigma), drive);
+                compare(found, symmetric_orbits(&numbers, sigma), &numbers, base_per_drive);
+            }
+            let found = orbits.resonant(drive, [0.97, 1.01].map(|omega| omega * omega0()));
+            let all = phase_resonant(&numbers).into_iter();
+            let near = all.filter(|orbit| (0.97..1.01).contains(&orbit.omega)).collect();
+            assert!(compare(found, near, &numbers, base_per_drive) > 1);
+        }
+    }
+    assert!(worst < 1e-10, "{worst:e}");
+}
+
+#[test]
+fn a_backbone_is_smooth_at_phase_resonance_and_changes_its_stability_where_a_multiplier_is_on_the_circle() {
+    let range = StructureRange {
+        omega: [0.98 * omega0(), 1.0 * omega0()],
+        speed: 1.5 * PARTICLE.half_width * omega0(),
+        points: 200,
+    };
+    let mut kinds = Vec::new();
+    for orbits in [
+        one_mode(),
+        two_modes(6.27, 3.0),
+        two_modes(6.27, 1.0),
+        two_modes(2.97, 1.0),
+    ] {
+        let branches = orbits.backbone(&range);
+        assert!(!branches.is_empty());
+        for branch in &branches {
+            for pair in branch.orbits.windows(2) {
+                let [from, to] = [&pair[0], &pair[1]];
+                assert!((from.phase + FRAC_PI_2).abs() < 1e-9, "{}", from.phase);
+                let step = (from.speed - to.speed).abs() / (PARTICLE.half_width * omega0());
+                assert!(step < 0.1, "{step}");
+            }
+            for change in &branch.changes {
+                let distance = |[re, im]: &[f64; 2]| (re.hypot(*im) - 1.0).abs();
+                let nearest = change.orbit.multipliers.iter().map(distance).fold(f64::MAX, f64::min);
+                assert!(nearest < 1e-6, "{:?} {nearest:e}", change.kind);
+                kinds.push(change.kind);
+            }
+        }
+    }
+    for kind in [Bifurcation::SymmetryBreaking, Bifurcation::NeimarkSacker] {
+        assert!(kinds.contains(&kind), "{kinds:?}");
+    }
+}
+
+#[test]
+fn a_frequency_response_has_the_orbits_of_each_frequency_and_its_folds_are_its_turning_points() {
+    let orbits = two_modes(6.27, 3.0);
+    let range = StructureRange {
+        omega: [0.97 * omega0(), 1.0 * omega0()],
+        speed: 3.0 * PARTICLE.half_width * omega0(),
+        points: 100,
+    };
+    let drive = 1.2;
+    let branches = orbits.frequency_response(drive, &range);
+    let mut folds = 0;
+    for branch in &branches {
+        for orbit in &branch.orbits {
+            let there = orbits.at(orbit.omega, drive);
+            let same = there.iter().any(|other| (other.speed / orbit.speed - 1.0).abs() < 1e-6);
+            assert!(
+                same && (orbit.drive / drive - 1.0).abs() < 1e-9,
+                "{}",
+                orbit.omega / omega0()
+            );
+        }
+        for change in branch.changes.iter().filter(|change| change.kind == Bifurcation::Fold) {
+            let [one, other] = [-1.0, 1.0].map(|side| orbits.at(change.orbit.omega * (1.0 + side * 1e-7), drive).len());
+            assert_eq!(one.abs_diff(other), 2, "one side has two orbits more");
+            folds += 1;
+        }
+    }
+    assert!(folds > 0);
+}
