@@ -52,6 +52,9 @@ struct LoViNes {
     longest: Cell<f64>,
     /// What was set, and the parameters of the rig: those set last that did not contradict each other.
     values: Values,
+    /// Whether what was set is known not to contradict itself.
+    #[serde(skip)]
+    valid: bool,
     parameters: Parameters,
     start: State,
 }
@@ -108,6 +111,7 @@ impl Component for LoViNes {
             longest: unknown(),
             parameters,
             values: Values::from(&parameters),
+            valid: false,
             start,
         }
     }
@@ -256,6 +260,7 @@ impl Component for LoViNes {
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
         archive.whole(self)?;
+        self.valid = self.values.parameters().validate().is_ok();
         self.reach = Reach::of(&self.parameters);
         Ok(())
     }

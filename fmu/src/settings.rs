@@ -78,15 +78,21 @@ impl LoViNes {
         self.outputs = Outputs::default();
         self.longest = unknown();
         let parameters = self.values.parameters();
-        if self.progress == Progress::None || parameters.validate().is_ok() {
+        self.valid = parameters.validate().is_ok();
+        if self.progress == Progress::None || self.valid {
             self.take_over(parameters)?;
         }
         Ok(())
     }
 
     /// Refuses parameters that contradict each other.
+    #[inline]
     pub(super) fn check_settings(&self) -> Result<(), InvalidValue> {
-        self.values.parameters().validate()
+        if self.valid {
+            Ok(())
+        } else {
+            self.values.parameters().validate()
+        }
     }
 
     /// Passes changed parameters to the rig.
