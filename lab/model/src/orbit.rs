@@ -22,7 +22,6 @@ use serde::Serialize;
 pub use continuation::{Branch, BranchBifurcation, BranchEnd, ContinuationLimits, continue_both_ways};
 pub use convergence::{Convergence, Difference, convergence};
 pub use impact_map::Bounce;
-pub use oscillator::Section;
 pub use periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, settle};
 pub(crate) use periodic::{NEAR, periodic_near};
 pub use plant::{

@@ -2,11 +2,12 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use lovines::{Excitation, Host, Mode};
 use vines_model::{
     Dimensionless,
     orbit::{
-        Bifurcation, FirstOrder, Orbit, Particle, Section, StructureOrbit, StructureOrbits, StructureRange,
-        exact_backbone, phase_resonant, symmetric_orbits,
+        Bifurcation, FirstOrder, Orbit, Particle, StructureOrbit, StructureOrbits, StructureRange, exact_backbone,
+        phase_resonant, symmetric_orbits,
     },
 };
 
@@ -23,35 +24,23 @@ fn shape() -> f64 {
     1.0 / RIG[0].sqrt()
 }
 
-/// A mode at `ratio` times the oscillator's frequency with `damping` times its damping ratio, driven by a force.
-fn mode(ratio: f64, damping: f64, [cavity, drive]: [f64; 2]) -> Section {
-    let omega = ratio * omega0();
-    Section {
-        delta: damping * ratio * RIG[2] / (2.0 * RIG[0]),
-        omega0_squared: omega * omega,
-        drive: [drive, 0.0],
-        kick: [0.0, cavity],
-        cavity: [cavity, 0.0],
-    }
-}
-
-/// The same mode on a base with this participation.
-fn on_base(mode: Section, participation: f64) -> Section {
-    Section {
-        drive: [participation * mode.omega0_squared, 2.0 * participation * mode.delta],
-        ..mode
-    }
+/// A mode at `ratio` times the oscillator's frequency with `damping` times its damping ratio.
+fn mode(ratio: f64, damping: f64, [cavity, drive]: [f64; 2]) -> Mode {
+    let zeta = damping * RIG[2] / (2.0 * RIG[0] * omega0());
+    Mode { omega: ratio * omega0(), zeta, cavity, drive }
 }
 
 /// The oscillator, and a second mode with the opposite sign at the cavity; the response is read where the force acts.
 fn two_modes(ratio: f64, damping: f64) -> StructureOrbits {
     let phi = shape();
-    let second = mode(ratio, damping, [-phi, phi]);
-    StructureOrbits::new(&[mode(1.0, 1.0, [phi; 2]), second], PARTICLE).with_response(&[[phi, 0.0]; 2])
+    let modes = [mode(1.0, 1.0, [phi; 2]), mode(ratio, damping, [-phi, phi])];
+    let host = Host::from_modes(Excitation::Force, &modes).unwrap();
+    StructureOrbits::new(&host, PARTICLE).with_response(&host.row(&[phi; 2]).unwrap())
 }
 
 fn one_mode() -> StructureOrbits {
-    StructureOrbits::new(&[mode(1.0, 1.0, [shape(); 2])], PARTICLE)
+    let host = Host::from_modes(Excitation::Force, &[mode(1.0, 1.0, [shape(); 2])]).unwrap();
+    StructureOrbits::new(&host, PARTICLE)
 }
 
 /// The orbit at phase resonance with the faster particle: the right branch.
@@ -109,10 +98,12 @@ fn a_second_mode_takes_the_stability_and_its_damping_gives_some_of_it_back() {
 }
 
 /// Largest difference of an orbit of a structure from one of the oscillator, over the units of the latter.
-fn apart(found: &StructureOrbit, scene: &Dimensionless, orbit: &Orbit, base_per_drive: f64) -> f64 {
+fn apart(found: &StructureOrbit, scene: &Dimensionless, orbit: &Orbit, base_per_drive: f64, d: f64) -> f64 {
     let b = scene.b;
     let mass_normalised = 1.0 / shape();
     let start = &found.start;
+    let [x, v] = start.sections[0];
+    let velocity = v + d * found.drive * start.phase.sin();
     let pairs = [
         (found.omega / scene.omega0, orbit.omega),
         (scene.excitation(base_per_drive * found.drive), orbit.g),
@@ -120,8 +111,8 @@ fn apart(found: &StructureOrbit, scene: &Dimensionless, orbit: &Orbit, base_per_
         (found.phase, orbit.gamma),
         (scene.speed(found.speed), orbit.b),
         (scene.speed(found.impact_velocity), orbit.impact_velocity),
-        (start.sections[0][0] / (mass_normalised * b), orbit.start.q1),
-        (scene.speed(start.sections[0][1] / mass_normalised), orbit.start.dq1),
+        (x / (mass_normalised * b), orbit.start.q1),
+        (scene.speed(velocity / mass_normalised), orbit.start.dq1),
         (start.q2 / b, orbit.start.q2),
         (scene.speed(start.dq2), orbit.start.dq2),
     ];
@@ -138,28 +129,28 @@ fn apart(found: &StructureOrbit, scene: &Dimensionless, orbit: &Orbit, base_per_
 
 #[test]
 fn a_structure_of_one_mode_has_the_orbits_of_the_oscillator() {
-    let mode = mode(1.0, 1.0, [shape(); 2]);
     let damping = RIG[2] / (RIG[0] * omega0());
     let mut worst = 0_f64;
-    let mut compare = |found: Vec<StructureOrbit>, expected: Vec<Orbit>, scene: &Dimensionless, per_drive: f64| {
-        assert_eq!(found.len(), expected.len());
-        for (one, other) in found.iter().zip(&expected) {
-            assert_eq!(one.stable, other.stable);
-            worst = worst.max(apart(one, scene, other, per_drive));
-        }
-        found.len()
-    };
-    for (section, is_force) in [(mode, true), (on_base(mode, 1.0 / shape()), false)] {
-        let orbits = StructureOrbits::new(&[section], PARTICLE);
+    let mut compare =
+        |found: Vec<StructureOrbit>, expected: Vec<Orbit>, scene: &Dimensionless, [per_drive, d]: [f64; 2]| {
+            assert_eq!(found.len(), expected.len());
+            for (one, other) in found.iter().zip(&expected) {
+                assert_eq!(one.stable, other.stable);
+                worst = worst.max(apart(one, scene, other, per_drive, d));
+            }
+            found.len()
+        };
+    for (excitation, drive) in [(Excitation::Force, shape()), (Excitation::Base, 1.0 / shape())] {
+        let host = Host::from_modes(excitation, &[mode(1.0, 1.0, [shape(), drive])]).unwrap();
+        let orbits = StructureOrbits::new(&host, PARTICLE);
+        let [_, d] = host.sections()[0].drive;
+        let is_force = excitation == Excitation::Force;
         let FirstOrder { mut numbers, base_per_drive, .. } = orbits.first_order(0).unwrap();
         assert!((numbers.epsilon - 0.032 / 3.807).abs() < 1e-15 && (numbers.b - 0.01).abs() < 1e-15);
-        // The base of the oscillator exerts its force through spring and damper.
+        // The base of the oscillator exerts its force through spring and damper; the ratio is that at the natural frequency.
         let per_drive = |omega: f64| {
-            if is_force {
-                base_per_drive / 1_f64.hypot(damping * omega)
-            } else {
-                base_per_drive
-            }
+            let force = |omega: f64| if is_force { 1_f64.hypot(damping * omega) } else { 1.0 };
+            base_per_drive * force(1.0) / force(omega)
         };
         let mut count = 0;
         for n in 0..400 {
@@ -168,7 +159,7 @@ fn a_structure_of_one_mode_has_the_orbits_of_the_oscillator() {
                 orbits.at_phase_resonance(omega * omega0()),
                 exact_backbone(&numbers, omega),
             );
-            count += compare(found, expected, &numbers, per_drive(omega));
+            count += compare(found, expected, &numbers, [per_drive(omega), d]);
         }
         assert!(count > 200, "{count}");
         if !is_force {
@@ -177,12 +168,12 @@ fn a_structure_of_one_mode_has_the_orbits_of_the_oscillator() {
             for n in 0..100 {
                 let sigma = -3.0 + 0.04 * f64::from(n);
                 let found = orbits.at(numbers.omega(sigma), drive);
-                compare(found, symmetric_orbits(&numbers, sigma), &numbers, base_per_drive);
+                compare(found, symmetric_orbits(&numbers, sigma), &numbers, [base_per_drive, d]);
             }
             let found = orbits.resonant(drive, [0.97, 1.01].map(|omega| omega * omega0()));
             let all = phase_resonant(&numbers).into_iter();
             let near = all.filter(|orbit| (0.97..1.01).contains(&orbit.omega)).collect();
-            assert!(compare(found, near, &numbers, base_per_drive) > 1);
+            assert!(compare(found, near, &numbers, [base_per_drive, d]) > 1);
         }
     }
     assert!(worst < 1e-10, "{worst:e}");

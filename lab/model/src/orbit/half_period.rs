@@ -20,7 +20,7 @@ const EXACT: f64 = 1e-8;
 pub(super) struct HalfPeriod {
     /// The sections and, last, the particle.
     parts: Vec<Part>,
-    /// Derivative of the state (x, x') of every section and of the particle.
+    /// Derivative of the state (x, v) of every section and of the particle.
     map: DMatrix<f64>,
 }
 
@@ -29,7 +29,7 @@ struct Part {
     section: Section,
     /// The propagator over half a period.
     flow: Matrix2<f64>,
-    /// (x, x') of the periodic response to the impulses, after the impact.
+    /// (x, v) of the periodic response to the impulses, after the impact.
     after: Vector2<f64>,
 }
 
@@ -57,7 +57,7 @@ impl HalfPeriod {
         multipliers
     }
 
-    /// The part of (x, x') of every section after the impact that the impulses make.
+    /// The part of (x, v) of every section after the impact that the impulses make.
     pub(super) fn impulsive(&self) -> impl Iterator<Item = [f64; 2]> {
         self.parts.iter().map(|part| part.after.into())
     }

@@ -5,20 +5,33 @@ use nalgebra::{Complex, Matrix2, Vector2};
 
 use crate::Dimensionless;
 
-/// A section of a host, `x'' + 2 delta x' + omega0² x = c u + d u'` with the drive u. An impulse J on the host at the cavity adds
-/// `kick J` to (x, x'), and the displacement of the host at the cavity is the sum of `a x + b x'`.
+/// A section of a host as in [`lovines::host`]: its state (x, v) has `x' = v + d u`, `v' = -omega0² x - 2 delta v + (c - 2 delta d) u`
+/// under the drive u. An impulse J on the host at the cavity adds `kick J`, and the displacement of the cavity is the sum of `a x + b v`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Section {
+pub(crate) struct Section {
     /// Decay rate, 1/s.
     pub delta: f64,
     /// Natural frequency squared, 1/s².
     pub omega0_squared: f64,
     /// (c, d).
     pub drive: [f64; 2],
-    /// Jump of (x, x') per impulse.
+    /// Jump of (x, v) per impulse.
     pub kick: [f64; 2],
     /// (a, b).
     pub cavity: [f64; 2],
+}
+
+impl From<&lovines::Section> for Section {
+    fn from(section: &lovines::Section) -> Self {
+        let lovines::Section { oscillator, drive, kick, cavity } = *section;
+        Self {
+            delta: oscillator.delta,
+            omega0_squared: oscillator.omega0_squared,
+            drive,
+            kick,
+            cavity,
+        }
+    }
 }
 
 impl Section {
@@ -44,9 +57,10 @@ impl Section {
         }
     }
 
-    /// Displacement and velocity of the cavity for (x, x'), without drive.
+    /// Displacement and velocity of the cavity for (x, v), without drive.
     pub(super) fn at_cavity(&self, state: Vector2<f64>) -> Vector2<f64> {
-        Vector2::new(weighed(self.cavity, state), weighed(self.cavity, self.rate(state)))
+        let ([a, b], rate) = (self.cavity, self.rate(state));
+        Vector2::new(a * state[0] + b * state[1], a * rate[0] + b * rate[1])
     }
 
     /// Velocity of the cavity per impulse.
@@ -54,7 +68,7 @@ impl Section {
         self.at_cavity(self.kick.into())[1]
     }
 
-    /// Factors of (x, x') whose squares sum up to twice the energy, up to a factor that all sections have in common: those of a
+    /// Factors of (x, v) whose squares sum up to twice the energy, up to a factor that all sections have in common: those of a
     /// mass-normalised mode are omega0 and 1. Without a natural frequency, the displacement counts as at the frequency `omega`.
     pub(super) fn energy_scales(&self, omega: f64) -> [f64; 2] {
         let omega0 = if self.omega0_squared > 0.0 {
@@ -72,7 +86,7 @@ impl Section {
         [scale * omega0, scale]
     }
 
-    /// (x, x') after one of the unit impulses of alternating sign that the propagator `flow` separates: minus the state after the one before.
+    /// (x, v) after one of the unit impulses of alternating sign that the propagator `flow` separates: minus the state after the one before.
     #[inline(always)]
     pub(super) fn alternating(&self, flow: &Matrix2<f64>) -> Option<Vector2<f64>> {
         let sum = Matrix2::identity() + flow;
@@ -81,12 +95,23 @@ impl Section {
         (determinant != 0.0).then_some(solution)
     }
 
-    /// x of the response to an impulsive force at the cavity, over the compliance.
-    pub(super) fn kicked(&self, omega: f64) -> Complex<f64> {
-        at_frequency([2.0 * self.delta * self.kick[0] + self.kick[1], self.kick[0]], omega)
+    /// Response of (x, v) to the drive `exp(i omega t)`, over the compliance.
+    pub(super) fn driven(&self, omega: f64) -> [Complex<f64>; 2] {
+        let [c, d] = self.drive;
+        let v = Complex::new(-d * self.omega0_squared, (c - 2.0 * self.delta * d) * omega);
+        [self.drive_force(omega), v]
     }
 
-    /// Maps (x, x') over the time `t` without drive.
+    /// Response of (x, v) to the force `exp(i omega t)` on the host at the cavity, over the compliance.
+    pub(super) fn kicked(&self, omega: f64) -> [Complex<f64>; 2] {
+        let [x, v] = self.kick;
+        [
+            Complex::new(v + 2.0 * self.delta * x, x * omega),
+            Complex::new(-x * self.omega0_squared, v * omega),
+        ]
+    }
+
+    /// Maps (x, v) over the time `t` without drive.
     #[inline(always)]
     pub(crate) fn propagator(&self, t: f64) -> Matrix2<f64> {
         let (cosine, sine) = self.envelope(t);
@@ -131,9 +156,10 @@ impl Section {
         Complex::new(self.omega0_squared - omega * omega, 2.0 * self.delta * omega)
     }
 
-    /// Force made by the drive `exp(i omega t)`.
+    /// `c u + d u'` for the drive `exp(i omega t)`.
     pub(crate) fn drive_force(&self, omega: f64) -> Complex<f64> {
-        at_frequency(self.drive, omega)
+        let [c, d] = self.drive;
+        Complex::new(c, d * omega)
     }
 
     /// x'' without drive.
@@ -141,20 +167,15 @@ impl Section {
         -self.omega0_squared * x - 2.0 * self.delta * dx
     }
 
-    /// The time derivative of (x, x') without drive.
+    /// The time derivative of (x, v) without drive.
     pub(super) fn rate(&self, state: Vector2<f64>) -> Vector2<f64> {
         Vector2::new(state[1], self.free_acceleration(state[0], state[1]))
     }
 }
 
-/// `a x + b x'`.
-pub(super) fn weighed([a, b]: [f64; 2], state: Vector2<f64>) -> f64 {
-    a * state[0] + b * state[1]
-}
-
-/// `a x + b x'` for `x = exp(i omega t)`.
-pub(super) fn at_frequency([a, b]: [f64; 2], omega: f64) -> Complex<f64> {
-    Complex::new(a, b * omega)
+/// The harmonic `a x + b v` of (x, v).
+pub(super) fn harmonic([a, b]: [f64; 2], [x, v]: [Complex<f64>; 2]) -> Complex<f64> {
+    x * a + v * b
 }
 
 /// The oscillator at one frequency and excitation.

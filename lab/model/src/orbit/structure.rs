@@ -8,12 +8,13 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use lovines::{Excitation, Host};
 use nalgebra::Complex;
 use serde::Serialize;
 
 use super::Bifurcation;
 use super::half_period::HalfPeriod;
-use super::oscillator::{Section, at_frequency};
+use super::oscillator::{Section, harmonic};
 use super::periodic::wrapped;
 use super::symmetric::{Particle, Reading, SymmetricMotion, SymmetricMotions, search};
 use crate::numerics::{bisection, equally_spaced, try_bisection};
@@ -48,7 +49,7 @@ pub struct StructureOrbit {
 pub struct StructureStart {
     /// Phase of the drive, rad, in (-pi, pi].
     pub phase: f64,
-    /// (x, x') of every section.
+    /// (x, v) of every section.
     pub sections: Vec<[f64; 2]>,
     /// Displacement of the particle, m.
     pub q2: f64,
@@ -125,8 +126,7 @@ pub struct ModeFacts {
 pub struct FirstOrder {
     /// The dimensionless numbers of the mode alone, without a drive; its response is the displacement of the cavity.
     pub numbers: Dimensionless,
-    /// Amplitude of the base, m, that drives the oscillator of these numbers as a unit drive does the mode; for a force but for the base's
-    /// damper, which is of second order.
+    /// Amplitude of the base, m, that drives the oscillator of these numbers as a unit drive does the mode.
     pub base_per_drive: f64,
     /// Amplitude of the response over the amplitude of the cavity.
     pub response_per_cavity: f64,
@@ -137,6 +137,7 @@ pub struct FirstOrder {
 /// By default the response is the displacement of the cavity, and lags the drive by a quarter of a period at resonance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructureOrbits {
+    excitation: Excitation,
     sections: Vec<Section>,
     particle: Particle,
     response: Option<Vec<[f64; 2]>>,
@@ -151,17 +152,18 @@ const LOCATED: f64 = 1e-11;
 const UNDRIVEN: f64 = 1e-12;
 
 impl StructureOrbits {
-    /// The orbits of a host that consists of `sections`.
-    pub fn new(sections: &[Section], particle: Particle) -> Self {
+    /// The orbits of a host.
+    pub fn new(host: &Host, particle: Particle) -> Self {
         Self {
-            sections: sections.to_vec(),
+            excitation: host.excitation(),
+            sections: host.sections().iter().map(Section::from).collect(),
             particle,
             response: None,
             target: -FRAC_PI_2,
         }
     }
 
-    /// With the displacement of another point as the response: the sum of `a x + b x'` with the pair (a, b) of every section.
+    /// With the displacement of another point as the response, which [`Host::row`] gives.
     pub fn with_response(mut self, point: &[[f64; 2]]) -> Self {
         self.response = Some(point.to_vec());
         self
@@ -234,17 +236,17 @@ impl StructureOrbits {
         let Particle { mass, half_width, restitution } = self.particle;
         let omega0 = section.omega0_squared.sqrt();
         let epsilon = mass * section.mobility();
-        let at_cavity = at_frequency(section.cavity, omega0).norm();
-        let base_per_drive = at_cavity * section.drive[0].abs() / section.omega0_squared;
-        if !(section.delta < omega0 && epsilon > 0.0 && base_per_drive > 0.0) {
+        let [cavity, response] = [None, self.response.as_ref()].map(|rows| {
+            let row = rows.map_or(section.cavity, |rows| rows[n]);
+            harmonic(row, section.driven(omega0)).norm()
+        });
+        if !(section.delta < omega0 && epsilon > 0.0 && cavity > 0.0) {
             return None;
         }
-        let reference = if section.drive[1] == 0.0 {
-            Reference::Force
-        } else {
-            Reference::Base
+        let reference = match self.excitation {
+            Excitation::Force => Reference::Force,
+            Excitation::Base => Reference::Base,
         };
-        let row = self.response.as_ref().map_or(section.cavity, |rows| rows[n]);
         Some(FirstOrder {
             numbers: Dimensionless {
                 omega0,
@@ -252,8 +254,8 @@ impl StructureOrbits {
                 definition: Definition { reference, sensor: Sensor::Q1, ..Definition::default() },
                 ..Dimensionless::new(epsilon, 2.0 * section.delta / (epsilon * omega0), restitution, 0.0)
             },
-            base_per_drive,
-            response_per_cavity: at_frequency(row, omega0).norm() / at_cavity,
+            base_per_drive: cavity / section.omega0_squared.hypot(2.0 * section.delta * omega0),
+            response_per_cavity: response / cavity,
         })
     }
 
@@ -332,15 +334,15 @@ impl StructureOrbits {
         }
         let half = HalfPeriod::new(&self.sections, &self.particle, motion)?;
         let multipliers = half.multipliers();
-        let harmonic = |section: &Section| {
-            if sizes[2] == 0.0 {
-                return Complex::ZERO;
-            }
-            motion.drive * section.drive_force(motion.omega) * section.compliance(motion.omega)
-        };
         let state = |(section, impulsive): (&Section, [f64; 2])| {
-            let harmonic = harmonic(section);
-            [harmonic.im + impulsive[0], motion.omega * harmonic.re + impulsive[1]]
+            // Without a drive there is no harmonic part, even at an undamped resonance.
+            let per_force = if sizes[2] > 0.0 {
+                motion.drive * section.compliance(motion.omega)
+            } else {
+                Complex::ZERO
+            };
+            let [x, v] = section.driven(motion.omega);
+            [(x * per_force).im + impulsive[0], (v * per_force).im + impulsive[1]]
         };
         let [q1, _] = motion.after;
         Some(StructureOrbit {

@@ -18,7 +18,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use nalgebra::{Complex, Vector2};
 
 use super::half_period::HalfPeriod;
-use super::oscillator::{Section, at_frequency};
+use super::oscillator::{Section, harmonic};
 use super::periodic::wrapped;
 use super::{AfterImpact, Orbit};
 use crate::numerics::{bisection, golden_section, quadratic, secant};
@@ -93,10 +93,8 @@ impl SymmetricMotions {
             before += section.at_cavity(p_before);
             mobility += section.mobility();
 
-            let force = section.drive_force(omega);
-            let stiffness = section.stiffness(omega);
-            let at_cavity = at_frequency(section.cavity, omega);
-            let to_cavity = at_cavity * force;
+            let (driven, stiffness) = (section.driven(omega), section.stiffness(omega));
+            let to_cavity = harmonic(section.cavity, driven);
             if to_cavity != Complex::ZERO {
                 // The inverse of a sum of compliances; zero also at an undamped resonance.
                 let own = stiffness / to_cavity;
@@ -107,14 +105,12 @@ impl SymmetricMotions {
                 };
             }
             let compliance = stiffness.inv();
-            let (mut row, mut at_row) = (section.cavity, at_cavity);
+            let mut row = section.cavity;
             if let Some(rows) = reading.sections {
                 row = rows[n];
-                at_row = at_frequency(row, omega);
-                response += at_row * force * compliance;
+                response += harmonic(row, driven) * compliance;
             }
-            // What follows an impulse at once is not a part of a x + b x'.
-            kicked += at_row * section.kicked(omega) * compliance - row[1] * kick[0];
+            kicked += harmonic(row, section.kicked(omega)) * compliance;
         }
         let Particle { mass, restitution, .. } = particle;
 
