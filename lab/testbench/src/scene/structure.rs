@@ -7,7 +7,6 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use super::SceneError;
@@ -41,8 +40,10 @@ pub struct StructureMode {
     pub omega: f64,
     /// Damping ratio.
     pub zeta: f64,
-    /// Mass-normalised shape at the points, 1/sqrt(kg), in their order. Of a complex mode its part in phase with a real one.
+    /// Mass-normalised shape at the points, 1/sqrt(kg), in their order. Of a complex mode the part in phase.
     pub shape: Vec<f64>,
+    /// Share of a measured shape that is out of phase and left out: its norm over the norm of the whole shape.
+    pub out_of_phase: f64,
     /// Participation of the base, sqrt(kg), or the shape at the force's point, 1/sqrt(kg).
     pub drive: f64,
 }
@@ -61,8 +62,6 @@ pub enum StructureForm {
         /// Stiffness, N/m.
         k: DMatrix<f64>,
     },
-    /// Poles with positive imaginary part, and shapes with `receptance(i, j) = sum psi_i psi_j/(s - p) + conjugate` at the points.
-    Poles(Vec<(Complex64, Vec<Complex64>)>),
 }
 
 /// A structure: its equations, its points, what drives it and what is measured.
@@ -304,7 +303,13 @@ impl StructureSection {
                     ));
                 }
             };
-            modes.push(StructureMode { omega: TAU * frequency, zeta: *damping, shape, drive });
+            modes.push(StructureMode {
+                omega: TAU * frequency,
+                zeta: *damping,
+                shape,
+                out_of_phase: 0.0,
+                drive,
+            });
         }
         modes.sort_by(|a, b| a.omega.total_cmp(&b.omega));
         Ok(Parts {
@@ -388,6 +393,7 @@ impl StructureSection {
                 omega,
                 zeta: 0.5 * damping[(n, n)] / omega,
                 shape: shapes.column(n).iter().copied().collect(),
+                out_of_phase: 0.0,
                 drive: base[n],
             }
         });
@@ -423,22 +429,19 @@ impl StructureSection {
         }
         let file = self.residues.as_deref().unwrap_or(Path::new(""));
         let Residues { points, poles } = Residues::read(folder, file, self.reference.as_deref())?;
-        let modes = poles.iter().map(|(pole, shape)| {
-            // A real mode has the residues phi_i phi_j/(2 i omega_d).
-            let real = (Complex64::new(0.0, 2.0 * pole.im)).sqrt();
-            StructureMode {
-                omega: pole.norm(),
-                zeta: -pole.re / pole.norm(),
-                shape: shape.iter().map(|value| (value * real).re).collect(),
-                drive: 0.0,
-            }
+        let modes = poles.iter().map(|(pole, shape)| StructureMode {
+            omega: pole.norm(),
+            zeta: -pole.re / pole.norm(),
+            shape: shape.iter().map(|value| value.re).collect(),
+            out_of_phase: norm(shape.iter().map(|value| value.im)) / norm(shape.iter().map(|value| value.norm())),
+            drive: 0.0,
         });
         let modes = modes.collect();
         Ok(Parts {
             points,
             modes,
             direction: Vec::new(),
-            form: StructureForm::Poles(poles),
+            form: StructureForm::Modes,
         })
     }
 
@@ -493,6 +496,11 @@ impl Structure {
         }
         Ok(())
     }
+}
+
+/// Euclidean norm.
+fn norm(values: impl Iterator<Item = f64>) -> f64 {
+    values.map(|value| value * value).sum::<f64>().sqrt()
 }
 
 /// Mass-normalised shapes, as columns, and squares of the natural frequencies, both rising: `K phi = omega² M phi`.

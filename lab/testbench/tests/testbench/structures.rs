@@ -123,7 +123,7 @@ fn residues_of_a_real_mode_give_its_mass_normalised_shape() {
     let omega = TAU * 8.8156 * (1.0 - 0.006_f64.powi(2)).sqrt();
     let [tip, root] = [0.51252 * 0.1, 0.1 * 0.1].map(|product| -product / (2.0 * omega));
     let text = format!("frequency, damping, re tip, im tip, re root, im root\n8.8156, 0.006, 0, {tip}, 0, {root}\n");
-    fs::write(folder.path().join("beam.csv"), text).unwrap();
+    fs::write(folder.path().join("beam.csv"), &text).unwrap();
     let residues = "excitation = \"force\"\ndrive = \"root\"\nresidues = \"beam.csv\"\nreference = \"root\"\n";
     let scene = of(&folder, &format!("{PLANT}{residues}"), &[]).unwrap();
     let structure = scene.structure.unwrap();
@@ -132,6 +132,10 @@ fn residues_of_a_real_mode_give_its_mass_normalised_shape() {
         (mode.shape[0] - 0.51252).abs() < 1e-12 && (mode.shape[1] - 0.1).abs() < 1e-12,
         "{mode:?}"
     );
+    assert!(mode.out_of_phase < 1e-15);
+    fs::write(folder.path().join("beam.csv"), text.replace(", -", ", ")).unwrap();
+    says(of(&folder, &format!("{PLANT}{residues}"), &[]), "negative modal mass");
+    fs::write(folder.path().join("beam.csv"), &text).unwrap();
     let without = format!("{PLANT}{}", residues.replace("reference = \"root\"\n", ""));
     says(of(&folder, &without, &[]), "`reference` is missing | tip, root");
     says(

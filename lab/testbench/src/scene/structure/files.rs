@@ -130,7 +130,7 @@ impl Matrix {
     }
 }
 
-/// Poles, and the shapes at the points that the residues have.
+/// Poles with positive imaginary part, and mass-normalised shapes at the points, 1/sqrt(kg); complex where the damping is not modal.
 pub(super) struct Residues {
     pub points: Vec<String>,
     pub poles: Vec<(Complex64, Vec<Complex64>)>,
@@ -185,17 +185,22 @@ impl Residues {
             }
             let omega = std::f64::consts::TAU * hertz;
             let pole = Complex64::new(-zeta * omega, omega * (1.0 - zeta * zeta).sqrt());
-            let residue = |[re, im]: [usize; 2]| Complex64::new(row[re], row[im]);
-            // By reciprocity R_ij = psi_i psi_j. The branch of the root has the sign of a real, positive shape.
-            let real = Complex64::new(0.0, 2.0 * pole.im);
-            let own = (residue(places[driven]) * real).sqrt() / real.sqrt();
+            // By reciprocity R_ij = phi_i phi_j/(2 i omega_d), with real shapes where the damping is modal.
+            let scaled = |[re, im]: [usize; 2]| Complex64::new(row[re], row[im]) * Complex64::new(0.0, 2.0 * pole.im);
+            let own = scaled(places[driven]).sqrt();
             if own.norm() == 0.0 {
                 return Err(format!(
                     "mode {number} of {title} has the residue 0 at the reference {reference}: a force there does not reach it, and its shape does not \
                      follow; choose another reference"
                 ));
             }
-            poles.push((pole, places.iter().map(|&place| residue(place) / own).collect()));
+            if own.re.abs() < own.im.abs() {
+                return Err(format!(
+                    "mode {number} of {title} has a residue at the reference {reference} with a negative modal mass: its imaginary part must be \
+                     negative, as of a receptance (displacement over force)"
+                ));
+            }
+            poles.push((pole, places.iter().map(|&place| scaled(place) / own).collect()));
         }
         if poles.is_empty() {
             return Err(format!("{title} has no row: give one for every mode"));
