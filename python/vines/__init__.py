@@ -17,6 +17,7 @@ from .plants import KINDS, Batch, Events, Plant, Trajectory
 from .recordings import LinearDecay, Recording, linear_decay, read_recording
 from .regimes import Regime, regime
 from .scenes import Scene
+from .structures import scene_from_uff, structure_from_uff
 from .sweeps import REGIMES, sweep
 
 __all__ = [
@@ -47,6 +48,8 @@ __all__ = [
     "orbits",
     "read_recording",
     "regime",
+    "scene_from_uff",
+    "structure_from_uff",
     "sweep",
     "theory",
 ]

@@ -1,23 +1,41 @@
-"""`python -m vines fit record.mat --response y --drive x`: `vines fit` for all formats of recordings."""
+"""`python -m vines fit record.mat --response y --drive x`: `vines fit` for all formats of recordings.
+
+`python -m vines structure modes.uff --cavity 12Z --drive 3Z`: a scene with the structure of a modal test.
+"""
 
 import argparse
 import sys
+from pathlib import Path
 
-from . import Scene, fit_recordings, linear_decay, read_recording
+from . import Scene, fit_recordings, linear_decay, read_recording, scene_from_uff
 
 
 def main() -> int:
-    """Fit a rig to recordings, and print what was found."""
+    """Fit a rig to recordings, or convert the modes of a structure to a scene, and print the result."""
     parser = argparse.ArgumentParser(prog="python -m vines", description=__doc__)
-    parser.add_argument("command", choices=["fit"])
-    parser.add_argument("files", nargs="+", metavar="FILE", help="recordings: CSV, MAT, HDF5, TDMS, UFF58 or LVM")
+    parser.add_argument("command", choices=["fit", "structure"])
+    parser.add_argument(
+        "files",
+        nargs="+",
+        metavar="FILE",
+        help="recordings: CSV, MAT, HDF5, TDMS, UFF58 or LVM; of structure: one UFF55",
+    )
     parser.add_argument("--response", metavar="NAME[:UNIT]", help="channel of the response")
-    parser.add_argument("--drive", metavar="NAME[:UNIT]", help="channel of the base")
+    parser.add_argument(
+        "--drive", metavar="NAME[:UNIT]", help="channel of the base; of structure: the point of the force"
+    )
     parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second")
     parser.add_argument("--time", metavar="NAME[:UNIT]", help="channel of the time")
     parser.add_argument("--scene", metavar="FILE", help="scene file; without it, the default scene")
     parser.add_argument("--known", action="append", default=[], metavar="SYMBOL=VALUE±U", help="a value from elsewhere")
+    parser.add_argument("--cavity", metavar="POINT", help="of structure: the point of the cavity, such as 12Z")
+    parser.add_argument("--units", metavar="SI", help="of structure: the units of a file that does not state them")
+    parser.add_argument(
+        "--out", metavar="FILE", help="of structure: the scene file to write; without it, it is printed"
+    )
     given = parser.parse_args()
+    if given.command == "structure":
+        return _structure(given)
     try:
         scene = Scene(given.scene)
         names = {"response": given.response, "drive": given.drive, "rate": given.rate, "time": given.time}
@@ -43,6 +61,21 @@ def main() -> int:
     if found.verdict:
         print(found.verdict)
     return 0 if found.describes else 1
+
+
+def _structure(given: argparse.Namespace) -> int:
+    try:
+        if len(given.files) != 1 or not given.cavity:
+            raise ValueError("structure needs one file and --cavity POINT; --drive POINT is the cavity unless given")
+        text = scene_from_uff(given.files[0], given.cavity, given.drive or given.cavity, units=given.units)
+        if given.out is None:
+            print(text, end="")
+        else:
+            Path(given.out).write_text(text, encoding="utf-8")
+    except (ValueError, OSError, ImportError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from . import _native
 from .scenes import Scene, checked
 
-_NEEDED = {"pymatreader": "MAT", "h5py": "HDF5", "nptdms": "TDMS", "pyuff": "UFF58", "lvm_read": "LVM"}
+_NEEDED = {"pymatreader": "MAT", "h5py": "HDF5", "nptdms": "TDMS", "pyuff": "UFF", "lvm_read": "LVM"}
 _UFF_TYPES = {
     2: "an auto spectrum",
     3: "a cross spectrum",

@@ -1,0 +1,104 @@
+"""Structures from the universal files of a modal test."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import pyuff
+
+import vines
+
+OMEGA = 2 * np.pi * np.array([8.8, 55.1])
+ZETA = np.array([0.006, 0.011])
+# Mass-normalised shapes, 1/sqrt(kg), at the nodes 1 and 12 in Z.
+SHAPES = np.array([[0.1, 0.51], [0.3, -0.49]])
+
+
+def normal(n: int, mass: float = 1.0, scale: float = 1.0) -> dict:
+    """A normal mode whose shape is scaled so that it has a modal mass."""
+    shape = SHAPES[n] * np.sqrt(mass) * scale
+    mode = {"analysis_type": 2, "freq": OMEGA[n] / (2 * np.pi), "modal_m": mass, "modal_damp_vis": ZETA[n]}
+    return {**mode, "modal_damp_his": 0.0, "r3": shape}
+
+
+def complex_mode(n: int) -> dict:
+    """A mode as a complex eigenvalue with an arbitrary factor of its vector."""
+    damped, factor = OMEGA[n] * np.sqrt(1 - ZETA[n] ** 2), 2.0 * np.exp(0.7j)
+    pole = complex(-ZETA[n] * OMEGA[n], damped)
+    return {
+        "analysis_type": 3,
+        "eig": pole,
+        "modal_a": factor**2 * 2j * damped,
+        "modal_b": 0j,
+        "r3": factor * SHAPES[n],
+    }
+
+
+def write(file, modes, units=(1, 1.0, 1.0)):
+    """Write data sets 55, and the units in data set 164."""
+    uff = pyuff.UFF(str(file))
+    if units:
+        code, length, force = units
+        uff.write_sets(
+            {"type": 164, "units_code": code, "length": length, "force": force, "temp": 1.0, "temp_offset": 0.0}
+        )
+    for n, mode in enumerate(modes, 1):
+        zero = np.zeros(2, dtype=np.asarray(mode["r3"]).dtype)
+        more = {"type": 55, "model_type": 1, "data_ch": 2, "spec_data_type": 8, "load_case": 0, "mode_n": n}
+        ids = {f"id{k}": "NONE" for k in range(1, 6)}
+        whole = more | ids | {"node_nums": np.array([1, 12]), "r1": zero, "r2": zero} | mode
+        uff.write_sets(whole | {"n_data_per_node": 3, "data_type": 5 if zero.dtype.kind == "c" else 2}, "add")
+    return file
+
+
+@pytest.mark.parametrize(
+    ("modes", "units"),
+    [
+        ([normal(1), normal(0, mass=3.0)], (1, 1.0, 1.0)),
+        # Millimetres and millinewtons: the unit of mass is the kilogram.
+        ([normal(0), normal(1)], (5, 1000.0, 1000.0)),
+        # Inches and pounds of force: masses are in slinches of 175.1268 kg, so that shapes are larger.
+        ([normal(0, scale=175.12684**0.5), normal(1, scale=175.12684**0.5)], (7, 39.370079, 0.22480894)),
+        ([complex_mode(0), complex_mode(1)], (1, 1.0, 1.0)),
+    ],
+    ids=["SI", "mm and mN", "inches", "complex"],
+)
+def test_modes_of_a_universal_file_are_mass_normalised_in_si_units(modes, units, tmp_path):
+    file = write(tmp_path / "beam.uff", modes, units)
+    found = vines.structure_from_uff(file)
+    assert found["out_of_phase"] < 1e-4
+    for mode in found["modes"]:
+        n = int(mode["frequency"] > 20.0)
+        assert mode["frequency"] == pytest.approx(OMEGA[n] / (2 * np.pi), rel=1e-5)
+        assert mode["damping"] == pytest.approx(ZETA[n], rel=1e-4)
+        assert list(mode["shape"]) == ["1Z", "12Z"]
+        assert np.abs(np.array(list(mode["shape"].values()))) == pytest.approx(np.abs(SHAPES[n]), rel=1e-4)
+    scene = vines.Scene(text=vines.scene_from_uff(file, "12Z", "1Z"))
+    assert scene.dimensionless["omega0"] == pytest.approx(OMEGA[0], rel=1e-5)
+    assert scene.dimensionless["epsilon"] == pytest.approx(0.032 * 0.51**2, rel=1e-3)
+
+
+def test_unknown_units_and_modes_without_mass_are_refused_in_one_sentence(tmp_path):
+    file = write(tmp_path / "beam.uff", [normal(0)], None)
+    with pytest.raises(ValueError, match=r"units of .* are unknown.*164"):
+        vines.structure_from_uff(file)
+    assert vines.structure_from_uff(file, units="SI")["modes"][0]["shape"]["12Z"] == pytest.approx(0.51)
+    with pytest.raises(ValueError, match="units = 'mm'"):
+        vines.structure_from_uff(file, units="mm")
+    file = write(tmp_path / "zero.uff", [normal(0), normal(1, mass=0.0)])
+    with pytest.raises(ValueError, match=r"mode 2 .* no modal mass"):
+        vines.structure_from_uff(file)
+    with pytest.raises(ValueError, match=r"cavity: 7Z is no point.*1Z, 12Z"):
+        vines.scene_from_uff(write(tmp_path / "good.uff", [normal(0)]), "7Z", "1Z")
+
+
+def test_the_module_converts_a_universal_file_to_a_scene(tmp_path):
+    file = write(tmp_path / "beam.uff", [normal(0), normal(1)])
+    arguments = [sys.executable, "-m", "vines", "structure", str(file), "--cavity", "12Z"]
+    done = subprocess.run([*arguments, "--drive", "1Z", "--out", str(tmp_path / "beam.toml")], check=True)
+    assert done.returncode == 0
+    assert vines.Scene(tmp_path / "beam.toml").settings["structure"]["points"] == ["12Z", "1Z"]
+    refused = subprocess.run([*arguments, "--drive", "9Z"], capture_output=True, text=True)
+    assert refused.returncode == 2
+    assert "9Z is no point" in refused.stderr
