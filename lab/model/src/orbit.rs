@@ -29,8 +29,8 @@ pub use plant::{
 };
 pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, backbone, bifurcation_curves, response};
 pub use structure::{
-    FirstOrder, ModeFacts, StabilityChange, StructureBranch, StructureOrbit, StructureOrbits, StructureRange,
-    StructureStart,
+    FirstOrder, ModeFacts, StabilityChange, StructureBranch, StructureFacts, StructureOrbit, StructureOrbits,
+    StructureRange, StructureStart,
 };
 pub use symmetric::{Particle, backbone_at_speed, exact_backbone, phase_resonant, stable_resonant, symmetric_orbits};
 

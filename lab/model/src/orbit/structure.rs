@@ -17,7 +17,8 @@ use super::half_period::HalfPeriod;
 use super::oscillator::{Section, harmonic};
 use super::periodic::wrapped;
 use super::symmetric::{Particle, Reading, SymmetricMotion, SymmetricMotions, search};
-use crate::numerics::{bisection, equally_spaced, try_bisection};
+use crate::numerics::{self, bisection, equally_spaced, try_bisection};
+use crate::theory::SlowFlow;
 use crate::{Definition, Dimensionless, Reference, Sensor};
 
 /// An exact symmetric 1:1 orbit of a structure.
@@ -92,6 +93,18 @@ pub struct StabilityChange {
     pub shares: Vec<f64>,
 }
 
+impl StabilityChange {
+    /// The section that contributes most to the disturbance; `None` for the particle.
+    pub fn section(&self) -> Option<usize> {
+        let largest = self
+            .shares
+            .iter()
+            .enumerate()
+            .max_by(|one, other| one.1.total_cmp(other.1));
+        largest.map(|(n, _)| n).filter(|n| n + 1 < self.shares.len())
+    }
+}
+
 /// Where curves are followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StructureRange {
@@ -119,6 +132,17 @@ pub struct ModeFacts {
     /// What this mode adds to the conditions of impact, alpha and beta, over what they are with the driven mode alone, at the driven mode's
     /// frequency. Far below 1, the mode leaves the orbits where they are; its effect on their stability is another question.
     pub influence: f64,
+}
+
+/// What the other modes of a structure do to the backbone of the driven one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StructureFacts {
+    /// The modes, in the order of the sections.
+    pub modes: Vec<ModeFacts>,
+    /// The backbone of the driven mode alone.
+    pub alone: Vec<StructureBranch>,
+    /// The backbone with all modes.
+    pub all: Vec<StructureBranch>,
 }
 
 /// First-order theory of one mode of a structure.
@@ -289,6 +313,32 @@ impl StructureOrbits {
             })
         };
         self.sections.iter().enumerate().map(facts).collect()
+    }
+
+    /// The range of the backbone of the section `driven`, by first-order theory: all frequencies from slow particles to a speed of 1.5 b omega0,
+    /// beyond which symmetric motions are unstable.
+    pub fn range(&self, driven: usize, points: usize) -> Option<StructureRange> {
+        const FASTEST: f64 = 1.5;
+        let Dimensionless { omega0, b, epsilon, lambda, r, .. } = self.first_order(driven)?.numbers;
+        let flow = SlowFlow::new(lambda, r);
+        let detunings = equally_spaced(0.0, FASTEST, GRID).map(|speed| flow.free_detuning(speed));
+        let (low, high) = numerics::range((0.0, 0.0), detunings);
+        Some(StructureRange {
+            // First-order theory leaves out detunings of order epsilon, and other modes.
+            omega: [low - 1.0, high + 1.0].map(|sigma| omega0 * (1.0 + epsilon * sigma)),
+            speed: FASTEST * b * omega0,
+            points,
+        })
+    }
+
+    /// The modes, and the backbone of the section `driven` alone and with all modes, with about `points` orbits each.
+    pub fn facts(&self, driven: usize, points: usize) -> Option<StructureFacts> {
+        let range = self.range(driven, points)?;
+        Some(StructureFacts {
+            modes: self.modes(driven)?,
+            alone: self.with_sections(|n| n == driven).backbone(&range),
+            all: self.backbone(&range),
+        })
     }
 
     fn motions(&self, omega: f64) -> Option<SymmetricMotions> {
