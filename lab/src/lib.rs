@@ -4,7 +4,6 @@
 
 mod files;
 pub mod pack;
-pub mod points;
 pub mod regime_map;
 pub mod report;
 pub mod table;

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
-use std::io::{Cursor, Write};
+use std::io::{self, Cursor, Write};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -107,7 +107,7 @@ pub fn own_libraries(components: &[Component], folder: &Path) -> Result<Vec<Bina
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum PackError {
-    #[error("{} is not the library of {identifier} for this machine: {reason}; build it with `cargo build --release -p {package}`", path.display())]
+    #[error("{} is not the library of {identifier} for this machine: {reason}", path.display())]
     NotOwn {
         path: PathBuf,
         identifier: &'static str,
@@ -116,8 +116,10 @@ pub enum PackError {
     },
     #[error("{0} has no library")]
     NoLibrary(String),
-    #[error("{} {problem}", path.display())]
-    Library { path: PathBuf, problem: String },
+    #[error("{} cannot be read: {source}", path.display())]
+    Unreadable { path: PathBuf, source: io::Error },
+    #[error("{} contains the GUID of no FMU of this program: it was built from other variables", .0.display())]
+    Foreign(PathBuf),
     #[error("the description cannot be read: {0}")]
     Description(#[from] fmi2_description::Error),
     #[error(transparent)]
@@ -141,12 +143,10 @@ pub fn pack(components: &[Component], binaries: &[Binary]) -> Result<Vec<File>, 
     // Name and content of the libraries of each component; the GUID in a library determines its component.
     let mut libraries = vec![BTreeMap::new(); components.len()];
     for Binary { platform: [folder, suffix], path } in binaries {
-        let refused = |problem: String| PackError::Library { path: path.clone(), problem };
-        let content = std::fs::read(path).map_err(|error| refused(format!("cannot be read: {error}")))?;
+        let content = std::fs::read(path).map_err(|source| PackError::Unreadable { path: path.clone(), source })?;
         let contains = |text: &str| content.windows(text.len()).any(|part| part == text.as_bytes());
         let owner = descriptions.iter().position(|description| contains(&description.guid));
-        let foreign = "contains the GUID of no FMU of this program: it was built from other variables; build it again";
-        let owner = owner.ok_or_else(|| refused(foreign.into()))?;
+        let owner = owner.ok_or_else(|| PackError::Foreign(path.clone()))?;
         let name = format!("binaries/{folder}/{}{suffix}", components[owner].identifier);
         libraries[owner].insert(name, content);
     }

@@ -204,9 +204,6 @@ impl Session {
         let mut samples = Vec::new();
         let result = measure(&mut samples, self.rig.rig.as_mut(), self.controller.as_mut());
         drop(self.controller);
-        if let (Some(watch), Err(error)) = (&mut self.watch, &result) {
-            watch.failure = Some(error.to_string());
-        }
         let timing = self.rig.close();
         let recorded = self.recording.map_or(Ok(None), Recording::finish);
         let ended = Ended { folder: self.folder, recorded, timing };
@@ -222,7 +219,11 @@ impl Session {
                     _ => None,
                 };
                 let reason = reason.map(|reason| summary::not_locked(&reason, scene));
-                Err(ended.without_result(Failure::from(error), reason, &samples, plan))
+                let failure = Failure::from(error);
+                if let Some(watch) = &mut self.watch {
+                    watch.failure = Some(failure.message.clone());
+                }
+                Err(ended.without_result(failure, reason, &samples, plan))
             }
         }
     }

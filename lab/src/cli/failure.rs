@@ -74,9 +74,12 @@ exit_codes! {
 
 impl From<PackError> for Failure {
     fn from(error: PackError) -> Self {
-        let advice = match error {
-            PackError::NotOwn { .. } => ", or name its folder with --libraries",
+        let advice = match &error {
+            PackError::NotOwn { package, .. } => {
+                &format!("; build it with `cargo build --release -p {package}`, or name its folder with --libraries")
+            }
             PackError::NoLibrary(_) => ": give one by --binary PLATFORM=FILE, or leave out --only-binaries",
+            PackError::Foreign(_) => "; build it again",
             _ => "",
         };
         Self::input(format!("{error}{advice}"))
@@ -121,6 +124,12 @@ impl From<ExperimentError> for Failure {
         };
         let advice = match error {
             ExperimentError::Tripped { .. } => ". `vines check` looks for the cause",
+            ExperimentError::NoLock { unmet: None, .. } => {
+                "; see phase_lock.acquire_timeout and the [controller] section"
+            }
+            ExperimentError::NoLock { .. } => "; make the loop slower, or set a larger value",
+            ExperimentError::MotionLost { .. } => "; set backbone.C_to nearer to the former, or more backbone.points",
+            ExperimentError::NoDrive => ": set excitation.G or excitation.E above 0",
             _ => "",
         };
         Self::new(code, format!("{error}{advice}"))

@@ -9,13 +9,13 @@ use clap::Args;
 use serde::Serialize;
 use vines::fit::{Effect, Fit, FitReport, Found, Known, MeasuredPoint, Part, Selection, decimals, find, parts};
 use vines::numerics::Estimate;
-use vines::points::{Column, Measurement, read};
 use vines::report::fitted;
 use vines::table::Table;
 
 use super::failure::Failure;
 use super::options::{SceneArguments, positive};
 use super::output::{Results, Written, output, progress_bar, writable};
+use super::points::{Column, Measurement, read};
 
 const HELP: &str = "\
 A point has the frequency of phase resonance f, the amplitude A of the response and the amplitude E of the base, each with its standard

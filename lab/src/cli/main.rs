@@ -13,6 +13,7 @@ mod options;
 mod orbit;
 mod output;
 mod pack;
+mod points;
 mod recording;
 mod report;
 mod serve;

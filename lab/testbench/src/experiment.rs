@@ -6,6 +6,7 @@ mod judge;
 mod search;
 
 use std::f64::consts::TAU;
+use std::fmt::{self, Display, Formatter};
 
 use phase_lock::Config;
 use thiserror::Error;
@@ -70,15 +71,58 @@ fn phase_in_words(error: Option<f64>) -> String {
     )
 }
 
-/// What the lock waits for, in words; `unmet` where the bench judges it.
-fn lock_in_words(unmet: Option<Condition>) -> String {
-    let Some(Condition { name, key, found, allowed }) = unmet else {
-        return "see phase_lock.acquire_timeout and the [controller] section".into();
-    };
-    format!(
-        "the bench judges the lock, as the controller does not: the {name} is {found:.1e}, and phase_lock.lock.{key} with the noise of the readings \
-         allows {allowed:.1e}; make the loop slower, or set a larger value"
-    )
+/// What a lock waits for that the bench judges, in words.
+fn unmet_in_words(unmet: Option<Condition>) -> String {
+    unmet.map_or_else(String::new, |Condition { name, key, found, allowed }| {
+        format!(
+            "; the bench judges the lock, as the controller does not: the {name} is {found:.1e}, and phase_lock.lock.{key} with the noise of the \
+             readings allows {allowed:.1e}"
+        )
+    })
+}
+
+/// What a search for the requested drive has found, in words.
+fn search_in_words(held: Option<[f64; 2]>, searches: u32, highest: f64) -> String {
+    match held {
+        Some([low, high]) => format!(
+            "with the response under control, symmetric 1:1 motions were held at drives from G = {low:.4} to {high:.4}, and lost {searches} times; a \
+             constant drive does not hold all of them"
+        ),
+        None => format!("no symmetric 1:1 motion was found at responses up to C = {highest:.3}"),
+    }
+}
+
+/// What the sensors read in the last period before a fault, and the limit of the scene that was exceeded. Lengths in m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evidence {
+    /// Last reading of the response.
+    pub response: f64,
+    /// Last reading of the base, if a sensor reads it.
+    pub base: Option<f64>,
+    /// Largest response of the period.
+    pub largest: f64,
+    /// After the loss of a lock, the mean phase error of the period, degrees; `None` inside: it is not known.
+    pub phase_error: Option<Option<f64>>,
+    /// Setting of the controller, its value, and the value's unit.
+    pub limit: Option<(&'static str, Option<f64>, &'static str)>,
+}
+
+impl Display for Evidence {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if let Some(error) = self.phase_error {
+            write!(f, "over the last period {}; ", phase_in_words(error))?;
+        }
+        write!(f, "the response read {} m", short(self.response))?;
+        if let Some(base) = self.base {
+            write!(f, ", and the base {} m", short(base))?;
+        }
+        write!(f, "; in the last period at most {} m", short(self.largest))?;
+        if let Some((name, value, unit)) = self.limit {
+            let value = value.map_or_else(|| "none".into(), short);
+            write!(f, "; {} is {value}{unit}", key(name))?;
+        }
+        Ok(())
+    }
 }
 
 /// Why an experiment ended early.
@@ -90,8 +134,8 @@ pub enum ExperimentError {
     #[error(transparent)]
     Controller(#[from] ControllerError),
     #[error(
-        "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s; {}",
-        phase_in_words(*phase_error), lock_in_words(*unmet)
+        "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s{}",
+        phase_in_words(*phase_error), unmet_in_words(*unmet)
     )]
     NoLock {
         periods: f64,
@@ -101,18 +145,29 @@ pub enum ExperimentError {
         /// What kept the bench from taking the motion as settled, if the controller does not judge its lock itself.
         unmet: Option<Condition>,
     },
-    #[error("the requested drive G = {g:.4} was not reached within {periods:.0} periods: {why}")]
-    NotReached { periods: f64, g: f64, why: String },
+    #[error(
+        "the requested drive G = {g:.4} was not reached within {periods:.0} periods: {}",
+        search_in_words(*held, *searches, *highest)
+    )]
+    NotReached {
+        periods: f64,
+        g: f64,
+        /// Least and largest G at which a symmetric 1:1 motion was held, if any was.
+        held: Option<[f64; 2]>,
+        searches: u32,
+        /// Largest C of the response that was tried.
+        highest: f64,
+    },
     #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}; {evidence}", stage.name())]
     Tripped {
         periods: f64,
         stage: Stage,
         fault: Fault,
-        evidence: String,
+        evidence: Evidence,
     },
     #[error(
         "the 1:1 motion, held at {held:.4e} m (C = {:.4}), is {regime} at {level:.4e} m (C = {:.4}): the backbone ends between the two, or the \
-         step was too large; set backbone.C_to nearer to the former, or more backbone.points",
+         step was too large",
         held / b, level / b
     )]
     MotionLost {
@@ -121,7 +176,7 @@ pub enum ExperimentError {
         b: f64,
         regime: crate::identification::Regime,
     },
-    #[error("the scene has no drive, E = 0, so that nothing can lock: set excitation.G or excitation.E above 0")]
+    #[error("the scene has no drive, E = 0, so that nothing can lock")]
     NoDrive,
     #[error("the controller answered {name} = {value} {unit}; it must be {allowed}. The drive is off")]
     Command {
@@ -439,8 +494,8 @@ fn checked(command: Command) -> Result<Command, ExperimentError> {
     refused.map_or(Ok(command), |refused| Err(error(refused)))
 }
 
-/// What the sensors read in the last period before a fault, and the limit of the scene that was exceeded.
-fn evidence(samples: &[Sample], config: &Config, fault: Fault) -> String {
+/// What was read before a fault.
+fn evidence(samples: &[Sample], config: &Config, fault: Fault) -> Evidence {
     let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
     let samples = &samples[samples.len().saturating_sub(period)..];
     let largest = samples
@@ -448,32 +503,23 @@ fn evidence(samples: &[Sample], config: &Config, fault: Fault) -> String {
         .map(|sample| sample.sensors.response.abs())
         .fold(0.0, f64::max);
     let last = samples.last().map(|sample| sample.sensors).unwrap_or_default();
-    let base = last
-        .reference
-        .map_or_else(String::new, |base| format!(", and the base {} m", short(base)));
-    let read = format!(
-        "the response read {} m{base}; in the last period at most {} m",
-        short(last.response),
-        short(largest)
-    );
-    let limit = |name, value: Option<f64>, unit| {
-        let value = value.map_or_else(|| "none".into(), short);
-        format!("{read}; {} is {value}{unit}", key(name))
+    let phase_error = (fault == Fault::LockLost).then(|| {
+        let errors: Option<Vec<f64>> = samples.iter().map(|sample| sample.command.phase_error).collect();
+        errors.map(|errors| mean(errors).to_degrees())
+    });
+    let limit = match fault {
+        Fault::ResponseTooLarge => Some(("response_max", config.response_max, " m")),
+        Fault::LockLost => Some(("lock.unlock_tolerance", Some(config.lock.unlock_tolerance), " rad")),
+        Fault::NoSignal => Some(("signal_timeout", config.signal_timeout, " s")),
+        Fault::Implausible => Some(("residual_max", config.residual_max, " of the amplitude")),
+        Fault::Sensor | Fault::TimedOut => None,
     };
-    match fault {
-        Fault::ResponseTooLarge => limit("response_max", config.response_max, " m"),
-        Fault::LockLost => {
-            let errors: Option<Vec<f64>> = samples.iter().map(|sample| sample.command.phase_error).collect();
-            let error = phase_in_words(errors.map(|errors| mean(errors).to_degrees()));
-            let tolerance = Some(config.lock.unlock_tolerance);
-            format!(
-                "over the last period {error}; {}",
-                limit("lock.unlock_tolerance", tolerance, " rad")
-            )
-        }
-        Fault::NoSignal => limit("signal_timeout", config.signal_timeout, " s"),
-        Fault::Implausible => limit("residual_max", config.residual_max, " of the amplitude"),
-        Fault::Sensor | Fault::TimedOut => read,
+    Evidence {
+        response: last.response,
+        base: last.reference,
+        largest,
+        phase_error,
+        limit,
     }
 }
 
@@ -505,7 +551,7 @@ mod tests {
             (Fault::LockLost, "phase_lock.lock.unlock_tolerance is 0.2 rad"),
             (Fault::LockLost, "the phase error is 14.324 degrees"),
         ] {
-            let text = evidence(&samples, &scene.controller_config(), fault);
+            let text = evidence(&samples, &scene.controller_config(), fault).to_string();
             assert!(text.contains(read) && text.contains(limit), "{text}");
         }
     }

@@ -345,22 +345,16 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         })
     }
 
-    /// Why the requested drive was not reached.
+    /// The requested drive was not reached.
     fn not_reached(&self) -> ExperimentError {
-        let d = self.bench.plan.knowledge.numbers;
-        let why = match self.held {
-            (low, high) if low <= high => format!(
-                "with the response under control, symmetric 1:1 motions were held at drives from G = {:.4} to {:.4}, and lost {SEARCHES} times; a \
-                 constant drive does not hold all of them",
-                d.excitation(low),
-                d.excitation(high)
-            ),
-            _ => format!(
-                "no symmetric 1:1 motion was found at responses up to C = {:.3}",
-                self.setpoint / self.b
-            ),
-        };
-        ExperimentError::NotReached { periods: self.bench.periods, g: d.g, why }
+        let (d, (low, high)) = (self.bench.plan.knowledge.numbers, self.held);
+        ExperimentError::NotReached {
+            periods: self.bench.periods,
+            g: d.g,
+            held: (low <= high).then(|| [low, high].map(|drive| d.excitation(drive))),
+            searches: SEARCHES,
+            highest: self.setpoint / self.b,
+        }
     }
 }
 

@@ -7,12 +7,11 @@ use std::path::Path;
 use std::str::FromStr;
 
 use serde_json::Value;
-
-use crate::ArgumentError;
-use crate::fit::{MeasuredPoint, Recording, RecordingError, Selection, Table};
-use crate::identification::Regime;
-use crate::numerics::Estimate;
-use crate::scene::Name;
+use vines::ArgumentError;
+use vines::fit::{MeasuredPoint, Recording, RecordingError, Selection, Table};
+use vines::identification::Regime;
+use vines::numerics::Estimate;
+use vines::scene::Name;
 
 /// Quantities of a point, and the columns that have them: SI units but for the frequency, in Hz.
 const COLUMNS: [(&str, &str, f64); 6] = [
@@ -26,7 +25,7 @@ const COLUMNS: [(&str, &str, f64); 6] = [
 
 /// A column of a user's table; parse it from `A=amplitude:mm`: the quantity, the name of the column, and its unit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Column {
+pub(super) struct Column {
     quantity: &'static str,
     name: Name,
 }
@@ -56,7 +55,7 @@ type Row = BTreeMap<String, String>;
 
 /// What a file contains.
 #[derive(Debug)]
-pub enum Measurement {
+pub(super) enum Measurement {
     /// Points, and the number of points that are left out: not settled, or of another regime than symmetric 1:1.
     Points(Vec<MeasuredPoint>, usize),
     /// Two channels over time.
@@ -67,7 +66,7 @@ pub enum Measurement {
 ///
 /// # Errors
 /// A file that cannot be read, without one of the columns, or with a value that is not a number.
-pub fn read(path: &Path, columns: &[Column], selection: &Selection) -> Result<Measurement, ArgumentError> {
+pub(super) fn read(path: &Path, columns: &[Column], selection: &Selection) -> Result<Measurement, ArgumentError> {
     let file = path.display();
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     if PYTHON.contains(&&*extension) {
