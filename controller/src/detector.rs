@@ -23,10 +23,10 @@ pub struct PhaseDetector {
     pub step: Real,
 }
 
-/// Estimate of the signal of one channel.
+/// The signal of one channel, as estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Estimate {
+pub struct Signal {
     /// m
     offset: Real,
     /// m, relative to the oscillator's phase. The first entry belongs to the fundamental.
@@ -37,7 +37,7 @@ pub struct Estimate {
     pub amplitude: Real,
 }
 
-impl Estimate {
+impl Signal {
     /// Coefficient of the fundamental, m: the signal contains `Re(c exp(i phase))`.
     pub fn fundamental(&self) -> Complex {
         self.harmonic[0]
@@ -85,7 +85,7 @@ impl PhaseDetector {
     }
 
     /// Whether the sum of the amplitudes of the harmonics above the fundamental is at most this, m.
-    pub fn harmonics_within(&self, estimate: &Estimate, limit: Real) -> bool {
+    pub fn harmonics_within(&self, estimate: &Signal, limit: Real) -> bool {
         let used = || estimate.harmonic.iter().take(self.harmonics).skip(1);
         // The bound without roots decides almost always.
         used().map(|c| c.re.abs() + c.im.abs()).sum::<Real>() <= limit
@@ -93,7 +93,7 @@ impl PhaseDetector {
     }
 
     /// Updates the estimate with a sample, m. Returns the difference between the sample and its prediction, m.
-    pub fn update(&self, estimate: &mut Estimate, sample: Real, rotors: &Rotors) -> Real {
+    pub fn update(&self, estimate: &mut Signal, sample: Real, rotors: &Rotors) -> Real {
         let Self { step, harmonics, .. } = *self;
         let residual = match self.method {
             Detector::Adaptive => {
@@ -139,7 +139,7 @@ mod tests {
     fn ripple(method: Detector, signal: impl Fn(f64) -> f64, truth: (f64, f64)) -> f64 {
         let (omega, sample_time) = (1.0, core::f64::consts::TAU / 100.3);
         let detector = detector(method, sample_time);
-        let mut estimate = Estimate::default();
+        let mut estimate = Signal::default();
         let mut oscillator = PhaseAccumulator::default();
         let mut worst = 0.0_f64;
         for n in 0..10_000 {
@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn the_coherence_is_one_for_a_sine_and_zero_for_a_zero_signal() {
         let detector = detector(Detector::Adaptive, 0.06);
-        let mut estimate = Estimate::default();
+        let mut estimate = Signal::default();
         assert_eq!(estimate.coherence(), 0.0);
         let mut oscillator = PhaseAccumulator::default();
         for _ in 0..5_000 {

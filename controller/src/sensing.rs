@@ -4,7 +4,7 @@
 
 use crate::balance::{Balance, GROWING, Powers};
 use crate::config::Config;
-use crate::detector::{Estimate, PhaseDetector, Rotors};
+use crate::detector::{PhaseDetector, Rotors, Signal};
 use crate::drive::PresentDrive;
 use crate::oscillator::Complex;
 use crate::real::consts::TAU;
@@ -27,8 +27,8 @@ const LASTS: Real = 5.0 * TAU;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Channel {
-    /// Estimate of the signal.
-    pub estimate: Estimate,
+    /// The signal, as estimated.
+    pub estimate: Signal,
     /// Whether the last reading is one of several implausible ones.
     is_implausible: bool,
     /// The last reading, m, and the phase for which it has not changed, rad.

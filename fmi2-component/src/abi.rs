@@ -215,7 +215,7 @@ unsafe fn output<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a
         return Ok(&mut []);
     }
     check(pointer, count, what)?;
-    // SAFETY: as above; what the master's memory holds now is not looked at.
+    // SAFETY: not NULL, aligned, of a sane size, and by the contract of `abi` as long as its count says; what is there now is not read.
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), count) })
 }
 

@@ -47,13 +47,13 @@ impl Unpacked {
         let file = File::open(path).map_err(|error| error.to_string())?;
         let damaged = |error: &dyn std::error::Error| format!("it is not a zip archive, or a damaged one: {error}");
         let mut archive = ZipArchive::new(io::BufReader::new(file)).map_err(|error| damaged(&error))?;
-        let folder = tempfile::Builder::new().prefix("vines-fmu").tempdir().map_err(|error| {
-            let place = std::env::temp_dir();
-            format!(
-                "it cannot be unpacked to {}: {error}; set TMPDIR to a folder that can be written to, or use `built-in`",
-                place.display()
-            )
-        })?;
+        let folder = tempfile::Builder::new()
+            .prefix("vines-fmu")
+            .tempdir()
+            .map_err(|error| {
+                let place = std::env::temp_dir();
+                format!("it cannot be unpacked to {}: {error}", place.display())
+            })?;
         let mut nested = None;
         for n in 0..archive.len() {
             let mut entry = archive.by_index(n).map_err(|error| damaged(&error))?;

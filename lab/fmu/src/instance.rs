@@ -17,7 +17,11 @@ use crate::units::{Scale, is_unit_of, scale};
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum FmuError {
     #[error("cannot load {} as an FMU: {reason}", path.display())]
-    Load { path: PathBuf, reason: String },
+    Load {
+        path: PathBuf,
+        reason: String,
+        obstacle: Option<Obstacle>,
+    },
     #[error("{} has no variable `{name}` that is a number or a Boolean, which the bench needs; [rig.names] and [controller_names] of \
              the scene map names", path.display())]
     Variable { path: PathBuf, name: String },
@@ -52,6 +56,38 @@ pub enum FmuError {
         time: f64,
         reason: String,
     },
+}
+
+/// What keeps this computer from loading an FMU, and can be changed there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Obstacle {
+    /// Nothing can be written to the temporary folder.
+    NoFolder,
+    /// The file system of the temporary folder may be mounted noexec.
+    NoExecution,
+    /// The library needs Python in this program.
+    Python,
+    /// The library needs another one.
+    Library,
+}
+
+impl FmuError {
+    /// An FMU that cannot be loaded for a reason that this crate or the loader of the system gives.
+    pub(crate) fn load(path: &Path, reason: String) -> Self {
+        let obstacle = [
+            ("it cannot be unpacked to", Obstacle::NoFolder),
+            ("failed to map segment", Obstacle::NoExecution),
+            ("undefined symbol: Py", Obstacle::Python),
+            ("undefined symbol: _Py", Obstacle::Python),
+            ("cannot open shared object file", Obstacle::Library),
+        ];
+        let obstacle = obstacle.into_iter().find(|(part, _)| reason.contains(part));
+        Self::Load {
+            path: path.into(),
+            reason,
+            obstacle: obstacle.map(|(_, obstacle)| obstacle),
+        }
+    }
 }
 
 impl From<FmuError> for RigError {
@@ -117,8 +153,8 @@ impl Fmu {
             log::warn!("{}: its description has, beyond FMI 2.0, {left_out}", path.display());
         }
         let fixed = fixed_step(description);
-        let refused = |reason| FmuError::Load { path: path.into(), reason };
-        let instance = Instance::new(&unpacked, role, &file_name(path)).map_err(refused)?;
+        let instance =
+            Instance::new(&unpacked, role, &file_name(path)).map_err(|reason| FmuError::load(path, reason))?;
         let (path, clock) = (path.into(), Clock::default());
         let fmu = Self {
             instance,
@@ -234,7 +270,7 @@ pub(super) fn unpack(
     if let Some(name) = names.unknown(&list) {
         return Err(FmuError::Name { name: name.into(), names: list.join(", ") });
     }
-    let unpacked = Unpacked::new(path).map_err(|reason| FmuError::Load { path: path.into(), reason })?;
+    let unpacked = Unpacked::new(path).map_err(|reason| FmuError::load(path, reason))?;
     let connections = bench
         .iter()
         .map(|(ours, si)| connect(ours, si, names, &unpacked.description, path));

@@ -10,6 +10,6 @@ mod units;
 
 pub use archive::{PLATFORMS, own_platforms};
 pub use controller::FmuController;
-pub use instance::{Connection, FmuError};
+pub use instance::{Connection, FmuError, Obstacle};
 pub use library::check;
 pub use rig::FmuRig;

@@ -313,23 +313,7 @@ impl Drop for Instance {
 /// Why a library cannot be loaded, as the end of a sentence.
 fn unloadable(error: &libloading::Error, fmu: &Unpacked) -> String {
     let folder = format!("{}/", fmu.folder().display());
-    let reason = loader(error).replace(&folder, "");
-    let advice = if reason.contains("failed to map segment") {
-        let place = std::env::temp_dir();
-        format!(
-            "; it was unpacked to {}, whose file system may be mounted noexec: set TMPDIR to another folder",
-            place.display()
-        )
-    } else if reason.contains("undefined symbol: Py") || reason.contains("undefined symbol: _Py") {
-        "; it needs Python in this program: set LD_PRELOAD to the library of that Python, libpython3.X.so, and PYTHONPATH to its packages, or \
-         serve the controller from Python"
-            .into()
-    } else if reason.contains("cannot open shared object file") {
-        "; it needs that library: install it, or export the FMU with its libraries".into()
-    } else {
-        String::new()
-    };
-    format!("its library cannot be loaded: {reason}{advice}")
+    format!("its library cannot be loaded: {}", loader(error).replace(&folder, ""))
 }
 
 /// What the system's loader says.

@@ -362,8 +362,7 @@ impl<T: Transport> HelicRig<T> {
         let seconds = f64::from(missed) * self.sample_time;
         if seconds > allowed {
             let text = format!("did not arrive, {seconds:.3} s; up to {allowed} s are bridged");
-            let advice = "Check the network and the load of this machine";
-            return Err(format!("{missed} samples of the helic device {text}. {advice}").into());
+            return Err(format!("{missed} samples of the helic device {text}").into());
         }
         self.counters.received += 1;
         for (number, record) in (next + missed as u64..).zip(packet.values.chunks_exact(width)) {

@@ -9,7 +9,7 @@ use std::sync::{Arc, OnceLock};
 use lovines::InvalidValue;
 use phase_lock::ConfigError;
 use vines::cells::CellError;
-use vines::fmu::FmuError;
+use vines::fmu::{FmuError, Obstacle};
 use vines::identification::IdentificationError;
 use vines::orbit::NoMotion;
 use vines::report::ReportError;
@@ -69,7 +69,28 @@ macro_rules! exit_codes {
 
 exit_codes! {
     2: ArgumentError, CellError, InvalidValue, SceneError;
-    1: io::Error, ControllerError, FileError, FmuError, NoMotion, ReportError, RigError;
+    1: io::Error, ControllerError, FileError, NoMotion, ReportError, RigError;
+}
+
+impl From<FmuError> for Failure {
+    fn from(error: FmuError) -> Self {
+        let FmuError::Load { obstacle: Some(obstacle), .. } = error else {
+            return Self::run(error);
+        };
+        let advice = match obstacle {
+            Obstacle::NoFolder => "; set TMPDIR to a folder that can be written to, or use `built-in`",
+            Obstacle::NoExecution => &format!(
+                "; it was unpacked to {}, whose file system may be mounted noexec: set TMPDIR to another folder",
+                std::env::temp_dir().display()
+            ),
+            Obstacle::Python => {
+                "; it needs Python in this program: set LD_PRELOAD to the library of that Python, libpython3.X.so, and PYTHONPATH to its \
+                 packages, or serve the controller from Python"
+            }
+            Obstacle::Library => "; it needs that library: install it, or export the FMU with its libraries",
+        };
+        Self::run(format!("{error}{advice}"))
+    }
 }
 
 impl From<PackError> for Failure {

@@ -190,7 +190,9 @@ impl Endpoint {
     /// The rig of this endpoint.
     pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
         if scene.structure.is_some() {
-            return Err(Failure::input("[structure]: no rig of this program has more than one mode yet"));
+            return Err(Failure::input(
+                "[structure]: no rig of this program has more than one mode yet",
+            ));
         }
         let (mut pace, mut timing) = (None, Arc::default());
         let rig: Box<dyn Rig> = match self {

@@ -163,7 +163,7 @@ pub enum ExperimentError {
         periods: f64,
         stage: Stage,
         fault: Fault,
-        evidence: Evidence,
+        evidence: Box<Evidence>,
     },
     #[error(
         "the 1:1 motion, held at {held:.4e} m (C = {:.4}), is {regime} at {level:.4e} m (C = {:.4}): the backbone ends between the two, or the \
@@ -431,7 +431,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         if fault == Fault::TimedOut {
             return self.no_lock(command);
         }
-        let evidence = evidence(self.samples, self.config, fault);
+        let evidence = evidence(self.samples, self.config, fault).into();
         ExperimentError::Tripped { periods: self.periods, stage, fault, evidence }
     }
 

@@ -89,7 +89,10 @@ fn a_library_that_is_missing_or_of_another_kind_is_named_with_its_package() {
     let path = library(folder.path());
     let refused = |part: &str| {
         let error = packed(folder.path(), &[]).expect_err("a mistake");
-        assert!(matches!(error, PackError::NotOwn { package: "tiny-fmu", .. }), "{error}");
+        assert!(
+            matches!(error, PackError::NotOwn { package: "tiny-fmu", .. }),
+            "{error}"
+        );
         let (message, named) = (error.to_string(), path.display().to_string());
         assert!(message.contains(part) && message.contains(&named), "{message}");
     };

@@ -147,6 +147,9 @@ impl Bench {
     }
 
     /// One sample: sensors, controller, drive. Returns the row of the record.
+    ///
+    /// This is the exchange of `ControlLoop`, without its record, its judgement of the lock and its end after a fault: the page keeps
+    /// running for hours, also with the loop open, with settings that change and after a trip.
     fn sample(&mut self, is_last: bool) -> Result<Row, Message> {
         let due = self.tracking.as_mut().and_then(|tracking| tracking.due(self.samples));
         if let Some((to, phase_target)) = due {
