@@ -106,16 +106,17 @@ type RecordingTuple = (
 
 /// The recording of two channels of a file: a table as text if `channels` is absent. `options`: response, drive and time.
 #[pyfunction]
-#[pyo3(signature = (path, channels, options, rate))]
+#[pyo3(signature = (path, channels, options, rate, late))]
 pub fn recording(
     py: Python<'_>,
     path: &str,
     channels: Option<Vec<ChannelTuple>>,
     options: [Option<String>; 3],
     rate: Option<f64>,
+    late: Option<f64>,
 ) -> PyResult<RecordingTuple> {
     let [response, drive, time] = options;
-    let selection = Selection { response, drive, time, rate };
+    let selection = Selection { response, drive, time, rate, late };
     let channel = |(name, unit, values, clock)| Channel { name, unit, values, clock };
     let read = || {
         let contents = match channels {

@@ -25,6 +25,7 @@ def main() -> int:
         "--drive", metavar="NAME[:UNIT]", help="channel of the base; of structure: the point of the force"
     )
     parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second")
+    parser.add_argument("--late", type=float, metavar="SECONDS", help="how much later than the response the base is")
     parser.add_argument("--time", metavar="NAME[:UNIT]", help="channel of the time")
     parser.add_argument("--scene", metavar="FILE", help="scene file; without it, the default scene")
     parser.add_argument("--known", action="append", default=[], metavar="SYMBOL=VALUE±U", help="a value from elsewhere")
@@ -38,7 +39,7 @@ def main() -> int:
         return _structure(given)
     try:
         scene = Scene(given.scene)
-        names = {"response": given.response, "drive": given.drive, "rate": given.rate, "time": given.time}
+        names = {key: getattr(given, key) for key in ("response", "drive", "rate", "time", "late")}
         recordings = [read_recording(file, **names) for file in given.files]
         for note in (note for one in recordings for note in one.notes):
             print(note)

@@ -100,6 +100,7 @@ def read_recording(
     *,
     rate: float | None = None,
     time: str | None = None,
+    late: float | None = None,
 ) -> Recording:
     """Read a recording from a file, by its extension.
 
@@ -111,13 +112,16 @@ def read_recording(
     response, drive : str, optional
         Channels of the response and of the base, by default `response` and `reference`: a name or a number, and after a
         colon a unit if the file has none (m, mm, µm, mm/s, m/s², g) or a multiple of it ("-1g"), the sensitivity of the
-        sensor ("100mV/g", "125mm/s/V"), or metres per unit ("-0.5"). The last part of a path is enough where it is the only one. Without a
-        channel of the base the base rests.
+        sensor ("100mV/g", "125mm/s/V"), or metres per unit ("-0.5"). The last part of a path is enough where it is the
+        only one. Without a channel of the base the base rests.
     rate : float, optional
         Samples a second. Without it the file says it: a channel of the time, or the clock of a channel in TDMS,
         UFF58 or LVM.
     time : str, optional
         Channel of the time, by default `time` or `t`.
+    late : float, optional
+        Time by which the channel of the base is later than that of the response, s: channels that a logger samples in
+        turn. Nothing in a recording shows it.
 
     Returns
     -------
@@ -155,7 +159,7 @@ def read_recording(
             reasons = "; ".join(f"{name}: {reason}" for name, reason in refused.items())
             raise ValueError(f"{file} has no channel of numbers{': ' if reasons else ''}{reasons}")
     origin, names, (start, step), measured, y, x, notes = _native.recording(
-        str(file), channels, [response, drive, time], rate
+        str(file), channels, [response, drive, time], rate, late
     )
     pair = (measured[0], measured[1])
     return Recording(origin, (names[0], names[1]), step, np.array(y), np.array(x), start, pair, tuple(notes))

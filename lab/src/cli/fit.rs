@@ -78,6 +78,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME[:UNIT]")]
     time: Option<String>,
 
+    /// Time by which the channel of the base is later than that of the response, s
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    late: Option<f64>,
+
     /// Samples a second of a recording
     #[arg(long, value_name = "HZ", value_parser = positive)]
     rate: Option<f64>,
@@ -119,6 +123,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         drive: arguments.drive.clone(),
         time: arguments.time.clone(),
         rate: arguments.rate,
+        late: arguments.late,
     };
     let (mut points, mut skipped, mut recordings) = (Vec::new(), 0, Vec::new());
     let mut notes: Vec<String> = Vec::new();

@@ -83,14 +83,14 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
 }
 
 /// Largest number of harmonics that are fitted: a bound of the work.
-const MOST_HARMONICS: usize = 40;
+const MOST_HARMONICS: usize = 60;
 
 /// Number of harmonics that belong to the motion in a response of which the sensor measures this, `least` of a displacement: an impact makes those of
 /// a velocity fall as 1/n, and those of an acceleration not at all. What is not fitted counts as noise, for which two fifths of the samples remain.
 pub(crate) fn harmonics_of(measurand: Measurand, samples_per_period: f64, least: usize) -> usize {
     match measurand {
         Measurand::Displacement => least,
-        _ => ((0.3 * samples_per_period) as usize).clamp(least, MOST_HARMONICS),
+        _ => ((0.42 * samples_per_period) as usize).clamp(least, MOST_HARMONICS),
     }
 }
 

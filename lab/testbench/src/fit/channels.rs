@@ -43,6 +43,8 @@ pub struct Selection {
     pub time: Option<String>,
     /// Samples a second, if the file does not say it.
     pub rate: Option<f64>,
+    /// Time by which the channel of the base is later than that of the response, s.
+    pub late: Option<f64>,
 }
 
 /// Usual names of the time.
@@ -110,6 +112,15 @@ impl Contents {
         };
         if time.is_none() {
             self.align(&mut response, &mut drive, &mut notes)?;
+        }
+        let mut start = start;
+        if let Some(late) = selection.late.filter(|_| !drive.name.is_empty()) {
+            let begins = self.shift([&mut response, &mut drive], late / sample_time)?;
+            start += begins as f64 * sample_time;
+            notes.push(format!(
+                "{}: channel {} is {late} s later than {}, as given, and is corrected",
+                self.origin, drive.name, response.name
+            ));
         }
         notes.append(&mut units);
         Ok(Recording {
@@ -440,6 +451,24 @@ impl Contents {
             common.len()
         ));
         Ok(())
+    }
+
+    /// The drive `late` samples earlier, and the response without the samples for which there is none. Returns the number of those at the beginning.
+    fn shift(&self, [response, drive]: [&mut Measured; 2], late: f64) -> Result<usize, RecordingError> {
+        let count = response.values.len().min(drive.values.len());
+        let last = count.saturating_sub(1) as f64;
+        let is_read = |n: &usize| (0.0..=last).contains(&(*n as f64 + late));
+        let common: Vec<usize> = (0..count).filter(is_read).collect();
+        let (Some(first), true) = (common.first(), count >= 4) else {
+            return Err(self.refused(&format!(
+                ": channel {} cannot be {late} samples later than {}: it has {count}",
+                drive.name, response.name
+            )));
+        };
+        let places: Vec<f64> = (0..count).map(|n| n as f64).collect();
+        drive.values = interpolated(&places, &drive.values, common.iter().map(|n| *n as f64 + late));
+        response.values = common.iter().map(|n| response.values[*n]).collect();
+        Ok(*first)
     }
 
     /// Where a sample is in the file.
