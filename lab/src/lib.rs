@@ -15,5 +15,5 @@ pub use vines_model::{ArgumentError, curves, map, numerics, orbit, regime, theor
 pub use vines_net as net;
 pub use vines_testbench::{
     advice, backbone, cells, comparison, experiment, fit, identification, linear, live, loop_check, plan, record, rig,
-    scene,
+    scene, survey,
 };

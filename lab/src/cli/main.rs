@@ -18,6 +18,7 @@ mod recording;
 mod report;
 mod serve;
 mod shell;
+mod structure;
 mod summary;
 mod tap;
 mod theory;
@@ -72,6 +73,7 @@ enum Command {
     Fit(fit::Arguments),
     Check(check::Arguments),
     Orbit(orbit::Arguments),
+    Structure(structure::Arguments),
     Theory(theory::Arguments),
     Map(map::Arguments),
     Report(report::Arguments),
@@ -103,6 +105,7 @@ fn dispatch(command: Command) -> Result<Results, Failure> {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Check(arguments) => check::run(&arguments).map(Results::from),
         Command::Orbit(arguments) => orbit::run(&arguments),
+        Command::Structure(arguments) => structure::run(&arguments).map(Results::from),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),
         Command::Report(arguments) => report::run(&arguments).map(Results::from),

@@ -18,3 +18,4 @@ pub mod plan;
 pub mod record;
 pub mod rig;
 pub mod scene;
+pub mod survey;

@@ -46,7 +46,7 @@ pub use controller::{ControllerSettings, KEYS, PhaseLock, key, refusal};
 pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
 pub use names::{Name, Names};
 pub use overrides::{Family, Override};
-pub use structure::{Excitation, Structure, StructureForm, StructureMode};
+pub use structure::{Excitation, Structure, StructureMode};
 pub use vines_model::{Definition, Dimensionless, Measurand, Reference, Sensor};
 
 /// The default scene, embedded so that the program works from any folder.

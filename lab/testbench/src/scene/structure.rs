@@ -6,6 +6,8 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
+use lovines::host::{Matrices, Row};
+use lovines::{Host, InvalidHost, Mode};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
@@ -48,24 +50,8 @@ pub struct StructureMode {
     pub drive: f64,
 }
 
-/// The equations of a structure, as its section states them.
-#[derive(Debug, Clone, PartialEq)]
-pub enum StructureForm {
-    /// Real modes with modal damping: [`Structure::modes`] says everything.
-    Modes,
-    /// Viscous damping that couples the modes.
-    Matrices {
-        /// Mass, kg.
-        m: DMatrix<f64>,
-        /// Damping, N s/m.
-        c: DMatrix<f64>,
-        /// Stiffness, N/m.
-        k: DMatrix<f64>,
-    },
-}
-
 /// A structure: its equations, its points, what drives it and what is measured.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Structure {
     /// What drives it.
     pub excitation: Excitation,
@@ -81,11 +67,22 @@ pub struct Structure {
     pub driven: usize,
     /// The modes by rising frequency.
     pub modes: Vec<StructureMode>,
-    /// Displacement of the points where the base moves by one, for matrices.
-    pub direction: Vec<f64>,
-    /// The equations.
+    /// The structure as plant and exact orbits take it.
     #[serde(skip)]
-    pub form: StructureForm,
+    pub host: Host,
+    /// The displacement of every point in the sections of the host.
+    #[serde(skip)]
+    pub rows: Vec<Row>,
+}
+
+impl PartialEq for Structure {
+    /// Points, modes and the sections of the host, with the drive in them.
+    fn eq(&self, other: &Self) -> bool {
+        let places = |one: &Self| (one.excitation, one.cavity, one.drive, one.sensor, one.driven);
+        places(self) == places(other)
+            && (&self.points, &self.modes, &self.rows) == (&other.points, &other.modes, &other.rows)
+            && self.host.sections() == other.host.sections()
+    }
 }
 
 impl Structure {
@@ -97,6 +94,16 @@ impl Structure {
     /// Shape of a mode at the cavity, 1/sqrt(kg).
     pub fn at_cavity(&self, mode: &StructureMode) -> f64 {
         mode.shape[self.cavity]
+    }
+
+    /// The displacement that the response is, in the sections of the host: at the sensor, with the sign of
+    /// [`Self::reading_per_response`].
+    pub fn response(&self) -> Row {
+        let sign = self.reading_per_response().signum();
+        self.rows[self.sensor]
+            .iter()
+            .map(|pair| pair.map(|value| sign * value))
+            .collect()
     }
 
     /// Modal mass ratio `m phi_n²` of a mode for the particle mass `m`, kg.
@@ -163,8 +170,9 @@ struct ModeSection {
 struct Parts {
     points: Vec<String>,
     modes: Vec<StructureMode>,
-    direction: Vec<f64>,
-    form: StructureForm,
+    /// M, C and K with the direction of the base, where the damping is not modal.
+    matrices: Option<[DMatrix<f64>; 3]>,
+    direction: DVector<f64>,
 }
 
 /// Largest relative difference of a matrix from its transpose, and share of a shape at a node: rounding of what a file states to nine digits.
@@ -195,7 +203,7 @@ impl StructureSection {
                 );
             }
         };
-        let Parts { points, mut modes, direction, form } = parts;
+        let Parts { points, mut modes, matrices, direction } = parts;
         let place = |key: &str, name: &str| {
             points.iter().position(|point| point == name).ok_or_else(|| {
                 format!(
@@ -233,19 +241,30 @@ impl StructureSection {
                 modes.len()
             ));
         }
-        let structure = Structure {
+        let driven = driven - 1;
+        let at = Places { cavity, drive, sensor };
+        check(&points, &modes, driven, &at)?;
+        let host =
+            host(self.excitation, &modes, matrices.as_ref(), &direction, &at).map_err(|error| error.to_string())?;
+        let shapes = |point: usize| -> Vec<f64> {
+            match matrices {
+                Some(_) => unit(points.len(), point),
+                None => modes.iter().map(|mode| mode.shape[point]).collect(),
+            }
+        };
+        let rows = (0..points.len()).map(|point| host.row(&shapes(point)));
+        let rows = rows.collect::<Result<_, _>>().map_err(|error| error.to_string())?;
+        Ok(Structure {
             excitation: self.excitation,
+            points,
             cavity,
             drive,
             sensor,
-            driven: driven - 1,
-            points,
+            driven,
             modes,
-            direction,
-            form,
-        };
-        structure.check()?;
-        Ok(structure)
+            host,
+            rows,
+        })
     }
 
     /// The modes of a table.
@@ -312,12 +331,7 @@ impl StructureSection {
             });
         }
         modes.sort_by(|a, b| a.omega.total_cmp(&b.omega));
-        Ok(Parts {
-            points,
-            modes,
-            direction: Vec::new(),
-            form: StructureForm::Modes,
-        })
+        Ok(Parts { points, modes, matrices: None, direction: DVector::zeros(0) })
     }
 
     /// Participation of the base in a mode, by the matrix M; refuses a shape that is not mass-normalised.
@@ -404,16 +418,8 @@ impl StructureSection {
             .iter()
             .enumerate()
             .all(|(n, value)| n % (modes.len() + 1) == 0 || value.abs() <= ROUNDING * largest);
-        let form = match is_modal {
-            true => StructureForm::Modes,
-            false => StructureForm::Matrices { m: m.values, c: c.values, k: k.values },
-        };
-        Ok(Parts {
-            points: m.names,
-            modes,
-            direction: direction.iter().copied().collect(),
-            form,
-        })
+        let matrices = (!is_modal).then_some([m.values, c.values, k.values]);
+        Ok(Parts { points: m.names, modes, matrices, direction })
     }
 
     /// The modes of a table of poles and residues.
@@ -437,12 +443,7 @@ impl StructureSection {
             drive: 0.0,
         });
         let modes = modes.collect();
-        Ok(Parts {
-            points,
-            modes,
-            direction: Vec::new(),
-            form: StructureForm::Modes,
-        })
+        Ok(Parts { points, modes, matrices: None, direction: DVector::zeros(0) })
     }
 
     fn only_with(&self, owner: &str, key: &str, is_given: bool) -> Result<(), String> {
@@ -453,49 +454,98 @@ impl StructureSection {
     }
 }
 
-impl Structure {
-    /// Refuses a driven mode that no impact or drive can reach, that the sensor does not see, or that does not oscillate.
-    fn check(&self) -> Result<(), String> {
-        for (n, mode) in self.modes.iter().enumerate() {
-            if mode.zeta >= 1.0 {
-                return Err(format!(
-                    "mode {} has the damping ratio {}: critical or more, and a mode must oscillate; the ratio must be below 1 (it is a number, not \
-                     per cent)",
-                    n + 1,
-                    mode.zeta
-                ));
-            }
-        }
-        let mode = self.mode();
-        let number = self.driven + 1;
-        let largest = mode
-            .shape
-            .iter()
-            .fold(0.0_f64, |largest, value| largest.max(value.abs()));
-        let is_node = |point: usize| mode.shape[point].abs() <= ROUNDING * largest;
-        if is_node(self.cavity) {
+/// Places of cavity, force and sensor among the points.
+struct Places {
+    cavity: usize,
+    drive: Option<usize>,
+    sensor: usize,
+}
+
+/// Refuses a driven mode that no impact or drive can reach, that the sensor does not see, or that does not oscillate.
+fn check(points: &[String], modes: &[StructureMode], driven: usize, at: &Places) -> Result<(), String> {
+    for (n, mode) in modes.iter().enumerate() {
+        if mode.zeta >= 1.0 {
             return Err(format!(
-                "the cavity at {} is at a node of the driven mode {number}: no impact can drive it; choose another point or mode",
-                self.points[self.cavity]
+                "mode {} has the damping ratio {}: critical or more, and a mode must oscillate; the ratio must be below 1 (it is a number, not \
+                 per cent)",
+                n + 1,
+                mode.zeta
             ));
         }
-        let is_still = self.drive.map_or(mode.drive == 0.0, is_node);
-        if is_still {
-            let place = self.drive.map_or("the base".into(), |point| {
-                format!("the force at {}", self.points[point])
-            });
-            return Err(format!(
-                "{place} does not drive mode {number}: its shape or participation there is 0"
-            ));
-        }
-        if is_node(self.sensor) {
-            return Err(format!(
-                "the sensor at {} is at a node of the driven mode {number}, and does not read it; choose another point or mode",
-                self.points[self.sensor]
-            ));
-        }
-        Ok(())
     }
+    let (mode, number) = (&modes[driven], driven + 1);
+    let largest = mode
+        .shape
+        .iter()
+        .fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    let is_node = |point: usize| mode.shape[point].abs() <= ROUNDING * largest;
+    if is_node(at.cavity) {
+        return Err(format!(
+            "the cavity at {} is at a node of the driven mode {number}: no impact can drive it; choose another point or mode",
+            points[at.cavity]
+        ));
+    }
+    if at.drive.map_or(mode.drive == 0.0, is_node) {
+        let place = at
+            .drive
+            .map_or("the base".into(), |point| format!("the force at {}", points[point]));
+        return Err(format!(
+            "{place} does not drive mode {number}: its shape or participation there is 0"
+        ));
+    }
+    if is_node(at.sensor) {
+        return Err(format!(
+            "the sensor at {} is at a node of the driven mode {number}, and does not read it; choose another point or mode",
+            points[at.sensor]
+        ));
+    }
+    Ok(())
+}
+
+/// The host: of real modes, or of the matrices where the damping couples these.
+fn host(
+    excitation: Excitation,
+    modes: &[StructureMode],
+    matrices: Option<&[DMatrix<f64>; 3]>,
+    direction: &DVector<f64>,
+    at: &Places,
+) -> Result<Host, InvalidHost> {
+    let kind = match excitation {
+        Excitation::Base => lovines::Excitation::Base,
+        Excitation::Force => lovines::Excitation::Force,
+    };
+    let Some(matrices) = matrices else {
+        let mode = |mode: &StructureMode| Mode {
+            omega: mode.omega,
+            zeta: mode.zeta,
+            cavity: mode.shape[at.cavity],
+            drive: mode.drive,
+        };
+        return Host::from_modes(kind, &modes.iter().map(mode).collect::<Vec<_>>());
+    };
+    let rows = |matrix: &DMatrix<f64>| -> Vec<Vec<f64>> {
+        matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+    };
+    let [mass, damping, stiffness] = matrices.each_ref().map(rows);
+    let n = direction.len();
+    let drive = at
+        .drive
+        .map_or_else(|| direction.iter().copied().collect(), |point| unit(n, point));
+    Host::from_matrices(
+        kind,
+        &Matrices {
+            mass: &mass,
+            damping: &damping,
+            stiffness: &stiffness,
+            cavity: &unit(n, at.cavity),
+            drive: &drive,
+        },
+    )
+}
+
+/// The row of a degree of freedom.
+fn unit(n: usize, place: usize) -> Vec<f64> {
+    (0..n).map(|other| f64::from(u8::from(other == place))).collect()
 }
 
 /// Euclidean norm.

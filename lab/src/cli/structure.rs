@@ -1,0 +1,166 @@
+//! `vines structure`: a structure before it is driven.
+
+use std::f64::consts::TAU;
+
+use clap::Args;
+use serde_json::json;
+use vines::orbit::{StructureBranch, StructureOrbit};
+use vines::scene::{Scene, Structure};
+use vines::survey::{Survey, Taken};
+use vines::table::{Table, number};
+
+use super::output::output;
+use super::{failure::Failure, options::SceneArguments};
+
+const HELP: &str = "\
+The first table has the modes:
+  m phi²      modal mass ratio, the particle over the modal mass at the cavity; first-order theory needs it to be small
+  ratio       natural frequency over the driven mode's, and the nearest of its harmonics 3, 5 and 7, which impacts excite
+  influence   what the mode adds to the conditions of impact, over what the driven mode alone has; far below 1 it leaves the motion, though
+              not always its stability, as it is
+The second table has all exact symmetric 1:1 orbits at phase resonance under the scene's drive. Then follows where the backbone is stable,
+with all modes and with the driven mode alone, and which mode takes the stability.
+
+Examples:
+  vines structure --scene scenes/cantilever.toml
+  vines structure --scene beam.toml --set structure.mode=2 --json";
+
+/// Print the modes of a structure, its exact 1:1 orbits at phase resonance, and which mode takes their stability
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+    let scene = arguments.scene.load()?;
+    let no_structure = || Failure::input("the scene has no [structure]: its host is one oscillator, see `vines orbit`");
+    let structure = scene.structure.as_ref().ok_or_else(no_structure)?;
+    let survey =
+        Survey::of(&scene).ok_or_else(|| Failure::run("the exact orbits have no closed form at this frequency"))?;
+    let taken = survey.taken(&scene);
+    let result = json!({ "structure": structure, "survey": survey, "taken": taken });
+    output(arguments.json, &result, || {
+        described(&scene, structure, &survey, &taken)
+    })
+}
+
+fn described(scene: &Scene, structure: &Structure, survey: &Survey, taken: &[Taken]) -> String {
+    let point = |n: usize| &structure.points[n];
+    let unit = structure.excitation.unit();
+    let drive = structure
+        .drive
+        .map_or_else(|| "the base".into(), |n| format!("a force at {}", point(n)));
+    let mut text = format!(
+        "Structure of {} modes, driven by {drive} in mode {}; cavity at {}, sensor at {}\n\n",
+        structure.modes.len(),
+        structure.driven + 1,
+        point(structure.cavity),
+        point(structure.sensor)
+    );
+    let rows = survey.modes.iter().enumerate().map(|(n, mode)| {
+        let (order, distance) = mode.harmonic;
+        let harmonic = match n == survey.driven {
+            true => "driven".into(),
+            false => format!("{order}, {:+.2}", (mode.ratio - f64::from(order)).signum() * distance),
+        };
+        vec![
+            (n + 1).to_string(),
+            number(mode.omega0 / TAU),
+            number(mode.zeta),
+            number(mode.mass_ratio),
+            number(mode.ratio),
+            harmonic,
+            number(mode.influence),
+        ]
+    });
+    let modes = Table::new("mode | frequency, Hz | damping | m phi² | ratio | harmonic | influence").rows(rows);
+    text += &modes.text();
+    for (n, mode) in structure
+        .modes
+        .iter()
+        .enumerate()
+        .filter(|(_, mode)| mode.out_of_phase > 0.0)
+    {
+        text += &format!(
+            "  mode {}: {:.1} % of the shape are out of phase and left out\n",
+            n + 1,
+            100.0 * mode.out_of_phase
+        );
+    }
+    let b = scene.plant.half_width * structure.reading_per_response().abs();
+    text += &format!(
+        "\nExact symmetric 1:1 orbits at phase resonance under {:.4e} {unit}\n",
+        scene.structure_drive().unwrap_or(0.0)
+    );
+    let rows = survey.orbits.iter().map(|orbit| row(orbit, b));
+    let orbits = Table::new(&format!(
+        "frequency, Hz | response, m | C | drive, {unit} | largest mult. | stable"
+    ))
+    .rows(rows);
+    text += &match orbits.is_empty() {
+        true => "  none between controller.omega_min and controller.omega_max\n".into(),
+        false => orbits.text(),
+    };
+    text += &format!(
+        "\nThe backbone is stable for C {}; with the driven mode alone, for C {}\n",
+        stable(&survey.backbone, b),
+        stable(&survey.alone, b)
+    );
+    for Taken { response: [from, to], mode, worst } in taken {
+        text += &format!(
+            "warning: mode {} takes the stability for C from {:.3} to {:.3}, where the driven mode alone is stable: largest multiplier {:.4} at {:.4} Hz\n",
+            mode + 1,
+            from / b,
+            to / b,
+            worst.growth(),
+            worst.omega / TAU
+        );
+    }
+    text
+}
+
+/// An orbit; C is its response over that of the driven mode with the amplitude b at the cavity.
+fn row(orbit: &StructureOrbit, b: f64) -> Vec<String> {
+    let numbers = [
+        orbit.omega / TAU,
+        orbit.response,
+        orbit.response / b,
+        orbit.drive,
+        orbit.growth(),
+    ];
+    let stable = if orbit.stable { "yes" } else { "no" };
+    numbers.map(number).into_iter().chain([stable.into()]).collect()
+}
+
+/// Ranges of C over which a backbone is stable.
+fn stable(branches: &[StructureBranch], b: f64) -> String {
+    let mut ranges = Vec::new();
+    for branch in branches {
+        for run in branch
+            .orbits
+            .chunk_by(|one, other| one.stable == other.stable)
+            .filter(|run| run[0].stable)
+        {
+            let responses = || run.iter().map(|orbit| orbit.response / b);
+            ranges.push([
+                responses().fold(f64::INFINITY, f64::min),
+                responses().fold(0.0, f64::max),
+            ]);
+        }
+    }
+    ranges.sort_by(|one, other| one[0].total_cmp(&other[0]));
+    let ranges: Vec<String> = ranges
+        .iter()
+        .map(|[low, high]| format!("from {low:.3} to {high:.3}"))
+        .collect();
+    match ranges.is_empty() {
+        true => "nowhere".into(),
+        false => ranges.join(" and "),
+    }
+}
