@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use clap::Args;
 use serde_json::json;
-use vines::orbit::{StructureBranch, StructureOrbit};
+use vines::orbit::{StabilityChange, StructureBranch, StructureOrbit};
 use vines::scene::{Scene, Structure};
-use vines::survey::{Survey, Taken};
+use vines::survey::Survey;
 use vines::table::{Table, number};
 
 use super::output::output;
@@ -43,14 +43,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let structure = scene.structure.as_ref().ok_or_else(no_structure)?;
     let survey =
         Survey::of(&scene).ok_or_else(|| Failure::run("the exact orbits have no closed form at this frequency"))?;
-    let taken = survey.taken(&scene);
-    let result = json!({ "structure": structure, "survey": survey, "taken": taken });
-    output(arguments.json, &result, || {
-        described(&scene, structure, &survey, &taken)
-    })
+    let result = json!({ "structure": structure, "survey": survey });
+    output(arguments.json, &result, || described(&scene, structure, &survey))
 }
 
-fn described(scene: &Scene, structure: &Structure, survey: &Survey, taken: &[Taken]) -> String {
+fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
     let point = |n: usize| &structure.points[n];
     let unit = structure.excitation.unit();
     let drive = structure
@@ -63,7 +60,7 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey, taken: &[Tak
         point(structure.cavity),
         point(structure.sensor)
     );
-    let rows = survey.modes.iter().enumerate().map(|(n, mode)| {
+    let rows = survey.facts.modes.iter().enumerate().map(|(n, mode)| {
         let (order, distance) = mode.harmonic;
         let harmonic = match n == survey.driven {
             true => "driven".into(),
@@ -109,17 +106,18 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey, taken: &[Tak
     };
     text += &format!(
         "\nThe backbone is stable for C {}; with the driven mode alone, for C {}\n",
-        stable(&survey.backbone, b),
-        stable(&survey.alone, b)
+        stable(&survey.facts.all, b),
+        stable(&survey.facts.alone, b)
     );
-    for Taken { response: [from, to], mode, worst } in taken {
+    for (mode, change) in survey.taken() {
+        let StabilityChange { kind, orbit, .. } = change;
         text += &format!(
-            "warning: mode {} takes the stability for C from {:.3} to {:.3}, where the driven mode alone is stable: largest multiplier {:.4} at {:.4} Hz\n",
+            "warning: mode {} takes the stability at C = {:.4}, {:.4} Hz, {:.4e} {unit} ({})\n",
             mode + 1,
-            from / b,
-            to / b,
-            worst.growth(),
-            worst.omega / TAU
+            orbit.response / b,
+            orbit.omega / TAU,
+            orbit.drive,
+            kind.name()
         );
     }
     text
