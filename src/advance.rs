@@ -2,15 +2,14 @@
 
 use core::ops::ControlFlow;
 
-use crate::arithmetic::{Sum, Sums};
+use crate::arithmetic::Sum;
 use crate::base_motion::Drive;
 use crate::contact::{Resolution, Touch, Wall};
 use crate::fast::Next;
 use crate::flight::{Flight, FlightEnd, Grip, until_released};
-use crate::oscillator::Oscillator;
 use crate::parameters::InvalidValue;
 use crate::plant::{Event, MOST_EVALUATIONS, MOST_IMPACTS, Outcome, Plant};
-use crate::segment::Segment;
+use crate::primary::Primary;
 use crate::system::{Contact, Masses};
 
 /// Largest number of releases per step: rounding can tear a particle off its wall again and again where values are extreme.
@@ -46,7 +45,7 @@ impl<F: FnMut(Event) -> ControlFlow<()>> Step<F> {
     }
 }
 
-impl Plant {
+impl<P: Primary> Plant<P> {
     /// Advances by `duration` seconds under `drive`.
     ///
     /// A jump of the base displacement against the end of the last step gives the primary mass the velocity jump
@@ -123,8 +122,7 @@ impl Plant {
         let before = core::mem::replace(&mut self.moving.base.drive, *drive);
         let jump =
             (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * self.fast.state.phasor.1;
-        let oscillator = &self.moving.system.free;
-        let kick = 2.0 * oscillator.delta * jump;
+        let kick = self.primary.velocity_per_jump(&self.moving) * jump;
         let earlier = (before.amplitude, before.signal[1]);
         if jump != 0.0 && !(self.status.contact).is_some_and(|contact| self.carries(contact, (jump, kick), earlier)) {
             self.moving.masses.primary = self.moving.masses.primary.plus([0.0, kick]);
@@ -153,9 +151,8 @@ impl Plant {
         if !is_rounding && !system.forces.carry(contact.wall(), kick, acceleration, lowest) {
             return false;
         }
-        let both = 2.0 * system.stuck.delta * jump;
+        self.primary.carry(&mut self.moving, jump, kick);
         let masses = &mut self.moving.masses;
-        masses.primary = masses.primary.plus([0.0, both]);
         masses.particle = masses.primary.values[1];
         true
     }
@@ -210,11 +207,11 @@ impl Plant {
             return;
         }
         let (system, masses) = (&self.moving.system, self.moving.masses);
-        let motion = Segment::new(&system.free, self.moving.base, masses.primary.values.into());
+        let motion = self.primary.alone(&self.moving, 0.0);
         let pull = system.forces.gravity;
         let flight = Flight::new(motion, (masses.w.value(), masses.dw), system.half_width, pull);
         let end = flight.first_contact(limit, released);
-        self.fly(&end, pull, step);
+        self.fly(&flight.motion, &end, pull, step);
     }
 
     /// Slides to a wall or a reversal, or for `limit` seconds; `slips` is the sign of `w'` where the particle has just been released. A
@@ -234,8 +231,7 @@ impl Plant {
         }
         let system = &self.moving.system;
         let friction = system.friction(direction);
-        let base = system.pushed(self.moving.base, -friction);
-        let motion = Segment::new(&system.free, base, masses.primary.values.into());
+        let motion = self.primary.alone(&self.moving, -friction);
         let pull = system.forces.gravity + friction;
         let flight = Flight::new(motion, (masses.w.value(), masses.dw), system.half_width, pull);
         let flight = flight.with_error(masses.w.error());
@@ -245,7 +241,7 @@ impl Plant {
             None => end.drifted,
         };
         self.status.totals.friction += system.parameters.particle_mass * system.forces.kinetic * moved.abs();
-        self.fly(&end, pull, step);
+        self.fly(&flight.motion, &end, pull, step);
         if end.reversed {
             let masses = &mut self.moving.masses;
             (masses.dw, masses.particle) = (0.0, masses.primary.values[1]);
@@ -284,11 +280,17 @@ impl Plant {
     }
 
     /// Moves on to the end of a flight or of a stretch of sliding, in which the particle has the constant acceleration `pull`, m/s².
-    fn fly(&mut self, end: &FlightEnd, pull: f64, step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>) {
+    fn fly(
+        &mut self,
+        motion: &P::Motion,
+        end: &FlightEnd,
+        pull: f64,
+        step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>,
+    ) {
         let half_width = self.moving.system.half_width;
         self.fast.evaluations += end.evaluations;
+        self.primary.fly(&mut self.moving, motion, end);
         let masses = &mut self.moving.masses;
-        masses.primary = masses.primary.plus([end.moved, end.gained]);
         masses.dw += end.gained - pull * end.t;
         masses.particle += pull * end.t;
         masses.drift(end.drifted, half_width);
@@ -318,12 +320,11 @@ impl Plant {
     /// remembered beyond this call: another drive or other parameters may hold the particle again.
     fn stay(&mut self, contact: Contact, left: f64, step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>) {
         let system = &self.moving.system;
-        let start = self.moving.masses.primary.values;
+        let velocity = self.moving.masses.primary.values[1];
         let wall = contact.wall();
         let forces = &system.forces;
-        let noise = self.acceleration_error(start[1]);
-        let base = system.pushed(self.moving.base, forces.gravity);
-        let motion = Segment::new(&system.stuck, base, start.into());
+        let noise = self.acceleration_error(velocity);
+        let motion = self.primary.with_particle(&self.moving);
         let grip = Grip {
             wall,
             gravity: forces.gravity,
@@ -332,7 +333,7 @@ impl Plant {
         };
         let stay = until_released(&motion, &grip, left);
         self.fast.evaluations += stay.evaluations;
-        self.moving.masses.primary = Sums { values: stay.state, errors: [0.0; 2] };
+        self.primary.stay(&mut self.moving, &motion, &stay);
         self.moving.masses.particle = stay.state[1];
         self.moving.masses.dw = 0.0;
         self.base_moves(stay.t);
@@ -386,7 +387,7 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Accelerations this small against `omega0² b` are zero: subnormal values carry no significant digits.
 const SMALLEST_ACCELERATION: f64 = 1e-200;
 
-impl Plant {
+impl<P: Primary> Plant<P> {
     /// The wall that the particle touches.
     #[inline]
     pub(crate) fn wall_touched(&self) -> Option<Wall> {
@@ -410,7 +411,7 @@ impl Plant {
             })
         };
         let hopped = self.moving.masses.dw != 0.0;
-        self.moving.masses.primary = self.moving.masses.primary.plus([0.0, touch.kick]);
+        self.primary.kick(&mut self.moving.masses, touch.kick);
         self.moving.masses.particle = touch.particle;
         self.moving.masses.dw = touch.relative;
         let t = step.now();
@@ -488,18 +489,13 @@ impl Plant {
 
     /// Acceleration of the primary mass at a velocity, while it moves alone and without friction, m/s².
     fn acceleration(&self, velocity: f64) -> f64 {
-        let start = (self.moving.masses.primary.values[0], velocity);
-        Segment::new(&self.moving.system.free, self.moving.base, start).derivatives_at_start()[2]
+        self.primary.acceleration(&self.moving, velocity)
     }
 
-    /// An upper bound of the acceleration's magnitude, m/s²: the sum of its terms.
+    /// An upper bound of the acceleration's magnitude, m/s².
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn acceleration_bound(&self, velocity: f64) -> f64 {
-        let Oscillator { delta, omega0_squared, .. } = self.moving.system.free;
-        let drive = &self.moving.base.drive;
-        let position = self.moving.masses.primary.values[0].abs() + drive.signal[0].abs() + drive.amplitude.abs();
-        let velocity = velocity.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
-        (omega0_squared * position + 2.0 * delta * velocity) * (1.0 + 1e-9)
+        self.primary.acceleration_bound(&self.moving, velocity)
     }
 
     /// Rounding error of the acceleration, m/s².

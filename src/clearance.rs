@@ -8,7 +8,7 @@
 //! Sources: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems", PhD thesis, UC Berkeley 1996, chapter 2
 //! (conservative advancement); R. E. Moore, "Interval Analysis", Prentice-Hall 1966 (bounding by Taylor's remainder).
 
-use crate::segment::Derivatives;
+use crate::segment::Look;
 
 /// A gap and how it closes now: `g(t+h) = gap - closing h - acceleration h²/2 - jerk h³/6 - ...`
 #[derive(Clone, Copy, Debug)]
@@ -24,17 +24,17 @@ pub struct Gap {
 }
 
 /// Bounds of the derivatives of the gaps over a `window` from now, s, given those of the motion now.
-pub trait Bounds {
+pub trait Bounds<D> {
     /// A bound of the third derivative.
-    fn third(&self, d: &Derivatives, window: f64) -> f64;
+    fn third(&self, d: &D, window: f64) -> f64;
 
     /// A bound of the first derivative. It helps where rounding errors of the higher ones are large.
-    fn first(&self, _d: &Derivatives, _window: f64) -> f64 {
+    fn first(&self, _d: &D, _window: f64) -> f64 {
         f64::INFINITY
     }
 
     /// How long gap number `_which` is certainly open, s, at most `window`.
-    fn open(&self, _which: usize, gap: &Gap, d: &Derivatives, window: f64) -> f64 {
+    fn open(&self, _which: usize, gap: &Gap, d: &D, window: f64) -> f64 {
         let open = gap.certainly_open(window, |h| self.third(d, h));
         open.max((gap.gap / self.first(d, window)).min(window))
     }
@@ -42,7 +42,7 @@ pub trait Bounds {
 
 /// Where a gap closes: `h` seconds after a look at `t`, close enough for the local Taylor polynomial.
 #[derive(Clone, Copy, Debug)]
-pub struct Closure {
+pub struct Closure<D> {
     /// Time of the last look, s.
     pub t: f64,
     /// From there to the contact, s.
@@ -50,7 +50,7 @@ pub struct Closure {
     /// Which gap.
     pub which: usize,
     /// Derivatives of the motion at the last look.
-    pub derivatives: Derivatives,
+    pub derivatives: D,
 }
 
 /// A contact nearer than this fraction of the fastest rate's time is solved on the local Taylor polynomial, whose first
@@ -70,12 +70,12 @@ const MOST_WINDOWS: usize = 40;
 ///
 /// `look` returns the gaps at a time and the derivatives of the motion there; `fastest` is the fastest rate of the motion, 1/s;
 /// `resolutions` are the rounding errors of the gaps.
-pub fn first_closure<const N: usize>(
+pub fn first_closure<const N: usize, D: Look>(
     (from, limit): (f64, f64),
     (fastest, resolutions): (f64, [f64; N]),
-    look: impl Fn(f64) -> ([Gap; N], Derivatives),
-    bounds: impl Bounds,
-) -> (Result<Closure, f64>, u64) {
+    look: impl Fn(f64) -> ([Gap; N], D),
+    bounds: impl Bounds<D>,
+) -> (Result<Closure<D>, f64>, u64) {
     let mut t = from;
     let mut looks = 0;
     let mut tiny_steps = 0;

@@ -24,7 +24,7 @@ use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive, Phase, shift};
 use crate::contact::Wall;
 use crate::oscillator::Oscillator;
-use crate::segment::Segment;
+use crate::segment::{Motion, Segment};
 use crate::system::{Moving, System};
 use propagator::{Coefficients, Grid, Increment, PhasePoint, Propagator, SAME, ShortStep};
 use verify::{Horizon, Start};

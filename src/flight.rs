@@ -2,15 +2,15 @@
 
 use crate::clearance::{Bounds, Closure, Gap, first_closure};
 use crate::contact::Wall;
-use crate::segment::{Derivatives, Instant, Segment, Series, position_change, velocity_change};
+use crate::segment::{Instant, Motion, Series, position_change, velocity_change};
 
 /// A gap smaller than this fraction of the half-width cannot be told from none.
 const RESOLUTION: f64 = 1.0 / (1u64 << 60) as f64;
 
 /// One flight, or one stretch of sliding: the primary mass's motion, and where the particle is relative to it at the start.
-#[derive(Clone, Copy, Debug)]
-pub struct Flight {
-    motion: Segment,
+#[derive(Clone, Debug)]
+pub struct Flight<M> {
+    pub(crate) motion: M,
     series: Series,
     /// `w` from the middle of the cavity at the start, m, and its velocity, m/s.
     start: (f64, f64),
@@ -40,10 +40,10 @@ pub struct FlightEnd {
     pub evaluations: u64,
 }
 
-impl Flight {
+impl<M: Motion> Flight<M> {
     /// A flight of a particle at `w` (m) with velocity `w'` (m/s) relative to the primary mass in `motion`, and with the constant
     /// acceleration `pull`, m/s².
-    pub fn new(motion: Segment, start: (f64, f64), half_width: f64, pull: f64) -> Self {
+    pub fn new(motion: M, start: (f64, f64), half_width: f64, pull: f64) -> Self {
         let error = 0.0;
         Self {
             series: motion.series(),
@@ -99,7 +99,7 @@ impl Flight {
     }
 
     /// What has changed `t` seconds after the start beyond uniform motion, of `w` (m) and `w'` (m/s), and the derivatives then.
-    fn departure(&self, t: f64) -> ((f64, f64), Derivatives) {
+    fn departure(&self, t: f64) -> ((f64, f64), M::Look) {
         let Instant { departure: (dx, dv), derivatives, .. } = self.motion.at(&self.series, t);
         ((dx - 0.5 * self.pull * t * t, dv - self.pull * t), derivatives)
     }
@@ -152,7 +152,7 @@ impl Flight {
     }
 
     /// The acceleration of the particle is constant, so that beyond the second derivative `w` moves as the primary mass does.
-    fn gap(&self, wall: Wall, change: (f64, f64), d: &Derivatives) -> Gap {
+    fn gap(&self, wall: Wall, change: (f64, f64), d: &M::Look) -> Gap {
         let s = wall.sign();
         // On the wall the bracket is exactly 0: what is left is the change alone, with all its digits.
         let gap = (self.half_width - s * self.start.0) - s * (self.error + change.0);
@@ -179,24 +179,24 @@ impl Flight {
     }
 }
 
-impl Bounds for &Flight {
-    fn third(&self, d: &Derivatives, window: f64) -> f64 {
+impl<M: Motion> Bounds<M::Look> for &Flight<M> {
+    fn third(&self, d: &M::Look, window: f64) -> f64 {
         self.motion.third_derivative_bound(d, window)
     }
 }
 
 /// Bounds of the gap to the wall ahead and of the relative velocity, in the unit of length.
-struct Sliding<'a> {
-    motion: &'a Segment,
+struct Sliding<'a, M> {
+    motion: &'a M,
     unit: f64,
 }
 
-impl Bounds for Sliding<'_> {
-    fn third(&self, d: &Derivatives, window: f64) -> f64 {
+impl<M: Motion> Bounds<M::Look> for Sliding<'_, M> {
+    fn third(&self, d: &M::Look, window: f64) -> f64 {
         self.motion.third_derivative_bound(d, window)
     }
 
-    fn open(&self, which: usize, gap: &Gap, d: &Derivatives, window: f64) -> f64 {
+    fn open(&self, which: usize, gap: &Gap, d: &M::Look, window: f64) -> f64 {
         gap.certainly_open(window, |h| match which {
             0 => self.third(d, h),
             _ => self.unit * self.motion.fourth_derivative_bound(d, h),
@@ -238,7 +238,7 @@ pub struct Grip {
 /// the wall at `w = +b` adds to it without limit, that at `w = -b` takes from it. A limit is said to be exceeded only beyond the
 /// rounding error of the acceleration, so that two masses at rest do not part over a last digit. There they part at once, even if the
 /// force falls: the base may change its velocity or acceleration at the start of the stretch, without a jump.
-pub fn until_released(motion: &Segment, grip: &Grip, limit: f64) -> Sticking {
+pub fn until_released<M: Motion>(motion: &M, grip: &Grip, limit: f64) -> Sticking {
     match grip.wall {
         Some(wall) => until_one_released(motion, grip, limit, [-wall.sign()]),
         None => until_one_released(motion, grip, limit, [1.0, -1.0]),
@@ -246,7 +246,12 @@ pub fn until_released(motion: &Segment, grip: &Grip, limit: f64) -> Sticking {
 }
 
 /// The same; `directions` are the signs of `w'` with which the particle can be released.
-fn until_one_released<const N: usize>(motion: &Segment, grip: &Grip, limit: f64, directions: [f64; N]) -> Sticking {
+fn until_one_released<M: Motion, const N: usize>(
+    motion: &M,
+    grip: &Grip,
+    limit: f64,
+    directions: [f64; N],
+) -> Sticking {
     let series = motion.series();
     let look = |t: f64| {
         let d = motion.at(&series, t).derivatives;
@@ -259,7 +264,7 @@ fn until_one_released<const N: usize>(motion: &Segment, grip: &Grip, limit: f64,
         (spare, d)
     };
     let scale = (motion.fastest(), [grip.noise; N]);
-    let (closure, evaluations) = first_closure((0.0, limit), scale, look, motion);
+    let (closure, evaluations) = first_closure((0.0, limit), scale, look, Held(motion));
     let (released, evaluations) = (closure.is_ok(), evaluations + u64::from(closure.is_err()));
     let (t, h, which, d) = match closure {
         Ok(Closure { t, h, which, derivatives }) => (t, h, which, derivatives),
@@ -271,12 +276,14 @@ fn until_one_released<const N: usize>(motion: &Segment, grip: &Grip, limit: f64,
 }
 
 /// Bounds of the force that is left, which moves as the second derivative of the motion.
-impl Bounds for &Segment {
-    fn third(&self, d: &Derivatives, window: f64) -> f64 {
-        self.fifth_derivative_bound(d, window)
+struct Held<'a, M>(&'a M);
+
+impl<M: Motion> Bounds<M::Look> for Held<'_, M> {
+    fn third(&self, d: &M::Look, window: f64) -> f64 {
+        self.0.fifth_derivative_bound(d, window)
     }
 
-    fn first(&self, d: &Derivatives, window: f64) -> f64 {
-        self.third_derivative_bound(d, window)
+    fn first(&self, d: &M::Look, window: f64) -> f64 {
+        self.0.third_derivative_bound(d, window)
     }
 }

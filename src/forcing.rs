@@ -62,12 +62,18 @@ impl Forcing {
     /// Coefficients for `omega` (rad/s), 0 or above.
     pub fn new(oscillator: &Oscillator, omega: f64) -> Self {
         let Oscillator { delta, omega0_squared, .. } = *oscillator;
-        let strength = Complex64::new(omega0_squared, 2.0 * delta * omega);
+        Self::with_strength(oscillator, omega, Complex64::new(omega0_squared, 2.0 * delta * omega))
+    }
+
+    /// The same for another strength `F`.
+    pub(crate) fn with_strength(oscillator: &Oscillator, omega: f64, strength: Complex64) -> Self {
+        let Oscillator { delta, omega0_squared, .. } = *oscillator;
+        let base = Complex64::new(omega0_squared, 2.0 * delta * omega);
         let (square, error) = product(omega, omega);
-        let detuned = Complex64::new((omega0_squared - square) - error, strength.im);
+        let detuned = Complex64::new((omega0_squared - square) - error, base.im);
         let limit = LARGEST_STEADY * LARGEST_STEADY * detuned.norm_sqr();
         let form = match oscillator.regime {
-            Regime::Oscillating { omega_d } if strength.norm_sqr() > limit => Form::DividedDifferences {
+            Regime::Oscillating { omega_d } if base.norm_sqr() > limit => Form::DividedDifferences {
                 gain: strength / Complex64::new(0.0, 2.0 * omega_d),
                 near: Complex64::new(delta, (omega - omega_d) - oscillator.omega_d_error),
                 far: Complex64::new(delta, omega + omega_d).inv(),
@@ -88,7 +94,12 @@ impl Forcing {
     /// The response after `t` seconds; `free` and `decayed` are the free motion's ([`Oscillator::flow`]) after that time.
     pub(crate) fn response(&self, t: f64, free: &Transition, decayed: Complex64) -> Response {
         let (sin, cos) = sincos_of_product((self.omega, 0.0), t);
-        let base = Complex64::new(cos, sin);
+        self.response_to(Complex64::new(cos, sin), t, free, decayed)
+    }
+
+    /// The same; `base` is `e^{i omega t}`.
+    #[inline(always)]
+    pub(crate) fn response_to(&self, base: Complex64, t: f64, free: &Transition, decayed: Complex64) -> Response {
         let position = match self.form {
             Form::Steady(steady) => steady * (base - Complex64::new(free.xx, self.omega * free.xv)),
             Form::DividedDifferences { gain, near, far } => {

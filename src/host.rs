@@ -95,6 +95,9 @@ pub struct Matrices<'a> {
     pub drive: &'a [f64],
 }
 
+/// A number and its rounding error.
+type Rounded = (f64, f64);
+
 /// A linear structure.
 #[derive(Clone, Debug)]
 pub struct Host {
@@ -105,6 +108,10 @@ pub struct Host {
     pub(crate) modal: Modal,
     /// Displacements of the degrees of freedom per modal coordinate; `None`: the host was made from modes.
     shapes: Option<DMatrix<f64>>,
+    /// The reverse.
+    to_modal: Option<DMatrix<f64>>,
+    /// The row of the cavity.
+    cavity: Row,
     /// The modal coordinates from the sections, where the sections are not these coordinates.
     pub(crate) expansion: Option<Expansion>,
 }
@@ -123,7 +130,6 @@ pub(crate) struct Modal {
     /// `h`.
     pub drive_rate: DVector<f64>,
     /// Displacement of the modal coordinates with the base, sqrt(kg); 0 for a force.
-    #[allow(dead_code)]
     pub carried: DVector<f64>,
 }
 
@@ -165,9 +171,9 @@ impl Host {
     /// `damping` is `2 delta` of every mode, 1/s.
     fn from_real_modes(
         excitation: Excitation,
-        (stiffness, damping): (Vec<(f64, f64)>, Vec<(f64, f64)>),
+        (stiffness, damping): (Vec<Rounded>, Vec<Rounded>),
         (cavity, drive): (DVector<f64>, DVector<f64>),
-        shapes: Option<DMatrix<f64>>,
+        shapes: Option<(DMatrix<f64>, DMatrix<f64>)>,
     ) -> Result<Self, InvalidHost> {
         let oscillators: Vec<_> = damping
             .iter()
@@ -198,10 +204,31 @@ impl Host {
             carried: if force { 0.0 * &drive } else { drive },
             cavity,
         };
-        Self { excitation, sections, modal, shapes, expansion: None }.checked()
+        Self::of(excitation, sections, modal, shapes, None)
     }
 
-    /// Refuses a cavity that nothing moves.
+    /// The parts, with a cavity that something moves.
+    fn of(
+        excitation: Excitation,
+        sections: Vec<Section>,
+        modal: Modal,
+        shapes: Option<(DMatrix<f64>, DMatrix<f64>)>,
+        expansion: Option<Expansion>,
+    ) -> Result<Self, InvalidHost> {
+        let (shapes, to_modal) = shapes.unzip();
+        let cavity = sections.iter().map(|section| section.cavity).collect();
+        Self {
+            excitation,
+            sections,
+            modal,
+            shapes,
+            to_modal,
+            cavity,
+            expansion,
+        }
+        .checked()
+    }
+
     fn checked(self) -> Result<Self, InvalidHost> {
         check(!self.sections.is_empty(), || {
             "the structure has no mode; it needs at least one".into()
@@ -310,6 +337,7 @@ impl Host {
         positive("C (damping matrix)", "N s/m", &damping, -ROUNDING * n as f64 * size)?;
 
         let shapes = natural_modes(&mass, &stiffness)?;
+        let to_modal = shapes.tr_mul(&mass);
         let column = |n: usize| shapes.column(n);
         let form = |a: &DMatrix<f64>, i: usize, j: usize| form(a, column(i).as_slice(), column(j).as_slice());
         let (row, drive) = (
@@ -343,7 +371,12 @@ impl Host {
             project(&(&mass * &drive))
         };
         if proportional {
-            return Self::from_real_modes(excitation, (natural, rates), (cavity, participation), Some(shapes));
+            return Self::from_real_modes(
+                excitation,
+                (natural, rates),
+                (cavity, participation),
+                Some((shapes, to_modal)),
+            );
         }
         let zero = DVector::zeros(n);
         let modal = Modal {
@@ -363,14 +396,7 @@ impl Host {
             cavity,
         };
         let (sections, expansion) = modal.sections(0.0)?;
-        Self {
-            excitation,
-            sections,
-            modal,
-            shapes: Some(shapes),
-            expansion: Some(expansion),
-        }
-        .checked()
+        Self::of(excitation, sections, modal, Some((shapes, to_modal)), Some(expansion))
     }
 
     /// The row of a point: mass-normalised shapes (1/sqrt(kg)) for a host from modes, the row over the degrees of freedom for one from
@@ -416,8 +442,83 @@ impl Host {
     }
 
     /// The row of the cavity.
-    pub fn cavity(&self) -> Row {
-        self.sections.iter().map(|section| section.cavity).collect()
+    pub fn cavity_row(&self) -> &Row {
+        &self.cavity
+    }
+
+    /// Velocity of a point per impulse at the cavity, 1/kg.
+    pub fn velocity_per_impulse(&self, row: &[[f64; 2]]) -> f64 {
+        row.iter()
+            .zip(&self.sections)
+            .map(|(pair, section)| section.velocity_per_impulse(*pair))
+            .sum()
+    }
+
+    /// Velocity of a point per jump of the drive.
+    pub fn velocity_per_jump(&self, row: &[[f64; 2]]) -> f64 {
+        let of = |(pair, section): (&[f64; 2], &Section)| {
+            let [c, d] = section.drive;
+            pair[0] * d + pair[1] * (c - 2.0 * section.oscillator.delta * d)
+        };
+        row.iter().zip(&self.sections).map(of).sum()
+    }
+
+    /// `(x, v)` of the sections from displacements and velocities of the coordinates under the drive `u`; empty ones are 0.
+    ///
+    /// # Errors
+    /// A wrong number of values, or one that is not finite.
+    pub fn state(&self, displacements: &[f64], velocities: &[f64], u: f64) -> Result<Vec<[f64; 2]>, InvalidHost> {
+        let n = self.modal.stiffness.len();
+        let mut modal = DVector::zeros(2 * n);
+        for (k, (name, values)) in [("displacements", displacements), ("velocities", velocities)]
+            .into_iter()
+            .enumerate()
+        {
+            check(
+                values.is_empty() || (values.len() == n && values.iter().all(|value| value.abs() <= 1e100)),
+                || {
+                    let got = values.len();
+                    format!(
+                        "the start has {got} {name}; it needs {n} finite numbers, one per mode or degree of freedom"
+                    )
+                },
+            )?;
+            if !values.is_empty() {
+                let values = DVector::from_row_slice(values);
+                let of_modes = self
+                    .to_modal
+                    .as_ref()
+                    .map_or_else(|| values.clone(), |to_modal| to_modal * &values);
+                modal.rows_mut(k * n, n).copy_from(&of_modes);
+            }
+        }
+        for i in 0..n {
+            modal[n + i] -= self.modal.drive_rate[i] * u;
+        }
+        let state = self.maps().1 * modal;
+        Ok((0..n).map(|k| [state[2 * k], state[2 * k + 1]]).collect())
+    }
+
+    /// Modal coordinates and momenta from `(x, v)` of the sections, and back.
+    pub(crate) fn maps(&self) -> (DMatrix<f64>, DMatrix<f64>) {
+        if let Some(expansion) = &self.expansion {
+            return (expansion.to_modal.clone(), expansion.to_sections.clone());
+        }
+        let n = self.sections.len();
+        let to_modal = DMatrix::from_fn(2 * n, 2 * n, |i, j| f64::from(j == 2 * (i % n) + i / n));
+        (to_modal.clone(), to_modal.transpose())
+    }
+
+    /// Kinetic and elastic energy, J, in the state `(x, v)` of the sections under the drive `u`.
+    pub fn energy(&self, state: &[[f64; 2]], u: f64) -> f64 {
+        let n = self.sections.len();
+        let modal = self.maps().0 * DVector::from_row_slice(state.as_flattened());
+        let of = |i: usize| {
+            let velocity = modal[n + i] + self.modal.drive_rate[i] * u;
+            let stretch = modal[i] - self.modal.carried[i] * u;
+            0.5 * (velocity * velocity + self.modal.stiffness[i].0 * stretch * stretch)
+        };
+        (0..n).map(of).sum()
     }
 }
 

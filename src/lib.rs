@@ -14,6 +14,7 @@ pub mod host;
 pub mod oscillator;
 pub mod parameters;
 pub mod plant;
+mod primary;
 pub mod segment;
 mod system;
 pub mod table;
@@ -21,7 +22,8 @@ pub mod variation;
 
 pub use base_motion::{BaseMotion, Drive};
 pub use contact::Wall;
-pub use host::{Excitation, Host, InvalidHost, Mode, Section};
+pub use host::{Excitation, Host, InvalidHost, Matrices, Mode, Row, Section};
 pub use parameters::{Cavity, InvalidValue, Parameters, Restitution};
 pub use plant::{Event, Outcome, Plant, State, Totals};
+pub use primary::{Primary, Single};
 pub use variation::Variation;

@@ -8,6 +8,7 @@ use crate::base_motion::{BaseMotion, Drive};
 use crate::contact::{Touch, Wall};
 use crate::fast::{FastPath, Predictions};
 use crate::parameters::{InvalidValue, Parameters};
+use crate::primary::{Primary, Single};
 pub use crate::system::Contact;
 use crate::system::{Masses, Moving, System};
 
@@ -18,13 +19,11 @@ pub const MOST_EVALUATIONS: u64 = 500_000_000;
 
 /// The plant. Its coefficients follow from the parameters; its state is what [`Plant::save`] saves, 0.6 kB; the rest of its 8 kB is a
 /// workspace.
+///
+/// Its primary structure is one oscillator, or a [`crate::Structure`].
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(from = "Saved", into = "Saved")
-)]
-pub struct Plant {
+pub struct Plant<P = Single> {
+    pub(crate) primary: P,
     pub(crate) moving: Moving,
     pub(crate) status: Status,
     pub(crate) fast: FastPath,
@@ -51,6 +50,7 @@ impl Plant {
         parameters.validate()?;
         let system = System::from(parameters);
         Ok(Self {
+            primary: Single,
             moving: Moving {
                 system,
                 masses: masses(&system, start)?,
@@ -66,24 +66,37 @@ impl Plant {
     /// # Errors
     /// A state that is not finite, a particle outside its cavity; the plant stays as it is.
     pub fn set_state(&mut self, state: State) -> Result<(), InvalidValue> {
+        self.set_state_at_cavity(state)
+    }
+}
+
+impl<P: Primary> Plant<P> {
+    /// A plant that is at rest, with the particle in the middle of the cavity, without the fast path.
+    pub(crate) fn of(primary: P, parameters: Parameters) -> Self {
+        let (system, mut fast) = (System::from(parameters), FastPath::default());
+        fast.state.disabled = true;
+        Self {
+            primary,
+            moving: Moving {
+                system,
+                masses: Masses::default(),
+                base: BaseMotion::default(),
+            },
+            status: Status::default(),
+            fast,
+        }
+    }
+
+    /// Sets displacements and velocities at the cavity; contact is decided anew.
+    pub(crate) fn set_state_at_cavity(&mut self, state: State) -> Result<(), InvalidValue> {
         self.moving.masses = masses(&self.moving.system, state)?;
         self.status.contact = None;
         self.fast.state_changed(&self.moving.base);
         Ok(())
     }
+}
 
-    /// Sets the base motion at the start: a drive that is set later is compared with it.
-    ///
-    /// # Errors
-    /// An invalid drive.
-    pub fn begin(&mut self, drive: Drive) -> Result<(), InvalidValue> {
-        drive.validate()?;
-        self.moving.base.drive = drive;
-        self.status.begun = true;
-        self.fast.state_changed(&self.moving.base);
-        Ok(())
-    }
-
+impl Plant {
     /// Switches the fast path on (default) or off. Without it every contact is found by the plain solver's certified search:
     /// the test oracle of the fast path.
     pub fn set_fast_path(&mut self, on: bool) {
@@ -101,6 +114,32 @@ impl Plant {
         self.moving.system = System::from(parameters);
         self.fast.parameters_changed(&self.moving.base);
         self.fast.choose(&self.moving.system);
+        Ok(())
+    }
+
+    /// Mechanical energy, J: of both masses' motion, of the spring between the primary mass and a base at `displacement`, m, and of the
+    /// particle's weight on a tilted axis (0 at `q2 = 0`).
+    pub fn energy(&self, displacement: f64) -> f64 {
+        let p = &self.moving.system.parameters;
+        let State { q1, dq1, q2, dq2 } = self.state();
+        let stretch = q1 - displacement;
+        0.5 * (p.primary_mass * dq1 * dq1 + p.particle_mass * dq2 * dq2 + p.stiffness * stretch * stretch)
+            - p.particle_mass * self.moving.system.forces.gravity * q2
+    }
+}
+
+impl<P: Primary> Plant<P> {
+    /// Sets the base motion at the start: a drive that is set later is compared with it.
+    ///
+    /// # Errors
+    /// An invalid drive.
+    pub fn begin(&mut self, drive: Drive) -> Result<(), InvalidValue> {
+        drive.validate()?;
+        let before = self.base_displacement();
+        self.moving.base.drive = drive;
+        self.status.begun = true;
+        self.fast.state_changed(&self.moving.base);
+        self.primary.begin(self.base_displacement() - before);
         Ok(())
     }
 
@@ -191,16 +230,6 @@ impl Plant {
     /// Totals since the start.
     pub fn totals(&self) -> &Totals {
         &self.status.totals
-    }
-
-    /// Mechanical energy, J: of both masses' motion, of the spring between the primary mass and a base at `displacement`, m, and of the
-    /// particle's weight on a tilted axis (0 at `q2 = 0`).
-    pub fn energy(&self, displacement: f64) -> f64 {
-        let p = &self.moving.system.parameters;
-        let State { q1, dq1, q2, dq2 } = self.state();
-        let stretch = q1 - displacement;
-        0.5 * (p.primary_mass * dq1 * dq1 + p.particle_mass * dq2 * dq2 + p.stiffness * stretch * stretch)
-            - p.particle_mass * self.moving.system.forces.gravity * q2
     }
 }
 
@@ -377,25 +406,27 @@ impl Totals {
 /// The state of a plant and its parameters. The motion continues with the same bits, whatever workspace it continues in.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Saved {
+pub struct Saved<S = ()> {
     parameters: Parameters,
     masses: Masses,
     base: BaseMotion,
     status: Status,
     fast: Predictions,
+    primary: S,
 }
 
-impl Plant {
+impl<P: Primary> Plant<P> {
     /// The plant without what can be computed again.
-    pub fn save(&self) -> Saved {
+    pub fn save(&self) -> Saved<P::State> {
         let Moving { system, masses, base } = self.moving;
         let (parameters, fast) = (system.parameters, self.fast.save());
-        Saved { parameters, masses, base, status: self.status, fast }
+        let primary = self.primary.state();
+        Saved { parameters, masses, base, status: self.status, fast, primary }
     }
 
     /// Makes this plant the one that was saved. One plant can take the place of many in turn: what it has computed for the last one is
-    /// used again as far as it serves.
-    pub fn restore(&mut self, saved: &Saved) {
+    /// used again as far as it serves. A structure must be the same one.
+    pub fn restore(&mut self, saved: &Saved<P::State>) {
         if self.moving.system.parameters != saved.parameters {
             let system = System::from(saved.parameters);
             if self.moving.system.free != system.free {
@@ -404,13 +435,8 @@ impl Plant {
             self.moving.system = system;
         }
         (self.moving.masses, self.moving.base, self.status) = (saved.masses, saved.base, saved.status);
+        self.primary.restore(&saved.primary);
         self.fast.restore(&saved.fast, &self.moving.system);
-    }
-}
-
-impl From<Plant> for Saved {
-    fn from(plant: Plant) -> Self {
-        plant.save()
     }
 }
 
@@ -420,13 +446,32 @@ impl From<&Saved> for Plant {
         let mut fast = FastPath::default();
         fast.restore(&saved.fast, &system);
         let Saved { masses, base, status, .. } = *saved;
-        Self { moving: Moving { system, masses, base }, status, fast }
+        Self {
+            primary: Single,
+            moving: Moving { system, masses, base },
+            status,
+            fast,
+        }
     }
 }
 
 impl From<Saved> for Plant {
     fn from(saved: Saved) -> Self {
         Self::from(&saved)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl serde::Serialize for Plant {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.save().serialize(serializer)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for Plant {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Saved::deserialize(deserializer).map(|saved: Saved| Self::from(&saved))
     }
 }
 

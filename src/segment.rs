@@ -5,6 +5,8 @@
 //! motion its Taylor series about the start is summed instead. It keeps the *relative* digits of what has changed since the
 //! start, which is what a particle hopping on its wall is made of.
 
+use core::ops::Index;
+
 use crate::arithmetic::sincos_of_product;
 use crate::base_motion::BaseMotion;
 use crate::forcing::Forcing;
@@ -12,11 +14,43 @@ use crate::oscillator::{Oscillator, is_apart, pushed};
 use num_complex::Complex64;
 
 /// The series is used while `fastest rate * t` is at most this; degree 15 then leaves out less than 1e-18.
-const SERIES_REACH: f64 = 0.5;
-const DEGREE: usize = 15;
+pub(crate) const SERIES_REACH: f64 = 0.5;
+pub(crate) const SERIES_DEGREE: usize = 15;
 
 /// Position and its first six derivatives.
 pub type Derivatives = [f64; 7];
+
+/// What is known of a motion at one instant: by index, position and its first six derivatives; and what its bounds follow from.
+pub trait Look: Copy + Index<usize, Output = f64> {}
+
+impl Look for Derivatives {}
+
+/// The motion of the cavity from a start until the next event.
+pub trait Motion {
+    /// The motion at one instant.
+    type Look: Look;
+
+    /// The fastest rate in the motion, 1/s.
+    fn fastest(&self) -> f64;
+
+    /// Position and its derivatives at the start.
+    fn derivatives_at_start(&self) -> Self::Look;
+
+    /// The Taylor series about the start.
+    fn series(&self) -> Series;
+
+    /// What happens `t` seconds after the start; `series` is that of this motion.
+    fn at(&self, series: &Series, t: f64) -> Instant<Self::Look>;
+
+    /// A bound on `|x'''|` over the next `window` seconds, given the derivatives now.
+    fn third_derivative_bound(&self, d: &Self::Look, window: f64) -> f64;
+
+    /// A bound on the fourth derivative over the next `window` seconds, given the derivatives now.
+    fn fourth_derivative_bound(&self, d: &Self::Look, window: f64) -> f64;
+
+    /// A bound on the fifth derivative over the next `window` seconds, given the derivatives now.
+    fn fifth_derivative_bound(&self, d: &Self::Look, window: f64) -> f64;
+}
 
 /// The motion of one oscillator from a start until the next event.
 #[derive(Clone, Copy, Debug)]
@@ -56,11 +90,6 @@ impl Segment {
         }
     }
 
-    /// The fastest rate in the motion, 1/s.
-    pub fn fastest(&self) -> f64 {
-        self.oscillator.fastest.max(self.omega())
-    }
-
     /// The frequency of the base, rad/s, 0 or above; 0 where it has none.
     fn omega(&self) -> f64 {
         self.driven.as_ref().map_or(0.0, |(_, forcing)| forcing.omega)
@@ -93,12 +122,6 @@ impl Segment {
         self.by_equation(x, v, phasor, t)
     }
 
-    /// Position and its derivatives at the start.
-    pub fn derivatives_at_start(&self) -> Derivatives {
-        let phasor = self.driven.map_or(Complex64::ZERO, |(phasor, _)| phasor);
-        self.by_equation(self.x0, self.v0, phasor, 0.0)
-    }
-
     fn by_equation(&self, x: f64, v: f64, phasor: Complex64, t: f64) -> Derivatives {
         let Oscillator { delta, omega0_squared, .. } = self.oscillator;
         let [u0, u1, u2, u3] = self.base.drive.signal;
@@ -120,22 +143,6 @@ impl Segment {
         d
     }
 
-    /// A bound on `|x'''|` over the next `window` seconds, given the derivatives now.
-    pub fn third_derivative_bound(&self, d: &Derivatives, window: f64) -> f64 {
-        let signal = self.oscillator.omega0_squared * 6.0 * libm::fabs(self.base.drive.signal[3]);
-        self.bound::<3>(d, window, signal)
-    }
-
-    /// A bound on the fourth derivative over the next `window` seconds, given the derivatives now.
-    pub fn fourth_derivative_bound(&self, d: &Derivatives, window: f64) -> f64 {
-        self.bound::<4>(d, window, 0.0)
-    }
-
-    /// A bound on the fifth derivative over the next `window` seconds, given the derivatives now.
-    pub fn fifth_derivative_bound(&self, d: &Derivatives, window: f64) -> f64 {
-        self.bound::<5>(d, window, 0.0)
-    }
-
     /// Every derivative of the motion obeys the equation of motion with the forcing's derivative: the energy of the free
     /// part never grows, and the forcing adds at most its own integral (variation of constants).
     fn bound<const N: usize>(&self, d: &Derivatives, window: f64, signal: f64) -> f64 {
@@ -147,11 +154,23 @@ impl Segment {
         // The last factor covers the rounding of this very bound.
         (oscillator.ceiling(d[N], d[N + 1]) + window * oscillator.reach * forcing) * (1.0 + 1e-12)
     }
+}
 
-    /// The Taylor series about the start.
-    pub fn series(&self) -> Series {
+impl Motion for Segment {
+    type Look = Derivatives;
+
+    fn fastest(&self) -> f64 {
+        self.oscillator.fastest.max(self.omega())
+    }
+
+    fn derivatives_at_start(&self) -> Derivatives {
+        let phasor = self.driven.map_or(Complex64::ZERO, |(phasor, _)| phasor);
+        self.by_equation(self.x0, self.v0, phasor, 0.0)
+    }
+
+    fn series(&self) -> Series {
         let Oscillator { delta, omega0_squared, .. } = self.oscillator;
-        let mut base = [0.0; DEGREE];
+        let mut base = [0.0; SERIES_DEGREE];
         base[..4].copy_from_slice(&self.base.drive.signal);
         if let Some((z, forcing)) = self.driven {
             let mut term = z;
@@ -161,9 +180,9 @@ impl Segment {
                 term = Complex64::new(-term.im * scale, term.re * scale);
             }
         }
-        let mut c = [0.0; DEGREE + 1];
+        let mut c = [0.0; SERIES_DEGREE + 1];
         (c[0], c[1]) = (self.x0, self.v0);
-        for n in 0..DEGREE - 1 {
+        for n in 0..SERIES_DEGREE - 1 {
             let (n1, n2) = (n as f64 + 1.0, n as f64 + 2.0);
             let damping = 2.0 * delta * n1 * (c[n + 1] - base[n + 1]);
             c[n + 2] = -(damping + omega0_squared * (c[n] - base[n])) / (n1 * n2);
@@ -171,8 +190,7 @@ impl Segment {
         Series { coefficients: c, reach: SERIES_REACH / self.fastest() }
     }
 
-    /// What happens `t` seconds after the start; `series` is that of this motion.
-    pub fn at(&self, series: &Series, t: f64) -> Instant {
+    fn at(&self, series: &Series, t: f64) -> Instant<Derivatives> {
         if t <= series.reach {
             let (dx, dv) = series.departure(t);
             let (sin, cos) = sincos_of_product((self.omega(), 0.0), t);
@@ -189,33 +207,46 @@ impl Segment {
             }
         }
     }
+
+    fn third_derivative_bound(&self, d: &Derivatives, window: f64) -> f64 {
+        let signal = self.oscillator.omega0_squared * 6.0 * libm::fabs(self.base.drive.signal[3]);
+        self.bound::<3>(d, window, signal)
+    }
+
+    fn fourth_derivative_bound(&self, d: &Derivatives, window: f64) -> f64 {
+        self.bound::<4>(d, window, 0.0)
+    }
+
+    fn fifth_derivative_bound(&self, d: &Derivatives, window: f64) -> f64 {
+        self.bound::<5>(d, window, 0.0)
+    }
 }
 
 /// The motion at one instant.
 #[derive(Clone, Copy, Debug)]
-pub struct Instant {
+pub struct Instant<D> {
     /// Change of position since the start, m.
     pub moved: f64,
     /// What has changed since the start beyond uniform motion: `x - x0 - v0 t` (m) and `v - v0` (m/s).
     pub departure: (f64, f64),
     /// Position and its derivatives.
-    pub derivatives: Derivatives,
+    pub derivatives: D,
 }
 
 /// Change of position over the next `h` seconds by the local Taylor polynomial, for `h` far below every period.
-pub fn position_change(d: &Derivatives, h: f64) -> f64 {
+pub fn position_change(d: &impl Look, h: f64) -> f64 {
     h * (d[1] + h * (d[2] / 2.0 + h * (d[3] / 6.0 + h * d[4] / 24.0)))
 }
 
 /// Change of velocity over the next `h` seconds by the local Taylor polynomial.
-pub fn velocity_change(d: &Derivatives, h: f64) -> f64 {
+pub fn velocity_change(d: &impl Look, h: f64) -> f64 {
     h * (d[2] + h * (d[3] / 2.0 + h * (d[4] / 6.0 + h * d[5] / 24.0)))
 }
 
 /// The motion's Taylor series about its start.
 #[derive(Clone, Copy, Debug)]
 pub struct Series {
-    coefficients: [f64; DEGREE + 1],
+    pub(crate) coefficients: [f64; SERIES_DEGREE + 1],
     /// Longest time the series is good for, s.
     pub reach: f64,
 }
@@ -224,7 +255,7 @@ impl Series {
     /// `x - x0 - v0 t` and `v - v0` after `t` seconds, both with full relative accuracy for small `t`.
     pub fn departure(&self, t: f64) -> (f64, f64) {
         let (mut x, mut v) = (0.0, 0.0);
-        for n in (2..=DEGREE).rev() {
+        for n in (2..=SERIES_DEGREE).rev() {
             x = x * t + self.coefficients[n];
             v = v * t + self.coefficients[n] * n as f64;
         }
@@ -233,7 +264,7 @@ impl Series {
 }
 
 /// `E e^{i phase}` for a frequency 0 or above: `E sin(phase - |omega| t) = -E sin(-phase + |omega| t)`.
-fn phasor(base: &BaseMotion) -> Option<Complex64> {
+pub(crate) fn phasor(base: &BaseMotion) -> Option<Complex64> {
     let amplitude = base.drive.amplitude;
     if amplitude == 0.0 {
         return None;

@@ -9,7 +9,7 @@ use crate::parameters::Parameters;
 
 /// The parameters and what follows from them.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct System {
+pub struct System {
     pub parameters: Parameters,
     pub mass_ratio: f64,
     /// Half the distance between the walls, m.
@@ -98,7 +98,7 @@ impl Contact {
 /// Displacements and velocities of both masses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Masses {
+pub struct Masses {
     /// Displacement of the primary mass, m, and its velocity, m/s.
     pub primary: Sums,
     /// Relative displacement from the middle of the cavity, `w = q1 - q2 - middle`, m. It is carried itself: in a narrow gap the
@@ -123,7 +123,7 @@ impl Masses {
 
 /// The parts of a plant that move, and the system.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Moving {
+pub struct Moving {
     pub system: System,
     pub masses: Masses,
     pub base: BaseMotion,

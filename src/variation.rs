@@ -10,7 +10,7 @@
 use crate::forcing::Forcing;
 use crate::oscillator::Oscillator;
 use crate::plant::{Event, Plant, State};
-use crate::segment::{Derivatives, Segment};
+use crate::segment::{Derivatives, Motion, Segment};
 use crate::system::{Contact, Moving};
 use crate::{BaseMotion, Drive};
 

@@ -7,7 +7,7 @@
 
 use lovines::base_motion::BaseMotion;
 use lovines::oscillator::Oscillator;
-use lovines::segment::Segment;
+use lovines::segment::{Motion, Segment};
 use lovines::{Drive, Parameters, Plant, State};
 use std::f64::consts::TAU;
 use twofloat::TwoFloat;
