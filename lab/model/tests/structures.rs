@@ -4,11 +4,12 @@ use std::f64::consts::FRAC_PI_2;
 
 use lovines::{Excitation, Host, Mode};
 use vines_model::{
-    Dimensionless,
+    Dimensionless, Reference,
     orbit::{
-        Bifurcation, FirstOrder, Orbit, Particle, StructureBranch, StructureOrbit, StructureOrbits, StructureRange,
-        exact_backbone, phase_resonant, symmetric_orbits,
+        Bifurcation, Condition, FirstOrder, Orbit, Particle, StructureBranch, StructureOrbit, StructureOrbits,
+        StructureRange, exact_backbone, phase_resonant, symmetric_orbits,
     },
+    theory::SlowFlow,
 };
 
 /// The default scene: mass, stiffness and damping of its oscillator, and the particle.
@@ -95,8 +96,11 @@ fn a_second_mode_takes_the_stability_and_its_damping_gives_some_of_it_back() {
     assert!(influences[0] < 0.002 && influences[1] > 0.04, "{influences:?}");
 }
 
-/// The bifurcations of a backbone with an unstable side above the fold, with what causes them, and the stable frequencies over omega0.
-fn changes(branches: &[StructureBranch]) -> (Vec<(Bifurcation, Option<usize>)>, Vec<[f64; 2]>) {
+/// A bifurcation, and the section that contributes most to it.
+type Change = (Bifurcation, Option<usize>);
+
+/// The bifurcations of a backbone above the fold with what causes them, and the stable frequencies over omega0.
+fn changes(branches: &[StructureBranch]) -> (Vec<Change>, Vec<[f64; 2]>) {
     let fast = |orbit: &StructureOrbit| orbit.speed > 0.7 * PARTICLE.half_width * omega0();
     let changes = branches
         .iter()
@@ -142,24 +146,29 @@ fn the_facts_say_where_the_backbone_loses_its_stability_and_to_which_mode() {
 }
 
 /// Largest difference of an orbit of a structure from one of the oscillator, over the units of the latter.
-fn apart(found: &StructureOrbit, scene: &Dimensionless, orbit: &Orbit, base_per_drive: f64, d: f64) -> f64 {
-    let b = scene.b;
-    let mass_normalised = 1.0 / shape();
-    let start = &found.start;
-    let [x, v] = start.sections[0];
-    let velocity = v + d * found.drive * start.phase.sin();
-    let pairs = [
+fn apart(found: &StructureOrbit, scene: &Dimensionless, orbit: &Orbit, base_per_drive: f64) -> f64 {
+    let mut pairs = vec![
         (found.omega / scene.omega0, orbit.omega),
         (scene.excitation(base_per_drive * found.drive), orbit.g),
-        (found.response / b, orbit.c),
+        (found.response / scene.b, orbit.c),
         (found.phase, orbit.gamma),
         (scene.speed(found.speed), orbit.b),
         (scene.speed(found.impact_velocity), orbit.impact_velocity),
-        (x / (mass_normalised * b), orbit.start.q1),
-        (scene.speed(velocity / mass_normalised), orbit.start.dq1),
-        (start.q2 / b, orbit.start.q2),
-        (scene.speed(start.dq2), orbit.start.dq2),
     ];
+    if scene.definition.reference == Reference::Base {
+        // The state of the oscillator where the phase of the base is 0.
+        let here = [Condition::Sigma(orbit.sigma), Condition::Excitation(orbit.g)];
+        let [_, q1, dq1, q2, dq2] = orbit.periodic(scene, here).unwrap().motion(scene, 1)[0];
+        let start = &found.start;
+        let [x, v] = start.sections[0].map(|value| value * shape());
+        pairs.extend([
+            (found.impact_phase, orbit.start.phase),
+            (x / scene.b, q1),
+            (scene.speed(v), dq1),
+            (start.q2 / scene.b, q2),
+            (scene.speed(start.dq2), dq2),
+        ]);
+    }
     let moduli = found
         .multipliers
         .iter()
@@ -175,19 +184,17 @@ fn apart(found: &StructureOrbit, scene: &Dimensionless, orbit: &Orbit, base_per_
 fn a_structure_of_one_mode_has_the_orbits_of_the_oscillator() {
     let damping = RIG[2] / (RIG[0] * omega0());
     let mut worst = 0_f64;
-    let mut compare =
-        |found: Vec<StructureOrbit>, expected: Vec<Orbit>, scene: &Dimensionless, [per_drive, d]: [f64; 2]| {
-            assert_eq!(found.len(), expected.len());
-            for (one, other) in found.iter().zip(&expected) {
-                assert_eq!(one.stable, other.stable);
-                worst = worst.max(apart(one, scene, other, per_drive, d));
-            }
-            found.len()
-        };
+    let mut compare = |found: Vec<StructureOrbit>, expected: Vec<Orbit>, scene: &Dimensionless, per_drive: f64| {
+        assert_eq!(found.len(), expected.len());
+        for (one, other) in found.iter().zip(&expected) {
+            assert_eq!(one.stable, other.stable);
+            worst = worst.max(apart(one, scene, other, per_drive));
+        }
+        found.len()
+    };
     for (excitation, drive) in [(Excitation::Force, shape()), (Excitation::Base, 1.0 / shape())] {
         let host = Host::from_modes(excitation, &[mode(1.0, 1.0, [shape(), drive])]).unwrap();
         let orbits = StructureOrbits::new(&host, PARTICLE);
-        let [_, d] = host.sections()[0].drive;
         let is_force = excitation == Excitation::Force;
         let FirstOrder { mut numbers, base_per_drive, .. } = orbits.first_order(0).unwrap();
         assert!((numbers.epsilon - 0.032 / 3.807).abs() < 1e-15 && (numbers.b - 0.01).abs() < 1e-15);
@@ -203,7 +210,7 @@ fn a_structure_of_one_mode_has_the_orbits_of_the_oscillator() {
                 orbits.at_phase_resonance(omega * omega0()),
                 exact_backbone(&numbers, omega),
             );
-            count += compare(found, expected, &numbers, [per_drive(omega), d]);
+            count += compare(found, expected, &numbers, per_drive(omega));
         }
         assert!(count > 200, "{count}");
         if !is_force {
@@ -212,12 +219,12 @@ fn a_structure_of_one_mode_has_the_orbits_of_the_oscillator() {
             for n in 0..100 {
                 let sigma = -3.0 + 0.04 * f64::from(n);
                 let found = orbits.at(numbers.omega(sigma), drive);
-                compare(found, symmetric_orbits(&numbers, sigma), &numbers, [base_per_drive, d]);
+                compare(found, symmetric_orbits(&numbers, sigma), &numbers, base_per_drive);
             }
             let found = orbits.resonant(drive, [0.97, 1.01].map(|omega| omega * omega0()));
             let all = phase_resonant(&numbers).into_iter();
             let near = all.filter(|orbit| (0.97..1.01).contains(&orbit.omega)).collect();
-            assert!(compare(found, near, &numbers, [base_per_drive, d]) > 1);
+            assert!(compare(found, near, &numbers, base_per_drive) > 1);
         }
     }
     assert!(worst < 1e-10, "{worst:e}");
@@ -287,4 +294,40 @@ fn a_frequency_response_has_the_orbits_of_each_frequency_and_its_folds_are_its_t
         }
     }
     assert!(folds > 0);
+}
+
+#[test]
+fn first_order_theory_of_the_driven_mode_approaches_the_exact_orbits_of_the_structure_as_the_particle_gets_lighter() {
+    let phi = shape();
+    let mut before = [f64::INFINITY; 3];
+    for halvings in 0..5 {
+        let mass = PARTICLE.mass / f64::from(1 << halvings);
+        // With a constant lambda, the damping falls as the mass.
+        let damping = mass / PARTICLE.mass;
+        let modes = [
+            mode(1.0, damping, [phi, 0.7 * phi]),
+            mode(8.4, damping, [0.4 * phi, -0.9 * phi]),
+        ];
+        let host = Host::from_modes(Excitation::Force, &modes).unwrap();
+        let point = host.row(&[0.7 * phi, -0.9 * phi]).unwrap();
+        let orbits = StructureOrbits::new(&host, Particle { mass, ..PARTICLE }).with_response(&point);
+        let FirstOrder { numbers, base_per_drive, response_per_cavity } = orbits.first_order(0).unwrap();
+        let theory = SlowFlow::new(numbers.lambda, numbers.r).backbone_at(0.85);
+        let found = orbits.at_phase_resonance(numbers.omega(theory.sigma));
+        let exact = found
+            .into_iter()
+            .max_by(|one, other| one.speed.total_cmp(&other.speed))
+            .unwrap();
+        let pairs = [
+            (exact.speed, theory.b * numbers.b * numbers.omega0),
+            (exact.response, theory.c * numbers.b * response_per_cavity),
+            (exact.drive, numbers.amplitude(theory.g) / base_per_drive),
+        ];
+        let errors = pairs.map(|(exact, theory)| (exact / theory - 1.0).abs());
+        for (error, before) in errors.iter().zip(before) {
+            assert!(*error < 0.6 * before, "{halvings} {errors:?} {before:?}");
+        }
+        before = errors;
+    }
+    assert!(before.iter().all(|error| *error < 0.01), "{before:?}");
 }

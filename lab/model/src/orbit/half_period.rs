@@ -58,8 +58,8 @@ impl HalfPeriod {
     }
 
     /// The part of (x, v) of every section after the impact that the impulses make.
-    pub(super) fn impulsive(&self) -> impl Iterator<Item = [f64; 2]> {
-        self.parts.iter().map(|part| part.after.into())
+    pub(super) fn impulsive(&self) -> impl Iterator<Item = Vector2<f64>> {
+        self.parts.iter().map(|part| part.after)
     }
 
     /// Shares of every section and, last, of the particle in the energy of the disturbance with a multiplier. `omega` is the frequency of a

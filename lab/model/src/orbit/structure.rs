@@ -8,15 +8,15 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use lovines::{Excitation, Host};
-use nalgebra::Complex;
+use lovines::{Excitation, Host, InvalidHost};
+use nalgebra::{Complex, Vector2};
 use serde::Serialize;
 
 use super::Bifurcation;
 use super::half_period::HalfPeriod;
 use super::oscillator::{Section, harmonic};
 use super::periodic::wrapped;
-use super::symmetric::{Particle, Reading, SymmetricMotion, SymmetricMotions, search};
+use super::symmetric::{Particle, Reading, SEARCHED, SymmetricMotion, SymmetricMotions, search};
 use crate::numerics::{self, bisection, equally_spaced, try_bisection};
 use crate::theory::SlowFlow;
 use crate::{Definition, Dimensionless, Reference, Sensor};
@@ -36,6 +36,8 @@ pub struct StructureOrbit {
     pub speed: f64,
     /// Relative velocity before an impact, m/s.
     pub impact_velocity: f64,
+    /// Phase of the drive at the impact on the wall w = +b, rad, in (-pi, pi]; the other impact is half a period later.
+    pub impact_phase: f64,
     /// Where the orbit can be started.
     pub start: StructureStart,
     /// Multipliers (real, imaginary) of the half-period map by rising modulus: two of every section, and two of the particle.
@@ -44,18 +46,34 @@ pub struct StructureOrbit {
     pub stable: bool,
 }
 
-/// The state just after an impact on the wall w = +b, where the drive is `sin(omega t + phase)` times its amplitude with t counted from that
-/// impact. Half a period later the state is minus this one.
+/// The state where the phase of the drive is 0, so that the drive is `sin(omega t)` times its amplitude from there on.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StructureStart {
-    /// Phase of the drive, rad, in (-pi, pi].
-    pub phase: f64,
-    /// (x, v) of every section.
+    /// (x, v) of every section, as in [`lovines::host`].
     pub sections: Vec<[f64; 2]>,
     /// Displacement of the particle, m.
     pub q2: f64,
     /// Velocity of the particle, m/s.
     pub dq2: f64,
+}
+
+impl StructureStart {
+    /// Displacements and velocities of the coordinates of the host (its modes or degrees of freedom), to start a plant from.
+    pub fn coordinates(&self, host: &Host) -> Result<[Vec<f64>; 2], InvalidHost> {
+        let count = self.sections.len();
+        let point = |n: usize| {
+            let unit: Vec<f64> = (0..count).map(|other| f64::from(u8::from(other == n))).collect();
+            let parts = host.row(&unit)?.into_iter().zip(host.sections()).zip(&self.sections);
+            // The drive is 0 here.
+            let states = parts.map(|((pair, section), state)| {
+                let point = Section { cavity: pair, ..Section::from(section) };
+                point.at_cavity(Vector2::from(*state))
+            });
+            Ok(states.sum::<Vector2<f64>>())
+        };
+        let points = (0..count).map(point).collect::<Result<Vec<_>, InvalidHost>>()?;
+        Ok([0, 1].map(|part| points.iter().map(|point| point[part]).collect()))
+    }
 }
 
 impl StructureOrbit {
@@ -64,9 +82,9 @@ impl StructureOrbit {
         self.multipliers.last().map_or(f64::NAN, |[re, im]| re.hypot(*im))
     }
 
-    /// Number of multipliers on or outside the unit circle.
+    /// Number of multipliers outside the unit circle.
     fn unstable(&self) -> usize {
-        let outside = |[re, im]: &&[f64; 2]| re.hypot(*im) >= 1.0;
+        let outside = |[re, im]: &&[f64; 2]| re.hypot(*im) > 1.0 + ON_CIRCLE;
         self.multipliers.iter().filter(outside).count()
     }
 }
@@ -172,8 +190,10 @@ pub struct StructureOrbits {
 const GRID: usize = 4000;
 /// Widths, in the angle along a loop, to which a change of stability and the end of a branch are located.
 const LOCATED: f64 = 1e-11;
-/// Amplitude of the harmonic part of the cavity's motion over b that is rounding: the orbit needs no drive.
-const UNDRIVEN: f64 = 1e-12;
+/// Distance from the unit circle at which a multiplier counts as on it: a double one has half of the digits.
+const ON_CIRCLE: f64 = 1e-7;
+/// Amplitudes over b that are rounding: of a response that is zero, and of the harmonic part of an orbit that needs no drive.
+const ROUNDING: f64 = 1e-12;
 
 impl StructureOrbits {
     /// The orbits of a host.
@@ -323,9 +343,10 @@ impl StructureOrbits {
         let flow = SlowFlow::new(lambda, r);
         let detunings = equally_spaced(0.0, FASTEST, GRID).map(|speed| flow.free_detuning(speed));
         let (low, high) = numerics::range((0.0, 0.0), detunings);
+        // First-order theory leaves out detunings of order epsilon, and other modes.
+        let omega = [low - 1.0, high + 1.0].map(|sigma| (1.0 + epsilon * sigma).clamp(SEARCHED[0], SEARCHED[1]));
         Some(StructureRange {
-            // First-order theory leaves out detunings of order epsilon, and other modes.
-            omega: [low - 1.0, high + 1.0].map(|sigma| omega0 * (1.0 + epsilon * sigma)),
+            omega: omega.map(|omega| omega * omega0),
             speed: FASTEST * b * omega0,
             points,
         })
@@ -364,12 +385,12 @@ impl StructureOrbits {
 
     /// The orbit with its stability, if the phase of its response has the sign that is wanted.
     fn accept_resonant(&self, motion: &SymmetricMotion) -> Option<StructureOrbit> {
-        if motion.cavity.norm() < UNDRIVEN * self.particle.half_width {
+        if motion.cavity.norm() < ROUNDING * self.particle.half_width {
             // Without a drive, its phase is free.
             let turned = wrapped(motion.drive.arg() + motion.phase + FRAC_PI_2);
             let mut orbit = self.accept(motion)?;
             orbit.phase = self.target;
-            orbit.start.phase = turned;
+            orbit.impact_phase = turned;
             return Some(orbit);
         }
         let resonant = motion.phase.sin() < -1e-12;
@@ -379,22 +400,24 @@ impl StructureOrbits {
     /// The orbit with its stability, if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
     fn accept(&self, motion: &SymmetricMotion) -> Option<StructureOrbit> {
         let sizes = [motion.speed, motion.response.norm(), motion.drive.norm()];
-        if sizes.iter().any(|size| !size.is_finite()) || motion.speed <= 0.0 || sizes[1] == 0.0 {
+        let is_motion = motion.speed > 0.0 && sizes[1] > ROUNDING * self.particle.half_width;
+        if sizes.iter().any(|size| !size.is_finite()) || !is_motion {
             return None;
         }
         let half = HalfPeriod::new(&self.sections, &self.particle, motion)?;
         let multipliers = half.multipliers();
-        let state = |(section, impulsive): (&Section, [f64; 2])| {
-            // Without a drive there is no harmonic part, even at an undamped resonance.
-            let per_force = if sizes[2] > 0.0 {
-                motion.drive * section.compliance(motion.omega)
-            } else {
-                Complex::ZERO
-            };
-            let [x, v] = section.driven(motion.omega);
-            [(x * per_force).im + impulsive[0], (v * per_force).im + impulsive[1]]
+        let (t, sign) = since_impact(motion);
+        let state = |(section, impulsive): (&Section, Vector2<f64>)| {
+            let impulsive = section.propagator(t) * impulsive * sign;
+            if sizes[2] == 0.0 {
+                // Without a drive there is no harmonic part, even at an undamped resonance.
+                return impulsive.into();
+            }
+            let per_force = section.compliance(motion.omega) * sizes[2];
+            let [x, v] = section.driven(motion.omega).map(|response| (response * per_force).im);
+            [x + impulsive[0], v + impulsive[1]]
         };
-        let [q1, _] = motion.after;
+        let q2 = motion.after[0] - self.particle.half_width;
         Some(StructureOrbit {
             omega: motion.omega,
             drive: sizes[2],
@@ -402,11 +425,11 @@ impl StructureOrbits {
             phase: wrapped(motion.phase + self.target + FRAC_PI_2),
             speed: motion.speed,
             impact_velocity: motion.impact_velocity,
+            impact_phase: motion.drive.arg(),
             start: StructureStart {
-                phase: motion.drive.arg(),
                 sections: self.sections.iter().zip(half.impulsive()).map(state).collect(),
-                q2: q1 - self.particle.half_width,
-                dq2: motion.speed,
+                q2: sign * (q2 + motion.speed * t),
+                dq2: sign * motion.speed,
             },
             stable: multipliers.iter().all(|multiplier| multiplier.norm() < 1.0),
             multipliers: multipliers
@@ -532,6 +555,16 @@ impl StructureOrbits {
         };
         let shares = self.shares_of(&orbit, multiplier)?;
         Some(StabilityChange { kind, orbit, shares })
+    }
+}
+
+/// Time since the last impact where the phase of the drive is 0, and -1 where this is the impact on the wall w = -b.
+fn since_impact(motion: &SymmetricMotion) -> (f64, f64) {
+    let turned = (-motion.drive.arg()).rem_euclid(TAU);
+    if turned < PI {
+        (turned / motion.omega, 1.0)
+    } else {
+        ((turned - PI) / motion.omega, -1.0)
     }
 }
 

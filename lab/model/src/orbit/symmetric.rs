@@ -251,7 +251,7 @@ fn orbit(scene: &Dimensionless, motion: &SymmetricMotion) -> Orbit {
 }
 
 /// Frequencies searched, over omega0.
-const SEARCHED: [f64; 2] = [0.2, 3.0];
+pub(super) const SEARCHED: [f64; 2] = [0.2, 3.0];
 /// Growth of e from one frequency to the next: equal steps around omega0, where the detuning is of order one, and equal ratios beyond.
 const GROWTH: f64 = 1.0004;
 
