@@ -11,23 +11,52 @@ use vines::ArgumentError;
 use vines::fit::{MeasuredPoint, Recording, RecordingError, Selection, Table};
 use vines::identification::Regime;
 use vines::numerics::Estimate;
-use vines::scene::Name;
+use vines::scene::{Measurand, Name};
 
-/// Quantities of a point, and the columns that have them: SI units but for the frequency, in Hz.
-const COLUMNS: [(&str, &str, f64); 6] = [
-    ("f", "f_Hz", std::f64::consts::TAU),
-    ("A", "A_m", 1.0),
-    ("E", "E_m", 1.0),
-    ("u_f", "u_f_Hz", std::f64::consts::TAU),
-    ("u_A", "u_A_m", 1.0),
-    ("u_E", "u_E_m", 1.0),
+/// Quantities of a point, the columns that have them, and their units.
+const COLUMNS: [(&str, &str, &str); 6] = [
+    ("f", "f_Hz", "Hz"),
+    ("A", "A_m", "m"),
+    ("E", "E_m", "m"),
+    ("u_f", "u_f_Hz", "Hz"),
+    ("u_A", "u_A_m", "m"),
+    ("u_E", "u_E_m", "m"),
 ];
+
+/// What a column measures, and SI units per unit. Amplitudes may be those of velocities and accelerations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ColumnUnit {
+    measurand: Measurand,
+    factor: f64,
+}
+
+impl ColumnUnit {
+    fn of(quantity: &str, column: &str, unit: &str) -> Result<Self, ArgumentError> {
+        let Name { factor, si, .. } = Name::with_unit(column, unit)?;
+        let si = si.unwrap_or_default();
+        let is_frequency = quantity.trim_start_matches("u_") == "f";
+        let measurand = match Measurand::of_unit(si).filter(|_| !is_frequency) {
+            None if is_frequency && si == "rad/s" => Measurand::Displacement,
+            None => {
+                let allowed = if is_frequency {
+                    "Hz, rad/s or 1/min"
+                } else {
+                    "a length (m, mm, µm), a velocity (m/s, mm/s) or an acceleration (m/s², g)"
+                };
+                return Err(format!("{column}: {quantity} in {unit} is not possible; allowed is {allowed}").into());
+            }
+            Some(measurand) => measurand,
+        };
+        Ok(Self { measurand, factor })
+    }
+}
 
 /// A column of a user's table; parse it from `A=amplitude:mm`: the quantity, the name of the column, and its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Column {
     quantity: &'static str,
-    name: Name,
+    name: String,
+    unit: ColumnUnit,
 }
 
 impl FromStr for Column {
@@ -46,7 +75,9 @@ impl FromStr for Column {
             .into_iter()
             .find(|(known, ..)| *known == quantity.trim())
             .ok_or_else(form)?;
-        Ok(Self { quantity, name: Name::with_unit(name.trim(), unit.trim())? })
+        let name = name.trim().to_string();
+        let unit = ColumnUnit::of(quantity, &name, unit.trim())?;
+        Ok(Self { quantity, name, unit })
     }
 }
 
@@ -85,14 +116,15 @@ pub(super) fn read(path: &Path, columns: &[Column], selection: &Selection) -> Re
                 "{file} has neither a locked point (`lock`) nor `points`: expected identification.json, tracked.json, or a table (CSV)"
             )
         })?;
-        return points(path, &rows, columns);
+        return points(path, &rows, columns, |_| "");
     }
     let table = Table::parse(&file.to_string(), &bytes).map_err(refused)?;
     let is_named = selection.response.is_some() || selection.drive.is_some();
     let has_points = !columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| table.has(name));
     if has_points && !is_named {
         let row = |row: Vec<(&str, String)>| row.into_iter().map(|(name, cell)| (name.to_string(), cell)).collect();
-        return points(path, &table.rows().map(row).collect::<Vec<Row>>(), columns);
+        let rows: Vec<Row> = table.rows().map(row).collect();
+        return points(path, &rows, columns, |column| table.unit(column));
     }
     let contents = table.contents();
     if !is_named && !table.has("response") {
@@ -118,9 +150,14 @@ fn not_a_number(path: &Path, row: usize, column: &str, value: &str) -> ArgumentE
 }
 
 /// The points of a file, and the number of points that are left out.
-fn points(path: &Path, rows: &[Row], columns: &[Column]) -> Result<Measurement, ArgumentError> {
+fn points<'a>(
+    path: &Path,
+    rows: &[Row],
+    columns: &[Column],
+    stated: impl Fn(&str) -> &'a str,
+) -> Result<Measurement, ArgumentError> {
     let kept: Vec<(usize, &Row)> = rows.iter().enumerate().filter(|(_, row)| is_symmetric(row)).collect();
-    let points = kept.iter().map(|(n, row)| point(path, n + 1, row, columns));
+    let points = kept.iter().map(|(n, row)| point(path, n + 1, row, columns, &stated));
     Ok(Measurement::Points(
         points.collect::<Result<_, _>>()?,
         rows.len() - kept.len(),
@@ -149,10 +186,23 @@ fn is_symmetric(row: &Row) -> bool {
     is_not_false("settled") && is_not_false("reached") && row.get("regime").is_none_or(is_regime)
 }
 
-fn point(path: &Path, number: usize, row: &Row, columns: &[Column]) -> Result<MeasuredPoint, ArgumentError> {
-    let value = |(quantity, column, factor): (&str, &str, f64)| {
+/// A point. `stated`: the unit that the head of a column states.
+fn point<'a>(
+    path: &Path,
+    number: usize,
+    row: &Row,
+    columns: &[Column],
+    stated: &impl Fn(&str) -> &'a str,
+) -> Result<MeasuredPoint, ArgumentError> {
+    // The value in SI units, and how often a displacement is differentiated.
+    let value = |(quantity, column, unit): (&str, &str, &str)| {
         let named = columns.iter().rfind(|column| column.quantity == quantity);
-        let (column, factor) = named.map_or((column, factor), |named| (&*named.name.name, named.name.factor));
+        let column = named.map_or(column, |named| &named.name);
+        let unit = match (named, stated(column)) {
+            (Some(named), _) => named.unit,
+            (None, "") => ColumnUnit::of(quantity, column, unit)?,
+            (None, stated) => ColumnUnit::of(quantity, column, stated)?,
+        };
         let text = row.get(column).ok_or_else(|| {
             let names: Vec<&str> = row.keys().map(String::as_str).collect();
             format!(
@@ -164,14 +214,17 @@ fn point(path: &Path, number: usize, row: &Row, columns: &[Column]) -> Result<Me
         })?;
         let number_of = text.parse::<f64>().ok().filter(|value| value.is_finite());
         let refused = || not_a_number(path, number, column, text);
-        number_of.map(|value| factor * value).ok_or_else(refused)
+        let value = unit.factor * number_of.ok_or_else(refused)?;
+        Ok::<_, ArgumentError>((value, unit.measurand.order()))
     };
-    let estimate = |n: usize| {
+    let estimate = |n: usize, omega: f64| {
+        let displacement = |(value, order): (f64, i32)| value / omega.powi(order);
         Ok::<_, ArgumentError>(Estimate {
-            value: value(COLUMNS[n])?,
-            uncertainty: value(COLUMNS[n + 3])?,
+            value: displacement(value(COLUMNS[n])?),
+            uncertainty: displacement(value(COLUMNS[n + 3])?),
         })
     };
-    let [omega, response, drive] = [estimate(0)?, estimate(1)?, estimate(2)?];
+    let omega = estimate(0, 1.0)?;
+    let [response, drive] = [estimate(1, omega.value)?, estimate(2, omega.value)?];
     Ok(MeasuredPoint { omega, response, drive })
 }

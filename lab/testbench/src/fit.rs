@@ -10,6 +10,7 @@
 mod channels;
 mod effects;
 mod recording;
+#[cfg(feature = "tables")]
 mod table;
 
 use std::cmp::Ordering;
@@ -33,6 +34,7 @@ use crate::scene::{Dimensionless, Parameters};
 pub use channels::{Channel, Contents, Selection};
 pub use effects::{Candidate, Effect, Explanation, Found, decimals, explain, find};
 pub use recording::{Kind, LinearDecay, Part, Recording, RecordingError, parts};
+#[cfg(feature = "tables")]
 pub use table::Table;
 
 /// A measured point of phase resonance.

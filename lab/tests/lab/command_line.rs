@@ -228,6 +228,36 @@ fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
     }
     let missing = "has no column `amplitude`";
     fails(&format!("fit {out}/tracked.csv --column A=amplitude:mm"), 2, missing);
+    for (column, words) in [
+        ("A=A_m:s", "A in s is not possible; allowed is a length"),
+        ("A=A_m:N", "A in N is not possible"),
+        ("f=f_Hz:mm", "f in mm is not possible; allowed is Hz, rad/s or 1/min"),
+    ] {
+        fails(&format!("fit {out}/tracked.csv --column {column}"), 2, words);
+    }
+    // The same points, with the response as an acceleration in g.
+    let table = std::fs::read_to_string(format!("{out}/tracked.csv")).unwrap();
+    let names: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+    let place = |name: &str| names.iter().position(|one| *one == name).unwrap();
+    let in_g = |row: &str| {
+        let mut cells: Vec<String> = row.split(',').map(String::from).collect();
+        let number = |cells: &[String], name| cells[place(name)].parse::<f64>().unwrap();
+        let omega = std::f64::consts::TAU * number(&cells, "f_Hz");
+        for name in ["A_m", "u_A_m"] {
+            cells[place(name)] = (number(&cells, name) * omega * omega / 9.806_65).to_string();
+        }
+        cells.join(",")
+    };
+    for (heading, columns) in [("A_m", " --column A=A_m:g --column u_A=u_A_m:g"), ("A_m [g]", "")] {
+        let head = table.lines().next().unwrap().replace("A_m", heading);
+        let rows: Vec<String> = table.lines().skip(1).map(in_g).collect();
+        let file = format!("{out}/accelerations.csv");
+        std::fs::write(&file, format!("{head}\n{}\n", rows.join("\n"))).unwrap();
+        let r = |line: &str| json(line)["parameters"][2]["value"].as_f64().unwrap();
+        let one = r(&format!("fit {out}/tracked.csv --json"));
+        let other = r(&format!("fit {file}{columns} --json"));
+        assert!((one / other - 1.0).abs() < 1e-7, "{one} {other}");
+    }
 }
 
 #[test]

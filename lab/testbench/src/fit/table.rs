@@ -162,6 +162,13 @@ impl Table {
         self.names.iter().any(|one| one == name)
     }
 
+    /// The unit that the head of a column states; empty without one.
+    #[must_use]
+    pub fn unit(&self, name: &str) -> &str {
+        let column = self.names.iter().position(|one| one == name);
+        column.map_or("", |column| &self.units[column])
+    }
+
     /// The rows: cells with a point as decimal mark, by the names of the columns.
     pub fn rows(&self) -> impl Iterator<Item = Vec<(&str, String)>> {
         self.rows.iter().map(|row| {
