@@ -94,7 +94,7 @@ impl StructureOrbit {
 pub struct StructureBranch {
     /// Its orbits.
     pub orbits: Vec<StructureOrbit>,
-    /// Where multipliers leave or enter the unit circle, in order.
+    /// Where multipliers leave or enter the unit circle, in order. Two opposite changes between neighbouring orbits are missed.
     pub changes: Vec<StabilityChange>,
     /// It leads back to its first orbit.
     pub closed: bool,
@@ -500,30 +500,31 @@ impl StructureOrbits {
             samples.rotate_left(gap);
             samples.push((samples[0].0 + TAU, samples[0].1.clone()));
         }
-        let mut branches: Vec<StructureBranch> = Vec::new();
-        let mut before: Option<&(f64, Option<StructureOrbit>)> = None;
-        for sample in &samples {
-            let last = before.map(|(angle, orbit)| (*angle, orbit.as_ref()));
-            match (last, &sample.1) {
-                (Some((start, Some(orbit))), Some(next)) => {
-                    if let Some(branch) = branches.last_mut() {
-                        branch.changes.extend(self.change(at, [start, sample.0], [orbit, next]));
-                        branch.orbits.push(next.clone());
-                    }
-                }
-                (last, Some(next)) => {
-                    let first = last.and_then(|(start, _)| end(at, sample.0, start));
-                    let orbits = first.into_iter().chain([next.clone()]).collect();
-                    branches.push(StructureBranch { orbits, changes: Vec::new(), closed });
-                }
-                (Some((start, Some(_))), None) => {
-                    if let Some(branch) = branches.last_mut() {
-                        branch.orbits.extend(end(at, start, sample.0));
-                    }
-                }
-                _ => {}
+        let (mut branches, mut from) = (Vec::new(), 0);
+        for run in samples.chunk_by(|one, other| one.1.is_some() == other.1.is_some()) {
+            let to = from + run.len();
+            let towards = |n: Option<usize>| n.and_then(|n| samples.get(n)).map(|sample| sample.0);
+            let first = towards(from.checked_sub(1)).and_then(|gap| end(at, run[0].0, gap));
+            let last = towards(Some(to)).and_then(|gap| end(at, run[run.len() - 1].0, gap));
+            let inside: Vec<(f64, &StructureOrbit)> = run
+                .iter()
+                .filter_map(|(angle, orbit)| Some((*angle, orbit.as_ref()?)))
+                .collect();
+            if !inside.is_empty() {
+                branches.push(StructureBranch {
+                    changes: inside
+                        .windows(2)
+                        .filter_map(|pair| self.change(at, pair[0], pair[1]))
+                        .collect(),
+                    orbits: first
+                        .into_iter()
+                        .chain(inside.iter().map(|inside| inside.1.clone()))
+                        .chain(last)
+                        .collect(),
+                    closed,
+                });
             }
-            before = Some(sample);
+            from = to;
         }
         branches
     }
@@ -532,8 +533,8 @@ impl StructureOrbits {
     fn change(
         &self,
         at: &impl Fn(f64) -> Option<StructureOrbit>,
-        [from, to]: [f64; 2],
-        [first, second]: [&StructureOrbit; 2],
+        (from, first): (f64, &StructureOrbit),
+        (to, second): (f64, &StructureOrbit),
     ) -> Option<StabilityChange> {
         let outside = first.unstable();
         if outside == second.unstable() {
