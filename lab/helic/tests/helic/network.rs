@@ -1,5 +1,5 @@
 //! Guards the device on loopback: sessions, and the drive that stops when the stream, the host or the control channel hangs.
-//! Nothing here depends on how fast the machine is.
+//! A host or a device on a machine that is too busy stops the drive as well, and says so: then the test tries again.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -65,9 +65,26 @@ impl Served {
     }
 }
 
-fn connect(address: SocketAddr) -> HelicRig<Network> {
+fn connect(address: SocketAddr) -> Result<HelicRig<Network>, RigError> {
     let network = Network::connect(address, PATIENT).unwrap();
-    HelicRig::new(network, &Names::default(), scene().sample_time(), 100.0).unwrap()
+    HelicRig::new(network, &Names::default(), scene().sample_time(), 100.0)
+}
+
+/// Repeats an attempt that ended because the machine is too busy for a rig in real time; any other error fails the test.
+fn eventually(mut attempt: impl FnMut() -> Result<(), String>) {
+    let began = Instant::now();
+    while let Err(error) = attempt() {
+        println!("{error}");
+        let busy = [
+            "took no reading for 2 s",
+            "no packet of its stream has arrived for 2.",
+            "no answer for 2.",
+            "of the helic device did not arrive",
+            "output of the helic device is off",
+        ];
+        assert!(busy.iter().any(|part| error.contains(part)), "{error}");
+        assert!(began.elapsed() < Duration::from_secs(600), "{error}");
+    }
 }
 
 /// Drives the device for `samples` samples with a frequency that always changes; returns the largest base displacement.
@@ -83,23 +100,28 @@ fn drive(rig: &mut HelicRig<Network>, samples: u32) -> Result<f64, RigError> {
     })
 }
 
-/// Drives the device until its base moves with the whole amplitude: on a busy machine, commands and readings are late.
-fn drive_until_it_moves(rig: &mut HelicRig<Network>) {
-    let mut amplitudes = std::iter::repeat_with(|| drive(rig, 200).unwrap() / 9e-5);
-    let largest = amplitudes.find(|share| *share > 0.95);
-    assert!(largest < Some(1.05), "{largest:?}");
+/// Drives the device until its base moves with the whole amplitude: commands and readings may be late.
+fn drive_until_it_moves(rig: &mut HelicRig<Network>) -> Result<(), RigError> {
+    loop {
+        let share = drive(rig, 50)? / 9e-5;
+        assert!(share < 1.05, "{share}");
+        if share > 0.95 {
+            return Ok(());
+        }
+    }
 }
 
 #[test]
 fn a_device_on_the_network_is_driven_and_disarmed_when_its_host_leaves() {
-    let server = Served::start();
-    let mut rig = connect(server.address);
-    drive_until_it_moves(&mut rig);
-    drop(rig);
-    server.comes_to_rest();
-    let sessions = server.end();
-    assert_eq!(sessions.len(), 1);
-    assert_eq!(sessions[0].ended, Ended::Farewell);
+    eventually(|| {
+        let server = Served::start();
+        let driven = connect(server.address).and_then(|mut rig| drive_until_it_moves(&mut rig));
+        server.comes_to_rest();
+        let sessions = server.end();
+        assert_eq!(sessions.len(), 1);
+        assert_eq!(sessions[0].ended, Ended::Farewell);
+        driven.map_err(|error| error.to_string())
+    });
 }
 
 #[test]
@@ -152,24 +174,28 @@ fn a_stream_a_host_and_a_control_channel_that_hang_end_the_drive_and_say_so() {
         "took no reading for 2 s",
         "no answer for ",
     ] {
-        let (server, dead) = (Served::start(), Arc::new(AtomicBool::new(false)));
-        let carried = message
-            .starts_with("no answer")
-            .then(|| carrier(server.address, Arc::clone(&dead)));
-        let mut rig = connect(carried.unwrap_or(server.address));
-        drive_until_it_moves(&mut rig);
-        match &message[..4] {
-            "no p" => drop(rig.transport.request(&Frame::new(message::STREAM_STOP, [])).unwrap()),
-            "took" => sleep(2 * PATIENT),
-            // Nothing reaches the device any more: its own watchdog stops it.
-            _ => dead.store(true, Ordering::Relaxed),
-        }
-        let error = drive(&mut rig, u32::MAX).unwrap_err().to_string();
-        // On a machine that is busy enough, the host is late whatever else happens.
-        let is_named = error.contains(message) || error.contains("took no reading for 2 s");
-        assert!(is_named, "{error}");
-        server.comes_to_rest();
-        drop(rig);
-        server.end();
+        eventually(|| {
+            let (server, dead) = (Served::start(), Arc::new(AtomicBool::new(false)));
+            let carried = message
+                .starts_with("no answer")
+                .then(|| carrier(server.address, Arc::clone(&dead)));
+            let hang = || {
+                let mut rig = connect(carried.unwrap_or(server.address))?;
+                drive_until_it_moves(&mut rig)?;
+                match &message[..4] {
+                    "no p" => drop(rig.transport.request(&Frame::new(message::STREAM_STOP, []))),
+                    "took" => sleep(2 * PATIENT),
+                    // Nothing reaches the device any more: its own watchdog stops it.
+                    _ => dead.store(true, Ordering::Relaxed),
+                }
+                let outcome = drive(&mut rig, u32::MAX);
+                // The host has not left: it is the end of the drive that brings the base to rest.
+                server.comes_to_rest();
+                outcome
+            };
+            let error = hang().unwrap_err().to_string();
+            server.end();
+            error.contains(message).then_some(()).ok_or(error)
+        });
     }
 }
