@@ -12,6 +12,7 @@ mod follow;
 mod scenes;
 mod simulation;
 mod single;
+mod structures;
 
 use figures::Figures;
 
@@ -44,5 +45,18 @@ fn random_cavities_are_survived() {
     let mut figures = Figures::default();
     figures.run("cavity", n, scenes::cavity, follow::follow);
     figures.run("balance in a cavity", n / 10, scenes::cavity, follow::balance);
+    figures.end();
+}
+
+/// `scripts/stress --structures` runs the long form (`SCENES=10000`).
+#[test]
+fn random_structures_are_survived() {
+    let mut figures = Figures::default();
+    figures.run(
+        "structure",
+        number_of_scenes() / if number_of_scenes() > 1500 { 1 } else { 5 },
+        structures::scenes,
+        structures::follow,
+    );
     figures.end();
 }
