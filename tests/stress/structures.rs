@@ -38,7 +38,8 @@ fn modes() -> impl Strategy<Value = Vec<Mode>> {
     let zeta = prop_oneof![1 => Just(0.0), 3 => decades(-5.0, -1.0), 1 => 0.1..0.2f64];
     let shape = prop_oneof![6 => -1.5..1.5f64, 1 => Just(0.0), 1 => decades(-6.0, 0.0)];
     let mode = (ratio, zeta, shape, -1.5..1.5f64);
-    (prop::collection::vec(mode, 1..=8), 0.2..1.5f64).prop_map(|(modes, first)| {
+    let undamped = prop_oneof![4 => Just(false), 1 => Just(true)];
+    (prop::collection::vec(mode, 1..=8), 0.2..1.5f64, undamped).prop_map(|(modes, first, undamped)| {
         let mut omega = 1.0;
         let of = |(n, (ratio, zeta, cavity, drive)): (usize, (f64, f64, f64, f64))| {
             if n > 0 {
@@ -47,7 +48,7 @@ fn modes() -> impl Strategy<Value = Vec<Mode>> {
             }
             Mode {
                 omega,
-                zeta,
+                zeta: if undamped { 0.0 } else { zeta },
                 cavity: if n == 0 { first } else { cavity },
                 drive,
             }
@@ -232,11 +233,7 @@ fn once(s: &Scene, saved: bool, figures: &mut Figures) -> Plant<Structure> {
             let rounding = 1e-14 * (state.q1.abs().max(state.q2.abs()));
             let outside = ((state.q1 - state.q2 - plus).max(minus.mul_add(-1.0, state.q2 - state.q1)) - rounding)
                 / (0.5 * (plus + minus));
-            figures.largest(
-                "structure: outside its cavity inside steps by, in half-widths",
-                outside,
-                1e-11,
-            );
+            figures.largest("outside its cavity inside steps by, in half-widths", outside, 1e-11);
             if let Some((wall, push)) = looked.push()
                 && s.parameters.cavity.kinetic_friction == 0.0
             {
