@@ -21,6 +21,8 @@ fn numbers(value: &Value) -> Vec<f64> {
 struct Reference {
     scene: Value,
     step: f64,
+    /// Number of steps until each row; empty: one per row.
+    steps: Vec<f64>,
     /// t, q..., q'..., q2, q2', impacts so far, wall stuck to.
     rows: Vec<Vec<f64>>,
 }
@@ -31,6 +33,7 @@ impl Reference {
         let all: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
         Self {
             step: number(&all["step"]),
+            steps: all.get("steps").map_or_else(Vec::new, numbers),
             rows: all["rows"].as_array().unwrap().iter().map(numbers).collect(),
             scene: all["scene"].clone(),
         }
@@ -42,12 +45,16 @@ impl Reference {
         let (mass, damping, stiffness) = (matrix("M"), matrix("C"), matrix("K"));
         let n = mass.len();
         let unit = |at: usize| -> Vec<f64> { (0..n).map(|i| f64::from(u8::from(i == at))).collect() };
-        let at = |name: &str| usize::try_from(scene[name].as_u64().unwrap()).unwrap();
+        // A point is one degree of freedom, or a row over all.
+        let row = |name: &str| match &scene[name] {
+            Value::Array(_) => numbers(&scene[name]),
+            at => unit(usize::try_from(at.as_u64().unwrap()).unwrap()),
+        };
         let (excitation, drive, amplitude) = match scene.get("base") {
             Some(base) => (Excitation::Base, numbers(base), number(&scene["E"])),
-            None => (Excitation::Force, unit(at("drive")), number(&scene["F"])),
+            None => (Excitation::Force, row("drive"), number(&scene["F"])),
         };
-        let cavity = unit(at("cavity"));
+        let cavity = row("cavity");
         let matrices = Matrices {
             mass: &mass,
             damping: &damping,
@@ -77,13 +84,21 @@ impl Reference {
         )
     }
 
-    /// Errors of displacements and velocities after every row in `steps` steps per row, relative to `b`.
-    fn errors(&self, steps: u32) -> Vec<f64> {
+    /// Errors of displacements and velocities after every row, relative to `b`, in steps of `1/parts` of the reference's; or, with `parts` of 0,
+    /// in one step per row.
+    fn errors(&self, parts: u32) -> Vec<f64> {
         let (mut plant, drive, units) = self.plant();
         let points: Vec<_> = units.iter().map(|unit| plant.host().row(unit).unwrap()).collect();
-        let after = |row: &Vec<f64>| {
-            for _ in 0..steps {
-                plant.advance(drive, self.step / f64::from(steps)).unwrap();
+        let mut taken = 0.0;
+        let mut after = |(n, row): (usize, &Vec<f64>)| {
+            let steps = self.steps.get(n).map_or(1.0, |until| until - taken);
+            taken += steps;
+            let (count, length) = match parts {
+                0 => (1, steps * self.step),
+                _ => (steps as u32 * parts, self.step / f64::from(parts)),
+            };
+            for _ in 0..count {
+                plant.advance(drive, length).unwrap();
             }
             let got: Vec<_> = points.iter().map(|point| plant.point(point)).collect();
             let state = plant.state();
@@ -98,16 +113,29 @@ impl Reference {
                 assert_eq!(plant.totals().impacts, impacts as u64, "t = {}", row[0]);
             }
             assert_eq!(plant.contact().map_or(0.0, Wall::sign), wall, "t = {}", row[0]);
+            // Velocities in units of the first natural frequency.
+            let unit = plant.host().sections()[0].oscillator.omega0;
+            let displacements = points.len();
+            let scale = |n: usize| match n {
+                n if n < displacements || n == 2 * displacements => 1.0,
+                _ => 1.0 / unit,
+            };
+            let error = error.enumerate().map(|(n, error)| error * scale(n));
             error.fold(0.0, f64::max) / plant.parameters().half_width
         };
-        self.rows.iter().map(after).collect()
+        self.rows.iter().enumerate().map(&mut after).collect()
     }
 
     /// Change of the particle's displacement after every row per change of its velocity at the start.
     fn sensitivities(&self) -> Vec<f64> {
         const CHANGE: f64 = 1e-9;
         let run = |change: f64| -> Vec<f64> {
-            let mut changed = Self { scene: self.scene.clone(), step: self.step, rows: Vec::new() };
+            let mut changed = Self {
+                scene: self.scene.clone(),
+                step: self.step,
+                steps: Vec::new(),
+                rows: Vec::new(),
+            };
             changed.scene["dq2"] = Value::from(number(&self.scene["dq2"]) + change);
             let (mut plant, drive, _) = changed.plant();
             let mut after = || {
@@ -159,6 +187,20 @@ fn chaotic_transients_of_structures_are_followed_as_far_as_double_precision_can(
                 early < 2e-12 && relative < 2e-14,
                 "{name}, {steps}: {early:e} {relative:e}"
             );
+        }
+    }
+}
+
+/// Own references: persistent contact, chatter and friction with two modes on a base, and with three under a force whose damping is not
+/// proportional.
+#[test]
+fn contact_chatter_and_friction_of_structures_follow_references_of_40_digits() {
+    for name in ["contact", "contact-force", "chatter", "chatter-force", "stick-slip"] {
+        let reference = Reference::read(name);
+        for parts in [0, 1, 10] {
+            let error = reference.errors(parts).into_iter().fold(0.0, f64::max);
+            println!("{name}, {parts} parts of a step: {error:.1e} b");
+            assert!(error < 2e-12, "{name}, {parts}: {error:e}");
         }
     }
 }

@@ -1,9 +1,10 @@
 //! What each shortcut saves, in instructions: the plant as it is, and the same work without the shortcut. And what each effect
-//! of a real cavity costs, per impact of the default lock.
+//! of a real cavity costs, per impact of the default lock; and what an impact on a structure with several modes costs.
 //!
 //! ```text
 //! cargo bench -p vines-benchmarks --bench savings
 //! LOVINES_WITHOUT=hop cargo bench -p vines-benchmarks --bench savings -- scenes    what scenes cost without a mechanism of the fast path
+//! cargo bench -p vines-benchmarks --bench savings -- structures    an impact on a structure of 1 to 8 modes
 //! ```
 //!
 //! Every case is run under valgrind for two lengths; the difference tells what one unit of work costs, without the start of
@@ -16,7 +17,7 @@ use std::error::Error;
 use std::hint::black_box;
 use std::process::Command;
 
-use lovines::{Cavity, Drive, Parameters, Plant, Restitution, State};
+use lovines::{Cavity, Drive, Excitation, Host, Mode, Parameters, Plant, Restitution, State, StructureState};
 
 const OMEGA: f64 = 0.990_417;
 const PERIOD: f64 = TAU / OMEGA;
@@ -230,6 +231,66 @@ fn all(plant: &Plant) {
     black_box(plant.energy(plant.base_displacement()));
 }
 
+/// Frequencies of a cantilever over its first.
+const CANTILEVER: [f64; 8] = [1.0, 6.267, 17.55, 34.39, 56.84, 84.91, 118.6, 157.9];
+/// Frequencies of a frame or a plate.
+const PLATE: [f64; 8] = [1.0, 2.2, 3.4, 4.7, 6.1, 7.4, 8.6, 9.9];
+
+/// The default rig with further modes, driven near its 1:1 motion for `periods`; 0 modes: the plain solver of one oscillator. Returns the number of
+/// impacts.
+fn structure(frequencies: &[f64], modes: usize, periods: u32) -> u64 {
+    let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
+    let zeta = 0.5 * parameters.damping;
+    let drive = Drive::harmonic(0.0084 * 1.1, OMEGA);
+    let step = f64::from(periods) * PERIOD;
+    if modes == 0 {
+        let mut plant = Plant::new(parameters, LOCK).expect("a valid scene");
+        plant.set_fast_path(false);
+        plant.advance(black_box(drive), step).expect("a valid step");
+        return plant.totals().impacts;
+    }
+    let mode = |(n, omega): (usize, &f64)| {
+        // The first mode is the default rig; the others are as mobile, and move with the base as little as a cantilever's do.
+        let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
+        Mode {
+            omega: *omega,
+            zeta,
+            cavity: sign,
+            drive: sign / (1 + n * n) as f64,
+        }
+    };
+    let modes: Vec<_> = frequencies.iter().enumerate().take(modes).map(mode).collect();
+    let host = Host::from_modes(Excitation::Base, &modes).expect("a valid structure");
+    let mut start = StructureState { q2: LOCK.q2, dq2: LOCK.dq2, ..StructureState::default() };
+    start.displacements = (0..modes.len()).map(|n| if n == 0 { LOCK.q1 } else { 0.0 }).collect();
+    start.velocities = (0..modes.len()).map(|n| if n == 0 { LOCK.dq1 } else { 0.0 }).collect();
+    let mut plant = Plant::with_host(host, parameters, &start).expect("a valid scene");
+    plant.advance(black_box(drive), step).expect("a valid step");
+    plant.totals().impacts
+}
+
+/// What an impact on a structure costs, against the plain solver of one oscillator.
+fn structures() -> Result<(), Box<dyn Error>> {
+    println!(
+        "| structure | modes | instructions per impact | plain solver of one oscillator | allowed |\n|---|---|---|---|---|"
+    );
+    let mut plain = None;
+    for (kind, frequencies) in [("plate", PLATE), ("cantilever", CANTILEVER)] {
+        for modes in [0, 1, 2, 3, 5, 8] {
+            let (few, many) = (20, 120);
+            let count = |periods| counted(&[kind, &modes.to_string()], periods);
+            let impacts = structure(&frequencies, modes, many) - structure(&frequencies, modes, few);
+            let cost = (count(many)? - count(few)?) as f64 / impacts as f64;
+            let ratio = cost / *plain.get_or_insert(cost);
+            println!(
+                "| {kind} | {modes} | {cost:.0} | {ratio:.2} | {:.1} |",
+                2.0 + 0.7 * modes as f64
+            );
+        }
+    }
+    Ok(())
+}
+
 /// Instructions of a run of this program with these arguments, as valgrind counts them.
 fn counted(arguments: &[&str], n: u32) -> Result<u64, Box<dyn Error>> {
     let output = Command::new("valgrind")
@@ -297,6 +358,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             "with" => (ROWS[row].2)(n),
             "without" => (ROWS[row].3)(n),
             "scene" => (SCENES[row].2)(n),
+            "plate" => drop(black_box(structure(&PLATE, row, n))),
+            "cantilever" => drop(black_box(structure(&CANTILEVER, row, n))),
             _ => locked_in(EFFECTS[row].1, n),
         }
         return Ok(());
@@ -311,6 +374,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     if arguments.iter().any(|argument| argument == "scenes") {
         return scenes();
+    }
+    if arguments.iter().any(|argument| argument == "structures") {
+        return structures();
     }
     table()
 }

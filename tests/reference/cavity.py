@@ -166,9 +166,25 @@ class Rig:
 
     def needed(self, dq1=None):
         """Acceleration that the particle needs beyond gravity to follow the primary mass."""
-        p = self.p
-        both = Oscillator(p, p["M"] + p["m"], p["m"] * self.a_g, self.t, self.q1, self.dq1 if dq1 is None else dq1)
+        both = self.both(dq1)
         return both.at(self.t)[2] - self.a_g
+
+    def both(self, dq1=None):
+        """The primary mass with the particle, at the velocity `dq1`."""
+        p = self.p
+        return Oscillator(p, p["M"] + p["m"], p["m"] * self.a_g, self.t, self.q1, self.dq1 if dq1 is None else dq1)
+
+    def alone(self, force):
+        """The primary mass alone under a constant force."""
+        return Oscillator(self.p, self.p["M"], force, self.t, self.q1, self.dq1)
+
+    def follow(self, motion):
+        """Takes over what a motion has reached."""
+        self.q1, self.dq1, _ = motion.at(self.t)
+
+    def kick(self, velocity):
+        """An impulse at the cavity."""
+        self.dq1 += velocity
 
     def decide(self):
         """What the particle does from now on: ("held", wall or 0) or ("slide", direction)."""
@@ -226,11 +242,10 @@ class Rig:
 
     def hold(self, which, limit):
         """The masses move as one: at the wall `which`, or in mid-cavity for 0."""
-        p = self.p
         if which == 0 and self.mode is None:
             self.sticks += 1
         self.mode = ("held", which)
-        both = Oscillator(p, p["M"] + p["m"], p["m"] * self.a_g, self.t, self.q1, self.dq1)
+        both = self.both()
         offset, began = self.q1 - self.q2, self.t
         directions = (-which,) if which else (1, -1)
 
@@ -243,7 +258,7 @@ class Rig:
             return function
 
         self.t, hit = self.scan_for([spare(d) for d in directions], limit, self.scan)
-        self.q1, self.dq1, _ = both.at(self.t)
+        self.follow(both)
         self.q2, self.dq2 = self.q1 - offset, self.dq1
         if which == 0:
             self.stuck_time += self.t - began
@@ -256,7 +271,7 @@ class Rig:
         # The force that began the sliding decides the direction once only.
         self.mode = None
         friction = which * self.kinetic
-        alone = Oscillator(p, p["M"], -p["m"] * friction, self.t, self.q1, self.dq1)
+        alone = self.alone(-p["m"] * friction)
         pull, t0, q2, dq2, w0 = self.a_g + friction, self.t, self.q2, self.dq2, self.q1 - self.q2
 
         def relative(t):
@@ -280,7 +295,7 @@ class Rig:
         _, dw, ddw = relative(t0)
         first = abs(dw / ddw) / 8 if ddw != 0 and dw != 0 else self.scan / 4
         self.t, hit = self.scan_for(functions, limit, first)
-        self.q1, self.dq1, _ = alone.at(self.t)
+        self.follow(alone)
         s = self.t - t0
         self.q2, self.dq2 = q2 + s * (dq2 + s * pull / 2), dq2 + s * pull
         self.friction += p["m"] * self.kinetic * abs(self.q1 - self.q2 - w0)
@@ -315,11 +330,12 @@ class Rig:
         momentum = self.dq1 - fraction * dw
         pressing = wall * self.needed(momentum) * (1 + p["m"] / p["M"]) + (1 + p["m"] / p["M"]) * self.kinetic
         if pressing > 0 and rebound**2 / (2 * pressing) < mpf(10) ** -26:
-            self.dq1 = self.dq2 = momentum
+            self.kick(momentum - self.dq1)
+            self.dq2 = self.dq1
             if wall * self.needed() >= -self.holding:
                 self.mode = ("held", wall)
             return
-        self.dq1 -= (1 + r) * fraction * dw
+        self.kick(-(1 + r) * fraction * dw)
         self.dq2 = self.dq1 + r * dw
 
 
