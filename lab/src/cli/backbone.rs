@@ -96,7 +96,7 @@ fn doubt_in_words(doubt: Doubt, of: usize, scene: &Scene) -> String {
              noise that hides the harmonic"
         ),
         Doubt::NotSettled => {
-            let levels = advice::stable_orbits(&scene.dimensionless());
+            let levels = advice::stable_orbits_of(scene, &scene.dimensionless());
             let (low, high) = range((f64::INFINITY, 0.0), levels.iter().map(|orbit| orbit.c));
             let stable = match low <= high {
                 true => format!("in the ideal cavity it is stable for C from {low:.3} to {high:.3}"),

@@ -91,6 +91,9 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     writable(&arguments.figure)?;
+    if arguments.scene.load()?.structure.is_some() {
+        return of_a_structure(arguments).map(Results::from);
+    }
     if arguments.periodic {
         return of_the_plant(arguments, &arguments.scene.load()?).map(Results::from);
     }
@@ -123,6 +126,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let orbits = phase_resonant(&scene);
     let title = format!("Exact symmetric 1:1 orbits at resonance: {}", scene.definition.name());
     shown(&scene, &title, &orbits, arguments.json, || listing(&scene, &orbits)).map(Results::from)
+}
+
+/// The phase-resonant orbits of a structure.
+fn of_a_structure(arguments: &Arguments) -> Result<String, Failure> {
+    if arguments.periodic || arguments.backbone || arguments.response || arguments.sigma.is_some() {
+        let rule = "--periodic, --backbone, --response and --sigma are for one oscillator, and this scene has a [structure]; `vines structure` \
+                    has its backbone";
+        return Err(Failure::input(rule));
+    }
+    let scene = arguments.scene.load()?;
+    let numbers = scene.dimensionless();
+    let orbits = vines::survey::phase_resonant(&scene, &numbers);
+    let title = "Exact symmetric 1:1 orbits of the structure at resonance, in the numbers of its driven mode; the four largest multipliers";
+    shown(&numbers, title, &orbits, arguments.json, || listing(&numbers, &orbits))
 }
 
 /// All components of the frequency response.

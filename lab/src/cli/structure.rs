@@ -125,15 +125,10 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
 
 /// An orbit; C is its response over that of the driven mode with the amplitude b at the cavity.
 fn row(orbit: &StructureOrbit, b: f64) -> Vec<String> {
-    let numbers = [
-        orbit.omega / TAU,
-        orbit.response,
-        orbit.response / b,
-        orbit.drive,
-        orbit.growth(),
-    ];
+    let [response, drive] = [orbit.response, orbit.drive].map(|value| format!("{value:.4e}"));
+    let [hertz, c, growth] = [orbit.omega / TAU, orbit.response / b, orbit.growth()].map(number);
     let stable = if orbit.stable { "yes" } else { "no" };
-    numbers.map(number).into_iter().chain([stable.into()]).collect()
+    vec![hertz, response, c, drive, growth, stable.into()]
 }
 
 /// Ranges of C over which a backbone is stable.

@@ -81,6 +81,17 @@ fn theory_backbone(p: &Dimensionless, top: f64, place: impl Fn(&BackbonePoint) -
     points.iter().map(|point| (place(point), point.stable())).collect()
 }
 
+/// Adds the exact backbone of a structure, or the right branch of one oscillator's.
+fn add_exact(panel: &mut Panel, curve: &ExactCurve, p: &Dimensionless, label: &str) {
+    let Some(curves) = &curve.of_structure else {
+        return add_exact_backbone(panel, p, EXACT, label);
+    };
+    for curve in curves {
+        let places = curve.iter().map(|([sigma, c], stable)| ((*sigma, *c), *stable));
+        panel.curve(places, 1.6, EXACT, label);
+    }
+}
+
 /// Adds the right branch of the exact backbone.
 fn add_exact_backbone(panel: &mut Panel, p: &Dimensionless, colour: &'static str, label: &str) {
     let fold = SlowFlow::new(p.lambda, p.r).manifold.b_min();
@@ -104,7 +115,7 @@ pub fn backbone(result: &Comparison) -> Figure {
     let x = widened(range((f64::MAX, f64::MIN), sigmas), 0.06);
     let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)));
     panel.curve(theory, 2.0, THEORY, FIRST_ORDER);
-    add_exact_backbone(&mut panel, p, EXACT, ORBITS);
+    add_exact(&mut panel, &result.curve, p, ORBITS);
     let predicted = result.decay.iter();
     let predicted = predicted.filter_map(|compared| Some((compared.sigma_predicted?, compared.point.c)));
     let predicted = predicted.filter(|(_, c)| *c > fold);
@@ -172,7 +183,7 @@ pub fn tracked(tracked: &TrackedComparison) -> Figure {
         THEORY,
         &first_order,
     );
-    add_exact_backbone(&mut backbone, p, EXACT, &orbits);
+    add_exact(&mut backbone, &tracked.exact, p, &orbits);
     let places = || points().map(|point| (point.at.sigma, point.at.c));
     circles(&mut backbone, places(), "tracked");
     let bars = places().zip(points().map(|point| point.at.u_sigma));

@@ -3,7 +3,7 @@
 use lovines::State;
 use serde::Serialize;
 use vines_model::numerics::{golden_section, mean_square};
-use vines_model::orbit::{self, ContinuationLimits, Orbit, backbone};
+use vines_model::orbit::{ContinuationLimits, Orbit, backbone};
 use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow, free_sigma, resonant};
 
 use crate::backbone::{LevelPoint, Tracked};
@@ -12,6 +12,7 @@ use crate::plan::Plan;
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Drive, Rig, Scaled, Simulated};
 use crate::scene::{Dimensionless, Scene};
+use crate::survey::{phase_resonant, structure_backbone};
 
 /// Amplitudes above which the decay is compared with theory, C.
 ///
@@ -41,6 +42,9 @@ pub struct Comparison {
     pub decay: Vec<ComparedPoint>,
     /// What ended its points.
     pub decay_end: DecayEnd,
+    /// The exact backbone that the decay is compared with.
+    #[serde(skip)]
+    pub curve: ExactCurve,
     /// RMS of the decay's sigma minus theory, over the points with C > 0.2.
     pub rms_sigma_error: Option<f64>,
     /// RMS of the decay's sigma minus the exact backbone's at the same C, over the same points.
@@ -75,11 +79,11 @@ impl Comparison {
         solutions.retain(|point| at_resonance && point.stable());
         solutions.sort_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
         let theory = solutions.first().copied();
-        let mut orbits = orbit::phase_resonant(&parameters);
+        let mut orbits = phase_resonant(scene, &parameters);
         orbits.retain(|_| at_resonance);
         let by_distance = |a: &&Orbit, b: &&Orbit| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c));
         let exact = orbits.iter().min_by(by_distance).copied();
-        let curve = ExactCurve::of(&parameters);
+        let curve = ExactCurve::of_scene(scene, &parameters);
         let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene, &scene.plan_on(knowledge)));
         let decay: Vec<ComparedPoint> = found
             .decay
@@ -98,7 +102,7 @@ impl Comparison {
             rms_sigma_exact: rms(&decay, |row| Some(row.point.sigma - row.sigma_exact?)),
             rms_sigma_predicted: rms(&decay, |row| Some(row.point.sigma - row.sigma_predicted?)),
             parameters,
-            left_out: scene.left_out(),
+            left_out: scene.left_out_of_cavity(),
             phase_target_deg: scene.controller.phase_target,
             lock,
             theory,
@@ -106,6 +110,7 @@ impl Comparison {
             orbits,
             decay,
             decay_end: found.decay.end,
+            curve,
         }
     }
 
@@ -139,6 +144,8 @@ const SPEED_MAX: f64 = 1.35;
 pub struct ExactCurve {
     /// C, sigma and G.
     places: Vec<[f64; 3]>,
+    /// The backbone of a structure, curve by curve: sigma, C and whether it is stable.
+    pub of_structure: Option<Vec<Vec<([f64; 2], bool)>>>,
 }
 
 /// Difference of a point from the exact backbone.
@@ -153,8 +160,39 @@ pub struct Distance {
     pub g: Option<f64>,
 }
 
+/// C, sigma and G of a curve from its smallest response towards faster particles.
+fn right_of_fold(curve: &[Orbit]) -> Vec<[f64; 3]> {
+    let mut orbits: Vec<&Orbit> = curve.iter().filter(|orbit| orbit.b < SPEED_MAX).collect();
+    orbits.sort_by(|one, other| one.b.total_cmp(&other.b));
+    let fold = (0..orbits.len()).min_by(|&a, &b| orbits[a].c.total_cmp(&orbits[b].c));
+    let rising = orbits.iter().skip(fold.unwrap_or(0));
+    rising.map(|orbit| [orbit.c, orbit.sigma, orbit.g]).collect()
+}
+
 impl ExactCurve {
-    /// The curve of a scene.
+    /// The curve of a scene, in the numbers of its oscillator or of the driven mode of its structure.
+    pub fn of_scene(scene: &Scene, numbers: &Dimensionless) -> Self {
+        let Some(curves) = structure_backbone(scene, numbers) else {
+            return Self::of(numbers);
+        };
+        // Several curves may exist at one amplitude; the measured one begins where the response is smallest and has the most orbits.
+        let places = curves
+            .iter()
+            .max_by_key(|curve| curve.len())
+            .map_or(Vec::new(), |curve| right_of_fold(curve));
+        let drawn = |curve: &Vec<Orbit>| {
+            curve
+                .iter()
+                .map(|orbit| ([orbit.sigma, orbit.c], orbit.stable))
+                .collect()
+        };
+        Self {
+            places,
+            of_structure: Some(curves.iter().map(drawn).collect()),
+        }
+    }
+
+    /// The curve of one oscillator.
     pub fn of(scene: &Dimensionless) -> Self {
         let limits = ContinuationLimits { step: STEP, points: 20_000, ..ContinuationLimits::default() };
         let mut points = backbone(scene, &limits).map_or(Vec::new(), |branch| branch.points);
@@ -171,7 +209,7 @@ impl ExactCurve {
         let places = rising
             .take_while(|orbit| orbit.b < SPEED_MAX)
             .map(|orbit| [orbit.c, orbit.sigma, orbit.g]);
-        Self { places: places.collect() }
+        Self { places: places.collect(), of_structure: None }
     }
 
     /// C, sigma and G of its orbits, from the fold on.
@@ -274,7 +312,7 @@ impl TrackedComparison {
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
         let knowledge = tracked.knowledge;
         let parameters = knowledge.numbers;
-        let curve = ExactCurve::of(&parameters);
+        let curve = ExactCurve::of_scene(scene, &parameters);
         let exact = |point: &LevelPoint| curve.distance(point.at.c, point.at.sigma, point.at.g);
         let compare = |point: &LevelPoint| TrackedPoint {
             point: *point,
@@ -290,7 +328,7 @@ impl TrackedComparison {
                 let u_sigma = knowledge.linear.uncertainty / (parameters.epsilon * parameters.omega0);
                 [u_sigma, 2.0 * u_sigma]
             }),
-            left_out: scene.left_out(),
+            left_out: scene.left_out_of_cavity(),
             parameters,
             exact: curve,
         }
@@ -377,6 +415,10 @@ fn predicted(orbit: &Orbit, scene: &Scene, plan: &Plan) -> Vec<[f64; 3]> {
     let start = orbit.start;
     let [q1, q2] = [start.q1, start.q2].map(|length| length * d.b);
     let [dq1, dq2] = [start.dq1, start.dq2].map(|velocity| velocity * d.b * d.omega0);
+    // The start of a structure has more coordinates.
+    if scene.structure.is_some() {
+        return Vec::new();
+    }
     let Ok(plant) = Simulated::new(scene.plant, State { q1, dq1, q2, dq2 }) else {
         return Vec::new();
     };

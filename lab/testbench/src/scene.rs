@@ -97,8 +97,22 @@ impl Scene {
         self.dimensionless().state(&self.start)
     }
 
-    /// What theory, exact orbits and regime maps leave out of the scene's cavity, as a list; `None` if the cavity is ideal.
+    /// What theory, exact orbits of one oscillator and regime maps leave out of the scene, as a list; `None` if its cavity is ideal and it has
+    /// one mode.
     pub fn left_out(&self) -> Option<String> {
+        let modes = self
+            .structure
+            .as_ref()
+            .is_some_and(|structure| structure.modes.len() > 1);
+        let modes = modes.then(|| "the other modes of the structure".to_string());
+        match (self.left_out_of_cavity(), modes) {
+            (Some(cavity), Some(modes)) => Some(format!("{cavity}, and without {modes}")),
+            (cavity, modes) => cavity.or(modes),
+        }
+    }
+
+    /// What exact orbits leave out of the scene's cavity, as a list; `None` if it is ideal.
+    pub fn left_out_of_cavity(&self) -> Option<String> {
         let Cavity { restitution, least_restitution, scatter, tilt, .. } = self.plant.cavity;
         let [plus, minus] = self.plant.gaps();
         let b = self.plant.half_width;
@@ -113,12 +127,6 @@ impl Scene {
                 "the restitution of r_law, r_plus, r_minus and r_min",
             ),
             (scatter != 0.0, "the scatter of the restitution"),
-            (
-                self.structure
-                    .as_ref()
-                    .is_some_and(|structure| structure.modes.len() > 1),
-                "the other modes of the structure",
-            ),
         ];
         let effects: Vec<&str> = effects
             .into_iter()

@@ -1,7 +1,12 @@
-//! A structure before it is driven: its modes, and what the exact orbits say of its 1:1 motion at phase resonance.
+//! Exact orbits of a scene, whose host is one oscillator or a structure: at phase resonance, along the backbone, and what a structure's other
+//! modes do to both.
 
 use serde::Serialize;
-use vines_model::orbit::{Particle, StabilityChange, StructureFacts, StructureOrbit, StructureOrbits};
+use vines_model::Dimensionless;
+use vines_model::orbit::{
+    self, AfterImpact, Orbit, Particle, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
+    StructureOrbits,
+};
 
 use crate::scene::{Scene, Structure};
 
@@ -63,6 +68,63 @@ impl Survey {
         let changes = self.facts.all.iter().flat_map(|branch| &branch.changes);
         changes.filter_map(|change| Some((change.section().filter(|mode| *mode != self.driven)?, change)))
     }
+}
+
+/// The exact phase-resonant orbits of a scene under its drive, by rising C; `numbers` are those of its oscillator or driven mode.
+pub fn phase_resonant(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
+    let of_structure = || {
+        let (orbits, drive) = (scene.structure_orbits()?, scene.structure_drive()?);
+        let found = orbits.resonant(drive, scene.frequencies());
+        Some(
+            found
+                .iter()
+                .filter_map(|orbit| dimensionless(orbit, scene, numbers))
+                .collect(),
+        )
+    };
+    of_structure().unwrap_or_else(|| orbit::phase_resonant(numbers))
+}
+
+/// The exact backbone of a scene's structure, curve by curve; `None` for one oscillator.
+pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<Vec<Orbit>>> {
+    let orbits = scene.structure_orbits()?;
+    let range = orbits.range(section_of(scene.structure.as_ref()?), POINTS)?;
+    let curve = |branch: &StructureBranch| {
+        branch
+            .orbits
+            .iter()
+            .filter_map(|orbit| dimensionless(orbit, scene, numbers))
+            .collect()
+    };
+    Some(orbits.backbone(&range).iter().map(curve).collect())
+}
+
+/// An orbit of a structure in the numbers of its driven mode: C is the response over that of the mode with the amplitude b at the cavity. Of
+/// the multipliers the four largest.
+fn dimensionless(orbit: &StructureOrbit, scene: &Scene, d: &Dimensionless) -> Option<Orbit> {
+    let structure = scene.structure.as_ref()?;
+    let length = |value: f64| value / d.b;
+    let [q2, dq2] = [length(orbit.start.q2), d.speed(orbit.start.dq2)];
+    let impact_velocity = d.speed(orbit.impact_velocity);
+    let moduli: Vec<f64> = orbit.multipliers.iter().map(|[re, im]| re.hypot(*im)).collect();
+    Some(Orbit {
+        g: d.excitation(orbit.drive * structure.base_per_drive()),
+        sigma: d.sigma(orbit.omega),
+        omega: orbit.omega / d.omega0,
+        c: length(orbit.response / structure.reading_per_response().abs()),
+        gamma: orbit.phase,
+        b: d.speed(orbit.speed),
+        impact_velocity,
+        start: AfterImpact {
+            phase: orbit.start.phase,
+            q1: q2 + 1.0,
+            dq1: dq2 - d.r * impact_velocity,
+            q2,
+            dq2,
+        },
+        multipliers: *moduli.last_chunk()?,
+        stable: orbit.stable,
+    })
 }
 
 /// The section of the driven mode: the nearest in frequency.
