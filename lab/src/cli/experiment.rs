@@ -102,6 +102,7 @@ impl ExperimentArguments {
         let recording = recording.map_err(Failure::input)?;
         let mut open = match rig {
             Some(endpoint) => endpoint.rig(&scene, scope)?,
+            None if scene.structure.is_some() => Endpoint::BuiltIn.rig(&scene, scope)?,
             None => {
                 let temporary = tempfile::tempdir().map_err(|error| {
                     let place = std::env::temp_dir();

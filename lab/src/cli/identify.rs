@@ -91,7 +91,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
             .into_iter()
             .map(|(name, content)| (name.into(), content.into()))
             .collect();
-        if arguments.rig.is_none() {
+        if arguments.rig.is_none() && scene.structure.is_none() {
             files.extend(fmus()?);
         }
         Ok(files)

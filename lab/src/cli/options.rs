@@ -189,17 +189,14 @@ impl Endpoint {
 
     /// The rig of this endpoint.
     pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
-        if scene.structure.is_some() {
+        if let (Some(_), Self::Fmu(_) | Self::Network(_)) = (&scene.structure, self) {
             return Err(Failure::input(
-                "[structure]: no rig of this program has more than one mode yet",
+                "a scene with [structure] has the rig `built-in` only: FMUs and rigs across the network have one oscillator",
             ));
         }
         let (mut pace, mut timing) = (None, Arc::default());
         let rig: Box<dyn Rig> = match self {
-            Self::BuiltIn => {
-                let plant = Simulated::new(scene.plant, scene.start)?;
-                Box::new(plant.with_sensors(scene.resonance))
-            }
+            Self::BuiltIn => Simulated::without_chain(scene)?,
             Self::Fmu(file) => Box::new(FmuRig::load(file, scene)?),
             Self::Network(address) if address.starts_with("helic://") => Box::new(helic(address, scene, scope)?),
             Self::Network(address) => {

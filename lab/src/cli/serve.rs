@@ -141,6 +141,10 @@ enum Protocol {
 
 pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
+    if scene.structure.is_some() {
+        let rule = "a structure is simulated by `vines identify` and `vines backbone` only: what is served has one oscillator; drop [structure]";
+        return Err(Failure::input(rule));
+    }
     let helic = arguments.protocol == Protocol::Helic;
     if arguments.sensors_only || helic {
         // A device runs on between its hosts.

@@ -7,14 +7,14 @@ mod stages;
 
 use std::error::Error;
 
-use lovines::{InvalidValue, Parameters, Plant, State};
+use lovines::{InvalidValue, Parameters, Plant, Primary, Refused, Row, Single, State, StructureState};
 use phase_lock::{Config, ConfigError, Input, Output, PhaseLock};
 pub use phase_lock::{Fault, LoopState, Move};
 use thiserror::Error;
 use vines_model::{Definition, Sensor};
 
-use crate::scene::Scene;
 pub use crate::scene::has_friction;
+use crate::scene::{Scene, Structure};
 
 pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
@@ -183,6 +183,8 @@ pub enum RigError {
     Failed(#[from] Cause),
     #[error("the rig: {0}")]
     Refused(#[from] InvalidValue),
+    #[error("the rig: {0}")]
+    Structure(#[from] Refused),
     #[error(
         "the rig accepts frequency and amplitude only, not samples of the base displacement: chain.hold = true and \
          helic devices need a rig that does"
@@ -255,8 +257,8 @@ impl Clock {
 
 /// The plant, stepped directly.
 #[derive(Clone)]
-pub struct Simulated {
-    plant: Plant,
+pub struct Simulated<P: Primary = Single> {
+    plant: Plant<P>,
     sensor: Sensor,
     clock: Clock,
 }
@@ -269,16 +271,19 @@ impl Simulated {
     }
 
     /// The rig of a scene, with its measurement chain.
-    pub fn of(scene: &Scene) -> Result<Box<dyn Rig>, InvalidValue> {
-        let plant = Self::new(scene.plant, scene.start)?.with_sensors(scene.resonance);
-        Ok(Chain::around(Box::new(plant), scene))
+    pub fn of(scene: &Scene) -> Result<Box<dyn Rig>, RigError> {
+        Ok(Chain::around(Self::without_chain(scene)?, scene))
     }
 
-    fn step(&mut self, drive: lovines::Drive, step: f64) -> Result<(), RigError> {
-        self.plant.set_time(self.clock.time());
-        self.plant.advance(drive, step)?;
-        self.clock.advance(step);
-        Ok(())
+    /// The rig of a scene with its sensors: one oscillator, or a structure.
+    pub fn without_chain(scene: &Scene) -> Result<Box<dyn Rig>, RigError> {
+        Ok(match &scene.structure {
+            None => Box::new(Self::new(scene.plant, scene.start)?.with_sensors(scene.resonance)),
+            Some(structure) => {
+                let rig = SimulatedStructure::new(structure, scene.plant, scene.start)?;
+                Box::new(Measured::new(rig, scene.resonance, &scene.plant))
+            }
+        })
     }
 
     /// This plant with the sensors of a definition.
@@ -289,7 +294,16 @@ impl Simulated {
     }
 }
 
-impl Rig for Simulated {
+impl<P: Primary> Simulated<P> {
+    fn step(&mut self, drive: lovines::Drive, step: f64) -> Result<(), RigError> {
+        self.plant.set_time(self.clock.time());
+        self.plant.advance(drive, step)?;
+        self.clock.advance(step);
+        Ok(())
+    }
+}
+
+impl<P: Primary> Rig for Simulated<P> {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let response = match self.sensor {
             Sensor::V => self.plant.centre(),
@@ -319,6 +333,67 @@ impl Rig for Simulated {
                 loss: totals.friction,
             }),
         }))
+    }
+}
+
+// A structure as a rig of the bench, which measures the oscillator of its driven mode.
+
+/// A simulated structure. Its drive is the base displacement that moves the oscillator of the driven mode as the drive moves the mode, and its
+/// response the displacement of the driven mode at the cavity that the sensor would read: both m, and the loop, its limits and results are
+/// those of one oscillator.
+#[derive(Clone)]
+pub struct SimulatedStructure {
+    simulated: Simulated<lovines::Structure>,
+    /// The displacement at the sensor, by the sections.
+    sensor: Row,
+    /// Base displacement per drive, and displacement at the sensor per displacement at the cavity.
+    base_per_drive: f64,
+    reading_per_response: f64,
+}
+
+impl SimulatedStructure {
+    /// A structure at rest, and its particle at `start`; of `parameters` those of the particle and its cavity count.
+    pub fn new(structure: &Structure, parameters: Parameters, start: State) -> Result<Self, Refused> {
+        let start = StructureState { q2: start.q2, dq2: start.dq2, ..StructureState::default() };
+        let plant = Plant::with_host(structure.host.clone(), parameters, &start)?;
+        Ok(Self {
+            simulated: Simulated { plant, sensor: Sensor::Q1, clock: Clock::default() },
+            sensor: structure.response(),
+            base_per_drive: structure.base_per_drive(),
+            reading_per_response: structure.reading_per_response().abs(),
+        })
+    }
+
+    fn drive(&self, drive: Drive) -> Drive {
+        Drive {
+            amplitude: drive.amplitude / self.base_per_drive,
+            displacement: drive.displacement / self.base_per_drive,
+            ..drive
+        }
+    }
+}
+
+impl RigStage for SimulatedStructure {
+    fn inner(&mut self) -> &mut dyn Rig {
+        &mut self.simulated
+    }
+
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        let [displacement, ..] = self.simulated.plant.point(&self.sensor);
+        Ok(Sensors {
+            response: displacement / self.reading_per_response,
+            reference: Some(self.simulated.plant.base_displacement() * self.base_per_drive),
+        })
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        let drive = self.drive(drive);
+        self.simulated.advance(drive, step)
+    }
+
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        let drive = self.drive(drive);
+        self.simulated.hold(drive, step)
     }
 }
 

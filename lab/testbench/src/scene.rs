@@ -41,6 +41,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use structure::StructureSection;
 use vines_model::ArgumentError;
 
+use crate::rig::SimulatedStructure;
+
 pub use chain::ChainSettings;
 pub use controller::{ControllerSettings, KEYS, PhaseLock, key, refusal};
 pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
@@ -316,6 +318,10 @@ impl Sections {
             rig_names: self.rig.names,
             controller_names: self.controller_names,
         };
+        if let Some(structure) = &scene.structure {
+            SimulatedStructure::new(structure, scene.plant, scene.start)
+                .map_err(|error| SceneError::text(origin, format!("[structure]: {error}")))?;
+        }
         scene.controller.check()?;
         scene.backbone.check()?;
         scene.record.check(&scene)?;

@@ -159,7 +159,29 @@ impl Scene {
             Measurand::Velocity => TAU * relative,
             Measurand::Acceleration => relative * self.controller.samples_per_period,
         };
-        RESIDUAL + impulse
+        RESIDUAL + impulse + self.other_modes()
+    }
+
+    /// Largest plausible response of a structure's other modes, over the smallest response of the backbone: the impacts on a particle of the
+    /// speed b omega0 are impulses 2 m b omega0 of alternating sign. At worst they meet the mode in phase, which then sums them up to
+    /// 1/(1 - exp(-pi zeta omega_n/omega0)) of one; here to the first order in the damping ratio.
+    fn other_modes(&self) -> f64 {
+        let Some(structure) = &self.structure else { return 0.0 };
+        let driven = structure.mode();
+        let others = structure
+            .modes
+            .iter()
+            .enumerate()
+            .filter(|(n, _)| *n != structure.driven);
+        let shares = others.map(|(_, mode)| {
+            let at_sensor = mode.shape[structure.sensor] / driven.shape[structure.sensor];
+            let at_cavity = structure.at_cavity(mode) * structure.at_cavity(driven) * self.plant.particle_mass;
+            let ratio = mode.omega / driven.omega;
+            (at_sensor * at_cavity).abs() * (2.0 / ratio) * (1.0 + 1.0 / (PI * mode.zeta * ratio))
+        });
+        let sum: f64 = shares.sum();
+        // An undamped mode has no bound; the controller takes numbers only.
+        (sum / self.backbone.c_from.min(self.backbone.c_to)).min(1e6)
     }
 
     /// The larger of the requested drive, m, and the one that holds the linear mode at the amplitude at which impacts certainly occur.
