@@ -1,8 +1,8 @@
 """Reference trajectories of structures in a real cavity, in 40-digit arithmetic.
 
-python tests/reference/structures.py [scene ...] writes tests/reference/structures/SCENE.json: persistent contact, chatter
-and friction with two or three modes. Nothing is shared with the plant: eigenvectors of the whole first-order system,
-events as in cavity.py.
+python tests/reference/structures.py [scene ...] writes tests/reference/structures/SCENE.json: persistent contact,
+chatter and friction with two or three modes. Nothing is shared with the plant: eigenvectors of the whole first-order
+system, events as in cavity.py.
 """
 
 import json
@@ -37,7 +37,7 @@ SCENES = {
 
 
 class Motion:
-    """The motion of the structure, with an additional mass at the cavity, under its drive and a constant force there."""
+    """The motion of the structure, with a further mass at the cavity, under its drive and a constant force there."""
 
     def __init__(self, rig, system, force, state):
         self.rig, self.system, self.t = rig, system, rig.t
