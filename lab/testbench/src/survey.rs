@@ -1,6 +1,8 @@
 //! Exact orbits of a scene, whose host is one oscillator or a structure: at phase resonance, along the backbone, and what a structure's other
 //! modes do to both.
 
+use std::f64::consts::FRAC_PI_2;
+
 use serde::Serialize;
 use vines_model::Dimensionless;
 use vines_model::orbit::{
@@ -104,7 +106,8 @@ pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<
 fn dimensionless(orbit: &StructureOrbit, scene: &Scene, d: &Dimensionless) -> Option<Orbit> {
     let structure = scene.structure.as_ref()?;
     let length = |value: f64| value / d.b;
-    let [q2, dq2] = [length(orbit.start.q2), d.speed(orbit.start.dq2)];
+    // Half a period later the particle is at the opposite point.
+    let [q2, dq2] = [-length(FRAC_PI_2 * orbit.speed / orbit.omega), d.speed(orbit.speed)];
     let impact_velocity = d.speed(orbit.impact_velocity);
     let moduli: Vec<f64> = orbit.multipliers.iter().map(|[re, im]| re.hypot(*im)).collect();
     Some(Orbit {
@@ -116,7 +119,7 @@ fn dimensionless(orbit: &StructureOrbit, scene: &Scene, d: &Dimensionless) -> Op
         b: d.speed(orbit.speed),
         impact_velocity,
         start: AfterImpact {
-            phase: orbit.start.phase,
+            phase: orbit.impact_phase,
             q1: q2 + 1.0,
             dq1: dq2 - d.r * impact_velocity,
             q2,

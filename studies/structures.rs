@@ -1,0 +1,178 @@
+//! Do random structures lock from rest on an exact orbit of their drive, and is an unstable 1:1 motion ever called steady?
+//!
+//! One to five modes; the driven one has a mass ratio of 0.002 to 0.02 and a damping ratio of 0.001 to 0.02, the others 1.1 to 20 times its
+//! frequency, damping ratios of 0.001 to 0.03, and shapes of either sign up to 1.5 times the driven one's (uniform logarithms). A base or a
+//! force, the sensor at the drive or at the cavity, r 0.3 to 0.9. Half of the drives are of a stable symmetric 1:1 orbit at phase resonance; at
+//! the others all orbits are unstable. A lock is correct within 2e-3 in sigma and C of a stable orbit, or within 3 u of it; wrong beyond.
+//! Where all orbits are unstable, `steady` counts locks of a constant drive that are called symmetric; `held` those whose response is under
+//! control, of which the result says so.
+//!
+//! Arguments: STRUCTURES (of each kind), SEED. Writes validation/structures.csv.
+
+mod common;
+
+use common::*;
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
+use vines_model::orbit::Orbit;
+use vines_testbench::survey::{phase_resonant as orbits_of, structure_backbone};
+
+/// What became of a structure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Outcome {
+    Correct,
+    Wrong,
+    Refused,
+    Held,
+    Steady,
+}
+
+/// A structure with the drive G: its text as a scene.
+fn text(uniform: &mut dyn FnMut(f64, f64) -> f64) -> String {
+    let mut log = |low: f64, high: f64| uniform(low.ln(), high.ln()).exp();
+    let (epsilon, count) = (log(0.002, 0.02), log(1.0, 6.0).floor() as usize);
+    let mut modes = Vec::new();
+    let mut ratio = 1.0;
+    let is_base = log(1.0, 4.0) < 2.0;
+    for n in 0..count {
+        let zeta = if n == 0 { log(0.001, 0.02) } else { log(0.001, 0.03) };
+        let mut shape = || {
+            if n == 0 {
+                log(0.5, 1.5)
+            } else {
+                log(0.1, 1.5) * (log(1.0, 4.0) - 2.0).signum()
+            }
+        };
+        let (cavity, other) = (if n == 0 { 1.0 } else { shape() }, shape());
+        let participation = if is_base {
+            format!("participation = {other:?}, ")
+        } else {
+            String::new()
+        };
+        modes.push(format!(
+            "{{ frequency = {ratio:?}, damping = {zeta:?}, {participation}shape = {{ cavity = {cavity:?}, drive = {other:?} }} }}"
+        ));
+        ratio *= log(1.1, 4.0);
+    }
+    let (drive, sensor) = match (is_base, log(1.0, 4.0) < 2.0) {
+        (true, _) => ("excitation = \"base\"", "cavity"),
+        (false, true) => ("excitation = \"force\"\ndrive = \"drive\"", "drive"),
+        (false, false) => ("excitation = \"force\"\ndrive = \"drive\"", "cavity"),
+    };
+    let r = log(0.3, 0.9);
+    format!(
+        "[plant]\nm = {epsilon:?}\nb = 1\nr = {r:?}\n[controller]\nomega_min = 0.8\nomega_max = 1.2\n[record]\ndecay_periods = 3\n[structure]\n\
+         cavity = \"cavity\"\n{drive}\nsensor = \"{sensor}\"\nmodes = [{}]\n",
+        modes.join(", ")
+    )
+}
+
+/// A scene with a drive at which a stable orbit exists, or only unstable ones.
+fn scene_with(is_stable: bool, uniform: &mut dyn FnMut(f64, f64) -> f64) -> Result<Scene, Failure> {
+    loop {
+        let text = text(uniform);
+        let share = uniform(0.0, 1.0);
+        let plain = scene(&format!("{text}[excitation]\nG = 1\n"), &[""; 0])?;
+        let d = plain.dimensionless();
+        let curves = structure_backbone(&plain, &d).ok_or("no structure")?;
+        let found: Vec<Orbit> = curves.into_iter().flatten().collect();
+        let of_kind = found
+            .iter()
+            .filter(|orbit| orbit.stable == is_stable && (0.8..=1.2).contains(&orbit.omega));
+        let of_kind: Vec<&Orbit> = of_kind.collect();
+        let Some(orbit) = of_kind.get((share * of_kind.len() as f64) as usize) else {
+            continue;
+        };
+        let driven = scene(&format!("{text}[excitation]\nG = {:?}\n", orbit.g), &[""; 0])?;
+        let orbits = orbits_of(&driven, &d);
+        if !orbits.is_empty() && orbits.iter().any(|orbit| orbit.stable) == is_stable {
+            return Ok(driven);
+        }
+    }
+}
+
+/// Locks a structure: what became of it, its errors in sigma and C, and its periods.
+fn lock(scene: &Scene, is_stable: bool) -> (Outcome, [f64; 2], f64) {
+    let refused = (Outcome::Refused, [f64::NAN; 2], f64::NAN);
+    let plan = scene.plan();
+    let Ok(rig) = Simulated::of(scene)
+        .as_mut()
+        .map(|rig| record(&mut **rig, &plan))
+        .map_err(|_| ())
+    else {
+        return refused;
+    };
+    let Ok(record) = rig else { return refused };
+    let Ok(found) = identify(&record, &plan) else {
+        return refused;
+    };
+    let at = found.lock.at;
+    let periods = record.settled as f64 / scene.controller.samples_per_period;
+    let orbits = orbits_of(scene, &scene.dimensionless());
+    let errors = |orbit: &Orbit| [(at.sigma - orbit.sigma).abs(), (at.c - orbit.c).abs()];
+    let largest = |[sigma, c]: [f64; 2]| sigma.max(c);
+    let candidates = orbits.iter().filter(|orbit| orbit.stable || record.held).map(errors);
+    let nearest = candidates.min_by(|one, other| largest(*one).total_cmp(&largest(*other)));
+    let errors = nearest.unwrap_or([f64::INFINITY; 2]);
+    let is_correct = largest(errors) <= 2e-3 || (errors[0] <= 3.0 * at.u_sigma && errors[1] <= 3.0 * at.u_c);
+    let outcome = match (is_stable, record.held, is_correct) {
+        (true, _, true) => Outcome::Correct,
+        (true, _, false) => Outcome::Wrong,
+        (false, true, true) => Outcome::Held,
+        (false, true, false) => Outcome::Wrong,
+        (false, false, _) => Outcome::Steady,
+    };
+    (outcome, errors, periods)
+}
+
+fn main() -> Result<(), Failure> {
+    let [count, seed] = &arguments(["STRUCTURES", "SEED"])?;
+    let (count, seed): (usize, u64) = (count.parse()?, seed.parse()?);
+    let mut rows = Vec::new();
+    for is_stable in [true, false] {
+        let mut uniform = uniform(seed + u64::from(is_stable));
+        let scenes = (0..count).map(|_| scene_with(is_stable, &mut uniform));
+        let scenes = scenes.collect::<Result<Vec<_>, Failure>>()?;
+        let found: Vec<_> = scenes.par_iter().map(|scene| lock(scene, is_stable)).collect();
+        for (scene, (outcome, errors, _)) in scenes.iter().zip(&found) {
+            if !matches!(outcome, Outcome::Correct | Outcome::Held) && (is_stable || *outcome != Outcome::Refused) {
+                let modes = scene.structure.as_ref().map(|structure| &structure.modes);
+                println!("{outcome:?}, errors {errors:?}: {:?}; {modes:?}", scene.dimensionless());
+            }
+        }
+        let of = |wanted: Outcome| found.iter().filter(|(outcome, ..)| *outcome == wanted).count();
+        let kinds = [
+            Outcome::Correct,
+            Outcome::Wrong,
+            Outcome::Refused,
+            Outcome::Held,
+            Outcome::Steady,
+        ]
+        .map(of);
+        let mut errors: Vec<f64> = found
+            .iter()
+            .flat_map(|(_, errors, _)| errors)
+            .copied()
+            .filter(|e| e.is_finite())
+            .collect();
+        let mut periods: Vec<f64> = found
+            .iter()
+            .map(|(.., periods)| *periods)
+            .filter(|p| p.is_finite())
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        periods.sort_by(f64::total_cmp);
+        let middle = |all: &[f64]| all.get(all.len() / 2).copied().unwrap_or(f64::NAN);
+        let last = |all: &[f64]| all.last().copied().unwrap_or(f64::NAN);
+        let kinds = kinds.map(|count| count.to_string()).join(",");
+        rows.push(format!(
+            "{count},{seed},{},{kinds},{:.1e},{:.1e},{:.0},{:.0}",
+            if is_stable { "stable" } else { "unstable" },
+            middle(&errors),
+            last(&errors),
+            middle(&periods),
+            last(&periods)
+        ));
+    }
+    let header = "structures,seed,orbits,correct,wrong,refused,held,steady,median_error,worst_error,median_periods,worst_periods";
+    write("structures", header, 3, &rows)
+}
