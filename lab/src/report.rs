@@ -6,5 +6,5 @@ mod files;
 mod theme;
 
 pub use figure::Figure;
-pub use figures::{fitted, responses, theory};
+pub use figures::{fitted, responses, structure, theory};
 pub use files::{ReportError, ResultFile, identification_files, map_files, tracked_files};

@@ -105,7 +105,7 @@ fn dispatch(command: Command) -> Result<Results, Failure> {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Check(arguments) => check::run(&arguments).map(Results::from),
         Command::Orbit(arguments) => orbit::run(&arguments),
-        Command::Structure(arguments) => structure::run(&arguments).map(Results::from),
+        Command::Structure(arguments) => structure::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),
         Command::Report(arguments) => report::run(&arguments).map(Results::from),

@@ -1,6 +1,7 @@
 //! `vines structure`: a structure before it is driven.
 
 use std::f64::consts::TAU;
+use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
@@ -9,7 +10,7 @@ use vines::scene::{Scene, Structure};
 use vines::survey::Survey;
 use vines::table::{Table, number};
 
-use super::output::output;
+use super::output::{Results, output, writable};
 use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
@@ -32,19 +33,27 @@ pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
 
+    /// Write a figure (SVG) of the backbone with all modes beside that of the driven mode alone
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
+
     /// Print JSON
     #[arg(long)]
     json: bool,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
+    writable(&arguments.figure)?;
     let scene = arguments.scene.load()?;
     let no_structure = || Failure::input("the scene has no [structure]: its host is one oscillator, see `vines orbit`");
     let structure = scene.structure.as_ref().ok_or_else(no_structure)?;
     let survey =
         Survey::of(&scene).ok_or_else(|| Failure::run("the exact orbits have no closed form at this frequency"))?;
     let result = json!({ "structure": structure, "survey": survey });
-    output(arguments.json, &result, || described(&scene, structure, &survey))
+    let text = output(arguments.json, &result, || described(&scene, structure, &survey))?;
+    let (figure, json, scene) = (arguments.figure.clone(), arguments.json, scene.clone());
+    let drawn = move || vines::report::structure(&scene, &survey).map_or(String::new(), |figure| figure.svg());
+    Ok(Results::with_figure(text, json, figure, drawn))
 }
 
 fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {

@@ -13,9 +13,10 @@ use super::theme::{EXACT, INK, MEASURED, PARTICLE, PREDICTED, THEORY};
 use crate::comparison::{Comparison, ExactCurve, TrackedComparison};
 use crate::fit::{Fit, MeasuredPoint};
 use crate::numerics::{Estimate, HarmonicBasis, equally_spaced, range};
-use crate::orbit::{self, ContinuationLimits, FrequencyResponse};
+use crate::orbit::{self, ContinuationLimits, FrequencyResponse, StructureBranch, StructureOrbit};
 use crate::record::Record;
 use crate::scene::{Dimensionless, Scene, Sensor};
+use crate::survey::Survey;
 use crate::theory::{self, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, SlowFlow, reading};
 
 /// Points of a computed curve: at this figure size, neighbours are at most a few pixels apart.
@@ -399,6 +400,44 @@ pub fn theory(p: &Dimensionless) -> Figure {
         height: TALL,
         rows: vec![vec![manifold, backbones]],
     }
+}
+
+/// The exact backbone of a structure beside that of its driven mode alone; frequencies and responses are those of the sensor.
+pub fn structure(scene: &Scene, survey: &Survey) -> Option<Figure> {
+    let d = scene.dimensionless();
+    let unit = scene.structure.as_ref()?.reading_per_response().abs() * d.b;
+    let curves = |branches: &[StructureBranch]| -> Vec<Vec<Marked>> {
+        let place = |orbit: &StructureOrbit| ((d.sigma(orbit.omega), orbit.response / unit), orbit.stable);
+        branches
+            .iter()
+            .map(|branch| branch.orbits.iter().map(place).collect())
+            .collect()
+    };
+    let (alone, all) = (curves(&survey.facts.alone), curves(&survey.facts.all));
+    let top = 1.0;
+    let sigmas = alone
+        .iter()
+        .chain(&all)
+        .flatten()
+        .filter(|((_, c), _)| *c < top)
+        .map(|((sigma, _), _)| *sigma);
+    let x = widened(range((f64::MAX, f64::MIN), sigmas), 0.06);
+    let panel = |curves: &[Vec<Marked>], colour: &'static str, label: &str| {
+        let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(&d)));
+        for curve in curves {
+            panel.curve(curve.iter().copied(), 2.0, colour, label);
+        }
+        panel
+    };
+    Some(Figure {
+        title: "Exact backbone: the driven mode alone, and all modes of the structure".into(),
+        caption: format!("{}; dashed: unstable", caption(&d, &at(d.g))),
+        height: TALL,
+        rows: vec![vec![
+            panel(&alone, THEORY, "driven mode alone"),
+            panel(&all, EXACT, "all modes"),
+        ]],
+    })
 }
 
 /// The frequency response at the scene's G over a range of sigma, exact and first-order, and the exact backbone.
