@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     bar.finish_and_clear();
     let (tracked, ended) = measured?;
     let result = TrackedComparison::of(&tracked, &scene);
-    let mut text = summary::tracked(&result);
+    let mut text = summary::tracked(&result) + &summary::structure(&scene);
     let settled = result.points.iter().filter(|compared| compared.is_of_backbone());
     let points: Vec<_> = settled.map(|compared| (&compared.point.at).into()).collect();
     let (settled, of) = (points.len(), result.points.len());

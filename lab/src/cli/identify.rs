@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         }
     };
     let result = Comparison::of(&identification, &scene);
-    let mut text = summary::identification(&result);
+    let mut text = summary::identification(&result) + &summary::structure(&scene);
     // A rig that reports its impacts is a simulation of the scene.
     let is_simulated = !identification.lock.impacts_per_period.is_nan();
     let lock = [(&identification.lock.at).into()];

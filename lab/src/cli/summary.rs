@@ -186,6 +186,26 @@ pub(super) fn ideal(results: &str, left_out: &str) -> String {
     format!("{results} of the ideal cavity, without {left_out}")
 }
 
+/// What base and response of a structure's results are, as a line; empty for one oscillator.
+pub(super) fn structure(scene: &Scene) -> String {
+    let Some(structure) = &scene.structure else {
+        return String::new();
+    };
+    let (per_base, per_response) = (
+        structure.base_per_drive().recip(),
+        structure.reading_per_response().abs(),
+    );
+    let drive = match structure.drive {
+        Some(point) => format!("{per_base:.5e} N at {}", structure.points[point]),
+        None => format!("{per_base:.5} m of the structure's base"),
+    };
+    format!(
+        "Base and response are those of mode {} alone: 1 m of base stands for {drive}, and 1 m of response for {per_response:.5} m at {}\n",
+        structure.driven + 1,
+        structure.points[structure.sensor]
+    )
+}
+
 /// What friction did, as a sentence.
 pub(super) fn friction_text(friction: &Friction) -> String {
     let Friction { sticks_per_period, stuck_time, loss } = friction;

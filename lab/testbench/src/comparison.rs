@@ -83,7 +83,7 @@ impl Comparison {
         orbits.retain(|_| at_resonance);
         let by_distance = |a: &&Orbit, b: &&Orbit| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c));
         let exact = orbits.iter().min_by(by_distance).copied();
-        let curve = ExactCurve::of_scene(scene, &parameters);
+        let curve = ExactCurve::of_scene(scene, &parameters, [lock.at.sigma, lock.at.c]);
         let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene, &scene.plan_on(knowledge)));
         let decay: Vec<ComparedPoint> = found
             .decay
@@ -170,16 +170,19 @@ fn right_of_fold(curve: &[Orbit]) -> Vec<[f64; 3]> {
 }
 
 impl ExactCurve {
-    /// The curve of a scene, in the numbers of its oscillator or of the driven mode of its structure.
-    pub fn of_scene(scene: &Scene, numbers: &Dimensionless) -> Self {
+    /// The curve of a scene, in the numbers of its oscillator or of the driven mode of its structure. A structure may have several curves; it is
+    /// the nearest to `near`, sigma and C.
+    pub fn of_scene(scene: &Scene, numbers: &Dimensionless, near: [f64; 2]) -> Self {
         let Some(curves) = structure_backbone(scene, numbers) else {
             return Self::of(numbers);
         };
-        // Several curves may exist at one amplitude; the measured one begins where the response is smallest and has the most orbits.
-        let places = curves
-            .iter()
-            .max_by_key(|curve| curve.len())
-            .map_or(Vec::new(), |curve| right_of_fold(curve));
+        let distance = |curve: &[[f64; 3]]| {
+            let distances = curve.iter().map(|[c, sigma, _]| (sigma - near[0]).hypot(c - near[1]));
+            distances.fold(f64::INFINITY, f64::min)
+        };
+        let rising = curves.iter().map(|curve| right_of_fold(curve));
+        let nearest = rising.min_by(|one, other| distance(one).total_cmp(&distance(other)));
+        let places = nearest.unwrap_or_default();
         let drawn = |curve: &Vec<Orbit>| {
             curve
                 .iter()
@@ -312,7 +315,11 @@ impl TrackedComparison {
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
         let knowledge = tracked.knowledge;
         let parameters = knowledge.numbers;
-        let curve = ExactCurve::of_scene(scene, &parameters);
+        let first = tracked
+            .points
+            .first()
+            .map_or([0.0; 2], |point| [point.at.sigma, point.at.c]);
+        let curve = ExactCurve::of_scene(scene, &parameters, first);
         let exact = |point: &LevelPoint| curve.distance(point.at.c, point.at.sigma, point.at.g);
         let compare = |point: &LevelPoint| TrackedPoint {
             point: *point,

@@ -90,7 +90,12 @@ pub fn phase_resonant(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
 /// The exact backbone of a scene's structure, curve by curve; `None` for one oscillator.
 pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<Vec<Orbit>>> {
     let orbits = scene.structure_orbits()?;
-    let range = orbits.range(section_of(scene.structure.as_ref()?), POINTS)?;
+    // Other modes may have the motion that the loop finds.
+    let (mut range, [low, high]) = (
+        orbits.range(section_of(scene.structure.as_ref()?), POINTS)?,
+        scene.frequencies(),
+    );
+    range.omega = [range.omega[0].min(low), range.omega[1].max(high)];
     let curve = |branch: &StructureBranch| {
         branch
             .orbits

@@ -177,7 +177,9 @@ impl Scene {
             let at_sensor = mode.shape[structure.sensor] / driven.shape[structure.sensor];
             let at_cavity = structure.at_cavity(mode) * structure.at_cavity(driven) * self.plant.particle_mass;
             let ratio = mode.omega / driven.omega;
-            (at_sensor * at_cavity).abs() * (2.0 / ratio) * (1.0 + 1.0 / (PI * mode.zeta * ratio))
+            // A sensor of velocities or accelerations shows fast modes more.
+            let shown = ratio.powi(self.resonance.sensor_quantity.order());
+            shown * (at_sensor * at_cavity).abs() * (2.0 / ratio) * (1.0 + 1.0 / (PI * mode.zeta * ratio))
         });
         let sum: f64 = shares.sum();
         // An undamped mode has no bound; the controller takes numbers only.
