@@ -369,3 +369,54 @@ fn random_structures_stay_on_stable_orbits_and_leave_unstable_ones_at_the_rate_o
     assert!(stable.len() > structures / 4 && departures.len() > structures / 4);
     assert!(worst[0] < 1e-10 && worst[1] < 0.01 && worst[2] < 0.01, "{worst:?}");
 }
+
+#[test]
+fn no_symmetric_motion_that_a_plant_settles_on_is_missing_from_the_orbits_of_its_drive() {
+    const SETTLE: usize = 1500;
+    let rigs = setting("STRUCTURES", 20);
+    let mut random = ChaCha8Rng::seed_from_u64(setting("SEED", 1));
+    let (mut symmetric, mut count) = (0, 0);
+    while count < rigs {
+        let rig = rig(&mut random);
+        let Some(range) = rig.orbits.range(rig.driven, 20) else {
+            continue;
+        };
+        let branches = rig.orbits.backbone(&range);
+        let all: Vec<&StructureOrbit> = branches.iter().flat_map(|branch| &branch.orbits).collect();
+        if all.is_empty() {
+            continue;
+        }
+        count += 1;
+        // A drive beside one that holds an orbit at phase resonance.
+        let orbit = all[pick(&mut random, all.len())];
+        let beside = StructureOrbit {
+            drive: orbit.drive * within(&mut random, [0.8, 1.3]),
+            omega: orbit.omega * within(&mut random, [0.998, 1.002]),
+            ..orbit.clone()
+        };
+        let mut motion = Motion::on(&rig, &beside);
+        motion.advance(SETTLE);
+        let (before, impacts) = (motion.state(), motion.plant.totals().impacts);
+        let half = 0.5 * TAU / beside.omega;
+        motion.plant.advance(motion.drive, half).unwrap();
+        let left = (motion.state() + &before).amax();
+        motion.plant.advance(motion.drive, half).unwrap();
+        if left > 1e-6 || motion.plant.totals().impacts != impacts + 2 {
+            continue;
+        }
+        symmetric += 1;
+        let speed = motion.plant.state().dq2.abs();
+        let found = rig.orbits.at(beside.omega, beside.drive);
+        // What is left to settle is the last change over the rate of decay.
+        let is_near =
+            |orbit: &StructureOrbit| (orbit.speed / speed - 1.0).abs() < 1e-9 + 10.0 * left / (1.0 - orbit.growth());
+        let is_found = found.iter().any(|orbit| orbit.stable && is_near(orbit));
+        assert!(
+            is_found,
+            "{} at {} rad/s: {speed} m/s {left:e}, {found:?}",
+            rig.kind, beside.omega
+        );
+    }
+    println!("{symmetric} symmetric motions of {count} structures");
+    assert!(symmetric > rigs / 8, "{symmetric}");
+}
