@@ -9,6 +9,7 @@ use thiserror::Error;
 use super::figures::{backbone, history, manifold, regimes, tracked};
 use crate::cells::CellError;
 use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
+use crate::linear::MeasuredLinear;
 use crate::orbit::Periodic;
 use crate::record::Record;
 use crate::regime::Regime;
@@ -110,13 +111,18 @@ fn decay_csv(result: &Comparison) -> Result<String, ReportError> {
 fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
     let headings = "f_Hz,A_m,E_m,u_f_Hz,u_A_m,u_E_m,sigma,C,G,phase_error_deg,u_sigma,u_C,u_G,u_phase_deg,level,periods,averaged,settled,\
                     reached,regime,regime_by_impacts,tone_Hz,tone_share,distance,sigma_less_exact,G_less_exact";
+    let headings = format!("{headings},{}", MeasuredLinear::COLUMNS.join(","));
+    let numbers = |one: MeasuredLinear| [one.f0, one.u_f0, one.zeta, one.u_zeta, one.correlation];
+    let linear = result.linear.map_or([None; 5], |one| numbers(one).map(Some));
+    let particle = result.linear.map(|one| one.particle);
     let rows = result.points.iter().map(|TrackedPoint { point, exact }| {
         let motion = (point.level, point.periods, point.averaged, point.settled, point.reached);
         let tone = point.tone.map(|tone| (tone.hertz, tone.share)).unzip();
         let exact = exact.map_or((None, None, None), |exact| (Some(exact.nearest), exact.sigma, exact.g));
-        (point.at, motion, point.regime, point.regime_by_impacts, tone, exact)
+        let regime = (point.regime, point.regime_by_impacts);
+        (point.at, motion, regime, tone, exact, linear, particle)
     });
-    csv(headings, rows)
+    csv(&headings, rows)
 }
 
 /// The cells of a map, as CSV.

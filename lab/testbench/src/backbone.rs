@@ -405,7 +405,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             .map(|cycle| cycle.samples);
         let averaged = &self.run.samples[self.run.samples.len() - samples.sum::<usize>()..];
         let [base, omega] = estimate.at;
-        let regime = regime_by_response(averaged, knowledge, base.value, omega.value);
+        let regime = regime_by_response(averaged, knowledge, base, omega);
         let reached = is_reached(estimate.response, level);
         LevelPoint {
             at: ResonancePoint::new([estimate.response, base, omega, estimate.phase_error], &d),

@@ -8,6 +8,7 @@ use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow, free_sigma, reson
 
 use crate::backbone::{LevelPoint, Tracked};
 use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime, WINDOW, decay_points};
+use crate::linear::MeasuredLinear;
 use crate::plan::Plan;
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Drive, Rig, Scaled, Simulated};
@@ -27,6 +28,9 @@ pub struct Comparison {
     /// What theory and exact orbits leave out of the scene's cavity; absent if it is ideal.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out: Option<String>,
+    /// The linear response, if it was measured on the rig.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub linear: Option<MeasuredLinear>,
     /// The phase of the response relative to the reference that the lock held, degrees.
     pub phase_target_deg: f64,
     /// The locked point as measured.
@@ -103,6 +107,7 @@ impl Comparison {
             rms_sigma_predicted: rms(&decay, |row| Some(row.point.sigma - row.sigma_predicted?)),
             parameters,
             left_out: scene.left_out_of_cavity(),
+            linear: knowledge.measured_linear(),
             phase_target_deg: scene.controller.phase_target,
             lock,
             theory,
@@ -281,6 +286,9 @@ pub struct TrackedComparison {
     /// Standard uncertainties of sigma and lambda, which all points and curves share, if the loop check has measured both.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u_linear: Option<[f64; 2]>,
+    /// The linear response, if it was measured on the rig.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub linear: Option<MeasuredLinear>,
     /// The points, each beside the exact curve.
     pub points: Vec<TrackedPoint>,
     /// The exact backbone that the points are compared with.
@@ -336,6 +344,7 @@ impl TrackedComparison {
                 [u_sigma, 2.0 * u_sigma]
             }),
             left_out: scene.left_out_of_cavity(),
+            linear: knowledge.measured_linear(),
             parameters,
             exact: curve,
         }
@@ -351,10 +360,9 @@ impl TrackedComparison {
         let count = |wanted: Regime| self.points.iter().filter(|row| row.regime() == wanted).count();
         let [linear, doubtful] = [Regime::NoImpacts, Regime::NotEstablished].map(count);
         let of = self.points.len();
-        let is_vague = |row: &TrackedPoint| row.point.settled && row.regime() == Regime::NotEstablished;
         if linear == of {
             Some(Doubt::NoImpacts)
-        } else if linear + doubtful == of || self.points.iter().any(is_vague) {
+        } else if linear + doubtful == of {
             Some(Doubt::NotEstablished { points: doubtful })
         } else {
             (!self.points.iter().any(TrackedPoint::is_of_backbone)).then_some(Doubt::NotSettled)

@@ -194,7 +194,7 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
         Estimate::new(speed.value, &[speed.uncertainty, speed.value * aside])
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
-        (count, Regime::Unknown) => (count, regime_by_response(hold, knowledge, base.value, omega.value)),
+        (count, Regime::Unknown) => (count, regime_by_response(hold, knowledge, base, omega)),
         by_impacts => by_impacts,
     };
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());

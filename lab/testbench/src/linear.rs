@@ -9,8 +9,11 @@
 //! With m/M = epsilon, a free particle leaves `f0` and `zeta`; a carried one gives `f0/sqrt(1 + epsilon)` and `zeta/sqrt(1 + epsilon)`, because
 //! the mass is M + m and the damper is the same.
 
+use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
-use vines_model::numerics::Estimate;
+use vines_model::numerics::{Estimate, SIGNIFICANT};
+
+use crate::plan::LinearResponse;
 
 /// What the particle does while no wall touches it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -59,4 +62,79 @@ impl MeasuredLinear {
     pub fn estimates(&self) -> [Estimate; 2] {
         [(self.f0, self.u_f0), (self.zeta, self.u_zeta)].map(|(value, uncertainty)| Estimate { value, uncertainty })
     }
+}
+
+// What a particle does to the structure that no wall touches.
+//
+// The force of a particle on the structure is -m q2''. Its fundamental adds the complex mass m χ, where χ is the fundamental of q2 over that of q1:
+// 1 if the particle is carried, 0 if it is free. Dry friction moves the particle's velocity towards the structure's, never beyond it. Of a
+// harmonic motion, viscous friction of any size gives |χ - 1/2| = 1/2 exactly. Coulomb friction that slides all the time gives
+// |χ|² = (8/π²) Re χ (the triangle wave of the particle's velocity lags by the angle at which the two velocities are equal), and sticking
+// leads from there to 1. All of it lies within the disc |χ - 1/2| <= 1/2; so does what changes between them, because a disc is convex.
+// A stable symmetric 1:1 motion has |χ| = (4/π) B/C, and to first order in epsilon |χ| > 1 and |χ - 1| > 1: it lies outside, measured
+// from either state.
+
+/// Largest mass ratio of a rig over the ratio in its drawing, whose masses are known within a fifth.
+const LARGEST_RATIO: f64 = 1.0 / (1.0 - 0.2);
+/// Largest third harmonic of the force of sliding friction over the force that carries the particle: of a square wave, whose height is at most
+/// that force.
+const FRICTION_THIRD: f64 = 4.0 / (3.0 * std::f64::consts::PI);
+
+/// Whether walls must have touched the particle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Impacts {
+    /// The motion needs them.
+    Needed,
+    /// A particle that is free or carried, or friction, explains the motion.
+    NotNeeded,
+    /// The uncertainty is too large to say.
+    Doubtful,
+}
+
+/// What a distance from the centre of a region without impacts, whose radius is `radius`, says.
+fn beyond(distance: f64, uncertainty: f64, radius: f64) -> Impacts {
+    match distance - radius {
+        beyond if beyond > SIGNIFICANT * uncertainty => Impacts::Needed,
+        beyond if beyond <= 0.0 => Impacts::NotNeeded,
+        _ => Impacts::Doubtful,
+    }
+}
+
+/// What a motion says of impacts by its frequency and its loss: response, m, base, m, and frequency, rad/s, at the phase `target` of the response
+/// relative to the base, rad. `epsilon`: the mass ratio in the drawing.
+#[must_use]
+pub fn impacts_by_resonance(
+    linear: &LinearResponse,
+    [response, base, omega]: [Estimate; 3],
+    target: f64,
+    epsilon: f64,
+) -> Impacts {
+    // Damping and detuning of a linear response of this gain with this response over the base.
+    let rate = linear.gain * base.value / Complex64::from_polar(response.value, target);
+    let stated = Complex64::new(linear.damping_rate, omega.value - linear.omega0);
+    let added = Complex64::new(0.0, -2.0 / linear.omega0) * (rate - stated);
+    let relative = [response, base]
+        .map(|one| one.uncertainty / one.value)
+        .into_iter()
+        .fold(linear.u_gain, f64::hypot);
+    let parts = [
+        relative * rate.norm(),
+        omega.uncertainty,
+        linear.uncertainty,
+        linear.uncertainty,
+    ];
+    let uncertainty = Estimate::new(0.0, &parts).uncertainty * 2.0 / linear.omega0;
+    // The disc of every particle up to the largest one, added to the state in which the linear response was measured.
+    let [centre, radius] = match linear.particle {
+        ParticleState::Free => [0.5, LARGEST_RATIO - 0.5],
+        ParticleState::Carried => [-0.5, LARGEST_RATIO - 0.5],
+        ParticleState::Unknown => [0.0, LARGEST_RATIO],
+    };
+    beyond((added - centre * epsilon).norm(), uncertainty, radius * epsilon)
+}
+
+/// What the third harmonic of the structure's motion says of impacts: the force that excites it, over the force of the mass M in the fundamental.
+#[must_use]
+pub fn impacts_by_harmonic(third: Estimate, epsilon: f64) -> Impacts {
+    beyond(third.value, third.uncertainty, FRICTION_THIRD * LARGEST_RATIO * epsilon)
 }

@@ -11,6 +11,7 @@ use phase_lock::Gains;
 use serde::Serialize;
 use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, mean_square, standard_deviation};
 
+use crate::linear::{MeasuredLinear, ParticleState};
 use crate::plan::{LinearResponse, Plan, Target};
 use crate::rig::{Drive, Rig, RigError, Scaled};
 use crate::scene::Reference;
@@ -475,6 +476,9 @@ pub struct Linear {
     pub gains: [f64; 2],
     /// Phase margin of the loop with a delay of one sample, degrees.
     pub phase_margin: f64,
+    /// The linear response as data. The particle is carried if the friction in the drawing holds it at the largest acceleration of the check.
+    #[serde(flatten)]
+    pub data: MeasuredLinear,
 }
 
 impl Linear {
@@ -522,10 +526,24 @@ impl Linear {
         }
         let bandwidth = plan.lock.bandwidth;
         let gains = Gains::from_bandwidth(bandwidth, rate.re.max(0.0));
+        let largest = omega * omega * phasors.iter().map(|z| z.norm()).fold(0.0, f64::max);
+        let particle = match FRICTION * largest < plan.knowledge.carried_up_to {
+            true => ParticleState::Carried,
+            false => ParticleState::Unknown,
+        };
+        let (omega_0, u_rate) = ((omega - rate.im).hypot(rate.re), u_q / (q.norm() * period));
         Some(Self {
-            omega_0: (omega - rate.im).hypot(rate.re),
+            data: MeasuredLinear {
+                f0: omega_0 / TAU,
+                u_f0: u_rate / TAU,
+                zeta: rate.re / omega_0,
+                u_zeta: u_rate / omega_0,
+                correlation: 0.0,
+                particle,
+            },
+            omega_0,
             damping_rate: rate.re,
-            u_damping_rate: u_q / (q.norm() * period),
+            u_damping_rate: u_rate,
             response_gain: gain.norm(),
             u_gain: u_gain.hypot(u_base),
             phase: gain.arg().to_degrees(),
@@ -553,10 +571,14 @@ impl Linear {
             damping_rate: self.damping_rate,
             uncertainty: self.u_damping_rate,
             gain: Complex64::from_polar(self.response_gain, self.phase.to_radians()),
+            u_gain: self.u_gain,
+            particle: self.data.particle,
         }
     }
 }
 
+/// Largest friction in a drawing over the rig's.
+const FRICTION: f64 = 2.0;
 /// Largest response at the start, as a share of the steady one, of a growth from rest.
 const FROM_REST: f64 = 0.5;
 /// Largest relative standard uncertainty of the gain of a response that is more than noise.

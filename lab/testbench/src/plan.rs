@@ -6,8 +6,9 @@ use num_complex::Complex64;
 use phase_lock::Config;
 
 use crate::experiment::DECAYED;
+use crate::linear::{MeasuredLinear, ParticleState};
 use crate::rig::Sensors;
-use crate::scene::{Definition, Dimensionless, Measurand, Parameters, Scene, has_mirror_images};
+use crate::scene::{Definition, Dimensionless, Measurand, Parameters, Scene, carried_up_to, has_mirror_images};
 
 /// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,10 +21,14 @@ pub struct LinearResponse {
     pub uncertainty: f64,
     /// Growth rate of the response at resonance per amplitude of the base, 1/s, with its phase relative to the base.
     pub gain: Complex64,
+    /// Relative standard uncertainty of the gain.
+    pub u_gain: f64,
+    /// The state of the particle that it belongs to.
+    pub particle: ParticleState,
 }
 
 impl LinearResponse {
-    /// That of a plant.
+    /// That of a plant whose particle is free.
     pub fn of(plant: &Parameters) -> Self {
         let omega0 = plant.natural_frequency();
         Self {
@@ -31,6 +36,20 @@ impl LinearResponse {
             damping_rate: 0.5 * plant.damping / plant.primary_mass,
             uncertainty: 0.0,
             gain: Complex64::new(0.0, -0.5 * omega0),
+            u_gain: 0.0,
+            particle: ParticleState::Free,
+        }
+    }
+
+    /// Natural frequency and damping ratio as data; both have the same uncertainty, the real and the imaginary part of one rate.
+    pub fn data(&self) -> MeasuredLinear {
+        MeasuredLinear {
+            f0: self.omega0 / TAU,
+            u_f0: self.uncertainty / TAU,
+            zeta: self.damping_rate / self.omega0,
+            u_zeta: self.uncertainty / self.omega0,
+            correlation: 0.0,
+            particle: self.particle,
         }
     }
 
@@ -116,6 +135,8 @@ pub struct Knowledge {
     pub numbers: Dimensionless,
     /// Whether a motion has a mirror image, half a period later; where it has none, the 1:1 motion is asymmetric.
     pub is_symmetric: bool,
+    /// Acceleration up to which friction carries the particle, as the drawing says, m/s².
+    pub carried_up_to: f64,
     /// Time from sample to sample, s: rig and controller agree on it before anything is measured.
     pub sample_time: f64,
     /// Phase of the response relative to the reference that the loop holds, and what is measured of both.
@@ -136,9 +157,15 @@ impl Knowledge {
             is_measured: false,
             numbers: Dimensionless { definition, ..Dimensionless::of(plant, amplitude) },
             is_symmetric: has_mirror_images(plant),
+            carried_up_to: carried_up_to(plant),
             sample_time,
             target,
         }
+    }
+
+    /// The linear response as data, if it was measured on the rig.
+    pub fn measured_linear(&self) -> Option<MeasuredLinear> {
+        self.is_measured.then(|| self.linear.data())
     }
 
     /// With a linear response that was measured on the rig.

@@ -33,6 +33,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
+use lovines::cavity::GRAVITY;
 use lovines::table::{LAWS, PARAMETERS, Parameter, Range, Values};
 use lovines::{Cavity, InvalidValue, Restitution, State};
 use phase_lock::{ConfigError, Number};
@@ -190,6 +191,13 @@ pub(crate) fn has_mirror_images(plant: &Parameters) -> bool {
     let r = Restitution::Constant(plant.restitution);
     let [plus, minus] = plant.cavity.restitution.map(|law| law.unwrap_or(r));
     plant.cavity.tilt == 0.0 && plus == minus
+}
+
+/// Acceleration of the structure up to which static friction carries a particle that touches no wall, m/s²; 0 without friction.
+pub fn carried_up_to(plant: &Parameters) -> f64 {
+    let Cavity { kinetic_friction, static_friction, tilt, .. } = plant.cavity;
+    let held = static_friction.unwrap_or(kinetic_friction) * tilt.cos();
+    (GRAVITY * (held - tilt.sin().abs())).max(0.0)
 }
 
 /// Whether there is friction in the cavity.

@@ -4,7 +4,7 @@
 //! legs. The one fit ([`ResonanceFit`]) gives `E_R` for each leg, and the frequency.
 //!
 //! 1. The loop closes under the requested drive.
-//! 2. The response rises until drive and frequency depart from the linear response: impacts have begun.
+//! 2. The response rises until drive and frequency are out of reach of a particle that touches no wall: impacts have begun.
 //! 3. It falls in small steps until the motion is symmetric 1:1.
 //! 4. It goes on, up or down, to where `E_R` is the requested drive, by interpolation of the last three legs. There a constant drive takes
 //!    over if `E_R` rises with the amplitude, the condition of stability under a constant drive. Otherwise the response stays under
@@ -15,10 +15,11 @@
 use std::f64::consts::TAU;
 
 use nalgebra::DVector;
-use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, noise, range};
+use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, noise, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, Stage};
 use crate::identification::{ASYMMETRIC, Cycle, ResonanceFit, Slopes, degrees, without_tones};
+use crate::linear::{Impacts, impacts_by_resonance};
 use crate::plan::{LinearResponse, Plan, Target};
 use crate::rig::{Controller, ControllerError, LoopState, Move, Rig};
 use crate::scene::Measurand;
@@ -40,8 +41,6 @@ const LOWEST: f64 = 0.05;
 /// Smallest response, over the response where the symmetry was lost or the lock was found, at which the motion counts as the same; the largest is
 /// its inverse. The stable range of the symmetric motion is wider.
 const LOST: f64 = 0.8;
-/// Smallest departure from the linear response that shows impacts, as a share of the drive: twice the uncertainty of damping and stiffness.
-const DEPARTURE: f64 = 0.2;
 /// Smallest slope of the holding drive over the response under a constant drive, over the slope of the linear response: with less, the motion
 /// takes ten times as long to settle.
 const SMALLEST_SLOPE: f64 = 0.1;
@@ -61,7 +60,7 @@ struct Leg {
     /// Drive that holds it, m, and its standard uncertainty.
     drive: f64,
     noise: f64,
-    /// Whether impacts change drive or frequency.
+    /// Whether frequency and loss need impacts.
     departed: bool,
     symmetric: bool,
     /// Second harmonic over the third, as far as noise does not explain it.
@@ -156,17 +155,20 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
             let change = rate * FOLLOWED as f64 * self.period;
             if leg.last + change > UNREACHED * self.b || rate <= 0.0 {
-                return Ok(leg);
+                break;
             }
             leg = self.leg(leg.last + change - self.setpoint, FOLLOWED, rate)?;
         }
         self.fall(leg, step, LOWEST * self.b)
     }
 
-    /// Lowers the response until the motion is symmetric, but not below `lowest`, m.
+    /// Lowers the response until the motion is symmetric, but not below `lowest`, m, nor on after impacts have ended, of which even harmonics
+    /// are a sign as well. A large response can hide them: beside a carried particle, their evidence grows as the response falls.
     fn fall(&mut self, mut leg: Leg, step: f64, lowest: f64) -> Result<Leg, ExperimentError> {
-        while !leg.symmetric && leg.departed && self.setpoint > lowest {
+        let mut seen = leg.departed;
+        while !leg.symmetric && (leg.departed || leg.asymmetry > 0.0 || !seen) && self.setpoint > lowest {
             leg = self.sweep(&leg, -step * leg.last)?;
+            seen |= leg.departed;
         }
         Ok(leg)
     }
@@ -313,13 +315,12 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         };
         // Harmonics above the third count as noise of a period, but do not scatter.
         let scatter = fit.excess.min(1.0);
-        let [drive, omega] = fit.at(0.0);
+        let certain = |estimate: Estimate| Estimate::new(estimate.value, &[scatter * estimate.uncertainty]);
+        let [drive, omega] = fit.at(0.0).map(certain);
         let response = fit.response.value;
-        let linear = self.damping() * response;
-        let detuning = omega.scaled(2.0 * response / self.linear.omega0);
-        let departure = (drive.value - linear).hypot(detuning.value - 2.0 * response);
-        let by_noise = SIGNIFICANT * scatter * drive.uncertainty.hypot(detuning.uncertainty);
-        let departed = departure > (DEPARTURE * linear.max(drive.value)).max(by_noise);
+        let epsilon = self.bench.plan.knowledge.numbers.epsilon;
+        let at = [certain(fit.response), drive, omega];
+        let departed = impacts_by_resonance(&self.linear, at, self.target.phase, epsilon) == Impacts::Needed;
         // Noise itself scatters by a share of sqrt(2/n): each window has half of the next one.
         let [even, odd, noise] = [0, 1, 2].map(|k| mean(harmonics.iter().map(|squares: &[f64; 3]| squares[k])));
         let (even, odd) = (even - noise, odd - noise);
@@ -338,7 +339,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             response,
             last: all[all.len() - 1].amplitude(),
             drive: drive.value,
-            noise: scatter * drive.uncertainty,
+            noise: drive.uncertainty,
             departed,
             symmetric,
             asymmetry: ((even - doubtful).max(0.0) / odd.max(doubtful)).sqrt(),

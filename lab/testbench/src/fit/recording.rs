@@ -27,6 +27,7 @@ use vines_model::{Measurand, Sensor};
 use super::{Known, MeasuredPoint, Quantity, decimals, fit};
 use crate::backbone::{Criterion, LAG, LevelEstimate};
 use crate::identification::{Cycle, Harmonic, Line, ResonanceFit, harmonic, regime_by_response};
+use crate::linear::ParticleState;
 use crate::plan::{Knowledge, LinearResponse, Target};
 use crate::record::Sample;
 use crate::rig::{Command, Drive, Sensors};
@@ -172,6 +173,8 @@ pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result
         damping_rate: 0.5 * plant.damping / plant.primary_mass,
         uncertainty: (TAU * u_f0).max(omega0 * u_zeta),
         gain: Complex64::new(0.0, -0.5 * omega0),
+        u_gain: 0.0,
+        particle: ParticleState::Free,
     };
     if fit.is_rejected() || fitted.uncertainty.is_nan() || fitted.uncertainty > uncertainty {
         return Ok(first);
@@ -644,7 +647,7 @@ fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], knowle
     } else {
         Kind::Held
     };
-    let regime = regime_by_response(samples, knowledge, base.value, omega.value);
+    let regime = regime_by_response(samples, knowledge, base, omega);
     // What the estimate contains once of the lag, and of the phase error in the second order.
     let here = [level.value, base.value, omega.value];
     let slopes = neighbours(curve, here)[1].map_or([0.0; 2], |neighbour| slopes(here, neighbour));

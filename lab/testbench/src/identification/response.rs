@@ -8,15 +8,15 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::{self, Display, Formatter};
 
 use nalgebra::DVector;
-use num_complex::Complex64;
 use serde::Serialize;
-use vines_model::numerics::{HarmonicBasis, golden_section, noise};
+use vines_model::numerics::{Estimate, HarmonicBasis, golden_section, noise};
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
 use super::harmonics_of;
-use crate::plan::{Knowledge, LinearResponse};
+use crate::linear::{Impacts, impacts_by_harmonic, impacts_by_resonance};
+use crate::plan::Knowledge;
 use crate::record::Sample;
-use crate::scene::{Dimensionless, Measurand, Sensor};
+use crate::scene::{Definition, Dimensionless, Measurand, Sensor};
 
 /// Largest residual of a steady motion, relative to the amplitude, unless it is noise.
 const STEADY: f64 = 3e-3;
@@ -28,8 +28,6 @@ const LINES: usize = 8;
 const SIGNIFICANT: f64 = 4.0;
 /// Smallest second harmonic of an asymmetric motion, over the third: symmetric motions have about 0.01, irregular ones 2 and more.
 pub(crate) const ASYMMETRIC: f64 = 0.5;
-/// Relative distance from the linear response within which a motion counts as the linear mode, beside the uncertainty of that response.
-const LINEAR: f64 = 0.1;
 /// Harmonics that are fitted to a displacement.
 const HARMONICS: usize = 5;
 
@@ -137,38 +135,49 @@ pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f6
 /// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase target,
 /// and `omega` (rad/s) its frequency.
 ///
-/// Impacts need evidence: response over base departs from the linear response. Of a linear response that was measured on the rig, this is
-/// sufficient; with the linear response of the scene in its place, the third harmonic must be significant as well.
-pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: f64, omega: f64) -> Regime {
-    let Some(content) = Content::of(samples, knowledge, omega) else {
+/// Impacts need evidence: frequency and loss, or a third harmonic, that no particle between carried and free produces. The former need a linear
+/// response that was measured on the rig.
+pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
+    let Some(content) = Content::of(samples, knowledge, omega.value) else {
         return Regime::Unknown;
     };
     if content.is_irregular() {
         return Regime::Other;
     }
+    let Dimensionless { epsilon, definition, omega0, .. } = knowledge.numbers;
     let target = knowledge.target;
-    let amplitude = content.amplitude * target.displacement(0, omega).norm();
-    let measured = Complex64::from_polar(amplitude / base, target.phase);
-    let departs = base > 0.0 && !is_linear(&knowledge.linear, measured, omega);
+    let noise = content.rest * (2.0 / samples.len() as f64).sqrt();
+    let amplitude = content.amplitude * target.displacement(0, omega.value).norm();
+    let response = Estimate::new(amplitude, &[noise * amplitude]);
     // The parameters of a simulation are known.
     let is_known = knowledge.is_measured || samples.iter().any(|sample| sample.ground_truth.is_some());
+    let by_resonance = match is_known && base.value > 0.0 {
+        true => impacts_by_resonance(&knowledge.linear, [response, base, omega], target.phase, epsilon),
+        false => Impacts::Doubtful,
+    };
+    // The force on the mass M over its inertia in the fundamental.
+    let square = (3.0 * omega.value / omega0).powi(2);
+    let force = |harmonic: f64| 9.0 * (square - 1.0) * harmonic / over_v(definition, square);
+    let third = Estimate {
+        value: force(content.third),
+        uncertainty: force(content.error),
+    };
     let significant = SIGNIFICANT * content.error;
     // As displacements.
     let asymmetric = ASYMMETRIC * (2.0_f64 / 3.0).powi(target.measurands[0].order());
-    match (departs, is_known) {
-        (false, true) => Regime::NoImpacts,
-        (false, false) => Regime::NotEstablished,
-        _ if content.second > significant.max(asymmetric * content.third) => Regime::Asymmetric,
-        _ if content.third > significant => Regime::Symmetric,
-        (true, true) => Regime::Unresolved,
-        (true, false) => Regime::NotEstablished,
+    match (by_resonance, impacts_by_harmonic(third, epsilon)) {
+        (Impacts::Needed, _) | (_, Impacts::Needed) => {
+            if content.second > significant.max(asymmetric * content.third) {
+                Regime::Asymmetric
+            } else if content.third > significant {
+                Regime::Symmetric
+            } else {
+                Regime::Unresolved
+            }
+        }
+        (Impacts::NotNeeded, _) => Regime::NoImpacts,
+        (Impacts::Doubtful, _) => Regime::NotEstablished,
     }
-}
-
-/// Whether response over base, `measured`, at the frequency `omega` (rad/s) belongs to the linear response.
-fn is_linear(linear: &LinearResponse, measured: Complex64, omega: f64) -> bool {
-    let tolerance = LINEAR + SIGNIFICANT * linear.uncertainty / linear.damping_rate.abs();
-    (linear.at(omega) / measured - 1.0).norm() <= tolerance
 }
 
 // Foreign tones: lines in the response that no motion of the particle produces.
@@ -247,12 +256,16 @@ impl Line {
     /// Whether no motion of the particle produces it.
     pub fn is_foreign(&self, d: &Dimensionless, sample_time: f64) -> bool {
         let square = (self.turn / (sample_time * d.omega0)).powi(2);
-        let factor = match d.definition.sensor {
-            Sensor::V => 1.0,
-            Sensor::Q1 => square * square.sqrt().powi(d.definition.sensor_quantity.order()),
-        };
-        let largest = 4.0 / PI * d.epsilon * d.b * factor / (square - 1.0).abs();
+        let largest = 4.0 / PI * d.epsilon * d.b * over_v(d.definition, square) / (square - 1.0).abs();
         self.amplitude() > ABOVE * largest
+    }
+}
+
+/// A line of what a sensor reads over the line of v, relative to their fundamentals; `square`: of its frequency over omega0.
+fn over_v(definition: Definition, square: f64) -> f64 {
+    match definition.sensor {
+        Sensor::V => 1.0,
+        Sensor::Q1 => square * square.sqrt().powi(definition.sensor_quantity.order()),
     }
 }
 

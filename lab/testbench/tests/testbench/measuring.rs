@@ -7,7 +7,7 @@ use std::path::Path;
 
 use lovines::{Restitution, State};
 use phase_lock_f32 as single;
-use vines_model::numerics::mean_square;
+use vines_model::numerics::{Estimate, mean_square};
 use vines_model::orbit::phase_resonant;
 use vines_testbench::backbone::LevelPoint;
 use vines_testbench::comparison::COMPARED_ABOVE;
@@ -218,12 +218,12 @@ fn measurements_in_si_units_have_the_same_bits_whatever_the_scene_says_of_the_pa
         (&[moving][..], &FALSE[..]),
         (&[moving, "chain.snr=40"], &FALSE),
         (&[moving, "resonance.sensor=q1"], &FALSE),
-        // Where impacts, or a symmetric motion, are searched for, b is the scale of the search.
+        // Where a symmetric motion is searched for, b is the scale of the search; where impacts are, m/M is the scale of their evidence.
         (&[], &FALSE[..2]),
-        (&["start.dq2=0"], &FALSE[..2]),
+        (&["start.dq2=0"], &FALSE[..1]),
         (
             &["resonance.sensor=q1", "resonance.sensor_quantity=acceleration"],
-            &FALSE[..2],
+            &FALSE[..1],
         ),
     ] {
         let expected = measured(settings, &[]);
@@ -243,6 +243,33 @@ fn measurements_in_si_units_have_the_same_bits_whatever_the_scene_says_of_the_pa
 }
 
 // Locks of rigs at rest, random, difficult or with a real cavity.
+
+#[test]
+fn friction_from_rest_is_never_called_a_motion_with_impacts() {
+    for (n, mu) in ["0.02", "0.05", "0.1"].into_iter().enumerate() {
+        // Half of the clients know of the friction.
+        let settings = |mu: &str| {
+            paper(&[
+                "start.dq2=0",
+                "chain.snr=40",
+                "backbone.points=9",
+                &format!("plant.mu_k={mu}"),
+            ])
+        };
+        let client = settings(if n == 1 { mu } else { "0" });
+        let mut rig = Simulated::of(&settings(mu)).unwrap();
+        let linear = check(&mut *rig, &client.plan()).unwrap().linear.unwrap();
+        let plan = client.plan_on(client.knowledge().measured(linear.response()));
+        let found = common::tracked(&mut *rig, &plan, 20.0).unwrap();
+        for point in common::kept(&found) {
+            assert_ne!(
+                point.regime_by_impacts,
+                Some(Regime::NoImpacts),
+                "mu = {mu}: {linear:?} {point:?}"
+            );
+        }
+    }
+}
 
 #[test]
 fn random_rigs_lock_from_rest_within_2e_3_of_a_stable_orbit() {
@@ -450,7 +477,8 @@ fn no_motion_of_a_particle_is_a_foreign_tone() {
         // The first of these windows contains the transient.
         for window in [&samples[1000..3000], &samples[4000..]] {
             assert_eq!(foreign_tone(window, &knowledge, drive.omega), None, "{settings:?}");
-            let regime = regime_by_response(window, &knowledge, drive.amplitude, drive.omega);
+            let exact = |value| Estimate { value, uncertainty: 0.0 };
+            let regime = regime_by_response(window, &knowledge, exact(drive.amplitude), exact(drive.omega));
             irregular += usize::from(regime == Regime::Other);
         }
     }
