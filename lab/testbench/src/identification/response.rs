@@ -135,8 +135,8 @@ pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f6
 /// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase target,
 /// and `omega` (rad/s) its frequency.
 ///
-/// Impacts need evidence: frequency and loss, or a third harmonic, that no particle between carried and free produces. The former need a linear
-/// response that was measured on the rig.
+/// Impacts need evidence: frequency and loss that no particle between carried and free produces; without a linear response that was measured on
+/// the rig, a third harmonic that none produces.
 pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
     let Some(content) = Content::of(samples, knowledge, omega.value) else {
         return Regime::Unknown;
@@ -151,10 +151,6 @@ pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estim
     let response = Estimate::new(amplitude, &[noise * amplitude]);
     // The parameters of a simulation are known.
     let is_known = knowledge.is_measured || samples.iter().any(|sample| sample.ground_truth.is_some());
-    let by_resonance = match is_known && base.value > 0.0 {
-        true => impacts_by_resonance(&knowledge.linear, [response, base, omega], target.phase, epsilon),
-        false => Impacts::Doubtful,
-    };
     // The force on the mass M over its inertia in the fundamental.
     let square = (3.0 * omega.value / omega0).powi(2);
     let force = |harmonic: f64| 9.0 * (square - 1.0) * harmonic / over_v(definition, square);
@@ -163,20 +159,19 @@ pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estim
         uncertainty: force(content.error),
     };
     let significant = SIGNIFICANT * content.error;
+    let impacts = match is_known {
+        true => impacts_by_resonance(&knowledge.linear, [response, base, omega], target.phase, epsilon),
+        false if content.third > significant => impacts_by_harmonic(third, epsilon),
+        false => Impacts::Doubtful,
+    };
     // As displacements.
     let asymmetric = ASYMMETRIC * (2.0_f64 / 3.0).powi(target.measurands[0].order());
-    match (by_resonance, impacts_by_harmonic(third, epsilon)) {
-        (Impacts::Needed, _) | (_, Impacts::Needed) => {
-            if content.second > significant.max(asymmetric * content.third) {
-                Regime::Asymmetric
-            } else if content.third > significant {
-                Regime::Symmetric
-            } else {
-                Regime::Unresolved
-            }
-        }
-        (Impacts::NotNeeded, _) => Regime::NoImpacts,
-        (Impacts::Doubtful, _) => Regime::NotEstablished,
+    match impacts {
+        Impacts::NotNeeded if is_known => Regime::NoImpacts,
+        Impacts::NotNeeded | Impacts::Doubtful => Regime::NotEstablished,
+        Impacts::Needed if content.second > significant.max(asymmetric * content.third) => Regime::Asymmetric,
+        Impacts::Needed if content.third > significant => Regime::Symmetric,
+        Impacts::Needed => Regime::Unresolved,
     }
 }
 
