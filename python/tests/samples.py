@@ -117,6 +117,11 @@ def linked(content: Any) -> None:
     content["lost"], content["self"] = h5py.SoftLink("/nowhere"), h5py.SoftLink("/raw")
 
 
+def angle(content: Any) -> None:
+    plain(content)
+    content["y"].attrs["units"] = "deg"
+
+
 def compound(content: Any) -> None:
     content["log"] = np.array(
         list(zip(TIME, RESPONSE, DRIVE, strict=True)), dtype=[("t", "f8"), ("y", "f8"), ("x", "f8")]
@@ -132,7 +137,7 @@ def spectra(content: Any) -> None:
     content["frf"] = np.fft.fft(RESPONSE)
 
 
-def tdms(shift: int = 0, rate: int = 1, stamped: bool = False, cut: int = 0):
+def tdms(shift: int = 0, rate: int = 1, stamped: bool = False, cut: int = 0, unit: str = "mm"):
     """Write TDMS: the base begins `shift` samples later, at `rate` times the rate; `cut` bytes are missing."""
 
     def write(file: Path) -> None:
@@ -146,7 +151,7 @@ def tdms(shift: int = 0, rate: int = 1, stamped: bool = False, cut: int = 0):
             base = {"wf_start_offset": 0.0, "wf_samples": 1}
             late = start + np.timedelta64(round(1e6 * shift * STEP), "us")
             channels = [
-                ("y", RESPONSE, base | {"wf_increment": STEP, "wf_start_time": start, "unit_string": "mm"}),
+                ("y", RESPONSE, base | {"wf_increment": STEP, "wf_start_time": start, "unit_string": unit}),
                 (
                     "x",
                     drive[shift * rate :],
@@ -170,13 +175,18 @@ def uff(
     kind: int = 1,
     uneven: bool = False,
     units: tuple[str, str] = ("mm", "um"),
+    ordinate: int = 8,
 ):
-    """Write UFF58."""
+    """Write UFF58; `ordinate` 8: displacement, 12: acceleration, 13: excitation force."""
 
     def write(file: Path) -> None:
         times = TIME + (2e-4 * np.sin(7.0 * TIME) if uneven else 0.0)
         both = {"type": 58, "func_type": kind, "rsp_dir": 1, "ref_node": 1, "ref_dir": 1, "binary": 0}
-        both |= {"abscissa_spacing": int(not uneven), "abscissa_spec_data_type": 17, "ordinate_spec_data_type": 8}
+        both |= {
+            "abscissa_spacing": int(not uneven),
+            "abscissa_spec_data_type": 17,
+            "ordinate_spec_data_type": ordinate,
+        }
         both |= {"orddenom_spec_data_type": 0, "ref_ent_name": "NONE", "x": times, "rsp_ent_name": "NONE"}
         both |= {"abscissa_inc": STEP, "abscissa_min": 0.0}
         data = (3.0 * np.sin(55.0 * times - np.pi / 2), 20.0 * np.sin(55.0 * times))
@@ -187,7 +197,9 @@ def uff(
     return write
 
 
-def lvm(separator: str = "\t", decimal: str = ".", columns: str = "No", blocks: int = 1, gap: float = 0.0):
+def lvm(
+    separator: str = "\t", decimal: str = ".", columns: str = "No", blocks: int = 1, gap: float = 0.0, unit: str = "mm"
+):
     """Write a measurement file of LabVIEW."""
 
     def write(file: Path) -> None:
@@ -209,7 +221,7 @@ def lvm(separator: str = "\t", decimal: str = ".", columns: str = "No", blocks: 
             start = TIME[first] + block * gap
             lines += [separator.join(["Channels", "2", "", ""]), separator.join(["Samples", str(size), str(size), ""])]
             lines += [
-                separator.join(["Y_Unit_Label", "mm", "um", ""]),
+                separator.join(["Y_Unit_Label", unit, "um", ""]),
                 separator.join(["X0", number(start), number(start), ""]),
             ]
             lines += [
@@ -290,7 +302,7 @@ SAMPLES = [
         text("time,y [V],x [um]\n"),
         "y",
         "x",
-        refusal="the unit V is unknown",
+        refusal="the unit V is a voltage",
     ),
     Sample("CSV: volts with a sensitivity", "data loggers", "a.csv", text("time,y [V],x [um]\n"), "y:1V/mm", "x"),
     Sample("rate of 0", "", "a.csv", text(PLAIN), options={"rate": 0.0}, refusal="must be above 0"),
@@ -324,6 +336,10 @@ SAMPLES = [
     Sample("HDF5: compound table", "PyTables, pandas", "a.h5", hdf5(compound)),
     Sample("HDF5: columns of a matrix", "h5py", "a.h5", hdf5(matrix), "data/2:mm", "data/3:um", {"time": "data/1"}),
     Sample("HDF5: complex data", "spectra", "a.h5", hdf5(spectra), "frf", refusal="complex"),
+    Sample("HDF5: an angle", "h5py", "a.h5", hdf5(angle), "y", refusal="deg is one of angles"),
+    Sample(
+        "TDMS: an angular velocity", "LabVIEW", "a.tdms", tdms(unit="rad/s"), "y", "x", refusal="one of frequencies"
+    ),
     Sample("TDMS: waveforms", "LabVIEW", "a.tdms", tdms(), "y", "x"),
     Sample("TDMS: one channel begins later", "LabVIEW", "a.tdms", tdms(shift=1), "y", "x", note="begins"),
     Sample("TDMS: two rates", "LabVIEW", "a.tdms", tdms(rate=2), "y", "x", note="common"),
@@ -359,6 +375,19 @@ SAMPLES = [
         "2+X",
         refusal="power spectral density",
     ),
+    Sample(
+        "UFF58: a force cell", "LMS Test.Lab", "a.uff", uff(units=("mm", "N")), "1+X", "2+X", refusal="N is a force"
+    ),
+    Sample(
+        "UFF58: a force without a unit",
+        "pyuff",
+        "a.uff",
+        uff(units=("NONE", "NONE"), ordinate=13),
+        "1+X",
+        "2+X",
+        refusal="N is a force",
+    ),
+    Sample("LVM: volts", "LabVIEW", "a.lvm", lvm(unit="V"), "y", "x", refusal="V is a voltage"),
     Sample("LVM: tab, without times", "LabVIEW", "a.lvm", lvm(), "y", "x"),
     Sample(
         "LVM: decimal comma, one column of times",

@@ -1,7 +1,9 @@
 """Recordings in files of other programs, and their fit."""
 
+import importlib.util
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -92,3 +94,29 @@ def test_a_ring_down_without_a_base_is_a_linear_decay_in_the_package_and_on_the_
     done = subprocess.run([*command, "--time", "clock"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "no channel `clock`" in done.stderr
+
+
+def test_accelerations_of_another_simulator_in_12_bits_with_hum_offset_and_drift_give_the_parameters(tmp_path):
+    path = Path(__file__).parents[2] / "studies" / "foreign_recordings.py"
+    spec = importlib.util.spec_from_file_location("foreign_recordings", path)
+    foreign = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = foreign
+    spec.loader.exec_module(foreign)
+    chain = foreign.Chain(bits=12, hum=0.01, offset=0.3, drift=0.2, late=1)
+    schedule = []
+    for g in (1.6, 1.4, 1.2, 1.1):
+        scene = vines.Scene(plant=foreign.HIDDEN, resonance={"sensor": "q1"}, excitation={"G": g})
+        orbit = next(one for one in vines.orbits(scene) if one.stable)
+        drive = scene.drive(sigma=orbit.sigma, G=g)
+        schedule.append((drive["amplitude"], drive["omega"]))
+    file = tmp_path / "foreign.csv"
+    foreign.write(file, foreign.recorded(foreign.simulate(schedule, 40, chain), chain, 1), chain)
+    read = vines.read_recording(file, "aq", "base", late=1.0 / foreign.RATE)
+    assert read.measured == ("acceleration", "acceleration")
+    fit = vines.fit_recordings(read, vines.Scene(resonance={"sensor": "q1"}))
+    for symbol in ("r", "b"):
+        value, uncertainty = fit[symbol]
+        assert abs(value - foreign.HIDDEN[symbol]) < 3 * uncertainty < 0.3 * value
+    # What no accelerometer reads is refused with the key to set.
+    with pytest.raises(ValueError, match=r'resonance\.sensor = "q1"'):
+        vines.fit_recordings(read)

@@ -14,6 +14,8 @@ from . import _native
 from .scenes import Scene, checked
 
 _NEEDED = {"pymatreader": "MAT", "h5py": "HDF5", "nptdms": "TDMS", "pyuff": "UFF", "lvm_read": "LVM"}
+# SI units of what an ordinate of UFF58 is, for files without labels.
+_UFF_UNITS = {8: "m", 9: "N", 11: "m/s", 12: "m/s²", 13: "N"}
 _UFF_TYPES = {
     2: "an auto spectrum",
     3: "a cross spectrum",
@@ -299,11 +301,13 @@ def _uff(file: Path) -> Iterator[_Channel]:
             yield name, f"it is {what} (func_type {kind}), not a time response (1)"
             continue
         unit = str(one.get("ordinate_axis_units_lab") or "").strip()
+        if unit.upper() in ("", "NONE"):
+            unit = _UFF_UNITS.get(int(one.get("ordinate_spec_data_type") or 0), "")
         clock = float(one.get("abscissa_min") or 0.0), float(one.get("abscissa_inc") or 0.0)
         if not one.get("abscissa_spacing"):
             uneven[np.asarray(one["x"]).tobytes()] = np.asarray(one["x"])
         for column, values, *_ in _columns(name, one["data"]):
-            yield column, values, "" if unit.upper() == "NONE" else unit, clock if clock[1] > 0.0 else None
+            yield column, values, unit, clock if clock[1] > 0.0 else None
     for number, times in enumerate(uneven.values(), 1):
         yield "time" if len(uneven) == 1 else f"abscissa {number}", times, "s"
 
