@@ -95,6 +95,43 @@ pub struct Matrices<'a> {
     pub drive: &'a [f64],
 }
 
+/// What a host is made of.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "lowercase", deny_unknown_fields)
+)]
+pub enum Equations {
+    /// [`Host::from_modes`].
+    Modes(Vec<Mode>),
+    /// [`Host::from_matrices`]; the fields are those of [`Matrices`].
+    #[allow(missing_docs)]
+    Matrices {
+        mass: Vec<Vec<f64>>,
+        damping: Vec<Vec<f64>>,
+        stiffness: Vec<Vec<f64>>,
+        cavity: Vec<f64>,
+        drive: Vec<f64>,
+    },
+}
+
+impl Equations {
+    /// The host.
+    ///
+    /// # Errors
+    /// As for [`Host::from_modes`] and [`Host::from_matrices`].
+    pub fn host(&self, excitation: Excitation) -> Result<Host, InvalidHost> {
+        match self {
+            Self::Modes(modes) => Host::from_modes(excitation, modes),
+            Self::Matrices { mass, damping, stiffness, cavity, drive } => {
+                let matrices = Matrices { mass, damping, stiffness, cavity, drive };
+                Host::from_matrices(excitation, &matrices)
+            }
+        }
+    }
+}
+
 /// A number and its rounding error.
 type Rounded = (f64, f64);
 

@@ -19,7 +19,7 @@ use crate::parameters::{InvalidValue, Parameters};
 use crate::plant::Plant;
 use crate::primary::Primary;
 use crate::segment::{Derivatives, Instant, Look, Motion, SERIES_DEGREE, SERIES_REACH, Series, phasor};
-use crate::system::{Masses, Moving};
+use crate::system::{Masses, Moving, System};
 
 /// A structure with the state of its sections.
 #[derive(Clone, Debug)]
@@ -689,6 +689,21 @@ impl Plant<Structure> {
         let fastest = fastest.max_by(|a, b| a.fastest.total_cmp(&b.fastest));
         let [stiffness, damping] = fastest.map_or([0.0; 2], |o| [mass * o.omega0_squared, 2.0 * mass * o.delta]);
         Parameters { primary_mass: mass, stiffness, damping, ..parameters }
+    }
+
+    /// Changes the parameters of the cavity from now on; displacements, velocities and totals stay. A change of half-width has no physical
+    /// meaning here.
+    ///
+    /// # Errors
+    /// Invalid parameters, another mass of the particle; the old ones stay.
+    pub fn set_parameters(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
+        let parameters = Self::equivalent(&self.primary.host, parameters);
+        parameters.validate()?;
+        let (m, present) = (parameters.particle_mass, self.parameters().particle_mass);
+        InvalidValue::unless(m == present, "m (particle mass)", m, "kg", "the mass at the start")?;
+        self.moving.system = System::from(parameters);
+        self.fast.parameters_changed(&self.moving.base);
+        Ok(())
     }
 
     /// Sets displacements and velocities; contact is decided anew. Drive, time and totals stay.

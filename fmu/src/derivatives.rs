@@ -37,7 +37,7 @@ impl LoViNes {
     /// The present plant with the present inputs.
     pub(super) fn instant(&self, plant: &Plant) -> Instant<f64> {
         let (p, state) = (&self.parameters, plant.state());
-        let base = self.base_motion(plant);
+        let base = self.base_motion(plant.base());
         let (gravity, friction) = plant.constant_accelerations();
         Instant {
             primary_mass: p.primary_mass,
@@ -86,6 +86,7 @@ impl LoViNes {
         };
         let (now, integrated) = match &self.simulation {
             Simulation::Steps(plant) => (self.instant(plant), false),
+            Simulation::Structure(_) => return Err(Refusal::error("a structure has no directional derivatives")),
             Simulation::Equations(hybrid) => (hybrid.instant(), self.progress == Progress::UnderWay),
         };
         let reduced_are_states = match known {
@@ -123,7 +124,9 @@ impl LoViNes {
     /// The time derivative of an output at the end of the last step.
     pub(super) fn time_derivative(&self, variable: Real, order: u32) -> Result<f64, Refusal> {
         let Simulation::Steps(plant) = &self.simulation else {
-            return Err(Refusal::error("output derivatives exist in co-simulation only"));
+            return Err(Refusal::error(
+                "output derivatives exist for one oscillator in co-simulation only",
+            ));
         };
         if order > MOST {
             return Err(Refusal::error(format!(

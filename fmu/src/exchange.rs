@@ -33,14 +33,14 @@ impl LoViNes {
     fn hybrid(&self) -> &Hybrid {
         match &self.simulation {
             Simulation::Equations(hybrid) => hybrid,
-            Simulation::Steps(_) => unreachable!("the shell asks this only after select"),
+            _ => unreachable!("the shell asks this only after select"),
         }
     }
 
     fn hybrid_mut(&mut self) -> &mut Hybrid {
         match &mut self.simulation {
             Simulation::Equations(hybrid) => hybrid,
-            Simulation::Steps(_) => unreachable!("the shell asks this only after select"),
+            _ => unreachable!("the shell asks this only after select"),
         }
     }
 }

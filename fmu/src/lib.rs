@@ -11,16 +11,20 @@ mod model_exchange;
 mod outputs;
 mod reach;
 mod settings;
+mod structure;
 
 use crate::limits::lost;
 use crate::model_exchange::hybrid::Hybrid;
-use fmi2_component::{Archive, Component, Key, Log, Refusal};
+use fmi2_component::{Archive, Component, Key, Log, Refusal, Resources};
 use lovines::plant::Contact;
 use lovines::table::Values;
-use lovines::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
+use lovines::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State, Structure};
 use outputs::Outputs;
 use reach::Reach;
 use std::cell::Cell;
+use std::ops::Range;
+use std::sync::Arc;
+use structure::Adopted;
 use variables::{Integer, Model, Real, category};
 
 mod variables {
@@ -57,6 +61,9 @@ struct LoViNes {
     valid: bool,
     parameters: Parameters,
     start: State,
+    /// What takes the oscillator's place.
+    #[serde(skip)]
+    adopted: Option<Arc<Adopted>>,
 }
 
 fn unknown() -> Cell<f64> {
@@ -69,7 +76,21 @@ fn unknown() -> Cell<f64> {
 enum Simulation {
     Steps(Plant),
     Equations(Hybrid),
+    #[serde(skip)]
+    Structure(Box<Plant<Structure>>),
 }
+
+/// Evaluates an expression with the plant of co-simulation, whatever carries the cavity; `else` is for model exchange.
+macro_rules! with_plant {
+    ($simulation:expr, $plant:ident => $with:expr, else $hybrid:pat => $without:expr) => {
+        match $simulation {
+            Simulation::Steps($plant) => $with,
+            Simulation::Structure($plant) => $with,
+            Simulation::Equations($hybrid) => $without,
+        }
+    };
+}
+use with_plant;
 
 /// The highest order of input derivatives that is followed.
 const DERIVATIVES: u32 = 3;
@@ -77,8 +98,13 @@ const DERIVATIVES: u32 = 3;
 /// A step whose events are logged.
 #[cold]
 #[inline(never)]
-fn logging(plant: &mut Plant, drive: Drive, step: f64, on_event: impl FnMut(Event)) -> Result<Outcome, InvalidValue> {
-    plant.advance_with(drive, step, on_event)
+fn logging(
+    simulation: &mut Simulation,
+    drive: Drive,
+    step: f64,
+    on_event: impl FnMut(Event),
+) -> Result<Outcome, InvalidValue> {
+    with_plant!(simulation, plant => plant.advance_with(drive, step, on_event), else _ => Ok(Outcome::default()))
 }
 
 #[derive(Clone, Copy, PartialEq, PartialOrd, serde::Serialize, serde::Deserialize)]
@@ -113,7 +139,25 @@ impl Component for LoViNes {
             values: Values::from(&parameters),
             valid: false,
             start,
+            adopted: None,
         }
+    }
+
+    fn adopt(&mut self, guid: &str, resources: &Resources) -> Result<(), Refusal> {
+        let adopted = Adopted::read(guid, resources)?;
+        self.values = adopted.values;
+        [self.start.q2, self.start.dq2] = adopted.particle;
+        self.adopted = Some(Arc::new(adopted));
+        // What cannot be started is refused at once.
+        self.make_plant()
+    }
+
+    fn further(&self) -> Range<u32> {
+        self.adopted.as_ref().map_or(0..0, |adopted| adopted.outputs())
+    }
+
+    fn get_further(&self, reference: u32) -> f64 {
+        self.at_point(reference)
     }
 
     #[inline(always)]
@@ -139,10 +183,11 @@ impl Component for LoViNes {
     }
 
     fn get_integer(&self, variable: Integer) -> i32 {
-        let (totals, contact) = match &self.simulation {
-            Simulation::Steps(plant) => (*plant.totals(), plant.contact()),
-            Simulation::Equations(hybrid) => (hybrid.totals(), hybrid.contact().and_then(Contact::wall)),
-        };
+        let (totals, contact) = with_plant!(
+            &self.simulation,
+            plant => (*plant.totals(), plant.contact()),
+            else hybrid => (hybrid.totals(), hybrid.contact().and_then(Contact::wall))
+        );
         match variable {
             Integer::impacts => i32::try_from(totals.impacts).unwrap_or(i32::MAX),
             Integer::contact => contact.map_or(0, |wall| wall.sign() as i32),
@@ -156,22 +201,18 @@ impl Component for LoViNes {
     }
 
     fn initialise(&mut self, start_time: f64, _log: &Log) -> Result<(), Refusal> {
-        self.parameters = self.values.parameters();
-        match &mut self.simulation {
-            Simulation::Steps(plant) => {
-                *plant = Plant::new(self.parameters, self.start)?;
-                Reach::of(&self.parameters).check(&self.start)?;
+        self.make_plant()?;
+        self.fit_limits();
+        with_plant!(
+            &mut self.simulation,
+            plant => {
+                self.reach.check(&self.start)?;
                 plant.set_time(start_time);
                 plant.begin(self.drive)?;
-            }
-            Simulation::Equations(hybrid) => {
-                *hybrid = Hybrid::new(self.parameters, self.start, self.drive)?;
-                hybrid.time = start_time;
-            }
-        }
+            },
+            else hybrid => hybrid.time = start_time
+        );
         self.epsilon = self.parameters.mass_ratio();
-        self.fastest = self.parameters.fastest_rate();
-        self.reach = Reach::of(&self.parameters);
         self.longest = unknown();
         self.progress = Progress::Initialised;
         self.inputs_set = false;
@@ -196,19 +237,24 @@ impl Component for LoViNes {
 
     #[inline]
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
-        let Simulation::Steps(plant) = &mut self.simulation else {
-            return Err(Refusal::error("steps exist in co-simulation only"));
-        };
-        plant.set_time(time);
-        let outcome = if log.wants(category::logEvents) || log.wants(category::logImpacts) {
-            logging(plant, self.drive, step, |event| log::tell(log, time, event))?
-        } else {
-            plant.advance(self.drive, step)?
-        };
+        let logs = log.wants(category::logEvents) || log.wants(category::logImpacts);
+        let outcome = with_plant!(
+            &mut self.simulation,
+            plant => {
+                plant.set_time(time);
+                if logs {
+                    logging(&mut self.simulation, self.drive, step, |event| log::tell(log, time, event))?
+                } else {
+                    plant.advance(self.drive, step)?
+                }
+            },
+            else _ => return Err(Refusal::error("steps exist in co-simulation only"))
+        );
         let [_, derivatives @ ..] = self.drive.signal;
         if derivatives != [0.0; 3] {
             // The signal stays where its polynomial has led.
-            self.drive.signal = [plant.base().drive.signal[0], 0.0, 0.0, 0.0];
+            let led = with_plant!(&self.simulation, plant => plant.base().drive.signal[0], else _ => 0.0);
+            self.drive.signal = [led, 0.0, 0.0, 0.0];
             self.longest = unknown();
         }
         self.progress = Progress::UnderWay;
@@ -259,9 +305,46 @@ impl Component for LoViNes {
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
+        let Some(adopted) = self.adopted.take() else {
+            return self.archive_oscillator(archive);
+        };
+        // The structure itself is in the resources.
+        let mut saved = match &self.simulation {
+            Simulation::Structure(plant) => plant.save(),
+            _ => adopted.plant(self.parameters, self.start)?.save(),
+        };
+        self.simulation = Self::new().simulation;
+        self.archive_oscillator(archive)?;
+        archive.whole(&mut saved)?;
+        let mut plant = adopted.plant(self.parameters, self.start)?;
+        plant.restore(&saved);
+        self.simulation = Simulation::Structure(Box::new(plant));
+        self.adopted = Some(adopted);
+        self.fit_limits();
+        Ok(())
+    }
+}
+
+impl LoViNes {
+    /// Makes the plant from what was set.
+    fn make_plant(&mut self) -> Result<(), Refusal> {
+        self.parameters = self.values.parameters();
+        if let Some(adopted) = &self.adopted {
+            let plant = adopted.plant(self.parameters, self.start)?;
+            self.simulation = Simulation::Structure(Box::new(plant));
+        }
+        match &mut self.simulation {
+            Simulation::Steps(plant) => *plant = Plant::new(self.parameters, self.start)?,
+            Simulation::Equations(hybrid) => *hybrid = Hybrid::new(self.parameters, self.start, self.drive)?,
+            Simulation::Structure(_) => {}
+        }
+        Ok(())
+    }
+
+    fn archive_oscillator(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
         archive.whole(self)?;
         self.valid = self.values.parameters().validate().is_ok();
-        self.reach = Reach::of(&self.parameters);
+        self.fit_limits();
         Ok(())
     }
 }

@@ -13,19 +13,22 @@ pub(super) struct Reach {
     displacement: f64,
     /// m/s: it leads to that displacement at most.
     velocity: f64,
+    /// Displacement of the cavity that a constant drive gives, m per unit: 1 for a base.
+    per_drive: f64,
     /// The middle between the walls and half their distance, m.
     cavity: (f64, f64),
 }
 
 impl Reach {
-    pub fn of(parameters: &Parameters) -> Self {
+    pub fn of(parameters: &Parameters, fastest: f64, per_drive: f64) -> Self {
         let displacement = parameters.half_width * RESOLUTION;
         let [plus, minus] = parameters.gaps();
         Self {
             // The position on a wall has a rounding error if the gaps differ.
             cavity: (0.5 * (plus - minus), 0.5 * (plus + minus) * (1.0 + 1e-12)),
             displacement,
-            velocity: displacement * parameters.fastest_rate(),
+            velocity: displacement * fastest,
+            per_drive,
         }
     }
 
@@ -51,7 +54,7 @@ impl Reach {
             let [u1, u2, u3] = derivatives.map(f64::abs);
             span * (u1 + span * (u2 + span * u3))
         };
-        u0.abs() + drive.amplitude.abs() + moved <= self.displacement
+        (u0.abs() + drive.amplitude.abs() + moved) * self.per_drive <= self.displacement
     }
 
     /// Refuses a start that is not within.

@@ -2,8 +2,9 @@
 
 use super::outputs::Outputs;
 use super::reach::Reach;
+use super::structure;
 use super::variables::{Integer, Real};
-use super::{LoViNes, Progress, Simulation, unknown};
+use super::{LoViNes, Progress, Simulation, unknown, with_plant};
 use fmi2_component::{Causality, Key, Refusal};
 use lovines::table::{PARAMETERS, Parameter, Values};
 use lovines::{InvalidValue, Parameters};
@@ -49,6 +50,9 @@ impl LoViNes {
     /// Sets a start value, or a parameter.
     #[cold]
     pub(super) fn configure(&mut self, variable: Real, value: f64) -> Result<(), Refusal> {
+        if self.adopted.is_some() && matches!(variable, Real::q1 | Real::der_q1 | Real::q1_start | Real::der_q1_start) {
+            return Err(structure::replaced(variable.variable().name));
+        }
         let start = match variable {
             // One value under two names: some masters set parameters only, others start values of outputs only.
             Real::q1 | Real::q1_start => &mut self.start.q1,
@@ -67,6 +71,10 @@ impl LoViNes {
     /// A number that is not allowed whatever the others are is refused at once. Parameters that contradict each other wait for the next
     /// call to mend them, and the plant keeps its own until then: [`Self::check_settings`] refuses them when the plant has to move.
     pub(super) fn set_parameter(&mut self, variable: impl Key, value: f64) -> Result<(), Refusal> {
+        let symbol = variable.variable().name;
+        if self.adopted.is_some() && structure::REPLACED.contains(&symbol) {
+            return Err(structure::replaced(symbol));
+        }
         let Some((n, row)) = row(variable) else {
             return Err(Refusal::error("this variable is computed, not set"));
         };
@@ -98,14 +106,21 @@ impl LoViNes {
     /// Passes changed parameters to the rig.
     fn take_over(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
         if self.progress != Progress::None {
-            match &mut self.simulation {
-                Simulation::Steps(plant) => plant.set_parameters(parameters)?,
-                Simulation::Equations(hybrid) => hybrid.set_parameters(parameters)?,
-            }
+            with_plant!(&mut self.simulation, plant => plant.set_parameters(parameters)?, else hybrid => hybrid.set_parameters(parameters)?);
         }
         self.parameters = parameters;
-        self.fastest = parameters.fastest_rate();
-        self.reach = Reach::of(&parameters);
+        self.fit_limits();
         Ok(())
+    }
+
+    /// Fits the limits of displacements and steps to the parameters, and to the structure.
+    pub(super) fn fit_limits(&mut self) {
+        self.fastest = self.parameters.fastest_rate();
+        let mut per_drive = 1.0;
+        if let (Some(adopted), Simulation::Structure(plant)) = (&self.adopted, &self.simulation) {
+            self.fastest = self.fastest.max(plant.parameters().fastest_rate());
+            per_drive = adopted.displacement_per_drive();
+        }
+        self.reach = Reach::of(&self.parameters, self.fastest, per_drive);
     }
 }

@@ -1,6 +1,9 @@
 //! Packing: a description and shared libraries become an FMU, a zip archive; two FMUs and a scene become a coupled system in the format of
 //! SSP 1.0, System Structure and Parameterization. The same input gives the same bytes.
 
+mod structure;
+
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::io::{self, Cursor, Write};
@@ -25,10 +28,14 @@ pub struct Component {
     pub package: &'static str,
     /// `modelDescription.xml`.
     pub xml: String,
+    /// The GUID in its library: that of the description, unless the library serves several models.
+    pub library_guid: String,
     /// Figure of the model.
     pub png: &'static [u8],
     /// The figure again as SVG, and what the description cannot say, as HTML.
-    pub page: &'static str,
+    pub page: Cow<'static, str>,
+    /// Files in `resources/`.
+    pub resources: Vec<File>,
 }
 
 macro_rules! component {
@@ -39,11 +46,14 @@ macro_rules! component {
             // With the GUID of the library.
             xml: fmi2_component_build::describe(include_str!($xml))
                 .expect("build.rs of the component has accepted this text"),
+            library_guid: fmi2_component_build::guid_of(include_str!($xml))
+                .expect("build.rs of the component has accepted this text"),
             png: include_bytes!(concat!("pack/pictures/", $identifier, ".png")),
-            page: concat!(
+            page: Cow::Borrowed(concat!(
                 include_str!(concat!("pack/pictures/", $identifier, ".svg")),
                 include_str!(concat!("pack/pictures/", $identifier, ".html"))
-            ),
+            )),
+            resources: Vec::new(),
         }
     };
 }
@@ -58,6 +68,19 @@ pub fn components() -> [Component; 2] {
             "../../controller/fmu/modelDescription.xml"
         ),
     ]
+}
+
+/// The plant of a scene and the controller.
+///
+/// # Errors
+/// A description that is not XML.
+pub fn components_of(scene: &Scene) -> Result<[Component; 2], PackError> {
+    let [oscillator, controller] = components();
+    let plant = match &scene.structure {
+        Some(host) => structure::component(&oscillator, host, scene)?,
+        None => oscillator,
+    };
+    Ok([plant, controller])
 }
 
 /// A library for a platform; parse it from `win64=PATH`.
@@ -124,15 +147,19 @@ pub enum PackError {
     Description(#[from] fmi2_description::Error),
     #[error(transparent)]
     Archive(#[from] ZipError),
+    #[error("the description of LoViNes.fmu is not XML: {0}")]
+    Xml(#[from] xml::reader::Error),
 }
 
 /// Name and content of a file.
 pub type File = (String, Vec<u8>);
 
-/// Plant and controller, and the two of them coupled as `bench.ssp` with the parameters of the scene.
+/// Plant and controller of a scene, and for an oscillator the two of them coupled as `bench.ssp` with the parameters of the scene.
 pub fn pack_bench(scene: &Scene, binaries: &[Binary]) -> Result<Vec<File>, PackError> {
-    let mut files = pack(&components(), binaries)?;
-    files.push(system(scene, &files)?);
+    let mut files = pack(&components_of(scene)?, binaries)?;
+    if scene.structure.is_none() {
+        files.push(system(scene, &files)?);
+    }
     Ok(files)
 }
 
@@ -145,7 +172,9 @@ pub fn pack(components: &[Component], binaries: &[Binary]) -> Result<Vec<File>, 
     for Binary { platform: [folder, suffix], path } in binaries {
         let content = std::fs::read(path).map_err(|source| PackError::Unreadable { path: path.clone(), source })?;
         let contains = |text: &str| content.windows(text.len()).any(|part| part == text.as_bytes());
-        let owner = descriptions.iter().position(|description| contains(&description.guid));
+        let owner = components
+            .iter()
+            .position(|component| contains(&component.library_guid));
         let owner = owner.ok_or_else(|| PackError::Foreign(path.clone()))?;
         let name = format!("binaries/{folder}/{}{suffix}", components[owner].identifier);
         libraries[owner].insert(name, content);
@@ -165,7 +194,10 @@ pub fn pack(components: &[Component], binaries: &[Binary]) -> Result<Vec<File>, 
             ("model.png", component.png.to_vec()),
         ];
         let entries = entries.map(|(name, content)| (name.into(), content));
-        fmus.push(archive(name, entries.into_iter().chain(libraries))?);
+        let entries = entries.into_iter().filter(|(_, content)| !content.is_empty());
+        let resources = component.resources.iter();
+        let resources = resources.map(|(name, content)| (format!("resources/{name}"), content.clone()));
+        fmus.push(archive(name, entries.chain(resources).chain(libraries))?);
     }
     Ok(fmus)
 }
@@ -203,7 +235,7 @@ fn documentation(component: &Component, description: &Description) -> String {
             body {
                 h1 { (description.model_name) }
                 p { (description.description) ". Version " (description.version) "; FMI " (description.fmi_version) "." }
-                (PreEscaped(component.page)) (variables.html("Variables"))
+                (PreEscaped(&component.page)) (variables.html("Variables"))
             }
         }
     };

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use vines_testbench::rig::{Drive, FrictionTotals, GroundTruth, Measured, Rig, RigError, Sensors, has_friction};
 use vines_testbench::scene::{
-    Definition, Measurand, Names, PLANT_PARAMETERS, Reference as ReferenceSignal, Scene, Sensor,
+    Definition, Excitation, Measurand, Names, PLANT_PARAMETERS, Reference as ReferenceSignal, Scene, Sensor, Structure,
 };
 
 use crate::instance::{Connection, Fmu, FmuError, Variable, unpack};
@@ -49,6 +49,19 @@ fn used(names: &Names, definition: Definition) -> Vec<(String, &'static str)> {
     NAMES.into_iter().chain(parameters).map(unit).collect()
 }
 
+/// The amplitude of a drive, its signal and its total, with their unit.
+fn drive_names(structure: Option<&Structure>) -> [(&'static str, &'static str); 3] {
+    match structure.map(|structure| structure.excitation) {
+        Some(Excitation::Force) => [("F_amplitude", "N"), ("F", "N"), ("force", "N")],
+        Some(Excitation::Base) | None => [("E", "m"), ("e", "m"), ("base", "m")],
+    }
+}
+
+/// The displacement at the sensor of a structure.
+fn at_sensor(structure: &Structure) -> String {
+    format!("q[{}]", structure.points[structure.sensor])
+}
+
 /// A plant FMU, stepped sample by sample.
 ///
 /// It needs the output that the sensor reads, `v` or `q1`, from which a velocity or an acceleration follows (or what the scene maps `response`
@@ -57,6 +70,8 @@ fn used(names: &Names, definition: Definition) -> Vec<(String, &'static str)> {
 /// reference sensor; where it has `impacts`, `impact_time`, `impact_velocity` and `der(q2)`, it reports its impacts. The parameters `M`,
 /// `k`, `c`, `m`, `b`, `r`, those of the scene's real cavity, and the start `q1`, `der(q1)`, `q2`, `der(q2)` are set as far as the FMU has
 /// them. A scene maps all names.
+///
+/// Of a scene with a structure it is the FMU of that structure: with its inputs, and the displacement at the sensor as output `q[POINT]`.
 pub struct FmuRig {
     fmu: Fmu,
     /// `omega` and `E`.
@@ -68,6 +83,8 @@ pub struct FmuRig {
     response: Variable,
     reference: Option<Variable>,
     inside: Option<Inside>,
+    /// Base displacement per drive, and displacement at the sensor per displacement at the cavity, of a structure's driven mode.
+    of_driven_mode: Option<[f64; 2]>,
 }
 
 /// The variables of the ground truth.
@@ -85,28 +102,48 @@ impl FmuRig {
     /// the scene maps them to. It has the sensors of the scene.
     pub fn load(path: &Path, scene: &Scene) -> Result<Measured<Self>, FmuError> {
         let (names, definition) = (&scene.rig_names, scene.resonance);
-        let mut fmu = Fmu::load(path, "plant", names, &used(names, definition), scene.sample_time())?;
+        let structure = scene.structure.as_ref();
+        let mut used = used(names, definition);
+        let drive = drive_names(structure);
+        used.extend(structure.map(|structure| (at_sensor(structure), "m")));
+        used.extend(drive.iter().map(|(name, unit)| ((*name).to_owned(), *unit)));
+        let mut fmu = Fmu::load(path, "plant", names, &used, scene.sample_time())?;
+        let [amplitude, signal, total] = drive.map(|(name, _)| name);
         let inputs = fmu
             .find("omega")
-            .zip(fmu.find("E"))
+            .zip(fmu.find(amplitude))
             .map(|(omega, amplitude)| [omega, amplitude]);
         let held = match inputs {
-            Some(_) => fmu.find("e"),
-            None => Some(fmu.need("e")?),
+            Some(_) => fmu.find(signal),
+            None => Some(fmu.need(signal)?),
         };
-        let ours = match definition.sensor {
-            _ if names.mapped("response").is_some() => "response",
-            Sensor::V => "v",
-            Sensor::Q1 => "q1",
+        let ours = match (structure, definition.sensor) {
+            _ if names.mapped("response").is_some() => "response".to_owned(),
+            (Some(structure), _) => at_sensor(structure),
+            (None, Sensor::V) => "v".to_owned(),
+            (None, Sensor::Q1) => "q1".to_owned(),
         };
-        let response = fmu.need(ours)?;
+        let response = fmu.need(&ours)?;
         let reference = match definition.reference {
-            ReferenceSignal::Base => fmu.find("base"),
-            ReferenceSignal::Force => Some(fmu.need("base")?),
+            ReferenceSignal::Base => fmu.find(total),
+            ReferenceSignal::Force => Some(fmu.need(total)?),
         };
-        fmu.start(&scene.start_values())?;
+        let mut starts = scene.start_values();
+        // A structure starts at rest.
+        starts.retain(|(name, _)| structure.is_none() || !["q1", "der(q1)"].contains(name));
+        fmu.start(&starts)?;
         let inside = Inside::of(&fmu, has_friction(&scene.plant));
-        let rig = Self { fmu, inputs, held, phase: 0.0, response, reference, inside };
+        let of_driven_mode = structure.map(|structure| [structure.base_per_drive(), structure.reading_per_response()]);
+        let rig = Self {
+            fmu,
+            inputs,
+            held,
+            phase: 0.0,
+            response,
+            reference,
+            inside,
+            of_driven_mode,
+        };
         // A variable that the scene names is what it is measured as; velocities and accelerations of our own variables are differences.
         let mut differences = definition;
         if names.mapped("response").is_some() {
@@ -116,6 +153,10 @@ impl FmuRig {
             differences.reference_quantity = Measurand::Displacement;
         }
         Ok(Measured::new(rig, differences, &scene.plant))
+    }
+
+    fn per_drive(&self) -> f64 {
+        self.of_driven_mode.map_or(1.0, |[base, _]| base)
     }
 
     /// What the bench uses, and what of it the FMU at `path` has.
@@ -142,10 +183,17 @@ impl Rig for FmuRig {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let response = self.fmu.get(self.response)?;
         let reference = self.fmu.get_if(self.reference)?;
-        Ok(Sensors { response, reference })
+        Ok(match self.of_driven_mode {
+            None => Sensors { response, reference },
+            Some([base, reading]) => Sensors {
+                response: response / reading,
+                reference: reference.map(|reference| reference * base),
+            },
+        })
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        let per_drive = self.per_drive();
         let Some(inputs) = self.inputs else {
             // The middle of the step: the mean of what is held is then in time.
             let displacement = drive.amplitude * (self.phase + 0.5 * drive.omega * step).sin();
@@ -153,12 +201,13 @@ impl Rig for FmuRig {
             return self.hold(Drive { displacement, ..drive }, step);
         };
         self.fmu.set(inputs[0], drive.omega)?;
-        self.fmu.set(inputs[1], drive.amplitude)?;
+        self.fmu.set(inputs[1], drive.amplitude / per_drive)?;
         Ok(self.fmu.step(step)?)
     }
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.fmu.set(self.held.ok_or(RigError::NoHold)?, drive.displacement)?;
+        let displacement = drive.displacement / self.per_drive();
+        self.fmu.set(self.held.ok_or(RigError::NoHold)?, displacement)?;
         if let Some([_, amplitude]) = self.inputs {
             self.fmu.set(amplitude, 0.0)?;
         }

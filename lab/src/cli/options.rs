@@ -189,9 +189,9 @@ impl Endpoint {
 
     /// The rig of this endpoint.
     pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
-        if let (Some(_), Self::Fmu(_) | Self::Network(_)) = (&scene.structure, self) {
+        if let (Some(_), Self::Network(_)) = (&scene.structure, self) {
             return Err(Failure::input(
-                "a scene with [structure] has the rig `built-in` only: FMUs and rigs across the network have one oscillator",
+                "a scene with [structure] has the rig `built-in` or its Structure.fmu: rigs across the network have one oscillator",
             ));
         }
         let (mut pace, mut timing) = (None, Arc::default());

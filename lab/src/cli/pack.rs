@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::pack::{Binary, File, components, own_libraries, pack, pack_bench};
+use vines::pack::{Binary, File, components, components_of, own_libraries, pack, pack_bench};
 use vines::rig::BuiltIn;
 
 use super::{failure::Failure, options::SceneArguments, output::results};
@@ -16,7 +16,8 @@ Examples:
   vines pack --out fmus --scene scenes/dimensionless.toml      bench.ssp with other parameters
   vines pack --out fmus --binary win64=lovines_fmu.dll --binary win64=phase_lock_fmu.dll";
 
-/// Write LoViNes.fmu (the plant), PhaseLock.fmu (the controller) and bench.ssp (the two coupled)
+/// Write LoViNes.fmu (the plant), PhaseLock.fmu (the controller) and bench.ssp (the two coupled); of a scene with [structure],
+/// Structure.fmu and PhaseLock.fmu
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
@@ -41,8 +42,8 @@ pub(super) struct Arguments {
     only_binaries: bool,
 }
 
-/// What is written.
-const FILES: [&str; 3] = ["LoViNes.fmu", "PhaseLock.fmu", "bench.ssp"];
+/// What is written, `bench.ssp` and `LoViNes.fmu` for an oscillator and `Structure.fmu` for a structure.
+const FILES: [&str; 4] = ["LoViNes.fmu", "PhaseLock.fmu", "bench.ssp", "Structure.fmu"];
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
@@ -51,14 +52,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut binaries = Vec::new();
     if !arguments.only_binaries {
         let libraries = arguments.libraries.clone().map_or_else(beside_this_program, Ok)?;
-        binaries = own_libraries(&components(), &libraries)?;
+        binaries = own_libraries(&components_of(&scene)?, &libraries)?;
     }
     binaries.extend(arguments.binaries.iter().cloned());
     let written = folder.replace(pack_bench(&scene, &binaries)?)?;
     Ok(written.iter().map(|path| format!("{}\n", path.display())).collect())
 }
 
-/// This program's FMUs; the plant is the first.
+/// This program's FMUs of one oscillator; the plant is the first.
 pub(super) fn fmus() -> Result<Vec<File>, Failure> {
     let components = components();
     let libraries = own_libraries(&components, &beside_this_program()?)?;

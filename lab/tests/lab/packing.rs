@@ -19,8 +19,10 @@ fn component() -> Component {
         xml: format!(
             "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"Tiny\" guid=\"{GUID}\"><ModelVariables/></fmiModelDescription>"
         ),
+        library_guid: GUID.into(),
         png: b"",
-        page: "",
+        page: "".into(),
+        resources: Vec::new(),
     }
 }
 

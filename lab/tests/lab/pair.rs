@@ -9,6 +9,7 @@ use std::{
 use vines::experiment::{self, ExperimentError};
 use vines::fmu::{FmuController, FmuRig};
 use vines::identification::identify;
+use vines::pack::{Binary, components_of, own_libraries, pack_bench};
 use vines::rig::{Controller, Drive, Rig, Simulated};
 use vines::scene::{Names, PAPER, Scene};
 
@@ -36,6 +37,51 @@ fn the_fmu_has_the_bits_of_the_plant_in_a_real_cavity() {
     }
     let truth = own.ground_truth().unwrap().unwrap();
     assert!(truth.impacts > 10, "{truth:?}");
+}
+
+#[test]
+fn the_fmu_of_a_structure_has_the_bits_of_the_simulated_one() {
+    for (preset, settings) in [
+        ("cantilever", "plant.r_scatter=0.1 plant.seed=5"),
+        ("frame", "plant.mu_k=0.1 plant.theta=0.3"),
+    ] {
+        let file = format!("{}/../scenes/{preset}.toml", env!("CARGO_MANIFEST_DIR"));
+        let scene = Scene::load(Some(Path::new(&file)), &overrides(settings)).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let (name, content) = pack_bench(&scene, &libraries(&scene)).unwrap().swap_remove(0);
+        assert_eq!(name, "Structure.fmu");
+        let path = folder.path().join(name);
+        fs::write(&path, content).unwrap();
+        let mut fmu = FmuRig::load(&path, &scene).unwrap();
+        let mut own = Simulated::without_chain(&scene).unwrap();
+        for n in 0..3000_u32 {
+            assert_eq!(fmu.sense().unwrap(), own.sense().unwrap(), "{preset}, sample {n}");
+            let [of_fmu, of_own] = [fmu.ground_truth(), own.ground_truth()];
+            assert_eq!(of_fmu.unwrap(), of_own.unwrap(), "{preset}, sample {n}");
+            let drive = Drive {
+                omega: (0.99 + f64::from(n % 5) / 500.0) * scene.dimensionless().omega0,
+                amplitude: 3.0 * scene.amplitude,
+                displacement: scene.amplitude * f64::from(n % 3),
+            };
+            for rig in [&mut fmu as &mut dyn Rig, own.as_mut()] {
+                // Both ways in which a loop drives a rig.
+                if n < 2500 {
+                    rig.advance(drive, scene.sample_time()).unwrap();
+                } else {
+                    rig.hold(drive, scene.sample_time()).unwrap();
+                }
+            }
+        }
+        let truth = own.ground_truth().unwrap().unwrap();
+        assert!(truth.impacts > 10, "{preset}: {truth:?}");
+    }
+}
+
+/// The libraries that were built with this program.
+fn libraries(scene: &Scene) -> Vec<Binary> {
+    let mut folder = std::env::current_exe().unwrap();
+    folder.pop();
+    own_libraries(&components_of(scene).unwrap(), &folder).unwrap()
 }
 
 /// Writes an FMU whose variables have other names.

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use lovines::host::{Matrices, Row};
-use lovines::{Host, InvalidHost, Mode};
+use lovines::host::{Equations, Row};
+use lovines::{Host, Mode};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
@@ -67,6 +67,9 @@ pub struct Structure {
     pub driven: usize,
     /// The modes by rising frequency.
     pub modes: Vec<StructureMode>,
+    /// What the host is made of.
+    #[serde(skip)]
+    pub equations: Equations,
     /// The structure as plant and exact orbits take it.
     #[serde(skip)]
     pub host: Host,
@@ -244,8 +247,12 @@ impl StructureSection {
         let driven = driven - 1;
         let at = Places { cavity, drive, sensor };
         check(&points, &modes, driven, &at)?;
-        let host =
-            host(self.excitation, &modes, matrices.as_ref(), &direction, &at).map_err(|error| error.to_string())?;
+        let equations = equations(&modes, matrices.as_ref(), &direction, &at);
+        let kind = match self.excitation {
+            Excitation::Base => lovines::Excitation::Base,
+            Excitation::Force => lovines::Excitation::Force,
+        };
+        let host = equations.host(kind).map_err(|error| error.to_string())?;
         let shapes = |point: usize| -> Vec<f64> {
             match matrices {
                 Some(_) => unit(points.len(), point),
@@ -262,6 +269,7 @@ impl StructureSection {
             sensor,
             driven,
             modes,
+            equations,
             host,
             rows,
         })
@@ -502,18 +510,13 @@ fn check(points: &[String], modes: &[StructureMode], driven: usize, at: &Places)
     Ok(())
 }
 
-/// The host: of real modes, or of the matrices where the damping couples these.
-fn host(
-    excitation: Excitation,
+/// The equations of the host: real modes, or the matrices where the damping couples these.
+fn equations(
     modes: &[StructureMode],
     matrices: Option<&[DMatrix<f64>; 3]>,
     direction: &DVector<f64>,
     at: &Places,
-) -> Result<Host, InvalidHost> {
-    let kind = match excitation {
-        Excitation::Base => lovines::Excitation::Base,
-        Excitation::Force => lovines::Excitation::Force,
-    };
+) -> Equations {
     let Some(matrices) = matrices else {
         let mode = |mode: &StructureMode| Mode {
             omega: mode.omega,
@@ -521,7 +524,7 @@ fn host(
             cavity: mode.shape[at.cavity],
             drive: mode.drive,
         };
-        return Host::from_modes(kind, &modes.iter().map(mode).collect::<Vec<_>>());
+        return Equations::Modes(modes.iter().map(mode).collect());
     };
     let rows = |matrix: &DMatrix<f64>| -> Vec<Vec<f64>> {
         matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
@@ -531,16 +534,7 @@ fn host(
     let drive = at
         .drive
         .map_or_else(|| direction.iter().copied().collect(), |point| unit(n, point));
-    Host::from_matrices(
-        kind,
-        &Matrices {
-            mass: &mass,
-            damping: &damping,
-            stiffness: &stiffness,
-            cavity: &unit(n, at.cavity),
-            drive: &drive,
-        },
-    )
+    Equations::Matrices { mass, damping, stiffness, cavity: unit(n, at.cavity), drive }
 }
 
 /// The row of a degree of freedom.

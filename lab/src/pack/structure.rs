@@ -1,0 +1,439 @@
+//! `Structure.fmu`: its description, which has the variables of `LoViNes.fmu` that a structure has and outputs at its points, and the
+//! structure as its library reads it.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+use std::fmt::Display;
+use std::io;
+
+use fmi2_component::guid_of;
+use lovines::table::PARAMETERS;
+use phase_lock::Value;
+use serde_json::json;
+use xml::reader::{EventReader, XmlEvent};
+use xml::writer::{EmitterConfig, EventWriter, XmlEvent as Written};
+
+use super::Component;
+use crate::scene::{Excitation, Scene, Structure};
+use crate::table::Table;
+
+/// `modelIdentifier`.
+const IDENTIFIER: &str = "Structure";
+/// The file of the structure in `resources/`.
+const FILE: &str = "structure.json";
+
+/// The FMU of a structure, which has the library of the oscillator.
+///
+/// # Errors
+/// A description that is not XML.
+pub fn component(
+    oscillator: &Component,
+    structure: &Structure,
+    scene: &Scene,
+) -> Result<Component, xml::reader::Error> {
+    let starts = scene
+        .start_values()
+        .into_iter()
+        .filter_map(|(name, value)| match value {
+            Value::Real(value) => Some((name, value)),
+            Value::Integer(value) => Some((name, f64::from(value))),
+            Value::Boolean(_) => None,
+        });
+    let starts: Vec<(&str, f64)> = starts.collect();
+    let content = resource(structure, &starts);
+    let facts = Facts {
+        guid: guid_of(&oscillator.library_guid, &content),
+        excitation: structure.excitation,
+        points: &structure.points,
+        starts,
+        step: scene.sample_time(),
+        stop: PERIODS * TAU / structure.mode().omega,
+    };
+    let xml = describe(&oscillator.xml, &facts)?;
+    Ok(Component {
+        identifier: IDENTIFIER,
+        package: oscillator.package,
+        xml,
+        library_guid: oscillator.library_guid.clone(),
+        png: b"",
+        page: page(structure),
+        resources: vec![(FILE.into(), content)],
+    })
+}
+
+/// The end of the default experiment, periods of the driven mode.
+const PERIODS: f64 = 100.0;
+
+/// What the description cannot say, as HTML.
+fn page(structure: &Structure) -> Cow<'static, str> {
+    let modes = structure.modes.iter().map(|mode| {
+        let shape = structure
+            .points
+            .iter()
+            .zip(&mode.shape)
+            .map(|(point, value)| format!("{point} {value:.6}"));
+        let numbers = [mode.omega / TAU, mode.zeta, mode.drive].map(|number| format!("{number:.6}"));
+        let [frequency, damping, drive] = numbers;
+        [frequency, damping, drive, shape.collect::<Vec<_>>().join(", ")]
+    });
+    let head = "frequency, Hz | damping ratio | drive | mass-normalised shape, 1/sqrt(kg)";
+    let drive = match structure.excitation {
+        Excitation::Base => {
+            "The displacement of its base drives it; <em>drive</em> is the participation factor, sqrt(kg)."
+        }
+        Excitation::Force => "A force drives it; <em>drive</em> is the shape at the force's point, 1/sqrt(kg).",
+    };
+    let text = format!(
+        "<p>A linear structure carries a cavity, in which a particle flies freely and hits the walls. {drive} Between impacts the motion is a \
+         closed formula; there is no step-size error. The structure is fixed, in <code>resources/{FILE}</code>; parameters of cavity and \
+         particle can be set. The FMU is for co-simulation.</p>"
+    );
+    Cow::Owned(text + &Table::new(head).rows(modes).html("Modes").into_string())
+}
+
+/// What the description depends on.
+struct Facts<'a> {
+    guid: String,
+    excitation: Excitation,
+    /// Names of the points, in the order of their value references.
+    points: &'a [String],
+    /// Start values by name; other variables keep theirs.
+    starts: Vec<(&'a str, f64)>,
+    /// Step and end of the default experiment, s.
+    step: f64,
+    stop: f64,
+}
+
+/// The structure as its library reads it.
+fn resource(structure: &Structure, starts: &[(&str, f64)]) -> Vec<u8> {
+    let points = structure.points.iter().zip(&structure.rows);
+    let points: Vec<_> = points.map(|(name, row)| json!({"name": name, "row": row})).collect();
+    let start = |symbol: &str| {
+        starts
+            .iter()
+            .find(|(name, _)| *name == symbol)
+            .map_or(0.0, |(_, value)| *value)
+    };
+    let parameters = PARAMETERS.iter().filter_map(|row| {
+        let (symbol, value) = starts.iter().find(|(name, _)| *name == row.symbol)?;
+        Some(((*symbol).to_owned(), json!(value)))
+    });
+    let file = json!({
+        "excitation": structure.host.excitation(),
+        "equations": structure.equations,
+        "points": points,
+        "parameters": serde_json::Map::from_iter(parameters),
+        "particle": [start("q2"), start("der(q2)")],
+    });
+    let mut text = serde_json::to_vec_pretty(&file).unwrap_or_default();
+    text.push(b'\n');
+    text
+}
+
+/// Value reference of the first output at a point. Those of point n are `FIRST + 3 n` for its displacement, velocity and acceleration.
+const FIRST: u32 = 1000;
+
+/// The outputs at a point: symbol, quantity, declared type, unit with its display unit.
+const QUANTITIES: [(&str, &str, &str, [&str; 2]); 3] = [
+    ("q", "displacement", "Displacement", ["m", "mm"]),
+    ("v", "velocity", "Velocity", ["m/s", "mm/s"]),
+    ("a", "acceleration", "Acceleration", ["m/s2", ""]),
+];
+
+/// Variables of one oscillator that a structure lacks: its own parameters and start are in the resources, and `v` is the centre of its
+/// two masses. The others are of model exchange.
+const ABSENT: [&str; 11] = [
+    "M",
+    "k",
+    "c",
+    "v",
+    "q1_start",
+    "der_q1_start",
+    "u1",
+    "der(u1)",
+    "u2",
+    "der(u2)",
+    "der(phase)",
+];
+
+/// Variables that follow from the structure.
+const COMPUTED: [&str; 2] = ["q1", "der(q1)"];
+
+/// Meanings that are others than those of the oscillator.
+const MEANINGS: [(&str, &str); 7] = [
+    ("q1", "displacement of the structure at the cavity"),
+    ("der(q1)", "velocity of the structure at the cavity"),
+    ("der(q2)", "velocity of the particle"),
+    (
+        "w",
+        "q1 - q2: displacement of the cavity relative to the particle, from -b to b",
+    ),
+    ("der(w)", "velocity of the cavity relative to the particle"),
+    (
+        "phase",
+        "phase of the built-in oscillator of the drive, 0 at the start, brought back to [0, 2 pi)",
+    ),
+    (
+        "energy",
+        "mechanical energy: of the structure, relative to a base at its displacement, of the particle, and of its weight on a tilted axis",
+    ),
+];
+
+/// Names and meanings of the drive, where it is a base and where it is a force.
+const DRIVE: [(&str, &str, [&str; 2]); 4] = [
+    (
+        "e",
+        "F",
+        [
+            "base displacement signal, held between samples, or a polynomial where input derivatives are given",
+            "force signal, held between samples, or a polynomial where input derivatives are given",
+        ],
+    ),
+    (
+        "E",
+        "F_amplitude",
+        [
+            "amplitude of the built-in oscillator of the base, added to e; held during a step: input derivatives are accepted and have no effect",
+            "amplitude of the built-in oscillator of the force, added to F; held during a step: input derivatives are accepted and have no effect",
+        ],
+    ),
+    (
+        "omega",
+        "omega",
+        [
+            "frequency of the built-in oscillator, held during a step: input derivatives are accepted and have no effect; its phase is continuous",
+            "frequency of the built-in oscillator, held during a step: input derivatives are accepted and have no effect; its phase is continuous",
+        ],
+    ),
+    (
+        "base",
+        "force",
+        [
+            "total base displacement e + E sin(phase): what the reference sensor reads",
+            "total force F + F_amplitude sin(phase): what the reference sensor reads",
+        ],
+    ),
+];
+
+/// An element of a description.
+#[derive(Clone, Debug, Default)]
+struct Element {
+    name: String,
+    attributes: Vec<(String, String)>,
+    children: Vec<Element>,
+}
+
+impl Element {
+    fn new(name: &str, attributes: &[(&str, &dyn Display)]) -> Self {
+        let attributes = attributes
+            .iter()
+            .map(|(name, value)| ((*name).to_owned(), value.to_string()));
+        Self {
+            name: name.into(),
+            attributes: attributes.collect(),
+            children: Vec::new(),
+        }
+    }
+
+    fn with(mut self, child: Self) -> Self {
+        self.children.push(child);
+        self
+    }
+
+    /// The root of a document.
+    fn parse(xml: &str) -> Result<Self, xml::reader::Error> {
+        let mut open = vec![Self::default()];
+        for event in EventReader::new(xml.as_bytes()) {
+            match event? {
+                XmlEvent::StartElement { name, attributes, .. } => {
+                    let attributes = attributes.into_iter().map(|one| (one.name.local_name, one.value));
+                    let (name, attributes) = (name.local_name, attributes.collect());
+                    open.push(Self { name, attributes, children: Vec::new() });
+                }
+                XmlEvent::EndElement { .. } => {
+                    if let (Some(done), Some(parent)) = (open.pop(), open.last_mut()) {
+                        parent.children.push(done);
+                    }
+                }
+                _ => {}
+            }
+        }
+        Ok(open.swap_remove(0).children.pop().unwrap_or_default())
+    }
+
+    fn write<W: io::Write>(&self, writer: &mut EventWriter<W>) -> xml::writer::Result<()> {
+        let start = Written::start_element(self.name.as_str());
+        let attributes = self.attributes.iter();
+        writer.write(attributes.fold(start, |start, (name, value)| start.attr(name.as_str(), value)))?;
+        self.children.iter().try_for_each(|child| child.write(writer))?;
+        writer.write(Written::end_element())
+    }
+
+    fn get(&self, name: &str) -> &str {
+        let found = self.attributes.iter().find(|(other, _)| other == name);
+        found.map_or("", |(_, value)| value)
+    }
+
+    fn set(&mut self, name: &str, value: impl Display) {
+        match self.attributes.iter_mut().find(|(other, _)| other == name) {
+            Some((_, old)) => *old = value.to_string(),
+            None => self.attributes.push((name.into(), value.to_string())),
+        }
+    }
+
+    fn remove(&mut self, name: &str) {
+        self.attributes.retain(|(other, _)| other != name);
+    }
+
+    fn child(&mut self, name: &str) -> &mut Self {
+        let found = self.children.iter().position(|child| child.name == name);
+        let place = found.unwrap_or_else(|| {
+            self.children.push(Self { name: name.into(), ..Self::default() });
+            self.children.len() - 1
+        });
+        &mut self.children[place]
+    }
+}
+
+/// The description of a structure, from that of `LoViNes.fmu`.
+///
+/// # Errors
+/// A text that is not XML.
+fn describe(oscillator: &str, facts: &Facts<'_>) -> Result<String, xml::reader::Error> {
+    let mut root = Element::parse(oscillator)?;
+    root.set("modelName", IDENTIFIER);
+    root.set("guid", &facts.guid);
+    // A point is an index in brackets, which in structured names would have to be a number.
+    root.set("variableNamingConvention", "flat");
+    root.remove("numberOfEventIndicators");
+    root.set(
+        "description",
+        "Structure with a vibro-impact nonlinear energy sink: a particle flies freely in a cavity of the structure and hits its walls",
+    );
+    root.children
+        .retain(|child| !["ModelExchange", "ModelStructure"].contains(&child.name.as_str()));
+    let interface = root.child("CoSimulation");
+    interface.set("modelIdentifier", IDENTIFIER);
+    interface.set("providesDirectionalDerivative", false);
+    interface.remove("maxOutputDerivativeOrder");
+    let experiment = root.child("DefaultExperiment");
+    experiment.remove("tolerance");
+    experiment.set("stopTime", facts.stop);
+    experiment.set("stepSize", facts.step);
+    if facts.excitation == Excitation::Force {
+        let newton = Element::new("BaseUnit", &[("kg", &1), ("m", &1), ("s", &-2)]);
+        root.child("UnitDefinitions")
+            .children
+            .push(Element::new("Unit", &[("name", &"N")]).with(newton));
+    }
+    let variables = root.child("ModelVariables");
+    variables.children = variables_of(std::mem::take(&mut variables.children), facts);
+    let structure = model_structure(&variables.children);
+    root.children.push(structure);
+    let mut written = Vec::new();
+    let config = EmitterConfig::new().perform_indent(true).line_separator("\n");
+    // A vector takes every byte, and what was parsed has the form of XML.
+    root.write(&mut config.create_writer(&mut written))
+        .expect("a document in memory");
+    Ok(String::from_utf8_lossy(&written).into_owned() + "\n")
+}
+
+/// The variables of the structure, in the order of the oscillator's, and its points.
+fn variables_of(oscillator: Vec<Element>, facts: &Facts<'_>) -> Vec<Element> {
+    let (mut kept, mut places) = (Vec::new(), HashMap::new());
+    for (n, mut variable) in oscillator.into_iter().enumerate() {
+        if ABSENT.contains(&variable.get("name")) {
+            continue;
+        }
+        adapt(&mut variable, facts);
+        kept.push(variable);
+        places.insert((n + 1).to_string(), kept.len());
+    }
+    for content in kept.iter_mut().flat_map(|variable| &mut variable.children) {
+        if let Some(place) = places.get(content.get("derivative")) {
+            content.set("derivative", place);
+        }
+    }
+    for (n, point) in facts.points.iter().enumerate() {
+        for (k, (symbol, quantity, kind, [unit, display])) in QUANTITIES.into_iter().enumerate() {
+            let mut content = Element::new("Real", &[("declaredType", &kind), ("unit", &unit)]);
+            if !display.is_empty() {
+                content.set("displayUnit", display);
+            }
+            let variable = Element::new(
+                "ScalarVariable",
+                &[
+                    ("name", &format!("{symbol}[{point}]")),
+                    ("valueReference", &(FIRST as usize + 3 * n + k)),
+                    ("causality", &"output"),
+                    ("variability", &"continuous"),
+                    ("initial", &"calculated"),
+                    (
+                        "description",
+                        &format!("{quantity} of the structure at the point {point}"),
+                    ),
+                ],
+            );
+            kept.push(variable.with(content));
+        }
+    }
+    kept
+}
+
+/// Makes a variable of the oscillator one of the structure.
+fn adapt(variable: &mut Element, facts: &Facts<'_>) {
+    let name = variable.get("name").to_owned();
+    let by_force = facts.excitation == Excitation::Force;
+    if let Some((_, force, meanings)) = DRIVE.iter().find(|(base, ..)| *base == name) {
+        variable.set("description", meanings[usize::from(by_force)]);
+        let content = &mut variable.children[0];
+        if by_force && content.get("unit") == "m" {
+            *content = Element::new("Real", &[("quantity", &"Force"), ("unit", &"N")]);
+            if name != "base" {
+                content.set("start", 0);
+            }
+        }
+        if by_force {
+            variable.set("name", force);
+        }
+    }
+    if let Some((_, meaning)) = MEANINGS.iter().find(|(other, _)| *other == name) {
+        variable.set("description", meaning);
+    }
+    if COMPUTED.contains(&&*name) {
+        variable.set("initial", "calculated");
+        variable.children[0].remove("start");
+        return;
+    }
+    if let Some((_, start)) = facts.starts.iter().find(|(other, _)| *other == name) {
+        variable.children[0].set("start", start);
+    }
+}
+
+/// Which outputs there are. That of the drive follows its inputs at once, all others with the next step.
+fn model_structure(variables: &[Element]) -> Element {
+    let inputs = variables
+        .iter()
+        .enumerate()
+        .filter(|(_, one)| one.get("causality") == "input");
+    let inputs: Vec<String> = inputs.map(|(n, _)| (n + 1).to_string()).collect();
+    let (mut outputs, mut unknowns) = (Element::new("Outputs", &[]), Element::new("InitialUnknowns", &[]));
+    for (n, variable) in variables
+        .iter()
+        .enumerate()
+        .filter(|(_, one)| one.get("causality") == "output")
+    {
+        let at_once = ["base", "force"].contains(&variable.get("name"));
+        let dependencies = if at_once { inputs.join(" ") } else { String::new() };
+        let index = n + 1;
+        outputs = outputs.with(Element::new(
+            "Unknown",
+            &[("index", &index), ("dependencies", &dependencies)],
+        ));
+        if variable.get("initial") == "calculated" {
+            unknowns = unknowns.with(Element::new("Unknown", &[("index", &index)]));
+        }
+    }
+    Element::new("ModelStructure", &[]).with(outputs).with(unknowns)
+}
