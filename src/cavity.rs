@@ -45,11 +45,13 @@ impl Forces {
     }
 
     /// Whether any acts: then the particle does not fly straight.
+    #[inline]
     pub fn act(&self) -> bool {
         self.gravity != 0.0 || self.holding != 0.0
     }
 
     /// The size of all.
+    #[inline]
     pub fn size(&self) -> f64 {
         self.gravity.abs() + self.holding
     }

@@ -115,6 +115,7 @@ impl ImpactLaw {
 
     /// The law for another coefficient of restitution. Its share has one rounding error only: that of a coefficient which changes from
     /// impact to impact does not add up.
+    #[inline]
     pub fn with_restitution(&self, r: f64) -> Self {
         let primary_share = ((1.0 + r) * self.particle_fraction, 0.0);
         Self { restitution: r, primary_share, ..*self }
@@ -153,6 +154,7 @@ impl ImpactLaw {
     }
 
     /// This law with another coefficient of restitution in the question whether the particle rests.
+    #[inline]
     pub(crate) fn resting_with(&self, restitution: f64) -> Self {
         Self { restitution, ..*self }
     }

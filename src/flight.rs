@@ -183,6 +183,10 @@ impl<M: Motion> Bounds<M::Look> for &Flight<M> {
     fn third(&self, d: &M::Look, window: f64) -> f64 {
         self.motion.third_derivative_bound(d, window)
     }
+
+    fn open(&self, which: usize, gap: &Gap, d: &M::Look, window: f64) -> f64 {
+        self.motion.certainly_open(Wall::BOTH[which].sign(), gap, d, window)
+    }
 }
 
 /// Bounds of the gap to the wall ahead and of the relative velocity, in the unit of length.

@@ -9,6 +9,7 @@ use core::ops::Index;
 
 use crate::arithmetic::sincos_of_product;
 use crate::base_motion::BaseMotion;
+use crate::clearance::Gap;
 use crate::forcing::Forcing;
 use crate::oscillator::{Oscillator, is_apart, pushed};
 use num_complex::Complex64;
@@ -41,6 +42,11 @@ pub trait Motion {
 
     /// What happens `t` seconds after the start; `series` is that of this motion.
     fn at(&self, series: &Series, t: f64) -> Instant<Self::Look>;
+
+    /// How long `gap`, to the wall of the sign `sign`, is certainly open during a flight, s, at most `window`.
+    fn certainly_open(&self, _sign: f64, gap: &Gap, d: &Self::Look, window: f64) -> f64 {
+        gap.certainly_open(window, |h| self.third_derivative_bound(d, h))
+    }
 
     /// A bound on `|x'''|` over the next `window` seconds, given the derivatives now.
     fn third_derivative_bound(&self, d: &Self::Look, window: f64) -> f64;

@@ -10,6 +10,7 @@ use num_complex::Complex64;
 
 use crate::arithmetic::Sums;
 use crate::base_motion::{BaseMotion, Drive, shift};
+use crate::clearance::Gap;
 use crate::contact::Wall;
 use crate::flight::{FlightEnd, Sticking};
 use crate::forcing::Forcing;
@@ -53,6 +54,32 @@ struct Part {
     is_apart: bool,
     x0: f64,
     v0: f64,
+    /// Position and velocity of its free motion beside the steady response and the polynomial, where these exist.
+    free: Option<[f64; 2]>,
+    /// Bounds of the third derivative of the output's part: by the steady response and the polynomial, and what the forcing adds per second.
+    steady_jerk: f64,
+    forced_jerk: f64,
+}
+
+/// What the sections from one on contribute by their free motions, which decay: value, velocity and acceleration now, and a bound of the value from
+/// now on; and a bound of the third derivative of all other parts, with what is added to it per second.
+#[derive(Clone, Copy, Debug, Default)]
+struct Split {
+    now: [f64; 3],
+    amplitude: f64,
+    jerk: [f64; 2],
+}
+
+/// The sum is split after the first section, the first two and the first four.
+const SPLITS: usize = 3;
+
+/// A section at an instant: position and velocity, and those of its free motion.
+#[derive(Clone, Copy, Debug, Default)]
+struct SectionState {
+    x: f64,
+    v: f64,
+    y: f64,
+    dy: f64,
 }
 
 /// A sum of sections under one drive.
@@ -78,6 +105,7 @@ pub struct SumOfSections {
 pub struct SumLook {
     derivatives: Derivatives,
     ceilings: [f64; 3],
+    splits: [Split; SPLITS],
 }
 
 impl Index<usize> for SumLook {
@@ -100,14 +128,19 @@ impl Part {
         let [u0, u1, u2, u3] = drive.signal;
         let forcing = [c * u0 + d * u1, c * u1 + 2.0 * d * u2, c * u2 + 3.0 * d * u3, c * u3];
         let is_apart = is_apart(&oscillator);
+        let polynomial = if is_apart {
+            forcing
+        } else {
+            follower(&oscillator, forcing)
+        };
+        let forcing = Forcing::with_strength(&oscillator, omega, Complex64::new(c, d * omega));
         Self {
-            polynomial: if is_apart {
-                forcing
-            } else {
-                follower(&oscillator, forcing)
-            },
+            polynomial,
             is_apart,
-            forcing: Forcing::with_strength(&oscillator, omega, Complex64::new(c, d * omega)),
+            free: None,
+            steady_jerk: 0.0,
+            forced_jerk: 0.0,
+            forcing,
             oscillator,
             row: cavity,
             drive: [c, d],
@@ -116,9 +149,28 @@ impl Part {
         }
     }
 
-    /// Position and velocity after `t` seconds; `turned` is `e^{i omega t}`.
+    /// Tells the free motion from the rest, where the drive has the phasor `phasor` at the start.
+    fn split(&mut self, phasor: Complex64, omega: f64, signal: &[f64; 4]) {
+        let ([a, b], [c, d]) = (self.row.map(f64::abs), self.drive.map(f64::abs));
+        let size = phasor.l1_norm() * omega * omega * omega;
+        let (harmonic, cubic) = ((c + d * omega) * size, 6.0 * signal[3].abs());
+        self.forced_jerk = self.oscillator.reach * (a * (harmonic + c * cubic) + b * harmonic * omega);
+        let [p0, p1, _, p3] = self.polynomial;
+        self.free = self.forcing.steady().filter(|_| !self.is_apart).map(|steady| {
+            let response = phasor * steady;
+            self.steady_jerk = (a + b * omega) * response.l1_norm() * omega * omega * omega + 6.0 * a * p3.abs();
+            [self.x0 - p0 - response.im, self.v0 - p1 - omega * response.re]
+        });
+    }
+
+    fn at_start(&self) -> SectionState {
+        let [y, dy] = self.free.unwrap_or_default();
+        SectionState { x: self.x0, v: self.v0, y, dy }
+    }
+
+    /// Its state after `t` seconds; `turned` is `e^{i omega t}`.
     #[inline]
-    fn closed_form(&self, t: f64, phasor: Complex64, turned: Complex64) -> (f64, f64) {
+    fn closed_form(&self, t: f64, phasor: Complex64, turned: Complex64) -> SectionState {
         let [p0, p1, p2, p3] = self.polynomial;
         let (free, decayed) = self.oscillator.flow(t);
         let (mut x, mut v);
@@ -137,12 +189,13 @@ impl Part {
             x += (phasor * response.position).im;
             v += (phasor * response.velocity).im;
         }
-        (x, v)
+        let (y, dy) = self.free.map_or((0.0, 0.0), |[y, dy]| free.of(y, dy));
+        SectionState { x, v, y, dy }
     }
 
     /// Position and its first seven derivatives.
     #[inline]
-    fn derivatives(&self, (x, v): (f64, f64), u: &DriveDerivatives) -> [f64; 8] {
+    fn derivatives(&self, &SectionState { x, v, .. }: &SectionState, u: &DriveDerivatives) -> [f64; 8] {
         let Oscillator { delta, omega0_squared, .. } = self.oscillator;
         let [c, d] = self.drive;
         let mut of = [x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
@@ -184,8 +237,11 @@ impl SumOfSections {
             start: SumLook::default(),
             parts,
         };
+        if motion.parts.len() > 1 {
+            (motion.parts.iter_mut()).for_each(|part| part.split(phasor, omega, &base.drive.signal));
+        }
         motion.forced = [3, 4, 5].map(|order| motion.forcing_bound(order));
-        motion.start = motion.look(motion.parts.iter().map(|part| (part.x0, part.v0)), &u);
+        motion.start = motion.look(motion.parts.iter().map(Part::at_start), &u);
         motion.all_bounds = all_bounds;
         motion
     }
@@ -212,12 +268,13 @@ impl SumOfSections {
 
     /// Output and bounds from positions and velocities of the sections.
     #[inline]
-    fn look(&self, states: impl Iterator<Item = (f64, f64)>, u: &DriveDerivatives) -> SumLook {
+    fn look(&self, states: impl Iterator<Item = SectionState>, u: &DriveDerivatives) -> SumLook {
         let mut derivatives: Derivatives = u.map(|u| self.feed * u);
         let mut ceilings = [0.0; 3];
         let bounds = if self.all_bounds { 3 } else { 1 };
-        for (part, state) in self.parts.iter().zip(states) {
-            let d = part.derivatives(state, u);
+        let mut splits = [Split::default(); SPLITS];
+        for (number, (part, state)) in self.parts.iter().zip(states).enumerate() {
+            let d = part.derivatives(&state, u);
             let [a, b] = part.row;
             for (n, sum) in derivatives.iter_mut().enumerate() {
                 *sum += a * d[n] + b * d[n + 1];
@@ -230,12 +287,15 @@ impl SumOfSections {
                     *sum += b.abs() * part.oscillator.ceiling(d[n + 4], next);
                 }
             }
+            if self.parts.len() > 1 {
+                part.add_to(&mut splits, number, &state, ceilings[0]);
+            }
         }
-        SumLook { derivatives, ceilings }
+        SumLook { derivatives, ceilings, splits }
     }
 
     /// Positions and velocities of the sections after `t` seconds, and the drive then.
-    fn after(&self, t: f64) -> (impl Iterator<Item = (f64, f64)>, DriveDerivatives) {
+    fn after(&self, t: f64) -> (impl Iterator<Item = SectionState>, DriveDerivatives) {
         let (sin, cos) = crate::arithmetic::sincos_of_product((self.omega, 0.0), t);
         let turned = Complex64::new(cos, sin);
         let u = self.drive(t, self.phasor * turned);
@@ -256,7 +316,9 @@ impl SumOfSections {
         let changes = self.parts.iter().map(move |part| {
             let (dx, dv) = match &series {
                 Some(series) => part.short_change(series, t),
-                None => states.next().map_or((0.0, 0.0), |(x, v)| (x - part.x0, v - part.v0)),
+                None => states
+                    .next()
+                    .map_or((0.0, 0.0), |now| (now.x - part.x0, now.v - part.v0)),
             };
             [dx, dv - part.drive[1] * by_drive]
         });
@@ -303,6 +365,39 @@ fn change_of(coefficients: &Coefficients, t: f64) -> f64 {
 }
 
 impl Part {
+    /// Adds section number `number` to the splits: to the free motions of those before it, to the rest of those behind; `ceiling` is the bound of the
+    /// third derivative of the free motions up to it.
+    #[inline]
+    fn add_to(&self, splits: &mut [Split; SPLITS], number: usize, state: &SectionState, ceiling: f64) {
+        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
+        let ([a, b], SectionState { y, dy, .. }) = (self.row, *state);
+        let ddy = -(2.0 * delta * dy + omega0_squared * y);
+        let dddy = -(2.0 * delta * ddy + omega0_squared * dy);
+        let mut amplitude = a.abs() * self.oscillator.ceiling(y, dy);
+        if b != 0.0 {
+            amplitude += b.abs() * self.oscillator.ceiling(dy, ddy);
+        }
+        if self.free.is_none() {
+            amplitude = f64::INFINITY;
+        }
+        for (n, split) in splits.iter_mut().enumerate() {
+            let slow = 1 << n;
+            if number >= slow {
+                let [x, v, acceleration] = &mut split.now;
+                *x += a * y + b * dy;
+                *v += a * dy + b * ddy;
+                *acceleration += a * ddy + b * dddy;
+                split.amplitude += amplitude;
+                split.jerk[0] += self.steady_jerk;
+            } else {
+                split.jerk[1] += self.forced_jerk;
+                if number + 1 == slow {
+                    split.jerk[0] += ceiling;
+                }
+            }
+        }
+    }
+
     /// The Taylor series of the position; `u` is that of the drive.
     fn series(&self, u: &Coefficients) -> Coefficients {
         let Oscillator { delta, omega0_squared, .. } = self.oscillator;
@@ -371,6 +466,26 @@ impl Motion for SumOfSections {
             derivatives[0] - x0
         };
         Instant { moved, departure, derivatives }
+    }
+
+    /// Far from the wall a fast section matters little: its free motion stays within a small amplitude, while its third derivative would cut the
+    /// steps short. Each split takes the sections behind it by their amplitude and the others by Taylor's theorem; the longest certificate counts.
+    fn certainly_open(&self, sign: f64, gap: &Gap, d: &SumLook, window: f64) -> f64 {
+        let mut open = gap.certainly_open(window, |h| self.third_derivative_bound(d, h));
+        let splits = (0..SPLITS).filter(|n| self.parts.len() > 1 << n).count();
+        for Split { now: [y, dy, ddy], amplitude, jerk: [jerk, per_second] } in &d.splits[..splits] {
+            let slow = Gap {
+                gap: gap.gap + sign * y - amplitude * (1.0 + 1e-12),
+                closing: gap.closing - sign * dy,
+                acceleration: gap.acceleration - sign * ddy,
+                jerk: 0.0,
+            };
+            if slow.gap > 0.0 && open < window {
+                open = open
+                    .max(slow.certainly_open(window, |h| (jerk + h * per_second + self.forced[0][1]) * (1.0 + 1e-12)));
+            }
+        }
+        open
     }
 
     fn third_derivative_bound(&self, d: &SumLook, window: f64) -> f64 {

@@ -195,7 +195,14 @@ fn chaotic_transients_of_structures_are_followed_as_far_as_double_precision_can(
 /// proportional.
 #[test]
 fn contact_chatter_and_friction_of_structures_follow_references_of_40_digits() {
-    for name in ["contact", "contact-force", "chatter", "chatter-force", "stick-slip"] {
+    for name in [
+        "contact",
+        "contact-force",
+        "chatter",
+        "chatter-force",
+        "friction",
+        "stick-slip",
+    ] {
         let reference = Reference::read(name);
         for parts in [0, 1, 10] {
             let error = reference.errors(parts).into_iter().fold(0.0, f64::max);
