@@ -1,34 +1,41 @@
 //! How far are the parameters that a fit finds from the truth, from what they state, and from the best that the points allow?
 //!
 //! A rig is drawn (epsilon 0.002 to 0.03, lambda 0.4 to 2.5, r 0.4 to 0.9), and a client's scene that is wrong: r by 0.2, b by 10 %, m by 20 %,
-//! c by 30 %, k by 1 %. The client fits f0, zeta, r, b and epsilon to the backbone that it tracks (`points`), or to a recording of the search, the
-//! hold and the decay of `vines identify`, cut at both ends (`recordings`). For each parameter, of the fits that are not rejected:
+//! c by 30 %, k by 1 %. The client fits f0, zeta, r, b and epsilon to the backbone that it tracks (`points`), or to a recording, cut at both
+//! ends, which the plant follows: of the tracked backbone (`levels`), of a lock whose drive then changes slowly (`sweeps`), or of the search, the hold and
+//! the decay of `vines identify` (`decays`). For each parameter, of the fits that are not rejected:
 //! the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the error over u, and that over the
-//! Cramér–Rao bound of the same points; and the numbers of fits that are rejected, and of rigs without a fit.
+//! Cramér–Rao bound of the same points (of recordings, u is this bound); and the numbers of fits that are rejected, and of rigs without a fit.
 //!
 //! `effects` gives each rig one hidden effect of its cavity, in turn friction, tilt, and two laws of restitution, and as many rigs none. A rig is drawn again if
 //! the loop does not lock on it, if friction keeps the particle from the walls, or if the effect moves its points by less than 5 u. The table has the
 //! numbers of rigs that were drawn, measured, flagged because the ideal cavity does not describe their points, explained by the right effect, by a wrong one
 //! alone, and by the right one only among others; and the coverage of the strength.
 //!
-//! Arguments: `points`, `recordings` or `effects`, RIGS, SEED, SNR in dB or `none`. Writes validation/fit.csv or, for `effects`,
+//! Arguments: `points`, `levels`, `sweeps`, `decays` or `effects`, RIGS, SEED, SNR in dB or `none`. Writes validation/fit.csv or, for `effects`,
 //! validation/fit_effects.csv.
 
 mod common;
 
 use common::*;
-use vines_testbench::fit::{Effect, Known, MeasuredPoint, Quantity, Recording, at, explain, fit, parts};
+use vines_testbench::advice;
+use vines_testbench::fit::{
+    Effect, Fit, Known, MeasuredPoint, Quantity, RecordFit, Recording, at, explain, fit, follow, parts,
+};
+use vines_testbench::rig::{Drive, RigError, RigStage, Sensors};
 
 /// Measured points, the scene of the client, and the rig.
 type Points = (Vec<MeasuredPoint>, Scene, Parameters);
 
 fn main() -> Result<(), Failure> {
-    let [source, count, seed, snr] = &arguments(["points|recordings|effects", "RIGS", "SEED", "SNR|none"])?;
-    let measure: fn(&Case, &str) -> Result<Points, Failure> = match &**source {
-        "points" => points,
-        "recordings" => recorded,
+    let [source, count, seed, snr] = &arguments(["points|levels|sweeps|decays|effects", "RIGS", "SEED", "SNR|none"])?;
+    let measure: fn(&Case, &str) -> Result<Found, Failure> = match &**source {
+        "points" => |case, snr| fitted(&points(case, snr)?),
         "effects" => return effects(count.parse()?, seed.parse()?, snr),
-        other => return Err(format!("{other}: there are points, recordings and effects").into()),
+        "levels" => |case, snr| follow_one(case, snr, levels),
+        "sweeps" => |case, snr| follow_one(case, snr, sweep),
+        "decays" => |case, snr| follow_one(case, snr, lock_and_decay),
+        other => return Err(format!("{other}: there are points, levels, sweeps, decays and effects").into()),
     };
     let mut uniform = uniform(seed.parse()?);
     let case = |_| {
@@ -38,7 +45,7 @@ fn main() -> Result<(), Failure> {
         scales[4] = (r + scales[4]).clamp(0.2, 0.98) / r - 1.0;
         Ok((ratios, noise, scales))
     };
-    let found = survey(count, case, |case| fitted(&measure(case, snr)?))?;
+    let found = survey(count, case, |case| measure(case, snr))?;
     let [kept, rejected, _, failed, ..] = counts(&found);
     let rows = Quantity::ALL[..5].iter().enumerate().map(|(n, quantity)| {
         // One value of each rig whose fit is kept.
@@ -179,24 +186,138 @@ fn measured(tracked: &Tracked) -> Vec<MeasuredPoint> {
     kept(tracked).map(|point| (&point.at).into()).collect()
 }
 
-/// The points of a recording.
-fn recorded(case: &Case, snr: &str) -> Result<Points, Failure> {
-    let (truth, scene, plan) = client(case, snr)?;
-    let scene = scene.at_rest();
-    let record = record(&mut SensorsOnly::around(behind_chain(truth, &scene)?), &plan)?;
-    let count = record.samples.len();
-    let samples = &record.samples[count / 40..count - count / 40];
-    let recording = Recording {
+/// Keeps what is read before each step, and changes the amplitude of the base by a factor that depends on the number of the sample.
+struct Recorder<'a> {
+    rig: Box<dyn Rig>,
+    read: Vec<Sensors>,
+    factor: &'a dyn Fn(usize) -> f64,
+}
+
+impl RigStage for Recorder<'_> {
+    fn inner(&mut self) -> &mut dyn Rig {
+        &mut *self.rig
+    }
+
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.read.push(self.rig.sense()?);
+        Ok(self.read[self.read.len() - 1])
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        let factor = (self.factor)(self.read.len());
+        self.rig
+            .advance(Drive { amplitude: factor * drive.amplitude, ..drive }, step)
+    }
+}
+
+/// A recording, cut at both ends.
+fn recording(read: &[Sensors], sample_time: f64) -> Recording {
+    let read = &read[read.len() / 40..read.len() - read.len() / 40];
+    Recording {
         origin: "the recording".into(),
         channels: ["response".into(), "reference".into()],
         start: 0.0,
         measurands: Default::default(),
         notes: Vec::new(),
-        sample_time: record.sample_time,
-        response: samples.iter().map(|one| one.sensors.response).collect(),
-        drive: samples.iter().filter_map(|one| one.sensors.reference).collect(),
+        sample_time,
+        response: read.iter().map(|one| one.response).collect(),
+        drive: read.iter().filter_map(|one| one.reference).collect(),
+    }
+}
+
+/// A recording of a tracked backbone.
+fn levels(case: &Case, snr: &str) -> Result<(Recording, Scene, Parameters), Failure> {
+    let (truth, scene, plan) = client(case, snr)?;
+    let mut rig = Recorder {
+        rig: behind_chain(truth, &scene)?,
+        read: Vec::new(),
+        factor: &|_| 1.0,
     };
-    // For the fit, the client knows the linear response from its scene only.
-    let parts = parts(&[recording], &scene, &[])?.concat();
-    Ok((parts.into_iter().filter_map(|part| part.point).collect(), scene, truth))
+    let sample_time = plan.knowledge.sample_time;
+    tracked(&mut rig, &plan, 20.0)?;
+    Ok((recording(&rig.read, sample_time), scene, truth))
+}
+
+/// A recording of a lock whose drive then changes slowly, down and up.
+fn sweep(case: &Case, snr: &str) -> Result<(Recording, Scene, Parameters), Failure> {
+    let (truth, scene, mut plan) = client(case, snr)?;
+    let d = Dimensionless::of(&truth, 0.0);
+    let (low, high) = range(
+        (f64::INFINITY, 0.0),
+        advice::stable_orbits(&d).iter().map(|orbit| orbit.g),
+    );
+    let middle = 0.5 * (low + high);
+    let (least, most) = (1.08 * low / middle, 0.95 * high / middle);
+    let begin = plan.knowledge.samples(600.0);
+    let turn = plan
+        .knowledge
+        .samples(10.0 * plan.knowledge.linear.relaxation_periods().max(30.0));
+    let factor = move |n: usize| {
+        let share = n.saturating_sub(begin) as f64 / turn as f64;
+        let down = 1.0 + (least - 1.0) * share.min(1.0);
+        let up = (most - least) * (share - 1.0).clamp(0.0, 1.0);
+        down + up
+    };
+    plan.hold = begin + 2 * turn;
+    plan.decay = plan.knowledge.samples(5.0);
+    let mut rig = Recorder {
+        rig: behind_chain(truth, &scene)?,
+        read: Vec::new(),
+        factor: &factor,
+    };
+    let found = record(&mut rig, &plan)?;
+    Ok((recording(&rig.read[..found.released], found.sample_time), scene, truth))
+}
+
+/// A recording of the search, the hold and the decay of `vines identify`.
+fn lock_and_decay(case: &Case, snr: &str) -> Result<(Recording, Scene, Parameters), Failure> {
+    let (truth, scene, plan) = client(case, snr)?;
+    let scene = scene.at_rest();
+    let record = record(&mut SensorsOnly::around(behind_chain(truth, &scene)?), &plan)?;
+    let read: Vec<Sensors> = record.samples.iter().map(|one| one.sensors).collect();
+    Ok((recording(&read, record.sample_time), scene, truth))
+}
+
+type Recorded = fn(&Case, &str) -> Result<(Recording, Scene, Parameters), Failure>;
+
+/// Fits a record as a record.
+fn follow_one(case: &Case, snr: &str, record: Recorded) -> Result<Found, Failure> {
+    let (recording, scene, truth) = record(case, snr)?;
+    let parts = parts(std::slice::from_ref(&recording), &scene, &[])?;
+    let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
+    let start = fit(&points, scene.resonance, &scene.plant, &[])?;
+    let prepared = [recording.prepared(&scene.knowledge())?];
+    let found = follow(&prepared, &parts, &[], scene.resonance, &start.plant(&scene.plant), &[]);
+    // Without it, the result is the fit of the points.
+    let points_only = RecordFit {
+        fit: start.clone(),
+        periods: 0,
+        left_out: Vec::new(),
+        colour: f64::NAN,
+    };
+    let RecordFit { fit, periods, left_out, colour } = found.unwrap_or(points_only);
+    let over = |fit: &Fit, u: &Fit| -> Vec<f64> {
+        let over = |quantity: &Quantity| {
+            let [value, u] = [fit, u].map(|one| one.estimate(*quantity).expect("a fitted parameter"));
+            (value.value - quantity.of_plant(&truth)) / u.uncertainty
+        };
+        Quantity::ALL[..5].iter().map(over).collect()
+    };
+    let (before, ratios) = (over(&start, &start), over(&fit, &fit));
+    let spans: Vec<[f64; 2]> = left_out.iter().map(|one| one.seconds).collect();
+    let channels = fit.channels.map(|one| one.p_value.unwrap_or(f64::NAN));
+    println!(
+        "{truth:.4?}: {ratios:.1?} u, points {before:.1?} u, {periods} periods, chi-square {:.1} of {}; \
+         p of channels {channels:.3?}, colour {colour:.2}; left out {spans:.0?}",
+        fit.chi_square, fit.degrees
+    );
+    Ok(match fit.is_rejected() {
+        true => Found { counts: [0, 1, 0, 0, 0, 0], ..Found::default() },
+        false => Found {
+            errors: ratios.clone(),
+            ratios,
+            periods: None,
+            counts: [1, 0, 0, 0, 0, 0],
+        },
+    })
 }

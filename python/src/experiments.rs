@@ -224,7 +224,7 @@ fn fitted(
     parts: &[Part],
 ) -> PyResult<String> {
     let scene = &scene.scene;
-    let Found { fit, plant, verdict } = py
+    let Found { fit, plant, verdict, .. } = py
         .detach(|| find(points, scene.resonance, &scene.plant, known, |_| {}))
         .map_err(invalid)?;
     let numbers = |point: MeasuredPoint| {

@@ -7,7 +7,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
-use vines::fit::{Effect, Fit, FitReport, Found, Known, MeasuredPoint, Part, Selection, decimals, find, parts};
+use vines::fit::{
+    Candidate, Effect, Fit, FitReport, Found, Known, LeftOut, MeasuredPoint, Part, RecordFit, Recording,
+    Selection, at, decimals, find, follow, parts,
+};
 use vines::numerics::Estimate;
 use vines::report::fitted;
 use vines::table::Table;
@@ -107,12 +110,67 @@ struct Output<'a> {
     /// What the candidates say where the ideal cavity does not describe all points.
     #[serde(skip_serializing_if = "Option::is_none")]
     verdict: Option<String>,
+    /// Effects with which other parameters describe the points as well.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    alternatives: Vec<Alternative>,
     /// Parts of recordings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     parts: Vec<Part>,
+    /// Periods of recordings that the plant follows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    followed_periods: Option<usize>,
+    /// Parts of recordings that do not belong to the motion.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    left_out_of_record: Vec<LeftOut>,
     /// How recordings were read, linear decays, and what counts as exact.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     notes: Vec<String>,
+}
+
+/// An effect of the cavity with which another half-width describes the points as well.
+#[derive(Serialize)]
+struct Alternative {
+    effect: String,
+    symbol: &'static str,
+    unit: &'static str,
+    strength: f64,
+    b_m: f64,
+}
+
+impl Alternative {
+    fn of(candidate: &Candidate) -> Self {
+        let ([symbol, unit], [strength, b_m]) = (candidate.effect.symbol(), candidate.one_more());
+        Self {
+            effect: candidate.effect.to_string(),
+            symbol,
+            unit,
+            strength,
+            b_m,
+        }
+    }
+}
+
+/// What the intervals depend on: other cavities that would give the same points.
+fn only_if_ideal(alternatives: &[Candidate]) -> String {
+    let texts: Vec<String> = alternatives
+        .iter()
+        .map(Alternative::of)
+        .map(|Alternative { effect, symbol, unit, strength, b_m }| {
+            let space = if unit.is_empty() { "" } else { " " };
+            format!(
+                "{effect} with {symbol} = {strength:.2}{space}{unit} would give the same points with b = {:.2} mm",
+                1e3 * b_m
+            )
+        })
+        .collect();
+    if texts.is_empty() {
+        return String::new();
+    }
+    format!(
+        "the intervals hold if the cavity is ideal: {}. Measure b with a ruler and the masses with a scale, and give --known b=VALUE±U and \
+         --known epsilon=VALUE±U\n",
+        texts.join("; ")
+    )
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
@@ -154,20 +212,50 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         let text = output(arguments.json, &serde_json::json!({ "notes": notes }), || lines)?;
         return Ok(Results::new(text, Written::default));
     }
-    let parts: Vec<Part> = parts(&recordings, &scene, &arguments.known)
-        .map_err(Failure::run)?
-        .concat();
+    let parts_of = parts(&recordings, &scene, &arguments.known).map_err(Failure::run)?;
+    let parts: Vec<Part> = parts_of.concat();
+    let measured = points.clone();
     points.extend(parts.iter().filter_map(|part| part.point));
     let bar = progress_bar(Effect::ALL.len() as u64, "fitting effects of a real cavity", "effects");
     let progress = |done: usize| bar.set_position(done as u64);
     let found = find(&points, scene.resonance, &scene.plant, &arguments.known, progress);
     bar.finish_and_clear();
-    let Found { fit, plant, verdict } = found.map_err(Failure::run)?;
+    let Found { mut fit, mut plant, mut verdict, mut alternatives } = found.map_err(Failure::run)?;
+    let prepared: Vec<Recording> = recordings
+        .iter()
+        .map(|one| one.prepared(&scene.knowledge()))
+        .collect::<Result<_, _>>()
+        .map_err(Failure::run)?;
+    let record = follow(
+        &prepared,
+        &parts_of,
+        &measured,
+        scene.resonance,
+        &plant,
+        &arguments.known,
+    )
+    .filter(|record| !recordings.is_empty() && !record.fit.is_rejected());
+    if let Some(record) = &record {
+        (fit, verdict) = (record.fit.clone(), None);
+        alternatives.clear();
+        plant = fit.plant(&scene.plant);
+        // The points are shown beside the fit of the record.
+        if let Some(beside) = at(&points, scene.resonance, &plant, &[]) {
+            fit.residuals = beside.residuals;
+            fit.left_out.clear();
+        }
+    }
     let report = fit.report(&scene.plant);
     let printed = Output {
         report: &report,
         verdict: verdict.clone(),
+        alternatives: alternatives.iter().map(Alternative::of).collect(),
         parts: parts.clone(),
+        followed_periods: record.as_ref().map(|record| record.periods),
+        left_out_of_record: record
+            .as_ref()
+            .map(|record| record.left_out.clone())
+            .unwrap_or_default(),
         notes,
     };
     let text = output(arguments.json, &printed, || {
@@ -179,8 +267,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         let verdict = verdict.as_ref().map(|verdict| format!("{verdict}\n"));
         lines
             + &parts
-            + &summary(&report, &fit, &arguments.known, [points.len(), skipped])
+            + &summary(
+                &report,
+                &fit,
+                record.as_ref(),
+                &arguments.known,
+                [points.len(), skipped],
+            )
             + &verdict.unwrap_or_default()
+            + &only_if_ideal(&alternatives)
     })?;
     let Arguments { figure, out, json, .. } = arguments.clone();
     let plant = plant_section(&fit, &report, &plant, verdict.as_deref());
@@ -230,7 +325,13 @@ fn recorded(parts: &[Part]) -> String {
         + "\n"
 }
 
-fn summary(report: &FitReport, fit: &Fit, known: &[Known], [points, skipped]: [usize; 2]) -> String {
+fn summary(
+    report: &FitReport,
+    fit: &Fit,
+    record: Option<&RecordFit>,
+    known: &[Known],
+    [points, skipped]: [usize; 2],
+) -> String {
     let doubt = if report.describes { "" } else { " (rejected)" };
     let rows = report.parameters.iter().map(|parameter| {
         let digits = decimals(parameter.uncertainty);
@@ -268,13 +369,21 @@ fn summary(report: &FitReport, fit: &Fit, known: &[Known], [points, skipped]: [u
     } else {
         "the model does not describe them"
     };
+    let what = match record {
+        Some(record) => format!("{} periods of recordings", record.periods),
+        None => format!("{} points", report.residuals.len()),
+    };
     let _ = writeln!(
         text,
-        "\n{} points; chi-square {:.1} for {} degrees of freedom ({p}): {verdict}",
-        report.residuals.len(),
-        report.chi_square,
-        report.degrees
+        "\n{what}; chi-square {:.1} for {} degrees of freedom ({p}): {verdict}",
+        report.chi_square, report.degrees
     );
+    for LeftOut { origin, seconds: [from, to] } in record.iter().flat_map(|record| &record.left_out) {
+        let _ = writeln!(
+            text,
+            "{origin}: {from:.2} s to {to:.2} s does not belong to the motion, and is left out"
+        );
+    }
     for (channel, test) in ["responses", "frequencies", "drives"].into_iter().zip(&report.channels) {
         let size = match test.verdict() {
             Some(Ordering::Less) => "small",

@@ -9,6 +9,7 @@
 
 mod channels;
 mod effects;
+mod record;
 mod recording;
 #[cfg(feature = "tables")]
 mod table;
@@ -33,6 +34,7 @@ use crate::scene::{Dimensionless, Parameters};
 
 pub use channels::{Channel, Contents, Selection};
 pub use effects::{Candidate, Effect, Explanation, Found, decimals, explain, find};
+pub use record::{LeftOut, RecordFit, follow};
 pub use recording::{Kind, LinearDecay, Part, Recording, RecordingError, parts};
 #[cfg(feature = "tables")]
 pub use table::Table;
@@ -348,6 +350,16 @@ impl ChannelTest {
             chi_square,
             expected,
             p_value: p_value.filter(|p| p.is_finite()),
+        }
+    }
+
+    /// The test of a sum of the squares of independent residuals.
+    fn of(chi_square: f64, expected: f64) -> Self {
+        let distribution = ChiSquared::new(expected).ok();
+        Self {
+            chi_square,
+            expected,
+            p_value: distribution.map(|one| one.sf(chi_square)),
         }
     }
 

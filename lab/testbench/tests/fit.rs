@@ -8,7 +8,7 @@ use vines_model::orbit::{backbone_at_speed, resonant_motion};
 use vines_testbench::backbone::track;
 use vines_testbench::fit::{
     Channel, Contents, Contradiction, Effect, Fit, FitError, Kind, Known, MeasuredPoint, Quantity, Recording,
-    RecordingError, Selection, Table, contradiction, explain, fit, parts,
+    RecordingError, Selection, Table, contradiction, explain, find, fit, follow, parts,
 };
 use vines_testbench::rig::{BuiltIn, Chain, Rig, RigError, RigStage, Sensors, Simulated};
 use vines_testbench::scene::{Definition, Dimensionless, Measurand, Parameters, Scene, Sensor};
@@ -311,6 +311,67 @@ fn a_recording_that_begins_and_ends_in_the_middle_of_a_level_gives_the_parameter
     let mut estimates = FITTED.iter().map(|quantity| fit.estimate(*quantity).unwrap());
     let are_narrow = estimates.all(|one| one.uncertainty < 0.2 * one.value);
     assert!(worst(&fit) < 3.0 && are_narrow && !fit.is_rejected(), "{fit:?}");
+}
+
+#[test]
+fn the_plant_follows_a_record_and_determines_the_parameters_better_than_its_points() {
+    let (scene, mut record) = (wrong_scene(), recording());
+    // A second in which the sensor reads another motion.
+    let from = record.response.len() / 2;
+    let odd = from..from + (1.0 / record.sample_time) as usize;
+    record.response[odd].iter_mut().for_each(|value| *value *= 1.02);
+    let parts = parts(&[record.clone()], &scene, &[]).unwrap();
+    let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
+    let start = fit(&points, Definition::default(), &scene.plant, &[]).unwrap();
+    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+    let followed = follow(
+        &prepared,
+        &parts,
+        &[],
+        Definition::default(),
+        &start.plant(&scene.plant),
+        &[],
+    )
+    .unwrap();
+    assert!(
+        worst(&followed.fit) < 3.0 && !followed.fit.is_rejected(),
+        "{followed:?}"
+    );
+    assert!(
+        followed.colour.abs() < 0.15,
+        "innovations are white: {}",
+        followed.colour
+    );
+    let u = |fit: &Fit| fit.estimate(Quantity::R).unwrap().uncertainty;
+    assert!(u(&followed.fit) < 0.5 * u(&start), "{} {}", u(&followed.fit), u(&start));
+    let middle = (from as f64 + 0.5 / record.sample_time) * record.sample_time;
+    let is_named = |[begin, end]: [f64; 2]| begin < middle && middle < end;
+    assert!(
+        followed.left_out.iter().any(|one| is_named(one.seconds)),
+        "{:?}",
+        followed.left_out
+    );
+}
+
+#[test]
+fn without_knowns_an_ideal_fit_says_which_cavity_would_give_the_same_points() {
+    let friction = Cavity { kinetic_friction: 0.05, ..Cavity::IDEAL };
+    let motions = || (0..10).map(|n| motion_at(friction, (0.36 + 0.03 * f64::from(n)) * RIG.half_width));
+    let points = measured(motions(), 1e-4, 12);
+    let expected = wrong_scene().plant;
+    let found = find(&points, Definition::default(), &expected, &[], |_| {}).unwrap();
+    assert!(
+        !found.fit.is_rejected() && found.verdict.is_none(),
+        "{:?}",
+        found.verdict
+    );
+    let effects: Vec<Effect> = found.alternatives.iter().map(|one| one.effect).collect();
+    assert!(effects.contains(&Effect::Friction), "{effects:?}");
+    // A ruler and a scale decide.
+    let known = ["b=0.0095±0.00003", "epsilon=0.00923±0.00003"].map(|one| one.parse().unwrap());
+    let found = find(&points, Definition::default(), &expected, &known, |_| {}).unwrap();
+    let verdict = found.verdict.unwrap_or_default();
+    assert!(verdict.starts_with("friction explains it"), "{verdict}");
 }
 
 #[test]

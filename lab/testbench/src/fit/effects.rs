@@ -15,7 +15,7 @@ use lovines::cavity::GRAVITY;
 use lovines::{Cavity, Restitution};
 use nalgebra::Vector3;
 use vines_model::Definition;
-use vines_model::numerics::{Estimate, LeastSquares, Misfit, mean};
+use vines_model::numerics::{Estimate, LeastSquares, Misfit, SIGNIFICANT, mean};
 use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
 
 use super::{
@@ -65,6 +65,8 @@ const SMALLEST: f64 = 1e-3;
 /// Strength from which the search begins, over that which gives the particle the acceleration `b omega0²`: friction and tilt of this size are
 /// about 0.03 and 2 degrees on the default rig.
 const TYPICAL: f64 = 0.01;
+/// A strong effect, over a typical one.
+const STRONG: f64 = 5.0;
 /// Step of a difference: of the unknowns, of the strength relative, and along the curve.
 const STEP: f64 = 1e-4;
 /// Difference of Akaike's criterion up to which a candidate that is not the best one remains possible: its evidence is a twentieth.
@@ -83,6 +85,18 @@ impl Effect {
             Self::Viscoelastic => ["k_r", "(s/m)^(1/5)"],
             Self::Plastic => ["v_y", "m/s"],
         }
+    }
+
+    /// Unknowns from which a search begins: those of an ideal cavity, with a typical strength times `factor`.
+    fn start(self, ideal: &Unknowns, factor: f64) -> Unknowns {
+        let mut x = *ideal;
+        let typical = factor * TYPICAL * x[3].exp() * x[0].exp().powi(2) / GRAVITY;
+        x[6] = match self {
+            Self::Friction => typical,
+            Self::Tilt => 4.0 * typical * typical,
+            Self::Viscoelastic | Self::Plastic => 0.0,
+        };
+        x
     }
 
     /// Whether it has a strength beside the five parameters: a law of restitution stands for r.
@@ -210,6 +224,24 @@ impl Candidate {
         first(self).cmp(&first(other)).then(by_criterion)
     }
 
+    /// Strength one standard uncertainty above the fitted one, but at most a strong one, and the half-width, m, that goes with it. A law of
+    /// restitution has the fitted values.
+    #[must_use]
+    pub fn one_more(&self) -> [f64; 2] {
+        let (x, covariance) = (&self.fit.x, &self.fit.covariance);
+        let b = Quantity::B.of(x);
+        if !self.effect.adds_a_parameter() {
+            return [self.strength.value, b];
+        }
+        let most = self.effect.start(x, STRONG)[6] - x[6];
+        let more = covariance[(6, 6)].sqrt().min(most.max(0.0));
+        let cavity = self.effect.cavity(x[6] + more, x[2], self.speed);
+        [
+            self.effect.strength_of(&cavity),
+            b * (covariance[(3, 6)] / covariance[(6, 6)] * more).exp(),
+        ]
+    }
+
     /// The plant of the fit, with the effect. Without a known mass, stiffness or damping, its primary mass is that of `scene`.
     #[must_use]
     pub fn plant(&self, scene: &Parameters) -> Parameters {
@@ -227,7 +259,12 @@ pub struct Found {
     pub plant: Parameters,
     /// What the effects say, if the ideal cavity does not describe all points.
     pub verdict: Option<String>,
+    /// If the ideal cavity describes all points: effects that describe them as well, with a half-width outside the interval of the fit.
+    pub alternatives: Vec<Candidate>,
 }
+
+/// Most points of the search for alternatives: a curve of six parameters needs no more.
+const MOST: usize = 24;
 
 /// [`fit()`], and where the ideal cavity does not describe all points, the effect that does. `progress` is told the number of effects tried.
 ///
@@ -243,7 +280,11 @@ pub fn find(
     let ideal = fit(points, definition, expected, known)?;
     let plant = ideal.plant(expected);
     if !ideal.is_rejected() && ideal.left_out.is_empty() {
-        return Ok(Found { fit: ideal, plant, verdict: None });
+        let problem = Problem::new(points.to_vec(), definition, known);
+        let order = problem.by_falling_response();
+        let kept: Vec<usize> = order.into_iter().step_by(points.len().div_ceil(MOST)).collect();
+        let alternatives = problem.of(&kept).alternatives(&ideal, expected, progress);
+        return Ok(Found { fit: ideal, plant, verdict: None, alternatives });
     }
     let explanation = explain(points, definition, expected, known, progress)?;
     let best = explanation
@@ -251,7 +292,7 @@ pub fn find(
         .filter(|best| ideal.is_rejected() || best.fit.left_out.len() <= ideal.left_out.len());
     let verdict = (ideal.is_rejected() || best.is_some()).then(|| explanation.verdict());
     let (fit, plant) = best.map_or((ideal, plant), |best| (best.fit.clone(), best.plant(expected)));
-    Ok(Found { fit, plant, verdict })
+    Ok(Found { fit, plant, verdict, alternatives: Vec::new() })
 }
 
 /// Fits the ideal cavity to all points, and, if they contradict it, each effect alone. `progress` is told the number of candidates done.
@@ -279,6 +320,32 @@ pub fn explain(
 }
 
 impl Problem<'_> {
+    /// Effects with which the points agree as well as with the ideal cavity, while the half-width differs from it significantly.
+    fn alternatives(&self, ideal: &Fit, expected: &Parameters, mut progress: impl FnMut(usize)) -> Vec<Candidate> {
+        let Ok(same_points) = self.fit(expected) else {
+            return Vec::new();
+        };
+        let differs = |candidate: &Candidate| {
+            let [_, b] = candidate.one_more();
+            let of_ideal = ideal.estimate(Quantity::B);
+            of_ideal.is_some_and(|one| (one.value - b).abs() > SIGNIFICANT * one.uncertainty)
+        };
+        let fits = Effect::ALL.into_iter().enumerate().filter_map(|(n, effect)| {
+            progress(n);
+            // The ideal motions are near: they are those of a weak effect.
+            let strengths = [1.0, 0.1].map(|factor| effect.start(&same_points.x, factor));
+            strengths
+                .into_iter()
+                .find_map(|x| self.with_effect_from(effect, x, &same_points))
+        });
+        fits.filter(|candidate| {
+            let Candidate { fit, .. } = candidate;
+            let agrees = !fit.is_rejected() && fit.left_out.is_empty();
+            agrees && candidate.criterion() - same_points.chi_square < POSSIBLE && differs(candidate)
+        })
+        .collect()
+    }
+
     /// The fit with an effect; `None` if the plant has no such motions.
     ///
     /// Beside the fold a motion with wrong parameters may not exist, and most effects shift the points of large amplitude least: these are fitted
@@ -294,13 +361,7 @@ impl Problem<'_> {
         let starts: &[f64] = if effect.adds_a_parameter() { &[1.0, 5.0] } else { &[1.0] };
         let ideal = self.of(&largest(STAGES[0])).fit(expected).ok()?;
         let found = starts.iter().filter_map(|factor| {
-            let mut x = ideal.x;
-            let typical = factor * TYPICAL * x[3].exp() * x[0].exp().powi(2) / GRAVITY;
-            x[6] = match effect {
-                Effect::Friction => typical,
-                Effect::Tilt => 4.0 * typical * typical,
-                Effect::Viscoelastic | Effect::Plastic => 0.0,
-            };
+            let mut x = effect.start(&ideal.x, *factor);
             let mut best: Option<Candidate> = None;
             for share in STAGES {
                 let kept = largest(share);

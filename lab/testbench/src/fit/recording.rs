@@ -227,7 +227,10 @@ impl Recording {
     }
 
     /// The channels as the bench has them: in m, and without their slow drift.
-    fn prepared(&self, knowledge: &Knowledge) -> Result<Self, RecordingError> {
+    ///
+    /// # Errors
+    /// As [`Recording::parts`].
+    pub fn prepared(&self, knowledge: &Knowledge) -> Result<Self, RecordingError> {
         let linear = knowledge.linear;
         self.check(&linear)?;
         let mut one = self.clone();
