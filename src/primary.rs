@@ -8,11 +8,11 @@ use crate::system::{Masses, Moving};
 
 /// The primary structure: one oscillator ([`Single`]), or a sum of sections ([`crate::Structure`]).
 ///
-/// [`Masses::primary`] holds the displacement and the velocity at the cavity; a structure has a state beside it.
+/// `Masses::primary` holds the displacement and the velocity at the cavity; a structure has a state beside it.
 pub trait Primary: Clone {
     /// Its motion between events.
     type Motion: Motion;
-    /// Its state beside [`Masses::primary`].
+    /// Its state beside `Masses::primary`.
     type State: Clone;
 
     /// Its motion while the particle is free, under a constant force: the one that gives the particle `acceleration`, m/s².
@@ -52,7 +52,7 @@ pub trait Primary: Clone {
     fn restore(&mut self, state: &Self::State);
 }
 
-/// One oscillator: all of its state is in [`Masses::primary`].
+/// One oscillator: all of its state is in `Masses::primary`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Single;
 
