@@ -8,8 +8,8 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 use vines::fit::{
-    Candidate, Effect, Fit, FitReport, Found, Known, LeftOut, MeasuredPoint, Part, RecordFit, Recording,
-    Selection, at, decimals, find, follow, parts,
+    Candidate, Effect, Fit, FitReport, Found, Known, LeftOut, MeasuredPoint, Part, RecordFit, Recording, Selection, at,
+    decimals, find, follow, parts,
 };
 use vines::numerics::Estimate;
 use vines::report::fitted;

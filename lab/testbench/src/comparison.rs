@@ -144,13 +144,16 @@ const STEP: f64 = 4e-3;
 /// Largest particle speed of the curve: beyond symmetry breaking.
 const SPEED_MAX: f64 = 1.35;
 
+/// A curve to draw: sigma and C of its points, and whether the motion is stable there.
+pub type DrawnCurve = Vec<([f64; 2], bool)>;
+
 /// The exact backbone beyond the fold as a fine polygon, by increasing particle speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExactCurve {
     /// C, sigma and G.
     places: Vec<[f64; 3]>,
-    /// The backbone of a structure, curve by curve: sigma, C and whether it is stable.
-    pub of_structure: Option<Vec<Vec<([f64; 2], bool)>>>,
+    /// The backbone of a structure, curve by curve.
+    pub of_structure: Option<Vec<DrawnCurve>>,
 }
 
 /// Difference of a point from the exact backbone.
