@@ -14,10 +14,10 @@ Examples:
   scripts/pack --out fmus --portable                           for older Linux (glibc 2.17)
   vines pack --libraries target/debug --out fmus               libraries of `cargo build`
   vines pack --out fmus --scene scenes/dimensionless.toml      bench.ssp with other parameters
+  vines pack --out fmus --scene scenes/cantilever.toml         Structure.fmu in place of LoViNes.fmu and bench.ssp
   vines pack --out fmus --binary win64=lovines_fmu.dll --binary win64=phase_lock_fmu.dll";
 
-/// Write LoViNes.fmu (the plant), PhaseLock.fmu (the controller) and bench.ssp (the two coupled); of a scene with [structure],
-/// Structure.fmu and PhaseLock.fmu
+/// Write LoViNes.fmu (the plant), PhaseLock.fmu (the controller) and bench.ssp (the two coupled)
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
