@@ -1,8 +1,8 @@
 //! Do random structures lock from rest on an exact orbit of their drive, and is an unstable 1:1 motion ever called steady?
 //!
-//! One to five modes; the driven one has a mass ratio of 0.002 to 0.02 and a damping ratio of 0.001 to 0.02, the others 1.1 to 20 times its
+//! One to five modes; the driven one has a mass ratio of 0.002 to 0.02 and lambda of 0.1 to 3, as in `locks.rs`, the others 1.1 to 20 times its
 //! frequency, damping ratios of 0.001 to 0.03, and shapes of either sign up to 1.5 times the driven one's (uniform logarithms). A base or a
-//! force, the sensor at the drive or at the cavity, r 0.3 to 0.9. Half of the drives are of a stable symmetric 1:1 orbit at phase resonance; at
+//! force, the sensor at the drive or at the cavity, r 0.3 to 0.9, and G at most 4, the largest drive of a tracked backbone. Half of the drives are of a stable symmetric 1:1 orbit at phase resonance; at
 //! the others all orbits are unstable. A lock is correct within 2e-3 in sigma and C of a stable orbit, or within 3 u of it; wrong beyond.
 //! Where all orbits are unstable, `steady` counts locks of a constant drive that are called symmetric; `held` those whose response is under
 //! control, of which the result says so.
@@ -29,12 +29,16 @@ enum Outcome {
 /// A structure with the drive G: its text as a scene.
 fn text(uniform: &mut dyn FnMut(f64, f64) -> f64) -> String {
     let mut log = |low: f64, high: f64| uniform(low.ln(), high.ln()).exp();
-    let (epsilon, count) = (log(0.002, 0.02), log(1.0, 6.0).floor() as usize);
+    let (epsilon, lambda, count) = (log(0.002, 0.02), log(0.1, 3.0), log(1.0, 6.0).floor() as usize);
     let mut modes = Vec::new();
     let mut ratio = 1.0;
     let is_base = log(1.0, 4.0) < 2.0;
     for n in 0..count {
-        let zeta = if n == 0 { log(0.001, 0.02) } else { log(0.001, 0.03) };
+        let zeta = if n == 0 {
+            0.5 * epsilon * lambda
+        } else {
+            log(0.001, 0.03)
+        };
         let mut shape = || {
             if n == 0 {
                 log(0.5, 1.5)
@@ -77,7 +81,7 @@ fn scene_with(is_stable: bool, uniform: &mut dyn FnMut(f64, f64) -> f64) -> Resu
         let found: Vec<Orbit> = curves.into_iter().flatten().collect();
         let of_kind = found
             .iter()
-            .filter(|orbit| orbit.stable == is_stable && (0.8..=1.2).contains(&orbit.omega));
+            .filter(|orbit| orbit.stable == is_stable && (0.8..=1.2).contains(&orbit.omega) && orbit.g <= 4.0);
         let of_kind: Vec<&Orbit> = of_kind.collect();
         let Some(orbit) = of_kind.get((share * of_kind.len() as f64) as usize) else {
             continue;
@@ -92,18 +96,28 @@ fn scene_with(is_stable: bool, uniform: &mut dyn FnMut(f64, f64) -> f64) -> Resu
 
 /// Locks a structure: what became of it, its errors in sigma and C, and its periods.
 fn lock(scene: &Scene, is_stable: bool) -> (Outcome, [f64; 2], f64) {
-    let refused = (Outcome::Refused, [f64::NAN; 2], f64::NAN);
     let plan = scene.plan();
-    let Ok(rig) = Simulated::of(scene)
-        .as_mut()
-        .map(|rig| record(&mut **rig, &plan))
-        .map_err(|_| ())
-    else {
-        return refused;
+    let locked = || -> Result<_, Failure> {
+        let record = record(&mut *Simulated::of(scene)?, &plan)?;
+        let found = identify(&record, &plan)?;
+        Ok((record, found))
     };
-    let Ok(record) = rig else { return refused };
-    let Ok(found) = identify(&record, &plan) else {
-        return refused;
+    let (record, found) = match locked() {
+        Ok(both) => both,
+        Err(error) => {
+            if is_stable {
+                let orbits = orbits_of(scene, &scene.dimensionless());
+                let stable = orbits
+                    .iter()
+                    .filter(|orbit| orbit.stable)
+                    .map(|orbit| (orbit.c, orbit.b, orbit.multipliers[3]));
+                println!(
+                    "refused: {error}; stable orbits (C, B, growth) {:.4?}",
+                    stable.collect::<Vec<_>>()
+                );
+            }
+            return (Outcome::Refused, [f64::NAN; 2], f64::NAN);
+        }
     };
     let at = found.lock.at;
     let periods = record.settled as f64 / scene.controller.samples_per_period;
@@ -134,7 +148,7 @@ fn main() -> Result<(), Failure> {
         let scenes = scenes.collect::<Result<Vec<_>, Failure>>()?;
         let found: Vec<_> = scenes.par_iter().map(|scene| lock(scene, is_stable)).collect();
         for (scene, (outcome, errors, _)) in scenes.iter().zip(&found) {
-            if !matches!(outcome, Outcome::Correct | Outcome::Held) && (is_stable || *outcome != Outcome::Refused) {
+            if !matches!(outcome, Outcome::Correct | Outcome::Held | Outcome::Refused) {
                 let modes = scene.structure.as_ref().map(|structure| &structure.modes);
                 println!("{outcome:?}, errors {errors:?}: {:?}; {modes:?}", scene.dimensionless());
             }

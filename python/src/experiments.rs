@@ -252,9 +252,12 @@ pub fn orbits(py: Python<'_>, scene: &Scene, sigma: Option<Real>) -> PyResult<St
     let sigma = sigma.map(|one| one.0);
     let numbers = scene.scene.dimensionless();
     finite(sigma)?;
+    if sigma.is_some() {
+        scene.one_oscillator("orbits at a detuning are of")?;
+    }
     json(&py.detach(|| match sigma {
         Some(sigma) => orbit::symmetric_orbits(&numbers, sigma),
-        None => orbit::phase_resonant(&numbers),
+        None => vines_testbench::survey::phase_resonant(&scene.scene, &numbers),
     }))
 }
 
@@ -283,6 +286,7 @@ pub fn theory(py: Python<'_>, scene: &Scene, points: i64) -> PyResult<String> {
 pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<Real>, periods: i64) -> PyResult<String> {
     let sigma = sigma.map(|one| one.0);
     finite(sigma)?;
+    scene.one_oscillator("a regime is of")?;
     if !(100..=100_000).contains(&periods) {
         return Err(PyValueError::new_err(format!(
             "periods = {periods}: a number from 100 to 100000 is allowed"

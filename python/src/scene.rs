@@ -22,6 +22,18 @@ pub struct Scene {
     pub scene: vines_testbench::scene::Scene,
 }
 
+impl Scene {
+    /// Refuses a structure where there is one oscillator only.
+    pub fn one_oscillator(&self, what: &str) -> PyResult<()> {
+        let refusal = || {
+            invalid(format!(
+                "{what} one oscillator: the scene has a [structure]; drop it, and give M, k and c"
+            ))
+        };
+        self.scene.structure.as_ref().map_or(Ok(()), |_| Err(refusal()))
+    }
+}
+
 #[pymethods]
 impl Scene {
     #[new]

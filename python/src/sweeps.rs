@@ -101,6 +101,7 @@ pub struct Cells {
 impl Cells {
     #[new]
     fn new(scene: &Scene, keys: Vec<String>, sigma: Option<f64>, results: Vec<String>, periods: i64) -> PyResult<Self> {
+        scene.one_oscillator("a sweep is of")?;
         let periods = usize::try_from(periods)
             .map_err(|_| invalid(format!("{periods} periods: a number of at least 100 is allowed")))?;
         if let Some(name) = results.iter().find(|name| !GROUPS.contains(&name.as_str())) {

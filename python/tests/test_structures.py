@@ -102,3 +102,36 @@ def test_the_module_converts_a_universal_file_to_a_scene(tmp_path):
     refused = subprocess.run([*arguments, "--drive", "9Z"], capture_output=True, text=True)
     assert refused.returncode == 2
     assert "9Z is no point" in refused.stderr
+
+
+FRAME = """
+[plant]
+m = 0.032
+b = 0.01
+r = 0.65
+[structure]
+excitation = "force"
+cavity = "right"
+drive = "left"
+modes = [
+    { frequency = 8.8156, damping = 0.006, shape = { left = 0.45, right = 0.51252 } },
+    { frequency = 9.3, damping = 0.006, shape = { left = 0.51252, right = -0.45 } },
+]
+[excitation]
+G = 1.1
+[start]
+dq2 = 0.5
+"""
+
+
+def test_a_structure_locks_on_its_exact_orbit_and_what_has_one_oscillator_says_so():
+    scene = vines.Scene(text=FRAME)
+    found = vines.identify(scene, results="lock")
+    orbit = min(vines.orbits(scene), key=lambda one: abs(one.C - found.lock["C"]) if one.stable else np.inf)
+    assert found.lock["C"] == pytest.approx(orbit.C, abs=1e-4)
+    for refused in (vines.Plant, vines.regime, lambda one: vines.orbits(one, sigma=0.0)):
+        with pytest.raises(ValueError, match=r"one oscillator.*\[structure\]"):
+            refused(scene)
+    pytest.importorskip("xarray")
+    with pytest.raises(ValueError, match="a sweep is of one oscillator"):
+        vines.sweep(scene, {"sigma": [0.0]}, periods=400)

@@ -455,6 +455,8 @@ def _values(
     values: Mapping[str, ArrayLike] = {}
     if isinstance(parameters, Scene):
         settings = parameters.settings
+        if "structure" in settings:
+            raise ValueError("a plant has one oscillator: the scene has a [structure]; drop it, and give M, k and c")
         values, first = settings["plant"], settings["start"]
     else:
         values = parameters

@@ -76,6 +76,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     };
     let result = Comparison::of(&identification, &scene);
     let mut text = summary::identification(&result) + &summary::structure(&scene);
+    let unstable = result
+        .exact
+        .filter(|orbit| scene.structure.is_some() && !orbit.stable && !record.held);
+    if let Some(orbit) = unstable {
+        text += &format!(
+            "warning: the exact orbit there is unstable under a constant drive (largest multiplier {:.4}): the motion is modulated around it, or \
+             will leave it\n",
+            orbit.multipliers[3]
+        );
+    }
     // A rig that reports its impacts is a simulation of the scene.
     let is_simulated = !identification.lock.impacts_per_period.is_nan();
     let lock = [(&identification.lock.at).into()];
