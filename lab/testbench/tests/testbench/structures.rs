@@ -4,8 +4,12 @@ use std::f64::consts::TAU;
 use std::fs;
 
 use tempfile::TempDir;
+use vines_model::orbit::Orbit;
+use vines_testbench::experiment::run;
+use vines_testbench::identification::{Identification, IdentificationError, identify};
+use vines_testbench::rig::{BuiltIn, Simulated};
 use vines_testbench::scene::{Excitation, Scene, SceneError};
-use vines_testbench::survey::Survey;
+use vines_testbench::survey::{Survey, phase_resonant};
 
 /// A beam by two modes; `changes` are pairs of a text and its replacement.
 fn beam(changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
@@ -314,4 +318,46 @@ fn the_presets_say_which_mode_takes_the_stability_of_the_1_1_motion() {
     };
     assert!(orbit.stable && !alone(orbit.omega));
     assert!(survey("frame").orbits.iter().any(|orbit| orbit.stable));
+}
+
+/// A preset of `scenes/`, and what was identified on its simulated rig.
+fn identified(name: &str, settings: &[&str]) -> (Scene, Result<Identification, IdentificationError>) {
+    let file = format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let settings: Vec<_> = settings.iter().map(|one| one.parse().unwrap()).collect();
+    let scene = Scene::load(Some(file.as_ref()), &settings).unwrap();
+    let plan = scene.plan();
+    let mut controller = BuiltIn::new(&plan.lock).unwrap();
+    let record = run(
+        &mut *Simulated::of(&scene).unwrap(),
+        &mut controller,
+        &plan,
+        |_, _, _| {},
+    )
+    .unwrap();
+    let found = identify(&record, &plan);
+    (scene, found)
+}
+
+#[test]
+fn the_loop_finds_the_stable_exact_orbits_of_the_presets_and_refuses_what_is_asymmetric() {
+    for (name, settings) in [
+        ("resonant", &[][..]),
+        ("frame", &[]),
+        ("cantilever", &["excitation.G=1.05"]),
+        (
+            "cantilever",
+            &["excitation.G=1.05", "resonance.sensor_quantity=velocity"],
+        ),
+    ] {
+        let (scene, found) = identified(name, settings);
+        let at = found.unwrap().lock.at;
+        let orbits = phase_resonant(&scene, &scene.dimensionless());
+        let near = |orbit: &Orbit| orbit.stable && (orbit.sigma - at.sigma).abs().max((orbit.c - at.c).abs()) < 1e-4;
+        assert!(orbits.iter().any(near), "{name}: {at:?}");
+    }
+    let (_, refused) = identified("cantilever", &[]);
+    assert!(
+        matches!(refused, Err(IdentificationError::Regime { .. })),
+        "{refused:?}"
+    );
 }
