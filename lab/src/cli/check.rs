@@ -9,6 +9,7 @@ use vines::table::{Table, number, with_uncertainty};
 use super::failure::Failure;
 use super::options::{Endpoint, ReachArguments, SceneArguments};
 use super::output::{output, print};
+use super::summary::structure;
 
 const HELP: &str = "\
 Drives the rig at a hundredth of the drive for 24 periods with the loop open, and compares amplitude and phase of response and base with
@@ -65,7 +66,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     }
     let checked = check(open.rig.as_mut(), &scene.plan()).map_err(ExperimentError::from)?;
     open.close();
-    let text = output(arguments.json, &checked, || variables + &described(&checked))?;
+    let text = output(arguments.json, &checked, || {
+        variables + &described(&checked) + &structure(&scene)
+    })?;
     if checked.verdict == Verdict::Healthy {
         return Ok(text);
     }

@@ -96,6 +96,7 @@ impl SceneArguments {
 /// Warns that `results` are of the ideal cavity, if that of the scene is another.
 pub(super) fn warn_left_out(scene: &Scene, results: &str) {
     if let Some(left_out) = scene.left_out() {
+        log_warnings();
         log::warn!("{}", ideal(results, &left_out));
     }
 }

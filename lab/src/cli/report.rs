@@ -185,10 +185,11 @@ fn page(scene: &Scene, sections: &[Markup]) -> Markup {
                 style { (PreEscaped(include_str!("report.css"))) }
             }
             body {
-                h1 { "Nonlinear modal test of an oscillator with a vibro-impact nonlinear energy sink" }
+                h1 { "Nonlinear modal test of " (if scene.structure.is_some() { "a structure" } else { "an oscillator" }) " with a vibro-impact nonlinear energy sink" }
                 p { (parameters(&scene.dimensionless())) }
                 @if let Some(left_out) = scene.left_out() {
-                    p { (ideal("Theory, exact orbits and the regime map on this page are", &left_out)) ". The measurements have it." }
+                    @let results = if scene.structure.is_some() { "Theory and the regime map" } else { "Theory, exact orbits and the regime map" };
+                    p { (ideal(&format!("{results} on this page are"), &left_out)) ". The measurements have it." }
                 }
                 @for section in sections { (section) }
                 h2 { "Scene and version" }

@@ -142,7 +142,7 @@ enum Protocol {
 pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
     if scene.structure.is_some() {
-        let rule = "a structure is simulated by `vines identify` and `vines backbone` only: what is served has one oscillator; drop [structure]";
+        let rule = "what is served has one oscillator, and this scene has a [structure]: use `vines identify`, `vines backbone` and `vines check` with the rig `built-in`, or drop [structure]";
         return Err(Failure::input(rule));
     }
     let helic = arguments.protocol == Protocol::Helic;

@@ -72,7 +72,12 @@ pub(super) fn not_locked(reason: &Reason, scene: &Scene) -> String {
             places(stable)
         ),
     };
-    match scene.left_out() {
+    // The exact orbits are those of all modes of a structure; only the onset of impacts is of one oscillator.
+    let left_out = match reason {
+        Reason::NoImpacts { .. } => scene.left_out(),
+        _ => scene.left_out_of_cavity(),
+    };
+    match left_out {
         Some(left_out) => format!("{text}. This holds for the ideal cavity, without {left_out}"),
         None => text,
     }
@@ -134,9 +139,11 @@ pub(super) fn identification(result: &Comparison) -> String {
     let exact = result
         .exact
         .map(|orbit| row("exact orbit", [orbit.sigma, orbit.c, orbit.b]));
-    let theory = result
-        .theory
-        .map(|point| row("theory, first order", [point.sigma, point.c, point.b]));
+    let name = match result.curve.of_structure {
+        Some(_) => "driven mode alone, first order",
+        None => "theory, first order",
+    };
+    let theory = result.theory.map(|point| row(name, [point.sigma, point.c, point.b]));
     let table = Table::new(" | sigma | C | B").rows([measured]).rows(exact).rows(theory);
     let held = match lock.held {
         true => " (the response is held by control: a constant drive would not hold it)",
@@ -242,8 +249,12 @@ fn agreement(result: &Comparison) -> String {
     let exact = exact.map_or(String::new(), |(raw, predicted)| {
         format!("\nRMS of sigma against the exact backbone: {raw:.4}; against the decay that the exact plant predicts: {predicted:.4}")
     });
+    let theory = match result.curve.of_structure {
+        Some(_) => "theory of the driven mode alone",
+        None => "theory",
+    };
     format!(
-        "RMS of sigma against theory over C > {COMPARED_ABOVE}: {rms:.4} (theory is of first order in epsilon){exact}"
+        "RMS of sigma against {theory} over C > {COMPARED_ABOVE}: {rms:.4} (theory is of first order in epsilon){exact}"
     )
 }
 

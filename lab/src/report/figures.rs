@@ -30,6 +30,7 @@ const LOW: f64 = 300.0;
 const DETUNING: &str = "detuning σ = (ω/ω₀ − 1)/ε";
 const SPEED: &str = "particle speed B, over b ω₀";
 const FIRST_ORDER: &str = "first-order theory";
+const FIRST_ORDER_ALONE: &str = "driven mode alone, first-order theory";
 const ORBITS: &str = "exact orbits";
 const IDENTIFIED: &str = "free decay, identified";
 const LOCKED: &str = "locked, measured";
@@ -82,6 +83,14 @@ fn theory_backbone(p: &Dimensionless, top: f64, place: impl Fn(&BackbonePoint) -
     points.iter().map(|point| (place(point), point.stable())).collect()
 }
 
+/// The name of first-order theory, which is of one oscillator, beside exact results.
+fn first_order_beside(exact: &ExactCurve) -> &'static str {
+    match exact.of_structure {
+        Some(_) => FIRST_ORDER_ALONE,
+        None => FIRST_ORDER,
+    }
+}
+
 /// Adds the exact backbone of a structure, or the right branch of one oscillator's.
 fn add_exact(panel: &mut Panel, curve: &ExactCurve, p: &Dimensionless, label: &str) {
     let Some(curves) = &curve.of_structure else {
@@ -115,7 +124,7 @@ pub fn backbone(result: &Comparison) -> Figure {
     let sigmas = sigmas.chain(decay().filter(|point| point.c >= fold).map(|point| point.sigma));
     let x = widened(range((f64::MAX, f64::MIN), sigmas), 0.06);
     let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)));
-    panel.curve(theory, 2.0, THEORY, FIRST_ORDER);
+    panel.curve(theory, 2.0, THEORY, first_order_beside(&result.curve));
     add_exact(&mut panel, &result.curve, p, ORBITS);
     let predicted = result.decay.iter();
     let predicted = predicted.filter_map(|compared| Some((compared.sigma_predicted?, compared.point.c)));
@@ -173,7 +182,7 @@ pub fn tracked(tracked: &TrackedComparison) -> Figure {
     let points = || tracked.points.iter().map(|compared| compared.point);
     let top = points().fold(0.5, |most: f64, point| most.max(1.15 * point.at.c));
     let x = widened(range((-1.6, 0.6), points().map(|point| point.at.sigma)), 0.1);
-    let [first_order, orbits] = [FIRST_ORDER, ORBITS].map(|name| match tracked.u_linear {
+    let [first_order, orbits] = [first_order_beside(&tracked.exact), ORBITS].map(|name| match tracked.u_linear {
         Some([_, u]) => format!("{name}, measured λ = {:.2} ± {u:.2}", p.lambda),
         None => name.into(),
     });
@@ -305,6 +314,7 @@ pub fn history(record: &Record, scene: &Scene, result: &Comparison) -> Figure {
     let (_, top) = range((0.0, lock.at.c), driven.iter().map(|triple| triple[1]));
     let detunings = driven.iter().chain(&points).map(|triple| triple[2]);
     let detunings = widened(range((-1.5, 0.5), detunings), 0.1);
+    let name = first_order_beside(&result.curve);
     let row = |row: usize, range: (f64, f64), label: &str| {
         let place = |triple: &Triple| (triple[0], triple[row]);
         let mut left = Panel::new(((0.0, end), "time, periods"), (range, label));
@@ -312,10 +322,10 @@ pub fn history(record: &Record, scene: &Scene, result: &Comparison) -> Figure {
         let exact = result.exact.iter().flat_map(|exact| level([exact.c, exact.sigma]));
         left.add(Shape::Line(1.6), exact, EXACT, "exact orbit");
         let first_order = result.theory.iter().flat_map(|theory| level([theory.c, theory.sigma]));
-        left.add(Shape::Line(1.2), first_order, THEORY, FIRST_ORDER);
+        left.add(Shape::Line(1.2), first_order, THEORY, name);
         left.add(Shape::Line(1.2), driven.iter().map(place), MEASURED, "measured");
         let mut right = Panel::new(((0.0, 1.02 * last), "time since the release, periods"), (range, label));
-        right.add(Shape::Line(1.2), theory.iter().map(place), THEORY, FIRST_ORDER);
+        right.add(Shape::Line(1.2), theory.iter().map(place), THEORY, name);
         circles(&mut right, points.iter().map(place), IDENTIFIED);
         vec![left, right]
     };

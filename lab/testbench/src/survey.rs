@@ -59,7 +59,7 @@ impl Survey {
         let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
         let driven = section_of(structure);
         Some(Self {
-            facts: orbits.facts(driven, POINTS)?,
+            facts: orbits.facts(driven, scene.frequencies(), POINTS)?,
             driven,
             orbits: orbits.resonant(scene.structure_drive()?, scene.frequencies()),
         })
@@ -91,11 +91,9 @@ pub fn phase_resonant(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
 pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<Vec<Orbit>>> {
     let orbits = scene.structure_orbits()?;
     // Other modes may have the motion that the loop finds.
-    let (mut range, [low, high]) = (
-        orbits.range(section_of(scene.structure.as_ref()?), POINTS)?,
-        scene.frequencies(),
-    );
-    range.omega = [range.omega[0].min(low), range.omega[1].max(high)];
+    let range = orbits
+        .range(section_of(scene.structure.as_ref()?), POINTS)?
+        .with(scene.frequencies());
     let curve = |branch: &StructureBranch| {
         branch
             .orbits

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::{fails, json, vines};
+use crate::{fails, json, text, vines};
 
 #[test]
 fn orbits_curves_and_theory_come_as_json() {
@@ -277,4 +277,35 @@ fn theory_and_response_are_drawn_for_a_file() {
         );
     }
     fails("orbit --figure figure.svg", 2, "--response");
+}
+
+#[test]
+fn results_of_one_oscillator_say_so_where_the_scene_has_a_structure() {
+    let scene = format!("--scene {}/../scenes/frame.toml", env!("CARGO_MANIFEST_DIR"));
+    let folder = tempfile::tempdir().unwrap();
+    let map = format!(
+        "map {scene} --x sigma=-1:1:2 --y G=1:1.2:2 --periods 100 --out {}",
+        folder.path().display()
+    );
+    for (line, part) in [
+        (
+            map,
+            "a regime map is of the ideal cavity, without the other modes of the structure",
+        ),
+        (
+            format!("theory {scene}"),
+            "theory is of the ideal cavity, without the other modes of the structure",
+        ),
+        (format!("check {scene}"), "Base and response are those of mode 1 alone"),
+    ] {
+        let output = vines(&line);
+        assert!(output.status.success(), "{output:?}");
+        let text = text(&output);
+        assert!(text.contains(part), "{line}: {text}");
+    }
+    fails(
+        &format!("rig {scene} --listen 127.0.0.1:0"),
+        2,
+        "what is served has one oscillator, and this scene has a [structure]",
+    );
 }

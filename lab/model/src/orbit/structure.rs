@@ -134,6 +134,15 @@ pub struct StructureRange {
     pub points: usize,
 }
 
+impl StructureRange {
+    /// This range, extended to the frequencies from `low` to `high`, rad/s.
+    #[must_use]
+    pub fn with(mut self, [low, high]: [f64; 2]) -> Self {
+        self.omega = [self.omega[0].min(low), self.omega[1].max(high)];
+        self
+    }
+}
+
 /// A mode beside the driven one, and what it does to the orbits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ModeFacts {
@@ -352,13 +361,14 @@ impl StructureOrbits {
         })
     }
 
-    /// The modes, and the backbone of the section `driven` alone and with all modes, with about `points` orbits each.
-    pub fn facts(&self, driven: usize, points: usize) -> Option<StructureFacts> {
+    /// The modes, and the backbone of the section `driven` alone over its own range, and with all modes also over the frequencies `omega`, rad/s,
+    /// with about `points` orbits each.
+    pub fn facts(&self, driven: usize, omega: [f64; 2], points: usize) -> Option<StructureFacts> {
         let range = self.range(driven, points)?;
         Some(StructureFacts {
             modes: self.modes(driven)?,
             alone: self.with_sections(|n| n == driven).backbone(&range),
-            all: self.backbone(&range),
+            all: self.backbone(&range.with(omega)),
         })
     }
 
