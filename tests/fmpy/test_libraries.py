@@ -7,8 +7,8 @@ import pytest
 from component import Fmu
 from references import ROOT
 
-MAX_SIZE = 1_000_000
-"""Bytes."""
+MAX_SIZE = {"LoViNes": 1_200_000, "PhaseLock": 1_000_000}
+"""Bytes. The library of LoViNes.fmu is that of Structure.fmu as well, with the modes of matrices: a third of it."""
 
 
 @pytest.fixture(params=["LoViNes", "PhaseLock"])
@@ -18,8 +18,8 @@ def library(request: pytest.FixtureRequest, fmus: dict[str, Fmu]) -> Path:
     return found
 
 
-def test_a_library_is_at_most_a_megabyte(library: Path) -> None:
-    assert library.stat().st_size <= MAX_SIZE
+def test_a_library_is_small(library: Path) -> None:
+    assert library.stat().st_size <= MAX_SIZE[library.stem]
 
 
 def test_a_library_contains_no_symbol_table_and_no_debug_information(library: Path) -> None:
