@@ -175,6 +175,13 @@ fn only_if_ideal(alternatives: &[Candidate]) -> String {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let scene = arguments.scene.load()?;
+    if scene
+        .structure
+        .as_ref()
+        .is_some_and(|structure| structure.modes.len() > 1)
+    {
+        log::warn!("a fit is of one oscillator, the driven mode, without the other modes of the structure");
+    }
     writable([&arguments.figure, &arguments.out].into_iter().flatten())?;
     let selection = Selection {
         response: arguments.response.clone(),

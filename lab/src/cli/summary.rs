@@ -303,6 +303,18 @@ pub(super) fn tracked(result: &TrackedComparison) -> String {
             worst.at_equal_c, worst.nearest
         )
     });
+    let hidden = points().map(|compared| &compared.point).filter(|point| {
+        let regimes = (point.regime, point.regime_by_impacts);
+        point.settled && regimes == (Regime::Symmetric, Some(Regime::Asymmetric))
+    });
+    match hidden.count() {
+        0 => (),
+        count => {
+            worst += &format!(
+                "{count} settled points look symmetric in the response, but their impacts are asymmetric: not the symmetric backbone\n"
+            );
+        }
+    }
     if let Some([u_sigma, u_lambda]) = result.u_linear {
         let measured = format!(
             "The exact backbone has the measured damping, lambda = {:.3} ± {u_lambda:.3}; all sigma share ± {u_sigma:.3}, from the measured natural \

@@ -303,6 +303,21 @@ fn results_of_one_oscillator_say_so_where_the_scene_has_a_structure() {
         let text = text(&output);
         assert!(text.contains(part), "{line}: {text}");
     }
+    let beam = format!(
+        "backbone {} --set backbone.C_from=0.5 --set backbone.C_to=0.46 --set backbone.points=3 --out {}",
+        scene.replace("frame", "cantilever"),
+        folder.path().display()
+    );
+    let tracked = text(&vines(&beam));
+    assert!(
+        tracked.contains("3 settled points look symmetric in the response, but their impacts are asymmetric"),
+        "{tracked}"
+    );
+    let fit = text(&vines(&format!("fit none.csv {scene}")));
+    assert!(
+        fit.contains("a fit is of one oscillator, the driven mode, without the other modes of the structure"),
+        "{fit}"
+    );
     fails(
         &format!("rig {scene} --listen 127.0.0.1:0"),
         2,
