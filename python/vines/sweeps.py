@@ -306,8 +306,8 @@ class _Store:
         if not folder.exists() or not any(folder.iterdir()):
             # Complete or absent: the name is given at the end.
             # After Ctrl-C, a thread of zarr may still write there: the interruption counts, not what is left.
-            place = {"dir": folder.parent, "prefix": f"{folder.name}."}
-            with tempfile.TemporaryDirectory(**place, ignore_cleanup_errors=True) as partial:
+            prefix = f"{folder.name}."
+            with tempfile.TemporaryDirectory(dir=folder.parent, prefix=prefix, ignore_cleanup_errors=True) as partial:
                 self._create(zarr.open_group(f"{partial}/store", mode="w", attributes=attributes))
                 Path(partial, "store").rename(folder)
         try:
