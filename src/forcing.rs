@@ -65,7 +65,7 @@ impl Forcing {
         Self::with_strength(oscillator, omega, Complex64::new(omega0_squared, 2.0 * delta * omega))
     }
 
-    /// The same for another strength `F`.
+    /// Coefficients for `omega` (rad/s), 0 or above, and a forcing of the strength `F`, 1/s², which need not be that of a base.
     pub(crate) fn with_strength(oscillator: &Oscillator, omega: f64, strength: Complex64) -> Self {
         let Oscillator { delta, omega0_squared, .. } = *oscillator;
         let base = Complex64::new(omega0_squared, 2.0 * delta * omega);

@@ -676,7 +676,7 @@ impl<'a> Problem<'a> {
         Self { points, ..self.clone() }
     }
 
-    /// Whether so many points are enough, and those that are left out no more than a fifth.
+    /// Whether `count` points are enough for a fit, and the points left out are at most a fifth of all.
     fn may_keep(&self, count: usize) -> bool {
         count >= FEWEST && (self.points.len() - count) * LEFT_OUT <= self.points.len()
     }
