@@ -2,6 +2,7 @@
 
 import { csv, link } from "./link.js";
 import { sound } from "./sound.js";
+import { begin, slug } from "./story.js";
 
 export const SPEEDS = [0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30];
 
@@ -48,15 +49,15 @@ export function control(page, { key, symbol, name, unit, min, max, step, help })
   return box;
 }
 
-// The list of scenes.
+// The list of scenes, in groups.
 export function bindScenes(page) {
-  $("scene").replaceChildren(...page.table.scenes.map((scene, i) => new Option(scene.name, i)));
-  $("scene").onchange = () => {
-    const scene = page.table.scenes[Number($("scene").value)];
-    $("scene").title = scene.help;
-    say("");
-    page.start(scene.values);
-  };
+  const groups = Object.groupBy(page.table.scenes, ({ group }) => group);
+  $("scene").replaceChildren(...Object.entries(groups).map(([label, scenes]) => {
+    const group = Object.assign(document.createElement("optgroup"), { label });
+    group.append(...scenes.map((scene) => new Option(scene.name, slug(scene))));
+    return group;
+  }));
+  $("scene").onchange = () => { say(""); begin(page, page.table.scenes.find((scene) => slug(scene) === $("scene").value)); };
 }
 
 // Buttons and keys.
@@ -66,7 +67,7 @@ export function bind(page) {
     impact: () => { page.play(false); page.toNextImpact(); },
     drive: () => page.change("drive", page.driving ? 0 : 1),
     track: () => page.change("track", 1),
-    defaults: () => { say(""); $("scene").value = 0; page.start({}); },
+    defaults: () => { say(""); $("scene").selectedIndex = 0; $("story").hidden = true; page.challenge = undefined; page.start({}); },
     restart: () => { say(""); page.start(page.values); },
     link: async () => {
       const { address, omitted } = link(page);

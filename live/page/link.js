@@ -1,5 +1,7 @@
 // The link, which contains the settings and, if it fits, the motion; the record as CSV.
 
+import { slug } from "./story.js";
+
 // Changes that a link repeats; more would make it too long.
 const MOST_CHANGES = 150;
 // Samples that a link repeats; more would take seconds.
@@ -48,8 +50,13 @@ export function read(hash, table) {
     return number(text, limits[key].name, limits[key].min, limits[key].max);
   };
   const values = {};
-  let changes = [], samples = 0;
+  let changes = [], samples = 0, scene;
   for (const [key, text] of query) {
+    if (key === "scene") {
+      scene = table.scenes.find((one) => slug(one) === text);
+      if (!scene) throw new Error(`The link is invalid: there is no scene "${text}"; there are ${table.scenes.map(slug).join(", ")}. The default scene is shown.`);
+      continue;
+    }
     if (key === "samples") samples = number(text, "samples", 0, MOST_SAMPLES);
     else if (key === "changes") {
       changes = text.split(",").map((one) => {
@@ -58,5 +65,5 @@ export function read(hash, table) {
       });
     } else values[key] = setting(key, text);
   }
-  return { values, changes, samples };
+  return { values, changes, samples, scene };
 }

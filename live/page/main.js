@@ -4,7 +4,7 @@ import { $, bind, say } from "./controls.js";
 import { read } from "./link.js";
 import { load } from "./module.js";
 import { Page, calm } from "./page.js";
-import { story } from "./story.js";
+import { begin, judge, slug, story } from "./story.js";
 import { Watching } from "./watch.js";
 
 // Starts what the address asks for.
@@ -15,6 +15,11 @@ function follow(page) {
     wanted = read(location.hash, page.table);
   } catch (error) {
     say(error.message);
+  }
+  if (wanted.scene) {
+    $("scene").value = slug(wanted.scene);
+    begin(page, wanted.scene);
+    return page.play(!calm.matches);
   }
   page.start(wanted.values, wanted.changes);
   if (wanted.samples > 0) page.goTo((wanted.samples - 1) * page.step, wanted.samples);
@@ -43,6 +48,7 @@ async function main() {
       if (page.rows.length) {
         page.pictures.draw(now);
         page.showTime();
+        judge(page);
       }
     } catch (error) {
       page.play(false);

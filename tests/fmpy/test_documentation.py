@@ -57,7 +57,7 @@ def anchors(page: Path) -> set[str]:
 def test_every_link_of_a_page_leads_somewhere(page):
     text = re.sub(r"^```.*?^```$|`[^`\n]*`", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
     for link in re.findall(r"\]\(([^)\s]+)\)", text):
-        if re.match(r"https?://|rust/", link):
+        if re.match(r"https?://|rust/|live/", link):
             continue
         name, _, anchor = link.partition("#")
         target = (page.parent / name).resolve() if name else page
