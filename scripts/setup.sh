@@ -80,7 +80,8 @@ portable_environment() {
     environment .venv-portable scripts/requirements-portable.txt && export PATH="$PWD/.venv-portable/bin:$PATH"
 }
 
-# One environment per client of the FMUs in tests/clients. The test of a client without an environment is skipped.
+# One environment per client of the FMUs in tests/clients, because some of them exclude each other; without the packages that are never
+# imported here. The test of a client without an environment is skipped.
 client_environments() {
     local file name
     for file in tests/clients/requirements/*.txt; do

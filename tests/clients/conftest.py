@@ -1,4 +1,4 @@
-"""Fixtures: the packed bench, the lab's own lock, the clients in their environments, the table of figures."""
+"""Fixtures: the packed bench, the lab's own lock, the clients in their environments."""
 
 import json
 import os
@@ -15,7 +15,7 @@ from scene import Bench, Tape
 
 ROOT = Path(__file__).parents[2]
 MASTERS = Path(__file__).parent / "masters"
-FIGURES = pytest.StashKey[list[tuple[str, str, str]]]()
+pytest_plugins = ["figures"]
 # cofmupy accepts a step in which nothing moves by 1e-3, whatever the unit: lengths in millimetres make that little.
 MILLIMETRES = ("--set", "plant.b=10.0", "--set", "start.dq2=500.0")
 
@@ -95,36 +95,9 @@ def check_lock(own_lock: dict[str, float], figure: Callable[..., None]) -> Calla
 
     def check_lock(name: str, bench: Bench, tape: Tape) -> Lock:
         lock = measure(bench, tape)
-        figure(f"{name}: sigma off the lab's own lock", abs(lock.sigma - own_lock["sigma"]), at_most=1e-4)
-        figure(f"{name}: C off the lab's own lock, relative", abs(lock.amplitude / own_lock["C"] - 1), at_most=1e-4)
-        figure(f"{name}: impacts per period off 2", abs(lock.impacts_per_period - 2), at_most=0.03)
+        figure(f"{name}: sigma off the lab's own lock", abs(lock.sigma - own_lock["sigma"]), below=1e-4)
+        figure(f"{name}: C off the lab's own lock, relative", abs(lock.amplitude / own_lock["C"] - 1), below=1e-4)
+        figure(f"{name}: impacts per period off 2", abs(lock.impacts_per_period - 2), below=0.03)
         return lock
 
     return check_lock
-
-
-@pytest.fixture
-def figure(request: pytest.FixtureRequest) -> Callable[..., None]:
-    """Notes a measured figure for the table at the end, and checks it against its limit."""
-    figures = request.config.stash[FIGURES]
-
-    def figure(what: str, value: float, *, at_most: float) -> None:
-        figures.append((what, f"{value:.3g}", f"at most {at_most:g}"))
-        assert value <= at_most, f"{what}: {value} is above {at_most}"
-
-    return figure
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    config.stash[FIGURES] = []
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    figures = config.stash[FIGURES]
-    if not figures:
-        return
-    terminalreporter.section("figures")
-    rows = [("what", "figure", "limit"), *figures]
-    wide = [max(len(row[n]) for row in rows) for n in range(2)]
-    for what, value, limit in rows:
-        terminalreporter.write_line(f"{what:<{wide[0]}}  {value:>{wide[1]}}  {limit}")

@@ -1,4 +1,4 @@
-"""Fixtures: the packed FMUs, instances of them, experiments that tests share, and the table of figures at the end."""
+"""Fixtures: the packed FMUs, instances of them, and experiments that tests share."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ from component import Component, Fmu
 from coupling import SAMPLE_TIME, Pair, Record, Scene, experiment
 from references import ROOT
 
-FIGURES = pytest.StashKey[list[tuple[str, str, str]]]()
+pytest_plugins = ["figures"]
 
 
 @pytest.fixture(scope="session")
@@ -63,34 +63,3 @@ def run(fmus: dict[str, Fmu]) -> Callable[..., Record]:
             return experiment(Pair(plant, controller, step, **coupling), scene)
 
     return run
-
-
-@pytest.fixture
-def figure(request: pytest.FixtureRequest) -> Callable[..., None]:
-    """Notes a measured figure for the table at the end, and checks it against its limits."""
-    figures = request.config.stash[FIGURES]
-
-    def check(
-        what: str, value: float, *, below: float | None = None, between: tuple[float, float] | None = None
-    ) -> None:
-        low, high = between or (-float("inf"), below)
-        limit = f"{low:g} to {high:g}" if between else f"at most {high:g}"
-        figures.append((what, f"{value:.4g}", limit))
-        assert low <= value <= high, f"{what}: {value} is not {limit}"
-
-    return check
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    config.stash[FIGURES] = []
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    figures = config.stash[FIGURES]
-    if not figures:
-        return
-    terminalreporter.section("figures")
-    rows = [("what", "figure", "limit"), *figures]
-    wide = [max(len(row[n]) for row in rows) for n in range(2)]
-    for what, value, limit in rows:
-        terminalreporter.write_line(f"{what:<{wide[0]}}  {value:>{wide[1]}}  {limit}")

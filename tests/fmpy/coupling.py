@@ -6,16 +6,13 @@ from math import pi
 import numpy as np
 
 from component import Component
-from identification import Harmonic, Regime, harmonic, regime
+from identification import Harmonic, harmonic
 
 SAMPLE_TIME = 2 * pi / 100
 PERIOD = 2 * pi
 HOLD_PERIODS = 20
 
-ROW = np.dtype(
-    [(name, float) for name in ("time", "v", "base", "omega", "E", "particle", "impact_time", "impact_velocity")]
-    + [("impacts", int), ("settled", bool)]
-)
+ROW = np.dtype([(name, float) for name in ("time", "v", "base", "omega", "particle")] + [("impacts", int)])
 
 
 @dataclass(frozen=True)
@@ -57,34 +54,20 @@ class Scene:
 
 @dataclass(frozen=True)
 class Record:
-    """An experiment: everything up to the settled lock, the hold, and the decay with the drive off."""
+    """The hold of a settled lock."""
 
     scene: Scene
     step: float
     rows: np.ndarray
-    settled: int
-    released: int
 
-    @property
-    def hold(self) -> np.ndarray:
-        return self.rows[self.settled : self.released]
+    def fundamental(self, name: str) -> Harmonic:
+        return harmonic(self.rows[name], self.step, self.rows["omega"].mean())
 
-    @property
-    def decay(self) -> np.ndarray:
-        """From the first sample at which the plant has felt the drive go."""
-        off = self.rows[self.released :]
-        return off[off["E"] == 0][1:]
-
-    def locked(self) -> Harmonic:
-        """Fundamental of the response over the hold."""
-        return harmonic(self.hold["v"], self.step, self.hold["omega"].mean())
-
-    def base(self) -> Harmonic:
-        """Fundamental of the base over the hold."""
-        return harmonic(self.hold["base"], self.step, self.hold["omega"].mean())
-
-    def regime(self) -> Regime:
-        return regime(self.hold, self.locked().omega)
+    def impacts_per_period(self) -> float:
+        """Counted between two samples: off by up to one impact."""
+        first, last = self.rows[0], self.rows[-1]
+        periods = (last["time"] - first["time"]) * self.fundamental("v").omega / (2 * pi)
+        return (last["impacts"] - first["impacts"]) / periods
 
 
 class Pair:
@@ -95,26 +78,25 @@ class Pair:
     ):
         """`sampled`: the base follows samples of the drive signal instead of its own oscillator."""
         self.plant, self.controller, self.step = plant, controller, step
-        self.sensors = plant.group("v", "base", "der(q2)", "impact_time", "impact_velocity")
+        self.sensors = plant.group("v", "base", "der(q2)")
         self.impacts = plant.group("impacts")
         self.sampled = sampled
         self.drive = plant.group("e") if sampled else plant.group("omega", "E")
         self.command = controller.group("omega", "E", "drive")
         self.settled = controller.group("settled")
         self.inputs = controller.group("response", "reference") if reference else controller.group("response")
-        self.active = controller.group("active")
+        controller.set({"active": True})
         self.rows: list[tuple] = []
 
-    def sample(self, active: bool) -> bool:
+    def sample(self) -> bool:
         """One communication point, then one step; returns whether the controller calls its lock settled."""
-        v, base, *inside = self.sensors.get()
+        v, base, particle = self.sensors.get()
         omega, amplitude, drive = self.command.get()
         (settled,) = self.settled.get()
         (impacts,) = self.impacts.get()
         time = len(self.rows) * self.step
-        self.rows.append((time, v, base, omega, amplitude, *inside, impacts, settled))
+        self.rows.append((time, v, base, omega, particle, impacts))
         self.inputs.set(*(v, base)[: self.inputs.count])
-        self.active.set(active)
         self.drive.set(*([drive] if self.sampled else [omega, amplitude]))
         self.plant.step(self.step)
         self.controller.step(self.step)
@@ -125,17 +107,13 @@ class Pair:
 
 
 def experiment(pair: Pair, scene: Scene, *, lock_periods: int = 2000) -> Record:
-    """Drives the pair until its lock is settled, holds it, lets go, and records the decay."""
+    """Drives the pair until its lock is settled, and holds it."""
     for _ in range(pair.periods(lock_periods)):
-        if pair.sample(active=True):
+        if pair.sample():
             break
     else:
         raise AssertionError(f"no settled lock within {lock_periods} periods: {pair.controller.outputs()}")
     settled = len(pair.rows)
     for _ in range(pair.periods(HOLD_PERIODS)):
-        pair.sample(active=True)
-    released = len(pair.rows)
-    # The decay slows down with epsilon: 50 periods at 0.0084 lead from the lock past the loss of synchrony.
-    for _ in range(pair.periods(0.42 / scene.epsilon)):
-        pair.sample(active=False)
-    return Record(scene, pair.step, np.array(pair.rows, dtype=ROW), settled, released)
+        pair.sample()
+    return Record(scene, pair.step, np.array(pair.rows[settled:], dtype=ROW))

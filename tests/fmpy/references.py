@@ -1,4 +1,4 @@
-"""The reference data: trajectories and exact orbits computed in 40-digit arithmetic by an independent program."""
+"""The reference data: a trajectory and exact orbits computed in 40-digit arithmetic by an independent program."""
 
 import csv
 import json
@@ -13,17 +13,9 @@ def trajectory(scene: str) -> dict:
     return json.loads((FOLDER / "trajectories" / f"{scene}.json").read_text())
 
 
-def orbits() -> list[dict[str, float]]:
-    """Exact symmetric two-impact orbits at phase resonance."""
-    with (FOLDER / "orbits.csv").open(newline="") as file:
-        return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
-
-
-def stable(row: dict[str, float]) -> bool:
-    return all(row[f"mult{n}"] < 1 for n in range(1, 5))
-
-
 def stable_orbit(epsilon: float, r: float, excitation: float) -> dict[str, float]:
-    """The stable orbit with the largest amplitude at these parameters."""
-    found = [row for row in orbits() if (row["eps"], row["r"], row["G"]) == (epsilon, r, excitation) and stable(row)]
+    """The stable symmetric two-impact orbit at phase resonance with the largest amplitude at these parameters."""
+    with (FOLDER / "orbits.csv").open(newline="") as file:
+        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+    found = [row for row in rows if (row["eps"], row["r"], row["G"]) == (epsilon, r, excitation) and row["mult4"] < 1]
     return max(found, key=lambda row: row["C"])

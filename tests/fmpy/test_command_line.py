@@ -4,24 +4,13 @@ import csv
 import json
 import re
 import subprocess
-from math import isfinite
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
-from references import ROOT, orbits
+from references import ROOT
 
 RESULTS = {"LoViNes.fmu", "identification.json", "backbone.csv", "backbone.svg", "history.svg", "sim.svg"}
-BAD_INPUT = {
-    "plant.rr=0.5": "rr",
-    "nonsense": "section.key=value",
-    "plant.r=2": "r (coefficient of restitution) = 2",
-    "plant.M=-1": "M (primary mass) = -1",
-    "plant.k=nan": "k (stiffness) = NaN",
-    "start.q2=0.02": "q2",
-    "controller.bandwidth=-1": "bandwidth",
-}
 
 
 @pytest.fixture
@@ -38,13 +27,6 @@ def printed(call, *arguments):
     done = call(*arguments)
     assert (done.returncode, done.stderr) == (0, "")
     return json.loads(done.stdout)
-
-
-def dimensionless(row):
-    scene = ROOT / "scenes" / "dimensionless.toml"
-    keys = {"plant.epsilon": "eps", "plant.lambda": "lam", "plant.r": "r", "excitation.G": "G"}
-    values = [word for key, name in keys.items() for word in ("--set", f"{key}={row[name]!r}")]
-    return ["--scene", str(scene), *values]
 
 
 @pytest.mark.parametrize("options", [[], ["--set", "plant.r=0.7"]], ids=["default", "r = 0.7"])
@@ -71,94 +53,17 @@ def test_identify_writes_its_results_and_they_keep_their_limits(call, tmp_path, 
     figure(f"{name}: phase error, degrees", abs(lock["phase_error_deg"]), below=0.3)
     figure(f"{name}: RMS of sigma less theory over C > 0.2", found["rms_sigma_error"], below=0.08)
 
-    check_decay(found["decay"])
-    check_csv(folder / "backbone.csv", found["decay"])
-    for picture in ("backbone.svg", "history.svg", "sim.svg"):
-        assert ElementTree.parse(folder / picture).getroot().tag.endswith("svg")
-
-
-def check_decay(points):
+    amplitudes = [point["C"] for point in found["decay"]]
     # A point per window's step over some 100 periods of decay, less the length of a window.
-    assert len(points) > 80
-    for point in points:
-        assert point.keys() >= {"tau", "C", "B", "sigma", "sigma_theory"}
-        assert all(isfinite(point[key]) for key in ("tau", "C", "B", "sigma"))
-    amplitudes = [point["C"] for point in points]
+    assert len(amplitudes) > 80
     assert amplitudes[0] == max(amplitudes)
     assert amplitudes[-1] < 0.2
-
-
-def check_csv(path: Path, points):
-    with path.open(newline="") as file:
+    with (folder / "backbone.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [float(row["sigma"]) for row in rows] == [point["sigma"] for point in points]
-    assert [float(row["C"]) for row in rows] == [point["C"] for point in points]
-
-
-def test_identify_says_so_when_the_drive_is_not_reached(call, tmp_path):
-    done = call("identify", "--set", "start.dq2=0.0", "--set", "excitation.G=0.5", "--out", "results")
-    assert done.returncode == 1
-    assert done.stderr.startswith("error: ")
-    assert "1:1" in done.stderr
-    assert not (tmp_path / "results" / "identification.json").exists()
-    assert (tmp_path / "results" / "interrupted.csv").read_text().startswith("time,response,")
-
-
-def test_orbit_finds_the_reference_orbits(call, figure):
-    worst = 0.0
-    for row in orbits():
-        found = printed(call, "orbit", *dimensionless(row), "--json")
-        orbit = min(found, key=lambda orbit: abs(orbit["sigma"] - row["sigma"]))
-        worst = max(worst, *(abs(orbit[key] - row[key]) for key in ("sigma", "C", "B")))
-        assert sorted(orbit["multipliers"]) == pytest.approx([row[f"mult{n}"] for n in range(1, 5)], abs=1e-5)
-        assert orbit["stable"] == (row["mult4"] < 1)
-    figure("vines orbit against orbits.csv: worst of sigma, C, B", worst, below=1e-8)
-
-
-def test_theory_gives_the_first_order_solutions_of_the_reference(call, figure):
-    worst = 0.0
-    for row in orbits():
-        found = printed(call, "theory", *dimensionless(row), "--json")
-        solution = min(found["solutions"], key=lambda one: abs(one["sigma"] - row["sigma_msm"]))
-        worst = max(worst, *(abs(solution[key] - row[f"{key}_msm"]) for key in ("sigma", "C", "B")))
-    figure("vines theory against orbits.csv: worst of sigma, C, B", worst, below=1e-8)
-
-
-@pytest.mark.parametrize("command", ["identify", "orbit", "theory"])
-@pytest.mark.parametrize("value", BAD_INPUT)
-def test_bad_input_ends_with_one_message_and_nothing_written(call, tmp_path, command, value):
-    done = call(command, "--set", value)
-    check_refusal(done, BAD_INPUT[value], tmp_path)
-
-
-def test_a_missing_scene_is_named(call, tmp_path):
-    check_refusal(call("identify", "--scene", "no-such.toml"), "no-such.toml", tmp_path)
-
-
-def test_an_unknown_key_in_a_scene_is_shown_with_its_line(call, tmp_path):
-    scene = tmp_path / "scene.toml"
-    scene.write_text((ROOT / "scenes" / "dimensionless.toml").read_text() + "\n[record]\nlock_period = 3\n")
-    done = call("identify", "--scene", "scene.toml")
-    scene.unlink()
-    check_refusal(done, "lock_period", tmp_path)
-
-
-def test_a_plant_that_is_no_fmu_is_refused(call, tmp_path):
-    (tmp_path / "rig.fmu").write_text("no archive")
-    done = call("identify", "--rig", "rig.fmu")
-    assert done.returncode != 0
-    assert done.stderr.startswith("error: ")
-    assert "rig.fmu" in done.stderr
-    assert not (tmp_path / "out").exists()
-
-
-def check_refusal(done, part, folder):
-    assert done.returncode == 2
-    assert done.stderr.startswith("error: ")
-    assert part in done.stderr
-    assert "panicked" not in done.stderr
-    assert done.stdout == ""
-    assert list(folder.iterdir()) == []
+    for key in ("sigma", "C"):
+        assert [float(row[key]) for row in rows] == [point[key] for point in found["decay"]]
+    for picture in ("backbone.svg", "history.svg", "sim.svg"):
+        assert ElementTree.parse(folder / picture).getroot().tag.endswith("svg")
 
 
 def test_a_rehearsal_ends_well_and_its_notebook_has_its_figures(tmp_path):

@@ -85,12 +85,22 @@ def test_the_parameter_sets_have_names_of_their_own(bench):
     assert names == ["plant", "controller"]
 
 
-def test_the_system_file_sets_parameters_and_inputs_only(bench):
+def test_the_system_file_sets_parameters_and_inputs_and_joins_outputs_to_inputs(bench, structure):
+    causality = {}
     for component, fmu in (("plant", "LoViNes"), ("controller", "PhaseLock")):
         description = read_model_description(str(bench / f"{fmu}.fmu"))
-        causality = {one.name: one.causality for one in description.modelVariables}
+        causality |= {(component, one.name): one.causality for one in description.modelVariables}
         for parameter in inside(bench / "bench.ssp", f"resources/{component}.ssv")[0]:
-            assert causality[parameter.get("name")] in ("parameter", "input"), parameter.get("name")
+            assert causality[component, parameter.get("name")] in ("parameter", "input"), parameter.get("name")
+    names = ("startElement", "startConnector", "endElement", "endConnector")
+    wires = {tuple(map(wire.get, names)) for wire in structure.iter(f"{SSD}Connection")}
+    assert wires == {
+        ("plant", "v", "controller", "response"),
+        ("plant", "base", "controller", "reference"),
+        ("controller", "omega", "plant", "omega"),
+        ("controller", "E", "plant", "E"),
+    }
+    assert {(causality[wire[:2]], causality[wire[2:]]) for wire in wires} == {("output", "input")}
 
 
 def test_a_start_parameter_and_its_output_have_one_default(fmus):

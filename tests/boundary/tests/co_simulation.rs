@@ -37,7 +37,7 @@ fn steps(m: &Master, from: u32, count: u32, step: f64) {
 }
 
 #[test]
-fn the_parameters_of_a_real_cavity_reach_the_plant_and_the_totals_come_back() {
+fn the_parameters_of_a_real_cavity_and_a_drive_that_jumps_reach_the_plant_and_the_totals_come_back() {
     let m = Master::with(&Fmu::plant(), CoSimulation, &[(E, 0.0003), (OMEGA, 54.0), (DQ2, 0.0)]);
     m.well(m.set_reals(&CAVITY, &REALS));
     for (vr, value) in INTEGERS {
@@ -80,8 +80,13 @@ fn the_parameters_of_a_real_cavity_reach_the_plant_and_the_totals_come_back() {
     for (vr, value) in INTEGERS {
         assert_eq!(m.integer(vr), value);
     }
-    let (step, drive) = (0.0025, Drive::harmonic(0.0003, 54.0));
+    let step = 0.0025;
     for n in 0..1000 {
+        let x = f64::from(n % 13) / 13.0;
+        let (signal, amplitude, omega) = ([1e-5 * x, 1e-3 * (x - 0.5), 0.0, 0.0], 0.0003 + 1e-5 * x, 54.0 + x);
+        let drive = Drive { signal, amplitude, omega };
+        m.well(m.set_reals(&[SIGNAL, E, OMEGA], &[signal[0], amplitude, omega]));
+        m.well(call!(m.fmi2SetRealInputDerivatives(&SIGNAL, 1, &1, &signal[1])));
         if n % 7 == 0 {
             // Forward with another step, and back.
             let before = m.bytes();
@@ -177,6 +182,21 @@ fn a_reset_instance_equals_a_fresh_one_and_states_are_small() {
         used.well(call!(used.fmi2Reset()));
         assert_eq!(used.bytes(), fresh.bytes());
     }
+}
+
+#[test]
+fn a_pair_in_other_instances_continues_from_the_states_with_the_same_bits() {
+    let fmus = Fmu::pair(None);
+    let [mut pair, mut twin] = [(); 2].map(|()| pair::Pair::new(&fmus));
+    (0..2000).for_each(|_| assert!(pair.step(pair::SAMPLE_TIME) > 0.0));
+    twin.take_over(&pair);
+    for pair in [&mut pair, &mut twin] {
+        for _ in 0..1500 {
+            pair.step(pair::SAMPLE_TIME);
+            pair.digest();
+        }
+    }
+    assert!(pair.impacts() > 20 && pair.hash() == twin.hash());
 }
 
 #[test]
