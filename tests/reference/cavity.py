@@ -1,18 +1,17 @@
-"""Reference trajectories of a real cavity, in 40-digit arithmetic: python tests/reference/cavity.py [scene ...]
+"""Reference trajectories of a real cavity, in 40-digit arithmetic: python tests/reference/cavity.py
 
-Writes tests/reference/cavity/SCENE.csv. Nothing is shared with the plant: one complex exponential per oscillator,
+Writes tests/reference/cavity.csv. Nothing is shared with the plant: one complex exponential per oscillator,
 events by scanning in small steps and bisection, every sign change of a derivative examined for a contact between
 two scans.
 """
 
-import sys
 from math import sqrt as fsqrt
 from pathlib import Path
 
 from mpmath import cos, exp, im, mp, mpc, mpf, re, sin, sqrt
 
 mp.dps = 40
-HERE = Path(__file__).parent / "cavity"
+FILE = Path(__file__).with_suffix(".csv")
 STEPS = 1000
 ROWS = [1, 2, 5, 10, 20, 50, 100, 200, 300, 400, 500, 600, 700, 800, 900, 1000]
 # The published rig (kg, N/m, N s/m, m); numbers are those of the plant: the nearest doubles.
@@ -340,11 +339,10 @@ class Rig:
 
 
 def main():
-    HERE.mkdir(exist_ok=True)
-    for name in sys.argv[1:] or SCENES:
-        scene = SCENES[name]
+    lines = []
+    for name, scene in SCENES.items():
         rig = Rig(scene)
-        lines = [f"# {key} = {value}" for key, value in {**DEFAULTS, **scene}.items()]
+        lines += [f"# {key} = {value}" for key, value in {"scene": name, **DEFAULTS, **scene}.items()]
         lines.append("step,q1,dq1,q2,dq2,held,impacts,sticks,friction,stuck_time")
         for row in ROWS:
             # The plant's steps are doubles, and so is their length.
@@ -353,8 +351,8 @@ def main():
             state = [mp.nstr(value, 25) for value in (rig.q1, rig.dq1, rig.q2, rig.dq2)]
             totals = [str(rig.impacts), str(rig.sticks), mp.nstr(rig.friction, 20), mp.nstr(rig.stuck_time, 20)]
             lines.append(",".join([str(row), *state, str(held), *totals]))
-        (HERE / f"{name}.csv").write_text("\n".join(lines) + "\n")
         print(name, rig.impacts, "impacts", rig.sticks, "sticks", mp.nstr(rig.stuck_time, 5), "s stuck", flush=True)
+    FILE.write_text("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":
