@@ -17,8 +17,7 @@ from pathlib import Path
 
 import report
 import run_time_map
-from judge import judge
-from measured import Load, Row, middle_point
+from measured import Load, Row, judge, middle_point
 from scenes import LOOP_PERIODS, fingerprint, load
 from worker import Missing, Worker
 
@@ -28,7 +27,6 @@ KEPT = {
     "performance.txt": "validation",
     "performance.csv": "validation",
     "run_time_map.csv": "validation",
-    "run-time-map.svg": "validation",
     "work-precision.svg": "docs",
 }
 TOLERANCES = (1e-6, 1e-9, 1e-12)
