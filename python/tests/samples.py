@@ -32,19 +32,33 @@ RESPONSE = 3.0 * np.sin(55.0 * TIME - np.pi / 2)
 DRIVE = 20.0 * np.sin(55.0 * TIME)
 
 
+# For the beginning of a kind: the file, and the two channels.
+FORMATS = {
+    "CSV": ("a.csv", "y:mm", "x:um"),
+    "text": ("a.dat", "y:mm", "x:um"),
+    "MAT": ("a.mat", "y:mm", "x:um"),
+    "HDF5": ("a.h5", "y:mm", "x:um"),
+    "TDMS": ("a.tdms", "y", "x"),
+    "UFF58": ("a.uff", "1+X", "2+X"),
+    "LVM": ("a.lvm", "y", "x"),
+}
+
+
 @dataclass
 class Sample:
     """A file, the arguments of `read_recording`, and words of the refusal; without words it is read."""
 
     kind: str
     tools: str
-    name: str
     write: Callable[[Path], Any]
-    response: str = "y:mm"
-    drive: str = "x:um"
+    channels: tuple[str, str] | None = None
     options: dict[str, Any] = field(default_factory=dict)
     refusal: str = ""
     note: str = ""
+
+    def __post_init__(self) -> None:
+        self.name, *channels = FORMATS[self.kind.replace(":", "").split()[0]]
+        self.response, self.drive = self.channels or channels
 
 
 def text(
@@ -242,37 +256,30 @@ def lvm(
 NUMBERED = np.column_stack([TIME, RESPONSE, DRIVE])
 PLAIN = "time,y,x\n"
 SAMPLES = [
-    Sample("CSV: comma, point", "NumPy, pandas, Python", "a.csv", text(PLAIN)),
+    Sample("CSV: comma, point", "NumPy, pandas, Python", text(PLAIN)),
     Sample(
         "CSV: semicolon, decimal comma, row of units, Latin-1",
         "Excel (German), DIAdem",
-        "a.csv",
         text("time;y;x\ns;mm;µm\n", ";", ",", "latin-1"),
-        "y",
-        "x",
+        ("y", "x"),
     ),
-    Sample("CSV: tab, UTF-16", "Excel (Unicode text)", "a.txt", text("time\ty\tx\n", "\t", ".", "utf-16")),
+    Sample("CSV: tab, UTF-16", "Excel (Unicode text)", text("time\ty\tx\n", "\t", ".", "utf-16")),
     Sample(
         "CSV: preamble, units in brackets",
         "HBM catman, oscilloscopes",
-        "a.csv",
         text("Rig,3\nRate,1000\n\ntime [s],y (mm),x [um]\n"),
-        "y",
-        "x",
+        ("y", "x"),
         {"time": "time [s]"},
     ),
-    Sample("text: spaces, commented header", "numpy.savetxt", "a.dat", text("# time y x\n", " ")),
-    Sample("CSV: without names", "loggers", "a.csv", text(""), "2:mm", "3:um", {"time": "1"}),
-    Sample("CSV: last row cut off", "a logger that was switched off", "a.csv", text(PLAIN, end="6.0,1."), note=""),
-    Sample("CSV: a name twice", "Excel", "a.csv", text("time,y,y\n"), "y:mm", "y:um", refusal="numbers 2 and 3"),
-    Sample("CSV: dates", "loggers, pandas", "a.csv", dated),
-    Sample(
-        "CSV: milliseconds", "Arduino, oscilloscopes", "a.csv", text("t (ms),y,x\n", columns=NUMBERED * [1e3, 1, 1])
-    ),
+    Sample("text: spaces, commented header", "numpy.savetxt", text("# time y x\n", " ")),
+    Sample("CSV: without names", "loggers", text(""), ("2:mm", "3:um"), {"time": "1"}),
+    Sample("CSV: last row cut off", "a logger that was switched off", text(PLAIN, end="6.0,1.")),
+    Sample("CSV: a name twice", "Excel", text("time,y,y\n"), ("y:mm", "y:um"), refusal="numbers 2 and 3"),
+    Sample("CSV: dates", "loggers, pandas", dated),
+    Sample("CSV: milliseconds", "Arduino, oscilloscopes", text("t (ms),y,x\n", columns=NUMBERED * [1e3, 1, 1])),
     Sample(
         "CSV: time of six digits at 100 s",
         "LabVIEW, Excel",
-        "a.csv",
         text(PLAIN, columns=np.column_stack([np.round(100.0004 + 1.1338 * TIME, 3), RESPONSE, DRIVE])),
         options={"rate": 1000.0},
         note="rounded",
@@ -280,7 +287,6 @@ SAMPLES = [
     Sample(
         "CSV: samples missing",
         "a logger that lost some",
-        "a.csv",
         text(PLAIN, columns=np.delete(NUMBERED, slice(3000, 3100), axis=0)),
         options={"rate": 1000.0},
         refusal="interrupted there",
@@ -288,126 +294,65 @@ SAMPLES = [
     Sample(
         "CSV: time goes back",
         "two runs in a file",
-        "a.csv",
         text(PLAIN, columns=np.vstack([NUMBERED, NUMBERED])),
         refusal="interrupted there",
     ),
-    Sample(
-        "CSV: constant time", "a broken logger", "a.csv", text(PLAIN, columns=NUMBERED * [0, 1, 1]), refusal="must rise"
-    ),
+    Sample("CSV: constant time", "a broken logger", text(PLAIN, columns=NUMBERED * [0, 1, 1]), refusal="must rise"),
     Sample(
         "CSV: volts without a sensitivity",
         "data loggers",
-        "a.csv",
         text("time,y [V],x [um]\n"),
-        "y",
-        "x",
+        ("y", "x"),
         refusal="the unit V is a voltage",
     ),
-    Sample("CSV: volts with a sensitivity", "data loggers", "a.csv", text("time,y [V],x [um]\n"), "y:1V/mm", "x"),
-    Sample("rate of 0", "", "a.csv", text(PLAIN), options={"rate": 0.0}, refusal="must be above 0"),
-    Sample("empty file", "a full disk", "a.csv", lambda file: file.touch(), refusal="is empty"),
-    Sample("MAT 5: vectors", "MATLAB, SciPy", "a.mat", mat(t=TIME, y=RESPONSE, x=DRIVE.reshape(-1, 1))),
+    Sample("CSV: volts with a sensitivity", "data loggers", text("time,y [V],x [um]\n"), ("y:1V/mm", "x")),
+    Sample("CSV: rate of 0", "", text(PLAIN), options={"rate": 0.0}, refusal="must be above 0"),
+    Sample("CSV: empty file", "a full disk", lambda file: file.touch(), refusal="is empty"),
+    Sample("MAT 5: vectors", "MATLAB, SciPy", mat(t=TIME, y=RESPONSE, x=DRIVE.reshape(-1, 1))),
     Sample(
         "MAT 5: structure",
         "MATLAB",
-        "a.mat",
         mat(HIdata={"t": TIME, "y": RESPONSE, "x": DRIVE}),
-        "HIdata.y:mm",
-        "HIdata.x:um",
+        ("HIdata.y:mm", "HIdata.x:um"),
         {"time": "HIdata.t"},
     ),
-    Sample("MAT 5: structure with time", "Simulink", "a.mat", mat(out=simulink()), options={"time": "out.time"}),
-    Sample(
-        "MAT 5: matrix of columns", "MATLAB", "a.mat", mat(data=NUMBERED), "data/2:mm", "data/3:um", {"time": "data/1"}
-    ),
-    Sample("MAT 7.3: structure", "MATLAB", "a.mat", mat73, "HIdata.y:mm", "HIdata.x:um", {"time": "HIdata.t"}),
-    Sample("HDF5: datasets", "h5py", "a.h5", hdf5(plain), "/y:mm"),
-    Sample("HDF5: counts with scale_factor and units", "netCDF, xarray", "a.h5", hdf5(counts), "y", "x"),
+    Sample("MAT 5: structure with time", "Simulink", mat(out=simulink()), options={"time": "out.time"}),
+    Sample("MAT 5: matrix of columns", "MATLAB", mat(data=NUMBERED), ("data/2:mm", "data/3:um"), {"time": "data/1"}),
+    Sample("MAT 7.3: structure", "MATLAB", mat73, ("HIdata.y:mm", "HIdata.x:um"), {"time": "HIdata.t"}),
+    Sample("HDF5: datasets", "h5py", hdf5(plain), ("/y:mm", "x:um")),
+    Sample("HDF5: counts with scale_factor and units", "netCDF, xarray", hdf5(counts), ("y", "x")),
     Sample(
         "HDF5: soft links, also broken and in a circle",
         "h5py, NeXus",
-        "a.h5",
         hdf5(linked),
-        "run/y:mm",
-        "raw/x:um",
+        ("run/y:mm", "raw/x:um"),
         {"time": "raw/time"},
     ),
-    Sample("HDF5: compound table", "PyTables, pandas", "a.h5", hdf5(compound)),
-    Sample("HDF5: columns of a matrix", "h5py", "a.h5", hdf5(matrix), "data/2:mm", "data/3:um", {"time": "data/1"}),
-    Sample("HDF5: complex data", "spectra", "a.h5", hdf5(spectra), "frf", refusal="complex"),
-    Sample("HDF5: an angle", "h5py", "a.h5", hdf5(angle), "y", refusal="deg is one of angles"),
+    Sample("HDF5: compound table", "PyTables, pandas", hdf5(compound)),
+    Sample("HDF5: columns of a matrix", "h5py", hdf5(matrix), ("data/2:mm", "data/3:um"), {"time": "data/1"}),
+    Sample("HDF5: complex data", "spectra", hdf5(spectra), ("frf", "x:um"), refusal="complex"),
+    Sample("HDF5: an angle", "h5py", hdf5(angle), ("y", "x:um"), refusal="deg is one of angles"),
+    Sample("TDMS: an angular velocity", "LabVIEW", tdms(unit="rad/s"), refusal="one of frequencies"),
+    Sample("TDMS: waveforms", "LabVIEW", tdms()),
+    Sample("TDMS: one channel begins later", "LabVIEW", tdms(shift=1), note="begins"),
+    Sample("TDMS: two rates", "LabVIEW", tdms(rate=2), note="common"),
+    Sample("TDMS: a channel of dates", "LabVIEW, FlexLogger", tdms(stamped=True), ("y:mm", "x:um")),
+    Sample("TDMS: cut off by a crash", "LabVIEW", tdms(cut=9000), note="common"),
+    Sample("UFF58: id lines NONE", "LMS Test.Lab, ME'scope", uff()),
     Sample(
-        "TDMS: an angular velocity", "LabVIEW", "a.tdms", tdms(unit="rad/s"), "y", "x", refusal="one of frequencies"
+        "UFF58: names with a colon", "LMS Test.Lab", uff(("1x : m/s²", "2x : m/s²")), ("1x : m/s²:mm", "2x : m/s²:um")
     ),
-    Sample("TDMS: waveforms", "LabVIEW", "a.tdms", tdms(), "y", "x"),
-    Sample("TDMS: one channel begins later", "LabVIEW", "a.tdms", tdms(shift=1), "y", "x", note="begins"),
-    Sample("TDMS: two rates", "LabVIEW", "a.tdms", tdms(rate=2), "y", "x", note="common"),
-    Sample("TDMS: a channel of dates", "LabVIEW, FlexLogger", "a.tdms", tdms(stamped=True)),
-    Sample("TDMS: cut off by a crash", "LabVIEW", "a.tdms", tdms(cut=9000), "y", "x", note="common"),
-    Sample("UFF58: id lines NONE", "LMS Test.Lab, ME'scope", "a.uff", uff(), "1+X", "2+X"),
-    Sample(
-        "UFF58: names with a colon",
-        "LMS Test.Lab",
-        "a.uff",
-        uff(("1x : m/s²", "2x : m/s²")),
-        "1x : m/s²:mm",
-        "2x : m/s²:um",
-    ),
-    Sample(
-        "UFF58: uneven abscissa", "pyuff, simulations", "a.uff", uff(uneven=True), "1+X", "2+X", note="interpolated"
-    ),
-    Sample(
-        "UFF58: frequency response function",
-        "LMS Test.Lab",
-        "a.uff",
-        uff(kind=4),
-        "1+X",
-        "2+X",
-        refusal="frequency response function",
-    ),
-    Sample(
-        "UFF58: power spectral density",
-        "LMS Test.Lab",
-        "a.uff",
-        uff(kind=9),
-        "1+X",
-        "2+X",
-        refusal="power spectral density",
-    ),
-    Sample(
-        "UFF58: a force cell", "LMS Test.Lab", "a.uff", uff(units=("mm", "N")), "1+X", "2+X", refusal="N is a force"
-    ),
-    Sample(
-        "UFF58: a force without a unit",
-        "pyuff",
-        "a.uff",
-        uff(units=("NONE", "NONE"), ordinate=13),
-        "1+X",
-        "2+X",
-        refusal="N is a force",
-    ),
-    Sample("LVM: volts", "LabVIEW", "a.lvm", lvm(unit="V"), "y", "x", refusal="V is a voltage"),
-    Sample("LVM: tab, without times", "LabVIEW", "a.lvm", lvm(), "y", "x"),
-    Sample(
-        "LVM: decimal comma, one column of times",
-        "LabVIEW (German)",
-        "a.lvm",
-        lvm(decimal=",", columns="One"),
-        "y",
-        "x",
-    ),
-    Sample("LVM: comma as separator, comments", "LabVIEW", "a.lvm", lvm(separator=",", columns="One"), "y", "x"),
-    Sample("LVM: several blocks", "LabVIEW", "a.lvm", lvm(blocks=3), "y", "x"),
-    Sample(
-        "LVM: several blocks with gaps",
-        "LabVIEW",
-        "a.lvm",
-        lvm(blocks=3, gap=0.5),
-        "y",
-        "x",
-        refusal="gaps between its blocks",
-    ),
+    Sample("UFF58: uneven abscissa", "pyuff, simulations", uff(uneven=True), note="interpolated"),
+    Sample("UFF58: frequency response function", "LMS Test.Lab", uff(kind=4), refusal="frequency response function"),
+    Sample("UFF58: power spectral density", "LMS Test.Lab", uff(kind=9), refusal="power spectral density"),
+    Sample("UFF58: a force cell", "LMS Test.Lab", uff(units=("mm", "N")), refusal="N is a force"),
+    Sample("UFF58: a force without a unit", "pyuff", uff(units=("NONE", "NONE"), ordinate=13), refusal="N is a force"),
+    Sample("LVM: volts", "LabVIEW", lvm(unit="V"), refusal="V is a voltage"),
+    Sample("LVM: tab, without times", "LabVIEW", lvm()),
+    Sample("LVM: decimal comma, one column of times", "LabVIEW (German)", lvm(decimal=",", columns="One")),
+    Sample("LVM: comma as separator, comments", "LabVIEW", lvm(separator=",", columns="One")),
+    Sample("LVM: several blocks", "LabVIEW", lvm(blocks=3)),
+    Sample("LVM: several blocks with gaps", "LabVIEW", lvm(blocks=3, gap=0.5), refusal="gaps between its blocks"),
 ]
 
 
