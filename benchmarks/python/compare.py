@@ -27,6 +27,7 @@ KEPT = {
     "performance.txt": "validation",
     "performance.csv": "validation",
     "run_time_map.csv": "validation",
+    "run-time-map.svg": "validation",
     "work-precision.svg": "docs",
 }
 TOLERANCES = (1e-6, 1e-9, 1e-12)
