@@ -10,10 +10,9 @@
 use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
 
-use criterion::{BatchSize, Criterion, Throughput};
 use lovines::{Drive, Parameters};
 use vines_benchmarks::baseline::Baseline;
-use vines_benchmarks::method::{Method, Stepped, begin, measure};
+use vines_benchmarks::method::{Stepped, begin, measure};
 use vines_benchmarks::scene::{Scene, Step, state};
 
 /// Duration of the measurement, and of the turns of a case in each round.
@@ -180,26 +179,8 @@ fn quartiles(pairs: &[[f64; 2]], value: impl Fn(&[f64; 2]) -> f64) -> [f64; 3] {
     [1, 2, 3].map(|n| values[n * (values.len() - 1) / 4])
 }
 
-/// The cost of a step of the plant in each case, without its setting up.
-fn absolute(cases: &[Case]) {
-    let mut criterion = Criterion::default()
-        .warm_up_time(Duration::from_millis(500))
-        .measurement_time(Duration::from_secs(2))
-        .configure_from_args();
-    let mut group = criterion.benchmark_group("plant");
-    for Case { name, scene, .. } in cases {
-        let start = || Stepped::start(scene, 0.0).expect("a valid scene");
-        let run = |plant: &mut Stepped| scene.steps.iter().try_for_each(|step| plant.step(step));
-        group.throughput(Throughput::Elements(scene.steps.len() as u64));
-        group.bench_function(name, |b| b.iter_batched_ref(start, run, BatchSize::SmallInput));
-    }
-    group.finish();
-    criterion.final_summary();
-}
-
 fn main() {
     let mut cases = cases();
-    absolute(&cases);
     // `cargo test --benches` only wants to see each run once.
     let measured = u32::from(std::env::args().any(|argument| argument == "--bench"));
     let (duration, round) = (measured * DURATION, measured * ROUND);

@@ -222,11 +222,7 @@ impl Fmu {
     /// Value of a variable, SI units; of a boolean one 0 or 1.
     pub fn get(&mut self, variable: Variable) -> Result<f64, FmuError> {
         let Variable { kind, reference, scale } = variable;
-        let value = match kind {
-            FmiType::Real => self.instance.real(reference),
-            FmiType::Boolean => self.instance.boolean(reference).map(|value| f64::from(u8::from(value))),
-            _ => self.instance.integer(reference).map(f64::from),
-        };
+        let value = self.instance.get(kind, reference);
         let value = self.refused("give a value", value)?;
         Ok(scale.factor * value + scale.offset)
     }
@@ -239,12 +235,9 @@ impl Fmu {
     /// Sets a variable, SI units.
     pub fn set(&mut self, variable: Variable, value: f64) -> Result<(), FmuError> {
         let Variable { kind, reference, scale } = variable;
-        let value = (value - scale.offset) / scale.factor;
-        let set = match kind {
-            FmiType::Real => self.instance.set_real(reference, value),
-            FmiType::Boolean => self.instance.set_boolean(reference, value != 0.0),
-            _ => self.instance.set_integer(reference, value.round() as i32),
-        };
+        let set = self
+            .instance
+            .set(kind, reference, (value - scale.offset) / scale.factor);
         self.refused("take a value", set)
     }
 

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::ptr;
 use std::sync::Mutex;
 
+use fmi2_description::FmiType;
 use libloading::Library;
 
 use crate::archive::Unpacked;
@@ -244,34 +245,28 @@ impl Instance {
         call!(self, fmi2DoStep(time, step, 1))
     }
 
-    pub fn real(&mut self, reference: c_uint) -> Result<f64, String> {
-        let mut value = 0.0;
-        call!(self, fmi2GetReal(&reference, 1, &mut value))?;
-        Ok(value)
+    /// The value of a variable; of a Boolean one 0 or 1.
+    pub fn get(&mut self, kind: FmiType, reference: c_uint) -> Result<f64, String> {
+        let (mut real, mut whole) = (0.0, 0);
+        match kind {
+            FmiType::Real => call!(self, fmi2GetReal(&reference, 1, &mut real))?,
+            FmiType::Boolean => call!(self, fmi2GetBoolean(&reference, 1, &mut whole))?,
+            _ => call!(self, fmi2GetInteger(&reference, 1, &mut whole))?,
+        }
+        Ok(match kind {
+            FmiType::Real => real,
+            FmiType::Boolean => f64::from(u8::from(whole != 0)),
+            _ => whole.into(),
+        })
     }
 
-    pub fn integer(&mut self, reference: c_uint) -> Result<i32, String> {
-        let mut value = 0;
-        call!(self, fmi2GetInteger(&reference, 1, &mut value))?;
-        Ok(value)
-    }
-
-    pub fn boolean(&mut self, reference: c_uint) -> Result<bool, String> {
-        let mut value = 0;
-        call!(self, fmi2GetBoolean(&reference, 1, &mut value))?;
-        Ok(value != 0)
-    }
-
-    pub fn set_real(&mut self, reference: c_uint, value: f64) -> Result<(), String> {
-        call!(self, fmi2SetReal(&reference, 1, &value))
-    }
-
-    pub fn set_integer(&mut self, reference: c_uint, value: i32) -> Result<(), String> {
-        call!(self, fmi2SetInteger(&reference, 1, &value))
-    }
-
-    pub fn set_boolean(&mut self, reference: c_uint, value: bool) -> Result<(), String> {
-        call!(self, fmi2SetBoolean(&reference, 1, &c_int::from(value)))
+    /// Sets a variable; a Boolean one to whether the value is not 0.
+    pub fn set(&mut self, kind: FmiType, reference: c_uint, value: f64) -> Result<(), String> {
+        match kind {
+            FmiType::Real => call!(self, fmi2SetReal(&reference, 1, &value)),
+            FmiType::Boolean => call!(self, fmi2SetBoolean(&reference, 1, &c_int::from(value != 0.0))),
+            _ => call!(self, fmi2SetInteger(&reference, 1, &(value.round() as i32))),
+        }
     }
 
     /// What a status means. A message of an error that did not fail is passed on as a warning.
