@@ -1,19 +1,16 @@
-"""A phase-locked loop tuned against noise: error of the locked detuning, and periods to the lock.
+# %% [markdown]
+# # A loop tuned against noise
+# Error of the locked detuning and periods to the lock, over the bandwidth of the detector.
 
-python examples/tuning.py [FOLDER]    writes tuning.svg
-"""
-
-import sys
+# %%
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 import vines
 
-folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
-folder.mkdir(parents=True, exist_ok=True)
+plt.style.use("vines.figures")
 bandwidths = np.geomspace(0.03, 0.3, 6)
 seeds = range(1, 7)
 exact = next(orbit.sigma for orbit in vines.orbits() if orbit.stable)
@@ -34,15 +31,20 @@ def locked(bandwidth: float, seed: int) -> tuple[float, float]:
     return lock["sigma"] - exact, lock["periods_to_lock"]
 
 
+# %% [markdown]
 # The interpreter lock is released: threads use all cores.
+
+# %%
 with ThreadPoolExecutor() as pool:
     found = pool.map(lambda case: locked(*case), [(bandwidth, seed) for bandwidth in bandwidths for seed in seeds])
     errors, periods = np.array(list(found)).reshape(len(bandwidths), len(seeds), 2).transpose(2, 0, 1)
-figure, (upper, lower) = plt.subplots(2, sharex=True, figsize=(6, 5), layout="constrained")
-upper.loglog(bandwidths, np.abs(errors), "k.")
+
+# %%
+figure, (upper, lower) = plt.subplots(2, sharex=True, figsize=(7.9, 5))
+upper.loglog(bandwidths, np.abs(errors), ".", color="C5")
 upper.loglog(bandwidths, np.sqrt(np.nanmean(errors**2, axis=1)), label="RMS")
 upper.set(ylabel="|error of $\\sigma$|", title="Noise 30 dB below the response")
 upper.legend()
-lower.semilogx(bandwidths, periods, "k.")
+lower.semilogx(bandwidths, periods, ".", color="C5")
 lower.set(xlabel="bandwidth / ω₀", ylabel="periods to the lock")
-figure.savefig(folder / "tuning.svg")
+figure.savefig("tuning.svg", metadata={"Date": None})

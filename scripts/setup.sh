@@ -75,6 +75,15 @@ package_environment() {
         { cat .venv-python.log >&2; fail "the packages in scripts/requirements-python.txt could not be installed"; }
 }
 
+# Builds the wheel, in target/wheels, and installs it in that environment.
+python_package() {
+    local python=$PWD/.venv-python/bin/python pip=(-m pip --quiet --disable-pip-version-check)
+    stage "Wheel (the first time: some minutes)"
+    rm -rf target/wheels
+    PATH="${python%/*}:$PATH" "$python" "${pip[@]}" wheel --no-build-isolation --no-deps -w target/wheels ./python
+    "$python" "${pip[@]}" install --no-deps --force-reinstall target/wheels/vines_testbench-*.whl
+}
+
 # `cargo zigbuild` and the zig linker, for libraries that load on older Linux.
 portable_environment() {
     environment .venv-portable scripts/requirements-portable.txt && export PATH="$PWD/.venv-portable/bin:$PATH"

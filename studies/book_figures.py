@@ -18,11 +18,10 @@ import matplotlib as mpl
 
 mpl.use("svg")
 import matplotlib.pyplot as plt
-from styles import COLOURS, MEASURED, THEORY
+from styles import COLOURS, EXACT, MEASURED, THEORY
 
 DOCS = Path(__file__).parent.parent / "docs"
 PROGRAM = sys.argv[1]
-plt.rcParams.update({"font.size": 9, "svg.fonttype": "none", "font.family": "sans-serif", "svg.hashsalt": "vines"})
 
 
 def vines(*words):
@@ -66,7 +65,7 @@ def own():
 
 def window():
     """Where stable symmetric 1:1 orbits at phase resonance exist, over r and G, and what `vines identify` says."""
-    figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
+    figure, axes = plt.subplots(figsize=(7.9, 4.6))
     ratios = [0.3 + 0.05 * n for n in range(15)]
     for r in ratios:
         points = printed("orbit", "--backbone", "--set", f"plant.r={r:.2f}")["points"]
@@ -93,7 +92,7 @@ def window():
     axes.set(
         xlabel="coefficient of restitution r", ylabel="base amplitude G = E/(b ε)", xlim=(0.27, 1.03), ylim=(0, 2.6)
     )
-    axes.legend(frameon=False, title="vines identify at G = 1.1")
+    axes.legend(title="vines identify at G = 1.1")
     save(figure, "window.svg")
 
 
@@ -101,16 +100,16 @@ def cavities():
     """Backbones of four real cavities, tracked by `vines backbone`, and that of the ideal cavity by exact orbits."""
     scenes = {
         "rough": ("friction, mu = 0.05", MEASURED, "o"),
-        "skewed": ("gaps 1.1 : 0.9", COLOURS["symmetric 1:1"], "s"),
-        "vertical": ("vertical", "#009e73", "^"),
-        "viscoelastic": ("viscoelastic", "#cc79a7", "D"),
+        "skewed": ("gaps 1.1 : 0.9", COLOURS["particle"], "s"),
+        "vertical": ("vertical", COLOURS["n impacts"], "^"),
+        "viscoelastic": ("viscoelastic", COLOURS["predicted"], "D"),
     }
-    figure, both = plt.subplots(1, 2, figsize=(7.5, 4), layout="constrained", sharey=True)
+    figure, both = plt.subplots(1, 2, figsize=(7.9, 4.2), sharey=True)
     orbits = printed("orbit", "--backbone")["points"]
     fold = min(orbits, key=lambda point: point["C"])["B"]
     ideal = [point for point in orbits if fold <= point["B"] < 1.3]
     for axes, name in zip(both, ("sigma", "G"), strict=True):
-        axes.plot([p[name] for p in ideal], [p["C"] for p in ideal], color="black", lw=1, label="ideal (exact orbits)")
+        axes.plot([p[name] for p in ideal], [p["C"] for p in ideal], color=EXACT, label="ideal (exact orbits)")
     for name, (label, colour, mark) in scenes.items():
         with tempfile.TemporaryDirectory() as folder:
             points = printed("backbone", "--scene", f"scenes/{name}.toml", "--out", folder)["points"]
@@ -120,13 +119,13 @@ def cavities():
             axes.plot(*place, mark, color=colour, mfc="none", ms=4, lw=0, label=label)
     both[0].set(xlabel="detuning sigma", ylabel="amplitude of the response C", xlim=(-2.2, 0.4), ylim=(0, 0.75))
     both[1].set(xlabel="base amplitude G", xlim=(0.8, 1.7))
-    both[1].legend(frameon=False, loc="lower right")
+    both[1].legend(loc="lower right")
     save(figure, "cavities.svg")
 
 
 def coverage():
     """How much the share of errors within the stated 95 % differs from it, from the results in validation/."""
-    figure, axes = plt.subplots(figsize=(6, 2.6), layout="constrained")
+    figure, axes = plt.subplots(figsize=(7.9, 3))
     # Several rows are of one kind, with other seeds: they count together.
     shares = {}
     for study, count, name in (("tracking", "settled", "tracked"), ("locks", "correct", "locks")):

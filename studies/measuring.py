@@ -55,7 +55,7 @@ balance = amplitude - work
 columns = np.column_stack([np.ones_like(time), integral(rate), deviation])
 coefficients = np.linalg.lstsq(columns, balance, rcond=None)[0]
 residual = balance - columns @ coefficients
-figure, axes = plt.subplots(3, sharex=True, figsize=(6.4, 5), layout="constrained")
+figure, axes = plt.subplots(3, sharex=True, figsize=(7.9, 6))
 axes[0].plot(time, amplitude / b, ".", color=MEASURED)
 axes[0].set(ylabel="A / b", title="A varies …")
 axes[1].plot(time, (balance - coefficients[2] * deviation) / b, ".", color=MEASURED)
@@ -71,7 +71,7 @@ exact = levels - np.column_stack([0 * points["C"], points["sigma_difference"], p
 measured, mean = -coefficients[1] / (scene.dimensionless["epsilon"] * b), amplitude.mean() / b
 expected = np.interp(mean, exact[::-1, 0], exact[::-1, 2])
 print(f"G = {measured:.5f} at C = {mean:.4f}, exact orbit {expected:.5f}; rest at most {abs(residual).max() / b:.1e} b")
-figure, axes = plt.subplots(1, 2, figsize=(6.4, 3), layout="constrained")
+figure, axes = plt.subplots(1, 2, figsize=(7.9, 3.6))
 for axis, column, label in zip(axes, (2, 1), ("drive $E_R$ / (ε b)", "detuning of $ω_R$"), strict=True):
     axis.plot(exact[:, 0], exact[:, column], color=EXACT, label="exact orbits")
     axis.plot(levels[:, 0], levels[:, column], ".", color=MEASURED, label="held levels")
