@@ -10,6 +10,7 @@ import { extname, join } from "node:path";
 import { createInterface } from "node:readline";
 import { after, before, describe, test } from "node:test";
 import puppeteer from "puppeteer-core";
+import { animation } from "../animation.mjs";
 
 const FOLDER = process.env.VINES_PAGE;
 const BOOK = join(import.meta.dirname, "../../docs");
@@ -57,6 +58,12 @@ test("the module has at most 200 KB", async () => {
   const { size } = await stat(join(FOLDER, "vines_live.wasm"));
   console.log(`the module has ${size} bytes`);
   assert.ok(size <= 200 * 1024, `${size} bytes`);
+});
+
+test("the animated picture of the README is what the module draws, in less than 500 KB", async () => {
+  const picture = await readFile(join(BOOK, "lock-and-decay.svg"), "utf8");
+  assert.ok(picture.length < 500_000);
+  assert.ok(picture === (await animation(FOLDER)), "run `node live/animation.mjs FOLDER`");
 });
 
 for (const { name, options } of BROWSERS) {
