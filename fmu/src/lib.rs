@@ -5,7 +5,6 @@
 
 mod derivatives;
 mod exchange;
-mod limits;
 mod log;
 mod model_exchange;
 mod outputs;
@@ -13,8 +12,8 @@ mod reach;
 mod settings;
 mod structure;
 
-use crate::limits::lost;
 use crate::model_exchange::hybrid::Hybrid;
+use crate::reach::lost;
 use fmi2_component::{Archive, Component, Key, Log, Refusal, Resources};
 use lovines::plant::Contact;
 use lovines::table::Values;

@@ -7,7 +7,6 @@
 //! fast and slow time are combined: in the modulation from impact to impact, and in a waveform. Equation numbers refer to docs/theory.md.
 
 mod activation;
-mod decay;
 mod modulation;
 mod resonance;
 mod slow_flow;

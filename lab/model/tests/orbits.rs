@@ -12,8 +12,8 @@ use vines_model::{
     theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow},
 };
 
-mod reference;
-use reference::rows;
+mod common;
+use common::{Row, rows};
 
 #[test]
 fn orbits_match_the_references_to_all_their_digits_and_others_are_on_the_unstable_left_branch() {
@@ -33,7 +33,7 @@ fn orbits_match_the_references_to_all_their_digits_and_others_are_on_the_unstabl
             multipliers = multipliers.max((found - expected).abs());
         }
         assert_eq!(orbit.stable, row.multipliers[3] < 1.0, "{row:?}");
-        let same_scene = |other: &&reference::Row| other.scene() == row.scene();
+        let same_scene = |other: &&Row| other.scene() == row.scene();
         let listed = |orbit: &Orbit| {
             rows.iter()
                 .filter(same_scene)

@@ -1,7 +1,8 @@
-//! What the tests share: numbers from the environment, random numbers, and comparisons.
+//! What the tests share: numbers from the environment, random numbers, comparisons, and reference orbits.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 use rand_chacha::{ChaCha8Rng, rand_core::Rng};
+use vines_model::Dimensionless;
 
 /// The number in the environment variable `name`.
 pub fn setting(name: &str, default: u64) -> u64 {
@@ -20,4 +21,41 @@ pub fn within(random: &mut ChaCha8Rng, [low, high]: [f64; 2]) -> f64 {
 pub fn close(one: f64, other: f64, tolerance: f64) {
     let size = 1f64.max(one.abs());
     assert!((one - other).abs() <= tolerance * size, "{one} and {other}");
+}
+
+const ORBITS: &str = include_str!("../../../../tests/reference/orbits.csv");
+
+/// A row of `tests/reference/orbits.csv`: an exact orbit, and the first-order theory beside it.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    pub epsilon: f64,
+    pub lambda: f64,
+    pub r: f64,
+    pub g: f64,
+    pub sigma: f64,
+    pub c: f64,
+    pub b: f64,
+    pub multipliers: [f64; 4],
+    /// sigma, C and B.
+    pub theory: [f64; 3],
+}
+
+impl Row {
+    pub fn scene(&self) -> Dimensionless {
+        Dimensionless::new(self.epsilon, self.lambda, self.r, self.g)
+    }
+}
+
+pub fn rows() -> Vec<Row> {
+    ORBITS.lines().skip(1).map(row).collect()
+}
+
+fn row(line: &str) -> Row {
+    let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+    let [epsilon, lambda, r, g, sigma, c, b, m1, m2, m3, m4, theory @ ..] = &cells[..] else {
+        panic!("fourteen columns expected: {line}")
+    };
+    let [epsilon, lambda, r, g, sigma, c, b] = [epsilon, lambda, r, g, sigma, c, b].map(|one| *one);
+    let (multipliers, theory) = ([*m1, *m2, *m3, *m4], theory.try_into().unwrap());
+    Row { epsilon, lambda, r, g, sigma, c, b, multipliers, theory }
 }
