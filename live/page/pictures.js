@@ -3,7 +3,7 @@
 import { $ } from "./controls.js";
 import { RegimeMap } from "./map.js";
 import { LOOP, ROW } from "./module.js";
-import { Plot, extent } from "./plots.js";
+import { Plot, colour, extent } from "./plots.js";
 import { Rig } from "./rig.js";
 import { Strip } from "./strip.js";
 
@@ -16,13 +16,6 @@ const TRAIL = 3;
 const EFFECTS = ["gap_difference", "friction", "tilt"];
 // Pixels within which a click on the backbone means a point of it.
 const NEAR = 24;
-
-const colours = new Map();
-const colour = (name) => {
-  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
-  return colours.get(name);
-};
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => colours.clear());
 
 const digits = (value, count, unit = "") => (Number.isNaN(value) ? "not measured" : value.toFixed(count) + unit);
 

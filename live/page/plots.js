@@ -2,6 +2,14 @@
 
 import { surface } from "./rig.js";
 
+// The colour of a name in the style sheet.
+const colours = new Map();
+export const colour = (name) => {
+  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+  return colours.get(name);
+};
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => colours.clear());
+
 const MARGIN = { left: 56, right: 12, top: 24, bottom: 34 };
 
 export class Plot {

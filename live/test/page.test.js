@@ -237,6 +237,51 @@ for (const { name, options } of BROWSERS) {
       assert.ok(ratio > 0.4 && ratio < 0.6, JSON.stringify(offsets));
     });
 
+    test("manifold and backbone follow the numbers of their sentence, by pointer and by key, and the point that is dragged", async () => {
+      const { page, errors } = await open("explore.html");
+      await page.waitForFunction(() => window.live, { timeout: 30000 });
+      const state = () => page.evaluate(() => {
+        const text = (id) => Number(document.getElementById(id).textContent.replace("−", "-"));
+        return { r: window.live.values.restitution, B: window.live.values.speed, fold: [text("fold-b"), text("fold-c")], C: text("amplitude"), sigma: text("sigma"), G: text("drive"), verdict: document.getElementById("verdict").textContent };
+      });
+      // The numbers of `vines theory`.
+      const first = await state();
+      assert.deepEqual(first.fold, [0.625, 0.134]);
+      assert.match(first.verdict, /constant drive holds it/);
+      const place = async (selector) => { const box = await (await page.$(selector)).boundingBox(); return [box.x + box.width / 2, box.y + box.height / 2]; };
+      const [x, y] = await place("[data-key=restitution]");
+      await page.mouse.move(x, y);
+      await page.mouse.down();
+      await page.mouse.move(x + 60, y);
+      await page.mouse.up();
+      const dragged = await state();
+      assert.ok(Math.abs(dragged.r - 0.8) < 1e-9 && dragged.fold[1] < 0.08, JSON.stringify(dragged));
+      await page.focus("[data-key=restitution]");
+      for (let i = 0; i < 15; i++) await page.keyboard.press("ArrowLeft");
+      const { r } = await state();
+      assert.ok(Math.abs(r - 0.65) < 1e-9, `${r}`);
+      for (const [keys, words] of [[20, /only control of the response/], [8, /left of the fold/]]) {
+        await page.focus("[data-key=speed]");
+        for (let i = 0; i < keys; i++) await page.keyboard.press("ArrowDown");
+        assert.match((await state()).verdict, words);
+      }
+      const canvas = await (await page.$("#manifold")).boundingBox();
+      await page.mouse.click(canvas.x + 0.8 * canvas.width, canvas.y + 0.5 * canvas.height);
+      const above = await state();
+      assert.ok(above.B > 1.07 && /become unequal/.test(above.verdict), JSON.stringify(above));
+      // The particle just reaches the walls, and the sentence has theory (4), (16) and (17).
+      const motions = await page.evaluate(async () => (await import("/explore.js")).motion({ restitution: 0.65, damping: 1.4273831309 }, 0.8807350));
+      assert.ok(Math.abs(motions.C - 0.426545) < 1e-5 && Math.abs(motions.sigma + 1.181708) < 1e-4 && Math.abs(motions.G - 1.1) < 1e-5, JSON.stringify(motions));
+      assert.deepEqual(errors, []);
+      await mkdir(SCREENS, { recursive: true });
+      for (const width of [390, 1000]) {
+        await page.setViewport({ width, height: 800 });
+        assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= width);
+        await page.screenshot({ path: join(SCREENS, `${name}-explore-${width}.png`), fullPage: true });
+      }
+      await page.close();
+    });
+
     test("a challenge is not solved by its start, nor by what only looks like its goal", async () => {
       const { page } = await open("#scene=lose-the-symmetry");
       await ready(page);
