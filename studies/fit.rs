@@ -1,8 +1,8 @@
 //! How far are the parameters that a fit finds from the truth, from what they state, and from the best that the points allow?
 //!
 //! A rig is drawn (epsilon 0.002 to 0.03, lambda 0.4 to 2.5, r 0.4 to 0.9), and a client's scene that is wrong: r by 0.2, b by 10 %, m by 20 %,
-//! c by 30 %, k by 1 %. The client fits f0, zeta, r, b and epsilon to the backbone that it tracks (`points`), or to a recording, cut at both
-//! ends, which the plant follows: of the tracked backbone (`levels`), of a lock whose drive then changes slowly (`sweeps`), or of the search, the hold and
+//! c by 30 %, k by 1 %. The client fits f0, zeta, r, b and epsilon to the backbone that it tracks (`points`), also with the linear response that a
+//! loop check of the rig at rest measures (`linear`), or to a recording, cut at both ends, which the plant follows: of the tracked backbone (`levels`), of a lock whose drive then changes slowly (`sweeps`), or of the search, the hold and
 //! the decay of `vines identify` (`decays`). For each parameter, of the fits that are not rejected:
 //! the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the error over u, and that over the
 //! Cramér–Rao bound of the same points (of recordings, u is this bound); and the numbers of fits that are rejected, and of rigs without a fit.
@@ -12,7 +12,7 @@
 //! numbers of rigs that were drawn, measured, flagged because the ideal cavity does not describe their points, explained by the right effect, by a wrong one
 //! alone, and by the right one only among others; and the coverage of the strength.
 //!
-//! Arguments: `points`, `levels`, `sweeps`, `decays` or `effects`, RIGS, SEED, SNR in dB or `none`. Writes validation/fit.csv or, for `effects`,
+//! Arguments: `points`, `linear`, `levels`, `sweeps`, `decays` or `effects`, RIGS, SEED, SNR in dB or `none`. Writes validation/fit.csv or, for `effects`,
 //! validation/fit_effects.csv.
 
 mod common;
@@ -20,22 +20,30 @@ mod common;
 use common::*;
 use vines_testbench::advice;
 use vines_testbench::fit::{
-    Effect, Fit, Known, MeasuredPoint, Quantity, RecordFit, Recording, at, explain, fit, follow, parts,
+    Effect, Fit, Known, MeasuredPoint, Quantity, RecordFit, Recording, at, explain, fit, follow, linear_verdicts, parts,
 };
+use vines_testbench::linear::MeasuredLinear;
 use vines_testbench::rig::{Drive, RigError, RigStage, Sensors};
 
 /// Measured points, the scene of the client, and the rig.
 type Points = (Vec<MeasuredPoint>, Scene, Parameters);
 
 fn main() -> Result<(), Failure> {
-    let [source, count, seed, snr] = &arguments(["points|levels|sweeps|decays|effects", "RIGS", "SEED", "SNR|none"])?;
+    let [source, count, seed, snr] =
+        &arguments(["points|linear|levels|sweeps|decays|effects", "RIGS", "SEED", "SNR|none"])?;
     let measure: fn(&Case, &str) -> Result<Found, Failure> = match &**source {
-        "points" => |case, snr| fitted(&points(case, snr)?),
+        "points" => |case, snr| fitted(&points(case, snr)?, &[]),
+        "linear" => |case, snr| {
+            let (measured @ (points, scene, _), linear) = (&points(case, snr)?, checked(case, snr)?);
+            let verdicts = linear_verdicts(&[linear], points, scene.resonance, &scene.plant, &[])?;
+            println!("{verdicts:?}");
+            fitted(measured, &[Known::Linear(verdicts[0].linear)])
+        },
         "effects" => return effects(count.parse()?, seed.parse()?, snr),
         "levels" => |case, snr| follow_one(case, snr, levels),
         "sweeps" => |case, snr| follow_one(case, snr, sweep),
         "decays" => |case, snr| follow_one(case, snr, lock_and_decay),
-        other => return Err(format!("{other}: there are points, levels, sweeps, decays and effects").into()),
+        other => return Err(format!("{other}: there are points, linear, levels, sweeps, decays and effects").into()),
     };
     let mut uniform = uniform(seed.parse()?);
     let case = |_| {
@@ -74,9 +82,9 @@ fn drawn(uniform: Uniform) -> [f64; 3] {
 }
 
 /// Fits the parameters, and counts the fit as kept or rejected. Errors of the five parameters of a fit that is kept are over the Cramér–Rao bound.
-fn fitted((points, scene, truth): &Points) -> Result<Found, Failure> {
-    let fit = fit(points, scene.resonance, &scene.plant, &[])?;
-    let bound = at(points, scene.resonance, truth, &[]).ok_or("the rig has no such motion")?;
+fn fitted((points, scene, truth): &Points, known: &[Known]) -> Result<Found, Failure> {
+    let fit = fit(points, scene.resonance, &scene.plant, known)?;
+    let bound = at(points, scene.resonance, truth, known).ok_or("the rig has no such motion")?;
     let [ratios, errors] = [&fit, &bound].map(|u| {
         let over = |quantity: &Quantity| {
             let [value, u] = [&fit, u].map(|one| one.estimate(*quantity).expect("a fitted parameter"));
@@ -167,8 +175,22 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
         .filter(|one| !one.fit.is_rejected())
         .map(|one| (one.strength.value - one.effect.strength_of(&cavity)).abs() / one.strength.uncertainty)
         .collect();
-    let verdict = if is_flagged { found.verdict() } else { "ideal".into() };
-    println!("{ratios:.4?} {effect:?} {size:.2} moves by {moved:.0} u: {verdict}; strength {possible:.1?} u");
+    let verdict: Vec<_> = found
+        .candidates
+        .iter()
+        .map(|one| {
+            (
+                one.effect,
+                one.fit.chi_square.round(),
+                one.fit.degrees,
+                one.fit.left_out.len(),
+            )
+        })
+        .collect();
+    println!(
+        "{ratios:.4?} {effect:?} {size:.2} moves by {moved:.0} u: ideal {:.0} of {}; {verdict:?}; strength {possible:.1?} u",
+        found.ideal.chi_square, found.ideal.degrees
+    );
     let named = best.is_some() && best == effect;
     let [misnamed, among_others] = [best.is_some(), !possible.is_empty()].map(|is_so| is_so && !named);
     let counts = [false, true, is_flagged, named, misnamed, among_others].map(usize::from);
@@ -180,6 +202,14 @@ fn points(case: &Case, snr: &str) -> Result<Points, Failure> {
     let (truth, scene, plan) = client(case, snr)?;
     let tracked = tracked(&mut *behind_chain(truth, &scene)?, &plan, 20.0)?;
     Ok((measured(&tracked), scene, truth))
+}
+
+/// The linear response of the same rig at rest, by a loop check.
+fn checked(case: &Case, snr: &str) -> Result<MeasuredLinear, Failure> {
+    let (truth, scene, plan) = client(case, snr)?;
+    let scene = scene.at_rest();
+    let checked = check(&mut *behind_chain(truth, &scene)?, &plan)?;
+    Ok(checked.linear.ok_or_else(|| checked.verdict.to_string())?.data)
 }
 
 fn measured(tracked: &Tracked) -> Vec<MeasuredPoint> {

@@ -20,8 +20,12 @@ use vines_testbench::{
     backbone::track,
     comparison::{Comparison, TrackedComparison},
     experiment,
-    fit::{Channel, Contents, Found, Known, MeasuredPoint, Part, Recording, Selection, Table, find, parts},
+    fit::{
+        Candidate, Channel, Contents, EffectReport, Found, Known, MeasuredPoint, Measurements, Recording, Selection,
+        Table, find,
+    },
     identification,
+    linear::MeasuredLinear,
     rig::{BuiltIn, Simulated, Stoppable},
 };
 
@@ -77,18 +81,63 @@ pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
     })
 }
 
-/// `points`: response (m), frequency (rad/s) and drive (m), each with its standard uncertainty.
+/// `points`: response (m), frequency (rad/s) and drive (m), each with its standard uncertainty; `linear`: linear responses as JSON.
 #[pyfunction]
-pub fn fit(py: Python<'_>, scene: &Scene, points: Vec<[f64; 6]>, known: Vec<String>) -> PyResult<String> {
-    let known = parsed(&known)?;
+pub fn fit(
+    py: Python<'_>,
+    scene: &Scene,
+    points: Vec<[f64; 6]>,
+    recordings: Vec<RecordingTuple>,
+    known: Vec<String>,
+    linear: Vec<String>,
+) -> PyResult<String> {
     let estimate = |value, uncertainty| Estimate { value, uncertainty };
     let point = |[response, u_response, omega, u_omega, drive, u_drive]: [f64; 6]| MeasuredPoint {
         response: estimate(response, u_response),
         omega: estimate(omega, u_omega),
         drive: estimate(drive, u_drive),
     };
-    let points: Vec<MeasuredPoint> = points.into_iter().map(point).collect();
-    fitted(py, scene, &points, &known, &[])
+    let known = known.iter().map(|one| one.parse::<Known>().map_err(invalid));
+    let linear = linear
+        .iter()
+        .map(|one| serde_json::from_str::<MeasuredLinear>(one).map_err(invalid));
+    let measured = Measurements {
+        points: points.into_iter().map(point).collect(),
+        recordings: recordings.into_iter().map(recording_of).collect::<PyResult<_>>()?,
+        known: known.collect::<PyResult<_>>()?,
+        linear: linear.collect::<PyResult<_>>()?,
+    };
+    let scene = &scene.scene;
+    let found = py.detach(|| find(&measured, scene, |_| {})).map_err(invalid)?;
+    let numbers = |point: MeasuredPoint| {
+        let MeasuredPoint { response, omega, drive } = point;
+        let omega = omega.scaled(1.0 / std::f64::consts::TAU);
+        json!({
+            "f_Hz": omega.value, "A_m": response.value, "E_m": drive.value,
+            "u_f_Hz": omega.uncertainty, "u_A_m": response.uncertainty, "u_E_m": drive.uncertainty,
+        })
+    };
+    let Found {
+        fit, plant, parts, linear, record, explanation, alternatives, ..
+    } = found;
+    let parts: Vec<_> = parts
+        .iter()
+        .map(|part| json!({"part": part, "point": part.point.map(numbers)}))
+        .collect();
+    let reports = |candidates: &[Candidate]| candidates.iter().map(Candidate::report).collect::<Vec<EffectReport>>();
+    json(&json!({
+        "report": fit.report(&scene.plant),
+        "explained_by": explanation.as_ref().and_then(|one| one.explains()).map(|best| best.effect.name()),
+        "effects": explanation.map(|one| reports(&one.candidates)),
+        "alternatives": reports(&alternatives),
+        "linear": linear,
+        "followed_periods": record.map(|one| one.periods),
+        "parts": parts,
+        "plant": {
+            "M": plant.primary_mass, "k": plant.stiffness, "c": plant.damping,
+            "m": plant.particle_mass, "b": plant.half_width, "r": plant.restitution,
+        },
+    }))
 }
 
 /// A channel: name, unit, samples, and start and step (s) of a clock of its own.
@@ -182,69 +231,9 @@ pub fn linear_decay(py: Python<'_>, scene: &Scene, recording: RecordingTuple) ->
         .detach(|| recording.linear_decay(&scene.scene.knowledge()))
         .map_err(invalid)?;
     Ok(decay.map(|decay| {
-        let (f0, zeta) = (decay.omega.scaled(1.0 / std::f64::consts::TAU), decay.zeta);
-        (
-            [f0.value, f0.uncertainty, zeta.value, zeta.uncertainty],
-            decay.to_string(),
-        )
+        let MeasuredLinear { f0, u_f0, zeta, u_zeta, .. } = decay.into();
+        ([f0, u_f0, zeta, u_zeta], decay.to_string())
     }))
-}
-
-/// The fit of recordings.
-#[pyfunction]
-pub fn fit_recordings(
-    py: Python<'_>,
-    scene: &Scene,
-    recordings: Vec<RecordingTuple>,
-    known: Vec<String>,
-) -> PyResult<String> {
-    let known = parsed(&known)?;
-    let recordings = recordings
-        .into_iter()
-        .map(recording_of)
-        .collect::<PyResult<Vec<Recording>>>()?;
-    let parts = py
-        .detach(|| parts(&recordings, &scene.scene, &known))
-        .map_err(invalid)?
-        .concat();
-    let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
-    fitted(py, scene, &points, &known, &parts)
-}
-
-fn parsed(known: &[String]) -> PyResult<Vec<Known>> {
-    known.iter().map(|one| one.parse::<Known>().map_err(invalid)).collect()
-}
-
-/// The fit as JSON: its report, its plant, what effects say, and the parts of recordings.
-fn fitted(
-    py: Python<'_>,
-    scene: &Scene,
-    points: &[MeasuredPoint],
-    known: &[Known],
-    parts: &[Part],
-) -> PyResult<String> {
-    let scene = &scene.scene;
-    let Found { fit, plant, verdict, .. } = py
-        .detach(|| find(points, scene.resonance, &scene.plant, known, |_| {}))
-        .map_err(invalid)?;
-    let numbers = |point: MeasuredPoint| {
-        let MeasuredPoint { response, omega, drive } = point;
-        let omega = omega.scaled(1.0 / std::f64::consts::TAU);
-        json!({
-            "f_Hz": omega.value, "A_m": response.value, "E_m": drive.value,
-            "u_f_Hz": omega.uncertainty, "u_A_m": response.uncertainty, "u_E_m": drive.uncertainty,
-        })
-    };
-    let parts: Vec<_> = parts
-        .iter()
-        .map(|part| json!({"part": part, "point": part.point.map(numbers)}))
-        .collect();
-    json(
-        &json!({"report": fit.report(&scene.plant), "verdict": verdict, "parts": parts, "plant": {
-            "M": plant.primary_mass, "k": plant.stiffness, "c": plant.damping,
-            "m": plant.particle_mass, "b": plant.half_width, "r": plant.restitution,
-        }}),
-    )
 }
 
 #[pyfunction]

@@ -22,7 +22,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(experiments::identify, module)?,
         wrap_pyfunction!(experiments::backbone, module)?,
         wrap_pyfunction!(experiments::fit, module)?,
-        wrap_pyfunction!(experiments::fit_recordings, module)?,
         wrap_pyfunction!(experiments::linear_decay, module)?,
         wrap_pyfunction!(experiments::recording, module)?,
         wrap_pyfunction!(experiments::orbits, module)?,

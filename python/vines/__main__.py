@@ -47,8 +47,7 @@ def main() -> int:
         for one, decay in zip(recordings, decays, strict=True):
             if decay is not None:
                 print(f"{one.origin}: {decay}")
-        recordings = [one for one, decay in zip(recordings, decays, strict=True) if decay is None]
-        if not recordings:
+        if None not in decays:
             return 0
         found = fit_recordings(recordings, scene, known=given.known)
     except (ValueError, OSError, ImportError) as error:
@@ -59,8 +58,14 @@ def main() -> int:
     for symbol, unit, value, uncertainty, expected in zip(*columns, strict=True):
         print(f"{symbol:8} {value:.6g} ± {uncertainty:.2g} {unit}{doubt}, the scene says {expected:.6g}")
     print(f"{len(found.residuals)} points; chi-square {found.chi_square:.1f} for {found.degrees} degrees of freedom")
-    if found.verdict:
-        print(found.verdict)
+    if found.undetermined:
+        print(f"the recordings do not determine {', '.join(found.undetermined)}: record at least three levels")
+    for response in (verdict["linear"] for verdict in found.linear):
+        print(f"linear response: f0 = {response['f0_Hz']:.6g} Hz, particle {response['particle']}")
+    if found.effects is not None:
+        print(f"explained by {found.explained_by or 'no single effect of the cavity'}")
+    for effect, b in zip(*(found.alternatives.get(name, ()) for name in ("effect", "possible_b_m")), strict=True):
+        print(f"{effect} would give the same points with b = {1e3 * b:.4g} mm; give --known b and --known epsilon")
     return 0 if found.describes else 1
 
 

@@ -13,7 +13,6 @@ __all__ = [
     "Scene",
     "backbone",
     "fit",
-    "fit_recordings",
     "identify",
     "linear_decay",
     "orbits",
@@ -132,8 +131,13 @@ class Cells:
 
 def identify(scene: Scene, decay: bool) -> str: ...
 def backbone(scene: Scene) -> str: ...
-def fit(scene: Scene, points: list[list[float]], known: list[str]) -> str: ...
-def fit_recordings(scene: Scene, recordings: list[tuple[Any, ...]], known: list[str]) -> str: ...
+def fit(
+    scene: Scene,
+    points: list[list[float]],
+    recordings: list[tuple[Any, ...]],
+    known: list[str],
+    linear: list[str],
+) -> str: ...
 def linear_decay(scene: Scene, recording: tuple[Any, ...]) -> tuple[list[float], str] | None: ...
 def recording(
     path: str,

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from . import _native
 from .experiments import Table, _table
-from .recordings import Recording, linear_decay
+from .recordings import LinearDecay, Recording, linear_decay
 from .results import Result, axes
 from .scenes import Scene, checked
 
 _COLUMNS = ("A_m", "u_A_m", "f_Hz", "u_f_Hz", "E_m", "u_E_m")
+_LINEAR = ("f0_Hz", "u_f0_Hz", "zeta", "u_zeta", "correlation", "particle")
 _REGIMES = ("symmetric 1:1", "steady, symmetry unresolved")
 
 
@@ -44,8 +45,21 @@ class Fit(Result):
         Indices of the points that contradict the others and are left out, from 0.
     plant : dict
         The section `plant` of a scene, for `Scene(plant=...)`.
-    verdict : str or None
-        Which effect of a real cavity explains the points, or that none does; None if the ideal cavity describes them.
+    undetermined : tuple of str
+        Symbols of the first five parameters that the points do not determine: then `describes` says little.
+    explained_by : str or None
+        The effect of a real cavity that explains the points, where the ideal cavity does not describe them.
+    effects : dict of ndarray or None
+        Of each effect that was tried then: effect, symbol, unit, strength, uncertainty, chi_square, degrees, left_out,
+        describes, and possible_strength and possible_b_m, a strength and the half-width (m) that the points do not
+        exclude.
+    alternatives : dict of ndarray
+        The same columns: effects with which the points agree as well as with the ideal cavity, with another half-width.
+    linear : tuple of dict
+        Linear responses, with the state of the particle that agrees with the points, and the rises of chi-square with
+        the particle carried along and free. A response whose state is `unknown` is left out.
+    followed_periods : int or None
+        Periods of recordings that the plant follows; None if the result is the fit of points.
     parts : tuple of dict
         Parts of recordings: seconds, kind (held, sweep or decay), regime, and the point or None.
     """
@@ -60,7 +74,12 @@ class Fit(Result):
     residuals: NDArray[np.float64]
     left_out: tuple[int, ...]
     plant: dict[str, float]
-    verdict: str | None
+    undetermined: tuple[str, ...]
+    explained_by: str | None
+    effects: Table | None
+    alternatives: Table
+    linear: tuple[dict[str, Any], ...]
+    followed_periods: int | None
     parts: tuple[dict[str, Any], ...]
 
     def __getitem__(self, symbol: str) -> tuple[float, float]:
@@ -83,6 +102,7 @@ def fit(
     scene: Scene | None = None,
     *,
     known: Mapping[str, float | tuple[float, float]] | None = None,
+    linear: Iterable[Mapping[str, Any] | LinearDecay] = (),
 ) -> Fit:
     """Fit natural frequency, damping ratio, restitution, half-width and mass ratio to points, as `vines fit` does.
 
@@ -97,6 +117,9 @@ def fit(
     known : mapping, optional
         Values from elsewhere by their symbols f0 (Hz), zeta, r, b (m), epsilon, M, m (kg), k (N/m) and c (N s/m): a
         number, which is kept, or a pair of value and standard uncertainty.
+    linear : iterable, optional
+        Linear responses beside those in columns of the points (tracked.csv): what `linear_decay` returns, or the
+        mapping `linear` of tracked.json, of identification.json or of `vines check --json`.
 
     Returns
     -------
@@ -115,6 +138,7 @@ def fit(
     """
     tables: list[Any] = [points] if isinstance(points, Mapping) or hasattr(points, "columns") else list(points)
     rows: list[list[float]] = []
+    responses = list(linear)
     for table in tables:
         missing = [name for name in _COLUMNS if name not in table]
         if missing:
@@ -127,9 +151,13 @@ def fit(
         if "regime" in table:
             kept &= np.isin(np.atleast_1d(np.asarray(table["regime"])), _REGIMES)
         rows += np.column_stack(columns)[kept].tolist()
+        if "linear_particle" in table and len(columns[0]):
+            first = {name: np.atleast_1d(np.asarray(table[f"linear_{name}"]))[0] for name in _LINEAR}
+            if isinstance(first["particle"], str) and first["particle"]:
+                responses.append({name: float(first[name]) for name in _LINEAR[:5]} | {"particle": first["particle"]})
     for row in rows:
         row[2:4] = [math.tau * value for value in row[2:4]]
-    return _result(_native.fit(checked(scene)._native, rows, _texts(known)))
+    return _result(_native.fit(checked(scene)._native, rows, [], _texts(known), _responses(responses)))
 
 
 def fit_recordings(
@@ -156,16 +184,28 @@ def fit_recordings(
     Raises
     ------
     ValueError
-        A linear decay (see `linear_decay`), a recording without a stretch near phase resonance,
+        Nothing but linear decays (see `linear_decay`), a recording without a stretch near phase resonance,
         a channel that is clipped or swapped, or too few points.
     """
     every = [recordings] if isinstance(recordings, Recording) else list(recordings)
     given = checked(scene)
-    for one in every:
-        decay = linear_decay(one, given)
-        if decay is not None:
-            raise ValueError(f"{one.origin}: {decay}; `linear_decay` returns these, and there are no points to fit")
-    return _result(_native.fit_recordings(given._native, [one._tuple() for one in every], _texts(known)))
+    decays = [linear_decay(one, given) for one in every]
+    kept = [one._tuple() for one, decay in zip(every, decays, strict=True) if decay is None]
+    linear = [decay for decay in decays if decay is not None]
+    if linear and not kept:
+        origin = every[0].origin
+        raise ValueError(f"{origin}: {linear[0]}; `linear_decay` returns these, and there are no points to fit")
+    return _result(_native.fit(given._native, [], kept, _texts(known), _responses(linear)))
+
+
+def _responses(linear: Iterable[Mapping[str, Any] | LinearDecay]) -> list[str]:
+    def mapping(one: Mapping[str, Any] | LinearDecay) -> dict[str, Any]:
+        if isinstance(one, LinearDecay):
+            # A decay does not tell the state of the particle.
+            return dict(zip(_LINEAR, (*one.f0, *one.zeta, 0.0, "unknown"), strict=True))
+        return {name: one[name] for name in _LINEAR}
+
+    return list(dict.fromkeys(json.dumps(mapping(one)) for one in linear))
 
 
 def _texts(known: Mapping[str, float | tuple[float, float]] | Iterable[str] | None) -> list[str]:
@@ -185,7 +225,12 @@ def _result(text: str) -> Fit:
         residuals=np.array(report["residuals"]).reshape(-1, 3),
         left_out=tuple(number - 1 for number in report["left_out"]),
         plant=found["plant"],
-        verdict=found["verdict"],
+        undetermined=tuple(report["undetermined"]),
+        explained_by=found["explained_by"],
+        effects=None if found["effects"] is None else _table(found["effects"]),
+        alternatives=_table(found["alternatives"]),
+        linear=tuple(found["linear"]),
+        followed_periods=found["followed_periods"],
         parts=tuple(part["part"] | {"point": part["point"]} for part in found["parts"]),
         **{key: report[key] for key in ("describes", "chi_square", "p_value", "degrees")},
     )

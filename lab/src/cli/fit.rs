@@ -8,8 +8,8 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 use vines::fit::{
-    Candidate, Effect, Fit, FitReport, Found, Known, LeftOut, MeasuredPoint, Part, RecordFit, Recording, Selection, at,
-    decimals, find, follow, parts,
+    Candidate, Effect, EffectReport, Explanation, Fit, FitReport, Found, Known, LeftOut, LinearVerdict, MeasuredPoint,
+    Measurements, Part, Selection, decimals, find,
 };
 use vines::numerics::Estimate;
 use vines::report::fitted;
@@ -30,7 +30,11 @@ A recording has two channels over time, the response and the base. Delimiter, de
 are found; a file of `vines` needs no options. A channel is NAME or NAME:UNIT, with a name or a number of a column, and a unit (mm, µm, mm/s,
 m/s², g) or a multiple of it (-1g), the sensitivity of a sensor (100mV/g, 8V/mm, 125mm/s/V), or metres per unit. Velocities and accelerations
 become displacements harmonic by harmonic. Held stretches, slow sweeps and decays near phase resonance become points.
-A decay without impacts gives f0 and zeta. The scene says what the sensor reads, and about which natural frequency and damping the structure has.
+The scene says what the sensor reads, and about which natural frequency and damping the structure has.
+
+The linear response of the structure is data as well, for the state of the particle (carried along or free) that agrees with the points. It
+comes from tracked.csv, tracked.json or identification.json of a rig that was checked, from `vines check --json`, or from a recording of a
+decay without impacts.
 
 The model is the exact symmetric 1:1 motion of a linear oscillator and a particle between two walls. The fit finds
   f0, zeta    natural frequency and damping ratio of the structure without the particle
@@ -46,6 +50,7 @@ none does, at most a fifth of the points are left out; if that does not help, ev
 Examples:
   vines fit out/tracked.csv
   vines fit out/tracked.csv out/identification.json --known m=0.032±0.0005
+  vines fit out/tracked.csv ringdown.csv --response y:mm
   vines fit record.csv --response y:mm --drive x:um --rate 5000 --scene mine.toml
   vines fit table.csv --column A=amplitude:mm --column E=base:um --column f=frequency:Hz --column u_A=noise:mm --column u_E=noise_e:um --column u_f=noise_f:Hz
   vines fit out/tracked.csv --out rig.toml      a scene with the fitted plant, for every other command";
@@ -112,54 +117,33 @@ struct Output<'a> {
     verdict: Option<String>,
     /// Effects with which other parameters describe the points as well.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    alternatives: Vec<Alternative>,
+    alternatives: Vec<EffectReport>,
+    /// What the points say of linear responses.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    linear: &'a [LinearVerdict],
     /// Parts of recordings.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    parts: Vec<Part>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    parts: &'a [Part],
     /// Periods of recordings that the plant follows.
     #[serde(skip_serializing_if = "Option::is_none")]
     followed_periods: Option<usize>,
     /// Parts of recordings that do not belong to the motion.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    left_out_of_record: Vec<LeftOut>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    left_out_of_record: &'a [LeftOut],
     /// How recordings were read, linear decays, and what counts as exact.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     notes: Vec<String>,
 }
 
-/// An effect of the cavity with which another half-width describes the points as well.
-#[derive(Serialize)]
-struct Alternative {
-    effect: String,
-    symbol: &'static str,
-    unit: &'static str,
-    strength: f64,
-    b_m: f64,
-}
-
-impl Alternative {
-    fn of(candidate: &Candidate) -> Self {
-        let ([symbol, unit], [strength, b_m]) = (candidate.effect.symbol(), candidate.one_more());
-        Self {
-            effect: candidate.effect.to_string(),
-            symbol,
-            unit,
-            strength,
-            b_m,
-        }
-    }
-}
-
 /// What the intervals depend on: other cavities that would give the same points.
-fn only_if_ideal(alternatives: &[Candidate]) -> String {
+fn only_if_ideal(alternatives: &[EffectReport]) -> String {
     let texts: Vec<String> = alternatives
         .iter()
-        .map(Alternative::of)
-        .map(|Alternative { effect, symbol, unit, strength, b_m }| {
+        .map(|EffectReport { effect, symbol, unit, possible_strength, possible_b_m, .. }| {
             let space = if unit.is_empty() { "" } else { " " };
             format!(
-                "{effect} with {symbol} = {strength:.2}{space}{unit} would give the same points with b = {:.2} mm",
-                1e3 * b_m
+                "{effect} with {symbol} = {possible_strength:.2}{space}{unit} would give the same points with b = {:.2} mm",
+                1e3 * possible_b_m
             )
         })
         .collect();
@@ -171,6 +155,65 @@ fn only_if_ideal(alternatives: &[Candidate]) -> String {
          --known epsilon=VALUE±U\n",
         texts.join("; ")
     )
+}
+
+/// What the effects of a real cavity say.
+fn explained(explanation: &Explanation) -> String {
+    let chi_square = |fit: &Fit| format!("{:.0} for {}", fit.chi_square, fit.degrees);
+    let list = |candidates: &mut dyn Iterator<Item = &Candidate>| {
+        let texts = candidates.map(|candidate| format!("{} ({})", candidate.effect, chi_square(&candidate.fit)));
+        texts.collect::<Vec<String>>().join(", ")
+    };
+    let without = chi_square(&explanation.ideal);
+    let Some(best) = explanation.explains() else {
+        let tried = match list(&mut explanation.candidates.iter()) {
+            none if none.is_empty() => "none of them a motion exists".into(),
+            some => some,
+        };
+        return format!(
+            "no single effect of the cavity explains it: chi-square is {without} without one, with {tried}"
+        );
+    };
+    let EffectReport { effect, symbol, unit, left_out, .. } = best.report();
+    let (strength, space) = (with_decimals(best.strength), if unit.is_empty() { "" } else { " " });
+    let mut text = format!(
+        "{effect} explains it: {symbol} = {strength}{space}{unit}, chi-square {}; without it, chi-square is {without}",
+        chi_square(&best.fit)
+    );
+    if left_out > 0 {
+        text +=
+            &format!("; {left_out} points of the smallest responses do not belong to this motion, and are left out");
+    }
+    let others = list(&mut explanation.possible());
+    if !others.is_empty() {
+        text += &format!("; the points do not exclude {others}");
+    }
+    text
+}
+
+/// What the points say of a linear response.
+fn of_linear(verdict: &LinearVerdict) -> String {
+    let [f0, zeta] = verdict.linear.estimates().map(with_decimals);
+    let rises = ["with the particle carried along", "with a free particle"]
+        .into_iter()
+        .zip(verdict.rises)
+        .filter_map(|(state, rise)| Some(format!("{state} chi-square rises by {:.1}", rise?)));
+    let rises = rises.collect::<Vec<String>>().join(", ");
+    let result = match verdict.agrees() {
+        [true, false] => "the particle was carried along; both are data of the fit",
+        [false, true] => "the particle was free; both are data of the fit",
+        [true, true] => "the points do not tell the state of the particle, and both are left out",
+        [false, false] => {
+            "the points contradict them, and both are left out: a cavity that is not ideal or a particle that slides may be the reason"
+        }
+    };
+    format!("linear response: f0 = {f0} Hz, zeta = {zeta}: {rises}: {result}\n")
+}
+
+/// A value and its standard uncertainty with two digits of it.
+fn with_decimals(Estimate { value, uncertainty }: Estimate) -> String {
+    let decimals = decimals(uncertainty);
+    format!("{value:.decimals$} ± {uncertainty:.decimals$}")
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
@@ -190,101 +233,78 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         rate: arguments.rate,
         late: arguments.late,
     };
-    let (mut points, mut skipped, mut recordings) = (Vec::new(), 0, Vec::new());
-    let mut notes: Vec<String> = Vec::new();
+    let mut measured = Measurements { known: arguments.known.clone(), ..Measurements::default() };
+    let (mut skipped, mut notes) = (0, Vec::new());
     for path in &arguments.points {
         match read(path, &arguments.column, &selection).map_err(Failure::input)? {
-            Measurement::Points(more, left_out) => {
-                points.extend(more);
+            Measurement::Points(points, left_out, linear) => {
+                measured.points.extend(points);
                 skipped += left_out;
+                // Several files of one run have the same response.
+                measured
+                    .linear
+                    .extend(linear.filter(|one| !measured.linear.contains(one)));
             }
             Measurement::Recording(recording) => {
                 notes.extend(recording.notes.iter().cloned());
                 match recording.linear_decay(&scene.knowledge()).map_err(Failure::run)? {
-                    Some(decay) => notes.push(format!("{}: {decay}", recording.origin)),
-                    None => recordings.push(recording),
+                    Some(decay) => {
+                        notes.push(format!("{}: {decay}", recording.origin));
+                        measured.linear.push(decay.into());
+                    }
+                    None => measured.recordings.push(recording),
                 }
             }
         }
     }
-    let exact = arguments.known.iter().filter(|one| one.estimate.uncertainty == 0.0);
-    notes.extend(exact.map(|Known { quantity, estimate }| {
-        format!(
+    let is_exact = |known: &&Known| matches!(known, Known::Value { estimate, .. } if estimate.uncertainty == 0.0);
+    notes.extend(arguments.known.iter().filter(is_exact).filter_map(|known| {
+        let Known::Value { quantity, estimate } = known else {
+            return None;
+        };
+        Some(format!(
             "{quantity} = {} has no uncertainty and counts as exact; give it as --known {quantity}={0}±U unless it is",
             estimate.value
-        )
+        ))
     }));
     let lines: String = notes.iter().map(|note| format!("{note}\n")).collect();
-    if points.is_empty() && recordings.is_empty() && skipped == 0 && !notes.is_empty() {
+    if measured.points.is_empty() && measured.recordings.is_empty() && skipped == 0 && !notes.is_empty() {
         let text = output(arguments.json, &serde_json::json!({ "notes": notes }), || lines)?;
         return Ok(Results::new(text, Written::default));
     }
-    let parts_of = parts(&recordings, &scene, &arguments.known).map_err(Failure::run)?;
-    let parts: Vec<Part> = parts_of.concat();
-    let measured = points.clone();
-    points.extend(parts.iter().filter_map(|part| part.point));
     let bar = progress_bar(Effect::ALL.len() as u64, "fitting effects of a real cavity", "effects");
-    let progress = |done: usize| bar.set_position(done as u64);
-    let found = find(&points, scene.resonance, &scene.plant, &arguments.known, progress);
+    let found = find(&measured, &scene, |done| bar.set_position(done as u64));
     bar.finish_and_clear();
-    let Found { mut fit, mut plant, mut verdict, mut alternatives } = found.map_err(Failure::run)?;
-    let prepared: Vec<Recording> = recordings
-        .iter()
-        .map(|one| one.prepared(&scene.knowledge()))
-        .collect::<Result<_, _>>()
-        .map_err(Failure::run)?;
-    let record = follow(
-        &prepared,
-        &parts_of,
-        &measured,
-        scene.resonance,
-        &plant,
-        &arguments.known,
-    )
-    .filter(|record| !recordings.is_empty() && !record.fit.is_rejected());
-    if let Some(record) = &record {
-        (fit, verdict) = (record.fit.clone(), None);
-        alternatives.clear();
-        plant = fit.plant(&scene.plant);
-        // The points are shown beside the fit of the record.
-        if let Some(beside) = at(&points, scene.resonance, &plant, &[]) {
-            fit.residuals = beside.residuals;
-            fit.left_out.clear();
-        }
-    }
-    let report = fit.report(&scene.plant);
+    let found = found.map_err(Failure::run)?;
+    let (report, verdict) = (
+        found.fit.report(&scene.plant),
+        found.explanation.as_ref().map(explained),
+    );
+    let alternatives: Vec<EffectReport> = found.alternatives.iter().map(Candidate::report).collect();
     let printed = Output {
         report: &report,
         verdict: verdict.clone(),
-        alternatives: alternatives.iter().map(Alternative::of).collect(),
-        parts: parts.clone(),
-        followed_periods: record.as_ref().map(|record| record.periods),
-        left_out_of_record: record
-            .as_ref()
-            .map(|record| record.left_out.clone())
-            .unwrap_or_default(),
+        alternatives: alternatives.clone(),
+        linear: &found.linear,
+        parts: &found.parts,
+        followed_periods: found.record.as_ref().map(|record| record.periods),
+        left_out_of_record: found.record.as_ref().map_or(&[], |record| &record.left_out),
         notes,
     };
     let text = output(arguments.json, &printed, || {
-        let parts = if parts.is_empty() {
-            String::new()
-        } else {
-            recorded(&parts)
-        };
         let verdict = verdict.as_ref().map(|verdict| format!("{verdict}\n"));
-        lines
-            + &parts
-            + &summary(
-                &report,
-                &fit,
-                record.as_ref(),
-                &arguments.known,
-                [points.len(), skipped],
-            )
-            + &verdict.unwrap_or_default()
-            + &only_if_ideal(&alternatives)
+        [
+            lines,
+            recorded(&found.parts),
+            summary(&report, &found, &arguments.known, skipped),
+            found.linear.iter().map(of_linear).collect(),
+            verdict.unwrap_or_default(),
+            only_if_ideal(&alternatives),
+        ]
+        .concat()
     })?;
     let Arguments { figure, out, json, .. } = arguments.clone();
+    let Found { fit, plant, points, .. } = found;
     let plant = plant_section(&fit, &report, &plant, verdict.as_deref());
     let scene_text = provenance(&arguments.points, &report) + &arguments.scene.with_plant(&plant)?;
     Ok(Results::new(text, move || {
@@ -312,16 +332,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
 
 /// The parts of recordings.
 fn recorded(parts: &[Part]) -> String {
+    if parts.is_empty() {
+        return String::new();
+    }
     let rows = parts.iter().map(|part| {
         let [from, to] = part.seconds.map(|time| format!("{time:.2}"));
         let kind = format!("{:?}", part.kind).to_lowercase();
-        let text = |estimate: Estimate, unit: f64| {
-            let Estimate { value, uncertainty } = estimate.scaled(unit);
-            let decimals = decimals(uncertainty);
-            format!("{value:.decimals$} ± {uncertainty:.decimals$}")
-        };
         let values = part.point.map(|MeasuredPoint { response, omega, drive }| {
-            [text(omega, 1.0 / TAU), text(response, 1e3), text(drive, 1e3)]
+            [omega.scaled(1.0 / TAU), response.scaled(1e3), drive.scaled(1e3)].map(with_decimals)
         });
         let [f, a, e] = values.unwrap_or_default();
         [from, to, kind, part.regime.to_string(), f, a, e]
@@ -332,23 +350,24 @@ fn recorded(parts: &[Part]) -> String {
         + "\n"
 }
 
-fn summary(
-    report: &FitReport,
-    fit: &Fit,
-    record: Option<&RecordFit>,
-    known: &[Known],
-    [points, skipped]: [usize; 2],
-) -> String {
+fn summary(report: &FitReport, found: &Found, known: &[Known], skipped: usize) -> String {
+    let (record, points) = (found.record.as_ref(), found.points.len());
     let doubt = if report.describes { "" } else { " (rejected)" };
     let rows = report.parameters.iter().map(|parameter| {
         let digits = decimals(parameter.uncertainty);
         let number = |value: f64| format!("{value:.digits$}");
         let difference = (parameter.value - parameter.expected) / parameter.uncertainty;
-        let is_exact =
-            |known: &Known| known.quantity.symbol()[0] == parameter.symbol && known.estimate.uncertainty == 0.0;
-        let [value, expected, difference] = match known.iter().find(|known| is_exact(known)) {
-            Some(known) => [
-                format!("{} (exact)", known.estimate.value),
+        let exact = known.iter().find_map(|known| match known {
+            Known::Value { quantity, estimate }
+                if quantity.symbol()[0] == parameter.symbol && estimate.uncertainty == 0.0 =>
+            {
+                Some(estimate.value)
+            }
+            _ => None,
+        });
+        let [value, expected, difference] = match exact {
+            Some(value) => [
+                format!("{value} (exact)"),
                 format!("{:.4}", parameter.expected),
                 String::new(),
             ],
@@ -371,10 +390,14 @@ fn summary(
     let p = report
         .p_value
         .map_or_else(|| "without a degree of freedom".into(), |p| format!("p = {p:.2}"));
-    let verdict = if report.describes {
-        "the model describes them"
-    } else {
-        "the model does not describe them"
+    let verdict = match (report.describes, &report.undetermined[..]) {
+        (true, []) => "the model describes them".into(),
+        (true, undetermined) => format!(
+            "this says little, because they do not determine {}. Measure at least three levels, with `vines backbone` (--record for a \
+             recording), or give --known",
+            undetermined.join(", ")
+        ),
+        (false, _) => "the model does not describe them".into(),
     };
     let what = match record {
         Some(record) => format!("{} periods of recordings", record.periods),
@@ -416,12 +439,6 @@ fn summary(
             "{} of {points} points contradict the others, and are left out: {}",
             numbers.len(),
             numbers.join(", ")
-        );
-    }
-    for (first, second, correlation) in fit.not_separated() {
-        let _ = writeln!(
-            text,
-            "{first} is not determined: {first} and {second} have the correlation {correlation:.3}; give one of them with --known"
         );
     }
     text

@@ -6,10 +6,12 @@ use std::fmt::Display;
 use std::path::Path;
 use std::str::FromStr;
 
+use serde::Deserialize;
 use serde_json::Value;
 use vines::ArgumentError;
 use vines::fit::{MeasuredPoint, Recording, RecordingError, Selection, Table};
 use vines::identification::Regime;
+use vines::linear::MeasuredLinear;
 use vines::numerics::Estimate;
 use vines::scene::{Measurand, Name};
 
@@ -87,8 +89,9 @@ type Row = BTreeMap<String, String>;
 /// What a file contains.
 #[derive(Debug)]
 pub(super) enum Measurement {
-    /// Points, and the number of points that are left out: not settled, or of another regime than symmetric 1:1.
-    Points(Vec<MeasuredPoint>, usize),
+    /// Points, the number of points that are left out (not settled, or of another regime than symmetric 1:1), and the linear response of the
+    /// rig.
+    Points(Vec<MeasuredPoint>, usize, Option<MeasuredLinear>),
     /// Two channels over time.
     Recording(Recording),
 }
@@ -111,12 +114,17 @@ pub(super) fn read(path: &Path, columns: &[Column], selection: &Selection) -> Re
     let bytes = std::fs::read(path).map_err(|error| cannot_read(path, error))?;
     if bytes.trim_ascii_start().starts_with(b"{") {
         let value: Value = serde_json::from_slice(&bytes).map_err(|error| cannot_read(path, error))?;
-        let rows = objects(&value).ok_or_else(|| {
+        let linear = value
+            .get("linear")
+            .and_then(|linear| MeasuredLinear::deserialize(linear).ok());
+        // A loop check has no points.
+        let rows = objects(&value).or(linear.map(|_| Vec::new())).ok_or_else(|| {
             format!(
-                "{file} has neither a locked point (`lock`) nor `points`: expected identification.json, tracked.json, or a table (CSV)"
+                "{file} has neither a locked point (`lock`) nor `points` nor a linear response (`linear`): expected identification.json, \
+                 tracked.json, the JSON of `vines check`, or a table (CSV)"
             )
         })?;
-        return points(path, &rows, columns, |_| "");
+        return points(path, &rows, columns, linear, |_| "");
     }
     let table = Table::parse(&file.to_string(), &bytes).map_err(refused)?;
     let is_named = selection.response.is_some() || selection.drive.is_some();
@@ -124,7 +132,9 @@ pub(super) fn read(path: &Path, columns: &[Column], selection: &Selection) -> Re
     if has_points && !is_named {
         let row = |row: Vec<(&str, String)>| row.into_iter().map(|(name, cell)| (name.to_string(), cell)).collect();
         let rows: Vec<Row> = table.rows().map(row).collect();
-        return points(path, &rows, columns, |column| table.unit(column));
+        return points(path, &rows, columns, rows.first().and_then(linear_of), |column| {
+            table.unit(column)
+        });
     }
     let contents = table.contents();
     if !is_named && !table.has("response") {
@@ -154,6 +164,7 @@ fn points<'a>(
     path: &Path,
     rows: &[Row],
     columns: &[Column],
+    linear: Option<MeasuredLinear>,
     stated: impl Fn(&str) -> &'a str,
 ) -> Result<Measurement, ArgumentError> {
     let kept: Vec<(usize, &Row)> = rows.iter().enumerate().filter(|(_, row)| is_symmetric(row)).collect();
@@ -161,7 +172,21 @@ fn points<'a>(
     Ok(Measurement::Points(
         points.collect::<Result<_, _>>()?,
         rows.len() - kept.len(),
+        linear,
     ))
+}
+
+/// The linear response in the columns of a table.
+fn linear_of(row: &Row) -> Option<MeasuredLinear> {
+    let values = MeasuredLinear::COLUMNS.map(|name| {
+        let text = row.get(name)?;
+        let value = text
+            .parse::<f64>()
+            .map_or_else(|_| Value::from(text.as_str()), Value::from);
+        Some((name.strip_prefix("linear_")?.to_string(), value))
+    });
+    let object = values.into_iter().collect::<Option<serde_json::Map<_, _>>>()?;
+    MeasuredLinear::deserialize(Value::Object(object)).ok()
 }
 
 /// The locked point of `vines identify`, or the points of `vines backbone`.

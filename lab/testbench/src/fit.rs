@@ -9,6 +9,7 @@
 
 mod channels;
 mod effects;
+mod known;
 mod record;
 mod recording;
 #[cfg(feature = "tables")]
@@ -16,24 +17,23 @@ mod table;
 
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
-use std::fmt::{self, Display, Formatter};
-use std::str::FromStr;
 
 use lovines::Cavity;
 use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
+use vines_model::Definition;
 use vines_model::numerics::{Estimate, LeastSquares, Misfit, Regression, SIGNIFICANT, equally_spaced, mean, range};
 use vines_model::orbit::backbone_at_speed;
 use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, SlowFlow};
-use vines_model::{ArgumentError, Definition};
 
 use crate::identification::ResonancePoint;
 use crate::scene::{Dimensionless, Parameters};
 
 pub use channels::{Channel, Contents, Selection};
-pub use effects::{Candidate, Effect, Explanation, Found, decimals, explain, find};
+pub use effects::{Candidate, Effect, EffectReport, Explanation, Found, Measurements, decimals, explain, find};
+pub use known::{Known, LinearVerdict, Quantity, linear_verdicts};
 pub use record::{LeftOut, RecordFit, follow};
 pub use recording::{Kind, LinearDecay, Part, Recording, RecordingError, parts};
 #[cfg(feature = "tables")]
@@ -58,144 +58,6 @@ impl From<&ResonancePoint> for MeasuredPoint {
             omega: estimate(TAU * at.f_hz, TAU * at.u_f_hz),
             drive: estimate(at.e_m, at.u_e_m),
         }
-    }
-}
-
-/// A quantity of a rig.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    /// Natural frequency without the particle, Hz.
-    F0,
-    /// Damping ratio of the structure.
-    Zeta,
-    /// Restitution coefficient.
-    R,
-    /// Half-width of the cavity, m.
-    B,
-    /// Mass ratio m/M.
-    Epsilon,
-    /// Primary mass, kg.
-    PrimaryMass,
-    /// Mass of the particle, kg.
-    ParticleMass,
-    /// Stiffness, N/m.
-    Stiffness,
-    /// Damping, N s/m.
-    Damping,
-}
-
-impl Quantity {
-    /// All of them: those that a fit determines first, then those that need a mass, a stiffness or a damping from elsewhere.
-    pub const ALL: [Self; 9] = [
-        Self::F0,
-        Self::Zeta,
-        Self::R,
-        Self::B,
-        Self::Epsilon,
-        Self::PrimaryMass,
-        Self::ParticleMass,
-        Self::Stiffness,
-        Self::Damping,
-    ];
-    /// Those that a fit determines.
-    pub const FITTED: &[Self] = Self::ALL.split_at(5).0;
-
-    /// Symbol and unit.
-    #[must_use]
-    pub fn symbol(self) -> [&'static str; 2] {
-        match self {
-            Self::F0 => ["f0", "Hz"],
-            Self::Zeta => ["zeta", ""],
-            Self::R => ["r", ""],
-            Self::B => ["b", "m"],
-            Self::Epsilon => ["epsilon", ""],
-            Self::PrimaryMass => ["M", "kg"],
-            Self::ParticleMass => ["m", "kg"],
-            Self::Stiffness => ["k", "N/m"],
-            Self::Damping => ["c", "N s/m"],
-        }
-    }
-
-    /// Whether the motion shows it only together with another mass, stiffness or damping.
-    fn needs_a_scale(self) -> bool {
-        !Self::FITTED.contains(&self)
-    }
-
-    /// The value at the unknowns.
-    fn of(self, x: &Unknowns) -> f64 {
-        let (omega0, mass) = (x[0].exp(), x[5].exp());
-        match self {
-            Self::F0 => omega0 / TAU,
-            Self::Zeta => x[1],
-            Self::R => x[2],
-            Self::B => x[3].exp(),
-            Self::Epsilon => x[4].exp(),
-            Self::PrimaryMass => mass,
-            Self::ParticleMass => x[4].exp() * mass,
-            Self::Stiffness => mass * omega0 * omega0,
-            Self::Damping => 2.0 * x[1] * omega0 * mass,
-        }
-    }
-
-    /// The value of a plant.
-    #[must_use]
-    pub fn of_plant(self, plant: &Parameters) -> f64 {
-        self.of(&unknowns(plant))
-    }
-
-    /// The gradient over the unknowns.
-    fn gradient(self, x: &Unknowns) -> Unknowns {
-        gradient(x, |x| self.of(x))
-    }
-}
-
-impl Display for Quantity {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.write_str(self.symbol()[0])
-    }
-}
-
-impl Known {
-    /// Its standard uncertainty, above rounding.
-    fn uncertainty(&self) -> f64 {
-        let Estimate { value, uncertainty } = self.estimate;
-        uncertainty.max(EXACT * value.abs()).max(f64::MIN_POSITIVE)
-    }
-}
-
-/// A quantity that is known from elsewhere; parse it from `m=0.032±0.0005`, or `r=0.65` for an exact value.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Known {
-    /// Which.
-    pub quantity: Quantity,
-    /// Its value in the unit of the quantity; an uncertainty of 0 fixes it.
-    pub estimate: Estimate,
-}
-
-impl FromStr for Known {
-    type Err = ArgumentError;
-
-    fn from_str(text: &str) -> Result<Self, ArgumentError> {
-        let symbols = Quantity::ALL.map(|quantity| quantity.symbol()[0]).join(", ");
-        let form = || {
-            format!("`{text}`: expected SYMBOL=VALUE±UNCERTAINTY, for instance m=0.032±0.0005, with one of {symbols}")
-        };
-        let (symbol, numbers) = text.split_once('=').ok_or_else(form)?;
-        let quantity = Quantity::ALL
-            .into_iter()
-            .find(|quantity| quantity.symbol()[0] == symbol.trim())
-            .ok_or_else(form)?;
-        let (value, uncertainty) = numbers
-            .split_once('±')
-            .or(numbers.split_once("+-"))
-            .unwrap_or((numbers, "0"));
-        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
-        let (value, uncertainty) = number(value).zip(number(uncertainty)).ok_or_else(form)?;
-        let may_be_0 = matches!(quantity, Quantity::Zeta | Quantity::Damping);
-        if uncertainty < 0.0 || value < 0.0 || (value == 0.0 && !may_be_0) {
-            return Err(format!("`{text}`: the value must be positive, and its uncertainty positive or 0").into());
-        }
-        Ok(Self { quantity, estimate: Estimate { value, uncertainty } })
     }
 }
 
@@ -228,16 +90,12 @@ const TRIMMED: [usize; 4] = [1, 2, 4, 8];
 const FALSE_ALARM: f64 = 1e-3;
 /// Relative gain of the squared distance from the curve at which the nearest place on it counts as found.
 const NEAREST: f64 = 1e-12;
-/// Relative uncertainty of a value that is known exactly: above rounding.
-const EXACT: f64 = 1e-9;
 /// Fewest points: two equations each for five parameters, and one to spare.
 const FEWEST: usize = 3;
 /// Probability of a larger chi-square below which the model is rejected.
 const REJECTED: f64 = 0.01;
 /// The share of the points that may be left out is the inverse of this.
 const LEFT_OUT: usize = 5;
-/// Relative standard uncertainty from which a parameter counts as not determined.
-const UNCERTAIN: f64 = 0.1;
 
 fn unknowns(plant: &Parameters) -> Unknowns {
     Unknowns::from([
@@ -306,6 +164,8 @@ pub enum FitError {
         "the points do not determine the five parameters: measure at further amplitudes, or give a parameter that is known"
     )]
     Undetermined,
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
 }
 
 /// The fitted rig.
@@ -457,23 +317,14 @@ impl Fit {
         self.p_value().is_some_and(|p| p < REJECTED)
     }
 
-    /// The fitted quantities whose relative standard uncertainty is above 10 %, each with the one that it is correlated with most, and that
-    /// correlation: the points do not separate the two.
+    /// The fitted quantities that the points do not determine: the interval of three standard uncertainties contains 0.
     #[must_use]
-    pub fn not_separated(&self) -> Vec<(Quantity, Quantity, f64)> {
-        let is_uncertain = |quantity: &&Quantity| {
-            let estimate = self.estimate(**quantity);
-            estimate.is_none_or(|estimate| {
-                estimate.uncertainty.is_nan() || estimate.uncertainty > UNCERTAIN * estimate.value.abs()
-            })
-        };
-        let partner = |quantity: &Quantity| {
-            let others = Quantity::FITTED.iter().filter(|partner| *partner != quantity);
-            let correlations = others.map(|partner| (*quantity, *partner, self.correlation(*quantity, *partner)));
-            correlations.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))
-        };
-        let uncertain = Quantity::FITTED.iter().filter(is_uncertain);
-        uncertain.filter_map(partner).collect()
+    pub fn undetermined(&self) -> Vec<Quantity> {
+        let is_determined = |estimate: Estimate| estimate.value.abs() > SIGNIFICANT * estimate.uncertainty;
+        let fitted = Quantity::FITTED.iter().copied();
+        fitted
+            .filter(|quantity| !self.estimate(*quantity).is_some_and(is_determined))
+            .collect()
     }
 
     /// The plant of the fit; without a known mass, stiffness or damping, its primary mass is that of `scene`.
@@ -545,7 +396,7 @@ pub fn at(points: &[MeasuredPoint], definition: Definition, plant: &Parameters, 
     let problem = Problem::new(points.to_vec(), definition, known);
     let here = LeastSquares::at(&problem, unknowns(plant), &Vec::new())?;
     Some(Fit {
-        degrees: 2 * points.len() + known.len(),
+        degrees: problem.equations(),
         ..problem.found(&here, &here.trace)
     })
 }
@@ -666,8 +517,13 @@ fn across(along: &Vector3<f64>, value: &Vector3<f64>) -> Vector3<f64> {
 
 impl<'a> Problem<'a> {
     fn new(points: Vec<MeasuredPoint>, definition: Definition, known: &'a [Known]) -> Self {
-        let has_scale = known.iter().any(|known| known.quantity.needs_a_scale());
+        let has_scale = known.iter().any(Known::needs_a_scale);
         Self { points, definition, known, has_scale, free: false }
+    }
+
+    /// Number of independent residuals.
+    fn equations(&self) -> usize {
+        2 * self.points.len() + self.known.iter().map(Known::equations).sum::<usize>()
     }
 
     /// The problem of some of the points.
@@ -791,7 +647,6 @@ impl<'a> Problem<'a> {
 
     /// The fit of a minimum.
     fn found<T: Clone>(&self, minimum: &LeastSquares<UNKNOWNS, T>, places: &[Nearest]) -> Fit {
-        let equations = 2 * self.points.len() + self.known.len();
         let covariance = minimum.covariance();
         Fit {
             x: minimum.x,
@@ -799,7 +654,9 @@ impl<'a> Problem<'a> {
             channels: channels(minimum, places, &covariance),
             has_scale: self.has_scale,
             chi_square: minimum.chi_square,
-            degrees: equations.saturating_sub(5 + usize::from(self.has_scale) + usize::from(self.free)),
+            degrees: self
+                .equations()
+                .saturating_sub(5 + usize::from(self.has_scale) + usize::from(self.free)),
             residuals: minimum.residuals.as_chunks().0[..self.points.len()].to_vec(),
             left_out: Vec::new(),
             speeds: places.iter().map(|place| place.speed).collect(),
@@ -809,15 +666,14 @@ impl<'a> Problem<'a> {
     /// What is known from elsewhere. Unknowns on which nothing depends, the mass without a scale and the strength without an effect, keep their
     /// values, with a standard uncertainty of 1.
     fn known_residuals(&self, x: &Unknowns) -> Vec<f64> {
-        let of = |known: &Known| (known.quantity.of(x) - known.estimate.value) / known.uncertainty();
-        self.known.iter().map(of).chain([0.0; 2]).collect()
+        let known = self.known.iter().flat_map(|known| known.residuals(x));
+        known.chain([0.0; 2]).collect()
     }
 
     fn known_rows(&self, x: &Unknowns) -> Vec<Unknowns> {
-        let of = |known: &Known| known.quantity.gradient(x) / known.uncertainty();
         let held = |i: usize, is_free: bool| Unknowns::ith(i, f64::from(u8::from(!is_free)));
         let held = [held(5, self.has_scale), held(6, self.free)];
-        self.known.iter().map(of).chain(held).collect()
+        self.known.iter().flat_map(|known| known.rows(x)).chain(held).collect()
     }
 
     /// The residual where the curve is nearest to a point.
@@ -863,8 +719,10 @@ impl<'a> Problem<'a> {
 /// A fit in numbers, for programs.
 #[derive(Debug, Clone, Serialize)]
 pub struct FitReport {
-    /// Whether the model describes the points.
+    /// Whether the points do not contradict the model.
     pub describes: bool,
+    /// Symbols of the first five that the points do not determine.
+    pub undetermined: Vec<&'static str>,
     /// Chi-square.
     pub chi_square: f64,
     /// Its degrees of freedom.
@@ -910,6 +768,7 @@ impl Fit {
         let correlations = |row: &Quantity| std::array::from_fn(|n| self.correlation(*row, Quantity::FITTED[n]));
         FitReport {
             describes: !self.is_rejected(),
+            undetermined: self.undetermined().into_iter().map(|one| one.symbol()[0]).collect(),
             chi_square: self.chi_square,
             degrees: self.degrees,
             p_value: self.p_value(),

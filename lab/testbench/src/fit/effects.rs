@@ -14,15 +14,18 @@ use std::fmt::{self, Display, Formatter};
 use lovines::cavity::GRAVITY;
 use lovines::{Cavity, Restitution};
 use nalgebra::Vector3;
+use serde::Serialize;
 use vines_model::Definition;
 use vines_model::numerics::{Estimate, LeastSquares, Misfit, SIGNIFICANT, mean};
 use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
 
 use super::{
-    FEWEST, Fit, FitError, Known, LEFT_OUT, LIMITS, MeasuredPoint, Nearest, Problem, Quantity, UNKNOWNS, Unknowns,
-    across, checked, fit, gradient, plant, shifted,
+    FEWEST, Fit, FitError, Known, LEFT_OUT, LIMITS, LinearVerdict, MeasuredPoint, Nearest, Part, Problem, Quantity,
+    RecordFit, Recording, UNKNOWNS, Unknowns, across, at, checked, fit, follow, gradient, linear_verdicts, parts,
+    plant, shifted,
 };
-use crate::scene::Parameters;
+use crate::linear::MeasuredLinear;
+use crate::scene::{Parameters, Scene};
 
 /// An effect of a real cavity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,6 +78,17 @@ const POSSIBLE: f64 = 6.0;
 impl Effect {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Friction, Self::Tilt, Self::Viscoelastic, Self::Plastic];
+
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Friction => "friction",
+            Self::Tilt => "tilt",
+            Self::Viscoelastic => "viscoelastic restitution",
+            Self::Plastic => "plastic restitution",
+        }
+    }
 
     /// Symbol and unit of its strength.
     #[must_use]
@@ -132,12 +146,7 @@ impl Effect {
 
 impl Display for Effect {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Friction => "friction",
-            Self::Tilt => "tilt",
-            Self::Viscoelastic => "viscoelastic restitution",
-            Self::Plastic => "plastic restitution",
-        })
+        f.write_str(self.name())
     }
 }
 
@@ -157,47 +166,15 @@ impl Explanation {
         self.candidates.first().filter(|best| !best.fit.is_rejected())
     }
 
-    /// The verdict in a sentence.
-    #[must_use]
-    pub fn verdict(&self) -> String {
-        let chi_square = |fit: &Fit| format!("{:.0} for {}", fit.chi_square, fit.degrees);
-        let list = |candidates: &mut dyn Iterator<Item = &Candidate>| {
-            let texts = candidates.map(|candidate| format!("{} ({})", candidate.effect, chi_square(&candidate.fit)));
-            texts.collect::<Vec<String>>().join(", ")
-        };
-        let Some(best) = self.explains() else {
-            let tried = match list(&mut self.candidates.iter()) {
-                none if none.is_empty() => "none of them a motion exists".into(),
-                some => some,
-            };
-            return format!(
-                "no single effect of the cavity explains it: chi-square is {} without one, with {tried}",
-                chi_square(&self.ideal)
-            );
-        };
-        let [symbol, unit] = best.effect.symbol();
-        let Estimate { value, uncertainty } = best.strength;
-        let (space, decimals) = (if unit.is_empty() { "" } else { " " }, decimals(uncertainty));
-        let mut text = format!(
-            "{} explains it: {symbol} = {value:.decimals$} ± {uncertainty:.decimals$}{space}{unit}, chi-square {}; without it, chi-square is {}",
-            best.effect,
-            chi_square(&best.fit),
-            chi_square(&self.ideal)
-        );
-        let left_out = best.fit.left_out.len();
-        if left_out > 0 {
-            text += &format!(
-                "; {left_out} points of the smallest responses do not belong to this motion, and are left out"
-            );
-        }
-        let is_possible = |candidate: &&Candidate| {
-            candidate.fit.left_out == best.fit.left_out && candidate.criterion() - best.criterion() < POSSIBLE
-        };
-        let others = list(&mut self.candidates[1..].iter().filter(is_possible));
-        if !others.is_empty() {
-            text += &format!("; the points do not exclude {others}");
-        }
-        text
+    /// The other candidates that the points do not exclude: their evidence is at least a twentieth of that of the best one.
+    pub fn possible(&self) -> impl Iterator<Item = &Candidate> {
+        let best = self.explains();
+        let others = self.candidates.iter().skip(1);
+        others.filter(move |candidate| {
+            best.is_some_and(|best| {
+                candidate.fit.left_out == best.fit.left_out && candidate.criterion() - best.criterion() < POSSIBLE
+            })
+        })
     }
 }
 
@@ -242,6 +219,26 @@ impl Candidate {
         ]
     }
 
+    /// Its numbers, for programs.
+    #[must_use]
+    pub fn report(&self) -> EffectReport {
+        let ([symbol, unit], [possible_strength, possible_b_m]) = (self.effect.symbol(), self.one_more());
+        let Estimate { value: strength, uncertainty } = self.strength;
+        EffectReport {
+            effect: self.effect.name(),
+            symbol,
+            unit,
+            strength,
+            uncertainty,
+            possible_strength,
+            possible_b_m,
+            chi_square: self.fit.chi_square,
+            degrees: self.fit.degrees,
+            left_out: self.fit.left_out.len(),
+            describes: !self.fit.is_rejected(),
+        }
+    }
+
     /// The plant of the fit, with the effect. Without a known mass, stiffness or damping, its primary mass is that of `scene`.
     #[must_use]
     pub fn plant(&self, scene: &Parameters) -> Parameters {
@@ -250,15 +247,63 @@ impl Candidate {
     }
 }
 
-/// The rig that fits some points.
+/// The fit with an effect in numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct EffectReport {
+    /// Name of the effect.
+    pub effect: &'static str,
+    /// Symbol of its strength.
+    pub symbol: &'static str,
+    /// Its unit; empty for a pure number.
+    pub unit: &'static str,
+    /// The fitted strength.
+    pub strength: f64,
+    /// Its standard uncertainty.
+    pub uncertainty: f64,
+    /// A strength that the points do not exclude ([`Candidate::one_more`]).
+    pub possible_strength: f64,
+    /// The half-width that goes with it, m.
+    pub possible_b_m: f64,
+    /// Chi-square.
+    pub chi_square: f64,
+    /// Its degrees of freedom.
+    pub degrees: usize,
+    /// Number of points that do not belong to this motion.
+    pub left_out: usize,
+    /// Whether the effect describes the other points.
+    pub describes: bool,
+}
+
+/// What was measured on a rig.
+#[derive(Debug, Clone, Default)]
+pub struct Measurements {
+    /// Points of its backbone.
+    pub points: Vec<MeasuredPoint>,
+    /// Recordings.
+    pub recordings: Vec<Recording>,
+    /// Linear responses.
+    pub linear: Vec<MeasuredLinear>,
+    /// What is known from elsewhere.
+    pub known: Vec<Known>,
+}
+
+/// The rig that fits what was measured.
 #[derive(Debug, Clone)]
 pub struct Found {
     /// The fit: of the ideal cavity, or with the effect that explains why the points contradict it.
     pub fit: Fit,
     /// Its plant.
     pub plant: Parameters,
+    /// All points, those of recordings last.
+    pub points: Vec<MeasuredPoint>,
+    /// Parts of the recordings.
+    pub parts: Vec<Part>,
+    /// What the points say of the linear responses.
+    pub linear: Vec<LinearVerdict>,
+    /// The fit of the recordings themselves, if it is the result.
+    pub record: Option<RecordFit>,
     /// What the effects say, if the ideal cavity does not describe all points.
-    pub verdict: Option<String>,
+    pub explanation: Option<Explanation>,
     /// If the ideal cavity describes all points: effects that describe them as well, with a half-width outside the interval of the fit.
     pub alternatives: Vec<Candidate>,
 }
@@ -266,33 +311,67 @@ pub struct Found {
 /// Most points of the search for alternatives: a curve of six parameters needs no more.
 const MOST: usize = 24;
 
-/// [`fit()`], and where the ideal cavity does not describe all points, the effect that does. `progress` is told the number of effects tried.
+/// The fit of all measurements: [`fit()`] of the points with the linear responses, [`follow`] of the recordings, and, where the ideal cavity does not
+/// describe all points, the effect that does. `progress` is told the number of effects tried.
 ///
 /// # Errors
-/// As [`fit()`].
-pub fn find(
-    points: &[MeasuredPoint],
-    definition: Definition,
-    expected: &Parameters,
-    known: &[Known],
-    progress: impl FnMut(usize),
-) -> Result<Found, FitError> {
-    let ideal = fit(points, definition, expected, known)?;
+/// As [`fit()`] and [`parts()`].
+pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize)) -> Result<Found, FitError> {
+    let Measurements { points: measured_points, recordings, linear, known } = measured;
+    let (definition, expected) = (scene.resonance, &scene.plant);
+    let parts = parts(recordings, scene, known)?;
+    let of_parts = parts.iter().flatten().filter_map(|part| part.point);
+    let points: Vec<MeasuredPoint> = measured_points.iter().copied().chain(of_parts).collect();
+    let linear = linear_verdicts(linear, &points, definition, expected, known)?;
+    let known: Vec<Known> = known
+        .iter()
+        .copied()
+        .chain(linear.iter().map(|one| Known::Linear(one.linear)))
+        .collect();
+    let ideal = fit(&points, definition, expected, &known)?;
     let plant = ideal.plant(expected);
-    if !ideal.is_rejected() && ideal.left_out.is_empty() {
-        let problem = Problem::new(points.to_vec(), definition, known);
+    let prepared = recordings.iter().map(|one| one.prepared(&scene.knowledge()));
+    let prepared: Vec<Recording> = prepared.collect::<Result<_, _>>()?;
+    let record = follow(&prepared, &parts, measured_points, definition, &plant, &known)
+        .filter(|record| !recordings.is_empty() && !record.fit.is_rejected());
+    let mut found = Found {
+        fit: ideal,
+        plant,
+        parts: parts.concat(),
+        points,
+        linear,
+        record,
+        explanation: None,
+        alternatives: Vec::new(),
+    };
+    let points = &found.points;
+    if let Some(RecordFit { fit, .. }) = &found.record {
+        found.fit = fit.clone();
+        found.plant = fit.plant(expected);
+        // The points are shown beside the fit of the record.
+        if let Some(beside) = at(points, definition, &found.plant, &[]) {
+            found.fit.residuals = beside.residuals;
+            found.fit.left_out.clear();
+        }
+    }
+    if !found.fit.is_rejected() && found.fit.left_out.is_empty() {
+        let problem = Problem::new(points.clone(), definition, &known);
         let order = problem.by_falling_response();
         let kept: Vec<usize> = order.into_iter().step_by(points.len().div_ceil(MOST)).collect();
-        let alternatives = problem.of(&kept).alternatives(&ideal, expected, progress);
-        return Ok(Found { fit: ideal, plant, verdict: None, alternatives });
+        found.alternatives = problem.of(&kept).alternatives(&found.fit, expected, progress);
+        return Ok(found);
     }
-    let explanation = explain(points, definition, expected, known, progress)?;
+    let explanation = explain(points, definition, expected, &known, progress)?;
+    let ideal = &found.fit;
     let best = explanation
         .explains()
         .filter(|best| ideal.is_rejected() || best.fit.left_out.len() <= ideal.left_out.len());
-    let verdict = (ideal.is_rejected() || best.is_some()).then(|| explanation.verdict());
-    let (fit, plant) = best.map_or((ideal, plant), |best| (best.fit.clone(), best.plant(expected)));
-    Ok(Found { fit, plant, verdict, alternatives: Vec::new() })
+    let is_told = ideal.is_rejected() || best.is_some();
+    if let Some(best) = best {
+        (found.fit, found.plant) = (best.fit.clone(), best.plant(expected));
+    }
+    found.explanation = is_told.then_some(explanation);
+    Ok(found)
 }
 
 /// Fits the ideal cavity to all points, and, if they contradict it, each effect alone. `progress` is told the number of candidates done.

@@ -523,7 +523,7 @@ pub fn follow(
     let count = innovations.len();
     let mut fit = problem.found(&minimum, &minimum.trace);
     fit.covariance = covariance;
-    fit.degrees = (2 * (count + points.len()) + known.len()).checked_sub(5 + usize::from(problem.has_scale))?;
+    fit.degrees = (2 * count + problem.equations()).checked_sub(5 + usize::from(problem.has_scale))?;
     let channel = |i: usize| innovations.iter().map(move |one| one[i]);
     for i in 0..2 {
         fit.channels[i] = ChannelTest::of(channel(i).map(|one| one * one).sum(), count as f64 - 2.5);
