@@ -14,19 +14,23 @@
 //!   `[phi_point, 0]`, and `c = Gamma omega0²`, `d = 2 delta Gamma` for a base with the participation `Gamma`, or `c = psi`, `d = 0` for a
 //!   force at a point with the shape `psi`.
 //! - Without proportional damping, and during persistent contact, modes are complex pairs: then `b` and `d` are not 0. Two real poles make
-//!   one overdamped section.
+//!   one overdamped section; of an odd number one is left over, whose section has a second pole that nothing excites.
+//!
+//! A coil or a filter adds first-order states ([`FirstOrderState`]).
 //!
 //! Source of the expansion of a symmetric quadratic eigenproblem in its modes: P. Lancaster, "Lambda-matrices and Vibrating Systems",
 //! Pergamon 1966, chapter 4.
 
 use core::fmt;
 
+use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use num_complex::Complex64;
 
 use crate::arithmetic::{plus, product, times};
 use crate::oscillator::Oscillator;
 use crate::parameters::FASTEST;
+use crate::shaker::Shaker;
 
 /// What drives a structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +38,7 @@ use crate::parameters::FASTEST;
 pub enum Excitation {
     /// The displacement of its base, m.
     Base,
-    /// A force, N.
+    /// A force, N, or the command of the amplifier of a [shaker](crate::Shaker), V.
     Force,
 }
 
@@ -95,6 +99,20 @@ pub struct Matrices<'a> {
     pub drive: &'a [f64],
 }
 
+/// A first-order state `z` beside `n` degrees of freedom `q`, such as the current of a coil: `z' = b u - sum of rates z - velocity q'`, and the
+/// structure gets the forces `force z`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FirstOrderState {
+    /// Per first-order state, 1/s.
+    pub rates: Vec<f64>,
+    /// Per velocity of a degree of freedom.
+    pub velocity: Vec<f64>,
+    /// On every degree of freedom.
+    pub force: Vec<f64>,
+    /// `b`, per unit of the drive.
+    pub drive: f64,
+}
+
 /// What a host is made of.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
@@ -114,15 +132,25 @@ pub enum Equations {
         cavity: Vec<f64>,
         drive: Vec<f64>,
     },
+    /// [`Shaker::attach`]; whatever the excitation that [`Self::host`] gets, the command drives it.
+    Shaken {
+        /// The structure alone.
+        structure: Box<Equations>,
+        /// What the shaker moves of it: its base, or a point.
+        by: Excitation,
+        /// The shaker.
+        shaker: Shaker,
+    },
 }
 
 impl Equations {
     /// The host.
     ///
     /// # Errors
-    /// As for [`Host::from_modes`] and [`Host::from_matrices`].
+    /// As for [`Host::from_modes`], [`Host::from_matrices`] and [`Shaker::attach`].
     pub fn host(&self, excitation: Excitation) -> Result<Host, InvalidHost> {
         match self {
+            Self::Shaken { structure, by, shaker } => shaker.attach(structure, *by),
             Self::Modes(modes) => Host::from_modes(excitation, modes),
             Self::Matrices { mass, damping, stiffness, cavity, drive } => {
                 let matrices = Matrices { mass, damping, stiffness, cavity, drive };
@@ -168,6 +196,42 @@ pub(crate) struct Modal {
     pub drive_rate: DVector<f64>,
     /// Displacement of the modal coordinates with the base, sqrt(kg); 0 for a force.
     pub carried: DVector<f64>,
+    /// The first-order states; there `h` is 0.
+    pub beside: Beside,
+}
+
+/// First-order states: `z' = b u - E z - S eta'`, with the forces `G z` on the modal coordinates.
+#[derive(Clone, Debug)]
+pub(crate) struct Beside {
+    /// `E`.
+    rates: DMatrix<f64>,
+    /// `S`.
+    velocity: DMatrix<f64>,
+    /// `G`.
+    force: DMatrix<f64>,
+    /// `b`.
+    drive: DVector<f64>,
+}
+
+impl Beside {
+    /// The states beside degrees of freedom with these mass-normalised shapes.
+    fn new(states: &[FirstOrderState], shapes: &DMatrix<f64>) -> Self {
+        let (count, n) = (states.len(), shapes.nrows());
+        Self {
+            rates: DMatrix::from_fn(count, count, |i, j| states[i].rates[j]),
+            velocity: DMatrix::from_fn(count, n, |i, j| states[i].velocity[j]) * shapes,
+            force: shapes.tr_mul(&DMatrix::from_fn(n, count, |i, j| states[j].force[i])),
+            drive: vector(states.iter().map(|state| state.drive)),
+        }
+    }
+
+    fn none(n: usize) -> Self {
+        Self::new(&[], &DMatrix::identity(n, n))
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.drive.len()
+    }
 }
 
 impl Host {
@@ -239,6 +303,7 @@ impl Host {
             drive: vector(sections.iter().map(|section| section.drive[0])),
             drive_rate: vector(sections.iter().map(|section| section.drive[1])),
             carried: if force { 0.0 * &drive } else { drive },
+            beside: Beside::none(cavity.len()),
             cavity,
         };
         Self::of(excitation, sections, modal, shapes, None)
@@ -353,6 +418,15 @@ impl Host {
     /// Matrices of unequal size, not symmetric, not positive definite (`M`, `K`) or with a negative eigenvalue (`C`); a cavity that nothing
     /// moves.
     pub fn from_matrices(excitation: Excitation, matrices: &Matrices) -> Result<Self, InvalidHost> {
+        Self::with_first_order(excitation, matrices, &[])
+    }
+
+    /// The same with first-order states beside it, for a drive that is not a base.
+    pub(crate) fn with_first_order(
+        excitation: Excitation,
+        matrices: &Matrices,
+        states: &[FirstOrderState],
+    ) -> Result<Self, InvalidHost> {
         let n = matrices.mass.len();
         check(n > 0, || {
             "the structure has no degree of freedom; it needs at least one".into()
@@ -397,9 +471,10 @@ impl Host {
             .collect();
         let size = |i: usize, j: usize| (column(i).abs().transpose() * damping.abs() * column(j).abs())[0];
         let modal_damping = DMatrix::from_fn(n, n, |i, j| if i == j { rates[i].0 } else { form(&damping, i, j).0 });
-        let proportional = (0..n)
-            .flat_map(|i| (0..i).map(move |j| (i, j)))
-            .all(|(i, j)| modal_damping[(i, j)].abs() <= ROUNDING * size(i, j));
+        let proportional = states.is_empty()
+            && (0..n)
+                .flat_map(|i| (0..i).map(move |j| (i, j)))
+                .all(|(i, j)| modal_damping[(i, j)].abs() <= ROUNDING * size(i, j));
         let cavity = project(&row);
         let force = excitation == Excitation::Force;
         let participation = if force {
@@ -428,6 +503,7 @@ impl Host {
                 project(&(&damping * &drive))
             },
             carried: if force { zero } else { participation },
+            beside: Beside::new(states, &shapes),
             stiffness: natural,
             damping: modal_damping,
             cavity,
@@ -442,6 +518,15 @@ impl Host {
     /// # Errors
     /// A wrong number of entries, or one that is not finite.
     pub fn row(&self, point: &[f64]) -> Result<Row, InvalidHost> {
+        let shape = self.shape(point)?;
+        Ok(match &self.expansion {
+            None => shape.iter().map(|phi| [*phi, 0.0]).collect(),
+            Some(expansion) => expansion.row(&shape),
+        })
+    }
+
+    /// The modal coordinates of a point.
+    fn shape(&self, point: &[f64]) -> Result<DVector<f64>, InvalidHost> {
         let n = self.modal.stiffness.len();
         check(
             point.len() == n && point.iter().all(|entry| entry.abs() <= 1e50),
@@ -453,14 +538,20 @@ impl Host {
             },
         )?;
         let point = DVector::from_row_slice(point);
-        let shape = self
-            .shapes
-            .as_ref()
-            .map_or_else(|| point.clone(), |shapes| shapes.tr_mul(&point));
-        Ok(match &self.expansion {
-            None => shape.iter().map(|phi| [*phi, 0.0]).collect(),
-            Some(expansion) => expansion.row(&shape),
-        })
+        let shapes = self.shapes.as_ref();
+        Ok(shapes.map_or_else(|| point.clone(), |shapes| shapes.tr_mul(&point)))
+    }
+
+    /// The row of a sum of displacements, velocities and first-order states, for a drive that is not a base: a force of springs and dampers, or
+    /// a current.
+    pub(crate) fn sum(&self, displacements: &[f64], velocities: &[f64], states: &[f64]) -> Result<Row, InvalidHost> {
+        let [displacements, velocities] = [self.shape(displacements)?, self.shape(velocities)?];
+        let all = displacements.iter().chain(velocities.iter()).chain(states);
+        let row = self.maps().0.tr_mul(&DVector::from_iterator(
+            2 * displacements.len() + states.len(),
+            all.copied(),
+        ));
+        Ok(row.as_slice().chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
     }
 
     /// Steady displacement of a point per unit of a harmonic drive with the angular frequency `omega`, rad/s.
@@ -506,7 +597,7 @@ impl Host {
     /// A wrong number of values, or one that is not finite.
     pub fn state(&self, displacements: &[f64], velocities: &[f64], u: f64) -> Result<Vec<[f64; 2]>, InvalidHost> {
         let n = self.modal.stiffness.len();
-        let mut modal = DVector::zeros(2 * n);
+        let mut modal = DVector::zeros(2 * n + self.modal.beside.count());
         for (k, (name, values)) in [("displacements", displacements), ("velocities", velocities)]
             .into_iter()
             .enumerate()
@@ -533,10 +624,14 @@ impl Host {
             modal[n + i] -= self.modal.drive_rate[i] * u;
         }
         let state = self.maps().1 * modal;
-        Ok((0..n).map(|k| [state[2 * k], state[2 * k + 1]]).collect())
+        Ok(state
+            .as_slice()
+            .chunks_exact(2)
+            .map(|pair| [pair[0], pair[1]])
+            .collect())
     }
 
-    /// Modal coordinates and momenta from `(x, v)` of the sections, and back.
+    /// Modal coordinates, momenta and first-order states from `(x, v)` of the sections, and back.
     pub(crate) fn maps(&self) -> (DMatrix<f64>, DMatrix<f64>) {
         if let Some(expansion) = &self.expansion {
             return (expansion.to_modal.clone(), expansion.to_sections.clone());
@@ -548,7 +643,7 @@ impl Host {
 
     /// Kinetic and elastic energy, J, in the state `(x, v)` of the sections under the drive `u`.
     pub fn energy(&self, state: &[[f64; 2]], u: f64) -> f64 {
-        let n = self.sections.len();
+        let n = self.modal.stiffness.len();
         let modal = self.maps().0 * DVector::from_row_slice(state.as_flattened());
         let of = |i: usize| {
             let velocity = modal[n + i] + self.modal.drive_rate[i] * u;
@@ -648,10 +743,10 @@ fn natural_modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Result<DMatri
 
 // Complex pairs and pairs of real poles
 
-/// The modal coordinates and their momenta from the sections of a set, and back. A momentum is `p = eta' - h u`.
+/// The modal coordinates, their momenta and the first-order states from the sections of a set, and back. A momentum is `p = eta' - h u`.
 #[derive(Clone, Debug)]
 pub(crate) struct Expansion {
-    /// `(x, v)` of every section from `eta` and `p`, and the part of `u`.
+    /// `(x, v)` of every section from `eta`, `p` and `z`, and the part of `u`.
     pub to_sections: DMatrix<f64>,
     pub drive_to_sections: DVector<f64>,
     /// The reverse.
@@ -664,33 +759,43 @@ impl Expansion {
     fn row(&self, shape: &DVector<f64>) -> Row {
         let n = shape.len();
         let displacements = self.to_modal.rows(0, n).tr_mul(shape);
-        (0..n)
-            .map(|k| [displacements[2 * k], displacements[2 * k + 1]])
+        displacements
+            .as_slice()
+            .chunks_exact(2)
+            .map(|pair| [pair[0], pair[1]])
             .collect()
     }
 }
 
-/// An eigenvalue and eigenvector of `lambda² (I + m phi phi^T) + lambda Delta + Omega²`.
+/// An eigenvalue and eigenvectors of the pencil `Q(s)`, whose first rows are `s² (I + m phi phi^T) + s Delta + Omega²` and `-G`, and whose last
+/// ones are `s S` and `s + E`.
 struct Pole {
     lambda: Complex64,
     vector: DVector<Complex64>,
-    /// `u Q'(lambda) u`: the inverse of `Q(s)` contains `u u^T/(norm (s - lambda))`.
+    /// The eigenvector of the transposed pencil: the same without first-order states, because the pencil is symmetric then.
+    left: DVector<Complex64>,
+    /// `left Q'(lambda) vector`: the inverse of `Q(s)` contains `vector left^T/(norm (s - lambda))`.
     norm: Complex64,
 }
+
+/// The second pole of the section of a lone real pole, over that pole. Nothing excites it; it is so near that a static response counts as the
+/// steady motion, and so far that the rates are told apart.
+const UNUSED: f64 = 1.1;
 
 impl Modal {
     /// The sections of the structure that carries the mass `m` (kg) at the cavity.
     pub fn sections(&self, m: f64) -> Result<(Vec<Section>, Expansion), InvalidHost> {
-        let n = self.stiffness.len();
+        let (n, beside) = (self.stiffness.len(), self.beside.count());
         let poles = self.poles(m)?;
         let (pairs, mut reals): (Vec<_>, Vec<_>) = poles.into_iter().partition(|pole| pole.lambda.im != 0.0);
         reals.sort_by(|a, b| a.lambda.re.total_cmp(&b.lambda.re));
-        let mut sections = Vec::with_capacity(n);
+        let (states, count) = (2 * n + beside, 2 * (n + beside.div_ceil(2)));
+        let mut sections = Vec::with_capacity(count / 2);
         let mut expansion = Expansion {
-            to_sections: DMatrix::zeros(2 * n, 2 * n),
-            drive_to_sections: DVector::zeros(2 * n),
-            to_modal: DMatrix::zeros(2 * n, 2 * n),
-            drive_to_modal: DVector::zeros(2 * n),
+            to_sections: DMatrix::zeros(count, states),
+            drive_to_sections: DVector::zeros(count),
+            to_modal: DMatrix::zeros(states, count),
+            drive_to_modal: DVector::zeros(states),
         };
         // The part of the drive in the momentum: (M^-1 - 1) h u.
         let slip = self.cavity.dot(&self.drive_rate);
@@ -698,8 +803,8 @@ impl Modal {
         for i in 0..n {
             expansion.drive_to_modal[n + i] = -share * self.cavity[i] * slip;
         }
-        // Two poles, and the weights `kappa` with which their coordinates make `x`.
-        let mut add = |poles: [(&Pole, Complex64); 2], oscillator: Oscillator| {
+        // One or two poles, and the weights `kappa` with which their coordinates make `x`.
+        let mut add = |poles: &[(&Pole, Complex64)], oscillator: Oscillator| {
             let k = 2 * sections.len();
             let sum = |of: &dyn Fn(&Pole) -> Complex64| {
                 let [x, v] = [0, 1].map(|power| {
@@ -710,35 +815,56 @@ impl Modal {
                 });
                 [x, v]
             };
-            let along = |pole: &Pole, with: &DVector<f64>| dot(&pole.vector, with);
-            let d = sum(&|pole| along(pole, &self.drive) + pole.lambda * along(pole, &self.drive_rate));
+            let along = |pole: &Pole, with: &DVector<f64>| dot(&pole.left.as_slice()[..n], with.as_slice());
+            let of_states = |pole: &Pole, with: &[f64]| dot(&pole.left.as_slice()[n..], with);
+            let d = sum(&|pole| {
+                let of_structure = along(pole, &self.drive) + pole.lambda * along(pole, &self.drive_rate);
+                of_structure + of_states(pole, self.beside.drive.as_slice())
+            });
             let kick = sum(&|pole| along(pole, &self.cavity));
             for i in 0..n {
                 let eta = sum(&|pole| {
-                    pole.lambda * (pole.vector[i] + m * self.cavity[i] * along(pole, &self.cavity))
-                        + dot(&pole.vector, &self.damping.column(i).into_owned())
+                    let of_structure = pole.lambda * (pole.left[i] + m * self.cavity[i] * along(pole, &self.cavity))
+                        + along(pole, &self.damping.column(i).into_owned());
+                    of_structure + of_states(pole, self.beside.velocity.column(i).as_slice())
                 });
-                let p = sum(&|pole| pole.vector[i] + m * self.cavity[i] * along(pole, &self.cavity));
+                let p = sum(&|pole| pole.left[i] + m * self.cavity[i] * along(pole, &self.cavity));
                 for row in 0..2 {
                     expansion.to_sections[(k + row, i)] = eta[row];
                     expansion.to_sections[(k + row, n + i)] = p[row];
                 }
             }
+            for i in 0..beside {
+                let z = sum(&|pole| pole.left[n + i]);
+                (expansion.to_sections.fixed_view_mut::<2, 1>(k, 2 * n + i)).copy_from_slice(&z);
+            }
             let carried = sum(&|pole| m * along(pole, &self.cavity) * slip);
-            // The coordinates `kappa z` of both poles from `(x, v)`: `z1 + z2 = x`, `lambda1 z1 + lambda2 z2 = v`.
-            let [(one, kappa_one), (two, kappa_two)] = poles;
-            let apart = one.lambda - two.lambda;
-            let inverse = [
-                [-two.lambda / apart / kappa_one, apart.inv() / kappa_one],
-                [one.lambda / apart / kappa_two, -apart.inv() / kappa_two],
-            ];
+            // The coordinates `kappa z` of the poles from `(x, v)`: `z1 + z2 = x`, `lambda1 z1 + lambda2 z2 = v`.
+            let inverse: Vec<[Complex64; 2]> = match *poles {
+                [(one, kappa_one), (two, kappa_two)] => {
+                    let apart = one.lambda - two.lambda;
+                    vec![
+                        [-two.lambda / apart / kappa_one, apart.inv() / kappa_one],
+                        [one.lambda / apart / kappa_two, -apart.inv() / kappa_two],
+                    ]
+                }
+                _ => poles.iter().map(|(_, kappa)| [kappa.inv(), Complex64::ZERO]).collect(),
+            };
             for column in 0..2 {
                 expansion.drive_to_sections[k + column] = carried[column];
+                let part = |i: usize, power: i32| {
+                    let of = |((pole, _), inverse): (&(&Pole, Complex64), &[Complex64; 2])| {
+                        let part = pole.vector[i] / pole.norm * inverse[column];
+                        if power == 0 { part } else { pole.lambda * part }
+                    };
+                    poles.iter().zip(&inverse).map(of).sum::<Complex64>().re
+                };
                 for i in 0..n {
-                    let part = |pole: &Pole, z: Complex64| pole.vector[i] / pole.norm * z;
-                    let [one_part, two_part] = [part(one, inverse[0][column]), part(two, inverse[1][column])];
-                    expansion.to_modal[(i, k + column)] = (one_part + two_part).re;
-                    expansion.to_modal[(n + i, k + column)] = (one.lambda * one_part + two.lambda * two_part).re;
+                    expansion.to_modal[(i, k + column)] = part(i, 0);
+                    expansion.to_modal[(n + i, k + column)] = part(i, 1);
+                }
+                for i in 0..beside {
+                    expansion.to_modal[(2 * n + i, k + column)] = part(n + i, 0);
                 }
             }
             let row = |column: usize| {
@@ -757,28 +883,37 @@ impl Modal {
             let conjugate = Pole {
                 lambda: pole.lambda.conj(),
                 vector: pole.vector.map(|entry| entry.conj()),
+                left: pole.left.map(|entry| entry.conj()),
                 norm: pole.norm.conj(),
             };
             let oscillator = Oscillator::from_rates((-2.0 * pole.lambda.re, 0.0), squared(pole.lambda));
             // With this weight an impulse at the cavity kicks `v` alone, and a real mode is its modal coordinate.
-            let reference = self.reference(&pole.vector);
+            let reference = self.reference(&pole.left);
             let size = libm::sqrt(2.0 / (pole.norm.norm() * pole.lambda.im)) * reference.norm();
             let kappa = Complex64::new(0.0, -0.5 * size) / reference;
-            add([(pole, kappa), (&conjugate, kappa.conj())], oscillator);
+            add(&[(pole, kappa), (&conjugate, kappa.conj())], oscillator);
         }
         for (fast, slow) in reals[..reals.len() / 2].iter().zip(reals.iter().rev()) {
             let (a, b) = (fast.lambda.re, slow.lambda.re);
             let oscillator = Oscillator::from_rates(plus((-a, 0.0), (-b, 0.0)), product(a, b));
             let gap = Complex64::from(b - a);
-            let weight = |pole: &Pole| (self.reference(&pole.vector) * gap).inv();
-            add([(slow, weight(slow)), (fast, -weight(fast))], oscillator);
+            let weight = |pole: &Pole| (self.reference(&pole.left) * gap).inv();
+            add(&[(slow, weight(slow)), (fast, -weight(fast))], oscillator);
+        }
+        if let Some(lone) = reals.get(reals.len() / 2).filter(|_| reals.len() % 2 == 1) {
+            let (a, b) = (lone.lambda.re, UNUSED * lone.lambda.re);
+            let oscillator = Oscillator::from_rates(plus((-a, 0.0), (-b, 0.0)), product(a, b));
+            add(&[(lone, (self.reference(&lone.left) * a).inv())], oscillator);
         }
         Ok((sections, expansion))
     }
 
     /// What a mode is scaled by: its shape at the cavity, or its largest entry where the cavity is at a node.
     fn reference(&self, vector: &DVector<Complex64>) -> Complex64 {
-        let (cavity, largest) = (dot(vector, &self.cavity), vector[vector.icamax()]);
+        let (cavity, largest) = (
+            dot(&vector.as_slice()[..self.cavity.len()], self.cavity.as_slice()),
+            vector[vector.icamax()],
+        );
         if cavity.norm() > 1e-6 * largest.norm() * self.cavity.amax() {
             cavity
         } else {
@@ -788,35 +923,37 @@ impl Modal {
 
     /// Poles with an imaginary part of 0 or above, refined by Newton's method.
     fn poles(&self, m: f64) -> Result<Vec<Pole>, InvalidHost> {
-        let n = self.stiffness.len();
+        let (n, beside) = (self.stiffness.len(), self.beside.count());
         let omega: Vec<_> = self.stiffness.iter().map(|square| libm::sqrt(square.0)).collect();
         let share = m / (1.0 + m * self.cavity.norm_squared());
         let inverse_mass = DMatrix::identity(n, n) - share * &self.cavity * self.cavity.transpose();
         let damping = &inverse_mass * &self.damping;
-        // In the coordinates (omega eta, eta') all entries have the size of frequencies.
-        let state = DMatrix::from_fn(2 * n, 2 * n, |i, j| match (i < n, j < n) {
-            (true, true) => 0.0,
-            (true, false) => {
-                if j - n == i {
-                    omega[i]
-                } else {
-                    0.0
-                }
-            }
-            (false, true) => -inverse_mass[(i - n, j)] * omega[j],
-            (false, false) => -damping[(i - n, j - n)],
+        let force = &inverse_mass * &self.beside.force;
+        // In the coordinates (omega eta, eta', z) all entries of a structure have the size of frequencies.
+        let mut state = DMatrix::from_fn(2 * n + beside, 2 * n + beside, |i, j| match (i / n, j / n) {
+            (0, 1) if j - n == i => omega[i],
+            (0, _) => 0.0,
+            (1, 0) => -inverse_mass[(i - n, j)] * omega[j],
+            (1, 1) => -damping[(i - n, j - n)],
+            (1, _) => force[(i - n, j - 2 * n)],
+            (_, 0) => 0.0,
+            (_, 1) => -self.beside.velocity[(i - 2 * n, j - n)],
+            (_, _) => -self.beside.rates[(i - 2 * n, j - 2 * n)],
         });
+        if beside > 0 {
+            balance_parlett_reinsch(&mut state);
+        }
         let found = state.complex_eigenvalues();
         let poles: Vec<_> = found
             .iter()
             .filter(|lambda| lambda.im >= 0.0)
-            .map(|lambda| self.refined(*lambda, m))
+            .map(|lambda| self.pole(*lambda, m))
             .collect();
         let count: usize = poles.iter().map(|pole| if pole.lambda.im == 0.0 { 1 } else { 2 }).sum();
         let apart = |one: &Pole, two: &Pole| (one.lambda - two.lambda).norm() > 1e-13 * one.lambda.norm();
         let distinct = (0..poles.len()).all(|i| (0..i).all(|j| apart(&poles[i], &poles[j])));
         check(
-            count == 2 * n
+            count == 2 * n + beside
                 && distinct
                 && poles
                     .iter()
@@ -829,41 +966,74 @@ impl Modal {
     }
 
     /// The pole near `lambda`.
-    fn refined(&self, mut lambda: Complex64, m: f64) -> Pole {
-        let n = self.stiffness.len();
+    fn pole(&self, lambda: Complex64, m: f64) -> Pole {
+        let (n, size) = (self.stiffness.len(), self.stiffness.len() + self.beside.count());
         let mass = |i: usize, j: usize| f64::from(i == j) + m * self.cavity[i] * self.cavity[j];
         let stiffness = |i: usize, j: usize| if i == j { self.stiffness[i].0 } else { 0.0 };
-        let q = |lambda: Complex64| {
-            DMatrix::from_fn(n, n, |i, j| {
-                lambda * (lambda * mass(i, j) + self.damping[(i, j)]) + stiffness(i, j)
+        let Beside { rates, velocity, force, .. } = &self.beside;
+        let pencil = |lambda: Complex64| {
+            DMatrix::from_fn(size, size, |i, j| match (i < n, j < n) {
+                (true, true) => lambda * (lambda * mass(i, j) + self.damping[(i, j)]) + stiffness(i, j),
+                (true, false) => Complex64::from(-force[(i, j - n)]),
+                (false, true) => lambda * velocity[(i - n, j)],
+                (false, false) => lambda * f64::from(i == j) + rates[(i - n, j - n)],
             })
         };
-        let slope = |lambda: Complex64| DMatrix::from_fn(n, n, |i, j| lambda * 2.0 * mass(i, j) + self.damping[(i, j)]);
-        let is_real = lambda.im == 0.0;
-        // Inverse iteration for a start.
-        let beside = lambda * (1.0 + 1e-9);
-        let start = DVector::from_fn(n, |i, _| Complex64::from(self.stiffness[i].0 * (1.0 + 0.1 * i as f64)));
-        let mut vector = q(beside).lu().solve(&start).unwrap_or(start);
-        for _ in 0..6 {
-            vector /= vector[vector.icamax()];
-            let largest = vector.icamax();
-            let (now, along) = (q(lambda), slope(lambda) * &vector);
-            let mut bordered = DMatrix::zeros(n + 1, n + 1);
-            bordered.view_mut((0, 0), (n, n)).copy_from(&now);
-            bordered.view_mut((0, n), (n, 1)).copy_from(&along);
-            bordered[(n, largest)] = Complex64::ONE;
-            let mut right = DVector::zeros(n + 1);
-            right.rows_mut(0, n).copy_from(&-(now * &vector));
-            let Some(step) = bordered.lu().solve(&right) else { break };
-            vector += step.rows(0, n);
-            lambda += step[n];
-            if is_real {
-                lambda.im = 0.0;
-            }
+        let slope = |lambda: Complex64| {
+            DMatrix::from_fn(size, size, |i, j| match (i < n, j < n) {
+                (true, true) => lambda * 2.0 * mass(i, j) + self.damping[(i, j)],
+                (true, false) => Complex64::ZERO,
+                (false, true) => Complex64::from(velocity[(i - n, j)]),
+                (false, false) => Complex64::from(f64::from(i == j)),
+            })
+        };
+        let start = DVector::from_fn(size, |i, _| {
+            Complex64::from(if i < n {
+                self.stiffness[i].0 * (1.0 + 0.1 * i as f64)
+            } else {
+                1.0
+            })
+        });
+        let (vector, lambda) = refined(lambda, &start, &pencil, &slope);
+        let mut left = vector.clone();
+        if size > n {
+            left = refined(lambda, &start, &|s| pencil(s).transpose(), &|s| slope(s).transpose()).0;
         }
-        let norm = (vector.transpose() * slope(lambda) * &vector)[0];
-        Pole { lambda, vector, norm }
+        let norm = (left.transpose() * slope(lambda) * &vector)[0];
+        Pole { lambda, vector, left, norm }
     }
+}
+
+/// An eigenvector of a pencil, and its eigenvalue near `lambda`, by Newton's method.
+fn refined(
+    mut lambda: Complex64,
+    start: &DVector<Complex64>,
+    pencil: &dyn Fn(Complex64) -> DMatrix<Complex64>,
+    slope: &dyn Fn(Complex64) -> DMatrix<Complex64>,
+) -> (DVector<Complex64>, Complex64) {
+    let n = start.len();
+    let is_real = lambda.im == 0.0;
+    // Inverse iteration for a start.
+    let near = lambda * (1.0 + 1e-9);
+    let mut vector = pencil(near).lu().solve(start).unwrap_or_else(|| start.clone());
+    for _ in 0..6 {
+        vector /= vector[vector.icamax()];
+        let largest = vector.icamax();
+        let (now, along) = (pencil(lambda), slope(lambda) * &vector);
+        let mut bordered = DMatrix::zeros(n + 1, n + 1);
+        bordered.view_mut((0, 0), (n, n)).copy_from(&now);
+        bordered.view_mut((0, n), (n, 1)).copy_from(&along);
+        bordered[(n, largest)] = Complex64::ONE;
+        let mut right = DVector::zeros(n + 1);
+        right.rows_mut(0, n).copy_from(&-(now * &vector));
+        let Some(step) = bordered.lu().solve(&right) else { break };
+        vector += step.rows(0, n);
+        lambda += step[n];
+        if is_real {
+            lambda.im = 0.0;
+        }
+    }
+    (vector, lambda)
 }
 
 /// `|lambda|²` with its rounding error.
@@ -871,8 +1041,8 @@ fn squared(lambda: Complex64) -> (f64, f64) {
     plus(product(lambda.re, lambda.re), product(lambda.im, lambda.im))
 }
 
-fn dot(a: &DVector<Complex64>, b: &DVector<f64>) -> Complex64 {
-    a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()
+fn dot(a: &[Complex64], b: &[f64]) -> Complex64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]
@@ -928,7 +1098,7 @@ mod tests {
                             + if i == j { stiffness[i].0 } else { 0.0 }
                     });
                     let input = DVector::from_fn(3, |i, _| drive[i] + s * drive_rate[i]);
-                    let expected = dot(&q.lu().solve(&input).unwrap(), &shape);
+                    let expected = dot(q.lu().solve(&input).unwrap().as_slice(), shape.as_slice());
                     let got = response(&row, sections.iter().map(|section| section.steady(omega)));
                     assert!(
                         (got - expected).norm() < 1e-13 * input.norm(),

@@ -502,7 +502,7 @@ impl Motion for SumOfSections {
 }
 
 /// The drive and its derivatives `t` seconds after the start, where its oscillator has the phasor `phasor`.
-fn drive_derivatives(drive: &Drive, phasor: Complex64, omega: f64, t: f64) -> DriveDerivatives {
+pub(crate) fn drive_derivatives(drive: &Drive, phasor: Complex64, omega: f64, t: f64) -> DriveDerivatives {
     let [u0, u1, u2, u3] = if t == 0.0 { drive.signal } else { shift(drive.signal, t) };
     let square = omega * omega;
     let (sin, cos) = (phasor.im, omega * phasor.re);
@@ -563,22 +563,22 @@ fn integrals(rate: f64, t: f64) -> [f64; 4] {
 impl Structure {
     /// The structure with a particle of mass `m`, kg, at rest.
     fn new(host: Host, m: f64) -> Result<Self, InvalidHost> {
-        let n = host.sections().len();
+        let n = host.modal.stiffness.len();
         let (stuck, expansion) = host.modal.sections(m)?;
         let (to_modal, from_modal) = host.maps();
         let flat = |matrix: nalgebra::DMatrix<f64>| matrix.transpose().as_slice().to_vec();
         let to_stuck = flat(&expansion.to_sections * &to_modal);
         let to_free = flat(&from_modal * &expansion.to_modal);
         let drive_to_free = &from_modal * &expansion.drive_to_modal;
-        let mut momenta = nalgebra::DVector::zeros(2 * n);
+        let mut momenta = nalgebra::DVector::zeros(2 * n + host.modal.beside.count());
         momenta.rows_mut(n, n).copy_from(&-&host.modal.drive_rate);
         let held = from_modal * momenta;
         Ok(Self {
             mobility: mobility(host.sections()),
             to_stuck: (to_stuck, expansion.drive_to_sections.as_slice().to_vec()),
             to_free: (to_free, drive_to_free.as_slice().to_vec()),
-            held: (0..n).map(|k| [held[2 * k], held[2 * k + 1]]).collect(),
-            state: vec![Sums::default(); n],
+            held: held.as_slice().chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect(),
+            state: vec![Sums::default(); host.sections().len()],
             stuck,
             host,
         })
@@ -828,17 +828,25 @@ impl Plant<Structure> {
     pub fn set_coordinates(&mut self, state: &StructureState) -> Result<(), Refused> {
         let u = self.base_displacement();
         let sections = self.primary.host.state(&state.displacements, &state.velocities, u)?;
-        let before = core::mem::take(&mut self.primary.state);
-        self.primary.state = sections
-            .iter()
-            .map(|values| Sums { values: *values, errors: [0.0; 2] })
-            .collect();
+        Ok(self.set_sections(&sections, [state.q2, state.dq2])?)
+    }
+
+    /// Sets `(x, v)` of every section, and displacement and velocity of the particle. Otherwise as [`Self::set_coordinates`].
+    ///
+    /// # Errors
+    /// As there. A wrong number of sections leaves the others as they are.
+    pub fn set_sections(&mut self, sections: &[[f64; 2]], [q2, dq2]: [f64; 2]) -> Result<(), InvalidValue> {
+        let u = self.base_displacement();
+        let before = self.primary.state.clone();
+        for (sums, values) in self.primary.state.iter_mut().zip(sections) {
+            *sums = Sums { values: *values, errors: [0.0; 2] };
+        }
         let [q1, dq1, _] = self.primary.cavity([u, 0.0], 0.0);
-        let set = self.set_state_at_cavity(crate::State { q1, dq1, q2: state.q2, dq2: state.dq2 });
+        let set = self.set_state_at_cavity(crate::State { q1, dq1, q2, dq2 });
         if set.is_err() {
             self.primary.state = before;
         }
-        Ok(set?)
+        set
     }
 
     /// The structure.

@@ -26,8 +26,10 @@ use crate::{Definition, Dimensionless, Reference, Sensor};
 pub struct StructureOrbit {
     /// Angular frequency, rad/s.
     pub omega: f64,
-    /// Amplitude of the drive: m for a base, N for a force.
+    /// Amplitude of the drive: m for a base, N for a force, V for the command of a shaker.
     pub drive: f64,
+    /// Amplitude of the reference, which is the drive itself unless [`StructureOrbits::with_reference`] says otherwise.
+    pub reference: f64,
     /// Amplitude of the first harmonic of the response, m.
     pub response: f64,
     /// Phase of this harmonic relative to the drive, rad.
@@ -192,6 +194,8 @@ pub struct StructureOrbits {
     sections: Vec<Section>,
     particle: Particle,
     response: Option<Vec<[f64; 2]>>,
+    /// The reference, and what it contains per square of the frequency.
+    reference: Option<[Vec<[f64; 2]>; 2]>,
     target: f64,
 }
 
@@ -212,6 +216,7 @@ impl StructureOrbits {
             sections: host.sections().iter().map(Section::from).collect(),
             particle,
             response: None,
+            reference: None,
             target: -FRAC_PI_2,
         }
     }
@@ -222,7 +227,13 @@ impl StructureOrbits {
         self
     }
 
-    /// With another phase, rad, of the response (a displacement) relative to the drive at resonance.
+    /// With a sum over the sections as the reference, instead of the drive; it has `inertial` times the square of the frequency added.
+    pub fn with_reference(mut self, row: &[[f64; 2]], inertial: &[[f64; 2]]) -> Self {
+        self.reference = Some([row, inertial].map(<[_]>::to_vec));
+        self
+    }
+
+    /// With another phase, rad, of the response (a displacement) relative to the reference at resonance.
     pub fn with_target(mut self, phase: f64) -> Self {
         self.target = phase;
         self
@@ -237,6 +248,10 @@ impl StructureOrbits {
         Self {
             sections: kept(&self.sections, &keep),
             response: self.response.as_ref().map(|rows| kept(rows, &keep)),
+            reference: self
+                .reference
+                .as_ref()
+                .map(|both| both.each_ref().map(|rows| kept(rows, &keep))),
             ..*self
         }
     }
@@ -252,10 +267,10 @@ impl StructureOrbits {
         self.both(omega, roots, |motion| self.accept_resonant(motion))
     }
 
-    /// All orbits at phase resonance under a drive of the amplitude `drive` with frequencies in a range, rad/s, by rising response.
-    pub fn resonant(&self, drive: f64, [low, high]: [f64; 2]) -> Vec<StructureOrbit> {
+    /// All orbits at phase resonance with a reference of the amplitude `reference` and frequencies in a range, rad/s, by rising response.
+    pub fn resonant(&self, reference: f64, [low, high]: [f64; 2]) -> Vec<StructureOrbit> {
         let grid: Vec<f64> = equally_spaced(low, high, GRID).collect();
-        let found = search(&grid, drive, |omega| self.motions(omega));
+        let found = search(&grid, reference, |omega| self.motions(omega));
         let mut orbits: Vec<_> = found.iter().filter_map(|motion| self.accept_resonant(motion)).collect();
         orbits.sort_unstable_by(|first, second| first.response.total_cmp(&second.response));
         let same = |first: f64, second: f64| (first - second).abs() < 1e-9 * first.abs();
@@ -373,8 +388,14 @@ impl StructureOrbits {
     }
 
     fn motions(&self, omega: f64) -> Option<SymmetricMotions> {
+        let reference = self.reference.as_ref().map(|[row, inertial]| -> Vec<[f64; 2]> {
+            let both = row.iter().zip(inertial);
+            both.map(|(row, inertial)| [0, 1].map(|n| row[n] + omega * omega * inertial[n]))
+                .collect()
+        });
         let reading = Reading {
             sections: self.response.as_deref(),
+            reference_sections: reference.as_deref(),
             particle: 0.0,
             reference: Complex::from_polar(1.0, self.target + FRAC_PI_2),
         };
@@ -431,6 +452,7 @@ impl StructureOrbits {
         Some(StructureOrbit {
             omega: motion.omega,
             drive: sizes[2],
+            reference: motion.reference.norm(),
             response: sizes[1],
             phase: wrapped(motion.phase + self.target + FRAC_PI_2),
             speed: motion.speed,

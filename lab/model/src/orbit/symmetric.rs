@@ -42,7 +42,9 @@ pub(super) struct Reading<'a> {
     pub sections: Option<&'a [[f64; 2]]>,
     /// Weight of m q2.
     pub particle: f64,
-    /// At resonance, the response lags the drive times this by a quarter of a period; only its direction matters.
+    /// Weights (a, b) of every section in the reference; `None` for the drive itself.
+    pub reference_sections: Option<&'a [[f64; 2]]>,
+    /// At resonance, the response lags the reference times this by a quarter of a period; only its direction matters.
     pub reference: Complex<f64>,
 }
 
@@ -60,6 +62,9 @@ pub(super) struct SymmetricMotions {
     /// The harmonic of the response is `response_over_y Y + kappa V`.
     response_over_y: Complex<f64>,
     kappa: Complex<f64>,
+    /// The harmonic of the reference is `reference_over_y Y + reference_kappa V`.
+    reference_over_y: Complex<f64>,
+    reference_kappa: Complex<f64>,
     reference: Complex<f64>,
 }
 
@@ -75,6 +80,8 @@ pub(super) struct SymmetricMotion {
     pub cavity: Complex<f64>,
     pub drive: Complex<f64>,
     pub response: Complex<f64>,
+    /// Harmonic of the reference.
+    pub reference: Complex<f64>,
     /// Phase of the response relative to the reference, rad.
     pub phase: f64,
     /// Displacement and velocity of the cavity after the impact.
@@ -87,6 +94,7 @@ impl SymmetricMotions {
         let (mut before, mut mobility) = (Vector2::zeros(), 0.0);
         let mut drive_over_y = Complex::new(f64::INFINITY, 0.0);
         let (mut response, mut kicked) = (Complex::<f64>::ZERO, Complex::<f64>::ZERO);
+        let mut reference = [Complex::<f64>::ZERO; 2];
         for (n, section) in sections.iter().enumerate() {
             let kick = Vector2::from(section.kick);
             let p_before = section.alternating(&section.propagator(PI / omega))? - kick;
@@ -111,6 +119,10 @@ impl SymmetricMotions {
                 response += harmonic(row, driven) * compliance;
             }
             kicked += harmonic(row, section.kicked(omega)) * compliance;
+            if let Some(rows) = reading.reference_sections {
+                reference[0] += harmonic(rows[n], driven) * compliance;
+                reference[1] += harmonic(rows[n], section.kicked(omega)) * compliance;
+            }
         }
         let Particle { mass, restitution, .. } = particle;
 
@@ -127,20 +139,25 @@ impl SymmetricMotions {
             drive_over_y,
             response_over_y: reading.sections.map_or(Complex::ONE, |_| response * drive_over_y),
             kappa: (kicked * impulse * -2.0 + triangle) * mass,
+            reference_over_y: reading
+                .reference_sections
+                .map_or(drive_over_y, |_| reference[0] * drive_over_y),
+            reference_kappa: reference[1] * impulse * (-2.0 * mass),
             reference: reading.reference,
         })
     }
 
-    /// Coefficients of V², V and 1 in `Re(D conj(F))`, up to a factor: zero at phase resonance.
+    /// Coefficients of V², V and 1 in `Re(D conj(R))` with the harmonic R of the reference, up to a factor: zero at phase resonance.
     fn resonance(&self) -> [f64; 3] {
         let Self { alpha, beta, .. } = *self;
         let b = self.particle.half_width;
         // Only the direction of the drive's harmonic matters for the phase.
-        let drive = (self.drive_over_y * self.reference).conj();
+        let drive = (self.reference_over_y * self.reference).conj();
+        let kicked = self.reference_kappa * self.reference;
         let d = (drive * self.response_over_y).re;
-        let u = drive * self.kappa;
+        let u = drive * self.kappa + self.response_over_y.conj() * kicked;
         [
-            d * (alpha * alpha + beta * beta) + u.re * beta + u.im * alpha,
+            d * (alpha * alpha + beta * beta) + u.re * beta + u.im * alpha + (self.kappa * kicked.conj()).re,
             (2.0 * alpha * d + u.im) * b,
             d * b * b,
         ]
@@ -175,9 +192,9 @@ impl SymmetricMotions {
         Complex::new(self.beta * speed, self.particle.half_width + self.alpha * speed)
     }
 
-    /// Drive of the motion at the particle speed `speed`.
-    fn drive(&self, speed: f64) -> f64 {
-        (self.y(speed) * self.drive_over_y).norm()
+    /// Amplitude of the reference of the motion at the particle speed `speed`.
+    fn reference(&self, speed: f64) -> f64 {
+        (self.y(speed) * self.reference_over_y + self.reference_kappa * speed).norm()
     }
 
     /// The motion at the particle speed `speed`. Whether it is physical, and how stable it is, is not examined: see [`HalfPeriod`].
@@ -186,6 +203,7 @@ impl SymmetricMotions {
         let y = self.y(speed);
         let response = y * self.response_over_y + self.kappa * speed;
         let drive = y * self.drive_over_y;
+        let reference = y * self.reference_over_y + self.reference_kappa * speed;
         let twice = 2.0 * mass * speed;
         let [q1, before] = (Vector2::new(y.im, self.omega * y.re) - self.before * twice).into();
         SymmetricMotion {
@@ -196,7 +214,8 @@ impl SymmetricMotions {
             cavity: y,
             drive,
             response,
-            phase: (response * (drive * self.reference).conj()).arg(),
+            reference,
+            phase: (response * (reference * self.reference).conj()).arg(),
             after: [q1, before - twice * self.mobility],
         }
     }
@@ -218,6 +237,7 @@ fn motions(scene: &Dimensionless, omega: f64) -> Option<SymmetricMotions> {
     let (section, Definition { sensor, reference, .. }) = (section(scene), scene.definition);
     let reading = Reading {
         sections: None,
+        reference_sections: None,
         particle: f64::from(u8::from(sensor == Sensor::V)),
         reference: match reference {
             Reference::Base => Complex::ONE,
@@ -336,7 +356,7 @@ fn accept(scene: &Dimensionless, motion: &SymmetricMotion, orbit: Orbit) -> Opti
     Some(Orbit { multipliers, stable: multipliers[3] < 1.0, ..orbit })
 }
 
-/// The symmetric motions at phase resonance under a drive of the amplitude `drive` at the frequencies of a grid and between them.
+/// The symmetric motions at phase resonance with a reference of the amplitude `drive` at the frequencies of a grid and between them.
 pub(super) fn search(
     grid: &[f64],
     drive: f64,
@@ -346,7 +366,7 @@ pub(super) fn search(
     branches.into_iter().flatten().collect()
 }
 
-/// One of the two branches of candidates, as the drive over frequency.
+/// One of the two branches of candidates, as the reference over frequency.
 struct CandidateBranch<'a, F> {
     motions: &'a F,
     branch: usize,
@@ -354,10 +374,10 @@ struct CandidateBranch<'a, F> {
 }
 
 impl<F: Fn(f64) -> Option<SymmetricMotions>> CandidateBranch<'_, F> {
-    /// Drive of the branch minus the drive that is searched for.
+    /// Reference of the branch minus the one that is searched for.
     fn excess(&self, omega: f64) -> Option<f64> {
         let motions = (self.motions)(omega)?;
-        let excess = motions.drive(motions.phase_resonant()?[self.branch]) - self.drive;
+        let excess = motions.reference(motions.phase_resonant()?[self.branch]) - self.drive;
         (!excess.is_nan()).then_some(excess)
     }
 
@@ -413,7 +433,7 @@ impl<F: Fn(f64) -> Option<SymmetricMotions>> CandidateBranch<'_, F> {
         let (root, _) = bisection(a, b, |omega| self.excess(omega).is_some_and(|excess| excess > 0.0));
         let motions = (self.motions)(root)?;
         let candidate = motions.at(motions.phase_resonant()?[self.branch]);
-        let close = (candidate.drive.norm() - self.drive).abs() < 1e-7 * self.drive;
+        let close = (candidate.reference.norm() - self.drive).abs() < 1e-7 * self.drive;
         close.then_some(candidate)
     }
 

@@ -1,0 +1,400 @@
+//! An electrodynamic shaker: armature, suspension, stinger, coil and amplifier, as further degrees of freedom of a structure.
+//!
+//! ```text
+//! m x'' + c x' + k x = Bl i - P,    P = ks (x - y) + cs (x' - y')
+//! voltage:  L i' + R i + Bl x' = V,    V' = wc (g u - V)
+//! current:  i' = wc (g u - i)
+//! ```
+//!
+//! `x` is the displacement of the armature, `y` of the structure's end of the stinger, `P` the force of the stinger on the structure, and `u`
+//! the command. Without inductance `i = (V - Bl x')/R`, and without a cut-off `wc` the amplifier follows at once. The whole is a
+//! [`Host`](crate::Host) whose drive is the command, and as exact as a structure alone.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::base_motion::{BaseMotion, Drive, shift};
+use crate::host::{Equations, Excitation, FirstOrderState, Host, InvalidHost, Matrices, Row};
+use crate::parameters::{FASTEST, InvalidValue};
+use crate::plant::Plant;
+use crate::structure::{Structure, drive_derivatives};
+
+/// A shaker.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Shaker {
+    /// Moving mass of the armature, kg.
+    pub mass: f64,
+    /// Stiffness (N/m) and damping (N s/m) of its suspension.
+    pub suspension: [f64; 2],
+    /// Stiffness (N/m) and damping (N s/m) of the stinger between armature and structure.
+    pub stinger: [f64; 2],
+    /// Mass at the structure's end of the stinger, kg: of the force cell and what it is mounted with, or of the table that carries the structure.
+    pub end_mass: f64,
+    /// Resistance of the coil, ohm.
+    pub resistance: f64,
+    /// Inductance of the coil, H.
+    pub inductance: f64,
+    /// Force per current, N/A, which is also the voltage per velocity, V s/m.
+    pub force_factor: f64,
+    /// What the amplifier controls.
+    pub amplifier: Amplifier,
+    /// Output of the amplifier per command, V/V or A/V.
+    pub gain: f64,
+    /// Cut-off frequency of the amplifier, rad/s; `None`: it follows at once.
+    pub cut_off: Option<f64>,
+}
+
+/// What an amplifier controls.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "lowercase")
+)]
+pub enum Amplifier {
+    /// The voltage of the coil. Without a command the coil is shorted.
+    #[default]
+    Voltage,
+    /// Its current. Without a command the coil is open.
+    Current,
+}
+
+/// What is measured on a structure with a shaker: sums over the sections.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShakerRows {
+    /// Displacement of the structure's end of the stinger, m.
+    pub end: Row,
+    /// Displacement of the armature, m.
+    pub armature: Row,
+    /// Force of the stinger on the structure, N.
+    pub force: Row,
+    /// Current of the coil, A, less what [`Self::current_per_command`] makes of the command.
+    pub current: Row,
+    /// Current per command, A/V.
+    pub current_per_command: f64,
+}
+
+/// Matrices of a structure with its shaker.
+struct Assembly {
+    mass: DMatrix<f64>,
+    damping: DMatrix<f64>,
+    stiffness: DMatrix<f64>,
+    cavity: Vec<f64>,
+    /// The displacements of the structure's end of the stinger, and of the armature.
+    end: DVector<f64>,
+    armature: DVector<f64>,
+}
+
+impl Shaker {
+    /// The structure that the shaker moves by its base, which is then a table of the mass [`Self::end_mass`], or by a force at its point.
+    ///
+    /// Coordinates of the host are those of the structure, the displacement of the base if there is one, and the stretch `x - y` of the stinger: with
+    /// a stiff one, the difference of two displacements would lose its force.
+    ///
+    /// # Errors
+    /// A structure that is refused; a value that is not finite or out of its range.
+    pub fn attach(&self, structure: &Equations, by: Excitation) -> Result<Host, InvalidHost> {
+        self.check(by)?;
+        structure.host(by)?;
+        let Assembly { mass, damping, stiffness, cavity, armature, .. } = self.assembly(structure, by)?;
+        let (drive, states) = self.electric(&armature);
+        let rows = |matrix: DMatrix<f64>| -> Vec<Vec<f64>> {
+            matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+        };
+        let (mass, damping, stiffness) = (rows(mass), rows(damping), rows(stiffness));
+        let matrices = Matrices {
+            mass: &mass,
+            damping: &damping,
+            stiffness: &stiffness,
+            cavity: &cavity,
+            drive: &drive,
+        };
+        Host::with_first_order(Excitation::Force, &matrices, &states)
+    }
+
+    /// What is measured on the host of [`Self::attach`].
+    ///
+    /// # Errors
+    /// As for [`Self::attach`].
+    pub fn rows(&self, host: &Host, structure: &Equations, by: Excitation) -> Result<ShakerRows, InvalidHost> {
+        let Assembly { end, armature, .. } = self.assembly(structure, by)?;
+        let (n, states) = (end.len(), self.electric(&armature).1);
+        let stretch = |times: f64| unit(n, n - 1, times);
+        let [force, damping] = self.stinger.map(stretch);
+        let mut of_states = vec![0.0; states.len()];
+        let (mut velocity, mut current_per_command) = (0.0, 0.0);
+        let is_resistive = self.amplifier == Amplifier::Voltage && self.inductance == 0.0;
+        let per_output = if is_resistive { 1.0 / self.resistance } else { 1.0 };
+        if is_resistive {
+            velocity = -self.force_factor / self.resistance;
+        }
+        match of_states.first_mut() {
+            Some(first) => *first = per_output,
+            None => current_per_command = self.gain * per_output,
+        }
+        Ok(ShakerRows {
+            end: host.row(end.as_slice())?,
+            armature: host.row(armature.as_slice())?,
+            force: host.sum(&force, &damping, &vec![0.0; states.len()])?,
+            current: host.sum(&stretch(0.0), (velocity * &armature).as_slice(), &of_states)?,
+            current_per_command,
+        })
+    }
+
+    fn check(&self, by: Excitation) -> Result<(), InvalidHost> {
+        let positive = [
+            ("mass of the armature", self.mass, "kg", true),
+            ("stiffness of the suspension", self.suspension[0], "N/m", true),
+            ("damping of the suspension", self.suspension[1], "N s/m", false),
+            ("stiffness of the stinger", self.stinger[0], "N/m", true),
+            ("damping of the stinger", self.stinger[1], "N s/m", false),
+            (
+                "mass at the structure's end of the stinger",
+                self.end_mass,
+                "kg",
+                by == Excitation::Base,
+            ),
+            ("resistance of the coil", self.resistance, "ohm", true),
+            ("inductance of the coil", self.inductance, "H", false),
+            (
+                "force factor Bl",
+                self.force_factor,
+                "N/A (the same number in V s/m)",
+                true,
+            ),
+            ("gain of the amplifier", self.gain, "V/V or A/V", true),
+            ("cut-off of the amplifier", self.cut_off.unwrap_or(1.0), "rad/s", true),
+        ];
+        for (name, value, unit, is_needed) in positive {
+            let valid = value <= FASTEST && if is_needed { value > 0.0 } else { value >= 0.0 };
+            if !valid {
+                let allowed = if is_needed {
+                    "a positive number"
+                } else {
+                    "0 or a positive number"
+                };
+                return Err(InvalidHost(format!(
+                    "the shaker has the {name} {value:?} {unit}; it needs {allowed} up to 1e12"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn assembly(&self, structure: &Equations, by: Excitation) -> Result<Assembly, InvalidHost> {
+        let diagonal = |values: Vec<f64>| DMatrix::from_diagonal(&DVector::from_vec(values));
+        let square = |rows: &[Vec<f64>]| DMatrix::from_fn(rows.len(), rows.len(), |i, j| rows[i][j]);
+        let (mass, damping, stiffness, cavity, drive) = match structure {
+            Equations::Modes(modes) => (
+                DMatrix::identity(modes.len(), modes.len()),
+                diagonal(modes.iter().map(|mode| 2.0 * mode.zeta * mode.omega).collect()),
+                diagonal(modes.iter().map(|mode| mode.omega * mode.omega).collect()),
+                modes.iter().map(|mode| mode.cavity).collect(),
+                modes.iter().map(|mode| mode.drive).collect(),
+            ),
+            Equations::Matrices { mass, damping, stiffness, cavity, drive } => {
+                let [mass, damping, stiffness] = [mass, damping, stiffness].map(|rows| square(rows));
+                (mass, damping, stiffness, cavity.clone(), drive.clone())
+            }
+            Equations::Shaken { .. } => return Err(InvalidHost("the structure has a shaker already".into())),
+        };
+        let n = cavity.len();
+        let has_base = by == Excitation::Base;
+        let size = n + usize::from(has_base) + 1;
+        // The base moves the structure through its springs and dampers.
+        let extended = |matrix: &DMatrix<f64>| {
+            let mut all = DMatrix::zeros(size, size);
+            all.view_mut((0, 0), (n, n)).copy_from(matrix);
+            if has_base {
+                let direction = DVector::from_row_slice(&drive);
+                let side = -(matrix * &direction);
+                all.view_mut((0, n), (n, 1)).copy_from(&side);
+                all.view_mut((n, 0), (1, n)).copy_from(&side.transpose());
+                all[(n, n)] = -direction.dot(&side);
+            }
+            all
+        };
+        let (mut damping, mut stiffness) = (extended(&damping), extended(&stiffness));
+        let mut all_mass = DMatrix::zeros(size, size);
+        all_mass.view_mut((0, 0), (n, n)).copy_from(&mass);
+        let mut end = DVector::zeros(size);
+        if has_base {
+            end[n] = 1.0;
+        } else {
+            end.rows_mut(0, n).copy_from_slice(&drive);
+        }
+        let stretch = DVector::from_vec(unit(size, size - 1, 1.0));
+        let armature = &end + &stretch;
+        all_mass += self.mass * &armature * armature.transpose() + self.end_mass * &end * end.transpose();
+        stiffness += self.suspension[0] * &armature * armature.transpose();
+        stiffness += self.stinger[0] * &stretch * stretch.transpose();
+        let mut of_armature = self.suspension[1];
+        if self.amplifier == Amplifier::Voltage && self.inductance == 0.0 {
+            of_armature += self.force_factor * self.force_factor / self.resistance;
+        }
+        damping += of_armature * &armature * armature.transpose();
+        damping += self.stinger[1] * &stretch * stretch.transpose();
+        let mut row = vec![0.0; size];
+        row[..n].copy_from_slice(&cavity);
+        Ok(Assembly {
+            mass: all_mass,
+            damping,
+            stiffness,
+            cavity: row,
+            end,
+            armature,
+        })
+    }
+
+    /// The force of the command on the degrees of freedom, and the first-order states: the current of a coil with inductance, then the output
+    /// of an amplifier with a cut-off.
+    fn electric(&self, armature: &DVector<f64>) -> (Vec<f64>, Vec<FirstOrderState>) {
+        let Self { resistance, inductance, force_factor, gain, cut_off, .. } = *self;
+        let at_armature = |value: f64| -> Vec<f64> { armature.iter().map(|at| at * value).collect() };
+        let has_coil = self.amplifier == Amplifier::Voltage && inductance > 0.0;
+        let per_output = match self.amplifier {
+            Amplifier::Voltage if has_coil => 0.0,
+            Amplifier::Voltage => force_factor / resistance,
+            Amplifier::Current => force_factor,
+        };
+        let count = usize::from(has_coil) + usize::from(cut_off.is_some());
+        let mut states = Vec::with_capacity(count);
+        if has_coil {
+            let mut rates = vec![0.0; count];
+            rates[0] = resistance / inductance;
+            let by_output = gain / inductance;
+            // The output of the amplifier is the state behind it, or the command itself.
+            if let Some(output) = rates.get_mut(1) {
+                *output = -1.0 / inductance;
+            }
+            states.push(FirstOrderState {
+                rates,
+                velocity: at_armature(force_factor / inductance),
+                force: at_armature(force_factor),
+                drive: if cut_off.is_some() { 0.0 } else { by_output },
+            });
+        }
+        if let Some(cut_off) = cut_off {
+            let mut rates = vec![0.0; count];
+            rates[count - 1] = cut_off;
+            states.push(FirstOrderState {
+                rates,
+                velocity: at_armature(0.0),
+                force: at_armature(per_output),
+                drive: cut_off * gain,
+            });
+        }
+        let at_once = if count > 0 { 0.0 } else { gain * per_output };
+        (at_armature(at_once), states)
+    }
+}
+
+/// A row with one entry.
+fn unit(n: usize, place: usize, value: f64) -> Vec<f64> {
+    (0..n).map(|other| if other == place { value } else { 0.0 }).collect()
+}
+
+// Clipping
+
+/// Shortest time above the limit, over the length of a step: within it a crest exceeds the limit by less than rounding.
+const SHORTEST: f64 = 1e-9;
+
+impl Plant<Structure> {
+    /// Advances by `duration` seconds under `drive`, which is clipped at plus and minus `limit`: the step is split where the drive crosses it.
+    /// Returns whether it was clipped.
+    ///
+    /// # Errors
+    /// An invalid drive or duration; the plant stays as it is.
+    pub fn advance_within(&mut self, limit: f64, drive: Drive, duration: f64) -> Result<bool, InvalidValue> {
+        drive.validate()?;
+        let motion = BaseMotion { drive, ..self.moving.base };
+        let command = Command::new(&motion, duration);
+        let crossings = command.crossings(limit, duration);
+        let ends = crossings.iter().copied().chain([duration]);
+        let (mut begin, mut is_clipped) = (0.0, false);
+        for end in ends {
+            let middle = command.at(0.5 * (begin + end))[0];
+            let clips = middle.abs() > limit;
+            is_clipped |= clips;
+            let now = if clips {
+                Drive {
+                    signal: [limit.copysign(middle), 0.0, 0.0, 0.0],
+                    amplitude: 0.0,
+                    ..drive
+                }
+            } else {
+                Drive { signal: shift(drive.signal, begin), ..drive }
+            };
+            self.advance(now, end - begin)?;
+            begin = end;
+        }
+        Ok(is_clipped)
+    }
+}
+
+/// A drive over a step.
+struct Command<'a> {
+    motion: &'a BaseMotion,
+    /// Bounds of its value and of its first two derivatives.
+    bounds: [f64; 3],
+}
+
+impl<'a> Command<'a> {
+    fn new(motion: &'a BaseMotion, duration: f64) -> Self {
+        let Drive { signal, amplitude, omega } = motion.drive;
+        let [u0, u1, u2, _] = shift(signal.map(f64::abs), duration.abs());
+        let (size, rate) = (amplitude.abs(), omega.abs());
+        Self {
+            motion,
+            bounds: [u0 + size, u1 + size * rate, 2.0 * u2 + size * rate * rate],
+        }
+    }
+
+    /// Value and first derivatives after `t` seconds.
+    fn at(&self, t: f64) -> [f64; 7] {
+        let BaseMotion { drive, .. } = self.motion;
+        let phasor = crate::segment::phasor(&self.motion.after(t)).unwrap_or_default();
+        drive_derivatives(drive, phasor, drive.omega.abs(), t)
+    }
+
+    /// Where the magnitude crosses `limit`, in order.
+    fn crossings(&self, limit: f64, duration: f64) -> Vec<f64> {
+        let mut found = Vec::new();
+        if self.bounds[0] > limit {
+            for sign in [-1.0, 1.0] {
+                self.search(sign * limit, [0.0, duration], SHORTEST * duration, &mut found);
+            }
+            found.sort_by(f64::total_cmp);
+        }
+        found
+    }
+
+    /// The crossings of `level` in an interval: none where the value is too far off, at most one where the slope has one sign, and else those in
+    /// its halves.
+    fn search(&self, level: f64, [begin, end]: [f64; 2], shortest: f64, found: &mut Vec<f64>) {
+        let half = 0.5 * (end - begin);
+        let middle = begin + half;
+        let [value, slope, ..] = self.at(middle);
+        if (value - level).abs() > self.bounds[1] * half || half <= shortest {
+            return;
+        }
+        if slope.abs() <= self.bounds[2] * half {
+            self.search(level, [begin, middle], shortest, found);
+            self.search(level, [middle, end], shortest, found);
+            return;
+        }
+        let is_above = |t: f64| self.at(t)[0] > level;
+        let (mut low, mut high, first) = (begin, end, is_above(begin));
+        if is_above(end) == first {
+            return;
+        }
+        loop {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                break;
+            }
+            *(if is_above(middle) == first { &mut low } else { &mut high }) = middle;
+        }
+        found.push(high);
+    }
+}

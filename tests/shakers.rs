@@ -1,0 +1,170 @@
+//! Plants with an electrodynamic shaker against references of 40 digits.
+
+use std::fs;
+
+use lovines::host::Equations;
+use lovines::{
+    Amplifier, Cavity, Drive, Excitation, Parameters, Plant, Row, Shaker, ShakerRows, Structure, StructureState, Wall,
+};
+use serde_json::Value;
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_str()
+        .map_or_else(|| value.as_f64().unwrap(), |text| text.parse().unwrap())
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(number).collect()
+}
+
+fn pair(value: &Value) -> [f64; 2] {
+    numbers(value).try_into().unwrap()
+}
+
+/// A scene of `tests/reference/shakers`.
+struct Reference {
+    scene: Value,
+    step: f64,
+    /// Number of steps until each row.
+    steps: Vec<f64>,
+    /// t, q..., q'..., q2, q2', current, impacts so far, wall stuck to.
+    rows: Vec<Vec<f64>>,
+}
+
+impl Reference {
+    fn read(name: &str) -> Self {
+        let path = format!("{}/tests/reference/shakers/{name}.json", env!("CARGO_MANIFEST_DIR"));
+        let all: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+        Self {
+            step: number(&all["step"]),
+            steps: numbers(&all["steps"]),
+            rows: all["rows"].as_array().unwrap().iter().map(numbers).collect(),
+            scene: all["scene"].clone(),
+        }
+    }
+
+    fn shaker(&self) -> Shaker {
+        let given = &self.scene["shaker"];
+        let value = |name: &str| number(&given[name]);
+        Shaker {
+            mass: value("mass"),
+            suspension: pair(&given["suspension"]),
+            stinger: pair(&given["stinger"]),
+            end_mass: value("end_mass"),
+            resistance: value("resistance"),
+            inductance: value("inductance"),
+            force_factor: value("force_factor"),
+            amplifier: match given["amplifier"].as_str() {
+                Some("current") => Amplifier::Current,
+                _ => Amplifier::Voltage,
+            },
+            gain: value("gain"),
+            cut_off: given.get("cut_off").map(number),
+        }
+    }
+
+    /// The plant, the rows of all displacements of the reference, and what is measured of the shaker.
+    fn plant(&self) -> (Plant<Structure>, Vec<Row>, ShakerRows) {
+        let scene = &self.scene;
+        let matrix = |name: &str| -> Vec<Vec<f64>> { scene[name].as_array().unwrap().iter().map(numbers).collect() };
+        let (damping, stiffness) = (matrix("C"), matrix("K"));
+        let modes = damping.len();
+        let unit = |n: usize, at: usize| -> Vec<f64> { (0..n).map(|i| f64::from(u8::from(i == at))).collect() };
+        let equations = Equations::Matrices {
+            mass: (0..modes).map(|i| unit(modes, i)).collect(),
+            damping,
+            stiffness,
+            cavity: numbers(&scene["cavity"]),
+            drive: numbers(&scene["drive"]),
+        };
+        let by = match scene["base"].as_bool() {
+            Some(true) => Excitation::Base,
+            _ => Excitation::Force,
+        };
+        let shaker = self.shaker();
+        let host = shaker.attach(&equations, by).unwrap();
+        let outputs = shaker.rows(&host, &equations, by).unwrap();
+        let size = modes + usize::from(by == Excitation::Base);
+        let mut rows: Vec<_> = (0..size).map(|n| host.row(&unit(size + 1, n)).unwrap()).collect();
+        rows.push(outputs.armature.clone());
+        let parameters = Parameters {
+            particle_mass: number(&scene["m"]),
+            half_width: number(&scene["b"]),
+            restitution: number(&scene["r"]),
+            cavity: Cavity { tilt: number(&scene["tilt"]), ..Cavity::IDEAL },
+            ..Parameters::dimensionless(0.01, 1.0, 0.65)
+        };
+        let start = StructureState {
+            q2: number(&scene["q2"]),
+            dq2: number(&scene["dq2"]),
+            ..StructureState::default()
+        };
+        (Plant::with_host(host, parameters, &start).unwrap(), rows, outputs)
+    }
+
+    /// Largest error of displacements, velocities over the first natural frequency of the structure, relative to `b`, and of the current, relative
+    /// to its largest value, in one step per row, or in steps of `1/parts` of the reference's.
+    fn error(&self, parts: u32) -> f64 {
+        let (mut plant, rows, outputs) = self.plant();
+        let drive = Drive::harmonic(number(&self.scene["E"]), number(&self.scene["omega"]));
+        let limit = self.scene.get("limit").map_or(f64::INFINITY, number);
+        let first = number(&self.scene["K"][0][0]).sqrt();
+        let currents = self.rows.iter().map(|row| row[row.len() - 3].abs());
+        let largest = currents.fold(0.0, f64::max);
+        let (mut taken, mut worst) = (0.0, 0f64);
+        for (until, expected) in self.steps.iter().zip(&self.rows) {
+            let (count, length) = match parts {
+                0 => (1, (until - taken) * self.step),
+                _ => ((until - taken) as u32 * parts, self.step / f64::from(parts)),
+            };
+            taken = *until;
+            for _ in 0..count {
+                plant.advance_within(limit, drive, length).unwrap();
+            }
+            let points: Vec<_> = rows.iter().map(|row| plant.point(row)).collect();
+            let (n, state) = (points.len(), plant.state());
+            let [.., current, impacts, wall] = expected[..] else {
+                unreachable!()
+            };
+            let mut errors: Vec<f64> = Vec::new();
+            for (at, point) in points.iter().enumerate() {
+                errors.push(point[0] - expected[1 + at]);
+                errors.push((point[1] - expected[1 + n + at]) / first);
+            }
+            errors.push(state.q2 - expected[1 + 2 * n]);
+            errors.push((state.dq2 - expected[2 + 2 * n]) / first);
+            let got = plant.point(&outputs.current)[0] + outputs.current_per_command * plant.base_displacement();
+            let of_current = (got - current).abs() / largest;
+            let error = errors.iter().fold(0f64, |worst, error| worst.max(error.abs()));
+            worst = worst.max(error / plant.parameters().half_width).max(of_current);
+            if self.scene.get("chatter").is_none() {
+                assert_eq!(plant.totals().impacts, impacts as u64, "t = {}", expected[0]);
+            }
+            assert_eq!(plant.contact().map_or(0.0, Wall::sign), wall, "t = {}", expected[0]);
+        }
+        worst
+    }
+}
+
+#[test]
+fn plants_with_a_shaker_follow_references_of_40_digits() {
+    for name in [
+        "voltage",
+        "inductance",
+        "filtered",
+        "current",
+        "current-filtered",
+        "clipped",
+        "clipped-contact",
+        "chatter",
+        "table",
+    ] {
+        let reference = Reference::read(name);
+        for parts in [0, 1, 10] {
+            let error = reference.error(parts);
+            println!("{name}, {parts} parts of a step: {error:.1e} b");
+            assert!(error < 2e-12, "{name}, {parts}: {error:e}");
+        }
+    }
+}
