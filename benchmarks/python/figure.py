@@ -1,5 +1,7 @@
 """The work-precision figure: a panel per scene, error against time, a line per method."""
 
+from pathlib import Path
+
 import matplotlib as mpl
 
 mpl.use("svg")
@@ -38,6 +40,9 @@ TITLES = {
     "resonance": "Undamped resonance",
     "loop": "Controller in the loop",
 }
+STYLE = Path(__file__).parents[2] / "python/vines/figures.mplstyle"
+# For panels of a third of the usual width.
+SMALL = {"font.size": 8, "axes.titlesize": 9.5, "axes.labelsize": 8.5}
 LEAST = 1e-16
 TOO_SLOW = 1e3
 CAPTION = (
@@ -74,14 +79,13 @@ def panel(ax, bench, scene):
     if words:
         text = "\n".join(line for word in words for line in broken(word, 40))
         ax.text(0.98, 0.03, text, transform=ax.transAxes, ha="right", va="bottom", fontsize=6.5)
-    ax.set_title(TITLES.get(scene, scene), fontsize=9.5, fontweight="bold")
+    ax.set_title(TITLES.get(scene, scene))
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_ylim(1e-20, 1e5)
     ax.set_yticks([1e-16, 1e-12, 1e-8, 1e-4, 1e0])
     ax.axhline(1e2, color="#999999", linewidth=0.6)
     ax.text(0.02, 0.975, "time limit", transform=ax.transAxes, ha="left", va="top", fontsize=6.5, color="#555555")
-    ax.grid(True, color="#e3e3e3", linewidth=0.5)
     ax.set_xlabel("ns per impact")
     ax.tick_params(labelbottom=True)
 
@@ -97,13 +101,16 @@ def broken(text, width):
 
 
 def write(bench, file):
-    plt.rcParams.update({"font.size": 8, "svg.fonttype": "none", "font.family": "sans-serif", "svg.hashsalt": "vines"})
+    plt.style.use(STYLE)
+    plt.rcParams.update(SMALL)
     scenes = list(dict.fromkeys(row.scene for row in bench.rows))
     columns = min(4, len(scenes))
     lines = -(-len(scenes) // columns)
     foot = 1.0
     height = 2.9 * lines + foot
-    figure, axes = plt.subplots(lines, columns, figsize=(3.2 * columns, height), squeeze=False, sharex=True)
+    figure, axes = plt.subplots(
+        lines, columns, figsize=(3.2 * columns, height), squeeze=False, sharex=True, layout="none"
+    )
     for ax, scene in zip(axes.flat, scenes, strict=False):
         panel(ax, bench, scene)
     for ax in list(axes.flat)[len(scenes) :]:
@@ -116,11 +123,9 @@ def write(bench, file):
         for method, (colour, dash, marker) in STYLES.items()
         if method in shown
     ]
-    figure.legend(
-        handles=handles, ncols=5, loc="upper center", bbox_to_anchor=(0.5, foot / height), frameon=False, fontsize=8.5
-    )
+    figure.legend(handles=handles, ncols=5, loc="upper center", bbox_to_anchor=(0.5, foot / height), fontsize=8.5)
     figure.tight_layout(rect=(0, foot / height, 1, 1))
-    figure.text(0.5, 0.06 / height, CAPTION, fontsize=8, ha="center", va="bottom")
+    figure.text(0.5, 0.06 / height, CAPTION, ha="center", va="bottom")
     part = file.with_suffix(".part")
     figure.savefig(part, format="svg", metadata={"Date": None})
     part.replace(file)

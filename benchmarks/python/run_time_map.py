@@ -116,14 +116,13 @@ def write(rows, lock, folder):
 
 def draw(rows, lock, file):
     """Three panels: regimes, the plant's cost, and that of Brent's method on the same scale of colours."""
-    import matplotlib as mpl
-
-    mpl.use("svg")
+    import figure
     import matplotlib.pyplot as plt
     from matplotlib.colors import ListedColormap, LogNorm
     from matplotlib.patches import Patch
 
-    plt.rcParams.update({"font.size": 8, "svg.fonttype": "none", "font.family": "sans-serif", "svg.hashsalt": "vines"})
+    plt.style.use(figure.STYLE)
+    plt.rcParams.update(figure.SMALL | {"axes.grid": False})
     names = list(REGIMES)
     regimes = [[names.index(cell["regime"]) for cell in row] for row in rows]
     plant = [[cell["ns"] for cell in row] for row in rows]
@@ -132,23 +131,23 @@ def draw(rows, lock, file):
     step = (SIGMA[1] - SIGMA[0]) / (len(rows[0]) - 1), (G[1] - G[0]) / (len(rows) - 1)
     extent = (SIGMA[0] - step[0] / 2, SIGMA[1] + step[0] / 2, G[0] - step[1] / 2, G[1] + step[1] / 2)
     options = {"origin": "lower", "extent": extent, "aspect": "auto", "interpolation": "nearest"}
-    figure, axes = plt.subplots(1, 3, figsize=(12.8, 4.3), sharey=True, layout="constrained")
+    drawn, axes = plt.subplots(1, 3, figsize=(12.8, 4.3), sharey=True)
     colours = ListedColormap(list(REGIMES.values()))
     axes[0].imshow(regimes, cmap=colours, vmin=-0.5, vmax=len(names) - 0.5, **options)
     scale = LogNorm(lock / 2, 64 * lock)
     for ax, costs in ((axes[1], plant), (axes[2], brent)):
         image = ax.imshow(costs, cmap="viridis", norm=scale, **options)
-    bar = figure.colorbar(image, ax=axes[1:], extend="both", pad=0.01)
+    bar = drawn.colorbar(image, ax=axes[1:], extend="both", pad=0.01)
     bar.set_label(f"ns per impact, or per period where impacts are rarer\n(default lock: {lock:.0f})")
     titles = ("Regime", "Plant", "Closed form with Brent's method (white: stalls)")
     for ax, title in zip(axes, titles, strict=True):
-        ax.set_title(title, fontsize=9.5, fontweight="bold")
+        ax.set_title(title)
         ax.set_xlabel("detuning sigma")
     axes[0].set_ylabel("base amplitude G")
     used = {cell["regime"] for row in rows for cell in row}
     handles = [Patch(color=colour, label=name) for name, colour in REGIMES.items() if name in used]
-    figure.legend(handles=handles, ncols=len(handles), loc="outside lower center", frameon=False)
+    drawn.legend(handles=handles, ncols=len(handles), loc="outside lower center")
     part = file.with_suffix(".part")
-    figure.savefig(part, format="svg", metadata={"Date": None})
+    drawn.savefig(part, format="svg", metadata={"Date": None})
     part.replace(file)
-    plt.close(figure)
+    plt.close(drawn)
