@@ -48,6 +48,7 @@ export function begin(page, scene) {
   page.challenge = goal && scene;
   const act = () => {
     // From the same start each time, so that the same happens.
+    page.challenge = goal && { ...scene, shown: true };
     page.start(scene.values, []);
     page.goTo(scene.from ?? 0, Infinity);
     page.pending = tries.map(([from, key, value]) => [page.samples + Math.round(from / page.step), key, value]);
@@ -61,12 +62,12 @@ export function begin(page, scene) {
 // Whether the challenge is solved: its regime, and the ranges of its settings and numbers.
 export function judge(page) {
   if (!page.challenge) return;
-  const { goal: { regime, ...ranges }, name } = page.challenge;
+  const { goal: { regime, ...ranges }, name, shown } = page.challenge;
   const numbers = { ...page.status, ...page.values };
   if (page.bench.words()[0] !== regime || !Object.entries(ranges).every(([key, [low, high]]) => numbers[key] >= low && numbers[key] <= high)) return;
   page.challenge = undefined;
   $("story").classList.add("solved");
-  $("story-step").textContent = `Solved: ${name}`;
+  $("story-step").textContent = `${shown ? "Shown" : "Solved"}: ${name}`;
 }
 
 // Shows the introduction to who has not seen it, unless a link asks for something else.
