@@ -14,7 +14,7 @@ use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stag
 use crate::identification::{
     Cycle, Regime, ResonanceFit, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
 };
-use crate::plan::{Knowledge, LinearResponse, Plan, Target};
+use crate::plan::{Knowledge, Plan, Target};
 use crate::record::Sample;
 use crate::rig::{Controller, Move, Rig};
 
@@ -28,8 +28,8 @@ use crate::rig::{Controller, Move, Rig};
 /// What is asked of a level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Criterion {
-    /// Linear response of the rig.
-    pub linear: LinearResponse,
+    /// What is known of the rig.
+    pub knowledge: Knowledge,
     /// Largest standard uncertainty of the drive E, as a share of it, and of the frequency, as a share of `omega0 E/A` at the largest level A.
     pub precision: f64,
     /// The largest level, m.
@@ -100,7 +100,7 @@ impl Criterion {
 
     /// Largest uncertainties allowed of the drive, m, and of the frequency, rad/s, at this drive, m.
     fn allowed(&self, drive: f64) -> [f64; 2] {
-        let (base, omega0) = (self.precision * drive.abs(), self.linear.omega0);
+        let (base, omega0) = (self.precision * drive.abs(), self.knowledge.linear.omega0);
         [base, omega0 * base / self.largest]
     }
 
@@ -122,7 +122,7 @@ impl Criterion {
 
     /// The point of a window.
     fn of(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
-        let fit = |cycles: &[Cycle], slopes| ResonanceFit::of(cycles, &self.linear, slopes);
+        let fit = |cycles: &[Cycle], slopes| ResonanceFit::of(cycles, &self.knowledge, slopes);
         let whole = fit(cycles, Slopes::Unknown)?;
         let [base, omega] = whole.at(0.0).map(|value| value.value);
         let known = self.slopes([whole.response.value, base, omega]);
@@ -432,7 +432,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     fn criterion(&self) -> Criterion {
         let before = |back: usize| self.states.iter().nth_back(back).copied();
         Criterion {
-            linear: self.plan.knowledge.linear,
+            knowledge: self.plan.knowledge,
             precision: self.plan.precision,
             largest: self.plan.levels.iter().copied().fold(0.0, f64::max),
             before: [before(1), before(0)],

@@ -10,7 +10,7 @@ use serde::Serialize;
 use thiserror::Error;
 use vines_model::numerics::{Estimate, RANDOM, SIGNIFICANT, mean, standard_deviation};
 
-use crate::plan::{Knowledge, LinearResponse, Plan};
+use crate::plan::{Knowledge, Plan};
 use crate::record::{Record, Sample};
 use crate::scene::{Dimensionless, Measurand};
 
@@ -183,7 +183,7 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
     // The drive of the hold decides where the approach ends.
     let [base, phase_error, response] = means(&held);
     let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
-    let [omega, limit] = limits(approach, wide, &knowledge.linear, command)?;
+    let [omega, limit] = limits(approach, wide, knowledge, command)?;
     let speed = |sample: &Sample| Some(d.speed(sample.ground_truth?.particle_velocity.abs()));
     let speeds: Option<Vec<f64>> = hold.iter().map(speed).collect();
     // The speed belongs to the amplitude of the hold, and changes about as it does.
@@ -221,10 +221,10 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
 ///
 /// A long window has less noise, a late one is nearer to the end. Where even the shortest disagrees, the difference is a part of the
 /// uncertainty.
-fn limits(approach: &[Cycle], wide: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[Estimate; 2]> {
-    let slopes = ResonanceFit::of(wide, linear, Slopes::Rising)?.slopes();
+fn limits(approach: &[Cycle], wide: &[Cycle], knowledge: &Knowledge, command: f64) -> Option<[Estimate; 2]> {
+    let slopes = ResonanceFit::of(wide, knowledge, Slopes::Rising)?.slopes();
     let slopes = slopes.map(|slope| Estimate::new(slope.value, &[slope.uncertainty, SLOPE_UNCERTAINTY * slope.value]));
-    let limit = |cycles: &[Cycle]| Some(ResonanceFit::of(cycles, linear, Slopes::Known(slopes))?.limit(command));
+    let limit = |cycles: &[Cycle]| Some(ResonanceFit::of(cycles, knowledge, Slopes::Known(slopes))?.limit(command));
     let mut cycles = approach;
     let mut whole = limit(cycles)?;
     while cycles.len() >= 4 * ResonanceFit::FEWEST {

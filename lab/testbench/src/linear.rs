@@ -27,6 +27,17 @@ pub enum ParticleState {
     Unknown,
 }
 
+impl ParticleState {
+    /// Smallest and largest mass that moves with the structure, over the particle's mass in the drawing.
+    pub(crate) fn carried(self) -> [f64; 2] {
+        match self {
+            Self::Free => [0.0, 0.0],
+            Self::Carried => [LARGEST_RATIO.recip(), LARGEST_RATIO],
+            Self::Unknown => [0.0, LARGEST_RATIO],
+        }
+    }
+}
+
 /// Natural frequency and damping ratio of the structure as measured, in one state of the particle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredLinear {

@@ -4,6 +4,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use num_complex::Complex64;
 use phase_lock::Config;
+use vines_model::Sensor;
+use vines_model::numerics::Estimate;
 
 use crate::experiment::DECAYED;
 use crate::linear::{MeasuredLinear, ParticleState};
@@ -166,6 +168,24 @@ impl Knowledge {
     /// The linear response as data, if it was measured on the rig.
     pub fn measured_linear(&self) -> Option<MeasuredLinear> {
         self.is_measured.then(|| self.linear.data())
+    }
+
+    /// Growth rate of the response at phase resonance per amplitude of the base, 1/s, at the frequency `omega`, rad/s: k/(2 omega) over the mass that
+    /// moves. Of q1 this mass is `k/omega²`, whatever the particle does. Of v it is M, and `omega0` belongs to M and what was carried of m.
+    pub fn growth(&self, omega: f64) -> Estimate {
+        let (omega0, epsilon) = (self.linear.omega0, self.numbers.epsilon);
+        match self.numbers.definition.sensor {
+            Sensor::Q1 => Estimate::new(0.5 * omega, &[]),
+            Sensor::V => {
+                let [least, most] = self.linear.particle.carried();
+                // A uniform distribution.
+                let mass = Estimate::new(
+                    1.0 + 0.5 * epsilon * (least + most),
+                    &[epsilon * (most - least) / 12_f64.sqrt()],
+                );
+                mass.scaled(0.5 * omega0 * omega0 / omega)
+            }
+        }
     }
 
     /// With a linear response that was measured on the rig.

@@ -310,7 +310,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             harmonics.extend(even_and_odd(two, step * cycle.omega, self.target.measurands[0]));
             all.push(cycle);
         }
-        let Some(fit) = ResonanceFit::of(&all, &self.linear, Slopes::Unknown) else {
+        let Some(fit) = ResonanceFit::of(&all, &self.bench.plan.knowledge, Slopes::Unknown) else {
             return self.measure(periods);
         };
         // Harmonics above the third count as noise of a period, but do not scatter.

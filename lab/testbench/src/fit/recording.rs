@@ -582,10 +582,9 @@ type Held = [f64; 3];
 
 /// The parts of the windows, which are evaluated twice: the points of the first time give the slopes of the second.
 fn evaluated(windows: &[Window], knowledge: &Knowledge) -> Vec<Part> {
-    let linear = knowledge.linear;
     let estimate = |window: &Window, before| {
         let largest = window.cycles.iter().map(Cycle::amplitude).fold(0.0, f64::max);
-        Criterion { linear, precision: 1.0, largest, before }.best(window.cycles)
+        Criterion { knowledge: *knowledge, precision: 1.0, largest, before }.best(window.cycles)
     };
     let held = |level: LevelEstimate| [level.response.value, level.at[0].value, level.at[1].value];
     let first: Vec<Option<Held>> = windows

@@ -4,7 +4,7 @@
 //! holds it at phase resonance, and the frequency `omega_R(A)`. For any slow history of drive E, frequency and phase error phi,
 //!
 //! ```text
-//! A' = g (E cos phi - E_R(A)),      Theta' = omega_R(A) - (g E/A) sin phi,      g = omega0^2/(2 omega).
+//! A' = g (E cos phi - E_R(A)),      Theta' = omega_R(A) - (g E/A) sin phi,      g = Knowledge::growth.
 //! ```
 //!
 //! Integrated over time, these are straight lines if A is constant. Where it varies within the window, `E_R` and `omega_R` are linear in it:
@@ -24,8 +24,9 @@ use nalgebra::{Complex, DVector};
 use vines_model::numerics::{Estimate, HarmonicBasis, Regression, mean, slope};
 
 use super::harmonics_of;
-use crate::plan::{LinearResponse, Target};
+use crate::plan::{Knowledge, LinearResponse, Target};
 use crate::record::{Sample, drive_phases};
+use crate::scene::{Definition, Reference, Sensor};
 
 /// Prior knowledge of the slopes of `E_R` and `omega_R` over the amplitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,7 +59,7 @@ pub struct ResonanceFit {
     /// Coefficients: constant, time, and integral of the amplitude's deviation.
     drive: Regression,
     turning: Regression,
-    /// Sizes of the neglected terms of `E_R`, m, and `omega_R`, rad/s.
+    /// Sizes of the neglected terms of `E_R`, m, and `omega_R`, rad/s, and of what the uncertainty of g adds to them.
     pub remainders: [f64; 2],
     /// Standard uncertainties of `E_R` and `omega_R` by the phase errors and the base within the integrals.
     within: [f64; 2],
@@ -76,14 +77,16 @@ impl ResonanceFit {
     /// Fewest periods: one more than the coefficients.
     pub const FEWEST: usize = 4;
 
-    /// From at least four periods of a rig whose linear response is `linear`.
-    pub fn of(cycles: &[Cycle], linear: &LinearResponse, slopes: Slopes) -> Option<Self> {
+    /// From at least four periods of a rig of which this is known.
+    pub fn of(cycles: &[Cycle], knowledge: &Knowledge, slopes: Slopes) -> Option<Self> {
         let n = cycles.len() as f64;
         if cycles.len() < Self::FEWEST {
             return None;
         }
-        let (omega, omega0) = (mean(cycles.iter().map(|cycle| cycle.omega)), linear.omega0);
-        let gain = 0.5 * omega0 * omega0 / omega;
+        let LinearResponse { omega0, damping_rate, .. } = knowledge.linear;
+        let omega = mean(cycles.iter().map(|cycle| cycle.omega));
+        let growth = knowledge.growth(omega);
+        let gain = growth.value;
         let motion = motion(cycles);
         let response = mean(motion.iter().map(|cycle| cycle.amplitude));
         let base = mean(cycles.iter().map(|cycle| cycle.base.norm()));
@@ -98,8 +101,17 @@ impl ResonanceFit {
         let total = |value: fn(&Cycle) -> f64| cycles.iter().map(value).sum::<f64>();
         let calibration = total(|cycle| cycle.base.norm()) / total(|cycle| cycle.commanded[0].norm());
         let drives = drives(cycles, &motion, calibration);
-        // The damper's force on the base leads it by twice the damping ratio.
-        let lead = 2.0 * linear.damping_rate / omega0;
+        // At equal A, the drive belongs to another frequency than `omega_R` by `omega E sin phi/(2 A)`. It grows with the frequency: against damping
+        // with omega, of v with its third power where the base moves the damper's other end; against impacts, of q1, with its square.
+        let Definition { sensor, reference, .. } = knowledge.numbers.definition;
+        let zeta = damping_rate / omega0;
+        let lead = match sensor {
+            Sensor::V => 2.0 * zeta,
+            Sensor::Q1 => base / response,
+        } + match reference {
+            Reference::Base => zeta,
+            Reference::Force => -zeta,
+        };
         let beyond = |drive: Complex<f64>| lead * drive.im;
         // The integral of A' is A. Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
@@ -127,18 +139,28 @@ impl ResonanceFit {
         let forces: Vec<f64> = drives.iter().map(|drive| drive.force.re).collect();
         let neglected = REMAINDER * inertia * (slope(&forces) * n / duration);
         let phase_noise = (noise / response).hypot(base_noise / base);
+        let change = slope(&cycles.iter().map(Cycle::amplitude).collect::<Vec<f64>>());
+        // What the drive adds to the balances is as uncertain as g.
+        let added =
+            [change * n / duration, gain * base / response * phase_error].map(|rate| rate * growth.uncertainty / gain);
+        // Friction and gravity have a frequency of their own: they change the force of the particle by up to twice the relative change of the
+        // frequency by the phase error.
+        let detuned = base / response * base * phase_error / 3_f64.sqrt();
         let of = |value, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
         Some(Self {
             response: of(response, noise),
             u_level: noise * (PARABOLA / n).sqrt(),
-            change: slope(&cycles.iter().map(Cycle::amplitude).collect::<Vec<f64>>()),
+            change,
             phase_error: of(phase_error, phase_noise),
             excess: drive.excess.max(turning.excess),
             gain,
             calibration,
             drive,
             turning,
-            remainders: [neglected / gain, neglected / response].map(f64::abs),
+            remainders: [
+                Estimate::new(0.0, &[neglected / gain, added[0] / gain, detuned]).uncertainty,
+                Estimate::new(0.0, &[neglected / response, added[1], gain / response * detuned]).uncertainty,
+            ],
             within: [
                 base_noise / n.sqrt(),
                 gain * base / response * phase_noise * (PARABOLA / n).sqrt(),
