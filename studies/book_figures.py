@@ -68,8 +68,8 @@ def window():
     figure, axes = plt.subplots(figsize=(7.9, 4.6))
     ratios = [0.3 + 0.05 * n for n in range(15)]
     for r in ratios:
-        points = printed("orbit", "--backbone", "--set", f"plant.r={r:.2f}")["points"]
-        for stable, part in pieces(points):
+        curves = printed("orbit", "--backbone", "--set", f"plant.r={r:.2f}")
+        for stable, part in (piece for curve in curves for piece in pieces(curve["points"])):
             if stable:
                 drives = [point["G"] for point in part]
                 axes.plot(
@@ -105,7 +105,7 @@ def cavities():
         "viscoelastic": ("viscoelastic", COLOURS["predicted"], "D"),
     }
     figure, both = plt.subplots(1, 2, figsize=(7.9, 4.2), sharey=True)
-    orbits = printed("orbit", "--backbone")["points"]
+    orbits = [point for curve in printed("orbit", "--backbone") for point in curve["points"]]
     fold = min(orbits, key=lambda point: point["C"])["B"]
     ideal = [point for point in orbits if fold <= point["B"] < 1.3]
     for axes, name in zip(both, ("sigma", "G"), strict=True):

@@ -27,12 +27,14 @@ pub(crate) use periodic::{NEAR, periodic_near};
 pub use plant::{
     DriveCondition, NoMotion, PlantMotion, periodic_motion, resonant_motion, resonant_motion_under, settled_motion,
 };
-pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, backbone, bifurcation_curves, response};
+pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, bifurcation_curves, response};
 pub use structure::{
-    FirstOrder, ModeFacts, StabilityChange, StructureBranch, StructureFacts, StructureOrbit, StructureOrbits,
-    StructureRange, StructureStart,
+    FirstOrder, ModeFacts, OrbitCurve, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
+    StructureOrbits, StructureRange, StructureStart,
 };
-pub use symmetric::{Particle, backbone_at_speed, exact_backbone, phase_resonant, stable_resonant, symmetric_orbits};
+pub use symmetric::{
+    Particle, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_resonant, symmetric_orbits,
+};
 
 /// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

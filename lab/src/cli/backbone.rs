@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     bar.finish_and_clear();
     let (tracked, ended) = measured?;
     let result = TrackedComparison::of(&tracked, &scene);
-    let mut text = summary::tracked(&result) + &summary::structure(&scene);
+    let mut text = summary::tracked(&result, &scene) + &summary::structure(&scene);
     let settled = result.points.iter().filter(|compared| compared.is_of_backbone());
     let points: Vec<_> = settled.map(|compared| (&compared.point.at).into()).collect();
     let (settled, of) = (points.len(), result.points.len());
@@ -64,7 +64,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         text += &format!("{settled} of {of} points are settled points of a motion with impacts\n");
     }
     if tracked.ended.is_none()
-        && result.left_out.is_none()
+        && scene.left_out().is_none()
         && let Some(found) = contradiction(&points, scene.resonance, &scene.plant)
     {
         text += &format!("\n{}; run `vines fit`\n", summary::contradicts(&found));

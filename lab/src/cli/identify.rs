@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         }
     };
     let result = Comparison::of(&identification, &scene);
-    let mut text = summary::identification(&result) + &summary::structure(&scene);
+    let mut text = summary::identification(&result, &scene) + &summary::structure(&scene);
     let unstable = result
         .exact
         .filter(|orbit| scene.structure.is_some() && !orbit.stable && !record.held);
@@ -89,7 +89,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     // A rig that reports its impacts is a simulation of the scene.
     let is_simulated = !identification.lock.impacts_per_period.is_nan();
     let lock = [(&identification.lock.at).into()];
-    if !is_simulated && let Some(found) = contradiction(&lock, scene.resonance, &scene.plant) {
+    if !is_simulated
+        && scene.left_out().is_none()
+        && let Some(found) = contradiction(&lock, scene.resonance, &scene.plant)
+    {
         text += &format!(
             "\n{}: track the backbone with `vines backbone`, and run `vines fit`\n",
             summary::contradicts(&found)

@@ -82,7 +82,7 @@ pub(super) const FILES: [&str; 3] = ["map.csv", "map.svg", "bifurcations.csv"];
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let Arguments { x, y, sigma, periods, confirmations, out, .. } = arguments;
     let mut map = Map::new(arguments.scene.family()?, x, y, *sigma, *periods)?;
-    warn_left_out(map.scene(), "a regime map is");
+    warn_left_out(map.scene().left_out(), "a regime map is");
     let folder = results(out, &FILES)?;
     let bar = progress_bar(map.size(), "mapping regimes", "cells");
     map.run(*confirmations, || bar.inc(1))?;

@@ -56,7 +56,7 @@ impl SceneArguments {
     /// The scene, for results of the ideal cavity: a warning says what they leave out.
     pub(super) fn load_for(&self, results: &str) -> Result<Scene, SceneError> {
         let scene = self.load()?;
-        warn_left_out(&scene, results);
+        warn_left_out(scene.left_out(), results);
         Ok(scene)
     }
 
@@ -93,9 +93,9 @@ impl SceneArguments {
     }
 }
 
-/// Warns that `results` are of the ideal cavity, if that of the scene is another.
-pub(super) fn warn_left_out(scene: &Scene, results: &str) {
-    if let Some(left_out) = scene.left_out() {
+/// Warns that `results` are of the ideal cavity, if they leave something out.
+pub(super) fn warn_left_out(left_out: Option<String>, results: &str) {
+    if let Some(left_out) = left_out {
         log_warnings();
         log::warn!("{}", ideal(results, &left_out));
     }

@@ -6,11 +6,14 @@ use std::path::PathBuf;
 use clap::Args;
 use lovines::{Event, State};
 use serde_json::json;
+use vines::comparison::ExactCurve;
 use vines::orbit::{
-    Branch, BranchEnd, Condition, ContinuationLimits, DOUBLINGS, Orbit, Periodic, PlantMotion, backbone,
-    continue_both_ways, phase_resonant, resonant_motion_under, response, settle, settled_motion, stable_resonant,
+    Bifurcation, Branch, BranchEnd, Condition, ContinuationLimits, DOUBLINGS, Orbit, OrbitCurve, Periodic, PlantMotion,
+    backbone, continue_both_ways, phase_resonant, resonant_motion_under, response, settle, settled_motion,
+    stable_resonant,
 };
 use vines::report::responses;
+use vines::survey::structure_curves;
 use vines::table::{Table, number, row};
 use vines::{
     ArgumentError,
@@ -20,7 +23,10 @@ use vines::{
 
 use super::output::{Results, output, writable};
 use super::summary::{self, parameters};
-use super::{failure::Failure, options::SceneArguments};
+use super::{
+    failure::Failure,
+    options::{SceneArguments, warn_left_out},
+};
 
 const HELP: &str = "\
 Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon sigma:
@@ -28,11 +34,11 @@ Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon
   B            speed of the particle in flight
   multipliers  moduli of the multipliers of the half-period map: stable if all are below 1, neutral if the largest is 1
 
-With --backbone or --response, stable and unstable orbits are followed by pseudo-arclength through folds and symmetry breaking; --json
-prints all of them. --response lists the components: all symmetric 1:1 orbits over the whole range, and the branches from symmetry
-breakings and period doublings, up to three in a row (mirror images count once). Isolated branches of other patterns, for instance
-within chaos, are missed; --sigma with --response follows the branch that a start leads to. A branch that is not 1:1 ends after a
-hundred unstable orbits in a row.
+With --backbone or --response, stable and unstable orbits are followed through folds and symmetry breaking; --json prints all of them.
+--response lists the components: all symmetric 1:1 orbits over the whole range, and the branches from symmetry breakings and period
+doublings, up to three in a row (mirror images count once; of a [structure] the symmetric 1:1 orbits only). Isolated branches of other
+patterns, for instance within chaos, are missed; --sigma with --response follows the branch that a start leads to. A branch that is not
+1:1 ends after a hundred unstable orbits in a row.
 
 --periodic computes a motion of the plant with all effects of its cavity (friction, tilt, gaps, restitution that depends on the speed) by
 Newton's method on the plant's own period map: at phase resonance under the scene's drive, continued from the ideal cavity, or, with
@@ -91,14 +97,20 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     writable(&arguments.figure)?;
-    if arguments.scene.load()?.structure.is_some() {
-        return of_a_structure(arguments).map(Results::from);
+    let loaded = arguments.scene.load()?;
+    if arguments.periodic && loaded.structure.is_none() {
+        return of_the_plant(arguments, &loaded).map(Results::from);
     }
-    if arguments.periodic {
-        return of_the_plant(arguments, &arguments.scene.load()?).map(Results::from);
-    }
-    let loaded = arguments.scene.load_for("exact orbits are")?;
+    warn_left_out(loaded.left_out_of_cavity(), "exact orbits are");
     let scene = loaded.dimensionless();
+    if arguments.backbone {
+        let of_structure = structure_curves(&loaded, &scene, arguments.range, false);
+        let curves = of_structure.unwrap_or_else(|| backbone(&scene, Some(arguments.range), POINTS));
+        return shown(&scene, "Exact backbone", &curves, arguments.json, || listed(&curves)).map(Results::from);
+    }
+    if loaded.structure.is_some() {
+        return of_a_structure(arguments, &loaded);
+    }
     if let Some(sigma) = arguments.sigma {
         return settled(arguments, &scene, sigma, loaded.dimensionless_start()).map(Results::from);
     }
@@ -108,18 +120,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         g: [lowest, highest.max(2.0 * scene.g)],
         ..ContinuationLimits::default()
     };
-    if arguments.backbone {
-        let branch = backbone(&scene, &limits).ok_or_else(|| {
-            Failure::run(format!(
-                "there is no phase-resonant orbit to start from at G = {:.4} (dimensionless); see `vines orbit`",
-                scene.g
-            ))
-        })?;
-        return shown(&scene, "Exact backbone", &branch, arguments.json, || {
-            curve("Symmetric 1:1", &branch)
-        })
-        .map(Results::from);
-    }
     if arguments.response {
         return components(arguments, &scene, &limits);
     }
@@ -128,19 +128,34 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     shown(&scene, &title, &orbits, arguments.json, || listing(&scene, &orbits)).map(Results::from)
 }
 
-/// The phase-resonant orbits of a structure.
-fn of_a_structure(arguments: &Arguments) -> Result<String, Failure> {
-    if arguments.periodic || arguments.backbone || arguments.response || arguments.sigma.is_some() {
-        let rule = "--periodic, --backbone, --response and --sigma are for one oscillator, and this scene has a [structure]; `vines structure` \
-                    has its backbone";
+/// The orbits of a structure in the numbers of its driven mode: its frequency response, or at resonance.
+fn of_a_structure(arguments: &Arguments, scene: &Scene) -> Result<Results, Failure> {
+    if arguments.periodic || arguments.sigma.is_some() {
+        let rule = "--periodic and --sigma are for one oscillator, and this scene has a [structure]; drop them";
         return Err(Failure::input(rule));
     }
-    let scene = arguments.scene.load()?;
-    let numbers = scene.dimensionless();
-    let orbits = vines::survey::phase_resonant(&scene, &numbers);
-    let title = "Exact symmetric 1:1 orbits of the structure at resonance, in the numbers of its driven mode; the four largest multipliers";
-    shown(&numbers, title, &orbits, arguments.json, || listing(&numbers, &orbits))
+    let (numbers, json) = (scene.dimensionless(), arguments.json);
+    if !arguments.response {
+        let orbits = vines::survey::phase_resonant(scene, &numbers);
+        let title = "Exact symmetric 1:1 orbits of the structure at resonance, in the numbers of its driven mode; the four largest multipliers";
+        return shown(&numbers, title, &orbits, json, || listing(&numbers, &orbits)).map(Results::from);
+    }
+    let curves = structure_curves(scene, &numbers, arguments.range, true).unwrap_or_default();
+    let title =
+        "Exact frequency response of the structure, symmetric 1:1 motions only, in the numbers of its driven mode";
+    let text = shown(&numbers, title, &curves, json, || listed(&curves))?;
+    let (figure, range, scene) = (arguments.figure.clone(), arguments.range, scene.clone());
+    Ok(Results::with_figure(text, json, figure, move || {
+        let middle = [0.5 * (range[0] + range[1]), 0.0];
+        let backbone = ExactCurve::of_scene(&scene, &numbers, middle);
+        let place = |orbit: &Orbit| ([orbit.sigma, orbit.c, orbit.b], orbit.stable);
+        let curves = curves.iter().map(|curve| curve.points.iter().map(place).collect());
+        responses(&numbers, curves, &backbone, range).svg()
+    }))
 }
+
+/// Orbits on a curve.
+const POINTS: usize = 400;
 
 /// All components of the frequency response.
 fn components(arguments: &Arguments, scene: &Dimensionless, limits: &ContinuationLimits) -> Result<Results, Failure> {
@@ -162,7 +177,7 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Continuatio
         let count = response.components.len();
         let curves = response.components.iter();
         let curves: String = curves
-            .map(|component| curve(&component.name, &component.branch))
+            .map(|component| branch_text(&component.name, &component.branch))
             .collect();
         let plural = if count == 1 { "" } else { "s" };
         format!(
@@ -172,7 +187,10 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Continuatio
     })?;
     let (figure, json, scene, range) = (arguments.figure.clone(), arguments.json, *scene, arguments.range);
     Ok(Results::with_figure(text, json, figure, move || {
-        responses(&scene, &response, range).svg()
+        let place = |motion: &Periodic| ([motion.sigma, motion.c, motion.b], motion.stable);
+        let components = response.components.iter();
+        let curves = components.map(|component| component.branch.points.iter().map(place).collect());
+        responses(&scene, curves, &ExactCurve::of(&scene), range).svg()
     }))
 }
 
@@ -204,7 +222,7 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
         let limits = ContinuationLimits { sigma: arguments.range, ..ContinuationLimits::default() };
         let branch = continue_both_ways(scene, &motion, Condition::Excitation(scene.g), &limits);
         return shown(scene, "Exact frequency response", &branch, arguments.json, || {
-            curve(&pattern, &branch)
+            branch_text(&pattern, &branch)
         });
     }
     shown(scene, "Exact orbit", &motion, arguments.json, || {
@@ -356,39 +374,88 @@ fn stability(largest: f64) -> &'static str {
     }
 }
 
-/// A curve: its ends, at most 24 of its orbits, its bifurcations.
-fn curve(name: &str, branch: &Branch) -> String {
-    let count = |word: &str| {
-        let points = branch.points.iter();
-        points.filter(|motion| stability(motion.moduli()[3]) == word).count()
+/// A motion of a curve, as a line of a table.
+struct Place {
+    numbers: [f64; 5],
+    largest: f64,
+}
+
+impl From<&Orbit> for Place {
+    fn from(orbit: &Orbit) -> Self {
+        let Orbit { sigma, g, c, gamma, b, multipliers: [.., largest], .. } = *orbit;
+        Self { numbers: [sigma, g, c, gamma, b], largest }
+    }
+}
+
+impl From<&Periodic> for Place {
+    fn from(motion: &Periodic) -> Self {
+        let Periodic { sigma, g, c, gamma, b, .. } = *motion;
+        Self {
+            numbers: [sigma, g, c, gamma, b],
+            largest: motion.moduli()[3],
+        }
+    }
+}
+
+/// Curves of symmetric motions.
+fn listed(curves: &[OrbitCurve]) -> String {
+    if curves.is_empty() {
+        return "  none at these detunings\n".into();
+    }
+    let text = curves.iter().map(|OrbitCurve { points, special, closed }| {
+        let special = special.iter().map(|(kind, orbit)| (*kind, orbit.into()));
+        let ends = if *closed { "closed" } else { "open" };
+        curve(
+            "Symmetric 1:1",
+            ends,
+            points.iter().map(Place::from).collect(),
+            special.collect(),
+        )
+    });
+    text.collect()
+}
+
+/// A continued branch.
+fn branch_text(name: &str, branch: &Branch) -> String {
+    let ends = match branch.ended {
+        [BranchEnd::Closed, _] => "closed".into(),
+        [first, last] => format!("ends: {}; {}", first.name(), last.name()),
     };
+    let special = branch
+        .special
+        .iter()
+        .map(|special| (special.kind, (&special.motion).into()));
+    curve(
+        name,
+        &ends,
+        branch.points.iter().map(Place::from).collect(),
+        special.collect(),
+    )
+}
+
+/// A curve: its ends, at most 24 of its orbits, its bifurcations.
+fn curve(name: &str, ends: &str, points: Vec<Place>, special: Vec<(Bifurcation, Place)>) -> String {
+    let count = |word: &str| points.iter().filter(|place| stability(place.largest) == word).count();
     let [stable, neutral] = ["yes", "neutral"].map(count);
     let neutral = if neutral > 0 {
         format!(" and {neutral} neutral")
     } else {
         String::new()
     };
-    let sigmas = branch.points.iter().map(|motion| motion.sigma);
-    let (low, high) = range((f64::MAX, f64::MIN), sigmas);
-    let ends = match branch.ended {
-        [BranchEnd::Closed, _] => "closed".into(),
-        [first, last] => format!("ends: {}; {}", first.name(), last.name()),
-    };
+    let (low, high) = range((f64::MAX, f64::MIN), points.iter().map(|place| place.numbers[0]));
     let mut text = format!(
         "{name}: sigma from {low:.4} to {high:.4}, {} orbits, {stable} of them stable{neutral}; {ends}\n",
-        branch.points.len()
+        points.len()
     );
-    let thinned = branch.points.iter().step_by(branch.points.len().div_ceil(24));
-    let rows = thinned.map(|motion| {
-        let Periodic { sigma, g, c, gamma, b, .. } = *motion;
-        let numbers = [sigma, g, c, gamma.to_degrees(), b, motion.moduli()[3]].map(number);
-        [numbers.to_vec(), vec![stability(motion.moduli()[3]).into()]].concat()
+    let thinned = points.iter().step_by(points.len().div_ceil(24));
+    let rows = thinned.map(|Place { numbers: [sigma, g, c, gamma, b], largest }| {
+        let numbers = [*sigma, *g, *c, gamma.to_degrees(), *b, *largest].map(number);
+        [numbers.to_vec(), vec![stability(*largest).into()]].concat()
     });
     let table = Table::new("sigma | G | C | phase, degrees | B | largest mult. | stable");
     text += &table.rows(rows).text();
-    for special in &branch.special {
-        let (name, Periodic { sigma, g, c, b, .. }) = (special.kind.name(), &special.motion);
-        let g = number(*g);
+    for (kind, Place { numbers: [sigma, g, c, _, b], .. }) in special {
+        let (name, g) = (kind.name(), number(g));
         text += &format!("  {name} at sigma = {sigma:.6}, G = {g}, C = {c:.6}, B = {b:.6}\n");
     }
     text + "\n"

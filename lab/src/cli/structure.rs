@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use vines::orbit::{StabilityChange, StructureBranch, StructureOrbit};
+use vines::orbit::{Bifurcation, StabilityChange, StructureBranch, StructureOrbit};
 use vines::scene::{Scene, Structure};
 use vines::survey::Survey;
 use vines::table::{Table, number};
@@ -19,8 +19,9 @@ The first table has the modes:
   ratio       natural frequency over the driven mode's, and the nearest of its harmonics 3, 5 and 7, which impacts excite
   influence   what the mode adds to the conditions of impact, over what the driven mode alone has; far below 1 it leaves the motion, though
               not always its stability, as it is
-The second table has all exact symmetric 1:1 orbits at phase resonance under the scene's drive. Then follows where the backbone is stable,
-with all modes and with the driven mode alone, and which mode takes the stability.
+The second table has all exact symmetric 1:1 orbits at phase resonance under the scene's drive. The third has the stretches of the backbone
+that are stable, with the driven mode alone and with all modes, and the mode that carries the disturbance at each end. Warnings name the ends at
+which it is not the driven one.
 
 Examples:
   vines structure --scene scenes/cantilever.toml
@@ -113,23 +114,63 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
         true => "  none between controller.omega_min and controller.omega_max\n".into(),
         false => orbits.text(),
     };
-    text += &format!(
-        "\nThe backbone is stable for C {}; with the driven mode alone, for C {}\n",
-        stable(&survey.facts.all, b),
-        stable(&survey.facts.alone, b)
-    );
-    for (mode, change) in survey.taken() {
-        let StabilityChange { kind, orbit, .. } = change;
+    text += "\nStable stretches of the backbone, with the driven mode alone and with all modes, and what ends them\n";
+    let rows = [("driven", &survey.facts.alone), ("all", &survey.facts.all)].map(|(modes, branches)| {
+        let stretches = branches.iter().flat_map(StructureBranch::stable);
+        stretches.map(move |(run, ends)| stretch(modes, run, ends, b))
+    });
+    let stretches = Table::new(&format!(
+        "modes | C | frequency, Hz | drive, {unit} | lower end | upper end"
+    ));
+    text += &stretches.rows(rows.into_iter().flatten()).text();
+    for (mode, StabilityChange { kind, orbit, .. }) in survey.taken() {
         text += &format!(
             "warning: mode {} takes the stability at C = {:.4}, {:.4} Hz, {:.4e} {unit} ({})\n",
             mode + 1,
             orbit.response / b,
             orbit.omega / TAU,
             orbit.drive,
-            kind.name()
+            words(*kind)
         );
     }
     text
+}
+
+/// A bifurcation on a backbone.
+fn words(kind: Bifurcation) -> &'static str {
+    match kind {
+        // The backbone goes on.
+        Bifurcation::Fold => "fold of the frequency response",
+        kind => kind.name(),
+    }
+}
+
+/// A stretch of stable orbits, from its smaller to its larger C.
+fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>; 2], b: f64) -> Vec<String> {
+    let mut ends = [(&run[0], ends[0]), (&run[run.len() - 1], ends[1])]
+        .map(|(orbit, change)| (change.map_or(orbit, |change| &change.orbit), change));
+    ends.sort_by(|one, other| one.0.response.total_cmp(&other.0.response));
+    let between = |value: fn(&StructureOrbit) -> f64, unit: f64| {
+        let [low, high] = ends.map(|(orbit, _)| format!("{:.4}", value(orbit) / unit));
+        if low == high { low } else { format!("{low} to {high}") }
+    };
+    let drives = ends.map(|(orbit, _)| format!("{:.3e}", orbit.drive));
+    let reason = |change: Option<&StabilityChange>| match change {
+        None => "the curve ends".into(),
+        Some(change) => match change.section() {
+            None => words(change.kind).into(),
+            Some(mode) => format!("{} (mode {})", words(change.kind), mode + 1),
+        },
+    };
+    let [lower, upper] = ends.map(|(_, change)| reason(change));
+    vec![
+        modes.into(),
+        between(|orbit| orbit.response, b),
+        between(|orbit| orbit.omega, TAU),
+        drives.join(" to "),
+        lower,
+        upper,
+    ]
 }
 
 /// An orbit; C is its response over that of the driven mode with the amplitude b at the cavity.
@@ -138,31 +179,4 @@ fn row(orbit: &StructureOrbit, b: f64) -> Vec<String> {
     let [hertz, c, growth] = [orbit.omega / TAU, orbit.response / b, orbit.growth()].map(number);
     let stable = if orbit.stable { "yes" } else { "no" };
     vec![hertz, response, c, drive, growth, stable.into()]
-}
-
-/// Ranges of C over which a backbone is stable.
-fn stable(branches: &[StructureBranch], b: f64) -> String {
-    let mut ranges = Vec::new();
-    for branch in branches {
-        for run in branch
-            .orbits
-            .chunk_by(|one, other| one.stable == other.stable)
-            .filter(|run| run[0].stable)
-        {
-            let responses = || run.iter().map(|orbit| orbit.response / b);
-            ranges.push([
-                responses().fold(f64::INFINITY, f64::min),
-                responses().fold(0.0, f64::max),
-            ]);
-        }
-    }
-    ranges.sort_by(|one, other| one[0].total_cmp(&other[0]));
-    let ranges: Vec<String> = ranges
-        .iter()
-        .map(|[low, high]| format!("from {low:.3} to {high:.3}"))
-        .collect();
-    match ranges.is_empty() {
-        true => "nowhere".into(),
-        false => ranges.join(" and "),
-    }
 }

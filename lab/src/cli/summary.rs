@@ -23,14 +23,46 @@ fn rig(p: &Dimensionless) -> String {
     format!("epsilon = {epsilon:.6}, lambda = {lambda:.4}, r = {r}")
 }
 
-/// Frequency in hertz, amplitude of the response and of the base in metres, with their uncertainties.
-fn in_si(at: &ResonancePoint) -> [String; 3] {
-    let metres = |value: f64, u: f64| format!("{value:.5e} ± {u:.1e}");
-    [
-        with_uncertainty(at.f_hz, at.u_f_hz),
-        metres(at.a_m, at.u_a_m),
-        metres(at.e_m, at.u_e_m),
-    ]
+/// Units of the measurements: response at the sensor, m per m of the oscillator's response; drive per m of the oscillator's base; name and unit of both.
+struct Units {
+    factors: [f64; 2],
+    names: [(String, &'static str); 2],
+}
+
+impl Units {
+    fn of(scene: &Scene) -> Self {
+        let Some(structure) = &scene.structure else {
+            return Self {
+                factors: [1.0; 2],
+                names: [("response".into(), "m"), ("base".into(), "m")],
+            };
+        };
+        let point = |n: usize| &structure.points[n];
+        let drive = structure
+            .drive
+            .map_or("base".into(), |n| format!("force at {}", point(n)));
+        Self {
+            factors: [
+                structure.reading_per_response().abs(),
+                structure.base_per_drive().recip(),
+            ],
+            names: [
+                (format!("response at {}", point(structure.sensor)), "m"),
+                (drive, structure.excitation.unit()),
+            ],
+        }
+    }
+
+    /// Frequency in hertz, amplitude of response and drive, with their uncertainties.
+    fn values(&self, at: &ResonancePoint) -> [String; 3] {
+        let [response, drive] = self.factors;
+        let value = |value: f64, u: f64, unit: f64| format!("{:.5e} ± {:.1e}", value * unit, u * unit);
+        [
+            with_uncertainty(at.f_hz, at.u_f_hz),
+            value(at.a_m, at.u_a_m, response),
+            value(at.e_m, at.u_e_m, drive),
+        ]
+    }
 }
 
 /// Why a run of the scene did not lock the symmetric 1:1 motion, and what to do.
@@ -130,18 +162,20 @@ const SYMBOLS: &str = "  sigma: detuning (omega/omega0 - 1)/epsilon; C: amplitud
                        over b epsilon\n";
 
 /// An identification: the locked point beside theory and exact orbit, then the decay.
-pub(super) fn identification(result: &Comparison) -> String {
+pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let (lock, at) = (&result.lock, &result.lock.at);
-    let [hertz, response, base] = in_si(at);
+    let units = Units::of(scene);
+    let [hertz, response, drive] = units.values(at);
+    let [(of_response, m), (of_drive, unit)] = units.names;
     let b = lock.b.zip(lock.u_b).map_or("-".into(), |(b, u)| with_uncertainty(b, u));
     let [sigma, c] = [(at.sigma, at.u_sigma), (at.c, at.u_c)].map(|(value, u)| with_uncertainty(value, u));
     let measured = ["measured at the lock".to_string(), sigma, c, b];
     let exact = result
         .exact
         .map(|orbit| row("exact orbit", [orbit.sigma, orbit.c, orbit.b]));
-    let name = match result.curve.of_structure {
-        Some(_) => "driven mode alone, first order",
-        None => "theory, first order",
+    let name = match result.curve.is_of_structure {
+        true => "driven mode alone, first order",
+        false => "theory, first order",
     };
     let theory = result.theory.map(|point| row(name, [point.sigma, point.c, point.b]));
     let table = Table::new(" | sigma | C | B").rows([measured]).rows(exact).rows(theory);
@@ -150,7 +184,7 @@ pub(super) fn identification(result: &Comparison) -> String {
         false => "",
     };
     let mut text = format!(
-        "Measured: {hertz} Hz, response {response} m, base {base} m\n{}, G = {}\nLocked after {:.0} periods{held}: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}",
+        "Measured: {hertz} Hz, {of_response} {response} {m}, {of_drive} {drive} {unit}\n{}, G = {}\nLocked after {:.0} periods{held}: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}",
         rig(&result.parameters),
         with_uncertainty(at.g, at.u_g),
         lock.periods_to_lock,
@@ -193,23 +227,16 @@ pub(super) fn ideal(results: &str, left_out: &str) -> String {
     format!("{results} of the ideal cavity, without {left_out}")
 }
 
-/// What base and response of a structure's results are, as a line; empty for one oscillator.
+/// Whose numbers the results of a structure are, as a line; empty for one oscillator.
 pub(super) fn structure(scene: &Scene) -> String {
     let Some(structure) = &scene.structure else {
         return String::new();
     };
-    let (per_base, per_response) = (
-        structure.base_per_drive().recip(),
-        structure.reading_per_response().abs(),
-    );
-    let drive = match structure.drive {
-        Some(point) => format!("{per_base:.5e} N at {}", structure.points[point]),
-        None => format!("{per_base:.5} m of the structure's base"),
-    };
     format!(
-        "Base and response are those of mode {} alone: 1 m of base stands for {drive}, and 1 m of response for {per_response:.5} m at {}\n",
+        "epsilon, lambda, sigma, C and G are those of mode {}, as are A_m and E_m in files: {:.5e} m and {:.5e} m per unit of response and drive\n",
         structure.driven + 1,
-        structure.points[structure.sensor]
+        structure.reading_per_response().abs().recip(),
+        structure.base_per_drive()
     )
 }
 
@@ -249,9 +276,9 @@ fn agreement(result: &Comparison) -> String {
     let exact = exact.map_or(String::new(), |(raw, predicted)| {
         format!("\nRMS of sigma against the exact backbone: {raw:.4}; against the decay that the exact plant predicts: {predicted:.4}")
     });
-    let theory = match result.curve.of_structure {
-        Some(_) => "theory of the driven mode alone",
-        None => "theory",
+    let theory = match result.curve.is_of_structure {
+        true => "theory of the driven mode alone",
+        false => "theory",
     };
     format!(
         "RMS of sigma against {theory} over C > {COMPARED_ABOVE}: {rms:.4} (theory is of first order in epsilon){exact}"
@@ -259,8 +286,8 @@ fn agreement(result: &Comparison) -> String {
 }
 
 /// The points of a tracked backbone, and the periods that they took. A rig that does not report impacts has columns in SI units.
-pub(super) fn tracked(result: &TrackedComparison) -> String {
-    let points = || result.points.iter();
+pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
+    let (points, units) = (|| result.points.iter(), Units::of(scene));
     let in_metres = points().all(|compared| compared.point.regime_by_impacts.is_none());
     let rows = points().map(|TrackedPoint { point, exact }| {
         let at = &point.at;
@@ -277,7 +304,7 @@ pub(super) fn tracked(result: &TrackedComparison) -> String {
         if let Some(tone) = point.tone {
             remarks += &format!("; {tone}");
         }
-        let si = in_metres.then(|| in_si(at)).into_iter().flatten();
+        let si = in_metres.then(|| units.values(at)).into_iter().flatten();
         let pairs = [(at.c, at.u_c), (at.sigma, at.u_sigma), (at.g, at.u_g)];
         let pairs = pairs.map(|(value, u)| with_uncertainty(value, u));
         let error = exact.and_then(|exact| Some(exact.sigma?.abs().max(exact.g?.abs())));
@@ -291,8 +318,11 @@ pub(super) fn tracked(result: &TrackedComparison) -> String {
         si.chain(pairs).chain(others).collect::<Vec<_>>()
     });
     let si = match in_metres {
-        true => "frequency, Hz | response, m | base, m | ",
-        false => "",
+        true => {
+            let [response, drive] = units.names.each_ref().map(|(name, unit)| format!("{name}, {unit}"));
+            format!("frequency, Hz | {response} | {drive} | ")
+        }
+        false => String::new(),
     };
     let headings = "C | sigma | G | off target | periods | averaged | error | regime by response / by impacts";
     let table = Table::new(&format!("{si}{headings}")).rows(rows);

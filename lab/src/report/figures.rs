@@ -13,7 +13,7 @@ use super::theme::{EXACT, INK, MEASURED, PARTICLE, PREDICTED, THEORY};
 use crate::comparison::{Comparison, ExactCurve, TrackedComparison};
 use crate::fit::{Fit, MeasuredPoint};
 use crate::numerics::{Estimate, HarmonicBasis, equally_spaced, range};
-use crate::orbit::{self, ContinuationLimits, FrequencyResponse, StructureBranch, StructureOrbit};
+use crate::orbit::{StructureBranch, StructureOrbit};
 use crate::record::Record;
 use crate::scene::{Dimensionless, Scene, Sensor};
 use crate::survey::Survey;
@@ -85,31 +85,19 @@ fn theory_backbone(p: &Dimensionless, top: f64, place: impl Fn(&BackbonePoint) -
 
 /// The name of first-order theory, which is of one oscillator, beside exact results.
 fn first_order_beside(exact: &ExactCurve) -> &'static str {
-    match exact.of_structure {
-        Some(_) => FIRST_ORDER_ALONE,
-        None => FIRST_ORDER,
+    if exact.is_of_structure {
+        FIRST_ORDER_ALONE
+    } else {
+        FIRST_ORDER
     }
 }
 
-/// Adds the exact backbone of a structure, or the right branch of one oscillator's.
-fn add_exact(panel: &mut Panel, curve: &ExactCurve, p: &Dimensionless, label: &str) {
-    let Some(curves) = &curve.of_structure else {
-        return add_exact_backbone(panel, p, EXACT, label);
-    };
-    for curve in curves {
+/// Adds the exact backbone.
+fn add_exact(panel: &mut Panel, exact: &ExactCurve, colour: &'static str, label: &str) {
+    for curve in &exact.curves {
         let places = curve.iter().map(|([sigma, c], stable)| ((*sigma, *c), *stable));
-        panel.curve(places, 1.6, EXACT, label);
+        panel.curve(places, 1.6, colour, label);
     }
-}
-
-/// Adds the right branch of the exact backbone.
-fn add_exact_backbone(panel: &mut Panel, p: &Dimensionless, colour: &'static str, label: &str) {
-    let fold = SlowFlow::new(p.lambda, p.r).manifold.b_min();
-    let branch = orbit::backbone(p, &ContinuationLimits::default());
-    let exact = branch.iter().flat_map(|branch| &branch.points);
-    let exact = exact.filter(|motion| motion.b >= fold);
-    let exact = exact.map(|motion| ((motion.sigma, motion.c), motion.stable));
-    panel.curve(exact, 1.6, colour, label);
 }
 
 /// The identified backbone beside theory and exact orbits: amplitude over detuning.
@@ -125,7 +113,7 @@ pub fn backbone(result: &Comparison) -> Figure {
     let x = widened(range((f64::MAX, f64::MIN), sigmas), 0.06);
     let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)));
     panel.curve(theory, 2.0, THEORY, first_order_beside(&result.curve));
-    add_exact(&mut panel, &result.curve, p, ORBITS);
+    add_exact(&mut panel, &result.curve, EXACT, ORBITS);
     let predicted = result.decay.iter();
     let predicted = predicted.filter_map(|compared| Some((compared.sigma_predicted?, compared.point.c)));
     let predicted = predicted.filter(|(_, c)| *c > fold);
@@ -193,7 +181,7 @@ pub fn tracked(tracked: &TrackedComparison) -> Figure {
         THEORY,
         &first_order,
     );
-    add_exact(&mut backbone, &tracked.exact, p, &orbits);
+    add_exact(&mut backbone, &tracked.exact, EXACT, &orbits);
     let places = || points().map(|point| (point.at.sigma, point.at.c));
     circles(&mut backbone, places(), "tracked");
     let bars = places().zip(points().map(|point| point.at.u_sigma));
@@ -450,31 +438,35 @@ pub fn structure(scene: &Scene, survey: &Survey) -> Option<Figure> {
     })
 }
 
-/// The frequency response at the scene's G over a range of sigma, exact and first-order, and the exact backbone.
-pub fn responses(p: &Dimensionless, response: &FrequencyResponse, range: [f64; 2]) -> Figure {
+/// The frequency response at the scene's G over a range of sigma, exact and first-order, and the exact backbone. A curve has sigma, C and B of its
+/// motions, and whether they are stable.
+pub fn responses(
+    p: &Dimensionless,
+    curves: impl Iterator<Item = Vec<([f64; 3], bool)>>,
+    exact: &ExactCurve,
+    range: [f64; 2],
+) -> Figure {
     let flow = SlowFlow::new(p.lambda, p.r);
     let fold = flow.manifold.b_min();
-    let symmetric = response.symmetric().flat_map(|branch| &branch.points);
-    let top = symmetric
-        .filter(|point| point.b > fold)
-        .fold(0.6, |most: f64, point| most.max(1.15 * point.c));
+    let curves: Vec<_> = curves.collect();
+    let fast = curves.iter().flatten().filter(|([.., b], _)| *b > fold);
+    let top = fast.fold(0.6, |most: f64, ([_, c, _], _)| most.max(1.15 * c));
     let mut panel = Panel::new(((range[0], range[1]), DETUNING), ((0.0, top), amplitude(p)));
-    for curve in flow.frequency_responses(response.g, 600) {
+    for curve in flow.frequency_responses(p.g, 600) {
         let points = curve.iter().map(|point| {
             let c = point.c * reading(p, point.b);
             ((point.sigma, c), point.impacts_stable && point.slow_flow_stable)
         });
-        panel.curve(points, 1.0, THEORY, FIRST_ORDER);
+        panel.curve(points, 1.0, THEORY, first_order_beside(exact));
     }
-    for component in &response.components {
-        let points = component.branch.points.iter();
-        let points = points.map(|point| ((point.sigma, point.c), point.stable));
+    for curve in &curves {
+        let points = curve.iter().map(|([sigma, c, _], stable)| ((*sigma, *c), *stable));
         panel.curve(points, 2.2, EXACT, ORBITS);
     }
-    add_exact_backbone(&mut panel, p, PREDICTED, "exact backbone");
+    add_exact(&mut panel, exact, PREDICTED, "exact backbone");
     Figure {
         title: format!("Frequency response, and backbone by {}", p.definition.name()),
-        caption: caption(p, &at(response.g)),
+        caption: caption(p, &at(p.g)),
         height: TALL,
         rows: vec![vec![panel]],
     }

@@ -3,8 +3,8 @@
 use lovines::State;
 use serde::Serialize;
 use vines_model::numerics::{golden_section, mean_square};
-use vines_model::orbit::{ContinuationLimits, Orbit, backbone};
-use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow, free_sigma, resonant};
+use vines_model::orbit::{Orbit, OrbitCurve, backbone};
+use vines_model::theory::{B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, SlowFlow, free_sigma, resonant};
 
 use crate::backbone::{LevelPoint, Tracked};
 use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime, WINDOW, decay_points};
@@ -139,8 +139,8 @@ fn rms(points: &[ComparedPoint], error: impl Fn(&ComparedPoint) -> Option<f64>) 
 
 // Distance of measured points from the exact backbone.
 
-/// Largest step along the curve, which bounds the error of the polygon to 1e-5.
-const STEP: f64 = 4e-3;
+/// Orbits of the curve of one oscillator: the error of the polygon is below 1e-5.
+const POINTS: usize = 3000;
 /// Largest particle speed of the curve: beyond symmetry breaking.
 const SPEED_MAX: f64 = 1.35;
 
@@ -152,8 +152,10 @@ pub type DrawnCurve = Vec<([f64; 2], bool)>;
 pub struct ExactCurve {
     /// C, sigma and G.
     places: Vec<[f64; 3]>,
-    /// The backbone of a structure, curve by curve.
-    pub of_structure: Option<Vec<DrawnCurve>>,
+    /// All curves, to be drawn; of one oscillator beyond the fold.
+    pub curves: Vec<DrawnCurve>,
+    /// It has more modes than the theory beside it.
+    pub is_of_structure: bool,
 }
 
 /// Difference of a point from the exact backbone.
@@ -178,49 +180,41 @@ fn right_of_fold(curve: &[Orbit]) -> Vec<[f64; 3]> {
 }
 
 impl ExactCurve {
-    /// The curve of a scene, in the numbers of its oscillator or of the driven mode of its structure. A structure may have several curves; it is
-    /// the nearest to `near`, sigma and C.
+    /// The curve of a scene, in the numbers of its oscillator or of the driven mode of its structure. There may be several curves; it is the nearest
+    /// to `near`, sigma and C.
     pub fn of_scene(scene: &Scene, numbers: &Dimensionless, near: [f64; 2]) -> Self {
-        let Some(curves) = structure_backbone(scene, numbers) else {
-            return Self::of(numbers);
+        match structure_backbone(scene, numbers) {
+            Some(curves) => Self { is_of_structure: true, ..Self::nearest(&curves, near) },
+            None => Self::of(numbers),
+        }
+    }
+
+    /// The curve of one oscillator.
+    pub fn of(scene: &Dimensionless) -> Self {
+        let flow = SlowFlow::new(scene.lambda, scene.r);
+        let beyond_fold = |mut curve: OrbitCurve| {
+            curve.points.retain(|orbit| orbit.b >= flow.manifold.b_min());
+            curve.points
         };
+        let curves: Vec<_> = backbone(scene, None, POINTS).into_iter().map(beyond_fold).collect();
+        let middle = flow.backbone_at(0.5 * (flow.manifold.b_min() + B_SYMMETRY_BREAKING));
+        Self::nearest(&curves, [middle.sigma, middle.c])
+    }
+
+    /// The one of some curves that is nearest to `near`.
+    fn nearest(curves: &[Vec<Orbit>], near: [f64; 2]) -> Self {
         let distance = |curve: &[[f64; 3]]| {
             let distances = curve.iter().map(|[c, sigma, _]| (sigma - near[0]).hypot(c - near[1]));
             distances.fold(f64::INFINITY, f64::min)
         };
         let rising = curves.iter().map(|curve| right_of_fold(curve));
         let nearest = rising.min_by(|one, other| distance(one).total_cmp(&distance(other)));
-        let places = nearest.unwrap_or_default();
-        let drawn = |curve: &Vec<Orbit>| {
-            curve
-                .iter()
-                .map(|orbit| ([orbit.sigma, orbit.c], orbit.stable))
-                .collect()
-        };
+        let place = |orbit: &Orbit| ([orbit.sigma, orbit.c], orbit.stable);
         Self {
-            places,
-            of_structure: Some(curves.iter().map(drawn).collect()),
+            places: nearest.unwrap_or_default(),
+            curves: curves.iter().map(|curve| curve.iter().map(place).collect()).collect(),
+            is_of_structure: false,
         }
-    }
-
-    /// The curve of one oscillator.
-    pub fn of(scene: &Dimensionless) -> Self {
-        let limits = ContinuationLimits { step: STEP, points: 20_000, ..ContinuationLimits::default() };
-        let mut points = backbone(scene, &limits).map_or(Vec::new(), |branch| branch.points);
-        if points
-            .first()
-            .zip(points.last())
-            .is_some_and(|(first, last)| first.b > last.b)
-        {
-            points.reverse();
-        }
-        // From the fold on: C rises with B there.
-        let fold = (0..points.len()).min_by(|&a, &b| points[a].c.total_cmp(&points[b].c));
-        let rising = points.into_iter().skip(fold.unwrap_or(0));
-        let places = rising
-            .take_while(|orbit| orbit.b < SPEED_MAX)
-            .map(|orbit| [orbit.c, orbit.sigma, orbit.g]);
-        Self { places: places.collect(), of_structure: None }
     }
 
     /// C, sigma and G of its orbits, from the fold on.

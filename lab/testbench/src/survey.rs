@@ -1,13 +1,11 @@
 //! Exact orbits of a scene, whose host is one oscillator or a structure: at phase resonance, along the backbone, and what a structure's other
 //! modes do to both.
 
-use std::f64::consts::FRAC_PI_2;
-
 use serde::Serialize;
 use vines_model::Dimensionless;
 use vines_model::orbit::{
-    self, AfterImpact, Orbit, Particle, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
-    StructureOrbits,
+    self, Orbit, OrbitCurve, Particle, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
+    StructureOrbits, StructureRange,
 };
 
 use crate::scene::{Scene, Structure};
@@ -65,22 +63,25 @@ impl Survey {
         })
     }
 
-    /// Where another mode takes the stability of the backbone, or gives it back.
+    /// Where another mode takes the stability of the backbone.
     pub fn taken(&self) -> impl Iterator<Item = (usize, &StabilityChange)> {
-        let changes = self.facts.all.iter().flat_map(|branch| &branch.changes);
-        changes.filter_map(|change| Some((change.section().filter(|mode| *mode != self.driven)?, change)))
+        let stretches = self.facts.all.iter().flat_map(StructureBranch::stable);
+        stretches
+            .flat_map(|(_, ends)| ends)
+            .flatten()
+            .filter_map(|change| Some((change.section().filter(|mode| *mode != self.driven)?, change)))
     }
 }
 
 /// The exact phase-resonant orbits of a scene under its drive, by rising C; `numbers` are those of its oscillator or driven mode.
 pub fn phase_resonant(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
     let of_structure = || {
-        let (orbits, drive) = (scene.structure_orbits()?, scene.structure_drive()?);
-        let found = orbits.resonant(drive, scene.frequencies());
+        let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
+        let found = orbits.resonant(scene.structure_drive()?, scene.frequencies());
         Some(
             found
                 .iter()
-                .filter_map(|orbit| dimensionless(orbit, scene, numbers))
+                .map(|orbit| of_driven_mode(orbit, structure, numbers))
                 .collect(),
         )
     };
@@ -89,48 +90,42 @@ pub fn phase_resonant(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
 
 /// The exact backbone of a scene's structure, curve by curve; `None` for one oscillator.
 pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<Vec<Orbit>>> {
-    let orbits = scene.structure_orbits()?;
+    let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
     // Other modes may have the motion that the loop finds.
-    let range = orbits
-        .range(section_of(scene.structure.as_ref()?), POINTS)?
-        .with(scene.frequencies());
-    let curve = |branch: &StructureBranch| {
-        branch
-            .orbits
-            .iter()
-            .filter_map(|orbit| dimensionless(orbit, scene, numbers))
-            .collect()
-    };
-    Some(orbits.backbone(&range).iter().map(curve).collect())
+    let range = orbits.range(section_of(structure), POINTS)?.with(scene.frequencies());
+    let told = |orbit: &StructureOrbit| of_driven_mode(orbit, structure, numbers);
+    let curves = orbits.backbone(&range).into_iter();
+    Some(curves.map(|branch| branch.orbits.iter().map(told).collect()).collect())
 }
 
-/// An orbit of a structure in the numbers of its driven mode: C is the response over that of the mode with the amplitude b at the cavity. Of
-/// the multipliers the four largest.
-fn dimensionless(orbit: &StructureOrbit, scene: &Scene, d: &Dimensionless) -> Option<Orbit> {
-    let structure = scene.structure.as_ref()?;
-    let length = |value: f64| value / d.b;
-    // Half a period later the particle is at the opposite point.
-    let [q2, dq2] = [-length(FRAC_PI_2 * orbit.speed / orbit.omega), d.speed(orbit.speed)];
-    let impact_velocity = d.speed(orbit.impact_velocity);
-    let moduli: Vec<f64> = orbit.multipliers.iter().map(|[re, im]| re.hypot(*im)).collect();
-    Some(Orbit {
-        g: d.excitation(orbit.drive * structure.base_per_drive()),
-        sigma: d.sigma(orbit.omega),
-        omega: orbit.omega / d.omega0,
-        c: length(orbit.response / structure.reading_per_response().abs()),
-        gamma: orbit.phase,
-        b: d.speed(orbit.speed),
-        impact_velocity,
-        start: AfterImpact {
-            phase: orbit.impact_phase,
-            q1: q2 + 1.0,
-            dq1: dq2 - d.r * impact_velocity,
-            q2,
-            dq2,
-        },
-        multipliers: *moduli.last_chunk()?,
-        stable: orbit.stable,
-    })
+/// Curves of the exact symmetric 1:1 orbits of a scene's structure at these detunings: at phase resonance, or the frequency response under the
+/// scene's drive. `None` for one oscillator.
+pub fn structure_curves(
+    scene: &Scene,
+    numbers: &Dimensionless,
+    sigma: [f64; 2],
+    is_response: bool,
+) -> Option<Vec<OrbitCurve>> {
+    let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
+    let range = StructureRange::at_any_speed(numbers, sigma, POINTS);
+    let branches = match is_response {
+        true => orbits.frequency_response(scene.structure_drive()?, &range),
+        false => orbits.backbone(&range),
+    };
+    let [per_drive, per_response] = [structure.base_per_drive(), structure.reading_per_response().abs()];
+    let told = branches
+        .iter()
+        .map(|branch| branch.in_numbers(numbers, per_drive, per_response));
+    Some(told.collect())
+}
+
+/// An orbit of a structure in the numbers of its driven mode: C is the response over that of the mode with the amplitude b at the cavity.
+fn of_driven_mode(orbit: &StructureOrbit, structure: &Structure, numbers: &Dimensionless) -> Orbit {
+    orbit.in_numbers(
+        numbers,
+        structure.base_per_drive(),
+        structure.reading_per_response().abs(),
+    )
 }
 
 /// The section of the driven mode: the nearest in frequency.

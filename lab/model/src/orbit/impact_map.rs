@@ -67,7 +67,6 @@ pub(super) struct Step {
     /// Jump of q1' at the impact.
     pub impulse: f64,
     pub by: ByAll,
-    pub impulse_by: RowByAll,
 }
 
 /// The map at one frequency and excitation.
@@ -150,13 +149,7 @@ impl ImpactMap {
         let particle = self.particle();
         let impulse = -self.epsilon * particle;
         let by = ByAll::from_rows(&[phase_by, q1_by, dq1_by + dw_by * impulse, by_dq2 + dw_by * particle]);
-        Some(Step {
-            next,
-            duration: t,
-            impulse: impulse * dw,
-            by,
-            impulse_by: dw_by * impulse,
-        })
+        Some(Step { next, duration: t, impulse: impulse * dw, by })
     }
 
     /// (q1, q1', q2, q2') at the time `t` after a bounce, before the next.

@@ -100,8 +100,6 @@ pub(super) struct ReturnMap {
     pub by: ByAll,
     /// First harmonic of the response relative to the reference: `Im(S exp(i phase))`.
     s: Complex<f64>,
-    /// Derivative of S by the unknowns, real and imaginary part.
-    s_by: [RowByAll; 2],
     /// Derivative of the return map by the state: its eigenvalues are the multipliers.
     pub monodromy: Matrix4<f64>,
 }
@@ -125,7 +123,6 @@ fn follow(
     // Derivatives of the state, Omega and G by the unknowns; Omega instead of sigma.
     let mut by = Matrix6::identity();
     let mut sum = Complex::new(0.0, 0.0);
-    let mut sum_by = [RowByAll::zeros(); 2];
     for n in 0..pattern.walls.len() {
         let step = map.step(&at)?;
         let wall = match pattern.walls.get(n + 1) {
@@ -136,15 +133,10 @@ fn follow(
             return None;
         }
         bounce(at, step.duration);
-        let impulse_by = step.impulse_by * by;
         let after = step.by * by;
         by.fixed_rows_mut::<4>(0).copy_from(&after);
         at = step.next;
-        let phasor = Complex::from_polar(1.0, -at.phase);
-        sum += phasor * step.impulse;
-        let phase_by = by.row(0) * -step.impulse;
-        sum_by[0] += impulse_by * phasor.re - phase_by * phasor.im;
-        sum_by[1] += impulse_by * phasor.im + phase_by * phasor.re;
+        sum += Complex::from_polar(1.0, -at.phase) * step.impulse;
     }
 
     let residual = start.apart(&at, pattern.turn(), pattern.sign());
@@ -153,49 +145,24 @@ fn follow(
     let monodromy: Matrix4<f64> = by.fixed_columns::<4>(0).into();
     by.fixed_columns_mut::<4>(0)
         .copy_from(&(monodromy - Matrix4::identity()));
-    let (s, mut s_by) = harmonic(scene, &map, pattern, sum, &sum_by);
     by.column_mut(4).scale_mut(scene.epsilon);
-    s_by.iter_mut().for_each(|row| row[4] *= scene.epsilon);
-    Some(ReturnMap { residual, by, s, s_by, monodromy })
+    let s = harmonic(scene, &map, pattern, sum);
+    Some(ReturnMap { residual, by, s, monodromy })
 }
 
-/// The first harmonic of the response relative to the reference, with its derivatives by the state, Omega and G, from the sum of the impulses over the
-/// map as phasors: `S = direct G + impulses sum`, the base through the oscillator, and the impulses through the oscillator and, for v, the particle.
-fn harmonic(
-    scene: &Dimensionless,
-    map: &ImpactMap,
-    pattern: &ImpactPattern,
-    sum: Complex<f64>,
-    sum_by: &[RowByAll; 2],
-) -> (Complex<f64>, [RowByAll; 2]) {
-    // Each coefficient with its derivative by Omega.
+/// The first harmonic of the response relative to the reference, from the sum of the impulses over the map as phasors: the base through the
+/// oscillator, and the impulses through the oscillator and, for v, the particle.
+fn harmonic(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern, sum: Complex<f64>) -> Complex<f64> {
     let ForcedOscillator { free, omega, g, unit: [unit, _], .. } = map.oscillator;
-    let compliance = free.compliance(omega);
-    let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * free.delta);
-    let unit_by =
-        (Complex::new(0.0, free.drive[1]) * compliance + free.drive_force(omega) * compliance_by) * scene.epsilon;
+    let Definition { sensor, reference, .. } = scene.definition;
+    let turned = Complex::from_polar(1.0, -reference.phase(scene.epsilon * scene.lambda, omega));
     // (2i/duration) times the response to a force through the oscillator, less the response of a free mass: the impulse on the
     // particle is the opposite one.
     let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
-    let Definition { sensor, reference, .. } = scene.definition;
     let particle = f64::from(u8::from(sensor == Sensor::V));
-    let inner = compliance + particle / (omega * omega);
-    let inner_by = compliance_by - 2.0 * particle / omega.powi(3);
-    // The direction of the reference, and its logarithmic derivative.
-    let damping = scene.epsilon * scene.lambda;
-    let turned = Complex::from_polar(1.0, -reference.phase(damping, omega));
-    let turned_by = Complex::new(0.0, -reference.phase_slope(damping, omega));
-    let read = |[z, by]: [Complex<f64>; 2]| [z * turned, (by + z * turned_by) * turned];
-    let [direct, direct_by] = read([unit, unit_by]);
-    let [a, a_by] = read([weight * inner, weight * inner_by + weight / omega * inner]);
-
-    let driven = |z: Complex<f64>| map.oscillator.driven(z * g);
-    let mut by = [sum_by[0] * a.re - sum_by[1] * a.im, sum_by[0] * a.im + sum_by[1] * a.re];
-    for (column, own) in [(4, driven(direct_by) + a_by * sum), (5, direct)] {
-        by[0][column] += own.re;
-        by[1][column] += own.im;
-    }
-    (driven(direct) + a * sum, by)
+    let inner = free.compliance(omega) + particle / (omega * omega);
+    let [direct, impulses] = [unit, weight * inner].map(|z| z * turned);
+    map.oscillator.driven(direct * g) + impulses * sum
 }
 
 /// A phase in (-pi, pi].
@@ -210,8 +177,6 @@ pub enum Condition {
     Sigma(f64),
     /// G has this value.
     Excitation(f64),
-    /// The first harmonic of the response lags (or leads) the reference by a quarter of a period.
-    PhaseResonance,
     /// A multiplier, or a pair of them, is on the unit circle.
     Bifurcation(Bifurcation),
     /// The unknowns lie in a plane: the end of a step along a curve.
@@ -294,7 +259,6 @@ impl Condition {
             Condition::Sigma(sigma) => (x[4] - sigma, unit_row(4)),
             Condition::Excitation(g) => (x[5] - g, unit_row(5)),
             Condition::Plane { through, normal } => (normal.dot(&(x - through)), normal.transpose()),
-            Condition::PhaseResonance => (map.s.re, map.s_by[0]),
             Condition::Bifurcation(kind) => {
                 let value = |map: &ReturnMap| kind.test(&map.monodromy);
                 // Central differences; NaN where the pattern ends.

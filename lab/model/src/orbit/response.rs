@@ -1,4 +1,4 @@
-//! Exact curves: all components of the frequency response, the backbone, and the bifurcation curves of the 1:1 motions.
+//! Exact curves by continuation: all components of the frequency response, and the bifurcation curves of the 1:1 motions.
 //!
 //! Symmetric 1:1 motions have a closed form at every sigma, so that none is missed on the grid of detunings that is searched, both ends of
 //! the range and isolas between two of its detunings included. Motions of other patterns are reached by switching branches at symmetry
@@ -6,13 +6,11 @@
 
 use serde::Serialize;
 
-use super::Orbit;
 use super::continuation::{Branch, BranchBifurcation, ContinuationLimits, branch_off, continue_both_ways};
 use super::periodic::{Bifurcation, Condition, ImpactPattern, LONGEST, Periodic};
-use super::symmetric::{exact_backbone, least_excitation, phase_resonant, symmetric_orbits};
+use super::symmetric::{least_excitation, symmetric_orbits};
 use crate::Dimensionless;
 use crate::numerics::{equally_spaced, golden_section};
-use crate::theory::Manifold;
 
 /// The exact frequency response at one excitation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -181,27 +179,6 @@ impl Branch {
             Periodic::find(scene, &from.pattern, &guess, conditions).is_none_or(|found| found.distance(motion) < same)
         })
     }
-}
-
-/// Detunings at which the backbone is searched for if it has no motion at the scene's G.
-const TRIED_DETUNINGS: [f64; 6] = [-1.0, -0.7, -1.4, -0.5, -2.0, 0.0];
-
-/// The exact backbone, through the scene's phase-resonant motion or, without one, through another (with G = 0 where there is neither
-/// damping nor loss): the one with the fastest particle, on the right branch. Without damping and with r = 1 it is the conservative
-/// nonlinear mode.
-pub fn backbone(scene: &Dimensionless, limits: &ContinuationLimits) -> Option<Branch> {
-    let condition = Condition::PhaseResonance;
-    let fastest = |orbits: Vec<Orbit>| orbits.into_iter().max_by(|first, second| first.b.total_cmp(&second.b));
-    let right = Manifold::new(scene.r).b_min();
-    let at_any_excitation = |sigma: f64| {
-        let met = exact_backbone(scene, 1.0 + scene.epsilon * sigma);
-        let orbit = fastest(met).filter(|orbit| orbit.b > right)?;
-        orbit.periodic(scene, [Condition::Sigma(sigma), condition])
-    };
-    let start = fastest(phase_resonant(scene))
-        .and_then(|orbit| orbit.periodic(scene, [Condition::Excitation(scene.g), condition]))
-        .or_else(|| TRIED_DETUNINGS.into_iter().find_map(at_any_excitation))?;
-    Some(continue_both_ways(scene, &start, condition, limits))
 }
 
 /// A curve in (sigma, G) on which 1:1 motions bifurcate.

@@ -12,12 +12,12 @@ use lovines::{Excitation, Host, InvalidHost};
 use nalgebra::{Complex, Vector2};
 use serde::Serialize;
 
-use super::Bifurcation;
 use super::half_period::HalfPeriod;
 use super::oscillator::{Section, harmonic};
 use super::periodic::wrapped;
-use super::symmetric::{Particle, Reading, SEARCHED, SymmetricMotion, SymmetricMotions, search};
-use crate::numerics::{self, bisection, equally_spaced, try_bisection};
+use super::symmetric::{Interval, Particle, Reading, SEARCHED, SymmetricMotion, SymmetricMotions, intervals, search};
+use super::{AfterImpact, Bifurcation, Orbit};
+use crate::numerics::{self, equally_spaced, try_bisection};
 use crate::theory::SlowFlow;
 use crate::{Definition, Dimensionless, Reference, Sensor};
 
@@ -84,6 +84,39 @@ impl StructureOrbit {
         self.multipliers.last().map_or(f64::NAN, |[re, im]| re.hypot(*im))
     }
 
+    /// This orbit in the numbers of an oscillator, which a base of the amplitude `base_per_drive`, m, drives as a unit drive does the host, and
+    /// whose response is this one over `reading_per_response`. Of the multipliers the four largest.
+    pub fn in_numbers(&self, d: &Dimensionless, base_per_drive: f64, reading_per_response: f64) -> Orbit {
+        // Half a period later the particle is at the opposite point.
+        let [q2, dq2] = [-FRAC_PI_2 * self.speed / self.omega / d.b, d.speed(self.speed)];
+        let impact_velocity = d.speed(self.impact_velocity);
+        let moduli = self.multipliers.iter().rev().map(|[re, im]| re.hypot(*im));
+        let mut multipliers = [f64::NAN; 4];
+        multipliers
+            .iter_mut()
+            .rev()
+            .zip(moduli)
+            .for_each(|(multiplier, modulus)| *multiplier = modulus);
+        Orbit {
+            g: d.excitation(self.drive * base_per_drive),
+            sigma: d.sigma(self.omega),
+            omega: self.omega / d.omega0,
+            c: self.response / (d.b * reading_per_response),
+            gamma: self.phase,
+            b: dq2,
+            impact_velocity,
+            start: AfterImpact {
+                phase: self.impact_phase,
+                q1: q2 + 1.0,
+                dq1: dq2 - d.r * impact_velocity,
+                q2,
+                dq2,
+            },
+            multipliers,
+            stable: self.stable,
+        }
+    }
+
     /// Number of multipliers outside the unit circle.
     fn unstable(&self) -> usize {
         let outside = |[re, im]: &&[f64; 2]| re.hypot(*im) > 1.0 + ON_CIRCLE;
@@ -102,6 +135,45 @@ pub struct StructureBranch {
     pub closed: bool,
 }
 
+/// A curve of symmetric 1:1 orbits in the numbers of an oscillator.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OrbitCurve {
+    /// Its orbits, in order.
+    pub points: Vec<Orbit>,
+    /// Where multipliers leave or enter the unit circle.
+    pub special: Vec<(Bifurcation, Orbit)>,
+    /// It leads back to its first orbit.
+    pub closed: bool,
+}
+
+impl StructureBranch {
+    /// The stretches of stable orbits, each with the changes at its ends; `None` where the curve ends.
+    pub fn stable(&self) -> impl Iterator<Item = (&[StructureOrbit], [Option<&StabilityChange>; 2])> {
+        let mut from = 0;
+        let runs = self.orbits.chunk_by(|one, other| one.stable == other.stable);
+        let with_ends = runs.map(move |run| {
+            let ends = [from, from + run.len()].map(|n| self.changes.iter().find(|change| change.after + 1 == n));
+            from += run.len();
+            (run, ends)
+        });
+        with_ends.filter(|(run, _)| run[0].stable)
+    }
+
+    /// This curve in the numbers of an oscillator, as [`StructureOrbit::in_numbers`].
+    pub fn in_numbers(&self, d: &Dimensionless, base_per_drive: f64, reading_per_response: f64) -> OrbitCurve {
+        let told = |orbit: &StructureOrbit| orbit.in_numbers(d, base_per_drive, reading_per_response);
+        OrbitCurve {
+            points: self.orbits.iter().map(told).collect(),
+            special: self
+                .changes
+                .iter()
+                .map(|change| (change.kind, told(&change.orbit)))
+                .collect(),
+            closed: self.closed,
+        }
+    }
+}
+
 /// An orbit with a multiplier on the unit circle.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StabilityChange {
@@ -111,6 +183,8 @@ pub struct StabilityChange {
     pub orbit: StructureOrbit,
     /// What each section and, last, the particle contribute to the disturbance that neither grows nor decays there: shares of its energy.
     pub shares: Vec<f64>,
+    /// Number of the last orbit of the curve before it, from 0.
+    pub after: usize,
 }
 
 impl StabilityChange {
@@ -137,6 +211,16 @@ pub struct StructureRange {
 }
 
 impl StructureRange {
+    /// All speeds at these detunings of an oscillator.
+    pub fn at_any_speed(d: &Dimensionless, sigma: [f64; 2], points: usize) -> Self {
+        let [low, high] = SEARCHED.map(|omega| omega * d.omega0);
+        Self {
+            omega: sigma.map(|sigma| d.omega(sigma).clamp(low, high)),
+            speed: f64::INFINITY,
+            points,
+        }
+    }
+
     /// This range, extended to the frequencies from `low` to `high`, rad/s.
     #[must_use]
     pub fn with(mut self, [low, high]: [f64; 2]) -> Self {
@@ -196,6 +280,10 @@ pub struct StructureOrbits {
     response: Option<Vec<[f64; 2]>>,
     /// The reference, and what it contains per square of the frequency.
     reference: Option<[Vec<[f64; 2]>; 2]>,
+    /// Weight of m q2 in the response.
+    of_particle: f64,
+    /// The phase refers to the force of the drive on the first section, not to the drive.
+    by_force: bool,
     target: f64,
 }
 
@@ -217,6 +305,23 @@ impl StructureOrbits {
             particle,
             response: None,
             reference: None,
+            of_particle: 0.0,
+            by_force: false,
+            target: -FRAC_PI_2,
+        }
+    }
+
+    /// The orbits of the study's oscillator, dimensionless.
+    pub(super) fn of(scene: &Dimensionless) -> Self {
+        let Definition { reference, sensor, .. } = scene.definition;
+        Self {
+            excitation: Excitation::Base,
+            sections: vec![Section::oscillator(scene.epsilon * scene.lambda)],
+            particle: Particle { mass: scene.epsilon, half_width: 1.0, restitution: scene.r },
+            response: None,
+            reference: None,
+            of_particle: f64::from(u8::from(sensor == Sensor::V)),
+            by_force: reference == Reference::Force,
             target: -FRAC_PI_2,
         }
     }
@@ -269,8 +374,12 @@ impl StructureOrbits {
 
     /// All orbits at phase resonance with a reference of the amplitude `reference` and frequencies in a range, rad/s, by rising response.
     pub fn resonant(&self, reference: f64, [low, high]: [f64; 2]) -> Vec<StructureOrbit> {
-        let grid: Vec<f64> = equally_spaced(low, high, GRID).collect();
-        let found = search(&grid, reference, |omega| self.motions(omega));
+        self.resonant_at(equally_spaced(low, high, GRID), reference)
+    }
+
+    /// As [`Self::resonant`], at frequencies of a grid and between them.
+    pub(super) fn resonant_at(&self, grid: impl IntoIterator<Item = f64>, reference: f64) -> Vec<StructureOrbit> {
+        let found = search(grid, reference, |omega| self.motions(omega));
         let mut orbits: Vec<_> = found.iter().filter_map(|motion| self.accept_resonant(motion)).collect();
         orbits.sort_unstable_by(|first, second| first.response.total_cmp(&second.response));
         let same = |first: f64, second: f64| (first - second).abs() < 1e-9 * first.abs();
@@ -387,7 +496,9 @@ impl StructureOrbits {
         })
     }
 
-    fn motions(&self, omega: f64) -> Option<SymmetricMotions> {
+    /// All symmetric motions at the frequency `omega`.
+    pub(super) fn motions(&self, omega: f64) -> Option<SymmetricMotions> {
+        let force = Some(self.sections.first()?.drive_force(omega)).filter(|_| self.by_force);
         let reference = self.reference.as_ref().map(|[row, inertial]| -> Vec<[f64; 2]> {
             let both = row.iter().zip(inertial);
             both.map(|(row, inertial)| [0, 1].map(|n| row[n] + omega * omega * inertial[n]))
@@ -396,8 +507,8 @@ impl StructureOrbits {
         let reading = Reading {
             sections: self.response.as_deref(),
             reference_sections: reference.as_deref(),
-            particle: 0.0,
-            reference: Complex::from_polar(1.0, self.target + FRAC_PI_2),
+            particle: self.of_particle,
+            reference: Complex::from_polar(1.0, self.target + FRAC_PI_2) * force.unwrap_or(Complex::ONE),
         };
         SymmetricMotions::new(&self.sections, self.particle, &reading, omega)
     }
@@ -428,10 +539,28 @@ impl StructureOrbits {
         resonant.then(|| self.accept(motion)).flatten()
     }
 
+    /// A motion as an orbit, of which neither start nor stability are examined.
+    pub(super) fn told(&self, motion: &SymmetricMotion) -> StructureOrbit {
+        StructureOrbit {
+            omega: motion.omega,
+            drive: motion.drive.norm(),
+            reference: motion.reference.norm(),
+            response: motion.response.norm(),
+            phase: wrapped(motion.phase + self.target + FRAC_PI_2),
+            speed: motion.speed,
+            impact_velocity: motion.impact_velocity,
+            impact_phase: motion.drive.arg(),
+            start: StructureStart { sections: Vec::new(), q2: f64::NAN, dq2: f64::NAN },
+            multipliers: Vec::new(),
+            stable: false,
+        }
+    }
+
     /// The orbit with its stability, if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
     fn accept(&self, motion: &SymmetricMotion) -> Option<StructureOrbit> {
-        let sizes = [motion.speed, motion.response.norm(), motion.drive.norm()];
-        let is_motion = motion.speed > 0.0 && sizes[1] > ROUNDING * self.particle.half_width;
+        let orbit = self.told(motion);
+        let sizes = [orbit.speed, orbit.response, orbit.drive];
+        let is_motion = orbit.speed > 0.0 && orbit.response > ROUNDING * self.particle.half_width;
         if sizes.iter().any(|size| !size.is_finite()) || !is_motion {
             return None;
         }
@@ -440,34 +569,24 @@ impl StructureOrbits {
         let (t, sign) = since_impact(motion);
         let state = |(section, impulsive): (&Section, Vector2<f64>)| {
             let impulsive = section.propagator(t) * impulsive * sign;
-            if sizes[2] == 0.0 {
+            if orbit.drive == 0.0 {
                 // Without a drive there is no harmonic part, even at an undamped resonance.
                 return impulsive.into();
             }
-            let per_force = section.compliance(motion.omega) * sizes[2];
+            let per_force = section.compliance(motion.omega) * orbit.drive;
             let [x, v] = section.driven(motion.omega).map(|response| (response * per_force).im);
             [x + impulsive[0], v + impulsive[1]]
         };
         let q2 = motion.after[0] - self.particle.half_width;
         Some(StructureOrbit {
-            omega: motion.omega,
-            drive: sizes[2],
-            reference: motion.reference.norm(),
-            response: sizes[1],
-            phase: wrapped(motion.phase + self.target + FRAC_PI_2),
-            speed: motion.speed,
-            impact_velocity: motion.impact_velocity,
-            impact_phase: motion.drive.arg(),
             start: StructureStart {
                 sections: self.sections.iter().zip(half.impulsive()).map(state).collect(),
                 q2: sign * (q2 + motion.speed * t),
                 dq2: sign * motion.speed,
             },
             stable: multipliers.iter().all(|multiplier| multiplier.norm() < 1.0),
-            multipliers: multipliers
-                .iter()
-                .map(|multiplier| [multiplier.re, multiplier.im])
-                .collect(),
+            multipliers: multipliers.iter().map(|one| [one.re, one.im]).collect(),
+            ..orbit
         })
     }
 
@@ -488,7 +607,11 @@ impl StructureOrbits {
             Some(roots(&motions)?.map(|speed| motions.at(speed)))
         };
         let mut branches = Vec::new();
-        for Interval { omega: [low, high], turns } in intervals(range.omega, |omega| both(omega).is_some()) {
+        let [low, high] = range.omega;
+        for Interval { points, inside: turns } in
+            intervals(equally_spaced(low, high, GRID), |omega| both(omega).map(|_| ()))
+        {
+            let [low, high] = [points[0].0, points[points.len() - 1].0];
             // Angles 0 to pi lead up along the first root, and pi to 2 pi back along the second one.
             let at = |angle: f64| {
                 let omega = 0.5 * (low + high) - 0.5 * (high - low) * angle.cos();
@@ -543,11 +666,12 @@ impl StructureOrbits {
                 .filter_map(|(angle, orbit)| Some((*angle, orbit.as_ref()?)))
                 .collect();
             if !inside.is_empty() {
+                let located = inside.windows(2).enumerate().filter_map(|(n, pair)| {
+                    let change = self.change(at, pair[0], pair[1])?;
+                    Some(StabilityChange { after: n + usize::from(first.is_some()), ..change })
+                });
                 branches.push(StructureBranch {
-                    changes: inside
-                        .windows(2)
-                        .filter_map(|pair| self.change(at, pair[0], pair[1]))
-                        .collect(),
+                    changes: located.collect(),
                     orbits: first
                         .into_iter()
                         .chain(inside.iter().map(|inside| inside.1.clone()))
@@ -573,21 +697,17 @@ impl StructureOrbits {
             return None;
         }
         let like_first = |angle: f64| at(angle).map(|orbit| orbit.unstable() == outside).ok_or(());
-        let (_, beyond) = try_bisection(from, to, LOCATED, like_first).ok()?;
-        let orbit = at(beyond)?;
-        let from_circle = |[re, im]: &[f64; 2]| (re.hypot(*im) - 1.0).abs();
-        let nearest = orbit
-            .multipliers
-            .iter()
-            .min_by(|one, other| from_circle(one).total_cmp(&from_circle(other)));
-        let multiplier = *nearest?;
+        let (before, beyond) = try_bisection(from, to, LOCATED, like_first).ok()?;
+        // The multipliers rise in modulus: the first one outside has just left, or is about to enter.
+        let orbit = at(if outside < second.unstable() { beyond } else { before })?;
+        let multiplier = *orbit.multipliers.get(orbit.multipliers.len() - orbit.unstable())?;
         let kind = match multiplier {
             [_, im] if im != 0.0 => Bifurcation::NeimarkSacker,
             [re, _] if re > 0.0 => Bifurcation::Fold,
             _ => Bifurcation::SymmetryBreaking,
         };
         let shares = self.shares_of(&orbit, multiplier)?;
-        Some(StabilityChange { kind, orbit, shares })
+        Some(StabilityChange { kind, orbit, shares, after: 0 })
     }
 }
 
@@ -606,39 +726,4 @@ fn end(at: &impl Fn(f64) -> Option<StructureOrbit>, from: f64, to: f64) -> Optio
     let is_orbit = |angle: f64| Ok::<_, ()>(at(angle).is_some());
     let (last, _) = try_bisection(from, to, LOCATED, is_orbit).ok()?;
     (last != from).then(|| at(last)).flatten()
-}
-
-/// An interval of frequencies in which a quadratic has roots, and whether both are equal at its ends.
-struct Interval {
-    omega: [f64; 2],
-    turns: [bool; 2],
-}
-
-/// The intervals of a range in which `exists` is true.
-fn intervals([low, high]: [f64; 2], exists: impl Fn(f64) -> bool) -> Vec<Interval> {
-    let mut found: Vec<Interval> = Vec::new();
-    let mut last: Option<(f64, bool)> = None;
-    for omega in equally_spaced(low, high, GRID) {
-        let now = exists(omega);
-        match last {
-            Some((before, false)) if now => {
-                let (_, first) = bisection(before, omega, &exists);
-                found.push(Interval { omega: [first, omega], turns: [true, false] });
-            }
-            None if now => found.push(Interval { omega: [omega; 2], turns: [false; 2] }),
-            _ => {}
-        }
-        if let Some(interval) = found.last_mut() {
-            match last {
-                Some((before, true)) if !now => {
-                    interval.omega[1] = bisection(before, omega, &exists).0;
-                    interval.turns[1] = true;
-                }
-                _ if now => interval.omega[1] = omega,
-                _ => {}
-            }
-        }
-        last = Some((omega, now));
-    }
-    found
 }

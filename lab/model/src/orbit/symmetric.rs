@@ -1,4 +1,5 @@
-//! All symmetric motions of a host at one frequency, in closed form, and the search for the phase-resonant ones over frequency.
+//! All symmetric motions of a host at one frequency, in closed form, the search for the phase-resonant ones over frequency, and both for the study's
+//! oscillator.
 //!
 //! The host is a sum of [`Section`]s; the study's oscillator is one section. At phase resonance or under a given drive, the particle's
 //! speed V is the root of a quadratic. Time starts at an impact on the wall w = +b; complex amplitudes Z stand for `Im(Z exp(i omega t))`.
@@ -17,13 +18,11 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Complex, Vector2};
 
-use super::half_period::HalfPeriod;
 use super::oscillator::{Section, harmonic};
-use super::periodic::wrapped;
-use super::{AfterImpact, Orbit};
+use super::{Orbit, OrbitCurve, StructureOrbit, StructureOrbits, StructureRange};
+use crate::Dimensionless;
 use crate::numerics::{bisection, golden_section, quadratic, secant};
 use crate::theory::{BranchSide, Manifold, SlowFlow};
-use crate::{Definition, Dimensionless, Reference, Sensor};
 
 /// A particle in its cavity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -197,7 +196,7 @@ impl SymmetricMotions {
         (self.y(speed) * self.reference_over_y + self.reference_kappa * speed).norm()
     }
 
-    /// The motion at the particle speed `speed`. Whether it is physical, and how stable it is, is not examined: see [`HalfPeriod`].
+    /// The motion at the particle speed `speed`. Whether it is physical, and how stable it is, is not examined.
     pub(super) fn at(&self, speed: f64) -> SymmetricMotion {
         let Particle { mass, restitution, .. } = self.particle;
         let y = self.y(speed);
@@ -223,51 +222,17 @@ impl SymmetricMotions {
 
 // The study's oscillator
 
-/// The particle of the dimensionless model.
-fn particle(scene: &Dimensionless) -> Particle {
-    Particle { mass: scene.epsilon, half_width: 1.0, restitution: scene.r }
+/// The numbers of `scene` with its own units.
+fn bare(scene: &Dimensionless) -> Dimensionless {
+    Dimensionless { omega0: 1.0, b: 1.0, ..*scene }
 }
 
-fn section(scene: &Dimensionless) -> Section {
-    Section::oscillator(scene.epsilon * scene.lambda)
-}
-
-/// The motions of the study's oscillator at the frequency `omega` over omega0.
-fn motions(scene: &Dimensionless, omega: f64) -> Option<SymmetricMotions> {
-    let (section, Definition { sensor, reference, .. }) = (section(scene), scene.definition);
-    let reading = Reading {
-        sections: None,
-        reference_sections: None,
-        particle: f64::from(u8::from(sensor == Sensor::V)),
-        reference: match reference {
-            Reference::Base => Complex::ONE,
-            Reference::Force => section.drive_force(omega),
-        },
-    };
-    SymmetricMotions::new(&[section], particle(scene), &reading, omega)
-}
-
-/// A motion of the study's oscillator, without its stability.
-fn orbit(scene: &Dimensionless, motion: &SymmetricMotion) -> Orbit {
-    let [q1, dq1] = motion.after;
-    Orbit {
-        g: motion.drive.norm() / scene.epsilon,
-        sigma: (motion.omega - 1.0) / scene.epsilon,
-        omega: motion.omega,
-        c: motion.response.norm(),
-        gamma: motion.phase,
-        b: motion.speed,
-        impact_velocity: motion.impact_velocity,
-        start: AfterImpact {
-            phase: motion.drive.arg(),
-            q1,
-            dq1,
-            q2: q1 - 1.0,
-            dq2: motion.speed,
-        },
-        multipliers: [f64::NAN; 4],
-        stable: false,
-    }
+/// Dimensionless orbits of the host in the numbers of `scene`.
+fn told(scene: &Dimensionless, found: &[StructureOrbit]) -> Vec<Orbit> {
+    found
+        .iter()
+        .map(|orbit| orbit.in_numbers(&bare(scene), 1.0, 1.0))
+        .collect()
 }
 
 /// Frequencies searched, over omega0.
@@ -280,13 +245,8 @@ const GROWTH: f64 = 1.0004;
 /// Frequencies between 0.2 and 3 omega0 are searched on a grid of about 0.001 in the detuning where that is of
 /// order one, and every root is refined to the last bit.
 pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
-    let candidates = search(&grid(scene.epsilon), scene.epsilon * scene.g, |omega| {
-        motions(scene, omega)
-    });
-    let mut orbits = resonant(scene, candidates);
-    orbits.sort_unstable_by(|first, second| first.c.total_cmp(&second.c));
-    orbits.dedup_by(|first, second| (first.sigma - second.sigma).abs() < 1e-9 && (first.b - second.b).abs() < 1e-9);
-    orbits
+    let orbits = StructureOrbits::of(scene);
+    told(scene, &orbits.resonant_at(grid(scene.epsilon), scene.epsilon * scene.g))
 }
 
 /// The stable one of [`phase_resonant`] with the smallest C.
@@ -298,154 +258,137 @@ pub fn stable_resonant(scene: &Dimensionless) -> Option<Orbit> {
 ///
 /// Without damping and with r = 1 these are the conservative nonlinear mode, with G = 0.
 pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
-    let candidates = motions(scene, omega).and_then(|motions| Some(motions.phase_resonant()?.map(|b| motions.at(b))));
-    resonant(scene, candidates.into_iter().flatten())
+    told(scene, &StructureOrbits::of(scene).at_phase_resonance(omega))
+}
+
+/// The exact backbone as curves of about `points` orbits each, over the detunings `sigma` or, without them, where first-order theory has it.
+pub fn backbone(scene: &Dimensionless, sigma: Option<[f64; 2]>, points: usize) -> Vec<OrbitCurve> {
+    let orbits = StructureOrbits::of(scene);
+    let range = match sigma {
+        None => orbits.range(0, points),
+        Some(sigma) => Some(StructureRange::at_any_speed(&bare(scene), sigma, points)),
+    };
+    let branches = range.map_or(Vec::new(), |range| orbits.backbone(&range));
+    branches
+        .iter()
+        .map(|branch| branch.in_numbers(&bare(scene), 1.0, 1.0))
+        .collect()
 }
 
 /// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.
 pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
-    motions(scene, 1.0 + scene.epsilon * sigma)
-        .and_then(|motions| Some(motions.driven(scene.epsilon * scene.g)?.map(|b| motions.at(b))))
-        .into_iter()
-        .flatten()
-        .filter_map(|motion| accept(scene, &motion, orbit(scene, &motion)))
-        .collect()
+    let (omega, drive) = (1.0 + scene.epsilon * sigma, scene.epsilon * scene.g);
+    told(scene, &StructureOrbits::of(scene).at(omega, drive))
 }
 
 /// The smallest G under which there is a symmetric 1:1 orbit at the detuning `sigma`, if its flights meet no wall.
 pub(super) fn least_excitation(scene: &Dimensionless, sigma: f64) -> f64 {
-    motions(scene, 1.0 + scene.epsilon * sigma).map_or(f64::INFINITY, |motions| motions.least_drive() / scene.epsilon)
+    let motions = StructureOrbits::of(scene).motions(1.0 + scene.epsilon * sigma);
+    motions.map_or(f64::INFINITY, |motions| motions.least_drive() / scene.epsilon)
 }
 
 /// Frequencies `1 + epsilon (e - 1/e) / 2` for growing e.
-fn grid(epsilon: f64) -> Vec<f64> {
+fn grid(epsilon: f64) -> impl Iterator<Item = f64> {
     let [low, high] = SEARCHED.map(|omega| {
         let x = (omega - 1.0) / epsilon;
         (x.abs() + (x * x + 1.0).sqrt()).powi(if x < 0.0 { -1 } else { 1 })
     });
     std::iter::successors(Some(low), |e| Some(e * GROWTH))
-        .take_while(|e| *e < high)
+        .take_while(move |e| *e < high)
         .chain([high])
-        .map(|e| 1.0 + 0.5 * epsilon * (e - 1.0 / e))
-        .collect()
+        .map(move |e| 1.0 + 0.5 * epsilon * (e - 1.0 / e))
 }
 
-/// The orbits of those candidates whose response lags the base; without dissipation no base motion is needed, and its phase is chosen.
-fn resonant(scene: &Dimensionless, candidates: impl IntoIterator<Item = SymmetricMotion>) -> Vec<Orbit> {
-    let lagging = candidates.into_iter().filter_map(|motion| {
-        let mut orbit = orbit(scene, &motion);
-        if orbit.g < 1e-12 {
-            orbit.start.phase = wrapped(orbit.start.phase + orbit.gamma + FRAC_PI_2);
-            orbit.gamma = -FRAC_PI_2;
+// Search over frequency
+
+/// An interval of frequencies in which a function has values, with these, and whether it begins and ends inside of the grid.
+pub(super) struct Interval<T> {
+    pub points: Vec<(f64, T)>,
+    pub inside: [bool; 2],
+}
+
+/// The intervals of a grid in which `at` has values; their ends are located to neighbouring doubles.
+pub(super) fn intervals<T>(grid: impl IntoIterator<Item = f64>, at: impl Fn(f64) -> Option<T>) -> Vec<Interval<T>> {
+    let mut found: Vec<Interval<T>> = Vec::new();
+    let mut last: Option<(f64, bool)> = None;
+    for omega in grid {
+        let value = at(omega);
+        let exists = value.is_some();
+        let end = last
+            .filter(|(_, existed)| *existed != exists)
+            .and_then(|(before, existed)| {
+                let (left, right) = bisection(before, omega, |omega| at(omega).is_some());
+                let end = if existed { left } else { right };
+                Some((end, at(end)?))
+            });
+        if exists && last.is_none_or(|(_, existed)| !existed) {
+            let begins = end.is_some();
+            found.push(Interval { points: end.into_iter().collect(), inside: [begins, false] });
+        } else if let Some((end, interval)) = end.zip(found.last_mut()) {
+            interval.points.push(end);
+            interval.inside[1] = true;
         }
-        (orbit.gamma.sin() < -1e-12).then_some((motion, orbit))
-    });
-    lagging
-        .filter_map(|(motion, orbit)| accept(scene, &motion, orbit))
-        .collect()
-}
-
-/// The orbit with its stability, if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
-fn accept(scene: &Dimensionless, motion: &SymmetricMotion, orbit: Orbit) -> Option<Orbit> {
-    let sizes = [orbit.b, orbit.c, orbit.g];
-    if sizes.iter().any(|size| !size.is_finite()) || orbit.b <= 0.0 || orbit.c <= 1e-12 {
-        return None;
+        if let Some((value, interval)) = value.zip(found.last_mut()) {
+            interval.points.push((omega, value));
+        }
+        last = Some((omega, exists));
     }
-    let multipliers = HalfPeriod::new(&[section(scene)], &particle(scene), motion)?.multipliers();
-    let multipliers = std::array::from_fn(|n| multipliers[n].norm());
-    Some(Orbit { multipliers, stable: multipliers[3] < 1.0, ..orbit })
+    found
 }
 
-/// The symmetric motions at phase resonance with a reference of the amplitude `drive` at the frequencies of a grid and between them.
+/// The symmetric motions at phase resonance with a reference of the amplitude `reference` at the frequencies of a grid and between them.
 pub(super) fn search(
-    grid: &[f64],
-    drive: f64,
+    grid: impl IntoIterator<Item = f64>,
+    reference: f64,
     motions: impl Fn(f64) -> Option<SymmetricMotions>,
 ) -> Vec<SymmetricMotion> {
-    let branches = [0, 1].map(|branch| CandidateBranch { motions: &motions, branch, drive }.search(grid));
-    branches.into_iter().flatten().collect()
+    // The references of both motions minus the one that is searched for.
+    let excess = |omega: f64| {
+        let motions = motions(omega)?;
+        let both = motions
+            .phase_resonant()?
+            .map(|speed| motions.reference(speed) - reference);
+        (!both.iter().all(|excess| excess.is_nan())).then_some(both)
+    };
+    let mut found = Vec::new();
+    for (interval, n) in intervals(grid, excess)
+        .iter()
+        .flat_map(|interval| [(interval, 0), (interval, 1)])
+    {
+        let points: Vec<_> = interval.points.iter().map(|(omega, both)| [*omega, both[n]]).collect();
+        for omega in zeros(&points, |omega| excess(omega).map_or(f64::NAN, |both| both[n])) {
+            let motion = motions(omega).and_then(|motions| Some(motions.at(motions.phase_resonant()?[n])));
+            // Not where the sign changes through a gap, or in the rounding errors of a motion that needs no drive.
+            found.extend(motion.filter(|motion| (motion.reference.norm() - reference).abs() < 1e-7 * reference));
+        }
+    }
+    found
 }
 
-/// One of the two branches of candidates, as the reference over frequency.
-struct CandidateBranch<'a, F> {
-    motions: &'a F,
-    branch: usize,
-    drive: f64,
-}
-
-impl<F: Fn(f64) -> Option<SymmetricMotions>> CandidateBranch<'_, F> {
-    /// Reference of the branch minus the one that is searched for.
-    fn excess(&self, omega: f64) -> Option<f64> {
-        let motions = (self.motions)(omega)?;
-        let excess = motions.reference(motions.phase_resonant()?[self.branch]) - self.drive;
-        (!excess.is_nan()).then_some(excess)
-    }
-
-    fn search(&self, grid: &[f64]) -> Vec<SymmetricMotion> {
-        let points = self.stretches(grid);
-        let mut found = Vec::new();
-        for pair in points.windows(2) {
-            let ([a, at_a], [b, at_b]) = (pair[0], pair[1]);
-            if (at_a > 0.0) != (at_b > 0.0) {
-                found.extend(self.root(a, b));
+/// The zeros of a function between neighbouring points, including two where an extremum between points reaches the other sign.
+fn zeros(points: &[[f64; 2]], f: impl Fn(f64) -> f64) -> Vec<f64> {
+    let root = |a: f64, b: f64| bisection(a, b, |x| f(x) > 0.0).0;
+    let changes = points
+        .windows(2)
+        .filter(|pair| (pair[0][1] > 0.0) != (pair[1][1] > 0.0));
+    let mut found: Vec<f64> = changes.map(|pair| root(pair[0][0], pair[1][0])).collect();
+    for triple in points.windows(3) {
+        let [[a, at_a], [_, at_middle], [b, at_b]] = [triple[0], triple[1], triple[2]];
+        let same_sign = (at_a > 0.0) == (at_middle > 0.0) && (at_middle > 0.0) == (at_b > 0.0);
+        if same_sign && at_middle.abs() <= at_a.abs().min(at_b.abs()) {
+            let turn = golden_section(a, b, |x| {
+                if f(x).is_nan() {
+                    f64::INFINITY
+                } else {
+                    at_a.signum() * f(x)
+                }
+            });
+            if at_a.signum() * f(turn) <= 0.0 {
+                found.extend([root(a, turn), root(turn, b)]);
             }
         }
-        for triple in points.windows(3) {
-            let [[a, at_a], [_, at_middle], [b, at_b]] = [triple[0], triple[1], triple[2]];
-            if a.is_nan() || b.is_nan() {
-                continue;
-            }
-            let same_sign = (at_a > 0.0) == (at_middle > 0.0) && (at_middle > 0.0) == (at_b > 0.0);
-            if same_sign && at_middle.abs() <= at_a.abs().min(at_b.abs()) {
-                found.extend(self.pair_near_extremum(a, b, at_a.signum()));
-            }
-        }
-        found
     }
-
-    /// The points (omega, excess) where the branch exists, with the ends of its intervals added; NaN separates them.
-    fn stretches(&self, grid: &[f64]) -> Vec<[f64; 2]> {
-        let mut points: Vec<[f64; 2]> = Vec::with_capacity(grid.len());
-        let mut last: Option<(f64, bool)> = None;
-        for &omega in grid {
-            let excess = self.excess(omega);
-            if let Some((before, existed)) = last
-                && existed != excess.is_some()
-            {
-                let (left, right) = bisection(before, omega, |omega| self.excess(omega).is_some());
-                let gap = [f64::NAN; 2];
-                let end = if existed { left } else { right };
-                let end = self.excess(end).map_or(gap, |excess| [end, excess]);
-                points.extend(if existed { [end, gap] } else { [gap, end] });
-            }
-            points.extend(excess.map(|excess| [omega, excess]));
-            last = Some((omega, excess.is_some()));
-        }
-        points
-    }
-
-    /// The root between two points of opposite sign; None where the sign changes through a gap, or in the rounding errors
-    /// of a motion that needs no drive.
-    fn root(&self, a: f64, b: f64) -> Option<SymmetricMotion> {
-        if a.is_nan() || b.is_nan() {
-            return None;
-        }
-        let (root, _) = bisection(a, b, |omega| self.excess(omega).is_some_and(|excess| excess > 0.0));
-        let motions = (self.motions)(root)?;
-        let candidate = motions.at(motions.phase_resonant()?[self.branch]);
-        let close = (candidate.reference.norm() - self.drive).abs() < 1e-7 * self.drive;
-        close.then_some(candidate)
-    }
-
-    /// Two roots between grid points: the excess has an extremum there that reaches the other sign.
-    fn pair_near_extremum(&self, a: f64, b: f64, sign: f64) -> Vec<SymmetricMotion> {
-        let distance = |omega| self.excess(omega).map_or(f64::INFINITY, |excess| sign * excess);
-        let turn = golden_section(a, b, distance);
-        if distance(turn) > 0.0 {
-            return Vec::new();
-        }
-        [self.root(a, turn), self.root(turn, b)].into_iter().flatten().collect()
-    }
+    found
 }
 
 /// Largest last step of the frequency, as a share of epsilon, and of the speed.
@@ -471,8 +414,9 @@ pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Orbit> {
     let guess = 1.0 + epsilon * flow.free_detuning(speed);
     // Of the first-order response; the exact one turns through half a circle without dissipation, too.
     let direction = Complex::new((flow.manifold.dissipation + epsilon) * speed, 1.0 - FRAC_PI_2 * speed);
+    let orbits = StructureOrbits::of(scene);
     let motion = |omega: f64| {
-        let motions = motions(scene, omega)?;
+        let motions = orbits.motions(omega)?;
         // The response is i + rate B: it has the direction at this B.
         let rate = motions.y(1.0) + motions.kappa - Complex::i();
         let b = direction.re / (rate.re * direction.im - rate.im * direction.re);
@@ -485,7 +429,7 @@ pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Orbit> {
     };
     let omega = secant(off, [guess * (1.0 + SECANT * epsilon), guess], CONVERGED * epsilon)?;
     let (motions, b) = motion(omega)?;
-    let motion = orbit(scene, &motions.at(b));
+    let motion = told(scene, &[orbits.told(&motions.at(b))])[0];
     let values = [omega, motion.c, motion.g];
     values.iter().all(|value| value.is_finite()).then_some(motion)
 }
