@@ -294,7 +294,7 @@ fn results_of_one_oscillator_say_so_where_the_scene_has_a_structure() {
             format!("theory {scene}"),
             "theory is of the ideal cavity, without the other modes of the structure",
         ),
-        (format!("check {scene}"), "Base and response are those of mode 1 alone"),
+        (format!("check {scene}"), "epsilon, lambda, sigma, C and G are those of mode 1"),
     ] {
         let output = vines(&line);
         assert!(output.status.success(), "{output:?}");
