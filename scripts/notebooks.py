@@ -43,8 +43,8 @@ def notebook(name: str) -> str:
 def page() -> str:
     """The gallery: what each example is about, its figure, and the cell that draws it."""
     text = "# Gallery\n\n<!-- Written by scripts/notebooks.py; change the examples, not this page. -->\n\n"
-    text += "Each figure is that of a notebook, which runs wherever the [Python package](python.md) is installed.\n"
-    text += "Jupyter opens it. Every build of the book runs it. Below the figure are the lines that draw it.\n"
+    text += "Each figure is that of a notebook, which runs where the [Python package](python.md) is installed with\n"
+    text += "`[all]`. Jupyter opens it. Every build of the book runs it. Below the figure are the lines that draw it.\n"
     for name in NAMES:
         parts = cells(name)
         title, _, about = parts[0][1].partition("\n")
