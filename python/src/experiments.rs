@@ -101,8 +101,9 @@ pub fn fit(
     let linear = linear
         .iter()
         .map(|one| serde_json::from_str::<MeasuredLinear>(one).map_err(invalid));
+    let points = points.into_iter().map(point).collect();
     let measured = Measurements {
-        points: points.into_iter().map(point).collect(),
+        points: vines_testbench::survey::without_other_modes(&scene.scene, points),
         recordings: recordings.into_iter().map(recording_of).collect::<PyResult<_>>()?,
         known: known.collect::<PyResult<_>>()?,
         linear: linear.collect::<PyResult<_>>()?,

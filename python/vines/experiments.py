@@ -1,6 +1,7 @@
 """Experiments on the simulated rig, exact orbits and first-order theory."""
 
 import json
+import warnings
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -319,5 +320,8 @@ def theory(scene: Scene | None = None, points: int = 200) -> Theory:
     >>> theory().solutions["sigma"].round(4)[-1]
     np.float64(-1.1817)
     """
-    found = json.loads(_native.theory(checked(scene)._native, points))
+    scene = checked(scene)
+    if "structure" in scene.settings:
+        warnings.warn("theory is of the driven mode alone, without the other modes of the structure", stacklevel=2)
+    found = json.loads(_native.theory(scene._native, points))
     return Theory(_table(found["backbone"]), _table(found["solutions"]), found["B_min"], found["C_min"])

@@ -4,6 +4,7 @@ use clap::Args;
 use vines::experiment::ExperimentError;
 use vines::fmu::{FmuController, FmuRig};
 use vines::loop_check::{CheckedChannel, CheckedQuantity, LoopCheck, Verdict, check};
+use vines::scene::Scene;
 use vines::table::{Table, number, with_uncertainty};
 
 use super::failure::Failure;
@@ -67,13 +68,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let checked = check(open.rig.as_mut(), &scene.plan()).map_err(ExperimentError::from)?;
     open.close();
     let text = output(arguments.json, &checked, || {
-        variables + &described(&checked) + &structure(&scene)
+        variables + &described(&checked) + unmeasured(&checked, &scene) + &structure(&scene)
     })?;
     if checked.verdict == Verdict::Healthy {
         return Ok(text);
     }
     print(&text)?;
     Err(Failure::run(format!("the loop check failed: {}", checked.verdict)))
+}
+
+/// Why the check of a structure has no linear response.
+fn unmeasured(checked: &LoopCheck, scene: &Scene) -> &'static str {
+    match (&checked.linear, &scene.structure) {
+        (None, Some(_)) if checked.verdict == Verdict::Healthy => {
+            "Natural frequency and damping are not measured: the response does not grow as that of one mode does.\n"
+        }
+        _ => "",
+    }
 }
 
 pub(super) fn described(checked: &LoopCheck) -> String {

@@ -13,6 +13,7 @@ use vines::fit::{
 };
 use vines::numerics::Estimate;
 use vines::report::fitted;
+use vines::survey::without_other_modes;
 use vines::table::Table;
 
 use super::failure::Failure;
@@ -218,13 +219,7 @@ fn with_decimals(Estimate { value, uncertainty }: Estimate) -> String {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let scene = arguments.scene.load()?;
-    if scene
-        .structure
-        .as_ref()
-        .is_some_and(|structure| structure.modes.len() > 1)
-    {
-        log::warn!("a fit is of one oscillator, the driven mode, without the other modes of the structure");
-    }
+    let modes = scene.structure.as_ref().map_or(1, |structure| structure.modes.len());
     writable([&arguments.figure, &arguments.out].into_iter().flatten())?;
     let selection = Selection {
         response: arguments.response.clone(),
@@ -246,6 +241,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
                     .extend(linear.filter(|one| !measured.linear.contains(one)));
             }
             Measurement::Recording(recording) => {
+                if modes > 1 {
+                    return Err(Failure::input(format!(
+                        "a recording is fitted for one oscillator, and the structure has {modes} modes: give tracked.csv of `vines backbone`"
+                    )));
+                }
                 notes.extend(recording.notes.iter().cloned());
                 match recording.linear_decay(&scene.knowledge()).map_err(Failure::run)? {
                     Some(decay) => {
@@ -256,6 +256,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
                 }
             }
         }
+    }
+    if modes > 1 {
+        let count = measured.points.len();
+        measured.points = without_other_modes(&scene, measured.points);
+        skipped += count - measured.points.len();
+        notes.push(
+            "points are moved to where the driven mode alone would have them, by exact orbits with and without the other modes of the scene".into(),
+        );
     }
     let is_exact = |known: &&Known| matches!(known, Known::Value { estimate, .. } if estimate.uncertainty == 0.0);
     notes.extend(arguments.known.iter().filter(is_exact).filter_map(|known| {

@@ -13,7 +13,7 @@ use vines::orbit::{
     stable_resonant,
 };
 use vines::report::responses;
-use vines::survey::structure_curves;
+use vines::survey::{detunings, structure_curves};
 use vines::table::{Table, number, row};
 use vines::{
     ArgumentError,
@@ -82,9 +82,9 @@ pub(super) struct Arguments {
     #[arg(long, group = "what")]
     periodic: bool,
 
-    /// Detunings of --response and --backbone
-    #[arg(long, value_name = "FIRST:LAST", default_value = "-6:6", allow_hyphen_values = true, value_parser = detunings)]
-    range: [f64; 2],
+    /// Detunings of --response and --backbone [default: -6:6; of a structure, those of its backbone and of the controller]
+    #[arg(long, value_name = "FIRST:LAST", allow_hyphen_values = true, value_parser = parsed)]
+    range: Option<[f64; 2]>,
 
     /// Write a figure (SVG) of --response: exact and by theory, and the exact backbone
     #[arg(long, value_name = "FILE", requires = "response", conflicts_with = "sigma")]
@@ -103,20 +103,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     }
     warn_left_out(loaded.left_out_of_cavity(), "exact orbits are");
     let scene = loaded.dimensionless();
+    let range = arguments
+        .range
+        .or_else(|| detunings(&loaded, &scene))
+        .unwrap_or([-6.0, 6.0]);
     if arguments.backbone {
-        let of_structure = structure_curves(&loaded, &scene, arguments.range, false);
-        let curves = of_structure.unwrap_or_else(|| backbone(&scene, Some(arguments.range), POINTS));
+        let of_structure = structure_curves(&loaded, &scene, range, false);
+        let curves = of_structure.unwrap_or_else(|| backbone(&scene, Some(range), POINTS));
         return shown(&scene, "Exact backbone", &curves, arguments.json, || listed(&curves)).map(Results::from);
     }
     if loaded.structure.is_some() {
-        return of_a_structure(arguments, &loaded);
+        return of_a_structure(arguments, &loaded, range);
     }
     if let Some(sigma) = arguments.sigma {
-        return settled(arguments, &scene, sigma, loaded.dimensionless_start()).map(Results::from);
+        return settled(arguments, &scene, (sigma, range), loaded.dimensionless_start()).map(Results::from);
     }
     let [lowest, highest] = ContinuationLimits::default().g;
     let limits = ContinuationLimits {
-        sigma: arguments.range,
+        sigma: range,
         g: [lowest, highest.max(2.0 * scene.g)],
         ..ContinuationLimits::default()
     };
@@ -129,7 +133,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
 }
 
 /// The orbits of a structure in the numbers of its driven mode: its frequency response, or at resonance.
-fn of_a_structure(arguments: &Arguments, scene: &Scene) -> Result<Results, Failure> {
+fn of_a_structure(arguments: &Arguments, scene: &Scene, range: [f64; 2]) -> Result<Results, Failure> {
     if arguments.periodic || arguments.sigma.is_some() {
         let rule = "--periodic and --sigma are for one oscillator, and this scene has a [structure]; drop them";
         return Err(Failure::input(rule));
@@ -140,11 +144,11 @@ fn of_a_structure(arguments: &Arguments, scene: &Scene) -> Result<Results, Failu
         let title = "Exact symmetric 1:1 orbits of the structure at resonance, in the numbers of its driven mode; the four largest multipliers";
         return shown(&numbers, title, &orbits, json, || listing(&numbers, &orbits)).map(Results::from);
     }
-    let curves = structure_curves(scene, &numbers, arguments.range, true).unwrap_or_default();
+    let curves = structure_curves(scene, &numbers, range, true).unwrap_or_default();
     let title =
         "Exact frequency response of the structure, symmetric 1:1 motions only, in the numbers of its driven mode";
     let text = shown(&numbers, title, &curves, json, || listed(&curves))?;
-    let (figure, range, scene) = (arguments.figure.clone(), arguments.range, scene.clone());
+    let (figure, scene) = (arguments.figure.clone(), scene.clone());
     Ok(Results::with_figure(text, json, figure, move || {
         let middle = [0.5 * (range[0] + range[1]), 0.0];
         let backbone = ExactCurve::of_scene(&scene, &numbers, middle);
@@ -159,7 +163,7 @@ const POINTS: usize = 400;
 
 /// All components of the frequency response.
 fn components(arguments: &Arguments, scene: &Dimensionless, limits: &ContinuationLimits) -> Result<Results, Failure> {
-    let [from, to] = arguments.range;
+    let [from, to] = limits.sigma;
     if 1.0 + scene.epsilon * from <= 0.0 {
         let rule = "1 + epsilon sigma must be above 0";
         return Err(Failure::input(format!(
@@ -185,7 +189,7 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Continuatio
              --sigma follows the\none that a start leads to.\n\n{curves}"
         )
     })?;
-    let (figure, json, scene, range) = (arguments.figure.clone(), arguments.json, *scene, arguments.range);
+    let (figure, json, scene, range) = (arguments.figure.clone(), arguments.json, *scene, limits.sigma);
     Ok(Results::with_figure(text, json, figure, move || {
         let place = |motion: &Periodic| ([motion.sigma, motion.c, motion.b], motion.stable);
         let components = response.components.iter();
@@ -195,7 +199,7 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Continuatio
 }
 
 /// Parses FIRST:LAST.
-fn detunings(text: &str) -> Result<[f64; 2], ArgumentError> {
+fn parsed(text: &str) -> Result<[f64; 2], ArgumentError> {
     let form = "expected FIRST:LAST, two detunings (dimensionless), the first below the last, for instance -6:6";
     let (from, to) = text.split_once(':').ok_or(form)?;
     match (from.trim().parse::<f64>(), to.trim().parse::<f64>()) {
@@ -208,7 +212,12 @@ fn detunings(text: &str) -> Result<[f64; 2], ArgumentError> {
 const SETTLE: usize = 1000;
 
 /// The motion that the start leads to at one detuning, or its frequency response.
-fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64; 4]) -> Result<String, Failure> {
+fn settled(
+    arguments: &Arguments,
+    scene: &Dimensionless,
+    (sigma, range): (f64, [f64; 2]),
+    start: [f64; 4],
+) -> Result<String, Failure> {
     positive_frequency(scene, sigma)?;
     let motion = settle(scene, sigma, start, SETTLE)?;
     let motion = motion.ok_or_else(|| {
@@ -219,7 +228,7 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
     })?;
     let pattern = motion.pattern.name();
     if arguments.response {
-        let limits = ContinuationLimits { sigma: arguments.range, ..ContinuationLimits::default() };
+        let limits = ContinuationLimits { sigma: range, ..ContinuationLimits::default() };
         let branch = continue_both_ways(scene, &motion, Condition::Excitation(scene.g), &limits);
         return shown(scene, "Exact frequency response", &branch, arguments.json, || {
             branch_text(&pattern, &branch)

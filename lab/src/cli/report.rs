@@ -20,7 +20,8 @@ use super::{
 
 const HELP: &str = "\
 Runs `vines identify`, `backbone`, `theory`, `orbit --response`, `map` and `fit` on one scene, and writes report.html beside their files:
-one page that opens offline in any browser and prints well. It has each command with its tables and figures, and all settings.
+one page that opens offline in any browser and prints well. It has each command with its tables and figures, and all settings. Of a scene with
+[structure] it has `vines structure` in place of the map.
 
 Examples:
   vines report --out report
@@ -90,8 +91,16 @@ const SECTIONS: [Section; 6] = [
     ),
 ];
 
+/// Of a structure, in place of the regimes, which are those of one oscillator.
+const STRUCTURE: Section = (
+    "Modes and stability",
+    "structure --figure OUT/structure.svg",
+    "The modes, and where the exact backbone is stable with the driven mode alone and with all modes.",
+    &["structure.svg"],
+);
+
 /// What is written.
-const FILES: [&str; 15] = [
+const FILES: [&str; 16] = [
     "report.html",
     "identification.json",
     "backbone.csv",
@@ -102,6 +111,7 @@ const FILES: [&str; 15] = [
     "tracked.csv",
     "tracked.svg",
     "response.svg",
+    "structure.svg",
     "map.csv",
     "map.svg",
     "bifurcations.csv",
@@ -112,17 +122,28 @@ const FILES: [&str; 15] = [
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     // Invalid settings are refused before anything runs or is written.
     let scene = arguments.scene.load()?;
-    Map::new(arguments.scene.family()?, &arguments.x, &arguments.y, None, LIMIT)?;
+    let is_structure = scene.structure.is_some();
+    if !is_structure {
+        Map::new(arguments.scene.family()?, &arguments.x, &arguments.y, None, LIMIT)?;
+    }
     BuiltIn::new(&scene.controller_config())?;
     let folder = results(&arguments.out, &FILES)?;
     // The files of all commands are put in place together.
     let new = tempfile::Builder::new().prefix(".vines-").tempdir_in(&arguments.out)?;
     let mut failed = Vec::new();
     let mut sections = Vec::new();
-    for (title, line, shows, figures) in SECTIONS {
-        let shown = words(arguments, line, &arguments.out).join(" ");
+    for section in SECTIONS {
+        let is_map = section.1.starts_with("map ");
+        let (title, line, shows, figures) = if is_map && is_structure { STRUCTURE } else { section };
+        // The detunings are those of the structure.
+        let line = if is_structure {
+            line.replace(" --range=-5:5", "")
+        } else {
+            line.into()
+        };
+        let shown = words(arguments, &line, &arguments.out).join(" ");
         eprintln!("{shown}");
-        let command = Cli::try_parse_from(words(arguments, line, new.path())).map_err(Failure::input)?;
+        let command = Cli::try_parse_from(words(arguments, &line, new.path())).map_err(Failure::input)?;
         let (mut text, failure) = match dispatch(command.command) {
             Ok(results) => results.unseen(),
             Err(failure) => (String::new(), Some(failure)),
@@ -188,7 +209,7 @@ fn page(scene: &Scene, sections: &[Markup]) -> Markup {
                 h1 { "Nonlinear modal test of " (if scene.structure.is_some() { "a structure" } else { "an oscillator" }) " with a vibro-impact nonlinear energy sink" }
                 p { (parameters(&scene.dimensionless())) }
                 @if let Some(left_out) = scene.left_out() {
-                    @let results = if scene.structure.is_some() { "Theory and the regime map" } else { "Theory, exact orbits and the regime map" };
+                    @let results = if scene.structure.is_some() { "Theory and the fit" } else { "Theory, exact orbits and the regime map" };
                     p { (ideal(&format!("{results} on this page are"), &left_out)) ". The measurements have it." }
                 }
                 @for section in sections { (section) }

@@ -3,15 +3,20 @@
 
 use serde::Serialize;
 use vines_model::Dimensionless;
+use vines_model::numerics::secant;
 use vines_model::orbit::{
     self, Orbit, OrbitCurve, Particle, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
-    StructureOrbits, StructureRange,
+    StructureOrbits, StructureRange, at_amplitude,
 };
 
+use crate::fit::MeasuredPoint;
 use crate::scene::{Scene, Structure};
 
 /// Orbits on a curve.
 const POINTS: usize = 400;
+/// Relative difference of the first two frequencies of a search near one, and its largest last step: far below the curvature, and rounding.
+const SECANT: f64 = 1e-7;
+const CONVERGED: f64 = 1e-13;
 
 /// What is known of a structure without driving it. The response is the displacement at the sensor, m.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -117,6 +122,46 @@ pub fn structure_curves(
         .iter()
         .map(|branch| branch.in_numbers(numbers, per_drive, per_response));
     Some(told.collect())
+}
+
+/// Detunings of a structure's backbone and of the frequencies that the controller may set.
+pub fn detunings(scene: &Scene, numbers: &Dimensionless) -> Option<[f64; 2]> {
+    let orbits = scene.structure_orbits()?;
+    let range = orbits.range(section_of(scene.structure.as_ref()?), POINTS)?;
+    Some(range.with(scene.frequencies()).omega.map(|omega| numbers.sigma(omega)))
+}
+
+/// Measured points of a structure as its driven mode alone would have them.
+///
+/// A point is moved by the difference, in frequency and drive, between the exact orbits with its response at the scene's parameters: of the driven mode
+/// alone, and of all modes near the frequency of the point. Points where one of them does not exist are left out. Those of one mode stay.
+pub fn without_other_modes(scene: &Scene, points: Vec<MeasuredPoint>) -> Vec<MeasuredPoint> {
+    let host = scene.structure.as_ref().zip(scene.structure_orbits());
+    let Some((structure, orbits)) = host.filter(|(structure, _)| structure.modes.len() > 1) else {
+        return points;
+    };
+    let numbers = scene.dimensionless();
+    let moved = |mut point: MeasuredPoint| {
+        let c = point.response.value / numbers.b;
+        let distance = |orbit: &Orbit| (orbit.c - c).abs();
+        let near = |omega: f64| {
+            let found = orbits.at_phase_resonance(omega);
+            let all = found.iter().map(|orbit| of_driven_mode(orbit, structure, &numbers));
+            all.min_by(|one, other| distance(one).total_cmp(&distance(other)))
+        };
+        let measured = point.omega.value;
+        let response = |omega: f64| Some(near(omega)?.c - c);
+        let all = near(secant(
+            response,
+            [measured * (1.0 + SECANT), measured],
+            CONVERGED * measured,
+        )?)?;
+        let alone = at_amplitude(&numbers, c)?;
+        point.omega.value += numbers.omega0 * (alone.omega - all.omega);
+        point.drive.value += numbers.amplitude(alone.g - all.g);
+        Some(point)
+    };
+    points.into_iter().filter_map(moved).collect()
 }
 
 /// An orbit of a structure in the numbers of its driven mode: C is the response over that of the mode with the amplitude b at the cavity.

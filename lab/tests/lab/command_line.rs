@@ -285,16 +285,20 @@ fn results_of_one_oscillator_say_so_where_the_scene_has_a_structure() {
         "map {scene} --x sigma=-1:1:2 --y G=1:1.2:2 --periods 100 --out {}",
         folder.path().display()
     );
+    fails(
+        &map,
+        2,
+        "a regime map is of one oscillator: the scene has a [structure]",
+    );
     for (line, part) in [
-        (
-            map,
-            "a regime map is of the ideal cavity, without the other modes of the structure",
-        ),
         (
             format!("theory {scene}"),
             "theory is of the ideal cavity, without the other modes of the structure",
         ),
-        (format!("check {scene}"), "epsilon, lambda, sigma, C and G are those of mode 1"),
+        (
+            format!("check {scene}"),
+            "epsilon, lambda, sigma, C and G are those of mode 1",
+        ),
     ] {
         let output = vines(&line);
         assert!(output.status.success(), "{output:?}");

@@ -435,7 +435,7 @@ pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Orbit> {
 }
 
 /// The motion at phase resonance beyond the fold whose response has the amplitude `c` over b.
-pub(super) fn at_amplitude(scene: &Dimensionless, c: f64) -> Option<Orbit> {
+pub fn at_amplitude(scene: &Dimensionless, c: f64) -> Option<Orbit> {
     let start = Manifold::new(scene.r).b(c, BranchSide::Right)?;
     let excess = |speed: f64| Some(at_speed(scene, speed)?.c - c);
     at_speed(scene, secant(excess, [start * (1.0 + SECANT), start], CONVERGED)?)

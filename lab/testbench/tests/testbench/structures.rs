@@ -4,12 +4,15 @@ use std::f64::consts::TAU;
 use std::fs;
 
 use tempfile::TempDir;
+use vines_model::numerics::Estimate;
 use vines_model::orbit::{Orbit, StructureOrbit};
+use vines_testbench::comparison::ExactCurve;
 use vines_testbench::experiment::run;
+use vines_testbench::fit::MeasuredPoint;
 use vines_testbench::identification::{Identification, IdentificationError, identify};
 use vines_testbench::rig::{BuiltIn, Simulated};
 use vines_testbench::scene::{Excitation, Scene, SceneError};
-use vines_testbench::survey::{Survey, phase_resonant};
+use vines_testbench::survey::{Survey, phase_resonant, structure_backbone, without_other_modes};
 
 /// A beam by two modes; `changes` are pairs of a text and its replacement.
 fn beam(changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
@@ -325,6 +328,33 @@ fn the_presets_say_which_mode_takes_the_stability_of_the_1_1_motion() {
     let near = |one: &&StructureOrbit| (one.drive / orbit.drive - 1.0).hypot(one.omega / orbit.omega - 1.0) < 0.01;
     let curve = frame.facts.all.iter().flat_map(|branch| &branch.orbits);
     assert!(curve.filter(near).any(|one| one.stable));
+}
+
+#[test]
+fn points_of_a_structure_without_its_other_modes_are_those_of_the_driven_mode() {
+    for name in ["cantilever", "resonant", "frame"] {
+        let file = format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let scene = Scene::load(Some(file.as_ref()), &[]).unwrap();
+        let numbers = scene.dimensionless();
+        let alone = ExactCurve::of(&numbers);
+        let orbits = structure_backbone(&scene, &numbers).unwrap().into_iter().flatten();
+        let estimate = |value| Estimate { value, uncertainty: 1e-9 };
+        let points: Vec<MeasuredPoint> = orbits
+            .filter(|orbit| orbit.stable && (0.3..0.6).contains(&orbit.c))
+            .map(|orbit| MeasuredPoint {
+                response: estimate(orbit.c * numbers.b),
+                omega: estimate(orbit.omega * numbers.omega0),
+                drive: estimate(numbers.amplitude(orbit.g)),
+            })
+            .collect();
+        let moved = without_other_modes(&scene, points.clone());
+        assert!(points.len() > 10 && moved.len() == points.len(), "{name}");
+        for MeasuredPoint { response, omega, drive } in moved {
+            let place = [numbers.sigma(omega.value), numbers.excitation(drive.value)];
+            let off = alone.distance(response.value / numbers.b, place[0], place[1]).unwrap();
+            assert!(off.nearest < 2e-5, "{name}: {off:?}");
+        }
+    }
 }
 
 /// A preset of `scenes/`, and what was identified on its simulated rig.
