@@ -51,13 +51,13 @@ export function control(page, { key, symbol, name, unit, min, max, step, help })
 
 // The list of scenes, in groups.
 export function bindScenes(page) {
-  const groups = Object.groupBy(page.table.scenes, ({ group }) => group);
-  $("scene").replaceChildren(...Object.entries(groups).map(([label, scenes]) => {
+  const { scenes } = page.table;
+  $("scene").replaceChildren(...[...new Set(scenes.map((scene) => scene.group))].map((label) => {
     const group = Object.assign(document.createElement("optgroup"), { label });
-    group.append(...scenes.map((scene) => new Option(scene.name, slug(scene))));
+    group.append(...scenes.filter((scene) => scene.group === label).map((scene) => new Option(scene.name, slug(scene))));
     return group;
   }));
-  $("scene").onchange = () => { say(""); begin(page, page.table.scenes.find((scene) => slug(scene) === $("scene").value)); };
+  $("scene").onchange = () => { say(""); begin(page, scenes.find((scene) => slug(scene) === $("scene").value)); };
 }
 
 // Buttons and keys.
