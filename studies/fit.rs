@@ -7,7 +7,8 @@
 //! the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the error over u, and that over the
 //! Cramér–Rao bound of the same points (of recordings, u is this bound); and the numbers of fits that are rejected, and of rigs without a fit.
 //!
-//! `effects` gives each rig one hidden effect of its cavity, in turn friction, tilt, and two laws of restitution, and as many rigs none. A rig is drawn again if
+//! `effects` gives each rig one hidden effect of its cavity, in turn friction, tilt, and two laws of restitution, and as many rigs none. Half of
+//! the rigs with friction are at rest when a loop check measures them. A rig is drawn again if
 //! the loop does not lock on it, if friction keeps the particle from the walls, or if the effect moves its points by less than 5 u. The table has the
 //! numbers of rigs that were drawn, measured, flagged because the ideal cavity does not describe their points, explained by the right effect, by a wrong one
 //! alone, and by the right one only among others; and the coverage of the strength.
@@ -148,7 +149,16 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
     // Laws of restitution have the value r at the speed of impacts of the middle of the stable motions, B = 0.85.
     let speed = 2.0 * 0.85 * (1.0 + epsilon) / (1.0 + r);
     let cavity = effect.map_or(Cavity::IDEAL, |effect| effect.cavity(strength, r, speed));
-    let tracked = tracked(&mut *behind_chain(Parameters { cavity, ..ideal }, &scene)?, &plan, 20.0)?;
+    let rig = Parameters { cavity, ..ideal };
+    let tracked = if effect == Some(Effect::Friction) && noise.is_multiple_of(2) {
+        let scene = scene.clone().at_rest();
+        let mut bench = behind_chain(rig, &scene)?;
+        let checked = check(&mut *bench, &plan)?;
+        let linear = checked.linear.ok_or_else(|| checked.verdict.to_string())?.response();
+        tracked(&mut *bench, &scene.plan_on(plan.knowledge.measured(linear)), 20.0)?
+    } else {
+        tracked(&mut *behind_chain(rig, &scene)?, &plan, 20.0)?
+    };
     // Much friction keeps the particle from the walls.
     let regime = tracked.points[0].regime_by_impacts;
     if !matches!(regime, Some(Regime::Symmetric | Regime::Asymmetric)) {

@@ -122,6 +122,15 @@ fn plant(x: &Unknowns, cavity: Cavity) -> Parameters {
     }
 }
 
+/// The dimensionless numbers of some unknowns.
+fn model(x: &Unknowns, definition: Definition) -> Dimensionless {
+    let epsilon = x[4].exp();
+    Dimensionless {
+        definition,
+        ..Dimensionless::new(epsilon, 2.0 * x[1] / epsilon, x[2], 0.0)
+    }
+}
+
 /// The gradient of a quantity.
 fn gradient(x: &Unknowns, of: impl Fn(&Unknowns) -> f64) -> Unknowns {
     Unknowns::from_fn(|i, _| {
@@ -327,6 +336,14 @@ impl Fit {
             .collect()
     }
 
+    /// Smallest and largest responses of the 1:1 motion, m: at the fold, and at the loss of symmetry.
+    fn range(&self, definition: Definition) -> Option<[f64; 2]> {
+        let manifold = SlowFlow::new(0.0, self.x[2]).manifold;
+        let [fold, loss] = [manifold.b_min(), B_SYMMETRY_BREAKING]
+            .map(|speed| Some(self.x[3].exp() * backbone_at_speed(&model(&self.x, definition), speed)?[1]));
+        Some([fold?, loss?])
+    }
+
     /// The plant of the fit; without a known mass, stiffness or damping, its primary mass is that of `scene`.
     #[must_use]
     pub fn plant(&self, scene: &Parameters) -> Parameters {
@@ -341,8 +358,8 @@ impl Fit {
 /// Fits the parameters to `points`. The rig `expected` is where the search begins; the points show resonance as `definition` says.
 ///
 /// The largest or the smallest responses are left out where the rest fits significantly better without them: the 1:1 motion exists between two
-/// unknown amplitudes. Where the model is rejected all the same, the points that contradict it most are left out one by one instead. If more
-/// than a fifth of the points would have to be left out, the fit is that of all points, and rejected.
+/// unknown amplitudes. Where the model is rejected all the same, the points that contradict it most are left out one by one instead, as long as
+/// each gain is significant. If more than a fifth of the points would have to be left out, the fit is that of all points, and rejected.
 ///
 /// # Errors
 /// Too few points, values that are not positive, points that no motion has, or that do not determine the parameters.
@@ -366,10 +383,20 @@ pub fn fit(
         if !problem.may_keep(kept.len()) {
             return Ok(all);
         }
-        fit = problem.of(&kept).fit(expected)?;
+        let next = problem.of(&kept).fit(expected)?;
+        // A model that is wrong everywhere contradicts no point much more than its neighbours.
+        if probability(fit.chi_square - next.chi_square, 1) >= FALSE_ALARM / points.len() as f64 {
+            return Ok(all);
+        }
+        fit = next;
     }
     fit.left_out = (0..points.len()).filter(|n| !kept.contains(n)).collect();
     Ok(fit)
+}
+
+/// Probability of a larger fall of chi-square without some points, if they belong to the others.
+fn probability(fall: f64, points: usize) -> f64 {
+    ChiSquared::new(2.0 * points as f64).map_or(1.0, |distribution| distribution.sf(fall.max(0.0)))
 }
 
 /// The points, if they are enough and their numbers are positive.
@@ -540,7 +567,8 @@ impl<'a> Problem<'a> {
     /// The points that remain where the largest or smallest responses of `kept` belong to another motion, and their fit.
     ///
     /// Without the k largest or smallest, chi-square falls by a chi-square of 2 k degrees of freedom if all belong to one motion. The number
-    /// whose fall is the least probable is left out, until no fall is significant.
+    /// whose fall is the least probable is left out, until no fall is significant. By the fit of the others, the 1:1 motion must have
+    /// ended at the outermost response that is left out: a model that is wrong everywhere shows most at both ends.
     fn trimmed(&self, mut kept: Vec<usize>, mut fit: Fit, expected: &Parameters) -> (Vec<usize>, Fit) {
         let order = self.by_falling_response();
         loop {
@@ -554,8 +582,17 @@ impl<'a> Problem<'a> {
                     let problem = self.of(&kept);
                     let starts = [Some(fit.x), problem.start(&fit.plant(expected))];
                     let next = problem.fit_from(starts.into_iter().flatten()).ok()?;
-                    let distribution = ChiSquared::new(2.0 * (high + low) as f64).ok()?;
-                    Some((distribution.sf(fit.chi_square - next.chi_square), kept, next))
+                    let [smallest, largest] = next.range(self.definition)?;
+                    let outermost = self.points[if high > 0 { rest[0] } else { rest[rest.len() - 1] }].response;
+                    let aside = SIGNIFICANT * outermost.uncertainty;
+                    let has_ended = match high {
+                        0 => outermost.value - aside < smallest,
+                        _ => outermost.value + aside > largest,
+                    };
+                    if !has_ended {
+                        return None;
+                    }
+                    Some((probability(fit.chi_square - next.chi_square, high + low), kept, next))
                 });
             match without.min_by(|first, second| first.0.total_cmp(&second.0)) {
                 Some((p, rest, next)) if p < FALSE_ALARM / (2 * TRIMMED.len()) as f64 => (kept, fit) = (rest, next),
@@ -696,11 +733,7 @@ impl<'a> Problem<'a> {
     /// The curve of the ideal cavity at a speed less a point, over its standard uncertainties.
     fn residual(&self, x: &Unknowns, point: usize, speed: f64) -> Option<Vector3<f64>> {
         let (omega0, b, epsilon) = (x[0].exp(), x[3].exp(), x[4].exp());
-        let model = Dimensionless {
-            definition: self.definition,
-            ..Dimensionless::new(epsilon, 2.0 * x[1] / epsilon, x[2], 0.0)
-        };
-        let [omega, c, g] = backbone_at_speed(&model, speed)?;
+        let [omega, c, g] = backbone_at_speed(&model(x, self.definition), speed)?;
         Some(self.over_u(point, b * c, omega0 * omega, b * epsilon * g))
     }
 

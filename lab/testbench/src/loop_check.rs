@@ -478,7 +478,7 @@ fn verdict(channels: &[CheckedChannel; 2], expected: &[f64; 2], has_base: bool, 
 //
 // In the n-th period the phasor of the response is `z = s + a q^n` with `q = exp(-r T)`, `r = delta + i (omega - omega_d)` and
 // `s = -i g E/r`, less what the growth within a period adds at twice the frequency, `conj(a q^n) (1 - p)/(1 - p exp(-4 pi i/N))` with
-// `p = exp(-conj(r) T/N)` and N samples per period.
+// `p = exp(-conj(r) T/N)` and N samples per period; it turns against the drive.
 // Least squares over all periods (Gauss and Newton) give `s`, `a` and `q`; `a` is free because of delays and of what was left of an
 // earlier motion. The covariance of the fit gives the uncertainties. The natural frequency is `omega_0 = |omega_d + i delta|`.
 
@@ -520,20 +520,23 @@ impl Linear {
     ) -> Option<Self> {
         let step = plan.knowledge.sample_time;
         let period = samples as f64 * step;
+        // The counter-rotating part turns by this in a period, whose number of samples is rounded.
+        let turn = Complex64::cis(-2.0 * omega * period);
         let (mut q, [mut steady, mut initial]) = start(phasors)?;
         let [mut u_q, mut u_gain] = [f64::NAN; 2];
         for _ in 0..ROUNDS {
             let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-            let (mut power, mut rest) = (Complex64::ONE, 0.0);
+            let (mut power, mut turned, mut rest) = (Complex64::ONE, Complex64::ONE, 0.0);
             let p = q.conj().powf(1.0 / samples as f64);
             let within = (1.0 - p) / (1.0 - p * Complex64::cis(-4.0 * PI / samples as f64));
             for (n, z) in phasors.iter().enumerate() {
                 let row = RowVector3::new(Complex64::ONE, power, initial * power / q * n as f64);
-                let residual = z - steady - initial * power + (initial * power).conj() * within;
+                let residual = z - steady - initial * power + (initial * power).conj() * within * turned;
                 normal += row.adjoint() * row;
                 right += row.adjoint() * residual;
                 rest += residual.norm_sqr();
                 power *= q;
+                turned *= turn;
             }
             let inverse = normal.try_inverse()?;
             let change = inverse * right;

@@ -184,7 +184,7 @@ fn the_largest_responses_are_left_out_where_they_belong_to_another_motion() {
     let d = Dimensionless::of(&RIG, 0.0);
     let motions = || {
         (0..30).map(|n| {
-            let [omega, c, g] = backbone_at_speed(&d, 0.7 + 0.012 * f64::from(n)).unwrap();
+            let [omega, c, g] = backbone_at_speed(&d, 0.7 + 0.0135 * f64::from(n)).unwrap();
             [c * d.b, d.omega0 * omega, d.amplitude(g)]
         })
     };
@@ -196,6 +196,10 @@ fn the_largest_responses_are_left_out_where_they_belong_to_another_motion() {
     let points = measured(bent, 2e-3, 3);
     let found = fitted(&points, &[]).unwrap();
     assert!(found.left_out == [26, 27, 28, 29] && worst(&found) < 3.0, "{found:?}");
+    // A structure that hardens: no motion ends, and the misfit shows most at both ends.
+    let hard = motions().map(|[a, omega, e]| [a, omega * (1.0 + 1e-3 * (a / d.b).powi(2)), e]);
+    let hard = fitted(&measured(hard, 1e-3, 3), &[]).unwrap();
+    assert!(hard.is_rejected() && hard.left_out.is_empty(), "{hard:?}");
     let whole = fitted(&measured(motions(), 2e-3, 3), &[]).unwrap();
     assert!(whole.left_out.is_empty() && worst(&whole) < 3.0, "{whole:?}");
 }
