@@ -290,6 +290,18 @@ pub struct State {
     pub dq2: f64,
 }
 
+impl From<[f64; 4]> for State {
+    fn from([q1, dq1, q2, dq2]: [f64; 4]) -> Self {
+        Self { q1, dq1, q2, dq2 }
+    }
+}
+
+impl From<State> for [f64; 4] {
+    fn from(State { q1, dq1, q2, dq2 }: State) -> Self {
+        [q1, dq1, q2, dq2]
+    }
+}
+
 /// An event of a step; times are in seconds since the step began.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {

@@ -19,8 +19,7 @@ fn followed(p: Parameters, x: [f64; 6], duration: f64) -> (Variation, [f64; 4], 
         variation.pass(event, 0.0);
     }
     variation.advance(duration - variation.elapsed());
-    let State { q1, dq1, q2, dq2 } = plant.state();
-    (variation, [q1, dq1, q2, dq2], events)
+    (variation, plant.state().into(), events)
 }
 
 /// What happens, without when. Impacts that accumulate until the particle rests count once.

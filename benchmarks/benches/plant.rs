@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use lovines::{Drive, Parameters};
 use vines_benchmarks::baseline::Baseline;
 use vines_benchmarks::method::{Stepped, begin, measure};
-use vines_benchmarks::scene::{Scene, Step, state};
+use vines_benchmarks::scene::{Scene, Step};
 
 /// Duration of the measurement, and of the turns of a case in each round.
 const DURATION: Duration = Duration::from_secs(10);
@@ -46,7 +46,7 @@ fn period(start: [f64; 4], g: f64, omega: f64) -> Scene {
         duration: TAU / omega,
     };
     let parameters = Parameters::dimensionless(EPSILON, 1.43, 0.65);
-    Scene { parameters, start: state(start), steps: vec![step] }
+    Scene { parameters, start: start.into(), steps: vec![step] }
 }
 
 /// The default rig at a detuning and a base amplitude over `b epsilon`, after a thousand periods.

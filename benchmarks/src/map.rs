@@ -14,7 +14,6 @@ use vines_model::{Dimensionless, map::observe, regime::Regime};
 
 use crate::baseline::Baseline;
 use crate::median;
-use crate::scene::{numbers, state};
 
 /// Mass ratio of the default scene (scenes/paper.toml).
 const EPSILON: f64 = 0.032 / 3.807;
@@ -134,7 +133,8 @@ impl Settled {
             plant.advance(self.drive, self.periods(1)).ok()?;
             brent.advance(self.drive, self.periods(1)).ok()?;
         }
-        let both = numbers(plant.state()).into_iter().zip(numbers(brent.state));
+        let [plant, brent] = [plant.state(), brent.state].map(<[f64; 4]>::from);
+        let both = plant.into_iter().zip(brent);
         both.map(|(a, b)| (b - a).abs()).reduce(f64::max)
     }
 }
@@ -157,9 +157,9 @@ impl Timed {
     fn new(sigma: f64, g: f64) -> anyhow::Result<Self> {
         let settled = Settled::new(sigma, g)?;
         let scene = Dimensionless::of(settled.plant.parameters(), settled.drive.amplitude);
-        let found = observe(&scene, sigma, numbers(settled.plant.state()), SETTLING as usize)?;
+        let found = observe(&scene, sigma, settled.plant.state().into(), SETTLING as usize)?;
         // What is timed is the regime that was found, not the transient before it, whose length depends on rounding.
-        let settled = Settled::from(state(found.state), sigma, g)?;
+        let settled = Settled::from(found.state.into(), sigma, g)?;
         let impacts_per_period = found.impacts_per_period;
         let repeats = found.periods > 0 || found.regime == Regime::NoImpacts;
         let rare = 0.0 < impacts_per_period && impacts_per_period < 1.0;

@@ -9,7 +9,7 @@ use lovines::{Plant, State};
 use serde::Serialize;
 
 use crate::baseline::{self, Baseline};
-use crate::scene::{Scene, Step, numbers, state};
+use crate::scene::{Scene, Step};
 
 /// How a method failed.
 #[derive(Clone, Debug)]
@@ -106,7 +106,7 @@ fn run<M: Method>(
             std::hint::black_box(method.state());
         }
         if checks.contains(&stop) {
-            states.push(numbers(method.state()));
+            states.push(method.state().into());
         }
         done = stop;
         if began.elapsed() > limit {
@@ -116,7 +116,7 @@ fn run<M: Method>(
     }
     let ns = began.elapsed().as_nanos() as f64;
     if states.is_empty() {
-        states.push(numbers(method.state()));
+        states.push(method.state().into());
     }
     Ok((ns, method.impacts()))
 }
@@ -197,7 +197,8 @@ impl Method for Shell {
         let p = &scene.parameters;
         let masses = [p.primary_mass, p.stiffness, p.damping, p.particle_mass];
         let all = masses.into_iter().chain([p.half_width, p.restitution]);
-        for (vr, value) in (0..).zip(all).chain(STATE.into_iter().zip(numbers(scene.start))) {
+        let start: [f64; 4] = scene.start.into();
+        for (vr, value) in (0..).zip(all).chain(STATE.into_iter().zip(start)) {
             rig.well(rig.set_real(vr, value));
         }
         let shell = Self { rig, time: 0.0, state: scene.start };
@@ -212,7 +213,7 @@ impl Method for Shell {
         self.set(step);
         self.rig.well(self.rig.step(self.time, step.duration));
         self.time += step.duration;
-        self.state = state(self.rig.reals(&STATE));
+        self.state = self.rig.reals(&STATE).into();
         Ok(())
     }
 

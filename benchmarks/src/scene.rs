@@ -6,19 +6,6 @@ use anyhow::Context;
 use lovines::{Cavity, Drive, Parameters, State};
 use serde_json::Value;
 
-/// Displacement and velocity of the primary mass and of the particle.
-#[must_use]
-pub fn numbers(state: State) -> [f64; 4] {
-    let State { q1, dq1, q2, dq2 } = state;
-    [q1, dq1, q2, dq2]
-}
-
-/// The state of these numbers.
-#[must_use]
-pub fn state([q1, dq1, q2, dq2]: [f64; 4]) -> State {
-    State { q1, dq1, q2, dq2 }
-}
-
 /// What the base does during one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
@@ -72,10 +59,10 @@ impl Scene {
             None => vec![[at("amplitude")?, at("omega")?]; at("steps")? as usize],
         };
         let step = |[amplitude, omega]: [f64; 2]| Step { drive: Drive::harmonic(amplitude, omega), duration };
-        let start = state(serde_json::from_value(scene["start"].take())?);
+        let start: [f64; 4] = serde_json::from_value(scene["start"].take())?;
         Ok(Self {
             parameters,
-            start,
+            start: start.into(),
             steps: drives.into_iter().map(step).collect(),
         })
     }

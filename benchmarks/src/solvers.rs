@@ -7,7 +7,7 @@ use lovines::{Drive, Parameters, State};
 
 use crate::baseline::rebound;
 use crate::method::{Failure, Method};
-use crate::scene::{Scene, Step, numbers, state};
+use crate::scene::{Scene, Step};
 
 /// The acceleration of the primary mass under the harmonic part of `drive` at the phase `angle`.
 pub fn acceleration(p: &Parameters, drive: &Drive, angle: f64, q1: f64, v1: f64) -> f64 {
@@ -62,7 +62,7 @@ pub struct Solved<S>(Flight, PhantomData<S>);
 
 impl<S: Solver> Method for Solved<S> {
     fn start(scene: &Scene, setting: f64) -> Result<Self, Failure> {
-        let (p, y) = (scene.parameters, numbers(scene.start));
+        let (p, y) = (scene.parameters, scene.start.into());
         Ok(Self(
             Flight { p, setting, y, angle: 0.0, time: 0.0, impacts: 0 },
             PhantomData,
@@ -76,7 +76,7 @@ impl<S: Solver> Method for Solved<S> {
     }
 
     fn state(&self) -> State {
-        state(self.0.y)
+        self.0.y.into()
     }
 
     fn impacts(&self) -> u64 {

@@ -15,7 +15,6 @@ SSC = "{http://ssp-standard.org/SSP1/SystemStructureCommon}"
 OMS = "{https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd}"
 OSP = "{http://opensimulationplatform.com/SSP/OSPAnnotations}"
 SAMPLE_TIME = 0.0011343573395537938
-STARTS = {"q1": "q1_start", "der(q1)": "der_q1_start", "q2": "q2_start", "der(q2)": "der_q2_start"}
 
 
 def pack(vines: Path, folder: Path) -> Path:
@@ -101,23 +100,6 @@ def test_the_system_file_sets_parameters_and_inputs_and_joins_outputs_to_inputs(
         ("controller", "E", "plant", "E"),
     }
     assert {(causality[wire[:2]], causality[wire[2:]]) for wire in wires} == {("output", "input")}
-
-
-def test_a_start_parameter_and_its_output_have_one_default(fmus):
-    for output, parameter in STARTS.items():
-        output, parameter = fmus["LoViNes"].variable(output), fmus["LoViNes"].variable(parameter)
-        assert float(output.start) == float(parameter.start)
-        assert output.unit == parameter.unit
-
-
-def test_a_start_parameter_moves_the_particle(fmus):
-    results = [
-        simulate_fmu(str(fmus["LoViNes"].path), stop_time=1, start_values=start, output=["q1", "w", "impacts"])
-        for start in ({"der(q2)": 0.5}, {"der_q2_start": 0.5}, {})
-    ]
-    by_output, by_parameter, default = [[tuple(row) for row in result] for result in results]
-    assert by_output == by_parameter
-    assert by_output != default
 
 
 def test_model_exchange_finds_every_impact_at_the_default_tolerance(fmus):

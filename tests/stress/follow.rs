@@ -42,8 +42,7 @@ pub fn follow(scene: &Scene, figures: &mut Figures) {
 
 /// Displacement and velocity of the primary mass and of the particle.
 pub fn states(plant: &Plant) -> [f64; 4] {
-    let State { q1, dq1, q2, dq2 } = plant.state();
-    [q1, dq1, q2, dq2]
+    plant.state().into()
 }
 
 /// How far the particle is outside the cavity, in half-widths, when its relative displacement is `w`.

@@ -102,8 +102,8 @@ impl Dimensionless {
     }
 
     /// The plant of these numbers in dimensionless form, M = k = b = 1, at (q1, q1', q2, q2').
-    pub fn plant(&self, [q1, dq1, q2, dq2]: [f64; 4]) -> Result<Plant, InvalidValue> {
+    pub fn plant(&self, state: [f64; 4]) -> Result<Plant, InvalidValue> {
         let parameters = Parameters::dimensionless(self.epsilon, self.lambda, self.r);
-        Plant::new(parameters, State { q1, dq1, q2, dq2 })
+        Plant::new(parameters, state.into())
     }
 }

@@ -205,7 +205,7 @@ impl CellRun {
                     return Ok(ControlFlow::Break(()));
                 }
             }
-            states.push(numbers(&plant.state()));
+            states.push(plant.state().into());
         }
         Ok(ControlFlow::Continue(()))
     }
@@ -233,12 +233,12 @@ impl CellRun {
         let mut growth = Vec::with_capacity(states.len());
         for pair in states.windows(2) {
             // Next to a wall, one side is outside the cavity.
-            let beside = |sign: f64| state(std::array::from_fn(|n| pair[0][n] + sign * apart[n]));
+            let beside = |sign: f64| State::from(std::array::from_fn(|n| pair[0][n] + sign * apart[n]));
             if plant.set_state(beside(1.0)).is_err() {
                 plant.set_state(beside(-1.0))?;
             }
             plant.advance(self.drive, TAU / self.drive.omega)?;
-            let there = numbers(&plant.state());
+            let there: [f64; 4] = plant.state().into();
             let after: [f64; 4] = std::array::from_fn(|n| there[n] - pair[1][n]);
             let size = after.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::EPSILON);
             growth.push((size / SEPARATION).ln());
@@ -272,14 +272,6 @@ impl CellRun {
             state: self.states[self.periods()],
         }
     }
-}
-
-fn numbers(state: &State) -> [f64; 4] {
-    [state.q1, state.dq1, state.q2, state.dq2]
-}
-
-fn state([q1, dq1, q2, dq2]: [f64; 4]) -> State {
-    State { q1, dq1, q2, dq2 }
 }
 
 /// Distance of the second plant that shows the Lyapunov exponent: far above rounding, far below what separates two motions.
