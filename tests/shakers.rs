@@ -1,6 +1,6 @@
 //! Plants with an electrodynamic shaker against references of 40 digits.
 
-use std::fs;
+mod reference;
 
 use lovines::host::Equations;
 use lovines::{
@@ -8,42 +8,13 @@ use lovines::{
 };
 use serde_json::Value;
 
-fn number(value: &Value) -> f64 {
-    value
-        .as_str()
-        .map_or_else(|| value.as_f64().unwrap(), |text| text.parse().unwrap())
-}
-
-fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(number).collect()
-}
+use reference::{Reference, number, numbers, table};
 
 fn pair(value: &Value) -> [f64; 2] {
     numbers(value).try_into().unwrap()
 }
 
-/// A scene of `tests/reference/shakers`.
-struct Reference {
-    scene: Value,
-    step: f64,
-    /// Number of steps until each row.
-    steps: Vec<f64>,
-    /// t, q..., q'..., q2, q2', current, impacts so far, wall stuck to.
-    rows: Vec<Vec<f64>>,
-}
-
 impl Reference {
-    fn read(name: &str) -> Self {
-        let path = format!("{}/tests/reference/shakers/{name}.json", env!("CARGO_MANIFEST_DIR"));
-        let all: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
-        Self {
-            step: number(&all["step"]),
-            steps: numbers(&all["steps"]),
-            rows: all["rows"].as_array().unwrap().iter().map(numbers).collect(),
-            scene: all["scene"].clone(),
-        }
-    }
-
     fn shaker(&self) -> Shaker {
         let given = &self.scene["shaker"];
         let value = |name: &str| number(&given[name]);
@@ -67,7 +38,7 @@ impl Reference {
     /// The plant, the rows of all displacements of the reference, and what is measured of the shaker.
     fn plant(&self) -> (Plant<Structure>, Vec<Row>, ShakerRows) {
         let scene = &self.scene;
-        let matrix = |name: &str| -> Vec<Vec<f64>> { scene[name].as_array().unwrap().iter().map(numbers).collect() };
+        let matrix = |name: &str| table(&scene[name]);
         let (damping, stiffness) = (matrix("C"), matrix("K"));
         let modes = damping.len();
         let unit = |n: usize, at: usize| -> Vec<f64> { (0..n).map(|i| f64::from(u8::from(i == at))).collect() };
@@ -160,7 +131,7 @@ fn plants_with_a_shaker_follow_references_of_40_digits() {
         "chatter",
         "table",
     ] {
-        let reference = Reference::read(name);
+        let reference = Reference::read("shakers.json", name);
         for parts in [0, 1, 10] {
             let error = reference.error(parts);
             println!("{name}, {parts} parts of a step: {error:.1e} b");

@@ -1,47 +1,18 @@
 //! Plants of structures against references of 45 digits, and against the plant of one oscillator.
 
-use std::fs;
+mod reference;
 
 use lovines::{
     Cavity, Drive, Excitation, Host, Matrices, Mode, Parameters, Plant, State, Structure, StructureState, Wall,
 };
 use serde_json::Value;
 
-fn number(value: &Value) -> f64 {
-    value
-        .as_str()
-        .map_or_else(|| value.as_f64().unwrap(), |text| text.parse().unwrap())
-}
-
-fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(number).collect()
-}
-
-/// A scene of `tests/reference/structures`.
-struct Reference {
-    scene: Value,
-    step: f64,
-    /// Number of steps until each row; empty: one per row.
-    steps: Vec<f64>,
-    /// t, q..., q'..., q2, q2', impacts so far, wall stuck to.
-    rows: Vec<Vec<f64>>,
-}
+use reference::{Reference, number, numbers, table};
 
 impl Reference {
-    fn read(name: &str) -> Self {
-        let path = format!("{}/tests/reference/structures/{name}.json", env!("CARGO_MANIFEST_DIR"));
-        let all: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
-        Self {
-            step: number(&all["step"]),
-            steps: all.get("steps").map_or_else(Vec::new, numbers),
-            rows: all["rows"].as_array().unwrap().iter().map(numbers).collect(),
-            scene: all["scene"].clone(),
-        }
-    }
-
     fn plant(&self) -> (Plant<Structure>, Drive, Vec<Vec<f64>>) {
         let scene = &self.scene;
-        let matrix = |name: &str| -> Vec<Vec<f64>> { scene[name].as_array().unwrap().iter().map(numbers).collect() };
+        let matrix = |name: &str| table(&scene[name]);
         let (mass, damping, stiffness) = (matrix("M"), matrix("C"), matrix("K"));
         let n = mass.len();
         let unit = |at: usize| -> Vec<f64> { (0..n).map(|i| f64::from(u8::from(i == at))).collect() };
@@ -91,8 +62,8 @@ impl Reference {
         let points: Vec<_> = units.iter().map(|unit| plant.host().row(unit).unwrap()).collect();
         let mut taken = 0.0;
         let mut after = |(n, row): (usize, &Vec<f64>)| {
-            let steps = self.steps.get(n).map_or(1.0, |until| until - taken);
-            taken += steps;
+            let steps = self.steps[n] - taken;
+            taken = self.steps[n];
             let (count, length) = match parts {
                 0 => (1, steps * self.step),
                 _ => (steps as u32 * parts, self.step / f64::from(parts)),
@@ -167,7 +138,7 @@ fn cavity_of(scene: &Value) -> Cavity {
 #[test]
 fn chaotic_transients_of_structures_are_followed_as_far_as_double_precision_can() {
     for name in ["beam-force", "three-base"] {
-        let reference = Reference::read(name);
+        let reference = Reference::read("structures.json", name);
         let sensitivities = reference.sensitivities();
         for steps in [1, 10, 1000] {
             let (mut early, mut relative, mut amplified) = (0f64, 0f64, 1f64);
@@ -203,7 +174,7 @@ fn contact_chatter_and_friction_of_structures_follow_references_of_40_digits() {
         "friction",
         "stick-slip",
     ] {
-        let reference = Reference::read(name);
+        let reference = Reference::read("structures.json", name);
         for parts in [0, 1, 10] {
             let error = reference.errors(parts).into_iter().fold(0.0, f64::max);
             println!("{name}, {parts} parts of a step: {error:.1e} b");

@@ -2,8 +2,10 @@
 //! one with its limits, mirror symmetry and scatter.
 
 use lovines::{Cavity, Drive, Event, Parameters, Plant, Restitution, State, Wall};
-use serde_json::Value;
 use std::collections::HashMap;
+
+mod reference;
+use reference::{number, numbers, table};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference");
 
@@ -19,28 +21,15 @@ struct Scene {
 
 /// A scene of tests/reference/trajectories, dimensionless, in the ideal cavity.
 fn ideal(name: &str) -> Scene {
-    let text = std::fs::read_to_string(format!("{FOLDER}/trajectories/{name}.json")).expect("reference data");
-    let reference: Value = serde_json::from_str(&text).expect("JSON");
-    let number = |value: &Value| match value.as_str() {
-        Some(text) => text.parse().expect("a number"),
-        None => value.as_f64().expect("a number"),
-    };
-    let list = |value: &Value| -> Vec<f64> { value.as_array().expect("a list").iter().map(number).collect() };
+    let reference = reference::read(&format!("trajectories/{name}.json"));
     let [epsilon, lambda, r, g, omega, step] =
         ["eps", "lam", "r", "G", "Om", "step"].map(|key| number(&reference[key]));
-    let x0 = list(&reference["x0"]);
-    let rows = reference["rows"]
-        .as_array()
-        .expect("rows")
-        .iter()
-        .zip(1..)
-        .map(|(row, n)| {
-            let row = list(row);
-            vec![f64::from(n), row[1], row[2], row[3], row[4], row[6], row[5]]
-        });
+    let start: [f64; 4] = numbers(&reference["x0"]).try_into().expect("a state");
+    let rows = table(&reference["rows"]).into_iter().zip(1..);
+    let rows = rows.map(|(row, n)| vec![f64::from(n), row[1], row[2], row[3], row[4], row[6], row[5]]);
     Scene {
         parameters: Parameters::dimensionless(epsilon, lambda, r),
-        start: State { q1: x0[0], dq1: x0[1], q2: x0[2], dq2: x0[3] },
+        start: start.into(),
         drive: Drive::harmonic(epsilon * g, omega),
         step,
         rows: rows.collect(),

@@ -1,6 +1,6 @@
 """Reference trajectories of structures with an electrodynamic shaker, in 40-digit arithmetic.
 
-python tests/reference/shakers.py [scene ...] writes tests/reference/shakers/SCENE.json. Nothing is shared with the
+python tests/reference/shakers.py [scene ...] writes scenes of tests/reference/shakers.json. Nothing is shared with the
 plant: displacements of structure and armature, the matrices of the whole first-order system with its eigenvectors, the
 instants at which the command is clipped by the arc sine, events as in cavity.py.
 """
@@ -13,7 +13,7 @@ from cavity import DEFAULTS, LOCK
 from mpmath import asin, ceil, eig, exp, eye, im, inverse, lu_solve, matrix, mp, mpc, mpf, nstr, pi, re, zeros
 from structures import BEAM, FRAME, ROWS, StructureRig
 
-HERE = Path(__file__).parent / "shakers"
+FILE = Path(__file__).with_suffix(".json")
 SHAKER = {
     "mass": 0.057, "suspension": [9932.0, 21.5], "stinger": [80000.0, 0.4], "end_mass": 0.01, "resistance": 2.0,
     "inductance": 0.0, "force_factor": 6.78, "amplifier": "voltage", "gain": 3.0,
@@ -207,7 +207,7 @@ class ShakerRig(StructureRig):
 
 def main():
     mp.dps = 40
-    HERE.mkdir(exist_ok=True)
+    found = json.loads(FILE.read_text())
     for name in sys.argv[1:] or SCENES:
         scene = {**DEFAULTS, **SCENES[name]}
         rig = ShakerRig(scene)
@@ -226,8 +226,9 @@ def main():
             values = [*rig.x[: 2 * rig.n], rig.q2, rig.dq2, rig.current()]
             rows.append([nstr(rig.t, 20), *(nstr(value, 22) for value in values), rig.impacts, held])
         columns = "t, q..., base if any, x, and their velocities, q2, q2', current, impacts so far, wall stuck to"
-        result = {"scene": written, "columns": columns, "step": scene["step"], "steps": ROWS, "rows": rows}
-        (HERE / f"{name}.json").write_text(json.dumps(result) + "\n")
+        found[name] = {"scene": written, "columns": columns, "step": scene["step"], "steps": ROWS, "rows": rows}
+        lines = (f"{json.dumps(one)}: {json.dumps(found[one])}" for one in sorted(found))
+        FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n")
         print(name, rig.impacts, "impacts", rig.sticks, "sticks", nstr(rig.stuck_time, 5), "s stuck", flush=True)
 
 

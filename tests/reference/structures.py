@@ -1,6 +1,6 @@
 """Reference trajectories of structures in a real cavity, in 40-digit arithmetic.
 
-python tests/reference/structures.py [scene ...] writes tests/reference/structures/SCENE.json: persistent contact,
+python tests/reference/structures.py [scene ...] writes scenes of tests/reference/structures.json: persistent contact,
 chatter and friction with two or three modes. Nothing is shared with the plant: eigenvectors of the whole first-order
 system, events as in cavity.py.
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 from cavity import DEFAULTS, LOCK, Rig
 from mpmath import diag, eig, exp, eye, im, inverse, lu_solve, matrix, mp, mpc, mpf, nstr, re, zeros
 
-HERE = Path(__file__).parent / "structures"
+FILE = Path(__file__).with_suffix(".json")
 STEPS = 1000
 ROWS = [1, 2, 5, 10, 20, 50, 100, 200, 400, 600, 800, 1000]
 
@@ -129,6 +129,7 @@ class StructureRig(Rig):
 
 def main():
     mp.dps = 40
+    found = json.loads(FILE.read_text())
     for name in sys.argv[1:] or SCENES:
         scene = {**DEFAULTS, **SCENES[name]}
         rig = StructureRig(scene)
@@ -149,8 +150,9 @@ def main():
             rows.append([nstr(rig.t, 20), *(nstr(value, 22) for value in values), rig.impacts, held])
             counts.append(step)
         columns = "t, q..., q'..., q2, q2', impacts so far, wall stuck to"
-        result = {"scene": written, "columns": columns, "step": scene["step"], "steps": counts, "rows": rows}
-        (HERE / f"{name}.json").write_text(json.dumps(result) + "\n")
+        found[name] = {"scene": written, "columns": columns, "step": scene["step"], "steps": counts, "rows": rows}
+        lines = (f"{json.dumps(one)}: {json.dumps(found[one])}" for one in sorted(found))
+        FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n")
         print(name, rig.impacts, "impacts", rig.sticks, "sticks", nstr(rig.stuck_time, 5), "s stuck", flush=True)
 
 
