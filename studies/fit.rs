@@ -327,7 +327,7 @@ fn follow_one(case: &Case, snr: &str, record: Recorded) -> Result<Found, Failure
     let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
     let start = fit(&points, scene.resonance, &scene.plant, &[])?;
     let prepared = [recording.prepared(&scene.knowledge())?];
-    let found = follow(&prepared, &parts, &[], scene.resonance, &start.plant(&scene.plant), &[]);
+    let found = follow(&prepared, &parts, &[], scene.resonance, &scene.plant, &[]);
     // Without it, the result is the fit of the points.
     let points_only = RecordFit {
         fit: start.clone(),
@@ -347,9 +347,9 @@ fn follow_one(case: &Case, snr: &str, record: Recorded) -> Result<Found, Failure
     let spans: Vec<[f64; 2]> = left_out.iter().map(|one| one.seconds).collect();
     let channels = fit.channels.map(|one| one.p_value.unwrap_or(f64::NAN));
     println!(
-        "{truth:.4?}: {ratios:.1?} u, points {before:.1?} u, {periods} periods, chi-square {:.1} of {}; \
+        "{:.4?}: {ratios:.1?} u, points {before:.1?} u, {periods} periods, chi-square {:.1} of {}; \
          p of channels {channels:.3?}, colour {colour:.2}; left out {spans:.0?}",
-        fit.chi_square, fit.degrees
+        case.0, fit.chi_square, fit.degrees
     );
     Ok(match fit.is_rejected() {
         true => Found { counts: [0, 1, 0, 0, 0, 0], ..Found::default() },

@@ -363,15 +363,7 @@ fn the_plant_follows_a_record_and_determines_the_parameters_better_than_its_poin
     let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
     let start = fit(&points, Definition::default(), &scene.plant, &[]).unwrap();
     let prepared = [record.prepared(&scene.knowledge()).unwrap()];
-    let followed = follow(
-        &prepared,
-        &parts,
-        &[],
-        Definition::default(),
-        &start.plant(&scene.plant),
-        &[],
-    )
-    .unwrap();
+    let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
     assert!(
         worst(&followed.fit) < 3.0 && !followed.fit.is_rejected(),
         "{followed:?}"

@@ -332,7 +332,7 @@ pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize))
     let plant = ideal.plant(expected);
     let prepared = recordings.iter().map(|one| one.prepared(&scene.knowledge()));
     let prepared: Vec<Recording> = prepared.collect::<Result<_, _>>()?;
-    let record = follow(&prepared, &parts, measured_points, definition, &plant, &known)
+    let record = follow(&prepared, &parts, measured_points, definition, expected, &known)
         .filter(|record| !recordings.is_empty() && !record.fit.is_rejected());
     let mut found = Found {
         fit: ideal,

@@ -1,28 +1,31 @@
 //! Fit of the five parameters to records themselves: the plant follows a record, and what it does not foresee is minimised.
 //!
 //! The plant is exact between events, so that no averaged equations, no held windows and no phase resonance are needed. It is driven by the measured
-//! base, and predicts the response. Once in a period the first harmonic of the error of the prediction, the innovation, corrects the state of the
-//! plant: a Kalman filter (Åström, Introduction to Stochastic Control Theory, chapter 7). Noise of the base is the noise of the process: its first
-//! harmonic in a period moves the amplitude by `omega0 T/2 = pi` times itself. Noise of the response is the noise of the measurement. Both are
-//! measured. Innovations are white, and their variance is known; so is the covariance of the parameters.
+//! base, and predicts the response. Once in a period the first harmonic of the error of the prediction, the innovation, corrects both masses: an
+//! extended Kalman filter (Åström, Introduction to Stochastic Control Theory, chapter 7), whose matrices are the plant's own derivatives, by plants
+//! that start the period a little beside it. Noise of the base is the noise of the process: its first harmonic in a period moves the response by
+//! `omega0 T/2 = pi` times itself. Noise of the response is the noise of the measurement: what the prediction leaves beside the first harmonic.
+//! Innovations are white, and their covariance is known; so is the covariance of the parameters.
 //!
-//! The fit begins at the parameters of the points of the record. The plant must keep the 1:1 motion: where it loses it, has not two impacts per
-//! period, does not forget its start, or where the innovations contradict their variances, a stretch does not belong, and is left out.
+//! The fit begins at the parameters of the points of the record. A piece of the record is left out where the plant has not two impacts per period,
+//! where a deviation of the particle grows, where the innovations contradict their covariance, and where they are not linear in the parameters: near
+//! the fold, and beyond it for other parameters within their uncertainties.
 
 use std::f64::consts::{PI, TAU};
 
 use lovines::{Cavity, Drive, Parameters, Plant, State};
+use nalgebra::{DVector, Matrix2, Matrix2x4, Matrix4, Matrix4x2, Vector2, Vector4};
 use num_complex::Complex64;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use vines_model::numerics::{LeastSquares, Misfit, mean, mean_square, noise};
+use vines_model::numerics::{Estimate, HarmonicBasis, LeastSquares, Misfit, mean, mean_square};
 use vines_model::orbit::{AfterImpact, Orbit, backbone_at_speed, exact_backbone};
 use vines_model::theory::{BranchSide, Manifold};
 use vines_model::{Definition, Dimensionless, Sensor};
 
 use super::{
-    ChannelTest, Covariance, Fit, Kind, Known, LIMITS, MeasuredPoint, Nearest, Part, Problem, Recording, UNKNOWNS,
-    Unknowns, plant, shifted, unknowns,
+    ChannelTest, Fit, Known, LIMITS, MeasuredPoint, Nearest, Part, Problem, Quantity, Recording, UNKNOWNS, Unknowns,
+    fit, plant, shifted, unknowns,
 };
 
 /// A stretch of a record: the number of the record, and the samples from which and to which it extends.
@@ -34,68 +37,85 @@ struct Stretch {
 
 /// Periods of a piece: innovations are tested piece by piece.
 const PIECE: usize = 16;
-/// Longest gap between two parts of one stretch, periods.
-const GAP: f64 = 20.0;
-/// Doublings of the standard deviation along an axis at which the rise of chi-square is looked at.
-const LONGEST: usize = 6;
+/// Periods by which stretches extend beyond the parts that have points: the tests of pieces say what belongs.
+const GAP: usize = 16;
 /// Most rounds of fits and tests.
-const ROUNDS: usize = 10;
-/// Prior standard deviation of the amplitude at the start of a stretch, over the amplitude.
-const PRIOR: f64 = 0.02;
+const ROUNDS: usize = 30;
+/// Prior standard deviations of both masses at the start of a stretch, over the response.
+const PRIOR: [f64; 2] = [0.02, 0.1];
 /// Error of the prediction, over the response, at which the plant has lost the motion.
 const LOST: f64 = 0.5;
-/// Step of a difference.
+/// Step of a difference, relative.
 const STEP: f64 = 1e-5;
-/// Least gain of the correction in the first fit, in which the plant stays near the record whatever the parameters.
+/// Step of a state, over the response: so small that hardly any impact lies between both states.
+const BESIDE: f64 = 1e-7;
+/// Noise of the process, over the noise of the measurement, in the first fit, in which the plant stays near the record whatever the parameters.
 const STRONG: f64 = 0.2;
-/// Gain of a further step, relative to one and chi-square, at which the minimum counts as found: in the first fit, and in the others.
-const FOUND: [f64; 2] = [1e-3, 1e-5];
+/// Gain of a further step, relative to one and chi-square, at which the minimum counts as found.
+const FOUND: f64 = 1e-5;
 /// Probability of a piece that belongs to the motion to be left out, for all pieces together.
 const FALSE_ALARM: f64 = 1e-3;
+/// Standard uncertainties of what is expected of f0, zeta, b and epsilon, relative, and of r, where the search begins.
+const EXPECTED: [f64; 5] = [0.01, 0.3, 0.2, 0.2, 0.3];
+/// Square of the move of the parameters, in standard uncertainties, below which the filter need not be linearised again.
+const STILL: f64 = 0.1;
 
 /// A record with its noise.
 struct Measured<'a> {
     recording: &'a Recording,
-    /// Standard deviations of the noise of response and base, m, in each piece of [`PIECE`] periods.
-    noise: Vec<[f64; 2]>,
-    /// Samples of a period.
+    /// Variance of a sample of the base, m², in each piece of [`PIECE`] periods.
+    base_noise: Vec<f64>,
+    /// Covariance of the first harmonic of the response in a period, m², in each piece.
+    response_noise: Vec<Matrix2<f64>>,
+    /// First harmonic of the base over that of the polygon of its samples, in each piece: it depends on the frequency of the base.
+    scale: Vec<f64>,
+    /// Samples of a period of the natural frequency.
     period: usize,
+}
+
+/// What the filter does in a period of a record.
+#[derive(Clone)]
+struct Step {
+    /// Its first sample, and that of the next one.
+    begin: usize,
+    end: usize,
+    /// Turns the response to the real axis.
+    turn: Complex64,
+    /// Correction of the state at the end by the innovation.
+    gain: Matrix4x2<f64>,
+    /// Makes the innovation one of covariance 1.
+    whitening: Matrix2<f64>,
+    /// Impacts of the plant for which this is.
+    impacts: u64,
+    /// Covariance of the first harmonic of the response, m², by what the prediction leaves beside it.
+    noise: Matrix2<f64>,
+    /// Derivatives of the state at the end over the state at the begin.
+    transition: Matrix4<f64>,
+}
+
+/// The periods of a stretch, and the state at the first one, for plants of other parameters as well: it has its own uncertainty.
+#[derive(Clone, Default)]
+struct Course {
+    start: State,
+    steps: Vec<Step>,
+}
+
+impl Course {
+    /// The periods that count. In those before, as many as in a piece, the particle forgets its start.
+    fn counted(&self) -> &[Step] {
+        self.steps.get(PIECE..).unwrap_or_default()
+    }
 }
 
 /// Records, of which some stretches are fitted, beside points.
 struct Followed<'a> {
     problem: &'a Problem<'a>,
-    records: &'a [Measured<'a>],
+    records: Vec<Measured<'a>>,
     stretches: Vec<Stretch>,
-    /// Angular frequency at which harmonics are taken, rad/s.
-    omega: f64,
-    /// Least gain of the correction.
-    least_gain: f64,
-    /// Periods after the start of a stretch that are not counted: the particle forgets its start by a factor of r at each impact.
-    forgotten: Vec<usize>,
-}
-
-/// How the plant followed a period.
-#[derive(Clone, Copy)]
-struct Period {
-    /// Its first sample.
-    begin: usize,
-    /// Innovation over its standard deviation: in phase with the response, and in quadrature.
-    innovation: [f64; 2],
-    /// Impacts less two for each turn of the response.
-    surplus: f64,
-    /// Distance of the twin over the distance at the begin of the piece.
-    spread: f64,
-}
-
-/// Relative difference of the particle's velocity between the plant and its twin.
-const TWIN: f64 = 1e-6;
-
-/// Distance of two states, m.
-fn distance(plant: &Plant, twin: &Plant, omega: f64) -> f64 {
-    let (one, other) = (plant.state(), twin.state());
-    let positions = (one.q1 - other.q1).hypot(one.q2 - other.q2);
-    positions.hypot((one.dq1 - other.dq1).hypot(one.dq2 - other.dq2) / omega)
+    /// The periods of each stretch.
+    courses: Vec<Course>,
+    /// Noise of the process, over the noise of the measurement, at least.
+    least_noise: f64,
 }
 
 /// Part of a record that does not belong to the motion.
@@ -120,53 +140,168 @@ pub struct RecordFit {
     pub colour: f64,
 }
 
-/// Standard deviations of the noise in a record, and how it is read.
-fn measured<'a>(recording: &'a Recording, omega: f64) -> Measured<'a> {
-    let period = (TAU / omega / recording.sample_time).round() as usize;
-    let pieces = recording
-        .response
-        .chunks(PIECE * period)
-        .zip(recording.drive.chunks(PIECE * period));
-    let mut noise: Vec<[f64; 2]> = pieces
-        .map(|(response, drive)| [noise(response), noise(drive)])
-        .collect();
-    // The last piece may have few samples.
-    if let [.., whole, last] = &mut noise[..] {
-        *last = *whole;
+/// Variance of white noise on a smooth signal, from sixth differences, which leave 1e-7 of a sine that is sampled 100 times a period.
+fn noise(values: &[f64]) -> f64 {
+    let difference = |v: &[f64]| 20.0 * v[3] - 15.0 * (v[2] + v[4]) + 6.0 * (v[1] + v[5]) - (v[0] + v[6]);
+    let differences = values.windows(7).map(difference);
+    // White noise of variance 1 gives them the sum of the squares.
+    if differences.len() == 0 {
+        0.0
+    } else {
+        mean_square(differences) / 924.0
     }
-    Measured { recording, noise, period }
 }
 
-impl Measured<'_> {
-    /// Variances of the first harmonics of response and base in the period that begins at a sample, m².
-    fn variances(&self, begin: usize) -> [f64; 2] {
-        let piece = (begin / (PIECE * self.period)).min(self.noise.len() - 1);
-        self.noise[piece].map(|u| 2.0 * u * u / self.period as f64)
+/// First harmonic of the values of one period.
+fn harmonic(values: &[f64]) -> Complex64 {
+    let step = TAU / values.len() as f64;
+    let turned = |(n, value): (usize, &f64)| Complex64::from_polar(*value, -step * n as f64);
+    let sum: Complex64 = values.iter().enumerate().map(turned).sum();
+    sum * Complex64::new(0.0, 2.0 / values.len() as f64)
+}
+
+impl<'a> Measured<'a> {
+    fn new(recording: &'a Recording, omega: f64) -> Self {
+        let period = (TAU / omega / recording.sample_time).round() as usize;
+        let [response_noise, base_noise] = [&recording.response, &recording.drive].map(|values| {
+            let mut noise: Vec<f64> = values.chunks(PIECE * period).map(noise).collect();
+            // The last piece may have few samples.
+            if let [.., whole, last] = &mut noise[..] {
+                *last = *whole;
+            }
+            noise
+        });
+        let of_harmonic = |noise: &f64| Matrix2::from_diagonal_element(2.0 * noise / period as f64);
+        let response_noise = response_noise.iter().map(of_harmonic).collect();
+        let scale = |drive: &[f64]| {
+            let harmonics: Vec<Complex64> = drive.chunks_exact(period).map(harmonic).collect();
+            let turned: Complex64 = harmonics.windows(2).map(|pair| pair[1] * pair[0].conj()).sum();
+            let half = 0.5 * (TAU + turned.arg()) / period as f64;
+            (half / half.sin()).powi(2)
+        };
+        let scale = recording.drive.chunks(PIECE * period).map(scale).collect();
+        Self { recording, base_noise, response_noise, scale, period }
     }
 
-    /// First harmonic of the values of a period that begins at the sample `from`: they are `Im(a exp(i omega t))`.
-    fn harmonic(&self, omega: f64, from: usize, values: &[f64]) -> Complex64 {
-        let step = omega * self.recording.sample_time;
-        let turned = |(n, value): (usize, &f64)| Complex64::from_polar(*value, -step * (from + n) as f64);
-        let sum: Complex64 = values.iter().enumerate().map(turned).sum();
-        sum * Complex64::new(0.0, 2.0 / values.len() as f64)
+    fn piece(&self, sample: usize) -> usize {
+        (sample / (PIECE * self.period)).min(self.base_noise.len() - 1)
     }
 
-    /// The signal of the base from a sample to the next, a straight line, from `late` seconds after the sample on. `scale` makes up for
-    /// the first harmonic of the polygon, which is smaller than that of the motion.
-    fn line(&self, n: usize, late: f64, scale: f64) -> Drive {
+    /// Variance of the first harmonic of the base in a period, m², by noise, and by what the base may do between two samples: what is not harmonic in
+    /// it changes in half a sample as the harmonic does.
+    fn base_variance(&self, begin: usize, end: usize) -> Option<f64> {
+        let (drive, n) = (&self.recording.drive, end - begin);
+        let period = &drive[begin..end];
+        let of = |from: usize| Some(harmonic(drive.get(from..from + n)?));
+        let (before, after) = begin.checked_sub(n).and_then(of).zip(of(end)).unwrap_or_default();
+        let step = (2.0 * TAU + (after * before.conj()).arg()) / (2 * n) as f64;
+        let phases: Vec<f64> = (0..n).map(|i| i as f64 * step).collect();
+        let basis = HarmonicBasis::new(&phases, 0, &[Some(0)]);
+        let values = DVector::from_column_slice(period);
+        let rest = basis.residual(&values, &basis.fit(&values)?).norm_squared() / n as f64;
+        let noise = self.base_noise[self.piece(begin)];
+        Some(2.0 * noise / n as f64 + (rest - noise).max(0.0) * (PI / n as f64).powi(2))
+    }
+
+    /// The signal of the base from a sample to the next, a straight line, from `late` seconds after the sample on.
+    fn line(&self, n: usize, late: f64) -> Drive {
         let Recording { drive, sample_time, .. } = self.recording;
+        let scale = self.scale[self.piece(n)];
         let slope = (drive[n + 1] - drive[n]) / sample_time;
         let signal = [scale * (drive[n] + slope * late), scale * slope, 0.0, 0.0];
         Drive { signal, ..Drive::default() }
     }
 }
 
+/// A plant that follows a record.
+#[derive(Clone)]
+struct Follower<'a> {
+    record: &'a Measured<'a>,
+    plant: Plant,
+    /// The sample at which it is.
+    n: usize,
+    omega: f64,
+    /// What the sensor reads of the particle.
+    share: f64,
+}
+
+impl Follower<'_> {
+    /// The sensor's reading, of which the plant goes on to the next sample.
+    fn sample(&mut self) -> Option<f64> {
+        let State { q1, q2, .. } = self.plant.state();
+        self.plant
+            .advance(self.record.line(self.n, 0.0), self.record.recording.sample_time)
+            .ok()?;
+        self.n += 1;
+        Some(q1 + self.share * q2)
+    }
+
+    /// The readings up to the first sample, from the earliest to the latest one, at which the particle has crossed the middle of its cavity upwards.
+    fn crossing(&mut self, [earliest, latest]: [usize; 2], last: usize) -> Option<Vec<f64>> {
+        let mut readings = Vec::new();
+        let mut before = self.plant.relative_displacement();
+        while self.n < last {
+            readings.push(self.sample()?);
+            let now = self.plant.relative_displacement();
+            if self.n >= latest || self.n >= earliest && before < 0.0 && now >= 0.0 {
+                return Some(readings);
+            }
+            before = now;
+        }
+        None
+    }
+
+    /// The readings up to a sample.
+    fn to(&mut self, end: usize) -> Option<Vec<f64>> {
+        (self.n..end).map(|_| self.sample()).collect()
+    }
+
+    /// Displacements and velocities over omega, m.
+    fn state(&self) -> Vector4<f64> {
+        let State { q1, dq1, q2, dq2 } = self.plant.state();
+        Vector4::new(q1, dq1 / self.omega, q2, dq2 / self.omega)
+    }
+
+    fn moved(&mut self, by: &Vector4<f64>) -> Option<()> {
+        let [q1, v1, q2, v2] = <[f64; 4]>::from(self.state() + by);
+        let state = State { q1, dq1: v1 * self.omega, q2, dq2: v2 * self.omega };
+        self.plant.set_state(state).ok()
+    }
+
+    /// What the prediction of a period leaves of the response.
+    fn errors(&self, begin: usize, readings: &[f64]) -> Vec<f64> {
+        let response = &self.record.recording.response[begin..begin + readings.len()];
+        response.iter().zip(readings).map(|(one, other)| one - other).collect()
+    }
+
+    /// The innovation of a period: the first harmonic of the errors.
+    fn innovation(&self, begin: usize, readings: &[f64], turn: Complex64) -> Vector2<f64> {
+        let first = harmonic(&self.errors(begin, readings)) * turn;
+        Vector2::new(first.re, first.im)
+    }
+}
+
+/// Covariance of the first harmonic of a period by independent errors of its samples, whose variance may differ: these are what the errors are
+/// without their mean and their harmonic.
+fn noise_of(errors: &[f64], turn: Complex64) -> Matrix2<f64> {
+    let (n, middle, first) = (errors.len() as f64, mean(errors.iter().copied()), harmonic(errors));
+    let square = |(i, error): (usize, &f64)| {
+        let wave = Complex64::from_polar(1.0, -TAU * i as f64 / n);
+        let rest = error - middle - (first * wave.conj()).im;
+        let turned = wave * Complex64::new(0.0, 2.0 / n) * turn * rest;
+        let turned = Vector2::new(turned.re, turned.im);
+        turned * turned.transpose()
+    };
+    errors.iter().enumerate().map(square).sum::<Matrix2<f64>>() * (n / (n - 3.0))
+}
+
 impl Followed<'_> {
-    /// The plant on the exact motion whose response has the amplitude and phase of the first period of a stretch, with the time from the begin of
-    /// the stretch at which it is there, s.
-    fn start(&self, record: &Measured, parameters: &Parameters, from: usize) -> Option<(f64, State)> {
-        let measured = record.harmonic(self.omega, from, &record.recording.response[from..from + record.period]);
+    /// The plant on the exact motion whose response has the amplitude and phase of the first period of a stretch, at a sample soon after.
+    fn start(&self, parameters: &Parameters, stretch: &Stretch) -> Option<Follower<'_>> {
+        let record = &self.records[stretch.record];
+        let Recording { response, sample_time, .. } = record.recording;
+        let from = stretch.span[0];
+        let measured = harmonic(response.get(from..from + record.period)?);
         let d = Dimensionless {
             definition: self.problem.definition,
             ..Dimensionless::of(parameters, 0.0)
@@ -180,151 +315,200 @@ impl Followed<'_> {
             .iter()
             .min_by(|one, other| distance(one).total_cmp(&distance(other)))?;
         // Phase of the response at the impact, less that at the sample.
-        let step = self.omega * record.recording.sample_time;
-        let rest = orbit.start.phase + orbit.gamma - (measured.arg() + step * from as f64);
+        let rest = orbit.start.phase + orbit.gamma - measured.arg();
+        let time = rest.rem_euclid(TAU) / TAU * record.period as f64 * sample_time;
         let AfterImpact { q1, dq1, q2, dq2, .. } = orbit.start;
         let ([q1, q2], [dq1, dq2]) = (
             [q1, q2].map(|one| one * d.b),
             [dq1, dq2].map(|one| one * d.b * d.omega0),
         );
-        Some((rest.rem_euclid(TAU) / self.omega, State { q1, dq1, q2, dq2 }))
+        let n = from + (time / sample_time) as usize;
+        let mut one = self.follower(parameters, stretch, State { q1, dq1, q2, dq2 }, n + 1)?;
+        let late = time - (n - from) as f64 * sample_time;
+        one.plant.advance(record.line(n, late), sample_time - late).ok()?;
+        Some(one)
     }
 
-    /// The periods of a stretch, up to the one in which the plant loses the motion.
-    /// `tests`: beside a twin that starts each piece with another velocity of the particle.
-    fn follow(&self, parameters: &Parameters, stretch: &Stretch, tests: bool) -> Option<Vec<Period>> {
-        let record = &self.records[stretch.record];
-        let Recording { response, drive, sample_time: dt, .. } = record.recording;
-        let [from, to] = stretch.span;
-        let period = record.period;
-        let half = 0.5 * self.omega * dt;
-        let scale = (half / half.sin()).powi(2);
-        let (time, state) = self.start(record, parameters, from)?;
-        let mut plant = Plant::new(*parameters, state).ok()?;
-        let mut n = from + (time / dt) as usize;
-        let late = time - (n - from) as f64 * dt;
-        plant.advance(record.line(n, late, scale), dt - late).ok()?;
-        n += 1;
-        // What is counted begins at the same sample, whatever the parameters.
-        while n < from + 2 * period {
-            plant.advance(record.line(n, 0.0, scale), *dt).ok()?;
-            n += 1;
+    /// The periods of a stretch for a plant, up to the one in which it loses the motion; `None` if none counts.
+    fn linearised(&self, parameters: &Parameters, stretch: &Stretch) -> Option<Course> {
+        let mut one = self.start(parameters, stretch)?;
+        let Measured { recording: Recording { response, .. }, period, .. } = one.record;
+        let end = stretch.span[1].min(response.len() - 1);
+        one.crossing([1, 3].map(|periods| stretch.span[0] + periods * period), end)?;
+        let amplitude = harmonic(&response[one.n - period..one.n]).norm();
+        let [masses, particle] = PRIOR.map(|prior| (prior * amplitude).powi(2));
+        let mut covariance = Matrix4::from_diagonal(&Vector4::new(masses, masses, particle, particle));
+        let start = one.plant.state();
+        let steps: Vec<Step> = std::iter::from_fn(|| self.step(&mut one, &mut covariance, end)).collect();
+        (steps.len() > PIECE).then_some(Course { start, steps })
+    }
+
+    /// Follows a period, if it ends before the sample `last`, and corrects the state, whose covariance is given; `None` where the motion is lost.
+    fn step(&self, one: &mut Follower, covariance: &mut Matrix4<f64>, last: usize) -> Option<Step> {
+        let (begin, from, record) = (one.n, one.clone(), one.record);
+        let readings = one.crossing([3, 5].map(|quarters| begin + quarters * record.period / 4), last)?;
+        let (end, state) = (one.n, one.state());
+        let there = harmonic(&record.recording.response[begin..end]);
+        let (amplitude, turn) = (there.norm(), there.conj() / there.norm());
+        let innovation = one.innovation(begin, &readings, turn);
+        if innovation.norm() > LOST * amplitude {
+            return None;
         }
-        let epsilon = match self.problem.definition.sensor {
+        let (mut transition, mut reading) = (Matrix4::zeros(), Matrix2x4::zeros());
+        for i in 0..4 {
+            let mut beside = from.clone();
+            beside.moved(&Vector4::ith(i, BESIDE * amplitude))?;
+            let others = beside.to(end)?;
+            transition.set_column(i, &((beside.state() - state) / (BESIDE * amplitude)));
+            let change = innovation - beside.innovation(begin, &others, turn);
+            reading.set_column(i, &(change / (BESIDE * amplitude)));
+        }
+        let noise = record.response_noise[record.piece(begin)];
+        let process = PI * PI * record.base_variance(begin, end)? + self.least_noise * self.least_noise * noise.trace();
+        let process = Matrix4::from_diagonal(&Vector4::new(process, process, 0.0, 0.0));
+        // Half of it has come before the middle of the period.
+        let before = *covariance + process * 0.5;
+        let total = reading * before * reading.transpose() + noise;
+        let gain = before * reading.transpose() * total.try_inverse()?;
+        let rest = Matrix4::identity() - gain * reading;
+        let kept = rest * before * rest.transpose() + gain * noise * gain.transpose();
+        // What is not linear in a correction.
+        let square = ((gain * innovation).norm_squared() / amplitude).powi(2);
+        *covariance =
+            transition * kept * transition.transpose() + process * 0.5 + Matrix4::from_diagonal_element(square);
+        let gain = transition * gain;
+        one.moved(&(gain * innovation))?;
+        Some(Step {
+            begin,
+            end,
+            turn,
+            gain,
+            whitening: total.cholesky()?.l().try_inverse()?,
+            impacts: one.plant.totals().impacts - from.plant.totals().impacts,
+            noise: noise_of(&one.errors(begin, &readings), turn),
+            transition,
+        })
+    }
+
+    /// The innovations of a plant along the steps of a stretch, over their standard deviations, up to the step that it cannot take.
+    fn innovations(
+        &self,
+        parameters: &Parameters,
+        stretch: &Stretch,
+        Course { start, steps }: &Course,
+    ) -> Vec<Vector2<f64>> {
+        let begin = steps.first().map_or(0, |step| step.begin);
+        let mut one = self.follower(parameters, stretch, *start, begin);
+        let period = |step: &Step| {
+            let follower = one.as_mut()?;
+            let readings = follower.to(step.end)?;
+            let innovation = follower.innovation(step.begin, &readings, step.turn);
+            follower.moved(&(step.gain * innovation))?;
+            Some(step.whitening * innovation)
+        };
+        steps.iter().map_while(period).skip(PIECE).collect()
+    }
+
+    /// A plant in a state at a sample of a stretch.
+    fn follower(&self, parameters: &Parameters, stretch: &Stretch, state: State, n: usize) -> Option<Follower<'_>> {
+        let share = match self.problem.definition.sensor {
             Sensor::V => parameters.mass_ratio(),
             Sensor::Q1 => 0.0,
         };
-        let read = |state: &State| state.q1 + epsilon * state.q2;
-        let twin_of = |plant: &Plant| {
-            let mut twin = *plant;
-            let State { q1, dq1, q2, dq2 } = plant.state();
-            twin.set_state(State { q1, dq1, q2, dq2: dq2 * (1.0 + TWIN) }).ok()?;
-            Some((twin, distance(plant, &twin, self.omega)))
-        };
-        let mut twin = twin_of(&plant)?;
-        let mut variance = (PRIOR * record.harmonic(self.omega, from, &response[from..from + period]).norm()).powi(2);
-        let (mut periods, mut errors) = (Vec::new(), Vec::with_capacity(period));
-        let mut base = record.harmonic(self.omega, n - period, &drive[n - period..n]).norm();
-        let mut last_response = record.harmonic(self.omega, n - period, &response[n - period..n]);
-        while n + period < to {
-            errors.clear();
-            let (begin, before) = (n, plant.totals().impacts);
-            for _ in 0..period {
-                errors.push(response[n] - read(&plant.state()));
-                let line = record.line(n, 0.0, scale);
-                plant.advance(line, *dt).ok()?;
-                if tests {
-                    twin.0.advance(line, *dt).ok()?;
-                }
-                n += 1;
-            }
-            let [u_response, u_base] = record.variances(begin);
-            let innovation = record.harmonic(self.omega, begin, &errors);
-            let there = record.harmonic(self.omega, begin, &response[begin..n]);
-            if innovation.norm() > LOST * there.norm() {
+        Some(Follower {
+            record: &self.records[stretch.record],
+            plant: Plant::new(*parameters, state).ok()?,
+            n,
+            omega: parameters.natural_frequency(),
+            share,
+        })
+    }
+}
+
+impl Followed<'_> {
+    /// The innovations of each stretch, up to where the plant cannot follow.
+    fn each(&self, x: &Unknowns) -> Vec<Vec<Vector2<f64>>> {
+        let parameters = plant(x, Cavity::IDEAL);
+        let stretches = self.stretches.iter().zip(&self.courses);
+        stretches
+            .map(|(stretch, course)| self.innovations(&parameters, stretch, course))
+            .collect()
+    }
+
+    /// The innovations of all periods; `None` where the plant cannot follow them.
+    fn all(&self, x: &Unknowns) -> Option<Vec<f64>> {
+        let each = self.each(x);
+        let is_whole = each
+            .iter()
+            .zip(&self.courses)
+            .all(|(one, course)| one.len() == course.counted().len());
+        is_whole.then(|| each.iter().flatten().flat_map(|one| [one.x, one.y]).collect())
+    }
+
+    /// Lets the plant follow the stretches, without the pieces in which it has another motion. Returns what is left out.
+    fn linearise(&mut self, x: &Unknowns) -> Vec<Stretch> {
+        let parameters = plant(x, Cavity::IDEAL);
+        let mut left_out = Vec::new();
+        loop {
+            let courses = self
+                .stretches
+                .iter()
+                .map(|one| self.linearised(&parameters, one).unwrap_or_default());
+            self.courses = courses.collect();
+            let is_another = |piece: &[Step]| {
+                let moved = piece
+                    .iter()
+                    .fold(Vector4::ith(3, 1.0), |moved, step| step.transition * moved);
+                moved.norm() >= 1.0 || piece.iter().any(|step| step.impacts != 2)
+            };
+            let flags: Vec<Vec<bool>> = self
+                .courses
+                .iter()
+                .map(|one| one.counted().chunks(PIECE).map(is_another).collect())
+                .collect();
+            let more = self.cut(&flags);
+            if more.is_empty() {
                 break;
             }
-            let total = variance + u_response;
-            let turned = innovation * (there / there.norm()).conj() / total.sqrt();
-            let turn = (there * last_response.conj()).arg() / TAU;
-            last_response = there;
-            let surplus = (plant.totals().impacts - before) as f64 - 2.0 * (1.0 + turn);
-            let spread = distance(&plant, &twin.0, self.omega) / twin.1;
-            periods.push(Period { begin, innovation: [turned.re, turned.im], surplus, spread });
-            // Between two samples the amplitude of a base that changes is known to half of the change.
-            let last = std::mem::replace(&mut base, record.harmonic(self.omega, begin, &drive[begin..n]).norm());
-            let between = ((base - last) / (2 * period) as f64).powi(2);
-            let gain = (variance / total).max(self.least_gain);
-            variance = (1.0 - gain).powi(2) * variance + gain * gain * u_response + PI * PI * (u_base + between);
-            // Both masses move, so that the particle keeps its place in the cavity.
-            let now = innovation * gain * Complex64::from_polar(1.0, self.omega * dt * n as f64);
-            let counted = periods.len() + PIECE - self.forgotten[stretch.record] % PIECE;
-            if tests && counted.is_multiple_of(PIECE) {
-                twin = twin_of(&plant)?;
-            }
-            let moved = |plant: &mut Plant| {
-                let State { q1, dq1, q2, dq2 } = plant.state();
-                let (dx, dv) = (now.im, self.omega * now.re);
-                plant
-                    .set_state(State { q1: q1 + dx, dq1: dq1 + dv, q2: q2 + dx, dq2 })
-                    .ok()
-            };
-            moved(&mut plant)?;
-            moved(&mut twin.0)?;
+            left_out.extend(more);
         }
-        periods.drain(..periods.len().min(self.forgotten[stretch.record]));
-        Some(periods)
+        self.measure_noise();
+        left_out
     }
 
-    /// The periods of all stretches; `None` where the plant loses the motion.
-    fn all(&self, x: &Unknowns) -> Option<Vec<Vec<Period>>> {
-        let parameters = plant(x, Cavity::IDEAL);
-        let whole = |stretch: &Stretch| {
-            let [_, to] = stretch.span;
-            let periods = self.follow(&parameters, stretch, false)?;
-            let end = periods.last()?.begin + 2 * self.records[stretch.record].period;
-            (end >= to).then_some(periods)
-        };
-        self.stretches.iter().map(whole).collect()
+    /// The noise of the response in each piece of the records.
+    fn measure_noise(&mut self) {
+        for (number, record) in self.records.iter_mut().enumerate() {
+            let mut sums = vec![(Matrix2::zeros(), 0.0); record.response_noise.len()];
+            let of_record = self
+                .stretches
+                .iter()
+                .zip(&self.courses)
+                .filter(|(stretch, _)| stretch.record == number);
+            for step in of_record.flat_map(|(_, course)| course.counted()) {
+                let (sum, count) = &mut sums[record.piece(step.begin)];
+                (*sum, *count) = (*sum + step.noise, *count + 1.0);
+            }
+            for (noise, (sum, count)) in record.response_noise.iter_mut().zip(sums) {
+                if count > 0.0 {
+                    *noise = sum / count;
+                }
+            }
+        }
     }
 
-    /// The stretches without the pieces that do not belong to the motion of a plant, and these. `tests`: whether the innovations are tested.
-    fn divided(&self, parameters: &Parameters, tests: bool) -> (Vec<Stretch>, Vec<Stretch>) {
-        let (mut kept, mut left_out): (Vec<Stretch>, Vec<Stretch>) = (Vec::new(), Vec::new());
-        let followed: Vec<Vec<Period>> = self
-            .stretches
-            .iter()
-            .map(|stretch| self.follow(parameters, stretch, true).unwrap_or_default())
-            .collect();
-        let pieces = followed
-            .iter()
-            .map(|one| one.len().div_ceil(PIECE))
-            .sum::<usize>()
-            .max(1) as f64;
-        let squares =
-            |piece: &[Period]| -> f64 { piece.iter().flat_map(|one| one.innovation).map(|one| one * one).sum() };
-        // A piece that does not belong bends the fit, so that others seem not to: the worst ones come first.
-        let most = followed
-            .iter()
-            .flat_map(|one| one.chunks(PIECE))
-            .map(squares)
-            .fold(0.0, f64::max);
-        let belongs = |piece: &[Period]| {
-            let surplus: f64 = piece.iter().map(|one| one.surplus).sum();
-            let p = ChiSquared::new(2.0 * piece.len() as f64).map_or(1.0, |one| one.sf(squares(piece)));
-            let is_foreign = tests && p < FALSE_ALARM / pieces && squares(piece) > 0.5 * most;
-            let is_stable = piece[piece.len() - 1].spread < 1.0;
-            // One impact may lie on each limit of the piece.
-            is_stable && surplus.abs() < 2.0 && !is_foreign
-        };
-        for (Stretch { record, span: [from, to] }, periods) in self.stretches.iter().zip(&followed) {
+    /// Cuts the flagged pieces, and what the plant did not reach, out of the stretches; returns them.
+    fn cut(&mut self, flags: &[Vec<bool>]) -> Vec<Stretch> {
+        let (mut kept, mut left_out) = (Vec::new(), Vec::new());
+        for ((Stretch { record, span: [from, to] }, course), flags) in
+            self.stretches.iter().zip(&self.courses).zip(flags)
+        {
             let period = self.records[*record].period;
             let of = |from: usize, to: usize| Stretch { record: *record, span: [from, to] };
-            let mut begin = *from;
-            let mut reached = *from;
-            for piece in periods.chunks(PIECE) {
-                let [first, last] = [piece[0].begin, piece[piece.len() - 1].begin + period];
-                if !belongs(piece) {
+            let (mut begin, mut reached) = (*from, *from);
+            for (piece, is_cut) in course.counted().chunks(PIECE).zip(flags) {
+                let [first, last] = [piece[0].begin, piece[piece.len() - 1].end];
+                if *is_cut {
                     kept.push(of(begin, first));
                     left_out.push(of(first, last));
                     begin = last;
@@ -342,65 +526,27 @@ impl Followed<'_> {
         }
         let is_long = |stretch: &Stretch| {
             let [from, to] = stretch.span;
-            to.saturating_sub(from) > (self.forgotten[stretch.record] + PIECE) * self.records[stretch.record].period
+            to.saturating_sub(from) > 2 * PIECE * self.records[stretch.record].period
         };
         kept.retain(is_long);
-        (kept, left_out)
+        self.stretches = kept;
+        left_out
     }
-}
 
-/// A minimum with its covariance.
-type Scanned = (LeastSquares<UNKNOWNS, Vec<Nearest>>, Covariance);
-
-impl Followed<'_> {
-    /// The covariance of a minimum, from the rise of chi-square along its principal axes: the motion near the fold is not linear in the parameters,
-    /// and derivatives alone may promise too much. Where chi-square is smaller on an axis, the search goes on from there.
-    fn scanned(&self, mut minimum: LeastSquares<UNKNOWNS, Vec<Nearest>>) -> Scanned {
-        for _ in 0..ROUNDS {
-            let axes = minimum.covariance().symmetric_eigen();
-            let mut lower: Option<(f64, Unknowns)> = None;
-            let mut covariance = Covariance::zeros();
-            for (variance, axis) in axes.eigenvalues.iter().zip(axes.eigenvectors.column_iter()) {
-                let step = axis * variance.max(0.0).sqrt();
-                // What no residual depends on is held: the strength of an effect, and without a scale the mass.
-                if axis[6].abs() > 0.5 || !self.problem.has_scale && axis[5].abs() > 0.5 {
-                    covariance += step * step.transpose();
-                    continue;
-                }
-                let rise = |factor: f64| {
-                    let ends = [-factor, factor].map(|factor| {
-                        let x = minimum.x + step * factor;
-                        let chi_square = self
-                            .residuals(&x, &minimum.trace)
-                            .map(|(one, _)| one.iter().map(|r| r * r).sum());
-                        (chi_square.unwrap_or(f64::INFINITY) - minimum.chi_square, x)
-                    });
-                    ends.into_iter()
-                        .min_by(|one, other| one.0.total_cmp(&other.0))
-                        .unwrap_or((1.0, minimum.x))
-                };
-                // The first distance at which chi-square has risen by one.
-                let mut scale = 1.0;
-                for factor in std::iter::successors(Some(1.0), |factor| Some(2.0 * factor)).take(LONGEST) {
-                    let (rise, x) = rise(factor);
-                    if rise < -FOUND[0] && lower.as_ref().is_none_or(|(least, _)| rise < *least) {
-                        lower = Some((rise, x));
-                    }
-                    scale = factor / rise.max(0.25).sqrt();
-                    if rise >= 1.0 {
-                        break;
-                    }
-                }
-                covariance += step * step.transpose() * scale.max(1.0).powi(2);
-            }
-            let next = lower.and_then(|(_, x)| LeastSquares::minimum(self, x, &minimum.trace, FOUND[1]));
-            match next.filter(|next| next.chi_square < minimum.chi_square) {
-                Some(next) => minimum = next,
-                None => return (minimum, covariance),
-            }
-        }
-        let covariance = minimum.covariance();
-        (minimum, covariance)
+    /// The pieces whose innovations contradict their covariance. A piece that does not belong bends the fit, so that others seem not to: the worst
+    /// ones come first.
+    fn contradicting(&self, x: &Unknowns) -> Vec<Vec<bool>> {
+        let squares = |piece: &[Vector2<f64>]| piece.iter().map(Vector2::norm_squared).sum::<f64>();
+        let sizes: Vec<Vec<f64>> = self
+            .each(x)
+            .iter()
+            .map(|one| one.chunks(PIECE).map(squares).collect())
+            .collect();
+        let most = sizes.iter().flatten().copied().fold(0.0, f64::max);
+        let p = FALSE_ALARM / sizes.concat().len().max(1) as f64;
+        let limit = ChiSquared::new(2.0 * PIECE as f64).map_or(f64::INFINITY, |one| one.inverse_cdf(1.0 - p));
+        let flags = |one: &Vec<f64>| one.iter().map(|size| *size > limit.max(0.5 * most)).collect();
+        sizes.iter().map(flags).collect()
     }
 }
 
@@ -409,17 +555,14 @@ impl Misfit<UNKNOWNS> for Followed<'_> {
 
     fn residuals(&self, x: &Unknowns, near: &Vec<Nearest>) -> Option<(Vec<f64>, Vec<Nearest>)> {
         let (mut residuals, places) = self.problem.residuals(x, near)?;
-        residuals.extend(self.all(x)?.concat().iter().flat_map(|one| one.innovation));
+        residuals.extend(self.all(x)?);
         Some((residuals, places))
     }
 
     fn derivatives(&self, x: &Unknowns, at: &Vec<Nearest>) -> Option<Vec<Unknowns>> {
         let mut rows = self.problem.derivatives(x, at)?;
-        let innovations = |x: Unknowns| -> Option<Vec<f64>> {
-            Some(self.all(&x)?.concat().iter().flat_map(|one| one.innovation).collect())
-        };
-        let here = innovations(*x)?;
-        let columns: Option<Vec<Vec<f64>>> = (0..5).map(|i| innovations(shifted(x, i, STEP))).collect();
+        let here = self.all(x)?;
+        let columns: Option<Vec<Vec<f64>>> = (0..5).map(|i| self.all(&shifted(x, i, STEP))).collect();
         let columns = columns?;
         let row = |n: usize| Unknowns::from_fn(|i, _| columns.get(i).map_or(0.0, |one| (one[n] - here[n]) / STEP));
         rows.extend((0..here.len()).map(row));
@@ -431,98 +574,124 @@ impl Misfit<UNKNOWNS> for Followed<'_> {
     }
 }
 
-/// Neighbouring parts of a record at which it has points, as stretches.
-fn stretches_of(record: usize, parts: &[Part], sample_time: f64, period: f64) -> Vec<Stretch> {
-    let mut spans: Vec<[f64; 2]> = Vec::new();
+/// Neighbouring parts of a record at which it has points, as stretches, with what is near them.
+fn stretches_of(record: usize, parts: &[Part], measured: &Measured) -> Vec<Stretch> {
+    let mut spans: Vec<[usize; 2]> = Vec::new();
+    let gap = GAP * measured.period;
     for part in parts.iter().filter(|part| part.point.is_some()) {
+        let [from, to] = part
+            .seconds
+            .map(|time| (time / measured.recording.sample_time) as usize);
         match spans.last_mut() {
-            Some([_, to]) if part.seconds[0] - *to < GAP * period => *to = part.seconds[1],
-            _ => spans.push(part.seconds),
+            Some([_, last]) if from < *last + 2 * gap => *last = to,
+            _ => spans.push([from, to]),
         }
     }
-    let samples = |span: [f64; 2]| span.map(|time| (time / sample_time) as usize);
+    let wider = |[from, to]: [usize; 2]| {
+        [
+            from.saturating_sub(gap),
+            (to + gap).min(measured.recording.response.len()),
+        ]
+    };
     spans
         .into_iter()
-        .map(|span| Stretch { record, span: samples(span) })
+        .map(|span| Stretch { record, span: wider(span) })
         .collect()
 }
 
-/// Fits the five parameters to records and points. `recordings`: prepared records ([`Recording::prepared`]) with their parts; `start`: the plant of
-/// the fit of all points. `None` for a decay, and where the plant does not follow half of the stretches.
+/// Where the search begins: at the fit of all points and of what is expected.
+fn start(
+    parts: &[Vec<Part>],
+    points: &[MeasuredPoint],
+    definition: Definition,
+    expected: &Parameters,
+    known: &[Known],
+) -> Option<Unknowns> {
+    let mut points = points.to_vec();
+    points.extend(parts.iter().flatten().filter_map(|part| part.point));
+    let wide = Quantity::FITTED.iter().zip(EXPECTED).map(|(quantity, range)| {
+        let value = quantity.of_plant(expected);
+        let uncertainty = range * if *quantity == Quantity::R { 1.0 } else { value };
+        Known::Value {
+            quantity: *quantity,
+            estimate: Estimate { value, uncertainty },
+        }
+    });
+    let known: Vec<Known> = known.iter().copied().chain(wide).collect();
+    let fit = fit(&points, definition, expected, &known).ok()?;
+    Some(unknowns(&fit.plant(expected)))
+}
+
+/// Fits the five parameters to records and points. `recordings`: prepared records ([`Recording::prepared`]) with their parts; `expected`: about
+/// which rig it is. `None` where the plant does not follow half of the stretches.
 #[must_use]
 pub fn follow(
     recordings: &[Recording],
     parts: &[Vec<Part>],
     points: &[MeasuredPoint],
     definition: Definition,
-    start: &Parameters,
+    expected: &Parameters,
     known: &[Known],
 ) -> Option<RecordFit> {
-    // A decay crosses the fold, near which the errors of the parameters are far from normal.
-    if parts.iter().flatten().any(|part| part.kind == Kind::Decay) {
-        return None;
-    }
-    let omega = start.natural_frequency();
     let problem = Problem::new(points.to_vec(), definition, known);
-    let records: Vec<Measured> = recordings.iter().map(|recording| measured(recording, omega)).collect();
+    let x = start(parts, points, definition, expected, known)?;
+    let omega = x[0].exp();
+    let records: Vec<Measured> = recordings
+        .iter()
+        .map(|recording| Measured::new(recording, omega))
+        .collect();
     let stretches = records
         .iter()
         .zip(parts)
         .enumerate()
-        .flat_map(|(n, (one, parts))| stretches_of(n, parts, one.recording.sample_time, TAU / omega))
+        .flat_map(|(n, (one, parts))| stretches_of(n, parts, one))
         .collect();
-    let forgotten = records.iter().map(|record| {
-        let u = mean((0..record.noise.len()).map(|n| record.variances(n * PIECE * record.period)[0])).sqrt();
-        let largest = record
-            .recording
-            .response
-            .iter()
-            .fold(0.0, |most: f64, one| most.max(one.abs()));
-        // Until the start is below the noise.
-        ((largest / u).ln() / (-2.0 * start.restitution.min(0.98).ln())).ceil() as usize
-    });
-    let forgotten = forgotten.collect();
     let mut followed = Followed {
         problem: &problem,
-        records: &records,
+        records,
         stretches,
-        omega,
-        least_gain: STRONG,
-        forgotten,
+        courses: Vec::new(),
+        least_noise: STRONG,
     };
-    let periods = |stretches: &[Stretch]| {
-        let of = |Stretch { record, span: [from, to] }: &Stretch| (to - from) / records[*record].period;
-        stretches.iter().map(of).sum::<usize>()
+    let samples = |stretches: &[Stretch]| {
+        stretches
+            .iter()
+            .map(|Stretch { span: [from, to], .. }| to - from)
+            .sum::<usize>()
     };
-    let whole = periods(&followed.stretches);
-    let mut out: Vec<Stretch> = Vec::new();
-    let mut cut = |followed: &mut Followed, x: &Unknowns, tests: bool| {
-        let (kept, left_out) = followed.divided(&plant(x, Cavity::IDEAL), tests);
-        followed.stretches = kept;
-        let is_cut = !left_out.is_empty();
-        out.extend(left_out);
-        is_cut
-    };
-    let mut x = unknowns(start);
-    while cut(&mut followed, &x, false) {}
-    x = LeastSquares::minimum(&followed, x, &Vec::new(), FOUND[0])?.x;
-    followed.least_gain = 0.0;
+    let whole = samples(&followed.stretches);
+    let mut x = x;
+    let mut out = followed.linearise(&x);
     let mut found = None;
     for _ in 0..ROUNDS {
-        while cut(&mut followed, &x, false) {}
-        let minimum = followed.scanned(LeastSquares::minimum(&followed, x, &Vec::new(), FOUND[1])?);
-        x = minimum.0.x;
-        found = Some(minimum);
-        if !cut(&mut followed, &x, true) {
-            break;
+        out.extend(followed.linearise(&x));
+        let minimum = LeastSquares::minimum(&followed, x, &Vec::new(), FOUND)?;
+        let moved = minimum.x - x;
+        x = minimum.x;
+        let is_first = followed.least_noise > 0.0;
+        followed.least_noise = 0.0;
+        if is_first {
+            continue;
         }
-        found = None;
+        let is_still = minimum
+            .derivatives
+            .iter()
+            .map(|row| row.dot(&moved).powi(2))
+            .sum::<f64>()
+            < STILL;
+        if is_still {
+            let more = followed.cut(&followed.contradicting(&x));
+            if more.is_empty() {
+                found = Some(minimum);
+                break;
+            }
+            out.extend(more);
+        }
     }
-    let (minimum, covariance) = found.filter(|_| 2 * periods(&followed.stretches) >= whole)?;
-    let innovations: Vec<[f64; 2]> = followed.all(&x)?.concat().iter().map(|one| one.innovation).collect();
+    let minimum = found.filter(|_| 2 * samples(&followed.stretches) >= whole)?;
+    let innovations: Vec<Vector2<f64>> = followed.each(&x).concat();
     let count = innovations.len();
     let mut fit = problem.found(&minimum, &minimum.trace);
-    fit.covariance = covariance;
     fit.degrees = (2 * count + problem.equations()).checked_sub(5 + usize::from(problem.has_scale))?;
     let channel = |i: usize| innovations.iter().map(move |one| one[i]);
     for i in 0..2 {

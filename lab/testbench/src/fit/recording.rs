@@ -15,11 +15,10 @@ use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 use std::fmt::{self, Display, Formatter};
 
-use nalgebra::DVector;
 use num_complex::Complex64;
 use serde::Serialize;
 use thiserror::Error;
-use vines_model::numerics::{Estimate, HarmonicBasis, RANDOM, mean, range, slope};
+use vines_model::numerics::{Estimate, RANDOM, mean, range, slope};
 use vines_model::regime::Regime;
 use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
 use vines_model::{Measurand, Sensor};
@@ -112,6 +111,8 @@ impl RecordingError {
 
 /// Periods of the fits that make the clock, and of those of a decay.
 const WINDOW: f64 = 2.5;
+/// Periods within which a constant hardly drifts.
+const SLOW: usize = 16;
 /// Fewest periods of a recording.
 const FEWEST: f64 = 16.0;
 /// Fewest samples in a period: the fit of one has nine unknowns, and the third harmonic must be resolved.
@@ -245,7 +246,7 @@ impl Recording {
         for (channel, values) in [&mut one.response, &mut one.drive].into_iter().enumerate() {
             let scale = knowledge.target.scale(channel);
             values.iter_mut().for_each(|value| *value *= scale);
-            remove_drift(values, linear.omega0 * self.sample_time);
+            remove_drift(values, (TAU / linear.omega0 / self.sample_time).round() as usize);
         }
         Ok(one)
     }
@@ -462,32 +463,32 @@ impl Recording {
     }
 }
 
-/// Removes what changes slowly: the constants of fits over [`WINDOW`] periods, between which straight lines lead. `step`: phase from sample to sample
-/// at the natural frequency.
-fn remove_drift(values: &mut [f64], step: f64) {
-    let period = TAU / step;
-    let window = (WINDOW * period).round() as usize + 1;
-    let middle = 0.5 * (window - 1) as f64;
-    let phases: Vec<f64> = (0..window).map(|n| (n as f64 - middle) * step).collect();
-    let basis = HarmonicBasis::new(&phases, 1, &[Some(2), None, Some(1)]);
-    let constant = |(n, values): (usize, &[f64])| {
-        let fit = basis.fit(&DVector::from_column_slice(values))?;
-        Some((n as f64 + middle, fit.constant()))
-    };
-    let windows = values
-        .windows(window)
-        .enumerate()
-        .step_by((period.round() as usize).max(1));
-    let knots: Vec<(f64, f64)> = windows.filter_map(constant).collect();
-    if knots.len() < 2 {
-        return;
+/// Removes what changes slowly: running means over a period of the natural frequency, three times, which the oscillation does not pass, and over
+/// [`SLOW`] periods, so that the noise near the natural frequency stays white. At both ends a straight line goes on.
+fn remove_drift(values: &mut [f64], period: usize) {
+    let slow = (SLOW * period).min((values.len() / 2).saturating_sub(2 * period));
+    let mut drift = values.to_vec();
+    for length in [period, period, period, slow] {
+        let first: f64 = drift[..length].iter().sum();
+        let later = drift.windows(length + 1).scan(first, |sum, one| {
+            *sum += one[length] - one[0];
+            Some(*sum)
+        });
+        let sums = std::iter::once(first).chain(later);
+        drift = sums.map(|sum| sum / length as f64).collect();
     }
+    let last = drift.len() - 1;
+    let first = (values.len() - drift.len()) / 2;
+    let apart = slow.min(last).max(1);
+    let slopes = [
+        drift[apart.min(last)] - drift[0],
+        drift[last] - drift[last.saturating_sub(apart)],
+    ]
+    .map(|change| change / apart as f64);
     for (n, value) in values.iter_mut().enumerate() {
-        let after = knots
-            .partition_point(|knot| knot.0 < n as f64)
-            .clamp(1, knots.len() - 1);
-        let [(from, left), (to, right)] = [knots[after - 1], knots[after]];
-        *value -= left + (right - left) * (n as f64 - from) / (to - from);
+        let at = n.saturating_sub(first).min(last);
+        let beyond = n as f64 - (first + at) as f64;
+        *value -= drift[at] + beyond * slopes[usize::from(beyond > 0.0)];
     }
 }
 
