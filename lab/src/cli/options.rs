@@ -195,6 +195,15 @@ impl Endpoint {
                 "a scene with [structure] has the rig `built-in` or its Structure.fmu: rigs across the network have one oscillator",
             ));
         }
+        let has_shaker = scene
+            .structure
+            .as_ref()
+            .is_some_and(|structure| structure.shaker.is_some());
+        if has_shaker && !matches!(self, Self::BuiltIn) {
+            return Err(Failure::input(
+                "a scene with [shaker] has the rig `built-in`: an FMU has no shaker yet",
+            ));
+        }
         let (mut pace, mut timing) = (None, Arc::default());
         let rig: Box<dyn Rig> = match self {
             Self::BuiltIn => Simulated::without_chain(scene)?,

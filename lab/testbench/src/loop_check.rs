@@ -3,6 +3,8 @@
 //! A linear resonator at rest that is driven at its natural frequency with the amplitude E responds with `-i g E (1 - exp(-d t))/d`
 //! (`g`: half the frequency, `d`: damping rate). Response and base are compared with this and with E, by amplitude and phase.
 
+mod shaker;
+
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::{DVector, Matrix3, RowVector3, Vector3};
@@ -42,7 +44,9 @@ impl LoopCheck {
     /// Whether a measured quantity differs from another check beyond the uncertainties.
     fn differs_from(&self, other: &Self) -> bool {
         let mut pairs = self.quantities.iter().zip(&other.quantities);
-        pairs.any(|(one, other)| (one.measured - other.measured).abs() > SIGNIFICANT * one.uncertainty.hypot(other.uncertainty))
+        pairs.any(|(one, other)| {
+            (one.measured - other.measured).abs() > SIGNIFICANT * one.uncertainty.hypot(other.uncertainty)
+        })
     }
 }
 
@@ -52,9 +56,15 @@ impl LoopCheck {
 /// A response that is refused is checked again at less drive: a sensor is late or has a wrong factor at every drive, but a particle that slides on
 /// the floor sticks to it. What a check at less drive finds counts if it differs.
 pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, RigError> {
+    if let Some(stated) = &plan.knowledge.shaker {
+        return shaker::check(rig, plan, stated);
+    }
     let mut found = at_share(rig, plan, SHARES[0])?;
     for share in &SHARES[1..] {
-        if !matches!(found.verdict, Verdict::ResponseLate | Verdict::BaseLate | Verdict::ResponseGain) {
+        if !matches!(
+            found.verdict,
+            Verdict::ResponseLate | Verdict::BaseLate | Verdict::ResponseGain
+        ) {
             break;
         }
         let again = at_share(rig, plan, *share)?;
@@ -412,6 +422,11 @@ pub enum Verdict {
         "the base moves at another frequency than the drive: check the clocks and the sample times of rig and controller"
     )]
     Clock,
+    #[error(
+        "the force collapses near the resonance, and a stable loop behind this shaker is slower than the motion that it must follow: take a softer \
+         suspension, a drive point that moves less, or a table"
+    )]
+    DropOut,
     #[error("the response is noisy: check its shield and range")]
     ResponseNoisy,
     #[error("the base sensor is noisy: check its shield and range")]

@@ -82,6 +82,8 @@ pub struct Target {
     pub measurands: [Measurand; 2],
     /// The frequency by which readings are divided, rad/s.
     pub omega0: f64,
+    /// A shaker stands between the command and the reference, so that the reference drives the structure as it is measured.
+    pub through_shaker: bool,
 }
 
 impl Target {
@@ -126,6 +128,19 @@ impl Target {
     }
 }
 
+/// What a shaker makes of its command near the natural frequency, without impacts. Amplitudes are those of the bench, in m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShakerPath {
+    /// Decay rate of the pole with which the response settles, and its frequency less the natural one, rad/s.
+    pub pole: [f64; 2],
+    /// Reference per command at the natural frequency, over the larger one at the ends of the range of frequencies: the drop-out.
+    pub drop_out: f64,
+    /// Whether the reference is a force, and not the displacement of a table.
+    pub by_force: bool,
+    /// Phase by which the reference turns within the half-power bandwidth, rad.
+    pub turn: f64,
+}
+
 /// What measuring knows of a rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Knowledge {
@@ -143,6 +158,8 @@ pub struct Knowledge {
     pub sample_time: f64,
     /// Phase of the response relative to the reference that the loop holds, and what is measured of both.
     pub target: Target,
+    /// The shaker, if one stands between the command and the reference, which then drives the structure as it is measured.
+    pub shaker: Option<ShakerPath>,
 }
 
 impl Knowledge {
@@ -153,6 +170,7 @@ impl Knowledge {
             phase,
             measurands: definition.measurands(),
             omega0: linear.omega0,
+            through_shaker: false,
         };
         Self {
             linear,
@@ -162,6 +180,7 @@ impl Knowledge {
             carried_up_to: carried_up_to(plant),
             sample_time,
             target,
+            shaker: None,
         }
     }
 
@@ -236,7 +255,11 @@ impl Scene {
     /// What the scene says of its rig.
     pub fn knowledge(&self) -> Knowledge {
         let phase = self.controller.phase_target.to_radians();
-        Knowledge::of(&self.plant, self.resonance, self.amplitude, self.sample_time(), phase)
+        let mut knowledge = Knowledge::of(&self.plant, self.resonance, self.amplitude, self.sample_time(), phase);
+        let structure = self.structure.as_ref();
+        knowledge.shaker = structure.and_then(|structure| structure.shaker_path(self.frequencies()));
+        knowledge.target.through_shaker = knowledge.shaker.is_some();
+        knowledge
     }
 
     /// The experiment on a rig that is as the scene says.

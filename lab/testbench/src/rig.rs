@@ -14,7 +14,7 @@ use thiserror::Error;
 use vines_model::{Definition, Sensor};
 
 pub use crate::scene::has_friction;
-use crate::scene::{Scene, Structure};
+use crate::scene::{Excitation, Limits, Scene, SceneShaker, Structure};
 
 pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
@@ -186,6 +186,16 @@ pub enum RigError {
     #[error("the rig: {0}")]
     Structure(#[from] Refused),
     #[error(
+        "the shaker reached its limit: the {name} is {value:.4} {unit}, and shaker.{key} allows {limit} {unit}; its amplifier has switched off"
+    )]
+    ShakerLimit {
+        name: &'static str,
+        key: &'static str,
+        value: f64,
+        limit: f64,
+        unit: &'static str,
+    },
+    #[error(
         "the rig accepts frequency and amplitude only, not samples of the base displacement: chain.hold = true and \
          helic devices need a rig that does"
     )]
@@ -346,9 +356,12 @@ pub struct SimulatedStructure {
     simulated: Simulated<lovines::Structure>,
     /// The displacement at the sensor, by the sections.
     sensor: Row,
-    /// Base displacement per drive, and displacement at the sensor per displacement at the cavity.
-    base_per_drive: f64,
+    /// Base displacement per command, and displacement at the sensor per displacement at the cavity.
+    base_per_command: f64,
     reading_per_response: f64,
+    /// The shaker, and the base displacement per reference.
+    shaker: Option<(SceneShaker, f64)>,
+    excitation: Excitation,
 }
 
 impl SimulatedStructure {
@@ -359,17 +372,53 @@ impl SimulatedStructure {
         Ok(Self {
             simulated: Simulated { plant, sensor: Sensor::Q1, clock: Clock::default() },
             sensor: structure.response(),
-            base_per_drive: structure.base_per_drive(),
+            base_per_command: structure.base_per_command(),
             reading_per_response: structure.reading_per_response().abs(),
+            shaker: structure
+                .shaker
+                .clone()
+                .map(|shaker| (shaker, structure.base_per_drive())),
+            excitation: structure.excitation,
         })
     }
 
-    fn drive(&self, drive: Drive) -> Drive {
-        Drive {
-            amplitude: drive.amplitude / self.base_per_drive,
-            displacement: drive.displacement / self.base_per_drive,
-            ..drive
+    /// Advances under a drive in m of base displacement; a command is clipped, and the other limits of a shaker are looked at.
+    fn step(&mut self, drive: lovines::Drive, step: f64) -> Result<(), RigError> {
+        let Some((shaker, _)) = &self.shaker else {
+            return self.simulated.step(drive, step);
+        };
+        let Simulated { plant, clock, .. } = &mut self.simulated;
+        plant.set_time(clock.time());
+        plant.advance_within(shaker.largest_command(), drive, step)?;
+        clock.advance(step);
+        let rows = &shaker.rows;
+        let current = plant.point(&rows.current)[0] + rows.current_per_command * plant.base_displacement();
+        let [force, stroke] = [&rows.force, &rows.armature].map(|row| plant.point(row)[0]);
+        let Limits {
+            current: current_max, stroke: stroke_max, force: force_max, ..
+        } = shaker.limits;
+        for (name, key, value, limit, unit) in [
+            ("current", "current_max", current, current_max, "A"),
+            ("displacement of the armature", "stroke_max", stroke, stroke_max, "m"),
+            ("force", "force_max", force, force_max, "N"),
+        ] {
+            // The command is clipped at the limit itself.
+            if let Some(limit) = limit.filter(|limit| value.abs() > limit * (1.0 + 1e-9)) {
+                return Err(RigError::ShakerLimit { name, key, value, limit, unit });
+            }
         }
+        Ok(())
+    }
+}
+
+impl SimulatedStructure {
+    /// The reference as a base displacement, m: the drive, the force cell or the table.
+    fn reference(&self) -> f64 {
+        let plant = &self.simulated.plant;
+        let Some((shaker, base_per_reference)) = &self.shaker else {
+            return plant.base_displacement() * self.base_per_command;
+        };
+        base_per_reference * plant.point(shaker.reference(self.excitation))[0]
     }
 }
 
@@ -382,18 +431,17 @@ impl RigStage for SimulatedStructure {
         let [displacement, ..] = self.simulated.plant.point(&self.sensor);
         Ok(Sensors {
             response: displacement / self.reading_per_response,
-            reference: Some(self.simulated.plant.base_displacement() * self.base_per_drive),
+            reference: Some(self.reference()),
         })
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let drive = self.drive(drive);
-        self.simulated.advance(drive, step)
+        let amplitude = drive.amplitude / self.base_per_command;
+        self.step(lovines::Drive::harmonic(amplitude, drive.omega), step)
     }
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let drive = self.drive(drive);
-        self.simulated.hold(drive, step)
+        self.step(lovines::Drive::held(drive.displacement / self.base_per_command), step)
     }
 }
 

@@ -25,6 +25,7 @@ mod chain;
 mod controller;
 mod names;
 mod overrides;
+mod shaker;
 mod structure;
 pub mod unit;
 
@@ -39,6 +40,7 @@ use lovines::{Cavity, InvalidValue, Restitution, State};
 use phase_lock::{ConfigError, Number};
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use shaker::ShakerSection;
 use structure::StructureSection;
 use vines_model::ArgumentError;
 
@@ -49,6 +51,7 @@ pub use controller::{ControllerSettings, KEYS, PhaseLock, key, refusal};
 pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
 pub use names::{Name, Names};
 pub use overrides::{Family, Override};
+pub use shaker::{Limits, SceneShaker};
 pub use structure::{Excitation, Structure, StructureMode};
 pub use vines_model::{Definition, Dimensionless, Measurand, Reference, Sensor};
 
@@ -160,14 +163,33 @@ impl Scene {
     pub fn implausible(&self) -> impl Iterator<Item = Implausible> {
         let d = Dimensionless::of(&self.plant, 0.0);
         let hertz = d.omega0 / TAU;
+        let [heavy, shaken] = self.heavy_shaker().unwrap_or_default();
         [
             ("epsilon = m/M", d.epsilon, "", d.epsilon > 0.3),
             ("lambda = c/(m omega0)", d.lambda, "", d.lambda > 30.0),
             ("b", d.b, "m", d.b > 1.0),
             ("the natural frequency", hertz, "Hz", hertz < 0.1),
+            (
+                "armature over structure: resonance of both, over the structure's, which the loop holds",
+                shaken,
+                "",
+                heavy > 1.0,
+            ),
         ]
         .into_iter()
         .filter_map(|(name, value, unit, is)| is.then_some(Implausible { name, value, unit }))
+    }
+
+    /// Mass of the armature over the mass that the driven mode has at its point, and the frequency of the pole with which structure and shaker
+    /// answer the command, over the natural frequency.
+    fn heavy_shaker(&self) -> Option<[f64; 2]> {
+        let (structure, path) = (self.structure.as_ref()?, self.knowledge().shaker?);
+        let (shaker, mode) = (&structure.shaker.as_ref()?.shaker, structure.mode());
+        // A heavy armature under a table is what a slip table is.
+        let share = structure
+            .drive
+            .map_or(0.0, |point| shaker.mass * mode.shape[point].powi(2));
+        Some([share, 1.0 + path.pole[1] / mode.omega])
     }
 
     /// The controller's sample time, s: rig and controller agree on it before anything is measured.
@@ -213,6 +235,7 @@ pub fn has_friction(plant: &Parameters) -> bool {
 struct Sections {
     plant: PlantSection,
     structure: Option<StructureSection>,
+    shaker: Option<ShakerSection>,
     start: StartSection,
     excitation: ExcitationSection,
     controller: ControllerSettings,
@@ -290,11 +313,21 @@ impl Sections {
     fn resolve(self, origin: &str) -> Result<Scene, SceneError> {
         // Paths are relative to the scene file.
         let folder = Path::new(origin).parent().unwrap_or(Path::new(""));
-        let structure = self
+        let mut plant = self.plant;
+        let mut structure = self
             .structure
             .map(|section| section.resolve(origin, folder))
             .transpose()?;
-        let mut plant = self.plant;
+        if let Some(shaker) = &self.shaker {
+            let host = match structure.take() {
+                Some(structure) => structure,
+                None => plant.take_oscillator(origin, shaker)?,
+            };
+            let attached = shaker
+                .attach(host)
+                .map_err(|message| SceneError::text(origin, format!("[shaker]: {message}")))?;
+            structure = Some(attached);
+        }
         let mut resonance = self.resonance;
         if let Some(structure) = &structure {
             plant = plant.of_structure(origin, structure)?;
@@ -329,6 +362,24 @@ impl Sections {
         if let Some(structure) = &scene.structure {
             SimulatedStructure::new(structure, scene.plant, scene.start)
                 .map_err(|error| SceneError::text(origin, format!("[structure]: {error}")))?;
+        }
+        if let Some(shaker) = scene.structure.as_ref().and_then(|structure| structure.shaker.as_ref()) {
+            if !scene.chain.reference {
+                let message = "[shaker] with chain.reference = false: the command is not the force; the loop needs the force cell, or the sensor of \
+                               the table, as its reference";
+                return Err(SceneError::text(origin, message));
+            }
+            let force = scene.amplitude / scene.structure.as_ref().map_or(1.0, Structure::base_per_drive);
+            let is_force = scene
+                .structure
+                .as_ref()
+                .is_some_and(|structure| structure.excitation == Excitation::Force);
+            if let Some(limit) = shaker.limits.force.filter(|limit| is_force && force > *limit) {
+                let message = format!(
+                    "[excitation] asks for {force:.4} N, and shaker.force_max allows {limit} N: lower one, or raise the other"
+                );
+                return Err(SceneError::text(origin, message));
+            }
         }
         scene.controller.check()?;
         scene.backbone.check()?;
@@ -472,6 +523,30 @@ impl PlantSection {
     /// The number under a symbol of the table.
     fn get(&self, symbol: &str) -> Option<f64> {
         self.values.0[Values::place(symbol)?]
+    }
+
+    /// The oscillator as a structure with one mode, on the table of a shaker or driven by its force.
+    fn take_oscillator(&mut self, origin: &str, shaker: &ShakerSection) -> Result<Structure, SceneError> {
+        let excitation = if shaker.has_table() {
+            Excitation::Base
+        } else {
+            Excitation::Force
+        };
+        let mut numbers = [0.0; 3];
+        for (number, symbol) in numbers.iter_mut().zip(["M", "k", "c"]) {
+            let place = Values::place(symbol);
+            *number = place.and_then(|place| self.values.0[place].take()).ok_or_else(|| {
+                let message = format!(
+                    "[shaker] with a [plant] without `{symbol}`: give M, k and c in SI units, or a [structure]"
+                );
+                SceneError::text(origin, message)
+            })?;
+        }
+        let [mass, stiffness, damping] = numbers;
+        positive("plant.M", mass, "kg")?;
+        positive("plant.k", stiffness, "N/m")?;
+        not_negative("plant.c", damping, "N s/m")?;
+        Structure::of_oscillator(numbers, excitation)
     }
 
     /// The section with the oscillator of a structure's driven mode.

@@ -39,11 +39,14 @@ impl Scene {
             restitution: self.plant.restitution,
         };
         let target = self.controller.phase_target.to_radians();
-        let orbits = StructureOrbits::new(&structure.host, particle);
+        let mut orbits = StructureOrbits::new(&structure.host, particle);
+        if let Some(shaker) = &structure.shaker {
+            orbits = orbits.with_reference(shaker.reference(structure.excitation));
+        }
         Some(orbits.with_response(&structure.response()).with_target(target))
     }
 
-    /// Amplitude of the drive of the scene's structure: m for a base, N for a force.
+    /// Amplitude of the drive of the scene's structure, or of its reference behind a shaker: m for a base, N for a force.
     pub fn structure_drive(&self) -> Option<f64> {
         self.structure
             .as_ref()

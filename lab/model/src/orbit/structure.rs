@@ -98,7 +98,7 @@ impl StructureOrbit {
             .zip(moduli)
             .for_each(|(multiplier, modulus)| *multiplier = modulus);
         Orbit {
-            g: d.excitation(self.drive * base_per_drive),
+            g: d.excitation(self.reference * base_per_drive),
             sigma: d.sigma(self.omega),
             omega: self.omega / d.omega0,
             c: self.response / (d.b * reading_per_response),
@@ -278,8 +278,7 @@ pub struct StructureOrbits {
     sections: Vec<Section>,
     particle: Particle,
     response: Option<Vec<[f64; 2]>>,
-    /// The reference, and what it contains per square of the frequency.
-    reference: Option<[Vec<[f64; 2]>; 2]>,
+    reference: Option<Vec<[f64; 2]>>,
     /// Weight of m q2 in the response.
     of_particle: f64,
     /// The phase refers to the force of the drive on the first section, not to the drive.
@@ -332,9 +331,9 @@ impl StructureOrbits {
         self
     }
 
-    /// With a sum over the sections as the reference, instead of the drive; it has `inertial` times the square of the frequency added.
-    pub fn with_reference(mut self, row: &[[f64; 2]], inertial: &[[f64; 2]]) -> Self {
-        self.reference = Some([row, inertial].map(<[_]>::to_vec));
+    /// With a sum over the sections as the reference, instead of the drive.
+    pub fn with_reference(mut self, row: &[[f64; 2]]) -> Self {
+        self.reference = Some(row.to_vec());
         self
     }
 
@@ -353,10 +352,7 @@ impl StructureOrbits {
         Self {
             sections: kept(&self.sections, &keep),
             response: self.response.as_ref().map(|rows| kept(rows, &keep)),
-            reference: self
-                .reference
-                .as_ref()
-                .map(|both| both.each_ref().map(|rows| kept(rows, &keep))),
+            reference: self.reference.as_ref().map(|rows| kept(rows, &keep)),
             ..*self
         }
     }
@@ -499,14 +495,9 @@ impl StructureOrbits {
     /// All symmetric motions at the frequency `omega`.
     pub(super) fn motions(&self, omega: f64) -> Option<SymmetricMotions> {
         let force = Some(self.sections.first()?.drive_force(omega)).filter(|_| self.by_force);
-        let reference = self.reference.as_ref().map(|[row, inertial]| -> Vec<[f64; 2]> {
-            let both = row.iter().zip(inertial);
-            both.map(|(row, inertial)| [0, 1].map(|n| row[n] + omega * omega * inertial[n]))
-                .collect()
-        });
         let reading = Reading {
             sections: self.response.as_deref(),
-            reference_sections: reference.as_deref(),
+            reference_sections: self.reference.as_deref(),
             particle: self.of_particle,
             reference: Complex::from_polar(1.0, self.target + FRAC_PI_2) * force.unwrap_or(Complex::ONE),
         };

@@ -211,7 +211,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             let scale = (slope.abs() * leg.response).clamp(SMALLEST_SLOPE * self.requested, self.requested);
             let is_found = (self.requested - leg.drive).abs() < (FOUND * scale).max(leg.noise);
             // The condition of stability under a constant drive.
-            let is_stable = slope > SMALLEST_SLOPE * self.damping();
+            // Behind a shaker a constant command is no constant force: the response stays under control.
+            let is_stable = !self.target.through_shaker && slope > SMALLEST_SLOPE * self.damping();
             if is_found || is_stable && legs == LEGS {
                 if is_stable {
                     self.bench.controller.hold_drive()?;

@@ -26,7 +26,7 @@ use vines_model::numerics::{Estimate, HarmonicBasis, Regression, mean, slope};
 use super::harmonics_of;
 use crate::plan::{Knowledge, LinearResponse, Target};
 use crate::record::{Sample, drive_phases};
-use crate::scene::{Definition, Reference, Sensor};
+use crate::scene::{Definition, Measurand, Reference, Sensor};
 
 /// Prior knowledge of the slopes of `E_R` and `omega_R` over the amplitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -313,7 +313,7 @@ pub struct Cycle {
     pub drive_phase: f64,
     /// Mean frequency of the drive, rad/s.
     pub omega: f64,
-    /// Fundamental of the commanded base motion, m, without noise; and its change over half the period.
+    /// Fundamental of the commanded base motion, m, without noise, or of the measured reference behind a shaker; and its change over half the period.
     pub commanded: [Complex<f64>; 2],
     /// Fundamental of the response relative to the drive's phase, m: `Im a exp(i phase)`.
     pub response: Complex<f64>,
@@ -358,9 +358,16 @@ impl Cycle {
             degrees[0] = Some(1);
             [basis, HarmonicBasis::new(&uniform, 0, &degrees)]
         };
-        let of_base = bases(HARMONICS);
-        let of_response = harmonics_of(target.measurands[0], samples.len() as f64, HARMONICS);
-        let of_response = (of_response != HARMONICS).then(|| bases(of_response));
+        let harmonics = |measurand| harmonics_of(measurand, samples.len() as f64, HARMONICS);
+        // Impacts jerk the force of a shaker as they jerk an acceleration.
+        let in_base = if target.through_shaker {
+            harmonics(Measurand::Acceleration)
+        } else {
+            HARMONICS
+        };
+        let in_response = harmonics(target.measurands[0]);
+        let of_base = bases(in_base);
+        let of_response = (in_response != in_base).then(|| bases(in_response));
         let [basis, drifting] = &of_base;
         let fitted = |channel: usize, value: fn(&Sample) -> f64| {
             let displacement = target.displacement(channel, mean_omega);
@@ -381,9 +388,15 @@ impl Cycle {
         let commanded = drifting.fit(&motion(&|n| 0.5 * (before(n) + samples[n].command.drive.amplitude)))?;
         let as_read = basis.fit(&motion(&before))?.harmonic(1);
         let measured = samples.iter().all(|s| s.sensors.reference.is_some());
-        let (base, base_noise) = if measured {
+        let mut commanded = [commanded.harmonic(1), commanded.drift(1)];
+        let (base, base_noise) = if measured && target.through_shaker {
             let (base, noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
-            (base * commanded.harmonic(1) / as_read, noise)
+            // Its change within a period cannot be told from so many harmonics.
+            commanded = [base, Complex::ZERO];
+            (base, noise)
+        } else if measured {
+            let (base, noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
+            (base * commanded[0] / as_read, noise)
         } else {
             (Complex::new(mean(|s| s.command.drive.amplitude), 0.0), 0.0)
         };
@@ -394,7 +407,7 @@ impl Cycle {
             mean(|s| s.command.phase_error.unwrap_or(0.0))
         };
         Some(Self {
-            commanded: [commanded.harmonic(1), commanded.drift(1)],
+            commanded,
             time: mean(|s| s.time),
             drive_phase,
             omega: mean_omega,

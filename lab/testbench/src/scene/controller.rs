@@ -3,12 +3,13 @@
 use std::f64::consts::{PI, TAU};
 
 use lovines::State;
-use phase_lock::{Config, ConfigError, LockCriterion, NONE, PARAMETERS, Parameter, Value as Setting};
+use num_complex::Complex64;
+use phase_lock::{Config, ConfigError, Gains, LockCriterion, NONE, PARAMETERS, Parameter, Value as Setting};
 use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
 use vines_model::ArgumentError;
 
-use crate::plan::{Knowledge, LinearResponse};
+use crate::plan::{Knowledge, LinearResponse, ShakerPath};
 
 use super::{Measurand, Scene, SceneError, Structure, check, given, positive, within};
 
@@ -106,21 +107,21 @@ impl Scene {
         let step = knowledge.sample_time;
         let delay = self.chain.total_delay(omega0 * step) / omega0;
         let units = self.units();
-        let limits = self.phase_lock.apply(
-            units,
-            Config {
-                amplitude_max: Some(4.0 * self.drive_needed(knowledge)),
-                response_max: Some(4.0 * knowledge.numbers.b),
-                ..Config::for_resonance(omega0, self.amplitude)
-            },
-        );
+        let defaults = Config {
+            amplitude_max: Some(4.0 * self.drive_needed(knowledge)),
+            response_max: Some(4.0 * knowledge.numbers.b),
+            residual_max: Some(self.residual(knowledge)),
+            lock: lock_criterion(&knowledge.linear),
+            ..Config::for_resonance(omega0, self.amplitude)
+        };
+        let limits = self.phase_lock.apply(units, Self::behind_shaker(knowledge, defaults));
         self.phase_lock.apply(
             units,
             Config {
                 sample_time: step,
                 omega_min: c.omega_min * omega0,
                 omega_max: c.omega_max * omega0,
-                bandwidth: c.bandwidth * omega0,
+                bandwidth: bandwidth(c.bandwidth * omega0, knowledge),
                 damping_rate: Some(damping_rate).filter(|rate| *rate > 0.0),
                 phase_target: knowledge.target.phase_of_readings(),
                 delay: delay + f64::from(u8::from(self.resonance.is_late())) * step,
@@ -129,12 +130,24 @@ impl Scene {
                 // The range in a period, or in half a time constant of the detector: the loop locks as fast as without a limit.
                 omega_rate: Some((c.omega_max - c.omega_min) * omega0 * (2.0 * c.bandwidth * omega0).max(1.0 / period)),
                 acquire_timeout: Some(self.lock_periods(&knowledge.linear) * period),
-                residual_max: Some(self.residual(knowledge)),
                 reference_connected: self.chain.reference,
-                lock: lock_criterion(&knowledge.linear),
                 ..limits
             },
         )
+    }
+
+    /// The configuration for the command of a shaker. The response to it settles with the pole of structure and shaker, and the force cell reads
+    /// harmonics beside a fundamental that falls near the resonance. The balance of power, which takes the drive for the force, does not apply.
+    fn behind_shaker(knowledge: &Knowledge, config: Config) -> Config {
+        let Some(ShakerPath { drop_out, .. }) = knowledge.shaker else {
+            return config;
+        };
+        let coherence_min = config.lock.coherence_min * drop_out.min(1.0).powi(2);
+        Config {
+            residual_max: None,
+            lock: LockCriterion { coherence_min, ..config.lock },
+            ..config
+        }
     }
 
     /// Base displacement per drive, and displacement at the cavity per displacement at the sensor, of the driven mode's oscillator: the controller
@@ -142,7 +155,7 @@ impl Scene {
     fn units(&self) -> [f64; 2] {
         let factors = |structure: &Structure| {
             [
-                structure.base_per_drive(),
+                structure.base_per_command(),
                 structure.reading_per_response().abs().recip(),
             ]
         };
@@ -211,10 +224,46 @@ impl Scene {
         let coupled = COUPLED * knowledge.linear.bandwidth().max(f64::MIN_POSITIVE).cbrt();
         Config {
             amplitude_max: limit.or(Some(knowledge.numbers.amplitude(TRACKED))),
-            bandwidth: self.controller.bandwidth.min(coupled) * knowledge.linear.omega0,
+            bandwidth: bandwidth(
+                self.controller.bandwidth.min(coupled) * knowledge.linear.omega0,
+                knowledge,
+            ),
             ..config
         }
     }
+}
+
+/// The bandwidth, rad/s: `wanted`, or the largest one below it with which the loop behind a shaker has a sensitivity of at most 2.
+///
+/// A change of the frequency turns the phase of the structure as `1/(s + d)`. Behind a shaker it does as `(1/d) (a s + |r|²)/((s + a)² + D²)`: the
+/// response settles with the pole `-r = -(a + i D)` of structure and shaker, and the measured force follows it.
+fn bandwidth(wanted: f64, knowledge: &Knowledge) -> f64 {
+    let Some(ShakerPath { pole: [decay, detuning], .. }) = knowledge.shaker else {
+        return wanted;
+    };
+    let damping = knowledge
+        .linear
+        .damping_rate
+        .max(BANDWIDTH_MIN * knowledge.linear.omega0);
+    let coupled = |s: Complex64| {
+        let square = decay * decay + detuning * detuning;
+        (decay * s + square) / (damping * ((s + decay) * (s + decay) + detuning * detuning))
+    };
+    let distance = |bandwidth: f64| {
+        let Gains { proportional, integral } = Gains::from_bandwidth(bandwidth, damping);
+        let fastest = 10.0 * bandwidth.max(decay.hypot(detuning));
+        let decades = |n: u32| DECADES * f64::from(n) / f64::from(FREQUENCIES);
+        let open = |n: u32| {
+            let s = Complex64::new(0.0, fastest * 10_f64.powf(-decades(n)));
+            (1.0 + bandwidth * (proportional * s + integral) / (s * (s + bandwidth)) * coupled(s)).norm()
+        };
+        (0..FREQUENCIES).map(open).fold(f64::INFINITY, f64::min)
+    };
+    let mut bandwidth = wanted;
+    while distance(bandwidth) < 1.0 / SENSITIVITY && bandwidth > FINEST * wanted {
+        bandwidth *= 0.95;
+    }
+    bandwidth
 }
 
 /// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.
@@ -229,6 +278,13 @@ fn lock_criterion(linear: &LinearResponse) -> LockCriterion {
     }
 }
 
+/// Number of frequencies at which an open loop is examined, over so many decades; and the smallest bandwidth over the one that is wanted.
+const FREQUENCIES: u32 = 500;
+const DECADES: f64 = 5.0;
+/// Largest sensitivity, the inverse of the smallest distance of the open loop from -1: a phase margin of at least 29 degrees, and a gain margin of
+/// 2 (K. J. Åström, R. M. Murray, "Feedback Systems", Princeton 2008, section 11.5).
+const SENSITIVITY: f64 = 2.0;
+const FINEST: f64 = 1e-3;
 /// That bandwidth over the cube root of E/A.
 const COUPLED: f64 = 0.9;
 /// Largest phase error that counts as locked, degrees.

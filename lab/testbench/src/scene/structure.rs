@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
 use super::SceneError;
+use super::shaker::SceneShaker;
 use files::{Matrix, Residues};
 
 /// What drives a structure.
@@ -26,7 +27,15 @@ pub enum Excitation {
 }
 
 impl Excitation {
-    /// Unit of the drive.
+    /// As plant and exact orbits name it.
+    pub(super) fn of_host(self) -> lovines::Excitation {
+        match self {
+            Self::Base => lovines::Excitation::Base,
+            Self::Force => lovines::Excitation::Force,
+        }
+    }
+
+    /// Unit of the drive, which is the reference of a structure with a shaker.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Base => "m",
@@ -76,6 +85,9 @@ pub struct Structure {
     /// The displacement of every point in the sections of the host.
     #[serde(skip)]
     pub rows: Vec<Row>,
+    /// The shaker that moves it, as a part of the host.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shaker: Option<SceneShaker>,
 }
 
 impl PartialEq for Structure {
@@ -85,6 +97,7 @@ impl PartialEq for Structure {
         places(self) == places(other)
             && (&self.points, &self.modes, &self.rows) == (&other.points, &other.modes, &other.rows)
             && self.host.sections() == other.host.sections()
+            && self.shaker == other.shaker
     }
 }
 
@@ -112,6 +125,85 @@ impl Structure {
     /// Modal mass ratio `m phi_n²` of a mode for the particle mass `m`, kg.
     pub fn mass_ratio(&self, mode: &StructureMode, m: f64) -> f64 {
         m * self.at_cavity(mode).powi(2)
+    }
+
+    /// A structure with one mode at one point, which is driven by its base or by a force there.
+    pub(super) fn of_oscillator(
+        [mass, stiffness, damping]: [f64; 3],
+        excitation: Excitation,
+    ) -> Result<Self, SceneError> {
+        let (omega, shape) = ((stiffness / mass).sqrt(), mass.sqrt().recip());
+        let drive = match excitation {
+            Excitation::Base => mass.sqrt(),
+            Excitation::Force => shape,
+        };
+        let mode = StructureMode {
+            omega,
+            zeta: 0.5 * damping / (mass * omega),
+            shape: vec![shape],
+            out_of_phase: 0.0,
+            drive,
+        };
+        let place = (excitation == Excitation::Force).then_some(0);
+        let at = Places { cavity: 0, drive: place, sensor: 0 };
+        let (points, modes) = (vec!["mass".to_owned()], vec![mode]);
+        let checked = check(&points, &modes, 0, &at).and_then(|()| {
+            let equations = equations(&modes, None, &DVector::zeros(0), &at);
+            let host = equations
+                .host(excitation.of_host())
+                .map_err(|error| error.to_string())?;
+            let row = host.row(&modes[0].shape).map_err(|error| error.to_string())?;
+            Ok((equations, host, row))
+        });
+        let (equations, host, row) = checked.map_err(|message| SceneError::text("[plant]", message))?;
+        Ok(Self {
+            excitation,
+            points,
+            cavity: 0,
+            drive: place,
+            sensor: 0,
+            driven: 0,
+            modes,
+            equations,
+            host,
+            rows: vec![row],
+            shaker: None,
+        })
+    }
+
+    /// The modes with a mass, kg, at the point of the force: what a force cell behind that mass sees.
+    pub(super) fn carry(&mut self, mass: f64) -> Result<(), String> {
+        let old = &self.modes;
+        let drive = DVector::from_iterator(old.len(), old.iter().map(|mode| mode.drive));
+        let squares = DVector::from_iterator(old.len(), old.iter().map(|mode| mode.omega * mode.omega));
+        let whole = DMatrix::identity(old.len(), old.len()) + mass * &drive * drive.transpose();
+        let (shapes, squares) = modes(&whole, &DMatrix::from_diagonal(&squares))?;
+        let mode = |(n, square): (usize, &f64)| {
+            let column = shapes.column(n);
+            let parts = || old.iter().zip(column.iter());
+            let share = |of: &dyn Fn(&StructureMode) -> f64| parts().map(|(mode, share)| share * of(mode)).sum();
+            let omega = square.sqrt();
+            let rate: f64 = parts()
+                .map(|(mode, share)| mode.zeta * mode.omega * share * share)
+                .sum();
+            StructureMode {
+                omega,
+                zeta: rate / omega,
+                shape: (0..self.points.len())
+                    .map(|point| share(&|mode| mode.shape[point]))
+                    .collect(),
+                out_of_phase: old[n].out_of_phase,
+                drive: share(&|mode| mode.drive),
+            }
+        };
+        self.modes = squares.iter().enumerate().map(mode).collect();
+        Ok(())
+    }
+
+    /// Displacement of the base, m, that moves the driven mode's oscillator as one unit of the command does: the drive itself without a shaker.
+    pub fn base_per_command(&self) -> f64 {
+        let per_command = self.shaker.as_ref().map_or(1.0, |shaker| shaker.reference_per_command);
+        self.base_per_drive() * per_command
     }
 
     /// Displacement of the base, m, that moves the driven mode's oscillator as one unit of the drive does: 1 for one oscillator on a base.
@@ -248,11 +340,9 @@ impl StructureSection {
         let at = Places { cavity, drive, sensor };
         check(&points, &modes, driven, &at)?;
         let equations = equations(&modes, matrices.as_ref(), &direction, &at);
-        let kind = match self.excitation {
-            Excitation::Base => lovines::Excitation::Base,
-            Excitation::Force => lovines::Excitation::Force,
-        };
-        let host = equations.host(kind).map_err(|error| error.to_string())?;
+        let host = equations
+            .host(self.excitation.of_host())
+            .map_err(|error| error.to_string())?;
         let shapes = |point: usize| -> Vec<f64> {
             match matrices {
                 Some(_) => unit(points.len(), point),
@@ -272,6 +362,7 @@ impl StructureSection {
             equations,
             host,
             rows,
+            shaker: None,
         })
     }
 

@@ -6,6 +6,7 @@ mod faults;
 mod loop_check;
 mod measuring;
 mod scenes;
+mod shakers;
 mod structures;
 
 use vines_testbench::backbone::{Tracked, track};

@@ -1,0 +1,173 @@
+//! Guards the section `[shaker]`: presets that lock on the exact orbit with their shaker, the check, limits, and a sentence for every mistake.
+
+use std::f64::consts::PI;
+
+use lovines::{Drive, Plant, StructureState};
+use vines_testbench::backbone::track;
+use vines_testbench::experiment::{ExperimentError, run};
+use vines_testbench::identification::identify;
+use vines_testbench::loop_check::{Verdict, check};
+use vines_testbench::rig::{BuiltIn, RigError, Sensors, SensorsOnly, Simulated};
+use vines_testbench::scene::{Scene, SceneError};
+use vines_testbench::survey::phase_resonant;
+
+use super::Altered;
+
+const PRESETS: [&str; 3] = [
+    include_str!("../../../../scenes/shaker-cantilever.toml"),
+    include_str!("../../../../scenes/shaker-oscillator.toml"),
+    include_str!("../../../../scenes/slip-table.toml"),
+];
+
+fn preset(n: usize, changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
+    let text = changes.iter().fold(PRESETS[n].to_string(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    });
+    Scene::parse("preset", &text, &[])
+}
+
+#[test]
+fn presets_lock_on_the_exact_orbit_with_their_shaker() {
+    // On the mass of the oscillator the force drops out.
+    for n in [0, 2] {
+        let scene = preset(n, &[]).unwrap();
+        let plan = scene.plan();
+        let mut controller = BuiltIn::new(&plan.lock).unwrap();
+        let record = run(
+            &mut *Simulated::of(&scene).unwrap(),
+            &mut controller,
+            &plan,
+            |_, _, _| {},
+        )
+        .unwrap();
+        let at = identify(&record, &plan).unwrap().lock.at;
+        // The response is held where the force is within 1e-4 of the one asked for.
+        let measured = Scene { amplitude: at.e_m, ..scene };
+        let orbits = phase_resonant(&measured, &measured.dimensionless());
+        let distance = orbits.iter().map(|orbit| {
+            println!(
+                "{n}: {} ± {}, {}; {} ± {}, {}",
+                at.sigma, at.u_sigma, orbit.sigma, at.c, at.u_c, orbit.c
+            );
+            ((at.sigma - orbit.sigma).abs() / at.u_sigma).max((at.c - orbit.c).abs() / at.u_c)
+        });
+        let nearest = distance.fold(f64::INFINITY, f64::min);
+        assert!(nearest < 3.0, "preset {n}: {nearest} u");
+    }
+}
+
+/// A plant that starts on an exact orbit under its voltage stays there.
+#[test]
+fn exact_orbits_with_a_shaker_are_motions_of_the_plant() {
+    for n in 0..PRESETS.len() {
+        let scene = preset(n, &[]).unwrap();
+        let structure = scene.structure.as_ref().unwrap();
+        let orbits = scene.structure_orbits().unwrap();
+        let range = [0.97, 1.0].map(|share| share * scene.dimensionless().omega0);
+        let found = orbits.resonant(scene.structure_drive().unwrap(), range);
+        assert!(!found.is_empty(), "preset {n}");
+        for orbit in found {
+            let mut plant = Plant::with_host(structure.host.clone(), scene.plant, &StructureState::default()).unwrap();
+            let drive = Drive::harmonic(orbit.drive, orbit.omega);
+            plant.begin(drive).unwrap();
+            plant
+                .set_sections(&orbit.start.sections, [orbit.start.q2, orbit.start.dq2])
+                .unwrap();
+            let before = plant.state();
+            plant.advance(drive, 2.0 * PI / orbit.omega).unwrap();
+            let (after, b) = (plant.state(), scene.plant.half_width);
+            let error = (after.q1 - before.q1).abs().max((after.q2 - before.q2).abs()) / b;
+            assert!(error < 1e-9 && plant.totals().impacts == 2, "preset {n}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn a_check_behind_a_shaker_measures_the_structure_and_names_a_fault() {
+    for n in 0..PRESETS.len() {
+        let scene = preset(n, &[]).unwrap().at_rest();
+        let plan = scene.plan();
+        let checked = check(&mut *Simulated::of(&scene).unwrap(), &plan).unwrap();
+        for quantity in &checked.quantities {
+            println!(
+                "{n}: {} {} ± {}, {}",
+                quantity.name, quantity.measured, quantity.uncertainty, quantity.expected
+            );
+        }
+        let expected = [Verdict::Healthy, Verdict::DropOut][usize::from(n == 1)];
+        assert_eq!(checked.verdict, expected, "preset {n}");
+        for (quantity, share) in checked.quantities.iter().zip([2e-5, 1e-3]) {
+            assert!(
+                (quantity.measured / quantity.expected - 1.0).abs() < share,
+                "preset {n}: {quantity:?}"
+            );
+        }
+        for (factor, expected) in [(-1.0, Verdict::ResponseReversed), (0.0, Verdict::BaseDead)] {
+            let changed = |sensors: Sensors| {
+                Ok(Sensors {
+                    reference: sensors.reference.map(|value| factor * value),
+                    ..sensors
+                })
+            };
+            let mut rig = Altered {
+                rig: Simulated::of(&scene).unwrap(),
+                read: Box::new(changed),
+                drive: Box::new(|drive, step| (drive, step)),
+            };
+            assert_eq!(check(&mut rig, &plan).unwrap().verdict, expected, "preset {n}");
+        }
+    }
+}
+
+#[test]
+fn a_limit_that_is_reached_ends_the_experiment_with_its_name() {
+    let scene = preset(0, &[("force_max = 45.0", "force_max = 12.2")]).unwrap();
+    let plan = scene.plan();
+    let mut controller = BuiltIn::new(&plan.tracking).unwrap();
+    let rig = Simulated::of(&scene).unwrap();
+    let error = track(&mut SensorsOnly::around(rig), &mut controller, &plan, |_, _| {});
+    let is_limit = |error: &ExperimentError| {
+        matches!(error, ExperimentError::Rig(RigError::ShakerLimit { name: "force", .. }))
+            && error.to_string().contains("shaker.force_max")
+    };
+    match error {
+        Ok(tracked) => assert!(tracked.ended.as_ref().is_some_and(is_limit), "{:?}", tracked.ended),
+        Err(error) => assert!(is_limit(&error), "{error}"),
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_shaker_is_said_in_one_sentence() {
+    for (n, from, to, parts) in [
+        (0, "\nmass = 0.057", "\nmass = 0", ["mass of the armature", "kg"]),
+        (
+            0,
+            "resistance = 2.0",
+            "resistance = -2.0",
+            ["resistance of the coil", "ohm"],
+        ),
+        (0, "Bl = 6.78", "Bl = 0", ["V s/m", "positive"]),
+        (0, "voltage_max = 40.0", "voltage_max = -1", ["voltage_max", "positive"]),
+        (
+            0,
+            "amplifier = \"voltage\"",
+            "amplifier = \"current\"",
+            ["voltage_max", "current_max"],
+        ),
+        (0, "cell_mass = 0.02", "table_mass = 2", ["table_mass", "base"]),
+        (0, "force_max = 45.0", "force_max = 0.1", ["force_max", "N"]),
+        (1, "M = 3.807", "", ["M", "SI"]),
+        (2, "table_mass = 40.0", "table_mass = 0", ["end of the stinger", "kg"]),
+        (
+            2,
+            "[start]",
+            "[chain]\nreference = false\n[start]",
+            ["chain.reference", "force cell"],
+        ),
+    ] {
+        let message = preset(n, &[(from, to)]).expect_err(to).to_string();
+        assert!(parts.iter().all(|part| message.contains(part)), "{to}: {message}");
+        assert!(!message.contains('\n'), "{message}");
+    }
+}

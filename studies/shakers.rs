@@ -1,0 +1,149 @@
+//! Does the loop track the backbone of random structures through random shakers, and are the settled points on the exact orbits with that shaker?
+//!
+//! One to three modes as in `structures.rs`, a force at the drive point, and r 0.5 to 0.8. The armature has 0.001 to 0.5 of the modal mass at the drive
+//! point; its suspension 0.3 to 3 times, and the stinger 3 to 30 times the natural frequency of the driven mode; the coil's damping Bl²/R is 0.03
+//! to 3 times m omega0 of the armature, its rate R/L 3 to 100 omega0 in half of the cases, and the amplifier controls the voltage or the current (uniform logarithms).
+//! Tracked in 8 levels over the range of responses in which the exact backbone with the shaker has stable orbits, at least a factor of 1.2. A point is right within 3 u of the exact backbone in sigma and G.
+//!
+//! Arguments: SHAKERS, SEED. Writes validation/shakers.csv: a row per shaker.
+
+mod common;
+
+use common::*;
+use vines_model::orbit::Orbit;
+use vines_testbench::survey::structure_backbone;
+
+/// A structure with its shaker, and the dimensionless numbers of the shaker: mass ratio, suspension and stinger over omega0, coil.
+fn text(uniform: Uniform) -> (String, [f64; 4]) {
+    let mut log = |low: f64, high: f64| uniform(low.ln(), high.ln()).exp();
+    let (epsilon, lambda, r) = (log(0.003, 0.02), log(0.5, 2.0), log(0.5, 0.8));
+    let (mut modes, mut ratio) = (Vec::new(), 1.0);
+    let drive = log(0.1, 1.0);
+    for n in 0..log(1.0, 4.0) as usize {
+        let zeta = if n == 0 {
+            0.5 * epsilon * lambda
+        } else {
+            log(0.003, 0.03)
+        };
+        let [cavity, other] = if n == 0 {
+            [1.0, drive]
+        } else {
+            [log(0.1, 1.5), log(0.1, 1.5) * (log(1.0, 4.0) - 2.0).signum()]
+        };
+        modes.push(format!(
+            "{{ frequency = {ratio:?}, damping = {zeta:?}, shape = {{ cavity = {cavity:?}, drive = {other:?} }} }}"
+        ));
+        ratio *= log(1.5, 5.0);
+    }
+    let [share, suspension, stinger, coil] = [log(0.001, 0.5), log(0.3, 3.0), log(3.0, 30.0), log(0.03, 3.0)];
+    let (omega, mass) = (std::f64::consts::TAU, share / (drive * drive));
+    let spring = |times: f64| mass * (times * omega).powi(2);
+    let damped = |times: f64, zeta: f64| 2.0 * zeta * mass * times * omega;
+    let inductance = if log(1.0, 4.0) < 2.0 {
+        0.0
+    } else {
+        1.0 / (log(3.0, 100.0) * omega)
+    };
+    let amplifier = if log(1.0, 4.0) < 2.0 { "voltage" } else { "current" };
+    let text = format!(
+        "[plant]\nm = {epsilon:?}\nb = 1\nr = {r:?}\n[controller]\nomega_min = 0.8\nomega_max = 1.2\n[structure]\ncavity = \"cavity\"\n\
+         excitation = \"force\"\ndrive = \"drive\"\nsensor = \"cavity\"\nmodes = [{}]\n[shaker]\nmass = {mass:?}\nstiffness = {:?}\ndamping = {:?}\n\
+         stinger_stiffness = {:?}\nstinger_damping = {:?}\nresistance = 1\nBl = {:?}\ninductance = {inductance:?}\namplifier = \"{amplifier}\"\n",
+        modes.join(", "),
+        spring(suspension),
+        damped(suspension, 0.02),
+        spring(stinger),
+        damped(stinger, 0.01),
+        (coil * mass * omega).sqrt()
+    );
+    (text, [share, suspension, stinger, coil])
+}
+
+/// A scene with a drive at which a stable orbit exists, and its levels.
+fn drawn(uniform: Uniform) -> Result<(Scene, [f64; 4]), Failure> {
+    loop {
+        let (text, numbers) = text(uniform);
+        let share = uniform(0.0, 1.0);
+        let plain = scene(&format!("{text}[excitation]\nG = 1\n"), &[""; 0])?;
+        let curves = structure_backbone(&plain, &plain.dimensionless()).ok_or("no structure")?;
+        let all: Vec<Orbit> = curves.into_iter().flatten().collect();
+        let is_level = |orbit: &&Orbit| orbit.stable && (0.85..=1.15).contains(&orbit.omega) && orbit.b < 1.35;
+        let (low, high) = range((f64::INFINITY, 0.0), all.iter().filter(is_level).map(|orbit| orbit.c));
+        let [from, to] = [0.95 * high.min(1.0), 1.1 * low];
+        let drives = all
+            .iter()
+            .filter(is_level)
+            .filter(|orbit| (to..=from).contains(&orbit.c))
+            .map(|orbit| orbit.g);
+        let (least, largest) = range((f64::INFINITY, 0.0), drives);
+        if from < 1.2 * to || largest > 3.0 {
+            continue;
+        }
+        let g = least + share * (largest - least);
+        let rest = format!(
+            "[excitation]\nG = {g:?}\n[start]\ndq2 = 5\n[backbone]\nC_from = {from:?}\nC_to = {to:?}\npoints = 8\n"
+        );
+        return Ok((scene(&format!("{text}{rest}"), &[""; 0])?, numbers));
+    }
+}
+
+/// Points, settled ones, those beyond 3 u, the largest error over u, periods, and why it ended.
+fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String) {
+    let plan = scene.plan();
+    let tracked = match Simulated::of(scene)
+        .map_err(Failure::from)
+        .and_then(|mut rig| Ok(tracked(&mut *rig, &plan, 20.0)?))
+    {
+        Ok(tracked) => tracked,
+        Err(error) => return (0, 0, 0, f64::NAN, f64::NAN, error.to_string()),
+    };
+    let curves = structure_backbone(scene, &scene.dimensionless()).unwrap_or_default();
+    let (mut settled, mut beyond, mut worst) = (0, 0, 0.0);
+    for LevelPoint { at, .. } in kept(&tracked) {
+        settled += 1;
+        // The orbit at the same response, on any of the curves.
+        let ratios = curves.iter().flat_map(|curve| curve.windows(2)).filter_map(|pair| {
+            let x = (at.c - pair[0].c) / (pair[1].c - pair[0].c);
+            let between = |one: f64, other: f64| one + x * (other - one);
+            (0.0..=1.0).contains(&x).then(|| {
+                let sigma = (at.sigma - between(pair[0].sigma, pair[1].sigma)).abs() / at.u_sigma;
+                sigma.max((at.g - between(pair[0].g, pair[1].g)).abs() / at.u_g)
+            })
+        });
+        let ratio = ratios.fold(f64::INFINITY, f64::min);
+        worst = ratio.max(worst);
+        beyond += usize::from(ratio > 3.0);
+    }
+    for point in tracked.points.iter().filter(|_| std::env::var("POINTS").is_ok()) {
+        println!("{point:?}");
+    }
+    let why = tracked.ended.as_ref().map_or_else(String::new, ToString::to_string);
+    (tracked.points.len(), settled, beyond, worst, tracked.periods, why)
+}
+
+fn main() -> Result<(), Failure> {
+    let [count, seed] = &arguments(["SHAKERS", "SEED"])?;
+    let mut uniform = uniform(seed.parse()?);
+    let scenes: Vec<_> = (0..count.parse()?)
+        .map(|_| drawn(&mut uniform))
+        .collect::<Result<_, _>>()?;
+    let found: Vec<_> = scenes.par_iter().map(run).collect();
+    let rows: Vec<_> = scenes.iter().zip(&found).enumerate().map(|(n, ((scene, numbers), found))| {
+        let [share, suspension, stinger, coil] = numbers;
+        let drop_out = scene.knowledge().shaker.map_or(f64::NAN, |shaker| shaker.drop_out);
+        let bandwidth = scene.plan().tracking.bandwidth / std::f64::consts::TAU;
+        let (points, settled, beyond, worst, periods, why) = found;
+        format!(
+            "{seed},{n},{share:.4},{suspension:.3},{stinger:.2},{coil:.3},{drop_out:.4},{bandwidth:.4},{points},{settled},{beyond},{worst:.2},{periods:.0},\"{}\"",
+            why.replace('"', "'")
+        )
+    }).collect();
+    let tracked = found.iter().filter(|one| one.1 >= 4 && one.2 == 0).count();
+    let wrong: usize = found.iter().map(|one| one.2).sum();
+    let settled: usize = found.iter().map(|one| one.1).sum();
+    println!(
+        "{tracked} of {count} tracked with at least half of the levels settled and none beyond 3 u; {wrong} of {settled} settled points beyond 3 u"
+    );
+    let header = "seed,shaker,mass_ratio,suspension,stinger,coil,drop_out,bandwidth,points,settled,beyond_3u,worst_u,periods,ended";
+    write("shakers", header, 2, &rows)
+}
