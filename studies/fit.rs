@@ -104,7 +104,7 @@ fn fitted((points, scene, truth): &Points, known: &[Known]) -> Result<Found, Fai
 }
 
 fn effects(count: usize, seed: u64, snr: &str) -> Result<(), Failure> {
-    let mut rows = Vec::new();
+    let header = "effect,snr_dB,seed,drawn,rigs,flagged,named,misnamed,among_others,strength_within_1.96u,largest_u";
     for effect in Effect::ALL.map(Some).into_iter().chain([None]) {
         let hidden = |n: &usize| (*n < count).then(|| Effect::ALL[n % 4]) == effect;
         let seeds: Vec<u64> = (0..2 * count).filter(hidden).map(|n| seed + 1000 * n as u64).collect();
@@ -122,13 +122,10 @@ fn effects(count: usize, seed: u64, snr: &str) -> Result<(), Failure> {
         let ratios: Vec<f64> = found.into_iter().flat_map(|one| one.ratios).collect();
         let name = effect.map_or_else(|| "none".into(), |effect| effect.to_string());
         let (within, largest) = (share(&ratios, 1.96), ends(&ratios)[1]);
-        rows.push(format!(
-            "{name},{snr},{seed},{},{within:.3},{largest:.1}",
-            counts.join(",")
-        ));
+        let row = format!("{name},{snr},{seed},{},{within:.3},{largest:.1}", counts.join(","));
+        write("fit_effects", header, 2, &[row])?;
     }
-    let header = "effect,snr_dB,seed,drawn,rigs,flagged,named,misnamed,among_others,strength_within_1.96u,largest_u";
-    write("fit_effects", header, 2, &rows)
+    Ok(())
 }
 
 /// Largest friction and tilt, times g, over b omega0²: on the default rig a friction of 0.31, and 9 degrees.
