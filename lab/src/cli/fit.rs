@@ -401,8 +401,8 @@ fn summary(report: &FitReport, found: &Found, known: &[Known], skipped: usize) -
     let verdict = match (report.describes, &report.undetermined[..]) {
         (true, []) => "the model describes them".into(),
         (true, undetermined) => format!(
-            "this says little, because they do not determine {}. Measure at least three levels, with `vines backbone` (--record for a \
-             recording), or give --known",
+            "this says little, because they do not determine {}. Measure at least three levels far apart, with `vines backbone` (--record \
+             for a recording), or give --known",
             undetermined.join(", ")
         ),
         (false, _) => "the model does not describe them".into(),
