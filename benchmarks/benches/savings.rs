@@ -17,7 +17,8 @@ use std::error::Error;
 use std::hint::black_box;
 use std::process::Command;
 
-use lovines::{Cavity, Drive, Excitation, Host, Mode, Parameters, Plant, Restitution, State, StructureState};
+use lovines::{Cavity, Drive, Excitation, Host, Parameters, Plant, Restitution, State, StructureState};
+use vines_benchmarks::structures::CANTILEVER;
 
 const OMEGA: f64 = 0.990_417;
 const PERIOD: f64 = TAU / OMEGA;
@@ -231,8 +232,6 @@ fn all(plant: &Plant) {
     black_box(plant.energy(plant.base_displacement()));
 }
 
-/// Frequencies of a cantilever over its first.
-const CANTILEVER: [f64; 8] = [1.0, 6.267, 17.55, 34.39, 56.84, 84.91, 118.6, 157.9];
 /// Frequencies of a frame or a plate.
 const PLATE: [f64; 8] = [1.0, 2.2, 3.4, 4.7, 6.1, 7.4, 8.6, 9.9];
 
@@ -240,7 +239,6 @@ const PLATE: [f64; 8] = [1.0, 2.2, 3.4, 4.7, 6.1, 7.4, 8.6, 9.9];
 /// impacts.
 fn structure(frequencies: &[f64], modes: usize, periods: u32) -> u64 {
     let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
-    let zeta = 0.5 * parameters.damping;
     let drive = Drive::harmonic(0.0084 * 1.1, OMEGA);
     let step = f64::from(periods) * PERIOD;
     if modes == 0 {
@@ -255,17 +253,7 @@ fn structure(frequencies: &[f64], modes: usize, periods: u32) -> u64 {
         .run(1);
         return 2 * u64::from(periods);
     }
-    let mode = |(n, omega): (usize, &f64)| {
-        // The first mode is the default rig; the others are as mobile, and move with the base as little as a cantilever's do.
-        let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
-        Mode {
-            omega: *omega,
-            zeta,
-            cavity: sign,
-            drive: sign / (1 + n * n) as f64,
-        }
-    };
-    let modes: Vec<_> = frequencies.iter().enumerate().take(modes).map(mode).collect();
+    let modes = vines_benchmarks::structures::modes(&frequencies[..modes]);
     let host = Host::from_modes(Excitation::Base, &modes).expect("a valid structure");
     let mut start = StructureState { q2: LOCK.q2, dq2: LOCK.dq2, ..StructureState::default() };
     start.displacements = (0..modes.len()).map(|n| if n == 0 { LOCK.q1 } else { 0.0 }).collect();

@@ -54,10 +54,10 @@ impl Trajectory {
         if self.secular { (x * t, v * t + x) } else { (x, v) }
     }
 
-    /// From where the method is, under its drive.
-    fn of(method: &Baseline) -> Self {
-        let Parameters { primary_mass: m, stiffness: k, damping: c, .. } = method.rig;
-        let Baseline { drive: (amplitude, omega), phase, time: from, .. } = *method;
+    /// Of an oscillator from `[q, q']` at the time `from` of a step, under a base of this amplitude and angular frequency.
+    fn of(oscillator: &Oscillator, (amplitude, omega): (f64, f64), phase: f64, from: f64) -> Self {
+        let Oscillator { mass: m, stiffness: k, damping: c, participation, state, .. } = *oscillator;
+        let amplitude = participation * amplitude;
         let (detuning, damping) = (k - m * omega * omega, c * omega);
         let square = detuning * detuning + damping * damping;
         let secular = square == 0.0 && amplitude != 0.0;
@@ -73,7 +73,7 @@ impl Trajectory {
         let free = Free::Under { delta, omega: 0.0, a: 0.0, b: 0.0 };
         let mut trajectory = Self { from, free, p, q, secular, omega, phase };
         let (xp, vp) = trajectory.particular(from);
-        let (y, dy) = (method.state.q1 - xp, method.state.dq1 - vp);
+        let (y, dy) = (state[0] - xp, state[1] - vp);
         let square = k / m - delta * delta;
         trajectory.free = if square > 0.0 {
             let omega = square.sqrt();
@@ -107,13 +107,32 @@ impl Trajectory {
     }
 }
 
-/// The method under way.
+/// One of the oscillators whose displacements add up to that of the cavity: the study's, or a mode of a structure.
 #[derive(Clone, Copy, Debug)]
-pub struct Baseline {
+pub struct Oscillator {
+    /// Mass, kg.
+    pub mass: f64,
+    /// Stiffness, N/m.
+    pub stiffness: f64,
+    /// Damping, N s/m.
+    pub damping: f64,
+    /// Displacement of the cavity per displacement of this oscillator.
+    pub shape: f64,
+    /// Displacement of its base per displacement of the base.
+    pub participation: f64,
+    /// Displacement, m, and velocity, m/s.
+    pub state: [f64; 2],
+}
+
+/// The method under way, with N oscillators as the host.
+#[derive(Clone, Copy, Debug)]
+pub struct Baseline<const N: usize = 1> {
+    /// The host.
+    pub host: [Oscillator; N],
     rig: Parameters,
     tolerance: f64,
-    /// Displacements, m, and velocities, m/s, at the end of the last step.
-    pub state: State,
+    /// Displacement, m, and velocity, m/s, of the particle.
+    pub particle: [f64; 2],
     /// Time since the start, s.
     pub elapsed: f64,
     /// Impacts since the start.
@@ -125,19 +144,47 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    /// At `start`; impact instants are found to `tolerance` seconds.
+    /// One oscillator at `start`; impact instants are found to `tolerance` seconds.
     pub fn new(rig: Parameters, start: State, tolerance: f64) -> Self {
+        let oscillator = Oscillator {
+            mass: rig.primary_mass,
+            stiffness: rig.stiffness,
+            damping: rig.damping,
+            shape: 1.0,
+            participation: 1.0,
+            state: [start.q1, start.dq1],
+        };
+        Self::of([oscillator], [start.q2, start.dq2], rig, tolerance)
+    }
+}
+
+impl<const N: usize> Baseline<N> {
+    /// Of a host, and the particle of `rig` in its cavity; impact instants are found to `tolerance` seconds.
+    pub fn of(host: [Oscillator; N], particle: [f64; 2], rig: Parameters, tolerance: f64) -> Self {
         let (elapsed, impacts, time, drive, phase) = (0.0, 0, 0.0, (0.0, 0.0), 0.0);
         Self {
+            host,
             rig,
             tolerance,
-            state: start,
+            particle,
             elapsed,
             impacts,
             time,
             drive,
             phase,
         }
+    }
+
+    /// Displacements and velocities of cavity and particle.
+    pub fn state(&self) -> State {
+        let part = |n: usize| self.host.iter().map(|one| one.shape * one.state[n]).sum();
+        let [q2, dq2] = self.particle;
+        State { q1: part(0), dq1: part(1), q2, dq2 }
+    }
+
+    fn trajectories(&self) -> [Trajectory; N] {
+        self.host
+            .map(|one| Trajectory::of(&one, self.drive, self.phase, self.time))
     }
 
     /// Advances by `duration` seconds under the harmonic part of `drive`, the phase going on.
@@ -148,16 +195,17 @@ impl Baseline {
         let Drive { amplitude, omega, .. } = drive;
         self.drive = (amplitude, omega);
         let end = duration;
-        let natural = (self.rig.stiffness / self.rig.primary_mass).sqrt();
-        let grid = 1.0 / (POINTS_PER_RADIAN * natural.max(omega));
+        let natural = self.host.iter().map(|one| (one.stiffness / one.mass).sqrt());
+        let grid = 1.0 / (POINTS_PER_RADIAN * natural.fold(omega, f64::max));
         let b = self.rig.half_width;
-        let mut motion = Trajectory::of(self);
+        let mut motion = self.trajectories();
         // Time since the flight's start, on a grid.
         let (mut h, mut stalled) = (0.0, 0);
         while h < end - self.time {
             let after = (h + grid).min(end - self.time);
-            let State { q2, dq2, .. } = self.state;
-            let w = |h: f64| motion.at(h).0 - (q2 + dq2 * h);
+            let [q2, dq2] = self.particle;
+            let q1 = |h: f64| -> f64 { (0..N).map(|n| self.host[n].shape * motion[n].at(h).0).sum() };
+            let w = |h: f64| q1(h) - (q2 + dq2 * h);
             let reached = w(after);
             if reached.abs() < b {
                 h = after;
@@ -171,9 +219,10 @@ impl Baseline {
             let Ok(hit) = find_root_brent(low, after, |h| w(h) - wall, &mut convergency) else {
                 return Err(Stalled);
             };
-            let (x, v) = motion.at(hit);
-            self.impact(self.time + hit, x, v, wall);
-            motion = Trajectory::of(self);
+            self.move_to(&motion, hit);
+            self.time += hit;
+            self.impact(wall);
+            motion = self.trajectories();
             h = 0.0;
             stalled += 1;
             if stalled > MOST_IMPACTS {
@@ -181,18 +230,30 @@ impl Baseline {
             }
         }
         let gone = end - self.time;
-        (self.state.q1, self.state.dq1) = motion.at(gone);
-        self.state.q2 += self.state.dq2 * gone;
+        self.move_to(&motion, gone);
+        self.particle[0] += self.particle[1] * gone;
         self.time = 0.0;
         self.elapsed += duration;
         self.phase = (self.phase + omega * duration) % core::f64::consts::TAU;
         Ok(())
     }
 
-    fn impact(&mut self, time: f64, x: f64, v: f64, wall: f64) {
-        let (dq1, dq2) = rebound(&self.rig, v, self.state.dq2);
-        self.state = State { q1: x, dq1, q2: x - wall, dq2 };
-        self.time = time;
+    fn move_to(&mut self, motion: &[Trajectory; N], h: f64) {
+        for (oscillator, trajectory) in self.host.iter_mut().zip(motion) {
+            oscillator.state = trajectory.at(h).into();
+        }
+    }
+
+    /// An impact gives each oscillator its share of the impulse.
+    fn impact(&mut self, wall: f64) {
+        let State { q1, dq1, dq2, .. } = self.state();
+        let Parameters { particle_mass: m, restitution, .. } = self.rig;
+        let mobility: f64 = self.host.iter().map(|one| one.shape * one.shape / one.mass).sum();
+        let impulse = -(1.0 + restitution) * (dq1 - dq2) / (mobility + 1.0 / m);
+        for one in &mut self.host {
+            one.state[1] += one.shape / one.mass * impulse;
+        }
+        self.particle = [q1 - wall, dq2 - impulse / m];
         self.impacts += 1;
     }
 }

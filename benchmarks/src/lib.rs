@@ -10,6 +10,7 @@ pub mod map;
 pub mod method;
 pub mod scene;
 pub mod solvers;
+pub mod structures;
 
 /// The middle value; not a number for no values.
 #[must_use]

@@ -4,6 +4,7 @@
 //! {"scene": "steady", "method": "plant", "setting": 0, "checks": [10, 20], "budget": 0.1, "limit": 10}
 //! {"growth": "periods", "budget": 0.1, "most": 1e6}
 //! {"record": 20}
+//! {"structure": 3, "pairs": 50}
 //! {"map_g": 1.2, "sigmas": [-1.0, 0.0], "effort": {"periods": 200, "brent_periods": 50, "runs": 5}}
 //! ```
 
@@ -20,7 +21,7 @@ use vines_benchmarks::baseline::Baseline;
 use vines_benchmarks::method::{Answer, Shell, Stepped, measure};
 use vines_benchmarks::scene::Scene;
 use vines_benchmarks::solvers::{Moreau, Rk4, Solved};
-use vines_benchmarks::{cost, map};
+use vines_benchmarks::{cost, map, structures};
 
 /// The methods by name.
 const METHODS: &[(&str, Measure)] = &[
@@ -72,6 +73,8 @@ fn answer(folder: &Path, request: &str) -> anyhow::Result<Value> {
         cost::growth(folder, &what, field(r, "budget")?, field(r, "most")?)?
     } else if asks("record") {
         json!({"drives": cost::record(field(r, "record")?)})
+    } else if asks("structure") {
+        structures::compare(field(r, "structure")?, field(r, "pairs")?)?
     } else if asks("closed_loop") {
         cost::closed_loop(field(r, "closed_loop")?, field(r, "budget")?)
     } else if asks("map_g") {

@@ -121,7 +121,7 @@ impl Settled {
         let mut brent = self.baseline(TOLERANCES.1);
         let began = Instant::now();
         let ended = brent.advance(black_box(self.drive), self.periods(periods));
-        black_box(brent.state);
+        black_box(brent.state());
         let ns = began.elapsed().as_nanos() as f64;
         ended.is_ok().then_some(ns / units(brent.impacts, periods))
     }
@@ -133,7 +133,7 @@ impl Settled {
             plant.advance(self.drive, self.periods(1)).ok()?;
             brent.advance(self.drive, self.periods(1)).ok()?;
         }
-        let [plant, brent] = [plant.state(), brent.state].map(<[f64; 4]>::from);
+        let [plant, brent] = [plant.state(), brent.state()].map(<[f64; 4]>::from);
         let both = plant.into_iter().zip(brent);
         both.map(|(a, b)| (b - a).abs()).reduce(f64::max)
     }

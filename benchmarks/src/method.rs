@@ -241,7 +241,7 @@ impl Method for Baseline {
     }
 
     fn state(&self) -> State {
-        self.state
+        self.state()
     }
 
     fn impacts(&self) -> u64 {

@@ -26,7 +26,7 @@ FRAME = {
 }  # fmt: skip
 SCENES = {
     "contact": {**BEAM, "theta": 0.5, "E": 0.0003, "omega": 50.0, "q2": 0.01, "step": 0.0004},
-    "contact-force": {**FRAME, "theta": 0.5, "E": 3.5, "omega": 50.0, "q2": 0.01, "step": 0.0004},
+    "contact-force": {**FRAME, "theta": 0.5, "E": 12.0, "omega": 50.0, "q2": 0.01, "step": 0.0004},
     "chatter": {**BEAM, "theta": 1.2, "r_plus": 0.5, "r_minus": 0.5, "E": 0.0005, "omega": 49.0, "step": 0.0004},
     "chatter-force": {**FRAME, "theta": 1.2, "r_plus": 0.5, "r_minus": 0.5, "E": 5.0, "omega": 49.0, "step": 0.0004},
     "friction": {**BEAM, **LOCK, "q1": 0.0, "q2": -0.009, "mu_k": 0.05, "step": 0.001},
