@@ -10,7 +10,7 @@ use crate::cells::{Cell, CellError, Cells, SIGMA};
 use crate::map::{RegimeResult, observe_confirmed};
 use crate::orbit::{BifurcationCurve, ContinuationLimits, bifurcation_curves};
 use crate::regime::Regime;
-use crate::scene::{Family, Scene};
+use crate::scene::Family;
 use crate::theory::SlowFlow;
 
 /// Most values of an axis: all cells are in memory, 200 bytes each, and in one figure.
@@ -109,7 +109,7 @@ pub struct MapCell {
 #[derive(Debug)]
 pub struct Map {
     /// What the cells have in common.
-    common: Cells,
+    pub common: Cells,
     /// Horizontal axis.
     pub x: Axis,
     /// Vertical axis.
@@ -141,24 +141,6 @@ impl Map {
         Ok(map)
     }
 
-    /// The scene without the values of the axes.
-    #[must_use]
-    pub fn scene(&self) -> &Scene {
-        self.common.scene()
-    }
-
-    /// The detuning, unless it is an axis.
-    #[must_use]
-    pub fn sigma(&self) -> Option<f64> {
-        self.common.sigma()
-    }
-
-    /// Largest number of periods that a cell is followed.
-    #[must_use]
-    pub fn periods(&self) -> usize {
-        self.common.periods()
-    }
-
     /// Number of cells.
     #[must_use]
     pub fn size(&self) -> u64 {
@@ -186,7 +168,7 @@ impl Map {
     fn cell(&self, place: &[f64; 2], confirmations: usize) -> Result<MapCell, CellError> {
         let Cell { scene, sigma, numbers } = self.common.at(place)?;
         let start = scene.dimensionless_start();
-        let (mut result, differing) = observe_confirmed(&numbers, sigma, start, self.periods(), confirmations)?;
+        let (mut result, differing) = observe_confirmed(&numbers, sigma, start, self.common.periods(), confirmations)?;
         let mut coexisting = Vec::new();
         if let Some(regime) = differing {
             coexisting.extend([result.regime, regime]);
@@ -214,7 +196,7 @@ impl Map {
             g: [g.from, g.to],
             ..ContinuationLimits::default()
         };
-        bifurcation_curves(&self.scene().dimensionless(), &limits)
+        bifurcation_curves(&self.common.scene().dimensionless(), &limits)
     }
 
     /// Names of the axes, horizontal first: sigma, G, r, or a key of the scene.

@@ -6,11 +6,14 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi, sqrt
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from measure import Lock, measure
+from identification import harmonic
 from scene import Bench, Tape
 
 ROOT = Path(__file__).parents[2]
@@ -87,6 +90,30 @@ def play(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str, Bench]
         return Tape(**json.loads(path.read_text()))
 
     return play
+
+
+@dataclass(frozen=True)
+class Lock:
+    """Detuning, amplitude over b, and impacts per period."""
+
+    sigma: float
+    amplitude: float
+    impacts_per_period: float
+
+
+def measure(bench: Bench, tape: Tape) -> Lock:
+    plant = bench.values("plant")
+    omega0 = sqrt(plant["k"] / plant["M"])
+    epsilon = plant["m"] / plant["M"]
+    assert len(tape.v) == bench.hold, "the master has recorded the whole hold"
+    response = harmonic(np.array(tape.v), bench.step, float(np.mean(tape.omega)))
+    periods = (bench.hold - 1) * bench.step * response.omega / (2 * pi)
+    return Lock(
+        sigma=(response.omega / omega0 - 1) / epsilon,
+        amplitude=response.amplitude / plant["b"],
+        # Counted between two samples: off by up to one impact.
+        impacts_per_period=(tape.impacts[-1] - tape.impacts[0]) / periods,
+    )
 
 
 @pytest.fixture

@@ -30,7 +30,10 @@ fn the_axes_of_a_map_may_be_any_two_numbers_of_a_scene() {
     assert!(map.cells.len() == 6 && map.curves.is_empty());
     // G = E/(b epsilon), and the scene states G.
     let [second, last] = [1, 5].map(|n| &map.cells[n]);
-    assert_eq!((second.r, second.g, Some(second.sigma)), (0.65, 1.1, map.sigma()));
+    assert_eq!(
+        (second.r, second.g, Some(second.sigma)),
+        (0.65, 1.1, map.common.sigma())
+    );
     assert!((last.r - 0.8).abs() < 1e-12);
 }
 

@@ -94,18 +94,12 @@ class Tape:
         self.impacts.append(int(impacts))
 
 
-def arguments() -> tuple[Bench, str, Path]:
-    """The bench, which variant of the master is wanted, and the file for the tape."""
+def run(masters: dict) -> None:
+    """Runs the master asked for, a function from a bench to a tape, with the bench of a folder."""
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=Path)
     parser.add_argument("variant")
     parser.add_argument("tape", type=Path)
     given = parser.parse_args()
-    return Bench(given.folder), given.variant, given.tape
-
-
-def run(masters: dict) -> None:
-    """Runs the master asked for: a function from a bench to a tape."""
-    bench, variant, path = arguments()
-    tape = masters[variant](bench)
-    path.write_text(json.dumps(vars(tape)))
+    tape = masters[given.variant](Bench(given.folder))
+    given.tape.write_text(json.dumps(vars(tape)))

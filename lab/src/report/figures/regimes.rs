@@ -54,9 +54,9 @@ fn place_on(map: &Map) -> impl Fn(&Periodic) -> Place {
 }
 
 fn caption(map: &Map) -> String {
-    let numbers = map.scene().dimensionless();
+    let numbers = map.common.scene().dimensionless();
     let Dimensionless { epsilon, lambda, g, r, .. } = numbers;
-    let sigma = map.sigma().map(|sigma| format!(", σ = {sigma:.4}"));
+    let sigma = map.common.sigma().map(|sigma| format!(", σ = {sigma:.4}"));
     let free = |name: &str| !map.names().contains(&name);
     let g = free("G").then(|| format!(", G = {g:.3}"));
     let r = free("r").then(|| format!(", r = {r}"));
@@ -67,7 +67,7 @@ fn caption(map: &Map) -> String {
     };
     format!(
         "ε = {epsilon:.5}, λ = {lambda:.3}{held}{dashed}\neach cell from the same start, followed until it repeats, at most {} periods",
-        map.periods()
+        map.common.periods()
     )
 }
 
