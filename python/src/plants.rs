@@ -44,9 +44,6 @@ impl Events {
     }
 
     fn into_arrays(self, py: Python<'_>) -> EventArrays<'_> {
-        fn column<'py, T: Element>(py: Python<'py>, all: impl Iterator<Item = T>) -> Bound<'py, PyArray1<T>> {
-            all.collect::<Vec<T>>().into_pyarray(py)
-        }
         (
             column(py, self.0.iter().map(|event| event.0)),
             column(py, self.0.iter().map(|event| event.1)),
@@ -62,13 +59,25 @@ fn sign(wall: Option<Wall>) -> i8 {
     wall.map_or(0, |wall| if wall == Wall::Plus { 1 } else { -1 })
 }
 
+type Column<'py, T> = Bound<'py, PyArray1<T>>;
 type EventArrays<'py> = (
-    Bound<'py, PyArray1<u64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<u8>>,
-    Bound<'py, PyArray1<i8>>,
-    Bound<'py, PyArray1<f64>>,
+    Column<'py, u64>,
+    Column<'py, f64>,
+    Column<'py, u8>,
+    Column<'py, i8>,
+    Column<'py, f64>,
 );
+type Totals<'py> = (
+    Column<'py, u64>,
+    Column<'py, f64>,
+    Column<'py, u64>,
+    Column<'py, f64>,
+    Column<'py, f64>,
+);
+
+fn column<'py, T: Element>(py: Python<'py>, all: impl Iterator<Item = T>) -> Column<'py, T> {
+    all.collect::<Vec<T>>().into_pyarray(py)
+}
 
 /// Why a plant did not advance: without an error if it was stopped.
 type Failure = Option<InvalidValue>;
@@ -134,10 +143,6 @@ fn parameters(values: [f64; COUNT]) -> Result<Parameters, InvalidValue> {
     Ok(values.parameters())
 }
 
-fn state([q1, dq1, q2, dq2]: [f64; 4]) -> State {
-    State { q1, dq1, q2, dq2 }
-}
-
 fn wall(plant: &OnePlant) -> i8 {
     sign(plant.contact())
 }
@@ -189,7 +194,7 @@ impl Plant {
     #[new]
     fn new(values: [Real; COUNT], start: [Real; 4]) -> PyResult<Self> {
         let parameters = parameters(values.map(|one| one.0));
-        let plant = parameters.and_then(|parameters| OnePlant::new(parameters, state(start.map(|one| one.0))));
+        let plant = parameters.and_then(|parameters| OnePlant::new(parameters, start.map(|one| one.0).into()));
         plant.map(Self::of).map_err(invalid)
     }
 
@@ -255,7 +260,7 @@ impl Plant {
     }
 
     fn _set_state(&mut self, values: [Real; 4]) -> PyResult<()> {
-        self.plant.set_state(state(values.map(|one| one.0))).map_err(invalid)
+        self.plant.set_state(values.map(|one| one.0).into()).map_err(invalid)
     }
 
     /// Displacement of the primary mass, m.
@@ -363,8 +368,7 @@ impl Plant {
     /// q1 (m), q1' (m/s), q2 (m) and q2' (m/s) as an array of shape (1, 4), as of a `Batch`.
     #[getter]
     fn states<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let State { q1, dq1, q2, dq2 } = self.plant.state();
-        Array2::from(vec![[q1, dq1, q2, dq2]]).into_pyarray(py)
+        Array2::from(vec![<[f64; 4]>::from(self.plant.state())]).into_pyarray(py)
     }
 }
 
@@ -422,7 +426,7 @@ impl Plants {
         for (n, (p, s)) in values.rows().into_iter().zip(starts.rows()).enumerate() {
             let (parameters, start) = (
                 parameters(std::array::from_fn(|i| p.get(i).copied().unwrap_or(f64::NAN))),
-                state(std::array::from_fn(|i| s[i])),
+                State::from(std::array::from_fn(|i| s[i])),
             );
             let plant = parameters.and_then(|parameters| OnePlant::new(parameters, start));
             let plant = plant.map_err(|error| invalid(format!("plant {n}: {error}")))?;
@@ -514,11 +518,7 @@ impl Plants {
 
     /// Rows of q1, dq1, q2, dq2.
     fn states<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let row = |plant: &OnePlant| {
-            let State { q1, dq1, q2, dq2 } = plant.state();
-            [q1, dq1, q2, dq2]
-        };
-        Array2::from(self.each(row)).into_pyarray(py)
+        Array2::from(self.each(|plant| <[f64; 4]>::from(plant.state()))).into_pyarray(py)
     }
 
     /// Time, s.
@@ -531,28 +531,15 @@ impl Plants {
         self.each(wall).into_pyarray(py)
     }
 
-    /// Impacts, and the energy that they dissipated, J.
-    fn totals<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<f64>>) {
+    /// Impacts, the energy that they dissipated, J, how often the particle stuck to the floor, how long, s, and the energy lost to friction, J.
+    fn totals<'py>(&self, py: Python<'py>) -> Totals<'py> {
+        let all = self.each(|plant| *plant.totals());
         (
-            self.each(|plant| plant.totals().impacts).into_pyarray(py),
-            self.each(|plant| plant.totals().dissipated).into_pyarray(py),
-        )
-    }
-
-    /// How often the particle stuck to the floor, how long, s, and the energy lost to friction, J.
-    #[allow(clippy::type_complexity)]
-    fn friction<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> (
-        Bound<'py, PyArray1<u64>>,
-        Bound<'py, PyArray1<f64>>,
-        Bound<'py, PyArray1<f64>>,
-    ) {
-        (
-            self.each(|plant| plant.totals().sticks).into_pyarray(py),
-            self.each(|plant| plant.totals().stuck_time).into_pyarray(py),
-            self.each(|plant| plant.totals().friction).into_pyarray(py),
+            column(py, all.iter().map(|totals| totals.impacts)),
+            column(py, all.iter().map(|totals| totals.dissipated)),
+            column(py, all.iter().map(|totals| totals.sticks)),
+            column(py, all.iter().map(|totals| totals.stuck_time)),
+            column(py, all.iter().map(|totals| totals.friction)),
         )
     }
 }

@@ -224,21 +224,21 @@ class Batch:
     @property
     def sticks(self) -> NDArray[np.uint64]:
         """How often the particle has stuck to the floor inside the cavity since the start, shape (n,)."""
-        return self._native.friction()[0]
+        return self._native.totals()[2]
 
     @property
     def stuck_time(self) -> NDArray[np.float64]:
         """How long it has stuck there, s, shape (n,)."""
-        return self._native.friction()[1]
+        return self._native.totals()[3]
 
     @property
     def friction_loss(self) -> NDArray[np.float64]:
         """Energy lost to friction in the cavity since the start, J, shape (n,)."""
-        return self._native.friction()[2]
+        return self._native.totals()[4]
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the present states as a dataset over the dimension `plant`, with units as attributes."""
-        columns = [*self.states.T, self.times, *self._native.totals(), *self._native.friction()]
+        columns = [*self.states.T, self.times, *self._native.totals()]
         named = zip(_STATE_UNITS, columns, strict=True)
         return dataset({name: ("plant", values) for name, values in named}, _STATE_UNITS)
 
