@@ -320,7 +320,7 @@ type Recorded = fn(&Case, &str) -> Result<(Recording, Scene, Parameters), Failur
 /// Fits a record as a record.
 fn follow_one(case: &Case, snr: &str, record: Recorded) -> Result<Found, Failure> {
     let (recording, scene, truth) = record(case, snr)?;
-    let parts = parts(std::slice::from_ref(&recording), &scene, &[])?;
+    let parts = parts(std::slice::from_ref(&recording), &scene)?;
     let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
     let start = fit(&points, scene.resonance, &scene.plant, &[])?;
     let prepared = [recording.prepared(&scene.knowledge())?];

@@ -6,6 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 use vines_model::numerics::Estimate;
 use vines_model::orbit::{backbone_at_speed, resonant_motion};
 use vines_testbench::backbone::track;
+use vines_testbench::experiment::run;
 use vines_testbench::fit::{
     Channel, Contents, Contradiction, Effect, Fit, FitError, Kind, Known, MeasuredPoint, Measurements, Quantity,
     Recording, RecordingError, Selection, Table, contradiction, explain, find, fit, follow, linear_verdicts, parts,
@@ -342,7 +343,7 @@ impl RigStage for Recorder {
 #[test]
 fn a_recording_that_begins_and_ends_in_the_middle_of_a_level_gives_the_parameters() {
     let scene = wrong_scene();
-    let parts = parts(&[recording()], &scene, &[]).unwrap().concat();
+    let parts = parts(&[recording()], &scene).unwrap().concat();
     let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
     let held = parts.iter().filter(|part| part.kind == Kind::Held).count();
     assert!(held >= 4, "{parts:?}");
@@ -359,7 +360,7 @@ fn the_plant_follows_a_record_and_determines_the_parameters_better_than_its_poin
     let from = record.response.len() / 2;
     let odd = from..from + (1.0 / record.sample_time) as usize;
     record.response[odd].iter_mut().for_each(|value| *value *= 1.02);
-    let parts = parts(&[record.clone()], &scene, &[]).unwrap();
+    let parts = parts(&[record.clone()], &scene).unwrap();
     let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
     let start = fit(&points, Definition::default(), &scene.plant, &[]).unwrap();
     let prepared = [record.prepared(&scene.knowledge()).unwrap()];
@@ -381,6 +382,36 @@ fn the_plant_follows_a_record_and_determines_the_parameters_better_than_its_poin
         followed.left_out.iter().any(|one| is_named(one.seconds)),
         "{:?}",
         followed.left_out
+    );
+}
+
+#[test]
+fn the_plant_follows_a_lock_and_its_decay_and_determines_the_parameters() {
+    let scene = scene("chain.snr=60");
+    let rig = Simulated::new(RIG, scene.start).unwrap().with_sensors(scene.resonance);
+    let mut controller = BuiltIn::new(&scene.plan().lock).unwrap();
+    let record = run(
+        &mut *Chain::around(Box::new(rig), &scene),
+        &mut controller,
+        &scene.plan(),
+        |_, _, _| {},
+    )
+    .unwrap();
+    let sensors = || record.samples.iter().map(|one| one.sensors);
+    let record = Recording {
+        sample_time: record.sample_time,
+        response: sensors().map(|one| one.response).collect(),
+        drive: sensors().map(|one| one.reference.unwrap()).collect(),
+        ..recording()
+    };
+    let scene = wrong_scene();
+    let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
+    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+    let found = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
+    let r = found.fit.estimate(Quantity::R).unwrap();
+    assert!(
+        worst(&found.fit) < 3.0 && !found.fit.is_rejected() && r.uncertainty < 0.01,
+        "{r:?} {found:?}"
     );
 }
 
@@ -523,7 +554,7 @@ fn a_slow_drift_of_five_amplitudes_leaves_the_fit_as_it_is() {
         *value += 0.02 * (n as f64 / count).powi(2);
     }
     let [still, drifting] = [still, drifting].map(|one| {
-        let parts = parts(&[one], &scene, &[]).unwrap().concat();
+        let parts = parts(&[one], &scene).unwrap().concat();
         let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
         fit(&points, Definition::default(), &scene.plant, &[]).unwrap()
     });
@@ -811,7 +842,7 @@ fn velocities_and_accelerations_give_the_parameters_that_displacements_give() {
     for (of_response, of_base) in [(2, 2), (1, 0), (0, 1)] {
         let measurands = [of_response, of_base].map(|order| Measurand::ALL[order]);
         let record = recorded_as(measurands);
-        let parts = parts(&[record], &scene, &[]).unwrap().concat();
+        let parts = parts(&[record], &scene).unwrap().concat();
         let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
         let fit = fit(&points, scene.resonance, &scene.plant, &[]).unwrap();
         let mut estimates = FITTED.iter().map(|quantity| fit.estimate(*quantity).unwrap());

@@ -319,7 +319,7 @@ const MOST: usize = 24;
 pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize)) -> Result<Found, FitError> {
     let Measurements { points: measured_points, recordings, linear, known } = measured;
     let (definition, expected) = (scene.resonance, &scene.plant);
-    let parts = parts(recordings, scene, known)?;
+    let parts = parts(recordings, scene)?;
     let of_parts = parts.iter().flatten().filter_map(|part| part.point);
     let points: Vec<MeasuredPoint> = measured_points.iter().copied().chain(of_parts).collect();
     let linear = linear_verdicts(linear, &points, definition, expected, known)?;

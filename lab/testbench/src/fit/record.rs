@@ -699,6 +699,9 @@ pub fn follow(
     }
     let neighbours =
         |i: usize| mean(innovations.windows(2).map(|pair| pair[0][i] * pair[1][i])) / mean_square(channel(i));
+    let colour = 0.5 * (neighbours(0) + neighbours(1));
+    // Sums of coloured innovations vary more, by this factor if each is a part of the one before and new noise.
+    fit.covariance *= ((1.0 + colour) / (1.0 - colour)).max(1.0);
     let left_out = out.iter().map(|Stretch { record, span }| {
         let Recording { origin, sample_time, .. } = &recordings[*record];
         LeftOut {
@@ -707,10 +710,5 @@ pub fn follow(
         }
     });
     let left_out = left_out.collect();
-    Some(RecordFit {
-        fit,
-        periods: count,
-        left_out,
-        colour: 0.5 * (neighbours(0) + neighbours(1)),
-    })
+    Some(RecordFit { fit, periods: count, left_out, colour })
 }

@@ -15,7 +15,6 @@ use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 use std::fmt::{self, Display, Formatter};
 
-use num_complex::Complex64;
 use serde::Serialize;
 use thiserror::Error;
 use vines_model::numerics::{Estimate, RANDOM, mean, range, slope};
@@ -23,14 +22,13 @@ use vines_model::regime::Regime;
 use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
 use vines_model::{Measurand, Sensor};
 
-use super::{Known, MeasuredPoint, Quantity, decimals, fit};
+use super::{MeasuredPoint, decimals};
 use crate::backbone::{Criterion, LAG, LevelEstimate};
 use crate::identification::{Cycle, Harmonic, Line, ResonanceFit, harmonic, regime_by_response};
-use crate::linear::ParticleState;
 use crate::plan::{Knowledge, LinearResponse, Target};
 use crate::record::Sample;
 use crate::rig::{Command, Drive, Sensors};
-use crate::scene::{Parameters, Scene};
+use crate::scene::Scene;
 
 /// Two channels of a measurement, sampled at equal distances.
 #[derive(Debug, Clone, PartialEq)]
@@ -143,44 +141,15 @@ const STEADY: f64 = 1.5;
 /// Relative standard uncertainty of the damping that a scene states: three of them are 30 %.
 const DAMPING: f64 = 0.1;
 
-/// The parts of each recording. The natural frequency and the damping are those of `scene` first, and then those that fit the points, if these
-/// determine them better.
+/// The parts of each recording of a rig that is about as `scene` says.
 ///
 /// # Errors
 /// As [`Recording::parts`].
-pub fn parts(recordings: &[Recording], scene: &Scene, known: &[Known]) -> Result<Vec<Vec<Part>>, RecordingError> {
-    let all = |linear: LinearResponse, plant: Parameters| {
-        let Knowledge { sample_time, target, .. } = scene.knowledge();
-        let stated = Knowledge::of(&plant, scene.resonance, scene.amplitude, sample_time, target.phase);
-        let knowledge = stated.measured(linear);
-        recordings
-            .iter()
-            .map(|record| record.parts(&knowledge))
-            .collect::<Result<Vec<_>, _>>()
-    };
-    let stated = LinearResponse::of(&scene.plant);
-    let uncertainty = DAMPING * stated.damping_rate;
-    let first = all(LinearResponse { uncertainty, ..stated }, scene.plant)?;
-    let points: Vec<MeasuredPoint> = first.iter().flatten().filter_map(|part| part.point).collect();
-    let Ok(fit) = fit(&points, scene.resonance, &scene.plant, known) else {
-        return Ok(first);
-    };
-    let plant = fit.plant(&scene.plant);
-    let omega0 = plant.natural_frequency();
-    let [u_f0, u_zeta] = [Quantity::F0, Quantity::Zeta]
-        .map(|quantity| fit.estimate(quantity).map_or(f64::NAN, |quantity| quantity.uncertainty));
-    let fitted = LinearResponse {
-        omega0,
-        damping_rate: 0.5 * plant.damping / plant.primary_mass,
-        uncertainty: (TAU * u_f0).max(omega0 * u_zeta),
-        gain: Complex64::new(0.0, -0.5 * omega0),
-        u_gain: 0.0,
-        particle: ParticleState::Free,
-    };
-    if fit.is_rejected() || fitted.uncertainty.is_nan() || fitted.uncertainty > uncertainty {
-        return Ok(first);
-    }
-    all(fitted, plant).or(Ok(first))
+pub fn parts(recordings: &[Recording], scene: &Scene) -> Result<Vec<Vec<Part>>, RecordingError> {
+    let linear = LinearResponse::of(&scene.plant);
+    let uncertainty = DAMPING * linear.damping_rate;
+    let knowledge = scene.knowledge().measured(LinearResponse { uncertainty, ..linear });
+    recordings.iter().map(|record| record.parts(&knowledge)).collect()
 }
 
 impl Recording {
