@@ -217,26 +217,33 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
     })
 }
 
-/// Frequency, rad/s, and amplitude, m, at the end of the approach: from the longest window that its own second half agrees with.
+/// Frequency, rad/s, and amplitude, m, at the end of the approach: from the longest window that its later halves agree with.
 ///
-/// A long window has less noise, a late one is nearer to the end. Where even the shortest disagrees, the difference is a part of the
+/// A long window has less noise, a late one is nearer to the end. Where even the shortest two disagree, the difference is a part of the
 /// uncertainty.
 fn limits(approach: &[Cycle], wide: &[Cycle], knowledge: &Knowledge, command: f64) -> Option<[Estimate; 2]> {
     let slopes = ResonanceFit::of(wide, knowledge, Slopes::Rising)?.slopes();
     let slopes = slopes.map(|slope| Estimate::new(slope.value, &[slope.uncertainty, SLOPE_UNCERTAINTY * slope.value]));
     let limit = |cycles: &[Cycle]| Some(ResonanceFit::of(cycles, knowledge, Slopes::Known(slopes))?.limit(command));
+    let mut windows = vec![limit(approach)?];
     let mut cycles = approach;
-    let mut whole = limit(cycles)?;
     while cycles.len() >= 4 * ResonanceFit::FEWEST {
         cycles = &cycles[cycles.len() / 2..];
-        let late = limit(cycles)?;
-        let beyond = [0, 1].map(|i| ((whole[i].value - late[i].value).abs() - RANDOM * late[i].uncertainty).max(0.0));
-        if beyond == [0.0; 2] {
-            break;
-        }
-        whole = [0, 1].map(|i| Estimate::new(late[i].value, &[late[i].uncertainty, beyond[i]]));
+        windows.push(limit(cycles)?);
     }
-    Some(whole)
+    let beyond = |n: usize, late: &[Estimate; 2]| {
+        [0, 1].map(|i| ((windows[n][i].value - late[i].value).abs() - RANDOM * late[i].uncertainty).max(0.0))
+    };
+    let last = windows.len() - 1;
+    let agrees = |n: &usize| windows[n + 1..].iter().all(|late| beyond(*n, late) == [0.0; 2]);
+    let longest = (0..last).find(agrees);
+    let difference = if last > 0 && longest.is_none() {
+        beyond(last - 1, &windows[last])
+    } else {
+        [0.0; 2]
+    };
+    let whole = windows[longest.unwrap_or(last)];
+    Some([0, 1].map(|i| Estimate::new(whole[i].value, &[whole[i].uncertainty, difference[i]])))
 }
 
 /// The last periods before the release.

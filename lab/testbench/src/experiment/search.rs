@@ -41,13 +41,21 @@ const LOWEST: f64 = 0.05;
 /// Smallest response, over the response where the symmetry was lost or the lock was found, at which the motion counts as the same; the largest is
 /// its inverse. The stable range of the symmetric motion is wider.
 const LOST: f64 = 0.8;
-/// Smallest slope of the holding drive over the response under a constant drive, over the slope of the linear response: with less, the motion
-/// takes ten times as long to settle.
+/// Smallest slope of the holding drive over the response under a constant drive, over their ratio, which is the slope without impacts: with less,
+/// an error of 1 % of the drive moves the response by more than 10 %, and the motion takes ten times as long to settle.
 const SMALLEST_SLOPE: f64 = 0.1;
-/// Relative error of the drive, or of the response if that is larger, at which the response that the requested drive holds has been found.
+/// Relative error of the response, and error of the frequency over the half-power bandwidth E/A, at which the response that the requested drive
+/// holds has been found.
 const FOUND: f64 = 1e-4;
-/// Largest number of steps of the interpolation; then the motion is left to settle where it is.
-const LEGS: u32 = 20;
+/// Relative error of the drive at which a constant drive takes over where the drive rises faster than in proportion to the response: a quarter of
+/// what a leg changes.
+const CLOSE: f64 = 0.25 * STEP;
+/// Longest time until a motion has settled under a constant drive, in its time constants: it is six times the logarithm of [`FOUND`].
+const SETTLING: f64 = 60.0;
+/// Share of a straight line that is followed where its bend is not known.
+const CAUTIOUS: f64 = 0.5;
+/// Largest number of levels that are held for it.
+const LEGS: usize = 20;
 /// Number of searches, each twice as slow as the one before.
 const SEARCHES: u32 = 4;
 
@@ -60,6 +68,8 @@ struct Leg {
     /// Drive that holds it, m, and its standard uncertainty.
     drive: f64,
     noise: f64,
+    /// Frequency, rad/s.
+    omega: f64,
     /// Whether frequency and loss need impacts.
     departed: bool,
     symmetric: bool,
@@ -176,66 +186,124 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Follows the symmetric motion to the response that the requested drive holds. Returns whether it stays under control there; `None` if
     /// the motion is lost. `any`: also one that a constant drive does not hold.
     fn solve(&mut self, leg: &mut Leg, step: f64, any: bool) -> Result<Option<bool>, ExperimentError> {
-        let (mut points, mut passed, mut legs) = (BackbonePoints::from(*leg), false, 0);
-        let mut upwards = leg.drive < self.requested;
-        while leg.symmetric && self.setpoint > LOWEST * self.b && legs < LEGS {
-            let most = step * leg.last;
-            let way = if upwards { most } else { -most };
-            // From where the response is: it follows its setpoint late.
-            let wanted = points.slope().is_some_and(|slope| any || slope > 0.0);
-            let predicted = points.at(self.requested).map(|to| to - leg.last);
-            let change = predicted.filter(|change| wanted && (passed || change * way > 0.0));
-            *leg = match change {
-                Some(change) if change.abs() < most => {
-                    legs += 1;
-                    let to = leg.last + change - self.setpoint;
-                    self.leg(to, self.periods(change, leg) / 2, 0.0)?;
-                    self.leg(0.0, FOLLOWED, 0.0)?
-                }
-                change => self.sweep(leg, change.map_or(way, |change| change.clamp(-most, most)))?,
-            };
+        let (mut swept, mut upwards) = (vec![*leg], leg.drive < self.requested);
+        while leg.symmetric && self.setpoint > LOWEST * self.b {
+            let change = step / self.steepness(&swept).max(1.0) * leg.last;
+            *leg = self.sweep(leg, if upwards { change } else { -change })?;
             if !leg.symmetric {
                 // A change may disturb the symmetry for a while.
                 *leg = self.leg(0.0, FOLLOWED, 0.0)?;
             }
-            if !leg.symmetric {
-                (points, passed, upwards) = (self.below(leg, step)?, false, false);
-                continue;
-            }
-            let between = points.add(*leg, 0.5 * step, self.requested);
-            let Some(slope) = points.slope().filter(|slope| any || *slope > 0.0) else {
-                passed = false;
-                continue;
-            };
-            passed |= between;
-            let scale = (slope.abs() * leg.response).clamp(SMALLEST_SLOPE * self.requested, self.requested);
-            let is_found = (self.requested - leg.drive).abs() < (FOUND * scale).max(leg.noise);
-            // The condition of stability under a constant drive.
-            // Behind a shaker a constant command is no constant force: the response stays under control.
-            let is_stable = !self.target.through_shaker && slope > SMALLEST_SLOPE * self.damping();
-            if is_found || is_stable && legs == LEGS {
-                if is_stable {
-                    self.bench.controller.hold_drive()?;
+            if leg.symmetric {
+                swept.push(*leg);
+                let Some(levels) = passed(&swept, self.requested, any) else {
+                    continue;
+                };
+                if let Some(held) = self.refine(leg, levels, any)? {
+                    return Ok(Some(held));
                 }
-                if self.settle(leg)? {
-                    return Ok(Some(!is_stable));
-                }
-                (points, passed, upwards) = (self.below(leg, step)?, false, false);
             }
+            // Above the symmetric motion is one without symmetry.
+            *leg = self.fall(*leg, step, LOST * leg.response)?;
+            (swept, upwards) = (vec![*leg], false);
         }
         Ok(None)
     }
 
-    /// Goes down to the symmetric motion from where it was lost: above it is a motion without symmetry.
-    fn below(&mut self, leg: &mut Leg, step: f64) -> Result<BackbonePoints, ExperimentError> {
-        *leg = self.fall(*leg, step, LOST * leg.response)?;
-        Ok(BackbonePoints::from(*leg))
+    /// Largest relative change of the drive, or of the frequency over the half-power bandwidth E/A, over that of the response, between the last
+    /// two legs.
+    fn steepness(&self, swept: &[Leg]) -> f64 {
+        let [.., two, last] = swept else { return 0.0 };
+        let turned = (last.omega - two.omega) / self.linear.omega0 * last.response;
+        (last.drive - two.drive).abs().max(turned.abs()) / last.drive / (last.response / two.response - 1.0).abs()
     }
 
-    /// Waits until the lock has settled. Returns whether it has; if not, the motion has lost its symmetry.
-    fn settle(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
+    /// Holds the response at levels until the requested drive holds it there. Returns whether it stays under control; `None` if there is no such
+    /// level. `first`: the first levels, m, from the highest on, and the slope of the drive over the response there.
+    fn refine(
+        &mut self,
+        leg: &mut Leg,
+        (first, slope): (Vec<f64>, f64),
+        any: bool,
+    ) -> Result<Option<bool>, ExperimentError> {
+        let (mut levels, lowest) = (Levels { legs: Vec::new(), slope }, first[first.len() - 1]);
+        let mut first = first.into_iter();
+        let mut next = first.next();
+        while let Some(to) = next.filter(|_| levels.legs.len() < LEGS) {
+            *leg = self.level(leg, to)?;
+            if !leg.symmetric {
+                return Ok(None);
+            }
+            levels.add(*leg);
+            next = first.next();
+            if next.is_some() {
+                continue;
+            }
+            let Some(predicted) = levels.predict(self.requested, any) else {
+                break;
+            };
+            // A motion that follows the drive faster than in proportion settles by itself.
+            let is_steep = predicted.is_root && predicted.slope * leg.response > leg.drive;
+            let is_close = is_steep && (leg.drive - self.requested).abs() < CLOSE * leg.drive;
+            if !(is_close || self.is_found(leg, &predicted)) {
+                next = Some(predicted.response).filter(|to| predicted.is_root || levels.is_new(*to));
+                continue;
+            }
+            // The condition of stability under a constant drive.
+            let is_stable = predicted.slope > SMALLEST_SLOPE * leg.drive / leg.response;
+            if is_stable {
+                self.bench.controller.hold_drive()?;
+            }
+            let rate = (self.gain() * predicted.slope * self.period).min(1.0 / FOLLOWED as f64);
+            let longest = if is_stable { SETTLING / rate } else { f64::INFINITY };
+            if !self.settle(leg, longest)? {
+                return Ok(None);
+            }
+            if is_stable || self.is_found(leg, &predicted) {
+                return Ok(Some(!is_stable));
+            }
+            levels
+                .legs
+                .retain(|level| (level.response - leg.response).abs() > FOUND * leg.response);
+            next = Some(leg.response);
+        }
+        // The sweep goes on below.
+        *leg = self.level(leg, lowest)?;
+        Ok(None)
+    }
+
+    /// Whether a held level is where the requested drive holds the response.
+    fn is_found(&self, leg: &Leg, predicted: &Predicted) -> bool {
+        let bandwidth = leg.drive / leg.response;
+        let change = predicted.response - leg.response;
+        let is_near = change.abs() < FOUND * leg.response
+            && (predicted.turning * change).abs() < FOUND * bandwidth * self.linear.omega0;
+        predicted.is_root && is_near || (self.requested - leg.drive).abs() < leg.noise
+    }
+
+    /// Holds the response at a level, m, until its drive changes by less than by what it differs from the requested one.
+    fn level(&mut self, leg: &Leg, to: f64) -> Result<Leg, ExperimentError> {
+        let periods = self.periods(to - leg.last, leg) / 2;
+        self.leg(to - self.setpoint, periods, 0.0)?;
+        let mut before = self.leg(0.0, FOLLOWED, 0.0)?;
+        for _ in 0..LEGS {
+            let held = self.leg(0.0, FOLLOWED, 0.0)?;
+            // A change may disturb the symmetry for a while.
+            let change = (held.drive - before.drive).abs();
+            if !held.symmetric || change <= held.noise.max((held.drive - self.requested).abs()) {
+                return Ok(held);
+            }
+            before = held;
+        }
+        Ok(before)
+    }
+
+    /// Waits until the lock has settled, for `longest` periods at most. Returns whether it has; if not, the motion has lost its symmetry, or
+    /// does not come to rest.
+    fn settle(&mut self, leg: &mut Leg, longest: f64) -> Result<bool, ExperimentError> {
         let (mut asymmetric, mut grown, first) = (0, 0, leg.response);
-        while asymmetric < 2 {
+        let end = self.bench.periods + longest + f64::from(2 * self.bench.config.lock.dwell);
+        while asymmetric < 2 && self.bench.periods < end {
             let before = leg.asymmetry;
             *leg = self.measure(FOLLOWED)?;
             // Beside symmetry breaking the symmetry is lost slowly; noise grows as often in one of 24 cases.
@@ -341,6 +409,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             last: all[all.len() - 1].amplitude(),
             drive: drive.value,
             noise: drive.uncertainty,
+            omega: omega.value,
             departed,
             symmetric,
             asymmetry: ((even - doubtful).max(0.0) / odd.max(doubtful)).sqrt(),
@@ -371,51 +440,145 @@ fn even_and_odd(samples: &[Sample], step: f64, measurand: Measurand) -> Option<[
     Some([even, odd, rest * rest * 4.0 / samples.len() as f64])
 }
 
-/// The last points of the backbone, at most three.
-struct BackbonePoints(Vec<Leg>);
-
-impl From<Leg> for BackbonePoints {
-    fn from(first: Leg) -> Self {
-        Self(vec![first])
-    }
+/// What a sweep has passed: levels of the response, m, near which the requested drive is, or an extremum of the drive that may reach it, the
+/// highest first; and the slope of the drive over the response there.
+fn passed(swept: &[Leg], requested: f64, any: bool) -> Option<(Vec<f64>, f64)> {
+    let beyond = |leg: &Leg| leg.drive - requested;
+    let [.., two, last] = swept else { return None };
+    let slope = (last.drive - two.drive) / (last.response - two.response);
+    let has_passed = |n: f64| beyond(two) * (last.drive - requested + n * (last.drive - two.drive)) <= 0.0;
+    let levels = match () {
+        // Where the drive rises faster than in proportion, the motion may be lost below.
+        () if has_passed(1.0) && slope * last.response > last.drive => vec![last.last],
+        () if has_passed(0.0) && (any || slope > 0.0) => vec![last.response - beyond(last) / slope],
+        () => {
+            let nearest =
+                (0..swept.len()).min_by(|n, m| beyond(&swept[*n]).abs().total_cmp(&beyond(&swept[*m]).abs()))?;
+            let near = &swept[nearest];
+            let is_beyond = |leg: &Leg| {
+                let noise = SIGNIFICANT * leg.noise.hypot(near.noise);
+                (leg.drive - near.drive).abs() > noise && beyond(leg) / beyond(near) > 1.0
+            };
+            if !(swept[..nearest].iter().any(is_beyond) && is_beyond(last)) {
+                return None;
+            }
+            let [before, after] = [nearest - 1, nearest + 1].map(|n| swept[n].response);
+            let mut levels = vec![before, near.response, 0.5 * (near.response + after)];
+            levels.sort_by(|one, other| other.total_cmp(one));
+            levels
+        }
+    };
+    Some((levels, slope))
 }
 
-impl BackbonePoints {
-    /// Adds a point, or replaces the last one if they are less apart than the share `apart` or noise. Returns whether the drive `requested` lies
-    /// between the two.
-    fn add(&mut self, leg: Leg, apart: f64, requested: f64) -> bool {
-        let last = self.0[self.0.len() - 1];
-        let difference = (leg.drive - last.drive).abs();
-        let is_new = (leg.response / last.response - 1.0).abs() > apart
-            && difference > SIGNIFICANT * leg.noise.hypot(last.noise);
-        if !is_new {
-            self.0.pop();
-        }
-        self.0.push(leg);
-        if self.0.len() > 3 {
-            self.0.remove(0);
-        }
-        (last.drive - requested) * (leg.drive - requested) <= 0.0
+/// Held levels by rising response.
+#[derive(Debug)]
+struct Levels {
+    legs: Vec<Leg>,
+    /// Slope of the drive over the response, as long as there is one level.
+    slope: f64,
+}
+
+/// Where held levels predict the requested drive, or the drive that is nearest to it.
+#[derive(Debug, Clone, Copy)]
+struct Predicted {
+    /// m
+    response: f64,
+    /// Slope of the drive over the response there.
+    slope: f64,
+    /// Slope of the frequency over the response there, rad/s per m.
+    turning: f64,
+    /// The requested drive is there.
+    is_root: bool,
+}
+
+impl Levels {
+    fn add(&mut self, leg: Leg) {
+        self.legs.retain(|level| level.response != leg.response);
+        self.legs.push(leg);
+        self.legs.sort_by(|one, other| one.response.total_cmp(&other.response));
     }
 
-    /// Slope of the holding drive over the response.
-    fn slope(&self) -> Option<f64> {
-        let [.., two, last] = &self.0[..] else { return None };
-        Some((last.drive - two.drive) / (last.response - two.response))
+    /// Whether no level has been held here, m.
+    fn is_new(&self, to: f64) -> bool {
+        self.legs.iter().all(|level| (level.response - to).abs() > FOUND * to)
     }
 
-    /// The response, m, that this drive, m, holds, on the parabola through the last points over the drive, which has no singularity at the fold;
-    /// but at most as far as on the line through the last two, and at least half as far.
-    fn at(&self, drive: f64) -> Option<f64> {
-        let [.., two, last] = &self.0[..] else { return None };
-        let inverse = |a: &Leg, b: &Leg| (a.response - b.response) / (a.drive - b.drive);
-        let line = inverse(last, two);
-        let bend = match &self.0[..] {
-            [three, two, last] => (line - inverse(two, three)) / (last.drive - three.drive),
-            _ => 0.0,
+    /// The prediction by the parabola through three levels: two between which the drive passes the requested one, rising with the response
+    /// or, for `any`, falling; otherwise those about the level whose drive is nearest to it.
+    fn predict(&self, requested: f64, any: bool) -> Option<Predicted> {
+        let beyond = |n: usize| self.legs[n].drive - requested;
+        let pairs = 1..self.legs.len();
+        let rises = |n: &usize| beyond(n - 1) <= 0.0 && beyond(*n) >= 0.0;
+        let falls = |n: &usize| any && beyond(n - 1) >= 0.0 && beyond(*n) <= 0.0;
+        let between = pairs.clone().find(rises).or_else(|| pairs.clone().find(falls));
+        let nearest = pairs.min_by(|n, m| {
+            let distance = |n: usize| beyond(n - 1).abs().min(beyond(n).abs());
+            distance(*n).total_cmp(&distance(*m))
+        });
+        let Some(upper) = between.or(nearest) else {
+            let [leg] = &self.legs[..] else { return None };
+            return Some(Predicted {
+                response: leg.response - CAUTIOUS * (leg.drive - requested) / self.slope,
+                slope: self.slope,
+                turning: f64::INFINITY,
+                is_root: true,
+            });
         };
-        let share = 1.0 + bend / line * (drive - two.drive);
-        let slope = line * share.clamp(0.5, 1.0);
-        Some(last.response + slope * (drive - last.drive))
+        let [a, b] = [self.legs[upper - 1], self.legs[upper]];
+        let width = b.response - a.response;
+        // The third level: the nearest to the two.
+        let distance = |leg: &Leg| (leg.response - 0.5 * (a.response + b.response)).abs();
+        let others = self
+            .legs
+            .iter()
+            .enumerate()
+            .filter(|(n, _)| *n != upper && n + 1 != upper);
+        let third = others
+            .map(|(_, leg)| leg)
+            .min_by(|one, other| distance(one).total_cmp(&distance(other)));
+        let line = (b.drive - a.drive) / width;
+        let bend = third.map_or(0.0, |c| {
+            ((c.drive - b.drive) / (c.response - b.response) - line) / (c.response - a.response)
+        });
+        // Beyond a: offset + rise u + bend u².
+        let (offset, rise) = (a.drive - requested, line - bend * width);
+        let square = rise * rise - 4.0 * bend * offset;
+        let is_root = square >= 0.0;
+        let ahead = if is_root {
+            // Of both roots the one where the drive rises, unless it is known to fall.
+            let slope = if line < 0.0 && (between.is_some() || any && third.is_none()) {
+                -square.sqrt()
+            } else {
+                square.sqrt()
+            };
+            -2.0 * offset / (rise + slope)
+        } else {
+            -0.5 * rise / bend
+        };
+        let response = a.response + ahead;
+        // Beyond two levels, nothing is known of the bend.
+        let nearest = if beyond(upper).abs() < beyond(upper - 1).abs() {
+            b.response
+        } else {
+            a.response
+        };
+        let share = if between.is_none() && third.is_none() {
+            CAUTIOUS
+        } else {
+            1.0
+        };
+        let response = nearest + share * (response - nearest);
+        let [lowest, .., highest] = &self.legs[..] else {
+            return None;
+        };
+        let span = (STEP * highest.response).max(highest.response - lowest.response);
+        let is_near = (lowest.response - span..highest.response + span).contains(&response);
+        is_near.then(|| Predicted {
+            response,
+            slope: rise + 2.0 * bend * ahead,
+            turning: (b.omega - a.omega) / width,
+            is_root,
+        })
     }
 }
