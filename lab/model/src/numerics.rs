@@ -431,6 +431,11 @@ impl HarmonicBasis {
 }
 
 impl HarmonicFit {
+    /// Number of harmonics.
+    pub fn harmonics(&self) -> usize {
+        self.columns.len()
+    }
+
     /// Constant of the polynomial: its value in the middle.
     pub fn constant(&self) -> f64 {
         self.coefficients[0]

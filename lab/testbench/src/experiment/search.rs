@@ -50,8 +50,6 @@ const FOUND: f64 = 1e-4;
 /// Relative error of the drive at which a constant drive takes over where the drive rises faster than in proportion to the response: a quarter of
 /// what a leg changes.
 const CLOSE: f64 = 0.25 * STEP;
-/// Longest time until a motion has settled under a constant drive, in its time constants: it is six times the logarithm of [`FOUND`].
-const SETTLING: f64 = 60.0;
 /// Share of a straight line that is followed where its bend is not known.
 const CAUTIOUS: f64 = 0.5;
 /// Largest number of levels that are held for it.
@@ -254,9 +252,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             if is_stable {
                 self.bench.controller.hold_drive()?;
             }
-            let rate = (self.gain() * predicted.slope * self.period).min(1.0 / FOLLOWED as f64);
-            let longest = if is_stable { SETTLING / rate } else { f64::INFINITY };
-            if !self.settle(leg, longest)? {
+            if !self.settle(leg)? {
                 return Ok(None);
             }
             if is_stable || self.is_found(leg, &predicted) {
@@ -298,12 +294,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         Ok(before)
     }
 
-    /// Waits until the lock has settled, for `longest` periods at most. Returns whether it has; if not, the motion has lost its symmetry, or
-    /// does not come to rest.
-    fn settle(&mut self, leg: &mut Leg, longest: f64) -> Result<bool, ExperimentError> {
+    /// Waits until the lock has settled. Returns whether it has; if not, the motion has lost its symmetry.
+    fn settle(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
         let (mut asymmetric, mut grown, first) = (0, 0, leg.response);
-        let end = self.bench.periods + longest + f64::from(2 * self.bench.config.lock.dwell);
-        while asymmetric < 2 && self.bench.periods < end {
+        while asymmetric < 2 {
             let before = leg.asymmetry;
             *leg = self.measure(FOLLOWED)?;
             // Beside symmetry breaking the symmetry is lost slowly; noise grows as often in one of 24 cases.

@@ -1,6 +1,7 @@
 //! The regime from the response alone, as on a real rig.
 //!
-//! Two impacts per period at even intervals excite odd harmonics, and uneven impacts even ones, too. Irregular impacts make amplitude
+//! Two impacts per period at even intervals excite odd harmonics, and uneven impacts even ones, too: most of all those near another mode of the
+//! structure, so that as many are fitted as the samples can show. Irregular impacts make amplitude
 //! and phase fluctuate, which leaves a residual. The motion without impacts is the linear mode: response over base is as in a
 //! linear test at small amplitude, which the loop check makes.
 
@@ -26,10 +27,14 @@ const NOISE_SHARE: f64 = 0.5;
 const LINES: usize = 8;
 /// Smallest significant harmonic, in standard errors.
 const SIGNIFICANT: f64 = 4.0;
-/// Smallest second harmonic of an asymmetric motion, over the third: symmetric motions have about 0.01, irregular ones 2 and more.
+/// Smallest even harmonic of an asymmetric motion, over the larger odd one next to it: of the second over the third, symmetric motions have about
+/// 0.01, irregular ones 2 and more.
 pub(crate) const ASYMMETRIC: f64 = 0.5;
 /// Harmonics that are fitted to a displacement.
 const HARMONICS: usize = 5;
+
+/// All harmonics that the samples can show.
+const ALL: Measurand = Measurand::Acceleration;
 
 /// Degrees of the amplitudes of the harmonics in time: quadratic for the fundamental, constant for the others.
 pub(crate) fn degrees(measurand: Measurand, samples_per_period: f64) -> Vec<Option<usize>> {
@@ -42,9 +47,8 @@ pub(crate) fn degrees(measurand: Measurand, samples_per_period: f64) -> Vec<Opti
 struct Content {
     /// Amplitude of the fundamental, m.
     amplitude: f64,
-    /// Amplitudes of the second and the third harmonic, relative.
-    second: f64,
-    third: f64,
+    /// Amplitudes of the harmonics from the second on, relative.
+    harmonics: Vec<f64>,
     /// Standard error of either: by noise, and what a change of the motion adds to a harmonic, as the fourth shows. The impacts excite the
     /// fourth harmonic twenty times less than the second.
     error: f64,
@@ -61,13 +65,28 @@ impl Content {
         self.rest > STEADY && self.noise < NOISE_SHARE * self.rest
     }
 
-    /// Fits the samples; `None` for too few samples or no motion.
-    fn of(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Self> {
+    /// Whether an even harmonic is more than noise and more than [`ASYMMETRIC`] of the larger odd one next to it, as displacements. `order`: how
+    /// often the sensor differentiates them. The probability of a false alarm does not depend on the number of harmonics.
+    fn is_asymmetric(&self, order: i32) -> bool {
+        let displacement = |n: usize| {
+            self.harmonics
+                .get(n - 2)
+                .map_or(0.0, |harmonic| harmonic / (n as f64).powi(order))
+        };
+        let even = (2..self.harmonics.len() + 2).step_by(2);
+        let significant = (SIGNIFICANT.powi(2) + 2.0 * (even.len() as f64).ln()).sqrt() * self.error;
+        let neighbour = |n: usize| displacement(n + 1).max(if n > 2 { displacement(n - 1) } else { 0.0 });
+        even.clone()
+            .any(|n| self.harmonics[n - 2] > significant && displacement(n) > ASYMMETRIC * neighbour(n))
+    }
+
+    /// Fits the samples, with as many harmonics as belong to what `measurand` says; `None` for too few samples or no motion.
+    fn of(samples: &[Sample], knowledge: &Knowledge, omega: f64, measurand: Measurand) -> Option<Self> {
         let (n, sample_time, d) = (samples.len(), knowledge.sample_time, knowledge.numbers);
         // The phase of the response is more uniform than the phase of a drive that a loop still corrects.
         let phases: Vec<f64> = (0..n).map(|n| n as f64 * sample_time * omega).collect();
         let per_period = TAU / (omega * sample_time);
-        let basis = HarmonicBasis::new(&phases, 1, &degrees(knowledge.target.measurands[0], per_period));
+        let basis = HarmonicBasis::new(&phases, 1, &degrees(measurand, per_period));
         if n < 2 * basis.terms() {
             return None;
         }
@@ -93,16 +112,18 @@ impl Content {
         let n = values.len();
         let fit = basis.fit(values)?;
         let rest = basis.residual(values, &fit);
-        let [amplitude, second, third, fourth] = [1, 2, 3, 4].map(|n| fit.harmonic(n).norm());
+        let amplitude = fit.harmonic(1).norm();
         if amplitude == 0.0 || !amplitude.is_finite() {
             return None;
         }
         let rms = (rest.norm_squared() / (n - basis.terms()) as f64).sqrt() / amplitude;
+        let harmonics: Vec<f64> = (2..=fit.harmonics())
+            .map(|n| fit.harmonic(n).norm() / amplitude)
+            .collect();
         let content = Self {
             amplitude,
-            second: second / amplitude,
-            third: third / amplitude,
-            error: (rms * (2.0 / n as f64).sqrt()).hypot(fourth / amplitude),
+            error: (rms * (2.0 / n as f64).sqrt()).hypot(harmonics[2]),
+            harmonics,
             rest: rms,
             noise: noise(rest.as_slice()) / amplitude,
             tones: Vec::new(),
@@ -113,7 +134,7 @@ impl Content {
 
 /// The largest foreign tone in the response of these samples, if they would be irregular with it. `omega` (rad/s) is the frequency of the motion.
 pub fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Tone> {
-    let content = Content::of(samples, knowledge, omega)?;
+    let content = Content::of(samples, knowledge, omega, ALL)?;
     let tones = content.tones.iter();
     let largest = tones.max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
     Some(Tone {
@@ -124,7 +145,7 @@ pub fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Op
 
 /// These samples without the foreign tones in their response; `None` if there are none.
 pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Vec<Sample>> {
-    let tones = Content::of(samples, knowledge, omega)?.tones;
+    let tones = Content::of(samples, knowledge, omega, knowledge.target.measurands[0])?.tones;
     let mut cleaned = samples.to_vec();
     for (n, sample) in cleaned.iter_mut().enumerate() {
         sample.sensors.response -= tones.iter().map(|line| line.at(n)).sum::<f64>();
@@ -138,7 +159,7 @@ pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f6
 /// Impacts need evidence: frequency and loss that no particle between carried and free produces; without a linear response that was measured on
 /// the rig, a third harmonic that none produces.
 pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
-    let Some(content) = Content::of(samples, knowledge, omega.value) else {
+    let Some(content) = Content::of(samples, knowledge, omega.value, ALL) else {
         return Regime::Unknown;
     };
     if content.is_irregular() {
@@ -154,23 +175,22 @@ pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estim
     // The force on the mass M over its inertia in the fundamental.
     let square = (3.0 * omega.value / omega0).powi(2);
     let force = |harmonic: f64| 9.0 * (square - 1.0) * harmonic / over_v(definition, square);
+    let third_harmonic = content.harmonics[1];
     let third = Estimate {
-        value: force(content.third),
+        value: force(third_harmonic),
         uncertainty: force(content.error),
     };
     let significant = SIGNIFICANT * content.error;
     let impacts = match is_known {
         true => impacts_by_resonance(&knowledge.linear, [response, base, omega], target.phase, epsilon),
-        false if content.third > significant => impacts_by_harmonic(third, epsilon),
+        false if third_harmonic > significant => impacts_by_harmonic(third, epsilon),
         false => Impacts::Doubtful,
     };
-    // As displacements.
-    let asymmetric = ASYMMETRIC * (2.0_f64 / 3.0).powi(target.measurands[0].order());
     match impacts {
         Impacts::NotNeeded if is_known => Regime::NoImpacts,
         Impacts::NotNeeded | Impacts::Doubtful => Regime::NotEstablished,
-        Impacts::Needed if content.second > significant.max(asymmetric * content.third) => Regime::Asymmetric,
-        Impacts::Needed if content.third > significant => Regime::Symmetric,
+        Impacts::Needed if content.is_asymmetric(target.measurands[0].order()) => Regime::Asymmetric,
+        Impacts::Needed if third_harmonic > significant => Regime::Symmetric,
         Impacts::Needed => Regime::Unresolved,
     }
 }
