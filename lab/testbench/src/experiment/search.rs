@@ -240,15 +240,17 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             let Some(predicted) = levels.predict(self.requested, any) else {
                 break;
             };
+            // Behind a shaker a constant command is no constant force: the response stays under control.
+            let by_drive = predicted.is_root && !self.target.through_shaker;
             // A motion that follows the drive faster than in proportion settles by itself.
-            let is_steep = predicted.is_root && predicted.slope * leg.response > leg.drive;
+            let is_steep = by_drive && predicted.slope * leg.response > leg.drive;
             let is_close = is_steep && (leg.drive - self.requested).abs() < CLOSE * leg.drive;
             if !(is_close || self.is_found(leg, &predicted)) {
                 next = Some(predicted.response).filter(|to| predicted.is_root || levels.is_new(*to));
                 continue;
             }
             // The condition of stability under a constant drive.
-            let is_stable = predicted.slope > SMALLEST_SLOPE * leg.drive / leg.response;
+            let is_stable = by_drive && predicted.slope > SMALLEST_SLOPE * leg.drive / leg.response;
             if is_stable {
                 self.bench.controller.hold_drive()?;
             }
