@@ -357,9 +357,9 @@ impl StructureOrbits {
         }
     }
 
-    /// All orbits at the frequency `omega`, rad/s, under a drive of the amplitude `drive`, at any phase: none or up to two.
-    pub fn at(&self, omega: f64, drive: f64) -> Vec<StructureOrbit> {
-        self.both(omega, |motions| motions.driven(drive), |motion| self.accept(motion))
+    /// All orbits at the frequency `omega`, rad/s, with a reference of the amplitude `reference`, at any phase: none or up to two.
+    pub fn at(&self, omega: f64, reference: f64) -> Vec<StructureOrbit> {
+        self.both(omega, |motions| motions.driven(reference), |motion| self.accept(motion))
     }
 
     /// All orbits at phase resonance at the frequency `omega`, rad/s, under any drive: none or up to two.
@@ -389,9 +389,9 @@ impl StructureOrbits {
         self.branches(range, roots, |motion| self.accept_resonant(motion))
     }
 
-    /// The frequency response of the symmetric 1:1 motions under a drive of the amplitude `drive` within `range`, as curves.
-    pub fn frequency_response(&self, drive: f64, range: &StructureRange) -> Vec<StructureBranch> {
-        self.branches(range, |motions| motions.driven(drive), |motion| self.accept(motion))
+    /// The frequency response of the symmetric 1:1 motions with a reference of the amplitude `reference` within `range`, as curves.
+    pub fn frequency_response(&self, reference: f64, range: &StructureRange) -> Vec<StructureBranch> {
+        self.branches(range, |motions| motions.driven(reference), |motion| self.accept(motion))
     }
 
     /// What each section and, last, the particle contribute to the disturbance of an orbit that grows fastest or decays slowest: shares

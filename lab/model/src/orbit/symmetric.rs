@@ -168,12 +168,15 @@ impl SymmetricMotions {
         quadratic(square, linear, constant)
     }
 
-    /// Speeds of the two motions under a drive of the amplitude `drive`: `|Y|²` is quadratic in V.
-    pub(super) fn driven(&self, drive: f64) -> Option<[f64; 2]> {
-        let Self { alpha, beta, .. } = *self;
-        let b = self.particle.half_width;
-        let y = drive / self.drive_over_y.norm();
-        quadratic(alpha * alpha + beta * beta, 2.0 * alpha * b, b * b - y * y)
+    /// Speeds of the two motions with a reference of the amplitude `reference`: its square is quadratic in V.
+    pub(super) fn driven(&self, reference: f64) -> Option<[f64; 2]> {
+        let rest = Complex::new(0.0, self.particle.half_width) * self.reference_over_y;
+        let rate = Complex::new(self.beta, self.alpha) * self.reference_over_y + self.reference_kappa;
+        quadratic(
+            rate.norm_sqr(),
+            2.0 * (rest.conj() * rate).re,
+            rest.norm_sqr() - reference * reference,
+        )
     }
 
     /// The smallest drive under which there is a motion: the discriminant of the quadratic is zero.
