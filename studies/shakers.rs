@@ -65,7 +65,9 @@ fn drawn(uniform: Uniform) -> Result<(Scene, [f64; 4]), Failure> {
         let (text, numbers) = text(uniform);
         let share = uniform(0.0, 1.0);
         let plain = scene(&format!("{text}[excitation]\nG = 1\n"), &[""; 0])?;
-        let curves = structure_backbone(&plain, &plain.dimensionless()).ok_or("no structure")?;
+        let Some(curves) = structure_backbone(&plain, &plain.dimensionless()) else {
+            continue;
+        };
         let all: Vec<Orbit> = curves.into_iter().flatten().collect();
         let is_level = |orbit: &&Orbit| orbit.stable && (0.85..=1.15).contains(&orbit.omega) && orbit.b < 1.35;
         let (low, high) = range((f64::INFINITY, 0.0), all.iter().filter(is_level).map(|orbit| orbit.c));
@@ -90,6 +92,19 @@ fn drawn(uniform: Uniform) -> Result<(Scene, [f64; 4]), Failure> {
 /// Points, settled ones, those beyond 3 u, the largest error over u, periods, and why it ended.
 fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String) {
     let plan = scene.plan();
+    let checked = Simulated::of(&scene.clone().at_rest()).map(|mut rig| check(&mut *rig, &plan));
+    if let Ok(Ok(checked)) = checked
+        && checked.verdict != Verdict::Healthy
+    {
+        return (
+            0,
+            0,
+            0,
+            f64::NAN,
+            f64::NAN,
+            format!("refused by the check, {}", checked.verdict),
+        );
+    }
     let tracked = match Simulated::of(scene)
         .map_err(Failure::from)
         .and_then(|mut rig| Ok(tracked(&mut *rig, &plan, 20.0)?))
@@ -135,14 +150,15 @@ fn main() -> Result<(), Failure> {
         let (points, settled, beyond, worst, periods, why) = found;
         format!(
             "{seed},{n},{share:.4},{suspension:.3},{stinger:.2},{coil:.3},{drop_out:.4},{bandwidth:.4},{points},{settled},{beyond},{worst:.2},{periods:.0},\"{}\"",
-            why.replace('"', "'")
+            why.split([':', ';', '"']).next().unwrap_or_default()
         )
     }).collect();
     let tracked = found.iter().filter(|one| one.1 >= 4 && one.2 == 0).count();
     let wrong: usize = found.iter().map(|one| one.2).sum();
     let settled: usize = found.iter().map(|one| one.1).sum();
+    let refused = found.iter().filter(|one| one.5.starts_with("refused")).count();
     println!(
-        "{tracked} of {count} tracked with at least half of the levels settled and none beyond 3 u; {wrong} of {settled} settled points beyond 3 u"
+        "{refused} refused by the check; {tracked} of {count} tracked with at least half of the levels settled and none beyond 3 u; {wrong} of {settled} settled points beyond 3 u"
     );
     let header = "seed,shaker,mass_ratio,suspension,stinger,coil,drop_out,bandwidth,points,settled,beyond_3u,worst_u,periods,ended";
     write("shakers", header, 2, &rows)

@@ -179,8 +179,13 @@ fn of_driven_mode(orbit: &StructureOrbit, structure: &Structure, numbers: &Dimen
 /// The section of the driven mode: the nearest in frequency.
 fn section_of(structure: &Structure) -> usize {
     let distance = |n: &usize| {
-        let section = &structure.host.sections()[*n];
-        (section.oscillator.omega0 - structure.mode().omega).abs()
+        let oscillator = &structure.host.sections()[*n].oscillator;
+        // A coil has no frequency.
+        if oscillator.delta < oscillator.omega0 {
+            (oscillator.omega0 - structure.mode().omega).abs()
+        } else {
+            f64::INFINITY
+        }
     };
     let all = 0..structure.host.sections().len();
     all.min_by(|one, other| distance(one).total_cmp(&distance(other)))

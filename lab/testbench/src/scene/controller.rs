@@ -233,7 +233,7 @@ impl Scene {
     }
 }
 
-/// The bandwidth, rad/s: `wanted`, or the largest one below it with which the loop behind a shaker has a sensitivity of at most 2.
+/// The bandwidth, rad/s: `wanted`, or the largest one below it with which the loop behind a shaker is stable with a sensitivity of at most 2.
 ///
 /// A change of the frequency turns the phase of the structure as `1/(s + d)`. Behind a shaker it does as `(1/d) (a s + |r|²)/((s + a)² + D²)`: the
 /// response settles with the pole `-r = -(a + i D)` of structure and shaker, and the measured force follows it.
@@ -251,6 +251,14 @@ fn bandwidth(wanted: f64, knowledge: &Knowledge) -> f64 {
     };
     let distance = |bandwidth: f64| {
         let Gains { proportional, integral } = Gains::from_bandwidth(bandwidth, damping);
+        // Routh's criterion for d s (s + w) ((s + a)² + D²) + w (kp s + ki) (a s + |r|²).
+        let (square, gain) = (decay * decay + detuning * detuning, bandwidth / damping);
+        let cubic = bandwidth + 2.0 * decay;
+        let quadratic = square + 2.0 * decay * bandwidth + gain * proportional * decay;
+        let linear = bandwidth * square + gain * (proportional * square + integral * decay);
+        if (cubic * quadratic - linear) * linear <= cubic * cubic * gain * integral * square {
+            return 0.0;
+        }
         let fastest = 10.0 * bandwidth.max(decay.hypot(detuning));
         let decades = |n: u32| DECADES * f64::from(n) / f64::from(FREQUENCIES);
         let open = |n: u32| {
