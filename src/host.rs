@@ -30,7 +30,6 @@ use num_complex::Complex64;
 use crate::arithmetic::{plus, product, times};
 use crate::oscillator::Oscillator;
 use crate::parameters::FASTEST;
-use crate::shaker::Shaker;
 
 /// What drives a structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +101,7 @@ pub struct Matrices<'a> {
 /// A first-order state `z` beside `n` degrees of freedom `q`, such as the current of a coil: `z' = b u - sum of rates z - velocity q'`, and the
 /// structure gets the forces `force z`.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FirstOrderState {
     /// Per first-order state, 1/s.
     pub rates: Vec<f64>,
@@ -131,15 +131,9 @@ pub enum Equations {
         stiffness: Vec<Vec<f64>>,
         cavity: Vec<f64>,
         drive: Vec<f64>,
-    },
-    /// [`Shaker::attach`]; whatever the excitation that [`Self::host`] gets, the command drives it.
-    Shaken {
-        /// The structure alone.
-        structure: Box<Equations>,
-        /// What the shaker moves of it: its base, or a point.
-        by: Excitation,
-        /// The shaker.
-        shaker: Shaker,
+        /// First-order states beside the degrees of freedom: of a coil and an amplifier. Such a structure is driven by a force.
+        #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
+        states: Vec<FirstOrderState>,
     },
 }
 
@@ -147,14 +141,16 @@ impl Equations {
     /// The host.
     ///
     /// # Errors
-    /// As for [`Host::from_modes`], [`Host::from_matrices`] and [`Shaker::attach`].
+    /// As for [`Host::from_modes`] and [`Host::from_matrices`]; first-order states and a base as the excitation.
     pub fn host(&self, excitation: Excitation) -> Result<Host, InvalidHost> {
         match self {
-            Self::Shaken { structure, by, shaker } => shaker.attach(structure, *by),
             Self::Modes(modes) => Host::from_modes(excitation, modes),
-            Self::Matrices { mass, damping, stiffness, cavity, drive } => {
+            Self::Matrices { mass, damping, stiffness, cavity, drive, states } => {
+                check(states.is_empty() || excitation == Excitation::Force, || {
+                    "a structure with first-order states is driven by a force, not by its base".into()
+                })?;
                 let matrices = Matrices { mass, damping, stiffness, cavity, drive };
-                Host::from_matrices(excitation, &matrices)
+                Host::with_first_order(excitation, &matrices, states)
             }
         }
     }

@@ -13,7 +13,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::base_motion::{BaseMotion, Drive, shift};
-use crate::host::{Equations, Excitation, FirstOrderState, Host, InvalidHost, Matrices, Row};
+use crate::host::{Equations, Excitation, FirstOrderState, Host, InvalidHost, Row};
 use crate::parameters::{FASTEST, InvalidValue};
 use crate::plant::Plant;
 use crate::structure::{Structure, drive_derivatives};
@@ -86,14 +86,15 @@ struct Assembly {
 }
 
 impl Shaker {
-    /// The structure that the shaker moves by its base, which is then a table of the mass [`Self::end_mass`], or by a force at its point.
+    /// The structure that the shaker moves by its base, which is then a table of the mass [`Self::end_mass`], or by a force at its point. The command
+    /// drives the result as a force ([`Excitation::Force`]).
     ///
     /// Coordinates of the host are those of the structure, the displacement of the base if there is one, and the stretch `x - y` of the stinger: with
     /// a stiff one, the difference of two displacements would lose its force.
     ///
     /// # Errors
     /// A structure that is refused; a value that is not finite or out of its range.
-    pub fn attach(&self, structure: &Equations, by: Excitation) -> Result<Host, InvalidHost> {
+    pub fn attach(&self, structure: &Equations, by: Excitation) -> Result<Equations, InvalidHost> {
         self.check(by)?;
         structure.host(by)?;
         let Assembly { mass, damping, stiffness, cavity, armature, .. } = self.assembly(structure, by)?;
@@ -101,18 +102,17 @@ impl Shaker {
         let rows = |matrix: DMatrix<f64>| -> Vec<Vec<f64>> {
             matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
         };
-        let (mass, damping, stiffness) = (rows(mass), rows(damping), rows(stiffness));
-        let matrices = Matrices {
-            mass: &mass,
-            damping: &damping,
-            stiffness: &stiffness,
-            cavity: &cavity,
-            drive: &drive,
-        };
-        Host::with_first_order(Excitation::Force, &matrices, &states)
+        Ok(Equations::Matrices {
+            mass: rows(mass),
+            damping: rows(damping),
+            stiffness: rows(stiffness),
+            cavity,
+            drive,
+            states,
+        })
     }
 
-    /// What is measured on the host of [`Self::attach`].
+    /// What is measured on the host of the equations of [`Self::attach`].
     ///
     /// # Errors
     /// As for [`Self::attach`].
@@ -192,11 +192,13 @@ impl Shaker {
                 modes.iter().map(|mode| mode.cavity).collect(),
                 modes.iter().map(|mode| mode.drive).collect(),
             ),
-            Equations::Matrices { mass, damping, stiffness, cavity, drive } => {
+            Equations::Matrices { states, .. } if !states.is_empty() => {
+                return Err(InvalidHost("the structure has a shaker already".into()));
+            }
+            Equations::Matrices { mass, damping, stiffness, cavity, drive, .. } => {
                 let [mass, damping, stiffness] = [mass, damping, stiffness].map(|rows| square(rows));
                 (mass, damping, stiffness, cavity.clone(), drive.clone())
             }
-            Equations::Shaken { .. } => return Err(InvalidHost("the structure has a shaker already".into())),
         };
         let n = cavity.len();
         let has_base = by == Excitation::Base;

@@ -48,13 +48,14 @@ impl Reference {
             stiffness,
             cavity: numbers(&scene["cavity"]),
             drive: numbers(&scene["drive"]),
+            states: Vec::new(),
         };
         let by = match scene["base"].as_bool() {
             Some(true) => Excitation::Base,
             _ => Excitation::Force,
         };
         let shaker = self.shaker();
-        let host = shaker.attach(&equations, by).unwrap();
+        let host = shaker.attach(&equations, by).unwrap().host(Excitation::Force).unwrap();
         let outputs = shaker.rows(&host, &equations, by).unwrap();
         let size = modes + usize::from(by == Excitation::Base);
         let mut rows: Vec<_> = (0..size).map(|n| host.row(&unit(size + 1, n)).unwrap()).collect();

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use lovines::host::{Equations, Row};
 use lovines::oscillator::Oscillator;
-use lovines::{Amplifier, Shaker, ShakerRows};
+use lovines::{Amplifier, Excitation as HostExcitation, Shaker, ShakerRows};
 use serde::{Deserialize, Serialize};
 
 use super::{Excitation, Structure};
@@ -177,7 +177,10 @@ impl ShakerSection {
             structure.carry(end_mass)?;
         }
         let by = structure.excitation.of_host();
-        let host = shaker.attach(&alone, by).map_err(|error| error.to_string())?;
+        let equations = shaker.attach(&alone, by).map_err(|error| error.to_string())?;
+        let host = equations
+            .host(HostExcitation::Force)
+            .map_err(|error| error.to_string())?;
         let rows = shaker.rows(&host, &alone, by).map_err(|error| error.to_string())?;
         let beyond = 1 + usize::from(self.has_table());
         let coordinates = |point: usize| -> Vec<f64> {
@@ -195,7 +198,6 @@ impl ShakerSection {
             .map_err(|error| error.to_string())?;
         let omega = structure.mode().omega;
         let mut attached = SceneShaker { shaker, limits, reference_per_command: 0.0, rows };
-        let equations = Equations::Shaken { structure: Box::new(alone), by, shaker };
         let structure = Structure { equations, host, rows: points, ..structure };
         let reference = attached.reference(structure.excitation);
         attached.reference_per_command = structure.host.frequency_response(reference, omega).norm();

@@ -625,7 +625,14 @@ fn equations(
     let drive = at
         .drive
         .map_or_else(|| direction.iter().copied().collect(), |point| unit(n, point));
-    Equations::Matrices { mass, damping, stiffness, cavity: unit(n, at.cavity), drive }
+    Equations::Matrices {
+        mass,
+        damping,
+        stiffness,
+        cavity: unit(n, at.cavity),
+        drive,
+        states: Vec::new(),
+    }
 }
 
 /// The row of a degree of freedom.
