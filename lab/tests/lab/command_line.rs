@@ -312,7 +312,8 @@ fn results_of_one_oscillator_say_so_where_the_scene_has_a_structure() {
     );
     let tracked = text(&vines(&beam));
     assert!(
-        tracked.contains("3 settled points look symmetric in the response, but their impacts are asymmetric"),
+        tracked.contains("0 of 3 points are settled points")
+            && tracked.matches("asymmetric 1:1 / asymmetric 1:1; not settled").count() == 3,
         "{tracked}"
     );
     fails(

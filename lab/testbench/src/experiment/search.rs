@@ -221,10 +221,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     fn refine(
         &mut self,
         leg: &mut Leg,
-        (first, slope): (Vec<f64>, f64),
+        (first, slope, share): (Vec<f64>, f64, f64),
         any: bool,
     ) -> Result<Option<bool>, ExperimentError> {
-        let (mut levels, lowest) = (Levels { legs: Vec::new(), slope }, first[first.len() - 1]);
+        let (mut levels, lowest) = (Levels { legs: Vec::new(), slope, share }, first[first.len() - 1]);
         let mut first = first.into_iter();
         let mut next = first.next();
         while let Some(to) = next.filter(|_| levels.legs.len() < LEGS) {
@@ -438,7 +438,7 @@ fn even_and_odd(samples: &[Sample], step: f64, measurand: Measurand) -> Option<[
 
 /// What a sweep has passed: levels of the response, m, near which the requested drive is, or an extremum of the drive that may reach it, the
 /// highest first; and the slope of the drive over the response there.
-fn passed(swept: &[Leg], requested: f64, any: bool) -> Option<(Vec<f64>, f64)> {
+fn passed(swept: &[Leg], requested: f64, any: bool) -> Option<(Vec<f64>, f64, f64)> {
     let beyond = |leg: &Leg| leg.drive - requested;
     let [.., two, last] = swept else { return None };
     let slope = (last.drive - two.drive) / (last.response - two.response);
@@ -464,7 +464,8 @@ fn passed(swept: &[Leg], requested: f64, any: bool) -> Option<(Vec<f64>, f64)> {
             levels
         }
     };
-    Some((levels, slope))
+    let share = if has_passed(0.0) { 1.0 } else { CAUTIOUS };
+    Some((levels, slope, share))
 }
 
 /// Held levels by rising response.
@@ -473,6 +474,8 @@ struct Levels {
     legs: Vec<Leg>,
     /// Slope of the drive over the response, as long as there is one level.
     slope: f64,
+    /// Share of a straight line that is followed: [`CAUTIOUS`] unless the sweep has passed the requested drive.
+    share: f64,
 }
 
 /// Where held levels predict the requested drive, or the drive that is nearest to it.
@@ -515,7 +518,7 @@ impl Levels {
         let Some(upper) = between.or(nearest) else {
             let [leg] = &self.legs[..] else { return None };
             return Some(Predicted {
-                response: leg.response - CAUTIOUS * (leg.drive - requested) / self.slope,
+                response: leg.response - self.share * (leg.drive - requested) / self.slope,
                 slope: self.slope,
                 turning: f64::INFINITY,
                 is_root: true,
@@ -560,7 +563,7 @@ impl Levels {
             a.response
         };
         let share = if between.is_none() && third.is_none() {
-            CAUTIOUS
+            self.share
         } else {
             1.0
         };
