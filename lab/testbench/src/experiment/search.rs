@@ -350,12 +350,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         self.linear.damping_rate / self.gain()
     }
 
-    /// Measures over `periods`, or until the lock has settled.
+    /// Measures over `periods`.
     fn measure(&mut self, periods: usize) -> Result<Leg, ExperimentError> {
         let mut begins = Vec::new();
-        while begins.len() < periods.max(ResonanceFit::FEWEST)
-            && !(self.bench.settled && begins.len() >= ResonanceFit::FEWEST)
-        {
+        while begins.len() < periods.max(ResonanceFit::FEWEST) {
             begins.push(self.bench.period(Stage::Locking)?);
         }
         // Two periods tell the harmonics from a drift of the fundamental.
