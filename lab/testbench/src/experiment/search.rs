@@ -54,6 +54,8 @@ const CLOSE: f64 = 0.25 * STEP;
 const CAUTIOUS: f64 = 0.5;
 /// Largest number of levels that are held for it.
 const LEGS: usize = 20;
+/// Distance of the response from its setpoint, over the response, at which it does not follow: of three legs.
+const UNFOLLOWED: f64 = 3.0 * STEP;
 /// Number of searches, each twice as slow as the one before.
 const SEARCHES: u32 = 4;
 
@@ -186,6 +188,16 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     fn solve(&mut self, leg: &mut Leg, step: f64, any: bool) -> Result<Option<bool>, ExperimentError> {
         let (mut swept, mut upwards) = (vec![*leg], leg.drive < self.requested);
         while leg.symmetric && self.setpoint > LOWEST * self.b {
+            // The power E A that holds a response falls with it, so that below, the requested drive holds at most this response.
+            let below = leg.drive * leg.response / self.requested;
+            if !upwards && leg.drive < self.requested && below < LOWEST * self.b {
+                break;
+            }
+            // A controller that takes no moves keeps the requested drive.
+            if (self.setpoint - leg.last).abs() > UNFOLLOWED * leg.last {
+                self.bench.controller.hold_drive()?;
+                return Ok(self.settle(leg)?.then_some(false));
+            }
             let change = step / self.steepness(&swept).max(1.0) * leg.last;
             *leg = self.sweep(leg, if upwards { change } else { -change })?;
             if !leg.symmetric {
