@@ -189,6 +189,11 @@ impl Knowledge {
         self.is_measured.then(|| self.linear.data())
     }
 
+    /// The shaker, where there can be one.
+    pub(crate) fn shaker(&self) -> Option<ShakerPath> {
+        self.shaker.filter(|_| cfg!(feature = "tables"))
+    }
+
     /// Growth rate of the response at phase resonance per amplitude of the base, 1/s, at the frequency `omega`, rad/s: k/(2 omega) over the mass that
     /// moves. Of q1 this mass is `k/omega²`, whatever the particle does. Of v it is M, and `omega0` belongs to M and what was carried of m.
     pub fn growth(&self, omega: f64) -> Estimate {
@@ -256,8 +261,7 @@ impl Scene {
     pub fn knowledge(&self) -> Knowledge {
         let phase = self.controller.phase_target.to_radians();
         let mut knowledge = Knowledge::of(&self.plant, self.resonance, self.amplitude, self.sample_time(), phase);
-        let structure = self.structure.as_ref();
-        knowledge.shaker = structure.and_then(|structure| structure.shaker_path(self.frequencies()));
+        knowledge.shaker = self.structure().and_then(|structure| structure.shaker_path(self.frequencies()));
         knowledge.target.through_shaker = knowledge.shaker.is_some();
         knowledge
     }

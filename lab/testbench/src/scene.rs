@@ -92,6 +92,11 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// The structure. Without the readers of files there is none: a small module then has no code for it.
+    pub(crate) fn structure(&self) -> Option<&Structure> {
+        self.structure.as_ref().filter(|_| cfg!(feature = "tables"))
+    }
+
     /// The numbers that the dimensionless model, the theory and the exact orbits depend on.
     pub fn dimensionless(&self) -> Dimensionless {
         let numbers = Dimensionless::of(&self.plant, self.amplitude);

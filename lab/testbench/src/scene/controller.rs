@@ -139,7 +139,7 @@ impl Scene {
     /// The configuration for the command of a shaker. The response to it settles with the pole of structure and shaker, and the force cell reads
     /// harmonics beside a fundamental that falls near the resonance. The balance of power, which takes the drive for the force, does not apply.
     fn behind_shaker(knowledge: &Knowledge, config: Config) -> Config {
-        let Some(ShakerPath { drop_out, .. }) = knowledge.shaker else {
+        let Some(ShakerPath { drop_out, .. }) = knowledge.shaker() else {
             return config;
         };
         let coherence_min = config.lock.coherence_min * drop_out.min(1.0).powi(2);
@@ -159,7 +159,7 @@ impl Scene {
                 structure.reading_per_response().abs().recip(),
             ]
         };
-        self.structure.as_ref().map_or([1.0; 2], factors)
+        self.structure().map_or([1.0; 2], factors)
     }
 
     /// Largest plausible difference between a reading and its prediction, as a share of the amplitude.
@@ -179,7 +179,7 @@ impl Scene {
     /// speed b omega0 are impulses 2 m b omega0 of alternating sign. At worst they meet the mode in phase, which then sums them up to
     /// 1/(1 - exp(-pi zeta omega_n/omega0)) of one; here to the first order in the damping ratio.
     fn other_modes(&self) -> f64 {
-        let Some(structure) = &self.structure else { return 0.0 };
+        let Some(structure) = self.structure() else { return 0.0 };
         let driven = structure.mode();
         let others = structure
             .modes
@@ -238,7 +238,7 @@ impl Scene {
 /// A change of the frequency turns the phase of the structure as `1/(s + d)`. Behind a shaker it does as `(1/d) (a s + |r|²)/((s + a)² + D²)`: the
 /// response settles with the pole `-r = -(a + i D)` of structure and shaker, and the measured force follows it.
 fn bandwidth(wanted: f64, knowledge: &Knowledge) -> f64 {
-    let Some(ShakerPath { pole: [decay, detuning], .. }) = knowledge.shaker else {
+    let Some(ShakerPath { pole: [decay, detuning], .. }) = knowledge.shaker() else {
         return wanted;
     };
     let damping = knowledge
