@@ -261,7 +261,9 @@ impl Scene {
     pub fn knowledge(&self) -> Knowledge {
         let phase = self.controller.phase_target.to_radians();
         let mut knowledge = Knowledge::of(&self.plant, self.resonance, self.amplitude, self.sample_time(), phase);
-        knowledge.shaker = self.structure().and_then(|structure| structure.shaker_path(self.frequencies()));
+        knowledge.shaker = self
+            .structure()
+            .and_then(|structure| structure.shaker_path(self.frequencies()));
         knowledge.target.through_shaker = knowledge.shaker.is_some();
         knowledge
     }
