@@ -194,7 +194,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 break;
             }
             // A controller that takes no moves keeps the requested drive.
-            if (self.setpoint - leg.last).abs() > UNFOLLOWED * leg.last {
+            if swept.len() > 3 && (self.setpoint - leg.last).abs() > UNFOLLOWED * leg.last {
                 self.bench.controller.hold_drive()?;
                 return Ok(self.settle(leg)?.then_some(false));
             }
