@@ -188,13 +188,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     fn solve(&mut self, leg: &mut Leg, step: f64, any: bool) -> Result<Option<bool>, ExperimentError> {
         let (mut swept, mut upwards) = (vec![*leg], leg.drive < self.requested);
         while leg.symmetric && self.setpoint > LOWEST * self.b {
-            // The power E A that holds a response falls with it, so that below, the requested drive holds at most this response.
-            let below = leg.drive * leg.response / self.requested;
-            if !upwards && leg.drive < self.requested && below < LOWEST * self.b {
-                break;
-            }
             // A controller that takes no moves keeps the requested drive.
-            if swept.len() > 3 && (self.setpoint - leg.last).abs() > UNFOLLOWED * leg.last {
+            let keeps = (self.bench.last.drive.amplitude - self.requested).abs() < FOUND * self.requested;
+            if keeps && swept.len() > 3 && (self.setpoint - leg.last).abs() > UNFOLLOWED * leg.last {
                 self.bench.controller.hold_drive()?;
                 return Ok(self.settle(leg)?.then_some(false));
             }
