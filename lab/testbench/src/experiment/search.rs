@@ -54,8 +54,6 @@ const CLOSE: f64 = 0.25 * STEP;
 const CAUTIOUS: f64 = 0.5;
 /// Largest number of levels that are held for it.
 const LEGS: usize = 20;
-/// Distance of the response from its setpoint, over the response, at which it does not follow: of three legs.
-const UNFOLLOWED: f64 = 3.0 * STEP;
 /// Number of searches, each twice as slow as the one before.
 const SEARCHES: u32 = 4;
 
@@ -117,6 +115,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             Err(ExperimentError::Controller(ControllerError::NoResponseLoop(_))) => return Ok(None),
             leg => leg?,
         };
+        if self.takes_no_moves() {
+            self.bench.controller.hold_drive()?;
+            return Ok(None);
+        }
         for search in 0..SEARCHES {
             let step = STEP / f64::from(1 << search);
             leg = self.symmetric(leg, step)?;
@@ -125,6 +127,15 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
         }
         Err(self.not_reached())
+    }
+
+    /// Whether the controller kept its drive, to the last bit, while it was to control the response: one elsewhere may ignore what it does not know.
+    fn takes_no_moves(&self) -> bool {
+        let count = (FOLLOWED as f64 * self.period / self.bench.sample_time) as usize;
+        let last = self.bench.samples.iter().rev().take(count);
+        let mut amplitudes = last.map(|sample| sample.command.drive.amplitude);
+        let first = amplitudes.next();
+        amplitudes.all(|amplitude| Some(amplitude) == first)
     }
 
     /// Goes to a symmetric motion with impacts, if there is one, and holds its response.
@@ -188,12 +199,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     fn solve(&mut self, leg: &mut Leg, step: f64, any: bool) -> Result<Option<bool>, ExperimentError> {
         let (mut swept, mut upwards) = (vec![*leg], leg.drive < self.requested);
         while leg.symmetric && self.setpoint > LOWEST * self.b {
-            // A controller that takes no moves keeps the requested drive.
-            let keeps = (self.bench.last.drive.amplitude - self.requested).abs() < FOUND * self.requested;
-            if keeps && swept.len() > 3 && (self.setpoint - leg.last).abs() > UNFOLLOWED * leg.last {
-                self.bench.controller.hold_drive()?;
-                return Ok(self.settle(leg)?.then_some(false));
-            }
             let change = step / self.steepness(&swept).max(1.0) * leg.last;
             *leg = self.sweep(leg, if upwards { change } else { -change })?;
             if !leg.symmetric {
@@ -205,8 +210,12 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 let Some(levels) = passed(&swept, self.requested, any) else {
                     continue;
                 };
-                if let Some(held) = self.refine(leg, levels, any)? {
+                if let Some(held) = self.refine(leg, levels, any, upwards)? {
                     return Ok(Some(held));
+                }
+                if leg.symmetric {
+                    swept = vec![*leg];
+                    continue;
                 }
             }
             // Above the symmetric motion is one without symmetry.
@@ -225,14 +234,17 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     }
 
     /// Holds the response at levels until the requested drive holds it there. Returns whether it stays under control; `None` if there is no such
-    /// level. `first`: the first levels, m, from the highest on, and the slope of the drive over the response there.
+    /// level; the response is then where the sweep goes on, up or down. `first`: the first levels, m, from the highest on, the slope of the drive over
+    /// the response there, and the share of a straight line that is followed.
     fn refine(
         &mut self,
         leg: &mut Leg,
         (first, slope, share): (Vec<f64>, f64, f64),
         any: bool,
+        upwards: bool,
     ) -> Result<Option<bool>, ExperimentError> {
-        let (mut levels, lowest) = (Levels { legs: Vec::new(), slope, share }, first[first.len() - 1]);
+        let mut levels = Levels { legs: Vec::new(), slope, share };
+        let end = if upwards { first[0] } else { first[first.len() - 1] };
         let mut first = first.into_iter();
         let mut next = first.next();
         while let Some(to) = next.filter(|_| levels.legs.len() < LEGS) {
@@ -273,8 +285,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 .retain(|level| (level.response - leg.response).abs() > FOUND * leg.response);
             next = Some(leg.response);
         }
-        // The sweep goes on below.
-        *leg = self.level(leg, lowest)?;
+        // The sweep goes on from there.
+        *leg = self.level(leg, end)?;
         Ok(None)
     }
 
@@ -464,8 +476,14 @@ fn passed(swept: &[Leg], requested: f64, any: bool) -> Option<(Vec<f64>, f64, f6
             if !(swept[..nearest].iter().any(is_beyond) && is_beyond(last)) {
                 return None;
             }
-            let [before, after] = [nearest - 1, nearest + 1].map(|n| swept[n].response);
-            let mut levels = vec![before, near.response, 0.5 * (near.response + after)];
+            let [before, after] = [nearest - 1, nearest + 1].map(|n| swept[n]);
+            // Between equal steps, a parabola exceeds its highest sample by an eighth of the difference to a neighbour at most. The response moves
+            // meanwhile, so that the whole difference is allowed.
+            let steps = [before, after].map(|leg| (leg.drive - near.drive).abs());
+            if beyond(near).abs() > steps[0].max(steps[1]) {
+                return None;
+            }
+            let mut levels = vec![before.response, near.response, 0.5 * (near.response + after.response)];
             levels.sort_by(|one, other| other.total_cmp(one));
             levels
         }

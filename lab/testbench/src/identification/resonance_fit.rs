@@ -391,7 +391,7 @@ impl Cycle {
         let mut commanded = [commanded.harmonic(1), commanded.drift(1)];
         let (base, base_noise) = if measured && target.through_shaker {
             let (base, noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
-            // Its change within a period cannot be told from so many harmonics.
+            // One period does not separate a drift of the fundamental from the harmonics of a force cell.
             commanded = [base, Complex::ZERO];
             (base, noise)
         } else if measured {

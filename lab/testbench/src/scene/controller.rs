@@ -286,12 +286,14 @@ fn lock_criterion(linear: &LinearResponse) -> LockCriterion {
     }
 }
 
-/// Number of frequencies at which an open loop is examined, over so many decades; and the smallest bandwidth over the one that is wanted.
+/// Number of frequencies at which the open loop is examined.
 const FREQUENCIES: u32 = 500;
+/// Decades that these frequencies span, from ten times the fastest rate down.
 const DECADES: f64 = 5.0;
 /// Largest sensitivity, the inverse of the smallest distance of the open loop from -1: a phase margin of at least 29 degrees, and a gain margin of
 /// 2 (K. J. Åström, R. M. Murray, "Feedback Systems", Princeton 2008, section 11.5).
 const SENSITIVITY: f64 = 2.0;
+/// Smallest bandwidth of the loop over the one that is wanted.
 const FINEST: f64 = 1e-3;
 /// That bandwidth over the cube root of E/A.
 const COUPLED: f64 = 0.9;
