@@ -151,7 +151,7 @@ def git(*words: str | Path) -> str:
     return subprocess.run(["git", *words], check=True, capture_output=True, text=True).stdout
 
 
-@pytest.mark.parametrize("page", filter(is_run, PAGES), ids=lambda page: page.name)
+@pytest.mark.parametrize("page", list(filter(is_run, PAGES)), ids=lambda page: page.name)
 def test_the_commands_of_a_page_run_in_a_clone_print_what_it_shows_and_leave_the_clone_clean(page, vines, tmp_path):
     clone = tmp_path / "vines"
     git("clone", "--quiet", "--shared", ROOT, clone)
