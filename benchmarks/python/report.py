@@ -4,13 +4,12 @@ import csv
 import io
 import os
 import platform
-import re
 import statistics
 from datetime import date
 from math import log
 from pathlib import Path
 
-from measured import short, time_at_the_limit
+from measured import short
 from tables import NONE, compared, markdown_table, number, ratio, replace, text_table, wrapped
 
 
@@ -21,37 +20,6 @@ def machine():
     names = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
     kind = names[0] if names else platform.processor() or "processor unknown"
     return f"{kind}, {os.cpu_count()} logical cores, {platform.system()} {platform.machine()}"
-
-
-def per_impact(row, bench):
-    return row.median / max(1, bench.truth[row.scene]["impacts"])
-
-
-def cells(row, bench):
-    """What a row shows, in the order of HEAD."""
-    setting = {0: NONE}.get(row.setting, f"{row.setting:g}" if row.setting >= 1 else f"{row.setting:.0e}")
-    plant = next((r for r in bench.rows if r.scene == row.scene and r.name == "plant" and r.times), None)
-    if not row.times:
-        rough = time_at_the_limit(row.failure, bench.limit, bench.truth[row.scene]["impacts"])
-        pace = "~" + number(rough, 2) if rough else NONE
-        times = "~" + number(rough / per_impact(plant, bench), 2) if rough and plant else NONE
-        how = re.sub(r"[\d.]+(?= %)", lambda done: f"{float(done[0]):.2g}", row.failure or "not run")
-        return [row.method, setting, pace, NONE, NONE, NONE, times, NONE, how]
-    spread = NONE if row.spread is None else f"±{100 * row.spread:.0f} %"
-    verdict = row.failure or "ok"
-    return [
-        row.method,
-        setting,
-        number(per_impact(row, bench)),
-        spread,
-        str(len(row.times)),
-        f"{row.error:.0e}",
-        *compared(row, plant),
-        verdict,
-    ]
-
-
-HEAD = ["method", "setting", "ns/impact", "spread", "rounds", "error", "time/plant", "quartiles", "verdict"]
 
 
 def savings(bench):
@@ -168,23 +136,20 @@ def notes(bench):
         "order drawn anew each round. In the loop, all methods get the drive recorded from controller and plant."
     )
     yield (
-        "ns/impact: wall time of a run over the true number of impacts. A round repeats a run for about a tenth of a "
-        "second and keeps the median; the table has the median of the rounds, of which all methods have equal numbers; "
-        "spread: half the distance of their quartiles. "
+        "median_ns: wall time of a run. A round repeats a run for about a tenth of a "
+        "second and keeps the median; performance.csv has the median of the rounds, of which all methods have equal "
+        "numbers; relative_spread: half the distance of their quartiles. "
         "Methods in Rust and the C interface take turns with the plant in one process: two milliseconds of runs of the "
         "one, then of the other, for a tenth of a second per round; each begins every other pair, so that the state of "
-        "the processor, which changes from second to second, meets both. time/plant: the median of the ratios of all "
-        "pairs, with their quartiles; for the other methods, which run in processes of their own, the ratio of the "
+        "the processor, which changes from second to second, meets both. time_over_plant: the median of the ratios of "
+        "all pairs, with their quartiles; for the other methods, which run in processes of their own, the ratio of the "
         "medians. "
         "Error: the largest difference of any displacement or velocity from 40-digit arithmetic, over up to "
-        "50 instants (half-width of the cavity 1, natural frequency 1). The verdict says how a method failed: an error "
+        "50 instants (half-width of the cavity 1, natural frequency 1). The failure says how a method failed: an error "
         "above 0.1 is a lost trajectory, a particle more than 0.01 beyond its wall (Moreau's scheme: 0.1) at one of "
         "these instants has tunnelled; a gap width is twice the half-width."
     )
-    yield (
-        "Setting: tolerance, or for RK4 and Moreau steps per period. The time limit of a run is "
-        + f"{bench.limit:g} s; ~ before a time says that the run was given up then, and what it would have come to."
-    )
+    yield (f"Setting: tolerance, or for RK4 and Moreau steps per period. The time limit of a run is {bench.limit:g} s.")
 
 
 # Methods in the table at a glance, and how they are called there.
@@ -249,11 +214,10 @@ def write(bench, growth, loop, run_times, folder):
     for note in notes(bench):
         text += [note, ""]
     text += ["At a glance", MATRIX_NOTE, text_table(head, rows), "", as_text(*run_times), ""]
+    text += ["Scenes (times and errors of all methods and settings: performance.csv)"]
     for scene in dict.fromkeys(row.scene for row in bench.rows):
-        title, impacts = bench.scenes[scene]["title"], bench.truth[scene]["impacts"]
-        count = f"{impacts} impact{'s' if impacts != 1 else ''}"
-        rows = [cells(row, bench) for row in bench.rows if row.scene == scene]
-        text += [f"{scene}: {title} ({count})", text_table(HEAD, rows), ""]
+        text += [f"{scene}: {bench.scenes[scene]['title']}"]
+    text += [""]
     sections = [
         ("What the plant's search and long steps save", SAVINGS_NOTE, *savings(bench)),
         ("Cost of a sample in the loop scene", SAMPLE_NOTE, *samples(bench)),
