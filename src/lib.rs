@@ -28,6 +28,6 @@ pub use host::{Excitation, Host, InvalidHost, Matrices, Mode, Row, Section};
 pub use parameters::{Cavity, InvalidValue, Parameters, Restitution};
 pub use plant::{Event, Outcome, Plant, State, Totals};
 pub use primary::{Primary, Single};
-pub use shaker::{Amplifier, Shaker, ShakerRows};
+pub use shaker::{Amplifier, Piece, Shaker, ShakerRows};
 pub use structure::{Refused, Structure, StructureState};
 pub use variation::Variation;

@@ -302,23 +302,35 @@ fn unit(n: usize, place: usize, value: f64) -> Vec<f64> {
 const SHORTEST: f64 = 1e-9;
 
 impl Plant<Structure> {
-    /// Advances by `duration` seconds under `drive`, which is clipped at plus and minus `limit`: the step is split where the drive crosses it.
-    /// Returns whether it was clipped.
+    /// Advances by `duration` seconds under `drive`, which is [clipped](Self::clipped) at plus and minus `limit`. Returns whether it was clipped.
     ///
     /// # Errors
     /// An invalid drive or duration; the plant stays as it is.
     pub fn advance_within(&mut self, limit: f64, drive: Drive, duration: f64) -> Result<bool, InvalidValue> {
+        let pieces = self.clipped(limit, drive, duration)?;
+        for piece in &pieces {
+            self.advance(piece.drive, piece.duration)?;
+        }
+        Ok(pieces.iter().any(|piece| piece.is_clipped))
+    }
+
+    /// The pieces of a step of `duration` seconds under `drive`, which is clipped at plus and minus `limit`: the step is split where the drive
+    /// crosses it.
+    ///
+    /// # Errors
+    /// An invalid drive.
+    pub fn clipped(&self, limit: f64, drive: Drive, duration: f64) -> Result<Vec<Piece>, InvalidValue> {
         drive.validate()?;
         let motion = BaseMotion { drive, ..self.moving.base };
         let command = Command::new(&motion, duration);
-        let crossings = command.crossings(limit, duration);
-        let ends = crossings.iter().copied().chain([duration]);
-        let (mut begin, mut is_clipped) = (0.0, false);
-        for end in ends {
+        if command.bounds[0] <= limit {
+            return Ok(vec![Piece { drive, duration, is_clipped: false }]);
+        }
+        let (mut begin, mut pieces) = (0.0, Vec::new());
+        for end in command.crossings(limit, duration).into_iter().chain([duration]) {
             let middle = command.at(0.5 * (begin + end))[0];
-            let clips = middle.abs() > limit;
-            is_clipped |= clips;
-            let now = if clips {
+            let is_clipped = middle.abs() > limit;
+            let drive = if is_clipped {
                 Drive {
                     signal: [limit.copysign(middle), 0.0, 0.0, 0.0],
                     amplitude: 0.0,
@@ -327,11 +339,22 @@ impl Plant<Structure> {
             } else {
                 Drive { signal: shift(drive.signal, begin), ..drive }
             };
-            self.advance(now, end - begin)?;
+            pieces.push(Piece { drive, duration: end - begin, is_clipped });
             begin = end;
         }
-        Ok(is_clipped)
+        Ok(pieces)
     }
+}
+
+/// A piece of a step under a drive that is clipped at a limit.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece {
+    /// The drive from its beginning on.
+    pub drive: Drive,
+    /// Its length, s.
+    pub duration: f64,
+    /// Whether the drive is at its limit.
+    pub is_clipped: bool,
 }
 
 /// A drive over a step.
@@ -362,12 +385,10 @@ impl<'a> Command<'a> {
     /// Where the magnitude crosses `limit`, in order.
     fn crossings(&self, limit: f64, duration: f64) -> Vec<f64> {
         let mut found = Vec::new();
-        if self.bounds[0] > limit {
-            for sign in [-1.0, 1.0] {
-                self.search(sign * limit, [0.0, duration], SHORTEST * duration, &mut found);
-            }
-            found.sort_by(f64::total_cmp);
+        for sign in [-1.0, 1.0] {
+            self.search(sign * limit, [0.0, duration], SHORTEST * duration, &mut found);
         }
+        found.sort_by(f64::total_cmp);
         found
     }
 

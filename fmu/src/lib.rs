@@ -17,7 +17,7 @@ use crate::reach::lost;
 use fmi2_component::{Archive, Component, Key, Log, Refusal, Resources};
 use lovines::plant::Contact;
 use lovines::table::Values;
-use lovines::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State, Structure};
+use lovines::{BaseMotion, Drive, Event, InvalidValue, Outcome, Parameters, Plant, State, Structure};
 use outputs::Outputs;
 use reach::Reach;
 use std::cell::Cell;
@@ -97,13 +97,8 @@ const DERIVATIVES: u32 = 3;
 /// A step whose events are logged.
 #[cold]
 #[inline(never)]
-fn logging(
-    simulation: &mut Simulation,
-    drive: Drive,
-    step: f64,
-    on_event: impl FnMut(Event),
-) -> Result<Outcome, InvalidValue> {
-    with_plant!(simulation, plant => plant.advance_with(drive, step, on_event), else _ => Ok(Outcome::default()))
+fn logging(plant: &mut Plant, drive: Drive, step: f64, on_event: impl FnMut(Event)) -> Result<Outcome, InvalidValue> {
+    plant.advance_with(drive, step, on_event)
 }
 
 #[derive(Clone, Copy, PartialEq, PartialOrd, serde::Serialize, serde::Deserialize)]
@@ -236,24 +231,35 @@ impl Component for LoViNes {
 
     #[inline]
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
-        let logs = log.wants(category::logEvents) || log.wants(category::logImpacts);
-        let outcome = with_plant!(
-            &mut self.simulation,
-            plant => {
+        let limit = self.largest_drive();
+        let outcome = match &mut self.simulation {
+            Simulation::Steps(plant) => {
                 plant.set_time(time);
-                if logs {
-                    logging(&mut self.simulation, self.drive, step, |event| log::tell(log, time, event))?
+                if log.wants(category::logEvents) || log.wants(category::logImpacts) {
+                    logging(plant, self.drive, step, |event| log::tell(log, time, event))?
                 } else {
                     plant.advance(self.drive, step)?
                 }
-            },
-            else _ => return Err(Refusal::error("steps exist in co-simulation only"))
-        );
+            }
+            Simulation::Structure(plant) => {
+                plant.set_time(time);
+                structure::step(plant, limit, self.drive, step, log)?
+            }
+            Simulation::Equations(_) => return Err(Refusal::error("steps exist in co-simulation only")),
+        };
         let [_, derivatives @ ..] = self.drive.signal;
         if derivatives != [0.0; 3] {
             // The signal stays where its polynomial has led.
-            let led = with_plant!(&self.simulation, plant => plant.base().drive.signal[0], else _ => 0.0);
-            self.drive.signal = [led, 0.0, 0.0, 0.0];
+            let led = match &self.simulation {
+                Simulation::Steps(plant) => plant.base().drive,
+                // Whether it was clipped or not.
+                _ => {
+                    BaseMotion { drive: self.drive, ..BaseMotion::default() }
+                        .after(step)
+                        .drive
+                }
+            };
+            self.drive.signal = [led.signal[0], 0.0, 0.0, 0.0];
             self.longest = unknown();
         }
         self.progress = Progress::UnderWay;
@@ -263,7 +269,10 @@ impl Component for LoViNes {
             self.outputs = Outputs::default();
             return Err(lost(resolved, time, (step, outcome.elapsed)));
         }
-        Ok(())
+        match (&self.adopted, &self.simulation) {
+            (Some(adopted), Simulation::Structure(plant)) => adopted.check(plant),
+            _ => Ok(()),
+        }
     }
 
     fn set_real_input_derivative(&mut self, variable: Real, order: u32, value: f64, log: &Log) -> Result<(), Refusal> {

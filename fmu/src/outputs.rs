@@ -145,7 +145,8 @@ impl LoViNes {
                 &self.simulation,
                 plant => if self.inputs_set {
                     let BaseMotion { drive, phase } = self.base_motion(plant.base());
-                    drive.signal[0] + drive.amplitude * libm::sin(phase.radians())
+                    let drive = drive.signal[0] + drive.amplitude * libm::sin(phase.radians());
+                    drive.clamp(-self.largest_drive(), self.largest_drive())
                 } else {
                     plant.base_displacement()
                 },

@@ -1,15 +1,19 @@
 //! A structure in the place of the oscillator: what the resources of `Structure.fmu` say of it, and its outputs.
+//!
+//! With a shaker its drive is the command of the amplifier, V, and outputs beside its points are linear in state and command.
 
-use fmi2_component::{Model as _, Refusal, Resources, foreign, guid_of};
+use fmi2_component::{Log, Model as _, Refusal, Resources, foreign, guid_of};
 use lovines::host::{Equations, Row};
 use lovines::table::Values;
-use lovines::{Excitation, Host, Parameters, Plant, Refused, State, Structure, StructureState};
+use lovines::{
+    Drive, Excitation, Host, InvalidValue, Outcome, Parameters, Plant, Refused, State, Structure, StructureState,
+};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::variables::Model;
-use super::{LoViNes, Simulation};
+use super::{LoViNes, Simulation, log};
 
 /// The file in `resources/`.
 const FILE: &str = "structure.json";
@@ -34,26 +38,38 @@ struct File {
     excitation: Excitation,
     equations: Equations,
     points: Vec<Point>,
+    /// The drive is clipped at this limit to each side.
+    #[serde(default = "unlimited")]
+    largest_drive: f64,
     /// Start values of parameters, by symbol.
     parameters: BTreeMap<String, f64>,
     /// Displacement and velocity of the particle at the start, m and m/s.
     particle: [f64; 2],
 }
 
-/// A point: its displacement in the sections of the host.
-#[derive(Deserialize)]
+/// A point, or another output: its displacement, or value, in the sections of the host, and what the drive adds to it.
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Point {
     name: String,
     row: Row,
+    #[serde(default)]
+    per_drive: f64,
+    /// Beyond it a step fails.
+    #[serde(default = "unlimited")]
+    limit: f64,
+}
+
+fn unlimited() -> f64 {
+    f64::INFINITY
 }
 
 /// The structure and its points.
 #[derive(Debug)]
 pub(super) struct Adopted {
     host: Host,
-    /// The row of each point.
-    points: Vec<Row>,
+    points: Vec<Point>,
+    pub largest_drive: f64,
     /// Values at the start.
     pub values: Values,
     pub particle: [f64; 2],
@@ -82,6 +98,12 @@ impl Adopted {
         }
         let host = file.equations.host(file.excitation)?;
         let size = host.sections().len();
+        if file.largest_drive <= 0.0 {
+            return Err(refused(format!(
+                "largest_drive = {}; it must be positive",
+                file.largest_drive
+            )));
+        }
         if let Some(point) = file.points.iter().find(|point| point.row.len() != size) {
             return Err(refused(format!(
                 "the row of {} has {} pairs; expected {size}",
@@ -89,8 +111,8 @@ impl Adopted {
                 point.row.len()
             )));
         }
-        let points = file.points.into_iter().map(|point| point.row).collect();
-        Ok(Self { host, points, values, particle: file.particle })
+        let File { points, largest_drive, particle, .. } = file;
+        Ok(Self { host, points, largest_drive, values, particle })
     }
 
     /// A plant at its start.
@@ -111,16 +133,65 @@ impl Adopted {
             .map(|section| (section.cavity[0] * section.drive[0] / section.oscillator.omega0_squared).abs())
             .sum()
     }
+
+    /// Refuses a motion with an output beyond its limit; that of the command is where it is clipped.
+    pub fn check(&self, plant: &Plant<Structure>) -> Result<(), Refusal> {
+        for point in &self.points {
+            let [value, ..] = point.of(plant);
+            if value.abs() > point.limit * (1.0 + 1e-9) {
+                return Err(Refusal::error(format!(
+                    "the shaker reached its limit: the {} is {value}, and {} is allowed to each side; its amplifier has switched off",
+                    point.name, point.limit
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A step under a drive that is clipped at its limit.
+pub(super) fn step(
+    plant: &mut Plant<Structure>,
+    limit: f64,
+    drive: Drive,
+    step: f64,
+    log: &Log,
+) -> Result<Outcome, InvalidValue> {
+    let mut whole = Outcome::default();
+    for piece in plant.clipped(limit, drive, step)? {
+        let begin = plant.time();
+        // Lines that are not wanted are not written: one copy of the code.
+        let outcome = plant.advance_with(piece.drive, piece.duration, |event| log::tell(log, begin, event))?;
+        whole.elapsed += outcome.elapsed;
+        whole.cut_short = outcome.cut_short;
+        if whole.cut_short {
+            break;
+        }
+    }
+    Ok(whole)
+}
+
+impl Point {
+    /// Displacement, velocity and acceleration; the drive adds to the first.
+    fn of(&self, plant: &Plant<Structure>) -> [f64; 3] {
+        let [value, rates @ ..] = plant.point(&self.row);
+        [value + self.per_drive * plant.base_displacement(), rates[0], rates[1]]
+    }
 }
 
 impl LoViNes {
+    /// Limit of the drive to each side.
+    pub(super) fn largest_drive(&self) -> f64 {
+        self.adopted
+            .as_ref()
+            .map_or(f64::INFINITY, |adopted| adopted.largest_drive)
+    }
+
     /// A displacement, velocity or acceleration at a point, at the end of the last step.
     pub(super) fn at_point(&self, reference: u32) -> f64 {
         let (n, quantity) = ((reference - FIRST) / 3, (reference - FIRST) % 3);
         match (&self.adopted, &self.simulation) {
-            (Some(adopted), Simulation::Structure(plant)) => {
-                plant.point(&adopted.points[n as usize])[quantity as usize]
-            }
+            (Some(adopted), Simulation::Structure(plant)) => adopted.points[n as usize].of(plant)[quantity as usize],
             _ => 0.0,
         }
     }

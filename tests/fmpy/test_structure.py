@@ -1,7 +1,9 @@
 """Structure.fmu of presets: valid for FMPy, and simulated in steps of any length."""
 
 import json
+import math
 import subprocess
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -9,46 +11,61 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
-from component import Component, Fmu
+from component import Component, FMICallException, Fmu
 from references import ROOT
 
 POINTS = [f"{quantity}[{{}}]" for quantity in "qva"]
 
+DRIVES = {
+    "cantilever": {"E": 1e-4, "omega": 54.8},
+    "frame": {"F_amplitude": 1.2, "omega": 54.8},
+    "shaker-cantilever": {"u_amplitude": 3.0, "omega": 53.0},
+    "slip-table": {"u_amplitude": 2.0, "omega": 54.8},
+}
+"""Inputs near the lowest frequency that make the particle hit the walls."""
 
-@pytest.fixture(scope="module", params=["cantilever", "frame"])
-def structure(request: pytest.FixtureRequest, vines: Path, tmp_path_factory: pytest.TempPathFactory) -> Fmu:
-    # A path that masters have to encode.
-    folder = tmp_path_factory.mktemp("größe 1")
-    scene = ROOT / "scenes" / f"{request.param}.toml"
-    subprocess.run([vines, "pack", "--scene", scene, "--out", folder], check=True, stdout=subprocess.DEVNULL)
-    assert sorted(path.name for path in folder.iterdir()) == ["PhaseLock.fmu", "Structure.fmu"]
-    return Fmu.unpack(folder / "Structure.fmu", folder / "unpacked")
+
+@pytest.fixture(scope="module", params=DRIVES)
+def preset(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def pack(vines: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Fmu]:
+    def pack(preset: str, *settings: str) -> Fmu:
+        # A path that masters have to encode.
+        folder = tmp_path_factory.mktemp("größe 1")
+        scene = ROOT / "scenes" / f"{preset}.toml"
+        changes = [argument for setting in settings for argument in ("--set", setting)]
+        command = [vines, "pack", "--scene", scene, *changes, "--out", folder]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        assert sorted(path.name for path in folder.iterdir()) == ["PhaseLock.fmu", "Structure.fmu"]
+        return Fmu.unpack(folder / "Structure.fmu", folder / "unpacked")
+
+    return pack
+
+
+@pytest.fixture(scope="module")
+def structure(preset: str, pack: Callable[..., Fmu]) -> Fmu:
+    return pack(preset)
 
 
 def described(fmu: Fmu) -> dict:
     return json.loads((fmu.folder / "resources" / "structure.json").read_text())
 
 
-def drive(fmu: Fmu) -> dict[str, float]:
-    """A drive near the lowest frequency that makes the particle hit the walls."""
-    of = described(fmu)
-    amplitude, size = ("E", 1e-4) if of["excitation"] == "Base" else ("F_amplitude", 1.2)
-    omega = min(mode["omega"] for mode in of["equations"]["modes"])
-    return {amplitude: size, "omega": 0.99 * omega}
-
-
 def test_the_description_is_valid_and_has_outputs_at_the_points(structure):
     assert validate_fmu(str(structure.path)) == []
     points = [point["name"] for point in described(structure)["points"]]
-    expected = [name.format(point) for point in points for name in POINTS]
+    expected = [name.format(point) for point in points if point not in ("force", "current") for name in POINTS]
     assert [name for name in structure.names("output") if "[" in name] == expected
     assert "M" not in structure.names("parameter")
 
 
-def test_fmpy_simulates_it_and_steps_of_any_length_agree(structure):
+def test_fmpy_simulates_it_and_steps_of_any_length_agree(structure, preset):
     point = described(structure)["points"][0]["name"]
     outputs = [name.format(point) for name in POINTS] + ["q2", "impacts"]
-    start = drive(structure) | {"der(q2)": 0.5}
+    start = DRIVES[preset] | {"der(q2)": 0.5}
     result = simulate_fmu(str(structure.path), stop_time=3, output_interval=1e-3, start_values=start, output=outputs)
     assert result["impacts"][-1] > 10
     with closing(Component(structure)) as coarse:
@@ -58,3 +75,33 @@ def test_fmpy_simulates_it_and_steps_of_any_length_agree(structure):
         for name in outputs[:-1]:
             size = max(map(abs, result[name].tolist()))
             assert coarse.get(name) == pytest.approx(float(result[name][-1]), abs=1e-7 * size)
+
+
+def test_the_outputs_of_a_shaker_obey_its_equations_while_the_command_is_clipped(pack):
+    mass, (stiffness, damping), (stinger, stinger_damping) = 0.057, (9932.0, 21.5), (1e5, 0.5)
+    resistance, force_factor = 2.0, 6.78
+    with closing(Component(pack("shaker-cantilever", "shaker.voltage_max=6"))) as rig:
+        rig.start({"u_amplitude": 8.0, "omega": 53.0, "der(q2)": 0.5})
+        clipped = 0
+        for n in range(1, 3000):
+            rig.step(1e-3)
+            command, current, force = rig.group("command", "current", "force").get()
+            x, v, a, y, dy = rig.group(*(f"{name}[armature]" for name in "qva"), "q[root]", "v[root]").get()
+            expected = 8.0 * math.sin(53.0 * n * 1e-3)
+            clipped += abs(expected) > 6.0
+            assert command == pytest.approx(max(-6.0, min(6.0, expected)), abs=1e-9)
+            assert current == pytest.approx((command - force_factor * v) / resistance, abs=1e-9)
+            assert force == pytest.approx(stinger * (x - y) + stinger_damping * (v - dy), abs=1e-7)
+            forces = force_factor * current - damping * v - stiffness * x - force
+            assert mass * a == pytest.approx(forces, abs=1e-7)
+        assert clipped > 1000
+        assert rig.get("impacts") > 10
+
+
+def test_a_shaker_that_reaches_its_limit_ends_the_simulation_in_one_sentence(pack):
+    with closing(Component(pack("shaker-cantilever", "shaker.stroke_max=1e-4"), logging=True)) as rig:
+        rig.start({"u_amplitude": 8.0, "omega": 53.0})
+        with pytest.raises(FMICallException):
+            rig.step(1e-3, 1000)
+        assert "the shaker reached its limit: the armature is" in rig.messages[-1].text
+        assert "0.0001 is allowed" in rig.messages[-1].text

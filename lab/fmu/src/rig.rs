@@ -49,12 +49,23 @@ fn used(names: &Names, definition: Definition) -> Vec<(String, &'static str)> {
     NAMES.into_iter().chain(parameters).map(unit).collect()
 }
 
-/// The amplitude of a drive, its signal and its total, with their unit.
+/// The amplitude of a drive, its signal, and the reference, with their unit.
 fn drive_names(structure: Option<&Structure>) -> [(&'static str, &'static str); 3] {
-    match structure.map(|structure| structure.excitation) {
-        Some(Excitation::Force) => [("F_amplitude", "N"), ("F", "N"), ("force", "N")],
-        Some(Excitation::Base) | None => [("E", "m"), ("e", "m"), ("base", "m")],
-    }
+    let reference = match structure.map(|structure| structure.excitation) {
+        Some(Excitation::Force) => ("force", "N"),
+        Some(Excitation::Base) if has_shaker(structure) => ("q[table]", "m"),
+        _ => ("base", "m"),
+    };
+    let (names, unit) = match reference {
+        _ if has_shaker(structure) => (["u_amplitude", "u"], "V"),
+        ("force", unit) => (["F_amplitude", "F"], unit),
+        (_, unit) => (["E", "e"], unit),
+    };
+    [(names[0], unit), (names[1], unit), reference]
+}
+
+fn has_shaker(structure: Option<&Structure>) -> bool {
+    structure.is_some_and(|structure| structure.shaker.is_some())
 }
 
 /// The displacement at the sensor of a structure.
@@ -83,8 +94,9 @@ pub struct FmuRig {
     response: Variable,
     reference: Option<Variable>,
     inside: Option<Inside>,
-    /// Base displacement per drive, and displacement at the sensor per displacement at the cavity, of a structure's driven mode.
-    of_driven_mode: Option<[f64; 2]>,
+    /// Of a structure's driven mode: base displacement per unit of what drives the FMU and per unit of the reference, and displacement at the
+    /// sensor per displacement at the cavity.
+    of_driven_mode: Option<[f64; 3]>,
 }
 
 /// The variables of the ground truth.
@@ -133,7 +145,13 @@ impl FmuRig {
         starts.retain(|(name, _)| structure.is_none() || !["q1", "der(q1)"].contains(name));
         fmu.start(&starts)?;
         let inside = Inside::of(&fmu, has_friction(&scene.plant));
-        let of_driven_mode = structure.map(|structure| [structure.base_per_drive(), structure.reading_per_response()]);
+        let of_driven_mode = structure.map(|structure| {
+            [
+                structure.base_per_command(),
+                structure.base_per_drive(),
+                structure.reading_per_response(),
+            ]
+        });
         let rig = Self {
             fmu,
             inputs,
@@ -156,7 +174,7 @@ impl FmuRig {
     }
 
     fn per_drive(&self) -> f64 {
-        self.of_driven_mode.map_or(1.0, |[base, _]| base)
+        self.of_driven_mode.map_or(1.0, |[base, ..]| base)
     }
 
     /// What the bench uses, and what of it the FMU at `path` has.
@@ -185,7 +203,7 @@ impl Rig for FmuRig {
         let reference = self.fmu.get_if(self.reference)?;
         Ok(match self.of_driven_mode {
             None => Sensors { response, reference },
-            Some([base, reading]) => Sensors {
+            Some([_, base, reading]) => Sensors {
                 response: response / reading,
                 reference: reference.map(|reference| reference * base),
             },

@@ -48,15 +48,6 @@ const FILES: [&str; 4] = ["LoViNes.fmu", "PhaseLock.fmu", "bench.ssp", "Structur
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     BuiltIn::new(&scene.controller_config())?;
-    if scene
-        .structure
-        .as_ref()
-        .is_some_and(|structure| structure.shaker.is_some())
-    {
-        return Err(Failure::input(
-            "a scene with [shaker] has no FMU yet: its drive would be a voltage; drop [shaker] to pack the structure alone",
-        ));
-    }
     let folder = results(&arguments.out, &FILES)?;
     let mut binaries = Vec::new();
     if !arguments.only_binaries {

@@ -8,6 +8,7 @@ use std::fmt::Display;
 use std::io;
 
 use fmi2_component::guid_of;
+use lovines::Row;
 use lovines::table::PARAMETERS;
 use phase_lock::Value;
 use serde_json::json;
@@ -15,7 +16,7 @@ use xml::reader::{EventReader, XmlEvent};
 use xml::writer::{EmitterConfig, EventWriter, XmlEvent as Written};
 
 use super::Component;
-use crate::scene::{Excitation, Scene, Structure};
+use crate::scene::{ARMATURE, Excitation, Scene, SceneShaker, Structure, TABLE};
 use crate::table::Table;
 
 /// `modelIdentifier`.
@@ -44,8 +45,8 @@ pub fn component(
     let content = resource(structure, &starts);
     let facts = Facts {
         guid: guid_of(&oscillator.library_guid, &content),
-        excitation: structure.excitation,
-        points: &structure.points,
+        drive: DriveKind::of(structure),
+        channels: channels(structure),
         starts,
         step: scene.sample_time(),
         stop: PERIODS * TAU / structure.mode().omega,
@@ -78,12 +79,16 @@ fn page(structure: &Structure) -> Cow<'static, str> {
         [frequency, damping, drive, shape.collect::<Vec<_>>().join(", ")]
     });
     let head = "frequency, Hz | damping ratio | drive | mass-normalised shape, 1/sqrt(kg)";
-    let drive = match structure.excitation {
+    let mut drive = match structure.excitation {
         Excitation::Base => {
-            "The displacement of its base drives it; <em>drive</em> is the participation factor, sqrt(kg)."
+            "The displacement of its base drives it; <em>drive</em> is the participation factor, sqrt(kg).".to_owned()
         }
-        Excitation::Force => "A force drives it; <em>drive</em> is the shape at the force's point, 1/sqrt(kg).",
+        Excitation::Force => "A force drives it; <em>drive</em> is the shape at the force's point, 1/sqrt(kg).".into(),
     };
+    if structure.shaker.is_some() {
+        drive += " A shaker moves the structure, by the command <code>u</code> of its amplifier, V, which is clipped at the amplifier's limit. \
+                  Reaching another limit of the shaker ends the simulation with an error.";
+    }
     let text = format!(
         "<p>A linear structure carries a cavity, in which a particle flies freely and hits the walls. {drive} Between impacts the motion is a \
          closed formula; there is no step-size error. The structure is fixed, in <code>resources/{FILE}</code>; parameters of cavity and \
@@ -95,9 +100,9 @@ fn page(structure: &Structure) -> Cow<'static, str> {
 /// What the description depends on.
 struct Facts<'a> {
     guid: String,
-    excitation: Excitation,
-    /// Names of the points, in the order of their value references.
-    points: &'a [String],
+    drive: DriveKind,
+    /// In the order of their value references.
+    channels: Vec<Channel<'a>>,
     /// Start values by name; other variables keep theirs.
     starts: Vec<(&'a str, f64)>,
     /// Step and end of the default experiment, s.
@@ -105,10 +110,56 @@ struct Facts<'a> {
     stop: f64,
 }
 
+/// An output of the structure: its motion at a point, or a number.
+struct Channel<'a> {
+    name: &'a str,
+    row: &'a Row,
+    /// What one unit of the drive adds.
+    per_drive: f64,
+    limit: Option<f64>,
+    /// Meaning, quantity and unit of a number; `None`: displacement, velocity and acceleration at a point.
+    number: Option<[&'static str; 3]>,
+}
+
+/// The points of the structure, and what is measured at its shaker.
+fn channels(structure: &Structure) -> Vec<Channel<'_>> {
+    let channel = |(name, row)| Channel { name, row, per_drive: 0.0, limit: None, number: None };
+    let points = structure.points.iter().map(String::as_str).zip(&structure.rows);
+    let mut channels: Vec<_> = points.map(channel).collect();
+    let Some(SceneShaker { limits, rows, .. }) = &structure.shaker else {
+        return channels;
+    };
+    if structure.excitation == Excitation::Base {
+        channels.push(channel((TABLE, &rows.end)));
+    }
+    channels.push(Channel { limit: limits.stroke, ..channel((ARMATURE, &rows.armature)) });
+    channels.push(Channel {
+        limit: limits.force,
+        number: Some(["force of the stinger on the structure", "Force", "N"]),
+        ..channel(("force", &rows.force))
+    });
+    channels.push(Channel {
+        per_drive: rows.current_per_command,
+        limit: limits.current,
+        number: Some(["current of the coil", "ElectricCurrent", "A"]),
+        ..channel(("current", &rows.current))
+    });
+    channels
+}
+
 /// The structure as its library reads it.
 fn resource(structure: &Structure, starts: &[(&str, f64)]) -> Vec<u8> {
-    let points = structure.points.iter().zip(&structure.rows);
-    let points: Vec<_> = points.map(|(name, row)| json!({"name": name, "row": row})).collect();
+    let point = |channel: Channel<'_>| {
+        let mut point = json!({"name": channel.name, "row": channel.row});
+        if channel.per_drive != 0.0 {
+            point["per_drive"] = json!(channel.per_drive);
+        }
+        if let Some(limit) = channel.limit {
+            point["limit"] = json!(limit);
+        }
+        point
+    };
+    let points: Vec<_> = channels(structure).into_iter().map(point).collect();
     let start = |symbol: &str| {
         starts
             .iter()
@@ -119,13 +170,17 @@ fn resource(structure: &Structure, starts: &[(&str, f64)]) -> Vec<u8> {
         let (symbol, value) = starts.iter().find(|(name, _)| *name == row.symbol)?;
         Some(((*symbol).to_owned(), json!(value)))
     });
-    let file = json!({
+    let mut file = json!({
         "excitation": structure.host.excitation(),
         "equations": structure.equations,
         "points": points,
         "parameters": serde_json::Map::from_iter(parameters),
         "particle": [start("q2"), start("der(q2)")],
     });
+    let largest = structure.shaker.as_ref().map(SceneShaker::largest_command);
+    if let Some(largest) = largest.filter(|largest| largest.is_finite()) {
+        file["largest_drive"] = json!(largest);
+    }
     let mut text = serde_json::to_vec_pretty(&file).unwrap_or_default();
     text.push(b'\n');
     text
@@ -140,6 +195,9 @@ const QUANTITIES: [(&str, &str, &str, [&str; 2]); 3] = [
     ("v", "velocity", "Velocity", ["m/s", "mm/s"]),
     ("a", "acceleration", "Acceleration", ["m/s2", ""]),
 ];
+
+/// Units that the oscillator has no need of: exponents of kg, m, s and A.
+const UNITS: [(&str, [i32; 4]); 3] = [("N", [1, 1, -2, 0]), ("V", [1, 2, -3, -1]), ("A", [0, 0, 0, 1])];
 
 /// Variables of one oscillator that a structure lacks: its own parameters and start are in the resources, and `v` is the centre of its
 /// two masses. The others are of model exchange.
@@ -161,7 +219,11 @@ const ABSENT: [&str; 11] = [
 const COMPUTED: [&str; 2] = ["q1", "der(q1)"];
 
 /// Meanings that are others than those of the oscillator.
-const MEANINGS: [(&str, &str); 7] = [
+const MEANINGS: [(&str, &str); 8] = [
+    (
+        "omega",
+        "frequency of the built-in oscillator, held during a step: input derivatives are accepted and have no effect; its phase is continuous",
+    ),
     ("q1", "displacement of the structure at the cavity"),
     ("der(q1)", "velocity of the structure at the cavity"),
     ("der(q2)", "velocity of the particle"),
@@ -176,45 +238,60 @@ const MEANINGS: [(&str, &str); 7] = [
     ),
     (
         "energy",
-        "mechanical energy: of the structure, relative to a base at its displacement, of the particle, and of its weight on a tilted axis",
+        "mechanical energy: of the structure with its shaker, relative to a base at its displacement, of the particle, and of its weight on a \
+         tilted axis",
     ),
 ];
 
-/// Names and meanings of the drive, where it is a base and where it is a force.
-const DRIVE: [(&str, &str, [&str; 2]); 4] = [
-    (
-        "e",
-        "F",
-        [
-            "base displacement signal, held between samples, or a polynomial where input derivatives are given",
-            "force signal, held between samples, or a polynomial where input derivatives are given",
-        ],
-    ),
-    (
-        "E",
-        "F_amplitude",
-        [
-            "amplitude of the built-in oscillator of the base, added to e; held during a step: input derivatives are accepted and have no effect",
-            "amplitude of the built-in oscillator of the force, added to F; held during a step: input derivatives are accepted and have no effect",
-        ],
-    ),
-    (
-        "omega",
-        "omega",
-        [
-            "frequency of the built-in oscillator, held during a step: input derivatives are accepted and have no effect; its phase is continuous",
-            "frequency of the built-in oscillator, held during a step: input derivatives are accepted and have no effect; its phase is continuous",
-        ],
-    ),
-    (
-        "base",
-        "force",
-        [
-            "total base displacement e + E sin(phase): what the reference sensor reads",
-            "total force F + F_amplitude sin(phase): what the reference sensor reads",
-        ],
-    ),
-];
+/// What drives the structure, as the names of its variables say.
+#[derive(Clone, Copy)]
+enum DriveKind {
+    Base,
+    Force,
+    Command,
+}
+
+impl DriveKind {
+    fn of(structure: &Structure) -> Self {
+        match (&structure.shaker, structure.excitation) {
+            (Some(_), _) => Self::Command,
+            (None, Excitation::Base) => Self::Base,
+            (None, Excitation::Force) => Self::Force,
+        }
+    }
+
+    /// The names of signal, amplitude and total, what they are of, and their quantity with its unit.
+    fn names(self) -> ([&'static str; 3], &'static str, [&'static str; 2]) {
+        match self {
+            Self::Base => (BASE, "base displacement", ["", "m"]),
+            Self::Force => (["F", "F_amplitude", "force"], "force", ["Force", "N"]),
+            Self::Command => (
+                ["u", "u_amplitude", "command"],
+                "command of the amplifier",
+                ["ElectricPotential", "V"],
+            ),
+        }
+    }
+
+    /// What a variable of the oscillator's base means; its place is that in [`BASE`].
+    fn meaning(self, place: usize) -> String {
+        let ([signal, amplitude, _], of, _) = self.names();
+        let no_derivatives = "held during a step: input derivatives are accepted and have no effect";
+        match (place, self) {
+            (0, _) => {
+                format!("{of}, signal: held between samples, or a polynomial where input derivatives are given")
+            }
+            (1, _) => format!("amplitude of the built-in oscillator of the {of}, added to {signal}; {no_derivatives}"),
+            (_, Self::Command) => {
+                format!("total {of} {signal} + {amplitude} sin(phase), clipped at the limit of the amplifier")
+            }
+            _ => format!("total {of} {signal} + {amplitude} sin(phase): what the reference sensor reads"),
+        }
+    }
+}
+
+/// Signal, amplitude and total of the base of an oscillator.
+const BASE: [&str; 3] = ["e", "E", "base"];
 
 /// An element of a description.
 #[derive(Clone, Debug, Default)]
@@ -321,15 +398,21 @@ fn describe(oscillator: &str, facts: &Facts<'_>) -> Result<String, xml::reader::
     experiment.remove("tolerance");
     experiment.set("stopTime", facts.stop);
     experiment.set("stepSize", facts.step);
-    if facts.excitation == Excitation::Force {
-        let newton = Element::new("BaseUnit", &[("kg", &1), ("m", &1), ("s", &-2)]);
+    let units: &[(&str, [i32; 4])] = match facts.drive {
+        DriveKind::Base => &[],
+        DriveKind::Force => &UNITS[..1],
+        DriveKind::Command => &UNITS,
+    };
+    for (name, [kg, m, s, ampere]) in units {
+        let base = Element::new("BaseUnit", &[("kg", kg), ("m", m), ("s", s), ("A", ampere)]);
         root.child("UnitDefinitions")
             .children
-            .push(Element::new("Unit", &[("name", &"N")]).with(newton));
+            .push(Element::new("Unit", &[("name", name)]).with(base));
     }
     let variables = root.child("ModelVariables");
     variables.children = variables_of(std::mem::take(&mut variables.children), facts);
-    let structure = model_structure(&variables.children);
+    let ([.., total], ..) = facts.drive.names();
+    let structure = model_structure(&variables.children, total);
     root.children.push(structure);
     let mut written = Vec::new();
     let config = EmitterConfig::new().perform_indent(true).line_separator("\n");
@@ -355,27 +438,38 @@ fn variables_of(oscillator: Vec<Element>, facts: &Facts<'_>) -> Vec<Element> {
             content.set("derivative", place);
         }
     }
-    for (n, point) in facts.points.iter().enumerate() {
+    for (n, channel) in facts.channels.iter().enumerate() {
+        let name = channel.name;
+        let mut add = |k: usize, name: String, meaning: String, content: Element| {
+            let variable = Element::new(
+                "ScalarVariable",
+                &[
+                    ("name", &name),
+                    ("valueReference", &(FIRST as usize + 3 * n + k)),
+                    ("causality", &"output"),
+                    ("variability", &"continuous"),
+                    ("initial", &"calculated"),
+                    ("description", &meaning),
+                ],
+            );
+            kept.push(variable.with(content));
+        };
+        if let Some([meaning, quantity, unit]) = channel.number {
+            let content = Element::new("Real", &[("quantity", &quantity), ("unit", &unit)]);
+            add(0, name.to_owned(), meaning.to_owned(), content);
+            continue;
+        }
         for (k, (symbol, quantity, kind, [unit, display])) in QUANTITIES.into_iter().enumerate() {
             let mut content = Element::new("Real", &[("declaredType", &kind), ("unit", &unit)]);
             if !display.is_empty() {
                 content.set("displayUnit", display);
             }
-            let variable = Element::new(
-                "ScalarVariable",
-                &[
-                    ("name", &format!("{symbol}[{point}]")),
-                    ("valueReference", &(FIRST as usize + 3 * n + k)),
-                    ("causality", &"output"),
-                    ("variability", &"continuous"),
-                    ("initial", &"calculated"),
-                    (
-                        "description",
-                        &format!("{quantity} of the structure at the point {point}"),
-                    ),
-                ],
-            );
-            kept.push(variable.with(content));
+            let meaning = match name {
+                ARMATURE => format!("{quantity} of the armature of the shaker"),
+                TABLE => format!("{quantity} of the table of the shaker"),
+                _ => format!("{quantity} of the structure at the point {name}"),
+            };
+            add(k, format!("{symbol}[{name}]"), meaning, content);
         }
     }
     kept
@@ -384,18 +478,15 @@ fn variables_of(oscillator: Vec<Element>, facts: &Facts<'_>) -> Vec<Element> {
 /// Makes a variable of the oscillator one of the structure.
 fn adapt(variable: &mut Element, facts: &Facts<'_>) {
     let name = variable.get("name").to_owned();
-    let by_force = facts.excitation == Excitation::Force;
-    if let Some((_, force, meanings)) = DRIVE.iter().find(|(base, ..)| *base == name) {
-        variable.set("description", meanings[usize::from(by_force)]);
-        let content = &mut variable.children[0];
-        if by_force && content.get("unit") == "m" {
-            *content = Element::new("Real", &[("quantity", &"Force"), ("unit", &"N")]);
-            if name != "base" {
-                content.set("start", 0);
+    if let Some(place) = BASE.iter().position(|base| *base == name) {
+        let (names, _, [quantity, unit]) = facts.drive.names();
+        variable.set("name", names[place]);
+        variable.set("description", facts.drive.meaning(place));
+        if !quantity.is_empty() {
+            variable.children[0] = Element::new("Real", &[("quantity", &quantity), ("unit", &unit)]);
+            if variable.get("causality") == "input" {
+                variable.children[0].set("start", 0);
             }
-        }
-        if by_force {
-            variable.set("name", force);
         }
     }
     if let Some((_, meaning)) = MEANINGS.iter().find(|(other, _)| *other == name) {
@@ -412,7 +503,7 @@ fn adapt(variable: &mut Element, facts: &Facts<'_>) {
 }
 
 /// Which outputs there are. That of the drive follows its inputs at once, all others with the next step.
-fn model_structure(variables: &[Element]) -> Element {
+fn model_structure(variables: &[Element], drive: &str) -> Element {
     let inputs = variables
         .iter()
         .enumerate()
@@ -424,8 +515,11 @@ fn model_structure(variables: &[Element]) -> Element {
         .enumerate()
         .filter(|(_, one)| one.get("causality") == "output")
     {
-        let at_once = ["base", "force"].contains(&variable.get("name"));
-        let dependencies = if at_once { inputs.join(" ") } else { String::new() };
+        let dependencies = if variable.get("name") == drive {
+            inputs.join(" ")
+        } else {
+            String::new()
+        };
         let index = n + 1;
         outputs = outputs.with(Element::new(
             "Unknown",

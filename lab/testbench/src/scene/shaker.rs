@@ -10,6 +10,11 @@ use serde::{Deserialize, Serialize};
 use super::{Excitation, Structure};
 use crate::plan::ShakerPath;
 
+/// Points that a shaker adds to those of a structure.
+pub const ARMATURE: &str = "armature";
+/// The table that carries a structure which is moved by its base.
+pub const TABLE: &str = "table";
+
 /// A shaker as a part of a structure, with what it is not driven beyond.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SceneShaker {
@@ -171,6 +176,15 @@ impl ShakerSection {
         }
         if self.amplifier == Amplifier::Current && limits.voltage.is_some() {
             return Err("voltage_max belongs to amplifier = \"voltage\"; an amplifier that controls the current has current_max".into());
+        }
+        if let Some(point) = structure
+            .points
+            .iter()
+            .find(|point| [ARMATURE, TABLE].contains(&point.as_str()))
+        {
+            return Err(format!(
+                "the structure has a point \"{point}\", which a shaker adds; rename it"
+            ));
         }
         let (alone, bare) = (structure.equations.clone(), structure.modes.clone());
         if structure.excitation == Excitation::Force {
