@@ -132,6 +132,27 @@ fn a_stable_motion_returns_after_a_thousand_periods_and_has_the_harmonic_of_its_
 }
 
 #[test]
+fn near_the_fold_the_motion_is_the_one_that_continues_the_larger_responses() {
+    // A random rig. The ideal motion with this response leads beyond the fold, where the impacts are slower and the motion is unstable.
+    let p = Parameters {
+        primary_mass: 1.0,
+        stiffness: 1.0,
+        damping: 0.00574,
+        particle_mass: 0.002846,
+        half_width: 1.0,
+        restitution: 0.4587,
+        cavity: Cavity { kinetic_friction: 0.000677, ..Cavity::IDEAL },
+    };
+    let motion = |response, guess: Option<&PlantMotion>| resonant_motion(&p, STUDY, response, guess).expect("a motion");
+    let continued = [0.26, 0.25, 0.246, 0.2432].into_iter();
+    let continued = continued.fold(motion(0.29, None), |near: PlantMotion, response| {
+        motion(response, Some(&near))
+    });
+    close(motion(0.2432, None).omega / continued.omega, 1.0, 1e-12);
+    assert!(continued.is_stable());
+}
+
+#[test]
 fn where_the_particle_sticks_the_map_loses_a_dimension_and_the_motion_is_still_solved() {
     let p = rig(Cavity {
         kinetic_friction: 0.12,

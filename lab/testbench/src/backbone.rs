@@ -146,8 +146,8 @@ impl Criterion {
         });
         let systematic = systematic[0].hypot(systematic[1]);
         let at = [0, 1].map(|i| {
-            // The noise of the amplitude moves drive and frequency along their slopes.
-            let aside = slope(i) * whole.u_level;
+            // The uncertainty of the amplitude moves drive and frequency along their slopes.
+            let aside = slope(i) * whole.u_level.hypot(whole.remainders[2]);
             let total = estimates[i];
             Estimate::new(
                 total.value,

@@ -50,7 +50,12 @@ pub struct PlantMotion {
 impl PlantMotion {
     /// Whether all multipliers are inside the unit circle.
     pub fn is_stable(&self) -> bool {
-        self.multipliers[3].norm() < 1.0
+        self.growth() < 1.0
+    }
+
+    /// Modulus of the largest multiplier.
+    fn growth(&self) -> f64 {
+        self.multipliers[3].norm()
     }
 }
 
@@ -98,7 +103,8 @@ pub enum NoMotion {
 /// symmetric motion of the ideal cavity while its effects grow to their strength.
 ///
 /// Mostly the ideal motion with the same response serves. Near its bifurcations it may be lost, or lead to an unstable motion beside the one that the
-/// ideal motion becomes: then the effects grow where it is most stable, in the middle of its range, and the response changes afterwards.
+/// ideal motion becomes: then the effects also grow where it is most stable, in the middle of its range, and the response changes afterwards, not
+/// beyond a fold. Of both motions the more stable one counts.
 ///
 /// # Errors
 /// Invalid parameters, a scatter of the restitution, and where no motion is found.
@@ -127,7 +133,8 @@ pub fn resonant_motion(
     let detour = Ideal::of(parameters, definition, in_the_middle)
         .map(|ideal| ideal.continued(parameters, definition, Some(response)));
     match detour {
-        Some(Ok(again)) if motion.is_err() || again.is_stable() => Ok(again),
+        Some(Ok(again)) if motion.as_ref().is_ok_and(|motion| motion.growth() <= again.growth()) => motion,
+        Some(Ok(again)) => Ok(again),
         _ => motion,
     }
 }
@@ -142,7 +149,7 @@ pub fn periodic_motion(
     let PlantMotion { state, omega, amplitude, periods, .. } = *guess;
     let mut solver = Solver::new(parameters, definition, periods, conditions)?;
     let start = unknowns(&solver.scale, &state, omega, amplitude);
-    solver.solve(0.0, start).map(|(motion, ..)| motion)
+    Ok(solver.solve(0.0, start)?.motion)
 }
 
 /// The motion at phase resonance under a base of the amplitude `amplitude`, m, continued from the stable symmetric motion of the ideal cavity
@@ -185,7 +192,7 @@ pub fn settled_motion(
         if apart < NEAR {
             match Solver::new(parameters, definition, periods, conditions)?.solve(0.0, here) {
                 // A particle that only slides may slide anywhere: one multiplier is 1.
-                Ok((motion, ..)) if motion.multipliers[3].norm() < 1.0 + NEUTRAL => return Ok(Some(motion)),
+                Ok(Solution { motion, .. }) if motion.growth() < 1.0 + NEUTRAL => return Ok(Some(motion)),
                 Ok(_) | Err(NoMotion::NotConverged) => {}
                 Err(error) => return Err(error),
             }
@@ -267,7 +274,7 @@ impl Ideal {
         } else {
             2.0
         };
-        let (mut done, mut increase) = (0.0, 1.0);
+        let (mut done, mut increase, mut side) = (0.0, 1.0, None);
         loop {
             let next = f64::min(done + increase, if done < 1.0 { 1.0 } else { end });
             let partial = self.with_effects(p, next.min(1.0));
@@ -276,13 +283,21 @@ impl Ideal {
                 None => DriveCondition::Amplitude(self.amplitude),
             };
             let conditions = [DriveCondition::PhaseResonance, second];
-            match Solver::new(&partial, definition, 1, conditions)?.solve(phase, at) {
+            let found = Solver::new(&partial, definition, 1, conditions)?.solve(phase, at);
+            let is_beyond_fold = |found: &Solution| side.is_some_and(|side| side != found.side);
+            match found {
                 // A particle that only rests is another motion: a linear one.
-                Ok((motion, ..)) if motion.impacts == 0 => return Err(NoMotion::Lost(next.min(1.0))),
-                Ok((motion, ..)) if next == end => return Ok(motion),
-                Ok((_, new_phase, new_at)) => (done, phase, at, increase) = (next, new_phase, new_at, 2.0 * increase),
-                Err(NoMotion::NotConverged) if increase > SMALLEST_INCREASE => increase *= 0.5,
+                Ok(Solution { motion, .. }) if motion.impacts == 0 => return Err(NoMotion::Lost(next.min(1.0))),
+                Ok(found) if !is_beyond_fold(&found) => {
+                    if next == end {
+                        return Ok(found.motion);
+                    }
+                    (done, phase, at, increase) = (next, found.phase, found.at, 2.0 * increase);
+                    side = (done >= 1.0).then_some(found.side);
+                }
+                Ok(_) | Err(NoMotion::NotConverged) if increase > SMALLEST_INCREASE => increase *= 0.5,
                 Err(NoMotion::NotConverged) if next <= 1.0 => return Err(NoMotion::Lost(next)),
+                Ok(_) => return Err(NoMotion::NotConverged),
                 Err(error) => return Err(error),
             }
         }
@@ -341,6 +356,15 @@ fn unknowns(scale: &Unknowns, state: &State, omega: f64, amplitude: f64) -> Unkn
 
 /// A plant at the section, its drive, and the duration of the motion, s.
 type Start = (Plant, Drive, f64);
+
+/// A solution, with phase and unknowns at its section.
+struct Solution {
+    motion: PlantMotion,
+    phase: f64,
+    at: Unknowns,
+    /// Sign of the determinant of the equations: independent of the section, it changes where a curve of motions folds.
+    side: f64,
+}
 
 struct Solver<'a> {
     parameters: &'a Parameters,
@@ -504,13 +528,14 @@ impl<'a> Solver<'a> {
         Some(())
     }
 
-    /// The motion near the unknowns `x` at the phase `phase`, with phase and unknowns at its section.
-    fn solve(&mut self, phase: f64, mut x: Unknowns) -> Result<(PlantMotion, f64, Unknowns), NoMotion> {
+    /// The motion near the unknowns `x` at the phase `phase`.
+    fn solve(&mut self, phase: f64, mut x: Unknowns) -> Result<Solution, NoMotion> {
         self.phase = phase.rem_euclid(TAU);
         let found = self.centre(&mut x, false).and_then(|()| newton(self, x));
-        let x = found.ok_or(NoMotion::NotConverged)?;
-        let motion = self.motion(&x).ok_or(NoMotion::NotConverged)?;
-        Ok((motion, self.phase, x))
+        let at = found.ok_or(NoMotion::NotConverged)?;
+        let (motion, jacobian) = self.motion(&at).zip(self.at(&at)).ok_or(NoMotion::NotConverged)?;
+        let side = jacobian.1.determinant().signum();
+        Ok(Solution { motion, phase: self.phase, at, side })
     }
 
     /// The motion at the solution `x`.

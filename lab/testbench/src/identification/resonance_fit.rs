@@ -59,8 +59,9 @@ pub struct ResonanceFit {
     /// Coefficients: constant, time, and integral of the amplitude's deviation.
     drive: Regression,
     turning: Regression,
-    /// Sizes of the neglected terms of `E_R`, m, and `omega_R`, rad/s, and of what the uncertainty of g adds to them.
-    pub remainders: [f64; 2],
+    /// Sizes of the neglected terms of `E_R`, m, and `omega_R`, rad/s, with what the uncertainty of g adds to them, and of the amplitude, m, that both
+    /// belong to.
+    pub remainders: [f64; 3],
     /// Standard uncertainties of `E_R` and `omega_R` by the phase errors and the base within the integrals.
     within: [f64; 2],
 }
@@ -143,9 +144,9 @@ impl ResonanceFit {
         // What the drive adds to the balances is as uncertain as g.
         let added =
             [change * n / duration, gain * base / response * phase_error].map(|rate| rate * growth.uncertainty / gain);
-        // Friction and gravity have a frequency of their own: they change the force of the particle by up to twice the relative change of the
-        // frequency by the phase error.
-        let detuned = base / response * base * phase_error / 3_f64.sqrt();
+        // Friction and gravity have a frequency of their own: they change the force of the particle, and the amplitude at the fold, by up to twice
+        // the relative change of the frequency by the phase error.
+        let detuned = base / response * phase_error / 3_f64.sqrt();
         let of = |value, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
         Some(Self {
             response: of(response, noise),
@@ -158,8 +159,9 @@ impl ResonanceFit {
             drive,
             turning,
             remainders: [
-                Estimate::new(0.0, &[neglected / gain, added[0] / gain, detuned]).uncertainty,
-                Estimate::new(0.0, &[neglected / response, added[1], gain / response * detuned]).uncertainty,
+                Estimate::new(0.0, &[neglected / gain, added[0] / gain, detuned * base]).uncertainty,
+                Estimate::new(0.0, &[neglected / response, added[1], detuned * gain * base / response]).uncertainty,
+                detuned * response,
             ],
             within: [
                 base_noise / n.sqrt(),
