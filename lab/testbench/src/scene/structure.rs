@@ -270,6 +270,39 @@ struct Parts {
     direction: DVector<f64>,
 }
 
+impl Parts {
+    /// The modes of M, C and K without the coupling by the damping, and the matrices where there is a coupling.
+    fn of_matrices(points: Vec<String>, matrices: [DMatrix<f64>; 3], direction: DVector<f64>) -> Result<Self, String> {
+        let [m, c, k] = &matrices;
+        let (shapes, squares) = modes(m, k)?;
+        let damping = shapes.transpose() * c * &shapes;
+        let base = shapes.transpose() * m * &direction;
+        let modes = squares.iter().enumerate().map(|(n, square)| {
+            let omega = square.sqrt();
+            StructureMode {
+                omega,
+                zeta: 0.5 * damping[(n, n)] / omega,
+                shape: shapes.column(n).iter().copied().collect(),
+                out_of_phase: 0.0,
+                drive: base[n],
+            }
+        });
+        let modes: Vec<StructureMode> = modes.collect();
+        // The coupling of two modes by the damper, over what dampens them.
+        let largest = damping.diagonal().amax();
+        let is_modal = damping
+            .iter()
+            .enumerate()
+            .all(|(n, value)| n % (modes.len() + 1) == 0 || value.abs() <= ROUNDING * largest);
+        Ok(Self {
+            points,
+            modes,
+            matrices: (!is_modal).then_some(matrices),
+            direction,
+        })
+    }
+}
+
 /// Largest relative difference of a matrix from its transpose, and share of a shape at a node: rounding of what a file states to nine digits.
 const ROUNDING: f64 = 1e-9;
 /// Largest difference of the norm of a mass-normalised shape from 1: shapes are measured, or written to three digits.
@@ -497,28 +530,7 @@ impl StructureSection {
         k.positive("N/m")?;
         c.not_negative("N s/m")?;
         let direction = self.direction(&m.names)?;
-        let (shapes, squares) = modes(&m.values, &k.values)?;
-        let damping = shapes.transpose() * &c.values * &shapes;
-        let base = shapes.transpose() * &m.values * &direction;
-        let modes = squares.iter().enumerate().map(|(n, square)| {
-            let omega = square.sqrt();
-            StructureMode {
-                omega,
-                zeta: 0.5 * damping[(n, n)] / omega,
-                shape: shapes.column(n).iter().copied().collect(),
-                out_of_phase: 0.0,
-                drive: base[n],
-            }
-        });
-        let modes: Vec<StructureMode> = modes.collect();
-        // The coupling of two modes by the damper, over what dampens them.
-        let largest = damping.diagonal().amax();
-        let is_modal = damping
-            .iter()
-            .enumerate()
-            .all(|(n, value)| n % (modes.len() + 1) == 0 || value.abs() <= ROUNDING * largest);
-        let matrices = (!is_modal).then_some([m.values, c.values, k.values]);
-        Ok(Parts { points: m.names, modes, matrices, direction })
+        Parts::of_matrices(m.names, [m.values, c.values, k.values], direction)
     }
 
     /// The modes of a table of poles and residues.
@@ -533,7 +545,12 @@ impl StructureSection {
             );
         }
         let file = self.residues.as_deref().unwrap_or(Path::new(""));
-        let Residues { points, poles } = Residues::read(folder, file, self.reference.as_deref())?;
+        let residues = Residues::read(folder, file, self.reference.as_deref())?;
+        if let Some(matrices) = residues.matrices() {
+            let n = residues.points.len();
+            return Parts::of_matrices(residues.points, matrices, DVector::zeros(n));
+        }
+        let Residues { points, poles } = residues;
         let modes = poles.iter().map(|(pole, shape)| StructureMode {
             omega: pole.norm(),
             zeta: -pole.re / pole.norm(),

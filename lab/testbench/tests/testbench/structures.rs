@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 use std::fs;
 
+use num_complex::Complex;
 use tempfile::TempDir;
 use vines_model::numerics::Estimate;
 use vines_model::orbit::{Orbit, StructureOrbit};
@@ -11,7 +12,7 @@ use vines_testbench::experiment::run;
 use vines_testbench::fit::MeasuredPoint;
 use vines_testbench::identification::{Identification, IdentificationError, identify};
 use vines_testbench::rig::{BuiltIn, Simulated};
-use vines_testbench::scene::{Excitation, Scene, SceneError};
+use vines_testbench::scene::{Excitation, Scene, SceneError, Structure};
 use vines_testbench::survey::{Survey, phase_resonant, structure_backbone, without_other_modes};
 
 /// A beam by two modes; `changes` are pairs of a text and its replacement.
@@ -157,6 +158,53 @@ fn residues_of_a_real_mode_give_its_mass_normalised_shape() {
         of(&folder, &format!("{PLANT}{residues}"), &base),
         "residues of a receptance belong to excitation",
     );
+}
+
+#[test]
+fn complex_residues_of_as_many_points_as_modes_give_the_structure_of_the_matrices() {
+    let folder = matrices([GOOD[0], [0.02, 0.0, 0.0], GOOD[2]]);
+    let force = "excitation = \"force\"\ndrive = \"tip\"\n";
+    let given = of(&folder, &format!("{PLANT}{force}{MATRICES}"), &[])
+        .unwrap()
+        .structure
+        .unwrap();
+    let csv = |digits: usize| {
+        let mut text = "frequency, damping, re tip, im tip, re root, im root\n".to_string();
+        for (n, section) in given.host.sections().iter().enumerate() {
+            let (delta, omega) = (section.oscillator.delta, section.oscillator.omega0);
+            let pole = Complex::new(-delta, (omega * omega - delta * delta).sqrt());
+            let [k0, k1] = section.kick;
+            let [x, v] = [k1 + 2.0 * delta * k0 + pole * k0, pole * k1 - omega * omega * k0];
+            text += &format!("{}, {}", omega / TAU, delta / omega);
+            for row in &given.rows {
+                let residue = (x * row[n][0] + v * row[n][1]) / Complex::new(0.0, 2.0 * pole.im);
+                text += &format!(", {:.digits$e}, {:.digits$e}", residue.re, residue.im);
+            }
+            text += "\n";
+        }
+        text
+    };
+    let text = format!("{PLANT}{force}residues = \"beam.csv\"\nreference = \"tip\"\n");
+    let off = |csv: &str| {
+        fs::write(folder.path().join("beam.csv"), csv).unwrap();
+        let found = of(&folder, &text, &[]).unwrap().structure.unwrap();
+        let response = |structure: &Structure, omega: f64| structure.host.frequency_response(&structure.rows[1], omega);
+        let relative = |omega: &f64| (response(&found, *omega) / response(&given, *omega) - 1.0).norm();
+        [0.0, 0.3, 0.9, 1.1, 2.0, 5.0].iter().map(relative).fold(0.0, f64::max)
+    };
+    assert!(off(&csv(16)) < 1e-11, "{}", off(&csv(16)));
+    assert!(off(&csv(4)) < 1e-2, "{}", off(&csv(4)));
+    // Parts out of phase that do not cancel are errors of the measurement: real modes remain.
+    let noisy = csv(16);
+    let lines: Vec<&str> = noisy.lines().collect();
+    let one: Vec<f64> = lines[1].split(", ").map(|cell| cell.parse().unwrap()).collect();
+    let turned = format!(
+        "{}, {}, {}, {}, {}, {}",
+        one[0], one[1], -one[2], one[3], -one[4], one[5]
+    );
+    fs::write(folder.path().join("beam.csv"), [lines[0], &turned, lines[2]].join("\n")).unwrap();
+    let real = of(&folder, &text, &[]).unwrap().structure.unwrap();
+    assert!(real.rows.iter().flatten().all(|[_, velocity]| *velocity == 0.0) && real.modes[0].out_of_phase > 1e-4);
 }
 
 #[test]

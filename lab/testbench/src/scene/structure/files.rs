@@ -137,6 +137,10 @@ impl Matrix {
     }
 }
 
+/// Largest sum of the parts of residues out of phase, relative to the sum of their sizes, that counts as zero: files state four digits. Noise does
+/// not cancel.
+const CANCELLED: f64 = 0.01;
+
 /// Poles with positive imaginary part, and mass-normalised shapes at the points, 1/sqrt(kg); complex where the damping is not modal.
 pub(super) struct Residues {
     pub points: Vec<String>,
@@ -214,5 +218,38 @@ impl Residues {
         }
         poles.sort_by(|a, b| a.0.norm().total_cmp(&b.0.norm()));
         Ok(Self { points, poles })
+    }
+
+    /// M, C and K of a structure with as many points as modes whose shapes are complex; `None` for others, and where the parts out of phase are
+    /// errors of the measurement.
+    ///
+    /// With the residues A of the poles s, the receptance is the sum of `A/(j omega - s)` and its conjugate. Its expansion for high frequencies
+    /// gives the inverse of M and then C, its value at 0 the inverse of K (P. Lancaster, "Lambda-matrices and Vibrating Systems", chapter 7).
+    pub(super) fn matrices(&self) -> Option<[DMatrix<f64>; 3]> {
+        let n = self.points.len();
+        let residues = self.poles.iter().map(|(pole, shape)| {
+            let residue = |i: usize, j: usize| shape[i] * shape[j] / Complex64::new(0.0, 2.0 * pole.im);
+            (pole, DMatrix::from_fn(n, n, residue))
+        });
+        let residues: Vec<_> = residues.collect();
+        let sum = |weight: fn(Complex64) -> Complex64| {
+            let parts = residues
+                .iter()
+                .map(|(pole, residue)| residue.map(|part| 2.0 * (weight(**pole) * part).re));
+            parts.fold(DMatrix::zeros(n, n), |sum, part| sum + part)
+        };
+        let sizes = residues
+            .iter()
+            .map(|(_, residue)| residue.map(|part| 2.0 * part.re).norm());
+        // An impulse on masses moves nothing at once.
+        let is_consistent = sum(|_| Complex64::ONE).norm() <= CANCELLED * sizes.sum::<f64>();
+        let is_real = |shape: &[Complex64]| shape.iter().all(|part| part.im.abs() <= ROUNDING * part.norm());
+        if self.poles.len() != n || !is_consistent || self.poles.iter().all(|(_, shape)| is_real(shape)) {
+            return None;
+        }
+        let mass = sum(|pole| pole).try_inverse()?;
+        let stiffness = sum(|pole| -pole.inv()).try_inverse()?;
+        let damping = -&mass * sum(|pole| pole * pole) * &mass;
+        Some([mass, damping, stiffness].map(|matrix| 0.5 * (&matrix + matrix.transpose())))
     }
 }
