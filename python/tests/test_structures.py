@@ -132,6 +132,9 @@ def test_a_structure_locks_on_its_exact_orbit_and_what_has_one_oscillator_says_s
     for refused in (vines.Plant, vines.regime, lambda one: vines.orbits(one, sigma=0.0)):
         with pytest.raises(ValueError, match=r"one oscillator.*\[structure\]"):
             refused(scene)
+    with pytest.warns(UserWarning, match="of the driven mode alone, without the other modes"):
+        alone = vines.theory(scene)
+    assert alone.C_min == pytest.approx(vines.theory().C_min)
     pytest.importorskip("xarray")
     with pytest.raises(ValueError, match="a sweep is of one oscillator"):
         vines.sweep(scene, {"sigma": [0.0]}, periods=400)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
@@ -60,6 +61,61 @@ def test_the_description_is_valid_and_has_outputs_at_the_points(structure):
     expected = [name.format(point) for point in points if point not in ("force", "current") for name in POINTS]
     assert [name for name in structure.names("output") if "[" in name] == expected
     assert "M" not in structure.names("parameter")
+
+
+def direct(structure: dict, drive: dict[str, float], dq2: float, times: np.ndarray) -> tuple[np.ndarray, int]:
+    """Displacement of the cavity at these times, and the number of impacts: by closed form and bisection."""
+    amplitude, omega = drive.values()
+    m, b, r = (structure["parameters"][name] for name in ("m", "b", "r"))
+    natural, zeta, cavity, driven = np.array([list(mode.values()) for mode in structure["equations"]["modes"]]).T
+    pole = natural * (-zeta + 1j * np.sqrt(1 - zeta**2))
+    is_base = structure["excitation"] == "Base"
+    per_drive = driven * (natural**2 + 2j * zeta * natural * omega if is_base else 1)
+    steady = amplitude * per_drive / (natural**2 - omega**2 + 2j * zeta * natural * omega)
+    begin, eta, speed, q2 = 0.0, np.zeros(len(pole)), np.zeros(len(pole)), 0.0
+
+    def modes(t: float) -> tuple[np.ndarray, np.ndarray]:
+        harmonic = steady * np.exp(1j * omega * t)
+        at_begin = steady * np.exp(1j * omega * begin)
+        x, v = eta - at_begin.imag, speed - (1j * omega * at_begin).imag
+        free = (x - 1j * (v - pole.real * x) / pole.imag) * np.exp(pole * (t - begin))
+        return free.real + harmonic.imag, (pole * free).real + (1j * omega * harmonic).imag
+
+    def w(t: float) -> float:
+        return cavity @ modes(t)[0] - q2 - dq2 * (t - begin)
+
+    q1, impacts = [], 0
+    for before, after in zip([0.0, *times[:-1]], times, strict=True):
+        while abs(w(after)) > b:
+            low, high = max(before, begin), after
+            while high - low > 1e-15:
+                middle = 0.5 * (low + high)
+                low, high = (low, middle) if abs(w(middle)) > b else (middle, high)
+                if middle in (before, after):
+                    break
+            (eta, speed), q2 = modes(low), q2 + dq2 * (low - begin)
+            impulse = -(1 + r) * (cavity @ speed - dq2) / (cavity @ cavity + 1 / m)
+            begin, speed, dq2, impacts = low, speed + cavity * impulse, dq2 - impulse / m, impacts + 1
+        q1.append(cavity @ modes(after)[0])
+    return np.array(q1), impacts
+
+
+@pytest.mark.parametrize("name", ["cantilever", "frame"])
+def test_fmpy_plays_the_motion_of_a_direct_simulation(pack, name):
+    structure, start = pack(name), DRIVES[name]
+    known = described(structure)
+    at_cavity = [[mode["cavity"], 0.0] for mode in known["equations"]["modes"]]
+    output = next(f"q[{point['name']}]" for point in known["points"] if point["row"] == at_cavity)
+    settings = {
+        "start_values": start | {"der(q2)": 0.5},
+        "output": [output, "impacts"],
+        "output_interval": 1e-3,
+        "stop_time": 2.5,
+    }
+    result = simulate_fmu(str(structure.path), **settings)
+    expected, impacts = direct(known, start, 0.5, result["time"])
+    assert result["impacts"][-1] == impacts > 10
+    assert result[output] == pytest.approx(expected, abs=1e-9 * max(abs(expected)))
 
 
 def test_fmpy_simulates_it_and_steps_of_any_length_agree(structure, preset):
