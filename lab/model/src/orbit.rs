@@ -6,7 +6,6 @@
 //! one quadratic equation for B remains. There is no first-order approximation.
 
 mod continuation;
-mod convergence;
 mod half_period;
 mod impact_map;
 pub(crate) mod oscillator;
@@ -20,7 +19,6 @@ use crate::Dimensionless;
 use serde::Serialize;
 
 pub use continuation::{Branch, BranchBifurcation, BranchEnd, ContinuationLimits, continue_both_ways};
-pub use convergence::{Convergence, Difference, convergence};
 pub use impact_map::Bounce;
 pub use periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, settle};
 pub(crate) use periodic::{NEAR, periodic_near};
