@@ -129,16 +129,10 @@ fn a_kick_whose_hop_cannot_be_resolved_moves_both_masses_as_one() {
 
 #[test]
 fn a_start_on_a_wall_is_on_it_whatever_the_gaps() {
-    let mut n = 0x9E37_79B9_7F4A_7C15_u64;
-    let mut random = || {
-        n ^= n << 13;
-        n ^= n >> 7;
-        n ^= n << 17;
-        (n >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut random = fastrand::Rng::with_seed(1);
     for _ in 0..2000 {
-        let [plus, minus] = [0.0; 2].map(|_| 0.3 + 2.0 * random());
-        let q1 = 6.0 * (random() - 0.5);
+        let [plus, minus] = [0.0; 2].map(|_| 0.3 + 2.0 * random.f64());
+        let q1 = 6.0 * (random.f64() - 0.5);
         let cavity = Cavity { b_plus: Some(plus), b_minus: Some(minus), ..Cavity::IDEAL };
         for w in [plus, -minus] {
             let start = State { q1, q2: q1 - w, ..State::default() };

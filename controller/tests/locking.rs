@@ -3,7 +3,7 @@
 
 mod rig;
 use phase_lock::{Config, Detector, LoopState, Move};
-use rig::{AMPLITUDE, Bench, Noise, OMEGA_0, ZETA, config};
+use rig::{AMPLITUDE, Bench, OMEGA_0, ZETA, config, noise};
 
 fn relative(a: f64, b: f64) -> f64 {
     (a / b - 1.0).abs()
@@ -115,12 +115,12 @@ fn locks_through_sensor_noise() {
     // Within 2e-4 of the frequency at 40 dB, and ten times as far with ten times the noise.
     for (decibels, share, tolerance) in [(40, 0.01, 2e-4), (20, 0.1, 2e-3)] {
         let mut bench = Bench::new(config());
-        let mut noise = Noise(1);
+        let mut noise = noise(1);
         let amplitude = AMPLITUDE / (2.0 * ZETA);
         let mut locked = None;
         for n in 0..1000 * 100 {
             // Uniform within ±a has the power a²/3.
-            let noise = share * amplitude * 1.5_f64.sqrt() * noise.next();
+            let noise = share * amplitude * 1.5_f64.sqrt() * noise();
             let output = bench.sample_through(|q, base| [q + noise, base]);
             if output.locked {
                 locked.get_or_insert(n / 100);

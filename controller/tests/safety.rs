@@ -3,7 +3,7 @@
 mod rig;
 
 use phase_lock::{Config, Fault, LockCriterion, LoopState, Move, Output};
-use rig::{AMPLITUDE, Bench, Noise, OMEGA_0, config};
+use rig::{AMPLITUDE, Bench, OMEGA_0, config, noise};
 
 #[test]
 fn never_locks_on_a_zero_signal_on_noise_or_without_a_drive() {
@@ -25,9 +25,9 @@ fn never_locks_on_a_zero_signal_on_noise_or_without_a_drive() {
         response_min: 0.0,
         ..LockCriterion::default()
     };
-    let (mut bench, mut noise) = (Bench::new(Config { lock, ..config() }), Noise(7));
+    let (mut bench, mut noise) = (Bench::new(Config { lock, ..config() }), noise(7));
     for _ in 0..200_000 {
-        let noise = noise.next();
+        let noise = noise();
         let output = bench.sample_through(|_, base| [noise, base]);
         assert!(!output.locked, "{output:?}");
     }
@@ -166,9 +166,9 @@ fn a_sensor_that_stops_trips_within_half_a_period() {
 #[test]
 fn a_sensor_that_reads_only_noise_trips_before_the_lock() {
     let mut bench = Bench::new(Config { response_max: None, residual_max: None, ..config() });
-    let mut noise = Noise(7);
+    let mut noise = noise(7);
     let tripped = (0..100 * 25).find(|_| {
-        let noise = 0.01 * noise.next();
+        let noise = 0.01 * noise();
         bench.sample_through(|_, base| [noise, base]).state == LoopState::Tripped
     });
     assert!(tripped.is_some());

@@ -136,14 +136,8 @@ impl Bench {
     }
 }
 
-/// A reproducible sequence of uniform numbers in [-1, 1) (xorshift).
-pub struct Noise(pub u64);
-
-impl Noise {
-    pub fn next(&mut self) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
+/// A reproducible sequence of uniform numbers in [-1, 1).
+pub fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut random = fastrand::Rng::with_seed(seed);
+    move || 2.0 * random.f64() - 1.0
 }

@@ -448,15 +448,11 @@ mod tests {
     /// Relative change of the start that shows how a sample spreads differences.
     const CHANGE: f64 = 1e-7;
 
-    /// Marsaglia's xorshift generator (J. Stat. Softw. 8 (2003) 14), in [0, 1).
-    struct Random(u64);
+    struct Random(fastrand::Rng);
 
     impl Random {
         fn next(&mut self) -> f64 {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+            self.0.f64()
         }
 
         fn between(&mut self, from: f64, to: f64) -> f64 {
@@ -561,7 +557,7 @@ mod tests {
     /// Any of the effects, with gravity of the size of the accelerations of the rig and far smaller.
     fn rough(random: &mut Random) -> Cavity {
         let gravity = 1.0 / lovines::cavity::GRAVITY;
-        let mut cavity = Cavity { seed: random.0, ..Cavity::IDEAL };
+        let mut cavity = Cavity { seed: random.0.u64(..), ..Cavity::IDEAL };
         let mut with = |share: f64| random.next() < share;
         let [gaps, tilt, friction, laws, scatter] = [0.5, 0.5, 0.7, 0.5, 0.3].map(&mut with);
         if gaps {
@@ -596,7 +592,7 @@ mod tests {
         let allowed = 4.0 * LOWEST_HOP.sqrt();
         let (mut worst, mut held_samples, mut impacts, mut sticks) = (0.0f64, 0u64, 0u64, 0u64);
         for number in 1..=scenes {
-            let mut random = Random(number.wrapping_mul(0x9E37_79B9_7F4A_7C15));
+            let mut random = Random(fastrand::Rng::with_seed(number));
             let r = random.between(0.05, 0.8);
             let mut parameters = Parameters::dimensionless(random.decades(-2.0, 0.0), 0.0, r);
             // Model exchange does not know the slope of a signal, which matters with damping only.

@@ -48,7 +48,7 @@ fn request(noise: &mut Noise) -> Frame {
 #[test]
 fn mutated_frames_never_drive_a_helic_device() {
     let (frames, seed) = size();
-    let mut noise = Noise(seed ^ 4);
+    let mut noise = Noise::new(seed ^ 4);
     let [moved, expected] = [(); 2].map(|()| Base::default());
     let (mut attacked, mut clean) = (moved.device(LARGEST), expected.device(LARGEST));
     let (mut collisions, mut driven) = (0u64, 0u64);
@@ -105,11 +105,11 @@ impl Transport for Damaged {
 #[test]
 fn damaged_answers_and_packets_never_make_the_host_panic() {
     let (frames, seed) = size();
-    let (mut noise, step) = (Noise(seed ^ 5), scene().sample_time());
+    let (mut noise, step) = (Noise::new(seed ^ 5), scene().sample_time());
     let (mut packets, mut runs) = (0, 0);
     while packets < frames / 10 {
         (runs, packets) = (runs + 1, packets + 1);
-        let transport = Damaged(Base::default().device(LARGEST), Noise(noise.next()));
+        let transport = Damaged(Base::default().device(LARGEST), Noise::new(noise.next()));
         let Ok(mut rig) = HelicRig::new(transport, &Names::default(), step, 100.0) else {
             continue;
         };

@@ -135,7 +135,7 @@ impl Wire {
 /// Sends mutated copies of every drive before it.
 fn mutated_frames_never_drive_a_rig(address: fn(SocketAddr) -> Address, is_tcp: bool) {
     let ((frames, seed), target) = (size(), Target::start(address, None));
-    let (mut noise, mut done, mut sessions) = (Noise(seed ^ u64::from(is_tcp)), 0, 0);
+    let (mut noise, mut done, mut sessions) = (Noise::new(seed ^ u64::from(is_tcp)), 0, 0);
     while done < frames {
         let mut wire = Wire::connect(target.server.address.socket(), is_tcp);
         let session = noise.next();
@@ -212,7 +212,10 @@ fn forge(mut forged: Vec<u8>, noise: &mut Noise) -> Option<Vec<u8>> {
 #[test]
 fn with_a_key_forged_and_replayed_datagrams_never_drive_a_rig() {
     let ((frames, seed), key) = (size(), Key::of(b"a shared secret of the fuzzer"));
-    let (target, [mut noise, mut own]) = (Target::start(Address::Udp, key), [3, 6].map(|salt| Noise(seed ^ salt)));
+    let (target, [mut noise, mut own]) = (
+        Target::start(Address::Udp, key),
+        [3, 6].map(|salt| Noise::new(seed ^ salt)),
+    );
     let [front, back] = [(); 2].map(|()| {
         let socket = socket();
         socket.set_nonblocking(true).unwrap();

@@ -1,4 +1,4 @@
-//! Random numbers (SplitMix64) and mutations.
+//! Random numbers and mutations.
 
 /// Number of frames per connection, and the seed.
 pub fn size() -> (u64, u64) {
@@ -6,19 +6,19 @@ pub fn size() -> (u64, u64) {
     (number("FRAMES", 20_000), number("SEED", 1))
 }
 
-pub struct Noise(pub u64);
+pub struct Noise(fastrand::Rng);
 
 impl Noise {
+    pub fn new(seed: u64) -> Self {
+        Self(fastrand::Rng::with_seed(seed))
+    }
+
     pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0.u64(..)
     }
 
     pub fn below(&mut self, end: usize) -> usize {
-        (self.next() % end.max(1) as u64) as usize
+        self.0.usize(..end.max(1))
     }
 
     pub fn bytes(&mut self, length: usize) -> Vec<u8> {
