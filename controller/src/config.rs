@@ -2,10 +2,10 @@
 //!
 //! To add a setting, add a row to [`parameters!`](crate::parameters) and use the field that it makes. The row holds the description,
 //! name, type, initial value, unit and range. From it follow the field of [`Config`] or [`LockCriterion`], the initial value, the check of the
-//! range, the key of a scene in `[phase_lock]`, and what is generated from [`PARAMETERS`]: the variable in `modelDescription.xml`, the field of
-//! the C structure with its header, and the row in docs/controller-settings.md. Tests compare these files with the table;
-//! `UPDATE=1 cargo test -p phase-lock -p phase-lock-fmu -p vines-testbench --test generated` writes them. A row in the middle of the
-//! table renumbers the variables of the FMU.
+//! range, the key of a scene in `[phase_lock]`, and what is generated from [`PARAMETERS`]: the variable in `modelDescription.xml`, and the row in
+//! docs/controller-settings.md. The field of the C structure is in `capi/src/types.rs`, and the header follows from it. Tests compare all with
+//! the table; `UPDATE=1 cargo test -p phase-lock -p phase-lock-fmu -p vines-testbench --test generated` writes what is generated. A row in
+//! the middle of the table renumbers the variables of the FMU.
 
 use core::fmt;
 

@@ -15,12 +15,13 @@ use core::fmt::{Display, Write};
 
 use phase_lock::{Config, ConfigError, PARAMETERS, Value};
 
-mod generated;
 mod types;
 
-pub use generated::{PhaseLockConfig, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOutput, PhaseLockStage};
 use types::Stored;
-pub use types::{PhaseLockController, PhaseLockDetector, PhaseLockOptional, PhaseLockReal};
+pub use types::{
+    PhaseLockConfig, PhaseLockController, PhaseLockDetector, PhaseLockFault, PhaseLockInput, PhaseLockMove,
+    PhaseLockOptional, PhaseLockOutput, PhaseLockReal, PhaseLockStage,
+};
 
 /// Conversions of the configuration in both directions. Every parameter of the table is a field of the same name.
 macro_rules! conversions {
