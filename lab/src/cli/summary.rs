@@ -337,13 +337,11 @@ pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
         let regimes = (point.regime, point.regime_by_impacts);
         point.settled && regimes == (Regime::Symmetric, Some(Regime::Asymmetric))
     });
-    match hidden.count() {
-        0 => (),
-        count => {
-            worst += &format!(
-                "{count} settled points look symmetric in the response, but their impacts are asymmetric: not the symmetric backbone\n"
-            );
-        }
+    let hidden = hidden.count();
+    if hidden > 0 {
+        worst += &format!(
+            "Settled points whose response looks symmetric, but whose impacts are asymmetric (not the symmetric backbone): {hidden}\n"
+        );
     }
     if let Some([u_sigma, u_lambda]) = result.u_linear {
         let measured = format!(

@@ -161,6 +161,20 @@ fn a_drive_without_a_stable_orbit_is_told_at_which_drives_one_is_stable() {
 }
 
 #[test]
+fn points_whose_impacts_are_asymmetric_though_their_response_looks_symmetric_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    // Beyond the symmetry breaking at C = 0.713 the asymmetry grows slowly.
+    let levels = "--set=backbone.C_from=0.66 --set=backbone.C_to=0.74 --set=backbone.points=9";
+    let text = text(&vines(&format!("backbone {levels} --out {}", folder.path().display())));
+    let hidden = text
+        .lines()
+        .filter(|row| row.ends_with("  symmetric 1:1 / asymmetric 1:1"));
+    let count = hidden.count();
+    let line = format!("but whose impacts are asymmetric (not the symmetric backbone): {count}\n");
+    assert!(count > 0 && text.contains(&line), "{text}");
+}
+
+#[test]
 fn a_map_is_written_as_table_and_figures() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().display();
