@@ -379,17 +379,6 @@ impl Section {
             Complex64::new(-d * omega0_squared, (c - 2.0 * delta * d) * omega) / denominator,
         ]
     }
-
-    /// Steady `(x, v)` per unit of a harmonic force at the cavity.
-    pub fn steady_of_cavity_force(&self, omega: f64) -> [Complex64; 2] {
-        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
-        let [k0, k1] = self.kick;
-        let denominator = Complex64::new(omega0_squared - omega * omega, 2.0 * delta * omega);
-        [
-            Complex64::new(k1 + 2.0 * delta * k0, k0 * omega) / denominator,
-            Complex64::new(-k0 * omega0_squared, k1 * omega) / denominator,
-        ]
-    }
 }
 
 fn check(valid: bool, message: impl FnOnce() -> String) -> Result<(), InvalidHost> {
@@ -443,7 +432,7 @@ impl Host {
         let size = damping.abs().row_sum().max();
         positive("C (damping matrix)", "N s/m", &damping, -ROUNDING * n as f64 * size)?;
 
-        let shapes = natural_modes(&mass, &stiffness)?;
+        let shapes = shapes_without_damping(&mass, &stiffness)?;
         let to_modal = shapes.tr_mul(&mass);
         let column = |n: usize| shapes.column(n);
         let form = |a: &DMatrix<f64>, i: usize, j: usize| form(a, column(i).as_slice(), column(j).as_slice());
@@ -452,19 +441,8 @@ impl Host {
             DVector::from_row_slice(matrices.drive),
         );
         let project = |x: &DVector<f64>| shapes.tr_mul(x);
-        let natural: Vec<_> = (0..n)
-            .map(|i| {
-                let (k, m) = (form(&stiffness, i, i), form(&mass, i, i));
-                // `k/m`, with `m` near 1.
-                times(k, (1.0 - (m.0 - 1.0), -m.1))
-            })
-            .collect();
-        let rates: Vec<_> = (0..n)
-            .map(|i| {
-                let (c, m) = (form(&damping, i, i), form(&mass, i, i));
-                times(c, (1.0 - (m.0 - 1.0), -m.1))
-            })
-            .collect();
+        let natural = quotients(&stiffness, &mass, &shapes);
+        let rates = quotients(&damping, &mass, &shapes);
         let size = |i: usize, j: usize| (column(i).abs().transpose() * damping.abs() * column(j).abs())[0];
         let modal_damping = DMatrix::from_fn(n, n, |i, j| if i == j { rates[i].0 } else { form(&damping, i, j).0 });
         let proportional = states.is_empty()
@@ -553,16 +531,6 @@ impl Host {
     /// Steady displacement of a point per unit of a harmonic drive with the angular frequency `omega`, rad/s.
     pub fn frequency_response(&self, row: &[[f64; 2]], omega: f64) -> Complex64 {
         response(row, self.sections.iter().map(|section| section.steady(omega)))
-    }
-
-    /// Steady displacement of a point per unit of a harmonic force at the cavity, m/N.
-    pub fn frequency_response_to_cavity(&self, row: &[[f64; 2]], omega: f64) -> Complex64 {
-        response(
-            row,
-            self.sections
-                .iter()
-                .map(|section| section.steady_of_cavity_force(omega)),
-        )
     }
 
     /// The row of the cavity.
@@ -698,14 +666,41 @@ fn form(a: &DMatrix<f64>, x: &[f64], y: &[f64]) -> (f64, f64) {
     sum
 }
 
+/// `x A x/(x M x)` of mass-normalised columns `x`, for which `x M x` is near 1.
+fn quotients(a: &DMatrix<f64>, mass: &DMatrix<f64>, x: &DMatrix<f64>) -> Vec<Rounded> {
+    let of = |column: &[f64]| {
+        let (a, m) = (form(a, column, column), form(mass, column, column));
+        times(a, (1.0 - (m.0 - 1.0), -m.1))
+    };
+    x.column_iter().map(|column| of(column.as_slice())).collect()
+}
+
+/// Mass-normalised shapes without damping, as columns, and squares of the natural frequencies, from the lowest on: `K phi = omega² M phi`.
+///
+/// # Errors
+/// Matrices that are not positive definite, or too badly scaled.
+pub fn natural_modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<f64>), InvalidHost> {
+    let shapes = shapes_without_damping(mass, stiffness)?;
+    let squares = quotients(stiffness, mass, &shapes)
+        .iter()
+        .map(|square| square.0)
+        .collect();
+    Ok((shapes, squares))
+}
+
 /// Mass-normalised modes without damping, as columns, from the lowest frequency on.
 ///
 /// The eigenvalues of the symmetric solver are exact to the rounding of the largest only, so that the eigenvectors are refined until all
 /// digits are right (Ogita and Aishima, "Iterative refinement for symmetric eigenvalue decomposition", Japan J. Indust. Appl. Math. 35 (2018)
 /// 1007).
-fn natural_modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Result<DMatrix<f64>, InvalidHost> {
+fn shapes_without_damping(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Result<DMatrix<f64>, InvalidHost> {
     let n = mass.nrows();
-    let no_modes = || InvalidHost("the modes of M and K cannot be computed: the matrices are too badly scaled".into());
+    let no_modes = || {
+        InvalidHost(
+            "the modes of M and K cannot be computed: the matrices are not positive definite, or too badly scaled"
+                .into(),
+        )
+    };
     let lower = mass.clone().cholesky().ok_or_else(no_modes)?.l();
     let inverse = lower.try_inverse().ok_or_else(no_modes)?;
     let reduced = &inverse * stiffness * inverse.transpose();

@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use lovines::host::{Equations, Row};
+use lovines::host::{Equations, Row, natural_modes};
 use lovines::{Host, Mode};
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use super::SceneError;
@@ -177,7 +177,8 @@ impl Structure {
         let drive = DVector::from_iterator(old.len(), old.iter().map(|mode| mode.drive));
         let squares = DVector::from_iterator(old.len(), old.iter().map(|mode| mode.omega * mode.omega));
         let whole = DMatrix::identity(old.len(), old.len()) + mass * &drive * drive.transpose();
-        let (shapes, squares) = modes(&whole, &DMatrix::from_diagonal(&squares))?;
+        let (shapes, squares) =
+            natural_modes(&whole, &DMatrix::from_diagonal(&squares)).map_err(|error| error.to_string())?;
         let mode = |(n, square): (usize, &f64)| {
             let column = shapes.column(n);
             let parts = || old.iter().zip(column.iter());
@@ -274,7 +275,7 @@ impl Parts {
     /// The modes of M, C and K without the coupling by the damping, and the matrices where there is a coupling.
     fn of_matrices(points: Vec<String>, matrices: [DMatrix<f64>; 3], direction: DVector<f64>) -> Result<Self, String> {
         let [m, c, k] = &matrices;
-        let (shapes, squares) = modes(m, k)?;
+        let (shapes, squares) = natural_modes(m, k).map_err(|error| error.to_string())?;
         let damping = shapes.transpose() * c * &shapes;
         let base = shapes.transpose() * m * &direction;
         let modes = squares.iter().enumerate().map(|(n, square)| {
@@ -660,22 +661,4 @@ fn unit(n: usize, place: usize) -> Vec<f64> {
 /// Euclidean norm.
 fn norm(values: impl Iterator<Item = f64>) -> f64 {
     values.map(|value| value * value).sum::<f64>().sqrt()
-}
-
-/// Mass-normalised shapes, as columns, and squares of the natural frequencies, both rising: `K phi = omega² M phi`.
-fn modes(m: &DMatrix<f64>, k: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<f64>), String> {
-    let n = m.nrows();
-    let factor = m.clone().cholesky().ok_or("M is not positive definite")?;
-    let lower = factor.l();
-    let solved = |right: &DMatrix<f64>| lower.solve_lower_triangular(right).ok_or("M is singular");
-    let reduced = solved(&solved(k)?.transpose())?;
-    let eigen = SymmetricEigen::new((&reduced + reduced.transpose()) * 0.5);
-    let mut order: Vec<usize> = (0..n).collect();
-    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-    let sorted = DMatrix::from_fn(n, n, |row, column| eigen.eigenvectors[(row, order[column])]);
-    let shapes = lower
-        .transpose()
-        .solve_upper_triangular(&sorted)
-        .ok_or("M is singular")?;
-    Ok((shapes, order.iter().map(|&n| eigen.eigenvalues[n]).collect()))
 }
