@@ -34,12 +34,6 @@ def test_the_fmu_is_a_co_simulation_component_for_this_platform(fmus, name):
     assert "linux64" in supported_platforms(str(fmus[name].path))
 
 
-def test_amplitude_and_phase_target_can_be_tuned_while_it_runs(fmus):
-    for name in ("amplitude", "phase_target"):
-        assert fmus["PhaseLock"].variable(name).variability == "tunable"
-    assert float(fmus["PhaseLock"].variable("phase_target").start) == pytest.approx(-1.5707963267948966)
-
-
 @pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])
 def test_every_real_variable_has_a_unit_and_says_of_what_kind_and_size_it_is(fmus, name):
     for variable in fmus[name].description.modelVariables:

@@ -11,9 +11,10 @@ mod structures;
 
 use vines_testbench::backbone::{Tracked, track};
 use vines_testbench::experiment::{ExperimentError, run};
+use vines_testbench::identification::{Identification, IdentificationError, identify};
 use vines_testbench::plan::{LinearResponse, Plan};
 use vines_testbench::record::Record;
-use vines_testbench::rig::{BuiltIn, Drive, Rig, RigError, RigStage, Sensors};
+use vines_testbench::rig::{BuiltIn, Drive, Rig, RigError, RigStage, Sensors, Simulated};
 use vines_testbench::scene::Scene;
 
 /// The default scene with these settings.
@@ -52,6 +53,14 @@ impl RigStage for Altered<'_> {
 fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     run(rig, &mut controller, &scene.plan(), |_, _, _| {})
+}
+
+/// What is identified on the simulated rig of a scene.
+fn identified(scene: &Scene) -> Result<Identification, IdentificationError> {
+    identify(
+        &record(&mut *Simulated::of(scene).unwrap(), scene).unwrap(),
+        &scene.plan(),
+    )
 }
 
 /// The tracked backbone.

@@ -23,7 +23,7 @@ use vines_testbench::rig::{
 use vines_testbench::scene::{Dimensionless, Scene};
 
 use super::common::{self, crossings, noisy, rig_with_stable_orbit, uniform};
-use super::{Altered, checked, paper, record, tracked};
+use super::{Altered, checked, identified, paper, record, tracked};
 
 /// The dimensionless default scene with these settings.
 fn dimensionless(settings: &[&str]) -> Scene {
@@ -32,8 +32,7 @@ fn dimensionless(settings: &[&str]) -> Scene {
 
 /// The lock of an experiment with the plant of a scene.
 fn lock(scene: &Scene) -> Lock {
-    let record = record(&mut *Simulated::of(scene).unwrap(), scene).unwrap();
-    identify(&record, &scene.plan()).unwrap().lock
+    identified(scene).unwrap().lock
 }
 
 /// The points of a tracked backbone that is complete.

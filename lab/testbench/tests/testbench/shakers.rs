@@ -4,14 +4,13 @@ use std::f64::consts::PI;
 
 use lovines::{Drive, Plant, StructureState};
 use vines_testbench::backbone::track;
-use vines_testbench::experiment::{ExperimentError, run};
-use vines_testbench::identification::identify;
+use vines_testbench::experiment::ExperimentError;
 use vines_testbench::loop_check::{Verdict, check};
 use vines_testbench::rig::{BuiltIn, RigError, Sensors, SensorsOnly, Simulated};
 use vines_testbench::scene::{Scene, SceneError};
 use vines_testbench::survey::phase_resonant;
 
-use super::Altered;
+use super::{Altered, identified};
 
 const PRESETS: [&str; 3] = [
     include_str!("../../../../scenes/shaker-cantilever.toml"),
@@ -32,16 +31,7 @@ fn presets_lock_on_the_exact_orbit_with_their_shaker() {
     // On the mass of the oscillator the force drops out.
     for n in [0, 2] {
         let scene = preset(n, &[]).unwrap();
-        let plan = scene.plan();
-        let mut controller = BuiltIn::new(&plan.lock).unwrap();
-        let record = run(
-            &mut *Simulated::of(&scene).unwrap(),
-            &mut controller,
-            &plan,
-            |_, _, _| {},
-        )
-        .unwrap();
-        let at = identify(&record, &plan).unwrap().lock.at;
+        let at = identified(&scene).unwrap().lock.at;
         // The response is held where the force is within 1e-4 of the one asked for.
         let measured = Scene { amplitude: at.e_m, ..scene };
         let orbits = phase_resonant(&measured, &measured.dimensionless());

@@ -8,12 +8,12 @@ use tempfile::TempDir;
 use vines_model::numerics::Estimate;
 use vines_model::orbit::{Orbit, StructureOrbit};
 use vines_testbench::comparison::ExactCurve;
-use vines_testbench::experiment::run;
 use vines_testbench::fit::MeasuredPoint;
-use vines_testbench::identification::{Identification, IdentificationError, identify};
-use vines_testbench::rig::{BuiltIn, Simulated};
+use vines_testbench::identification::IdentificationError;
 use vines_testbench::scene::{Excitation, Scene, SceneError, Structure};
 use vines_testbench::survey::{Survey, phase_resonant, structure_backbone, without_other_modes};
+
+use super::identified;
 
 /// A beam by two modes; `changes` are pairs of a text and its replacement.
 fn beam(changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
@@ -405,22 +405,11 @@ fn points_of_a_structure_without_its_other_modes_are_those_of_the_driven_mode() 
     }
 }
 
-/// A preset of `scenes/`, and what was identified on its simulated rig.
-fn identified(name: &str, settings: &[&str]) -> (Scene, Result<Identification, IdentificationError>) {
+/// A preset of `scenes/`.
+fn preset(name: &str, settings: &[&str]) -> Scene {
     let file = format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let settings: Vec<_> = settings.iter().map(|one| one.parse().unwrap()).collect();
-    let scene = Scene::load(Some(file.as_ref()), &settings).unwrap();
-    let plan = scene.plan();
-    let mut controller = BuiltIn::new(&plan.lock).unwrap();
-    let record = run(
-        &mut *Simulated::of(&scene).unwrap(),
-        &mut controller,
-        &plan,
-        |_, _, _| {},
-    )
-    .unwrap();
-    let found = identify(&record, &plan);
-    (scene, found)
+    Scene::load(Some(file.as_ref()), &settings).unwrap()
 }
 
 #[test]
@@ -434,13 +423,13 @@ fn the_loop_finds_the_stable_exact_orbits_of_the_presets_and_refuses_what_is_asy
             &["excitation.G=1.05", "resonance.sensor_quantity=velocity"],
         ),
     ] {
-        let (scene, found) = identified(name, settings);
-        let at = found.unwrap().lock.at;
+        let scene = preset(name, settings);
+        let at = identified(&scene).unwrap().lock.at;
         let orbits = phase_resonant(&scene, &scene.dimensionless());
         let near = |orbit: &Orbit| orbit.stable && (orbit.sigma - at.sigma).abs().max((orbit.c - at.c).abs()) < 1e-4;
         assert!(orbits.iter().any(near), "{name}: {at:?}");
     }
-    let (_, refused) = identified("cantilever", &[]);
+    let refused = identified(&preset("cantilever", &[]));
     assert!(
         matches!(refused, Err(IdentificationError::Regime { .. })),
         "{refused:?}"
