@@ -7,13 +7,14 @@
 //! the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the error over u, and that over the
 //! Cramér–Rao bound of the same points (of recordings, u is this bound); and the numbers of fits that are rejected, and of rigs without a fit.
 //!
-//! `effects` gives each rig one hidden effect of its cavity, in turn friction, tilt, and two laws of restitution, and as many rigs none. Half of
+//! `effects` gives each rig one hidden effect, in turn friction, tilt, two laws of restitution, and a cubic stiffness, which moves the measured
+//! frequencies by harmonic balance; and as many rigs none. Half of
 //! the rigs with friction are at rest when a loop check measures them. A rig is drawn again if
 //! the loop does not lock on it, if friction keeps the particle from the walls, or if the effect moves its points by less than 5 u. The table has the
 //! numbers of rigs that were drawn, measured, flagged because the ideal cavity does not describe their points, explained by the right effect, by a wrong one
 //! alone, and by the right one only among others; and the coverage of the strength.
 //!
-//! Arguments: `points`, `linear`, `levels`, `sweeps`, `decays` or `effects`, RIGS, SEED, SNR in dB or `none`. Writes validation/fit.csv or, for `effects`,
+//! Arguments: `points`, `linear`, `levels`, `sweeps`, `decays`, `effects`, the name of one effect or `none`, RIGS, SEED, SNR in dB or `none`. Writes validation/fit.csv or, for `effects`,
 //! validation/fit_effects.csv.
 
 mod common;
@@ -30,8 +31,12 @@ use vines_testbench::rig::{Drive, RigError, RigStage, Sensors};
 type Points = (Vec<MeasuredPoint>, Scene, Parameters);
 
 fn main() -> Result<(), Failure> {
-    let [source, count, seed, snr] =
-        &arguments(["points|linear|levels|sweeps|decays|effects", "RIGS", "SEED", "SNR|none"])?;
+    let [source, count, seed, snr] = &arguments([
+        "points|linear|levels|sweeps|decays|effects|EFFECT",
+        "RIGS",
+        "SEED",
+        "SNR|none",
+    ])?;
     let measure: fn(&Case, &str) -> Result<Found, Failure> = match &**source {
         "points" => |case, snr| fitted(&points(case, snr)?, &[]),
         "linear" => |case, snr| {
@@ -40,11 +45,10 @@ fn main() -> Result<(), Failure> {
             println!("{verdicts:?}");
             fitted(measured, &[Known::Linear(verdicts[0].linear)])
         },
-        "effects" => return effects(count.parse()?, seed.parse()?, snr),
         "levels" => |case, snr| follow_one(case, snr, levels),
         "sweeps" => |case, snr| follow_one(case, snr, sweep),
         "decays" => |case, snr| follow_one(case, snr, lock_and_decay),
-        other => return Err(format!("{other}: there are points, linear, levels, sweeps, decays and effects").into()),
+        other => return effects(other, count.parse()?, seed.parse()?, snr),
     };
     let mut uniform = uniform(seed.parse()?);
     let case = |_| {
@@ -103,10 +107,19 @@ fn fitted((points, scene, truth): &Points, known: &[Known]) -> Result<Found, Fai
     })
 }
 
-fn effects(count: usize, seed: u64, snr: &str) -> Result<(), Failure> {
+fn effects(source: &str, count: usize, seed: u64, snr: &str) -> Result<(), Failure> {
     let header = "effect,snr_dB,seed,drawn,rigs,flagged,named,misnamed,among_others,strength_within_1.96u,largest_u";
-    for effect in Effect::ALL.map(Some).into_iter().chain([None]) {
-        let hidden = |n: &usize| (*n < count).then(|| Effect::ALL[n % 4]) == effect;
+    let name = |effect: Option<Effect>| effect.map_or("none", Effect::name);
+    let mut effects: Vec<Option<Effect>> = Effect::ALL.map(Some).into_iter().chain([None]).collect();
+    effects.retain(|effect| ["effects", name(*effect)].contains(&source));
+    if effects.is_empty() {
+        let names = Effect::ALL.map(Effect::name).join(", ");
+        return Err(
+            format!("{source}: there are points, linear, levels, sweeps, decays, effects, {names} and none").into(),
+        );
+    }
+    for effect in effects {
+        let hidden = |n: &usize| (*n < count).then(|| Effect::ALL[n % 5]) == effect;
         let seeds: Vec<u64> = (0..2 * count).filter(hidden).map(|n| seed + 1000 * n as u64).collect();
         // The rigs that the loop does not lock, and those that the effect hardly moves, are drawn again.
         let measure = |seed: &u64| {
@@ -120,15 +133,16 @@ fn effects(count: usize, seed: u64, snr: &str) -> Result<(), Failure> {
         let found = survey(&seeds.len().to_string(), |n| Ok(seeds[n]), measure)?;
         let counts = counts(&found).map(|count| count.to_string());
         let ratios: Vec<f64> = found.into_iter().flat_map(|one| one.ratios).collect();
-        let name = effect.map_or_else(|| "none".into(), |effect| effect.to_string());
         let (within, largest) = (share(&ratios, 1.96), ends(&ratios)[1]);
+        let name = name(effect);
         let row = format!("{name},{snr},{seed},{},{within:.3},{largest:.1}", counts.join(","));
         write("fit_effects", header, 2, &[row])?;
     }
     Ok(())
 }
 
-/// Largest friction and tilt, times g, over b omega0²: on the default rig a friction of 0.31, and 9 degrees.
+/// Largest friction and tilt, times g, over b omega0²: on the default rig a friction of 0.31, and 9 degrees. The first is the largest additional
+/// stiffness over m omega0² as well.
 const LARGEST: [f64; 2] = [0.1, 0.05];
 
 /// Draws a rig with a hidden effect, or with none, and counts whether it is flagged, named, misnamed, and named among others. The ratio is the
@@ -161,7 +175,18 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
     if !matches!(regime, Some(Regime::Symmetric | Regime::Asymmetric)) {
         return Ok(None);
     }
-    let points = measured(&tracked);
+    let h = if effect == Some(Effect::Hardening) {
+        LARGEST[0] * size * epsilon
+    } else {
+        0.0
+    };
+    let points: Vec<MeasuredPoint> = measured(&tracked)
+        .into_iter()
+        .map(|point| {
+            let factor = (1.0 + 0.75 * h * point.response.value.powi(2)).sqrt();
+            MeasuredPoint { omega: point.omega.scaled(factor), ..point }
+        })
+        .collect();
     let moved = at(&points, scene.resonance, &ideal, &[]).ok_or("the ideal rig has no such motion")?;
     let (_, moved) = range((0.0, 0.0), moved.residuals.iter().flatten().map(|one| one.abs()));
     if points.len() < 6 || (effect.is_some() && moved < 5.0) {
@@ -180,7 +205,7 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
     let candidates = found.candidates.iter().filter(|one| Some(one.effect) == effect);
     let possible: Vec<f64> = candidates
         .filter(|one| !one.fit.is_rejected())
-        .map(|one| (one.strength.value - one.effect.strength_of(&cavity)).abs() / one.strength.uncertainty)
+        .map(|one| (one.strength.value - h - one.effect.strength_of(&cavity)).abs() / one.strength.uncertainty)
         .collect();
     let verdict: Vec<_> = found
         .candidates

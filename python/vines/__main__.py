@@ -63,7 +63,7 @@ def main() -> int:
     for response in (verdict["linear"] for verdict in found.linear):
         print(f"linear response: f0 = {response['f0_Hz']:.6g} Hz, particle {response['particle']}")
     if found.effects is not None:
-        print(f"explained by {found.explained_by or 'no single effect of the cavity'}")
+        print(f"explained by {found.explained_by or 'no single effect'}")
     for effect, b in zip(*(found.alternatives.get(name, ()) for name in ("effect", "possible_b_m")), strict=True):
         print(f"{effect} would give the same points with b = {1e3 * b:.4g} mm; give --known b and --known epsilon")
     return 0 if found.describes else 1

@@ -44,9 +44,9 @@ The model is the exact symmetric 1:1 motion of a linear oscillator and a particl
   epsilon     mass ratio m/M
 and, if --known gives one of M, m, k and c, the others in SI units. The scene is where the search begins, and what the result is compared with.
 
-If the model does not describe all points (probability of so large a chi-square below 1 %), friction, tilt, and two laws of a restitution that
-depends on the speed are fitted one at a time, by periodic motions of the plant. If one of them describes the points, the result is its fit. If
-none does, at most a fifth of the points are left out; if that does not help, every line says so, and the exit code is 1.
+If the model does not describe all points (probability of so large a chi-square below 1 %), friction, tilt, two laws of a restitution that
+depends on the speed, and a cubic stiffness are fitted one at a time, by periodic motions of the plant. If one of them describes the points, the
+result is its fit. If none does, at most a fifth of the points are left out; if that does not help, every line says so, and the exit code is 1.
 
 Examples:
   vines fit out/tracked.csv
@@ -171,9 +171,7 @@ fn explained(explanation: &Explanation) -> String {
             none if none.is_empty() => "none of them a motion exists".into(),
             some => some,
         };
-        return format!(
-            "no single effect of the cavity explains it: chi-square is {without} without one, with {tried}"
-        );
+        return format!("no single effect explains it: chi-square is {without} without one, with {tried}");
     };
     let EffectReport { effect, symbol, unit, left_out, .. } = best.report();
     let (strength, space) = (with_decimals(best.strength), if unit.is_empty() { "" } else { " " });

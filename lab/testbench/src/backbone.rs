@@ -49,6 +49,8 @@ pub struct LevelEstimate {
     pub phase_error: Estimate,
     /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
     pub at: [Estimate; 2],
+    /// What the phase error adds to their uncertainties where friction or gravity move the fold. A level does not wait for it.
+    pub detuned: [f64; 2],
     /// Whether only noise is larger than the precision: the fit describes the window, and the systematic part of the uncertainty is small
     /// enough.
     pub steady: bool,
@@ -146,8 +148,8 @@ impl Criterion {
         });
         let systematic = systematic[0].hypot(systematic[1]);
         let at = [0, 1].map(|i| {
-            // The uncertainty of the amplitude moves drive and frequency along their slopes.
-            let aside = slope(i) * whole.u_level.hypot(whole.remainders[2]);
+            // The noise of the amplitude moves drive and frequency along their slopes.
+            let aside = slope(i) * whole.u_level;
             let total = estimates[i];
             Estimate::new(
                 total.value,
@@ -160,6 +162,7 @@ impl Criterion {
             response: whole.response,
             phase_error: whole.phase_error,
             at,
+            detuned: [0, 1].map(|i| slope(i) * whole.remainders[2]),
             steady: whole.excess <= EXCESS && systematic <= allowed[0].min(units[1] * allowed[1]),
         })
     }
@@ -174,6 +177,7 @@ impl LevelEstimate {
             response: mean(&Cycle::amplitude),
             phase_error: mean(&|cycle| cycle.phase_error),
             at: [mean(&|cycle| cycle.base.norm()), mean(&|cycle| cycle.omega)],
+            detuned: [0.0; 2],
             steady: false,
         }
     }
@@ -407,8 +411,10 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let [base, omega] = estimate.at;
         let regime = regime_by_response(averaged, knowledge, base, omega);
         let reached = is_reached(estimate.response, level);
+        let [stated_base, stated_omega] =
+            [(base, 0), (omega, 1)].map(|(at, i)| Estimate::new(at.value, &[at.uncertainty, estimate.detuned[i]]));
         LevelPoint {
-            at: ResonancePoint::new([estimate.response, base, omega, estimate.phase_error], &d),
+            at: ResonancePoint::new([estimate.response, stated_base, stated_omega, estimate.phase_error], &d),
             // The level as a person would write it.
             level: (1e9 * level / d.b).round() / 1e9,
             periods: self.run.periods - start,

@@ -522,7 +522,8 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
         let mut rows = Vec::new();
         for (n, Nearest { speed, along }) in at.iter().enumerate() {
             let mut columns = [Vector3::zeros(); UNKNOWNS];
-            for (i, column) in columns[..5].iter_mut().enumerate() {
+            let is_free = |(i, _): &(usize, &mut Vector3<f64>)| *i < 5 || *i == 6 && self.free;
+            for (i, column) in columns.iter_mut().enumerate().filter(is_free) {
                 *column = across(along, &slope(|step| self.residual(&shifted(x, i, step), n, *speed))?);
             }
             rows.extend([0, 1, 2].map(|channel| Unknowns::from_fn(|i, _| columns[i][channel])));
@@ -730,11 +731,12 @@ impl<'a> Problem<'a> {
         ))
     }
 
-    /// The curve of the ideal cavity at a speed less a point, over its standard uncertainties.
+    /// The curve of the ideal cavity, with a cubic stiffness ([`Effect::Hardening`]), at a speed less a point, over its standard uncertainties.
     fn residual(&self, x: &Unknowns, point: usize, speed: f64) -> Option<Vector3<f64>> {
         let (omega0, b, epsilon) = (x[0].exp(), x[3].exp(), x[4].exp());
         let [omega, c, g] = backbone_at_speed(&model(x, self.definition), speed)?;
-        Some(self.over_u(point, b * c, omega0 * omega, b * epsilon * g))
+        let hardening = 1.0 + 0.375 * x[6] * c * c;
+        Some(self.over_u(point, b * c, omega0 * omega * hardening, b * epsilon * g))
     }
 
     /// A response, m, a frequency, rad/s, and a drive, m, less those of a point, over its standard uncertainties.

@@ -483,13 +483,23 @@ fn the_effect_that_explains_a_misfit_is_named_with_its_strength() {
     let known = ["b=0.0095±0.00003", "epsilon=0.00923±0.00003"].map(|one| one.parse().unwrap());
     let friction = Cavity { kinetic_friction: 0.03, ..Cavity::IDEAL };
     let tilt = Cavity { tilt: 0.1, ..Cavity::IDEAL };
-    for (cavity, effect) in [(friction, Effect::Friction), (tilt, Effect::Tilt)] {
-        // The periodic motions of the rig, with the uncertainties of 60 dB.
-        let motions = (0..10).map(|n| motion_at(cavity, (0.36 + 0.03 * f64::from(n)) * RIG.half_width));
+    let cases = [
+        (friction, Effect::Friction, 0.03),
+        (tilt, Effect::Tilt, 0.1_f64.to_degrees()),
+        (Cavity::IDEAL, Effect::Hardening, 1e-3),
+    ];
+    for (cavity, effect, strength) in cases {
+        // The periodic motions of the rig, with the uncertainties of 60 dB. Harmonic balance: a cubic stiffness moves their frequency.
+        let h = if effect == Effect::Hardening { strength } else { 0.0 };
+        let motions = (0..10).map(|n| {
+            let c = 0.36 + 0.03 * f64::from(n);
+            let [response, omega, drive] = motion_at(cavity, c * RIG.half_width);
+            [response, omega * (1.0 + 0.75 * h * c * c).sqrt(), drive]
+        });
         let points = measured(motions, 1e-4, 11);
         let found = explain(&points, Definition::default(), &wrong_scene().plant, &known, |_| {}).unwrap();
         let best = found.explains().unwrap_or_else(|| panic!("{found:?}"));
-        let (Estimate { value, uncertainty }, strength) = (best.strength, effect.strength_of(&cavity));
+        let Estimate { value, uncertainty } = best.strength;
         assert!(best.effect == effect && found.ideal.is_rejected(), "{found:?}");
         assert!(
             (value - strength).abs() < 3.0 * uncertainty && uncertainty < 0.2 * strength,

@@ -1,4 +1,4 @@
-//! Effects of a real cavity that explain why points contradict the ideal one: each is fitted alone, and they are compared.
+//! Effects of a real rig that explain why points contradict the ideal one: each is fitted alone, and they are compared.
 //!
 //! The points of a rig with an effect lie on a curve of the plant's own periodic motions ([`periodic_motion`]). For given parameters each point has a
 //! motion near it; the distance from the tangent of the curve there, and its derivatives over parameters and strength, are differences between motions
@@ -27,7 +27,7 @@ use super::{
 use crate::linear::MeasuredLinear;
 use crate::scene::{Parameters, Scene};
 
-/// An effect of a real cavity.
+/// An effect of a real cavity, or of its suspension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
     /// Coulomb friction on the floor.
@@ -38,6 +38,9 @@ pub enum Effect {
     Viscoelastic,
     /// A restitution that falls with the speed as that of plastic impacts.
     Plastic,
+    /// A cubic stiffness of the suspension, `k (1 + h (q1/b)²)`. It moves the frequency of a response of the amplitude C b by `3/8 h C²` of itself
+    /// (harmonic balance), the more negative the softer. The plant has none: its motions are those of the ideal cavity.
+    Hardening,
 }
 
 /// A fit with one effect.
@@ -65,8 +68,8 @@ const STAGES: [f64; 3] = [0.5, 0.8, 1.0];
 const FOUND: f64 = 1e-4;
 /// Smallest strength, over that from which the search begins.
 const SMALLEST: f64 = 1e-3;
-/// Strength from which the search begins, over that which gives the particle the acceleration `b omega0²`: friction and tilt of this size are
-/// about 0.03 and 2 degrees on the default rig.
+/// Strength from which the search begins, over that which gives the particle the acceleration `b omega0²`, or the suspension the additional
+/// stiffness `m omega0²`: friction and tilt of this size are about 0.03 and 2 degrees on the default rig.
 const TYPICAL: f64 = 0.01;
 /// A strong effect, over a typical one.
 const STRONG: f64 = 5.0;
@@ -77,7 +80,13 @@ const POSSIBLE: f64 = 6.0;
 
 impl Effect {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Friction, Self::Tilt, Self::Viscoelastic, Self::Plastic];
+    pub const ALL: [Self; 5] = [
+        Self::Friction,
+        Self::Tilt,
+        Self::Viscoelastic,
+        Self::Plastic,
+        Self::Hardening,
+    ];
 
     /// Its name.
     #[must_use]
@@ -87,6 +96,7 @@ impl Effect {
             Self::Tilt => "tilt",
             Self::Viscoelastic => "viscoelastic restitution",
             Self::Plastic => "plastic restitution",
+            Self::Hardening => "cubic stiffness",
         }
     }
 
@@ -98,6 +108,7 @@ impl Effect {
             Self::Tilt => ["theta", "deg"],
             Self::Viscoelastic => ["k_r", "(s/m)^(1/5)"],
             Self::Plastic => ["v_y", "m/s"],
+            Self::Hardening => ["h", ""],
         }
     }
 
@@ -109,13 +120,14 @@ impl Effect {
             Self::Friction => typical,
             Self::Tilt => 4.0 * typical * typical,
             Self::Viscoelastic | Self::Plastic => 0.0,
+            Self::Hardening => factor * TYPICAL * x[4].exp(),
         };
         x
     }
 
     /// Whether it has a strength beside the five parameters: a law of restitution stands for r.
     fn adds_a_parameter(self) -> bool {
-        matches!(self, Self::Friction | Self::Tilt)
+        !matches!(self, Self::Viscoelastic | Self::Plastic)
     }
 
     /// The cavity with this effect. `strength` is the friction, or the square of the tilt, rad² (the motions are even in it); a law of restitution
@@ -128,6 +140,15 @@ impl Effect {
             Self::Tilt => Cavity { tilt: strength.sqrt(), ..Cavity::IDEAL },
             Self::Viscoelastic => both(Restitution::Viscoelastic((1.0 - r) / speed.powf(0.2))),
             Self::Plastic => both(Restitution::Plastic(speed * r.powi(4))),
+            Self::Hardening => Cavity::IDEAL,
+        }
+    }
+
+    /// The strength in the unit of [`Effect::symbol`], of what [`Effect::cavity`] takes.
+    fn strength(self, strength: f64, r: f64, speed: f64) -> f64 {
+        match self {
+            Self::Hardening => strength,
+            _ => self.strength_of(&self.cavity(strength, r, speed)),
         }
     }
 
@@ -212,9 +233,8 @@ impl Candidate {
         }
         let most = self.effect.start(x, STRONG)[6] - x[6];
         let more = covariance[(6, 6)].sqrt().min(most.max(0.0));
-        let cavity = self.effect.cavity(x[6] + more, x[2], self.speed);
         [
-            self.effect.strength_of(&cavity),
+            self.effect.strength(x[6] + more, x[2], self.speed),
             b * (covariance[(3, 6)] / covariance[(6, 6)] * more).exp(),
         ]
     }
@@ -473,15 +493,19 @@ impl Problem<'_> {
         let particle = mean(ideal.speeds.iter().copied()) * Quantity::B.of(&ideal.x) * ideal.x[0].exp();
         let speed = 2.0 * particle * (1.0 + ideal.x[4].exp()) / (1.0 + ideal.x[2]);
         let problem = Problem { free: effect.adds_a_parameter(), ..self.clone() };
-        let curve = PlantCurve { problem: &problem, effect, speed, smallest: SMALLEST * x[6] };
-        let minimum = LeastSquares::minimum(&curve, x, &curve.along(&x)?, FOUND)?;
-        let places: Vec<Nearest> = minimum
-            .trace
-            .iter()
-            .map(|one| Nearest { speed, along: one.along })
-            .collect();
-        let fit = problem.found(&minimum, &places);
-        let value = |x: &Unknowns| effect.strength_of(&effect.cavity(x[6], x[2], speed));
+        let fit = if effect == Effect::Hardening {
+            problem.fit_from([x].into_iter()).ok()?
+        } else {
+            let curve = PlantCurve { problem: &problem, effect, speed, smallest: SMALLEST * x[6] };
+            let minimum = LeastSquares::minimum(&curve, x, &curve.along(&x)?, FOUND)?;
+            let places: Vec<Nearest> = minimum
+                .trace
+                .iter()
+                .map(|one| Nearest { speed, along: one.along })
+                .collect();
+            problem.found(&minimum, &places)
+        };
+        let value = |x: &Unknowns| effect.strength(x[6], x[2], speed);
         let gradient = gradient(&fit.x, value);
         let variance = (gradient.transpose() * fit.covariance * gradient)[0];
         let strength = Estimate { value: value(&fit.x), uncertainty: variance.max(0.0).sqrt() };
