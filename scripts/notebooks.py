@@ -1,43 +1,31 @@
-"""Runs the examples and makes notebooks of them, for the book.
+"""Executes the examples as notebooks, for the book.
 
-python scripts/notebooks.py [FOLDER]    runs all, writes their figures into docs/gallery and the page docs/gallery.md,
-                                        and the notebooks into FOLDER, by default target/book/notebooks
+python scripts/notebooks.py [FOLDER]    writes the notebooks with outputs into FOLDER, by default target/book/notebooks;
+                                        their figures into docs/gallery, and the page docs/gallery.md
 
 An example is a notebook as text: its cells begin with `# %%`, as editors and jupytext read them.
 """
 
-import json
-import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+import jupytext
+import nbformat
+from nbclient import NotebookClient
+
 ROOT = Path(__file__).resolve().parent.parent
 GALLERY = ROOT / "docs" / "gallery"
+# Without the warning that messages on loopback are not encrypted.
+QUIET = ["--log-level=ERROR"]
 NAMES = ("first_lock", "figures", "controller", "recording", "sweep", "tuning")
 
 
-def cells(name: str) -> list[tuple[str, str]]:
-    """Kind (markdown or code) and text of the cells of an example."""
-    found = []
-    for part in f"\n{(ROOT / 'examples' / f'{name}.py').read_text()}".split("\n# %%")[1:]:
-        kind, _, text = part.partition("\n")
-        if kind.strip() == "[markdown]":
-            found.append(("markdown", "\n".join(line.removeprefix("#")[1:] for line in text.strip().splitlines())))
-        else:
-            found.append(("code", text.strip()))
-    return found
-
-
-def notebook(name: str) -> str:
-    """The notebook in Jupyter's format."""
-    made = []
-    for number, (kind, text) in enumerate(cells(name)):
-        cell = {"cell_type": kind, "id": f"cell-{number}", "metadata": {}, "source": text.splitlines(keepends=True)}
-        made.append(cell | ({"execution_count": None, "outputs": []} if kind == "code" else {}))
-    kernel = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
-    return json.dumps({"cells": made, "metadata": kernel, "nbformat": 4, "nbformat_minor": 5}, indent=1)
+def notebook(name: str) -> nbformat.NotebookNode:
+    """The notebook of an example, not yet executed."""
+    made = jupytext.read(ROOT / "examples" / f"{name}.py", fmt="py:percent")
+    made.metadata = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
+    return made
 
 
 def page() -> str:
@@ -46,24 +34,25 @@ def page() -> str:
     text += "Each figure is that of a notebook, which runs where the [Python package](python.md) is installed with\n"
     text += "`[all]`. Jupyter opens it. Every build of the book runs it. Below the figure are the lines that draw it.\n"
     for name in NAMES:
-        parts = cells(name)
-        title, _, about = parts[0][1].partition("\n")
+        cells = notebook(name).cells
+        title, _, about = cells[0].source.partition("\n")
         text += f"\n#{title}\n\n{about.strip()} [Notebook](notebooks/{name}.ipynb), [as text](../examples/{name}.py).\n"
-        text += f"\n![{title.lstrip('# ')}](gallery/{name}.svg)\n\n```python,norun\n{parts[-1][1]}\n```\n"
+        text += f"\n![{title.lstrip('# ')}](gallery/{name}.svg)\n\n```python,norun\n{cells[-1].source}\n```\n"
     return text
 
 
 def main(folder: Path) -> None:
-    """Run the examples in folders of their own; a failure ends the script."""
+    """Execute the notebooks in folders of their own; a failure ends the script."""
     GALLERY.mkdir(exist_ok=True)
     folder.mkdir(parents=True, exist_ok=True)
     for name in NAMES:
+        executed = notebook(name)
         with tempfile.TemporaryDirectory() as work:
-            environment = os.environ | {"MPLBACKEND": "agg"}
-            command = [sys.executable, ROOT / "examples" / f"{name}.py"]
-            subprocess.run(command, check=True, cwd=work, env=environment, stdout=subprocess.DEVNULL)
+            NotebookClient(
+                executed, timeout=600, resources={"metadata": {"path": work}}, extra_arguments=QUIET
+            ).execute()
             (GALLERY / f"{name}.svg").write_bytes((Path(work) / f"{name}.svg").read_bytes())
-        (folder / f"{name}.ipynb").write_text(notebook(name))
+        nbformat.write(executed, folder / f"{name}.ipynb")
     (ROOT / "docs" / "gallery.md").write_text(page())
 
 
