@@ -155,6 +155,7 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
     let (ideal, scene, plan) = client(&(ratios, noise, scales), snr)?;
     let strength = match effect {
         Some(Effect::Tilt) => (LARGEST[1] * size / GRAVITY).powi(2),
+        Some(Effect::Hardening) => LARGEST[0] * size * epsilon,
         _ => LARGEST[0] * size / GRAVITY,
     };
     // Laws of restitution have the value r at the speed of impacts of the middle of the stable motions, B = 0.85.
@@ -176,7 +177,7 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
         return Ok(None);
     }
     let h = if effect == Some(Effect::Hardening) {
-        LARGEST[0] * size * epsilon
+        strength
     } else {
         0.0
     };
@@ -205,7 +206,7 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
     let candidates = found.candidates.iter().filter(|one| Some(one.effect) == effect);
     let possible: Vec<f64> = candidates
         .filter(|one| !one.fit.is_rejected())
-        .map(|one| (one.strength.value - h - one.effect.strength_of(&cavity)).abs() / one.strength.uncertainty)
+        .map(|one| (one.strength.value - one.effect.strength(strength, r, speed)).abs() / one.strength.uncertainty)
         .collect();
     let verdict: Vec<_> = found
         .candidates

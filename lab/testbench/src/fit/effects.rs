@@ -138,29 +138,20 @@ impl Effect {
         match self {
             Self::Friction => Cavity { kinetic_friction: strength, ..Cavity::IDEAL },
             Self::Tilt => Cavity { tilt: strength.sqrt(), ..Cavity::IDEAL },
-            Self::Viscoelastic => both(Restitution::Viscoelastic((1.0 - r) / speed.powf(0.2))),
-            Self::Plastic => both(Restitution::Plastic(speed * r.powi(4))),
+            Self::Viscoelastic => both(Restitution::Viscoelastic(self.strength(strength, r, speed))),
+            Self::Plastic => both(Restitution::Plastic(self.strength(strength, r, speed))),
             Self::Hardening => Cavity::IDEAL,
         }
     }
 
     /// The strength in the unit of [`Effect::symbol`], of what [`Effect::cavity`] takes.
-    fn strength(self, strength: f64, r: f64, speed: f64) -> f64 {
-        match self {
-            Self::Hardening => strength,
-            _ => self.strength_of(&self.cavity(strength, r, speed)),
-        }
-    }
-
-    /// The strength of this effect in a cavity, in the unit of [`Effect::symbol`].
     #[must_use]
-    pub fn strength_of(self, cavity: &Cavity) -> f64 {
-        match (self, cavity.restitution[0]) {
-            (Self::Friction, _) => cavity.kinetic_friction,
-            (Self::Tilt, _) => cavity.tilt.to_degrees(),
-            (Self::Viscoelastic, Some(Restitution::Viscoelastic(k))) => k,
-            (Self::Plastic, Some(Restitution::Plastic(v))) => v,
-            _ => 0.0,
+    pub fn strength(self, strength: f64, r: f64, speed: f64) -> f64 {
+        match self {
+            Self::Friction | Self::Hardening => strength,
+            Self::Tilt => strength.sqrt().to_degrees(),
+            Self::Viscoelastic => (1.0 - r) / speed.powf(0.2),
+            Self::Plastic => speed * r.powi(4),
         }
     }
 }
