@@ -18,7 +18,7 @@ use nalgebra::{DVector, Matrix2, Matrix2x4, Matrix4, Matrix4x2, Vector2, Vector4
 use num_complex::Complex64;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use vines_model::numerics::{Estimate, HarmonicBasis, LeastSquares, Misfit, mean, mean_square};
+use vines_model::numerics::{Estimate, HarmonicBasis, HarmonicFit, LeastSquares, Misfit, mean, mean_square};
 use vines_model::orbit::{AfterImpact, Orbit, backbone_at_speed, exact_backbone};
 use vines_model::theory::{BranchSide, Manifold};
 use vines_model::{Definition, Dimensionless, Sensor};
@@ -57,8 +57,21 @@ const FOUND: f64 = 1e-5;
 const FALSE_ALARM: f64 = 1e-3;
 /// Standard uncertainties of what is expected of f0, zeta, b and epsilon, relative, and of r, where the search begins.
 const EXPECTED: [f64; 5] = [0.01, 0.3, 0.2, 0.2, 0.3];
+/// Share of the jumps that the base makes: all where a simulation changes its amplitude at each sample, none of a smooth base.
+const JUMP: Estimate = Estimate { value: 0.5, uncertainty: 0.5 };
 /// Square of the move of the parameters, in standard uncertainties, below which the filter need not be linearised again.
 const STILL: f64 = 0.1;
+
+/// What a sample does not show of the base.
+#[derive(Clone, Copy, Default)]
+struct Base {
+    /// First harmonic of the base over that of the polygon of its samples: it depends on the frequency.
+    scale: f64,
+    /// Jump of the base after the sample, m, if its amplitude changes only there.
+    jump: f64,
+    /// Mean square of what is not a sine in this period, m².
+    rest: f64,
+}
 
 /// A record with its noise.
 struct Measured<'a> {
@@ -67,8 +80,8 @@ struct Measured<'a> {
     base_noise: Vec<f64>,
     /// Covariance of the first harmonic of the response in a period, m², in each piece.
     response_noise: Vec<Matrix2<f64>>,
-    /// First harmonic of the base over that of the polygon of its samples, in each piece: it depends on the frequency of the base.
-    scale: Vec<f64>,
+    /// The base at each sample.
+    base: Vec<Base>,
     /// Samples of a period of the natural frequency.
     period: usize,
 }
@@ -160,6 +173,37 @@ fn harmonic(values: &[f64]) -> Complex64 {
     sum * Complex64::new(0.0, 2.0 / values.len() as f64)
 }
 
+/// The base in a period of its samples, which begins at sample `from`.
+fn period_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
+    let values = &drive[from..drive.len().min(from + period)];
+    let around = &drive[from.saturating_sub(period)..drive.len().min(from + 2 * period)];
+    let harmonics: Vec<Complex64> = around.chunks_exact(period).map(harmonic).collect();
+    let turned: Complex64 = harmonics.windows(2).map(|pair| pair[1] * pair[0].conj()).sum();
+    let step = (TAU + turned.arg()) / period as f64;
+    let scale = (0.5 * step / (0.5 * step).sin()).powi(2);
+    let phases: Vec<f64> = (0..values.len()).map(|i| i as f64 * step).collect();
+    let basis = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(0)]);
+    let vector = DVector::from_column_slice(values);
+    let is_moving = |fit: &HarmonicFit| values.len() == period && fit.harmonic(1).norm() > 0.0;
+    let Some(fit) = basis.fit(&vector).filter(is_moving) else {
+        return vec![Base { scale, ..Base::default() }; values.len()];
+    };
+    let rest = basis.residual(&vector, &fit).norm_squared() / (values.len() - basis.terms()) as f64;
+    // Over a period, a harmonic has half of the square of its amplitude, and one that grows linearly from -1 to 1 a sixth.
+    let rest = rest + fit.harmonic(3).norm_sqr() / 2.0 + fit.drift(1).norm_sqr() / 6.0;
+    // The amplitude E0 + E1 n + Re(E2 exp(2i phase)) has a third harmonic.
+    let [first, growth, third] = [fit.harmonic(1), fit.drift(1), fit.harmonic(3)];
+    let turn = first.conj() / first.norm();
+    let growth = (growth * turn).re * 2.0 / (values.len() - 1) as f64;
+    let swing = 2.0 * third * turn.powi(3);
+    let jump = |phase: f64| {
+        let angle = phase + first.arg();
+        let rate = growth - 2.0 * step * (swing * Complex64::from_polar(1.0, 2.0 * angle + step)).im;
+        Base { scale, jump: rate * angle.sin(), rest }
+    };
+    phases.into_iter().map(jump).collect()
+}
+
 impl<'a> Measured<'a> {
     fn new(recording: &'a Recording, omega: f64) -> Self {
         let period = (TAU / omega / recording.sample_time).round() as usize;
@@ -173,42 +217,33 @@ impl<'a> Measured<'a> {
         });
         let of_harmonic = |noise: &f64| Matrix2::from_diagonal_element(2.0 * noise / period as f64);
         let response_noise = response_noise.iter().map(of_harmonic).collect();
-        let scale = |drive: &[f64]| {
-            let harmonics: Vec<Complex64> = drive.chunks_exact(period).map(harmonic).collect();
-            let turned: Complex64 = harmonics.windows(2).map(|pair| pair[1] * pair[0].conj()).sum();
-            let half = 0.5 * (TAU + turned.arg()) / period as f64;
-            (half / half.sin()).powi(2)
-        };
-        let scale = recording.drive.chunks(PIECE * period).map(scale).collect();
-        Self { recording, base_noise, response_noise, scale, period }
+        let starts = (0..recording.drive.len()).step_by(period);
+        let base = starts
+            .flat_map(|from| period_of_base(&recording.drive, from, period))
+            .collect();
+        Self { recording, base_noise, response_noise, base, period }
     }
 
     fn piece(&self, sample: usize) -> usize {
         (sample / (PIECE * self.period)).min(self.base_noise.len() - 1)
     }
 
-    /// Variance of the first harmonic of the base in a period, m², by noise, and by what the base may do between two samples: what is not harmonic in
-    /// it changes in half a sample as the harmonic does.
-    fn base_variance(&self, begin: usize, end: usize) -> Option<f64> {
-        let (drive, n) = (&self.recording.drive, end - begin);
-        let period = &drive[begin..end];
-        let of = |from: usize| Some(harmonic(drive.get(from..from + n)?));
-        let (before, after) = begin.checked_sub(n).and_then(of).zip(of(end)).unwrap_or_default();
-        let step = (2.0 * TAU + (after * before.conj()).arg()) / (2 * n) as f64;
-        let phases: Vec<f64> = (0..n).map(|i| i as f64 * step).collect();
-        let basis = HarmonicBasis::new(&phases, 0, &[Some(0)]);
-        let values = DVector::from_column_slice(period);
-        let rest = basis.residual(&values, &basis.fit(&values)?).norm_squared() / n as f64;
+    /// Variance of the first harmonic of the base in a period, m², by noise, and by what the base may do between two samples: what is no sine in
+    /// it changes in half a sample as the sine does.
+    fn base_variance(&self, begin: usize, end: usize) -> f64 {
         let noise = self.base_noise[self.piece(begin)];
-        Some(2.0 * noise / n as f64 + (rest - noise).max(0.0) * (PI / n as f64).powi(2))
+        let rest = mean(self.base[begin..end].iter().map(|one| one.rest));
+        let n = (end - begin) as f64;
+        2.0 * noise / n + (rest - noise).max(0.0) * (PI / n).powi(2)
     }
 
     /// The signal of the base from a sample to the next, a straight line, from `late` seconds after the sample on.
-    fn line(&self, n: usize, late: f64) -> Drive {
+    fn line(&self, n: usize, late: f64, share: f64) -> Drive {
         let Recording { drive, sample_time, .. } = self.recording;
-        let scale = self.scale[self.piece(n)];
-        let slope = (drive[n + 1] - drive[n]) / sample_time;
-        let signal = [scale * (drive[n] + slope * late), scale * slope, 0.0, 0.0];
+        let Base { scale, jump, .. } = self.base[n];
+        let from = scale * (drive[n] + share * jump);
+        let slope = (scale * drive[n + 1] - from) / sample_time;
+        let signal = [from + slope * late, slope, 0.0, 0.0];
         Drive { signal, ..Drive::default() }
     }
 }
@@ -223,6 +258,8 @@ struct Follower<'a> {
     omega: f64,
     /// What the sensor reads of the particle.
     share: f64,
+    /// Share of the jumps that the base makes.
+    jump: f64,
 }
 
 impl Follower<'_> {
@@ -230,7 +267,10 @@ impl Follower<'_> {
     fn sample(&mut self) -> Option<f64> {
         let State { q1, q2, .. } = self.plant.state();
         self.plant
-            .advance(self.record.line(self.n, 0.0), self.record.recording.sample_time)
+            .advance(
+                self.record.line(self.n, 0.0, self.jump),
+                self.record.recording.sample_time,
+            )
             .ok()?;
         self.n += 1;
         Some(q1 + self.share * q2)
@@ -297,14 +337,14 @@ fn noise_of(errors: &[f64], turn: Complex64) -> Matrix2<f64> {
 
 impl Followed<'_> {
     /// The plant on the exact motion whose response has the amplitude and phase of the first period of a stretch, at a sample soon after.
-    fn start(&self, parameters: &Parameters, stretch: &Stretch) -> Option<Follower<'_>> {
+    fn start(&self, x: &Unknowns, stretch: &Stretch) -> Option<Follower<'_>> {
         let record = &self.records[stretch.record];
         let Recording { response, sample_time, .. } = record.recording;
         let from = stretch.span[0];
         let measured = harmonic(response.get(from..from + record.period)?);
         let d = Dimensionless {
             definition: self.problem.definition,
-            ..Dimensionless::of(parameters, 0.0)
+            ..Dimensionless::of(&plant(x, Cavity::IDEAL), 0.0)
         };
         let manifold = Manifold::new(d.r);
         let by_theory = manifold.b(measured.norm() / d.b, BranchSide::Right);
@@ -323,15 +363,15 @@ impl Followed<'_> {
             [dq1, dq2].map(|one| one * d.b * d.omega0),
         );
         let n = from + (time / sample_time) as usize;
-        let mut one = self.follower(parameters, stretch, State { q1, dq1, q2, dq2 }, n + 1)?;
+        let mut one = self.follower(x, stretch, State { q1, dq1, q2, dq2 }, n + 1)?;
         let late = time - (n - from) as f64 * sample_time;
-        one.plant.advance(record.line(n, late), sample_time - late).ok()?;
+        one.plant.advance(record.line(n, late, x[6]), sample_time - late).ok()?;
         Some(one)
     }
 
     /// The periods of a stretch for a plant, up to the one in which it loses the motion; `None` if none counts.
-    fn linearised(&self, parameters: &Parameters, stretch: &Stretch) -> Option<Course> {
-        let mut one = self.start(parameters, stretch)?;
+    fn linearised(&self, x: &Unknowns, stretch: &Stretch) -> Option<Course> {
+        let mut one = self.start(x, stretch)?;
         let Measured { recording: Recording { response, .. }, period, .. } = one.record;
         let end = stretch.span[1].min(response.len() - 1);
         one.crossing([1, 3].map(|periods| stretch.span[0] + periods * period), end)?;
@@ -364,7 +404,7 @@ impl Followed<'_> {
             reading.set_column(i, &(change / (BESIDE * amplitude)));
         }
         let noise = record.response_noise[record.piece(begin)];
-        let process = PI * PI * record.base_variance(begin, end)? + self.least_noise * self.least_noise * noise.trace();
+        let process = PI * PI * record.base_variance(begin, end) + self.least_noise * self.least_noise * noise.trace();
         let process = Matrix4::from_diagonal(&Vector4::new(process, process, 0.0, 0.0));
         // Half of it has come before the middle of the period.
         let before = *covariance + process * 0.5;
@@ -391,14 +431,9 @@ impl Followed<'_> {
     }
 
     /// The innovations of a plant along the steps of a stretch, over their standard deviations, up to the step that it cannot take.
-    fn innovations(
-        &self,
-        parameters: &Parameters,
-        stretch: &Stretch,
-        Course { start, steps }: &Course,
-    ) -> Vec<Vector2<f64>> {
+    fn innovations(&self, x: &Unknowns, stretch: &Stretch, Course { start, steps }: &Course) -> Vec<Vector2<f64>> {
         let begin = steps.first().map_or(0, |step| step.begin);
-        let mut one = self.follower(parameters, stretch, *start, begin);
+        let mut one = self.follower(x, stretch, *start, begin);
         let period = |step: &Step| {
             let follower = one.as_mut()?;
             let readings = follower.to(step.end)?;
@@ -410,17 +445,19 @@ impl Followed<'_> {
     }
 
     /// A plant in a state at a sample of a stretch.
-    fn follower(&self, parameters: &Parameters, stretch: &Stretch, state: State, n: usize) -> Option<Follower<'_>> {
+    fn follower(&self, x: &Unknowns, stretch: &Stretch, state: State, n: usize) -> Option<Follower<'_>> {
+        let parameters = plant(x, Cavity::IDEAL);
         let share = match self.problem.definition.sensor {
             Sensor::V => parameters.mass_ratio(),
             Sensor::Q1 => 0.0,
         };
         Some(Follower {
             record: &self.records[stretch.record],
-            plant: Plant::new(*parameters, state).ok()?,
+            plant: Plant::new(parameters, state).ok()?,
             n,
             omega: parameters.natural_frequency(),
             share,
+            jump: x[6],
         })
     }
 }
@@ -428,10 +465,9 @@ impl Followed<'_> {
 impl Followed<'_> {
     /// The innovations of each stretch, up to where the plant cannot follow.
     fn each(&self, x: &Unknowns) -> Vec<Vec<Vector2<f64>>> {
-        let parameters = plant(x, Cavity::IDEAL);
         let stretches = self.stretches.iter().zip(&self.courses);
         stretches
-            .map(|(stretch, course)| self.innovations(&parameters, stretch, course))
+            .map(|(stretch, course)| self.innovations(x, stretch, course))
             .collect()
     }
 
@@ -447,13 +483,12 @@ impl Followed<'_> {
 
     /// Lets the plant follow the stretches, without the pieces in which it has another motion. Returns what is left out.
     fn linearise(&mut self, x: &Unknowns) -> Vec<Stretch> {
-        let parameters = plant(x, Cavity::IDEAL);
         let mut left_out = Vec::new();
         loop {
             let courses = self
                 .stretches
                 .iter()
-                .map(|one| self.linearised(&parameters, one).unwrap_or_default());
+                .map(|one| self.linearised(x, one).unwrap_or_default());
             self.courses = courses.collect();
             let is_another = |piece: &[Step]| {
                 let moved = piece
@@ -555,6 +590,7 @@ impl Misfit<UNKNOWNS> for Followed<'_> {
 
     fn residuals(&self, x: &Unknowns, near: &Vec<Nearest>) -> Option<(Vec<f64>, Vec<Nearest>)> {
         let (mut residuals, places) = self.problem.residuals(x, near)?;
+        residuals.push((x[6] - JUMP.value) / JUMP.uncertainty);
         residuals.extend(self.all(x)?);
         Some((residuals, places))
     }
@@ -562,9 +598,17 @@ impl Misfit<UNKNOWNS> for Followed<'_> {
     fn derivatives(&self, x: &Unknowns, at: &Vec<Nearest>) -> Option<Vec<Unknowns>> {
         let mut rows = self.problem.derivatives(x, at)?;
         let here = self.all(x)?;
-        let columns: Option<Vec<Vec<f64>>> = (0..5).map(|i| self.all(&shifted(x, i, STEP))).collect();
+        let column = |i: usize| {
+            if i == 5 {
+                Some(here.clone())
+            } else {
+                self.all(&shifted(x, i, STEP))
+            }
+        };
+        let columns: Option<Vec<Vec<f64>>> = (0..UNKNOWNS).map(column).collect();
         let columns = columns?;
-        let row = |n: usize| Unknowns::from_fn(|i, _| columns.get(i).map_or(0.0, |one| (one[n] - here[n]) / STEP));
+        let row = |n: usize| Unknowns::from_fn(|i, _| (columns[i][n] - here[n]) / STEP);
+        rows.push(Unknowns::ith(6, 1.0 / JUMP.uncertainty));
         rows.extend((0..here.len()).map(row));
         Some(rows)
     }
@@ -619,7 +663,9 @@ fn start(
     });
     let known: Vec<Known> = known.iter().copied().chain(wide).collect();
     let fit = fit(&points, definition, expected, &known).ok()?;
-    Some(unknowns(&fit.plant(expected)))
+    let mut x = unknowns(&fit.plant(expected));
+    x[6] = JUMP.value;
+    Some(x)
 }
 
 /// Fits the five parameters to records and points. `recordings`: prepared records ([`Recording::prepared`]) with their parts; `expected`: about
@@ -633,7 +679,11 @@ pub fn follow(
     expected: &Parameters,
     known: &[Known],
 ) -> Option<RecordFit> {
-    let problem = Problem::new(points.to_vec(), definition, known);
+    // In place of the strength of an effect: the share of the jumps.
+    let problem = Problem {
+        free: true,
+        ..Problem::new(points.to_vec(), definition, known)
+    };
     let x = start(parts, points, definition, expected, known)?;
     let omega = x[0].exp();
     let records: Vec<Measured> = recordings
