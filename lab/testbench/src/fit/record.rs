@@ -7,6 +7,10 @@
 //! `omega0 T/2 = pi` times itself. Noise of the response is the noise of the measurement: what the prediction leaves beside the first harmonic.
 //! Innovations are white, and their covariance is known; so is the covariance of the parameters.
 //!
+//! Where a simulation changes the amplitude of the base, the base jumps at a sample, and the record does not show it. Its amplitude grows, and swings
+//! twice in a period, so that the jumps have a first harmonic of up to 1e-4 of the base, always of one sign. They follow from the growth of the
+//! recorded base and from its third harmonic. The share of them that the base makes is fitted.
+//!
 //! The fit begins at the parameters of the points of the record. A piece of the record is left out where the plant has not two impacts per period,
 //! where a deviation of the particle grows, where the innovations contradict their covariance, and where they are not linear in the parameters: near
 //! the fold, and beyond it for other parameters within their uncertainties.
