@@ -379,6 +379,17 @@ impl Section {
             Complex64::new(-d * omega0_squared, (c - 2.0 * delta * d) * omega) / denominator,
         ]
     }
+
+    /// Steady `(x, v)` per unit of a harmonic force at the cavity.
+    fn steady_of_cavity_force(&self, omega: f64) -> [Complex64; 2] {
+        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
+        let [k0, k1] = self.kick;
+        let denominator = Complex64::new(omega0_squared - omega * omega, 2.0 * delta * omega);
+        [
+            Complex64::new(k1 + 2.0 * delta * k0, k0 * omega) / denominator,
+            Complex64::new(-k0 * omega0_squared, k1 * omega) / denominator,
+        ]
+    }
 }
 
 fn check(valid: bool, message: impl FnOnce() -> String) -> Result<(), InvalidHost> {
@@ -531,6 +542,15 @@ impl Host {
     /// Steady displacement of a point per unit of a harmonic drive with the angular frequency `omega`, rad/s.
     pub fn frequency_response(&self, row: &[[f64; 2]], omega: f64) -> Complex64 {
         response(row, self.sections.iter().map(|section| section.steady(omega)))
+    }
+
+    /// Steady value of a sum over the sections per unit of a harmonic force at the cavity, such as m/N.
+    pub fn frequency_response_to_cavity(&self, row: &[[f64; 2]], omega: f64) -> Complex64 {
+        let steady = self
+            .sections
+            .iter()
+            .map(|section| section.steady_of_cavity_force(omega));
+        response(row, steady)
     }
 
     /// The row of the cavity.

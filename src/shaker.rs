@@ -85,6 +85,64 @@ struct Assembly {
     armature: DVector<f64>,
 }
 
+/// Matrices and rows of a structure without a shaker.
+struct Alone {
+    mass: DMatrix<f64>,
+    damping: DMatrix<f64>,
+    stiffness: DMatrix<f64>,
+    cavity: Vec<f64>,
+    drive: Vec<f64>,
+}
+
+impl Alone {
+    fn of(structure: &Equations) -> Result<Self, InvalidHost> {
+        let diagonal = |values: Vec<f64>| DMatrix::from_diagonal(&DVector::from_vec(values));
+        let square = |rows: &[Vec<f64>]| DMatrix::from_fn(rows.len(), rows.len(), |i, j| rows[i][j]);
+        Ok(match structure {
+            Equations::Modes(modes) => Self {
+                mass: DMatrix::identity(modes.len(), modes.len()),
+                damping: diagonal(modes.iter().map(|mode| 2.0 * mode.zeta * mode.omega).collect()),
+                stiffness: diagonal(modes.iter().map(|mode| mode.omega * mode.omega).collect()),
+                cavity: modes.iter().map(|mode| mode.cavity).collect(),
+                drive: modes.iter().map(|mode| mode.drive).collect(),
+            },
+            Equations::Matrices { states, .. } if !states.is_empty() => {
+                return Err(InvalidHost("the structure has a shaker already".into()));
+            }
+            Equations::Matrices { mass, damping, stiffness, cavity, drive, .. } => Self {
+                mass: square(mass),
+                damping: square(damping),
+                stiffness: square(stiffness),
+                cavity: cavity.clone(),
+                drive: drive.clone(),
+            },
+        })
+    }
+}
+
+fn rows(matrix: DMatrix<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
+impl Equations {
+    /// A structure with a mass, kg, at the point of its force: what the stinger of a shaker moves behind the force cell.
+    ///
+    /// # Errors
+    /// A structure that has a shaker already.
+    pub fn carrying(&self, end_mass: f64) -> Result<Self, InvalidHost> {
+        let Alone { mass, damping, stiffness, cavity, drive } = Alone::of(self)?;
+        let direction = DVector::from_row_slice(&drive);
+        Ok(Self::Matrices {
+            mass: rows(mass + end_mass * &direction * direction.transpose()),
+            damping: rows(damping),
+            stiffness: rows(stiffness),
+            cavity,
+            drive,
+            states: Vec::new(),
+        })
+    }
+}
+
 impl Shaker {
     /// The structure that the shaker moves by its base, which is then a table of the mass [`Self::end_mass`], or by a force at its point. The command
     /// drives the result as a force ([`Excitation::Force`]).
@@ -99,9 +157,6 @@ impl Shaker {
         structure.host(by)?;
         let Assembly { mass, damping, stiffness, cavity, armature, .. } = self.assembly(structure, by)?;
         let (drive, states) = self.electric(&armature);
-        let rows = |matrix: DMatrix<f64>| -> Vec<Vec<f64>> {
-            matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
-        };
         Ok(Equations::Matrices {
             mass: rows(mass),
             damping: rows(damping),
@@ -182,24 +237,7 @@ impl Shaker {
     }
 
     fn assembly(&self, structure: &Equations, by: Excitation) -> Result<Assembly, InvalidHost> {
-        let diagonal = |values: Vec<f64>| DMatrix::from_diagonal(&DVector::from_vec(values));
-        let square = |rows: &[Vec<f64>]| DMatrix::from_fn(rows.len(), rows.len(), |i, j| rows[i][j]);
-        let (mass, damping, stiffness, cavity, drive) = match structure {
-            Equations::Modes(modes) => (
-                DMatrix::identity(modes.len(), modes.len()),
-                diagonal(modes.iter().map(|mode| 2.0 * mode.zeta * mode.omega).collect()),
-                diagonal(modes.iter().map(|mode| mode.omega * mode.omega).collect()),
-                modes.iter().map(|mode| mode.cavity).collect(),
-                modes.iter().map(|mode| mode.drive).collect(),
-            ),
-            Equations::Matrices { states, .. } if !states.is_empty() => {
-                return Err(InvalidHost("the structure has a shaker already".into()));
-            }
-            Equations::Matrices { mass, damping, stiffness, cavity, drive, .. } => {
-                let [mass, damping, stiffness] = [mass, damping, stiffness].map(|rows| square(rows));
-                (mass, damping, stiffness, cavity.clone(), drive.clone())
-            }
-        };
+        let Alone { mass, damping, stiffness, cavity, drive } = Alone::of(structure)?;
         let n = cavity.len();
         let has_base = by == Excitation::Base;
         let size = n + usize::from(has_base) + 1;

@@ -255,12 +255,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
             }
         }
     }
-    if modes > 1 {
+    let has_shaker = scene
+        .structure
+        .as_ref()
+        .is_some_and(|structure| structure.shaker.is_some());
+    if modes > 1 || has_shaker {
         let count = measured.points.len();
         measured.points = without_other_modes(&scene, measured.points);
         skipped += count - measured.points.len();
-        notes.push(
-            "points are moved to where the driven mode alone would have them, by exact orbits with and without the other modes of the scene".into(),
+        let others = if has_shaker {
+            "the other modes and the shaker"
+        } else {
+            "the other modes"
+        };
+        notes.push(format!(
+            "points are moved to where the driven mode alone would have them, by exact orbits with and without {others} of the scene"
+        ),
         );
     }
     let is_exact = |known: &&Known| matches!(known, Known::Value { estimate, .. } if estimate.uncertainty == 0.0);

@@ -82,9 +82,11 @@ pub(super) const FILES: [&str; 3] = ["map.csv", "map.svg", "bifurcations.csv"];
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let Arguments { x, y, sigma, periods, confirmations, out, .. } = arguments;
     let mut map = Map::new(arguments.scene.family()?, x, y, *sigma, *periods)?;
-    if map.common.scene().structure.is_some() {
-        let rule = "a regime map is of one oscillator: the scene has a [structure]; drop it, and give M, k and c";
-        return Err(Failure::input(rule));
+    if let Some(structure) = &map.common.scene().structure {
+        return Err(Failure::input(format!(
+            "a regime map is of one oscillator: the scene has a {}; drop it, and give M, k and c",
+            structure.section()
+        )));
     }
     warn_left_out(map.common.scene().left_out(), "a regime map is");
     let folder = results(out, &FILES)?;

@@ -190,19 +190,13 @@ impl Endpoint {
 
     /// The rig of this endpoint.
     pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
-        if let (Some(_), Self::Network(_)) = (&scene.structure, self) {
-            return Err(Failure::input(
-                "a scene with [structure] has the rig `built-in` or its Structure.fmu: rigs across the network have one oscillator",
-            ));
-        }
-        let has_shaker = scene
-            .structure
-            .as_ref()
-            .is_some_and(|structure| structure.shaker.is_some());
-        if has_shaker && !matches!(self, Self::BuiltIn) {
-            return Err(Failure::input(
-                "a scene with [shaker] has the rig `built-in`: an FMU has no shaker yet",
-            ));
+        if let (Some(structure), Self::Network(address)) = (&scene.structure, self)
+            && address.starts_with("helic://")
+        {
+            return Err(Failure::input(format!(
+                "a helic device has one oscillator, and the scene has a {}; serve it with `vines rig` over tcp:// or udp://",
+                structure.section()
+            )));
         }
         let (mut pace, mut timing) = (None, Arc::default());
         let rig: Box<dyn Rig> = match self {

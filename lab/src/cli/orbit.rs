@@ -134,9 +134,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
 
 /// The orbits of a structure in the numbers of its driven mode: its frequency response, or at resonance.
 fn of_a_structure(arguments: &Arguments, scene: &Scene, range: [f64; 2]) -> Result<Results, Failure> {
-    if arguments.periodic || arguments.sigma.is_some() {
-        let rule = "--periodic and --sigma are for one oscillator, and this scene has a [structure]; drop them";
-        return Err(Failure::input(rule));
+    if let Some(structure) = scene
+        .structure
+        .as_ref()
+        .filter(|_| arguments.periodic || arguments.sigma.is_some())
+    {
+        return Err(Failure::input(format!(
+            "--periodic and --sigma are for one oscillator, and this scene has a {}; drop them",
+            structure.section()
+        )));
     }
     let (numbers, json) = (scene.dimensionless(), arguments.json);
     if !arguments.response {

@@ -141,11 +141,13 @@ enum Protocol {
 
 pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
-    if scene.structure.is_some() {
-        let rule = "what is served has one oscillator, and this scene has a [structure]: use `vines identify`, `vines backbone` and `vines check` with the rig `built-in`, or drop [structure]";
-        return Err(Failure::input(rule));
-    }
     let helic = arguments.protocol == Protocol::Helic;
+    if let Some(structure) = scene.structure.as_ref().filter(|_| helic) {
+        return Err(Failure::input(format!(
+            "--protocol helic: a device has one oscillator, and this scene has a {}; drop --protocol",
+            structure.section()
+        )));
+    }
     if arguments.sensors_only || helic {
         // A device runs on between its hosts.
         scene = scene.at_rest();
@@ -158,9 +160,7 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
     if helic {
         scene = scene.sampled(f64::from(arguments.oversampling));
     }
-    let plant = Simulated::new(scene.plant, scene.start)
-        .map_err(Failure::input)?
-        .with_sensors(scene.resonance);
+    drop(Simulated::without_chain(&scene).map_err(Failure::input)?);
     // What cannot be served is refused before a client comes.
     match &arguments.rig {
         Endpoint::Network(address) => {
@@ -184,7 +184,7 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
                 Box::new(faulty(&scene, kind, seconds, move |zero| print_reaction(zero, json))?)
             }
             _ if arguments.sensors_only => Box::new(SensorsOnly::around(Simulated::of(&scene)?)),
-            _ => Box::new(plant.clone()),
+            _ => Simulated::without_chain(&scene)?,
         };
         Ok(match &watch {
             Some(watch) => watch.rig(rig),

@@ -88,6 +88,9 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
     });
     let modes = Table::new("mode | frequency, Hz | damping | m phi² | ratio | harmonic | influence").rows(rows);
     text += &modes.text();
+    if structure.shaker.is_some() {
+        text += "  the modes of the structure with its shaker: a damping above 1 is that of two poles which do not oscillate\n";
+    }
     for (n, mode) in structure
         .modes
         .iter()
@@ -101,13 +104,18 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
         );
     }
     let b = scene.plant.half_width * structure.reading_per_response().abs();
+    // The reference of an orbit, and what drives it.
+    let (command, of_command) = match structure.shaker {
+        Some(_) => ("command, V".to_owned(), "V"),
+        None => (format!("drive, {unit}"), unit),
+    };
     text += &format!(
         "\nExact symmetric 1:1 orbits at phase resonance under {:.4e} {unit}\n",
         scene.structure_drive().unwrap_or(0.0)
     );
     let rows = survey.orbits.iter().map(|orbit| row(orbit, b));
     let orbits = Table::new(&format!(
-        "frequency, Hz | response, m | C | drive, {unit} | largest mult. | stable"
+        "frequency, Hz | response, m | C | {command} | largest mult. | stable"
     ))
     .rows(rows);
     text += &match orbits.is_empty() {
@@ -120,12 +128,34 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
         stretches.map(move |(run, ends)| stretch(modes, run, ends, b))
     });
     let stretches = Table::new(&format!(
-        "modes | C | frequency, Hz | drive, {unit} | lower end | upper end"
+        "modes | C | frequency, Hz | {command} | lower end | upper end"
     ));
     text += &stretches.rows(rows.into_iter().flatten()).text();
+    let rows = survey.behind_shaker.iter().map(|one| {
+        let percent = |of: f64| format!("{:+.3}", 100.0 * of);
+        let [omega, drive] = one.at;
+        let apart = one.by_sine.map(|[sine, by]| {
+            let numbers = scene.dimensionless();
+            [numbers.sigma(omega) - numbers.sigma(sine), drive / by - 1.0]
+        });
+        let [sigma, by] = apart.map_or(["-".into(), "-".into()], |[sigma, by]| {
+            [format!("{sigma:+.2e}"), percent(by)]
+        });
+        let harmonics = one.harmonics.map(|harmonic| format!("{:.3}", 100.0 * harmonic));
+        let at = [number(one.response / b), number(omega / TAU), format!("{drive:.4e}")];
+        at.into_iter().chain(harmonics).chain([sigma, by]).collect::<Vec<_>>()
+    });
+    let behind = Table::new(&format!(
+        "C | frequency, Hz | drive, {unit} | 3rd, % | 5th, % | 7th, % | sigma less sine's | drive over sine's, %"
+    ))
+    .rows(rows);
+    if !behind.is_empty() {
+        text += "\nThe stable backbone behind the shaker: harmonics of the drive, and distance from the backbone under a pure sine at the same C\n";
+        text += &behind.text();
+    }
     for (mode, StabilityChange { kind, orbit, .. }) in survey.taken() {
         text += &format!(
-            "warning: mode {} takes the stability at C = {:.4}, {:.4} Hz, {:.4e} {unit} ({})\n",
+            "warning: mode {} takes the stability at C = {:.4}, {:.4} Hz, {:.4e} {of_command} ({})\n",
             mode + 1,
             orbit.response / b,
             orbit.omega / TAU,

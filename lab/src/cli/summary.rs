@@ -333,6 +333,19 @@ pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
             worst.at_equal_c, worst.nearest
         )
     });
+    let harmonics = points().filter_map(|compared| Some((compared.point.at.c, compared.point.drive_harmonics?)));
+    let rows = harmonics.map(|(c, harmonics)| {
+        let harmonics = harmonics.map(|harmonic| format!("{:.3}", 100.0 * harmonic));
+        [format!("{c:.4}")].into_iter().chain(harmonics).collect::<Vec<_>>()
+    });
+    let harmonics = Table::new("C | 2, % | 3, % | 4, % | 5, % | 6, % | 7, %").rows(rows);
+    if !harmonics.is_empty() {
+        let [_, (drive, _)] = &units.names;
+        worst += &format!(
+            "Harmonics of the {drive}, as measured, over its first\n{}",
+            harmonics.text()
+        );
+    }
     let hidden = points().map(|compared| &compared.point).filter(|point| {
         let regimes = (point.regime, point.regime_by_impacts);
         point.settled && regimes == (Regime::Symmetric, Some(Regime::Asymmetric))

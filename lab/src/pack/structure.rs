@@ -8,7 +8,6 @@ use std::fmt::Display;
 use std::io;
 
 use fmi2_component::guid_of;
-use lovines::Row;
 use lovines::table::PARAMETERS;
 use phase_lock::Value;
 use serde_json::json;
@@ -16,7 +15,7 @@ use xml::reader::{EventReader, XmlEvent};
 use xml::writer::{EmitterConfig, EventWriter, XmlEvent as Written};
 
 use super::Component;
-use crate::scene::{ARMATURE, Excitation, Scene, SceneShaker, Structure, TABLE};
+use crate::scene::{ARMATURE, Channel, Excitation, Scene, SceneShaker, Structure, TABLE};
 use crate::table::Table;
 
 /// `modelIdentifier`.
@@ -46,7 +45,7 @@ pub fn component(
     let facts = Facts {
         guid: guid_of(&oscillator.library_guid, &content),
         drive: DriveKind::of(structure),
-        channels: channels(structure),
+        channels: structure.channels(),
         starts,
         step: scene.sample_time(),
         stop: PERIODS * TAU / structure.mode().omega,
@@ -110,43 +109,6 @@ struct Facts<'a> {
     stop: f64,
 }
 
-/// An output of the structure: its motion at a point, or a number.
-struct Channel<'a> {
-    name: &'a str,
-    row: &'a Row,
-    /// What one unit of the drive adds.
-    per_drive: f64,
-    limit: Option<f64>,
-    /// Meaning, quantity and unit of a number; `None`: displacement, velocity and acceleration at a point.
-    number: Option<[&'static str; 3]>,
-}
-
-/// The points of the structure, and what is measured at its shaker.
-fn channels(structure: &Structure) -> Vec<Channel<'_>> {
-    let channel = |(name, row)| Channel { name, row, per_drive: 0.0, limit: None, number: None };
-    let points = structure.points.iter().map(String::as_str).zip(&structure.rows);
-    let mut channels: Vec<_> = points.map(channel).collect();
-    let Some(SceneShaker { limits, rows, .. }) = &structure.shaker else {
-        return channels;
-    };
-    if structure.excitation == Excitation::Base {
-        channels.push(channel((TABLE, &rows.end)));
-    }
-    channels.push(Channel { limit: limits.stroke, ..channel((ARMATURE, &rows.armature)) });
-    channels.push(Channel {
-        limit: limits.force,
-        number: Some(["force of the stinger on the structure", "Force", "N"]),
-        ..channel(("force", &rows.force))
-    });
-    channels.push(Channel {
-        per_drive: rows.current_per_command,
-        limit: limits.current,
-        number: Some(["current of the coil", "ElectricCurrent", "A"]),
-        ..channel(("current", &rows.current))
-    });
-    channels
-}
-
 /// The structure as its library reads it.
 fn resource(structure: &Structure, starts: &[(&str, f64)]) -> Vec<u8> {
     let point = |channel: Channel<'_>| {
@@ -159,7 +121,7 @@ fn resource(structure: &Structure, starts: &[(&str, f64)]) -> Vec<u8> {
         }
         point
     };
-    let points: Vec<_> = channels(structure).into_iter().map(point).collect();
+    let points: Vec<_> = structure.channels().into_iter().map(point).collect();
     let start = |symbol: &str| {
         starts
             .iter()
@@ -454,8 +416,13 @@ fn variables_of(oscillator: Vec<Element>, facts: &Facts<'_>) -> Vec<Element> {
             );
             kept.push(variable.with(content));
         };
-        if let Some([meaning, quantity, unit]) = channel.number {
-            let content = Element::new("Real", &[("quantity", &quantity), ("unit", &unit)]);
+        if let Some(meaning) = channel.meaning {
+            let quantity = if channel.unit == "N" {
+                "Force"
+            } else {
+                "ElectricCurrent"
+            };
+            let content = Element::new("Real", &[("quantity", &quantity), ("unit", &channel.unit)]);
             add(0, name.to_owned(), meaning.to_owned(), content);
             continue;
         }

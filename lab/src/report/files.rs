@@ -111,7 +111,14 @@ fn decay_csv(result: &Comparison) -> Result<String, ReportError> {
 fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
     let headings = "f_Hz,A_m,E_m,u_f_Hz,u_A_m,u_E_m,sigma,C,G,phase_error_deg,u_sigma,u_C,u_G,u_phase_deg,level,periods,averaged,settled,\
                     reached,regime,regime_by_impacts,tone_Hz,tone_share,distance,sigma_less_exact,G_less_exact";
-    let headings = format!("{headings},{}", MeasuredLinear::COLUMNS.join(","));
+    let mut headings = format!("{headings},{}", MeasuredLinear::COLUMNS.join(","));
+    let is_shaken = result
+        .points
+        .iter()
+        .any(|compared| compared.point.drive_harmonics.is_some());
+    if is_shaken {
+        headings += &(2..8).map(|n| format!(",drive_{n}")).collect::<String>();
+    }
     let numbers = |one: MeasuredLinear| [one.f0, one.u_f0, one.zeta, one.u_zeta, one.correlation];
     let linear = result.linear.map_or([None; 5], |one| numbers(one).map(Some));
     let particle = result.linear.map(|one| one.particle);
@@ -120,7 +127,9 @@ fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
         let tone = point.tone.map(|tone| (tone.hertz, tone.share)).unzip();
         let exact = exact.map_or((None, None, None), |exact| (Some(exact.nearest), exact.sigma, exact.g));
         let regime = (point.regime, point.regime_by_impacts);
-        (point.at, motion, regime, tone, exact, linear, particle)
+        let harmonics = point.drive_harmonics.map(|values| values.map(Some)).unwrap_or_default();
+        let harmonics = if is_shaken { harmonics.to_vec() } else { Vec::new() };
+        (point.at, motion, regime, tone, exact, linear, particle, harmonics)
     });
     csv(&headings, rows)
 }

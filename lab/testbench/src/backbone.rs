@@ -12,7 +12,8 @@ use vines_model::numerics::{Estimate, RANDOM};
 
 use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stage};
 use crate::identification::{
-    Cycle, Regime, ResonanceFit, ResonancePoint, Slopes, Tone, classify, foreign_tone, regime_by_response,
+    Cycle, Regime, ResonanceFit, ResonancePoint, Slopes, Tone, classify, drive_harmonics, foreign_tone,
+    regime_by_response,
 };
 use crate::plan::{Knowledge, Plan, Target};
 use crate::record::Sample;
@@ -209,6 +210,9 @@ pub struct LevelPoint {
     /// A tone in the response that is not part of the motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tone: Option<Tone>,
+    /// Harmonics 2 to 7 of what a shaker drives the structure with, force or displacement of the table, over its first, as measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drive_harmonics: Option<[f64; 6]>,
 }
 
 /// The tracked backbone.
@@ -431,6 +435,9 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
                 .ground_truth
                 .map(|_| classify(averaged, self.run.sample_time, omega.value).1),
             tone: foreign_tone(averaged, knowledge, omega.value),
+            drive_harmonics: knowledge
+                .shaker()
+                .and_then(|_| drive_harmonics(averaged, knowledge, omega.value)),
         }
     }
 

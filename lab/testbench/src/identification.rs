@@ -18,7 +18,7 @@ pub(crate) use decay::PER_PERIOD;
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
 pub use resonance_fit::{Cycle, ResonanceFit, Slopes};
 pub(crate) use response::{ASYMMETRIC, Line, degrees, without_tones};
-pub use response::{Tone, classify, foreign_tone, impacts, regime_by_response};
+pub use response::{Tone, classify, drive_harmonics, foreign_tone, impacts, regime_by_response};
 pub use vines_model::regime::{Impact, Regime};
 
 /// Why a record cannot be identified.

@@ -382,8 +382,16 @@ impl SimulatedStructure {
         })
     }
 
-    /// Advances under a drive in m of base displacement; a command is clipped, and the other limits of a shaker are looked at.
-    fn step(&mut self, drive: lovines::Drive, step: f64) -> Result<(), RigError> {
+    /// The plant.
+    pub fn plant(&self) -> &Plant<lovines::Structure> {
+        &self.simulated.plant
+    }
+
+    /// Advances under a drive, m, N or V; a command is clipped, and the other limits of a shaker are looked at.
+    ///
+    /// # Errors
+    /// A value that is not allowed; a limit of the shaker.
+    pub fn step(&mut self, drive: lovines::Drive, step: f64) -> Result<(), RigError> {
         let Some((shaker, _)) = &self.shaker else {
             return self.simulated.step(drive, step);
         };

@@ -51,7 +51,7 @@ pub use controller::{ControllerSettings, KEYS, PhaseLock, key, refusal};
 pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
 pub use names::{Name, Names};
 pub use overrides::{Family, Override};
-pub use shaker::{ARMATURE, Limits, SceneShaker, TABLE};
+pub use shaker::{ARMATURE, Channel, Limits, SceneShaker, TABLE};
 pub use structure::{Excitation, Structure, StructureMode};
 pub use vines_model::{Definition, Dimensionless, Measurand, Reference, Sensor};
 

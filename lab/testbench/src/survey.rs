@@ -27,12 +27,32 @@ pub struct Survey {
     pub driven: usize,
     /// Orbits at phase resonance under the scene's drive, at frequencies that the controller may set.
     pub orbits: Vec<StructureOrbit>,
+    /// Stable orbits of the backbone behind a shaker, by rising response, beside those under a pure sine.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub behind_shaker: Vec<BehindShaker>,
+}
+
+/// An orbit of the backbone of structure and shaker under a sine of the command, and the orbit of the structure alone with the same response under a
+/// sine of the reference, which is the force, N, or the displacement of the table, m. They differ by the harmonics of the reference.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BehindShaker {
+    /// Amplitude of the response, m.
+    pub response: f64,
+    /// Frequency, rad/s, and amplitude of the reference.
+    pub at: [f64; 2],
+    /// Harmonics 3, 5 and 7 of the reference over its first; a symmetric motion has no even ones.
+    pub harmonics: [f64; 3],
+    /// The same under a sine of the reference, if there is such an orbit.
+    pub by_sine: Option<[f64; 2]>,
 }
 
 impl Scene {
     /// The exact orbits of the scene's structure; `None` without one. The response is the displacement at the sensor.
     pub fn structure_orbits(&self) -> Option<StructureOrbits> {
-        let structure = self.structure.as_ref()?;
+        self.structure.as_ref().map(|structure| self.orbits_of(structure))
+    }
+
+    fn orbits_of(&self, structure: &Structure) -> StructureOrbits {
         let particle = Particle {
             mass: self.plant.particle_mass,
             half_width: self.plant.half_width,
@@ -43,7 +63,7 @@ impl Scene {
         if let Some(shaker) = &structure.shaker {
             orbits = orbits.with_reference(shaker.reference(structure.excitation));
         }
-        Some(orbits.with_response(&structure.response()).with_target(target))
+        orbits.with_response(&structure.response()).with_target(target)
     }
 
     /// Amplitude of the drive of the scene's structure, or of its reference behind a shaker: m for a base, N for a force.
@@ -64,8 +84,10 @@ impl Survey {
     pub fn of(scene: &Scene) -> Option<Self> {
         let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
         let driven = section_of(structure);
+        let facts = orbits.facts(driven, scene.frequencies(), POINTS)?;
         Some(Self {
-            facts: orbits.facts(driven, scene.frequencies(), POINTS)?,
+            behind_shaker: behind_shaker(scene, &facts.all).unwrap_or_default(),
+            facts,
             driven,
             orbits: orbits.resonant(scene.structure_drive()?, scene.frequencies()),
         })
@@ -79,6 +101,48 @@ impl Survey {
             .flatten()
             .filter_map(|change| Some((change.section().filter(|mode| *mode != self.driven)?, change)))
     }
+}
+
+/// Orbits of the longest stable stretch of a backbone that are compared with those under a sine.
+const COMPARED: usize = 9;
+
+/// Orbits of this backbone behind the scene's shaker, and under a pure sine; `None` without a shaker.
+fn behind_shaker(scene: &Scene, backbone: &[StructureBranch]) -> Option<Vec<BehindShaker>> {
+    let structure = scene.structure.as_ref()?;
+    let shaker = structure.shaker.as_ref()?;
+    let (reference, alone) = (shaker.reference(structure.excitation), scene.orbits_of(&shaker.alone));
+    let stretches = backbone.iter().flat_map(StructureBranch::stable).map(|(run, _)| run);
+    let run = stretches.max_by_key(|run| run.len())?;
+    let mut orbits: Vec<&StructureOrbit> = run.iter().step_by(run.len().div_ceil(COMPARED)).collect();
+    orbits.sort_by(|one, other| one.response.total_cmp(&other.response));
+    let compared = |orbit: &StructureOrbit| {
+        // The impulses of two impacts per period, as a force.
+        let impulses = 4.0 * scene.plant.particle_mass * orbit.speed * orbit.omega / std::f64::consts::PI;
+        let harmonic = |order: f64| {
+            let per_force = structure
+                .host
+                .frequency_response_to_cavity(reference, order * orbit.omega);
+            impulses * per_force.norm() / orbit.reference
+        };
+        BehindShaker {
+            response: orbit.response,
+            at: [orbit.omega, orbit.reference],
+            harmonics: [3.0, 5.0, 7.0].map(harmonic),
+            by_sine: with_response(&alone, orbit.response, orbit.omega).map(|sine| [sine.omega, sine.reference]),
+        }
+    };
+    Some(orbits.into_iter().map(compared).collect())
+}
+
+/// The orbit at phase resonance with this response, m, near a frequency, rad/s.
+fn with_response(orbits: &StructureOrbits, response: f64, omega: f64) -> Option<StructureOrbit> {
+    let distance = |orbit: &StructureOrbit| (orbit.response - response).abs();
+    let near = |omega: f64| {
+        let found = orbits.at_phase_resonance(omega).into_iter();
+        found.min_by(|one, other| distance(one).total_cmp(&distance(other)))
+    };
+    let miss = |omega: f64| Some(near(omega)?.response / response - 1.0);
+    near(secant(miss, [omega * (1.0 + SECANT), omega], CONVERGED * omega)?)
 }
 
 /// The exact phase-resonant orbits of a scene under its drive, by rising C; `numbers` are those of its oscillator or driven mode.
@@ -137,29 +201,20 @@ pub fn detunings(scene: &Scene, numbers: &Dimensionless) -> Option<[f64; 2]> {
 /// Measured points of a structure as its driven mode alone would have them.
 ///
 /// A point is moved by the difference, in frequency and drive, between the exact orbits with its response at the scene's parameters: of the driven mode
-/// alone, and of all modes near the frequency of the point. Points where one of them does not exist are left out. Those of one mode stay.
+/// alone, and of all modes near the frequency of the point. Points where one of them does not exist are left out. Those of one mode without a shaker stay.
 pub fn without_other_modes(scene: &Scene, points: Vec<MeasuredPoint>) -> Vec<MeasuredPoint> {
     let host = scene.structure.as_ref().zip(scene.structure_orbits());
-    let Some((structure, orbits)) = host.filter(|(structure, _)| structure.modes.len() > 1) else {
+    let Some((structure, orbits)) =
+        host.filter(|(structure, _)| structure.modes.len() > 1 || structure.shaker.is_some())
+    else {
         return points;
     };
     let numbers = scene.dimensionless();
     let moved = |mut point: MeasuredPoint| {
-        let c = point.response.value / numbers.b;
-        let distance = |orbit: &Orbit| (orbit.c - c).abs();
-        let near = |omega: f64| {
-            let found = orbits.at_phase_resonance(omega);
-            let all = found.iter().map(|orbit| of_driven_mode(orbit, structure, &numbers));
-            all.min_by(|one, other| distance(one).total_cmp(&distance(other)))
-        };
-        let measured = point.omega.value;
-        let response = |omega: f64| Some(near(omega)?.c - c);
-        let all = near(secant(
-            response,
-            [measured * (1.0 + SECANT), measured],
-            CONVERGED * measured,
-        )?)?;
-        let alone = at_amplitude(&numbers, c)?;
+        let response = point.response.value * structure.reading_per_response().abs();
+        let all = with_response(&orbits, response, point.omega.value)?;
+        let all = of_driven_mode(&all, structure, &numbers);
+        let alone = at_amplitude(&numbers, point.response.value / numbers.b)?;
         point.omega.value += numbers.omega0 * (alone.omega - all.omega);
         point.drive.value += numbers.amplitude(alone.g - all.g);
         Some(point)

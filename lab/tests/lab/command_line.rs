@@ -330,9 +330,17 @@ fn results_of_one_oscillator_say_so_where_the_scene_has_a_structure() {
             && tracked.matches("asymmetric 1:1 / asymmetric 1:1; not settled").count() == 3,
         "{tracked}"
     );
-    fails(
-        &format!("rig {scene} --listen 127.0.0.1:0"),
-        2,
-        "what is served has one oscillator, and this scene has a [structure]",
-    );
+    let table = scene.replace("frame", "slip-table");
+    for (line, part) in [
+        (
+            format!("rig {scene} --protocol helic --listen 127.0.0.1:0"),
+            "a device has one oscillator, and this scene has a [structure]",
+        ),
+        (
+            format!("orbit {table} --periodic"),
+            "--periodic and --sigma are for one oscillator, and this scene has a [shaker]",
+        ),
+    ] {
+        fails(&line, 2, part);
+    }
 }

@@ -121,6 +121,28 @@ fn built_in_fmu_and_lock_step_network_give_the_same_bits() {
 }
 
 #[test]
+fn a_structure_with_a_shaker_gives_the_same_bits_across_the_network() {
+    let scene = format!(
+        "--scene {}/../scenes/shaker-cantilever.toml",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let identified = |rig: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let done = vines(&format!(
+            "identify --json {scene} --rig {rig} --out {}",
+            folder.path().display()
+        ));
+        assert!(done.status.success(), "{done:?}");
+        json(&done)
+    };
+    let serve = format!("rig {scene} --lock-step --listen 127.0.0.1:0 --sessions 1 --duration 120");
+    let mut server = Running::start(&words(&serve));
+    let address = server.word();
+    assert_eq!(identified(&address), identified("built-in"));
+    assert!(server.output().status.success());
+}
+
+#[test]
 fn a_rig_in_real_time_gives_the_same_sigma_within_5e_3() {
     let direct = identified("--rig built-in");
     let rig = Server::start("rig --json --silence 5");

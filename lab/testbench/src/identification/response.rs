@@ -153,6 +153,18 @@ pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f6
     (!tones.is_empty()).then_some(cleaned)
 }
 
+/// Harmonics 2 to 7 of the reference over its first; `None` without a reference, and for fewer than two samples per period of the last.
+pub fn drive_harmonics(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<[f64; 6]> {
+    let turn = omega * knowledge.sample_time;
+    let values: Option<Vec<f64>> = samples.iter().map(|sample| sample.sensors.reference).collect();
+    let values = values.filter(|_| 7.0 * turn < PI)?;
+    let phases: Vec<f64> = (0..values.len()).map(|n| n as f64 * turn).collect();
+    let degrees: [_; 7] = std::array::from_fn(|n| Some(if n == 0 { 2 } else { 0 }));
+    let fit = HarmonicBasis::new(&phases, 1, &degrees).fit(&DVector::from_vec(values))?;
+    let first = fit.harmonic(1).norm();
+    (first > 0.0).then(|| std::array::from_fn(|n| fit.harmonic(n + 2).norm() / first))
+}
+
 /// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase target,
 /// and `omega` (rad/s) its frequency.
 ///

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use lovines::host::{Equations, Row};
 use lovines::oscillator::Oscillator;
-use lovines::{Amplifier, Excitation as HostExcitation, Shaker, ShakerRows};
+use lovines::{Amplifier, Excitation as HostExcitation, Host, Plant, Shaker, ShakerRows};
 use serde::{Deserialize, Serialize};
 
 use super::{Excitation, Structure};
@@ -28,6 +28,9 @@ pub struct SceneShaker {
     /// What is measured.
     #[serde(skip)]
     pub rows: ShakerRows,
+    /// The structure as the reference drives it: with the mass in front of the force cell.
+    #[serde(skip)]
+    pub alone: Box<Structure>,
 }
 
 /// Limits of a shaker. What the amplifier controls is clipped at its limit; reaching another one ends the experiment.
@@ -62,7 +65,66 @@ impl SceneShaker {
     }
 }
 
+/// What is measured on a structure beside its drive: the displacement of a point, or a number at its shaker.
+#[derive(Debug, Clone)]
+pub struct Channel<'a> {
+    /// Name of the point, or of the number.
+    pub name: &'a str,
+    /// Its value in the sections of the host.
+    pub row: &'a Row,
+    /// What one unit of the drive adds to it.
+    pub per_drive: f64,
+    /// Unit of the value.
+    pub unit: &'static str,
+    /// Largest magnitude allowed.
+    pub limit: Option<f64>,
+    /// Of a number, what it is; `None`: a point.
+    pub meaning: Option<&'static str>,
+}
+
+impl Channel<'_> {
+    /// Its value now.
+    pub fn read(&self, plant: &Plant<lovines::Structure>) -> f64 {
+        plant.point(self.row)[0] + self.per_drive * plant.base_displacement()
+    }
+}
+
 impl Structure {
+    /// The points of the structure, and what is measured at its shaker.
+    pub fn channels(&self) -> Vec<Channel<'_>> {
+        let point = |(name, row)| Channel {
+            name,
+            row,
+            per_drive: 0.0,
+            unit: "m",
+            limit: None,
+            meaning: None,
+        };
+        let points = self.points.iter().map(String::as_str).zip(&self.rows);
+        let mut channels: Vec<_> = points.map(point).collect();
+        let Some(SceneShaker { limits, rows, .. }) = &self.shaker else {
+            return channels;
+        };
+        if self.excitation == Excitation::Base {
+            channels.push(point((TABLE, &rows.end)));
+        }
+        channels.push(Channel { limit: limits.stroke, ..point((ARMATURE, &rows.armature)) });
+        channels.push(Channel {
+            unit: "N",
+            limit: limits.force,
+            meaning: Some("force of the stinger on the structure"),
+            ..point(("force", &rows.force))
+        });
+        channels.push(Channel {
+            per_drive: rows.current_per_command,
+            unit: "A",
+            limit: limits.current,
+            meaning: Some("current of the coil"),
+            ..point(("current", &rows.current))
+        });
+        channels
+    }
+
     /// What the shaker makes of its command, for a controller with this range of frequencies, rad/s; `None` without a shaker.
     pub(crate) fn shaker_path(&self, range: [f64; 2]) -> Option<ShakerPath> {
         let (shaker, mode, host) = (self.shaker.as_ref()?, self.mode(), &self.host);
@@ -197,7 +259,7 @@ impl ShakerSection {
             .map_err(|error| error.to_string())?;
         let rows = shaker.rows(&host, &alone, by).map_err(|error| error.to_string())?;
         let beyond = 1 + usize::from(self.has_table());
-        let coordinates = |point: usize| -> Vec<f64> {
+        let coordinates = |point: usize, beyond: usize| -> Vec<f64> {
             let of_structure: Vec<f64> = match &alone {
                 Equations::Modes(_) => bare.iter().map(|mode| mode.shape[point]).collect(),
                 _ => (0..structure.points.len())
@@ -206,12 +268,25 @@ impl ShakerSection {
             };
             of_structure.into_iter().chain(vec![0.0; beyond]).collect()
         };
-        let points = (0..structure.points.len()).map(|point| host.row(&coordinates(point)));
-        let points = points
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(|error| error.to_string())?;
+        let points = |host: &Host, beyond: usize| {
+            let rows = (0..structure.points.len()).map(|point| host.row(&coordinates(point, beyond)));
+            rows.collect::<Result<Vec<_>, _>>().map_err(|error| error.to_string())
+        };
+        let mut driven = structure.clone();
+        if structure.excitation == Excitation::Force {
+            driven.equations = alone.carrying(end_mass).map_err(|error| error.to_string())?;
+            driven.host = driven.equations.host(by).map_err(|error| error.to_string())?;
+            driven.rows = points(&driven.host, 0)?;
+        }
+        let points = points(&host, beyond)?;
         let omega = structure.mode().omega;
-        let mut attached = SceneShaker { shaker, limits, reference_per_command: 0.0, rows };
+        let mut attached = SceneShaker {
+            shaker,
+            limits,
+            reference_per_command: 0.0,
+            rows,
+            alone: Box::new(driven),
+        };
         let structure = Structure { equations, host, rows: points, ..structure };
         let reference = attached.reference(structure.excitation);
         attached.reference_per_command = structure.host.frequency_response(reference, omega).norm();

@@ -102,6 +102,14 @@ impl PartialEq for Structure {
 }
 
 impl Structure {
+    /// The section of the scene that makes it more than one oscillator.
+    pub fn section(&self) -> &'static str {
+        match &self.shaker {
+            Some(_) if self.modes.len() == 1 => "[shaker]",
+            _ => "[structure]",
+        }
+    }
+
     /// The driven mode.
     pub fn mode(&self) -> &StructureMode {
         &self.modes[self.driven]

@@ -8,9 +8,9 @@ use vines_testbench::experiment::ExperimentError;
 use vines_testbench::loop_check::{Verdict, check};
 use vines_testbench::rig::{BuiltIn, RigError, Sensors, SensorsOnly, Simulated};
 use vines_testbench::scene::{Scene, SceneError};
-use vines_testbench::survey::phase_resonant;
+use vines_testbench::survey::{BehindShaker, Survey, phase_resonant};
 
-use super::{Altered, identified};
+use super::{Altered, identified, tracked};
 
 const PRESETS: [&str; 3] = [
     include_str!("../../../../scenes/shaker-cantilever.toml"),
@@ -70,6 +70,28 @@ fn exact_orbits_with_a_shaker_are_motions_of_the_plant() {
             let error = (after.q1 - before.q1).abs().max((after.q2 - before.q2).abs()) / b;
             assert!(error < 1e-9 && plant.totals().impacts == 2, "preset {n}: {error:e}");
         }
+    }
+}
+
+#[test]
+fn measured_harmonics_of_the_force_are_those_of_the_exact_orbits_under_a_voltage() {
+    let levels = "[backbone]\nC_from = 0.44\nC_to = 0.42\npoints = 3\n\n[start]";
+    let scene = preset(0, &[("[start]", levels)]).unwrap();
+    let exact = Survey::of(&scene).unwrap().behind_shaker;
+    let b = scene.plant.half_width * scene.structure.as_ref().unwrap().reading_per_response().abs();
+    let points = tracked(Simulated::of(&scene).unwrap().as_mut(), &scene).unwrap().points;
+    assert_eq!(points.len(), 3);
+    for point in points {
+        let [second, third, fourth, fifth, sixth, seventh] = point.drive_harmonics.unwrap();
+        let distance = |one: &&BehindShaker| (one.response / b - point.at.c).abs();
+        let nearest = exact
+            .iter()
+            .min_by(|one, other| distance(one).total_cmp(&distance(other)));
+        // They change by a hundredth between the levels that are compared; the samples see the edges of the force late.
+        for (measured, exact) in [third, fifth, seventh].into_iter().zip(nearest.unwrap().harmonics) {
+            assert!((measured / exact - 1.0).abs() < 0.05, "{measured} {exact}");
+        }
+        assert!([second, fourth, sixth].iter().all(|even| *even < 0.1 * third));
     }
 }
 
