@@ -5,6 +5,7 @@ mod number;
 mod plants;
 mod saved;
 mod scene;
+mod structures;
 mod sweeps;
 mod wait;
 
@@ -15,6 +16,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<plants::Plant>()?;
     module.add_class::<plants::Plants>()?;
     module.add_class::<scene::Scene>()?;
+    module.add_class::<structures::StructurePlant>()?;
     module.add_class::<experiments::PhaseLock>()?;
     module.add_class::<sweeps::Cells>()?;
     for function in [

@@ -25,12 +25,16 @@ pub struct Scene {
 impl Scene {
     /// Refuses a structure where there is one oscillator only.
     pub fn one_oscillator(&self, what: &str) -> PyResult<()> {
-        let refusal = || {
+        let refusal = |structure: &vines_testbench::scene::Structure| {
+            let section = structure.section();
             invalid(format!(
-                "{what} one oscillator: the scene has a [structure]; drop it, and give M, k and c"
+                "{what} one oscillator: the scene has a {section}; drop it, and give M, k and c"
             ))
         };
-        self.scene.structure.as_ref().map_or(Ok(()), |_| Err(refusal()))
+        self.scene
+            .structure
+            .as_ref()
+            .map_or(Ok(()), |structure| Err(refusal(structure)))
     }
 }
 

@@ -1,13 +1,18 @@
-"""Structures from the universal files of a modal test."""
+"""Structures: as plants under a voltage, and from the universal files of a modal test."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import pyuff
+from fmpy import simulate_fmu
 
 import vines
+
+SCENES = Path(__file__).parents[2] / "scenes"
 
 OMEGA = 2 * np.pi * np.array([8.8, 55.1])
 ZETA = np.array([0.006, 0.011])
@@ -138,3 +143,44 @@ def test_a_structure_locks_on_its_exact_orbit_and_what_has_one_oscillator_says_s
     pytest.importorskip("xarray")
     with pytest.raises(ValueError, match="a sweep is of one oscillator"):
         vines.sweep(scene, {"sigma": [0.0]}, periods=400)
+
+
+def test_a_plant_under_a_voltage_has_the_bits_of_its_fmu_channel_by_channel(tmp_path):
+    file = SCENES / "shaker-cantilever.toml"
+    subprocess.run([os.environ["VINES"], "pack", "--scene", file, "--out", tmp_path], check=True)
+    plant = vines.StructurePlant(vines.Scene(file))
+    names = {name: name if unit != "m" else f"q[{name}]" for name, unit in plant.channels.items()}
+    names |= {"drive": "command", "q2": "q2", "impacts": "impacts"}
+    steps, start = 4096, {"u_amplitude": 3.0, "omega": 53.0}
+    fmu = simulate_fmu(
+        str(tmp_path / "Structure.fmu"),
+        stop_time=4,
+        output_interval=4 / steps,
+        start_values=start,
+        output=[*names.values()],
+    )
+    motion = plant.trajectory(4.0, steps, amplitude=3.0, omega=53.0)
+    assert motion["impacts"][-1] > 10
+    for channel, name in names.items():
+        np.testing.assert_array_equal(motion[channel][1:], fmu[name][1:], err_msg=name)
+
+
+def test_a_limit_of_the_shaker_is_an_error_and_leaves_the_plant_as_it_was():
+    plant = vines.StructurePlant(vines.Scene(SCENES / "shaker-cantilever.toml", shaker={"stroke_max": 1e-4}))
+    plant.advance(0.01, held=0.05)
+    before = plant["armature"]
+    with pytest.raises(
+        RuntimeError, match=r"shaker reached its limit: the displacement of the armature is .* shaker.stroke_max"
+    ):
+        plant.trajectory(2.0, 2000, amplitude=20.0, omega=53.0)
+    plant.advance(0.0)
+    assert plant["armature"] == before != 0.0
+    with pytest.raises(KeyError, match="'voltage' is no channel; known are time, drive, q2, impacts, root, tip"):
+        plant["voltage"]
+    with pytest.raises(ValueError, match=r"no \[structure\]"):
+        vines.StructurePlant(vines.Scene())
+
+
+def test_an_experiment_with_a_shaker_locks_on_its_exact_orbit():
+    found = vines.identify(vines.Scene(SCENES / "shaker-cantilever.toml"), results="lock")
+    assert abs(found.lock["sigma"] - found.exact.sigma) < 3 * found.lock["u_sigma"]

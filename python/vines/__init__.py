@@ -17,7 +17,7 @@ from .plants import KINDS, Batch, Events, Plant, Trajectory
 from .recordings import LinearDecay, Recording, linear_decay, read_recording
 from .regimes import Regime, regime
 from .scenes import Scene
-from .structures import scene_from_uff, structure_from_uff
+from .structures import StructurePlant, scene_from_uff, structure_from_uff
 from .sweeps import REGIMES, sweep
 
 __all__ = [
@@ -36,6 +36,7 @@ __all__ = [
     "Recording",
     "Regime",
     "Scene",
+    "StructurePlant",
     "Theory",
     "Trajectory",
     "__version__",

@@ -11,6 +11,7 @@ __all__ = [
     "Plant",
     "Plants",
     "Scene",
+    "StructurePlant",
     "backbone",
     "fit",
     "identify",
@@ -36,6 +37,12 @@ class Scene:
     def __new__(cls, text: str | None, origin: str, overrides: list[str]) -> Scene: ...
     def settings(self) -> str: ...
     def dimensionless(self) -> str: ...
+
+@disjoint_base
+class StructurePlant:
+    def __new__(cls, scene: Scene) -> Self: ...
+    def _channels(self) -> list[tuple[str, str]]: ...
+    def _trajectory(self, duration: float, steps: int, drive: tuple[float, float, float]) -> NDArray[np.float64]: ...
 
 @disjoint_base
 class Plant:

@@ -456,7 +456,9 @@ def _values(
     if isinstance(parameters, Scene):
         settings = parameters.settings
         if "structure" in settings:
-            raise ValueError("a plant has one oscillator: the scene has a [structure]; drop it, and give M, k and c")
+            raise ValueError(
+                "a Plant has one oscillator, and the scene has a [structure] or a [shaker]: take StructurePlant(scene)"
+            )
         values, first = settings["plant"], settings["start"]
     else:
         values = parameters

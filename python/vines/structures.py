@@ -1,12 +1,16 @@
-"""Modal tests in universal files (UFF 55) as the section `[structure]` of a scene."""
+"""Structures: as plants, and modal tests in universal files (UFF 55) as the section `[structure]` of a scene."""
 
+import operator
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ._native import StructurePlant as _StructurePlant
 from .recordings import _package
+from .scenes import Scene
 
 _DIRECTIONS = ("X", "Y", "Z", "RX", "RY", "RZ")
 _TRANSLATIONS = 3
@@ -152,3 +156,109 @@ def _mode(
 def _order(point: str) -> tuple[int, str]:
     digits = point.rstrip("XYZR")
     return int(digits), point[len(digits) :]
+
+
+class StructurePlant(_StructurePlant):
+    """One structure with its particle, and with its shaker if the scene has one, from rest.
+
+    The drive is the displacement of the base, m, the force, N, or with a shaker the command of its amplifier, V, which
+    is clipped at the amplifier's limit.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with `[structure]` or `[shaker]`.
+
+    Raises
+    ------
+    ValueError
+        A scene with one oscillator: it is a `Plant`.
+
+    Examples
+    --------
+    >>> oscillator = "[plant]; M = 3.8; k = 11680; c = 2.5; m = 0.032; b = 0.01; r = 0.65; [excitation]; G = 1.1; [shaker]"
+    >>> shaker = "mass = 9; stiffness = 9e4; stinger_stiffness = 3e7; table_mass = 4; resistance = 1; Bl = 120"
+    >>> plant = StructurePlant(Scene(text=f"{oscillator}; {shaker}".replace("; ", "\\n")))
+    >>> plant.channels
+    {'drive': 'V', 'mass': 'm', 'table': 'm', 'armature': 'm', 'force': 'N', 'current': 'A'}
+    >>> motion = plant.trajectory(1.0, 1000, amplitude=2.0, omega=54.9)
+    >>> float(abs(motion["force"]).max()) > 1
+    True
+    >>> plant["force"] == float(motion["force"][-1])
+    True
+    """
+
+    _last: NDArray[np.float64]
+
+    def __new__(cls, scene: Scene) -> Self:
+        plant = super().__new__(cls, scene._native)
+        plant._last = plant._trajectory(0.0, 0, (0.0, 0.0, 0.0))[-1]
+        return plant
+
+    @property
+    def channels(self) -> dict[str, str]:
+        """Names of the drive, the points and what is measured at the shaker, with their units."""
+        return dict(self._channels())
+
+    def _columns(self) -> list[str]:
+        drive, *channels = self.channels
+        return ["time", drive, "q2", "impacts", *channels]
+
+    def __getitem__(self, name: str) -> float:
+        """Return a channel, or `time` (s), `q2` (m) or `impacts`, now."""
+        columns = self._columns()
+        if name not in columns:
+            raise KeyError(f"{name!r} is no channel; known are {', '.join(columns)}")
+        return float(self._last[columns.index(name)])
+
+    def advance(self, duration: float, *, held: float = 0.0, amplitude: float = 0.0, omega: float = 0.0) -> None:
+        """Advance it under the drive held + E sin(phase + omega t), whose phase continues from call to call.
+
+        Parameters
+        ----------
+        duration : float
+            Duration, s.
+        held, amplitude : float
+            Held part and amplitude E of the drive, m, N or V.
+        omega : float
+            Angular frequency, rad/s.
+
+        Raises
+        ------
+        ValueError
+            A value that is not allowed. The plant is not advanced then.
+        RuntimeError
+            The shaker reached a limit. The plant is not advanced then.
+        """
+        self.trajectory(duration, 1, held=held, amplitude=amplitude, omega=omega)
+
+    def trajectory(
+        self, duration: float, steps: int, *, held: float = 0.0, amplitude: float = 0.0, omega: float = 0.0
+    ) -> dict[str, NDArray[np.float64]]:
+        """Advance it in equal steps, and return `time`, `q2`, `impacts` and all channels by name.
+
+        They are those at the start and after every step.
+
+        Parameters
+        ----------
+        duration : float
+            Duration of all steps, s.
+        steps : int
+            Number of steps, 1 to 10^7.
+        held, amplitude, omega : float
+            As of `advance`.
+
+        Returns
+        -------
+        dict of ndarray
+
+        Raises
+        ------
+        ValueError, RuntimeError
+            As of `advance`.
+        """
+        if not 1 <= operator.index(steps) <= 10**7:
+            raise ValueError(f"steps = {steps}: a whole number from 1 to 10^7 is allowed")
+        rows = self._trajectory(duration, steps, (held, amplitude, omega))
+        self._last = rows[-1]
+        return dict(zip(self._columns(), np.ascontiguousarray(rows.T), strict=True))

@@ -1,0 +1,113 @@
+//! A structure with its particle and its shaker.
+
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use lovines::Drive;
+use numpy::{IntoPyArray, PyArray2, ndarray::Array2};
+use pyo3::{
+    exceptions::{PyKeyboardInterrupt, PyRuntimeError},
+    prelude::*,
+};
+use vines_testbench::{
+    rig::{RigError, SimulatedStructure},
+    scene::{Channel, Structure},
+};
+
+use crate::{
+    number::Real,
+    scene::{Scene, invalid},
+    wait::wait,
+};
+
+/// The plant, and what is measured on it.
+#[pyclass(subclass)]
+pub struct StructurePlant {
+    structure: Structure,
+    plant: SimulatedStructure,
+}
+
+/// Columns before those of the channels: time, drive, q2, impacts.
+const COLUMNS: usize = 4;
+
+fn row(plant: &SimulatedStructure, channels: &[Channel<'_>]) -> Vec<f64> {
+    let plant = plant.plant();
+    let first = [
+        plant.time(),
+        plant.base_displacement(),
+        plant.state().q2,
+        plant.totals().impacts as f64,
+    ];
+    first
+        .into_iter()
+        .chain(channels.iter().map(|channel| channel.read(plant)))
+        .collect()
+}
+
+#[pymethods]
+impl StructurePlant {
+    #[new]
+    fn new(scene: &Scene) -> PyResult<Self> {
+        let Scene { scene, .. } = scene;
+        let structure = scene.structure.clone().ok_or_else(|| {
+            invalid("the scene has no [structure] and no [shaker]: its oscillator is vines.Plant(scene)")
+        })?;
+        let plant = SimulatedStructure::new(&structure, scene.plant, scene.start).map_err(invalid)?;
+        Ok(Self { structure, plant })
+    }
+
+    /// Names and units of the channels; the first is the drive.
+    fn _channels(&self) -> Vec<(String, &'static str)> {
+        let drive = match &self.structure.shaker {
+            Some(_) => "V",
+            None => self.structure.excitation.unit(),
+        };
+        let channels = self.structure.channels();
+        let channels = channels.iter().map(|channel| (channel.name.to_owned(), channel.unit));
+        [("drive".to_owned(), drive)].into_iter().chain(channels).collect()
+    }
+
+    /// Advances it in equal steps. Returns rows of time, drive, q2, impacts and channels; after a failure it is as before.
+    fn _trajectory<'py>(
+        &mut self,
+        py: Python<'py>,
+        duration: Real,
+        steps: usize,
+        drive: (Real, Real, Real),
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (held, amplitude, omega) = drive;
+        let drive = Drive {
+            signal: [held.0, 0.0, 0.0, 0.0],
+            ..Drive::harmonic(amplitude.0, omega.0)
+        };
+        let (stop, before) = (AtomicBool::new(false), self.plant.clone());
+        let channels = self.structure.channels();
+        let plant = &mut self.plant;
+        let mut run = || -> Result<Vec<f64>, Option<RigError>> {
+            let mut rows = row(plant, &channels);
+            for _ in 0..steps {
+                plant.step(drive, duration.0 / steps as f64).map_err(Some)?;
+                rows.extend(row(plant, &channels));
+                if stop.load(Relaxed) {
+                    return Err(None);
+                }
+            }
+            Ok(rows)
+        };
+        // A thread costs more than a step.
+        let result = if steps == 1 {
+            run()
+        } else {
+            wait(py, &stop, |_| Ok(()), run)?
+        };
+        let rows = result.map_err(|failure| {
+            self.plant = before;
+            match failure {
+                None => PyKeyboardInterrupt::new_err(()),
+                Some(error @ RigError::ShakerLimit { .. }) => PyRuntimeError::new_err(error.to_string()),
+                Some(error) => invalid(error),
+            }
+        })?;
+        let shape = (steps + 1, COLUMNS + channels.len());
+        Ok(Array2::from_shape_vec(shape, rows).map_err(invalid)?.into_pyarray(py))
+    }
+}
