@@ -10,7 +10,8 @@
 //! orbit, stable or not, as near. `wrong` are both beyond. Where all orbits are unstable at a fixed frequency, `stabilised` counts locks of a
 //! constant drive that the phase loop keeps for as long as a disturbance of 1e-6 would need to grow to 1, and `steady` the others.
 //!
-//! Arguments: STRUCTURES (of each kind), SEED. Writes validation/structures.csv.
+//! Arguments: STRUCTURES (of each kind), SEED. Writes validation/structures.csv. With further arguments, which are `stable` or `unstable` and numbers
+//! of structures, it runs these alone, says what the loop did, and writes nothing.
 
 mod common;
 
@@ -105,8 +106,8 @@ fn scene_with(is_stable: bool, uniform: &mut dyn FnMut(f64, f64) -> f64) -> Resu
     }
 }
 
-/// Locks a structure: what became of it, its errors in sigma and C, and its periods.
-fn lock(scene: &Scene, is_stable: bool) -> (Outcome, [f64; 2], f64) {
+/// Locks a structure: what became of it, its errors in sigma and C, its periods, and what was found.
+fn lock(scene: &Scene, is_stable: bool) -> (Outcome, [f64; 2], f64, String) {
     let mut plan = scene.plan();
     let locked = |plan: &Plan| -> Result<_, Failure> {
         let record = record(&mut *Simulated::of(scene)?, plan)?;
@@ -115,20 +116,7 @@ fn lock(scene: &Scene, is_stable: bool) -> (Outcome, [f64; 2], f64) {
     };
     let (record, found) = match locked(&plan) {
         Ok(both) => both,
-        Err(error) => {
-            if is_stable {
-                let orbits = orbits_of(scene, &scene.dimensionless());
-                let stable = orbits
-                    .iter()
-                    .filter(|orbit| orbit.stable)
-                    .map(|orbit| (orbit.c, orbit.b, orbit.multipliers[3]));
-                println!(
-                    "refused: {error}; stable orbits (C, B, growth) {:.4?}",
-                    stable.collect::<Vec<_>>()
-                );
-            }
-            return (Outcome::Refused, [f64::NAN; 2], f64::NAN);
-        }
+        Err(error) => return (Outcome::Refused, [f64::NAN; 2], f64::NAN, error.to_string()),
     };
     let at = found.lock.at;
     let periods = record.settled as f64 / scene.controller.samples_per_period;
@@ -169,23 +157,77 @@ fn lock(scene: &Scene, is_stable: bool) -> (Outcome, [f64; 2], f64) {
             if stays { Outcome::Stabilised } else { Outcome::Steady }
         }
     };
-    (outcome, errors, periods)
+    let found = format!(
+        "sigma {:.5} +- {:.5}, C {:.5} +- {:.5}, G {:.5} of {:.5}, {}{}",
+        at.sigma,
+        at.u_sigma,
+        at.c,
+        at.u_c,
+        at.g,
+        d.g,
+        found.lock.regime,
+        if record.held { ", held" } else { "" }
+    );
+    (outcome, errors, periods, found)
+}
+
+/// The orbits under the drive of a scene, and where those of its backbone are stable.
+fn orbits_in_words(scene: &Scene) -> String {
+    let d = scene.dimensionless();
+    let said = |orbit: &Orbit| {
+        let Orbit { sigma, c, g, b, .. } = *orbit;
+        format!(
+            "sigma {sigma:.4} C {c:.4} G {g:.4} B {b:.3} growth {:.4}; ",
+            orbit.multipliers[3]
+        )
+    };
+    let mut words = format!("{d:?}\n  under the drive: ");
+    words.extend(orbits_of(scene, &d).iter().map(said));
+    for curve in structure_backbone(scene, &d).unwrap_or_default() {
+        for run in curve.chunk_by(|one, other| one.stable == other.stable) {
+            words += if run[0].stable {
+                "\n  stable: "
+            } else {
+                "\n  unstable: "
+            };
+            words.extend([&run[0], &run[run.len() / 2], &run[run.len() - 1]].map(said));
+        }
+    }
+    words + &format!("\n  {:?}", scene.structure.as_ref().map(|structure| &structure.modes))
 }
 
 fn main() -> Result<(), Failure> {
-    let [count, seed] = &arguments(["STRUCTURES", "SEED"])?;
+    let given: Vec<String> = std::env::args().skip(1).collect();
+    let [count, seed, only @ ..] = &given[..] else {
+        return Err("arguments: STRUCTURES SEED [stable|unstable NUMBER...]".into());
+    };
     let (count, seed): (usize, u64) = (count.parse()?, seed.parse()?);
     let mut rows = Vec::new();
     for is_stable in [true, false] {
+        let kind = if is_stable { "stable" } else { "unstable" };
+        if only.first().is_some_and(|only| only != kind) {
+            continue;
+        }
         let mut uniform = uniform(seed + u64::from(is_stable));
         let scenes = (0..count).map(|_| scene_with(is_stable, &mut uniform));
-        let scenes = scenes.collect::<Result<Vec<_>, Failure>>()?;
-        let found: Vec<_> = scenes.par_iter().map(|scene| lock(scene, is_stable)).collect();
-        for (scene, (outcome, errors, _)) in scenes.iter().zip(&found) {
-            if !matches!(outcome, Outcome::Correct | Outcome::Held | Outcome::Refused) {
-                let modes = scene.structure.as_ref().map(|structure| &structure.modes);
-                println!("{outcome:?}, errors {errors:?}: {:?}; {modes:?}", scene.dimensionless());
+        let mut scenes: Vec<_> = scenes
+            .collect::<Result<Vec<_>, Failure>>()?
+            .into_iter()
+            .enumerate()
+            .collect();
+        scenes.retain(|(n, _)| only.is_empty() || only.contains(&n.to_string()));
+        let found: Vec<_> = scenes.par_iter().map(|(_, scene)| lock(scene, is_stable)).collect();
+        for ((n, scene), (outcome, errors, periods, found)) in scenes.iter().zip(&found) {
+            if *outcome != Outcome::Correct || !only.is_empty() {
+                println!(
+                    "{kind} {n}: {outcome:?}, errors {:.1e} and {:.1e}, {periods:.0} periods: {found}",
+                    errors[0], errors[1]
+                );
+                println!("  {}", orbits_in_words(scene));
             }
+        }
+        if !only.is_empty() {
+            continue;
         }
         let of = |wanted: Outcome| found.iter().filter(|(outcome, ..)| *outcome == wanted).count();
         let kinds = [
@@ -199,13 +241,13 @@ fn main() -> Result<(), Failure> {
         .map(of);
         let mut errors: Vec<f64> = found
             .iter()
-            .flat_map(|(_, errors, _)| errors)
+            .flat_map(|(_, errors, ..)| errors)
             .copied()
             .filter(|e| e.is_finite())
             .collect();
         let mut periods: Vec<f64> = found
             .iter()
-            .map(|(.., periods)| *periods)
+            .map(|(_, _, periods, _)| *periods)
             .filter(|p| p.is_finite())
             .collect();
         errors.sort_by(f64::total_cmp);
@@ -214,13 +256,15 @@ fn main() -> Result<(), Failure> {
         let last = |all: &[f64]| all.last().copied().unwrap_or(f64::NAN);
         let kinds = kinds.map(|count| count.to_string()).join(",");
         rows.push(format!(
-            "{count},{seed},{},{kinds},{:.1e},{:.1e},{:.0},{:.0}",
-            if is_stable { "stable" } else { "unstable" },
+            "{count},{seed},{kind},{kinds},{:.1e},{:.1e},{:.0},{:.0}",
             middle(&errors),
             last(&errors),
             middle(&periods),
             last(&periods)
         ));
+    }
+    if rows.is_empty() {
+        return Ok(());
     }
     let header = "structures,seed,orbits,correct,wrong,refused,held,stabilised,steady,median_error,worst_error,median_periods,worst_periods";
     write("structures", header, 3, &rows)
