@@ -177,8 +177,8 @@ class StructurePlant(_StructurePlant):
     Examples
     --------
     >>> oscillator = "[plant]; M = 3.8; k = 11680; c = 2.5; m = 0.032; b = 0.01; r = 0.65; [excitation]; G = 1.1"
-    >>> shaker = "[shaker]; mass = 9; stiffness = 9e4; stinger_stiffness = 3e7; table_mass = 4; resistance = 1; Bl = 120"
-    >>> plant = StructurePlant(Scene(text=f"{oscillator}; {shaker}".replace("; ", "\\n")))
+    >>> table = "[shaker]; mass = 9; stiffness = 9e4; stinger_stiffness = 3e7; table_mass = 4; resistance = 1; Bl = 120"
+    >>> plant = StructurePlant(Scene(text=f"{oscillator}; {table}".replace("; ", "\\n")))
     >>> plant.channels
     {'drive': 'V', 'mass': 'm', 'table': 'm', 'armature': 'm', 'force': 'N', 'current': 'A'}
     >>> motion = plant.trajectory(1.0, 1000, amplitude=2.0, omega=54.9)
