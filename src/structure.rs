@@ -797,6 +797,18 @@ impl Plant<Structure> {
         Ok(plant)
     }
 
+    /// Replaces the structure, which begins in this state. The parameters of the cavity and the totals stay.
+    ///
+    /// # Errors
+    /// As for [`Self::with_host`]; the plant stays as it is.
+    pub fn replace_host(&mut self, host: Host, start: &StructureState) -> Result<(), Refused> {
+        let plant = Self::with_host(host, *self.parameters(), start)?;
+        let totals = self.status.totals;
+        *self = plant;
+        self.status.totals = totals;
+        Ok(())
+    }
+
     /// The parameters whose primary mass is that which an impact feels, `1/S`, on the stiffest spring of the structure.
     fn equivalent(host: &Host, parameters: Parameters) -> Parameters {
         let mass = 1.0 / host.mobility();

@@ -91,29 +91,28 @@ fn drawn(uniform: Uniform) -> Result<(Scene, [f64; 4]), Failure> {
 
 /// Points, settled ones, those beyond 3 u, the largest error over u, periods, and why it ended.
 fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String) {
-    let plan = scene.plan();
-    let checked = Simulated::of(&scene.clone().at_rest()).map(|mut rig| check(&mut *rig, &plan));
-    if let Ok(Ok(checked)) = checked
-        && checked.verdict != Verdict::Healthy
-    {
-        return (
-            0,
-            0,
-            0,
-            f64::NAN,
-            f64::NAN,
-            format!("refused by the check, {}", checked.verdict),
-        );
-    }
+    let none = |why: String| (0, 0, 0, f64::NAN, f64::NAN, why);
+    let stated = scene.plan();
+    let checked = Simulated::of(&scene.clone().at_rest()).and_then(|mut rig| check(&mut *rig, &stated));
+    let linear = match checked {
+        Ok(checked) => match checked.linear {
+            Some(linear) => linear.response(),
+            None => return none(format!("refused by the check, {}", checked.verdict)),
+        },
+        Err(error) => return none(error.to_string()),
+    };
+    let plan = scene.plan_on(stated.knowledge.measured(linear));
     let tracked = match Simulated::of(scene)
         .map_err(Failure::from)
         .and_then(|mut rig| Ok(tracked(&mut *rig, &plan, 20.0)?))
     {
         Ok(tracked) => tracked,
-        Err(error) => return (0, 0, 0, f64::NAN, f64::NAN, error.to_string()),
+        Err(error) => return none(error.to_string()),
     };
     let curves = structure_backbone(scene, &scene.dimensionless()).unwrap_or_default();
     let (mut settled, mut beyond, mut worst) = (0, 0, 0.0);
+    // All detunings share the uncertainty of the natural frequency.
+    let shared = plan.knowledge.linear.uncertainty / plan.knowledge.numbers.omega_change(1.0);
     for LevelPoint { at, .. } in kept(&tracked) {
         settled += 1;
         // The orbit at the same response, on any of the curves.
@@ -121,7 +120,7 @@ fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String
             let x = (at.c - pair[0].c) / (pair[1].c - pair[0].c);
             let between = |one: f64, other: f64| one + x * (other - one);
             (0.0..=1.0).contains(&x).then(|| {
-                let sigma = (at.sigma - between(pair[0].sigma, pair[1].sigma)).abs() / at.u_sigma;
+                let sigma = (at.sigma - between(pair[0].sigma, pair[1].sigma)).abs() / at.u_sigma.hypot(shared);
                 sigma.max((at.g - between(pair[0].g, pair[1].g)).abs() / at.u_g)
             })
         });
@@ -145,7 +144,7 @@ fn main() -> Result<(), Failure> {
     let found: Vec<_> = scenes.par_iter().map(run).collect();
     let rows: Vec<_> = scenes.iter().zip(&found).enumerate().map(|(n, ((scene, numbers), found))| {
         let [share, suspension, stinger, coil] = numbers;
-        let drop_out = scene.knowledge().shaker.map_or(f64::NAN, |shaker| shaker.drop_out);
+        let drop_out = scene.knowledge().shaker.map_or(f64::NAN, |shaker| shaker.drop_out());
         let bandwidth = scene.plan().tracking.bandwidth / std::f64::consts::TAU;
         let (points, settled, beyond, worst, periods, why) = found;
         format!(

@@ -120,14 +120,12 @@ impl FromStr for Fault {
         let seconds = positive(seconds)?;
         // The sign × is on few keyboards.
         let as_typed = |name: &str| name.replace('×', "x");
-        match RigFault::ALL
-            .into_iter()
-            .find(|(fault, _)| as_typed(fault) == as_typed(name))
-        {
+        let all = || RigFault::ALL.into_iter().chain(RigFault::OF_SHAKER);
+        match all().find(|(fault, _)| as_typed(fault) == as_typed(name)) {
             Some((_, kind)) => Ok(Self { kind, seconds }),
             None => {
-                let names = RigFault::ALL.map(|(name, _)| name).join(", ");
-                Err(format!("unknown fault; known are: {names}").into())
+                let names: Vec<&str> = all().map(|(name, _)| name).collect();
+                Err(format!("unknown fault; known are: {}", names.join(", ")).into())
             }
         }
     }

@@ -15,7 +15,7 @@ use vines_model::numerics::mean;
 use crate::identification::Cycle;
 use crate::plan::{Plan, Target};
 use crate::record::{Record, Sample};
-use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError, Scaled};
+use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError, Scaled, Sensors};
 use crate::scene::key;
 
 pub use judge::Condition;
@@ -105,12 +105,17 @@ pub struct Evidence {
     pub phase_error: Option<Option<f64>>,
     /// Setting of the controller, its value, and the value's unit.
     pub limit: Option<(&'static str, Option<f64>, &'static str)>,
+    /// Which channel behind a shaker has failed, and how.
+    pub failed: Option<&'static str>,
 }
 
 impl Display for Evidence {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         if let Some(error) = self.phase_error {
             write!(f, "over the last period {}; ", phase_in_words(error))?;
+        }
+        if let Some(failed) = self.failed {
+            write!(f, "{failed}; ")?;
         }
         write!(f, "the response read {} m", short(self.response))?;
         if let Some(base) = self.base {
@@ -324,7 +329,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             return Err(ExperimentError::NoDrive);
         }
         Ok(Self {
-            rig: Scaled::new(rig, plan.knowledge.target),
+            rig: Scaled::controlled(rig, &plan.knowledge),
             controller,
             plan,
             config,
@@ -431,7 +436,11 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         if fault == Fault::TimedOut {
             return self.no_lock(command);
         }
-        let evidence = evidence(self.samples, self.config, fault).into();
+        let mut evidence = evidence(self.samples, self.config, fault);
+        if self.plan.knowledge.shaker().is_some() {
+            evidence.failed = failed(self.samples, self.plan.knowledge.samples(1.0));
+        }
+        let evidence = evidence.into();
         ExperimentError::Tripped { periods: self.periods, stage, fault, evidence }
     }
 
@@ -520,7 +529,71 @@ fn evidence(samples: &[Sample], config: &Config, fault: Fault) -> Evidence {
         largest,
         phase_error,
         limit,
+        failed: None,
     }
+}
+
+/// Which channel of a shaker has failed, and how, from the readings of the last period beside those of the period before it.
+fn failed(samples: &[Sample], period: usize) -> Option<&'static str> {
+    let begin = samples.len().checked_sub(2 * period)?;
+    let channel =
+        |of: fn(Sensors) -> f64| -> Vec<f64> { samples[begin..].iter().map(|sample| of(sample.sensors)).collect() };
+    let force = channel(|sensors| sensors.reference.unwrap_or(0.0));
+    let response = channel(|sensors| sensors.response);
+    match (how(&force, period), how(&response, period)) {
+        (_, Some(_)) => Some("the response jumped, as no structure does: check its sensor and cable"),
+        (Some(Failure::Nothing), _) => {
+            Some("the force cell reads nothing: it or its cable is dead, or the stinger is broken")
+        }
+        (Some(Failure::Reversed), _) => Some("the force cell reads the opposite sign: check its cable and factor"),
+        (Some(Failure::Clipped), _) => {
+            Some("the force cell stays at one value: it saturates or is frozen; check its range")
+        }
+        (Some(Failure::Other), _) => Some(
+            "the force does not follow the command: the amplifier clips, is off or overloaded, or the force cell is noisy or late",
+        ),
+        (None, None) => None,
+    }
+}
+
+/// How a channel differs from what it read a period before.
+enum Failure {
+    Nothing,
+    Reversed,
+    /// It stays at its largest value.
+    Clipped,
+    Other,
+}
+
+/// Change from period to period, over the amplitude, of a channel that has failed.
+const JUMP: f64 = 0.3;
+
+fn how(readings: &[f64], period: usize) -> Option<Failure> {
+    let (before, now) = readings.split_at(period);
+    let largest = before.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    let begin = now
+        .iter()
+        .zip(before)
+        .position(|(now, before)| (now - before).abs() > JUMP * largest)?;
+    let (now, before) = (&now[begin..], &before[begin..]);
+    let [least, most] = now
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| {
+            [least.min(*value), most.max(*value)]
+        });
+    let is_same = |one: f64, other: f64| (one - other).abs() < 1e-6 * largest;
+    let power: f64 = before.iter().map(|value| value * value).sum();
+    let ratio = now.iter().zip(before).map(|(now, before)| now * before).sum::<f64>() / power;
+    let at_limit = now
+        .iter()
+        .filter(|value| is_same(value.abs(), most.max(-least)))
+        .count();
+    Some(match () {
+        () if is_same(least, 0.0) && is_same(most, 0.0) => Failure::Nothing,
+        () if (ratio + 1.0).abs() < JUMP => Failure::Reversed,
+        () if at_limit > 2 => Failure::Clipped,
+        () => Failure::Other,
+    })
 }
 
 /// Five digits, with an exponent if the number is very small or large.
@@ -532,7 +605,7 @@ fn short(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::Sensors;
+
     use crate::scene::Scene;
 
     #[test]

@@ -14,7 +14,7 @@ use serde::Serialize;
 use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, mean_square, standard_deviation};
 
 use crate::linear::{MeasuredLinear, ParticleState};
-use crate::plan::{LinearResponse, Plan, Target};
+use crate::plan::{LinearResponse, Plan, ShakerPath, Target};
 use crate::rig::{Drive, Rig, RigError, Scaled};
 use crate::scene::Reference;
 
@@ -425,10 +425,10 @@ pub enum Verdict {
     )]
     Clock,
     #[error(
-        "the force collapses near the resonance, and a stable loop behind this shaker is slower than the motion that it must follow: take a softer \
-         suspension, a drive point that moves less, or a table"
+        "shaker and structure have another resonance so near the natural frequency that the force cannot be controlled: change the mass of the \
+         armature, its suspension or the drive point"
     )]
-    DropOut,
+    ShakerResonance,
     #[error("the response is noisy: check its shield and range")]
     ResponseNoisy,
     #[error("the base sensor is noisy: check its shield and range")]
@@ -520,6 +520,9 @@ pub struct Linear {
     pub gains: [f64; 2],
     /// Phase margin of the loop with a delay of one sample, degrees.
     pub phase_margin: f64,
+    /// What a shaker makes of its command.
+    #[serde(skip)]
+    pub shaker: Option<ShakerPath>,
     /// The linear response as data. The particle is carried if the friction in the drawing holds it at the largest acceleration of the check.
     #[serde(flatten)]
     pub data: MeasuredLinear,
@@ -580,6 +583,7 @@ impl Linear {
         };
         let (omega_0, u_rate) = ((omega - rate.im).hypot(rate.re), u_q / (q.norm() * period));
         Some(Self {
+            shaker: None,
             data: MeasuredLinear {
                 f0: omega_0 / TAU,
                 u_f0: u_rate / TAU,
@@ -620,6 +624,7 @@ impl Linear {
             gain: Complex64::from_polar(self.response_gain, self.phase.to_radians()),
             u_gain: self.u_gain,
             particle: self.data.particle,
+            shaker: self.shaker,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use nalgebra::{Matrix2, RowVector2, Vector2};
 use num_complex::Complex64;
 use phase_lock::Config;
 use vines_model::Sensor;
@@ -27,6 +28,8 @@ pub struct LinearResponse {
     pub u_gain: f64,
     /// The state of the particle that it belongs to.
     pub particle: ParticleState,
+    /// What a shaker makes of its command, if one was measured.
+    pub shaker: Option<ShakerPath>,
 }
 
 impl LinearResponse {
@@ -40,6 +43,7 @@ impl LinearResponse {
             gain: Complex64::new(0.0, -0.5 * omega0),
             u_gain: 0.0,
             particle: ParticleState::Free,
+            shaker: None,
         }
     }
 
@@ -128,17 +132,75 @@ impl Target {
     }
 }
 
-/// What a shaker makes of its command near the natural frequency, without impacts. Amplitudes are those of the bench, in m.
+/// What a shaker makes of its command near the natural frequency, without impacts: reference over command is `gain (s + d)/(s + pole)`, where
+/// `s = i (omega - omega0)`, d is the damping rate of the structure, and amplitudes are those of the bench, in m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShakerPath {
-    /// Decay rate of the pole with which the response settles, and its frequency less the natural one, rad/s.
-    pub pole: [f64; 2],
-    /// Reference per command at the natural frequency, over the larger one at the ends of the range of frequencies: the drop-out.
-    pub drop_out: f64,
+    /// Reference per command of a structure that does not move.
+    pub gain: Complex64,
+    /// Rate, rad/s, with which the response of structure and shaker settles.
+    pub pole: Complex64,
+    /// Damping rate of the structure, rad/s.
+    pub damping_rate: f64,
     /// Whether the reference is a force, and not the displacement of a table.
     pub by_force: bool,
+    /// Largest command, m; infinite without a limit.
+    pub largest: f64,
+    /// Base displacement per reference, m/N or m/m.
+    pub base_per_reference: f64,
+}
+
+impl ShakerPath {
+    /// Least squares of the relative errors of reference over command at some frequencies, rad/s, for a structure with this natural frequency
+    /// and damping rate, rad/s.
+    pub(crate) fn fitted(self, omega0: f64, damping_rate: f64, values: &[(f64, Complex64)]) -> Self {
+        let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+        for (omega, value) in values {
+            let s = Complex64::new(0.0, omega - omega0);
+            let row = RowVector2::new(s, Complex64::ONE) * (value / (s + damping_rate));
+            normal += row.adjoint() * row;
+            right += row.adjoint();
+        }
+        let [inverse, of_pole] = normal.try_inverse().map_or([Complex64::ONE; 2], |inverse| {
+            let found: Vector2<Complex64> = inverse * right;
+            [found[0], found[1]]
+        });
+        Self {
+            gain: 1.0 / inverse,
+            pole: of_pole / inverse,
+            damping_rate,
+            ..self
+        }
+    }
+
+    /// Largest relative error of reference over command at these frequencies.
+    pub(crate) fn error(&self, omega0: f64, values: &[(f64, Complex64)]) -> f64 {
+        let error = |(omega, value): &(f64, Complex64)| (value / self.at(omega - omega0) - 1.0).norm();
+        values.iter().map(error).fold(0.0, f64::max)
+    }
+
+    /// Reference over command at `omega0 + detuning`, rad/s.
+    pub fn at(&self, detuning: f64) -> Complex64 {
+        let s = Complex64::new(0.0, detuning);
+        self.gain * (s + self.damping_rate) / (s + self.pole)
+    }
+
+    /// Amplitude of the command that gives this reference at phase resonance, and this response of an oscillator at its natural frequency
+    /// `omega0`, rad/s, both m.
+    pub fn command(&self, omega0: f64, reference: f64, response: f64) -> f64 {
+        let moved = (self.pole - self.damping_rate) * (response / (0.5 * omega0));
+        (reference + moved).norm() / self.gain.norm()
+    }
+
+    /// What is left of the reference at the natural frequency: the drop-out.
+    pub fn drop_out(&self) -> f64 {
+        self.damping_rate / self.pole.norm()
+    }
+
     /// Phase by which the reference turns within the half-power bandwidth, rad.
-    pub turn: f64,
+    pub fn turn(&self) -> f64 {
+        (self.at(self.damping_rate) * self.at(-self.damping_rate).conj()).arg()
+    }
 }
 
 /// What measuring knows of a rig.
@@ -218,7 +280,8 @@ impl Knowledge {
         let (omega0, epsilon) = (linear.omega0, self.numbers.epsilon);
         let lambda = 2.0 * linear.damping_rate.max(0.0) / (epsilon * omega0);
         let numbers = Dimensionless { omega0, lambda, ..self.numbers };
-        Self { linear, is_measured: true, numbers, ..self }
+        let shaker = linear.shaker.or(self.shaker);
+        Self { linear, is_measured: true, numbers, shaker, ..self }
     }
 
     /// Number of samples in these natural periods.
@@ -261,9 +324,7 @@ impl Scene {
     pub fn knowledge(&self) -> Knowledge {
         let phase = self.controller.phase_target.to_radians();
         let mut knowledge = Knowledge::of(&self.plant, self.resonance, self.amplitude, self.sample_time(), phase);
-        knowledge.shaker = self
-            .structure()
-            .and_then(|structure| structure.shaker_path(self.frequencies()));
+        knowledge.shaker = self.structure().and_then(|structure| structure.shaker_path());
         knowledge.target.through_shaker = knowledge.shaker.is_some();
         knowledge
     }

@@ -3,6 +3,7 @@
 
 mod chain;
 mod faulty;
+mod reference_control;
 mod stages;
 
 use std::error::Error;
@@ -14,10 +15,11 @@ use thiserror::Error;
 use vines_model::{Definition, Sensor};
 
 pub use crate::scene::has_friction;
-use crate::scene::{Excitation, Limits, Scene, SceneShaker, Structure};
+use crate::scene::{Limits, Release, Scene, SceneShaker, Structure};
 
 pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
+pub(crate) use reference_control::BANDWIDTH;
 pub use stages::{Interrupted, Measured, Scaled, SensorsOnly, Stoppable};
 
 /// What the controller asks of the rig for the coming sample period.
@@ -196,6 +198,16 @@ pub enum RigError {
         unit: &'static str,
     },
     #[error(
+        "the shaker does not follow: {asked:.4} {unit} are asked for, and the measured fundamental is off by {error:.4} {unit} for a period; check \
+         amplifier, stinger and sensor"
+    )]
+    ReferenceOff { asked: f64, error: f64, unit: &'static str },
+    #[error(
+        "the amplifier is at its limit: the drive asked for needs {times:.2} times the command that voltage_max or current_max of [shaker] allows; lower \
+         the drive, or the responses of the backbone"
+    )]
+    AmplifierLimit { times: f64 },
+    #[error(
         "the rig accepts frequency and amplitude only, not samples of the base displacement: chain.hold = true and \
          helic devices need a rig that does"
     )]
@@ -354,14 +366,29 @@ impl<P: Primary> Rig for Simulated<P> {
 #[derive(Clone)]
 pub struct SimulatedStructure {
     simulated: Simulated<lovines::Structure>,
+    structure: Structure,
     /// The displacement at the sensor, by the sections.
     sensor: Row,
     /// Base displacement per command, and displacement at the sensor per displacement at the cavity.
     base_per_command: f64,
     reading_per_response: f64,
-    /// The shaker, and the base displacement per reference.
-    shaker: Option<(SceneShaker, f64)>,
-    excitation: Excitation,
+    /// Largest command that the amplifier passes on, V.
+    clipped_at: f64,
+    /// What fails, and when, s.
+    fault: Option<(ShakerFault, f64)>,
+    /// Largest command so far, V.
+    driven: f64,
+}
+
+/// How a shaker fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShakerFault {
+    /// The stinger breaks.
+    StingerBreaks,
+    /// The amplifier clips at half of the present command.
+    AmplifierClips,
+    /// The armature is at its stop: where it is now.
+    AtStop,
 }
 
 impl SimulatedStructure {
@@ -369,16 +396,19 @@ impl SimulatedStructure {
     pub fn new(structure: &Structure, parameters: Parameters, start: State) -> Result<Self, Refused> {
         let start = StructureState { q2: start.q2, dq2: start.dq2, ..StructureState::default() };
         let plant = Plant::with_host(structure.host.clone(), parameters, &start)?;
+        let clipped_at = structure
+            .shaker
+            .as_ref()
+            .map_or(f64::INFINITY, SceneShaker::largest_command);
         Ok(Self {
             simulated: Simulated { plant, sensor: Sensor::Q1, clock: Clock::default() },
             sensor: structure.response(),
             base_per_command: structure.base_per_command(),
             reading_per_response: structure.reading_per_response().abs(),
-            shaker: structure
-                .shaker
-                .clone()
-                .map(|shaker| (shaker, structure.base_per_drive())),
-            excitation: structure.excitation,
+            structure: structure.clone(),
+            clipped_at,
+            fault: None,
+            driven: 0.0,
         })
     }
 
@@ -387,17 +417,65 @@ impl SimulatedStructure {
         &self.simulated.plant
     }
 
+    /// With a fault of the shaker that begins after some seconds.
+    #[must_use]
+    pub fn failing(self, fault: ShakerFault, seconds: f64) -> Self {
+        Self { fault: Some((fault, seconds)), ..self }
+    }
+
+    /// Cuts the stinger; the motion goes on.
+    fn break_stinger(&mut self) -> Result<(), RigError> {
+        let Some(broken) = self.structure.with_broken_stinger() else {
+            return Ok(());
+        };
+        let (structure, coordinates) = broken.map_err(|error| RigError::Failed(error.into()))?;
+        let plant = &self.simulated.plant;
+        let of = |derivative: usize| coordinates.iter().map(|row| plant.point(row)[derivative]).collect();
+        let State { q2, dq2, .. } = plant.state();
+        let state = StructureState { displacements: of(0), velocities: of(1), q2, dq2 };
+        self.simulated.plant.replace_host(structure.host.clone(), &state)?;
+        self.sensor = structure.response();
+        self.structure = structure;
+        Ok(())
+    }
+
+    /// What fails or is cut now: `command`, V, is the amplitude of the drive.
+    fn change(&mut self, command: f64) -> Result<(), RigError> {
+        let begins = |(_, at): &mut (ShakerFault, f64)| self.simulated.clock.time() >= *at;
+        let fault = self.fault.take_if(begins).map(|(fault, _)| fault);
+        let Some(shaker) = &mut self.structure.shaker else {
+            return Ok(());
+        };
+        // A check of the loop drives with a hundredth.
+        self.driven = command.max(self.driven);
+        let is_released = command == 0.0 && self.driven > 0.0 && shaker.release == Release::Cut;
+        match fault {
+            Some(ShakerFault::AmplifierClips) => self.clipped_at = 0.5 * command,
+            Some(ShakerFault::AtStop) => {
+                let row = shaker.rows.armature.clone();
+                shaker.limits.stroke = Some(self.simulated.plant.point(&row)[0].abs());
+            }
+            None if !is_released => {}
+            Some(ShakerFault::StingerBreaks) | None => {
+                self.driven = 0.0;
+                self.break_stinger()?;
+            }
+        }
+        Ok(())
+    }
+
     /// Advances under a drive, m, N or V; a command is clipped, and the other limits of a shaker are looked at.
     ///
     /// # Errors
     /// A value that is not allowed; a limit of the shaker.
     pub fn step(&mut self, drive: lovines::Drive, step: f64) -> Result<(), RigError> {
-        let Some((shaker, _)) = &self.shaker else {
+        self.change(drive.amplitude.hypot(drive.signal[0]))?;
+        let Some(shaker) = &self.structure.shaker else {
             return self.simulated.step(drive, step);
         };
         let Simulated { plant, clock, .. } = &mut self.simulated;
         plant.set_time(clock.time());
-        plant.advance_within(shaker.largest_command(), drive, step)?;
+        plant.advance_within(self.clipped_at, drive, step)?;
         clock.advance(step);
         let rows = &shaker.rows;
         let current = plant.point(&rows.current)[0] + rows.current_per_command * plant.base_displacement();
@@ -417,16 +495,16 @@ impl SimulatedStructure {
         }
         Ok(())
     }
-}
 
-impl SimulatedStructure {
     /// The reference as a base displacement, m: the drive, the force cell or the table.
     fn reference(&self) -> f64 {
         let plant = &self.simulated.plant;
-        let Some((shaker, base_per_reference)) = &self.shaker else {
-            return plant.base_displacement() * self.base_per_command;
-        };
-        base_per_reference * plant.point(shaker.reference(self.excitation))[0]
+        match &self.structure.shaker {
+            None => plant.base_displacement() * self.base_per_command,
+            Some(shaker) => {
+                self.structure.base_per_drive() * plant.point(shaker.reference(self.structure.excitation))[0]
+            }
+        }
     }
 }
 

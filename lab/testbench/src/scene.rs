@@ -51,7 +51,8 @@ pub use controller::{ControllerSettings, KEYS, PhaseLock, key, refusal};
 pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
 pub use names::{Name, Names};
 pub use overrides::{Family, Override};
-pub use shaker::{ARMATURE, Channel, Limits, SceneShaker, TABLE};
+pub use shaker::{ARMATURE, Channel, Limits, Release, SceneShaker, TABLE};
+pub(crate) use shaker::{PLACES, frequencies};
 pub use structure::{Excitation, Structure, StructureMode};
 pub use vines_model::{Definition, Dimensionless, Measurand, Reference, Sensor};
 
@@ -194,7 +195,7 @@ impl Scene {
         let share = structure
             .drive
             .map_or(0.0, |point| shaker.mass * mode.shape[point].powi(2));
-        Some([share, 1.0 + path.pole[1] / mode.omega])
+        Some([share, 1.0 - path.pole.im / mode.omega])
     }
 
     /// The controller's sample time, s: rig and controller agree on it before anything is measured.
@@ -382,6 +383,22 @@ impl Sections {
             if let Some(limit) = shaker.limits.force.filter(|limit| is_force && force > *limit) {
                 let message = format!(
                     "[excitation] asks for {force:.4} N, and shaker.force_max allows {limit} N: lower one, or raise the other"
+                );
+                return Err(SceneError::text(origin, message));
+            }
+        }
+        if let Some(path) = scene.knowledge().shaker() {
+            // The least response at which particles hit: half of the cavity.
+            let command = path.command(
+                scene.dimensionless().omega0,
+                scene.amplitude,
+                0.5 * scene.plant.half_width,
+            );
+            if command > path.largest {
+                let message = format!(
+                    "[excitation] needs {:.2} times the command that voltage_max or current_max of [shaker] allows, at a response of half of the cavity: \
+                     lower the drive, raise the limit, or choose a drive point that moves less",
+                    command / path.largest
                 );
                 return Err(SceneError::text(origin, message));
             }

@@ -2,11 +2,11 @@
 
 use std::collections::VecDeque;
 
-use lovines::{InvalidValue, Parameters};
+use lovines::Parameters;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
 use super::chain::normal;
-use super::{Chain, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated};
+use super::{Chain, Drive, Measured, Rig, RigError, Sensors, SensorsOnly, ShakerFault, Simulated, SimulatedStructure};
 use crate::scene::Scene;
 
 /// What fails in a rig.
@@ -26,6 +26,8 @@ pub enum RigFault {
     Structure,
     /// The rig's clock jumps forward by this many samples.
     Forward(usize),
+    /// The electrodynamic shaker of a scene that has one.
+    Electrodynamic(ShakerFault),
 }
 
 /// How a sensor fails.
@@ -90,6 +92,13 @@ impl RigFault {
             ("structure changes (lost lock)", Structure),
         ]
     };
+
+    /// Those of a scene with a shaker, beside the faults of its sensors.
+    pub const OF_SHAKER: [(&'static str, Self); 3] = [
+        ("stinger breaks", Self::Electrodynamic(ShakerFault::StingerBreaks)),
+        ("amplifier clips", Self::Electrodynamic(ShakerFault::AmplifierClips)),
+        ("armature at its stop", Self::Electrodynamic(ShakerFault::AtStop)),
+    ];
 }
 
 /// Healthy readings that are kept: more than a default period.
@@ -128,10 +137,17 @@ pub fn faulty(
     fault: RigFault,
     seconds: f64,
     ended: impl FnMut(Option<f64>) + 'static,
-) -> Result<SensorsOnly, InvalidValue> {
-    let plant = |stiffness: f64| -> Result<Box<dyn Rig>, InvalidValue> {
-        let plant = Simulated::new(Parameters { stiffness, ..scene.plant }, scene.start)?;
-        Ok(Box::new(plant.with_sensors(scene.resonance)))
+) -> Result<SensorsOnly, RigError> {
+    let plant = |stiffness: f64| -> Result<Box<dyn Rig>, RigError> {
+        let Some(structure) = &scene.structure else {
+            let plant = Simulated::new(Parameters { stiffness, ..scene.plant }, scene.start)?;
+            return Ok(Box::new(plant.with_sensors(scene.resonance)));
+        };
+        let mut plant = SimulatedStructure::new(structure, scene.plant, scene.start)?;
+        if let RigFault::Electrodynamic(fault) = fault {
+            plant = plant.failing(fault, seconds);
+        }
+        Ok(Box::new(Measured::new(plant, scene.resonance, &scene.plant)))
     };
     let changed = (fault == RigFault::Structure).then(|| plant(STIFFER * scene.plant.stiffness));
     let begins = (seconds / scene.sample_time()) as usize;
@@ -237,7 +253,7 @@ impl Rig for Faulty {
                 *reference = Some(self.read(1, sensor, elapsed));
             }
             RigFault::Swapped => (*response, *reference) = (reference.unwrap_or(0.0), Some(*response)),
-            RigFault::Shaker(_) | RigFault::Structure | RigFault::Forward(_) => {}
+            RigFault::Shaker(_) | RigFault::Structure | RigFault::Forward(_) | RigFault::Electrodynamic(_) => {}
         }
         Ok(sensors)
     }

@@ -7,8 +7,9 @@ use lovines::Parameters;
 use thiserror::Error;
 use vines_model::{Definition, Measurand, Reference};
 
+use super::reference_control::ReferenceControl;
 use super::{Drive, GroundTruth, Rig, RigError, RigStage, Sensors};
-use crate::plan::Target;
+use crate::plan::{Knowledge, Target};
 
 /// A rig whose response and reference are displacements, with the sensors of a definition of resonance.
 ///
@@ -110,30 +111,51 @@ impl<R: Rig> RigStage for Measured<R> {
 
 // What the bench makes of the readings of a rig.
 
-/// A rig whose readings are in m, as [`Target::scaled`] says.
+/// A rig whose readings are in m, as [`Target::scaled`] says, and whose shaker, if there is one, is commanded so that it drives as asked.
 pub struct Scaled<'a, R: ?Sized> {
     rig: &'a mut R,
     target: Target,
+    control: Option<ReferenceControl>,
+    /// The last reading of the reference.
+    reference: f64,
 }
 
 impl<'a, R: Rig + ?Sized> Scaled<'a, R> {
-    /// The rig `rig` with the channels of `target`.
+    /// The rig `rig` with the channels of `target`. What it is driven with is the command.
     pub fn new(rig: &'a mut R, target: Target) -> Self {
-        Self { rig, target }
+        Self { rig, target, control: None, reference: 0.0 }
+    }
+
+    /// The rig `rig`, which is driven with the reference, as far as `knowledge` says what its shaker makes of a command.
+    pub fn controlled(rig: &'a mut R, knowledge: &Knowledge) -> Self {
+        let control = ReferenceControl::new(knowledge);
+        Self { control, ..Self::new(rig, knowledge.target) }
+    }
+
+    fn command(&mut self, drive: Drive, step: f64) -> Result<Drive, RigError> {
+        match &mut self.control {
+            // A small module has no code for it, as it has no structures.
+            Some(control) if cfg!(feature = "tables") => control.command(self.reference, drive, step),
+            _ => Ok(drive),
+        }
     }
 }
 
 impl<R: Rig + ?Sized> Rig for Scaled<'_, R> {
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        Ok(self.target.scaled(self.rig.sense()?))
+        let sensors = self.target.scaled(self.rig.sense()?);
+        self.reference = sensors.reference.unwrap_or(0.0);
+        Ok(sensors)
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.rig.advance(drive, step)
+        let command = self.command(drive, step)?;
+        self.rig.advance(command, step)
     }
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.rig.hold(drive, step)
+        let command = self.command(drive, step)?;
+        self.rig.hold(command, step)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

@@ -3,13 +3,12 @@
 use std::f64::consts::{PI, TAU};
 
 use lovines::State;
-use num_complex::Complex64;
-use phase_lock::{Config, ConfigError, Gains, LockCriterion, NONE, PARAMETERS, Parameter, Value as Setting};
+use phase_lock::{Config, ConfigError, LockCriterion, MAX_HARMONICS, NONE, PARAMETERS, Parameter, Value as Setting};
 use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
 use vines_model::ArgumentError;
 
-use crate::plan::{Knowledge, LinearResponse, ShakerPath};
+use crate::plan::{Knowledge, LinearResponse};
 
 use super::{Measurand, Scene, SceneError, Structure, check, given, positive, within};
 
@@ -121,7 +120,7 @@ impl Scene {
                 sample_time: step,
                 omega_min: c.omega_min * omega0,
                 omega_max: c.omega_max * omega0,
-                bandwidth: bandwidth(c.bandwidth * omega0, knowledge),
+                bandwidth: c.bandwidth * omega0,
                 damping_rate: Some(damping_rate).filter(|rate| *rate > 0.0),
                 phase_target: knowledge.target.phase_of_readings(),
                 delay: delay + f64::from(u8::from(self.resonance.is_late())) * step,
@@ -136,15 +135,18 @@ impl Scene {
         )
     }
 
-    /// The configuration for the command of a shaker. The response to it settles with the pole of structure and shaker, and the force cell reads
-    /// harmonics beside a fundamental that falls near the resonance. The balance of power, which takes the drive for the force, does not apply.
+    /// The configuration behind a shaker, whose force cell reads the harmonics of impacts beside a fundamental that falls near the resonance. The
+    /// detector averages over `1/(bandwidth sample_time)` samples: at this coherence, without drop-out, it knows the fundamental to a third.
     fn behind_shaker(knowledge: &Knowledge, config: Config) -> Config {
-        let Some(ShakerPath { drop_out, .. }) = knowledge.shaker() else {
+        let Some(path) = knowledge.shaker() else {
             return config;
         };
-        let coherence_min = config.lock.coherence_min * drop_out.min(1.0).powi(2);
+        let known_to_a_third = 10.0 * config.bandwidth * knowledge.sample_time;
+        let coherence_min = config.lock.coherence_min.min(known_to_a_third) * path.drop_out().min(1.0).powi(2);
         Config {
-            residual_max: None,
+            harmonics: MAX_HARMONICS as u8,
+            // Beside less than a tenth of the force, the transients of the shaker look like failures.
+            residual_max: config.residual_max.filter(|_| path.drop_out() > 0.1),
             lock: LockCriterion { coherence_min, ..config.lock },
             ..config
         }
@@ -155,7 +157,7 @@ impl Scene {
     fn units(&self) -> [f64; 2] {
         let factors = |structure: &Structure| {
             [
-                structure.base_per_command(),
+                structure.base_per_drive(),
                 structure.reading_per_response().abs().recip(),
             ]
         };
@@ -172,7 +174,7 @@ impl Scene {
             Measurand::Velocity => TAU * relative,
             Measurand::Acceleration => relative * self.controller.samples_per_period,
         };
-        RESIDUAL + impulse + self.other_modes()
+        RESIDUAL + impulse + self.other_modes() + self.in_reference(knowledge)
     }
 
     /// Largest plausible response of a structure's other modes, over the smallest response of the backbone: the impacts on a particle of the
@@ -197,6 +199,23 @@ impl Scene {
         let sum: f64 = shares.sum();
         // An undamped mode has no bound; the controller takes numbers only.
         (sum / self.backbone.c_from.min(self.backbone.c_to)).min(1e6)
+    }
+
+    /// Largest plausible harmonics of the reference behind a shaker, over half of the requested amplitude: the same impulses on the particle, whose
+    /// odd harmonics have `4/T` of an impulse each, act on the force cell or table through structure and shaker.
+    fn in_reference(&self, knowledge: &Knowledge) -> f64 {
+        let Some((structure, shaker)) = self.structure().and_then(|one| Some((one, one.shaker.as_ref()?))) else {
+            return 0.0;
+        };
+        let omega = knowledge.linear.omega0;
+        let impulse = 2.0 * self.plant.particle_mass * knowledge.numbers.b * omega;
+        let reference = shaker.reference(structure.excitation);
+        let highest = (0.5 * self.controller.samples_per_period) as usize;
+        let harmonics = (3..highest).step_by(2).map(|n| {
+            let per_force = structure.host.frequency_response_to_cavity(reference, n as f64 * omega);
+            per_force.norm() * impulse * 2.0 * omega / PI
+        });
+        2.0 * harmonics.sum::<f64>() * structure.base_per_drive() / self.amplitude
     }
 
     /// The larger of the requested drive, m, and the one that holds the linear mode at the amplitude at which impacts certainly occur.
@@ -224,54 +243,10 @@ impl Scene {
         let coupled = COUPLED * knowledge.linear.bandwidth().max(f64::MIN_POSITIVE).cbrt();
         Config {
             amplitude_max: limit.or(Some(knowledge.numbers.amplitude(TRACKED))),
-            bandwidth: bandwidth(
-                self.controller.bandwidth.min(coupled) * knowledge.linear.omega0,
-                knowledge,
-            ),
+            bandwidth: self.controller.bandwidth.min(coupled) * knowledge.linear.omega0,
             ..config
         }
     }
-}
-
-/// The bandwidth, rad/s: `wanted`, or the largest one below it with which the loop behind a shaker is stable with a sensitivity of at most 2.
-///
-/// A change of the frequency turns the phase of the structure as `1/(s + d)`. Behind a shaker it does as `(1/d) (a s + |r|²)/((s + a)² + D²)`: the
-/// response settles with the pole `-r = -(a + i D)` of structure and shaker, and the measured force follows it.
-fn bandwidth(wanted: f64, knowledge: &Knowledge) -> f64 {
-    let Some(ShakerPath { pole: [decay, detuning], .. }) = knowledge.shaker() else {
-        return wanted;
-    };
-    let damping = knowledge
-        .linear
-        .damping_rate
-        .max(BANDWIDTH_MIN * knowledge.linear.omega0);
-    let coupled = |s: Complex64| {
-        let square = decay * decay + detuning * detuning;
-        (decay * s + square) / (damping * ((s + decay) * (s + decay) + detuning * detuning))
-    };
-    let distance = |bandwidth: f64| {
-        let Gains { proportional, integral } = Gains::from_bandwidth(bandwidth, damping);
-        // Routh's criterion for d s (s + w) ((s + a)² + D²) + w (kp s + ki) (a s + |r|²).
-        let (square, gain) = (decay * decay + detuning * detuning, bandwidth / damping);
-        let cubic = bandwidth + 2.0 * decay;
-        let quadratic = square + 2.0 * decay * bandwidth + gain * proportional * decay;
-        let linear = bandwidth * square + gain * (proportional * square + integral * decay);
-        if (cubic * quadratic - linear) * linear <= cubic * cubic * gain * integral * square {
-            return 0.0;
-        }
-        let fastest = 10.0 * bandwidth.max(decay.hypot(detuning));
-        let decades = |n: u32| DECADES * f64::from(n) / f64::from(FREQUENCIES);
-        let open = |n: u32| {
-            let s = Complex64::new(0.0, fastest * 10_f64.powf(-decades(n)));
-            (1.0 + bandwidth * (proportional * s + integral) / (s * (s + bandwidth)) * coupled(s)).norm()
-        };
-        (0..FREQUENCIES).map(open).fold(f64::INFINITY, f64::min)
-    };
-    let mut bandwidth = wanted;
-    while distance(bandwidth) < 1.0 / SENSITIVITY && bandwidth > FINEST * wanted {
-        bandwidth *= 0.95;
-    }
-    bandwidth
 }
 
 /// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.
@@ -286,16 +261,7 @@ fn lock_criterion(linear: &LinearResponse) -> LockCriterion {
     }
 }
 
-/// Number of frequencies at which the open loop is examined.
-const FREQUENCIES: u32 = 500;
-/// Decades that these frequencies span, from ten times the fastest rate down.
-const DECADES: f64 = 5.0;
-/// Largest sensitivity, the inverse of the smallest distance of the open loop from -1: a phase margin of at least 29 degrees, and a gain margin of
-/// 2 (K. J. Åström, R. M. Murray, "Feedback Systems", Princeton 2008, section 11.5).
-const SENSITIVITY: f64 = 2.0;
-/// Smallest bandwidth of the loop over the one that is wanted.
-const FINEST: f64 = 1e-3;
-/// That bandwidth over the cube root of E/A.
+/// Bandwidth at which the loops are weakly coupled, over the cube root of E/A.
 const COUPLED: f64 = 0.9;
 /// Largest phase error that counts as locked, degrees.
 const PHASE_TOLERANCE: f64 = 0.3;

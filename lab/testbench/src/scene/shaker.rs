@@ -3,12 +3,13 @@
 use std::f64::consts::TAU;
 
 use lovines::host::{Equations, Row};
-use lovines::oscillator::Oscillator;
 use lovines::{Amplifier, Excitation as HostExcitation, Host, Plant, Shaker, ShakerRows};
+use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use super::{Excitation, Structure};
 use crate::plan::ShakerPath;
+use crate::rig::BANDWIDTH;
 
 /// Points that a shaker adds to those of a structure.
 pub const ARMATURE: &str = "armature";
@@ -25,12 +26,28 @@ pub struct SceneShaker {
     pub limits: Limits,
     /// The reference per command at the natural frequency, without impacts: N/V for a force, m/V for a table.
     pub reference_per_command: f64,
+    /// Whether the stinger is cut when the drive is released.
+    pub release: Release,
     /// What is measured.
     #[serde(skip)]
     pub rows: ShakerRows,
     /// The structure as the reference drives it: with the mass in front of the force cell.
     #[serde(skip)]
     pub alone: Box<Structure>,
+    /// The structure without it.
+    #[serde(skip)]
+    without: Box<Structure>,
+}
+
+/// What happens to the stinger at the release, for the free decay.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Release {
+    /// The shaker stays attached: its coil shorted behind an amplifier that controls the voltage, and open behind one that controls the current.
+    #[default]
+    Attached,
+    /// The stinger is cut.
+    Cut,
 }
 
 /// Limits of a shaker. What the amplifier controls is clipped at its limit; reaching another one ends the experiment.
@@ -125,28 +142,37 @@ impl Structure {
         channels
     }
 
-    /// What the shaker makes of its command, for a controller with this range of frequencies, rad/s; `None` without a shaker.
-    pub(crate) fn shaker_path(&self, range: [f64; 2]) -> Option<ShakerPath> {
-        let (shaker, mode, host) = (self.shaker.as_ref()?, self.mode(), &self.host);
-        let response = self.response();
-        // The pole whose part of the response is largest.
-        let part = |n: usize| {
-            let ([x, v], [a, b]) = (host.sections()[n].steady(mode.omega), response[n]);
-            (x * a + v * b).norm()
-        };
-        let largest = (0..response.len()).max_by(|one, other| part(*one).total_cmp(&part(*other)))?;
-        let Oscillator { delta, omega0, .. } = host.sections()[largest].oscillator;
-        let detuning = (omega0 * omega0 - delta * delta).max(0.0).sqrt() - mode.omega;
-        let at = |omega: f64| host.frequency_response(shaker.reference(self.excitation), omega);
-        let half_power = [-1.0, 1.0].map(|side| at(mode.omega * (1.0 + side * mode.zeta)));
-        let ends = range.map(|omega| at(omega).norm());
-        Some(ShakerPath {
-            pole: [delta, detuning],
-            drop_out: shaker.reference_per_command / ends[0].max(ends[1]),
+    /// What the shaker makes of its command, from the frequency response at the frequencies of the check.
+    pub(crate) fn shaker_path(&self) -> Option<ShakerPath> {
+        let (shaker, mode) = (self.shaker.as_ref()?, self.mode());
+        let damping_rate = mode.zeta * mode.omega;
+        let reference = shaker.reference(self.excitation);
+        let values = frequencies(mode.omega, damping_rate).map(|omega| {
+            let value = self.host.frequency_response(reference, omega) / shaker.reference_per_command;
+            (omega, value)
+        });
+        let path = ShakerPath {
+            gain: Complex64::ONE,
+            pole: Complex64::ONE,
+            damping_rate,
             by_force: self.excitation == Excitation::Force,
-            turn: (half_power[1] * half_power[0].conj()).arg(),
-        })
+            largest: shaker.largest_command() * self.base_per_command(),
+            base_per_reference: self.base_per_drive(),
+        };
+        Some(path.fitted(mode.omega, damping_rate, &values))
     }
+}
+
+/// Places of the frequencies about the natural one, half-power bandwidths.
+pub(crate) const PLACES: [f64; 7] = [-1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0];
+
+/// Frequencies at which a shaker is measured, rad/s: at [`PLACES`], and at the bandwidth of its control to each side.
+pub(crate) fn frequencies(omega0: f64, damping_rate: f64) -> [f64; 9] {
+    let sides = [1.0 - BANDWIDTH, 1.0 + BANDWIDTH];
+    std::array::from_fn(|n| match PLACES.get(n) {
+        Some(place) => omega0 + 2.0 * place * damping_rate,
+        None => omega0 * sides[n - PLACES.len()],
+    })
 }
 
 /// The section as written.
@@ -177,6 +203,8 @@ pub(super) struct ShakerSection {
     current_max: Option<f64>,
     stroke_max: Option<f64>,
     force_max: Option<f64>,
+    #[serde(default)]
+    release: Release,
 }
 
 fn one() -> f64 {
@@ -190,7 +218,7 @@ impl ShakerSection {
     }
 
     /// The structure with the shaker attached.
-    pub(super) fn attach(&self, mut structure: Structure) -> Result<Structure, String> {
+    pub(super) fn attach(&self, structure: Structure) -> Result<Structure, String> {
         let end_mass = match (structure.excitation, self.cell_mass, self.table_mass) {
             (Excitation::Base, None, Some(mass)) => mass,
             (Excitation::Force, mass, None) => mass.unwrap_or(0.0),
@@ -248,51 +276,83 @@ impl ShakerSection {
                 "the structure has a point \"{point}\", which a shaker adds; rename it"
             ));
         }
-        let (alone, bare) = (structure.equations.clone(), structure.modes.clone());
-        if structure.excitation == Excitation::Force {
-            structure.carry(end_mass)?;
+        let structure = structure.with_shaker(shaker, limits, self.release)?;
+        match &structure.shaker {
+            Some(attached) if attached.reference_per_command > 0.0 => Ok(structure),
+            _ => Err("the command does not move the driven mode: check the drive point, and gain and Bl".into()),
         }
-        let by = structure.excitation.of_host();
-        let equations = shaker.attach(&alone, by).map_err(|error| error.to_string())?;
-        let host = equations
-            .host(HostExcitation::Force)
-            .map_err(|error| error.to_string())?;
-        let rows = shaker.rows(&host, &alone, by).map_err(|error| error.to_string())?;
-        let beyond = 1 + usize::from(self.has_table());
+    }
+}
+
+/// Stiffness that is left of a stinger that is cut, over the whole: a host needs a stiffness.
+const CUT: f64 = 1e-9;
+
+impl Structure {
+    /// This structure with a shaker attached.
+    fn with_shaker(mut self, shaker: Shaker, limits: Limits, release: Release) -> Result<Self, String> {
+        let text = |error: lovines::InvalidHost| error.to_string();
+        let without = Box::new(self.clone());
+        if self.excitation == Excitation::Force {
+            self.carry(shaker.end_mass)?;
+        }
+        let by = self.excitation.of_host();
+        let equations = shaker.attach(&without.equations, by).map_err(text)?;
+        let host = equations.host(HostExcitation::Force).map_err(text)?;
+        let rows = shaker.rows(&host, &without.equations, by).map_err(text)?;
+        let beyond = rows_beyond(self.excitation);
         let coordinates = |point: usize, beyond: usize| -> Vec<f64> {
-            let of_structure: Vec<f64> = match &alone {
-                Equations::Modes(_) => bare.iter().map(|mode| mode.shape[point]).collect(),
-                _ => (0..structure.points.len())
+            let of_structure: Vec<f64> = match &without.equations {
+                Equations::Modes(_) => without.modes.iter().map(|mode| mode.shape[point]).collect(),
+                _ => (0..self.points.len())
                     .map(|n| f64::from(u8::from(n == point)))
                     .collect(),
             };
             of_structure.into_iter().chain(vec![0.0; beyond]).collect()
         };
         let points = |host: &Host, beyond: usize| {
-            let rows = (0..structure.points.len()).map(|point| host.row(&coordinates(point, beyond)));
-            rows.collect::<Result<Vec<_>, _>>().map_err(|error| error.to_string())
+            let rows = (0..self.points.len()).map(|point| host.row(&coordinates(point, beyond)).map_err(text));
+            rows.collect::<Result<Vec<_>, _>>()
         };
-        let mut driven = structure.clone();
-        if structure.excitation == Excitation::Force {
-            driven.equations = alone.carrying(end_mass).map_err(|error| error.to_string())?;
-            driven.host = driven.equations.host(by).map_err(|error| error.to_string())?;
+        let mut driven = self.clone();
+        if self.excitation == Excitation::Force {
+            driven.equations = without.equations.carrying(shaker.end_mass).map_err(text)?;
+            driven.host = driven.equations.host(by).map_err(text)?;
             driven.rows = points(&driven.host, 0)?;
         }
         let points = points(&host, beyond)?;
-        let omega = structure.mode().omega;
+        let omega = self.mode().omega;
         let mut attached = SceneShaker {
             shaker,
             limits,
             reference_per_command: 0.0,
+            release,
             rows,
+            without,
             alone: Box::new(driven),
         };
-        let structure = Structure { equations, host, rows: points, ..structure };
+        let structure = Self { equations, host, rows: points, ..self };
         let reference = attached.reference(structure.excitation);
         attached.reference_per_command = structure.host.frequency_response(reference, omega).norm();
-        if attached.reference_per_command <= 0.0 {
-            return Err("the command does not move the driven mode: check the drive point, and gain and Bl".into());
-        }
-        Ok(Structure { shaker: Some(attached), ..structure })
+        Ok(Self { shaker: Some(attached), ..structure })
     }
+
+    /// This structure after its stinger has broken, with the displacements of all coordinates before: both have the same coordinates.
+    pub(crate) fn with_broken_stinger(&self) -> Option<Result<(Self, Vec<Row>), String>> {
+        let SceneShaker { shaker, limits, release, without, .. } = self.shaker.as_ref()?;
+        let stinger = [CUT * shaker.stinger[0], 0.0];
+        let broken = (**without)
+            .clone()
+            .with_shaker(Shaker { stinger, ..*shaker }, *limits, *release);
+        let n = without.modes.len() + rows_beyond(self.excitation);
+        let coordinate = |place: usize| {
+            let of_coordinate: Vec<f64> = (0..n).map(|other| f64::from(u8::from(other == place))).collect();
+            self.host.row(&of_coordinate).map_err(|error| error.to_string())
+        };
+        Some(broken.and_then(|broken| Ok((broken, (0..n).map(coordinate).collect::<Result<_, _>>()?))))
+    }
+}
+
+/// Coordinates of a structure with a shaker beside its own: the table, and the stretch of the stinger.
+fn rows_beyond(excitation: Excitation) -> usize {
+    1 + usize::from(excitation == Excitation::Base)
 }

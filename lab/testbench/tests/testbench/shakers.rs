@@ -1,16 +1,21 @@
 //! Guards the section `[shaker]`: presets that lock on the exact orbit with their shaker, the check, limits, and a sentence for every mistake.
 
+use std::cell::Cell;
 use std::f64::consts::PI;
+use std::rc::Rc;
 
 use lovines::{Drive, Plant, StructureState};
 use vines_testbench::backbone::track;
+use vines_testbench::comparison::COMPARED_ABOVE;
 use vines_testbench::experiment::ExperimentError;
+use vines_testbench::identification::{WINDOW, decay_points};
 use vines_testbench::loop_check::{Verdict, check};
-use vines_testbench::rig::{BuiltIn, RigError, Sensors, SensorsOnly, Simulated};
+use vines_testbench::rig::{BuiltIn, RigError, RigFault, SensorFault, Sensors, SensorsOnly, Simulated, faulty};
 use vines_testbench::scene::{Scene, SceneError};
 use vines_testbench::survey::{BehindShaker, Survey, phase_resonant};
 
-use super::{Altered, identified, tracked};
+use super::common::{at, crossings, mean_square};
+use super::{Altered, identified, record, tracked};
 
 const PRESETS: [&str; 3] = [
     include_str!("../../../../scenes/shaker-cantilever.toml"),
@@ -28,8 +33,7 @@ fn preset(n: usize, changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
 
 #[test]
 fn presets_lock_on_the_exact_orbit_with_their_shaker() {
-    // On the mass of the oscillator the force drops out.
-    for n in [0, 2] {
+    for n in 0..PRESETS.len() {
         let scene = preset(n, &[]).unwrap();
         let at = identified(&scene).unwrap().lock.at;
         // The response is held where the force is within 1e-4 of the one asked for.
@@ -107,8 +111,7 @@ fn a_check_behind_a_shaker_measures_the_structure_and_names_a_fault() {
                 quantity.name, quantity.measured, quantity.uncertainty, quantity.expected
             );
         }
-        let expected = [Verdict::Healthy, Verdict::DropOut][usize::from(n == 1)];
-        assert_eq!(checked.verdict, expected, "preset {n}");
+        assert_eq!(checked.verdict, Verdict::Healthy, "preset {n}");
         for (quantity, share) in checked.quantities.iter().zip([2e-5, 1e-3]) {
             assert!(
                 (quantity.measured / quantity.expected - 1.0).abs() < share,
@@ -150,6 +153,53 @@ fn a_limit_that_is_reached_ends_the_experiment_with_its_name() {
 }
 
 #[test]
+fn the_decay_after_the_stinger_is_cut_is_that_of_the_simulation() {
+    let scene = preset(1, &[("[shaker]", "[shaker]\nrelease = \"cut\"")]).unwrap();
+    let record = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+    let truth = crossings(&record, &scene);
+    let points = decay_points(&record, &scene.knowledge(), WINDOW).points;
+    let errors = points.iter().filter(|point| point.c > COMPARED_ABOVE);
+    let errors: Vec<f64> = errors
+        .filter_map(|point| Some(point.sigma - at(&truth, point.tau)?))
+        .collect();
+    let (count, error) = (errors.len(), mean_square(errors).sqrt());
+    println!("{count} points, RMS error {error:.1e} of sigma");
+    // The same fit of the default scene, without a shaker, has an error of 3e-3.
+    assert!(count > 20 && error < 1e-2, "{count} {error}");
+}
+
+#[test]
+fn faults_of_a_shaker_end_the_drive_with_their_name() {
+    use {RigFault::*, SensorFault::*};
+    let scene = preset(0, &[]).unwrap();
+    let healthy = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+    let begins = (healthy.settled + 30) as f64 * healthy.sample_time;
+    let [stinger, amplifier, stop] = RigFault::OF_SHAKER.map(|(_, fault)| fault);
+    for (fault, name) in [
+        (Base(Reversed), "opposite sign"),
+        (Base(Dead), "force cell reads nothing"),
+        (Base(Saturated), "it saturates"),
+        (amplifier, "amplifier"),
+        (stinger, "stinger is broken"),
+        (stop, "shaker.stroke_max"),
+    ] {
+        for phase in [0.0, 0.3] {
+            let zero = Rc::new(Cell::new(None));
+            let told = Rc::clone(&zero);
+            let seconds = begins + phase * scene.dimensionless().natural_period();
+            let mut rig = faulty(&scene, fault, seconds, move |time| told.set(time)).unwrap();
+            let error = record(&mut rig, &scene).unwrap_err().to_string();
+            drop(rig);
+            let time = zero.get();
+            assert!(
+                error.contains(name) && time.is_some_and(|time| time < 0.3),
+                "{fault:?}: {time:?}, {error}"
+            );
+        }
+    }
+}
+
+#[test]
 fn what_is_wrong_with_a_shaker_is_said_in_one_sentence() {
     for (n, from, to, parts) in [
         (0, "\nmass = 0.057", "\nmass = 0", ["mass of the armature", "kg"]),
@@ -169,6 +219,12 @@ fn what_is_wrong_with_a_shaker_is_said_in_one_sentence() {
         ),
         (0, "cell_mass = 0.02", "table_mass = 2", ["table_mass", "base"]),
         (0, "force_max = 45.0", "force_max = 0.1", ["force_max", "N"]),
+        (
+            0,
+            "voltage_max = 40.0",
+            "voltage_max = 0.4",
+            ["voltage_max", "times the command"],
+        ),
         (1, "M = 3.807", "", ["M", "SI"]),
         (2, "table_mass = 40.0", "table_mass = 0", ["end of the stinger", "kg"]),
         (
