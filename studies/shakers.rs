@@ -149,7 +149,7 @@ fn main() -> Result<(), Failure> {
         let (points, settled, beyond, worst, periods, why) = found;
         format!(
             "{seed},{n},{share:.4},{suspension:.3},{stinger:.2},{coil:.3},{drop_out:.4},{bandwidth:.4},{points},{settled},{beyond},{worst:.2},{periods:.0},\"{}\"",
-            why.split([':', ';', '"']).next().unwrap_or_default()
+            why.split([';', '"']).next().and_then(|why| why.split(": ").next()).unwrap_or_default()
         )
     }).collect();
     let tracked = found.iter().filter(|one| one.1 >= 4 && one.2 == 0).count();
