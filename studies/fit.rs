@@ -1,21 +1,21 @@
 //! How far are the parameters that a fit finds from the truth, from what they state, and from the best that the points allow?
 //!
-//! A rig is drawn (epsilon 0.002 to 0.03, lambda 0.4 to 2.5, r 0.4 to 0.9), and a client's scene that is wrong: r by 0.2, b by 10 %, m by 20 %,
-//! c by 30 %, k by 1 %. The client fits f0, zeta, r, b and epsilon to the backbone that it tracks (`points`), also with the linear response that a
-//! loop check of the rig at rest measures (`linear`), or to a recording, cut at both ends, which the plant follows: of the tracked backbone (`levels`), of a lock whose drive then changes slowly (`sweeps`), or of the search, the hold and
-//! the decay of `vines identify` (`decays`). For each parameter, of the fits that are not rejected:
-//! the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the error over u, and that over the
-//! Cramér–Rao bound of the same points (of recordings, u is this bound); and the numbers of fits that are rejected, and of rigs without a fit.
+//! A rig is drawn (epsilon 0.002 to 0.03, lambda 0.4 to 2.5, r 0.4 to 0.9), and a client's scene that is wrong: r by 0.2, b by 10 %, m by 20 %, c by
+//! 30 %, k by 1 %. The client fits f0, zeta, r, b and epsilon to the backbone that it tracks (`points`), also with the linear response that a loop
+//! check of the rig at rest measures (`linear`), or to a recording, cut at both ends, which the plant follows: of the tracked backbone (`levels`), of
+//! a lock whose drive then changes slowly (`sweeps`), or of the search, the hold and the decay of `vines identify` (`decays`). For each parameter, of
+//! the fits that are not rejected: the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the
+//! error over u, and that over the Cramér–Rao bound of the same points (of recordings, u is this bound); and the numbers of fits that are rejected,
+//! and of rigs without a fit.
 //!
 //! `effects` gives each rig one hidden effect, in turn friction, tilt, two laws of restitution, and a cubic stiffness, which moves the measured
-//! frequencies by harmonic balance; and as many rigs none. Half of
-//! the rigs with friction are at rest when a loop check measures them. A rig is drawn again if
-//! the loop does not lock on it, if friction keeps the particle from the walls, or if the effect moves its points by less than 5 u. The table has the
-//! numbers of rigs that were drawn, measured, flagged because the ideal cavity does not describe their points, explained by the right effect, by a wrong one
-//! alone, and by the right one only among others; and the coverage of the strength.
+//! frequencies by harmonic balance; and as many rigs none. Half of the rigs with friction are at rest when a loop check measures them. A rig is drawn
+//! again if the loop does not lock on it, if friction keeps the particle from the walls, or if the effect moves its points by less than 5 u. The
+//! table has the numbers of rigs that were drawn, measured, flagged because the ideal cavity does not describe their points, explained by the right
+//! effect, by a wrong one alone, and by the right one only among others; and the coverage of the strength.
 //!
-//! Arguments: `points`, `linear`, `levels`, `sweeps`, `decays`, `effects`, the name of one effect or `none`, RIGS, SEED, SNR in dB or `none`. Writes validation/fit.csv or, for `effects`,
-//! validation/fit_effects.csv.
+//! Arguments: `points`, `linear`, `levels`, `sweeps`, `decays`, `effects`, the name of one effect or `none`, RIGS, SEED, SNR in dB or `none`. Writes
+//! validation/fit.csv or, for `effects`, validation/fit_effects.csv.
 
 mod common;
 

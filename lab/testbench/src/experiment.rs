@@ -565,8 +565,8 @@ enum Failure {
     Other,
 }
 
-/// Change from period to period, over the amplitude, of a channel that has failed.
-const JUMP: f64 = 0.3;
+/// Change from period to period, over the amplitude, of a channel that has failed. It chooses the words, not whether a run ends.
+const CHANGED: f64 = 0.3;
 
 fn how(readings: &[f64], period: usize) -> Option<Failure> {
     let (before, now) = readings.split_at(period);
@@ -574,7 +574,7 @@ fn how(readings: &[f64], period: usize) -> Option<Failure> {
     let begin = now
         .iter()
         .zip(before)
-        .position(|(now, before)| (now - before).abs() > JUMP * largest)?;
+        .position(|(now, before)| (now - before).abs() > CHANGED * largest)?;
     let (now, before) = (&now[begin..], &before[begin..]);
     let [least, most] = now
         .iter()
@@ -590,7 +590,7 @@ fn how(readings: &[f64], period: usize) -> Option<Failure> {
         .count();
     Some(match () {
         () if is_same(least, 0.0) && is_same(most, 0.0) => Failure::Nothing,
-        () if (ratio + 1.0).abs() < JUMP => Failure::Reversed,
+        () if (ratio + 1.0).abs() < CHANGED => Failure::Reversed,
         () if at_limit > 2 => Failure::Clipped,
         () => Failure::Other,
     })
@@ -605,7 +605,6 @@ fn short(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
     use crate::scene::Scene;
 
     #[test]
