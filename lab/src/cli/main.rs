@@ -87,7 +87,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::try_parse().unwrap_or_else(|error| shell::with_commands(error).exit());
+    let cli = Cli::try_parse().unwrap_or_else(|error| shell::with_advice(error).exit());
     match dispatch(cli.command).and_then(Results::show) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -41,12 +41,16 @@ pub(super) fn man(arguments: &ManArguments) -> Result<String, Failure> {
     Ok(String::from_utf8_lossy(&page).into_owned())
 }
 
-/// The error of the command line; if it is a command that does not exist, with a list of those that do.
-pub(super) fn with_commands(mut error: clap::Error) -> clap::Error {
-    if error.kind() == ErrorKind::InvalidSubcommand {
-        let list = vec![commands().into()];
-        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(list));
-    }
+/// The error of the command line, with what to do: of a command that does not exist the list of those that do, of a scene its option.
+pub(super) fn with_advice(mut error: clap::Error) -> clap::Error {
+    let advice = match (error.kind(), error.get(ContextKind::InvalidArg)) {
+        (ErrorKind::InvalidSubcommand, _) => commands(),
+        (ErrorKind::UnknownArgument, Some(ContextValue::String(file))) if file.ends_with(".toml") => {
+            format!("a scene has an option: --scene {file}")
+        }
+        _ => return error,
+    };
+    error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
     error
 }
 

@@ -117,6 +117,7 @@ fn input_without_sense_ends_with_one_message_and_code_two_and_without_a_result_w
         ("dance", 2, "commands are identify, backbone, fit"),
         ("help dance", 2, "commands are identify, backbone, fit"),
         ("man dance", 2, "commands are identify, backbone, fit"),
+        ("check rig.toml", 2, "--scene rig.toml"),
         ("rig --listen 127.0.0.1:0 --sessions 0", 2, "1.."),
         ("orbit --sigma=-1000", 2, "above 0"),
         ("orbit --sigma=-1 --set=excitation.G=0.6", 1, "vines map"),
