@@ -12,9 +12,10 @@
 //! frequencies by harmonic balance; and as many rigs none. Half of the rigs with friction are at rest when a loop check measures them. A rig is drawn
 //! again if the loop does not lock on it, if friction keeps the particle from the walls, or if the effect moves its points by less than 5 u. The
 //! table has the numbers of rigs that were drawn, measured, flagged because the ideal cavity does not describe their points, explained by the right
-//! effect, by a wrong one alone, and by the right one only among others; and the coverage of the strength.
+//! effect alone, by wrong ones, and by the right one among others; and the coverage of the strength. `two effects` gives each rig two of them:
+//! `named` counts the rigs for which both are possible, `among_others` those for which one is.
 //!
-//! Arguments: `points`, `linear`, `levels`, `sweeps`, `decays`, `effects`, the name of one effect or `none`, RIGS, SEED, SNR in dB or `none`. Writes
+//! Arguments: `points`, `linear`, `levels`, `sweeps`, `decays`, `effects`, the name of one effect, `two effects` or `none`, RIGS, SEED, SNR in dB or `none`. Writes
 //! validation/fit.csv or, for `effects`, validation/fit_effects.csv.
 
 mod common;
@@ -109,60 +110,85 @@ fn fitted((points, scene, truth): &Points, known: &[Known]) -> Result<Found, Fai
 
 fn effects(source: &str, count: usize, seed: u64, snr: &str) -> Result<(), Failure> {
     let header = "effect,snr_dB,seed,drawn,rigs,flagged,named,misnamed,among_others,strength_within_1.96u,largest_u";
-    let name = |effect: Option<Effect>| effect.map_or("none", Effect::name);
-    let mut effects: Vec<Option<Effect>> = Effect::ALL.map(Some).into_iter().chain([None]).collect();
-    effects.retain(|effect| ["effects", name(*effect)].contains(&source));
-    if effects.is_empty() {
-        let names = Effect::ALL.map(Effect::name).join(", ");
-        return Err(
-            format!("{source}: there are points, linear, levels, sweeps, decays, effects, {names} and none").into(),
-        );
+    let names = [&Effect::ALL.map(Effect::name)[..], &["none", "two effects"]].concat();
+    let chosen = names.iter().filter(|name| match source {
+        "effects" => **name != "two effects",
+        source => **name == source,
+    });
+    let chosen: Vec<&str> = chosen.copied().collect();
+    if chosen.is_empty() {
+        let names = names.join(", ");
+        return Err(format!("{source}: there are points, linear, levels, sweeps, decays, effects, {names}").into());
     }
-    for effect in effects {
-        let hidden = |n: &usize| (*n < count).then(|| Effect::ALL[n % 5]) == effect;
-        let seeds: Vec<u64> = (0..2 * count).filter(hidden).map(|n| seed + 1000 * n as u64).collect();
+    for name in chosen {
+        let hidden = |n: usize| -> Vec<Effect> {
+            match name {
+                "none" => Vec::new(),
+                "two effects" => PAIRS[n % PAIRS.len()].map(|one| Effect::ALL[one]).into(),
+                _ => vec![Effect::ALL[n % 5]],
+            }
+        };
+        let is_its = |n: &usize| match name {
+            "none" => *n >= count,
+            "two effects" => *n < count,
+            _ => *n < count && Effect::ALL[n % 5].name() == name,
+        };
+        let rigs: Vec<usize> = (0..2 * count).filter(is_its).collect();
         // The rigs that the loop does not lock, and those that the effect hardly moves, are drawn again.
-        let measure = |seed: &u64| {
-            let mut uniform = uniform(*seed);
-            let mut rigs = (1..).map(|drawn| (drawn, named(effect, &mut uniform, snr)));
+        let measure = |n: &usize| {
+            let mut uniform = uniform(seed + 1000 * *n as u64);
+            let mut rigs = (1..).map(|drawn| (drawn, named(&hidden(*n), &mut uniform, snr)));
             let measured = rigs.find_map(|(drawn, found)| Some((drawn, found.ok()??)));
             let (drawn, mut found) = measured.ok_or("no rig")?;
             found.counts[0] = drawn;
             Ok(found)
         };
-        let found = survey(&seeds.len().to_string(), |n| Ok(seeds[n]), measure)?;
+        let found = survey(&rigs.len().to_string(), |n| Ok(rigs[n]), measure)?;
         let counts = counts(&found).map(|count| count.to_string());
         let ratios: Vec<f64> = found.into_iter().flat_map(|one| one.ratios).collect();
         let (within, largest) = (share(&ratios, 1.96), ends(&ratios)[1]);
-        let name = name(effect);
         let row = format!("{name},{snr},{seed},{},{within:.3},{largest:.1}", counts.join(","));
-        write("fit_effects", header, 2, &[row])?;
+        write("fit_effects", header, 3, &[row])?;
     }
     Ok(())
 }
+
+/// Pairs of effects that a rig can have.
+const PAIRS: [[usize; 2]; 9] = [[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [1, 3], [1, 4], [2, 4], [3, 4]];
 
 /// Largest friction and tilt, times g, over b omega0²: on the default rig a friction of 0.31, and 9 degrees. The first is the largest additional
 /// stiffness over m omega0² as well.
 const LARGEST: [f64; 2] = [0.1, 0.05];
 
-/// Draws a rig with a hidden effect, or with none, and counts whether it is flagged, named, misnamed, and named among others. The ratio is the
-/// error of the strength over its standard uncertainty. `None` where the effect hardly moves the points of the rig.
-fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<Found>, Failure> {
+/// Draws a rig with hidden effects, or with none, and counts whether it is flagged, named, misnamed, and named among others. The ratio is the
+/// error of the strength over its standard uncertainty. `None` where the effects hardly move the points of the rig.
+fn named(hidden: &[Effect], uniform: Uniform, snr: &str) -> Result<Option<Found>, Failure> {
     let ratios @ [epsilon, _, r] = drawn(uniform);
     let mut scales = SCALES.map(|range| uniform(-range, range));
     scales[4] = scales[4].min(0.95 / r - 1.0);
-    let (noise, size) = (uniform(0.0, 1e6) as u64, uniform(0.1, 1.0));
+    let noise = uniform(0.0, 1e6) as u64;
     let (ideal, scene, plan) = client(&(ratios, noise, scales), snr)?;
-    let strength = match effect {
-        Some(Effect::Tilt) => (LARGEST[1] * size / GRAVITY).powi(2),
-        Some(Effect::Hardening) => LARGEST[0] * size * epsilon,
-        _ => LARGEST[0] * size / GRAVITY,
-    };
     // Laws of restitution have the value r at the speed of impacts of the middle of the stable motions, B = 0.85.
     let speed = 2.0 * 0.85 * (1.0 + epsilon) / (1.0 + r);
-    let cavity = effect.map_or(Cavity::IDEAL, |effect| effect.cavity(strength, r, speed));
-    let rig = Parameters { cavity, ..ideal };
-    let tracked = if effect == Some(Effect::Friction) && noise.is_multiple_of(2) {
+    let mut rig = ideal;
+    let (mut strengths, mut h) = (Vec::new(), 0.0);
+    for effect in hidden {
+        let size = uniform(0.1, 1.0);
+        let strength = match effect {
+            Effect::Tilt => (LARGEST[1] * size / GRAVITY).powi(2),
+            Effect::Hardening => LARGEST[0] * size * epsilon,
+            _ => LARGEST[0] * size / GRAVITY,
+        };
+        strengths.push(effect.strength(strength, r, speed));
+        let (cavity, of_effect) = (&mut rig.cavity, effect.cavity(strength, r, speed));
+        match effect {
+            Effect::Friction => cavity.kinetic_friction = of_effect.kinetic_friction,
+            Effect::Tilt => cavity.tilt = of_effect.tilt,
+            Effect::Viscoelastic | Effect::Plastic => cavity.restitution = of_effect.restitution,
+            Effect::Hardening => h = strength,
+        }
+    }
+    let tracked = if hidden.contains(&Effect::Friction) && noise.is_multiple_of(2) {
         let scene = scene.clone().at_rest();
         let mut bench = behind_chain(rig, &scene)?;
         let checked = check(&mut *bench, &plan)?;
@@ -176,11 +202,6 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
     if !matches!(regime, Some(Regime::Symmetric | Regime::Asymmetric)) {
         return Ok(None);
     }
-    let h = if effect == Some(Effect::Hardening) {
-        strength
-    } else {
-        0.0
-    };
     let points: Vec<MeasuredPoint> = measured(&tracked)
         .into_iter()
         .map(|point| {
@@ -190,7 +211,7 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
         .collect();
     let moved = at(&points, scene.resonance, &ideal, &[]).ok_or("the ideal rig has no such motion")?;
     let (_, moved) = range((0.0, 0.0), moved.residuals.iter().flatten().map(|one| one.abs()));
-    if points.len() < 6 || (effect.is_some() && moved < 5.0) {
+    if points.len() < 6 || (!hidden.is_empty() && moved < 5.0) {
         return Ok(None);
     }
     // A ruler and a scale.
@@ -201,33 +222,40 @@ fn named(effect: Option<Effect>, uniform: Uniform, snr: &str) -> Result<Option<F
         known.expect("a positive value")
     });
     let found = explain(&points, scene.resonance, &scene.plant, &known, |_| {})?;
-    let is_flagged = found.ideal.is_rejected();
-    let best = found.explains().map(|best| best.effect);
-    let candidates = found.candidates.iter().filter(|one| Some(one.effect) == effect);
-    let possible: Vec<f64> = candidates
-        .filter(|one| !one.fit.is_rejected())
-        .map(|one| (one.strength.value - one.effect.strength(strength, r, speed)).abs() / one.strength.uncertainty)
-        .collect();
-    let verdict: Vec<_> = found
-        .candidates
-        .iter()
-        .map(|one| {
-            (
-                one.effect,
-                one.fit.chi_square.round(),
-                one.fit.degrees,
-                one.fit.left_out.len(),
-            )
-        })
-        .collect();
+    let possible: Vec<Effect> = found.possible().map(|one| one.effect).collect();
+    let describes = |effect: &Effect| {
+        found
+            .candidates
+            .iter()
+            .find(|one| one.effect == *effect && !one.fit.is_rejected())
+    };
+    let errors = hidden.iter().zip(&strengths).filter_map(|(effect, truth)| {
+        let strength = describes(effect)?.strength;
+        Some((strength.value - truth).abs() / strength.uncertainty)
+    });
+    let errors: Vec<f64> = errors.collect();
+    let verdict = found.candidates.iter().map(|one| {
+        let Fit { chi_square, degrees, left_out, .. } = &one.fit;
+        (one.effect, chi_square.round(), *degrees, left_out.len())
+    });
     println!(
-        "{ratios:.4?} {effect:?} {size:.2} moves by {moved:.0} u: ideal {:.0} of {}; {verdict:?}; strength {possible:.1?} u",
-        found.ideal.chi_square, found.ideal.degrees
+        "{ratios:.4?} {hidden:?} {strengths:.2?} moves by {moved:.0} u: ideal {:.0} of {}; {:?}; possible {possible:?}; strength {errors:.1?} u",
+        found.ideal.chi_square,
+        found.ideal.degrees,
+        verdict.collect::<Vec<_>>()
     );
-    let named = best.is_some() && best == effect;
-    let [misnamed, among_others] = [best.is_some(), !possible.is_empty()].map(|is_so| is_so && !named);
-    let counts = [false, true, is_flagged, named, misnamed, among_others].map(usize::from);
-    Ok(Some(Found { ratios: possible, counts, ..Found::default() }))
+    let right = possible.iter().filter(|one| hidden.contains(one)).count();
+    let named = !hidden.is_empty() && right == hidden.len() && (right == possible.len() || right > 1);
+    let counts = [
+        false,
+        true,
+        found.ideal.is_rejected(),
+        named,
+        right == 0 && !possible.is_empty(),
+        right > 0 && !named,
+    ];
+    let counts = counts.map(usize::from);
+    Ok(Some(Found { ratios: errors, counts, ..Found::default() }))
 }
 
 /// The points of a tracked backbone.

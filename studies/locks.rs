@@ -15,7 +15,8 @@ use vines_model::orbit::Orbit;
 /// Locks a rig, and counts it as correct, uncertain or wrong.
 fn lock(scene: &Scene) -> Result<Found, Failure> {
     let record = record(&mut *Simulated::of(scene)?, &scene.plan())?;
-    let at = identify(&record, &scene.plan())?.lock.at;
+    let lock = identify(&record, &scene.plan())?.lock;
+    let at = lock.at;
     let mut orbits = phase_resonant(&scene.dimensionless());
     orbits.retain(|orbit| orbit.stable || record.held);
     let largest = |[sigma, c]: [f64; 2]| sigma.max(c);
@@ -33,7 +34,11 @@ fn lock(scene: &Scene) -> Result<Found, Failure> {
         _ => 2,
     }] = 1;
     if counts[0] == 0 {
-        println!("{:?}: errors {errors:?}, {ratios:.1?} u", scene.dimensionless());
+        let (is, held) = (lock.regime, if record.held { ", held" } else { "" });
+        println!(
+            "{:?}: errors {errors:?}, {ratios:.1?} u, {is}{held}",
+            scene.dimensionless()
+        );
     }
     let periods = Some(record.settled as f64 / scene.controller.samples_per_period);
     let (errors, ratios) = (errors.into(), ratios.into());

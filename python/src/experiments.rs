@@ -21,8 +21,8 @@ use vines_testbench::{
     comparison::{Comparison, TrackedComparison},
     experiment,
     fit::{
-        Candidate, Channel, Contents, EffectReport, Found, Known, MeasuredPoint, Measurements, Recording, Selection,
-        Table, find,
+        Candidate, Channel, Contents, EffectReport, Explanation, Found, Known, MeasuredPoint, Measurements, Recording,
+        Selection, Table, find,
     },
     identification,
     linear::MeasuredLinear,
@@ -125,10 +125,16 @@ pub fn fit(
         .iter()
         .map(|part| json!({"part": part, "point": part.point.map(numbers)}))
         .collect();
+    let names = |one: &Explanation| {
+        one.possible()
+            .map(|one| one.effect.name())
+            .collect::<Vec<_>>()
+            .join(" or ")
+    };
     let reports = |candidates: &[Candidate]| candidates.iter().map(Candidate::report).collect::<Vec<EffectReport>>();
     json(&json!({
         "report": fit.report(&scene.plant),
-        "explained_by": explanation.as_ref().and_then(|one| one.explains()).map(|best| best.effect.name()),
+        "explained_by": explanation.as_ref().map(names).filter(|names| !names.is_empty()),
         "effects": explanation.map(|one| reports(&one.candidates)),
         "alternatives": reports(&alternatives),
         "linear": linear,

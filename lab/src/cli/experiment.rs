@@ -215,7 +215,11 @@ impl Session {
                     ExperimentError::NoLock { .. }
                     | ExperimentError::NotReached { .. }
                     | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. } => {
-                        advice::reason(scene, &plan.knowledge.numbers, advice::last_regime(&samples, plan))
+                        let runs_away = advice::runs_away(&samples, plan);
+                        let reason = runs_away.then_some(advice::Reason::WrongSign);
+                        reason.or_else(|| {
+                            advice::reason(scene, &plan.knowledge.numbers, advice::last_regime(&samples, plan))
+                        })
                     }
                     _ => None,
                 };

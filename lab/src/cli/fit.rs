@@ -161,33 +161,39 @@ fn only_if_ideal(alternatives: &[EffectReport]) -> String {
 /// What the effects of a real cavity say.
 fn explained(explanation: &Explanation) -> String {
     let chi_square = |fit: &Fit| format!("{:.0} for {}", fit.chi_square, fit.degrees);
-    let list = |candidates: &mut dyn Iterator<Item = &Candidate>| {
-        let texts = candidates.map(|candidate| format!("{} ({})", candidate.effect, chi_square(&candidate.fit)));
-        texts.collect::<Vec<String>>().join(", ")
-    };
     let without = chi_square(&explanation.ideal);
-    let Some(best) = explanation.explains() else {
-        let tried = match list(&mut explanation.candidates.iter()) {
-            none if none.is_empty() => "none of them a motion exists".into(),
-            some => some,
+    let possible = explanation.possible().map(|candidate| {
+        let EffectReport { effect, symbol, unit, left_out, .. } = candidate.report();
+        let (strength, space) = (
+            with_decimals(candidate.strength),
+            if unit.is_empty() { "" } else { " " },
+        );
+        let without = match left_out {
+            0 => String::new(),
+            _ => {
+                format!("; {left_out} points of the smallest responses do not belong to this motion, and are left out")
+            }
         };
-        return format!("no single effect explains it: chi-square is {without} without one, with {tried}");
-    };
-    let EffectReport { effect, symbol, unit, left_out, .. } = best.report();
-    let (strength, space) = (with_decimals(best.strength), if unit.is_empty() { "" } else { " " });
-    let mut text = format!(
-        "{effect} explains it: {symbol} = {strength}{space}{unit}, chi-square {}; without it, chi-square is {without}",
-        chi_square(&best.fit)
-    );
-    if left_out > 0 {
-        text +=
-            &format!("; {left_out} points of the smallest responses do not belong to this motion, and are left out");
+        let chi_square = chi_square(&candidate.fit);
+        format!("{effect} ({symbol} = {strength}{space}{unit}, chi-square {chi_square}{without})")
+    });
+    let possible: Vec<String> = possible.collect();
+    match &possible[..] {
+        [] => {
+            let tried = explanation.candidates.iter();
+            let tried = tried.map(|one| format!("{} ({})", one.effect, chi_square(&one.fit)));
+            let tried = match tried.collect::<Vec<String>>().join(", ") {
+                none if none.is_empty() => "none of them a motion exists".into(),
+                some => some,
+            };
+            format!("no single effect explains it: chi-square is {without} without one, with {tried}")
+        }
+        [one] => format!("{one} explains it; without it, chi-square is {without}"),
+        several => format!(
+            "{} explains it, the points do not say which; without it, chi-square is {without}",
+            several.join(" or ")
+        ),
     }
-    let others = list(&mut explanation.possible());
-    if !others.is_empty() {
-        text += &format!("; the points do not exclude {others}");
-    }
-    text
 }
 
 /// What the points say of a linear response.

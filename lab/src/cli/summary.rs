@@ -4,6 +4,7 @@ use vines::advice::Reason;
 use vines::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use vines::fit::{Contradiction, FittedParameter};
 use vines::identification::{DecayEnd, Friction, Regime, ResonancePoint};
+use vines::numerics::SIGNIFICANT;
 use vines::orbit::Orbit;
 use vines::regime_map::Map;
 use vines::scene::{Definition, Dimensionless, Scene};
@@ -76,6 +77,11 @@ pub(super) fn not_locked(reason: &Reason, scene: &Scene) -> String {
         )
     };
     let text = match reason {
+        Reason::WrongSign => {
+            return "the loop runs away from resonance: its frequency rises while the response lags, or falls while it leads. The sign of the \
+                    controller's gain, or of its phase, is wrong"
+                .into();
+        }
         Reason::Unstable { g, range } => {
             let range = range.map_or_else(
                 || "at no G".into(),
@@ -208,6 +214,12 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     if let Some(tone) = lock.tone {
         note(&format!(
             "{tone}: more than the particle can cause, so it is no part of the motion; check the cable of the sensor"
+        ));
+    }
+    let smallest = result.curve.places().iter().map(|[.., g]| *g).reduce(f64::min);
+    if let Some(smallest) = smallest.filter(|g| (at.g - g).abs() < SIGNIFICANT * at.u_g) {
+        note(&format!(
+            "the drive lies at the fold within its uncertainty: the smallest of the exact backbone is G = {smallest:.6}"
         ));
     }
     for orbit in result.others() {

@@ -1,10 +1,12 @@
 //! Advice after a run without the expected lock, from the exact orbits of the scene.
 
+use std::f64::consts::FRAC_PI_4;
+
 use vines_model::numerics::range;
 use vines_model::orbit::{Orbit, exact_backbone};
 use vines_model::regime::Regime;
 
-use crate::identification::classify;
+use crate::identification::{Cycle, classify};
 use crate::plan::Plan;
 use crate::record::Sample;
 use crate::scene::{Dimensionless, Scene};
@@ -46,6 +48,8 @@ fn drives(orbits: &[Orbit]) -> Option<[f64; 2]> {
 #[derive(Debug, Clone, PartialEq)]
 #[expect(missing_docs, reason = "each variant explains its fields")]
 pub enum Reason {
+    /// The loop runs away from resonance ([`runs_away`]).
+    WrongSign,
     /// No orbit at the drive `g` is stable; the range of drives is that of [`stable_range`].
     Unstable { g: f64, range: Option<[f64; 2]> },
     /// The controller may not set the frequency of any of these stable orbits.
@@ -54,6 +58,18 @@ pub enum Reason {
     NoImpacts { stable: Vec<Orbit>, onset: f64 },
     /// The motion is of this regime, and coexists with these stable orbits.
     Coexists { stable: Vec<Orbit>, regime: Regime },
+}
+
+/// Whether the loop runs away from resonance: its frequency has left the first one in the direction opposite to the one that the phase asks for,
+/// and the phase is beyond that of the half-power point. Above resonance the response lags, and the frequency must fall.
+pub fn runs_away(samples: &[Sample], plan: &Plan) -> bool {
+    let last = &samples[samples.len().saturating_sub(plan.hold)..];
+    let cycle = Cycle::of(last, plan.knowledge.sample_time, 0.0, plan.knowledge.target);
+    let first = samples.iter().find(|sample| sample.command.drive.amplitude > 0.0);
+    cycle.zip(first).is_some_and(|(cycle, first)| {
+        let moved = cycle.omega - first.command.drive.omega;
+        cycle.phase_error.abs() > FRAC_PI_4 && moved * cycle.phase_error < 0.0
+    })
 }
 
 /// The reason from the scene, the numbers of its rig and the regime of the last periods; it holds for the ideal cavity.
@@ -80,4 +96,42 @@ pub fn last_regime(samples: &[Sample], plan: &Plan) -> Option<Regime> {
     let last = &samples[samples.len().saturating_sub(plan.hold)..];
     let omega = last.last()?.command.drive.omega;
     Some(classify(last, plan.knowledge.sample_time, omega).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::{Command, Drive, Simulated};
+
+    #[test]
+    fn a_frequency_that_leaves_resonance_against_the_phase_shows_the_wrong_sign() {
+        let mut scene = Scene::load(None, &[]).unwrap().at_rest();
+        scene.amplitude *= 0.01;
+        let (plan, omega0) = (scene.plan(), scene.plant.natural_frequency());
+        for (from, to, is_wrong) in [
+            (1.0, 1.05, true),
+            (1.0, 0.95, true),
+            (1.1, 1.05, false),
+            (0.9, 0.95, false),
+        ] {
+            let mut rig = Simulated::of(&scene).unwrap();
+            let mut phase: f64 = 0.0;
+            let mut sample = |n: usize| {
+                let omega = omega0 * if n == 0 { from } else { to };
+                let amplitude = scene.amplitude;
+                let drive = Drive { omega, amplitude, displacement: amplitude * phase.sin() };
+                let sensors = rig.sense().unwrap();
+                rig.advance(drive, plan.knowledge.sample_time).unwrap();
+                phase += omega * plan.knowledge.sample_time;
+                Sample {
+                    time: n as f64 * plan.knowledge.sample_time,
+                    sensors,
+                    command: Command { drive, ..Command::default() },
+                    ground_truth: None,
+                }
+            };
+            let samples: Vec<Sample> = (0..plan.knowledge.samples(300.0)).map(&mut sample).collect();
+            assert_eq!(runs_away(&samples, &plan), is_wrong, "from {from} to {to}");
+        }
+    }
 }

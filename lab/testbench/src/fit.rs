@@ -86,7 +86,7 @@ const LIMITS: [[f64; 2]; UNKNOWNS] = {
 };
 /// Numbers of the largest or the smallest responses without which the fit is tried.
 const TRIMMED: [usize; 4] = [1, 2, 4, 8];
-/// Probability at which responses that belong to the motion are left out, for all numbers together.
+/// Probability at which points that belong to the motion are left out, for all choices together.
 const FALSE_ALARM: f64 = 1e-3;
 /// Relative gain of the squared distance from the curve at which the nearest place on it counts as found.
 const NEAREST: f64 = 1e-12;
@@ -357,12 +357,11 @@ impl Fit {
 
 /// Fits the parameters to `points`. The rig `expected` is where the search begins; the points show resonance as `definition` says.
 ///
-/// The largest or the smallest responses are left out where the rest fits significantly better without them: the 1:1 motion exists between two
-/// unknown amplitudes. Where the model is rejected all the same, the points that contradict it most are left out one by one instead, as long as
-/// each gain is significant. If more than a fifth of the points would have to be left out, the fit is that of all points, and rejected.
+/// Points without which the rest fits significantly better are left out, as [`Problem::without_strangers`] finds them. If that does not make the
+/// model describe the others, the fit is that of all points, and rejected.
 ///
 /// # Errors
-/// Too few points, values that are not positive, points that no motion has, or that do not determine the parameters.
+/// Too few points, numbers that are not positive, and points that no symmetric 1:1 motion has, or that do not determine the parameters.
 pub fn fit(
     points: &[MeasuredPoint],
     definition: Definition,
@@ -371,24 +370,12 @@ pub fn fit(
 ) -> Result<Fit, FitError> {
     let problem = Problem::new(checked(points)?, definition, known);
     let all = problem.fit(expected)?;
-    let numbers: Vec<usize> = (0..points.len()).collect();
-    let trimmed = problem.trimmed(numbers.clone(), all.clone(), expected);
-    let describes = Some(trimmed).filter(|(_, fit)| !fit.is_rejected());
-    let (mut kept, mut fit) = describes.unwrap_or_else(|| (numbers, all.clone()));
-    while fit.is_rejected() {
-        let size = |residual: &[f64; 3]| residual.iter().map(|part| part * part).sum::<f64>();
-        let sizes: Vec<f64> = fit.residuals.iter().map(size).collect();
-        let worst = (0..sizes.len()).max_by(|first, second| sizes[*first].total_cmp(&sizes[*second]));
-        kept.remove(worst.ok_or(FitError::NoMotion)?);
-        if !problem.may_keep(kept.len()) {
-            return Ok(all);
-        }
-        let next = problem.of(&kept).fit(expected)?;
-        // A model that is wrong everywhere contradicts no point much more than its neighbours.
-        if probability(fit.chi_square - next.chi_square, 1) >= FALSE_ALARM / points.len() as f64 {
-            return Ok(all);
-        }
-        fit = next;
+    let (mut kept, mut fit): (Vec<usize>, _) = ((0..points.len()).collect(), all.clone());
+    while let Some(rest) = problem.without_strangers(&kept, &fit, expected) {
+        (kept, fit) = rest;
+    }
+    if fit.is_rejected() {
+        return Ok(all);
     }
     fit.left_out = (0..points.len()).filter(|n| !kept.contains(n)).collect();
     Ok(fit)
@@ -519,17 +506,9 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
 
     /// The speed follows the parameters: only what is perpendicular to the curve counts.
     fn derivatives(&self, x: &Unknowns, at: &Vec<Nearest>) -> Option<Vec<Unknowns>> {
-        let mut rows = Vec::new();
-        for (n, Nearest { speed, along }) in at.iter().enumerate() {
-            let mut columns = [Vector3::zeros(); UNKNOWNS];
-            let is_free = |(i, _): &(usize, &mut Vector3<f64>)| *i < 5 || *i == 6 && self.free;
-            for (i, column) in columns.iter_mut().enumerate().filter(is_free) {
-                *column = across(along, &slope(|step| self.residual(&shifted(x, i, step), n, *speed))?);
-            }
-            rows.extend([0, 1, 2].map(|channel| Unknowns::from_fn(|i, _| columns[i][channel])));
-        }
-        rows.extend(self.known_rows(x));
-        Some(rows)
+        self.rows(x, at.iter().map(|place| place.along), |n, i| {
+            slope(|step| self.residual(&shifted(x, i, step), n, at[n].speed))
+        })
     }
 
     fn limits(&self) -> [[f64; 2]; UNKNOWNS] {
@@ -549,6 +528,26 @@ impl<'a> Problem<'a> {
         Self { points, definition, known, has_scale, free: false }
     }
 
+    /// Derivatives of the residuals: those of the points perpendicular to the direction of the curve, `along`, and those of what is known.
+    /// `derivative`: that of the residual of a point by an unknown.
+    fn rows(
+        &self,
+        x: &Unknowns,
+        along: impl Iterator<Item = Vector3<f64>>,
+        derivative: impl Fn(usize, usize) -> Option<Vector3<f64>>,
+    ) -> Option<Vec<Unknowns>> {
+        let mut rows = Vec::new();
+        for (n, along) in along.enumerate() {
+            let mut columns = [Vector3::zeros(); UNKNOWNS];
+            for i in (0..UNKNOWNS).filter(|i| *i < 5 || *i == 6 && self.free) {
+                columns[i] = across(&along, &derivative(n, i)?);
+            }
+            rows.extend([0, 1, 2].map(|channel| Unknowns::from_fn(|i, _| columns[i][channel])));
+        }
+        rows.extend(self.known_rows(x));
+        Some(rows)
+    }
+
     /// Number of independent residuals.
     fn equations(&self) -> usize {
         2 * self.points.len() + self.known.iter().map(Known::equations).sum::<usize>()
@@ -565,41 +564,49 @@ impl<'a> Problem<'a> {
         count >= FEWEST && (self.points.len() - count) * LEFT_OUT <= self.points.len()
     }
 
-    /// The points that remain where the largest or smallest responses of `kept` belong to another motion, and their fit.
+    /// The points of `kept` that remain without those that do not belong to them, and their fit; `None` where all belong.
     ///
-    /// Without the k largest or smallest, chi-square falls by a chi-square of 2 k degrees of freedom if all belong to one motion. The number
-    /// whose fall is the least probable is left out, until no fall is significant. By the fit of the others, the 1:1 motion must have
-    /// ended at the outermost response that is left out: a model that is wrong everywhere shows most at both ends.
-    fn trimmed(&self, mut kept: Vec<usize>, mut fit: Fit, expected: &Parameters) -> (Vec<usize>, Fit) {
-        let order = self.by_falling_response();
-        loop {
-            let rest: Vec<usize> = order.iter().copied().filter(|n| kept.contains(n)).collect();
-            let tests = TRIMMED.iter().flat_map(|k| [(*k, 0), (0, *k)]);
-            let without = tests
-                .filter(|(high, low)| self.may_keep(rest.len().saturating_sub(high + low)))
-                .filter_map(|(high, low)| {
-                    let mut kept = rest[high..rest.len() - low].to_vec();
-                    kept.sort_unstable();
-                    let problem = self.of(&kept);
-                    let starts = [Some(fit.x), problem.start(&fit.plant(expected))];
-                    let next = problem.fit_from(starts.into_iter().flatten()).ok()?;
-                    let [smallest, largest] = next.range(self.definition)?;
-                    let outermost = self.points[if high > 0 { rest[0] } else { rest[rest.len() - 1] }].response;
-                    let aside = SIGNIFICANT * outermost.uncertainty;
-                    let has_ended = match high {
-                        0 => outermost.value - aside < smallest,
-                        _ => outermost.value + aside > largest,
-                    };
-                    if !has_ended {
-                        return None;
-                    }
-                    Some((probability(fit.chi_square - next.chi_square, high + low), kept, next))
-                });
-            match without.min_by(|first, second| first.0.total_cmp(&second.0)) {
-                Some((p, rest, next)) if p < FALSE_ALARM / (2 * TRIMMED.len()) as f64 => (kept, fit) = (rest, next),
-                _ => return (kept, fit),
-            }
-        }
+    /// Without k points, chi-square falls by a chi-square of 2 k degrees of freedom if all belong to one motion. The points whose fall is the least
+    /// probable are left out, if that is significant: k of the largest or of the smallest responses, because the 1:1 motion exists between two
+    /// unknown amplitudes, or, where the model is rejected, the one that contradicts it most. By the fit of the others, the 1:1 motion must
+    /// have ended at the outermost response of several: a model that is wrong everywhere shows most at both ends.
+    fn without_strangers(&self, kept: &[usize], fit: &Fit, expected: &Parameters) -> Option<(Vec<usize>, Fit)> {
+        let mut order = self.by_falling_response();
+        order.retain(|n| kept.contains(n));
+        let ends = TRIMMED.iter().flat_map(|k| [(*k, 0), (0, *k)]);
+        let ends = ends.filter(|(high, low)| self.may_keep(order.len().saturating_sub(high + low)));
+        let ends = ends.filter_map(|(high, low)| {
+            let (rest, next) = self.rest(&order[high..order.len() - low], fit, expected)?;
+            let [smallest, largest] = next.range(self.definition)?;
+            let outermost = self.points[if high > 0 { order[0] } else { order[order.len() - 1] }].response;
+            let aside = SIGNIFICANT * outermost.uncertainty;
+            let has_ended = match high {
+                0 => outermost.value - aside < smallest,
+                _ => outermost.value + aside > largest,
+            };
+            let p = probability(fit.chi_square - next.chi_square, high + low) * (2 * TRIMMED.len()) as f64;
+            has_ended.then_some((p, rest, next))
+        });
+        let size = |n: usize| fit.residuals[n].iter().map(|part| part * part).sum::<f64>();
+        let worst = (0..kept.len()).max_by(|first, second| size(*first).total_cmp(&size(*second)))?;
+        let worst = Some(worst).filter(|_| fit.is_rejected() && self.may_keep(kept.len() - 1));
+        let worst = worst.and_then(|worst| {
+            let (rest, next) = self.rest(&[&kept[..worst], &kept[worst + 1..]].concat(), fit, expected)?;
+            let p = probability(fit.chi_square - next.chi_square, 1) * self.points.len() as f64;
+            Some((p, rest, next))
+        });
+        let (p, rest, next) = ends.chain(worst).min_by(|first, second| first.0.total_cmp(&second.0))?;
+        (p < FALSE_ALARM).then_some((rest, next))
+    }
+
+    /// Some of the points, in their order, and their fit from that of more points.
+    fn rest(&self, kept: &[usize], fit: &Fit, expected: &Parameters) -> Option<(Vec<usize>, Fit)> {
+        let mut kept = kept.to_vec();
+        kept.sort_unstable();
+        let problem = self.of(&kept);
+        let starts = [Some(fit.x), problem.start(&fit.plant(expected))];
+        let next = problem.fit_from(starts.into_iter().flatten()).ok()?;
+        Some((kept, next))
     }
 
     /// The numbers of the points, from the largest response on.

@@ -895,6 +895,13 @@ fn the_clock_is_fitted_and_the_phase_of_the_base_says_which_times_hold() {
         assert!(one.notes[0].contains("rounded"), "{:?}", one.notes);
         assert!((one.sample_time / 1.133_8e-3 - 1.0).abs() < 1.5e-5 && one.response.len() == 4000);
     }
+    // A clock with the resolution of a sample repeats a time, or leaves one out.
+    for step in [0.9995e-3, 1.0005e-3] {
+        let even = |n: f64| 100.0 + step * n;
+        let one = record(&|n| (1e3 * even(n)).round() / 1e3, &even);
+        assert!(one.notes[0].contains("rounded"), "{:?}", one.notes);
+        assert!((one.sample_time / step - 1.0).abs() < 1e-5 && one.response.len() == 4000);
+    }
     // Samples that are taken at uneven times are interpolated.
     let one = record(&shaken, &shaken);
     assert!(one.notes[0].contains("interpolated"), "{:?}", one.notes);

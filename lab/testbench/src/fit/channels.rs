@@ -1,6 +1,7 @@
 //! The channels of a file, and how two of them become a recording: names, units and the clock, whatever the format.
 
 use vines_model::Measurand;
+use vines_model::numerics::{golden_section, mean, mean_square, range, slope};
 
 use super::recording::{Recording, RecordingError};
 use crate::scene::unit;
@@ -54,14 +55,6 @@ const EVEN: f64 = 1e-3;
 /// A step over the 99th percentile of all steps from which samples are missing.
 const GAP: f64 = 1.5;
 
-/// A channel in SI units.
-struct Measured {
-    name: String,
-    unit: &'static str,
-    values: Vec<f64>,
-    clock: Option<[f64; 2]>,
-}
-
 /// Even times that fit those of a channel.
 struct Clock {
     start: f64,
@@ -89,9 +82,9 @@ impl Contents {
         let mut response = self.measured(response, "response", &motions, &mut units)?;
         let mut drive = match (&selection.drive, self.commanded(selection)?) {
             (None, Some(commanded)) => commanded,
-            (None, None) if self.find("reference")?.is_none() => Measured {
+            (None, None) if self.find("reference")?.is_none() => Channel {
                 name: String::new(),
-                unit: "m",
+                unit: "m".into(),
                 values: vec![0.0; response.values.len()],
                 clock: response.clock,
             },
@@ -110,13 +103,43 @@ impl Contents {
                 [start, rate.map_or(step, |rate| 1.0 / rate)]
             }
         };
-        if time.is_none() {
-            self.align(&mut response, &mut drive, &mut notes)?;
+        let mut begins = 0;
+        if let (None, Some(clock), Some(other)) = (&time, response.clock, drive.clock)
+            && (clock != other || response.values.len() != drive.values.len())
+        {
+            let counts = [&response, &drive].map(|one| one.values.len());
+            let Some(first) = align(&mut response, &mut drive, clock, other) else {
+                return Err(self.refused(&format!(
+                    ": channels {} and {} have no common time; were they recorded together?",
+                    response.name, drive.name
+                )));
+            };
+            begins = first;
+            notes.push(format!(
+                "{}: channel {} begins {:.6e} s after {} and has {} samples of {:.6e} s, not {} of {:.6e} s; the common {} samples are used",
+                self.origin,
+                drive.name,
+                other[0] - clock[0],
+                response.name,
+                counts[1],
+                other[1],
+                counts[0],
+                clock[1],
+                response.values.len()
+            ));
         }
-        let mut start = start;
         if let Some(late) = selection.late.filter(|_| !drive.name.is_empty()) {
-            let begins = self.shift([&mut response, &mut drive], late / sample_time)?;
-            start += begins as f64 * sample_time;
+            let clocks = [0.0, -late].map(|start| [start, sample_time]);
+            let Some(first) = align(&mut response, &mut drive, clocks[0], clocks[1]) else {
+                return Err(self.refused(&format!(
+                    ": channel {} cannot be {} samples later than {}: it has {}",
+                    drive.name,
+                    late / sample_time,
+                    response.name,
+                    drive.values.len()
+                )));
+            };
+            begins += first;
             notes.push(format!(
                 "{}: channel {} is {late} s later than {}, as given, and is corrected",
                 self.origin, drive.name, response.name
@@ -126,9 +149,9 @@ impl Contents {
         Ok(Recording {
             origin: self.origin.clone(),
             channels: [response.name, drive.name],
-            start,
+            start: start + begins as f64 * sample_time,
             sample_time,
-            measurands: [response.unit, drive.unit].map(|unit| Measurand::of_unit(unit).unwrap_or_default()),
+            measurands: [response.unit, drive.unit].map(|unit| Measurand::of_unit(&unit).unwrap_or_default()),
             response: response.values,
             drive: drive.values,
             notes,
@@ -217,7 +240,7 @@ impl Contents {
         option: &str,
         allowed: &[&str],
         notes: &mut Vec<String>,
-    ) -> Result<Measured, RecordingError> {
+    ) -> Result<Channel, RecordingError> {
         let (channel, given) = self.named(text, option)?;
         let Channel { name, unit: stated, values, clock } = channel;
         let written = given.as_deref().unwrap_or(stated).trim();
@@ -260,7 +283,7 @@ impl Contents {
             ));
         }
         let values = values.iter().map(|value| factor * value).collect();
-        Ok(Measured { name: name.clone(), unit, values, clock: *clock })
+        Ok(Channel { name: name.clone(), unit: unit.into(), values, clock: *clock })
     }
 
     /// Whether the table has the columns of a recording of `vines`, which is in SI units.
@@ -271,7 +294,7 @@ impl Contents {
     }
 
     /// The base that a run of `vines` without a base sensor commanded: from its columns omega and E.
-    fn commanded(&self, selection: &Selection) -> Result<Option<Measured>, RecordingError> {
+    fn commanded(&self, selection: &Selection) -> Result<Option<Channel>, RecordingError> {
         let is_silent = |channel: &Channel| channel.values.iter().all(|value| value.is_nan());
         if self.find("reference")?.is_some_and(|channel| !is_silent(channel)) {
             return Ok(None);
@@ -282,23 +305,23 @@ impl Contents {
         let Some(time) = self.time(selection, &mut Vec::new())? else {
             return Ok(None);
         };
-        let step = line(&time.values).step;
+        let step = Clock::of(&time.values).step;
         let (mut phase, mut before) = (0.0, amplitude.values.first().copied().unwrap_or(0.0));
         let base = omega.values.iter().zip(&amplitude.values).map(|(omega, amplitude)| {
             let value = before * f64::sin(phase);
             (phase, before) = (phase + omega * step, *amplitude);
             value
         });
-        Ok(Some(Measured {
+        Ok(Some(Channel {
             name: "E".into(),
-            unit: "m",
+            unit: "m".into(),
             values: base.collect(),
             clock: None,
         }))
     }
 
     /// The channel of the time, s.
-    fn time(&self, selection: &Selection, notes: &mut Vec<String>) -> Result<Option<Measured>, RecordingError> {
+    fn time(&self, selection: &Selection, notes: &mut Vec<String>) -> Result<Option<Channel>, RecordingError> {
         let last = |channel: &Channel| channel.name.rsplit(['/', '.']).next().unwrap_or("").to_lowercase();
         let mut usual = self.channels.iter().filter(|channel| TIMES.contains(&&*last(channel)));
         let (first, second) = (usual.next(), usual.next());
@@ -316,159 +339,85 @@ impl Contents {
     /// Start and step of the clock that fits the times. Samples at uneven times are interpolated.
     fn fitted(
         &self,
-        time: &Measured,
+        time: &Channel,
         rate: Option<f64>,
-        both: [&mut Measured; 2],
+        both: [&mut Channel; 2],
         notes: &mut Vec<String>,
     ) -> Result<[f64; 2], RecordingError> {
-        let (times, name) = (&time.values, &time.name);
-        let refused = |message: String| self.refused(&format!(", channel {name}: {message}"));
-        for one in &both {
-            if one.values.len() != times.len() {
-                let (count, channel, other) = (times.len(), &one.name, one.values.len());
-                return Err(refused(format!(
-                    "it has {count} values, and channel {channel} has {other}"
-                )));
-            }
+        let (times, name, origin) = (&time.values, &time.name, &self.origin);
+        let refused = |message: String| Err(self.refused(&format!(", channel {name}: {message}")));
+        let count = times.len();
+        if let Some(one) = both.iter().find(|one| one.values.len() != count) {
+            let other = one.values.len();
+            return refused(format!("it has {count} values, and channel {} has {other}", one.name));
         }
         if let Some(n) = times.iter().position(|value| !value.is_finite()) {
-            return Err(refused(format!("{} is not a time", self.place(n))));
+            return refused(format!("{} is not a time", self.place(n)));
         }
-        let clock = line(times);
-        if times.len() < 4 || clock.step.is_nan() || clock.step <= 0.0 {
-            let (first, last) = (times.first().unwrap_or(&f64::NAN), times.last().unwrap_or(&f64::NAN));
-            return Err(refused(format!(
-                "the time goes from {first} s to {last} s in {} values, and must rise; name another channel, or give `rate` and a copy of the file \
-                 without this channel",
-                times.len()
-            )));
-        }
-        let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let is_broken = {
-            let mut sorted = steps.clone();
-            sorted.sort_by(f64::total_cmp);
-            let usual = sorted[(sorted.len() - 1) * 99 / 100].max(clock.step);
-            move |step: &f64| *step > GAP * usual || *step < -0.5 * clock.step
-        };
-        if let Some(n) = steps.iter().position(is_broken) {
-            return Err(RecordingError::new(format!(
-                "{}, {}: the time goes from {} s to {} s, where a step is {:.6e} s: the recording is interrupted there. Fit the parts as files of \
-                 their own, `vines fit one.csv two.csv`",
-                self.origin,
-                self.place(n + 1),
-                times[n],
-                times[n + 1],
-                clock.step
-            )));
-        }
-        let [response, drive] = both;
-        let mut verdict = "even";
-        if clock.residual > EVEN * clock.step {
-            steps.retain(|step| *step <= 0.0);
-            let is_strict = steps.is_empty();
-            let count = ((times[times.len() - 1] - times[0]) / clock.step).round() as usize + 1;
-            let even = |n: usize| times[0] + clock.step * n as f64;
-            let judge = if drive.name.is_empty() {
-                &response.values
-            } else {
-                &drive.values
-            };
-            verdict = "even, because these times are rounded: the base is smoother without them";
-            // White noise of variance 1 has fourth differences of variance 70.
-            let is_smooth = roughness(times) / f64::sqrt(70.0) < 0.5 * clock.residual;
-            let is_better = || roughness(&interpolated(times, judge, (0..count).map(even))) <= roughness(judge);
-            if is_strict && (is_smooth || is_better()) {
-                for one in [response, drive] {
-                    one.values = interpolated(times, &one.values, (0..count).map(even));
-                }
-                verdict = if is_smooth {
-                    "interpolated at even times, because these times vary smoothly"
-                } else {
-                    "interpolated at even times, because the base is smoother at these times"
-                };
-            }
-        }
-        notes.push(format!(
-            "{}: {} samples, {:.6} a second; the times in {name} are {:.2e} s (rms) from even ones; the samples are {verdict}",
-            self.origin,
-            times.len(),
-            1.0 / clock.step,
-            clock.residual
-        ));
-        let Some(rate) = rate else {
-            return Ok([clock.start, clock.step]);
-        };
-        let resolution = (4.0 * clock.uncertainty).max(1e-9 * clock.step);
-        if (1.0 / rate - clock.step).abs() > resolution {
-            notes.push(format!(
-                "{}: the rate of {rate} samples a second that was given contradicts {name}, which has {:.6} ± {:.1e}; the given one is used",
-                self.origin,
-                1.0 / clock.step,
-                clock.uncertainty / (clock.step * clock.step)
+        let clock = Clock::of(times);
+        let step = clock.step;
+        if count < 4 || step.is_nan() || step <= 0.0 {
+            let [first, last] = [times.first(), times.last()].map(|time| time.unwrap_or(&f64::NAN));
+            return refused(format!(
+                "the time goes from {first} s to {last} s in {count} values, and must rise; name another channel, or give `rate` and a copy of \
+                 the file without this channel"
             ));
         }
-        Ok([clock.start, 1.0 / rate])
-    }
-
-    /// The drive at the times of the response, where both have clocks of their own: their common part.
-    fn align(
-        &self,
-        response: &mut Measured,
-        drive: &mut Measured,
-        notes: &mut Vec<String>,
-    ) -> Result<(), RecordingError> {
-        let (Some([start, step]), Some([other_start, other_step])) = (response.clock, drive.clock) else {
-            return Ok(());
-        };
-        let counts = [&*response, drive].map(|one| one.values.len());
-        if [start, step] == [other_start, other_step] && counts[0] == counts[1] {
-            return Ok(());
-        }
-        let other = |n: usize| other_start + n as f64 * other_step;
-        let times: Vec<f64> = (0..counts[1]).map(other).collect();
-        let within = |n: &usize| {
-            let time = start + *n as f64 * step;
-            times.first().is_some_and(|first| *first - 1e-6 * step <= time)
-                && times.last().is_some_and(|last| time <= last + 1e-6 * step)
-        };
-        let common: Vec<usize> = (0..counts[0]).filter(within).collect();
-        if times.len() < 4 || common.is_empty() {
-            return Err(self.refused(&format!(
-                ": channels {} and {} have no common time; were they recorded together?",
-                response.name, drive.name
+        let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
+        let mut sorted: Vec<f64> = steps().collect();
+        sorted.sort_by(f64::total_cmp);
+        let usual = sorted[(sorted.len() - 1) * 99 / 100].max(step);
+        let is_broken = |one: f64| one > GAP * usual || one < -0.5 * step;
+        let broken = steps().position(is_broken);
+        let is_uneven = broken.is_some() || sorted[0] < 0.5 * step;
+        let rounded = if is_uneven { rounded(times, step) } else { None };
+        if let Some(n) = broken.filter(|_| rounded.is_none()) {
+            return Err(RecordingError::new(format!(
+                "{origin}, {}: the time goes from {} s to {} s, where a step is {step:.6e} s: the recording is interrupted there. Fit the parts \
+                 as files of their own, `vines fit one.csv two.csv`",
+                self.place(n + 1),
+                times[n],
+                times[n + 1]
             )));
         }
-        drive.values = interpolated(&times, &drive.values, common.iter().map(|n| start + *n as f64 * step));
-        response.values = common.iter().map(|n| response.values[*n]).collect();
+        let step = rounded.unwrap_or(step);
+        let [response, drive] = both;
+        let mut verdict = "even";
+        if clock.residual > EVEN * step {
+            let count = ((times[count - 1] - times[0]) / step).round() as usize + 1;
+            let even = |values: &[f64]| interpolated(times, values, (0..count).map(|n| times[0] + step * n as f64));
+            let judge = if drive.name.is_empty() { &*response } else { &*drive };
+            // White noise of variance 1 has fourth differences of variance 70.
+            let is_smooth = roughness(times) / f64::sqrt(70.0) < 0.5 * clock.residual;
+            let is_better = || roughness(&even(&judge.values)) <= roughness(&judge.values);
+            verdict = match sorted[0] > 0.0 {
+                true if is_smooth && rounded.is_none() => {
+                    "interpolated at even times, because these times vary smoothly"
+                }
+                true if is_better() => "interpolated at even times, because the base is smoother at these times",
+                _ => "even, because these times are rounded: the base is smoother without them",
+            };
+            if verdict.starts_with("interpolated") {
+                for one in [response, drive] {
+                    one.values = even(&one.values);
+                }
+            }
+        }
+        let frequency = step.recip();
         notes.push(format!(
-            "{}: channel {} begins {:.6e} s after {} and has {} samples of {other_step:.6e} s, not {} of {step:.6e} s; the common {} samples are used",
-            self.origin,
-            drive.name,
-            other_start - start,
-            response.name,
-            counts[1],
-            counts[0],
-            common.len()
+            "{origin}: {} samples, {frequency:.6} a second; the times in {name} are {:.2e} s (rms) from even ones; the samples are {verdict}",
+            times.len(),
+            clock.residual
         ));
-        Ok(())
-    }
-
-    /// The drive `late` samples earlier, and the response without the samples for which there is none. Returns the number of those at the beginning.
-    fn shift(&self, [response, drive]: [&mut Measured; 2], late: f64) -> Result<usize, RecordingError> {
-        let count = response.values.len().min(drive.values.len());
-        let last = count.saturating_sub(1) as f64;
-        let is_read = |n: &usize| (0.0..=last).contains(&(*n as f64 + late));
-        let common: Vec<usize> = (0..count).filter(is_read).collect();
-        let (Some(first), true) = (common.first(), count >= 4) else {
-            return Err(self.refused(&format!(
-                ": channel {} cannot be {late} samples later than {}: it has {count}",
-                drive.name, response.name
-            )));
-        };
-        let places: Vec<f64> = (0..count).map(|n| n as f64).collect();
-        drive.values = interpolated(&places, &drive.values, common.iter().map(|n| *n as f64 + late));
-        response.values = common.iter().map(|n| response.values[*n]).collect();
-        Ok(*first)
+        let given = rate.map_or(step, f64::recip);
+        if (given - step).abs() > (4.0 * clock.uncertainty).max(1e-9 * step) {
+            notes.push(format!(
+                "{origin}: the rate of {} samples a second that was given contradicts {name}, which has {frequency:.6} ± {:.1e}; the given one is used",
+                given.recip(),
+                clock.uncertainty / (step * step)
+            ));
+        }
+        Ok([clock.start, given])
     }
 
     /// Where a sample is in the file.
@@ -478,6 +427,21 @@ impl Contents {
             first => format!("row {}", first + sample),
         }
     }
+}
+
+/// The drive at the times of the response, from start and step of both clocks, in their common part: its first sample of the response. `None`
+/// without a common part.
+fn align(response: &mut Channel, drive: &mut Channel, [start, step]: [f64; 2], other: [f64; 2]) -> Option<usize> {
+    let times: Vec<f64> = (0..drive.values.len())
+        .map(|n| other[0] + n as f64 * other[1])
+        .collect();
+    let at = |n: &usize| start + *n as f64 * step;
+    let within = times.first()? - 1e-6 * step..=times.last()? + 1e-6 * step;
+    let common: Vec<usize> = (0..response.values.len()).filter(|n| within.contains(&at(n))).collect();
+    let first = *common.first().filter(|_| times.len() >= 4)?;
+    drive.values = interpolated(&times, &drive.values, common.iter().map(at));
+    response.values = common.iter().map(|n| response.values[*n]).collect();
+    Some(first)
 }
 
 /// What an SI unit measures, in words.
@@ -494,32 +458,40 @@ fn quantity(unit: &str) -> &'static str {
     }
 }
 
-/// The even times that fit.
-fn line(times: &[f64]) -> Clock {
-    let count = times.len() as f64;
-    let middle = 0.5 * (count - 1.0);
-    // Differences from the first: dates are large.
-    let first = times.first().copied().unwrap_or(f64::NAN);
-    let mean = times.iter().map(|time| time - first).sum::<f64>() / count;
-    let product = |(n, time): (usize, &f64)| (n as f64 - middle) * (time - first - mean);
-    let squares = count * (count * count - 1.0) / 12.0;
-    let step = times.iter().enumerate().map(product).sum::<f64>() / squares;
-    let start = first + mean - middle * step;
-    let residual = |(n, time): (usize, &f64)| (time - start - n as f64 * step).powi(2);
-    let residual = (times.iter().enumerate().map(residual).sum::<f64>() / count).sqrt();
-    Clock {
-        start,
-        step,
-        uncertainty: residual / squares.sqrt(),
-        residual,
+impl Clock {
+    /// The even times that fit.
+    fn of(times: &[f64]) -> Self {
+        let count = times.len() as f64;
+        // Differences from the first: dates are large.
+        let first = times.first().copied().unwrap_or(f64::NAN);
+        let since: Vec<f64> = times.iter().map(|time| time - first).collect();
+        let step = slope(&since);
+        let start = mean(since.iter().copied()) - 0.5 * (count - 1.0) * step;
+        let residual = mean_square(since.iter().enumerate().map(|(n, time)| time - start - n as f64 * step)).sqrt();
+        let uncertainty = residual / (count * (count * count - 1.0) / 12.0).sqrt();
+        Self { start: first + start, step, uncertainty, residual }
     }
+}
+
+/// The step of even times from which all times differ by at most half of it, as those of a clock do that is rounded to a sample: it repeats a time or
+/// leaves one out. `near`: about the step.
+fn rounded(times: &[f64], near: f64) -> Option<f64> {
+    let width = |step: f64| {
+        let apart = times
+            .iter()
+            .enumerate()
+            .map(|(n, time)| time - times[0] - n as f64 * step);
+        let (low, high) = range((0.0, 0.0), apart);
+        high - low
+    };
+    let aside = 2.0 * near / times.len() as f64;
+    Some(golden_section(near - aside, near + aside, width)).filter(|step| width(*step) <= (1.0 + EVEN) * step)
 }
 
 /// Root mean square of the fourth differences: large where a smooth motion is sampled at other times than assumed.
 fn roughness(values: &[f64]) -> f64 {
     let fourth = |five: &[f64]| (five[0] - 4.0 * five[1] + 6.0 * five[2] - 4.0 * five[3] + five[4]).powi(2);
-    let count = values.len().saturating_sub(4).max(1) as f64;
-    (values.windows(5).map(fourth).sum::<f64>() / count).sqrt()
+    mean(values.windows(5).map(fourth)).sqrt()
 }
 
 /// Values at other times, by the cubic through the four samples around each. The error in a sine is 2e-6 of its amplitude at 64 samples in a

@@ -21,8 +21,8 @@ use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_
 
 use super::{
     FEWEST, Fit, FitError, Known, LEFT_OUT, LIMITS, LinearVerdict, MeasuredPoint, Nearest, Part, Problem, Quantity,
-    RecordFit, Recording, UNKNOWNS, Unknowns, across, at, checked, fit, follow, gradient, linear_verdicts, parts,
-    plant, shifted,
+    REJECTED, RecordFit, Recording, UNKNOWNS, Unknowns, across, at, checked, fit, follow, gradient, linear_verdicts,
+    parts, plant, shifted,
 };
 use crate::linear::MeasuredLinear;
 use crate::scene::{Parameters, Scene};
@@ -71,13 +71,10 @@ const SMALLEST: f64 = 1e-3;
 /// Strength from which the search begins, over that which gives the particle the acceleration `b omega0²`, or the suspension the additional
 /// stiffness `m omega0²`: friction and tilt of this size are about 0.03 and 2 degrees on the default rig.
 const TYPICAL: f64 = 0.01;
-/// A strong effect, over a typical one.
-const STRONG: f64 = 5.0;
+/// Strengths from which a search begins, over a typical one: a typical, a weak and a strong one.
+const STRENGTHS: [f64; 3] = [1.0, 0.1, 5.0];
 /// Step of a difference: of the unknowns, of the strength relative, and along the curve.
 const STEP: f64 = 1e-4;
-/// Difference of Akaike's criterion up to which a candidate that is not the best one remains possible: its evidence is a twentieth.
-const POSSIBLE: f64 = 6.0;
-
 impl Effect {
     /// All of them.
     pub const ALL: [Self; 5] = [
@@ -175,18 +172,29 @@ impl Explanation {
     /// The best candidate, if it describes the points.
     #[must_use]
     pub fn explains(&self) -> Option<&Candidate> {
-        self.candidates.first().filter(|best| !best.fit.is_rejected())
+        self.possible().next()
     }
 
-    /// The other candidates that the points do not exclude: their evidence is at least a twentieth of that of the best one.
+    /// The candidates that describe the points, the best one first. The evidence of a candidate is `exp(-criterion/2)`. That of each is at least 1 %
+    /// of that of every other one that describes the same points; one that leaves out more points than another has 100 times its evidence on
+    /// the others.
     pub fn possible(&self) -> impl Iterator<Item = &Candidate> {
-        let best = self.explains();
-        let others = self.candidates.iter().skip(1);
-        others.filter(move |candidate| {
-            best.is_some_and(|best| {
-                candidate.fit.left_out == best.fit.left_out && candidate.criterion() - best.criterion() < POSSIBLE
-            })
-        })
+        let describe = || self.candidates.iter().filter(|one| !one.fit.is_rejected());
+        let excludes = |other: &Candidate, one: &Candidate| {
+            let [left_out, of_one] = [&other.fit.left_out, &one.fit.left_out];
+            let kept = (0..).filter(|n| !left_out.contains(n)).zip(&other.fit.residuals);
+            let beside = kept
+                .filter(|(n, _)| of_one.contains(n))
+                .flat_map(|(_, residual)| residual);
+            let excess = one.criterion() + beside.map(|one| one * one).sum::<f64>() - other.criterion();
+            let limit = -2.0 * REJECTED.ln();
+            match left_out.len().cmp(&of_one.len()) {
+                Ordering::Less => excess > -limit,
+                Ordering::Equal => excess > limit,
+                Ordering::Greater => false,
+            }
+        };
+        describe().filter(move |one| !describe().any(|other| excludes(other, one)))
     }
 }
 
@@ -222,7 +230,7 @@ impl Candidate {
         if !self.effect.adds_a_parameter() {
             return [self.strength.value, b];
         }
-        let most = self.effect.start(x, STRONG)[6] - x[6];
+        let most = self.effect.start(x, STRENGTHS[2])[6] - x[6];
         let more = covariance[(6, 6)].sqrt().min(most.max(0.0));
         [
             self.effect.strength(x[6] + more, x[2], self.speed),
@@ -334,20 +342,17 @@ pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize))
     let of_parts = parts.iter().flatten().filter_map(|part| part.point);
     let points: Vec<MeasuredPoint> = measured_points.iter().copied().chain(of_parts).collect();
     let linear = linear_verdicts(linear, &points, definition, expected, known)?;
-    let known: Vec<Known> = known
-        .iter()
-        .copied()
-        .chain(linear.iter().map(|one| Known::Linear(one.linear)))
-        .collect();
+    let of_linear = linear.iter().map(|one| Known::Linear(one.linear));
+    let known: Vec<Known> = known.iter().copied().chain(of_linear).collect();
     let ideal = fit(&points, definition, expected, &known)?;
-    let plant = ideal.plant(expected);
     let prepared = recordings.iter().map(|one| one.prepared(&scene.knowledge()));
     let prepared: Vec<Recording> = prepared.collect::<Result<_, _>>()?;
     let record = follow(&prepared, &parts, measured_points, definition, expected, &known)
         .filter(|record| !recordings.is_empty() && !record.fit.is_rejected());
+    let fit = record.as_ref().map_or(ideal, |record| record.fit.clone());
     let mut found = Found {
-        fit: ideal,
-        plant,
+        plant: fit.plant(expected),
+        fit,
         parts: parts.concat(),
         points,
         linear,
@@ -356,14 +361,12 @@ pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize))
         alternatives: Vec::new(),
     };
     let points = &found.points;
-    if let Some(RecordFit { fit, .. }) = &found.record {
-        found.fit = fit.clone();
-        found.plant = fit.plant(expected);
+    if found.record.is_some()
+        && let Some(beside) = at(points, definition, &found.plant, &[])
+    {
         // The points are shown beside the fit of the record.
-        if let Some(beside) = at(points, definition, &found.plant, &[]) {
-            found.fit.residuals = beside.residuals;
-            found.fit.left_out.clear();
-        }
+        found.fit.residuals = beside.residuals;
+        found.fit.left_out.clear();
     }
     if !found.fit.is_rejected() && found.fit.left_out.is_empty() {
         let problem = Problem::new(points.clone(), definition, &known);
@@ -373,11 +376,10 @@ pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize))
         return Ok(found);
     }
     let explanation = explain(points, definition, expected, &known, progress)?;
-    let ideal = &found.fit;
-    let best = explanation
-        .explains()
-        .filter(|best| ideal.is_rejected() || best.fit.left_out.len() <= ideal.left_out.len());
-    let is_told = ideal.is_rejected() || best.is_some();
+    let is_rejected = found.fit.is_rejected();
+    let best = explanation.explains();
+    let best = best.filter(|best| is_rejected || best.fit.left_out.len() <= found.fit.left_out.len());
+    let is_told = is_rejected || best.is_some();
     if let Some(best) = best {
         (found.fit, found.plant) = (best.fit.clone(), best.plant(expected));
     }
@@ -398,42 +400,38 @@ pub fn explain(
 ) -> Result<Explanation, FitError> {
     let problem = Problem::new(checked(points)?, definition, known);
     let ideal = problem.fit(expected)?;
-    let mut candidates = Vec::new();
-    if ideal.is_rejected() {
-        for (n, effect) in Effect::ALL.into_iter().enumerate() {
-            progress(n);
-            candidates.extend(problem.with_effect(effect, expected));
-        }
-    }
-    candidates.sort_by(Candidate::order);
+    let candidates = if ideal.is_rejected() {
+        problem.candidates(expected, &mut progress)
+    } else {
+        Vec::new()
+    };
     Ok(Explanation { ideal, candidates })
 }
 
 impl Problem<'_> {
+    /// The fits with each effect alone, the best one first.
+    fn candidates(&self, expected: &Parameters, progress: &mut impl FnMut(usize)) -> Vec<Candidate> {
+        let numbered = Effect::ALL.into_iter().enumerate().inspect(|(n, _)| progress(*n));
+        let mut candidates: Vec<_> = numbered
+            .filter_map(|(_, effect)| self.with_effect(effect, expected))
+            .collect();
+        candidates.sort_by(Candidate::order);
+        candidates
+    }
+
     /// Effects with which the points agree as well as with the ideal cavity, while the half-width differs from it significantly.
     fn alternatives(&self, ideal: &Fit, expected: &Parameters, mut progress: impl FnMut(usize)) -> Vec<Candidate> {
-        let Ok(same_points) = self.fit(expected) else {
+        let Some((b, same_points)) = ideal.estimate(Quantity::B).zip(self.fit(expected).ok()) else {
             return Vec::new();
         };
-        let differs = |candidate: &Candidate| {
-            let [_, b] = candidate.one_more();
-            let of_ideal = ideal.estimate(Quantity::B);
-            of_ideal.is_some_and(|one| (one.value - b).abs() > SIGNIFICANT * one.uncertainty)
-        };
-        let fits = Effect::ALL.into_iter().enumerate().filter_map(|(n, effect)| {
-            progress(n);
-            // The ideal motions are near: they are those of a weak effect.
-            let strengths = [1.0, 0.1].map(|factor| effect.start(&same_points.x, factor));
-            strengths
-                .into_iter()
-                .find_map(|x| self.with_effect_from(effect, x, &same_points))
+        let mut found = self.candidates(expected, &mut progress);
+        found.retain(|candidate| {
+            let agrees = !candidate.fit.is_rejected() && candidate.fit.left_out.is_empty();
+            let [_, other] = candidate.one_more();
+            let excess = candidate.criterion() - same_points.chi_square;
+            agrees && excess < -2.0 * REJECTED.ln() && (b.value - other).abs() > SIGNIFICANT * b.uncertainty
         });
-        fits.filter(|candidate| {
-            let Candidate { fit, .. } = candidate;
-            let agrees = !fit.is_rejected() && fit.left_out.is_empty();
-            agrees && candidate.criterion() - same_points.chi_square < POSSIBLE && differs(candidate)
-        })
-        .collect()
+        found
     }
 
     /// The fit with an effect; `None` if the plant has no such motions.
@@ -448,30 +446,29 @@ impl Problem<'_> {
             kept.sort_unstable();
             kept
         };
-        let starts: &[f64] = if effect.adds_a_parameter() { &[1.0, 5.0] } else { &[1.0] };
-        let ideal = self.of(&largest(STAGES[0])).fit(expected).ok()?;
-        let found = starts.iter().filter_map(|factor| {
-            let mut x = effect.start(&ideal.x, *factor);
-            let mut best: Option<Candidate> = None;
-            for share in STAGES {
-                let kept = largest(share);
+        // Where the ideal cavity describes all points, its motions are near.
+        let is_rejected = self.fit(expected).ok()?.is_rejected();
+        let stages = if is_rejected { &STAGES[..] } else { &STAGES[2..] };
+        let ideal = self.of(&largest(stages[0])).fit(expected).ok()?;
+        let mut best: Option<Candidate> = None;
+        for factor in STRENGTHS {
+            let (mut x, mut found) = (effect.start(&ideal.x, factor), None::<Candidate>);
+            for share in stages {
+                let kept = largest(*share);
                 let Some(mut next) = self.of(&kept).with_effect_from(effect, x, &ideal) else {
                     break;
                 };
-                if next.fit.is_rejected() && best.as_ref().is_some_and(|best| !best.fit.is_rejected()) {
+                if next.fit.is_rejected() && found.as_ref().is_some_and(|one| !one.fit.is_rejected()) {
                     break;
                 }
                 next.fit.left_out = (0..self.points.len()).filter(|n| !kept.contains(n)).collect();
                 x = next.fit.x;
-                best = Some(next);
+                found = Some(next);
             }
-            best.filter(|best| best.fit.left_out.len() * LEFT_OUT <= self.points.len())
-        });
-        let mut best: Option<Candidate> = None;
-        for candidate in found {
-            let describes_all = !candidate.fit.is_rejected() && candidate.fit.left_out.is_empty();
-            best = best.into_iter().chain([candidate]).min_by(Candidate::order);
-            if describes_all {
+            let found = found.filter(|one| one.fit.left_out.len() * LEFT_OUT <= self.points.len());
+            best = best.into_iter().chain(found).min_by(Candidate::order);
+            let describes_all = |one: &Candidate| !one.fit.is_rejected() && one.fit.left_out.is_empty();
+            if !effect.adds_a_parameter() || best.as_ref().is_some_and(describes_all) {
                 break;
             }
         }
@@ -616,21 +613,14 @@ impl Misfit<UNKNOWNS> for PlantCurve<'_> {
     }
 
     fn derivatives(&self, x: &Unknowns, at: &Vec<Place>) -> Option<Vec<Unknowns>> {
-        let mut rows = Vec::new();
-        for (n, place) in at.iter().enumerate() {
-            let mut columns = [Vector3::zeros(); UNKNOWNS];
-            for i in (0..UNKNOWNS).filter(|i| *i != 5 && (self.problem.free || *i != 6)) {
-                let step = if i == 6 { STEP * x[6] } else { STEP };
-                let at = |step: f64| {
-                    let motion = self.motion(&shifted(x, i, step), &place.motion, place.tangent, 0.0)?;
-                    Some((self.residual(n, &motion) - place.residual) / step)
-                };
-                columns[i] = across(&place.along, &at(step).or_else(|| at(-step))?);
-            }
-            rows.extend([0, 1, 2].map(|channel| Unknowns::from_fn(|i, _| columns[i][channel])));
-        }
-        rows.extend(self.problem.known_rows(x));
-        Some(rows)
+        self.problem.rows(x, at.iter().map(|place| place.along), |n, i| {
+            let step = if i == 6 { STEP * x[6] } else { STEP };
+            let slope = |step: f64| {
+                let motion = self.motion(&shifted(x, i, step), &at[n].motion, at[n].tangent, 0.0)?;
+                Some((self.residual(n, &motion) - at[n].residual) / step)
+            };
+            slope(step).or_else(|| slope(-step))
+        })
     }
 
     /// Neither friction nor the square of a tilt is negative.
