@@ -136,11 +136,21 @@ fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String
 }
 
 fn main() -> Result<(), Failure> {
-    let [count, seed] = &arguments(["SHAKERS", "SEED"])?;
+    let given: Vec<String> = std::env::args().skip(1).collect();
+    let [count, seed, only @ ..] = &given[..] else {
+        return Err("arguments: SHAKERS SEED [SHAKER]".into());
+    };
     let mut uniform = uniform(seed.parse()?);
     let scenes: Vec<_> = (0..count.parse()?)
         .map(|_| drawn(&mut uniform))
         .collect::<Result<_, _>>()?;
+    if let [only] = only {
+        let (points, settled, beyond, worst, periods, why) = run(&scenes[only.parse::<usize>()?]);
+        println!(
+            "{points} points, {settled} settled, {beyond} beyond 3 u, worst {worst:.2} u, {periods:.0} periods; {why}"
+        );
+        return Ok(());
+    }
     let found: Vec<_> = scenes.par_iter().map(run).collect();
     let rows: Vec<_> = scenes.iter().zip(&found).enumerate().map(|(n, ((scene, numbers), found))| {
         let [share, suspension, stinger, coil] = numbers;

@@ -198,10 +198,14 @@ pub enum RigError {
         unit: &'static str,
     },
     #[error(
-        "the shaker does not follow: {asked:.4} {unit} are asked for, and the measured fundamental is off by {error:.4} {unit} for a period; check \
-         amplifier, stinger and sensor"
+        "the shaker does not follow: {asked:.4} {unit} are asked for, and the measured fundamental is off by {error:.4} {unit} for a period; {cause}"
     )]
-    ReferenceOff { asked: f64, error: f64, unit: &'static str },
+    ReferenceOff {
+        asked: f64,
+        error: f64,
+        unit: &'static str,
+        cause: &'static str,
+    },
     #[error(
         "the amplifier is at its limit: the drive asked for needs {times:.2} times the command that voltage_max or current_max of [shaker] allows; lower \
          the drive, or the responses of the backbone"

@@ -1,9 +1,9 @@
 //! Control of the reference behind a shaker: the command that gives the force, or the displacement of the table, that the controller asks for.
 //!
-//! Near the natural frequency a shaker makes of a command u the reference `F = K (s + d)/(s + r) u`, where `s = i (omega - omega0)` ([`ShakerPath`]):
-//! at the resonance, a force collapses to d/r of K u. The command is the inverse, `u = (F + (r - d) z)/K` with the response `z' = F - (s + d) z` of the
-//! structure to the force, in phasors. What is left of the error of the measured reference, which harmonics and impacts make, is integrated.
-//! The open loop is `k/s` times a low pass, whatever the shaker is.
+//! Near the natural frequency a structure with the impact force I has the response `z' = F + I - (s + d) z` in phasors, where `s = i (omega - omega0)`,
+//! and a shaker makes of a command u the reference `F = K u - (r - d) z` ([`ShakerPath`]): the moving structure takes the force away. The command is
+//! the inverse, `u = (F + (r - d) z)/K`, with the *measured* response z, in which the impacts are. What is left of the error of the measured reference
+//! is integrated.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,7 +16,10 @@ use crate::plan::{Knowledge, ShakerPath, Target};
 const DETECTOR: f64 = 0.3;
 /// Bandwidth of the control, a quarter of the detector's: both roots of the loop are then equal, at half of the latter.
 pub(crate) const BANDWIDTH: f64 = 0.25 * DETECTOR;
-/// Harmonics of the detector. Impacts of one period are alternating impulses, with odd harmonics.
+/// Bandwidth of the detector of the response, which the force that is measured predicts and impacts disturb: at half of it, the force on an oscillator of
+/// 1.8 % drop-out (scenes/shaker-oscillator.toml) is so late behind the impacts that the loop does not settle.
+const OBSERVER: f64 = 2.0 * DETECTOR;
+/// Harmonics of both. Impacts of one period are alternating impulses, with odd harmonics.
 const HARMONICS: [f64; 3] = [1.0, 3.0, 5.0];
 
 /// Error of the reference, over what the command makes on a structure that does not move, that is taken for a failure, and the phase for which it
@@ -25,23 +28,44 @@ const HARMONICS: [f64; 3] = [1.0, 3.0, 5.0];
 const SHARE: f64 = 0.25;
 const OFF: f64 = TAU;
 
+/// Offset and harmonics of a signal: an adaptive filter, as the controller's.
+#[derive(Debug, Clone, Default)]
+struct Detector {
+    offset: f64,
+    phasors: [Complex64; HARMONICS.len()],
+}
+
+impl Detector {
+    /// Takes a reading at a phase of the oscillator, rad.
+    fn take(&mut self, reading: f64, phase: f64, share: f64) {
+        let rotors = HARMONICS.map(|order| Complex64::cis(order * phase));
+        let predicted: f64 = self.phasors.iter().zip(rotors).map(|(of, rotor)| (of * rotor).im).sum();
+        let residual = reading - self.offset - predicted;
+        self.offset += share * residual;
+        for (of, rotor) in self.phasors.iter_mut().zip(rotors) {
+            *of += 2.0 * share * residual * Complex64::I * rotor.conj();
+        }
+    }
+}
+
 /// The control, and its state. Phasors are those of sines, relative to the controller's oscillator.
 #[derive(Debug, Clone)]
 pub(crate) struct ReferenceControl {
     path: ShakerPath,
     omega0: f64,
     damping_rate: f64,
+    /// Response over `z`, 1/s.
+    gain: Complex64,
     target: Target,
     /// Phase of the controller's oscillator, and of the rig's, rad.
     phases: [f64; 2],
     /// What was asked for in the last sample, m.
     asked: f64,
-    /// The error of the reference, scaled as readings are: offset and harmonics.
-    offset: f64,
-    error: [Complex64; HARMONICS.len()],
-    /// Correction of the reference, m, and its response of the structure, m s.
+    /// The error of the reference, and the response, scaled as readings are.
+    error: Detector,
+    response: Detector,
+    /// Correction of the reference, m.
     correction: Complex64,
-    response: Complex64,
     /// The last command, m.
     command: Complex64,
     /// The command that is needed, over the largest one.
@@ -60,31 +84,36 @@ impl ReferenceControl {
             target: knowledge.target,
             phases: [0.0; 2],
             asked: 0.0,
-            offset: 0.0,
-            error: [Complex64::ZERO; HARMONICS.len()],
+            gain: knowledge.linear.gain,
+            error: Detector::default(),
+            response: Detector::default(),
             correction: Complex64::ZERO,
-            response: Complex64::ZERO,
             command: Complex64::ZERO,
             times: 0.0,
             off: 0.0,
         })
     }
 
-    /// Takes the scaled reading of the reference. Returns the command for the coming `step`, s, in which the controller asks for `drive`.
+    /// Takes the scaled readings of response and reference. Returns the command for the coming `step`, s, in which the controller asks for `drive`.
     ///
     /// # Errors
     /// A reference that has not followed for a period.
-    pub fn command(&mut self, reading: f64, drive: Drive, step: f64) -> Result<Drive, RigError> {
+    pub fn command(&mut self, [response, reading]: [f64; 2], drive: Drive, step: f64) -> Result<Drive, RigError> {
         let Drive { omega, amplitude, .. } = drive;
-        let displacement = self.target.displacement(1, omega);
+        let [of_response, displacement] = [0, 1].map(|channel| self.target.displacement(channel, omega));
         let rotor = Complex64::cis(self.phases[0]);
         let error = (self.asked / displacement * rotor).im - reading;
         // A reading that is no number is the controller's to refuse.
-        if error.is_finite() {
-            self.detect(error, 1.0 - (-DETECTOR * self.omega0 * step).exp());
+        if error.is_finite() && response.is_finite() {
+            let detuned = Complex64::new(self.damping_rate, omega - self.omega0);
+            let driven = self.gain * (self.asked - self.error.phasors[0] * displacement) / of_response;
+            self.response.phasors[0] += step * (driven - detuned * self.response.phasors[0]);
+            let share = |bandwidth: f64| 1.0 - (-bandwidth * self.omega0 * step).exp();
+            self.error.take(error, self.phases[0], share(DETECTOR));
+            self.response.take(response, self.phases[0], share(OBSERVER));
         }
-        let detuned = Complex64::new(self.damping_rate, omega - self.omega0);
-        let error = self.error[0] * displacement;
+        let error = self.error.phasors[0] * displacement;
+        let moved = (self.path.pole - self.damping_rate) / self.gain * self.response.phasors[0] * of_response;
         let largest = SHARE * (self.path.gain * self.command).norm();
         let is_off = self.asked > 0.0 && amplitude > 0.0 && (error.norm() > largest || self.times > 1.0);
         self.off = if is_off { self.off + omega * step } else { 0.0 };
@@ -93,17 +122,20 @@ impl ReferenceControl {
         }
         if self.off > OFF {
             let unit = ["m", "N"][usize::from(self.path.by_force)];
+            let cause = if (self.asked - error).norm() < 0.5 * self.asked {
+                "next to nothing is left: the sensor of the reference is dead, or the stinger is broken"
+            } else {
+                "the amplifier clips or is off, or the sensor of the reference or its sign is wrong"
+            };
             let [asked, error] = [self.asked, error.norm()].map(|value| value / self.path.base_per_reference);
-            return Err(RigError::ReferenceOff { asked, error, unit });
+            return Err(RigError::ReferenceOff { asked, error, unit, cause });
         }
         if amplitude == 0.0 {
-            (self.correction, self.response) = (Complex64::ZERO, Complex64::ZERO);
+            self.correction = Complex64::ZERO;
         } else if self.times <= 1.0 {
             self.correction += BANDWIDTH * self.omega0 * step * error;
         }
-        let reference = amplitude + self.correction;
-        self.response += step * (reference - detuned * self.response);
-        let inverse = (reference + (self.path.pole - self.damping_rate) * self.response) / self.path.gain;
+        let inverse = (amplitude + self.correction + moved) / self.path.gain;
         self.times = inverse.norm() / self.path.largest;
         self.command = if amplitude == 0.0 {
             Complex64::ZERO
@@ -112,17 +144,6 @@ impl ReferenceControl {
         };
         self.asked = amplitude;
         Ok(self.drive(omega, step))
-    }
-
-    /// The detector: an adaptive filter for offset and harmonics, as the controller's.
-    fn detect(&mut self, error: f64, share: f64) {
-        let rotors = HARMONICS.map(|order| Complex64::cis(order * self.phases[0]));
-        let predicted: f64 = self.error.iter().zip(rotors).map(|(of, rotor)| (of * rotor).im).sum();
-        let residual = error - self.offset - predicted;
-        self.offset += share * residual;
-        for (of, rotor) in self.error.iter_mut().zip(rotors) {
-            *of += 2.0 * share * residual * Complex64::I * rotor.conj();
-        }
     }
 
     /// The command as a sine of the rig's oscillator, whose phase changes by its frequency only: at most to twice, at least to half of `omega`.

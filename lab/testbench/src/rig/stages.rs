@@ -116,14 +116,14 @@ pub struct Scaled<'a, R: ?Sized> {
     rig: &'a mut R,
     target: Target,
     control: Option<ReferenceControl>,
-    /// The last reading of the reference.
-    reference: f64,
+    /// The last readings of response and reference.
+    readings: [f64; 2],
 }
 
 impl<'a, R: Rig + ?Sized> Scaled<'a, R> {
     /// The rig `rig` with the channels of `target`. What it is driven with is the command.
     pub fn new(rig: &'a mut R, target: Target) -> Self {
-        Self { rig, target, control: None, reference: 0.0 }
+        Self { rig, target, control: None, readings: [0.0; 2] }
     }
 
     /// The rig `rig`, which is driven with the reference, as far as `knowledge` says what its shaker makes of a command.
@@ -135,7 +135,7 @@ impl<'a, R: Rig + ?Sized> Scaled<'a, R> {
     fn command(&mut self, drive: Drive, step: f64) -> Result<Drive, RigError> {
         match &mut self.control {
             // A small module has no code for it, as it has no structures.
-            Some(control) if cfg!(feature = "tables") => control.command(self.reference, drive, step),
+            Some(control) if cfg!(feature = "tables") => control.command(self.readings, drive, step),
             _ => Ok(drive),
         }
     }
@@ -144,7 +144,7 @@ impl<'a, R: Rig + ?Sized> Scaled<'a, R> {
 impl<R: Rig + ?Sized> Rig for Scaled<'_, R> {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let sensors = self.target.scaled(self.rig.sense()?);
-        self.reference = sensors.reference.unwrap_or(0.0);
+        self.readings = [sensors.response, sensors.reference.unwrap_or(0.0)];
         Ok(sensors)
     }
 

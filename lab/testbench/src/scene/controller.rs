@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use lovines::State;
+use lovines::oscillator::Oscillator;
 use phase_lock::{Config, ConfigError, LockCriterion, MAX_HARMONICS, NONE, PARAMETERS, Parameter, Value as Setting};
 use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
@@ -145,8 +146,6 @@ impl Scene {
         let coherence_min = config.lock.coherence_min.min(known_to_a_third) * path.drop_out().min(1.0).powi(2);
         Config {
             harmonics: MAX_HARMONICS as u8,
-            // Beside less than a tenth of the force, the transients of the shaker look like failures.
-            residual_max: config.residual_max.filter(|_| path.drop_out() > 0.1),
             lock: LockCriterion { coherence_min, ..config.lock },
             ..config
         }
@@ -201,8 +200,9 @@ impl Scene {
         (sum / self.backbone.c_from.min(self.backbone.c_to)).min(1e6)
     }
 
-    /// Largest plausible harmonics of the reference behind a shaker, over half of the requested amplitude: the same impulses on the particle, whose
-    /// odd harmonics have `4/T` of an impulse each, act on the force cell or table through structure and shaker.
+    /// Largest plausible change of the reference behind a shaker by impacts, over the smallest amplitude: half of the requested one holds the least
+    /// response, and a move to a lower one takes four fifths of it away. The same impulses on the particle act
+    /// on the force cell or table through structure and shaker. Fast modes sum them up, as above; near the natural frequency the detector follows.
     fn in_reference(&self, knowledge: &Knowledge) -> f64 {
         let Some((structure, shaker)) = self.structure().and_then(|one| Some((one, one.shaker.as_ref()?))) else {
             return 0.0;
@@ -210,12 +210,18 @@ impl Scene {
         let omega = knowledge.linear.omega0;
         let impulse = 2.0 * self.plant.particle_mass * knowledge.numbers.b * omega;
         let reference = shaker.reference(structure.excitation);
-        let highest = (0.5 * self.controller.samples_per_period) as usize;
-        let harmonics = (3..highest).step_by(2).map(|n| {
-            let per_force = structure.host.frequency_response_to_cavity(reference, n as f64 * omega);
-            per_force.norm() * impulse * 2.0 * omega / PI
+        let changes = reference.iter().zip(structure.host.sections()).map(|(pair, section)| {
+            let Oscillator { delta, omega0, reach, .. } = section.oscillator;
+            let jump = pair[0] * section.kick[0] + pair[1] * section.kick[1];
+            let change = jump.abs() + reach * section.velocity_per_impulse(*pair).abs();
+            let kept = if omega0 < 2.0 * omega {
+                0.0
+            } else {
+                (-PI * delta / omega).exp()
+            };
+            change / (1.0 - kept)
         });
-        2.0 * harmonics.sum::<f64>() * structure.base_per_drive() / self.amplitude
+        10.0 * changes.sum::<f64>() * impulse * structure.base_per_drive() / self.amplitude
     }
 
     /// The larger of the requested drive, m, and the one that holds the linear mode at the amplitude at which impacts certainly occur.
