@@ -8,8 +8,8 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 use vines::fit::{
-    Candidate, Effect, EffectReport, Explanation, Fit, FitReport, Found, Known, LeftOut, LinearVerdict, MeasuredPoint,
-    Measurements, Part, Selection, decimals, find,
+    Candidate, Effect, EffectReport, Explanation, Fit, FitReport, FittedParameter, Found, Known, LeftOut,
+    LinearVerdict, MeasuredPoint, Measurements, Part, Selection, decimals, find,
 };
 use vines::numerics::Estimate;
 use vines::report::fitted;
@@ -141,9 +141,9 @@ fn only_if_ideal(alternatives: &[EffectReport]) -> String {
     let texts: Vec<String> = alternatives
         .iter()
         .map(|EffectReport { effect, symbol, unit, possible_strength, possible_b_m, .. }| {
-            let space = if unit.is_empty() { "" } else { " " };
+            let (space, digits) = (if unit.is_empty() { "" } else { " " }, decimals(*possible_strength));
             format!(
-                "{effect} with {symbol} = {possible_strength:.2}{space}{unit} would give the same points with b = {:.2} mm",
+                "{effect} with {symbol} = {possible_strength:.digits$}{space}{unit} would give the same points with b = {:.2} mm",
                 1e3 * possible_b_m
             )
         })
@@ -318,7 +318,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         [
             lines,
             recorded(&found.parts),
-            summary(&report, &found, &arguments.known, skipped),
+            summary(&report, &found, skipped),
             found.linear.iter().map(of_linear).collect(),
             verdict.unwrap_or_default(),
             only_if_ideal(&alternatives),
@@ -327,7 +327,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     })?;
     let Arguments { figure, out, json, .. } = arguments.clone();
     let Found { fit, plant, points, .. } = found;
-    let plant = plant_section(&fit, &report, &plant, verdict.as_deref());
+    let plant = plant_section(&report, &plant, verdict.as_deref());
     let scene_text = provenance(&arguments.points, &report) + &arguments.scene.with_plant(&plant)?;
     Ok(Results::new(text, move || {
         let mut files = Written::default();
@@ -372,39 +372,20 @@ fn recorded(parts: &[Part]) -> String {
         + "\n"
 }
 
-fn summary(report: &FitReport, found: &Found, known: &[Known], skipped: usize) -> String {
+fn summary(report: &FitReport, found: &Found, skipped: usize) -> String {
     let (record, points) = (found.record.as_ref(), found.points.len());
     let doubt = if report.describes { "" } else { " (rejected)" };
     let rows = report.parameters.iter().map(|parameter| {
-        let digits = decimals(parameter.uncertainty);
-        let number = |value: f64| format!("{value:.digits$}");
-        let difference = (parameter.value - parameter.expected) / parameter.uncertainty;
-        let exact = known.iter().find_map(|known| match known {
-            Known::Value { quantity, estimate }
-                if quantity.symbol()[0] == parameter.symbol && estimate.uncertainty == 0.0 =>
-            {
-                Some(estimate.value)
-            }
-            _ => None,
-        });
-        let [value, expected, difference] = match exact {
-            Some(value) => [
-                format!("{value} (exact)"),
-                format!("{:.4}", parameter.expected),
-                String::new(),
+        let FittedParameter { symbol, unit, value, uncertainty, expected } = *parameter;
+        let [value, expected, difference] = match exact(parameter) {
+            Some(value) => [format!("{value} (exact)"), format!("{expected:.4}"), String::new()],
+            None => [
+                with_decimals(Estimate { value, uncertainty }) + doubt,
+                format!("{expected:.0$}", decimals(uncertainty)),
+                format!("{:+.1} u", (value - expected) / uncertainty),
             ],
-            None => {
-                let value = format!("{} ± {}{doubt}", number(parameter.value), number(parameter.uncertainty));
-                [value, number(parameter.expected), format!("{difference:+.1} u")]
-            }
         };
-        [
-            parameter.symbol.to_string(),
-            value,
-            parameter.unit.to_string(),
-            expected,
-            difference,
-        ]
+        [symbol.to_string(), value, unit.to_string(), expected, difference]
     });
     let mut text = Table::new("parameter | value | unit | scene | difference")
         .rows(rows)
@@ -481,35 +462,33 @@ fn provenance(files: &[PathBuf], report: &FitReport) -> String {
     )
 }
 
-/// Relative uncertainty below which a value was given as exact.
-const EXACT: f64 = 1e-8;
+/// The value of a parameter that was given as exact: the fit keeps all digits of a number that people write.
+fn exact(parameter: &FittedParameter) -> Option<f32> {
+    let FittedParameter { value, uncertainty, .. } = *parameter;
+    (uncertainty < 1e-8 * value.abs()).then_some(value as f32)
+}
 
 /// The section `[plant]` of a scene, with the standard uncertainties in comments.
-fn plant_section(fit: &Fit, report: &FitReport, plant: &vines::scene::Parameters, verdict: Option<&str>) -> String {
-    let digits = fit.conditional_uncertainties();
+fn plant_section(report: &FitReport, plant: &vines::scene::Parameters, verdict: Option<&str>) -> String {
     let lines = vines::scene::plant_keys(plant).into_iter().map(|(symbol, value)| {
         let fitted = report.parameters.iter().find(|one| one.symbol == symbol);
-        let conditional = digits.iter().find(|(one, _)| *one == symbol);
-        let Some(((_, conditional), value)) = conditional.zip(value.parse::<f64>().ok()) else {
-            return format!("{symbol} = {value}\n");
-        };
-        let note = match fitted {
-            None => "scaled by the mass of the scene".into(),
-            Some(one) if one.uncertainty < EXACT * one.value.abs() => {
-                return format!("{symbol} = {}  # exact\n", value as f32);
-            }
-            Some(one) => format!("± {:.1$}", one.uncertainty, decimals(one.uncertainty)),
-        };
-        format!("{symbol} = {value:.0$}  # {note}\n", decimals(*conditional))
+        match fitted.map(|one| (exact(one), one.uncertainty)) {
+            None => format!("{symbol} = {value}\n"),
+            Some((Some(value), _)) => format!("{symbol} = {value}  # exact\n"),
+            Some((None, u)) => format!("{symbol} = {value}  # ± {u:.0$}\n", decimals(u)),
+        }
     });
     let verdict = verdict.map(|verdict| format!("# {verdict}\n")).unwrap_or_default();
-    let doubt = if report.describes {
-        ""
-    } else {
-        "# Rejected: the model does not describe the points.\n"
+    let scale = match report.parameters.iter().any(|one| one.symbol == "M") {
+        true => "",
+        false => "# Masses, stiffness and damping are scaled by the mass of the scene.\n",
+    };
+    let doubt = match report.describes {
+        true => "",
+        false => "# Rejected: the model does not describe the points.\n",
     };
     format!(
-        "[plant]\n{verdict}{doubt}# The values are correlated: their digits keep what they determine together, such as k/M.\n{}",
+        "[plant]\n{verdict}{doubt}{scale}# The values are correlated: their digits keep what they determine together, such as k/M.\n{}",
         lines.collect::<String>()
     )
 }

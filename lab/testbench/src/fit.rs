@@ -284,35 +284,6 @@ impl Fit {
         covariance(&a, &b) / (covariance(&a, &a) * covariance(&b, &b)).sqrt()
     }
 
-    /// Standard uncertainties of M, k, c, m, b and r while the others are kept: the digits that a scene needs. With fewer, rounding would move
-    /// what the points determine better than each of these, such as the natural frequency.
-    #[must_use]
-    pub fn conditional_uncertainties(&self) -> [(&'static str, f64); 6] {
-        let quantities = [
-            Quantity::PrimaryMass,
-            Quantity::Stiffness,
-            Quantity::Damping,
-            Quantity::ParticleMass,
-            Quantity::B,
-            Quantity::R,
-        ];
-        let gradients = quantities.map(|one| one.gradient(&self.x));
-        let covariance = SMatrix::<f64, 6, 6>::from_fn(|i, j| {
-            (gradients[i].transpose() * self.covariance * gradients[j])[0]
-                / (self.size(quantities[i]) * self.size(quantities[j]))
-        });
-        let information = covariance.try_inverse();
-        std::array::from_fn(|i| {
-            let relative = information.map_or(f64::NAN, |matrix| matrix[(i, i)].powf(-0.5));
-            (quantities[i].symbol()[0], relative * self.size(quantities[i]))
-        })
-    }
-
-    /// The value of a quantity, or 1 instead of 0.
-    fn size(&self, quantity: Quantity) -> f64 {
-        Some(quantity.of(&self.x)).filter(|value| *value != 0.0).unwrap_or(1.0)
-    }
-
     /// The probability of a larger chi-square if the model is right; `None` without a degree of freedom.
     #[must_use]
     pub fn p_value(&self) -> Option<f64> {

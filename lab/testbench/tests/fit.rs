@@ -425,6 +425,22 @@ fn without_knowns_an_ideal_fit_says_which_cavity_would_give_the_same_points() {
     assert!(!found.fit.is_rejected() && found.explanation.is_none(), "{found:?}");
     let effects: Vec<Effect> = found.alternatives.iter().map(|one| one.effect).collect();
     assert!(effects.contains(&Effect::Friction), "{effects:?}");
+    // A tilt contradicts every ideal cavity, and is found without knowns as well.
+    let tilt = Cavity { tilt: 0.06, ..Cavity::IDEAL };
+    let motions = (0..9).map(|n| motion_at(tilt, (0.3 + 0.04 * f64::from(n)) * RIG.half_width));
+    let tilted = self::measured(motions, 2e-4, 12);
+    let tilted = explain(&tilted, Definition::default(), &wrong_scene().plant, &[], |_| {}).unwrap();
+    let possible: Vec<Effect> = tilted.possible().map(|one| one.effect).collect();
+    let fits = tilted
+        .candidates
+        .iter()
+        .map(|one| (one.effect, one.fit.chi_square, one.fit.left_out.len()));
+    assert!(
+        possible == [Effect::Tilt],
+        "{} {:?}",
+        tilted.ideal.chi_square,
+        fits.collect::<Vec<_>>()
+    );
     // A ruler and a scale decide.
     measured.known = ["b=0.0095±0.00003", "epsilon=0.00923±0.00003"]
         .map(|one| one.parse().unwrap())

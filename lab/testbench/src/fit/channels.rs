@@ -160,45 +160,41 @@ impl Contents {
 
     /// A refusal, with the channels as they were read.
     pub fn refused(&self, message: &str) -> RecordingError {
-        let how = if self.layout.is_empty() {
-            String::new()
-        } else {
-            format!(" ({})", self.layout)
+        let after = |sign: char, text: &str, end: char| match text {
+            "" => String::new(),
+            text => format!(" {sign}{text}{end}"),
         };
-        let mut text = format!("{}{message}\nThe file as it was read{how}:", self.origin);
-        for (n, channel) in self.channels.iter().enumerate().take(20) {
-            let unit = if channel.unit.is_empty() {
-                String::new()
-            } else {
-                format!(" [{}]", channel.unit)
-            };
-            let first: Vec<String> = channel.values.iter().take(3).map(f64::to_string).collect();
-            let count = channel.values.len();
-            text += &format!(
-                "\n  {}  {}{unit}: {} ... ({count} values)",
-                n + 1,
-                channel.name,
-                first.join(", ")
-            );
-        }
-        if self.channels.len() > 20 {
-            text += &format!("\n  and {} more", self.channels.len() - 20);
-        }
-        RecordingError::new(text)
+        let line = |(n, Channel { name, unit, values, .. }): (usize, &Channel)| {
+            let first: Vec<String> = values.iter().take(3).map(f64::to_string).collect();
+            let (unit, first, count) = (after('[', unit, ']'), first.join(", "), values.len());
+            format!("\n  {}  {name}{unit}: {first} ... ({count} values)", n + 1)
+        };
+        let lines: String = self.channels.iter().enumerate().take(20).map(line).collect();
+        let more = match self.channels.len().saturating_sub(20) {
+            0 => String::new(),
+            more => format!("\n  and {more} more"),
+        };
+        let (origin, layout) = (&self.origin, after('(', &self.layout, ')'));
+        RecordingError::new(format!(
+            "{origin}{message}\nThe file as it was read{layout}:{lines}{more}"
+        ))
     }
 
     /// A channel by its name, the last part of its path, or its number.
     fn find(&self, name: &str) -> Result<Option<&Channel>, RecordingError> {
         let name = name.trim().trim_start_matches('/');
         let is_last = |channel: &Channel| channel.name.rsplit(['/', '.']).next() == Some(name);
-        let with = |is_it: &dyn Fn(&Channel) -> bool| -> Vec<usize> {
-            (0..self.channels.len()).filter(|n| is_it(&self.channels[*n])).collect()
+        let has_one = self.channels.iter().any(|channel| channel.name == name);
+        let is_it = |channel: &Channel| {
+            if has_one {
+                channel.name == name
+            } else {
+                is_last(channel)
+            }
         };
-        let mut found = with(&|channel| channel.name == name);
-        if found.is_empty() {
-            found = with(&is_last);
-        }
-        if let [one, other, ..] = found[..] {
+        let mut found = (0..self.channels.len()).filter(|n| is_it(&self.channels[*n]));
+        let (first, second) = (found.next(), found.next());
+        if let Some((one, other)) = first.zip(second) {
             return Err(self.refused(&format!(
                 " has several channels `{name}`, for instance those with the numbers {} and {}: give the number, or the whole path",
                 one + 1,
@@ -206,11 +202,7 @@ impl Contents {
             )));
         }
         let number = || name.parse::<usize>().ok()?.checked_sub(1);
-        Ok(found
-            .first()
-            .copied()
-            .or_else(number)
-            .and_then(|n| self.channels.get(n)))
+        Ok(first.or_else(number).and_then(|n| self.channels.get(n)))
     }
 
     /// A channel and its unit, from the text of an option.

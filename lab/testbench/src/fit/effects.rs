@@ -20,9 +20,9 @@ use vines_model::numerics::{Estimate, LeastSquares, Misfit, SIGNIFICANT, mean};
 use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
 
 use super::{
-    FEWEST, Fit, FitError, Known, LEFT_OUT, LIMITS, LinearVerdict, MeasuredPoint, Nearest, Part, Problem, Quantity,
-    REJECTED, RecordFit, Recording, UNKNOWNS, Unknowns, across, at, checked, fit, follow, gradient, linear_verdicts,
-    parts, plant, shifted,
+    Fit, FitError, Known, LEFT_OUT, LIMITS, LinearVerdict, MeasuredPoint, Nearest, Part, Problem, Quantity, REJECTED,
+    RecordFit, Recording, UNKNOWNS, Unknowns, across, at, checked, fit, follow, gradient, linear_verdicts, parts,
+    plant, shifted,
 };
 use crate::linear::MeasuredLinear;
 use crate::scene::{Parameters, Scene};
@@ -62,8 +62,6 @@ const ROUNDS: usize = 30;
 const FARTHEST: f64 = 0.1;
 /// Difference of the response over b at which a motion is at a point.
 const NEAR: f64 = 1e-3;
-/// Shares of the points, those of the largest amplitudes, that are fitted one after the other.
-const STAGES: [f64; 3] = [0.5, 0.8, 1.0];
 /// What a further step would take from chi-square, relative to one and chi-square, at which the minimum counts as found.
 const FOUND: f64 = 1e-4;
 /// Smallest strength, over that from which the search begins.
@@ -327,9 +325,6 @@ pub struct Found {
     pub alternatives: Vec<Candidate>,
 }
 
-/// Most points of the search for alternatives: a curve of six parameters needs no more.
-const MOST: usize = 24;
-
 /// The fit of all measurements: [`fit()`] of the points with the linear responses, [`follow`] of the recordings, and, where the ideal cavity does not
 /// describe all points, the effect that does. `progress` is told the number of effects tried.
 ///
@@ -370,9 +365,7 @@ pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize))
     }
     if !found.fit.is_rejected() && found.fit.left_out.is_empty() {
         let problem = Problem::new(points.clone(), definition, &known);
-        let order = problem.by_falling_response();
-        let kept: Vec<usize> = order.into_iter().step_by(points.len().div_ceil(MOST)).collect();
-        found.alternatives = problem.of(&kept).alternatives(&found.fit, expected, progress);
+        found.alternatives = problem.alternatives(&found.fit, expected, progress);
         return Ok(found);
     }
     let explanation = explain(points, definition, expected, &known, progress)?;
@@ -436,37 +429,30 @@ impl Problem<'_> {
 
     /// The fit with an effect; `None` if the plant has no such motions.
     ///
-    /// Beside the fold a motion with wrong parameters may not exist, and most effects shift the points of large amplitude least: these are fitted
-    /// first, and each fit starts the one of more points. A strong effect moves the fold, and the points beyond it belong to another motion: those of
-    /// the smallest amplitudes, a fifth at most, are left out if the others agree.
+    /// Beside the fold a motion with wrong parameters may not exist, and most effects shift the points of large amplitude least: the fit without the
+    /// fifth of the smallest responses starts that of all. A strong effect moves the fold, and the points beyond it belong to another motion: they
+    /// are left out if the others agree.
     fn with_effect(&self, effect: Effect, expected: &Parameters) -> Option<Candidate> {
-        let order = self.by_falling_response();
-        let largest = |share: f64| {
-            let mut kept = order[..((share * order.len() as f64).ceil() as usize).max(FEWEST)].to_vec();
+        let (order, all) = (self.by_falling_response(), self.points.len());
+        let largest = |count: usize| {
+            let mut kept = order[..count].to_vec();
             kept.sort_unstable();
             kept
         };
-        // Where the ideal cavity describes all points, its motions are near.
-        let is_rejected = self.fit(expected).ok()?.is_rejected();
-        let stages = if is_rejected { &STAGES[..] } else { &STAGES[2..] };
-        let ideal = self.of(&largest(stages[0])).fit(expected).ok()?;
+        let most = all - all / LEFT_OUT;
+        let ideal = self.of(&largest(most)).fit(expected).ok()?;
         let mut best: Option<Candidate> = None;
         for factor in STRENGTHS {
-            let (mut x, mut found) = (effect.start(&ideal.x, factor), None::<Candidate>);
-            for share in stages {
-                let kept = largest(*share);
+            let mut x = effect.start(&ideal.x, factor);
+            for count in [most, all] {
+                let kept = largest(count);
                 let Some(mut next) = self.of(&kept).with_effect_from(effect, x, &ideal) else {
                     break;
                 };
-                if next.fit.is_rejected() && found.as_ref().is_some_and(|one| !one.fit.is_rejected()) {
-                    break;
-                }
-                next.fit.left_out = (0..self.points.len()).filter(|n| !kept.contains(n)).collect();
+                next.fit.left_out = (0..all).filter(|n| !kept.contains(n)).collect();
                 x = next.fit.x;
-                found = Some(next);
+                best = best.into_iter().chain([next]).min_by(Candidate::order);
             }
-            let found = found.filter(|one| one.fit.left_out.len() * LEFT_OUT <= self.points.len());
-            best = best.into_iter().chain(found).min_by(Candidate::order);
             let describes_all = |one: &Candidate| !one.fit.is_rejected() && one.fit.left_out.is_empty();
             if !effect.adds_a_parameter() || best.as_ref().is_some_and(describes_all) {
                 break;
