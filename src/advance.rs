@@ -106,7 +106,7 @@ impl<P: Primary> Plant<P> {
             self.fast
                 .drive_changed(&self.moving.system.free, &self.moving.base.drive);
         }
-        if self.status.contact.is_none() && self.fast.step(&mut self.moving, duration) {
+        if P::HAS_FAST_PATH && self.status.contact.is_none() && self.fast.step(&mut self.moving, duration) {
             self.status.time += duration;
             return Ok(Outcome { elapsed: duration, evaluations: 1, ..Outcome::default() });
         }
@@ -177,7 +177,12 @@ impl<P: Primary> Plant<P> {
             if let Some(contact) = self.status.contact {
                 self.stay(contact, left, &mut step);
             } else {
-                match self.fast.next(&mut self.moving, left, duration) {
+                let next = if P::HAS_FAST_PATH {
+                    self.fast.next(&mut self.moving, left, duration)
+                } else {
+                    Next::Search(left)
+                };
+                match next {
                     Next::ContactFree(t) if t == left => step.left = Sum::default(),
                     Next::ContactFree(t) => step.left = step.left.plus(-t),
                     Next::Contact(t, wall) => {
@@ -264,7 +269,7 @@ impl<P: Primary> Plant<P> {
 
     /// Moves on to the wall ahead, if constant forces act and the fast path finds the contact within `limit` seconds.
     fn arrives(&mut self, limit: f64, direction: f64, step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>) -> bool {
-        if !self.moving.system.forces.act() {
+        if !P::HAS_FAST_PATH || !self.moving.system.forces.act() {
             return false;
         }
         let w = self.moving.masses.w;
@@ -318,6 +323,7 @@ impl<P: Primary> Plant<P> {
 
     /// Both masses move as one for at most `left` seconds, until the particle is released; then it goes on. The release is not
     /// remembered beyond this call: another drive or other parameters may hold the particle again.
+    #[inline(never)]
     fn stay(&mut self, contact: Contact, left: f64, step: &mut Step<impl FnMut(Event) -> ControlFlow<()>>) {
         let system = &self.moving.system;
         let velocity = self.moving.masses.primary.values[1];

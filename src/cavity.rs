@@ -178,6 +178,7 @@ impl Rebound {
 }
 
 /// The coefficient of restitution at the speed of approach `v`, m/s, before limits.
+#[cfg_attr(not(target_arch = "wasm32"), inline)]
 fn coefficient(law: Restitution, v: f64) -> f64 {
     match law {
         Restitution::Constant(r) => r,
@@ -204,6 +205,7 @@ fn fifth_root(v: f64) -> f64 {
 /// The sum of eight uniform numbers of 16 bits is nearly normal: the excess of the fourth moment is -0.15, and the largest deviate is 4.9.
 /// They come from two outputs of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), whose state is a counter. The mixed seed keeps the
 /// streams of neighbouring seeds apart.
+#[cfg_attr(not(target_arch = "wasm32"), inline)]
 pub fn deviate(seed: u64, counter: u64) -> f64 {
     const GAMMA: u64 = 0x9E37_79B9_7F4A_7C15;
     /// Every other number of 16 bits.

@@ -70,6 +70,7 @@ const MOST_WINDOWS: usize = 40;
 ///
 /// `look` returns the gaps at a time and the derivatives of the motion there; `fastest` is the fastest rate of the motion, 1/s;
 /// `resolutions` are the rounding errors of the gaps.
+#[cfg_attr(not(target_arch = "wasm32"), inline)]
 pub fn first_closure<const N: usize, D: Look>(
     (from, limit): (f64, f64),
     (fastest, resolutions): (f64, [f64; N]),

@@ -113,6 +113,7 @@ impl Oscillator {
 
     /// A bound on `|y|` from now on, for a free motion that has `y` and `y'` now (each derivative of the motion obeys
     /// the same equation): its energy never grows.
+    #[cfg_attr(not(target_arch = "wasm32"), inline)]
     pub fn ceiling(&self, y: f64, dy: f64) -> f64 {
         let carried = self.reach * dy;
         match self.regime {

@@ -73,17 +73,15 @@ impl Plant {
 impl<P: Primary> Plant<P> {
     /// A plant that is at rest, with the particle in the middle of the cavity, without the fast path.
     pub(crate) fn of(primary: P, parameters: Parameters) -> Self {
-        let (system, mut fast) = (System::from(parameters), FastPath::default());
-        fast.state.disabled = true;
         Self {
             primary,
             moving: Moving {
-                system,
+                system: System::from(parameters),
                 masses: Masses::default(),
                 base: BaseMotion::default(),
             },
             status: Status::default(),
-            fast,
+            fast: FastPath::default(),
         }
     }
 

@@ -14,6 +14,8 @@ pub trait Primary: Clone {
     type Motion: Motion;
     /// Its state beside `Masses::primary`.
     type State: Clone;
+    /// Whether the fast path knows its motion. Otherwise the plain solver finds every contact.
+    const HAS_FAST_PATH: bool;
 
     /// Its motion while the particle is free, under a constant force: the one that gives the particle `acceleration`, m/s².
     fn alone(&self, moving: &Moving, acceleration: f64) -> Self::Motion;
@@ -59,6 +61,7 @@ pub struct Single;
 impl Primary for Single {
     type Motion = Segment;
     type State = ();
+    const HAS_FAST_PATH: bool = true;
 
     #[inline]
     fn alone(&self, moving: &Moving, acceleration: f64) -> Segment {

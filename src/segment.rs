@@ -151,6 +151,7 @@ impl Segment {
 
     /// Every derivative of the motion obeys the equation of motion with the forcing's derivative: the energy of the free
     /// part never grows, and the forcing adds at most its own integral (variation of constants).
+    #[cfg_attr(not(target_arch = "wasm32"), inline)]
     fn bound<const N: usize>(&self, d: &Derivatives, window: f64, signal: f64) -> f64 {
         let oscillator = &self.oscillator;
         let mut forcing = signal;
@@ -214,6 +215,7 @@ impl Motion for Segment {
         }
     }
 
+    #[cfg_attr(not(target_arch = "wasm32"), inline)]
     fn third_derivative_bound(&self, d: &Derivatives, window: f64) -> f64 {
         let signal = self.oscillator.omega0_squared * 6.0 * libm::fabs(self.base.drive.signal[3]);
         self.bound::<3>(d, window, signal)

@@ -650,6 +650,7 @@ fn map<'a>(
 impl Primary for Structure {
     type Motion = SumOfSections;
     type State = Vec<Sums>;
+    const HAS_FAST_PATH: bool = false;
 
     fn alone(&self, moving: &Moving, acceleration: f64) -> SumOfSections {
         let force = moving.system.parameters.particle_mass * acceleration;

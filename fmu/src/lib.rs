@@ -17,7 +17,7 @@ use crate::reach::lost;
 use fmi2_component::{Archive, Component, Key, Log, Refusal, Resources};
 use lovines::plant::Contact;
 use lovines::table::Values;
-use lovines::{BaseMotion, Drive, Event, InvalidValue, Outcome, Parameters, Plant, State, Structure};
+use lovines::{BaseMotion, Drive, Parameters, Plant, State, Structure};
 use outputs::Outputs;
 use reach::Reach;
 use std::cell::Cell;
@@ -93,13 +93,6 @@ use with_plant;
 
 /// The highest order of input derivatives that is followed.
 const DERIVATIVES: u32 = 3;
-
-/// A step whose events are logged.
-#[cold]
-#[inline(never)]
-fn logging(plant: &mut Plant, drive: Drive, step: f64, on_event: impl FnMut(Event)) -> Result<Outcome, InvalidValue> {
-    plant.advance_with(drive, step, on_event)
-}
 
 #[derive(Clone, Copy, PartialEq, PartialOrd, serde::Serialize, serde::Deserialize)]
 enum Progress {
@@ -235,11 +228,13 @@ impl Component for LoViNes {
         let outcome = match &mut self.simulation {
             Simulation::Steps(plant) => {
                 plant.set_time(time);
-                if log.wants(category::logEvents) || log.wants(category::logImpacts) {
-                    logging(plant, self.drive, step, |event| log::tell(log, time, event))?
-                } else {
-                    plant.advance(self.drive, step)?
-                }
+                // One call for both cases: each is a copy of the plant's code.
+                let logs = log.wants(category::logEvents) || log.wants(category::logImpacts);
+                plant.advance_with(self.drive, step, |event| {
+                    if logs {
+                        log::tell(log, time, event);
+                    }
+                })?
             }
             Simulation::Structure(plant) => {
                 plant.set_time(time);

@@ -25,7 +25,7 @@ pub(super) enum FlightEnd {
 
 impl FastPath {
     /// What comes next within `left` seconds of a step of `duration`.
-    #[inline]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn next(&mut self, moving: &mut Moving, left: f64, duration: f64) -> Next {
         if !self.serves {
             return Next::Search(left);

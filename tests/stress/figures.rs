@@ -80,7 +80,8 @@ impl Figures {
         assert!(self.exceeded.is_empty(), "{:#?}", self.exceeded);
     }
 
-    /// Follows `n` scenes of a kind and prints a row for each figure; where the environment names a scene, that one alone.
+    /// Follows `n` scenes of a kind and prints a row for each figure; where the environment names a scene, that one alone. `SKIP` is the number of
+    /// scenes that another run has followed.
     pub fn run<T: Debug>(
         &mut self,
         kind: &str,
@@ -98,7 +99,8 @@ impl Figures {
             }
             return;
         }
-        for begin in (0..n).step_by(PORTION) {
+        let skipped = std::env::var("SKIP").map_or(0, |n| n.parse().expect("a number of scenes"));
+        for begin in (skipped..n).step_by(PORTION) {
             let end = n.min(begin + PORTION);
             let one = |strategy: &mut BoxedStrategy<T>, number| {
                 let (scene, mut figures) = (draw(strategy, number), Self::default());
@@ -119,7 +121,7 @@ impl Figures {
                 eprintln!("{kind}: {end} of {n} scenes");
             }
         }
-        self.print(kind, n);
+        self.print(kind, n - skipped.min(n));
     }
 }
 
