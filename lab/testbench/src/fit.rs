@@ -213,23 +213,14 @@ impl ChannelTest {
     /// chi-square with the same mean and variance).
     fn new(chi_square: f64, covariance: &DMatrix<f64>) -> Self {
         let (expected, squares) = (covariance.trace(), covariance.norm_squared());
-        let distribution = ChiSquared::new(expected * expected / squares).ok();
-        let p_value = distribution.map(|one| one.sf(chi_square * expected / squares));
-        Self {
-            chi_square,
-            expected,
-            p_value: p_value.filter(|p| p.is_finite()),
-        }
+        let p_value = probability(chi_square * expected / squares, expected * expected / squares);
+        Self { chi_square, expected, p_value }
     }
 
     /// The test of a sum of the squares of independent residuals.
     fn of(chi_square: f64, expected: f64) -> Self {
-        let distribution = ChiSquared::new(expected).ok();
-        Self {
-            chi_square,
-            expected,
-            p_value: distribution.map(|one| one.sf(chi_square)),
-        }
+        let p_value = probability(chi_square, expected);
+        Self { chi_square, expected, p_value }
     }
 
     /// What its size says about the uncertainties of this channel, at a probability of 1 % for all channels and both sides.
@@ -254,12 +245,8 @@ fn channels<T: Clone>(
         // The covariance of the residuals is what remains of the unit matrix beside the directions that the fit can follow.
         let row = |n: usize| fit.derivatives[3 * n + channel];
         let remaining = DMatrix::from_fn(places.len(), places.len(), |n, m| {
-            let own = if n == m {
-                1.0 - places[n].along.normalize()[channel].powi(2)
-            } else {
-                0.0
-            };
-            own - (row(n).transpose() * covariance * row(m))[0]
+            let beside = 1.0 - places[n].along.normalize()[channel].powi(2);
+            f64::from(u8::from(n == m)) * beside - (row(n).transpose() * covariance * row(m))[0]
         });
         let residuals = (0..places.len()).map(|n| fit.residuals[3 * n + channel]);
         ChannelTest::new(residuals.map(|one| one * one).sum(), &remaining)
@@ -287,8 +274,7 @@ impl Fit {
     /// The probability of a larger chi-square if the model is right; `None` without a degree of freedom.
     #[must_use]
     pub fn p_value(&self) -> Option<f64> {
-        let distribution = ChiSquared::new(self.degrees as f64).ok()?;
-        Some(distribution.sf(self.chi_square))
+        probability(self.chi_square, self.degrees as f64)
     }
 
     /// Whether the points contradict the model.
@@ -352,9 +338,10 @@ pub fn fit(
     Ok(fit)
 }
 
-/// Probability of a larger fall of chi-square without some points, if they belong to the others.
-fn probability(fall: f64, points: usize) -> f64 {
-    ChiSquared::new(2.0 * points as f64).map_or(1.0, |distribution| distribution.sf(fall.max(0.0)))
+/// Probability of a larger chi-square of so many degrees of freedom; `None` without one.
+fn probability(chi_square: f64, degrees: f64) -> Option<f64> {
+    let p = ChiSquared::new(degrees).ok()?.sf(chi_square.max(0.0));
+    p.is_finite().then_some(p)
 }
 
 /// The points, if they are enough and their numbers are positive.
@@ -555,7 +542,7 @@ impl<'a> Problem<'a> {
                 0 => outermost.value - aside < smallest,
                 _ => outermost.value + aside > largest,
             };
-            let p = probability(fit.chi_square - next.chi_square, high + low) * (2 * TRIMMED.len()) as f64;
+            let p = Self::gain(fit, &next, 2 * TRIMMED.len());
             has_ended.then_some((p, rest, next))
         });
         let size = |n: usize| fit.residuals[n].iter().map(|part| part * part).sum::<f64>();
@@ -563,11 +550,17 @@ impl<'a> Problem<'a> {
         let worst = Some(worst).filter(|_| fit.is_rejected() && self.may_keep(kept.len() - 1));
         let worst = worst.and_then(|worst| {
             let (rest, next) = self.rest(&[&kept[..worst], &kept[worst + 1..]].concat(), fit, expected)?;
-            let p = probability(fit.chi_square - next.chi_square, 1) * self.points.len() as f64;
+            let p = Self::gain(fit, &next, self.points.len());
             Some((p, rest, next))
         });
         let (p, rest, next) = ends.chain(worst).min_by(|first, second| first.0.total_cmp(&second.0))?;
         (p < FALSE_ALARM).then_some((rest, next))
+    }
+
+    /// Probability of a larger fall of chi-square from the fit of some points to that of fewer in any of so many choices, if all belong together.
+    fn gain(more: &Fit, fewer: &Fit, choices: usize) -> f64 {
+        let left_out = more.speeds.len() - fewer.speeds.len();
+        probability(more.chi_square - fewer.chi_square, 2.0 * left_out as f64).unwrap_or(1.0) * choices as f64
     }
 
     /// Some of the points, in their order, and their fit from that of more points.

@@ -5,11 +5,12 @@ use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use vines_model::numerics::Estimate;
 use vines_model::{ArgumentError, Definition};
 
-use super::{Fit, FitError, LinearDecay, MeasuredPoint, Problem, REJECTED, Unknowns, fit, gradient, unknowns};
+use super::{
+    Fit, FitError, LinearDecay, MeasuredPoint, Problem, REJECTED, Unknowns, fit, gradient, probability, unknowns,
+};
 use crate::linear::{MeasuredLinear, ParticleState};
 use crate::scene::Parameters;
 
@@ -198,12 +199,8 @@ impl LinearVerdict {
     /// Whether a state agrees with the points: the probability of a larger rise, of two degrees of freedom, is at least 1 %.
     #[must_use]
     pub fn agrees(&self) -> [bool; 2] {
-        let distribution = ChiSquared::new(2.0).ok();
-        self.rises.map(|rise| {
-            distribution
-                .zip(rise)
-                .is_some_and(|(chi_square, rise)| chi_square.sf(rise.max(0.0)) >= REJECTED)
-        })
+        let is_likely = |rise: f64| probability(rise, 2.0).is_some_and(|p| p >= REJECTED);
+        self.rises.map(|rise| rise.is_some_and(is_likely))
     }
 }
 
