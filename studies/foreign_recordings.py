@@ -203,7 +203,7 @@ def main() -> None:
     schedule = levels(12)
     reads: dict[tuple[int, int], tuple[NDArray[np.float64], ...]] = {}
     rows = []
-    file = Path("foreign.csv")
+    file = ROOT / "target/foreign.csv"
     for name, chain in CASES.items():
         kind = chain.response, chain.base
         if kind not in reads:

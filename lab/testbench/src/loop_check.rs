@@ -5,7 +5,7 @@
 
 mod shaker;
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
 use nalgebra::{DVector, Matrix3, RowVector3, Vector3};
 use num_complex::Complex64;
@@ -351,10 +351,8 @@ const NOISE: f64 = 0.15;
 const DEAD: f64 = 0.01;
 /// Factor by which an amplitude may differ from the expected one, or its inverse: the damping is known roughly.
 const GAIN: f64 = 2.0;
-/// Smallest RMS of the response without a drive, over its noise with the drive, of a rig that moves.
-const AT_REST: f64 = 3.0;
-/// Deviation of the phase, rad, up to which a channel is in time, or reversed.
-const IN_TIME: f64 = 0.7;
+/// Deviation of the phase, rad, up to which a channel is in time, or reversed, or exchanged: the nearest quarter of a turn.
+const IN_TIME: f64 = FRAC_PI_4;
 
 /// A channel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
@@ -468,7 +466,7 @@ fn verdict(channels: &[CheckedChannel; 2], expected: &[f64; 2], has_base: bool, 
     // The response's converter may be too coarse for the motion of the base.
     let as_base = dead[0] || near(crossed[0]) && in_time(crossed_phases[0]);
     match () {
-        () if response.floor > (AT_REST * response.noise).max(NOISE * expected[0]) => Verdict::NotAtRest,
+        () if response.floor > (SIGNIFICANT * response.noise).max(NOISE * expected[0]) => Verdict::NotAtRest,
         () if dead[0] && (dead[1] || !has_base) => Verdict::ShakerOff,
         () if has_base && as_base && near(crossed[1]) && in_time(crossed_phases[1]) => Verdict::Swapped,
         () if dead[0] => Verdict::ResponseDead,
