@@ -2,10 +2,11 @@
 
 #![allow(dead_code, unused_imports, reason = "no study uses everything")]
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::{fmt::Debug, fs, path::Path};
 
 pub use lovines::{Cavity, Parameters, Restitution, cavity::GRAVITY};
+use num_complex::Complex64;
 use phase_lock::Config;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -232,6 +233,35 @@ pub fn crossings(record: &Record, scene: &Scene) -> Vec<[f64; 2]> {
         [0.5 * (span[0] + span[2]) * step * d.omega0, d.sigma(omega)]
     };
     zeros.windows(3).map(point).collect()
+}
+
+/// Time since the release, times omega0, and sigma of the fundamental in a free decay: the change over a period of the phase of the mean over two periods
+/// with the weights of Hann. Where impacts are seen, zero crossings turn against the fundamental as the amplitude falls, by up to 0.01 in sigma.
+pub fn demodulated(record: &Record, scene: &Scene) -> Vec<[f64; 2]> {
+    let values: Vec<f64> = record.decay().iter().map(|sample| sample.sensors.response).collect();
+    let (d, step) = (scene.dimensionless(), record.sample_time);
+    let omega = record
+        .hold()
+        .last()
+        .map_or(d.omega0, |sample| sample.command.drive.omega);
+    let half = (TAU / omega / step).round() as usize;
+    let fundamental = |middle: usize| -> Complex64 {
+        let term = |n: usize| {
+            let from = n as f64 - middle as f64;
+            let weight = (0.5 * PI * from / half as f64).cos().powi(2);
+            weight * values[n] * Complex64::cis(-omega * step * n as f64)
+        };
+        (middle - half..=middle + half).map(term).sum()
+    };
+    let places = (half + half / 2..values.len().saturating_sub(half + half / 2 + 1)).step_by(4);
+    let point = |n: usize| {
+        let turn = (fundamental(n + half / 2) * fundamental(n - half / 2).conj()).arg();
+        [
+            n as f64 * step * d.omega0,
+            d.sigma(omega + turn / (2 * (half / 2)) as f64 / step),
+        ]
+    };
+    places.map(point).collect()
 }
 
 /// Sigma at a time, interpolated linearly; `None` outside the points.

@@ -5,7 +5,7 @@
 //! to 3 times m omega0 of the armature, its rate R/L 3 to 100 omega0 in half of the cases, and the amplifier controls the voltage or the current (uniform logarithms).
 //! Tracked in 8 levels over the range of responses in which the exact backbone with the shaker has stable orbits, at least a factor of 1.2. A point is right within 3 u of the exact backbone in sigma and G.
 //!
-//! Arguments: SHAKERS, SEED. Writes validation/shakers.csv: a row per shaker.
+//! Arguments: SHAKERS, SEED, settings of the scene, `KEY=VALUE`, and the number of the only SHAKER to run, which writes nothing. Writes validation/shakers.csv: a row per shaker.
 
 mod common;
 
@@ -60,7 +60,7 @@ fn text(uniform: Uniform) -> (String, [f64; 4]) {
 }
 
 /// A scene with a drive at which a stable orbit exists, and its levels.
-fn drawn(uniform: Uniform) -> Result<(Scene, [f64; 4]), Failure> {
+fn drawn(uniform: Uniform, settings: &[String]) -> Result<(Scene, [f64; 4]), Failure> {
     loop {
         let (text, numbers) = text(uniform);
         let share = uniform(0.0, 1.0);
@@ -85,7 +85,7 @@ fn drawn(uniform: Uniform) -> Result<(Scene, [f64; 4]), Failure> {
         let rest = format!(
             "[excitation]\nG = {g:?}\n[start]\ndq2 = 5\n[backbone]\nC_from = {from:?}\nC_to = {to:?}\npoints = 8\n"
         );
-        return Ok((scene(&format!("{text}{rest}"), &[""; 0])?, numbers));
+        return Ok((scene(&format!("{text}{rest}"), settings)?, numbers));
     }
 }
 
@@ -136,13 +136,14 @@ fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String
 }
 
 fn main() -> Result<(), Failure> {
-    let given: Vec<String> = std::env::args().skip(1).collect();
+    let given = std::env::args().skip(1);
+    let (settings, given): (Vec<String>, Vec<String>) = given.partition(|one| one.contains('='));
     let [count, seed, only @ ..] = &given[..] else {
-        return Err("arguments: SHAKERS SEED [SHAKER]".into());
+        return Err("arguments: SHAKERS SEED [SHAKER] [KEY=VALUE ...]".into());
     };
     let mut uniform = uniform(seed.parse()?);
     let scenes: Vec<_> = (0..count.parse()?)
-        .map(|_| drawn(&mut uniform))
+        .map(|_| drawn(&mut uniform, &settings))
         .collect::<Result<_, _>>()?;
     if let [only] = only {
         let (points, settled, beyond, worst, periods, why) = run(&scenes[only.parse::<usize>()?]);

@@ -10,7 +10,7 @@ use pyo3::{
 };
 use vines_testbench::{
     rig::{RigError, SimulatedStructure},
-    scene::{Channel, Structure},
+    scene::Structure,
 };
 
 use crate::{
@@ -29,14 +29,16 @@ pub struct StructurePlant {
 /// Columns before those of the channels: time, drive, q2, impacts.
 const COLUMNS: usize = 4;
 
-fn row(plant: &SimulatedStructure, channels: &[Channel<'_>]) -> Vec<f64> {
-    let plant = plant.plant();
+/// A row; the channels are those of the present structure, whose stinger may have been cut.
+fn row(rig: &SimulatedStructure) -> Vec<f64> {
+    let plant = rig.plant();
     let first = [
         plant.time(),
         plant.base_displacement(),
         plant.state().q2,
         plant.totals().impacts as f64,
     ];
+    let channels = rig.structure().channels();
     first
         .into_iter()
         .chain(channels.iter().map(|channel| channel.read(plant)))
@@ -80,13 +82,13 @@ impl StructurePlant {
             ..Drive::harmonic(amplitude.0, omega.0)
         };
         let (stop, before) = (AtomicBool::new(false), self.plant.clone());
-        let channels = self.structure.channels();
+        let channels = self.structure.channels().len();
         let plant = &mut self.plant;
         let mut run = || -> Result<Vec<f64>, Option<RigError>> {
-            let mut rows = row(plant, &channels);
+            let mut rows = row(plant);
             for _ in 0..steps {
                 plant.step(drive, duration.0 / steps as f64).map_err(Some)?;
-                rows.extend(row(plant, &channels));
+                rows.extend(row(plant));
                 if stop.load(Relaxed) {
                     return Err(None);
                 }
@@ -107,7 +109,7 @@ impl StructurePlant {
                 Some(error) => invalid(error),
             }
         })?;
-        let shape = (steps + 1, COLUMNS + channels.len());
+        let shape = (steps + 1, COLUMNS + channels);
         Ok(Array2::from_shape_vec(shape, rows).map_err(invalid)?.into_pyarray(py))
     }
 }

@@ -184,3 +184,26 @@ def test_a_limit_of_the_shaker_is_an_error_and_leaves_the_plant_as_it_was():
 def test_an_experiment_with_a_shaker_locks_on_its_exact_orbit():
     found = vines.identify(vines.Scene(SCENES / "shaker-cantilever.toml"), results="lock")
     assert abs(found.lock["sigma"] - found.exact.sigma) < 3 * found.lock["u_sigma"]
+
+
+def test_a_shaker_in_python_is_that_of_its_file():
+    from tomllib import loads
+
+    text = (SCENES / "shaker-cantilever.toml").read_text(encoding="utf-8")
+    shaker = loads(text)["shaker"]
+    without = text[: text.index("[shaker]")] + text[text.index("[excitation]") :]
+    assert vines.Scene(text=without, shaker=shaker) == vines.Scene(text=text)
+    with pytest.raises(ValueError, match="stinger_stiffness"):
+        vines.Scene(text=without, shaker={"mass": 0.057, "stiffness": 9932.0})
+
+
+def test_after_the_stinger_is_cut_the_channels_are_those_of_the_structure_alone():
+    plant = vines.StructurePlant(vines.Scene(SCENES / "shaker-cantilever.toml", shaker={"release": "cut"}))
+    driven = plant.trajectory(1.0, 1000, amplitude=1.0, omega=53.0)
+    free = plant.trajectory(1.0, 1000, amplitude=0.0, omega=53.0)
+    largest = np.abs(driven["force"]).max()
+    assert largest > 0.1
+    assert np.abs(free["force"][1:]).max() < 1e-6 * largest
+    # The displacement goes on where it was; the current is that of a shaker whose coil is shorted.
+    assert free["tip"][1] == pytest.approx(driven["tip"][-1], abs=0.01 * np.abs(driven["tip"]).max())
+    assert np.abs(free["current"][-1]) < np.abs(driven["current"]).max()

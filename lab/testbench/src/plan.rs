@@ -185,13 +185,6 @@ impl ShakerPath {
         self.gain * (s + self.damping_rate) / (s + self.pole)
     }
 
-    /// Amplitude of the command that gives this reference at phase resonance, and this response of an oscillator at its natural frequency
-    /// `omega0`, rad/s, both m.
-    pub fn command(&self, omega0: f64, reference: f64, response: f64) -> f64 {
-        let moved = (self.pole - self.damping_rate) * (response / (0.5 * omega0));
-        (reference + moved).norm() / self.gain.norm()
-    }
-
     /// What is left of the reference at the natural frequency: the drop-out.
     pub fn drop_out(&self) -> f64 {
         self.damping_rate / self.pole.norm()

@@ -421,6 +421,11 @@ impl SimulatedStructure {
         &self.simulated.plant
     }
 
+    /// The structure as it is now: with its stinger, or without.
+    pub fn structure(&self) -> &Structure {
+        &self.structure
+    }
+
     /// With a fault of the shaker that begins after some seconds.
     #[must_use]
     pub fn failing(self, fault: ShakerFault, seconds: f64) -> Self {
@@ -443,7 +448,7 @@ impl SimulatedStructure {
         Ok(())
     }
 
-    /// What fails or is cut now: `command`, V, is the amplitude of the drive.
+    /// What fails or is cut now: `command`, V, is the amplitude of the drive, or a held sample of it.
     fn change(&mut self, command: f64) -> Result<(), RigError> {
         let begins = |(_, at): &mut (ShakerFault, f64)| self.simulated.clock.time() >= *at;
         let fault = self.fault.take_if(begins).map(|(fault, _)| fault);

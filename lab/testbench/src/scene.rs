@@ -369,37 +369,15 @@ impl Sections {
             SimulatedStructure::new(structure, scene.plant, scene.start)
                 .map_err(|error| SceneError::text(origin, format!("[structure]: {error}")))?;
         }
-        if let Some(shaker) = scene.structure.as_ref().and_then(|structure| structure.shaker.as_ref()) {
+        let shaken = scene.structure.as_ref().filter(|one| one.shaker.is_some());
+        if let Some(structure) = shaken.filter(|_| cfg!(feature = "tables")) {
             if !scene.chain.reference {
                 let message = "[shaker] with chain.reference = false: the command is not the force; the loop needs the force cell, or the sensor of \
                                the table, as its reference";
                 return Err(SceneError::text(origin, message));
             }
-            let force = scene.amplitude / scene.structure.as_ref().map_or(1.0, Structure::base_per_drive);
-            let is_force = scene
-                .structure
-                .as_ref()
-                .is_some_and(|structure| structure.excitation == Excitation::Force);
-            if let Some(limit) = shaker.limits.force.filter(|limit| is_force && force > *limit) {
-                let message = format!(
-                    "[excitation] asks for {force:.4} N, and shaker.force_max allows {limit} N: lower one, or raise the other"
-                );
-                return Err(SceneError::text(origin, message));
-            }
-        }
-        if let Some(path) = scene.knowledge().shaker() {
             // The least response at which particles hit: half of the cavity.
-            let command = path.command(
-                scene.dimensionless().omega0,
-                scene.amplitude,
-                0.5 * scene.plant.half_width,
-            );
-            if command > path.largest {
-                let message = format!(
-                    "[excitation] needs {:.2} times the command that voltage_max or current_max of [shaker] allows, at a response of half of the cavity: \
-                     lower the drive, raise the limit, or choose a drive point that moves less",
-                    command / path.largest
-                );
+            if let Some(message) = structure.beyond_limits(scene.amplitude, 0.5 * scene.plant.half_width) {
                 return Err(SceneError::text(origin, message));
             }
         }

@@ -99,7 +99,12 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
         f64::INFINITY
     };
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
-    let mut windows = fitted(&values, dt, omega, window);
+    let terms = if knowledge.shaker().is_some() {
+        BEHIND_SHAKER
+    } else {
+        TERMS
+    };
+    let mut windows = fitted(&values, [dt, window], omega, terms);
     for window in &mut windows {
         window.fit = window.fit.displacement(0, &knowledge.target);
     }
@@ -154,14 +159,14 @@ impl SlidingFit {
     }
 }
 
-/// Fits in a sliding window of `periods`. Each fit starts from the frequency of the one before, the first from `omega`.
-fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<SlidingFit> {
+/// Fits of these terms in a sliding window of some periods. Each fit starts from the frequency of the one before, the first from `omega`.
+fn fitted(values: &[f64], [dt, periods]: [f64; 2], mut omega: f64, terms: Terms) -> Vec<SlidingFit> {
     let period = TAU / omega / dt;
     let window = (periods * period).round() as usize + 1;
     let step = ((period / PER_PERIOD).round() as usize).max(1);
     let fits = values.windows(window).enumerate().step_by(step);
     fits.map_while(|(n, values)| {
-        let fit = harmonic(values, dt, omega)?;
+        let fit = harmonic_of(values, dt, omega, terms)?;
         omega = fit.omega;
         let time = (n as f64 + 0.5 * (window - 1) as f64) * dt;
         Some(SlidingFit { samples: n..n + window, time, fit })
@@ -201,6 +206,16 @@ impl Harmonic {
     }
 }
 
+/// Degree of the trend, and the degrees of the harmonics.
+type Terms = (usize, &'static [Option<usize>]);
+/// A constant, and harmonics 1 and 3 with drift.
+const TERMS: Terms = (0, &[Some(2), None, Some(1)]);
+/// A shaker that is released returns slowly, and a sensor at the cavity sees the walls' impulses: a trend, and harmonics up to 9.
+const BEHIND_SHAKER: Terms = (
+    2,
+    &[Some(2), None, Some(1), None, Some(1), None, Some(1), None, Some(1)],
+);
+
 /// Number of fits, each about the frequency that the fit before found; each reduces the error by orders of magnitude.
 const ROUNDS: usize = 6;
 /// Largest relative distance of the frequency from the guess: beyond it, the fits diverge.
@@ -212,6 +227,10 @@ const FARTHEST: f64 = 0.5;
 /// The drift of the fitted phase corrects the frequency, and the fit is repeated about that. `None` for a window that is too
 /// short or contains no motion of about that frequency.
 pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic> {
+    harmonic_of(values, sample_time, omega, TERMS)
+}
+
+fn harmonic_of(values: &[f64], sample_time: f64, omega: f64, (trend, degrees): Terms) -> Option<Harmonic> {
     let middle = 0.5 * (values.len() - 1) as f64;
     let right = DVector::from_column_slice(values);
     // Half a window, s.
@@ -221,7 +240,7 @@ pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic
         let phases: Vec<f64> = (0..values.len())
             .map(|n| (n as f64 - middle) * sample_time * omega)
             .collect();
-        let basis = HarmonicBasis::new(&phases, 0, &[Some(2), None, Some(1)]);
+        let basis = HarmonicBasis::new(&phases, trend, degrees);
         if values.len() <= basis.terms() {
             return None;
         }

@@ -77,15 +77,20 @@ impl Override {
     }
 }
 
-/// `table` with the overrides applied one by one, so that an error names the
-/// argument that caused it.
+/// `table` with the overrides applied one by one, so that an error names the argument that caused it; a new section, which may need several keys, is
+/// checked with the last of them.
 pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, SceneError> {
     let sets = |key| overrides.iter().find(|change| change.is("excitation", key));
     if let (Some(_), Some(second)) = (sets("G"), sets("E")) {
         return Err(second.error("excitation.G is set as well: set one of them"));
     }
-    for change in overrides {
+    let before = table.clone();
+    for (n, change) in overrides.iter().enumerate() {
         change.merge_into(&mut table)?;
+        let is_of_section = |other: &Override| other.section == change.section;
+        if !before.contains_key(&change.section) && overrides[n + 1..].iter().any(is_of_section) {
+            continue;
+        }
         let sections = Sections::deserialize(table.clone()).map_err(|error| change.error(plain(error.message())))?;
         sections.plant.is_si().map_err(|message| change.error(message))?;
     }

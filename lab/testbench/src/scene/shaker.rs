@@ -142,6 +142,48 @@ impl Structure {
         channels
     }
 
+    /// A limit of the shaker that the drive needs more than, in a sentence: `amplitude`, m, of the base or of the oscillator's, at a response at the cavity,
+    /// m, that lags by a quarter of a period. The command and a force at the cavity, which the impacts are, make both at the natural frequency.
+    pub(crate) fn beyond_limits(&self, amplitude: f64, response: f64) -> Option<String> {
+        let shaker = self.shaker.as_ref()?;
+        let (omega, asked) = (self.mode().omega, amplitude / self.base_per_drive());
+        let of = |row: &Row| {
+            let by_command = self.host.frequency_response(row, omega);
+            [by_command, self.host.frequency_response_to_cavity(row, omega)]
+        };
+        let alone = &shaker.alone.host;
+        let linear = alone.frequency_response(alone.cavity_row(), omega);
+        let response = linear * (response / linear.norm());
+        let ([a, b], [c, d]) = (of(shaker.reference(self.excitation)), of(self.host.cavity_row()));
+        let determinant = a * d - b * c;
+        let (command, force) = (
+            (asked * d - b * response) / determinant,
+            (a * response - c * asked) / determinant,
+        );
+        let at = |row: &Row| {
+            let [by_command, by_force] = of(row);
+            by_command * command + by_force * force
+        };
+        let (rows, limits) = (&shaker.rows, &shaker.limits);
+        let current = at(&rows.current) + rows.current_per_command * command;
+        let needed = [
+            ("voltage_max", "V", command * shaker.shaker.gain, limits.voltage),
+            ("current_max", "A", current, limits.current),
+            ("stroke_max", "m", at(&rows.armature), limits.stroke),
+            ("force_max", "N", at(&rows.force), limits.force),
+        ];
+        let beyond = needed
+            .into_iter()
+            .find_map(|(key, unit, value, limit)| Some((key, unit, value.norm(), limit?)).filter(|one| one.2 > one.3));
+        beyond.map(|(key, unit, value, limit)| {
+            format!(
+                "[excitation] needs {value:.4} {unit} at a response of half of the cavity, {:.2} times what shaker.{key} = {limit} allows: lower the drive, \
+                 raise the limit, or choose a drive point that moves less",
+                value / limit
+            )
+        })
+    }
+
     /// What the shaker makes of its command, from the frequency response at the frequencies of the check.
     pub(crate) fn shaker_path(&self) -> Option<ShakerPath> {
         let (shaker, mode) = (self.shaker.as_ref()?, self.mode());

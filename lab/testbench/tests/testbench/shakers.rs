@@ -14,7 +14,7 @@ use vines_testbench::rig::{BuiltIn, RigError, RigFault, SensorFault, Sensors, Se
 use vines_testbench::scene::{Scene, SceneError};
 use vines_testbench::survey::{BehindShaker, Survey, phase_resonant};
 
-use super::common::{at, crossings, mean_square};
+use super::common::{at, demodulated, mean_square};
 use super::{Altered, identified, record, tracked};
 
 const PRESETS: [&str; 3] = [
@@ -159,7 +159,7 @@ fn a_limit_that_is_reached_ends_the_experiment_with_its_name() {
 fn the_decay_after_the_stinger_is_cut_is_that_of_the_simulation() {
     let scene = preset(1, &[("[shaker]", "[shaker]\nrelease = \"cut\"")]).unwrap();
     let record = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
-    let truth = crossings(&record, &scene);
+    let truth = demodulated(&record, &scene);
     let points = decay_points(&record, &scene.knowledge(), WINDOW).points;
     let errors = points.iter().filter(|point| point.c > COMPARED_ABOVE);
     let errors: Vec<f64> = errors
@@ -167,8 +167,8 @@ fn the_decay_after_the_stinger_is_cut_is_that_of_the_simulation() {
         .collect();
     let (count, error) = (errors.len(), mean_square(errors).sqrt());
     println!("{count} points, RMS error {error:.1e} of sigma");
-    // The same fit of the default scene, without a shaker, has an error of 3e-3.
-    assert!(count > 20 && error < 1e-2, "{count} {error}");
+    // The same fit of the default scene, without a shaker, has an error of 3e-3, because the window blurs the end.
+    assert!(count > 20 && error < 2e-3, "{count} {error}");
 }
 
 #[test]
@@ -226,8 +226,10 @@ fn what_is_wrong_with_a_shaker_is_said_in_one_sentence() {
             0,
             "voltage_max = 40.0",
             "voltage_max = 0.4",
-            ["voltage_max", "times the command"],
+            ["voltage_max", "times what"],
         ),
+        (0, "current_max = 15.0", "current_max = 0.1", ["current_max", "A"]),
+        (0, "stroke_max = 0.0088", "stroke_max = 1e-5", ["stroke_max", "m"]),
         (1, "M = 3.807", "", ["M", "SI"]),
         (2, "table_mass = 40.0", "table_mass = 0", ["end of the stinger", "kg"]),
         (
