@@ -70,6 +70,25 @@ pub fn share(values: &[f64], limit: f64) -> f64 {
     values.iter().filter(|value| **value <= limit).count() as f64 / values.len() as f64
 }
 
+/// Probability that uniform values are distributed as unequally as these (the test of Kolmogorov and Smirnov); NaN of fewer than five.
+pub fn uniformity(values: &[f64]) -> f64 {
+    if values.len() < 5 {
+        return f64::NAN;
+    }
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let n = sorted.len() as f64;
+    let apart = |(i, p): (usize, &f64)| f64::max((i + 1) as f64 / n - p, p - i as f64 / n);
+    let distance = sorted.iter().enumerate().map(apart).fold(0.0, f64::max);
+    // Numerical Recipes, section 14.3.
+    let scaled = (n.sqrt() + 0.12 + 0.11 / n.sqrt()) * distance;
+    let term = |k: f64| 2.0 * (-2.0 * (k * scaled).powi(2)).exp();
+    let sum: f64 = (1..100)
+        .map(|k| term(f64::from(2 * k - 1)) - term(f64::from(2 * k)))
+        .sum();
+    if scaled < 0.2 { 1.0 } else { sum.clamp(0.0, 1.0) }
+}
+
 /// What was measured on one random rig.
 #[derive(Default)]
 pub struct Found {

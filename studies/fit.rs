@@ -5,8 +5,10 @@
 //! check of the rig at rest measures (`linear`), or to a recording, cut at both ends, which the plant follows: of the tracked backbone (`levels`), of
 //! a lock whose drive then changes slowly (`sweeps`), or of the search, the hold and the decay of `vines identify` (`decays`). For each parameter, of
 //! the fits that are not rejected: the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the
-//! error over u, and that over the Cramér–Rao bound of the same points (of recordings, u is this bound); and the numbers of fits that are rejected,
-//! and of rigs without a fit.
+//! error over u, and that over the Cramér–Rao bound of the same points (of recordings, u is this bound); the numbers of fits that are rejected, of
+//! recordings of which only the points were fitted, and of rigs without a fit; and the probabilities by Kolmogorov and Smirnov that the p-values of
+//! each channel's chi-square are uniform: of response, frequency and drive, or of the innovations of a record, in phase with the response and a
+//! quarter of a period beside it.
 //!
 //! `effects` gives each rig one hidden effect, in turn friction, tilt, two laws of restitution, and a cubic stiffness, which moves the measured
 //! frequencies by harmonic balance; and as many rigs none. Half of the rigs with friction are at rest when a loop check measures them. A rig is drawn
@@ -60,7 +62,15 @@ fn main() -> Result<(), Failure> {
         Ok((ratios, noise, scales))
     };
     let found = survey(count, case, |case| measure(case, snr))?;
-    let [kept, rejected, _, failed, ..] = counts(&found);
+    let [kept, rejected, by_points, failed, ..] = counts(&found);
+    let uniform = [0, 1, 2].map(|channel| {
+        let p_values = found.iter().filter_map(|one| one.ratios.get(5 + channel).copied());
+        format!(
+            "{:.3}",
+            uniformity(&p_values.filter(|p| p.is_finite()).collect::<Vec<f64>>())
+        )
+    });
+    let uniform = uniform.join(",");
     let rows = Quantity::ALL[..5].iter().enumerate().map(|(n, quantity)| {
         // One value of each rig whose fit is kept.
         let gather = |values: fn(&Found) -> &[f64]| -> Vec<f64> {
@@ -70,14 +80,15 @@ fn main() -> Result<(), Failure> {
         let (ratios, over_bound) = (gather(|one| &one.ratios), gather(|one| &one.errors));
         let rms = |values: &[f64]| mean_square(values.iter().copied()).sqrt();
         format!(
-            "{source},{snr},{quantity},{count},{seed},{kept},{:.3},{:.1},{:.2},{:.2},{rejected},{failed}",
+            "{source},{snr},{quantity},{count},{seed},{kept},{:.3},{:.1},{:.2},{:.2},{rejected},{by_points},{failed},{uniform}",
             share(&ratios, 1.96),
             ends(&ratios)[1],
             rms(&ratios),
             rms(&over_bound),
         )
     });
-    let header = "source,snr_dB,parameter,rigs,seed,fitted,within_1.96u,largest_u,rms_u,rms_bound,rejected,without_fit";
+    let header = "source,snr_dB,parameter,rigs,seed,fitted,within_1.96u,largest_u,rms_u,rms_bound,rejected,by_points,without_fit,\
+        uniform_1,uniform_2,uniform_3";
     write("fit", header, 3, &rows.collect::<Vec<_>>())
 }
 
@@ -104,8 +115,18 @@ fn fitted((points, scene, truth): &Points, known: &[Known]) -> Result<Found, Fai
     );
     Ok(match fit.is_rejected() {
         true => Found { counts: [0, 1, 0, 0, 0, 0], ..Found::default() },
-        false => Found { errors, ratios, periods: None, counts: [1, 0, 0, 0, 0, 0] },
+        false => Found {
+            errors,
+            ratios: [ratios, p_values(&fit)].concat(),
+            periods: None,
+            counts: [1, 0, 0, 0, 0, 0],
+        },
     })
+}
+
+/// The p-value of each channel's chi-square.
+fn p_values(fit: &Fit) -> Vec<f64> {
+    fit.channels.iter().map(|one| one.p_value.unwrap_or(f64::NAN)).collect()
 }
 
 fn effects(source: &str, count: usize, seed: u64, snr: &str) -> Result<(), Failure> {
@@ -375,40 +396,36 @@ type Recorded = fn(&Case, &str) -> Result<(Recording, Scene, Parameters), Failur
 fn follow_one(case: &Case, snr: &str, record: Recorded) -> Result<Found, Failure> {
     let (recording, scene, truth) = record(case, snr)?;
     let parts = parts(std::slice::from_ref(&recording), &scene)?;
-    let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
-    let start = fit(&points, scene.resonance, &scene.plant, &[])?;
     let prepared = [recording.prepared(&scene.knowledge())?];
     let found = follow(&prepared, &parts, &[], scene.resonance, &scene.plant, &[]);
-    // Without it, the result is the fit of the points.
-    let points_only = RecordFit {
-        fit: start.clone(),
-        periods: 0,
-        left_out: Vec::new(),
-        colour: f64::NAN,
+    let by_points = usize::from(found.is_none());
+    let RecordFit { fit, periods, left_out, colour } = match found {
+        Some(found) => found,
+        None => {
+            let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
+            let fit = fit(&points, scene.resonance, &scene.plant, &[])?;
+            RecordFit { fit, periods: 0, left_out: Vec::new(), colour: f64::NAN }
+        }
     };
-    let RecordFit { fit, periods, left_out, colour } = found.unwrap_or(points_only);
-    let over = |fit: &Fit, u: &Fit| -> Vec<f64> {
-        let over = |quantity: &Quantity| {
-            let [value, u] = [fit, u].map(|one| one.estimate(*quantity).expect("a fitted parameter"));
-            (value.value - quantity.of_plant(&truth)) / u.uncertainty
-        };
-        Quantity::ALL[..5].iter().map(over).collect()
+    let over = |quantity: &Quantity| {
+        let Estimate { value, uncertainty } = fit.estimate(*quantity).expect("a fitted parameter");
+        (value - quantity.of_plant(&truth)) / uncertainty
     };
-    let (before, ratios) = (over(&start, &start), over(&fit, &fit));
+    let errors: Vec<f64> = Quantity::ALL[..5].iter().map(over).collect();
     let spans: Vec<[f64; 2]> = left_out.iter().map(|one| one.seconds).collect();
-    let channels = fit.channels.map(|one| one.p_value.unwrap_or(f64::NAN));
+    let p_values = if by_points == 1 { Vec::new() } else { p_values(&fit) };
     println!(
-        "{:.4?}: {ratios:.1?} u, points {before:.1?} u, {periods} periods, chi-square {:.1} of {}; \
-         p of channels {channels:.3?}, colour {colour:.2}; left out {spans:.0?}",
+        "{:.4?}: {errors:.1?} u, {periods} periods, chi-square {:.1} of {}; p of channels {p_values:.3?}, colour {colour:.2}; \
+         left out {spans:.0?}",
         case.0, fit.chi_square, fit.degrees
     );
     Ok(match fit.is_rejected() {
-        true => Found { counts: [0, 1, 0, 0, 0, 0], ..Found::default() },
+        true => Found { counts: [0, 1, by_points, 0, 0, 0], ..Found::default() },
         false => Found {
-            errors: ratios.clone(),
-            ratios,
+            ratios: [errors.clone(), p_values].concat(),
+            errors,
             periods: None,
-            counts: [1, 0, 0, 0, 0, 0],
+            counts: [1, 0, by_points, 0, 0, 0],
         },
     })
 }
