@@ -123,20 +123,17 @@ pub(super) fn not_locked(reason: &Reason, scene: &Scene) -> String {
 
 /// How measured points contradict the scene.
 pub(super) fn contradicts(contradiction: &Contradiction) -> String {
-    let parameters = match contradiction {
-        Contradiction::TooFew { chi_square, degrees } => {
+    let Contradiction { points, chi_square, degrees, parameters } = contradiction;
+    let size = format!("chi-square is {chi_square:.0} for {degrees}");
+    let differences = match parameters.as_deref() {
+        None if *points < 3 => return format!("the locked point does not belong to this scene ({size})"),
+        None => {
             return format!(
-                "the locked point does not belong to this scene (chi-square is {chi_square:.0} for {degrees})"
+                "the points do not belong to this scene ({size}), nor to the ideal cavity with other parameters"
             );
         }
-        Contradiction::NoFit { chi_square, degrees } => {
-            return format!(
-                "the points do not belong to this scene (chi-square is {chi_square:.0} for {degrees}), nor to the ideal cavity with other \
-                 parameters"
-            );
-        }
-        Contradiction::Parameters(parameters) if parameters.is_empty() => "several parameters differ a little".into(),
-        Contradiction::Parameters(parameters) => {
+        Some([]) => "several parameters differ a little".into(),
+        Some(parameters) => {
             let texts = parameters.iter().map(|parameter| {
                 let FittedParameter { symbol, unit, value, uncertainty, expected } = parameter;
                 let space = if unit.is_empty() { "" } else { " " };
@@ -145,7 +142,7 @@ pub(super) fn contradicts(contradiction: &Contradiction) -> String {
             texts.collect::<Vec<String>>().join("; ")
         }
     };
-    format!("the points do not belong to this scene: {parameters}")
+    format!("the points do not belong to this scene: {differences}")
 }
 
 /// How often each regime occurs on a map.

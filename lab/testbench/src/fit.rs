@@ -375,38 +375,30 @@ pub fn at(points: &[MeasuredPoint], definition: Definition, plant: &Parameters, 
 
 /// How points contradict the rig that is expected.
 #[derive(Debug, Clone)]
-#[expect(missing_docs, reason = "each variant explains its fields")]
-pub enum Contradiction {
-    /// The points are too few for a fit; their chi-square at the expected rig.
-    TooFew { chi_square: f64, degrees: usize },
-    /// No ideal cavity fits; the chi-square is that at the expected rig.
-    NoFit { chi_square: f64, degrees: usize },
-    /// Other parameters fit; here are those that differ significantly.
-    Parameters(Vec<FittedParameter>),
+pub struct Contradiction {
+    /// Number of points.
+    pub points: usize,
+    /// Their chi-square at the expected rig.
+    pub chi_square: f64,
+    /// Its degrees of freedom.
+    pub degrees: usize,
+    /// The parameters of an ideal cavity that differ significantly; absent if none describes the points, or these are too few for a fit.
+    pub parameters: Option<Vec<FittedParameter>>,
 }
 
 /// How the points contradict the rig `expected`. `None` where they do not, or cannot tell, or where the rig has effects of a real cavity, which
 /// the model has not.
 #[must_use]
 pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected: &Parameters) -> Option<Contradiction> {
-    if expected.cavity != Cavity::IDEAL {
-        return None;
-    }
-    let scene = at(points, definition, expected, &[])?;
-    if !scene.is_rejected() {
-        return None;
-    }
-    let Fit { chi_square, degrees, .. } = scene;
-    if points.len() < FEWEST {
-        return Some(Contradiction::TooFew { chi_square, degrees });
-    }
-    let fit = fit(points, definition, expected, &[]).ok()?;
-    if fit.is_rejected() {
-        return Some(Contradiction::NoFit { chi_square, degrees });
-    }
-    let mut parameters = fit.report(expected).parameters;
-    parameters.retain(|parameter| (parameter.value - parameter.expected).abs() > SIGNIFICANT * parameter.uncertainty);
-    Some(Contradiction::Parameters(parameters))
+    let scene = Some(expected).filter(|expected| expected.cavity == Cavity::IDEAL)?;
+    let Fit { chi_square, degrees, .. } = at(points, definition, scene, &[]).filter(Fit::is_rejected)?;
+    let fitted = match fit(points, definition, expected, &[]) {
+        Err(FitError::TooFew(_)) => None,
+        fitted => Some(fitted.ok()?).filter(|fit| !fit.is_rejected()),
+    };
+    let differs = |one: &FittedParameter| (one.value - one.expected).abs() > SIGNIFICANT * one.uncertainty;
+    let parameters = fitted.map(|fit| fit.report(expected).parameters.into_iter().filter(differs).collect());
+    Some(Contradiction { points: points.len(), chi_square, degrees, parameters })
 }
 
 /// What is minimised.

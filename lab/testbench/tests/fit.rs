@@ -8,8 +8,8 @@ use vines_model::orbit::{backbone_at_speed, resonant_motion};
 use vines_testbench::backbone::track;
 use vines_testbench::experiment::run;
 use vines_testbench::fit::{
-    Channel, Contents, Contradiction, Effect, Fit, FitError, Kind, Known, MeasuredPoint, Measurements, Quantity,
-    Recording, RecordingError, Selection, Table, contradiction, explain, find, fit, follow, linear_verdicts, parts,
+    Channel, Contents, Effect, Fit, FitError, Kind, Known, MeasuredPoint, Measurements, Quantity, Recording,
+    RecordingError, Selection, Table, contradiction, explain, find, fit, follow, linear_verdicts, parts,
 };
 use vines_testbench::linear::{MeasuredLinear, ParticleState};
 use vines_testbench::rig::{BuiltIn, Chain, Rig, RigError, RigStage, Sensors, Simulated};
@@ -281,9 +281,8 @@ fn points_of_another_rig_contradict_the_scene_and_those_of_its_own_do_not() {
     let points = points(2e-3, 8);
     assert!(contradiction(&points, Definition::default(), &RIG).is_none());
     let wrong = Parameters { restitution: 0.65, ..RIG };
-    let Some(Contradiction::Parameters(parameters)) = contradiction(&points, Definition::default(), &wrong) else {
-        panic!("another restitution fits");
-    };
+    let found = contradiction(&points, Definition::default(), &wrong).unwrap();
+    let parameters = found.parameters.expect("another restitution fits");
     let r = parameters.iter().find(|parameter| parameter.symbol == "r").unwrap();
     assert!((r.value - 0.55).abs() < 0.01 && r.expected == 0.65, "{r:?}");
 }
