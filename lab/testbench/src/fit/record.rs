@@ -9,7 +9,8 @@
 //!
 //! Where a simulation changes the amplitude of the base, the base jumps at a sample, and the record does not show it. Its amplitude grows, and swings
 //! twice in a period, so that the jumps have a first harmonic of up to 1e-4 of the base, always of one sign. They follow from the growth of the
-//! recorded base and from its third harmonic. The share of them that the base makes is fitted.
+//! recorded base and from its third harmonic. The share of them that the base makes is fitted. What is not a sine in the base is noise of the process
+//! beside them: a floor of the uncertainty, which in simulations without noise exceeds the errors several times.
 //!
 //! The fit begins at the parameters of the points of the record. A piece of the record is left out where the plant has not two impacts per period,
 //! where a deviation of the particle grows, where the innovations contradict their covariance, and where they are not linear in the parameters: near
