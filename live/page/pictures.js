@@ -44,6 +44,7 @@ export class Pictures {
       detuning: plot("history", { xLabel: "time, s", yLabel: "σ", area: [0.5, 1] }),
       manifold: plot("manifold", { xLabel: "speed of the particle B", yLabel: "amplitude C" }),
       backbone: plot("backbone", { xLabel: "detuning σ", yLabel: "amplitude C" }),
+      dropOut: plot("drop-out", { xLabel: "frequency, Hz", yLabel: `${page.bench.host?.drop_out?.unit} per V` }),
     };
     this.#pointers();
   }
@@ -107,7 +108,8 @@ export class Pictures {
     this.map?.reset();
     // The curves leave the effects of a real cavity out.
     const real = EFFECTS.some((key) => this.page.values[key]);
-    this.ideal = real ? " (ideal)" : "";
+    this.ideal = real ? " (ideal)" : bench.host ? " (driven mode)" : "";
+    this.all = real ? " (ideal)" : bench.host ? " (all modes)" : "";
     for (const note of document.querySelectorAll(".ideal")) note.hidden = !real;
   }
 
@@ -159,6 +161,7 @@ export class Pictures {
     const done = page.points.filter((one) => one[0] <= page.shown + page.step);
     this.#backbone(top, seen, point, linked, done);
     this.map?.draw(point);
+    if (page.bench.host?.drop_out) this.#dropOut(page.bench.host.drop_out.points, point);
     const words = page.bench.words();
     this.strip.draw(page, status, point, words, replay);
     this.#numbers(status, point, words, replay, done.length);
@@ -166,8 +169,9 @@ export class Pictures {
 
   #rig(point, motion, replay, status, now) {
     const { page, drag, reach, units: { b, epsilon } } = this;
-    // The primary mass, from v = q1 + epsilon q2 and w = q1 - q2.
-    let look = { q1: Number.isNaN(point.w) ? point.v : (point.v + epsilon * point.w) / (1 + epsilon), base: point.base || 0, wall: 0 };
+    // The primary mass, from v = q1 + epsilon q2 and w = q1 - q2; of a structure, the response is the displacement at the cavity.
+    const share = page.bench.share ?? epsilon;
+    let look = { q1: Number.isNaN(point.w) ? point.v : (point.v + share * point.w) / (1 + share), base: point.base || 0, wall: 0 };
     look.q2 = look.q1 - point.w;
     if (!replay) {
       const plant = page.bench.look(page.shown - (page.samples - 1) * page.step);
@@ -185,7 +189,7 @@ export class Pictures {
     const need = { mass: most("v", look.q1), base: most("base", look.base) };
     for (const key of ["mass", "base"]) reach[key] = Math.max(need[key], reach[key] + 0.02 * (need[key] - reach[key]));
     const difference = (page.values.gap_difference ?? 0) / 100;
-    this.rig.draw(look, reach, [1 + difference, 1 - difference], page.values.tilt ?? 0, now, this.calm.matches);
+    this.rig.draw(look, reach, [1 + difference, 1 - difference], page.values.tilt ?? 0, now, this.calm.matches, page.bench.host);
   }
 
   #motion(motion, status, cursor) {
@@ -194,7 +198,7 @@ export class Pictures {
     const begin = motion[0].time;
     const column = (key) => motion.map((one) => [one.time, one[key]]);
     scope.begin([begin, Math.max(motion.at(-1).time, begin + (2 * Math.PI) / status.omega0)], [-top, top]);
-    scope.line(column("base"), "base", { label: "base/(ε b)" });
+    scope.line(column("base"), "base", { label: page.bench.host?.drive === "force" ? "force (as base/(ε b))" : "base/(ε b)" });
     scope.line(column("v"), "ink", { label: "response v" });
     scope.line(column("w"), "particle", { label: "relative w" });
     scope.cursor(cursor);
@@ -248,12 +252,21 @@ export class Pictures {
     const sigmas = [...curves, ...[...seen.filter((one) => one.time > point.time - TRAIL || one.decays), ...this.ghost.filter((one) => one.decays), point].filter(onBackbone).map((one) => one.sigma)];
     backbone.begin(extent(sigmas, 0.5), [0, top]);
     backbone.curve(lines.theory, "theory", { label: `theory${this.ideal}`, width: 1.2 });
-    backbone.curve(lines.exact, "exact", { label: `exact${this.ideal}`, width: 2.4 });
+    backbone.curve(lines.exact, "exact", { label: `exact${this.all}`, width: 2.4 });
     this.#tracks(backbone, seen, (one) => [one.sigma, one.C]);
     backbone.points(tracked.map((one) => [one[1], one[2]]), "measured", { label: "tracked", open: true });
     if (onBackbone(point)) backbone.points([[point.sigma, point.C]], "particle", { label: "now", radius: 5 });
     if (linked && onBackbone(linked)) backbone.points([[linked.sigma, linked.C]], "ink", { radius: 7, open: true });
     backbone.end();
+  }
+
+  // What the shaker makes of a constant command, and where the loop is on it.
+  #dropOut(points, point) {
+    const { plots: { dropOut } } = this;
+    dropOut.begin([points[0][0], points.at(-1)[0]], [0, 1.05 * largest(points.map(([, value]) => value), 0)]);
+    dropOut.line(points, "exact", { label: "structure and shaker", width: 2.4 });
+    if (onBackbone(point)) dropOut.cursor(point.omega / (2 * Math.PI));
+    dropOut.end();
   }
 
   #numbers(status, point, [regime, fault], replay, tracked) {

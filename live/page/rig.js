@@ -1,8 +1,10 @@
-// The rig, drawn to scale: base, spring and damper, mass with its cavity, particle. Displacements are over b.
+// The rig, drawn to scale: base or shaker, spring and damper, mass with its cavity, particle. Displacements are over b.
 
 // Lengths in the drawing, over b: the mass beyond where the particle's centre meets a wall, the spring at rest, the radius of the particle,
 // the base's displacement over epsilon b.
 const BODY = 0.5, SPRING = 1.5, RADIUS = 0.28, BASE = 0.35;
+// Place of a shaker with its stinger, or of the arrow of a force, and width of the shaker.
+const SHAKER = 1.6, COIL = 0.9;
 // Smallest margins, pixels.
 const SIDE = 16, LABELS = 40;
 // Height of the line of words below a tilted rig, pixels.
@@ -15,13 +17,14 @@ export class Rig {
 
   // `look`: displacements over b; base over b epsilon, since it is too small to be seen to scale. `reach`: largest displacements of late
   // of mass and base, which fit into the canvas. `gaps`: left and right of the particle, over b. `tilt`, degrees: gravity pulls the particle to
-  // the right if it is positive, so that the right end is the lower one.
-  draw(look, reach, gaps, tilt, now, calm) {
+  // the right if it is positive, so that the right end is the lower one. `host`: what drives a structure, drawn as its driven mode.
+  draw(look, reach, gaps, tilt, now, calm, host) {
     const { context: c, width: wide, height } = surface(this.canvas);
     const high = tilt ? height - WORDS : height;
     const { colour } = this;
     c.clearRect(0, 0, wide, height);
-    const lengths = 2 * BASE * reach.base + SPRING + gaps[0] + gaps[1] + 2 * BODY + 2 * reach.mass;
+    const force = host?.drive === "force", before = host?.drop_out && !force ? SHAKER : 0;
+    const lengths = 2 * BASE * reach.base + SPRING + gaps[0] + gaps[1] + 2 * BODY + 2 * reach.mass + before + (force ? SHAKER : 0);
     // The tilted rectangle of the rig fits into the canvas. Before the page has its layout, the canvas has no size.
     const angle = (tilt * Math.PI) / 180, cos = Math.cos(angle), sin = Math.abs(Math.sin(angle));
     const b = Math.max(0, Math.min(
@@ -34,8 +37,8 @@ export class Rig {
     c.translate(-along / 2, -across / 2);
     const floor = 0.5 * (across - LABELS) + 0.875 * b + 16;
     const slack = along - 2 * SIDE - lengths * b;
-    const wall = SIDE + 0.2 * slack + BASE * (reach.base + look.base) * b;
-    const rest = SIDE + 0.6 * slack + (2 * BASE * reach.base + SPRING + reach.mass + gaps[0] + BODY) * b;
+    const wall = SIDE + 0.2 * slack + (before + BASE * (reach.base + (force ? 0 : look.base))) * b;
+    const rest = SIDE + 0.6 * slack + (before + 2 * BASE * reach.base + SPRING + reach.mass + gaps[0] + BODY) * b;
     const centre = rest + look.q1 * b;
     const radius = RADIUS * b;
     const inside = [centre - gaps[0] * b - radius, centre + gaps[1] * b + radius];
@@ -45,12 +48,16 @@ export class Rig {
     c.strokeStyle = c.fillStyle = colour("faint");
     c.beginPath(); c.moveTo(0, floor + 1); c.lineTo(along, floor + 1); c.stroke();
     // Base
-    c.fillStyle = colour("base");
+    c.fillStyle = c.strokeStyle = colour(force ? "faint" : "base");
     c.fillRect(wall - 10, floor - 1.75 * b, 10, 1.75 * b);
+    if (before) shaker(c, SIDE, wall - 10, floor - 0.8 * b, COIL * b);
     // Spring and damper
     c.strokeStyle = colour("ink");
     spring(c, wall, outside[0], floor - 1.25 * b, b * 0.16);
     damper(c, wall, outside[0], floor - 0.5 * b, b * 0.14);
+    c.strokeStyle = colour("base");
+    if (force && host.drop_out) shaker(c, along - SIDE, outside[1], floor - 0.8 * b, -COIL * b);
+    else if (force) arrow(c, outside[1], outside[1] + (look.base / reach.base) * (SHAKER - 0.2) * b, floor - 0.8 * b, 0.1 * b);
     // Mass with its cavity
     const top = floor - 1.6 * b;
     c.fillStyle = colour("line");
@@ -90,7 +97,9 @@ export class Rig {
       c.fillText("gravity ↓", tilt > 0 ? wide - 4 : 4, 14);
     } else {
       c.textAlign = "left";
-      c.fillText("base (not to scale)", 6, floor + 17);
+      c.fillText(force ? "ground" : before ? "shaker and its table" : "base (not to scale)", 6, floor + 17);
+      c.textAlign = "right";
+      if (force) c.fillText(host.drop_out ? "shaker" : "force", along - 6, floor + 17);
       c.textAlign = "center";
       c.fillText(words, centre, floor + 17);
     }
@@ -139,6 +148,20 @@ function spring(c, from, to, y, size) {
   c.beginPath(); c.moveTo(from, y); c.lineTo(from + lead, y);
   for (let i = 0; i < 2 * turns; i++) c.lineTo(from + lead + ((i + 0.5) / (2 * turns)) * (to - from - 2 * lead), y + (i % 2 ? size : -size));
   c.lineTo(to - lead, y); c.lineTo(to, y); c.stroke();
+}
+
+// A shaker whose housing begins at `from` and is `wide` (towards `to` if positive), with its stinger to `to`.
+function shaker(c, from, to, y, wide) {
+  const half = 0.5 * Math.abs(wide), inner = from + wide;
+  c.strokeRect(Math.min(from, inner), y - half, Math.abs(wide), 2 * half);
+  for (const share of [0.3, 0.5, 0.7]) { c.beginPath(); c.moveTo(from + share * wide, y - 0.6 * half); c.lineTo(from + share * wide, y + 0.6 * half); c.stroke(); }
+  c.beginPath(); c.moveTo(from + 0.7 * wide, y); c.lineTo(to, y); c.stroke();
+}
+
+function arrow(c, from, to, y, size) {
+  const back = Math.sign(from - to) * Math.min(size, Math.abs(to - from));
+  c.beginPath(); c.moveTo(from, y); c.lineTo(to, y);
+  c.moveTo(to + back, y - size); c.lineTo(to, y); c.lineTo(to + back, y + size); c.stroke();
 }
 
 function damper(c, from, to, y, size) {

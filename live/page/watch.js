@@ -13,7 +13,10 @@ class Experiment {
   state = {};
 
   constructor(watch) {
-    Object.assign(this, { watch, defaults: { ...watch.values, closed: 1 } });
+    const { host, values, particle_in_response: share } = watch;
+    // Gaps between curves are null: JSON has no NaN.
+    const curve = watch.exact.map((point) => point.map((value) => value ?? NaN));
+    Object.assign(this, { watch, host, curve, share, defaults: { ...values, closed: 1 } });
   }
 
   status() {
@@ -33,7 +36,7 @@ class Experiment {
   words() { return [this.state.regime ?? "", this.state.fault_text ?? ""]; }
   manifold(end) { return this.watch.manifold.filter(([b]) => b <= end); }
   theory() { return this.watch.theory; }
-  exact() { return this.watch.exact; }
+  exact() { return this.curve; }
   tracked() { return []; }
   look() {}
   restart() {}
@@ -53,6 +56,10 @@ export class Watching extends Page {
     document.body.classList.add("watching");
     $("tour").hidden = true;
     for (const element of document.querySelectorAll(".sim")) element.hidden = true;
+    if (watch.host?.drop_out) {
+      document.querySelector(".drop-out").hidden = false;
+      document.querySelector(".drop-out h2").textContent = watch.host.drop_out.title;
+    }
     this.start();
     const source = new EventSource("rows");
     source.onmessage = ({ data }) => this.#take(JSON.parse(data), source);

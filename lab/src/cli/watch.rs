@@ -5,6 +5,7 @@
 
 use std::cell::Cell;
 use std::collections::VecDeque;
+use std::f64::consts::TAU;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::rc::Rc;
@@ -16,12 +17,13 @@ use clap::Args;
 use serde_json::{Value, json};
 use vines::curves;
 use vines::live::{Decay, HarmonicMotion, LastImpacts};
+use vines::numerics::equally_spaced;
 use vines::plan::Target;
 use vines::record::Sample;
 use vines::regime::Impact;
 use vines::rig::{Command, Controller, ControllerError, Move, Rig, Sensors};
-use vines::scene::Scene;
-use vines_model::Sensor;
+use vines::scene::{Excitation, Measurand, Scene, Sensor, Structure};
+use vines::survey::structure_backbone;
 
 use super::failure::Failure;
 use super::tap::{Tap, no_sample};
@@ -32,10 +34,12 @@ const CHANNEL: usize = 1 << 16;
 const PER_PERIOD: f64 = 50.0;
 /// Rows that a browser gets that comes late: more than the last minute of the default scene.
 const KEPT: usize = 30_000;
+/// Points of the drop-out: several per half-power bandwidth of a light structure.
+const DROP_OUT: usize = 1200;
 /// Time between two evaluations of the samples.
 const PACE: Duration = Duration::from_millis(40);
-/// Longest wait for the request on a connection (browsers open some without one), and for a browser that does not read.
-const PATIENCE: [Duration; 2] = [Duration::from_millis(200), Duration::from_secs(2)];
+/// Longest wait for the rest of a request, and for a browser that does not read.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Args)]
 pub(super) struct WatchArguments {
@@ -225,9 +229,8 @@ impl View {
                 motion.omega = drive.omega;
             }
         }
-        let epsilon = self.scene.plant.particle_mass / self.scene.plant.primary_mass;
-        let relative = match (ground_truth, self.scene.resonance.sensor) {
-            (Some(_), Sensor::V) => sensors.response - (1.0 + epsilon) * self.particle,
+        let relative = match (ground_truth, particle_in_response(&self.scene)) {
+            (Some(_), Some(share)) => sensors.response - (1.0 + share) * self.particle,
             _ => f64::NAN,
         };
         let decays = !driven && (ground_truth.is_none() || self.fit.synchronous);
@@ -263,14 +266,15 @@ impl View {
             velocity: truth.impact_velocity,
         });
         self.impacts.trim();
-        let plant = &self.scene.plant;
-        let epsilon = plant.particle_mass / plant.primary_mass;
-        // The response v = q1 + epsilon q2 is smooth at an impact; the relative displacement is that of the wall there.
+        let Some(share) = particle_in_response(&self.scene) else {
+            return;
+        };
+        // The response v = q1 + epsilon q2 is smooth at an impact, and q1 nearly so; the relative displacement is that of the wall there.
         let rate = (now.sensors.response - last.sensors.response) / step.max(f64::MIN_POSITIVE);
         let response = now.sensors.response - rate * since;
-        let [plus, minus] = plant.gaps();
+        let [plus, minus] = self.scene.plant.gaps();
         let wall = if truth.impact_velocity > 0.0 { plus } else { -minus };
-        self.particle = (response - wall) / (1.0 + epsilon) + velocity * since;
+        self.particle = (response - wall) / (1.0 + share) + velocity * since;
     }
 
     /// What the page shows beside the rows.
@@ -286,6 +290,54 @@ impl View {
             "regime": ground_truth.map(|_| self.impacts.regime(self.phase).name()),
         })
     }
+}
+
+/// Share of the particle's displacement in the response: epsilon in v, nothing in the displacement at the cavity; `None`: the response is
+/// measured elsewhere, or is not a displacement.
+fn particle_in_response(scene: &Scene) -> Option<f64> {
+    if scene.resonance.measurands()[0] != Measurand::Displacement {
+        return None;
+    }
+    match (&scene.structure, scene.resonance.sensor) {
+        (Some(structure), _) => (structure.sensor == structure.cavity).then_some(0.0),
+        (None, Sensor::V) => Some(scene.plant.particle_mass / scene.plant.primary_mass),
+        (None, Sensor::Q1) => Some(0.0),
+    }
+}
+
+/// Points (sigma, C, 1 if stable, G) of the exact backbone; not-a-number between two curves.
+fn exact(scene: &Scene) -> Vec<[f64; 4]> {
+    let d = scene.dimensionless();
+    let Some(branches) = structure_backbone(scene, &d) else {
+        return curves::exact(&d, 120).collect();
+    };
+    let gap = [f64::NAN, f64::NAN, 0.0, f64::NAN];
+    let points = branches.iter().flat_map(|branch| {
+        let points = branch
+            .iter()
+            .map(|orbit| [orbit.sigma, orbit.c, f64::from(u8::from(orbit.stable)), orbit.g]);
+        points.chain([gap])
+    });
+    points.collect()
+}
+
+/// What drives a structure, in words, and what its shaker makes of a constant command.
+fn host(scene: &Scene, structure: &Structure) -> Value {
+    let (drive, unit) = (structure.excitation, structure.excitation.unit());
+    let points = |shaker| {
+        let ends = [scene.controller.omega_min, scene.controller.omega_max].map(|share| share * structure.mode().omega);
+        let omegas = equally_spaced(ends[0], ends[1], DROP_OUT);
+        let at = |omega: f64| [omega / TAU, structure.reference_by_command(shaker, omega).norm()];
+        omegas.map(at).collect::<Vec<_>>()
+    };
+    let title = match drive {
+        Excitation::Force => "Drop-out: the force at a constant command, without impacts",
+        Excitation::Base => "Drop-out: the displacement of the table at a constant command, without impacts",
+    };
+    json!({
+        "drive": drive,
+        "drop_out": structure.shaker.as_ref().map(|shaker| json!({ "title": title, "unit": unit, "points": points(shaker) })),
+    })
 }
 
 /// The settings of the page with the values of the scene, its curves, and what the module would know.
@@ -307,7 +359,9 @@ fn table(title: &str, scene: &Scene) -> Value {
         "unlock": lock.unlock_tolerance.to_degrees(),
         "manifold": curves::manifold(&d, 12.0, 1200).collect::<Vec<_>>(),
         "theory": curves::backbone(&d, 160).collect::<Vec<_>>(),
-        "exact": curves::exact(&d, 120).collect::<Vec<_>>(),
+        "exact": exact(scene),
+        "particle_in_response": particle_in_response(scene),
+        "host": scene.structure.as_ref().map(|structure| host(scene, structure)),
     });
     table
 }
@@ -340,7 +394,7 @@ fn kind(name: &str) -> &'static str {
 
 /// Evaluates samples and serves browsers until the experiment is over and its end is sent.
 fn serve(listener: &TcpListener, address: SocketAddr, messages: &Receiver<Message>, mut view: View, table: &str) {
-    let mut browsers = Vec::new();
+    let (mut browsers, mut silent) = (Vec::new(), Vec::new());
     let mut outcome = Value::Null;
     while outcome.is_null() {
         thread::sleep(PACE);
@@ -351,6 +405,12 @@ fn serve(listener: &TcpListener, address: SocketAddr, messages: &Receiver<Messag
             }
         }
         while let Ok((stream, _)) = listener.accept() {
+            silent.extend(stream.set_nonblocking(true).map(|()| stream));
+        }
+        // Browsers open connections before they have a request.
+        let asked;
+        (silent, asked) = silent.into_iter().partition(is_silent);
+        for stream in asked {
             let stream = answer(stream, address, table).ok().flatten();
             browsers.extend(stream.map(|stream| Browser { stream, session: 0, next: 0 }));
         }
@@ -359,15 +419,20 @@ fn serve(listener: &TcpListener, address: SocketAddr, messages: &Receiver<Messag
     }
 }
 
+/// Whether nothing has arrived on a connection yet, not even its end.
+fn is_silent(stream: &TcpStream) -> bool {
+    matches!(stream.peek(&mut [0]), Err(error) if error.kind() == io::ErrorKind::WouldBlock)
+}
+
 /// Answers one request. Returns the stream of a browser that asks for the rows.
 fn answer(mut stream: TcpStream, address: SocketAddr, table: &str) -> io::Result<Option<TcpStream>> {
     stream.set_nonblocking(false)?;
-    stream.set_read_timeout(Some(PATIENCE[0]))?;
-    stream.set_write_timeout(Some(PATIENCE[1]))?;
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
     // A request of this page has less than a kilobyte.
     let head: Vec<String> = BufReader::new((&stream).take(1 << 14))
         .lines()
-        .take_while(|line| line.as_ref().is_ok_and(|line| !line.is_empty()))
+        .take_while(|line| !line.as_ref().is_ok_and(String::is_empty))
         .collect::<Result<_, _>>()?;
     let mut words = head.first().map_or("", String::as_str).split([' ', '?']);
     let (method, path) = (words.next(), words.next().unwrap_or_default());

@@ -175,3 +175,25 @@ fn the_page_has_all_its_files_and_answers_at_its_own_address_only() {
     write!(other, "GET / HTTP/1.1\r\nHost: example.org\r\n\r\n").unwrap();
     assert!(std::io::read_to_string(other).unwrap().starts_with("HTTP/1.1 403"));
 }
+
+#[test]
+fn the_page_of_a_shaker_has_the_exact_backbone_of_all_modes_and_the_drop_out_of_the_force() {
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/shaker-cantilever.toml");
+    let rig = Watched::start(&format!("rig --scene={scene} --listen=127.0.0.1:0 --duration=60"));
+    let body = rig.get("GET /settings.json");
+    let table: Value = serde_json::from_str(body.split("\r\n\r\n").nth(1).unwrap()).unwrap();
+    let host = &table["watch"]["host"];
+    assert_eq!(
+        (&host["drive"], &host["drop_out"]["unit"]),
+        (&"force".into(), &"N".into())
+    );
+    let points: Vec<[f64; 2]> = serde_json::from_value(host["drop_out"]["points"].clone()).unwrap();
+    let [hertz, least] = *points.iter().min_by(|one, other| one[1].total_cmp(&other[1])).unwrap();
+    assert!((hertz / 8.815 - 1.0).abs() < 0.005, "{hertz} Hz");
+    assert!(least < 0.8 * points[0][1], "{least} of {}", points[0][1]);
+    // At C = 0.51 another mode takes the stability.
+    let exact: Vec<[Option<f64>; 4]> = serde_json::from_value(table["watch"]["exact"].clone()).unwrap();
+    let stable = exact.iter().filter(|point| point[2] == Some(1.0));
+    let highest = stable.filter_map(|point| point[1]).fold(0.0, f64::max);
+    assert!((0.45..0.52).contains(&highest), "{highest}");
+}

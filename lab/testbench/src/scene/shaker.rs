@@ -184,13 +184,17 @@ impl Structure {
         })
     }
 
+    /// Force of the shaker on the structure, N, or displacement of its table, m, per volt of its command at a frequency, rad/s, without impacts.
+    pub fn reference_by_command(&self, shaker: &SceneShaker, omega: f64) -> Complex64 {
+        self.host.frequency_response(shaker.reference(self.excitation), omega)
+    }
+
     /// What the shaker makes of its command, from the frequency response at the frequencies of the check.
     pub(crate) fn shaker_path(&self) -> Option<ShakerPath> {
         let (shaker, mode) = (self.shaker.as_ref()?, self.mode());
         let damping_rate = mode.zeta * mode.omega;
-        let reference = shaker.reference(self.excitation);
         let values = frequencies(mode.omega, damping_rate).map(|omega| {
-            let value = self.host.frequency_response(reference, omega) / shaker.reference_per_command;
+            let value = self.reference_by_command(shaker, omega) / shaker.reference_per_command;
             (omega, value)
         });
         let path = ShakerPath {
