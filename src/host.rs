@@ -955,11 +955,13 @@ impl Modal {
             balance_parlett_reinsch(&mut state);
         }
         let found = state.complex_eigenvalues();
-        let poles: Vec<_> = found
+        let mut poles: Vec<_> = found
             .iter()
             .filter(|lambda| lambda.im >= 0.0)
             .map(|lambda| self.pole(*lambda, m))
             .collect();
+        // Sections by rising frequency, as modes are listed.
+        poles.sort_by(|one, other| one.lambda.norm().total_cmp(&other.lambda.norm()));
         let count: usize = poles.iter().map(|pole| if pole.lambda.im == 0.0 { 1 } else { 2 }).sum();
         let apart = |one: &Pole, two: &Pole| (one.lambda - two.lambda).norm() > 1e-13 * one.lambda.norm();
         let distinct = (0..poles.len()).all(|i| (0..i).all(|j| apart(&poles[i], &poles[j])));
