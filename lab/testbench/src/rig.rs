@@ -448,7 +448,7 @@ impl SimulatedStructure {
         Ok(())
     }
 
-    /// What fails or is cut now: `command`, V, is the amplitude of the drive, or a held sample of it.
+    /// What fails or is cut now: `command`, V, is the amplitude of the drive.
     fn change(&mut self, command: f64) -> Result<(), RigError> {
         let begins = |(_, at): &mut (ShakerFault, f64)| self.simulated.clock.time() >= *at;
         let fault = self.fault.take_if(begins).map(|(fault, _)| fault);
@@ -478,7 +478,12 @@ impl SimulatedStructure {
     /// # Errors
     /// A value that is not allowed; a limit of the shaker.
     pub fn step(&mut self, drive: lovines::Drive, step: f64) -> Result<(), RigError> {
-        self.change(drive.amplitude.hypot(drive.signal[0]))?;
+        self.commanded(drive.amplitude.hypot(drive.signal[0]), drive, step)
+    }
+
+    /// The same under a command of this amplitude, of which a held sample can be zero.
+    fn commanded(&mut self, command: f64, drive: lovines::Drive, step: f64) -> Result<(), RigError> {
+        self.change(command)?;
         let Some(shaker) = &self.structure.shaker else {
             return self.simulated.step(drive, step);
         };
@@ -536,7 +541,9 @@ impl RigStage for SimulatedStructure {
     }
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.step(lovines::Drive::held(drive.displacement / self.base_per_command), step)
+        let [command, sample] =
+            [drive.amplitude.hypot(drive.displacement), drive.displacement].map(|value| value / self.base_per_command);
+        self.commanded(command, lovines::Drive::held(sample), step)
     }
 }
 

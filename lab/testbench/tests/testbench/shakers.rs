@@ -172,6 +172,28 @@ fn the_decay_after_the_stinger_is_cut_is_that_of_the_simulation() {
 }
 
 #[test]
+fn a_held_sample_of_zero_does_not_cut_the_stinger() {
+    let scene = preset(1, &[("[shaker]", "[shaker]\nrelease = \"cut\"")]).unwrap();
+    let mut rig = Simulated::of(&scene).unwrap();
+    let mut force = |amplitude: f64| {
+        let mut largest = 0.0_f64;
+        for n in 0..200 {
+            let sine = if n % 10 == 0 { 0.0 } else { (0.06 * f64::from(n)).sin() };
+            let (omega, displacement) = (scene.dimensionless().omega0, amplitude * sine);
+            let drive = vines_testbench::rig::Drive { omega, amplitude, displacement };
+            rig.hold(drive, scene.sample_time()).unwrap();
+            largest = largest.max(rig.sense().unwrap().reference.unwrap().abs());
+        }
+        largest
+    };
+    let [driven, again, released] = [1e-6, 1e-6, 0.0].map(&mut force);
+    assert!(
+        again > 0.1 * driven && released < 1e-6 * driven,
+        "{driven:e} {again:e} {released:e}"
+    );
+}
+
+#[test]
 fn faults_of_a_shaker_end_the_drive_with_their_name() {
     use {RigFault::*, SensorFault::*};
     let scene = preset(0, &[]).unwrap();
