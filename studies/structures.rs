@@ -7,11 +7,12 @@
 //!
 //! `correct` counts locks of a constant drive within 2e-3 in sigma and C of a stable orbit, or within 3 u of it. `held` counts those whose
 //! response stays under control, of which the result says so: its drive is measured, and within 2e-3 of the requested one there is an exact
-//! orbit, stable or not, as near. `wrong` are both beyond. Where all orbits are unstable at a fixed frequency, `stabilised` counts locks of a
-//! constant drive that the phase loop keeps for as long as a disturbance of 1e-6 would need to grow to 1, and `steady` the others.
+//! orbit, as near and stable. `held_unstable` counts those near an orbit that is not stable at a fixed frequency. A constant drive near such an
+//! orbit is `stabilised` if the phase loop keeps it for as long as a disturbance of 1e-6 would need to grow to 1, and otherwise `steady`. `wrong`
+//! are near no orbit.
 //!
-//! Arguments: STRUCTURES (of each kind), SEED. Writes validation/structures.csv. With further arguments, which are `stable` or `unstable` and numbers
-//! of structures, it runs these alone, says what the loop did, and writes nothing.
+//! Arguments: STRUCTURES (of each kind), SEED. Writes validation/structures.csv. With `stable` or `unstable` it runs this kind alone; with numbers of
+//! structures behind it these alone: it then says what the loop did, and writes nothing.
 
 mod common;
 
@@ -34,6 +35,7 @@ enum Outcome {
     Wrong,
     Refused,
     Held,
+    HeldUnstable,
     Stabilised,
     Steady,
 }
@@ -122,37 +124,55 @@ fn lock(scene: &Scene, is_stable: bool) -> (Outcome, [f64; 2], f64, String) {
     let periods = record.settled as f64 / scene.controller.samples_per_period;
     let d = scene.dimensionless();
     let largest = |errors: [f64; 2]| errors[0].max(errors[1]);
+    // Of the orbit that is nearest to the lock: its errors.
     let nearest = |points: &mut dyn Iterator<Item = [f64; 2]>| {
         let errors = points.map(|[sigma, c]| [(at.sigma - sigma).abs(), (at.c - c).abs()]);
-        errors.min_by(|one, other| largest(*one).total_cmp(&largest(*other)))
+        let nearest = errors.min_by(|one, other| largest(*one).total_cmp(&largest(*other)));
+        nearest.unwrap_or([f64::INFINITY; 2])
     };
-    let errors = if record.held {
+    let errors_of = |stable: bool| {
+        if !record.held {
+            let orbits = orbits_of(scene, &d);
+            return nearest(
+                &mut orbits
+                    .iter()
+                    .filter(|orbit| orbit.stable == stable)
+                    .map(|orbit| [orbit.sigma, orbit.c]),
+            );
+        }
         let curves = structure_backbone(scene, &d).unwrap_or_default();
-        let points = curves.iter().flat_map(|curve| curve.windows(2)).flat_map(|pair| {
-            let [a, b] = [&pair[0], &pair[1]].map(|orbit| [orbit.sigma, orbit.c, orbit.g]);
-            (0..=FINE).map(move |n| [0, 1, 2].map(|i| a[i] + (b[i] - a[i]) * n as f64 / FINE as f64))
-        });
+        let pairs = curves.iter().flat_map(|curve| curve.windows(2));
+        let points = pairs
+            .filter(|pair| pair.iter().any(|orbit| orbit.stable == stable))
+            .flat_map(|pair| {
+                let [a, b] = [&pair[0], &pair[1]].map(|orbit| [orbit.sigma, orbit.c, orbit.g]);
+                (0..=FINE).map(move |n| [0, 1, 2].map(|i| a[i] + (b[i] - a[i]) * n as f64 / FINE as f64))
+            });
         let is_near = |g: f64, to: f64| (g / to - 1.0).abs() <= TOLERANCE;
-        let mut near = points
-            .filter(|point| is_near(point[2], at.g))
-            .map(|[sigma, c, _]| [sigma, c]);
-        nearest(&mut near).filter(|_| is_near(at.g, d.g))
-    } else {
-        let orbits = orbits_of(scene, &d);
-        let stable = orbits.iter().filter(|orbit| orbit.stable);
-        nearest(&mut stable.map(|orbit| [orbit.sigma, orbit.c]))
+        let near = points.filter(|point| is_near(point[2], at.g) && is_near(at.g, d.g));
+        nearest(&mut near.map(|[sigma, c, _]| [sigma, c]))
     };
-    let errors = errors.unwrap_or([f64::INFINITY; 2]);
-    let is_correct = largest(errors) <= TOLERANCE || (errors[0] <= 3.0 * at.u_sigma && errors[1] <= 3.0 * at.u_c);
-    let outcome = match (is_stable, record.held, is_correct) {
-        (true, false, true) => Outcome::Correct,
-        (_, true, true) => Outcome::Held,
-        (true, ..) | (_, true, _) => Outcome::Wrong,
-        (false, false, _) => {
-            let all = orbits_of(scene, &d).into_iter();
-            let slowest = all.map(|orbit| orbit.multipliers[3]).fold(f64::INFINITY, f64::min);
+    let is_right =
+        |errors: [f64; 2]| largest(errors) <= TOLERANCE || (errors[0] <= 3.0 * at.u_sigma && errors[1] <= 3.0 * at.u_c);
+    let [stable, unstable] = [true, false].map(errors_of);
+    let errors = if is_right(stable) || largest(stable) < largest(unstable) {
+        stable
+    } else {
+        unstable
+    };
+    let outcome = match (is_right(stable), is_right(unstable), record.held) {
+        (true, _, false) => Outcome::Correct,
+        (true, _, true) => Outcome::Held,
+        (false, true, true) => Outcome::HeldUnstable,
+        (false, false, true) => Outcome::Wrong,
+        (false, false, false) if is_stable => Outcome::Wrong,
+        (false, _, false) => {
+            let distance = |orbit: &Orbit| largest([(at.sigma - orbit.sigma).abs(), (at.c - orbit.c).abs()]);
+            let all = orbits_of(scene, &d).into_iter().filter(|orbit| !orbit.stable);
+            let near = all.min_by(|one, other| distance(one).total_cmp(&distance(other)));
+            let growth = near.map_or(f64::INFINITY, |orbit| orbit.multipliers[3]);
             // Two half periods.
-            plan.hold = plan.knowledge.samples(-SMALL.ln() / (2.0 * slowest.ln()));
+            plan.hold = plan.knowledge.samples(-SMALL.ln() / (2.0 * growth.ln()));
             let stays = locked(&plan).is_ok_and(|(_, later)| (later.lock.at.c - at.c).abs() <= TOLERANCE);
             if stays { Outcome::Stabilised } else { Outcome::Steady }
         }
@@ -199,7 +219,7 @@ fn orbits_in_words(scene: &Scene) -> String {
 fn main() -> Result<(), Failure> {
     let given: Vec<String> = std::env::args().skip(1).collect();
     let [count, seed, only @ ..] = &given[..] else {
-        return Err("arguments: STRUCTURES SEED [stable|unstable NUMBER...]".into());
+        return Err("arguments: STRUCTURES SEED [stable|unstable [NUMBER...]]".into());
     };
     let (count, seed): (usize, u64) = (count.parse()?, seed.parse()?);
     let mut rows = Vec::new();
@@ -215,10 +235,10 @@ fn main() -> Result<(), Failure> {
             .into_iter()
             .enumerate()
             .collect();
-        scenes.retain(|(n, _)| only.is_empty() || only.contains(&n.to_string()));
+        scenes.retain(|(n, _)| only.len() < 2 || only.contains(&n.to_string()));
         let found: Vec<_> = scenes.par_iter().map(|(_, scene)| lock(scene, is_stable)).collect();
         for ((n, scene), (outcome, errors, periods, found)) in scenes.iter().zip(&found) {
-            if *outcome != Outcome::Correct || !only.is_empty() {
+            if *outcome != Outcome::Correct || only.len() > 1 {
                 println!(
                     "{kind} {n}: {outcome:?}, errors {:.1e} and {:.1e}, {periods:.0} periods: {found}",
                     errors[0], errors[1]
@@ -226,7 +246,7 @@ fn main() -> Result<(), Failure> {
                 println!("  {}", orbits_in_words(scene));
             }
         }
-        if !only.is_empty() {
+        if only.len() > 1 {
             continue;
         }
         let of = |wanted: Outcome| found.iter().filter(|(outcome, ..)| *outcome == wanted).count();
@@ -235,6 +255,7 @@ fn main() -> Result<(), Failure> {
             Outcome::Wrong,
             Outcome::Refused,
             Outcome::Held,
+            Outcome::HeldUnstable,
             Outcome::Stabilised,
             Outcome::Steady,
         ]
@@ -266,6 +287,6 @@ fn main() -> Result<(), Failure> {
     if rows.is_empty() {
         return Ok(());
     }
-    let header = "structures,seed,orbits,correct,wrong,refused,held,stabilised,steady,median_error,worst_error,median_periods,worst_periods";
+    let header = "structures,seed,orbits,correct,wrong,refused,held,held_unstable,stabilised,steady,median_error,worst_error,median_periods,worst_periods";
     write("structures", header, 3, &rows)
 }
