@@ -4,13 +4,13 @@ use clap::Args;
 use vines::experiment::ExperimentError;
 use vines::fmu::{FmuController, FmuRig};
 use vines::loop_check::{CheckedChannel, CheckedQuantity, LoopCheck, Verdict, check};
-use vines::scene::Scene;
+use vines::scene::{Excitation, Scene};
 use vines::table::{Table, number, with_uncertainty};
 
 use super::failure::Failure;
 use super::options::{Endpoint, ReachArguments, SceneArguments};
 use super::output::{output, print};
-use super::summary::structure;
+use super::summary::{Units, structure};
 
 const HELP: &str = "\
 Drives the rig at a hundredth of the drive for 24 periods with the loop open, and compares amplitude and phase of response and base with
@@ -18,7 +18,7 @@ those of the scene's linear resonator at rest:
   gain   measured over expected amplitude; a wrong unit shows as a power of ten
   phase  measured minus expected phase, degrees; 180 for a reversed sensor
   delay  the difference of phase in samples; in the response it includes the effect of a wrong natural frequency
-  noise  RMS of everything else, and the RMS without a drive (floor), m
+  noise  RMS of everything else, and the RMS without a drive (floor), m; of a force N
 From the growth of the response follow its natural frequency and damping, and its phase and amplitude beside an oscillator that has both.
 The second table compares the measured values with the scene. Amplitudes 5 %, phases 1 degree and clocks 0.1 % off are refused, beyond three
 standard uncertainties: later measurements would be wrong by as much. A different natural frequency or damping is reported, not refused.
@@ -68,13 +68,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let checked = check(open.rig.as_mut(), &scene.plan()).map_err(ExperimentError::from)?;
     open.close();
     let text = output(arguments.json, &checked, || {
-        variables + &described(&checked) + unmeasured(&checked, &scene) + &structure(&scene)
+        variables + &described(&checked, &scene) + unmeasured(&checked, &scene) + &structure(&scene)
     })?;
     if checked.verdict == Verdict::Healthy {
         return Ok(text);
     }
     print(&text)?;
-    Err(Failure::run(format!("the loop check failed: {}", checked.verdict)))
+    let verdict = named(&checked.verdict.to_string(), &scene);
+    Err(Failure::run(format!("the loop check failed: {verdict}")))
 }
 
 /// Why the check of a structure has no linear response.
@@ -87,13 +88,31 @@ fn unmeasured(checked: &LoopCheck, scene: &Scene) -> &'static str {
     }
 }
 
-pub(super) fn described(checked: &LoopCheck) -> String {
-    let channels = [("response", Some(&checked.response)), ("base", checked.base.as_ref())];
-    let rows = channels.into_iter().filter_map(|(name, channel)| {
+/// The words of a check; where a force drives, those of a force.
+pub(super) fn named(text: &str, scene: &Scene) -> String {
+    match &scene.structure {
+        Some(structure) if structure.excitation == Excitation::Force => text
+            .replace(
+                "whether the base moves the structure through its spring",
+                "the drive point",
+            )
+            .replace("base sensor", "force cell")
+            .replace("base", "force"),
+        _ => text.into(),
+    }
+}
+
+pub(super) fn described(checked: &LoopCheck, scene: &Scene) -> String {
+    let Units { factors: [response, drive], names: [_, (_, unit)] } = Units::of(scene);
+    let channels = [
+        ("response", Some(&checked.response), response),
+        ("base", checked.base.as_ref(), drive),
+    ];
+    let rows = channels.into_iter().filter_map(|(name, channel, factor)| {
         let CheckedChannel { gain, phase, delay, noise, floor, .. } = channel?;
-        let noises = [noise, floor].map(|noise| format!("{noise:.1e}"));
+        let noises = [noise, floor].map(|noise| format!("{:.1e}", noise * factor));
         let numbers = [format!("{gain:.3}"), format!("{phase:.1}"), format!("{delay:.1}")];
-        Some([&[name.to_string()][..], &numbers, &noises].concat())
+        Some([&[named(name, scene)][..], &numbers, &noises].concat())
     });
     let table = Table::new("channel | gain | phase | delay | noise | floor").rows(rows);
     let mut text = format!("{}\n", table.text());
@@ -102,20 +121,25 @@ pub(super) fn described(checked: &LoopCheck) -> String {
         let rows = checked.quantities.iter().map(|quantity| {
             let separator = if quantity.unit.is_empty() { "" } else { ", " };
             let name = format!("{}{separator}{}", quantity.name, quantity.unit);
-            [name, measured(quantity), number(quantity.expected)]
+            [named(&name, scene), measured(quantity), number(quantity.expected)]
         });
         text += &format!("{}\n", Table::new("measured | value | scene").rows(rows).text());
     }
     for quantity in checked.quantities.iter().filter(|quantity| quantity.differs()) {
         let CheckedQuantity { name, unit, .. } = quantity;
-        let (measured, expected) = (measured(quantity), number(quantity.expected));
+        let (name, measured, expected) = (named(name, scene), measured(quantity), number(quantity.expected));
         let consequence = match quantity.verdict {
             Some(_) => format!("more than {} off is refused", quantity.tolerance),
             None => "`vines identify` and `vines backbone` use the measured value".into(),
         };
         text += &format!("Different from the scene: {name} is {measured} {unit}, not {expected}; {consequence}.\n");
     }
-    text += &format!("At E = {:.2e} m: {}\n", checked.amplitude, checked.verdict);
+    let symbol = match scene.structure.as_ref().map(|structure| structure.excitation) {
+        Some(Excitation::Force) => "F",
+        _ => "E",
+    };
+    let (amplitude, verdict) = (checked.amplitude * drive, named(&checked.verdict.to_string(), scene));
+    text += &format!("At {symbol} = {amplitude:.2e} {unit}: {verdict}\n");
     if let Some(linear) = &checked.linear {
         text += &format!(
             "Gains at a bandwidth of {:.3} rad/s: {:.4} 1/s and {:.4} 1/s²; phase margin {:.0} degrees.\n",

@@ -139,11 +139,11 @@ impl ExperimentArguments {
             return Ok(plan);
         }
         let checked = loop_check::check(rig, &plan).map_err(ExperimentError::from)?;
-        eprint!("{}", check::described(&checked));
+        eprint!("{}", check::described(&checked, scene));
         let Verdict::Healthy = checked.verdict else {
             return Err(Failure::run(format!(
                 "the loop check failed, and the drive is off: {}; --no-check skips it",
-                checked.verdict
+                check::named(&checked.verdict.to_string(), scene)
             )));
         };
         let Some(linear) = checked.linear else { return Ok(plan) };

@@ -25,13 +25,13 @@ fn rig(p: &Dimensionless) -> String {
 }
 
 /// Units of the measurements: response at the sensor, m per m of the oscillator's response; drive per m of the oscillator's base; name and unit of both.
-struct Units {
-    factors: [f64; 2],
-    names: [(String, &'static str); 2],
+pub(super) struct Units {
+    pub(super) factors: [f64; 2],
+    pub(super) names: [(String, &'static str); 2],
 }
 
 impl Units {
-    fn of(scene: &Scene) -> Self {
+    pub(super) fn of(scene: &Scene) -> Self {
         let Some(structure) = &scene.structure else {
             return Self {
                 factors: [1.0; 2],

@@ -419,7 +419,7 @@ pub enum Verdict {
     #[error("the base sensor is late: check its filter and delay; a lock would hold another phase than it reports")]
     BaseLate,
     #[error(
-        "the base moves at another frequency than the drive: check the clocks and the sample times of rig and controller"
+        "the base has another frequency than the drive: check the clocks and the sample times of rig and controller"
     )]
     Clock,
     #[error(

@@ -314,6 +314,15 @@ fn results_of_one_oscillator_say_so_where_the_scene_has_a_structure() {
             format!("check {scene}"),
             "epsilon, lambda, sigma, C and G are those of mode 1",
         ),
+        // What a force drives is named by the force, in newtons.
+        (
+            format!("check {scene}"),
+            "At F = 1.23e-2 N: signs, gains, delays and noise are as expected",
+        ),
+        (
+            format!("check {scene}"),
+            "frequency of the force over that of the drive",
+        ),
     ] {
         let output = vines(&line);
         assert!(output.status.success(), "{output:?}");
