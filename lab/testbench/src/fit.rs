@@ -314,7 +314,7 @@ impl Fit {
 
 /// Fits the parameters to `points`. The rig `expected` is where the search begins; the points show resonance as `definition` says.
 ///
-/// Points without which the rest fits significantly better are left out, as [`Problem::without_strangers`] finds them. If that does not make the
+/// Points without which the rest fits significantly better are left out, as `Problem::without_strangers` finds them. If that does not make the
 /// model describe the others, the fit is that of all points, and rejected.
 ///
 /// # Errors
