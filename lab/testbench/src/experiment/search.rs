@@ -21,9 +21,7 @@ use nalgebra::DVector;
 use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, noise, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, Stage};
-use crate::identification::{
-    ASYMMETRIC, Cycle, Regime, ResonanceFit, Slopes, degrees, regime_by_response, without_tones,
-};
+use crate::identification::{ASYMMETRIC, Cycle, ResonanceFit, Slopes, degrees, without_tones};
 use crate::linear::{Impacts, impacts_by_resonance};
 use crate::plan::{LinearResponse, Plan, Target};
 use crate::rig::{Controller, ControllerError, LoopState, Move, Rig};
@@ -54,8 +52,6 @@ const SMALLEST_SLOPE: f64 = 0.1;
 /// Relative error of the response, and error of the frequency over the half-power bandwidth E/A, at which the response that the requested drive
 /// holds has been found.
 const FOUND: f64 = 1e-4;
-/// Growth of the second harmonic while a lock settles that tells that the symmetric motion is unstable; noise does not grow as much.
-const GROWN: f64 = 10.0;
 /// Share of a straight line that is followed where its bend is not known.
 const CAUTIOUS: f64 = 0.5;
 /// Largest number of levels that are held for it.
@@ -340,19 +336,13 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Waits until the lock has settled. Returns whether it has; if not, the motion has lost its symmetry.
     fn settle(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
-        let (mut asymmetric, mut grown, mut least, first) = (0, 0, f64::INFINITY, leg.response);
-        let mut settled = 0;
-        while asymmetric < 2 && settled < LEGS {
+        let (mut asymmetric, mut grown, first) = (0, 0, leg.response);
+        while asymmetric < 2 {
             let before = leg.even;
             *leg = self.measure(FOLLOWED)?;
-            least = leg.even.min(least);
-            if leg.asymmetry > 0.0 && leg.even > GROWN * GROWN * least && self.bench.plan.knowledge.is_symmetric {
-                leg.symmetric = false;
-            }
             // Beside symmetry breaking the symmetry is lost slowly; noise grows as often in one of 24 cases.
             grown = if leg.even > before { grown + 1 } else { 0 };
-            settled += usize::from(self.bench.settled);
-            if leg.symmetric && self.bench.settled && grown < CONFIRMED && self.is_periodic(leg) {
+            if self.bench.settled && grown < CONFIRMED {
                 return Ok(true);
             }
             // Noise may hide an asymmetry, but not where the motion goes.
@@ -360,22 +350,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             asymmetric = if leg.symmetric && is_there { 0 } else { asymmetric + 1 };
             self.setpoint = leg.last;
         }
-        leg.symmetric = false;
         Ok(false)
-    }
-
-    /// Whether the last legs are periodic, and symmetric by all harmonics if the rig is, as the identification asks of a hold.
-    fn is_periodic(&self, leg: &Leg) -> bool {
-        let (knowledge, samples) = (&self.bench.plan.knowledge, &self.bench.samples);
-        let count = knowledge.samples(f64::from(CONFIRMED) * FOLLOWED as f64);
-        let last = &samples[samples.len().saturating_sub(count)..];
-        let [drive, omega] =
-            [(leg.drive, leg.noise), (leg.omega, 0.0)].map(|(value, uncertainty)| Estimate { value, uncertainty });
-        match regime_by_response(last, knowledge, drive, omega) {
-            Regime::Other => false,
-            Regime::Asymmetric => !knowledge.is_symmetric,
-            _ => true,
-        }
     }
 
     /// A leg that changes the response by `change`, m, and lets it go on at this rate.
