@@ -155,7 +155,7 @@ def test_the_outputs_of_a_shaker_obey_its_equations_while_the_command_is_clipped
 
 
 def test_a_shaker_that_reaches_its_limit_ends_the_simulation_in_one_sentence(pack):
-    with closing(Component(pack("shaker-cantilever", "shaker.stroke_max=1e-4"), logging=True)) as rig:
+    with closing(Component(pack("shaker-cantilever", "plant.b=1e-3", "shaker.stroke_max=1e-4"), logging=True)) as rig:
         rig.start({"u_amplitude": 8.0, "omega": 53.0})
         with pytest.raises(FMICallException):
             rig.step(1e-3, 1000)
