@@ -10,12 +10,9 @@
 //!    over if `E_R` rises with the amplitude, the condition of stability under a constant drive. Otherwise the response stays under
 //!    control.
 //!
-//! A motion that is symmetric from the start skips steps 2 and 3. Where the drive rises faster than in proportion to the response, the constant
-//! drive takes over from the sweep at once.
-//!
-//! A motion that is lost is searched again, more slowly, from the largest response downwards, and also where the drive falls with the response.
+//! A motion that is symmetric from the start skips steps 2 and 3. A motion that is lost is searched again, more slowly.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use nalgebra::DVector;
 use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, noise, range};
@@ -31,8 +28,6 @@ use crate::scene::Measurand;
 const NEAR: f64 = 0.35;
 /// Largest relative change of the response in a leg: the stable orbits above the fold span a few percent.
 const STEP: f64 = 0.04;
-/// Largest change of the frequency in a leg, over epsilon omega0, the scale of what impacts make of it.
-const SHIFT: f64 = 0.15;
 /// Largest share of the drive that changes the response.
 const SHARE: f64 = 0.3;
 /// Duration of a rise of the response by the half-width, periods.
@@ -41,7 +36,7 @@ const RISE: f64 = 60.0;
 const DRAWING: f64 = 0.1;
 /// Response over the half-width from which impacts are no longer expected: the particle does not move freely.
 const UNREACHED: f64 = 1.5;
-/// Smallest response over the half-width of the search: up to r = 0.85, the fold, at about 2/pi (1 - r)/(1 + r), has a larger one.
+/// Smallest response over the half-width of the search: up to r = 0.9, the fold has a larger one.
 const LOWEST: f64 = 0.05;
 /// Smallest response, over the response where the symmetry was lost or the lock was found, at which the motion counts as the same; the largest is
 /// its inverse. The stable range of the symmetric motion is wider.
@@ -52,6 +47,9 @@ const SMALLEST_SLOPE: f64 = 0.1;
 /// Relative error of the response, and error of the frequency over the half-power bandwidth E/A, at which the response that the requested drive
 /// holds has been found.
 const FOUND: f64 = 1e-4;
+/// Relative error of the drive at which a constant drive takes over where the drive rises faster than in proportion to the response: a quarter of
+/// what a leg changes.
+const CLOSE: f64 = 0.25 * STEP;
 /// Share of a straight line that is followed where its bend is not known.
 const CAUTIOUS: f64 = 0.5;
 /// Largest number of levels that are held for it.
@@ -75,8 +73,6 @@ struct Leg {
     symmetric: bool,
     /// Second harmonic over the third, as far as noise does not explain it.
     asymmetry: f64,
-    /// Mean square of the second harmonic, m², with noise.
-    even: f64,
 }
 
 /// The search.
@@ -94,8 +90,6 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     setpoint: f64,
     /// Smallest and largest drive that held a symmetric motion, m; infinite before the first.
     held: (f64, f64),
-    /// Response at which a sweep upwards has lost the motion, m.
-    lost: f64,
 }
 
 impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
@@ -111,7 +105,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             bench,
             setpoint: 0.0,
             held: (f64::INFINITY, 0.0),
-            lost: 0.0,
         }
     }
 
@@ -128,8 +121,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         }
         for search in 0..SEARCHES {
             let step = STEP / f64::from(1 << search);
-            leg = self.symmetric(leg, step, search > 0)?;
-            if let Some(held) = self.solve(&mut leg, step, search > 0)? {
+            leg = self.symmetric(leg, step)?;
+            if let Some(held) = self.solve(&mut leg, step, search >= SEARCHES / 2)? {
                 return Ok(Some(held));
             }
         }
@@ -148,7 +141,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Goes to a symmetric motion with impacts, if there is one, and holds its response.
     pub fn impacts(&mut self) -> Result<(), ExperimentError> {
         let leg = self.begin()?;
-        self.symmetric(leg, STEP, false)?;
+        self.symmetric(leg, STEP)?;
         Ok(())
     }
 
@@ -168,14 +161,13 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         self.leg(0.0, FOLLOWED, 0.0)
     }
 
-    /// Goes to a symmetric motion with impacts: raises the response until they have begun, for `high` to the largest one, and lowers it until the
-    /// motion is symmetric.
-    fn symmetric(&mut self, mut leg: Leg, step: f64, high: bool) -> Result<Leg, ExperimentError> {
+    /// Goes to a symmetric motion with impacts: raises the response until they have begun, and lowers it until the motion is symmetric.
+    fn symmetric(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         let largest = self.bench.config.amplitude_max.unwrap_or(f64::INFINITY);
         let spare = SHARE * self.gain() * (largest - self.damping() * (1.0 + DRAWING) * self.b);
         let rate = (self.b / (RISE * self.period)).min(spare);
-        while high || !leg.departed || leg.response < (1.0 - DRAWING) * self.b {
-            if leg.symmetric && !high {
+        while !leg.departed || leg.response < (1.0 - DRAWING) * self.b {
+            if leg.symmetric {
                 // A rise may resemble impacts; at rest the setpoint tells them apart.
                 leg = self.leg(0.0, FOLLOWED, 0.0)?;
                 if leg.symmetric {
@@ -188,14 +180,14 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
             leg = self.leg(leg.last + change - self.setpoint, FOLLOWED, rate)?;
         }
-        self.fall(leg, step)
+        self.fall(leg, step, LOWEST * self.b)
     }
 
-    /// Lowers the response until the motion is symmetric, but not below the smallest response, nor on after impacts have ended, of which
-    /// even harmonics are a sign as well. A large response can hide them: beside a carried particle, their evidence grows as the response falls.
-    fn fall(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
+    /// Lowers the response until the motion is symmetric, but not below `lowest`, m, nor on after impacts have ended, of which even harmonics
+    /// are a sign as well. A large response can hide them: beside a carried particle, their evidence grows as the response falls.
+    fn fall(&mut self, mut leg: Leg, step: f64, lowest: f64) -> Result<Leg, ExperimentError> {
         let mut seen = leg.departed;
-        while !leg.symmetric && (leg.departed || leg.asymmetry > 0.0 || !seen) && self.setpoint > LOWEST * self.b {
+        while !leg.symmetric && (leg.departed || leg.asymmetry > 0.0 || !seen) && self.setpoint > lowest {
             leg = self.sweep(&leg, -step * leg.last)?;
             seen |= leg.departed;
         }
@@ -205,8 +197,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Follows the symmetric motion to the response that the requested drive holds. Returns whether it stays under control there; `None` if
     /// the motion is lost. `any`: also one that a constant drive does not hold.
     fn solve(&mut self, leg: &mut Leg, step: f64, any: bool) -> Result<Option<bool>, ExperimentError> {
-        let mut upwards = leg.drive < self.requested && leg.response > self.lost;
-        let mut swept = vec![*leg];
+        let (mut swept, mut upwards) = (vec![*leg], leg.drive < self.requested);
         while leg.symmetric && self.setpoint > LOWEST * self.b {
             let change = step / self.steepness(&swept).max(1.0) * leg.last;
             *leg = self.sweep(leg, if upwards { change } else { -change })?;
@@ -227,13 +218,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                     continue;
                 }
             }
-            if upwards {
-                self.lost = leg.response;
-            }
-            // Above and between symmetric motions is one without symmetry, as long as there are impacts.
-            while !leg.symmetric && leg.departed && self.setpoint > LOWEST * self.b {
-                *leg = self.sweep(leg, -step * leg.last)?;
-            }
+            // Above the symmetric motion is one without symmetry.
+            *leg = self.fall(*leg, step, LOST * leg.response)?;
             (swept, upwards) = (vec![*leg], false);
         }
         Ok(None)
@@ -243,10 +229,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// two legs.
     fn steepness(&self, swept: &[Leg]) -> f64 {
         let [.., two, last] = swept else { return 0.0 };
-        let turned = (last.omega - two.omega) / self.linear.omega0;
-        let shift = STEP / SHIFT * turned / self.bench.plan.knowledge.numbers.epsilon;
-        let [drive, turned] = [last.drive - two.drive, turned * last.response].map(|change| change / last.drive);
-        drive.abs().max(turned.abs()).max(shift.abs()) / (last.response / two.response - 1.0).abs()
+        let turned = (last.omega - two.omega) / self.linear.omega0 * last.response;
+        (last.drive - two.drive).abs().max(turned.abs()) / last.drive / (last.response / two.response - 1.0).abs()
     }
 
     /// Holds the response at levels until the requested drive holds it there. Returns whether it stays under control; `None` if there is no such
@@ -259,11 +243,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         any: bool,
         upwards: bool,
     ) -> Result<Option<bool>, ExperimentError> {
-        // A motion that follows the drive faster than in proportion settles by itself, and held at a level it may be lost.
-        if slope * leg.response > leg.drive && first[..] == [leg.last] && !self.target.through_shaker {
-            self.bench.controller.hold_drive()?;
-            return Ok(self.settle(leg)?.then_some(false));
-        }
         let mut levels = Levels { legs: Vec::new(), slope, share };
         let end = if upwards { first[0] } else { first[first.len() - 1] };
         let mut first = first.into_iter();
@@ -283,7 +262,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             };
             // Behind a shaker a constant command is no constant force: the response stays under control.
             let by_drive = predicted.is_root && !self.target.through_shaker;
-            if !self.is_found(leg, &predicted) {
+            // A motion that follows the drive faster than in proportion settles by itself.
+            let is_steep = by_drive && predicted.slope * leg.response > leg.drive;
+            let is_close = is_steep && (leg.drive - self.requested).abs() < CLOSE * leg.drive;
+            if !(is_close || self.is_found(leg, &predicted)) {
                 next = Some(predicted.response).filter(|to| predicted.is_root || levels.is_new(*to));
                 continue;
             }
@@ -338,10 +320,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     fn settle(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
         let (mut asymmetric, mut grown, first) = (0, 0, leg.response);
         while asymmetric < 2 {
-            let before = leg.even;
+            let before = leg.asymmetry;
             *leg = self.measure(FOLLOWED)?;
             // Beside symmetry breaking the symmetry is lost slowly; noise grows as often in one of 24 cases.
-            grown = if leg.even > before { grown + 1 } else { 0 };
+            grown = if leg.asymmetry > before { grown + 1 } else { 0 };
             if self.bench.settled && grown < CONFIRMED {
                 return Ok(true);
             }
@@ -424,10 +406,11 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let departed = impacts_by_resonance(&self.linear, at, self.target.phase, epsilon) == Impacts::Needed;
         // Noise itself scatters by a share of sqrt(2/n): each window has half of the next one.
         let [even, odd, noise] = [0, 1, 2].map(|k| mean(harmonics.iter().map(|squares: &[f64; 3]| squares[k])));
-        let (squares, even, odd) = (even, even - noise, odd - noise);
+        let (even, odd) = (even - noise, odd - noise);
         let doubtful = SIGNIFICANT * noise / (0.5 * all.len() as f64).sqrt();
         let possible = self.setpoint > LOWEST * self.b && response < UNREACHED * self.b;
-        // Without mirror images there is no symmetric motion to tell from others. The harmonics are those of displacements.
+        // Without mirror images there is no symmetric motion to tell from others.
+        // As displacements.
         let asymmetric = ASYMMETRIC * (2.0_f64 / 3.0).powi(self.target.measurands[0].order());
         let is_even_small =
             !self.bench.plan.knowledge.is_symmetric || even <= (asymmetric * asymmetric * odd).max(doubtful);
@@ -444,7 +427,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             departed,
             symmetric,
             asymmetry: ((even - doubtful).max(0.0) / odd.max(doubtful)).sqrt(),
-            even: squares,
         })
     }
 
@@ -463,17 +445,13 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
 /// Squares of the second and the third harmonic of the response, m², and their mean by noise; `step` is the phase between two samples, rad.
 fn even_and_odd(samples: &[Sample], step: f64, measurand: Measurand) -> Option<[f64; 3]> {
-    let count = samples.len();
-    let phases: Vec<f64> = (0..count).map(|n| n as f64 * step).collect();
-    // With the squares of these weights, Hann's window, what is not fitted leaks into the harmonics a hundred times less.
-    let weights = DVector::from_fn(count, |n, _| (PI * (n as f64 + 0.5) / count as f64).sin());
-    let basis = HarmonicBasis::new(&phases, 0, &degrees(measurand, TAU / step)).weighted(&weights);
-    let values = DVector::from_iterator(count, samples.iter().map(|sample| sample.sensors.response));
-    let values = values.component_mul(&weights);
+    let phases: Vec<f64> = (0..samples.len()).map(|n| n as f64 * step).collect();
+    let basis = HarmonicBasis::new(&phases, 0, &degrees(measurand, TAU / step));
+    let values = DVector::from_iterator(samples.len(), samples.iter().map(|sample| sample.sensors.response));
     let fit = basis.fit(&values)?;
     let rest = noise(basis.residual(&values, &fit).as_slice());
     let [even, odd] = [2, 3].map(|n| fit.harmonic(n).norm_sqr());
-    Some([even, odd, 3.0 * rest * rest * 4.0 / count as f64])
+    Some([even, odd, rest * rest * 4.0 / samples.len() as f64])
 }
 
 /// What a sweep has passed: levels of the response, m, near which the requested drive is, or an extremum of the drive that may reach it, the
@@ -485,7 +463,7 @@ fn passed(swept: &[Leg], requested: f64, any: bool) -> Option<(Vec<f64>, f64, f6
     let has_passed = |n: f64| beyond(two) * (last.drive - requested + n * (last.drive - two.drive)) <= 0.0;
     let levels = match () {
         // Where the drive rises faster than in proportion, the motion may be lost below.
-        () if has_passed(0.0) && slope * last.response > last.drive => vec![last.last],
+        () if has_passed(1.0) && slope * last.response > last.drive => vec![last.last],
         () if has_passed(0.0) && (any || slope > 0.0) => vec![last.response - beyond(last) / slope],
         () => {
             let nearest =
@@ -529,7 +507,7 @@ struct Levels {
 struct Predicted {
     /// m
     response: f64,
-    /// Slope of the drive over the response there, less what noise may make of it.
+    /// Slope of the drive over the response there.
     slope: f64,
     /// Slope of the frequency over the response there, rad/s per m.
     turning: f64,
@@ -618,17 +596,10 @@ impl Levels {
             return None;
         };
         let span = (STEP * highest.response).max(highest.response - lowest.response);
-        let (slope, doubt) = (rise + 2.0 * bend * ahead, SIGNIFICANT * a.noise.hypot(b.noise) / width);
-        // The legs between which the sweep has passed the requested drive are further apart than levels.
-        let passed = if self.share < 1.0 {
-            f64::NEG_INFINITY
-        } else {
-            self.slope
-        };
         let is_near = (lowest.response - span..highest.response + span).contains(&response);
         is_near.then(|| Predicted {
             response,
-            slope: slope.min((slope - doubt).max(passed)),
+            slope: rise + 2.0 * bend * ahead,
             turning: (b.omega - a.omega) / width,
             is_root,
         })
