@@ -754,6 +754,33 @@ for (const { name, options } of BROWSERS) {
       }
     });
 
+    test("a running experiment behind a shaker is shown with its drop-out, the particle and the backbone of all modes", async () => {
+      const scene = ["--scene", join(BOOK, "../scenes/shaker-cantilever.toml")];
+      const rig = await started(["rig", ...scene, "--listen", "127.0.0.1:0", "--silence", "20", "--duration", "120"], "stdout", /udp:\S+/);
+      const out = join(tmpdir(), `vines-watch-shaker-${process.pid}-${name}`);
+      const experiment = await started(["identify", ...scene, "--rig", rig.found, "--watch", "--out", out], "stderr", /http:\S+/);
+      try {
+        const { page, errors } = await open();
+        await page.goto(experiment.found);
+        await page.waitForFunction(() => window.live?.page.end > 3, { timeout: 60000 });
+        const found = await page.evaluate(() => {
+          const one = window.live.page, { dropOut } = one.pictures.plots;
+          const stable = one.bench.exact().filter(([, , stable]) => stable).map(([, c]) => c);
+          return { seen: document.querySelector(".drop-out").checkVisibility(), hertz: dropOut.x, most: dropOut.y[1], c: Math.max(...stable), particle: Math.abs(one.rows.row(-1)[3]) <= 0.0101 };
+        });
+        assert.deepEqual({ seen: found.seen, particle: found.particle }, { seen: true, particle: true });
+        // From 0.9 to 1.1 of the natural frequency; force, N per V; a higher mode takes the stability at C = 0.51.
+        assert.ok(found.hertz[0] > 7.9 && found.hertz[0] < 8 && found.most > 3 && found.most < 5 && found.c > 0.45 && found.c < 0.52, JSON.stringify(found));
+        assert.deepEqual(errors, []);
+        await page.screenshot({ path: join(SCREENS, `${name}-watch-shaker.png`), fullPage: true });
+        await page.close();
+      } finally {
+        experiment.child.kill();
+        rig.child.kill();
+        await rm(out, { recursive: true, force: true });
+      }
+    });
+
     test("the map of regimes fills while the page runs, and a click leads to the regime of its cell", async () => {
       const { page, errors } = await open();
       await ready(page);
