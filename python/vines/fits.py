@@ -48,8 +48,8 @@ class Fit(Result):
     undetermined : tuple of str
         Symbols of the first five parameters that the points do not determine: then `describes` says little.
     explained_by : str or None
-        The effect of a real cavity that explains the points, where the ideal cavity does not describe them; several that
-        do are joined by " or ".
+        The effect of a real cavity that explains the points, where the ideal cavity does not describe them; several
+        that do are joined by " or ".
     effects : dict of ndarray or None
         Of each effect that was tried then: effect, symbol, unit, strength, uncertainty, chi_square, degrees, left_out,
         describes, and possible_strength and possible_b_m, a strength and the half-width (m) that the points do not
