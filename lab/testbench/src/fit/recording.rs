@@ -4,11 +4,12 @@
 //!    would know; where it rests, the rig decays.
 //! 2. The periods of a driven part are cut into windows of about the same amplitude, near phase resonance: long where the response is held,
 //!    short where it is swept.
-//! 3. Each window gives a point by the fit that the bench itself uses ([`Criterion::best`]).
+//! 3. Each window gives a point by the fit that the bench itself uses ([`Criterion::best`]); the slopes are those of the points whose amplitudes are
+//!    next to it.
 //! 4. A decay gives drive and frequency from the rate and the frequency of the response, with E = 0 in the balance of the amplitude.
 //!
-//! The points are where the fit of the record itself begins ([`super::follow`]). The impacts follow a change of the amplitude late. The errors by this
-//! are alike within a sweep or a decay of n points, so that averaging does not reduce them: each counts with the factor √n.
+//! The impacts follow a change of the amplitude late. The errors by this are alike within a sweep or a decay of n points, so that averaging does
+//! not reduce them: each counts with the factor √n.
 
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
@@ -22,7 +23,7 @@ use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
 use vines_model::{Measurand, Sensor};
 
 use super::{MeasuredPoint, decimals};
-use crate::backbone::{Criterion, LAG};
+use crate::backbone::{Criterion, LAG, LevelEstimate};
 use crate::identification::{Cycle, Harmonic, Line, ResonanceFit, harmonic, regime_by_response};
 use crate::plan::{Knowledge, LinearResponse, Target};
 use crate::record::Sample;
@@ -183,7 +184,7 @@ impl Recording {
         let driven: Vec<_> = stretches.clone().filter(of(true)).map(periods).collect();
         self.plausible(&driven.iter().flat_map(|(_, cycles)| cycles).collect::<Vec<_>>())?;
         let windows = driven.iter().flat_map(|(samples, cycles)| windows(samples, cycles));
-        let mut parts: Vec<Part> = windows.map(|window| part(&window, knowledge)).collect();
+        let mut parts = evaluated(&windows.collect::<Vec<_>>(), knowledge);
         let decays = stretches.filter(of(false));
         parts.extend(decays.flat_map(|stretch| decay(stretch, linear, self.sample_time)));
         parts.sort_by(|first, second| first.seconds[0].total_cmp(&second.seconds[0]));
@@ -546,6 +547,29 @@ fn windows<'a>(samples: &'a [Sample], cycles: &'a [Cycle]) -> Vec<Window<'a>> {
     windows
 }
 
+/// Amplitude of the response, m, drive, m, and frequency, rad/s.
+type Held = [f64; 3];
+
+/// The parts of the windows, which are evaluated twice: the points of the first time give the slopes of the second.
+fn evaluated(windows: &[Window], knowledge: &Knowledge) -> Vec<Part> {
+    let estimate = |window: &Window, before| {
+        let largest = window.cycles.iter().map(Cycle::amplitude).fold(0.0, f64::max);
+        Criterion { knowledge: *knowledge, precision: 1.0, largest, before }.best(window.cycles)
+    };
+    let held = |level: LevelEstimate| [level.response.value, level.at[0].value, level.at[1].value];
+    let first: Vec<Option<Held>> = windows
+        .iter()
+        .map(|window| estimate(window, [None; 2]).map(held))
+        .collect();
+    let mut curve: Vec<Held> = first.iter().copied().flatten().collect();
+    curve.sort_by(|first, second| first[0].total_cmp(&second[0]));
+    let second = windows.iter().zip(first).map(|(window, first)| {
+        let estimate = first.and_then(|first| estimate(window, neighbours(&curve, first)));
+        part(window, estimate, &curve, knowledge)
+    });
+    second.collect()
+}
+
 /// Leaves of points with about the same amplitude the best one: their errors are alike, whatever their number.
 fn best_of_each_amplitude(parts: &mut [Part]) {
     let u = |point: &MeasuredPoint| point.drive.uncertainty / point.drive.value;
@@ -569,18 +593,22 @@ fn change(cycles: &[Cycle]) -> f64 {
     if change.abs() > RANDOM * noise { change } else { 0.0 }
 }
 
+/// The two points whose amplitudes are next to that of `here`, the nearest last.
+fn neighbours(curve: &[Held], here: Held) -> [Option<Held>; 2] {
+    let mut others: Vec<Held> = curve
+        .iter()
+        .copied()
+        .filter(|point| (point[0] / here[0] - 1.0).abs() > 2.0 * HELD)
+        .collect();
+    others.sort_by(|first, second| (first[0] - here[0]).abs().total_cmp(&(second[0] - here[0]).abs()));
+    [others.get(1).copied(), others.first().copied()]
+}
+
 /// The part of a window.
-fn part(window: &Window, knowledge: &Knowledge) -> Part {
+fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], knowledge: &Knowledge) -> Part {
     let Window { cycles, samples, change, late } = *window;
     let seconds = [samples[0].time, samples[samples.len() - 1].time];
-    let largest = cycles.iter().map(Cycle::amplitude).fold(0.0, f64::max);
-    let criterion = Criterion {
-        knowledge: *knowledge,
-        precision: 1.0,
-        largest,
-        before: [None; 2],
-    };
-    let Some(estimate) = criterion.best(cycles) else {
+    let Some(estimate) = estimate else {
         let (kind, regime) = (Kind::Held, Regime::Unknown);
         return Part { seconds, kind, point: None, regime };
     };
@@ -592,15 +620,13 @@ fn part(window: &Window, knowledge: &Knowledge) -> Part {
         Kind::Held
     };
     let regime = regime_by_response(samples, knowledge, base, omega);
-    // Of the phase error, the estimate contains the first order. Drive and detuning change about as the amplitude does.
-    let detuning = omega.value - knowledge.linear.omega0;
-    let (beside, late) = (
-        estimate.phase_error.value.abs() * base.value / level.value,
-        late / level.value,
-    );
-    let drive = base.value * beside.hypot(late);
-    let drive = Estimate::new(base.value, &[base.uncertainty, drive]);
-    let omega = Estimate::new(omega.value, &[omega.uncertainty, detuning * beside.hypot(late)]);
+    // What the estimate contains once of the lag, and of the phase error in the second order.
+    let here = [level.value, base.value, omega.value];
+    let slopes = neighbours(curve, here)[1].map_or([0.0; 2], |neighbour| slopes(here, neighbour));
+    let beside = estimate.phase_error.value.abs() * base.value / level.value;
+    let aside = beside * (omega.value - knowledge.linear.omega0);
+    let drive = Estimate::new(base.value, &[base.uncertainty, slopes[0] * late, beside * base.value]);
+    let omega = Estimate::new(omega.value, &[omega.uncertainty, slopes[1] * late, aside]);
     // Beyond the amplitude at which the symmetric motion loses its symmetry, noise hides another motion.
     let manifold = Manifold::new(knowledge.numbers.r);
     let largest = manifold.c(B_SYMMETRY_BREAKING) * knowledge.numbers.b;
@@ -615,6 +641,11 @@ fn point(response: Estimate, omega: Estimate, drive: Estimate) -> Option<Measure
     (drive.value > 0.0 && is_known).then_some(MeasuredPoint { response, omega, drive })
 }
 
+/// Slopes of drive and frequency over the amplitude.
+fn slopes(here: Held, neighbour: Held) -> [f64; 2] {
+    [1, 2].map(|i| (neighbour[i] - here[i]) / (neighbour[0] - here[0]))
+}
+
 /// The points of a decay, with `E = -A'/g`. The fits do not overlap.
 fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<Part> {
     let apart = WINDOW.ceil() as usize;
@@ -623,6 +654,10 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
         .step_by(apart)
         .filter_map(|anchor| Some((anchor.middle * sample_time, anchor.response?)))
         .collect();
+    let held = |harmonic: &Harmonic| {
+        let gain = 0.5 * linear.omega0 * linear.omega0 / harmonic.omega;
+        [harmonic.amplitude, -harmonic.rate / gain, harmonic.omega]
+    };
     // The impacts have ended where what remains is the damping of the structure.
     let damping = linear.damping_rate;
     let taken = |harmonic: &Harmonic| -harmonic.rate - damping * harmonic.amplitude;
@@ -633,16 +668,20 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
     let count = synchronous.len() as f64;
     let half = 0.5 * WINDOW * TAU / linear.omega0;
     synchronous
-        .iter()
-        .map(|(time, harmonic)| {
-            let gain = 0.5 * linear.omega0 * linear.omega0 / harmonic.omega;
-            let value = -harmonic.rate / gain;
+        .windows(2)
+        .map(|pair| {
+            let [(time, harmonic), (_, next)] = [pair[0], pair[1]];
+            let here = held(harmonic);
+            let slopes = slopes(here, held(next));
+            let late = LAG * harmonic.rate * TAU / harmonic.omega;
+            let gain = -harmonic.rate / here[1];
+            // A misfit of one balance widens the other one as well: both have the same samples.
+            let units = [1.0, harmonic.amplitude / gain];
+            let systematic = (slopes[0] * late).hypot(units[1] * slopes[1] * late) * count.sqrt();
             let [u_amplitude, u_omega] = harmonic.uncertainties;
-            // Drive and detuning change about as the amplitude does.
-            let late = LAG * harmonic.rate * TAU / harmonic.omega / harmonic.amplitude * count.sqrt();
-            let detuning = harmonic.omega - linear.omega0;
-            let drive = Estimate::new(value, &[u_omega * harmonic.amplitude / gain, value * late]);
-            let omega = Estimate::new(harmonic.omega, &[u_omega, detuning * late]);
+            let u_rate = u_omega * harmonic.amplitude;
+            let drive = Estimate::new(here[1], &[u_rate / gain, systematic]);
+            let omega = Estimate::new(harmonic.omega, &[u_omega, systematic / units[1]]);
             let response = Estimate { value: harmonic.amplitude, uncertainty: u_amplitude };
             Part {
                 seconds: [time - half, time + half],
