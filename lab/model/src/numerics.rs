@@ -395,6 +395,15 @@ impl HarmonicBasis {
         Self { factors: matrix.clone().qr(), matrix, columns }
     }
 
+    /// With rows weighted by these; values are to be weighted alike.
+    #[must_use]
+    pub fn weighted(mut self, weights: &DVector<f64>) -> Self {
+        for mut column in self.matrix.column_iter_mut() {
+            column.component_mul_assign(weights);
+        }
+        Self { factors: self.matrix.clone().qr(), ..self }
+    }
+
     /// Number of unknowns.
     pub fn terms(&self) -> usize {
         self.matrix.ncols()

@@ -12,7 +12,7 @@
 //!
 //! A motion that is symmetric from the start skips steps 2 and 3. A motion that is lost is searched again, more slowly.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use nalgebra::DVector;
 use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, noise, range};
@@ -73,6 +73,8 @@ struct Leg {
     symmetric: bool,
     /// Second harmonic over the third, as far as noise does not explain it.
     asymmetry: f64,
+    /// Mean square of the second harmonic, m², with noise.
+    even: f64,
 }
 
 /// The search.
@@ -320,10 +322,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     fn settle(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
         let (mut asymmetric, mut grown, first) = (0, 0, leg.response);
         while asymmetric < 2 {
-            let before = leg.asymmetry;
+            let before = leg.even;
             *leg = self.measure(FOLLOWED)?;
             // Beside symmetry breaking the symmetry is lost slowly; noise grows as often in one of 24 cases.
-            grown = if leg.asymmetry > before { grown + 1 } else { 0 };
+            grown = if leg.even > before { grown + 1 } else { 0 };
             if self.bench.settled && grown < CONFIRMED {
                 return Ok(true);
             }
@@ -406,7 +408,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let departed = impacts_by_resonance(&self.linear, at, self.target.phase, epsilon) == Impacts::Needed;
         // Noise itself scatters by a share of sqrt(2/n): each window has half of the next one.
         let [even, odd, noise] = [0, 1, 2].map(|k| mean(harmonics.iter().map(|squares: &[f64; 3]| squares[k])));
-        let (even, odd) = (even - noise, odd - noise);
+        let (squares, even, odd) = (even, even - noise, odd - noise);
         let doubtful = SIGNIFICANT * noise / (0.5 * all.len() as f64).sqrt();
         let possible = self.setpoint > LOWEST * self.b && response < UNREACHED * self.b;
         // Without mirror images there is no symmetric motion to tell from others.
@@ -427,6 +429,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             departed,
             symmetric,
             asymmetry: ((even - doubtful).max(0.0) / odd.max(doubtful)).sqrt(),
+            even: squares,
         })
     }
 
@@ -445,13 +448,17 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
 /// Squares of the second and the third harmonic of the response, m², and their mean by noise; `step` is the phase between two samples, rad.
 fn even_and_odd(samples: &[Sample], step: f64, measurand: Measurand) -> Option<[f64; 3]> {
-    let phases: Vec<f64> = (0..samples.len()).map(|n| n as f64 * step).collect();
-    let basis = HarmonicBasis::new(&phases, 0, &degrees(measurand, TAU / step));
-    let values = DVector::from_iterator(samples.len(), samples.iter().map(|sample| sample.sensors.response));
+    let count = samples.len();
+    let phases: Vec<f64> = (0..count).map(|n| n as f64 * step).collect();
+    // With the squares of these weights, Hann's window, what is not fitted leaks into the harmonics a hundred times less.
+    let weights = DVector::from_fn(count, |n, _| (PI * (n as f64 + 0.5) / count as f64).sin());
+    let basis = HarmonicBasis::new(&phases, 0, &degrees(measurand, TAU / step)).weighted(&weights);
+    let values = DVector::from_iterator(count, samples.iter().map(|sample| sample.sensors.response));
+    let values = values.component_mul(&weights);
     let fit = basis.fit(&values)?;
     let rest = noise(basis.residual(&values, &fit).as_slice());
     let [even, odd] = [2, 3].map(|n| fit.harmonic(n).norm_sqr());
-    Some([even, odd, rest * rest * 4.0 / samples.len() as f64])
+    Some([even, odd, 3.0 * rest * rest * 4.0 / count as f64])
 }
 
 /// What a sweep has passed: levels of the response, m, near which the requested drive is, or an extremum of the drive that may reach it, the
