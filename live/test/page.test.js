@@ -760,7 +760,9 @@ for (const { name, options } of BROWSERS) {
       const out = join(tmpdir(), `vines-watch-shaker-${process.pid}-${name}`);
       const experiment = await started(["identify", ...scene, "--rig", rig.found, "--watch", "--out", out], "stderr", /http:\S+/);
       try {
-        const { page, errors } = await open();
+        const [page, errors] = [await browser.newPage(), []];
+        page.on("pageerror", (error) => errors.push(String(error)));
+        page.on("console", (line) => line.type() === "error" && errors.push(line.text()));
         await page.goto(experiment.found);
         await page.waitForFunction(() => window.live?.page.end > 3, { timeout: 60000 });
         const found = await page.evaluate(() => {
