@@ -338,7 +338,7 @@ pub fn fit(
     Ok(fit)
 }
 
-/// Probability of a larger chi-square of so many degrees of freedom; `None` without one.
+/// Probability that a chi-square with this number of degrees of freedom is larger; `None` without a degree of freedom.
 fn probability(chi_square: f64, degrees: f64) -> Option<f64> {
     let p = ChiSquared::new(degrees).ok()?.sf(chi_square.max(0.0));
     p.is_finite().then_some(p)
@@ -549,7 +549,8 @@ impl<'a> Problem<'a> {
         (p < FALSE_ALARM).then_some((rest, next))
     }
 
-    /// Probability of a larger fall of chi-square from the fit of some points to that of fewer in any of so many choices, if all belong together.
+    /// Bound of the probability that, if all points belong to the motion, leaving out as many of them lowers chi-square by more in any of `choices`
+    /// choices (Bonferroni).
     fn gain(more: &Fit, fewer: &Fit, choices: usize) -> f64 {
         let left_out = more.speeds.len() - fewer.speeds.len();
         probability(more.chi_square - fewer.chi_square, 2.0 * left_out as f64).unwrap_or(1.0) * choices as f64

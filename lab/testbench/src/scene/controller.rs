@@ -201,8 +201,9 @@ impl Scene {
     }
 
     /// Largest plausible change of the reference behind a shaker by impacts, over the smallest amplitude: half of the requested one holds the least
-    /// response, and a move to a lower one takes four fifths of it away. The same impulses on the particle act
-    /// on the force cell or table through structure and shaker. Fast modes sum them up, as above; near the natural frequency the detector follows.
+    /// response, and a move to a lower one takes four fifths of it away: a factor of 10. The impulses of [`Self::other_modes`] act on the force cell or
+    /// table through structure and shaker. A faster mode adds up successive impulses, less what it loses between them; slower changes the detector
+    /// follows.
     fn in_reference(&self, knowledge: &Knowledge) -> f64 {
         let Some((structure, shaker)) = self.structure().and_then(|one| Some((one, one.shaker.as_ref()?))) else {
             return 0.0;
