@@ -73,6 +73,12 @@ fn at_sensor(structure: &Structure) -> String {
     format!("q[{}]", structure.points[structure.sensor])
 }
 
+/// The displacement of a structure's force cell whose mass is compensated.
+fn at_cell(structure: &Structure) -> Option<String> {
+    let drive = structure.drive.filter(|_| structure.compensated_mass() > 0.0)?;
+    Some(format!("q[{}]", structure.points[drive]))
+}
+
 /// A plant FMU, stepped sample by sample.
 ///
 /// It needs the output that the sensor reads, `v` or `q1`, from which a velocity or an acceleration follows (or what the scene maps `response`
@@ -93,6 +99,8 @@ pub struct FmuRig {
     phase: f64,
     response: Variable,
     reference: Option<Variable>,
+    /// Displacement of a force cell whose mass is compensated.
+    cell: Option<Variable>,
     inside: Option<Inside>,
     /// Of a structure's driven mode: base displacement per unit of what drives the FMU and per unit of the reference, and displacement at the
     /// sensor per displacement at the cavity.
@@ -117,7 +125,14 @@ impl FmuRig {
         let structure = scene.structure.as_ref();
         let mut used = used(names, definition);
         let drive = drive_names(structure);
-        used.extend(structure.map(|structure| (at_sensor(structure), "m")));
+        let cell = structure.and_then(at_cell);
+        used.extend(
+            structure
+                .map(at_sensor)
+                .into_iter()
+                .chain(cell.clone())
+                .map(|name| (name, "m")),
+        );
         used.extend(drive.iter().map(|(name, unit)| ((*name).to_owned(), *unit)));
         let mut fmu = Fmu::load(path, "plant", names, &used, scene.sample_time())?;
         let [amplitude, signal, total] = drive.map(|(name, _)| name);
@@ -140,6 +155,7 @@ impl FmuRig {
             ReferenceSignal::Base => fmu.find(total),
             ReferenceSignal::Force => Some(fmu.need(total)?),
         };
+        let cell = cell.map(|name| fmu.need(&name)).transpose()?;
         let mut starts = scene.start_values();
         // A structure starts at rest.
         starts.retain(|(name, _)| structure.is_none() || !["q1", "der(q1)"].contains(name));
@@ -159,6 +175,7 @@ impl FmuRig {
             phase: 0.0,
             response,
             reference,
+            cell,
             inside,
             of_driven_mode,
         };
@@ -170,7 +187,7 @@ impl FmuRig {
         if names.mapped("base").is_some() {
             differences.reference_quantity = Measurand::Displacement;
         }
-        Ok(Measured::new(rig, differences, &scene.plant))
+        Ok(Measured::new(rig, differences, &scene.plant).compensating(structure))
     }
 
     fn per_drive(&self) -> f64 {
@@ -208,6 +225,10 @@ impl Rig for FmuRig {
                 reference: reference.map(|reference| reference * base),
             },
         })
+    }
+
+    fn cell_displacement(&mut self) -> Result<f64, RigError> {
+        Ok(self.fmu.get_if(self.cell)?.unwrap_or(0.0))
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {

@@ -91,6 +91,9 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
     if structure.shaker.is_some() {
         text += "  the modes of the structure with its shaker: a damping above 1 is that of two poles which do not oscillate\n";
     }
+    if let Some(masses) = structure.mass_loading() {
+        text += &format!("  {masses}\n");
+    }
     for (n, mode) in structure
         .modes
         .iter()

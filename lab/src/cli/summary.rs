@@ -202,6 +202,11 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     if let Some(friction) = lock.friction {
         note(&friction_text(&friction));
     }
+    if let Some(share) = lock.clipped_percent {
+        note(&format!(
+            "before the release the amplifier was at its limit in {share:.1} % of the samples"
+        ));
+    }
     if let Some(left_out) = &result.left_out {
         note(&ideal("theory and exact orbits are", left_out));
     }
@@ -241,8 +246,10 @@ pub(super) fn structure(scene: &Scene) -> String {
     let Some(structure) = &scene.structure else {
         return String::new();
     };
+    let masses = structure.mass_loading();
+    let masses = masses.map_or(String::new(), |text| format!("{text}; all modes here are with them\n"));
     format!(
-        "epsilon, lambda, sigma, C and G are those of mode {}, as are A_m and E_m in files: {:.5e} m and {:.5e} m per unit of response and drive\n",
+        "{masses}epsilon, lambda, sigma, C and G are those of mode {}, as are A_m and E_m in files: {:.5e} m and {:.5e} m per unit of response and drive\n",
         structure.driven + 1,
         structure.reading_per_response().abs().recip(),
         structure.base_per_drive()
@@ -342,16 +349,20 @@ pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
             worst.at_equal_c, worst.nearest
         )
     });
-    let harmonics = points().filter_map(|compared| Some((compared.point.at.c, compared.point.drive_harmonics?)));
-    let rows = harmonics.map(|(c, harmonics)| {
-        let harmonics = harmonics.map(|harmonic| format!("{:.3}", 100.0 * harmonic));
-        [format!("{c:.4}")].into_iter().chain(harmonics).collect::<Vec<_>>()
+    let rows = points().filter_map(|compared| {
+        let point = &compared.point;
+        let harmonics = point
+            .drive_harmonics?
+            .map(|harmonic| format!("{:.3}", 100.0 * harmonic));
+        let clipped = point.clipped_percent.map(|share| format!("{share:.1}"));
+        let numbers = [format!("{:.4}", point.at.c)].into_iter().chain(harmonics);
+        Some(numbers.chain(clipped).collect::<Vec<_>>())
     });
-    let harmonics = Table::new("C | 2, % | 3, % | 4, % | 5, % | 6, % | 7, %").rows(rows);
+    let harmonics = Table::new("C | 2, % | 3, % | 4, % | 5, % | 6, % | 7, % | clipped, %").rows(rows);
     if !harmonics.is_empty() {
         let [_, (drive, _)] = &units.names;
         worst += &format!(
-            "Harmonics of the {drive}, as measured, over its first\n{}",
+            "Harmonics of the {drive}, as measured, over its first, and share of the samples with the amplifier at its limit\n{}",
             harmonics.text()
         );
     }

@@ -118,6 +118,7 @@ fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
         .any(|compared| compared.point.drive_harmonics.is_some());
     if is_shaken {
         headings += &(2..8).map(|n| format!(",drive_{n}")).collect::<String>();
+        headings += ",clipped_percent";
     }
     let numbers = |one: MeasuredLinear| [one.f0, one.u_f0, one.zeta, one.u_zeta, one.correlation];
     let linear = result.linear.map_or([None; 5], |one| numbers(one).map(Some));
@@ -128,8 +129,18 @@ fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
         let exact = exact.map_or((None, None, None), |exact| (Some(exact.nearest), exact.sigma, exact.g));
         let regime = (point.regime, point.regime_by_impacts);
         let harmonics = point.drive_harmonics.map(|values| values.map(Some)).unwrap_or_default();
-        let harmonics = if is_shaken { harmonics.to_vec() } else { Vec::new() };
-        (point.at, motion, regime, tone, exact, linear, particle, harmonics)
+        let clipped = [point.clipped_percent];
+        let of_shaker = harmonics.into_iter().chain(clipped).filter(|_| is_shaken);
+        (
+            point.at,
+            motion,
+            regime,
+            tone,
+            exact,
+            linear,
+            particle,
+            of_shaker.collect::<Vec<_>>(),
+        )
     });
     csv(&headings, rows)
 }

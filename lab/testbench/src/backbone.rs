@@ -213,6 +213,9 @@ pub struct LevelPoint {
     /// Harmonics 2 to 7 of what a shaker drives the structure with, force or displacement of the table, over its first, as measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drive_harmonics: Option<[f64; 6]>,
+    /// Share of the samples of the move to this level and at it with the command at the limit of the shaker's amplifier, per cent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clipped_percent: Option<f64>,
 }
 
 /// The tracked backbone.
@@ -348,7 +351,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
 
     /// Goes to a level, m, and holds it until the point has settled, or for the longest time allowed.
     fn hold(&mut self, level: f64) -> Result<LevelPoint, ExperimentError> {
-        let start = self.run.periods;
+        let (start, clipped) = (self.run.periods, self.run.clipped());
         let (to, periods) = self.step(level);
         self.run.hold_response(to)?;
         self.run.samples.clear();
@@ -375,7 +378,11 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         if drive.is_finite() && omega.is_finite() {
             self.states.push([estimate.response.value, drive, omega]);
         }
-        Ok(self.point(level, start, &estimate, &cycles, &criterion))
+        let clipped_percent = self.run.clipped_percent(clipped);
+        Ok(LevelPoint {
+            clipped_percent,
+            ..self.point(level, start, &estimate, &cycles, &criterion)
+        })
     }
 
     /// The move to a level, m, and its periods: [`MOVE`], or as many as the drive needs for this change of the response.
@@ -438,6 +445,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             drive_harmonics: knowledge
                 .shaker()
                 .and_then(|_| drive_harmonics(averaged, knowledge, omega.value)),
+            clipped_percent: None,
         }
     }
 

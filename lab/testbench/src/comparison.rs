@@ -457,6 +457,7 @@ fn predicted(orbit: &Orbit, scene: &Scene, plan: &Plan) -> Vec<[f64; 3]> {
         settled: 0,
         released: 1,
         held: false,
+        clipped_percent: None,
     };
     let points = decay_points(&record, &plan.knowledge, WINDOW).points;
     points.iter().map(|point| [point.c, point.sigma, point.rate]).collect()

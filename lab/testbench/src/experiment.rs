@@ -239,10 +239,12 @@ pub fn run_into(
         bench.sample(Stage::Locking)?;
     }
     let settled = bench.taken - 1;
-    for stage in [Stage::Holding, Stage::Decaying] {
-        for _ in 0..counts[stage as usize] {
-            bench.sample(stage)?;
-        }
+    for _ in 0..counts[Stage::Holding as usize] {
+        bench.sample(Stage::Holding)?;
+    }
+    let clipped_percent = bench.clipped_percent([0; 2]);
+    for _ in 0..counts[Stage::Decaying as usize] {
+        bench.sample(Stage::Decaying)?;
     }
     drop(bench);
     let samples = std::mem::take(samples);
@@ -252,6 +254,7 @@ pub fn run_into(
         samples,
         settled,
         held: held == Some(true),
+        clipped_percent,
     })
 }
 
@@ -383,6 +386,17 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             return Err(self.no_lock(&command));
         }
         Ok(())
+    }
+
+    /// Samples so far, and of these the ones with the command of a shaker at the limit of its amplifier.
+    pub fn clipped(&self) -> [usize; 2] {
+        [self.taken, self.rig.clipped().unwrap_or(0)]
+    }
+
+    /// Share of the samples with the command at this limit, per cent, since [`Self::clipped`] has returned `before`; `None` without a shaker.
+    pub fn clipped_percent(&self, before: [usize; 2]) -> Option<f64> {
+        let clipped = self.rig.clipped()? - before[1];
+        Some(100.0 * clipped as f64 / (self.taken - before[0]).max(1) as f64)
     }
 
     /// Samples to the end of the present period of the drive.

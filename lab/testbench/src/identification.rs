@@ -118,6 +118,9 @@ pub struct Lock {
     pub impacts_per_period: f64,
     /// The regime: from the impacts, or from the response alone if the rig does not report them.
     pub regime: Regime,
+    /// Share of the samples before the release with the command at the limit of a shaker's amplifier, per cent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clipped_percent: Option<f64>,
     /// What friction did over the hold; absent without friction, or if the rig does not report it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<Friction>,
@@ -212,6 +215,7 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
         held: record.held,
         impacts_per_period,
         regime,
+        clipped_percent: record.clipped_percent,
         friction: Friction::of(hold, (hold.len() - 1) as f64 * dt * omega.value / TAU),
         tone,
     })

@@ -79,6 +79,8 @@ pub struct Record {
     pub held: bool,
     /// Index of the first sample with the drive off.
     pub released: usize,
+    /// Share of the samples before it with the command at the limit of a shaker's amplifier, per cent; `None` without a shaker.
+    pub clipped_percent: Option<f64>,
 }
 
 impl Record {

@@ -15,7 +15,7 @@ use thiserror::Error;
 use vines_model::{Definition, Sensor};
 
 pub use crate::scene::has_friction;
-use crate::scene::{Limits, Release, Scene, SceneShaker, Structure};
+use crate::scene::{Excitation, Limits, Release, Scene, SceneShaker, Structure};
 
 pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
@@ -84,6 +84,11 @@ pub trait Rig {
         Err(RigError::NoHold)
     }
 
+    /// Displacement of the force cell, m, from which the acceleration of the mass before it follows.
+    fn cell_displacement(&mut self) -> Result<f64, RigError> {
+        Ok(0.0)
+    }
+
     /// The ground truth, if the rig is a simulation.
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         Ok(None)
@@ -110,6 +115,11 @@ pub trait RigStage {
         self.inner().hold(drive, step)
     }
 
+    /// [`Rig::cell_displacement`].
+    fn cell_displacement(&mut self) -> Result<f64, RigError> {
+        self.inner().cell_displacement()
+    }
+
     /// [`Rig::ground_truth`].
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         self.inner().ground_truth()
@@ -127,6 +137,10 @@ impl<S: RigStage> Rig for S {
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         RigStage::hold(self, drive, step)
+    }
+
+    fn cell_displacement(&mut self) -> Result<f64, RigError> {
+        RigStage::cell_displacement(self)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
@@ -307,7 +321,7 @@ impl Simulated {
             None => Box::new(Self::new(scene.plant, scene.start)?.with_sensors(scene.resonance)),
             Some(structure) => {
                 let rig = SimulatedStructure::new(structure, scene.plant, scene.start)?;
-                Box::new(Measured::new(rig, scene.resonance, &scene.plant))
+                Box::new(Measured::new(rig, scene.resonance, &scene.plant).compensating(Some(structure)))
             }
         })
     }
@@ -513,12 +527,14 @@ impl SimulatedStructure {
     /// The reference as a base displacement, m: the drive, the force cell or the table.
     fn reference(&self) -> f64 {
         let plant = &self.simulated.plant;
-        match &self.structure.shaker {
-            None => plant.base_displacement() * self.base_per_command,
-            Some(shaker) => {
-                self.structure.base_per_drive() * plant.point(shaker.reference(self.structure.excitation))[0]
-            }
-        }
+        let Some(SceneShaker { rows, .. }) = &self.structure.shaker else {
+            return plant.base_displacement() * self.base_per_command;
+        };
+        let row = match self.structure.excitation {
+            Excitation::Base => &rows.end,
+            Excitation::Force => &rows.force,
+        };
+        self.structure.base_per_drive() * plant.point(row)[0]
     }
 }
 
@@ -533,6 +549,11 @@ impl RigStage for SimulatedStructure {
             response: displacement / self.reading_per_response,
             reference: Some(self.reference()),
         })
+    }
+
+    fn cell_displacement(&mut self) -> Result<f64, RigError> {
+        let shaker = self.structure.shaker.as_ref();
+        Ok(shaker.map_or(0.0, |shaker| self.simulated.plant.point(&shaker.rows.end)[0]))
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {

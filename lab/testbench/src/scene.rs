@@ -98,6 +98,11 @@ impl Scene {
         self.structure.as_ref().filter(|_| cfg!(feature = "tables"))
     }
 
+    /// Whether response and reference are read one sample late, because a sensor needs differences of samples.
+    pub(crate) fn is_late(&self) -> bool {
+        self.resonance.is_late() || self.structure().is_some_and(|one| one.compensated_mass() > 0.0)
+    }
+
     /// The numbers that the dimensionless model, the theory and the exact orbits depend on.
     pub fn dimensionless(&self) -> Dimensionless {
         let numbers = Dimensionless::of(&self.plant, self.amplitude);

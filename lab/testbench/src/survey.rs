@@ -61,7 +61,7 @@ impl Scene {
         let target = self.controller.phase_target.to_radians();
         let mut orbits = StructureOrbits::new(&structure.host, particle);
         if let Some(shaker) = &structure.shaker {
-            orbits = orbits.with_reference(shaker.reference(structure.excitation));
+            orbits = orbits.with_reference(shaker.reference_and_inertia(structure.excitation));
         }
         orbits.with_response(&structure.response()).with_target(target)
     }
@@ -110,7 +110,7 @@ const COMPARED: usize = 9;
 fn behind_shaker(scene: &Scene, backbone: &[StructureBranch]) -> Option<Vec<BehindShaker>> {
     let structure = scene.structure.as_ref()?;
     let shaker = structure.shaker.as_ref()?;
-    let (reference, alone) = (shaker.reference(structure.excitation), scene.orbits_of(&shaker.alone));
+    let alone = scene.orbits_of(&shaker.alone);
     let stretches = backbone.iter().flat_map(StructureBranch::stable).map(|(run, _)| run);
     let run = stretches.max_by_key(|run| run.len())?;
     let mut orbits: Vec<&StructureOrbit> = run.iter().step_by(run.len().div_ceil(COMPARED)).collect();
@@ -119,9 +119,9 @@ fn behind_shaker(scene: &Scene, backbone: &[StructureBranch]) -> Option<Vec<Behi
         // The impulses of two impacts per period, as a force.
         let impulses = 4.0 * scene.plant.particle_mass * orbit.speed * orbit.omega / std::f64::consts::PI;
         let harmonic = |order: f64| {
-            let per_force = structure
-                .host
-                .frequency_response_to_cavity(reference, order * orbit.omega);
+            let omega = order * orbit.omega;
+            let reference = shaker.reference(structure.excitation, omega);
+            let per_force = structure.host.frequency_response_to_cavity(&reference, omega);
             impulses * per_force.norm() / orbit.reference
         };
         BehindShaker {

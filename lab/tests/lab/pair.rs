@@ -46,6 +46,10 @@ fn the_fmu_of_a_structure_has_the_bits_of_the_simulated_one() {
         ("frame", "plant.mu_k=0.1 plant.theta=0.3"),
         // Its command is clipped.
         ("shaker-cantilever", "shaker.voltage_max=4.5 shaker.inductance=1e-3"),
+        (
+            "shaker-cantilever",
+            "shaker.voltage_max=4.5 shaker.compensated_mass=0.015 structure.masses={tip=0.005}",
+        ),
         ("slip-table", "shaker.cut_off=300"),
     ] {
         let file = format!("{}/../scenes/{preset}.toml", env!("CARGO_MANIFEST_DIR"));

@@ -278,7 +278,8 @@ pub struct StructureOrbits {
     sections: Vec<Section>,
     particle: Particle,
     response: Option<Vec<[f64; 2]>>,
-    reference: Option<Vec<[f64; 2]>>,
+    /// Reference, and inertia in it.
+    reference: Option<[Vec<[f64; 2]>; 2]>,
     /// Weight of m q2 in the response.
     of_particle: f64,
     /// The phase refers to the force of the drive on the first section, not to the drive.
@@ -331,9 +332,9 @@ impl StructureOrbits {
         self
     }
 
-    /// With a sum over the sections as the reference, instead of the drive.
-    pub fn with_reference(mut self, row: &[[f64; 2]]) -> Self {
-        self.reference = Some(row.to_vec());
+    /// With a sum over the sections as the reference, instead of the drive, less the acceleration of another sum.
+    pub fn with_reference(mut self, reference_and_inertia: [Vec<[f64; 2]>; 2]) -> Self {
+        self.reference = Some(reference_and_inertia);
         self
     }
 
@@ -352,7 +353,10 @@ impl StructureOrbits {
         Self {
             sections: kept(&self.sections, &keep),
             response: self.response.as_ref().map(|rows| kept(rows, &keep)),
-            reference: self.reference.as_ref().map(|rows| kept(rows, &keep)),
+            reference: self
+                .reference
+                .as_ref()
+                .map(|both| both.each_ref().map(|rows| kept(rows, &keep))),
             ..*self
         }
     }
@@ -497,7 +501,7 @@ impl StructureOrbits {
         let force = Some(self.sections.first()?.drive_force(omega)).filter(|_| self.by_force);
         let reading = Reading {
             sections: self.response.as_deref(),
-            reference_sections: self.reference.as_deref(),
+            reference_sections: self.reference.as_ref(),
             particle: self.of_particle,
             reference: Complex::from_polar(1.0, self.target + FRAC_PI_2) * force.unwrap_or(Complex::ONE),
         };

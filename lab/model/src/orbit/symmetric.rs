@@ -41,8 +41,8 @@ pub(super) struct Reading<'a> {
     pub sections: Option<&'a [[f64; 2]]>,
     /// Weight of m q2.
     pub particle: f64,
-    /// Weights (a, b) of every section in the reference; `None` for the drive itself.
-    pub reference_sections: Option<&'a [[f64; 2]]>,
+    /// Weights (a, b) of every section in the reference, and in what its acceleration is subtracted of; `None` for the drive itself.
+    pub reference_sections: Option<&'a [Vec<[f64; 2]>; 2]>,
     /// At resonance, the response lags the reference times this by a quarter of a period; only its direction matters.
     pub reference: Complex<f64>,
 }
@@ -118,9 +118,10 @@ impl SymmetricMotions {
                 response += harmonic(row, driven) * compliance;
             }
             kicked += harmonic(row, section.kicked(omega)) * compliance;
-            if let Some(rows) = reading.reference_sections {
-                reference[0] += harmonic(rows[n], driven) * compliance;
-                reference[1] += harmonic(rows[n], section.kicked(omega)) * compliance;
+            if let Some([rows, inertia]) = reading.reference_sections {
+                let row = [0, 1].map(|part| rows[n][part] + omega * omega * inertia[n][part]);
+                reference[0] += harmonic(row, driven) * compliance;
+                reference[1] += harmonic(row, section.kicked(omega)) * compliance;
             }
         }
         let Particle { mass, restitution, .. } = particle;

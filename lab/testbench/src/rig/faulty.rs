@@ -147,7 +147,8 @@ pub fn faulty(
         if let RigFault::Electrodynamic(fault) = fault {
             plant = plant.failing(fault, seconds);
         }
-        Ok(Box::new(Measured::new(plant, scene.resonance, &scene.plant)))
+        let measured = Measured::new(plant, scene.resonance, &scene.plant);
+        Ok(Box::new(measured.compensating(Some(structure))))
     };
     let changed = (fault == RigFault::Structure).then(|| plant(STIFFER * scene.plant.stiffness));
     let begins = (seconds / scene.sample_time()) as usize;

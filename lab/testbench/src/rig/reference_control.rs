@@ -70,6 +70,8 @@ pub(crate) struct ReferenceControl {
     command: Complex64,
     /// The command that is needed, over the largest one.
     times: f64,
+    /// Samples so far with the command at its limit.
+    pub clipped: usize,
     /// Phase for which the reference has been off, or the command at its limit, rad.
     off: f64,
 }
@@ -90,6 +92,7 @@ impl ReferenceControl {
             correction: Complex64::ZERO,
             command: Complex64::ZERO,
             times: 0.0,
+            clipped: 0,
             off: 0.0,
         })
     }
@@ -142,6 +145,7 @@ impl ReferenceControl {
         } else {
             inverse / self.times.max(1.0)
         };
+        self.clipped += usize::from(amplitude > 0.0 && self.times > 1.0);
         self.asked = amplitude;
         Ok(self.drive(omega, step))
     }

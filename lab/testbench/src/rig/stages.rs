@@ -10,12 +10,14 @@ use vines_model::{Definition, Measurand, Reference};
 use super::reference_control::ReferenceControl;
 use super::{Drive, GroundTruth, Rig, RigError, RigStage, Sensors};
 use crate::plan::{Knowledge, Target};
+use crate::scene::Structure;
 
 /// A rig whose response and reference are displacements, with the sensors of a definition of resonance.
 ///
 /// Velocities and accelerations are differences of displacements: an accelerometer that averages over two sample periods with the weights of a
 /// triangle, which keep the instants of the walls' impulses. The force `k e + c e'` over k takes e' from a difference of e. All
-/// belong to the sample before; then response and reference are both read one sample late.
+/// belong to the sample before; then response and reference are both read one sample late. So does the acceleration by which the mass before a force
+/// cell is compensated.
 #[derive(Debug, Clone)]
 pub struct Measured<R> {
     rig: R,
@@ -25,6 +27,10 @@ pub struct Measured<R> {
     now: Sensors,
     /// The readings before, the latest first, each with the time to the next one, s.
     before: [(Sensors, f64); 2],
+    /// Mass that is compensated behind a force cell, in the unit of the reference per m/s².
+    compensated: f64,
+    /// Displacements of the cell, m: now and before.
+    cell: [f64; 3],
 }
 
 impl<R: Rig> Measured<R> {
@@ -36,11 +42,28 @@ impl<R: Rig> Measured<R> {
             plant: [plant.damping / plant.stiffness, plant.natural_frequency()],
             now: Sensors::default(),
             before: [(Sensors::default(), 0.0); 2],
+            compensated: 0.0,
+            cell: [0.0; 3],
         }
+    }
+
+    /// This rig with the mass compensation of a structure's force cell: less its mass times the acceleration there.
+    #[must_use]
+    pub fn compensating(mut self, structure: Option<&Structure>) -> Self {
+        self.compensated = structure.map_or(0.0, |structure| {
+            structure.base_per_drive() * structure.compensated_mass()
+        });
+        self
+    }
+
+    /// Whether there is mass compensation; a small module has no code for it, as it has no structures.
+    fn compensates(&self) -> bool {
+        cfg!(feature = "tables") && self.compensated > 0.0
     }
 
     fn step_begins(&mut self, step: f64) {
         self.before = [(self.now, step), self.before[0]];
+        self.cell = [self.cell[0], self.cell[0], self.cell[1]];
     }
 }
 
@@ -65,7 +88,10 @@ impl<R: Rig> RigStage for Measured<R> {
 
     fn sense(&mut self) -> Result<Sensors, RigError> {
         self.now = self.rig.sense()?;
-        if !self.definition.is_late() {
+        if self.compensates() {
+            self.cell[0] = self.rig.cell_displacement()?;
+        }
+        if !(self.definition.is_late() || self.compensates()) {
             return Ok(self.now);
         }
         let [(middle, late), (first, early)] = self.before;
@@ -92,9 +118,15 @@ impl<R: Rig> RigStage for Measured<R> {
             Reference::Force => force(three),
         };
         let base = first.reference.zip(middle.reference).zip(self.now.reference);
+        let inertia = if self.compensates() {
+            let [now, middle, first] = self.cell;
+            self.compensated * derivative(Measurand::Acceleration, [first, middle, now], [early, late], omega0)
+        } else {
+            0.0
+        };
         Ok(Sensors {
             response: read(0, [first.response, middle.response, self.now.response]),
-            reference: base.map(|((first, middle), now)| of_base([first, middle, now])),
+            reference: base.map(|((first, middle), now)| of_base([first, middle, now]) - inertia),
         })
     }
 
@@ -130,6 +162,12 @@ impl<'a, R: Rig + ?Sized> Scaled<'a, R> {
     pub fn controlled(rig: &'a mut R, knowledge: &Knowledge) -> Self {
         let control = ReferenceControl::new(knowledge);
         Self { control, ..Self::new(rig, knowledge.target) }
+    }
+
+    /// Samples so far with the command of a shaker at the limit of its amplifier; `None` without a shaker.
+    pub fn clipped(&self) -> Option<usize> {
+        let control = self.control.as_ref().filter(|_| cfg!(feature = "tables"))?;
+        Some(control.clipped)
     }
 
     fn command(&mut self, drive: Drive, step: f64) -> Result<Drive, RigError> {

@@ -124,7 +124,7 @@ impl Scene {
                 bandwidth: c.bandwidth * omega0,
                 damping_rate: Some(damping_rate).filter(|rate| *rate > 0.0),
                 phase_target: knowledge.target.phase_of_readings(),
-                delay: delay + f64::from(u8::from(self.resonance.is_late())) * step,
+                delay: delay + f64::from(u8::from(self.is_late())) * step,
                 // The velocity of a base that moves with the largest amplitude.
                 ramp_rate: limits.amplitude_max.map(|largest| largest * omega0),
                 // The range in a period, or in half a time constant of the detector: the loop locks as fast as without a limit.
@@ -210,11 +210,13 @@ impl Scene {
         };
         let omega = knowledge.linear.omega0;
         let impulse = 2.0 * self.plant.particle_mass * knowledge.numbers.b * omega;
-        let reference = shaker.reference(structure.excitation);
-        let changes = reference.iter().zip(structure.host.sections()).map(|(pair, section)| {
+        let [reference, inertia] = shaker.reference_and_inertia(structure.excitation);
+        let rows = reference.iter().zip(&inertia).zip(structure.host.sections());
+        let changes = rows.map(|((reference, inertia), section)| {
             let Oscillator { delta, omega0, reach, .. } = section.oscillator;
+            let pair = [0, 1].map(|n| reference[n] + omega0 * omega0 * inertia[n]);
             let jump = pair[0] * section.kick[0] + pair[1] * section.kick[1];
-            let change = jump.abs() + reach * section.velocity_per_impulse(*pair).abs();
+            let change = jump.abs() + reach * section.velocity_per_impulse(pair).abs();
             let kept = if omega0 < 2.0 * omega {
                 0.0
             } else {
@@ -222,7 +224,9 @@ impl Scene {
             };
             change / (1.0 - kept)
         });
-        10.0 * changes.sum::<f64>() * impulse * structure.base_per_drive() / self.amplitude
+        // An acceleration is averaged over a sample period.
+        let shock = structure.host.velocity_per_impulse(&inertia).abs() / knowledge.sample_time;
+        10.0 * (changes.sum::<f64>() + shock) * impulse * structure.base_per_drive() / self.amplitude
     }
 
     /// The larger of the requested drive, m, and the one that holds the linear mode at the amplitude at which impacts certainly occur.

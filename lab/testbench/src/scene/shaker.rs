@@ -2,11 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use lovines::host::{Equations, Row};
-use lovines::{Amplifier, Excitation as HostExcitation, Host, Plant, Shaker, ShakerRows};
+use lovines::host::Row;
+use lovines::{Amplifier, Excitation as HostExcitation, Plant, Shaker, ShakerRows};
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
+use super::structure::rows;
 use super::{Excitation, Structure};
 use crate::plan::ShakerPath;
 use crate::rig::BANDWIDTH;
@@ -22,6 +23,8 @@ pub struct SceneShaker {
     /// The shaker.
     #[serde(flatten)]
     pub shaker: Shaker,
+    /// Mass whose inertia is subtracted from what the force cell reads, kg.
+    pub compensated_mass: f64,
     /// Its limits.
     pub limits: Limits,
     /// The reference per command at the natural frequency, without impacts: N/V for a force, m/V for a table.
@@ -31,7 +34,7 @@ pub struct SceneShaker {
     /// What is measured.
     #[serde(skip)]
     pub rows: ShakerRows,
-    /// The structure as the reference drives it: with the mass in front of the force cell.
+    /// The structure as the reference drives it: with what is left of the mass in front of the force cell.
     #[serde(skip)]
     pub alone: Box<Structure>,
     /// The structure without it.
@@ -73,12 +76,23 @@ impl SceneShaker {
         limit.map_or(f64::INFINITY, |limit| limit / self.shaker.gain)
     }
 
-    /// The reference in the sections of the host: the force of the stinger, or the displacement of the table.
-    pub fn reference(&self, excitation: Excitation) -> &Row {
+    /// The reference in the sections of the host: the displacement of the table, or the force of the stinger; and the inertia that is subtracted from
+    /// it, per negative acceleration.
+    pub fn reference_and_inertia(&self, excitation: Excitation) -> [Row; 2] {
+        let end = &self.rows.end;
+        let inertia = end.iter().map(|pair| pair.map(|value| self.compensated_mass * value));
         match excitation {
-            Excitation::Base => &self.rows.end,
-            Excitation::Force => &self.rows.force,
+            Excitation::Base => [end.clone(), vec![[0.0; 2]; end.len()]],
+            Excitation::Force => [self.rows.force.clone(), inertia.collect()],
         }
+    }
+
+    /// The reference of a motion with the frequency `omega`, rad/s, in the sections of the host.
+    pub fn reference(&self, excitation: Excitation, omega: f64) -> Row {
+        let [reference, inertia] = self.reference_and_inertia(excitation);
+        let both = reference.iter().zip(&inertia);
+        both.map(|(row, inertia)| [0, 1].map(|n| row[n] + omega * omega * inertia[n]))
+            .collect()
     }
 }
 
@@ -107,6 +121,11 @@ impl Channel<'_> {
 }
 
 impl Structure {
+    /// Mass whose inertia is subtracted from what the force cell reads, kg.
+    pub fn compensated_mass(&self) -> f64 {
+        self.shaker.as_ref().map_or(0.0, |shaker| shaker.compensated_mass)
+    }
+
     /// The points of the structure, and what is measured at its shaker.
     pub fn channels(&self) -> Vec<Channel<'_>> {
         let point = |(name, row)| Channel {
@@ -154,7 +173,8 @@ impl Structure {
         let alone = &shaker.alone.host;
         let linear = alone.frequency_response(alone.cavity_row(), omega);
         let response = linear * (response / linear.norm());
-        let ([a, b], [c, d]) = (of(shaker.reference(self.excitation)), of(self.host.cavity_row()));
+        let reference = shaker.reference(self.excitation, omega);
+        let ([a, b], [c, d]) = (of(&reference), of(self.host.cavity_row()));
         let determinant = a * d - b * c;
         let (command, force) = (
             (asked * d - b * response) / determinant,
@@ -186,7 +206,8 @@ impl Structure {
 
     /// Force of the shaker on the structure, N, or displacement of its table, m, per volt of its command at a frequency, rad/s, without impacts.
     pub fn reference_by_command(&self, shaker: &SceneShaker, omega: f64) -> Complex64 {
-        self.host.frequency_response(shaker.reference(self.excitation), omega)
+        let reference = shaker.reference(self.excitation, omega);
+        self.host.frequency_response(&reference, omega)
     }
 
     /// What the shaker makes of its command, from the frequency response at the frequencies of the check.
@@ -233,6 +254,8 @@ pub(super) struct ShakerSection {
     #[serde(default)]
     stinger_damping: f64,
     cell_mass: Option<f64>,
+    #[serde(default)]
+    compensated_mass: f64,
     table_mass: Option<f64>,
     resistance: f64,
     #[serde(default)]
@@ -280,6 +303,12 @@ impl ShakerSection {
                 );
             }
         };
+        let compensated = self.compensated_mass;
+        if !(compensated >= 0.0 && compensated.is_finite()) || compensated > 0.0 && self.table_mass.is_some() {
+            return Err(format!(
+                "compensated_mass = {compensated} kg: the mass that is compensated behind a force cell, 0 or positive; a table has none"
+            ));
+        }
         let shaker = Shaker {
             mass: self.mass,
             suspension: [self.stiffness, self.damping],
@@ -322,7 +351,7 @@ impl ShakerSection {
                 "the structure has a point \"{point}\", which a shaker adds; rename it"
             ));
         }
-        let structure = structure.with_shaker(shaker, limits, self.release)?;
+        let structure = structure.with_shaker(shaker, compensated, limits, self.release)?;
         match &structure.shaker {
             Some(attached) if attached.reference_per_command > 0.0 => Ok(structure),
             _ => Err("the command does not move the driven mode: check the drive point, and gain and Bl".into()),
@@ -335,60 +364,60 @@ const CUT: f64 = 1e-9;
 
 impl Structure {
     /// This structure with a shaker attached.
-    fn with_shaker(mut self, shaker: Shaker, limits: Limits, release: Release) -> Result<Self, String> {
+    fn with_shaker(
+        mut self,
+        shaker: Shaker,
+        compensated_mass: f64,
+        limits: Limits,
+        release: Release,
+    ) -> Result<Self, String> {
         let text = |error: lovines::InvalidHost| error.to_string();
         let without = Box::new(self.clone());
-        if self.excitation == Excitation::Force {
-            self.carry(shaker.end_mass)?;
+        // What a force cell does not compensate belongs to the structure.
+        let in_front = self.drive.map(|drive| (drive, shaker.end_mass - compensated_mass));
+        let in_front = in_front.filter(|(_, mass)| *mass != 0.0);
+        if let Some((drive, mass)) = in_front {
+            self.carry(drive, mass).map_err(|error| {
+                format!("compensated_mass = {compensated_mass} kg leaves {mass} kg in front of the force cell: {error}")
+            })?;
         }
         let by = self.excitation.of_host();
         let equations = shaker.attach(&without.equations, by).map_err(text)?;
         let host = equations.host(HostExcitation::Force).map_err(text)?;
-        let rows = shaker.rows(&host, &without.equations, by).map_err(text)?;
-        let beyond = rows_beyond(self.excitation);
-        let coordinates = |point: usize, beyond: usize| -> Vec<f64> {
-            let of_structure: Vec<f64> = match &without.equations {
-                Equations::Modes(_) => without.modes.iter().map(|mode| mode.shape[point]).collect(),
-                _ => (0..self.points.len())
-                    .map(|n| f64::from(u8::from(n == point)))
-                    .collect(),
-            };
-            of_structure.into_iter().chain(vec![0.0; beyond]).collect()
-        };
-        let points = |host: &Host, beyond: usize| {
-            let rows = (0..self.points.len()).map(|point| host.row(&coordinates(point, beyond)).map_err(text));
-            rows.collect::<Result<Vec<_>, _>>()
-        };
+        let of_shaker = shaker.rows(&host, &without.equations, by).map_err(text)?;
+        let beyond = vec![0.0; rows_beyond(self.excitation)];
+        let coordinates = self.coordinates.iter().map(|point| [&point[..], &beyond].concat());
+        let points = rows(&host, &coordinates.collect::<Vec<_>>())?;
         let mut driven = self.clone();
-        if self.excitation == Excitation::Force {
-            driven.equations = without.equations.carrying(shaker.end_mass).map_err(text)?;
+        if let Some((_, mass)) = in_front {
+            driven.equations = without.equations.carrying(mass).map_err(text)?;
             driven.host = driven.equations.host(by).map_err(text)?;
-            driven.rows = points(&driven.host, 0)?;
+            driven.rows = rows(&driven.host, &self.coordinates)?;
         }
-        let points = points(&host, beyond)?;
         let omega = self.mode().omega;
         let mut attached = SceneShaker {
             shaker,
+            compensated_mass,
             limits,
             reference_per_command: 0.0,
             release,
-            rows,
+            rows: of_shaker,
             without,
             alone: Box::new(driven),
         };
         let structure = Self { equations, host, rows: points, ..self };
-        let reference = attached.reference(structure.excitation);
-        attached.reference_per_command = structure.host.frequency_response(reference, omega).norm();
+        attached.reference_per_command = structure.reference_by_command(&attached, omega).norm();
         Ok(Self { shaker: Some(attached), ..structure })
     }
 
     /// This structure after its stinger has broken, with the displacements of all coordinates before: both have the same coordinates.
     pub(crate) fn with_broken_stinger(&self) -> Option<Result<(Self, Vec<Row>), String>> {
-        let SceneShaker { shaker, limits, release, without, .. } = self.shaker.as_ref()?;
+        let SceneShaker { shaker, compensated_mass, limits, release, without, .. } = self.shaker.as_ref()?;
         let stinger = [CUT * shaker.stinger[0], 0.0];
-        let broken = (**without)
-            .clone()
-            .with_shaker(Shaker { stinger, ..*shaker }, *limits, *release);
+        let broken =
+            (**without)
+                .clone()
+                .with_shaker(Shaker { stinger, ..*shaker }, *compensated_mass, *limits, *release);
         let n = without.modes.len() + rows_beyond(self.excitation);
         let coordinate = |place: usize| {
             let of_coordinate: Vec<f64> = (0..n).map(|other| f64::from(u8::from(other == place))).collect();

@@ -82,9 +82,18 @@ pub struct Structure {
     /// The structure as plant and exact orbits take it.
     #[serde(skip)]
     pub host: Host,
+    /// Every point in the coordinates of these equations.
+    #[serde(skip)]
+    pub(super) coordinates: Vec<Vec<f64>>,
     /// The displacement of every point in the sections of the host.
     #[serde(skip)]
     pub rows: Vec<Row>,
+    /// Masses, kg, of what is mounted at points, by their places among the points.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub masses: Vec<(usize, f64)>,
+    /// Natural frequencies without these masses, rad/s.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub omega_without_masses: Vec<f64>,
     /// The shaker that moves it, as a part of the host.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shaker: Option<SceneShaker>,
@@ -156,14 +165,14 @@ impl Structure {
         let at = Places { cavity: 0, drive: place, sensor: 0 };
         let (points, modes) = (vec!["mass".to_owned()], vec![mode]);
         let checked = check(&points, &modes, 0, &at).and_then(|()| {
-            let equations = equations(&modes, None, &DVector::zeros(0), &at);
+            let (equations, coordinates) = equations(&modes, None, &at, 1);
             let host = equations
                 .host(excitation.of_host())
                 .map_err(|error| error.to_string())?;
-            let row = host.row(&modes[0].shape).map_err(|error| error.to_string())?;
-            Ok((equations, host, row))
+            let rows = rows(&host, &coordinates)?;
+            Ok((equations, coordinates, host, rows))
         });
-        let (equations, host, row) = checked.map_err(|message| SceneError::text("[plant]", message))?;
+        let (equations, coordinates, host, rows) = checked.map_err(|message| SceneError::text("[plant]", message))?;
         Ok(Self {
             excitation,
             points,
@@ -174,39 +183,41 @@ impl Structure {
             modes,
             equations,
             host,
-            rows: vec![row],
+            coordinates,
+            rows,
+            masses: Vec::new(),
+            omega_without_masses: Vec::new(),
             shaker: None,
         })
     }
 
-    /// The modes with a mass, kg, at the point of the force: what a force cell behind that mass sees.
-    pub(super) fn carry(&mut self, mass: f64) -> Result<(), String> {
-        let old = &self.modes;
-        let drive = DVector::from_iterator(old.len(), old.iter().map(|mode| mode.drive));
-        let squares = DVector::from_iterator(old.len(), old.iter().map(|mode| mode.omega * mode.omega));
-        let whole = DMatrix::identity(old.len(), old.len()) + mass * &drive * drive.transpose();
-        let (shapes, squares) =
-            natural_modes(&whole, &DMatrix::from_diagonal(&squares)).map_err(|error| error.to_string())?;
-        let mode = |(n, square): (usize, &f64)| {
-            let column = shapes.column(n);
-            let parts = || old.iter().zip(column.iter());
-            let share = |of: &dyn Fn(&StructureMode) -> f64| parts().map(|(mode, share)| share * of(mode)).sum();
-            let omega = square.sqrt();
-            let rate: f64 = parts()
-                .map(|(mode, share)| mode.zeta * mode.omega * share * share)
-                .sum();
-            StructureMode {
-                omega,
-                zeta: rate / omega,
-                shape: (0..self.points.len())
-                    .map(|point| share(&|mode| mode.shape[point]))
-                    .collect(),
-                out_of_phase: old[n].out_of_phase,
-                drive: share(&|mode| mode.drive),
-            }
+    /// The modes with a mass, kg, at a point: what a force cell behind that mass sees.
+    pub(super) fn carry(&mut self, point: usize, mass: f64) -> Result<(), String> {
+        let parts = Parts {
+            points: self.points.clone(),
+            modes: self.modes.clone(),
+            coupled: None,
         };
-        self.modes = squares.iter().enumerate().map(mode).collect();
+        if self.masses.is_empty() {
+            self.omega_without_masses = self.modes.iter().map(|mode| mode.omega).collect();
+        }
+        self.modes = parts.loaded(&[(point, mass)])?.modes;
+        self.modes.iter_mut().for_each(|mode| mode.drive = mode.shape[point]);
+        self.masses.push((point, mass));
         Ok(())
+    }
+
+    /// What the masses at its points do to its modes, in a sentence; `None` without masses.
+    pub fn mass_loading(&self) -> Option<String> {
+        let masses = self
+            .masses
+            .iter()
+            // A difference of two masses has rounding.
+            .map(|(point, mass)| format!("{} kg at {}", (1e9 * mass).round() / 1e9, self.points[*point]));
+        let lower = self.modes.iter().zip(&self.omega_without_masses);
+        let lower = lower.map(|(mode, without)| format!("{:.3}", 100.0 * (1.0 - mode.omega / without)));
+        let [masses, lower] = [masses.collect::<Vec<_>>(), lower.collect()].map(|parts| parts.join(", "));
+        (!masses.is_empty()).then(|| format!("masses mounted ({masses}) lower the modes by {lower} %"))
     }
 
     /// Displacement of the base, m, that moves the driven mode's oscillator as one unit of the command does: the drive itself without a shaker.
@@ -256,6 +267,8 @@ pub(super) struct StructureSection {
     direction: Option<BTreeMap<String, f64>>,
     residues: Option<PathBuf>,
     reference: Option<String>,
+    /// Masses at points, kg.
+    masses: BTreeMap<String, f64>,
 }
 
 /// A mode as written.
@@ -274,24 +287,41 @@ struct ModeSection {
 struct Parts {
     points: Vec<String>,
     modes: Vec<StructureMode>,
-    /// M, C and K with the direction of the base, where the damping is not modal.
-    matrices: Option<[DMatrix<f64>; 3]>,
+    /// Where the damping couples the modes.
+    coupled: Option<Coupled>,
+}
+
+/// A structure by M, C and K.
+struct Coupled {
+    matrices: [DMatrix<f64>; 3],
+    /// Displacement of its coordinates with the base.
     direction: DVector<f64>,
+    /// Displacements of the points, line by line, per coordinate.
+    coordinates: DMatrix<f64>,
+}
+
+impl Coupled {
+    /// A structure whose points are its degrees of freedom.
+    fn of_points(matrices: [DMatrix<f64>; 3], direction: DVector<f64>) -> Self {
+        let n = direction.len();
+        Self { matrices, direction, coordinates: DMatrix::identity(n, n) }
+    }
 }
 
 impl Parts {
     /// The modes of M, C and K without the coupling by the damping, and the matrices where there is a coupling.
-    fn of_matrices(points: Vec<String>, matrices: [DMatrix<f64>; 3], direction: DVector<f64>) -> Result<Self, String> {
-        let [m, c, k] = &matrices;
+    fn of_matrices(points: Vec<String>, coupled: Coupled) -> Result<Self, String> {
+        let Coupled { matrices: [m, c, k], direction, coordinates } = &coupled;
         let (shapes, squares) = natural_modes(m, k).map_err(|error| error.to_string())?;
         let damping = shapes.transpose() * c * &shapes;
-        let base = shapes.transpose() * m * &direction;
+        let base = shapes.transpose() * m * direction;
+        let at_points = coordinates * &shapes;
         let modes = squares.iter().enumerate().map(|(n, square)| {
             let omega = square.sqrt();
             StructureMode {
                 omega,
                 zeta: 0.5 * damping[(n, n)] / omega,
-                shape: shapes.column(n).iter().copied().collect(),
+                shape: at_points.column(n).iter().copied().collect(),
                 out_of_phase: 0.0,
                 drive: base[n],
             }
@@ -303,12 +333,41 @@ impl Parts {
             .iter()
             .enumerate()
             .all(|(n, value)| n % (modes.len() + 1) == 0 || value.abs() <= ROUNDING * largest);
-        Ok(Self {
-            points,
-            modes,
-            matrices: (!is_modal).then_some(matrices),
-            direction,
-        })
+        Ok(Self { points, modes, coupled: (!is_modal).then_some(coupled) })
+    }
+
+    /// These with masses, kg, at points. What the springs do to the structure is as before, also what they do with the base.
+    fn loaded(self, masses: &[(usize, f64)]) -> Result<Self, String> {
+        let Self { points, modes, coupled } = self;
+        if masses.is_empty() {
+            return Ok(Self { points, modes, coupled });
+        }
+        // Without matrices the coordinates are the modes.
+        let modal = || {
+            let diagonal = |of: fn(&StructureMode) -> f64| {
+                DMatrix::from_diagonal(&DVector::from_iterator(modes.len(), modes.iter().map(of)))
+            };
+            let matrices = [
+                diagonal(|_| 1.0),
+                diagonal(|mode| 2.0 * mode.zeta * mode.omega),
+                diagonal(|mode| mode.omega * mode.omega),
+            ];
+            Coupled {
+                matrices,
+                direction: DVector::from_iterator(modes.len(), modes.iter().map(|mode| mode.drive)),
+                coordinates: DMatrix::from_fn(points.len(), modes.len(), |point, n| modes[n].shape[point]),
+            }
+        };
+        let mut coupled = coupled.unwrap_or_else(modal);
+        for (point, mass) in masses {
+            let row = coupled.coordinates.row(*point);
+            coupled.matrices[0] += *mass * row.transpose() * row;
+        }
+        let mut loaded = Self::of_matrices(points, coupled)?;
+        for (mode, old) in loaded.modes.iter_mut().zip(&modes) {
+            mode.out_of_phase = old.out_of_phase;
+        }
+        Ok(loaded)
     }
 }
 
@@ -340,7 +399,7 @@ impl StructureSection {
                 );
             }
         };
-        let Parts { points, mut modes, matrices, direction } = parts;
+        let points = parts.points.clone();
         let place = |key: &str, name: &str| {
             points.iter().position(|point| point == name).ok_or_else(|| {
                 format!(
@@ -368,6 +427,18 @@ impl StructureSection {
         };
         let sensor = self.sensor.as_ref().map(|name| place("sensor", name)).transpose()?;
         let sensor = sensor.or(drive).unwrap_or(cavity);
+        let mounted = |(name, mass): (&String, &f64)| match *mass {
+            mass if mass > 0.0 && mass.is_finite() => Ok((place("masses", name)?, mass)),
+            mass => Err(format!(
+                "masses has {mass} kg at {name}; a mass mounted on a point must be positive and finite"
+            )),
+        };
+        let masses: Vec<_> = self.masses.iter().map(mounted).collect::<Result<_, _>>()?;
+        let omega_without_masses = match masses.is_empty() {
+            true => Vec::new(),
+            false => parts.modes.iter().map(|mode| mode.omega).collect(),
+        };
+        let Parts { mut modes, coupled, .. } = parts.loaded(&masses)?;
         if let Some(drive) = drive {
             modes.iter_mut().for_each(|mode| mode.drive = mode.shape[drive]);
         }
@@ -381,18 +452,11 @@ impl StructureSection {
         let driven = driven - 1;
         let at = Places { cavity, drive, sensor };
         check(&points, &modes, driven, &at)?;
-        let equations = equations(&modes, matrices.as_ref(), &direction, &at);
+        let (equations, coordinates) = equations(&modes, coupled.as_ref(), &at, points.len());
         let host = equations
             .host(self.excitation.of_host())
             .map_err(|error| error.to_string())?;
-        let shapes = |point: usize| -> Vec<f64> {
-            match matrices {
-                Some(_) => unit(points.len(), point),
-                None => modes.iter().map(|mode| mode.shape[point]).collect(),
-            }
-        };
-        let rows = (0..points.len()).map(|point| host.row(&shapes(point)));
-        let rows = rows.collect::<Result<_, _>>().map_err(|error| error.to_string())?;
+        let rows = rows(&host, &coordinates)?;
         Ok(Structure {
             excitation: self.excitation,
             points,
@@ -403,7 +467,10 @@ impl StructureSection {
             modes,
             equations,
             host,
+            coordinates,
             rows,
+            masses,
+            omega_without_masses,
             shaker: None,
         })
     }
@@ -472,7 +539,7 @@ impl StructureSection {
             });
         }
         modes.sort_by(|a, b| a.omega.total_cmp(&b.omega));
-        Ok(Parts { points, modes, matrices: None, direction: DVector::zeros(0) })
+        Ok(Parts { points, modes, coupled: None })
     }
 
     /// Participation of the base in a mode, by the matrix M; refuses a shape that is not mass-normalised.
@@ -539,7 +606,7 @@ impl StructureSection {
         k.positive("N/m")?;
         c.not_negative("N s/m")?;
         let direction = self.direction(&m.names)?;
-        Parts::of_matrices(m.names, [m.values, c.values, k.values], direction)
+        Parts::of_matrices(m.names, Coupled::of_points([m.values, c.values, k.values], direction))
     }
 
     /// The modes of a table of poles and residues.
@@ -560,7 +627,7 @@ impl StructureSection {
             && let Some(matrices) = residues.matrices()
         {
             let n = residues.points.len();
-            return Parts::of_matrices(residues.points, matrices, DVector::zeros(n));
+            return Parts::of_matrices(residues.points, Coupled::of_points(matrices, DVector::zeros(n)));
         }
         let Residues { points, poles } = residues;
         let modes = poles.iter().map(|(pole, shape)| StructureMode {
@@ -571,7 +638,7 @@ impl StructureSection {
             drive: 0.0,
         });
         let modes = modes.collect();
-        Ok(Parts { points, modes, matrices: None, direction: DVector::zeros(0) })
+        Ok(Parts { points, modes, coupled: None })
     }
 
     fn only_with(&self, owner: &str, key: &str, is_given: bool) -> Result<(), String> {
@@ -630,43 +697,48 @@ fn check(points: &[String], modes: &[StructureMode], driven: usize, at: &Places)
     Ok(())
 }
 
-/// The equations of the host: real modes, or the matrices where the damping couples these.
+/// The equations of the host, which are real modes, or the matrices where the damping couples these; and its points in their coordinates.
 fn equations(
     modes: &[StructureMode],
-    matrices: Option<&[DMatrix<f64>; 3]>,
-    direction: &DVector<f64>,
+    coupled: Option<&Coupled>,
     at: &Places,
-) -> Equations {
-    let Some(matrices) = matrices else {
+    points: usize,
+) -> (Equations, Vec<Vec<f64>>) {
+    let Some(Coupled { matrices, direction, coordinates }) = coupled else {
         let mode = |mode: &StructureMode| Mode {
             omega: mode.omega,
             zeta: mode.zeta,
             cavity: mode.shape[at.cavity],
             drive: mode.drive,
         };
-        return Equations::Modes(modes.iter().map(mode).collect());
+        let shapes = |point: usize| modes.iter().map(|mode| mode.shape[point]).collect();
+        return (
+            Equations::Modes(modes.iter().map(mode).collect()),
+            (0..points).map(shapes).collect(),
+        );
     };
     let rows = |matrix: &DMatrix<f64>| -> Vec<Vec<f64>> {
         matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
     };
-    let [mass, damping, stiffness] = matrices.each_ref().map(rows);
-    let n = direction.len();
-    let drive = at
-        .drive
-        .map_or_else(|| direction.iter().copied().collect(), |point| unit(n, point));
-    Equations::Matrices {
+    let ([mass, damping, stiffness], coordinates) = (matrices.each_ref().map(rows), rows(coordinates));
+    let equations = Equations::Matrices {
         mass,
         damping,
         stiffness,
-        cavity: unit(n, at.cavity),
-        drive,
+        cavity: coordinates[at.cavity].clone(),
+        drive: at.drive.map_or_else(
+            || direction.iter().copied().collect(),
+            |point| coordinates[point].clone(),
+        ),
         states: Vec::new(),
-    }
+    };
+    (equations, coordinates)
 }
 
-/// The row of a degree of freedom.
-fn unit(n: usize, place: usize) -> Vec<f64> {
-    (0..n).map(|other| f64::from(u8::from(other == place))).collect()
+/// The displacements of points in the sections of a host.
+pub(super) fn rows(host: &Host, coordinates: &[Vec<f64>]) -> Result<Vec<Row>, String> {
+    let rows = coordinates.iter().map(|point| host.row(point));
+    rows.collect::<Result<_, _>>().map_err(|error| error.to_string())
 }
 
 /// Euclidean norm.

@@ -152,6 +152,7 @@ fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04
         settled: 0,
         held: false,
         released: 0,
+        clipped_percent: None,
     };
     let [fine, coarse] = [&fine, &coarse].map(|record| crossings(record, &scene));
     let above = coarse.iter().filter(|[tau, _]| *tau < last);

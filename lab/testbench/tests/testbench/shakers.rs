@@ -1,17 +1,18 @@
 //! Guards the section `[shaker]`: presets that lock on the exact orbit with their shaker, the check, limits, and a sentence for every mistake.
 
 use std::cell::Cell;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use std::rc::Rc;
 
 use lovines::{Drive, Plant, StructureState};
+use num_complex::Complex;
 use vines_testbench::backbone::track;
 use vines_testbench::comparison::COMPARED_ABOVE;
 use vines_testbench::experiment::ExperimentError;
 use vines_testbench::identification::{WINDOW, decay_points};
 use vines_testbench::loop_check::{Verdict, check};
 use vines_testbench::rig::{BuiltIn, RigError, RigFault, SensorFault, Sensors, SensorsOnly, Simulated, faulty};
-use vines_testbench::scene::{Scene, SceneError};
+use vines_testbench::scene::{Scene, SceneError, StructureMode};
 use vines_testbench::survey::{BehindShaker, Survey, phase_resonant};
 
 use super::common::{at, demodulated, mean_square};
@@ -31,10 +32,17 @@ fn preset(n: usize, changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
     Scene::parse("preset", &text, &[])
 }
 
+/// The shaker on the cantilever with this key behind its `cell_mass`.
+fn compensated(mass: &str) -> Result<Scene, SceneError> {
+    let compensated = format!("[shaker]\ncompensated_mass = {mass}");
+    preset(0, &[("[shaker]", &compensated)])
+}
+
 #[test]
 fn presets_lock_on_the_exact_orbit_with_their_shaker() {
-    for n in 0..PRESETS.len() {
-        let scene = preset(n, &[]).unwrap();
+    let presets = (0..PRESETS.len()).map(|n| preset(n, &[]));
+    for (n, scene) in presets.chain([compensated("0.02")]).enumerate() {
+        let scene = scene.unwrap();
         let at = identified(&scene).unwrap().lock.at;
         // The force is known to its uncertainty, which moves the orbit.
         let [orbits, moved] = [at.e_m, at.e_m + at.u_e_m].map(|amplitude| {
@@ -52,6 +60,64 @@ fn presets_lock_on_the_exact_orbit_with_their_shaker() {
         let nearest = distance.fold(f64::INFINITY, f64::min);
         assert!(nearest < 3.0, "preset {n}: {nearest} u");
     }
+}
+
+/// The receptance of the cantilever of the preset at its tip, by forces at its root and at its tip, m/N.
+fn receptance(scene: &Scene, omega: f64) -> [Complex<f64>; 2] {
+    let bare = preset(0, &[("cell_mass = 0.02", "")]).unwrap();
+    let structure = bare.structure.as_ref().unwrap();
+    assert_eq!(structure.points, scene.structure.as_ref().unwrap().points);
+    [structure.drive.unwrap(), structure.cavity].map(|from| {
+        let of = |mode: &StructureMode| {
+            let stiffness = Complex::new(mode.omega.powi(2) - omega * omega, 2.0 * mode.zeta * mode.omega * omega);
+            mode.shape[structure.sensor] * mode.shape[from] / stiffness
+        };
+        structure.modes.iter().map(of).sum()
+    })
+}
+
+#[test]
+fn a_compensated_force_drives_the_structure_alone() {
+    let scene = compensated("0.02").unwrap();
+    let structure = scene.structure.as_ref().unwrap();
+    let (host, response) = (&structure.host, structure.response());
+    for hertz in [2.0, 8.8156, 9.5, 55.0, 160.0] {
+        let omega = TAU * hertz;
+        let [by_force, by_impacts] = receptance(&scene, omega);
+        let row = structure
+            .shaker
+            .as_ref()
+            .unwrap()
+            .reference(structure.excitation, omega);
+        let driven = host.frequency_response(&response, omega) / host.frequency_response(&row, omega);
+        let hit = host.frequency_response_to_cavity(&response, omega)
+            - by_force * host.frequency_response_to_cavity(&row, omega);
+        let errors = [driven / by_force - 1.0, hit / by_impacts - 1.0].map(|error| error.norm());
+        assert!(errors.iter().all(|error| *error < 1e-12), "{hertz} Hz: {errors:?}");
+    }
+}
+
+#[test]
+fn readings_behind_a_compensated_force_cell_are_those_of_the_structure_alone() {
+    let scene = compensated("0.02").unwrap();
+    let structure = scene.structure.as_ref().unwrap();
+    let omega = scene.dimensionless().omega0;
+    let period = (TAU / omega / scene.sample_time()).round() as usize;
+    let mut rig = Simulated::without_chain(&scene.clone().at_rest()).unwrap();
+    let mut sums = [Complex::new(0.0, 0.0); 2];
+    // The motion settles to 1e-13 in 800 periods.
+    for n in 0..801 * period {
+        let drive = vines_testbench::rig::Drive { omega, amplitude: 1e-5, displacement: 0.0 };
+        rig.advance(drive, TAU / omega / period as f64).unwrap();
+        let Sensors { response, reference } = rig.sense().unwrap();
+        if n >= 800 * period {
+            let rotor = Complex::cis(-TAU * (n % period) as f64 / period as f64);
+            sums[0] += rotor * response * structure.reading_per_response().abs();
+            sums[1] += rotor * reference.unwrap() / structure.base_per_drive();
+        }
+    }
+    let error = (sums[0] / sums[1] / receptance(&scene, omega)[0] - 1.0).norm();
+    assert!(error < 1e-11, "{error:e}");
 }
 
 /// A plant that starts on an exact orbit under its voltage stays there.
@@ -156,6 +222,27 @@ fn a_limit_that_is_reached_ends_the_experiment_with_its_name() {
 }
 
 #[test]
+fn the_share_of_clipped_samples_is_that_of_the_commands_at_the_limit() {
+    let scene = preset(0, &[("voltage_max = 40.0", "voltage_max = 10.0")]).unwrap();
+    let structure = scene.structure.as_ref().unwrap();
+    let limit = structure.shaker.as_ref().unwrap().largest_command() * structure.base_per_command();
+    let counted = Rc::new(Cell::new(0));
+    let count = Rc::clone(&counted);
+    let mut rig = Altered {
+        rig: Simulated::of(&scene).unwrap(),
+        read: Box::new(Ok),
+        drive: Box::new(move |drive, step| {
+            count.set(count.get() + u32::from(drive.amplitude > limit * (1.0 - 1e-9)));
+            (drive, step)
+        }),
+    };
+    let record = record(&mut rig, &scene).unwrap();
+    let share = 100.0 * f64::from(counted.get()) / record.released as f64;
+    let stated = record.clipped_percent.unwrap();
+    assert!(share > 0.1 && (stated - share).abs() < 1e-12, "{stated} {share}");
+}
+
+#[test]
 fn the_decay_after_the_stinger_is_cut_is_that_of_the_simulation() {
     let scene = preset(1, &[("[shaker]", "[shaker]\nrelease = \"cut\"")]).unwrap();
     let record = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
@@ -243,6 +330,24 @@ fn what_is_wrong_with_a_shaker_is_said_in_one_sentence() {
             ["voltage_max", "current_max"],
         ),
         (0, "cell_mass = 0.02", "table_mass = 2", ["table_mass", "base"]),
+        (
+            0,
+            "[shaker]",
+            "[shaker]\ncompensated_mass = -0.01",
+            ["compensated_mass = -0.01 kg", "0 or positive"],
+        ),
+        (
+            0,
+            "[shaker]",
+            "[shaker]\ncompensated_mass = 30",
+            ["-29.98 kg in front of the force cell", "positive definite"],
+        ),
+        (
+            2,
+            "[shaker]",
+            "[shaker]\ncompensated_mass = 1",
+            ["compensated_mass = 1 kg", "table"],
+        ),
         (0, "force_max = 45.0", "force_max = 0.1", ["force_max", "N"]),
         (
             0,

@@ -219,6 +219,16 @@ fn points_that_do_not_exist_are_refused_with_a_list_of_those_that_do() {
     );
     says(beam(&[("cavity = \"tip\"", "")]), "`cavity` is missing");
     says(beam(&[("drive = \"root\"", "")]), "`drive` is missing");
+    says(
+        beam(&[("cavity", "masses = { top = 0.005 }\ncavity")]),
+        "masses = \"top\" is no point | middle, root, tip",
+    );
+    for mass in ["0", "-0.005", "nan"] {
+        says(
+            beam(&[("cavity", &format!("masses = {{ tip = {mass} }}\ncavity"))]),
+            "kg at tip | positive",
+        );
+    }
 }
 
 #[test]
@@ -434,4 +444,95 @@ fn the_loop_finds_the_stable_exact_orbits_of_the_presets_and_refuses_what_is_asy
         matches!(refused, Err(IdentificationError::Regime { .. })),
         "{refused:?}"
     );
+}
+
+/// Receptances and base responses of modes at points, by the sum over the modes.
+struct Modal<'a>(&'a Structure, f64);
+
+impl Modal<'_> {
+    fn sum(&self, of: impl Fn(usize) -> Complex<f64>) -> Complex<f64> {
+        let Self(structure, omega) = self;
+        let modes = structure.modes.iter().enumerate().map(|(n, mode)| {
+            let stiffness = mode.omega.powi(2) - omega * omega;
+            of(n) / Complex::new(stiffness, 2.0 * mode.zeta * mode.omega * omega)
+        });
+        modes.sum()
+    }
+
+    fn receptance(&self, to: usize, from: usize) -> Complex<f64> {
+        self.sum(|n| Complex::from(self.0.modes[n].shape[to] * self.0.modes[n].shape[from]))
+    }
+
+    fn driven(&self, to: usize) -> Complex<f64> {
+        self.sum(|n| {
+            let mode = &self.0.modes[n];
+            let by = match self.0.excitation {
+                Excitation::Force => Complex::from(1.0),
+                Excitation::Base => Complex::new(mode.omega.powi(2), 2.0 * mode.zeta * mode.omega * self.1),
+            };
+            mode.shape[to] * mode.drive * by
+        })
+    }
+}
+
+/// The inertia of a mass is a force at its point: the response with it follows from receptances without it.
+#[test]
+fn a_mass_at_a_point_changes_the_response_as_its_inertia_does() {
+    let cantilever = include_str!("../../../../scenes/cantilever.toml");
+    let text = |masses: &str| {
+        [BEAM, cantilever].map(|text| text.replace("cavity = \"tip\"", &format!("cavity = \"tip\"\n{masses}")))
+    };
+    for (bare, loaded) in text("").iter().zip(text("masses = { middle = 0.3 }")) {
+        let [bare, loaded] = [bare, &loaded].map(|text| Scene::parse("scene", text, &[]).unwrap().structure.unwrap());
+        let at = bare.points.iter().position(|point| point == "middle").unwrap();
+        for hertz in [2.0, 8.7, 9.5, 54.0, 150.0] {
+            let omega = TAU * hertz;
+            let bare = Modal(&bare, omega);
+            let inertia = 0.3 * omega * omega;
+            let moved = bare.driven(at) / (1.0 - inertia * bare.receptance(at, at));
+            for (point, row) in loaded.rows.iter().enumerate() {
+                let expected = bare.driven(point) + bare.receptance(point, at) * inertia * moved;
+                let error = (loaded.host.frequency_response(row, omega) / expected - 1.0).norm();
+                assert!(error < 1e-11, "{hertz} Hz, point {point}: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn modes_with_a_mass_are_the_roots_of_the_frequency_equation() {
+    let mass = 0.05;
+    let loaded = beam(&[("cavity", "masses = { tip = 0.05 }\ncavity")])
+        .unwrap()
+        .structure
+        .unwrap();
+    // (first - (1 + m a²) x) (second - (1 + m b²) x) = (m a b x)², with the squared frequency x and the shapes a and b at the tip.
+    let [first, second] = [8.8156, 55.274].map(|hertz: f64| (TAU * hertz).powi(2));
+    let [a, b] = [mass * 0.51252_f64.powi(2); 2];
+    let (quadratic, linear) = (1.0 + a + b, first * (1.0 + b) + second * (1.0 + a));
+    let root = (linear * linear - 4.0 * quadratic * first * second).sqrt();
+    let said = loaded.mass_loading().unwrap();
+    for (mode, (bare, sign)) in loaded.modes.iter().zip([(first, -1.0), (second, 1.0)]) {
+        let expected = ((linear + sign * root) / (2.0 * quadratic)).sqrt();
+        assert!((mode.omega / expected - 1.0).abs() < 1e-13, "{} {expected}", mode.omega);
+        let lower = format!("{:.3}", 100.0 * (1.0 - expected / bare.sqrt()));
+        assert!(
+            said.contains(&lower) && said.contains("0.05 kg at tip"),
+            "{said}, {lower}"
+        );
+    }
+}
+
+#[test]
+fn a_mass_on_matrices_is_a_mass_in_the_matrix() {
+    let [c, k] = [[0.05, -0.02, 0.3], [4000.0, -900.0, 9000.0]];
+    let of_masses = |mass: [f64; 3], masses: &str| {
+        let folder = matrices([mass, c, k]);
+        let scene = of(&folder, &format!("{PLANT}{MATRICES}{masses}"), &[]);
+        scene.unwrap().structure.unwrap()
+    };
+    let loaded = of_masses([1.0, 0.1, 0.8], "masses = { root = 0.25 }");
+    let heavier = of_masses([1.0, 0.1, 1.05], "");
+    assert_eq!(loaded.host.sections(), heavier.host.sections());
+    assert_eq!(loaded.rows, heavier.rows);
 }
