@@ -362,6 +362,7 @@ fn squares(values: &[f64]) -> Option<f64> {
 pub struct HarmonicBasis {
     matrix: DMatrix<f64>,
     factors: QR<f64, Dyn, Dyn>,
+    weights: Option<DVector<f64>>,
     /// Column of each harmonic's constant part.
     columns: Vec<usize>,
 }
@@ -392,7 +393,7 @@ impl HarmonicBasis {
             let wave = if cosine { angle.cos() } else { angle.sin() };
             time(row).powi(degree as i32) * wave
         });
-        Self { factors: matrix.clone().qr(), matrix, columns }
+        Self { factors: matrix.clone().qr(), matrix, weights: None, columns }
     }
 
     /// With rows weighted by these; values are to be weighted alike.
@@ -401,7 +402,11 @@ impl HarmonicBasis {
         for mut column in self.matrix.column_iter_mut() {
             column.component_mul_assign(weights);
         }
-        Self { factors: self.matrix.clone().qr(), ..self }
+        Self {
+            factors: self.matrix.clone().qr(),
+            weights: Some(weights.clone()),
+            ..self
+        }
     }
 
     /// Number of unknowns.
@@ -422,18 +427,24 @@ impl HarmonicBasis {
         Some(HarmonicFit { coefficients, columns: self.columns.clone() })
     }
 
-    /// Variances of a harmonic's sine and cosine coefficient of this degree, for values with noise of variance 1; NaN where the
-    /// terms are not independent. `harmonic` counts from 1.
+    /// Variances of a harmonic's sine and cosine coefficient of this degree, for values with white noise of variance 1 before they are weighted; NaN
+    /// where the terms are not independent. `harmonic` counts from 1.
     pub fn variances(&self, harmonic: usize, degree: usize) -> [f64; 2] {
         let column = self.columns[harmonic - 1] + 2 * degree;
         let identity = DMatrix::identity(self.terms(), self.terms());
         let Some(inverse) = self.factors.r().solve_upper_triangular(&identity) else {
             return [f64::NAN; 2];
         };
-        [column, column + 1].map(|row| inverse.row(row).norm_squared())
+        let variance = |row: usize| match &self.weights {
+            None => inverse.row(row).norm_squared(),
+            Some(weights) => (self.factors.q() * inverse.row(row).transpose())
+                .component_mul(weights)
+                .norm_squared(),
+        };
+        [column, column + 1].map(variance)
     }
 
-    /// The residual of a fit.
+    /// The residual of a fit, weighted as the rows are.
     pub fn residual(&self, values: &DVector<f64>, fit: &HarmonicFit) -> DVector<f64> {
         values - &self.matrix * &fit.coefficients
     }
