@@ -2,8 +2,8 @@
 //!
 //! Near the natural frequency a structure with the impact force I has the response `z' = F + I - (s + d) z` in phasors, where `s = i (omega - omega0)`,
 //! and a shaker makes of a command u the reference `F = K u - (r - d) z` ([`ShakerPath`]): the moving structure takes the force away. The command is
-//! the inverse, `u = (F + (r - d) z)/K`, with the *measured* response z, in which the impacts are. What is left of the error of the measured reference
-//! is integrated.
+//! the inverse, `u = (F + (r - d) z)/K`, with the *measured* response z, in which the impacts are: an observer predicts it from the command,
+//! `z' = K u + I - (s + r) z`, and corrects it by the reading. What is left of the error of the measured reference is integrated.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,16 +16,17 @@ use crate::plan::{Knowledge, ShakerPath, Target};
 const DETECTOR: f64 = 0.3;
 /// Bandwidth of the control, a quarter of the detector's: both roots of the loop are then equal, at half of the latter.
 pub(crate) const BANDWIDTH: f64 = 0.25 * DETECTOR;
-/// Bandwidth of the detector of the response, which the force that is measured predicts and impacts disturb: at half of it, the force on an oscillator of
-/// 1.8 % drop-out (scenes/shaker-oscillator.toml) is so late behind the impacts that the loop does not settle.
+/// Bandwidth of the observer of the response, which impacts disturb: at half of it, the force on an oscillator of 1.8 % drop-out
+/// (scenes/shaker-oscillator.toml) is so late behind the impacts that the loop does not settle.
 const OBSERVER: f64 = 2.0 * DETECTOR;
 /// Harmonics of both. Impacts of one period are alternating impulses, with odd harmonics.
 const HARMONICS: [f64; 3] = [1.0, 3.0, 5.0];
 
-/// Error of the reference, over what the command makes on a structure that does not move, that is taken for a failure, and the phase for which it
-/// lasts, rad. An amplifier that clips at half of the command loses 0.39 of the fundamental; beside a force that has collapsed, transients of the
-/// shaker are several times the force.
+/// Share of the command's fundamental that an amplifier loses which has failed; clipping at half of the command loses 0.39. At the natural frequency
+/// this is the share of the reference, over the drop-out. An error of the whole reference is a failure whatever the drop-out: it is not the reference
+/// asked for that is left then. And a reference that never reaches this share is not there, of a broken stinger.
 const SHARE: f64 = 0.25;
+/// Phase for which such an error lasts, rad.
 const OFF: f64 = TAU;
 
 /// Offset and harmonics of a signal: an adaptive filter, as the controller's.
@@ -72,8 +73,9 @@ pub(crate) struct ReferenceControl {
     times: f64,
     /// Samples so far with the command at its limit.
     pub clipped: usize,
-    /// Phase for which the reference has been off, or the command at its limit, rad.
+    /// Phase for which the reference has been off, or the command at its limit, and for which the reading has been small, rad.
     off: f64,
+    quiet: f64,
 }
 
 impl ReferenceControl {
@@ -94,6 +96,7 @@ impl ReferenceControl {
             times: 0.0,
             clipped: 0,
             off: 0.0,
+            quiet: 0.0,
         })
     }
 
@@ -108,24 +111,26 @@ impl ReferenceControl {
         let error = (self.asked / displacement * rotor).im - reading;
         // A reading that is no number is the controller's to refuse.
         if error.is_finite() && response.is_finite() {
-            let detuned = Complex64::new(self.damping_rate, omega - self.omega0);
-            let driven = self.gain * (self.asked - self.error.phasors[0] * displacement) / of_response;
-            self.response.phasors[0] += step * (driven - detuned * self.response.phasors[0]);
+            let rate = self.path.pole + Complex64::new(0.0, omega - self.omega0);
+            let driven = self.gain * self.path.gain * self.command / of_response;
+            self.response.phasors[0] += step * (driven - rate * self.response.phasors[0]);
             let share = |bandwidth: f64| 1.0 - (-bandwidth * self.omega0 * step).exp();
             self.error.take(error, self.phases[0], share(DETECTOR));
             self.response.take(response, self.phases[0], share(OBSERVER));
         }
         let error = self.error.phasors[0] * displacement;
         let moved = (self.path.pole - self.damping_rate) / self.gain * self.response.phasors[0] * of_response;
-        let largest = SHARE * (self.path.gain * self.command).norm();
-        let is_off = self.asked > 0.0 && amplitude > 0.0 && (error.norm() > largest || self.times > 1.0);
-        self.off = if is_off { self.off + omega * step } else { 0.0 };
+        let largest = self.asked * (SHARE / self.path.drop_out()).min(1.0);
+        let is_driven = self.asked > 0.0 && amplitude > 0.0;
+        let longer = |phase: f64, is: bool| if is && is_driven { phase + omega * step } else { 0.0 };
+        self.off = longer(self.off, error.norm() > largest || self.times > 1.0);
+        self.quiet = longer(self.quiet, reading.abs() * displacement.norm() < SHARE * self.asked);
         if self.off > OFF && self.times > 1.0 {
             return Err(RigError::AmplifierLimit { times: self.times });
         }
-        if self.off > OFF {
+        if self.off.max(self.quiet) > OFF {
             let unit = ["m", "N"][usize::from(self.path.by_force)];
-            let cause = if (self.asked - error).norm() < 0.5 * self.asked {
+            let cause = if self.quiet > OFF {
                 "next to nothing is left: the sensor of the reference is dead, or the stinger is broken"
             } else {
                 "the amplifier clips or is off, or the sensor of the reference or its sign is wrong"

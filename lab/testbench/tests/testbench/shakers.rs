@@ -280,6 +280,23 @@ fn a_held_sample_of_zero_does_not_cut_the_stinger() {
     );
 }
 
+/// Asserts that a fault, which begins while the lock is held, ends the drive within 0.3 s, and that the error has this text.
+fn assert_named(scene: &Scene, begins: f64, fault: RigFault, name: &str) {
+    for phase in [0.0, 0.3] {
+        let zero = Rc::new(Cell::new(None));
+        let told = Rc::clone(&zero);
+        let seconds = begins + phase * scene.dimensionless().natural_period();
+        let mut rig = faulty(scene, fault, seconds, move |time| told.set(time)).unwrap();
+        let error = record(&mut rig, scene).unwrap_err().to_string();
+        drop(rig);
+        let time = zero.get();
+        assert!(
+            error.contains(name) && time.is_some_and(|time| time < 0.3),
+            "{fault:?}: {time:?}, {error}"
+        );
+    }
+}
+
 #[test]
 fn faults_of_a_shaker_end_the_drive_with_their_name() {
     use {RigFault::*, SensorFault::*};
@@ -295,19 +312,21 @@ fn faults_of_a_shaker_end_the_drive_with_their_name() {
         (stinger, "stinger is broken"),
         (stop, "shaker.stroke_max"),
     ] {
-        for phase in [0.0, 0.3] {
-            let zero = Rc::new(Cell::new(None));
-            let told = Rc::clone(&zero);
-            let seconds = begins + phase * scene.dimensionless().natural_period();
-            let mut rig = faulty(&scene, fault, seconds, move |time| told.set(time)).unwrap();
-            let error = record(&mut rig, &scene).unwrap_err().to_string();
-            drop(rig);
-            let time = zero.get();
-            assert!(
-                error.contains(name) && time.is_some_and(|time| time < 0.3),
-                "{fault:?}: {time:?}, {error}"
-            );
-        }
+        assert_named(&scene, begins, fault, name);
+    }
+}
+
+#[test]
+fn faults_before_the_lock_are_found_as_fast_where_little_of_the_force_is_left() {
+    let scene = preset(1, &[]).unwrap();
+    let [stinger, amplifier, _] = RigFault::OF_SHAKER.map(|(_, fault)| fault);
+    let begins = 60.0 * scene.dimensionless().natural_period();
+    for (fault, name) in [
+        (RigFault::Base(SensorFault::Reversed), "its sign is wrong"),
+        (amplifier, "the amplifier clips"),
+        (stinger, "stinger is broken"),
+    ] {
+        assert_named(&scene, begins, fault, name);
     }
 }
 
