@@ -29,7 +29,7 @@ use vines_model::theory::{BranchSide, Manifold};
 use vines_model::{Definition, Dimensionless, Sensor};
 
 use super::{
-    ChannelTest, Fit, Known, LIMITS, MeasuredPoint, Nearest, Part, Problem, Quantity, Recording, UNKNOWNS, Unknowns,
+    ChannelTest, Covariance, Fit, Known, LIMITS, MeasuredPoint, Nearest, Part, Problem, Quantity, Recording, UNKNOWNS, Unknowns,
     fit, plant, shifted, unknowns,
 };
 
@@ -66,6 +66,10 @@ const EXPECTED: [f64; 5] = [0.01, 0.3, 0.2, 0.2, 0.3];
 const JUMP: Estimate = Estimate { value: 0.5, uncertainty: 0.5 };
 /// Square of the move of the parameters, in standard uncertainties, below which the filter need not be linearised again.
 const STILL: f64 = 0.1;
+/// Weight that holds a function of the unknowns, over its standard uncertainty.
+const HOLD: f64 = 1e3;
+/// Rise of chi-square at the end of an interval of three standard uncertainties.
+const END: f64 = 9.0;
 
 /// What a sample does not show of the base.
 #[derive(Clone, Copy, Default)]
@@ -134,6 +138,8 @@ struct Followed<'a> {
     courses: Vec<Course>,
     /// Noise of the process, over the noise of the measurement, at least.
     least_noise: f64,
+    /// A linear function of the unknowns, and the value at which the fit holds it.
+    held: Option<(Unknowns, f64)>,
 }
 
 /// Part of a record that does not belong to the motion.
@@ -596,6 +602,7 @@ impl Misfit<UNKNOWNS> for Followed<'_> {
     fn residuals(&self, x: &Unknowns, near: &Vec<Nearest>) -> Option<(Vec<f64>, Vec<Nearest>)> {
         let (mut residuals, places) = self.problem.residuals(x, near)?;
         residuals.push((x[6] - JUMP.value) / JUMP.uncertainty);
+        residuals.extend(self.held.map(|(function, value)| HOLD * (function.dot(x) - value)));
         residuals.extend(self.all(x)?);
         Some((residuals, places))
     }
@@ -614,12 +621,63 @@ impl Misfit<UNKNOWNS> for Followed<'_> {
         let columns = columns?;
         let row = |n: usize| Unknowns::from_fn(|i, _| (columns[i][n] - here[n]) / STEP);
         rows.push(Unknowns::ith(6, 1.0 / JUMP.uncertainty));
+        rows.extend(self.held.map(|(function, _)| HOLD * function));
         rows.extend((0..here.len()).map(row));
         Some(rows)
     }
 
     fn limits(&self) -> [[f64; 2]; UNKNOWNS] {
         LIMITS
+    }
+}
+
+type Minimum = LeastSquares<UNKNOWNS, Vec<Nearest>>;
+
+impl Followed<'_> {
+    /// Covariance of the unknowns, by the likelihood ratio in the direction that is determined least: chi-square may be far from a parabola there, as
+    /// after a short decay, which hardly tells b and epsilon apart. From the minimum on, steps to both sides are doubled and the other unknowns
+    /// fitted, until chi-square has risen by [`END`]. The largest displacement over the square root of its rise (where that is above 1) takes the
+    /// place of the standard deviation.
+    fn covariance(&mut self, minimum: &Minimum) -> Covariance {
+        let covariance = minimum.covariance();
+        let scale = covariance.diagonal().map(f64::sqrt);
+        if !scale.iter().all(|one| one.is_normal()) {
+            return covariance;
+        }
+        let eigen = covariance
+            .component_div(&(scale * scale.transpose()))
+            .symmetric_eigen();
+        let weakest = eigen.eigenvalues.imax();
+        let (direction, length) = (eigen.eigenvectors.column(weakest), eigen.eigenvalues[weakest].sqrt());
+        let deviation = direction.component_mul(&scale) * length;
+        // In standard deviations.
+        let function = direction.component_div(&scale) / length;
+        let mut reached = Vec::new();
+        for side in [-1.0, 1.0] {
+            let (mut step, mut moved) = (side, deviation * side);
+            loop {
+                self.held = Some((function, function.dot(&minimum.x) + step));
+                let Some(found) = Minimum::minimum(self, minimum.x + moved, &minimum.trace, FOUND) else {
+                    break;
+                };
+                moved = found.x - minimum.x;
+                reached.push((moved, found.chi_square - minimum.chi_square));
+                if found.chi_square > minimum.chi_square + END {
+                    break;
+                }
+                (step, moved) = (2.0 * step, 2.0 * moved);
+            }
+        }
+        self.held = None;
+        let lowest = reached.iter().map(|(_, rise)| *rise).fold(0.0, f64::min);
+        let steps = reached
+            .into_iter()
+            .map(|(moved, rise)| moved / (rise - lowest).max(1.0).sqrt());
+        let length = |step: &Unknowns| function.dot(step).abs();
+        let widest = steps.fold(deviation, |widest, step| {
+            if length(&step) > length(&widest) { step } else { widest }
+        });
+        covariance - deviation * deviation.transpose() + widest * widest.transpose()
     }
 }
 
@@ -707,6 +765,7 @@ pub fn follow(
         stretches,
         courses: Vec::new(),
         least_noise: STRONG,
+        held: None,
     };
     let samples = |stretches: &[Stretch]| {
         stretches
@@ -747,6 +806,7 @@ pub fn follow(
     let innovations: Vec<Vector2<f64>> = followed.each(&x).concat();
     let count = innovations.len();
     let mut fit = problem.found(&minimum, &minimum.trace);
+    fit.covariance = followed.covariance(&minimum);
     fit.degrees = (2 * count + problem.equations()).checked_sub(5 + usize::from(problem.has_scale))?;
     let channel = |i: usize| innovations.iter().map(move |one| one[i]);
     for i in 0..2 {
