@@ -5,7 +5,8 @@
 //! extended Kalman filter (Åström, Introduction to Stochastic Control Theory, chapter 7), whose matrices are the plant's own derivatives, by plants
 //! that start the period a little beside it. Noise of the base is the noise of the process: its first harmonic in a period moves the response by
 //! `omega0 T/2 = pi` times itself. Noise of the response is the noise of the measurement: what the prediction leaves beside the first harmonic.
-//! Innovations are white, and their covariance is known; so is the covariance of the parameters.
+//! Innovations are white, and their covariance is known; so is the covariance of the parameters, except in the direction that the record determines
+//! least: there the ratio of likelihoods gives the interval.
 //!
 //! Where a simulation changes the amplitude of the base, the base jumps at a sample, and the record does not show it. Its amplitude grows, and swings
 //! twice in a period, so that the jumps have a first harmonic of up to 1e-4 of the base, always of one sign. They follow from the growth of the
@@ -29,8 +30,8 @@ use vines_model::theory::{BranchSide, Manifold};
 use vines_model::{Definition, Dimensionless, Sensor};
 
 use super::{
-    ChannelTest, Covariance, Fit, Known, LIMITS, MeasuredPoint, Nearest, Part, Problem, Quantity, Recording, UNKNOWNS, Unknowns,
-    fit, plant, shifted, unknowns,
+    ChannelTest, Covariance, Fit, Known, LIMITS, MeasuredPoint, Nearest, Part, Problem, Quantity, Recording, UNKNOWNS,
+    Unknowns, fit, plant, shifted, unknowns,
 };
 
 /// A stretch of a record: the number of the record, and the samples from which and to which it extends.
@@ -50,8 +51,8 @@ const ROUNDS: usize = 30;
 const PRIOR: [f64; 2] = [0.02, 0.1];
 /// Error of the prediction, over the response, at which the plant has lost the motion.
 const LOST: f64 = 0.5;
-/// Step of a difference, relative.
-const STEP: f64 = 1e-5;
+/// Step of a difference, relative: far below the uncertainty in the direction that a record without noise determines best, 1e-8 to 1e-5.
+const STEP: f64 = 1e-7;
 /// Step of a state, over the response: so small that hardly any impact lies between both states.
 const BESIDE: f64 = 1e-7;
 /// Noise of the process, over the noise of the measurement, in the first fit, in which the plant stays near the record whatever the parameters.
@@ -83,6 +84,7 @@ struct Base {
 }
 
 /// A record with its noise.
+#[derive(Clone)]
 struct Measured<'a> {
     recording: &'a Recording,
     /// Variance of a sample of the base, m², in each piece of [`PIECE`] periods.
@@ -130,6 +132,7 @@ impl Course {
 }
 
 /// Records, of which some stretches are fitted, beside points.
+#[derive(Clone)]
 struct Followed<'a> {
     problem: &'a Problem<'a>,
     records: Vec<Measured<'a>>,
@@ -634,19 +637,42 @@ impl Misfit<UNKNOWNS> for Followed<'_> {
 type Minimum = LeastSquares<UNKNOWNS, Vec<Nearest>>;
 
 impl Followed<'_> {
+    /// The minimum that is reached from these parameters, and what is left out; `None` where half of the stretches do not belong.
+    fn search(&mut self, mut x: Unknowns) -> Option<(Minimum, Vec<Stretch>)> {
+        let samples = |stretches: &[Stretch]| stretches.iter().map(|one| one.span[1] - one.span[0]).sum::<usize>();
+        let whole = samples(&self.stretches);
+        let mut out = self.linearise(&x);
+        for _ in 0..ROUNDS {
+            out.extend(self.linearise(&x));
+            let minimum = Minimum::minimum(self, x, &Vec::new(), FOUND)?;
+            let moved = minimum.x - x;
+            x = minimum.x;
+            let is_first = self.least_noise > 0.0;
+            self.least_noise = 0.0;
+            let moves = minimum.derivatives.iter().map(|row| row.dot(&moved).powi(2));
+            if is_first || moves.sum::<f64>() >= STILL {
+                continue;
+            }
+            let more = self.cut(&self.contradicting(&x));
+            if more.is_empty() {
+                return Some((minimum, out)).filter(|_| 2 * samples(&self.stretches) >= whole);
+            }
+            out.extend(more);
+        }
+        None
+    }
+
     /// Covariance of the unknowns, by the likelihood ratio in the direction that is determined least: chi-square may be far from a parabola there, as
     /// after a short decay, which hardly tells b and epsilon apart. From the minimum on, steps to both sides are doubled and the other unknowns
     /// fitted, until chi-square has risen by [`END`]. The largest displacement over the square root of its rise (where that is above 1) takes the
-    /// place of the standard deviation.
-    fn covariance(&mut self, minimum: &Minimum) -> Covariance {
+    /// place of the standard deviation. Where chi-square falls by more than 1 on the way, another minimum is near: returns the place as well.
+    fn covariance(&mut self, minimum: &Minimum) -> (Covariance, Option<Unknowns>) {
         let covariance = minimum.covariance();
         let scale = covariance.diagonal().map(f64::sqrt);
         if !scale.iter().all(|one| one.is_normal()) {
-            return covariance;
+            return (covariance, None);
         }
-        let eigen = covariance
-            .component_div(&(scale * scale.transpose()))
-            .symmetric_eigen();
+        let eigen = covariance.component_div(&(scale * scale.transpose())).symmetric_eigen();
         let weakest = eigen.eigenvalues.imax();
         let (direction, length) = (eigen.eigenvectors.column(weakest), eigen.eigenvalues[weakest].sqrt());
         let deviation = direction.component_mul(&scale) * length;
@@ -669,15 +695,21 @@ impl Followed<'_> {
             }
         }
         self.held = None;
-        let lowest = reached.iter().map(|(_, rise)| *rise).fold(0.0, f64::min);
+        let lowest = reached.iter().min_by(|one, other| one.1.total_cmp(&other.1));
+        let fall = lowest.map_or(0.0, |(_, rise)| -rise.min(0.0));
+        let lower = lowest.filter(|_| fall > 1.0).map(|(moved, _)| minimum.x + moved);
         let steps = reached
-            .into_iter()
-            .map(|(moved, rise)| moved / (rise - lowest).max(1.0).sqrt());
+            .iter()
+            .map(|(moved, rise)| moved / (rise + fall).max(1.0).sqrt());
         let length = |step: &Unknowns| function.dot(step).abs();
-        let widest = steps.fold(deviation, |widest, step| {
-            if length(&step) > length(&widest) { step } else { widest }
-        });
-        covariance - deviation * deviation.transpose() + widest * widest.transpose()
+        let widest = steps.fold(
+            deviation,
+            |widest, step| {
+                if length(&step) > length(&widest) { step } else { widest }
+            },
+        );
+        let covariance = covariance - deviation * deviation.transpose() + widest * widest.transpose();
+        (covariance, lower)
     }
 }
 
@@ -767,46 +799,24 @@ pub fn follow(
         least_noise: STRONG,
         held: None,
     };
-    let samples = |stretches: &[Stretch]| {
-        stretches
-            .iter()
-            .map(|Stretch { span: [from, to], .. }| to - from)
-            .sum::<usize>()
+    let all = followed.stretches.clone();
+    let (mut minimum, mut out) = followed.search(x)?;
+    let covariance = loop {
+        let (covariance, lower) = followed.covariance(&minimum);
+        // A narrow valley ends the search early. Farther on, other pieces belong.
+        let mut again = Followed { stretches: all.clone(), ..followed.clone() };
+        let each = |minimum: &Minimum| minimum.chi_square / minimum.residuals.len() as f64;
+        let found = lower.and_then(|lower| again.search(lower));
+        let Some(found) = found.filter(|(next, _)| each(next) < each(&minimum)) else {
+            break covariance;
+        };
+        (minimum, out) = found;
+        followed = again;
     };
-    let whole = samples(&followed.stretches);
-    let mut x = x;
-    let mut out = followed.linearise(&x);
-    let mut found = None;
-    for _ in 0..ROUNDS {
-        out.extend(followed.linearise(&x));
-        let minimum = LeastSquares::minimum(&followed, x, &Vec::new(), FOUND)?;
-        let moved = minimum.x - x;
-        x = minimum.x;
-        let is_first = followed.least_noise > 0.0;
-        followed.least_noise = 0.0;
-        if is_first {
-            continue;
-        }
-        let is_still = minimum
-            .derivatives
-            .iter()
-            .map(|row| row.dot(&moved).powi(2))
-            .sum::<f64>()
-            < STILL;
-        if is_still {
-            let more = followed.cut(&followed.contradicting(&x));
-            if more.is_empty() {
-                found = Some(minimum);
-                break;
-            }
-            out.extend(more);
-        }
-    }
-    let minimum = found.filter(|_| 2 * samples(&followed.stretches) >= whole)?;
-    let innovations: Vec<Vector2<f64>> = followed.each(&x).concat();
+    let innovations: Vec<Vector2<f64>> = followed.each(&minimum.x).concat();
     let count = innovations.len();
     let mut fit = problem.found(&minimum, &minimum.trace);
-    fit.covariance = followed.covariance(&minimum);
+    fit.covariance = covariance;
     fit.degrees = (2 * count + problem.equations()).checked_sub(5 + usize::from(problem.has_scale))?;
     let channel = |i: usize| innovations.iter().map(move |one| one[i]);
     for i in 0..2 {
