@@ -20,9 +20,9 @@ use vines_model::numerics::{Estimate, LeastSquares, Misfit, SIGNIFICANT, mean};
 use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
 
 use super::{
-    Fit, FitError, Known, LEFT_OUT, LIMITS, LinearVerdict, MeasuredPoint, Nearest, Part, Problem, Quantity, REJECTED,
-    RecordFit, Recording, UNKNOWNS, Unknowns, across, at, checked, fit, follow, gradient, linear_verdicts, parts,
-    plant, shifted,
+    FEWEST, Fit, FitError, Known, LEFT_OUT, LIMITS, LinearVerdict, MeasuredPoint, Nearest, Part, Problem, Quantity,
+    REJECTED, RecordFit, Recording, UNKNOWNS, Unknowns, across, at, checked, fit, follow, gradient, linear_verdicts,
+    parts, plant, shifted,
 };
 use crate::linear::MeasuredLinear;
 use crate::scene::{Parameters, Scene};
@@ -339,12 +339,14 @@ pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize))
     let linear = linear_verdicts(linear, &points, definition, expected, known)?;
     let of_linear = linear.iter().map(|one| Known::Linear(one.linear));
     let known: Vec<Known> = known.iter().copied().chain(of_linear).collect();
-    let ideal = fit(&points, definition, expected, &known)?;
     let prepared = recordings.iter().map(|one| one.prepared(&scene.knowledge()));
     let prepared: Vec<Recording> = prepared.collect::<Result<_, _>>()?;
     let record = follow(&prepared, &parts, measured_points, definition, expected, &known)
         .filter(|record| !recordings.is_empty() && !record.fit.is_rejected());
-    let fit = record.as_ref().map_or(ideal, |record| record.fit.clone());
+    let fit = match &record {
+        Some(record) => record.fit.clone(),
+        None => fit(&points, definition, expected, &known)?,
+    };
     let mut found = Found {
         plant: fit.plant(expected),
         fit,
@@ -362,6 +364,9 @@ pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize))
         // The points are shown beside the fit of the record.
         found.fit.residuals = beside.residuals;
         found.fit.left_out.clear();
+    }
+    if points.len() < FEWEST {
+        return Ok(found);
     }
     if !found.fit.is_rejected() && found.fit.left_out.is_empty() {
         let problem = Problem::new(points.clone(), definition, &known);

@@ -757,7 +757,9 @@ fn start(
         }
     });
     let known: Vec<Known> = known.iter().copied().chain(wide).collect();
-    let fit = fit(&points, definition, expected, &known).ok()?;
+    // With what is expected, a single point is enough.
+    let of_few = |_| Problem::new(points.clone(), definition, &known).fit(expected);
+    let fit = fit(&points, definition, expected, &known).or_else(of_few).ok()?;
     let mut x = unknowns(&fit.plant(expected));
     x[6] = JUMP.value;
     Some(x)
