@@ -332,7 +332,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             return Err(ExperimentError::NoDrive);
         }
         Ok(Self {
-            rig: Scaled::controlled(rig, &plan.knowledge),
+            rig: Scaled::controlled(rig, &plan.knowledge, config.delay),
             controller,
             plan,
             config,

@@ -91,9 +91,7 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
     let begins = rig.readings.len();
     rig.drive(driven, omega, amplitude)?;
     let ends = rig.readings.len();
-    // The phase of the rig's oscillator ends at a multiple of 2 pi.
-    let last = (TAU - rig.phase % TAU) / (samples(1) as f64 * step);
-    rig.drive(samples(1), last, 0.0)?;
+    rig.end(samples(1))?;
     let OpenLoop { mut readings, has_base, .. } = rig;
     readings.truncate(ends);
     without_drift(&mut readings[begins..]);
@@ -205,6 +203,12 @@ struct OpenLoop<'a, R: ?Sized> {
 }
 
 impl<R: Rig + ?Sized> OpenLoop<'_, R> {
+    /// Takes `samples` without a drive, at whose end the phase of the rig's oscillator is a multiple of 2 pi, as at the start of a controller.
+    fn end(&mut self, samples: usize) -> Result<(), RigError> {
+        let last = (TAU - self.phase % TAU) / (samples as f64 * self.step);
+        self.drive(samples, last, 0.0)
+    }
+
     /// Drives with a frequency, rad/s, and an amplitude, m, and keeps the readings.
     fn drive(&mut self, samples: usize, omega: f64, amplitude: f64) -> Result<(), RigError> {
         for _ in 0..samples {

@@ -68,6 +68,7 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
     for omega in frequencies {
         all.push(steady(omega)?);
     }
+    rig.end(window(linear.omega0) / WINDOW[0])?;
     let near = &all[..PLACES.len()];
     let (_, at, noise) = near[PLACES.len() / 2];
     // The curve of R/D.
@@ -119,7 +120,8 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
     let values: Vec<(f64, Complex64)> = frequencies
         .into_iter()
         .zip(&all)
-        .map(|(omega, (_, both, _))| (omega, both[1] / amplitude))
+        // The control takes what readings are late from their phase.
+        .map(|(omega, (_, both, _))| (omega, both[1] / amplitude * Complex64::cis(omega * plan.lock.delay)))
         .collect();
     let path = stated.fitted(natural, damping, &values);
     measured.shaker = Some(path);

@@ -58,6 +58,8 @@ pub(crate) struct ReferenceControl {
     /// Response over `z`, 1/s.
     gain: Complex64,
     target: Target,
+    /// Time by which the readings are late, s.
+    delay: f64,
     /// Phase of the controller's oscillator, and of the rig's, rad.
     phases: [f64; 2],
     /// What was asked for in the last sample, m.
@@ -79,13 +81,14 @@ pub(crate) struct ReferenceControl {
 }
 
 impl ReferenceControl {
-    /// The control of a rig of which this is known; `None` without a shaker.
-    pub fn new(knowledge: &Knowledge) -> Option<Self> {
+    /// The control of a rig of which this is known, with readings that are late by `delay` seconds; `None` without a shaker.
+    pub fn new(knowledge: &Knowledge, delay: f64) -> Option<Self> {
         Some(Self {
             path: knowledge.shaker()?,
             omega0: knowledge.linear.omega0,
             damping_rate: knowledge.linear.damping_rate,
             target: knowledge.target,
+            delay,
             phases: [0.0; 2],
             asked: 0.0,
             gain: knowledge.linear.gain,
@@ -107,16 +110,16 @@ impl ReferenceControl {
     pub fn command(&mut self, [response, reading]: [f64; 2], drive: Drive, step: f64) -> Result<Drive, RigError> {
         let Drive { omega, amplitude, .. } = drive;
         let [of_response, displacement] = [0, 1].map(|channel| self.target.displacement(channel, omega));
-        let rotor = Complex64::cis(self.phases[0]);
-        let error = (self.asked / displacement * rotor).im - reading;
+        let phase = self.phases[0] - self.delay * omega;
+        let error = (self.asked / displacement * Complex64::cis(phase)).im - reading;
         // A reading that is no number is the controller's to refuse.
         if error.is_finite() && response.is_finite() {
             let rate = self.path.pole + Complex64::new(0.0, omega - self.omega0);
             let driven = self.gain * self.path.gain * self.command / of_response;
             self.response.phasors[0] += step * (driven - rate * self.response.phasors[0]);
             let share = |bandwidth: f64| 1.0 - (-bandwidth * self.omega0 * step).exp();
-            self.error.take(error, self.phases[0], share(DETECTOR));
-            self.response.take(response, self.phases[0], share(OBSERVER));
+            self.error.take(error, phase, share(DETECTOR));
+            self.response.take(response, phase, share(OBSERVER));
         }
         let error = self.error.phasors[0] * displacement;
         let moved = (self.path.pole - self.damping_rate) / self.gain * self.response.phasors[0] * of_response;

@@ -158,9 +158,10 @@ impl<'a, R: Rig + ?Sized> Scaled<'a, R> {
         Self { rig, target, control: None, readings: [0.0; 2] }
     }
 
-    /// The rig `rig`, which is driven with the reference, as far as `knowledge` says what its shaker makes of a command.
-    pub fn controlled(rig: &'a mut R, knowledge: &Knowledge) -> Self {
-        let control = ReferenceControl::new(knowledge);
+    /// The rig `rig`, which is driven with the reference, as far as `knowledge` says what its shaker makes of a command. Its readings are late by
+    /// `delay` seconds.
+    pub fn controlled(rig: &'a mut R, knowledge: &Knowledge, delay: f64) -> Self {
+        let control = ReferenceControl::new(knowledge, delay);
         Self { control, ..Self::new(rig, knowledge.target) }
     }
 

@@ -8,8 +8,8 @@ use lovines::{Drive, Plant, StructureState};
 use num_complex::Complex;
 use vines_testbench::backbone::track;
 use vines_testbench::comparison::COMPARED_ABOVE;
-use vines_testbench::experiment::ExperimentError;
-use vines_testbench::identification::{WINDOW, decay_points};
+use vines_testbench::experiment::{ExperimentError, run};
+use vines_testbench::identification::{WINDOW, decay_points, identify};
 use vines_testbench::loop_check::{Verdict, check};
 use vines_testbench::rig::{BuiltIn, RigError, RigFault, SensorFault, Sensors, SensorsOnly, Simulated, faulty};
 use vines_testbench::scene::{Scene, SceneError, StructureMode};
@@ -201,6 +201,30 @@ fn a_check_behind_a_shaker_measures_the_structure_and_names_a_fault() {
             };
             assert_eq!(check(&mut rig, &plan).unwrap().verdict, expected, "preset {n}");
         }
+    }
+}
+
+/// The check leaves the rig's oscillator where a controller expects it: a command of another phase would be a force that does not follow. An
+/// anti-alias filter makes the readings late, which the control knows.
+#[test]
+fn a_rig_that_was_checked_locks_also_behind_a_filter() {
+    // The filter (Butterworth, second order) makes readings smaller.
+    let behind = (1.0 + 4_f64.powi(-4)).sqrt().recip();
+    for (filter, gain) in [("", 1.0), ("[chain]\nfilter = 4.0\n", behind)] {
+        let scene = preset(0, &[("[start]", &format!("{filter}[start]"))]).unwrap();
+        let mut rig = SensorsOnly::around(Simulated::of(&scene).unwrap());
+        let linear = check(&mut rig, &scene.plan()).unwrap().linear.unwrap();
+        let plan = scene.plan_on(scene.knowledge().measured(linear.response()));
+        let mut controller = BuiltIn::new(&plan.lock).unwrap();
+        let record = run(&mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
+        let at = identify(&record, &plan).unwrap().lock.at;
+        let driven = Scene { amplitude: scene.amplitude / gain, ..scene };
+        let orbits = phase_resonant(&driven, &driven.dimensionless());
+        let nearest = orbits
+            .iter()
+            .map(|orbit| (orbit.c - at.c / gain).abs())
+            .fold(f64::INFINITY, f64::min);
+        assert!(nearest < 1e-3, "{filter}: C = {} ± {}, {nearest}", at.c, at.u_c);
     }
 }
 
