@@ -160,6 +160,9 @@ def _overrides(sections: Mapping[str, Mapping[str, Any]]) -> list[str]:
 
 
 def _toml(name: str, given: Any) -> str:
+    if isinstance(given, Mapping):
+        pairs = [f"{json.dumps(key)} = {_toml(f'{name}.{key}', value)}" for key, value in given.items()]
+        return f"{{ {', '.join(pairs)} }}"
     try:
         value = scalar(given)
         if isinstance(value, (bool, int, str)):
