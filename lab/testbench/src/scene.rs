@@ -412,6 +412,15 @@ impl Sections {
             );
             return Err(SceneError::text(origin, message));
         }
+        let is_force = |one: &Structure| one.excitation == Excitation::Force;
+        if scene.structure().is_some_and(is_force) && reference_quantity != Measurand::Displacement {
+            let name = reference_quantity.name();
+            let message = format!(
+                "resonance.reference_quantity = \"{name}\" where a force drives the structure: the reference is this force; drop the key, which belongs to \
+                 a base"
+            );
+            return Err(SceneError::text(origin, message));
+        }
         let fastest = scene.controller.omega_max * scene.dimensionless().omega0;
         lovines::Drive::harmonic(scene.amplitude, fastest)
             .validate()

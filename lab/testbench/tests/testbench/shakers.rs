@@ -401,6 +401,12 @@ fn what_is_wrong_with_a_shaker_is_said_in_one_sentence() {
         (0, "current_max = 15.0", "current_max = 0.1", ["current_max", "A"]),
         (0, "stroke_max = 0.0088", "stroke_max = 1e-5", ["stroke_max", "m"]),
         (1, "M = 3.807", "", ["M", "SI"]),
+        (
+            0,
+            "[start]",
+            "[resonance]\nreference_quantity = \"acceleration\"\n[start]",
+            ["reference_quantity", "the reference is this force"],
+        ),
         (2, "table_mass = 40.0", "table_mass = 0", ["end of the stinger", "kg"]),
         (
             2,
