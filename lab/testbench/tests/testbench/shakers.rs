@@ -11,7 +11,10 @@ use vines_testbench::comparison::COMPARED_ABOVE;
 use vines_testbench::experiment::{ExperimentError, run};
 use vines_testbench::identification::{WINDOW, decay_points, identify};
 use vines_testbench::loop_check::{Verdict, check};
-use vines_testbench::rig::{BuiltIn, RigError, RigFault, SensorFault, Sensors, SensorsOnly, Simulated, faulty};
+use vines_testbench::rig::{
+    BuiltIn, Command, Controller, ControllerError, RigError, RigFault, SensorFault, Sensors, SensorsOnly, Simulated,
+    faulty,
+};
 use vines_testbench::scene::{Scene, SceneError, StructureMode};
 use vines_testbench::survey::{BehindShaker, Survey, phase_resonant};
 
@@ -245,25 +248,50 @@ fn a_limit_that_is_reached_ends_the_experiment_with_its_name() {
     }
 }
 
+/// A controller that asks for more than the drive of the scene in the first samples, and for less afterwards.
+struct Excessive {
+    samples: usize,
+    drive: vines_testbench::rig::Drive,
+}
+
+/// Fewer samples than a period has, for which a command may stay at its limit.
+const AT_LIMIT: usize = 60;
+
+impl Controller for Excessive {
+    fn sample(&mut self, _: Sensors, active: bool) -> Result<Command, ControllerError> {
+        self.samples += 1;
+        let share = match active {
+            true if self.samples <= AT_LIMIT => 1.5,
+            true => 0.8,
+            false => 0.0,
+        };
+        let amplitude = share * self.drive.amplitude;
+        let drive = vines_testbench::rig::Drive { amplitude, ..self.drive };
+        Ok(Command {
+            drive,
+            settled: Some(self.samples > 2 * AT_LIMIT),
+            ..Command::default()
+        })
+    }
+}
+
 #[test]
 fn the_share_of_clipped_samples_is_that_of_the_commands_at_the_limit() {
-    let scene = preset(0, &[("voltage_max = 40.0", "voltage_max = 10.0")]).unwrap();
-    let structure = scene.structure.as_ref().unwrap();
-    let limit = structure.shaker.as_ref().unwrap().largest_command() * structure.base_per_command();
-    let counted = Rc::new(Cell::new(0));
-    let count = Rc::clone(&counted);
-    let mut rig = Altered {
-        rig: Simulated::of(&scene).unwrap(),
-        read: Box::new(Ok),
-        drive: Box::new(move |drive, step| {
-            count.set(count.get() + u32::from(drive.amplitude > limit * (1.0 - 1e-9)));
-            (drive, step)
-        }),
-    };
-    let record = record(&mut rig, &scene).unwrap();
-    let share = 100.0 * f64::from(counted.get()) / record.released as f64;
+    let scene = preset(0, &[("voltage_max = 40.0", "voltage_max = 4.5")]).unwrap();
+    let (omega, amplitude) = (scene.dimensionless().omega0, scene.amplitude);
+    let drive = vines_testbench::rig::Drive { omega, amplitude, displacement: 0.0 };
+    let mut controller = Excessive { samples: 0, drive };
+    let plan = scene.plan();
+    let record = run(
+        &mut *Simulated::of(&scene).unwrap(),
+        &mut controller,
+        &plan,
+        |_, _, _| {},
+    )
+    .unwrap();
+    let expected = 100.0 * AT_LIMIT as f64 / record.released as f64;
     let stated = record.clipped_percent.unwrap();
-    assert!(share > 0.1 && (stated - share).abs() < 1e-12, "{stated} {share}");
+    assert!((stated - expected).abs() < 1e-9, "{stated} {expected}");
 }
 
 #[test]
