@@ -757,7 +757,7 @@ fn start(
         }
     });
     let known: Vec<Known> = known.iter().copied().chain(wide).collect();
-    // With what is expected, a single point is enough.
+    // With what is expected, two points are enough.
     let of_few = |_| Problem::new(points.clone(), definition, &known).fit(expected);
     let fit = fit(&points, definition, expected, &known).or_else(of_few).ok()?;
     let mut x = unknowns(&fit.plant(expected));
