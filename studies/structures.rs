@@ -7,9 +7,10 @@
 //!
 //! `correct` counts locks of a constant drive within 2e-3 in sigma and C of a stable orbit, or within 3 u of it. `held` counts those whose
 //! response stays under control, of which the result says so: its drive is measured, and within 2e-3 of the requested one there is an exact
-//! orbit, as near and stable. `held_unstable` counts those near an orbit that is not stable at a fixed frequency. A constant drive near such an
-//! orbit is `stabilised` if the phase loop keeps it for as long as a disturbance of 1e-6 would need to grow to 1, and otherwise `steady`. `wrong`
-//! are near no orbit.
+//! orbit, as near and stable. Both are locks at the drive that was asked for. `held_unstable` counts those near an orbit that is not stable at a
+//! fixed frequency. A constant drive near such an orbit is `stabilised` if the phase loop keeps it for as long as a disturbance of 1e-6 would need
+//! to grow to 1. Otherwise it is `unseen` if the result says that it does not exclude this growth, and `steady` if it does not say so. `wrong` are
+//! near no orbit.
 //!
 //! Arguments: STRUCTURES (of each kind), SEED. Writes validation/structures.csv. With `stable` or `unstable` it runs this kind alone; with numbers of
 //! structures behind it these alone: it then says what the loop did, and writes nothing.
@@ -37,6 +38,7 @@ enum Outcome {
     Held,
     HeldUnstable,
     Stabilised,
+    Unseen,
     Steady,
 }
 
@@ -174,11 +176,16 @@ fn lock(scene: &Scene, is_stable: bool) -> (Outcome, [f64; 2], f64, String) {
             // Two half periods.
             plan.hold = plan.knowledge.samples(-SMALL.ln() / (2.0 * growth.ln()));
             let stays = locked(&plan).is_ok_and(|(_, later)| (later.lock.at.c - at.c).abs() <= TOLERANCE);
-            if stays { Outcome::Stabilised } else { Outcome::Steady }
+            // A multiplier is that of half a period.
+            match growth * growth - 1.0 <= found.lock.unseen_growth {
+                _ if stays => Outcome::Stabilised,
+                true => Outcome::Unseen,
+                false => Outcome::Steady,
+            }
         }
     };
     let found = format!(
-        "sigma {:.5} +- {:.5}, C {:.5} +- {:.5}, G {:.5} of {:.5}, {}{}",
+        "sigma {:.5} +- {:.5}, C {:.5} +- {:.5}, G {:.5} of {:.5}, {}{}, unseen growth {:.4}",
         at.sigma,
         at.u_sigma,
         at.c,
@@ -186,7 +193,8 @@ fn lock(scene: &Scene, is_stable: bool) -> (Outcome, [f64; 2], f64, String) {
         at.g,
         d.g,
         found.lock.regime,
-        if record.held { ", held" } else { "" }
+        if record.held { ", held" } else { "" },
+        found.lock.unseen_growth
     );
     (outcome, errors, periods, found)
 }
@@ -257,6 +265,7 @@ fn main() -> Result<(), Failure> {
             Outcome::Held,
             Outcome::HeldUnstable,
             Outcome::Stabilised,
+            Outcome::Unseen,
             Outcome::Steady,
         ]
         .map(of);
@@ -287,6 +296,6 @@ fn main() -> Result<(), Failure> {
     if rows.is_empty() {
         return Ok(());
     }
-    let header = "structures,seed,orbits,correct,wrong,refused,held,held_unstable,stabilised,steady,median_error,worst_error,median_periods,worst_periods";
+    let header = "structures,seed,orbits,correct,wrong,refused,held,held_unstable,stabilised,unseen,steady,median_error,worst_error,median_periods,worst_periods";
     write("structures", header, 3, &rows)
 }

@@ -183,7 +183,7 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let theory = result.theory.map(|point| row(name, [point.sigma, point.c, point.b]));
     let table = Table::new(" | sigma | C | B").rows([measured]).rows(exact).rows(theory);
     let held = match lock.held {
-        true => " (the response is held by control: a constant drive would not hold it)",
+        true => " (the response is held by control: a constant drive holds it hardly, or not)",
         false => "",
     };
     let mut text = format!(
@@ -199,6 +199,11 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     );
     text += SYMBOLS;
     let mut note = |note: &str| text += &format!("  ({note})\n");
+    note(&format!(
+        "steady over {} periods, which would not show a disturbance that grows by less than {:.1} % per period",
+        lock.averaged,
+        100.0 * lock.unseen_growth
+    ));
     if let Some(friction) = lock.friction {
         note(&friction_text(&friction));
     }

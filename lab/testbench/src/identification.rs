@@ -110,9 +110,12 @@ pub struct Lock {
     pub u_b: Option<f64>,
     /// Number of periods that sigma and C are estimated from: the hold, and the periods before it with about the same amplitude.
     pub averaged: usize,
+    /// Growth of a disturbance per period, relative, up to which these periods would not show it: from [`SMALLEST`] to the deviation that ends
+    /// them.
+    pub unseen_growth: f64,
     /// From the start to the settled lock, in periods of the locked motion.
     pub periods_to_lock: f64,
-    /// Whether control holds the response, because a constant drive would not.
+    /// Whether control holds the response, because a constant drive would hold it hardly, or not.
     pub held: bool,
     /// Impacts per period; NaN if the rig does not report them.
     pub impacts_per_period: f64,
@@ -170,6 +173,8 @@ const MOST: f64 = 240.0;
 /// Largest relative deviations from the amplitude of the hold, in addition to noise: of the periods from which the lock is evaluated, and of
 /// those from which the slopes of drive and frequency over the amplitude are evaluated.
 const SPREADS: [f64; 2] = [0.008, 0.1];
+/// Smallest disturbance of a motion, relative to the response: less than the noise of any rig.
+const SMALLEST: f64 = 1e-6;
 /// Relative uncertainty of these slopes, because the backbone is curved within the second deviation.
 const SLOPE_UNCERTAINTY: f64 = 0.3;
 /// Largest phase error of a period that is evaluated, rad: the balances are of the first order in it.
@@ -211,6 +216,7 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
         b: b.map(|b| b.value),
         u_b: b.map(|b| b.uncertainty),
         averaged: approach.len(),
+        unseen_growth: (SPREADS[0] / SMALLEST).powf(1.0 / approach.len() as f64) - 1.0,
         periods_to_lock: record.settled as f64 * dt * omega.value / TAU,
         held: record.held,
         impacts_per_period,

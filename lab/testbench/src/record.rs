@@ -75,7 +75,7 @@ pub struct Record {
     pub samples: Vec<Sample>,
     /// Index of the sample at which the lock had settled.
     pub settled: usize,
-    /// Whether the response is held by control, because the requested drive alone would not hold it.
+    /// Whether the response is held by control, because the requested drive alone would hold it hardly, or not.
     pub held: bool,
     /// Index of the first sample with the drive off.
     pub released: usize,
