@@ -110,7 +110,7 @@ pub struct Lock {
     pub u_b: Option<f64>,
     /// Number of periods that sigma and C are estimated from: the hold, and the periods before it with about the same amplitude.
     pub averaged: usize,
-    /// Growth of a disturbance per period, relative, up to which these periods would not show it: from [`SMALLEST`] to the deviation that ends
+    /// Growth of a disturbance per period, relative, up to which these periods would not show it: from 1e-6 of the response to the deviation that ends
     /// them.
     pub unseen_growth: f64,
     /// From the start to the settled lock, in periods of the locked motion.
