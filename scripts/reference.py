@@ -37,7 +37,7 @@ COLUMNS = {
     "level": "requested level, C",
     "periods": "periods spent on this level",
     "averaged": "periods that the result is averaged over",
-    "unseen_growth": "growth of a disturbance per period, relative, that these periods would not show (from 1e-6 to 0.8 %)",
+    "unseen_growth": "growth of a disturbance per period, relative, that they would not show (from 1e-6 to 0.8 %)",
     "settled": "whether all uncertainties are within backbone.precision",
     "reached": "whether the response reached the level; if not, the drive is at a limit",
     "held": "whether the response is under control at the lock, not the drive",
