@@ -395,7 +395,9 @@ impl StructureSection {
             [false, false, true] => self.of_residues(folder)?,
             _ => {
                 return Err(
-                    "give exactly one description: `modes`, the matrices `M`, `C` and `K`, or `residues`".into(),
+                    "give exactly one description: `modes`, the matrices `M`, `C` and `K`, or `residues` (one oscillator is [plant], and what is mounted on it \
+                     belongs to its M)"
+                        .into(),
                 );
             }
         };
