@@ -3,6 +3,7 @@
 
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
+import { once } from "node:events";
 import { createServer } from "node:http";
 import { mkdir, readFile, readdir, rm, stat } from "node:fs/promises";
 import { tmpdir } from "node:os";
@@ -52,6 +53,14 @@ async function started(args, output, first) {
     if (found) return { child, found: found[0] };
   }
   throw new Error(`vines ${args[0]} has ended without ${first}`);
+}
+
+// Ends it, so that it writes no more.
+async function ended({ child }) {
+  if (child.exitCode !== null || child.signalCode !== null) return;
+  const exit = once(child, "exit");
+  child.kill();
+  await exit;
 }
 
 test("the module has at most 200 KB", async () => {
@@ -748,8 +757,7 @@ for (const { name, options } of BROWSERS) {
         assert.deepEqual(errors, []);
         await pages[0].close();
       } finally {
-        experiment.child.kill();
-        rig.child.kill();
+        await Promise.all([experiment, rig].map(ended));
         await rm(out, { recursive: true, force: true });
       }
     });
@@ -777,8 +785,7 @@ for (const { name, options } of BROWSERS) {
         await page.screenshot({ path: join(SCREENS, `${name}-watch-shaker.png`), fullPage: true });
         await page.close();
       } finally {
-        experiment.child.kill();
-        rig.child.kill();
+        await Promise.all([experiment, rig].map(ended));
         await rm(out, { recursive: true, force: true });
       }
     });

@@ -362,7 +362,6 @@ fn squares(values: &[f64]) -> Option<f64> {
 pub struct HarmonicBasis {
     matrix: DMatrix<f64>,
     factors: QR<f64, Dyn, Dyn>,
-    weights: Option<DVector<f64>>,
     /// Column of each harmonic's constant part.
     columns: Vec<usize>,
 }
@@ -393,7 +392,7 @@ impl HarmonicBasis {
             let wave = if cosine { angle.cos() } else { angle.sin() };
             time(row).powi(degree as i32) * wave
         });
-        Self { factors: matrix.clone().qr(), matrix, weights: None, columns }
+        Self { factors: matrix.clone().qr(), matrix, columns }
     }
 
     /// With rows weighted by these; values are to be weighted alike.
@@ -402,11 +401,7 @@ impl HarmonicBasis {
         for mut column in self.matrix.column_iter_mut() {
             column.component_mul_assign(weights);
         }
-        Self {
-            factors: self.matrix.clone().qr(),
-            weights: Some(weights.clone()),
-            ..self
-        }
+        Self { factors: self.matrix.clone().qr(), ..self }
     }
 
     /// Number of unknowns.
@@ -427,17 +422,18 @@ impl HarmonicBasis {
         Some(HarmonicFit { coefficients, columns: self.columns.clone() })
     }
 
-    /// Variances of a harmonic's sine and cosine coefficient of this degree, for values with white noise of variance 1 before they are weighted; NaN
-    /// where the terms are not independent. `harmonic` counts from 1.
-    pub fn variances(&self, harmonic: usize, degree: usize) -> [f64; 2] {
+    /// Variances of a harmonic's sine and cosine coefficient of this degree, for values with white noise of variance 1 before they are weighted, if
+    /// they are, by `weights`; NaN where the terms are not independent. `harmonic` counts from 1.
+    pub fn variances(&self, harmonic: usize, degree: usize, weights: Option<&DVector<f64>>) -> [f64; 2] {
         let column = self.columns[harmonic - 1] + 2 * degree;
         let identity = DMatrix::identity(self.terms(), self.terms());
         let Some(inverse) = self.factors.r().solve_upper_triangular(&identity) else {
             return [f64::NAN; 2];
         };
-        let variance = |row: usize| match &self.weights {
+        let variance = |row: usize| match weights {
             None => inverse.row(row).norm_squared(),
-            Some(weights) => (self.factors.q() * inverse.row(row).transpose())
+            // Q is the matrix times the inverse of R.
+            Some(weights) => (&self.matrix * (&inverse * inverse.row(row).transpose()))
                 .component_mul(weights)
                 .norm_squared(),
         };

@@ -251,8 +251,7 @@ fn harmonic_of(values: &[f64], sample_time: f64, omega: f64, terms: Terms) -> Op
     let middle = 0.5 * (values.len() - 1) as f64;
     let count = values.len() as f64;
     // Their squares are Hann's window, whose mean is a half.
-    let weights = terms
-        .is_hann
+    let weights = (cfg!(feature = "tables") && terms.is_hann)
         .then(|| DVector::from_fn(values.len(), |n, _| (PI * (n as f64 + 0.5) / count).sin()));
     let mut right = DVector::from_column_slice(values);
     let share = if let Some(weights) = &weights {
@@ -293,7 +292,8 @@ fn harmonic_of(values: &[f64], sample_time: f64, omega: f64, terms: Terms) -> Op
     let amplitude = a.norm_sqr().sqrt();
     let degrees = (values.len() - basis.terms()) as f64;
     let noise = (basis.residual(&right, &fit).norm_squared() / (share * degrees)).sqrt();
-    let largest = |degree: usize| basis.variances(1, degree).into_iter().fold(0.0, f64::max).sqrt();
+    let variances = |degree: usize| basis.variances(1, degree, weights.as_ref()).into_iter();
+    let largest = |degree: usize| variances(degree).fold(0.0, f64::max).sqrt();
     Some(Harmonic {
         amplitude,
         phase: a.arg(),
