@@ -41,7 +41,17 @@ pub trait Motion {
     fn series(&self) -> Series;
 
     /// What happens `t` seconds after the start; `series` is that of this motion.
-    fn at(&self, series: &Series, t: f64) -> Instant<Self::Look>;
+    fn at(&self, series: &Series, t: f64) -> Instant<Self::Look> {
+        // Every search begins with a look at the start.
+        if t == 0.0 {
+            let derivatives = self.derivatives_at_start();
+            return Instant { moved: 0.0, departure: (0.0, 0.0), derivatives };
+        }
+        self.later(series, t)
+    }
+
+    /// The same for `t` above 0.
+    fn later(&self, series: &Series, t: f64) -> Instant<Self::Look>;
 
     /// How long `gap`, to the wall of the sign `sign`, is certainly open during a flight, s, at most `window`.
     fn certainly_open(&self, _sign: f64, gap: &Gap, d: &Self::Look, window: f64) -> f64 {
@@ -197,7 +207,7 @@ impl Motion for Segment {
         Series { coefficients: c, reach: SERIES_REACH / self.fastest() }
     }
 
-    fn at(&self, series: &Series, t: f64) -> Instant<Derivatives> {
+    fn later(&self, series: &Series, t: f64) -> Instant<Derivatives> {
         if t <= series.reach {
             let (dx, dv) = series.departure(t);
             let (sin, cos) = sincos_of_product((self.omega(), 0.0), t);

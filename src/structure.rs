@@ -451,7 +451,7 @@ impl Motion for SumOfSections {
         Series { coefficients: sum, reach: SERIES_REACH / self.fastest }
     }
 
-    fn at(&self, series: &Series, t: f64) -> Instant<SumLook> {
+    fn later(&self, series: &Series, t: f64) -> Instant<SumLook> {
         let (states, u) = self.after(t);
         let derivatives = self.look(states, &u);
         let [x0, v0] = [self.start[0], self.start[1]];
