@@ -20,7 +20,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Complex, DVector};
+use nalgebra::{Complex, DMatrix, DVector};
 use vines_model::numerics::{Estimate, HarmonicBasis, Regression, mean, slope};
 
 use super::harmonics_of;
@@ -84,6 +84,10 @@ impl ResonanceFit {
         if cycles.len() < Self::FEWEST {
             return None;
         }
+        let cleaned = knowledge
+            .shaker()
+            .map(|_| without_aliases(cycles, knowledge.sample_time));
+        let cycles = cleaned.as_deref().unwrap_or(cycles);
         let LinearResponse { omega0, damping_rate, .. } = knowledge.linear;
         let omega = mean(cycles.iter().map(|cycle| cycle.omega));
         let growth = knowledge.growth(omega);
@@ -252,6 +256,77 @@ fn motion(cycles: &[Cycle]) -> Vec<PeriodResponse> {
             }
         })
         .collect()
+}
+
+/// Multiples of the sampling rate whose neighbours [`without_aliases`] takes for aliased.
+const ALIASES: i32 = 2;
+/// Rounds in which it finds the noise: each keeps the share of it that a short window cannot tell from the beats.
+const ALIAS_ROUNDS: usize = 4;
+
+/// The same periods without what the edges of a shaker's force alias into its fundamental.
+///
+/// Of N samples per period, harmonics q N - 1 and q N + 1 look like the fundamental, and turn against it by the fraction of q N in each period: beats
+/// of known frequencies, whose amplitudes fall as 1/q. They are fitted beside a straight line, and removed. The noise of the periods becomes what the
+/// mean has of it, with what stays in the mean of that part of the residuals which does not change it from period to period: a beat of less
+/// than a turn in each half of the window, which looks like a transient, and the sample by which a period is not a whole number of them.
+fn without_aliases(cycles: &[Cycle], sample_time: f64) -> Vec<Cycle> {
+    let n = cycles.len() as f64;
+    let in_period = TAU / (mean(cycles.iter().map(|cycle| cycle.omega)) * sample_time);
+    let turns = |order: &i32| {
+        let turn = f64::from(*order) * in_period;
+        n * (turn - turn.round()).abs()
+    };
+    let (beats, slow): (Vec<i32>, Vec<i32>) = (1..=ALIASES).partition(|order| turns(order) >= 2.0);
+    let beat = |cycle: &Cycle| {
+        let turned = in_period.round() * cycle.drive_phase - TAU * (cycle.time / sample_time).fract();
+        Complex::cis(turned)
+    };
+    let rows = DMatrix::from_fn(cycles.len(), 2 + 2 * beats.len(), |k, column| match column {
+        0 => Complex::ONE,
+        1 => Complex::from((k as f64 - 0.5 * (n - 1.0)) / n),
+        _ => {
+            let order = beats[column / 2 - 1];
+            beat(&cycles[k]).powi(if column % 2 == 0 { order } else { -order })
+        }
+    });
+    let base = DVector::from_iterator(cycles.len(), cycles.iter().map(|cycle| cycle.base));
+    let (products, right) = (rows.ad_mul(&rows), rows.ad_mul(&base));
+    let prior = mean(cycles.iter().map(|cycle| cycle.noise[1]));
+    let (mut noise, mut found) = (prior, None);
+    for _ in 0..ALIAS_ROUNDS {
+        let mut normal = products.clone();
+        for (n, order) in beats.iter().enumerate() {
+            let weight = noise / prior * f64::from(order * order);
+            for column in [2 + 2 * n, 3 + 2 * n] {
+                normal[(column, column)] += weight;
+            }
+        }
+        let Some(inverse) = normal.try_inverse() else { break };
+        let coefficients = &inverse * &right;
+        let rest = (&base - &rows * &coefficients).norm_squared();
+        let variance = noise * inverse[(0, 0)].re;
+        // Expectation maximisation: a coefficient takes its share of the noise with it. Of two components each.
+        noise = (0.5 * rest + noise * (inverse * &products).trace().re) / n;
+        found = Some((coefficients, variance));
+    }
+    let Some((mut coefficients, variance)) = found else {
+        return cycles.to_vec();
+    };
+    let shares = slow.iter().map(|order| f64::from(*order)).chain([in_period]);
+    let stays: f64 = shares.map(|share| (prior - noise).max(0.0) / (share * share)).sum();
+    coefficients.rows_mut(0, 2).fill(Complex::ZERO);
+    let aliased = rows * coefficients;
+    let cleaned = cycles.iter().zip(&aliased).map(|(cycle, aliased)| {
+        let base = cycle.base - aliased;
+        Cycle {
+            base,
+            commanded: [base, cycle.commanded[1]],
+            phase_error: cycle.phase_error - (base * cycle.base.conj()).arg(),
+            noise: [cycle.noise[0], n * (variance + stays)],
+            ..*cycle
+        }
+    });
+    cleaned.collect()
 }
 
 /// Integral over time from the first value on, by the trapezoidal rule.
@@ -439,5 +514,47 @@ impl Cycle {
     /// Amplitude of the response, m.
     pub fn amplitude(&self) -> f64 {
         self.response.norm()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::{Command, Drive, Sensors};
+
+    #[test]
+    fn edges_that_alias_do_not_move_the_force_of_a_window() {
+        let target = Target {
+            phase: -std::f64::consts::FRAC_PI_2,
+            measurands: [Measurand::Displacement; 2],
+            omega0: 1.0,
+            through_shaker: true,
+        };
+        for in_period in [100.03, 100.1, 100.3, 100.51, 100.97] {
+            let sample_time = TAU / in_period;
+            let samples: Vec<Sample> = (0..6060)
+                .map(|n| {
+                    let time = f64::from(n) * sample_time;
+                    // A sine and an edge, whose fundamental is 4/pi of its height.
+                    let force = time.sin() + 0.2 * (time + 0.3).sin().signum();
+                    let sensors = Sensors { response: -time.cos(), reference: Some(force) };
+                    let drive = Drive { omega: 1.0, amplitude: 1.0, displacement: 0.0 };
+                    let command = Command { drive, ..Command::default() };
+                    Sample { time, sensors, command, ..Sample::default() }
+                })
+                .collect();
+            let cycles = Cycle::all(&samples, sample_time, target);
+            let n = cycles.len() as f64;
+            let exact = Complex::<f64>::ONE + Complex::from_polar(0.8 / std::f64::consts::PI, 0.3);
+            let cleaned = without_aliases(&cycles, sample_time);
+            let sum: Complex<f64> = cleaned.iter().map(|cycle| cycle.base - exact).sum();
+            let error = sum / n;
+            let u = (cleaned[0].noise[1] / n).sqrt();
+            let as_noise = (mean(cycles.iter().map(|cycle| cycle.noise[1])) / n).sqrt();
+            assert!(error.norm() < 3.0 * u, "{in_period}: {:e} ± {u:e}", error.norm());
+            // Where the beats are fast, they do not look like noise.
+            let is_slow = [100.03, 100.51, 100.97].contains(&in_period);
+            assert!(is_slow || u < 0.4 * as_noise, "{in_period}: {u:e}, {as_noise:e}");
+        }
     }
 }
