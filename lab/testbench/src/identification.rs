@@ -44,6 +44,11 @@ pub enum IdentificationError {
         tolerance: f64,
     },
     #[error(
+        "the response has not come to rest under its drive: from {held:.4e} m it may go on by {farthest:.1e} m, and of more than {allowed:.1e} m the \
+         record says nothing. Hold it longer (record.hold_periods), or ask for a drive farther from the fold of the backbone"
+    )]
+    Moving { held: f64, farthest: f64, allowed: f64 },
+    #[error(
         "a sensor {what} {seconds:.3} s after the release, so that the decay is not recorded: check its cable and converter"
     )]
     SensorAfterRelease { seconds: f64, what: &'static str },
@@ -66,7 +71,7 @@ pub struct Identification {
 /// A lock in another regime than the symmetric 1:1 one, or no motion.
 pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, IdentificationError> {
     let knowledge = plan.knowledge;
-    let lock = measure(record, &knowledge).ok_or(IdentificationError::NoMotion)?;
+    let (lock, held) = measure(record, &knowledge).ok_or(IdentificationError::NoMotion)?;
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
     let is_expected = match lock.regime {
         Regime::Symmetric | Regime::Unresolved => true,
@@ -77,6 +82,7 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
         return Err(IdentificationError::Regime { regime: lock.regime, sigma: lock.at.sigma, c: lock.at.c });
     }
     on_target(&lock, plan.lock.lock.phase_tolerance)?;
+    at_rest(&lock, held)?;
     sensors_after_release(record, &knowledge)?;
     let decay = decay_points(record, &knowledge, WINDOW);
     Ok(Identification { knowledge, lock, decay })
@@ -180,8 +186,8 @@ const SLOPE_UNCERTAINTY: f64 = 0.3;
 /// Largest phase error of a period that is evaluated, rad: the balances are of the first order in it.
 const PHASE_RANGE: f64 = 0.1;
 
-/// The locked point of a record; `None` without a motion.
-fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
+/// The locked point of a record, and the amplitude of its hold, m; `None` without a motion.
+fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64)> {
     let d = &knowledge.numbers;
     let (dt, hold) = (record.sample_time, record.hold());
     let target = knowledge.target;
@@ -211,7 +217,7 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
     } else {
         foreign_tone(hold, knowledge, omega.value)
     };
-    Some(Lock {
+    let lock = Lock {
         at: ResonancePoint::new([limit, base, omega, phase_error], d),
         b: b.map(|b| b.value),
         u_b: b.map(|b| b.uncertainty),
@@ -224,7 +230,8 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
         clipped_percent: record.clipped_percent,
         friction: Friction::of(hold, (hold.len() - 1) as f64 * dt * omega.value / TAU),
         tone,
-    })
+    };
+    Some((lock, response.value))
 }
 
 /// Frequency, rad/s, and amplitude, m, at the end of the approach: from the longest window that its later halves agree with.
@@ -359,7 +366,7 @@ impl ResonancePoint {
     }
 }
 
-// What makes a record useless: a phase off its target while the lock was held, and a sensor that fails after the release.
+// What makes a record useless: a phase off its target while the lock was held, a response that moves, and a sensor that fails after the release.
 
 /// Share of a free response that impacts leave in two periods at least. They take the share pi epsilon G_imp/C in each, with
 /// G_imp = (4/pi) R B^2/C: 0.14 at epsilon = 0.05, r = 0.65, C = 0.5.
@@ -375,6 +382,17 @@ fn on_target(lock: &Lock, tolerance: f64) -> Result<(), IdentificationError> {
         return Ok(());
     }
     Err(IdentificationError::OffTarget { error, uncertainty: lock.at.u_phase_deg, tolerance })
+}
+
+/// Refuses a lock at a constant drive whose limit may lie farther from the amplitude of the hold, m, than the slopes reach that lead there: near a fold
+/// of the backbone a response creeps for hundreds of periods, and noise hides it.
+fn at_rest(lock: &Lock, held: f64) -> Result<(), IdentificationError> {
+    let ResonancePoint { a_m: limit, u_a_m: uncertainty, .. } = lock.at;
+    let (farthest, allowed) = ((limit - held).abs() + SIGNIFICANT * uncertainty, SPREADS[1] * held);
+    if lock.held || farthest <= allowed {
+        return Ok(());
+    }
+    Err(IdentificationError::Moving { held, farthest, allowed })
 }
 
 /// Refuses a decay in which a sensor reads no number, or in which the response is lost within two periods.

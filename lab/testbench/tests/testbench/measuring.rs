@@ -13,7 +13,7 @@ use vines_testbench::backbone::LevelPoint;
 use vines_testbench::comparison::COMPARED_ABOVE;
 use vines_testbench::experiment::ExperimentError;
 use vines_testbench::identification::{
-    Lock, Regime, ResonancePoint, WINDOW, decay_points, foreign_tone, identify, regime_by_response,
+    IdentificationError, Lock, Regime, ResonancePoint, WINDOW, decay_points, foreign_tone, identify, regime_by_response,
 };
 use vines_testbench::loop_check::check;
 use vines_testbench::record::{Record, Sample};
@@ -273,6 +273,29 @@ fn friction_from_rest_is_never_called_a_motion_with_impacts() {
                 Some(Regime::NoImpacts),
                 "mu = {mu}: {linear:?} {point:?}"
             );
+        }
+    }
+}
+
+#[test]
+fn a_response_that_creeps_below_the_fold_behind_noise_is_not_called_a_lock() {
+    let scene = dimensionless(&[
+        "plant.epsilon=0.00408",
+        "plant.lambda=0.3234",
+        "plant.r=0.4172",
+        "excitation.G=0.9218",
+        "start.dq2=0",
+        "controller.omega_min=0.8",
+        "controller.omega_max=1.2",
+        "chain.snr=20",
+    ]);
+    // Of the exact backbone, no motion between C = 0.3 and 0.6 needs so little drive: the response falls from one to the other for 800 periods.
+    for seed in [1, 2, 3] {
+        let mut scene = scene.clone();
+        scene.chain.seed = seed;
+        match identified(&scene) {
+            Ok(found) => assert!(found.lock.at.c < 0.3, "{:?}", found.lock),
+            Err(error) => assert!(matches!(error, IdentificationError::Moving { .. }), "{error}"),
         }
     }
 }
