@@ -47,6 +47,8 @@ COLUMNS = {
     "regime_by_impacts": "regime by the impacts (simulations only)",
     "tone_Hz": "frequency of a foreign tone in the response, Hz",
     "tone_share": "its amplitude over the amplitude of the response",
+    **{f"drive_{n}": f"harmonic {n} of the measured drive over the first, behind a shaker" for n in range(2, 8)},
+    "clipped_percent": "share of the samples with the amplifier at its limit, behind a shaker",
     "linear_f0_Hz": "natural frequency measured by the check of the loop, Hz, in this state of the particle",
     "linear_u_f0_Hz": "its standard uncertainty, Hz",
     "linear_zeta": "damping ratio measured there",
@@ -139,25 +141,33 @@ def meaning(column):
     return COLUMNS.get(column, "")
 
 
+def header(path):
+    """Names of the columns of a CSV file."""
+    with path.open(newline="") as file:
+        return next(csv.reader(file))
+
+
 def outputs(program):
     """Files that the commands write, and the columns of those with the measured points."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         run(program, "identify", "--rig", "built-in", "--out", out)
         run(program, "backbone", "--set", "backbone.points=8", "--out", out)
+        shaken = [program, "backbone", "--scene", ROOT / "scenes" / "slip-table.toml", "--set", "backbone.points=8"]
+        run(*shaken, "--out", out / "shaken")
         grids = ["--x", "sigma=-2:-1:3", "--y", "G=1:1.2:3", "--periods", "200", "--confirmations", "0"]
         run(program, "map", *grids, "--out", out)
         page = "# Output files\n\n" + NOTE + "\n"
         page += "A file is complete or absent. JSON files have the same names as the columns.\n"
         page += "A value that does not exist is empty in CSV and `null` in JSON.\n\n"
         rows = [[f"`{name}`", f"`vines {command}`", text] for name, (command, text) in FILES.items()]
-        missing = {name for name in FILES if not (out / name).is_file()}
-        extra = {file.name for file in out.iterdir()} - FILES.keys() - {"LoViNes.fmu", "PhaseLock.fmu"}
+        files = {file.name for file in out.iterdir() if file.is_file()}
+        missing, extra = FILES.keys() - files, files - FILES.keys() - {"LoViNes.fmu", "PhaseLock.fmu"}
         assert not missing | extra, f"scripts/reference.py describes other files than are written: {missing | extra}"
         page += table(["file", "written by", "content"], rows)
         for name in ("backbone.csv", "tracked.csv"):
-            with (out / name).open(newline="") as file:
-                columns = next(csv.reader(file))
+            shaken = header(out / "shaken" / name) if name == "tracked.csv" else []
+            columns = list(dict.fromkeys([*header(out / name), *shaken]))
             unknown = [column for column in columns if not meaning(column)]
             assert not unknown, f"scripts/reference.py has no meaning for the columns {unknown} of {name}"
             page += f"\n## {name}\n\n" + table(["column", "meaning"], [[f"`{one}`", meaning(one)] for one in columns])
@@ -166,9 +176,7 @@ def outputs(program):
         assert not unknown, f"scripts/reference.py has no meaning for the keys {unknown} of the lock"
         page += "\n## identification.json: lock\n\n"
         page += table(["key", "meaning"], [[f"`{one}`", meaning(one)] for one in lock])
-        with (out / "map.csv").open(newline="") as file:
-            columns = next(csv.reader(file))
-        page += "\n## map.csv\n\nColumns: " + ", ".join(f"`{one}`" for one in columns)
+        page += "\n## map.csv\n\nColumns: " + ", ".join(f"`{one}`" for one in header(out / "map.csv"))
         return page + ". [Orbits and regimes](../regimes.md) defines them.\n"
 
 
