@@ -166,7 +166,8 @@ pub fn tracked(rig: &mut dyn Rig, plan: &Plan, largest: f64) -> Result<Tracked, 
 
 /// A plant behind the chain of a scene.
 pub fn behind_chain(plant: Parameters, scene: &Scene) -> Result<Box<dyn Rig>, Failure> {
-    Ok(Chain::around(Box::new(Simulated::new(plant, scene.start)?), scene))
+    let rig = Simulated::new(plant, scene.start)?.with_sensors(scene.resonance);
+    Ok(Chain::around(Box::new(rig), scene))
 }
 
 /// A rig with M = k = b = 1 and a client: epsilon, lambda and r, the seed of the noise, and the relative errors of k, c, m, b and r in the client's

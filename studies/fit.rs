@@ -2,8 +2,8 @@
 //!
 //! A rig is drawn (epsilon 0.002 to 0.03, lambda 0.4 to 2.5, r 0.4 to 0.9), and a client's scene that is wrong: r by 0.2, b by 10 %, m by 20 %, c by
 //! 30 %, k by 1 %. The client fits f0, zeta, r, b and epsilon to the backbone that it tracks (`points`), also with the linear response that a loop
-//! check of the rig at rest measures (`linear`), or to a recording, cut at both ends, which the plant follows: of the tracked backbone (`levels`), of
-//! a lock whose drive then changes slowly (`sweeps`), or of the search, the hold and the decay of `vines identify` (`decays`). For each parameter, of
+//! check of the rig at rest measures (`linear`), or to a recording, cut at both ends, which the plant follows: of the tracked backbone (`levels`), also
+//! by accelerometers on mass and base, beside the noiseless sensors of the loop (`accelerations`), of a lock whose drive then changes slowly (`sweeps`), or of the search, the hold and the decay of `vines identify` (`decays`). For each parameter, of
 //! the fits that are not rejected: the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the
 //! error over u, and that over the Cramér–Rao bound of the same points (of recordings, u is this bound); the numbers of fits that are rejected, of
 //! recordings of which only the points were fitted, and of rigs without a fit; and the probabilities by Kolmogorov and Smirnov that the p-values of
@@ -17,25 +17,29 @@
 //! effect alone, by wrong ones, and by the right one among others; and the coverage of the strength. `two effects` gives each rig two of them:
 //! `named` counts the rigs for which both are possible, `among_others` those for which one is.
 //!
-//! Arguments: `points`, `linear`, `levels`, `sweeps`, `decays`, `effects`, the name of one effect, `two effects` or `none`, RIGS, SEED, SNR in dB or `none`. Writes
-//! validation/fit.csv or, for `effects`, validation/fit_effects.csv.
+//! Arguments: `points`, `linear`, `levels`, `accelerations`, `sweeps`, `decays`, `effects`, the name of one effect, `two effects` or `none`, RIGS, SEED,
+//! SNR in dB or `none`. Writes validation/fit.csv or, for `effects`, validation/fit_effects.csv.
 
 mod common;
 
 use common::*;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
 use vines_testbench::advice;
 use vines_testbench::fit::{
     Effect, Fit, Known, MeasuredPoint, Quantity, RecordFit, Recording, at, explain, fit, follow, linear_verdicts, parts,
 };
 use vines_testbench::linear::MeasuredLinear;
 use vines_testbench::rig::{Drive, RigError, RigStage, Sensors};
+use vines_testbench::scene::{Measurand, Sensor};
 
 /// Measured points, the scene of the client, and the rig.
 type Points = (Vec<MeasuredPoint>, Scene, Parameters);
 
 fn main() -> Result<(), Failure> {
     let [source, count, seed, snr] = &arguments([
-        "points|linear|levels|sweeps|decays|effects|EFFECT",
+        "points|linear|levels|accelerations|sweeps|decays|effects|EFFECT",
         "RIGS",
         "SEED",
         "SNR|none",
@@ -48,7 +52,8 @@ fn main() -> Result<(), Failure> {
             println!("{verdicts:?}");
             fitted(measured, &[Known::Linear(verdicts[0].linear)])
         },
-        "levels" => |case, snr| follow_one(case, snr, levels),
+        "levels" => |case, snr| follow_one(case, snr, |case, snr| levels(case, snr, Definition::default())),
+        "accelerations" => |case, snr| follow_one(case, snr, accelerations),
         "sweeps" => |case, snr| follow_one(case, snr, sweep),
         "decays" => |case, snr| follow_one(case, snr, lock_and_decay),
         other => return effects(other, count.parse()?, seed.parse()?, snr),
@@ -139,7 +144,10 @@ fn effects(source: &str, count: usize, seed: u64, snr: &str) -> Result<(), Failu
     let chosen: Vec<&str> = chosen.copied().collect();
     if chosen.is_empty() {
         let names = names.join(", ");
-        return Err(format!("{source}: there are points, linear, levels, sweeps, decays, effects, {names}").into());
+        return Err(format!(
+            "{source}: there are points, linear, levels, accelerations, sweeps, decays, effects, {names}"
+        )
+        .into());
     }
     for name in chosen {
         let hidden = |n: usize| -> Vec<Effect> {
@@ -337,9 +345,33 @@ fn recording(read: &[Sensors], sample_time: f64) -> Recording {
     }
 }
 
+/// A recording of a tracked backbone by accelerometers, each with noise of its own: second differences of the displacements of mass and base.
+fn accelerations(case: &Case, snr: &str) -> Result<(Recording, Scene, Parameters), Failure> {
+    let of_mass = Definition { sensor: Sensor::Q1, ..Definition::default() };
+    let (mut recording, scene, truth) = levels(case, "none", of_mass)?;
+    let step = recording.sample_time;
+    let mut random = ChaCha8Rng::seed_from_u64(case.1);
+    for values in [&mut recording.response, &mut recording.drive] {
+        // Exact for a sine of the natural frequency 1.
+        let second = |three: &[f64]| (three[0] - 2.0 * three[1] + three[2]) / (2.0 * (0.5 * step).sin()).powi(2);
+        let accelerations: Vec<f64> = values.windows(3).map(second).collect();
+        let size = mean_square(accelerations.iter().copied()).sqrt();
+        let deviation = snr.parse().map_or(0.0, |snr: f64| size * 10_f64.powf(-snr / 20.0));
+        *values = accelerations;
+        for value in values {
+            let normal: f64 = StandardNormal.sample(&mut random);
+            *value += deviation * normal;
+        }
+    }
+    recording.measurands = [Measurand::Acceleration; 2];
+    Ok((recording, scene, truth))
+}
+
 /// A recording of a tracked backbone.
-fn levels(case: &Case, snr: &str) -> Result<(Recording, Scene, Parameters), Failure> {
+fn levels(case: &Case, snr: &str, resonance: Definition) -> Result<(Recording, Scene, Parameters), Failure> {
     let (truth, scene, plan) = client(case, snr)?;
+    let scene = Scene { resonance, ..scene };
+    let plan = scene.plan_on(scene.knowledge().measured(plan.knowledge.linear));
     let mut rig = Recorder {
         rig: behind_chain(truth, &scene)?,
         read: Vec::new(),

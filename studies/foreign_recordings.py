@@ -7,8 +7,8 @@ plant of vines. The rig is that of the tutorial "From a recording to a scene". I
 and frequency near phase resonance. Both channels pass an anti-alias filter (Butterworth, fourth order, 300 Hz); an
 impact excites the filter of an accelerometer as an impulse. Noise is 50 dB below each channel. Rows: what the channels
 measure, what is wrong with them, and the seed of the noise. Columns: errors of the parameters, and their standard
-uncertainties u, over the u that the tutorial states; `periods`: of the recording that the plant follows. It does not
-follow a velocity or an acceleration: then the points alone are fitted. It needs a release build of `vines`.
+uncertainties u, over the u that the tutorial states; `periods`: of the recording that the plant follows, 0 where this
+fit is rejected and the points alone are fitted. It needs a release build of `vines`.
 """
 
 import json

@@ -20,6 +20,7 @@ use crate::scene::{Excitation, Limits, Release, Scene, SceneShaker, Structure};
 pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
 pub(crate) use reference_control::BANDWIDTH;
+pub(crate) use stages::derivative;
 pub use stages::{Interrupted, Measured, Scaled, SensorsOnly, Stoppable};
 
 /// What the controller asks of the rig for the coming sample period.

@@ -867,21 +867,29 @@ fn velocities_and_accelerations_give_the_parameters_that_displacements_give() {
     for (of_response, of_base) in [(2, 2), (1, 0), (0, 1)] {
         let measurands = [of_response, of_base].map(|order| Measurand::ALL[order]);
         let record = recorded_as(measurands);
-        let parts = parts(&[record], &scene).unwrap().concat();
-        let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
-        let fit = fit(&points, scene.resonance, &scene.plant, &[]).unwrap();
-        let mut estimates = FITTED.iter().map(|quantity| fit.estimate(*quantity).unwrap());
-        let are_narrow = estimates.all(|one| one.uncertainty < 0.2 * one.value);
+        let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
+        let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
+        let of_points = fit(&points, scene.resonance, &scene.plant, &[]).unwrap();
+        let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+        let followed = follow(&prepared, &parts, &[], scene.resonance, &scene.plant, &[]).unwrap();
         println!(
-            "{measurands:?}: worst {:.2} u, {} points, p {:?}",
-            worst(&fit),
+            "{measurands:?}: worst {:.2} u of {} points, {:.2} u of {} periods",
+            worst(&of_points),
             points.len(),
-            fit.p_value()
+            worst(&followed.fit),
+            followed.periods
         );
-        assert!(
-            worst(&fit) < 3.0 && are_narrow && !fit.is_rejected(),
-            "{measurands:?} {fit:?}"
-        );
+        for fit in [&of_points, &followed.fit] {
+            let mut estimates = FITTED.iter().map(|quantity| fit.estimate(*quantity).unwrap());
+            let are_narrow = estimates.all(|one| one.uncertainty < 0.2 * one.value);
+            assert!(
+                worst(fit) < 3.0 && are_narrow && !fit.is_rejected(),
+                "{measurands:?} {fit:?}"
+            );
+        }
+        let [r, of_points] = [&followed.fit, &of_points].map(|fit| fit.estimate(Quantity::R).unwrap());
+        assert!(r.uncertainty < 0.2 * of_points.uncertainty, "{r:?} {of_points:?}");
+        assert!(followed.periods > 200 && followed.left_out.is_empty(), "{followed:?}");
     }
     // The scene's sensor reads v, and no accelerometer does.
     let message = recorded_as([Measurand::Acceleration, Measurand::Displacement]).parts(&wrong_scene().knowledge());

@@ -5,6 +5,8 @@
 //! extended Kalman filter (Åström, Introduction to Stochastic Control Theory, chapter 7), whose matrices are the plant's own derivatives, by plants
 //! that start the period a little beside it. Noise of the base is the noise of the process: its first harmonic in a period moves the response by
 //! `omega0 T/2 = pi` times itself. Noise of the response is the noise of the measurement: what the prediction leaves beside the first harmonic.
+//! Velocities and accelerations of the response are predicted as such, so that their noise stays white; those of the base are integrated, without
+//! what changes slowly, which moves the whole rig.
 //! Innovations are white, and their covariance is known; so is the covariance of the parameters, except in the direction that the record determines
 //! least: there the ratio of likelihoods gives the interval.
 //!
@@ -27,12 +29,14 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use vines_model::numerics::{Estimate, HarmonicBasis, HarmonicFit, LeastSquares, Misfit, mean, mean_square};
 use vines_model::orbit::{AfterImpact, Orbit, backbone_at_speed, exact_backbone};
 use vines_model::theory::{BranchSide, Manifold};
-use vines_model::{Definition, Dimensionless, Sensor};
+use vines_model::{Definition, Dimensionless, Measurand, Sensor};
 
+use super::recording::remove_drift;
 use super::{
     ChannelTest, Covariance, Fit, Known, LIMITS, MeasuredPoint, Nearest, Part, Problem, Quantity, Recording, UNKNOWNS,
     Unknowns, fit, plant, shifted, unknowns,
 };
+use crate::rig::derivative;
 
 /// A stretch of a record: the number of the record, and the samples from which and to which it extends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,6 +85,8 @@ struct Base {
     jump: f64,
     /// Mean square of what is not a sine in this period, m².
     rest: f64,
+    /// Variance of a sample by what is near the sine, if it is white, m².
+    near: f64,
 }
 
 /// A record with its noise.
@@ -91,8 +97,12 @@ struct Measured<'a> {
     base_noise: Vec<f64>,
     /// Covariance of the first harmonic of the response in a period, m², in each piece.
     response_noise: Vec<Matrix2<f64>>,
-    /// The base at each sample.
+    /// The displacement of the base at each sample, m.
+    drive: Vec<f64>,
+    /// What the samples do not show of it.
     base: Vec<Base>,
+    /// The frequency by which velocities and accelerations are scaled, rad/s.
+    omega0: f64,
     /// Samples of a period of the natural frequency.
     period: usize,
 }
@@ -181,10 +191,38 @@ fn noise(values: &[f64]) -> f64 {
 
 /// First harmonic of the values of one period.
 fn harmonic(values: &[f64]) -> Complex64 {
-    let step = TAU / values.len() as f64;
+    harmonic_of(values, 1.0)
+}
+
+/// A harmonic of the values of one period.
+fn harmonic_of(values: &[f64], order: f64) -> Complex64 {
+    let step = order * TAU / values.len() as f64;
     let turned = |(n, value): (usize, &f64)| Complex64::from_polar(*value, -step * n as f64);
     let sum: Complex64 = values.iter().enumerate().map(turned).sum();
     sum * Complex64::new(0.0, 2.0 / values.len() as f64)
+}
+
+/// Variance of the first harmonic in a period by the even ones next to it, in which the impulses of both impacts cancel, however a sensor shows them.
+/// The inverse of the mean over a piece is that of the variance on average: it has four degrees of freedom in a period.
+fn variance_near(errors: &[f64]) -> f64 {
+    let squares = [2.0, 4.0].map(|order| harmonic_of(errors, order).norm_sqr());
+    0.5 * mean(squares) * PIECE as f64 / (PIECE as f64 - 0.5)
+}
+
+/// The displacements, m, of a base whose velocities or accelerations are given, over omega0 or its square: their integrals, without what changes
+/// slowly. `natural`: phase by which a sine of this frequency turns from sample to sample, rad.
+fn displacements(values: &[f64], of: Measurand, period: usize, natural: f64) -> Vec<f64> {
+    let mut values = values.to_vec();
+    for _ in 0..of.order() {
+        let (mut sum, mut before) = (0.0, 0.0);
+        for value in &mut values {
+            // The trapezoidal rule, exact for a sine of this frequency.
+            sum += (0.5 * natural).tan() * (before + *value);
+            (before, *value) = (*value, sum);
+        }
+        remove_drift(&mut values, period);
+    }
+    values
 }
 
 /// The base in a period of its samples, which begins at sample `from`.
@@ -202,7 +240,9 @@ fn period_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
     let Some(fit) = basis.fit(&vector).filter(is_moving) else {
         return vec![Base { scale, ..Base::default() }; values.len()];
     };
-    let rest = basis.residual(&vector, &fit).norm_squared() / (values.len() - basis.terms()) as f64;
+    let residual = basis.residual(&vector, &fit);
+    let near = variance_near(residual.as_slice()) * values.len() as f64 / 2.0;
+    let rest = residual.norm_squared() / (values.len() - basis.terms()) as f64;
     // Over a period, a harmonic has half of the square of its amplitude, and one that grows linearly from -1 to 1 a sixth.
     let rest = rest + fit.harmonic(3).norm_sqr() / 2.0 + fit.drift(1).norm_sqr() / 6.0;
     // The amplitude E0 + E1 n + Re(E2 exp(2i phase)) has a third harmonic.
@@ -213,15 +253,15 @@ fn period_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
     let jump = |phase: f64| {
         let angle = phase + first.arg();
         let rate = growth - 2.0 * step * (swing * Complex64::from_polar(1.0, 2.0 * angle + step)).im;
-        Base { scale, jump: rate * angle.sin(), rest }
+        Base { scale, jump: rate * angle.sin(), rest, near }
     };
     phases.into_iter().map(jump).collect()
 }
 
 impl<'a> Measured<'a> {
-    fn new(recording: &'a Recording, omega: f64) -> Self {
+    fn new(recording: &'a Recording, omega: f64, omega0: f64) -> Self {
         let period = (TAU / omega / recording.sample_time).round() as usize;
-        let [response_noise, base_noise] = [&recording.response, &recording.drive].map(|values| {
+        let [response_noise, mut base_noise] = [&recording.response, &recording.drive].map(|values| {
             let mut noise: Vec<f64> = values.chunks(PIECE * period).map(noise).collect();
             // The last piece may have few samples.
             if let [.., whole, last] = &mut noise[..] {
@@ -230,12 +270,30 @@ impl<'a> Measured<'a> {
             noise
         });
         let of_harmonic = |noise: &f64| Matrix2::from_diagonal_element(2.0 * noise / period as f64);
-        let response_noise = response_noise.iter().map(of_harmonic).collect();
-        let starts = (0..recording.drive.len()).step_by(period);
-        let base = starts
-            .flat_map(|from| period_of_base(&recording.drive, from, period))
-            .collect();
-        Self { recording, base_noise, response_noise, base, period }
+        let response_noise: Vec<Matrix2<f64>> = response_noise.iter().map(of_harmonic).collect();
+        let of_base = recording.measurands[1];
+        let drive = displacements(&recording.drive, of_base, period, omega0 * recording.sample_time);
+        let bases = |drive: &[f64]| -> Vec<Base> {
+            let starts = (0..drive.len()).step_by(period);
+            starts.flat_map(|from| period_of_base(drive, from, period)).collect()
+        };
+        if of_base != Measurand::Displacement {
+            // Differences show every jump of the base as well.
+            let near = bases(&recording.drive);
+            for (noise, near) in base_noise.iter_mut().zip(near.chunks(PIECE * period)) {
+                *noise = noise.min(mean(near.iter().map(|one| one.near)));
+            }
+        }
+        let base = bases(&drive);
+        Self {
+            recording,
+            base_noise,
+            response_noise,
+            drive,
+            base,
+            omega0,
+            period,
+        }
     }
 
     fn piece(&self, sample: usize) -> usize {
@@ -253,7 +311,7 @@ impl<'a> Measured<'a> {
 
     /// The signal of the base from a sample to the next, a straight line, from `late` seconds after the sample on.
     fn line(&self, n: usize, late: f64, share: f64) -> Drive {
-        let Recording { drive, sample_time, .. } = self.recording;
+        let (drive, sample_time) = (&self.drive, self.recording.sample_time);
         let Base { scale, jump, .. } = self.base[n];
         let from = scale * (drive[n] + share * jump);
         let slope = (scale * drive[n + 1] - from) / sample_time;
@@ -269,6 +327,8 @@ struct Follower<'a> {
     plant: Plant,
     /// The sample at which it is.
     n: usize,
+    /// Displacement of the response at the sample before, m.
+    before: f64,
     omega: f64,
     /// What the sensor reads of the particle.
     share: f64,
@@ -279,15 +339,19 @@ struct Follower<'a> {
 impl Follower<'_> {
     /// The sensor's reading, of which the plant goes on to the next sample.
     fn sample(&mut self) -> Option<f64> {
+        let Recording { sample_time, measurands: [of, _], .. } = self.record.recording;
+        let here = self.response();
+        let drive = self.record.line(self.n, 0.0, self.jump);
+        self.plant.advance(drive, *sample_time).ok()?;
+        let (three, omega0) = ([self.before, here, self.response()], self.record.omega0);
+        (self.n, self.before) = (self.n + 1, here);
+        Some(derivative(*of, three, [*sample_time; 2], omega0) * omega0.powi(-of.order()))
+    }
+
+    /// Displacement of the response, m.
+    fn response(&self) -> f64 {
         let State { q1, q2, .. } = self.plant.state();
-        self.plant
-            .advance(
-                self.record.line(self.n, 0.0, self.jump),
-                self.record.recording.sample_time,
-            )
-            .ok()?;
-        self.n += 1;
-        Some(q1 + self.share * q2)
+        q1 + self.share * q2
     }
 
     /// The readings up to the first sample, from the earliest to the latest one, at which the particle has crossed the middle of its cavity upwards.
@@ -319,6 +383,7 @@ impl Follower<'_> {
     fn moved(&mut self, by: &Vector4<f64>) -> Option<()> {
         let [q1, v1, q2, v2] = <[f64; 4]>::from(self.state() + by);
         let state = State { q1, dq1: v1 * self.omega, q2, dq2: v2 * self.omega };
+        self.before += by[0] - by[1] * self.omega * self.record.recording.sample_time;
         self.plant.set_state(state).ok()
     }
 
@@ -369,7 +434,7 @@ impl Followed<'_> {
             .iter()
             .min_by(|one, other| distance(one).total_cmp(&distance(other)))?;
         // Phase of the response at the impact, less that at the sample.
-        let rest = orbit.start.phase + orbit.gamma - measured.arg();
+        let rest = orbit.start.phase + orbit.gamma + record.recording.measurands[0].lead() - measured.arg();
         let time = rest.rem_euclid(TAU) / TAU * record.period as f64 * sample_time;
         let AfterImpact { q1, dq1, q2, dq2, .. } = orbit.start;
         let ([q1, q2], [dq1, dq2]) = (
@@ -439,7 +504,10 @@ impl Followed<'_> {
             gain,
             whitening: total.cholesky()?.l().try_inverse()?,
             impacts: one.plant.totals().impacts - from.plant.totals().impacts,
-            noise: noise_of(&one.errors(begin, &readings), turn),
+            noise: match record.recording.measurands[0] {
+                Measurand::Displacement => noise_of(&one.errors(begin, &readings), turn),
+                _ => Matrix2::from_diagonal_element(variance_near(&one.errors(begin, &readings))),
+            },
             transition,
         })
     }
@@ -465,10 +533,12 @@ impl Followed<'_> {
             Sensor::V => parameters.mass_ratio(),
             Sensor::Q1 => 0.0,
         };
+        let record = &self.records[stretch.record];
         Some(Follower {
-            record: &self.records[stretch.record],
+            record,
             plant: Plant::new(parameters, state).ok()?,
             n,
+            before: state.q1 - state.dq1 * record.recording.sample_time,
             omega: parameters.natural_frequency(),
             share,
             jump: x[6],
@@ -785,7 +855,7 @@ pub fn follow(
     let omega = x[0].exp();
     let records: Vec<Measured> = recordings
         .iter()
-        .map(|recording| Measured::new(recording, omega))
+        .map(|recording| Measured::new(recording, omega, expected.natural_frequency()))
         .collect();
     let stretches = records
         .iter()

@@ -159,8 +159,8 @@ impl Recording {
     /// # Errors
     /// Channels that cannot be those of a rig near resonance; the message says which, and what to do.
     pub fn parts(&self, knowledge: &Knowledge) -> Result<Vec<Part>, RecordingError> {
-        let knowledge = self.knowledge(knowledge);
-        self.prepared(&knowledge)?.parts_near_resonance(&knowledge)
+        self.prepared(knowledge)?
+            .parts_near_resonance(&self.knowledge(knowledge))
     }
 
     /// What is known, with the sample time and the channels of this recording.
@@ -201,6 +201,7 @@ impl Recording {
     /// # Errors
     /// As [`Recording::parts`].
     pub fn prepared(&self, knowledge: &Knowledge) -> Result<Self, RecordingError> {
+        let knowledge = self.knowledge(knowledge);
         let linear = knowledge.linear;
         self.check(&linear)?;
         let mut one = self.clone();
@@ -434,7 +435,7 @@ impl Recording {
 
 /// Removes what changes slowly: running means over a period of the natural frequency, three times, which the oscillation does not pass, and over
 /// [`SLOW`] periods, so that the noise near the natural frequency stays white. At both ends a straight line goes on.
-fn remove_drift(values: &mut [f64], period: usize) {
+pub(super) fn remove_drift(values: &mut [f64], period: usize) {
     let slow = (SLOW * period).min((values.len() / 2).saturating_sub(2 * period));
     let mut drift = values.to_vec();
     for length in [period, period, period, slow] {

@@ -68,7 +68,7 @@ impl<R: Rig> Measured<R> {
 }
 
 /// The derivative of three values, `late` and `early` seconds apart, at the middle one; exact for a sine of the frequency `omega`, rad/s.
-fn derivative(of: Measurand, [first, middle, now]: [f64; 3], [early, late]: [f64; 2], omega: f64) -> f64 {
+pub(crate) fn derivative(of: Measurand, [first, middle, now]: [f64; 3], [early, late]: [f64; 2], omega: f64) -> f64 {
     let step = 0.5 * (early + late);
     match of {
         Measurand::Displacement => middle,
