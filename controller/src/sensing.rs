@@ -179,6 +179,10 @@ impl Sensing {
             take(&mut state.response, input.response, is_known.then_some(1.0));
             if let Some(reading) = base {
                 take(&mut state.base, reading, Some(change));
+                if drive.amplitude == 0.0 {
+                    // A base without a drive rests.
+                    state.base.unchanged = 0.0;
+                }
             }
             state.drive += self.detector.step * (drive.amplitude - state.drive);
         }

@@ -164,6 +164,18 @@ fn a_sensor_that_stops_trips_within_half_a_period() {
 }
 
 #[test]
+fn a_base_that_rests_without_a_drive_is_not_a_failed_sensor() {
+    // The response falls slower than asked, until the reference is lost.
+    let mut bench = holding(Config { residual_max: None, ramp_rate: None, ..config() });
+    let response = 0.3 * bench.sample().response_amplitude;
+    bench.hold(Move { response, amplitude: -AMPLITUDE, ..Move::default() });
+    let outputs: Vec<_> = (0..200).map(|_| bench.sample()).collect();
+    let rested = outputs.iter().take_while(|output| output.fault.is_none());
+    assert!(rested.filter(|output| output.amplitude == 0.0).count() > 50);
+    assert_eq!(outputs[199].fault, Some(Fault::LockLost));
+}
+
+#[test]
 fn a_sensor_that_reads_only_noise_trips_before_the_lock() {
     let mut bench = Bench::new(Config { response_max: None, residual_max: None, ..config() });
     let mut noise = noise(7);
