@@ -38,8 +38,8 @@ const DRAWING: f64 = 0.1;
 const UNREACHED: f64 = 1.5;
 /// Smallest response over the half-width of the search: up to r = 0.9, the fold has a larger one.
 const LOWEST: f64 = 0.05;
-/// Smallest response, over the response where the symmetry was lost or the lock was found, at which the motion counts as the same; the largest is
-/// its inverse. The stable range of the symmetric motion is wider.
+/// Smallest ratio of the response to where the lock was found at which the motion counts as the same; the largest is its inverse. The stable range of
+/// the symmetric motion is wider. It is also the smallest ratio of the setpoint to a response that follows it.
 const LOST: f64 = 0.8;
 /// Smallest slope of the holding drive over the response under a constant drive, over their ratio, which is the slope without impacts: with less,
 /// an error of 1 % of the drive moves the response by more than 10 %, and the motion takes ten times as long to settle.
@@ -182,14 +182,17 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
             leg = self.leg(leg.last + change - self.setpoint, FOLLOWED, rate)?;
         }
-        self.fall(leg, step, LOWEST * self.b)
+        self.fall(leg, step)
     }
 
-    /// Lowers the response until the motion is symmetric, but not below `lowest`, m, nor on after impacts have ended, of which even harmonics
-    /// are a sign as well. A large response can hide them: beside a carried particle, their evidence grows as the response falls.
-    fn fall(&mut self, mut leg: Leg, step: f64, lowest: f64) -> Result<Leg, ExperimentError> {
+    /// Lowers the response as long as it follows, until the motion is symmetric, but not below [`LOWEST`], nor on after impacts have ended, of which even
+    /// harmonics are a sign as well. A large response can hide them: beside a carried particle, their evidence grows as the response falls.
+    fn fall(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         let mut seen = leg.departed;
-        while !leg.symmetric && (leg.departed || leg.asymmetry > 0.0 || !seen) && self.setpoint > lowest {
+        while !leg.symmetric
+            && (leg.departed || leg.asymmetry > 0.0 || !seen)
+            && self.setpoint > (LOWEST * self.b).max(LOST * leg.last)
+        {
             leg = self.sweep(&leg, -step * leg.last)?;
             seen |= leg.departed;
         }
@@ -220,8 +223,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                     continue;
                 }
             }
-            // Above the symmetric motion is one without symmetry.
-            *leg = self.fall(*leg, step, LOST * leg.response)?;
+            // Above the symmetric motion is one without symmetry, which may go on far below.
+            *leg = self.fall(*leg, step)?;
             (swept, upwards) = (vec![*leg], false);
         }
         Ok(None)
