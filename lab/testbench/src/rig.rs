@@ -213,7 +213,7 @@ pub enum RigError {
         unit: &'static str,
     },
     #[error(
-        "the shaker does not follow: {asked:.4} {unit} are asked for, and the measured fundamental is off by {error:.4} {unit} for a period; {cause}"
+        "the shaker does not follow: {asked:.4} {unit} are asked for, and the measured fundamental is off by {error:.4} {unit} for 1.5 periods; {cause}"
     )]
     ReferenceOff {
         asked: f64,

@@ -26,8 +26,9 @@ const HARMONICS: [f64; 3] = [1.0, 3.0, 5.0];
 /// this is the share of the reference, over the drop-out. An error of the whole reference is a failure whatever the drop-out: it is not the reference
 /// asked for that is left then. And a reference that never reaches this share is not there, of a broken stinger.
 const SHARE: f64 = 0.25;
-/// Phase for which such an error lasts, rad.
-const OFF: f64 = TAU;
+/// Phase for which such an error lasts, rad. The control corrects an error in a period or more: its roots are at half of the detector's bandwidth, and
+/// while the controller searches, impacts and drive change the reference all the time where little of it is left.
+const OFF: f64 = 1.5 * TAU;
 
 /// Offset and harmonics of a signal: an adaptive filter, as the controller's.
 #[derive(Debug, Clone, Default)]
@@ -106,7 +107,7 @@ impl ReferenceControl {
     /// Takes the scaled readings of response and reference. Returns the command for the coming `step`, s, in which the controller asks for `drive`.
     ///
     /// # Errors
-    /// A reference that has not followed for a period.
+    /// A reference that has not followed for 1.5 periods.
     pub fn command(&mut self, [response, reading]: [f64; 2], drive: Drive, step: f64) -> Result<Drive, RigError> {
         let Drive { omega, amplitude, .. } = drive;
         let [of_response, displacement] = [0, 1].map(|channel| self.target.displacement(channel, omega));
