@@ -194,10 +194,23 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64)> {
     let held = Cycle::all(hold, dt, target);
     let cycles = before_release(record, knowledge);
     let [approach, wide] = SPREADS.map(|spread| approached(&cycles, &held, spread));
-    // The drive of the hold decides where the approach ends.
     let [base, phase_error, response] = means(&held);
-    let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
-    let [omega, limit] = limits(approach, wide, knowledge, command)?;
+    let [base, omega, limit] = if record.held {
+        // The response is kept, and the balances say which drive it needs.
+        let fit = ResonanceFit::of(approach, knowledge, Slopes::Unknown)?;
+        let (at, slopes) = (fit.at(0.0), fit.slopes());
+        // The noise of the amplitude moves drive and frequency along their slopes.
+        let [drive, omega] = [0, 1].map(|i| {
+            let aside = slopes[i].value * fit.u_level;
+            Estimate::new(at[i].value, &[at[i].uncertainty, aside, fit.remainders[i]])
+        });
+        [drive, omega, fit.response]
+    } else {
+        // The drive of the hold decides where the approach ends.
+        let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
+        let [omega, limit] = limits(approach, wide, knowledge, command)?;
+        [base, omega, limit]
+    };
     let speed = |sample: &Sample| Some(d.speed(sample.ground_truth?.particle_velocity.abs()));
     let speeds: Option<Vec<f64>> = hold.iter().map(speed).collect();
     // The speed belongs to the amplitude of the hold, and changes about as it does.
