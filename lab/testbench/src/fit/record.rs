@@ -383,7 +383,8 @@ impl Follower<'_> {
     fn moved(&mut self, by: &Vector4<f64>) -> Option<()> {
         let [q1, v1, q2, v2] = <[f64; 4]>::from(self.state() + by);
         let state = State { q1, dq1: v1 * self.omega, q2, dq2: v2 * self.omega };
-        self.before += by[0] - by[1] * self.omega * self.record.recording.sample_time;
+        let [position, velocity] = [0, 1].map(|i| by[i] + self.share * by[i + 2]);
+        self.before += position - velocity * self.omega * self.record.recording.sample_time;
         self.plant.set_state(state).ok()
     }
 
@@ -538,7 +539,7 @@ impl Followed<'_> {
             record,
             plant: Plant::new(parameters, state).ok()?,
             n,
-            before: state.q1 - state.dq1 * record.recording.sample_time,
+            before: state.q1 + share * state.q2 - (state.dq1 + share * state.dq2) * record.recording.sample_time,
             omega: parameters.natural_frequency(),
             share,
             jump: x[6],
