@@ -50,7 +50,7 @@ pub trait Motion {
         self.later(series, t)
     }
 
-    /// The same for `t` above 0.
+    /// What happens `t` seconds after the start, for `t` above 0; [`Motion::at`] knows the start itself.
     fn later(&self, series: &Series, t: f64) -> Instant<Self::Look>;
 
     /// How long `gap`, to the wall of the sign `sign`, is certainly open during a flight, s, at most `window`.

@@ -33,7 +33,7 @@ fn lock(scene: &Scene) -> Result<Found, Failure> {
         true => by_response(),
         false => (orbits.iter().map(by_orbit)).min_by(|one, other| largest(one.0).total_cmp(&largest(other.0))),
     };
-    let (errors, unseen) = nearest.ok_or("no orbit")?;
+    let (errors, unseen) = nearest.unwrap_or(([f64::INFINITY; 2], false));
     let ratios = [
         errors[0] / at.u_sigma,
         errors[1] / if record.held { at.u_g } else { at.u_c },

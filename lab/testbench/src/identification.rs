@@ -44,8 +44,8 @@ pub enum IdentificationError {
         tolerance: f64,
     },
     #[error(
-        "the response has not come to rest under its drive: from {held:.4e} m it may go on by {farthest:.1e} m, and of more than {allowed:.1e} m the \
-         record says nothing. Hold it longer (record.hold_periods), or ask for a drive farther from the fold of the backbone"
+        "the response has not come to rest under its drive: from {held:.4e} m it may move on by {farthest:.1e} m, more \
+         than the {allowed:.1e} m within which the record shows where it goes. Hold it longer (record.hold_periods), or ask for a drive farther from the fold of the backbone"
     )]
     Moving { held: f64, farthest: f64, allowed: f64 },
     #[error(
@@ -68,7 +68,7 @@ pub struct Identification {
 /// Identifies the record of an experiment.
 ///
 /// # Errors
-/// A lock in another regime than the symmetric 1:1 one, or no motion.
+/// No motion, a lock in another regime than the symmetric 1:1 one or off its phase, a response that still moves, and a sensor that fails in the decay.
 pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, IdentificationError> {
     let knowledge = plan.knowledge;
     let (lock, held) = measure(record, &knowledge).ok_or(IdentificationError::NoMotion)?;
