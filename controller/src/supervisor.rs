@@ -108,7 +108,9 @@ impl Fault {
     #[must_use]
     pub fn text(self) -> &'static str {
         match self {
-            Self::Sensor => "a sensor read no number, or did not change for a sixth of a period",
+            Self::Sensor => {
+                "a sensor read no number, or did not change for a sixth of a period, as at the end of its range"
+            }
             Self::ResponseTooLarge => "the response exceeded its limit",
             Self::TimedOut => "the time limit for the lock is over",
             Self::LockLost => "the lock was lost",

@@ -82,13 +82,16 @@ fn unmet_in_words(unmet: Option<Condition>) -> String {
 }
 
 /// What a search for the requested drive has found, in words.
-fn search_in_words(held: Option<[f64; 2]>, searches: u32, highest: f64) -> String {
+fn search_in_words(held: Option<[f64; 2]>, searches: u32, [highest, strongest]: [f64; 2]) -> String {
     match held {
         Some([low, high]) => format!(
             "with the response under control, symmetric 1:1 motions were held at drives from G = {low:.4} to {high:.4}, and lost {searches} times; a \
              constant drive does not hold all of them"
         ),
-        None => format!("no symmetric 1:1 motion was found at responses up to C = {highest:.3}"),
+        None => format!(
+            "no symmetric 1:1 motion was found at responses up to C = {highest:.3}, with drives up to G = {strongest:.2} (phase_lock.amplitude_max, \
+             which a converter's chain.base_range bounds)"
+        ),
     }
 }
 
@@ -152,7 +155,7 @@ pub enum ExperimentError {
     },
     #[error(
         "the requested drive G = {g:.4} was not reached within {periods:.0} periods: {}",
-        search_in_words(*held, *searches, *highest)
+        search_in_words(*held, *searches, *tried)
     )]
     NotReached {
         periods: f64,
@@ -160,8 +163,8 @@ pub enum ExperimentError {
         /// Least and largest G at which a symmetric 1:1 motion was held, if any was.
         held: Option<[f64; 2]>,
         searches: u32,
-        /// Largest C of the response that was tried.
-        highest: f64,
+        /// Largest C of the response that was tried, and largest G of the drive that was allowed.
+        tried: [f64; 2],
     },
     #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}; {evidence}", stage.name())]
     Tripped {

@@ -390,6 +390,16 @@ impl Sections {
         scene.backbone.check()?;
         scene.record.check(&scene)?;
         scene.chain.check(&scene.controller)?;
+        check(
+            "chain.base_range",
+            scene.chain.base_range,
+            "(over b epsilon)",
+            scene.amplitude <= scene.drive_range(),
+            format!(
+                "must be at least G = {:.6}, or the converter of the base saturates",
+                d.excitation(scene.amplitude)
+            ),
+        )?;
         if scene.resonance.reference == Reference::Force && !scene.chain.reference {
             let message = "resonance.reference = \"force\" with chain.reference = false: the force k e + c e' follows from the base \
                            sensor; switch it on, or take the reference \"base\"";

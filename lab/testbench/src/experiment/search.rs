@@ -444,7 +444,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             g: d.g,
             held: (low <= high).then(|| [low, high].map(|drive| d.excitation(drive))),
             searches: SEARCHES,
-            highest: self.setpoint / self.b,
+            tried: [
+                self.setpoint / self.b,
+                d.excitation(self.bench.config.amplitude_max.unwrap_or(f64::INFINITY)),
+            ],
         }
     }
 }

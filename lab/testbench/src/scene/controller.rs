@@ -108,7 +108,7 @@ impl Scene {
         let delay = self.chain.total_delay(omega0 * step) / omega0;
         let units = self.units();
         let defaults = Config {
-            amplitude_max: Some(4.0 * self.drive_needed(knowledge)),
+            amplitude_max: Some((4.0 * self.drive_needed(knowledge)).min(self.drive_range())),
             response_max: Some(4.0 * knowledge.numbers.b),
             residual_max: Some(self.residual(knowledge)),
             lock: lock_criterion(&knowledge.linear),
@@ -235,6 +235,15 @@ impl Scene {
         self.amplitude.max(IMPACTS * linear * knowledge.numbers.b)
     }
 
+    /// Largest drive, m, that the converters of the base can show; infinite without them.
+    pub(super) fn drive_range(&self) -> f64 {
+        let chain = &self.chain;
+        match chain.adc_bits.filter(|_| chain.reference).or(chain.dac_bits) {
+            Some(_) => self.dimensionless().amplitude(chain.base_range),
+            None => f64::INFINITY,
+        }
+    }
+
     /// Default time limit for the lock, natural periods: at least 3000, and 20 times the relaxation time.
     fn lock_periods(&self, linear: &LinearResponse) -> f64 {
         let relaxation = PI * linear.relaxation_periods();
@@ -253,7 +262,7 @@ impl Scene {
         // bandwidth times A/E, which is largest without impacts: the inverse of twice the damping ratio.
         let coupled = COUPLED * knowledge.linear.bandwidth().max(f64::MIN_POSITIVE).cbrt();
         Config {
-            amplitude_max: limit.or(Some(knowledge.numbers.amplitude(TRACKED))),
+            amplitude_max: limit.or(Some(knowledge.numbers.amplitude(TRACKED).min(self.drive_range()))),
             bandwidth: self.controller.bandwidth.min(coupled) * knowledge.linear.omega0,
             ..config
         }

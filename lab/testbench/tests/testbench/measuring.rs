@@ -79,6 +79,9 @@ fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most_and_six_bits_s
     // The response is within one step of this converter.
     let coarse = at("chain.adc_bits=6").unwrap_err();
     assert!(matches!(coarse, ExperimentError::Tripped { .. }), "{coarse}");
+    // The drive stays within the range of the converter that reads it.
+    let damped = at("plant.lambda=4.5 start.dq2=0 excitation.G=2 chain.adc_bits=12").unwrap_err();
+    assert!(matches!(damped, ExperimentError::NotReached { .. }), "{damped}");
     // A delay that nobody compensates is seen, and one common to both sensors is not.
     let late = at("chain.delay=1 chain.reference=false phase_lock.delay=0").unwrap();
     assert!((late.sigma - ideal.sigma + 0.078).abs() < 0.005);

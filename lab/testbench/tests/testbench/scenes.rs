@@ -113,6 +113,12 @@ fn settings_replace_values_and_what_makes_no_sense_is_named_with_unit_and_range(
 }
 
 #[test]
+fn a_drive_beyond_the_range_of_its_converter_is_refused() {
+    let scene = Scene::load(None, &set(&["chain.adc_bits=12", "chain.base_range=1.0"]));
+    says(scene, "chain.base_range = 1 (over b epsilon) | at least G = 1.1");
+}
+
+#[test]
 fn a_mistake_in_a_file_is_reported_with_its_line_and_missing_and_mixed_keys_with_those_needed() {
     says(load("nowhere/at-all.toml", &[]), "nowhere/at-all.toml");
     let plant = "[plant]\nepsilon = 0.01\nlambda = 1\nr = 0.5\n";
