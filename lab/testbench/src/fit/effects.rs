@@ -345,6 +345,10 @@ pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize))
         .filter(|record| !recordings.is_empty() && !record.fit.is_rejected());
     let fit = match &record {
         Some(record) => record.fit.clone(),
+        // Nothing that was measured shows impacts.
+        None if points.is_empty() && !recordings.is_empty() => {
+            return Err(recordings[0].without_points(&parts[0]).into());
+        }
         None => fit(&points, definition, expected, &known)?,
     };
     let mut found = Found {

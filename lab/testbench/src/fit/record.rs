@@ -17,7 +17,8 @@
 //!
 //! The fit begins at the parameters of the points of the record. A piece of the record is left out where the plant has not two impacts per period,
 //! where a deviation of the particle grows, where the innovations contradict their covariance, and where they are not linear in the parameters: near
-//! the fold, and beyond it for other parameters within their uncertainties.
+//! the fold, and beyond it for other parameters within their uncertainties. Whether a part shows impacts by itself does not matter, because that
+//! depends on the natural frequency of the scene: what is followed needs them if no linear structure follows it.
 
 use std::f64::consts::{PI, TAU};
 
@@ -28,13 +29,14 @@ use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use vines_model::numerics::{Estimate, HarmonicBasis, HarmonicFit, LeastSquares, Misfit, mean, mean_square};
 use vines_model::orbit::{AfterImpact, Orbit, backbone_at_speed, exact_backbone};
+use vines_model::regime::Regime;
 use vines_model::theory::{BranchSide, Manifold};
 use vines_model::{Definition, Dimensionless, Measurand, Sensor};
 
 use super::recording::remove_drift;
 use super::{
-    ChannelTest, Covariance, Fit, Known, LIMITS, MeasuredPoint, Nearest, Part, Problem, Quantity, Recording, UNKNOWNS,
-    Unknowns, fit, plant, shifted, unknowns,
+    ChannelTest, Covariance, Fit, Kind, Known, LIMITS, MeasuredPoint, Nearest, Part, Problem, Quantity, Recording,
+    UNKNOWNS, Unknowns, fit, plant, probability, shifted, unknowns,
 };
 use crate::rig::derivative;
 
@@ -73,6 +75,8 @@ const JUMP: Estimate = Estimate { value: 0.5, uncertainty: 0.5 };
 const STILL: f64 = 0.1;
 /// Weight that holds a function of the unknowns, over its standard uncertainty.
 const HOLD: f64 = 1e3;
+/// Half-width of a cavity that no response fills, over the expected one.
+const WIDE: f64 = 1e3;
 /// Rise of chi-square at the end of an interval of three standard uncertainties.
 const END: f64 = 9.0;
 
@@ -153,6 +157,10 @@ struct Followed<'a> {
     least_noise: f64,
     /// A linear function of the unknowns, and the value at which the fit holds it.
     held: Option<(Unknowns, f64)>,
+    /// Impacts in a period: two, or none of a structure that no particle touches.
+    impacts: u64,
+    /// Fewest samples to be followed: half of those of parts that show 1:1 by themselves.
+    fewest: usize,
 }
 
 /// Part of a record that does not belong to the motion.
@@ -416,12 +424,19 @@ fn noise_of(errors: &[f64], turn: Complex64) -> Matrix2<f64> {
 }
 
 impl Followed<'_> {
-    /// The plant on the exact motion whose response has the amplitude and phase of the first period of a stretch, at a sample soon after.
+    /// The plant on the exact motion, or without impacts on that of the structure, whose response has the amplitude and phase of the first period of
+    /// a stretch, at a sample soon after.
     fn start(&self, x: &Unknowns, stretch: &Stretch) -> Option<Follower<'_>> {
         let record = &self.records[stretch.record];
         let Recording { response, sample_time, .. } = record.recording;
         let from = stretch.span[0];
         let measured = harmonic(response.get(from..from + record.period)?);
+        let phase = measured.arg() - record.recording.measurands[0].lead();
+        if self.impacts == 0 {
+            let (q1, velocity) = (measured.norm() * phase.sin(), measured.norm() * phase.cos());
+            let state = State { q1, dq1: velocity * x[0].exp(), ..State::default() };
+            return self.follower(x, stretch, state, from);
+        }
         let d = Dimensionless {
             definition: self.problem.definition,
             ..Dimensionless::of(&plant(x, Cavity::IDEAL), 0.0)
@@ -435,7 +450,7 @@ impl Followed<'_> {
             .iter()
             .min_by(|one, other| distance(one).total_cmp(&distance(other)))?;
         // Phase of the response at the impact, less that at the sample.
-        let rest = orbit.start.phase + orbit.gamma + record.recording.measurands[0].lead() - measured.arg();
+        let rest = orbit.start.phase + orbit.gamma - phase;
         let time = rest.rem_euclid(TAU) / TAU * record.period as f64 * sample_time;
         let AfterImpact { q1, dq1, q2, dq2, .. } = orbit.start;
         let ([q1, q2], [dq1, dq2]) = (
@@ -531,8 +546,8 @@ impl Followed<'_> {
     fn follower(&self, x: &Unknowns, stretch: &Stretch, state: State, n: usize) -> Option<Follower<'_>> {
         let parameters = plant(x, Cavity::IDEAL);
         let share = match self.problem.definition.sensor {
-            Sensor::V => parameters.mass_ratio(),
-            Sensor::Q1 => 0.0,
+            Sensor::V if self.impacts > 0 => parameters.mass_ratio(),
+            _ => 0.0,
         };
         let record = &self.records[stretch.record];
         Some(Follower {
@@ -579,7 +594,7 @@ impl Followed<'_> {
                 let moved = piece
                     .iter()
                     .fold(Vector4::ith(3, 1.0), |moved, step| step.transition * moved);
-                moved.norm() >= 1.0 || piece.iter().any(|step| step.impacts != 2)
+                self.impacts > 0 && moved.norm() >= 1.0 || piece.iter().any(|step| step.impacts != self.impacts)
             };
             let flags: Vec<Vec<bool>> = self
                 .courses
@@ -708,14 +723,18 @@ impl Misfit<UNKNOWNS> for Followed<'_> {
 type Minimum = LeastSquares<UNKNOWNS, Vec<Nearest>>;
 
 impl Followed<'_> {
-    /// The minimum that is reached from these parameters, and what is left out; `None` where half of the stretches do not belong.
+    /// The minimum that is reached from these parameters, and what is left out; `None` where too little belongs.
     fn search(&mut self, mut x: Unknowns) -> Option<(Minimum, Vec<Stretch>)> {
-        let samples = |stretches: &[Stretch]| stretches.iter().map(|one| one.span[1] - one.span[0]).sum::<usize>();
-        let whole = samples(&self.stretches);
         let mut out = self.linearise(&x);
         for _ in 0..ROUNDS {
             out.extend(self.linearise(&x));
+            if self.impacts == 0 && !out.is_empty() {
+                return None;
+            }
             let minimum = Minimum::minimum(self, x, &Vec::new(), FOUND)?;
+            if self.impacts == 0 && Self::contradicts(&minimum) {
+                return None;
+            }
             let moved = minimum.x - x;
             x = minimum.x;
             let is_first = self.least_noise > 0.0;
@@ -726,7 +745,8 @@ impl Followed<'_> {
             }
             let more = self.cut(&self.contradicting(&x));
             if more.is_empty() {
-                return Some((minimum, out)).filter(|_| 2 * samples(&self.stretches) >= whole);
+                let followed: usize = self.stretches.iter().map(|one| one.span[1] - one.span[0]).sum();
+                return Some((minimum, out)).filter(|_| followed >= self.fewest);
             }
             out.extend(more);
         }
@@ -784,11 +804,44 @@ impl Followed<'_> {
     }
 }
 
-/// Neighbouring parts of a record at which it has points, as stretches, with what is near them.
+impl Followed<'_> {
+    /// Whether a structure that no particle touches, with its own frequency and damping, contradicts what is followed. `expected`: about which rig it
+    /// is. A free particle and one that is carried along differ in frequency and damping only.
+    fn needs_impacts(&self, expected: &Parameters) -> bool {
+        // The particle rests in the middle of a cavity that no response fills.
+        let wide = Parameters { half_width: WIDE * expected.half_width, ..*expected };
+        let (known, x) = (expectations(&wide), start_at(&wide));
+        let problem = Problem {
+            free: true,
+            known: &known,
+            points: Vec::new(),
+            ..self.problem.clone()
+        };
+        let mut linear = Followed {
+            problem: &problem,
+            impacts: 0,
+            least_noise: STRONG,
+            fewest: 0,
+            ..self.clone()
+        };
+        linear.search(x).is_none()
+    }
+
+    /// Whether the innovations are too large for what is followed, at the probability [`FALSE_ALARM`].
+    fn contradicts(minimum: &Minimum) -> bool {
+        let degrees = minimum.residuals.len() as f64 - 2.0;
+        probability(minimum.chi_square, degrees).is_none_or(|p| p < FALSE_ALARM)
+    }
+}
+
+/// Neighbouring parts of a record that may be 1:1, as stretches, with what is near them.
 fn stretches_of(record: usize, parts: &[Part], measured: &Measured) -> Vec<Stretch> {
     let mut spans: Vec<[usize; 2]> = Vec::new();
     let gap = GAP * measured.period;
-    for part in parts.iter().filter(|part| part.point.is_some()) {
+    for part in parts
+        .iter()
+        .filter(|part| part.candidate.is_some() || part.kind == Kind::Decay)
+    {
         let [from, to] = part
             .seconds
             .map(|time| (time / measured.recording.sample_time) as usize);
@@ -809,16 +862,8 @@ fn stretches_of(record: usize, parts: &[Part], measured: &Measured) -> Vec<Stret
         .collect()
 }
 
-/// Where the search begins: at the fit of all points and of what is expected.
-fn start(
-    parts: &[Vec<Part>],
-    points: &[MeasuredPoint],
-    definition: Definition,
-    expected: &Parameters,
-    known: &[Known],
-) -> Option<Unknowns> {
-    let mut points = points.to_vec();
-    points.extend(parts.iter().flatten().filter_map(|part| part.point));
+/// What is expected of a rig.
+fn expectations(expected: &Parameters) -> Vec<Known> {
     let wide = Quantity::FITTED.iter().zip(EXPECTED).map(|(quantity, range)| {
         let value = quantity.of_plant(expected);
         let uncertainty = range * if *quantity == Quantity::R { 1.0 } else { value };
@@ -827,13 +872,23 @@ fn start(
             estimate: Estimate { value, uncertainty },
         }
     });
-    let known: Vec<Known> = known.iter().copied().chain(wide).collect();
-    // With what is expected, two points are enough.
-    let of_few = |_| Problem::new(points.clone(), definition, &known).fit(expected);
-    let fit = fit(&points, definition, expected, &known).or_else(of_few).ok()?;
-    let mut x = unknowns(&fit.plant(expected));
+    wide.collect()
+}
+
+/// Where the search begins: at the fit of points and of what is expected.
+fn start(points: &[MeasuredPoint], definition: Definition, expected: &Parameters, known: &[Known]) -> Option<Unknowns> {
+    let known: Vec<Known> = known.iter().copied().chain(expectations(expected)).collect();
+    // With what is expected, one point is enough.
+    let of_few = |_| Problem::new(points.to_vec(), definition, &known).fit_from(std::iter::once(unknowns(expected)));
+    let fit = fit(points, definition, expected, &known).or_else(of_few).ok()?;
+    Some(start_at(&fit.plant(expected)))
+}
+
+/// The unknowns of a plant.
+fn start_at(plant: &Parameters) -> Unknowns {
+    let mut x = unknowns(plant);
     x[6] = JUMP.value;
-    Some(x)
+    x
 }
 
 /// Fits the five parameters to records and points. `recordings`: prepared records ([`Recording::prepared`]) with their parts; `expected`: about
@@ -852,28 +907,41 @@ pub fn follow(
         free: true,
         ..Problem::new(points.to_vec(), definition, known)
     };
-    let x = start(parts, points, definition, expected, known)?;
-    let omega = x[0].exp();
+    let mut all = points.to_vec();
+    all.extend(parts.iter().flatten().filter_map(|part| part.candidate));
+    let u = |point: &MeasuredPoint| point.drive.uncertainty / point.drive.value;
+    all.sort_by(|one, other| u(one).total_cmp(&u(other)));
+    // Points of another motion may lead all of them astray: the best one alone follows.
+    let starts = [&all[..], &all[..all.len().min(1)]].map(|points| start(points, definition, expected, known));
+    let omega = starts.iter().flatten().next()?[0].exp();
     let records: Vec<Measured> = recordings
         .iter()
         .map(|recording| Measured::new(recording, omega, expected.natural_frequency()))
         .collect();
-    let stretches = records
-        .iter()
-        .zip(parts)
-        .enumerate()
+    let numbered = records.iter().zip(parts).enumerate();
+    let stretches = numbered
         .flat_map(|(n, (one, parts))| stretches_of(n, parts, one))
         .collect();
-    let mut followed = Followed {
+    let shown = recordings.iter().zip(parts).flat_map(|(one, parts)| {
+        let shown = parts.iter().filter(|part| part.point.is_some());
+        shown.map(|part| (part.seconds[1] - part.seconds[0]) / one.sample_time)
+    });
+    let followed = Followed {
         problem: &problem,
         records,
         stretches,
         courses: Vec::new(),
         least_noise: STRONG,
         held: None,
+        impacts: 2,
+        fewest: (0.5 * shown.sum::<f64>()) as usize,
     };
     let all = followed.stretches.clone();
-    let (mut minimum, mut out) = followed.search(x)?;
+    let mut searched = starts.into_iter().flatten().map(|x| {
+        let mut followed = followed.clone();
+        followed.search(x).map(|found| (followed, found))
+    });
+    let (mut followed, (mut minimum, mut out)) = searched.find_map(|found| found)?;
     let covariance = loop {
         let (covariance, lower) = followed.covariance(&minimum);
         // A narrow valley ends the search early. Farther on, other pieces belong.
@@ -886,6 +954,17 @@ pub fn follow(
         (minimum, out) = found;
         followed = again;
     };
+    // A particle that slides looks like one in another cavity: without a third harmonic of impacts, the rig must be about the expected one.
+    let is_shown = parts.iter().flatten().any(|part| part.regime == Regime::Symmetric);
+    let strange = expectations(expected)
+        .iter()
+        .flat_map(|one| one.residuals(&minimum.x))
+        .map(|one| one * one)
+        .sum();
+    let is_strange = probability(strange, 5.0).is_none_or(|p| p < FALSE_ALARM);
+    if !is_shown && is_strange || !followed.needs_impacts(expected) {
+        return None;
+    }
     let innovations: Vec<Vector2<f64>> = followed.each(&minimum.x).concat();
     let count = innovations.len();
     let mut fit = problem.found(&minimum, &minimum.trace);

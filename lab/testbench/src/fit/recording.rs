@@ -92,6 +92,9 @@ pub struct Part {
     /// The point; absent if it is not one of the backbone, or if another part has a better one at this amplitude.
     #[serde(skip)]
     pub point: Option<MeasuredPoint>,
+    /// What the point is if the motion is 1:1, where only the record as a whole can show whether it is.
+    #[serde(skip)]
+    pub(super) candidate: Option<MeasuredPoint>,
     /// The regime of its motion.
     pub regime: Regime,
 }
@@ -189,9 +192,9 @@ impl Recording {
         parts.extend(decays.flat_map(|stretch| decay(stretch, linear, self.sample_time)));
         parts.sort_by(|first, second| first.seconds[0].total_cmp(&second.seconds[0]));
         best_of_each_amplitude(&mut parts);
-        if parts.iter().all(|part| part.point.is_none()) {
-            let is_seen = 2 * anchors.iter().filter(|anchor| anchor.response.is_some()).count() >= anchors.len();
-            return Err(self.nothing(is_seen, &parts, linear));
+        let is_seen = 2 * anchors.iter().filter(|anchor| anchor.response.is_some()).count() >= anchors.len();
+        if !is_seen && parts.iter().all(|part| part.candidate.is_none()) {
+            return Err(self.nothing(&parts, linear));
         }
         Ok(parts)
     }
@@ -404,16 +407,22 @@ impl Recording {
         Ok(())
     }
 
-    /// Why there are no points. `is_seen`: half of the recording has an oscillation near the natural frequency.
-    fn nothing(&self, is_seen: bool, parts: &[Part], linear: &LinearResponse) -> RecordingError {
-        let Self { origin, channels: [response, drive], .. } = self;
+    /// Why less than half of the recording has an oscillation near the natural frequency.
+    fn nothing(&self, parts: &[Part], linear: &LinearResponse) -> RecordingError {
+        let Self { origin, channels: [response, _], .. } = self;
         let (hertz, strongest, rate) = (linear.omega0 / TAU, self.strongest(), 1.0 / self.sample_time);
-        if !is_seen && (strongest / hertz - 1.0).abs() > FARTHEST {
+        if (strongest / hertz - 1.0).abs() > FARTHEST {
             return RecordingError(format!(
                 "{origin}, channel {response}: the strongest oscillation has {strongest:.4} Hz, and the scene's natural frequency is {hertz:.4} Hz. \
                  If the rate of {rate:.6} samples a second is wrong, give it with --rate; if the scene is wrong, give stiffness and mass with --scene"
             ));
         }
+        self.without_points(parts)
+    }
+
+    /// That nothing in the recording shows 1:1.
+    pub(super) fn without_points(&self, parts: &[Part]) -> RecordingError {
+        let Self { origin, channels: [response, drive], .. } = self;
         let regimes: BTreeSet<String> = parts.iter().map(|part| part.regime.to_string()).collect();
         let found = match regimes.into_iter().collect::<Vec<_>>().join(", ") {
             none if none.is_empty() => "no such stretch".into(),
@@ -583,6 +592,7 @@ fn best_of_each_amplitude(parts: &mut [Part]) {
             points.iter().any(better)
         };
         part.point = part.point.filter(|point| !is_second(point));
+        part.candidate = part.candidate.filter(|point| !is_second(point));
     }
 }
 
@@ -611,7 +621,7 @@ fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], knowle
     let seconds = [samples[0].time, samples[samples.len() - 1].time];
     let Some(estimate) = estimate else {
         let (kind, regime) = (Kind::Held, Regime::Unknown);
-        return Part { seconds, kind, point: None, regime };
+        return Part { seconds, kind, point: None, candidate: None, regime };
     };
     let ([base, omega], level) = (estimate.at, estimate.response);
     let samples = &samples[samples.len() - count(&cycles[cycles.len() - estimate.periods..])..];
@@ -632,8 +642,10 @@ fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], knowle
     let manifold = Manifold::new(knowledge.numbers.r);
     let largest = manifold.c(B_SYMMETRY_BREAKING) * knowledge.numbers.b;
     let is_symmetric = regime == Regime::Symmetric || (regime == Regime::Unresolved && level.value < largest);
-    let point = point(level, omega, drive).filter(|_| is_symmetric);
-    Part { seconds, kind, point, regime }
+    let is_another = matches!(regime, Regime::Other | Regime::Asymmetric | Regime::Unknown);
+    let candidate = point(level, omega, drive).filter(|_| !is_another);
+    let point = candidate.filter(|_| is_symmetric);
+    Part { seconds, kind, point, candidate, regime }
 }
 
 /// A point, if its uncertainties are small enough.
@@ -668,6 +680,15 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
     let synchronous: Vec<_> = fits.iter().take_while(|(_, harmonic)| has_impacts(harmonic)).collect();
     let count = synchronous.len() as f64;
     let half = 0.5 * WINDOW * TAU / linear.omega0;
+    // The rest of the decay: the loss that the scene states may hide the impacts there.
+    let rest = &fits[synchronous.len().saturating_sub(1)..];
+    let rest = rest.first().zip(rest.last()).map(|((from, _), (to, _))| Part {
+        seconds: [from - half, to + half],
+        kind: Kind::Decay,
+        point: None,
+        candidate: None,
+        regime: Regime::NotEstablished,
+    });
     synchronous
         .windows(2)
         .map(|pair| {
@@ -688,8 +709,10 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
                 seconds: [time - half, time + half],
                 kind: Kind::Decay,
                 point: point(response, omega, drive),
+                candidate: point(response, omega, drive),
                 regime: Regime::Unresolved,
             }
         })
+        .chain(rest)
         .collect()
 }
