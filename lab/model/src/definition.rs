@@ -160,7 +160,15 @@ impl Reference {
     pub fn name(&self) -> &'static str {
         match self {
             Reference::Base => "e",
-            Reference::Force => "k e + c e'",
+            Reference::Force => "the force",
+        }
+    }
+
+    /// Amplitude of the reference, a force as its static displacement, over that of the base that makes it at omega0; `damping`: 2 zeta.
+    pub fn per_base(self, damping: f64) -> f64 {
+        match self {
+            Reference::Base => 1.0,
+            Reference::Force => 1.0_f64.hypot(damping),
         }
     }
 

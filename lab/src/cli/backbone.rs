@@ -65,7 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     }
     if tracked.ended.is_none()
         && scene.left_out().is_none()
-        && let Some(found) = contradiction(&points, scene.resonance, &scene.plant)
+        && let Some(found) = contradiction(&points, scene.definition(), &scene.plant)
     {
         text += &format!("\n{}; run `vines fit`\n", summary::contradicts(&found));
     }

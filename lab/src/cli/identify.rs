@@ -91,7 +91,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let lock = [(&identification.lock.at).into()];
     if !is_simulated
         && scene.left_out().is_none()
-        && let Some(found) = contradiction(&lock, scene.resonance, &scene.plant)
+        && let Some(found) = contradiction(&lock, scene.definition(), &scene.plant)
     {
         text += &format!(
             "\n{}: track the backbone with `vines backbone`, and run `vines fit`\n",

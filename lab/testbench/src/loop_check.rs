@@ -609,12 +609,12 @@ impl Linear {
     /// The gain of an oscillator of this natural frequency and damping that is moved through its spring and damper, or by the force in them,
     /// at the frequency `omega`, rad/s.
     fn expected_gain(&self, omega: f64, reference: Reference) -> Complex64 {
-        let damper = match reference {
-            Reference::Base => 2.0 * self.damping_rate * omega,
-            Reference::Force => 0.0,
+        let [spring, damper] = match reference {
+            Reference::Base => [1.0, 2.0 * self.damping_rate * omega / self.omega_0.powi(2)],
+            Reference::Force => [reference.per_base(2.0 * self.damping_rate / self.omega_0), 0.0],
         };
         let free = (self.omega_0.powi(2) - self.damping_rate.powi(2)).max(0.0).sqrt();
-        Complex64::new(self.omega_0.powi(2), damper) / Complex64::new(self.damping_rate, omega + free)
+        self.omega_0.powi(2) * Complex64::new(spring, damper) / Complex64::new(self.damping_rate, omega + free)
     }
 
     /// The frequency response.

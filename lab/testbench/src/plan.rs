@@ -252,8 +252,8 @@ impl Knowledge {
     /// Growth rate of the response at phase resonance per amplitude of the base, 1/s, at the frequency `omega`, rad/s: k/(2 omega) over the mass that
     /// moves. Of q1 this mass is `k/omega²`, whatever the particle does. Of v it is M, and `omega0` belongs to M and what was carried of m.
     pub fn growth(&self, omega: f64) -> Estimate {
-        let (omega0, epsilon) = (self.linear.omega0, self.numbers.epsilon);
-        match self.numbers.definition.sensor {
+        let (omega0, Dimensionless { epsilon, definition, .. }) = (self.linear.omega0, self.numbers);
+        let growth = match definition.sensor {
             Sensor::Q1 => Estimate::new(0.5 * omega, &[]),
             Sensor::V => {
                 let [least, most] = self.linear.particle.carried();
@@ -264,7 +264,8 @@ impl Knowledge {
                 );
                 mass.scaled(0.5 * omega0 * omega0 / omega)
             }
-        }
+        };
+        growth.scaled(definition.reference.per_base(self.linear.bandwidth()))
     }
 
     /// With a linear response that was measured on the rig.
@@ -316,7 +317,13 @@ impl Scene {
     /// What the scene says of its rig.
     pub fn knowledge(&self) -> Knowledge {
         let phase = self.controller.phase_target.to_radians();
-        let mut knowledge = Knowledge::of(&self.plant, self.resonance, self.amplitude, self.sample_time(), phase);
+        let mut knowledge = Knowledge::of(
+            &self.plant,
+            self.definition(),
+            self.amplitude,
+            self.sample_time(),
+            phase,
+        );
         knowledge.shaker = self.structure().and_then(|structure| structure.shaker_path());
         knowledge.target.through_shaker = knowledge.shaker.is_some();
         knowledge

@@ -106,7 +106,19 @@ impl Scene {
     /// The numbers that the dimensionless model, the theory and the exact orbits depend on.
     pub fn dimensionless(&self) -> Dimensionless {
         let numbers = Dimensionless::of(&self.plant, self.amplitude);
-        Dimensionless { definition: self.resonance, ..numbers }
+        Dimensionless { definition: self.definition(), ..numbers }
+    }
+
+    /// What counts as resonance of the oscillator or the driven mode. A force on a structure is what spring and damper of the oscillator pass on; its
+    /// sensors are those of [`Scene::resonance`].
+    pub fn definition(&self) -> Definition {
+        let by_force = self.structure().is_some_and(|one| one.excitation == Excitation::Force);
+        let reference = if by_force {
+            Reference::Force
+        } else {
+            self.resonance.reference
+        };
+        Definition { reference, ..self.resonance }
     }
 
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.

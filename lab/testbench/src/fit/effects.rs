@@ -332,7 +332,7 @@ pub struct Found {
 /// As [`fit()`] and [`parts()`].
 pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize)) -> Result<Found, FitError> {
     let Measurements { points: measured_points, recordings, linear, known } = measured;
-    let (definition, expected) = (scene.resonance, &scene.plant);
+    let (definition, expected) = (scene.definition(), &scene.plant);
     let parts = parts(recordings, scene)?;
     let of_parts = parts.iter().flatten().filter_map(|part| part.point);
     let points: Vec<MeasuredPoint> = measured_points.iter().copied().chain(of_parts).collect();

@@ -17,7 +17,7 @@ use super::{
 use crate::linear::{MeasuredLinear, ParticleState};
 use crate::plan::{Plan, ShakerPath};
 use crate::rig::{Rig, RigError, Scaled};
-use crate::scene::{PLACES, frequencies};
+use crate::scene::{PLACES, Reference, frequencies};
 
 /// Periods of a window, and most windows at a frequency.
 const WINDOW: [usize; 2] = [8, 100];
@@ -114,8 +114,12 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
     let gain = Complex64::new(damping / natural, 1.0) / slope;
     let mut measured = measured(plan, [natural, damping, u_rate], gain, u_gain);
     // A table also moves the structure through its damper.
-    let damper = if stated.by_force { 0.0 } else { 2.0 * damping / natural };
-    let ratio = gain / (Complex64::new(damper, -1.0) * (0.5 * natural));
+    let through = 2.0 * damping / natural;
+    let expected = match plan.knowledge.numbers.definition.reference {
+        Reference::Base => Complex64::new(through, -1.0),
+        reference => Complex64::new(0.0, -reference.per_base(through)),
+    };
+    let ratio = gain / (expected * (0.5 * natural));
     let mut quantities = of_response(&measured, ratio, plan).to_vec();
     let values: Vec<(f64, Complex64)> = frequencies
         .into_iter()

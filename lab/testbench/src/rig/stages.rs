@@ -15,9 +15,9 @@ use crate::scene::Structure;
 /// A rig whose response and reference are displacements, with the sensors of a definition of resonance.
 ///
 /// Velocities and accelerations are differences of displacements: an accelerometer that averages over two sample periods with the weights of a
-/// triangle, which keep the instants of the walls' impulses. The force `k e + c e'` over k takes e' from a difference of e. All
-/// belong to the sample before; then response and reference are both read one sample late. So does the acceleration by which the mass before a force
-/// cell is compensated.
+/// triangle, which keep the instants of the walls' impulses. The force `k e + c e'` takes e' from a difference of e, and is read as the amplitude of
+/// the base that makes it at omega0. All belong to the sample before; then response and reference are both read one sample late. So does the
+/// acceleration by which the mass before a force cell is compensated.
 #[derive(Debug, Clone)]
 pub struct Measured<R> {
     rig: R,
@@ -112,7 +112,9 @@ impl<R: Rig> RigStage for Measured<R> {
             });
         }
         let read = |channel: usize, three| derivative(measurands[channel], three, [early, late], omega0);
-        let force = |[first, middle, now]: [f64; 3]| middle + leading * (now - first) / (late + early);
+        // As the base that makes it.
+        let per_base = self.definition.reference.per_base(leading * omega0);
+        let force = |[first, middle, now]: [f64; 3]| (middle + leading * (now - first) / (late + early)) / per_base;
         let of_base = |three| match self.definition.reference {
             Reference::Base => read(1, three),
             Reference::Force => force(three),

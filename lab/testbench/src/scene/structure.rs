@@ -11,8 +11,8 @@ use lovines::{Host, Mode};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::SceneError;
 use super::shaker::SceneShaker;
+use super::{Reference, SceneError};
 use files::{Matrix, Residues};
 
 /// What drives a structure.
@@ -231,7 +231,7 @@ impl Structure {
         let mode = self.mode();
         let per_stiffness = match self.excitation {
             Excitation::Base => 1.0,
-            Excitation::Force => mode.omega.powi(-2),
+            Excitation::Force => mode.omega.powi(-2) / Reference::Force.per_base(2.0 * mode.zeta),
         };
         (self.at_cavity(mode) * mode.drive).abs() * per_stiffness
     }

@@ -8,12 +8,14 @@ use tempfile::TempDir;
 use vines_model::numerics::Estimate;
 use vines_model::orbit::{Orbit, StructureOrbit};
 use vines_testbench::comparison::ExactCurve;
-use vines_testbench::fit::MeasuredPoint;
+use vines_testbench::fit::{MeasuredPoint, contradiction};
 use vines_testbench::identification::IdentificationError;
+use vines_testbench::loop_check::{Verdict, check};
+use vines_testbench::rig::Simulated;
 use vines_testbench::scene::{Excitation, Scene, SceneError, Structure};
 use vines_testbench::survey::{Survey, phase_resonant, structure_backbone, without_other_modes};
 
-use super::identified;
+use super::{identified, paper, tracked};
 
 /// A beam by two modes; `changes` are pairs of a text and its replacement.
 fn beam(changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
@@ -71,6 +73,37 @@ fn says(result: Result<Scene, SceneError>, parts: &str) {
 }
 
 #[test]
+fn a_force_through_much_damping_is_checked_and_its_points_belong_to_the_scene() {
+    let oscillator = "[plant]\nm = 0.032\nb = 0.01\nr = 0.65\n[structure]\nexcitation = \"force\"\ncavity = \"c\"\ndrive = \"c\"\n\
+                      modes = [{ frequency = 8.8, damping = 0.02, shape = { c = 0.5 } }]\n[excitation]\nG = 2.5\n[start]\ndq2 = 0.5\n";
+    let of_base = [
+        "plant.c=9",
+        "resonance.reference=force",
+        "resonance.sensor=q1",
+        "excitation.G=2.5",
+    ];
+    for scene in [of(&TempDir::new().unwrap(), oscillator, &[]).unwrap(), paper(&of_base)] {
+        let found = check(&mut *Simulated::of(&scene.clone().at_rest()).unwrap(), &scene.plan()).unwrap();
+        assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+        assert!(
+            found
+                .quantities
+                .iter()
+                .all(|one| (one.measured - one.expected).abs() < 0.02),
+            "{found:?}"
+        );
+        let points = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap().points;
+        let points: Vec<MeasuredPoint> = points
+            .iter()
+            .filter(|one| one.settled)
+            .map(|one| (&one.at).into())
+            .collect();
+        assert!(points.len() > 20, "{}", points.len());
+        assert!(contradiction(&points, scene.definition(), &scene.plant).is_none());
+    }
+}
+
+#[test]
 fn the_driven_mode_of_a_table_is_the_oscillator_of_knowledge_and_plan() {
     let scene = beam(&[]).unwrap();
     let structure = scene.structure.as_ref().unwrap();
@@ -80,8 +113,8 @@ fn the_driven_mode_of_a_table_is_the_oscillator_of_knowledge_and_plan() {
     assert!((knowledge.linear.omega0 / (TAU * 8.8156) - 1.0).abs() < 1e-14);
     assert!((knowledge.linear.damping_rate / (0.006 * TAU * 8.8156) - 1.0).abs() < 1e-14);
     assert!((knowledge.numbers.epsilon - 0.032 * 0.51252_f64.powi(2)).abs() < 1e-15);
-    // F at the drive and a base of the amplitude E move the mode alike; the sensor is at the drive unless it says otherwise.
-    let stiffness = knowledge.linear.omega0.powi(2) / 0.51252;
+    // F at the drive and a base of the amplitude E, through spring and damper, move the mode alike; the sensor is at the drive unless it says otherwise.
+    let stiffness = knowledge.linear.omega0.powi(2) * 1.0_f64.hypot(2.0 * 0.006) / 0.51252;
     assert!((scene.amplitude * stiffness / (0.1 * 1.2) - 1.0).abs() < 1e-14);
     assert!((structure.reading_per_response() - 0.1 / 0.51252).abs() < 1e-15);
     let second = beam(&[("[excitation]", "mode = 2\nsensor = \"middle\"\n[excitation]")]);
