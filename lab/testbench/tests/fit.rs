@@ -359,6 +359,15 @@ fn the_plant_follows_a_record_and_determines_the_parameters_better_than_its_poin
     let from = record.response.len() / 2;
     let odd = from..from + (1.0 / record.sample_time) as usize;
     record.response[odd].iter_mut().for_each(|value| *value *= 1.02);
+    // Later, two seconds of uneven impacts: a second harmonic of 0.1 %.
+    let [second, turn] = [
+        1.0 / record.sample_time,
+        2.0 * RIG.natural_frequency() * record.sample_time,
+    ];
+    let uneven = from + (8.0 * second) as usize..from + (10.0 * second) as usize;
+    for n in uneven.clone() {
+        record.response[n] += 5e-6 * (turn * n as f64).sin();
+    }
     let parts = parts(&[record.clone()], &scene).unwrap();
     let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
     let start = fit(&points, Definition::default(), &scene.plant, &[]).unwrap();
@@ -375,13 +384,16 @@ fn the_plant_follows_a_record_and_determines_the_parameters_better_than_its_poin
     );
     let u = |fit: &Fit| fit.estimate(Quantity::R).unwrap().uncertainty;
     assert!(u(&followed.fit) < 0.5 * u(&start), "{} {}", u(&followed.fit), u(&start));
-    let middle = (from as f64 + 0.5 / record.sample_time) * record.sample_time;
-    let is_named = |[begin, end]: [f64; 2]| begin < middle && middle < end;
-    assert!(
-        followed.left_out.iter().any(|one| is_named(one.seconds)),
-        "{:?}",
-        followed.left_out
-    );
+    for middle in [from as f64 + 0.5 * second, uneven.start as f64 + second] {
+        let middle = middle * record.sample_time;
+        let is_named = |[begin, end]: [f64; 2]| begin < middle && middle < end;
+        let mut left_out = followed.left_out.iter();
+        assert!(
+            left_out.any(|one| is_named(one.seconds)),
+            "{middle} s: {:?}",
+            followed.left_out
+        );
+    }
 }
 
 /// A recording of a lock and its decay, on [`RIG`] with this cavity.

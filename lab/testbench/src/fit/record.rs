@@ -16,9 +16,10 @@
 //! beside them: a floor of the uncertainty, which in simulations without noise exceeds the errors several times.
 //!
 //! The fit begins at the parameters of the points of the record. A piece of the record is left out where the plant has not two impacts per period,
-//! where a deviation of the particle grows, where the innovations contradict their covariance, and where they are not linear in the parameters: near
-//! the fold, and beyond it for other parameters within their uncertainties. Whether a part shows impacts by itself does not matter, because that
-//! depends on the natural frequency of the scene: what is followed needs them if no linear structure follows it.
+//! where a deviation of the particle grows, where the response has a second harmonic, where the innovations contradict their covariance, and where
+//! they are not linear in the parameters: near the fold, and beyond it for other parameters within their uncertainties. Whether a part shows impacts
+//! by itself does not matter, because that depends on the natural frequency of the scene: what is followed needs them if no linear structure follows
+//! it.
 
 use std::f64::consts::{PI, TAU};
 
@@ -127,8 +128,19 @@ struct Step {
     impacts: u64,
     /// Covariance of the first harmonic of the response, m², by what the prediction leaves beside it.
     noise: Matrix2<f64>,
+    /// Second harmonic of what the prediction leaves, m.
+    second: Complex64,
     /// Derivatives of the state at the end over the state at the begin.
     transition: Matrix4<f64>,
+}
+
+/// Chi-square (two degrees of freedom) of the second harmonic of a piece: impacts at uneven intervals have one, which lasts for many periods.
+fn unevenness(piece: &[Step]) -> f64 {
+    let [sum, variance] = [
+        piece.iter().map(|step| step.second).sum::<Complex64>().norm_sqr(),
+        piece.iter().map(|step| 0.5 * step.noise.trace()).sum(),
+    ];
+    sum / variance
 }
 
 /// The periods of a stretch, and the state at the first one, for plants of other parameters as well: it has its own uncertainty.
@@ -512,6 +524,7 @@ impl Followed<'_> {
         *covariance =
             transition * kept * transition.transpose() + process * 0.5 + Matrix4::from_diagonal_element(square);
         let gain = transition * gain;
+        let errors = one.errors(begin, &readings);
         one.moved(&(gain * innovation))?;
         Some(Step {
             begin,
@@ -521,9 +534,10 @@ impl Followed<'_> {
             whitening: total.cholesky()?.l().try_inverse()?,
             impacts: one.plant.totals().impacts - from.plant.totals().impacts,
             noise: match record.recording.measurands[0] {
-                Measurand::Displacement => noise_of(&one.errors(begin, &readings), turn),
-                _ => Matrix2::from_diagonal_element(variance_near(&one.errors(begin, &readings))),
+                Measurand::Displacement => noise_of(&errors, turn),
+                _ => Matrix2::from_diagonal_element(variance_near(&errors)),
             },
+            second: harmonic_of(&errors, 2.0) * turn * turn,
             transition,
         })
     }
@@ -590,11 +604,18 @@ impl Followed<'_> {
                 .iter()
                 .map(|one| self.linearised(x, one).unwrap_or_default());
             self.courses = courses.collect();
+            let pieces = self
+                .courses
+                .iter()
+                .map(|one| one.counted().chunks(PIECE).len())
+                .sum::<usize>();
+            let limit = -2.0 * (FALSE_ALARM / pieces.max(1) as f64).ln();
             let is_another = |piece: &[Step]| {
                 let moved = piece
                     .iter()
                     .fold(Vector4::ith(3, 1.0), |moved, step| step.transition * moved);
-                self.impacts > 0 && moved.norm() >= 1.0 || piece.iter().any(|step| step.impacts != self.impacts)
+                self.impacts > 0 && (moved.norm() >= 1.0 || unevenness(piece) > limit)
+                    || piece.iter().any(|step| step.impacts != self.impacts)
             };
             let flags: Vec<Vec<bool>> = self
                 .courses
