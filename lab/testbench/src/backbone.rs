@@ -376,7 +376,11 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let estimate = estimate.unwrap_or_else(|| LevelEstimate::means(&cycles[cycles.len() / 2..]));
         let [drive, omega] = estimate.at.map(|quantity| quantity.value);
         if drive.is_finite() && omega.is_finite() {
-            self.states.push([estimate.response.value, drive, omega]);
+            let response = estimate.response.value;
+            // Of points at one level, as at a limit of the drive, only the last one predicts the next.
+            self.states
+                .retain(|state| (state[0] - response).abs() > REACHED * level);
+            self.states.push([response, drive, omega]);
         }
         let clipped_percent = self.run.clipped_percent(clipped);
         Ok(LevelPoint {

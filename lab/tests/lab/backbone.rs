@@ -80,9 +80,14 @@ fn through_40_db_of_sensor_noise_points_lie_within_5e_3_and_within_what_they_sta
 }
 
 #[test]
-fn a_level_that_the_drive_cannot_hold_is_reported_as_not_reached() {
-    let report = tracked("phase_lock.amplitude_max=1.092e-2 backbone.C_from=0.8 backbone.C_to=0.4 backbone.points=2");
-    assert!(!report.points[0].point.reached && report.points[1].point.reached);
+fn levels_that_the_drive_cannot_hold_are_reported_as_not_reached_and_those_after_them_are_measured() {
+    let report = tracked("plant.lambda=6.77 excitation.G=2 backbone.C_from=0.7 backbone.C_to=0.5 backbone.points=11");
+    let reached = |range: std::ops::Range<usize>| report.points[range].iter().map(|one| one.point.reached);
+    assert!(
+        !reached(0..8).any(|one| one) && reached(9..11).all(|one| one),
+        "{:?}",
+        report.points
+    );
 }
 
 #[test]
