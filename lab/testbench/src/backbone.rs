@@ -17,7 +17,7 @@ use crate::identification::{
 };
 use crate::plan::{Knowledge, Plan, Target};
 use crate::record::Sample;
-use crate::rig::{Controller, Move, Rig};
+use crate::rig::{Controller, Move, OFF, Rig};
 
 // One level: the window of the fit, and the judge of whether the motion is steady.
 //
@@ -389,13 +389,15 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         })
     }
 
-    /// The move to a level, m, and its periods: [`MOVE`], or as many as the drive needs for this change of the response.
+    /// The move to a level, m, and its periods: [`MOVE`], or as many as the drive needs for this change of the response; and behind a shaker, before and
+    /// after the middle, as many as the control of the force needs to correct an error.
     fn step(&self, level: f64) -> (Move, f64) {
         let omega0 = self.plan.knowledge.linear.omega0;
         let [response, drive, omega] = *self.states.last().unwrap_or(&self.closed);
         let slowest = (level - response).abs() / (MOVE_SHARE * 0.5 * drive * TAU);
         // A smooth move is twice as fast in its middle as on average.
-        let periods = MOVE.max(2.0 * slowest);
+        let late = self.plan.knowledge.shaker().map_or(0.0, |_| 2.0 * OFF / TAU);
+        let periods = MOVE.max(2.0 * slowest) + late;
         let expected = extrapolated(&self.states, level);
         let [amplitude, omega] = expected.map_or([0.0; 2], |there| [there[0] - drive, there[1] - omega]);
         let to = Move {

@@ -19,7 +19,7 @@ use crate::scene::{Excitation, Limits, Release, Scene, SceneShaker, Structure};
 
 pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
-pub(crate) use reference_control::BANDWIDTH;
+pub(crate) use reference_control::{BANDWIDTH, OFF};
 pub(crate) use stages::derivative;
 pub use stages::{Interrupted, Measured, Scaled, SensorsOnly, Stoppable};
 

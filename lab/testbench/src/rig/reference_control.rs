@@ -2,8 +2,8 @@
 //!
 //! Near the natural frequency a structure with the impact force I has the response `z' = F + I - (s + d) z` in phasors, where `s = i (omega - omega0)`,
 //! and a shaker makes of a command u the reference `F = K u - (r - d) z` ([`ShakerPath`]): the moving structure takes the force away. The command is
-//! the inverse, `u = (F + (r - d) z)/K`, with the *measured* response z, in which the impacts are: an observer predicts it from the command,
-//! `z' = K u + I - (s + r) z`, and corrects it by the reading. What is left of the error of the measured reference is integrated.
+//! the inverse, `u = (F + (r - d) z)/K`, with the *measured* response z: an observer predicts z and I from the command, `z' = K u + I - (s + r) z` and
+//! `I' = 0`, and corrects both by the reading. What is left of the error of the measured reference, by errors of K and r, is integrated.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,40 +12,52 @@ use num_complex::Complex64;
 use super::{Drive, RigError};
 use crate::plan::{Knowledge, ShakerPath, Target};
 
-/// Bandwidth of the detector of the error, over the natural frequency.
-const DETECTOR: f64 = 0.3;
-/// Bandwidth of the control, a quarter of the detector's: both roots of the loop are then equal, at half of the latter.
-pub(crate) const BANDWIDTH: f64 = 0.25 * DETECTOR;
-/// Bandwidth of the observer of the response, which impacts disturb: at half of it, the force on an oscillator of 1.8 % drop-out
+/// Bandwidth of the observer of response and impacts, over the natural frequency: at half of it, the force on an oscillator of 1.8 % drop-out
 /// (scenes/shaker-oscillator.toml) is so late behind the impacts that the loop does not settle.
-const OBSERVER: f64 = 2.0 * DETECTOR;
-/// Harmonics of both. Impacts of one period are alternating impulses, with odd harmonics.
-const HARMONICS: [f64; 3] = [1.0, 3.0, 5.0];
+const OBSERVER: f64 = 0.6;
+/// Bandwidth of the detector of the error.
+const DETECTOR: f64 = 0.5 * OBSERVER;
+/// Rate of a second integrator over the bandwidth of the first: both roots of the loop are then equal, at half of this bandwidth.
+const SECOND: f64 = 0.25;
+/// Bandwidth of the control.
+pub(crate) const BANDWIDTH: f64 = SECOND * DETECTOR;
+/// Number of odd harmonics that both detectors know, as far as they are sampled. Impacts of one period are alternating impulses. A resonance of armature
+/// and stinger can make a harmonic of the force ten times the fundamental: unknown, it would be in the command, and another motion the result.
+const HARMONICS: usize = 15;
+/// How many of them change as fast as the motion does, and the rate of the others, which then hardly acts on the loop, over that of the fundamental.
+const FAST: usize = 3;
+const SLOW: f64 = 0.1;
 
 /// Share of the command's fundamental that an amplifier loses which has failed; clipping at half of the command loses 0.39. At the natural frequency
 /// this is the share of the reference, over the drop-out. An error of the whole reference is a failure whatever the drop-out: it is not the reference
 /// asked for that is left then. And a reference that never reaches this share is not there, of a broken stinger.
 const SHARE: f64 = 0.25;
-/// Phase for which such an error lasts, rad. The control corrects an error in a period or more: its roots are at half of the detector's bandwidth, and
-/// while the controller searches, impacts and drive change the reference all the time where little of it is left.
-const OFF: f64 = 1.5 * TAU;
+/// Phase for which such an error lasts, rad. A step by 1.7 times the reference is seen as an error of more than the reference for so long, until the
+/// control has corrected it: impacts and drive change the reference all the time while the controller searches, where little of it is left.
+pub(crate) const OFF: f64 = 1.5 * TAU;
 
 /// Offset and harmonics of a signal: an adaptive filter, as the controller's.
 #[derive(Debug, Clone, Default)]
 struct Detector {
     offset: f64,
-    phasors: [Complex64; HARMONICS.len()],
+    phasors: [Complex64; HARMONICS],
 }
 
 impl Detector {
-    /// Takes a reading at a phase of the oscillator, rad.
-    fn take(&mut self, reading: f64, phase: f64, share: f64) {
-        let rotors = HARMONICS.map(|order| Complex64::cis(order * phase));
+    /// Takes a reading at a phase of the oscillator, which turns by `turn` from sample to sample, rad.
+    fn take(&mut self, reading: f64, phase: f64, turn: f64, share: f64) {
+        let sampled = (0.5 * (PI / turn + 1.0)) as usize;
+        let (first, mut rotors) = (Complex64::cis(phase), [Complex64::ZERO; HARMONICS]);
+        (0..sampled.min(HARMONICS)).fold(first, |rotor, n| {
+            rotors[n] = rotor;
+            rotor * first * first
+        });
         let predicted: f64 = self.phasors.iter().zip(rotors).map(|(of, rotor)| (of * rotor).im).sum();
         let residual = reading - self.offset - predicted;
         self.offset += share * residual;
-        for (of, rotor) in self.phasors.iter_mut().zip(rotors) {
-            *of += 2.0 * share * residual * Complex64::I * rotor.conj();
+        for (n, (of, rotor)) in self.phasors.iter_mut().zip(rotors).enumerate() {
+            let rate = if n < FAST { 1.0 } else { SLOW };
+            *of += 2.0 * rate * share * residual * Complex64::I * rotor.conj();
         }
     }
 }
@@ -68,6 +80,8 @@ pub(crate) struct ReferenceControl {
     /// The error of the reference, and the response, scaled as readings are.
     error: Detector,
     response: Detector,
+    /// What impacts add to the rate of the response, scaled as readings are, 1/s.
+    impacts: Complex64,
     /// Correction of the reference, m.
     correction: Complex64,
     /// The last command, m.
@@ -95,6 +109,7 @@ impl ReferenceControl {
             gain: knowledge.linear.gain,
             error: Detector::default(),
             response: Detector::default(),
+            impacts: Complex64::ZERO,
             correction: Complex64::ZERO,
             command: Complex64::ZERO,
             times: 0.0,
@@ -117,10 +132,12 @@ impl ReferenceControl {
         if error.is_finite() && response.is_finite() {
             let rate = self.path.pole + Complex64::new(0.0, omega - self.omega0);
             let driven = self.gain * self.path.gain * self.command / of_response;
-            self.response.phasors[0] += step * (driven - rate * self.response.phasors[0]);
+            self.response.phasors[0] += step * (driven + self.impacts - rate * self.response.phasors[0]);
+            let predicted = self.response.phasors[0];
             let share = |bandwidth: f64| 1.0 - (-bandwidth * self.omega0 * step).exp();
-            self.error.take(error, phase, share(DETECTOR));
-            self.response.take(response, phase, share(OBSERVER));
+            self.error.take(error, phase, omega * step, share(DETECTOR));
+            self.response.take(response, phase, omega * step, share(OBSERVER));
+            self.impacts += SECOND * OBSERVER * self.omega0 * (self.response.phasors[0] - predicted);
         }
         let error = self.error.phasors[0] * displacement;
         let moved = (self.path.pole - self.damping_rate) / self.gain * self.response.phasors[0] * of_response;
