@@ -238,7 +238,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             late = if leg.even < least { 0 } else { late + 1 };
             least = least.min(leg.even);
         }
-        let settled = leg.symmetric && self.settle(leg)? && leg.symmetric;
+        let decayed = leg.symmetric;
+        let settled = decayed && self.settle(leg)? && leg.symmetric;
         if !settled {
             self.handed = from;
             *leg = self.leg(0.0, FOLLOWED, 0.0)?;
