@@ -128,7 +128,7 @@ struct Step {
     impacts: u64,
     /// Covariance of the first harmonic of the response, m², by what the prediction leaves beside it.
     noise: Matrix2<f64>,
-    /// Second harmonic of what the prediction leaves, m.
+    /// Second harmonic of what the prediction leaves, over the standard deviation of the first.
     second: Complex64,
     /// Derivatives of the state at the end over the state at the begin.
     transition: Matrix4<f64>,
@@ -136,11 +136,7 @@ struct Step {
 
 /// Chi-square (two degrees of freedom) of the second harmonic of a piece: impacts at uneven intervals have one, which lasts for many periods.
 fn unevenness(piece: &[Step]) -> f64 {
-    let [sum, variance] = [
-        piece.iter().map(|step| step.second).sum::<Complex64>().norm_sqr(),
-        piece.iter().map(|step| 0.5 * step.noise.trace()).sum(),
-    ];
-    sum / variance
+    piece.iter().map(|step| step.second).sum::<Complex64>().norm_sqr() / piece.len() as f64
 }
 
 /// The periods of a stretch, and the state at the first one, for plants of other parameters as well: it has its own uncertainty.
@@ -525,6 +521,10 @@ impl Followed<'_> {
             transition * kept * transition.transpose() + process * 0.5 + Matrix4::from_diagonal_element(square);
         let gain = transition * gain;
         let errors = one.errors(begin, &readings);
+        let left = match record.recording.measurands[0] {
+            Measurand::Displacement => noise_of(&errors, turn),
+            _ => Matrix2::from_diagonal_element(variance_near(&errors)),
+        };
         one.moved(&(gain * innovation))?;
         Some(Step {
             begin,
@@ -533,11 +533,8 @@ impl Followed<'_> {
             gain,
             whitening: total.cholesky()?.l().try_inverse()?,
             impacts: one.plant.totals().impacts - from.plant.totals().impacts,
-            noise: match record.recording.measurands[0] {
-                Measurand::Displacement => noise_of(&errors, turn),
-                _ => Matrix2::from_diagonal_element(variance_near(&errors)),
-            },
-            second: harmonic_of(&errors, 2.0) * turn * turn,
+            noise: left,
+            second: harmonic_of(&errors, 2.0) * turn * turn / (0.5 * (total - noise + left).trace()).sqrt(),
             transition,
         })
     }
