@@ -195,3 +195,23 @@ impl ReferenceControl {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn harmonics_ten_times_the_fundamental_are_not_in_what_a_detector_reads_of_it() {
+        for (order, in_period) in [(7.0, 100.4), (21.0, 100.4), (29.0, 100.4), (7.0, 16.2)] {
+            let (turn, mut detector) = (TAU / in_period, Detector::default());
+            for n in 0..10_000 {
+                let phase = f64::from(n) * turn;
+                let reading = phase.sin() + 10.0 * (order * phase + 0.3).sin();
+                detector.take(reading, phase, turn, DETECTOR * turn);
+                // Until the slow ones have settled.
+                let error = (detector.phasors[0] - 1.0).norm();
+                assert!(n < 8_000 || error < 1e-3, "{order} of {in_period}: {error}");
+            }
+        }
+    }
+}
