@@ -16,7 +16,6 @@ use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, mean_square, stand
 use crate::linear::{MeasuredLinear, ParticleState};
 use crate::plan::{LinearResponse, Plan, ShakerPath, Target};
 use crate::rig::{Drive, Rig, RigError, Scaled};
-use crate::scene::Reference;
 
 /// Drives of the check, over the scene's drive: too small for impacts. The smaller one follows where the particle may have slid.
 const SHARES: [f64; 2] = [0.01, 0.01 / 16.0];
@@ -132,7 +131,9 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
     if let Some(linear) = &linear {
         // Amplitude and phase of the response for the natural frequency and the damping that the rig has.
         let gain = Complex64::from_polar(linear.response_gain, linear.phase.to_radians());
-        let ratio = gain / linear.expected_gain(omega, plan.knowledge.numbers.definition.reference);
+        let (found, knowledge) = (linear.response(), &plan.knowledge);
+        let alone = found.oscillator_gain(omega, knowledge.numbers.definition.reference);
+        let ratio = gain / (alone + knowledge.other_modes * found.rate(omega));
         channels[0] = channels[0].at(ratio * base.0 / expected[1], omega * step);
         quantities.extend(of_response(linear, ratio, plan));
     }
@@ -604,17 +605,6 @@ impl Linear {
             gains: [gains.proportional, gains.integral],
             phase_margin: gains.phase_margin(bandwidth, rate.re.max(0.0), step).to_degrees(),
         })
-    }
-
-    /// The gain of an oscillator of this natural frequency and damping that is moved through its spring and damper, or by the force in them,
-    /// at the frequency `omega`, rad/s.
-    fn expected_gain(&self, omega: f64, reference: Reference) -> Complex64 {
-        let [spring, damper] = match reference {
-            Reference::Base => [1.0, 2.0 * self.damping_rate * omega / self.omega_0.powi(2)],
-            Reference::Force => [reference.per_base(2.0 * self.damping_rate / self.omega_0), 0.0],
-        };
-        let free = (self.omega_0.powi(2) - self.damping_rate.powi(2)).max(0.0).sqrt();
-        self.omega_0.powi(2) * Complex64::new(spring, damper) / Complex64::new(self.damping_rate, omega + free)
     }
 
     /// The frequency response.

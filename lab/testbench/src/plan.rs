@@ -5,8 +5,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use nalgebra::{Matrix2, RowVector2, Vector2};
 use num_complex::Complex64;
 use phase_lock::Config;
-use vines_model::Sensor;
 use vines_model::numerics::Estimate;
+use vines_model::{Reference, Sensor};
 
 use crate::experiment::DECAYED;
 use crate::linear::{MeasuredLinear, ParticleState};
@@ -62,6 +62,22 @@ impl LinearResponse {
     /// Response over base at the frequency `omega`, rad/s.
     pub fn at(&self, omega: f64) -> Complex64 {
         self.gain / Complex64::new(self.damping_rate, omega - self.omega0)
+    }
+
+    /// `delta + i (omega - omega_d)`, 1/s, with which the amplitude approaches its steady value under a drive of the frequency `omega`, rad/s.
+    pub(crate) fn rate(&self, omega: f64) -> Complex64 {
+        let free = (self.omega0.powi(2) - self.damping_rate.powi(2)).max(0.0).sqrt();
+        Complex64::new(self.damping_rate, omega - free)
+    }
+
+    /// This rate times response over base, 1/s, of an oscillator that is moved through its spring and damper, or by the force in them.
+    pub(crate) fn oscillator_gain(&self, omega: f64, reference: Reference) -> Complex64 {
+        let (square, damper) = (self.omega0.powi(2), 2.0 * self.damping_rate * omega);
+        let force = match reference {
+            Reference::Base => Complex64::new(square, damper),
+            Reference::Force => Complex64::from(square * reference.per_base(self.bandwidth())),
+        };
+        force / (self.rate(-omega).conj())
     }
 
     /// Half-power bandwidth over omega0: twice the damping ratio, and base over response at resonance.
@@ -215,6 +231,8 @@ pub struct Knowledge {
     pub target: Target,
     /// The shaker, if one stands between the command and the reference, which then drives the structure as it is measured.
     pub shaker: Option<ShakerPath>,
+    /// Response of the other modes of a structure over the base, at the natural frequency: nearly constant there.
+    pub other_modes: Complex64,
 }
 
 impl Knowledge {
@@ -236,6 +254,7 @@ impl Knowledge {
             sample_time,
             target,
             shaker: None,
+            other_modes: Complex64::ZERO,
         }
     }
 
@@ -326,6 +345,11 @@ impl Scene {
         );
         knowledge.shaker = self.structure().and_then(|structure| structure.shaker_path());
         knowledge.target.through_shaker = knowledge.shaker.is_some();
+        if let Some(structure) = self.structure().filter(|one| one.shaker.is_none()) {
+            let (linear, omega0) = (knowledge.linear, knowledge.linear.omega0);
+            let alone = linear.oscillator_gain(omega0, knowledge.numbers.definition.reference) / linear.rate(omega0);
+            knowledge.other_modes = structure.response_per_base(omega0) - alone;
+        }
         knowledge
     }
 

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use lovines::host::{Equations, Row, natural_modes};
 use lovines::{Host, Mode};
 use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use super::shaker::SceneShaker;
@@ -234,6 +235,12 @@ impl Structure {
             Excitation::Force => mode.omega.powi(-2) / Reference::Force.per_base(2.0 * mode.zeta),
         };
         (self.at_cavity(mode) * mode.drive).abs() * per_stiffness
+    }
+
+    /// Response of all modes without impacts over the drive, as those of the driven mode's oscillator and its base, at the frequency `omega`, rad/s.
+    pub(crate) fn response_per_base(&self, omega: f64) -> Complex64 {
+        let per_drive = self.host.frequency_response(&self.response(), omega);
+        per_drive / (self.reading_per_response().abs() * self.base_per_drive())
     }
 
     /// Displacement at the sensor per displacement at the cavity in the driven mode. Its sign is chosen so that the response in resonance lags

@@ -104,6 +104,19 @@ fn a_force_through_much_damping_is_checked_and_its_points_belong_to_the_scene() 
 }
 
 #[test]
+fn the_check_of_a_damped_beam_takes_no_other_mode_for_a_late_response() {
+    // Beside the drive, the second mode adds half of the driven one's static response.
+    let damped = [
+        ("damping = 0.006", "damping = 0.03"),
+        ("root = 0.3", "root = 0.45"),
+        ("F = 1.2", "F = 5"),
+    ];
+    let scene = beam(&damped).unwrap();
+    let found = check(&mut *Simulated::of(&scene).unwrap(), &scene.plan()).unwrap();
+    assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+}
+
+#[test]
 fn the_driven_mode_of_a_table_is_the_oscillator_of_knowledge_and_plan() {
     let scene = beam(&[]).unwrap();
     let structure = scene.structure.as_ref().unwrap();
