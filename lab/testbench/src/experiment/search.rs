@@ -8,7 +8,7 @@
 //! 3. It falls in small steps until the motion is symmetric 1:1.
 //! 4. It goes on, up or down, to where `E_R` is the requested drive, by interpolation of the last three legs. There a constant drive takes
 //!    over if `E_R` rises with the amplitude, the condition of stability under a constant drive. Otherwise the response stays under
-//!    control. Where `E_R` rises fast, or the motion gets out of control, the constant drive takes over at once: it settles, or it does not.
+//!    control.
 //!
 //! A motion that is symmetric from the start skips steps 2 and 3. A motion that is lost is searched again, more slowly.
 
@@ -36,7 +36,7 @@ const RISE: f64 = 60.0;
 const DRAWING: f64 = 0.1;
 /// Response over the half-width from which impacts are no longer expected: the particle does not move freely.
 const UNREACHED: f64 = 1.5;
-/// Smallest response over the half-width of the search: up to r = 0.85, the fold has a larger one.
+/// Smallest response over the half-width of the search: up to r = 0.9, the fold has a larger one.
 const LOWEST: f64 = 0.05;
 /// Smallest ratio of the response to where the lock was found at which the motion counts as the same; the largest is its inverse. The stable range of
 /// the symmetric motion is wider. It is also the smallest ratio of the setpoint to a response that follows it.
@@ -60,8 +60,6 @@ const SEARCHES: u32 = 4;
 /// What a leg measured.
 #[derive(Debug, Clone, Copy)]
 struct Leg {
-    /// Setpoint of the response at its end, m.
-    to: f64,
     /// Response amplitude, m: mean and last.
     response: f64,
     last: f64,
@@ -94,8 +92,6 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     setpoint: f64,
     /// Smallest and largest drive that held a symmetric motion, m; infinite before the first.
     held: (f64, f64),
-    /// Response at which the motion did not settle under the requested drive, m; infinite before.
-    handed: f64,
 }
 
 impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
@@ -111,7 +107,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             bench,
             setpoint: 0.0,
             held: (f64::INFINITY, 0.0),
-            handed: f64::INFINITY,
         }
     }
 
@@ -129,7 +124,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         for search in 0..SEARCHES {
             let step = STEP / f64::from(1 << search);
             leg = self.symmetric(leg, step)?;
-            self.handed = f64::INFINITY;
             if let Some(held) = self.solve(&mut leg, step, search >= SEARCHES / 2)? {
                 return Ok(Some(held));
             }
@@ -188,63 +182,21 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
             leg = self.leg(leg.last + change - self.setpoint, FOLLOWED, rate)?;
         }
-        self.fall(&mut leg, step, 0.0)?;
-        Ok(leg)
+        self.fall(leg, step)
     }
 
     /// Lowers the response as long as it follows, until the motion is symmetric, but not below [`LOWEST`], nor on after impacts have ended, of which even
     /// harmonics are a sign as well. A large response can hide them: beside a carried particle, their evidence grows as the response falls.
-    /// Returns whether the motion has settled under the requested drive on the way, `below` a response, m.
-    fn fall(&mut self, leg: &mut Leg, step: f64, below: f64) -> Result<bool, ExperimentError> {
+    fn fall(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         let mut seen = leg.departed;
         while !leg.symmetric
             && (leg.departed || leg.asymmetry > 0.0 || !seen)
             && self.setpoint > (LOWEST * self.b).max(LOST * leg.last)
         {
-            let before = *leg;
-            *leg = self.sweep(leg, -step * leg.last)?;
-            if self.settles_by_itself(&before, leg, below) && self.hand_over(leg)? {
-                return Ok(true);
-            }
+            leg = self.sweep(&leg, -step * leg.last)?;
             seen |= leg.departed;
         }
-        Ok(false)
-    }
-
-    /// Whether the requested drive holds the motion by itself near this leg, which has moved the setpoint on from `before`: the drive that holds the
-    /// response has passed the requested one, rising with the setpoint. The response itself may have got out of control there. A symmetric motion is
-    /// handed over at once only if the drive rises faster than in proportion: it then settles faster than without impacts. One that has lost its symmetry
-    /// is handed over only `below` the response, m, at which it was symmetric: above, no constant drive restores the symmetry.
-    fn settles_by_itself(&self, before: &Leg, leg: &Leg, below: f64) -> bool {
-        let slope = (leg.drive - before.drive) / (leg.to - before.to) * leg.to / leg.drive;
-        let certain = 1.0 - SIGNIFICANT * leg.noise.hypot(before.noise) / (leg.drive - before.drive).abs();
-        let has_passed = |n: f64| {
-            (before.drive - self.requested) * (leg.drive - self.requested + n * (leg.drive - before.drive)) <= 0.0
-        };
-        let is_due = match leg.symmetric {
-            true => slope * certain > 1.0 && has_passed(1.0),
-            false => slope > SMALLEST_SLOPE && has_passed(0.0) && leg.response < below,
-        };
-        is_due && leg.departed && leg.response < LOST * self.handed && !self.target.through_shaker
-    }
-
-    /// Hands over to the requested drive. Returns whether the motion has settled: first its disturbance must decay.
-    fn hand_over(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
-        self.bench.controller.hold_drive()?;
-        let (from, mut least, mut late) = (leg.response, f64::INFINITY, 0);
-        while !leg.symmetric && late < CONFIRMED {
-            *leg = self.measure(FOLLOWED)?;
-            self.setpoint = leg.last;
-            late = if leg.even < least { 0 } else { late + 1 };
-            least = least.min(leg.even);
-        }
-        let decayed = leg.symmetric;
-        let settled = decayed && self.settle(leg)? && leg.symmetric;
-        if !settled {
-            self.handed = from;
-            *leg = self.leg(0.0, FOLLOWED, 0.0)?;
-        }
-        Ok(settled)
+        Ok(leg)
     }
 
     /// Follows the symmetric motion to the response that the requested drive holds. Returns whether it stays under control there; `None` if
@@ -253,11 +205,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let (mut swept, mut upwards) = (vec![*leg], leg.drive < self.requested);
         while leg.symmetric && self.setpoint > LOWEST * self.b {
             let change = step / self.steepness(&swept).max(1.0) * leg.last;
-            let before = *leg;
             *leg = self.sweep(leg, if upwards { change } else { -change })?;
-            if self.settles_by_itself(&before, leg, before.response) && self.hand_over(leg)? {
-                return Ok(Some(false));
-            }
             if !leg.symmetric {
                 // A change may disturb the symmetry for a while.
                 *leg = self.leg(0.0, FOLLOWED, 0.0)?;
@@ -276,10 +224,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 }
             }
             // Above the symmetric motion is one without symmetry, which may go on far below.
-            let last = swept[swept.len() - 1].response;
-            if self.fall(leg, step, last)? {
-                return Ok(Some(false));
-            }
+            *leg = self.fall(*leg, step)?;
             (swept, upwards) = (vec![*leg], false);
         }
         Ok(None)
@@ -479,7 +424,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             self.held = range(self.held, [drive.value]);
         }
         Ok(Leg {
-            to: self.setpoint,
             response,
             last: all[all.len() - 1].amplitude(),
             drive: drive.value,
