@@ -20,6 +20,7 @@ use crate::scene::key;
 
 pub use judge::Condition;
 use judge::Judge;
+use search::SEARCHES;
 pub(crate) use search::Search;
 
 /// Share of its amplitude to which the response of the linear rig falls in the recorded decay. The 1:1 motion has a smaller range, from symmetry
@@ -82,10 +83,10 @@ fn unmet_in_words(unmet: Option<Condition>) -> String {
 }
 
 /// What a search for the requested drive has found, in words.
-fn search_in_words(held: Option<[f64; 2]>, searches: u32, [highest, strongest]: [f64; 2]) -> String {
+fn search_in_words(held: Option<[f64; 2]>, [highest, strongest]: [f64; 2]) -> String {
     match held {
         Some([low, high]) => format!(
-            "with the response under control, symmetric 1:1 motions were held at drives from G = {low:.4} to {high:.4}, and lost {searches} times; a \
+            "with the response under control, symmetric 1:1 motions were held at drives from G = {low:.4} to {high:.4}, and lost {SEARCHES} times; a \
              constant drive does not hold all of them"
         ),
         None => format!(
@@ -155,14 +156,13 @@ pub enum ExperimentError {
     },
     #[error(
         "the requested drive G = {g:.4} was not reached within {periods:.0} periods: {}",
-        search_in_words(*held, *searches, *tried)
+        search_in_words(*held, *tried)
     )]
     NotReached {
         periods: f64,
         g: f64,
         /// Least and largest G at which a symmetric 1:1 motion was held, if any was.
         held: Option<[f64; 2]>,
-        searches: u32,
         /// Largest C of the response that was tried, and largest G of the drive that was allowed.
         tried: [f64; 2],
     },

@@ -55,7 +55,7 @@ const CAUTIOUS: f64 = 0.5;
 /// Largest number of levels that are held for it.
 const LEGS: usize = 20;
 /// Number of searches, each twice as slow as the one before.
-const SEARCHES: u32 = 4;
+pub(super) const SEARCHES: u32 = 4;
 
 /// What a leg measured.
 #[derive(Debug, Clone, Copy)]
@@ -443,7 +443,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             periods: self.bench.periods,
             g: d.g,
             held: (low <= high).then(|| [low, high].map(|drive| d.excitation(drive))),
-            searches: SEARCHES,
             tried: [
                 self.setpoint / self.b,
                 d.excitation(self.bench.config.amplitude_max.unwrap_or(f64::INFINITY)),

@@ -235,12 +235,12 @@ impl Scene {
         self.amplitude.max(IMPACTS * linear * knowledge.numbers.b)
     }
 
-    /// Largest drive, m, that the converters of the base can show; infinite without them.
+    /// Largest drive, m, that the converters of the base can show; infinite without them, as in a small module.
     pub(super) fn drive_range(&self) -> f64 {
         let chain = &self.chain;
         match chain.adc_bits.filter(|_| chain.reference).or(chain.dac_bits) {
-            Some(_) => self.dimensionless().amplitude(chain.base_range),
-            None => f64::INFINITY,
+            Some(_) if cfg!(feature = "tables") => self.dimensionless().amplitude(chain.base_range),
+            _ => f64::INFINITY,
         }
     }
 
