@@ -36,7 +36,7 @@ const RISE: f64 = 60.0;
 const DRAWING: f64 = 0.1;
 /// Response over the half-width from which impacts are no longer expected: the particle does not move freely.
 const UNREACHED: f64 = 1.5;
-/// Smallest response over the half-width of the search: up to r = 0.9, the fold has a larger one.
+/// Smallest response over the half-width of the search: up to r = 0.85, the fold has a larger one.
 const LOWEST: f64 = 0.05;
 /// Smallest ratio of the response to where the lock was found at which the motion counts as the same; the largest is its inverse. The stable range of
 /// the symmetric motion is wider. It is also the smallest ratio of the setpoint to a response that follows it.
