@@ -72,6 +72,10 @@ pub struct ShakerRows {
     pub current: Row,
     /// Current per command, A/V.
     pub current_per_command: f64,
+    /// Voltage of the coil, V, less what [`Self::voltage_per_command`] makes of the command.
+    pub voltage: Row,
+    /// Voltage per command, V/V. Where a controlled current has no cut-off, its inductance is left out.
+    pub voltage_per_command: f64,
 }
 
 /// Matrices of a structure with its shaker.
@@ -187,12 +191,24 @@ impl Shaker {
             Some(first) => *first = per_output,
             None => current_per_command = self.gain * per_output,
         }
+        let inductive = self.inductance * self.cut_off.unwrap_or(0.0);
+        let (last, back, voltage_per_command) = match (self.amplifier, self.cut_off) {
+            (Amplifier::Voltage, Some(_)) => (1.0, 0.0, 0.0),
+            (Amplifier::Voltage, None) => (0.0, 0.0, self.gain),
+            // R i + L i' + Bl x', with i' of the amplifier.
+            (Amplifier::Current, Some(_)) => (self.resistance - inductive, self.force_factor, inductive * self.gain),
+            (Amplifier::Current, None) => (0.0, self.force_factor, self.resistance * self.gain),
+        };
+        let voltage_of_states = unit(states.len(), states.len().wrapping_sub(1), last);
+        let at_rest = stretch(0.0);
         Ok(ShakerRows {
             end: host.row(end.as_slice())?,
             armature: host.row(armature.as_slice())?,
             force: host.sum(&force, &damping, &vec![0.0; states.len()])?,
-            current: host.sum(&stretch(0.0), (velocity * &armature).as_slice(), &of_states)?,
+            current: host.sum(&at_rest, (velocity * &armature).as_slice(), &of_states)?,
             current_per_command,
+            voltage: host.sum(&at_rest, (back * &armature).as_slice(), &voltage_of_states)?,
+            voltage_per_command,
         })
     }
 

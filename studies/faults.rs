@@ -4,7 +4,8 @@
 //! scene, from sensor readings alone. Longest time from the fault to a drive of zero, ms, and runs in which the fault was missed. With a shaker, the
 //! faults of shakers too, and what ended the run at the first instant of the hold.
 //!
-//! Arguments: INSTANTS, and settings of the scene, `KEY=VALUE`, or the file of a scene before them. Writes validation/faults.csv.
+//! Arguments: INSTANTS, the file of a scene, settings of it, `KEY=VALUE`, and parts of the names of the only faults to take. Writes
+//! validation/faults.csv.
 
 mod common;
 
@@ -34,8 +35,11 @@ fn zero(scene: &Scene, plan: &Plan, fault: RigFault, seconds: f64, tracks: bool)
 }
 
 fn main() -> Result<(), Failure> {
-    let given: Vec<String> = std::env::args().skip(1).collect();
-    let (instants, settings) = given.split_first().ok_or("arguments: INSTANTS [KEY=VALUE ...]")?;
+    let given = std::env::args().skip(1);
+    let is_setting = |one: &String| one.contains('=') || one.ends_with(".toml") || one.parse::<usize>().is_ok();
+    let (given, names): (Vec<String>, Vec<String>) = given.partition(is_setting);
+    let usage = "arguments: INSTANTS [FILE.toml] [KEY=VALUE ...] [NAME ...]";
+    let (instants, settings) = given.split_first().ok_or(usage)?;
     let instants: usize = instants.parse()?;
     let file = settings.first().filter(|first| first.ends_with(".toml"));
     let text = file.map_or(Ok(String::new()), std::fs::read_to_string)?;
@@ -83,6 +87,8 @@ fn main() -> Result<(), Failure> {
     if has_shaker {
         faults.extend(RigFault::OF_SHAKER);
     }
+    let is_named = |name: &str| names.is_empty() || names.iter().any(|part| name.contains(part.as_str()));
+    faults.retain(|(name, _)| is_named(name));
     let rows: Vec<String> = faults.into_par_iter().map(row).collect();
     let header = "scene,instants,fault,locking_ms,holding_ms,tracking_ms,missed";
     write("faults", header, 3, &rows)

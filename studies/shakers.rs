@@ -3,6 +3,8 @@
 //! One to three modes as in `structures.rs`, a force at the drive point, and r 0.5 to 0.8. The armature has 0.001 to 0.5 of the modal mass at the drive
 //! point; its suspension 0.3 to 3 times, and the stinger 3 to 30 times the natural frequency of the driven mode; the coil's damping Bl²/R is 0.03
 //! to 3 times m omega0 of the armature, its rate R/L 3 to 100 omega0 in half of the cases, and the amplifier controls the voltage or the current (uniform logarithms).
+//! Limits of voltage, current, stroke and force are 1 to 100 times what the exact orbit at the first level needs, or as much more as a scene needs that
+//! is not refused: a drive beyond one of them in more than the last sample is a failure.
 //! Tracked in 8 levels over the range of responses in which the exact backbone with the shaker has stable orbits, at least a factor of 1.2. A point is right within 3 u of the exact backbone in sigma and G.
 //!
 //! Arguments: SHAKERS, SEED, settings of the scene, `KEY=VALUE`, and the number of the only SHAKER to run, which writes nothing. Writes validation/shakers.csv: a row per shaker.
@@ -10,7 +12,10 @@
 mod common;
 
 use common::*;
+use lovines::StructureState;
 use vines_model::orbit::Orbit;
+use vines_testbench::rig::{RigError, RigStage, Sensors, SimulatedStructure};
+use vines_testbench::scene::{SceneShaker, Structure};
 use vines_testbench::survey::structure_backbone;
 
 /// A structure with its shaker, and the dimensionless numbers of the shaker: mass ratio, suspension and stinger over omega0, coil.
@@ -60,7 +65,7 @@ fn text(uniform: Uniform) -> (String, [f64; 4]) {
 }
 
 /// A scene with a drive at which a stable orbit exists, and its levels.
-fn drawn(uniform: Uniform, settings: &[String]) -> Result<(Scene, [f64; 4]), Failure> {
+fn drawn(uniform: Uniform, limits: Uniform, settings: &[String]) -> Result<(Scene, [f64; 4]), Failure> {
     loop {
         let (text, numbers) = text(uniform);
         let share = uniform(0.0, 1.0);
@@ -85,7 +90,89 @@ fn drawn(uniform: Uniform, settings: &[String]) -> Result<(Scene, [f64; 4]), Fai
         let rest = format!(
             "[excitation]\nG = {g:?}\n[start]\ndq2 = 5\n[backbone]\nC_from = {from:?}\nC_to = {to:?}\npoints = 8\n"
         );
-        return Ok((scene(&format!("{text}{rest}"), settings)?, numbers));
+        let bare = scene(&format!("{text}{rest}"), settings)?;
+        let mut shares = [0; 4].map(|_| limits(0.0, 100_f64.ln()).exp());
+        let distance = |orbit: &&Orbit| (orbit.c - from).abs();
+        let levels = all.iter().filter(is_level);
+        let top = levels.min_by(|one, other| distance(one).total_cmp(&distance(other)));
+        let needed = needed(&bare, top.map_or(1.0, |top| top.omega))?;
+        // What needs more at its smallest response with impacts is refused.
+        for _ in 0..20 {
+            let [voltage, current, stroke, force] = [0, 1, 2, 3].map(|n| shares[n] * needed[n]);
+            // An inductance has no voltage where the current jumps.
+            let voltage = match text.contains("\"current\"") && !text.contains("inductance = 0\n") {
+                true => String::new(),
+                false => format!("voltage_max = {voltage:?}\n"),
+            };
+            let limits =
+                format!("{voltage}current_max = {current:?}\nstroke_max = {stroke:?}\nforce_max = {force:?}\n");
+            if let Ok(scene) = scene(&format!("{text}{limits}{rest}"), settings) {
+                return Ok((scene, numbers));
+            }
+            shares = shares.map(|share| 1.5 * share);
+        }
+        return Err("a drive that no limits allow".into());
+    }
+}
+
+/// Voltage, current, stroke and force now.
+fn now(structure: &Structure, plant: &lovines::Plant<lovines::Structure>) -> [f64; 4] {
+    let Some(SceneShaker { rows, .. }) = &structure.shaker else {
+        return [0.0; 4];
+    };
+    let command = plant.base_displacement();
+    [
+        (&rows.voltage, rows.voltage_per_command),
+        (&rows.current, rows.current_per_command),
+        (&rows.armature, 0.0),
+        (&rows.force, 0.0),
+    ]
+    .map(|(row, per_command)| (plant.point(row)[0] + per_command * command).abs())
+}
+
+/// Largest voltage, current, stroke and force of the exact orbits at phase resonance at a frequency, over omega0.
+fn needed(scene: &Scene, omega: f64) -> Result<[f64; 4], Failure> {
+    let structure = scene.structure.as_ref().ok_or("no structure")?;
+    let (orbits, omega0) = (
+        scene.structure_orbits().ok_or("no orbits")?,
+        scene.dimensionless().omega0,
+    );
+    let mut largest = [0.0_f64; 4];
+    for orbit in orbits.at_phase_resonance(omega * omega0) {
+        let mut plant = lovines::Plant::with_host(structure.host.clone(), scene.plant, &StructureState::default())?;
+        let drive = lovines::Drive::harmonic(orbit.drive, orbit.omega);
+        plant.begin(drive)?;
+        plant.set_sections(&orbit.start.sections, [orbit.start.q2, orbit.start.dq2])?;
+        for _ in 0..200 {
+            plant.advance(drive, std::f64::consts::PI / orbit.omega / 100.0)?;
+            let now = now(structure, &plant);
+            largest = [0, 1, 2, 3].map(|n| largest[n].max(now[n]));
+        }
+    }
+    Ok(largest)
+}
+
+/// A simulated shaker, and the samples at which it was driven beyond a limit.
+struct Watched {
+    rig: SimulatedStructure,
+    structure: Structure,
+    beyond: usize,
+}
+
+impl RigStage for Watched {
+    fn inner(&mut self) -> &mut dyn Rig {
+        &mut self.rig
+    }
+
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        let limits = self.structure.shaker.as_ref().map(|shaker| shaker.limits);
+        let limits = limits.map_or([None; 4], |limits| {
+            [limits.voltage, limits.current, limits.stroke, limits.force]
+        });
+        let now = now(&self.structure, self.rig.plant());
+        let is_beyond = |n: usize| limits[n].is_some_and(|limit| now[n] > limit * (1.0 + 1e-9));
+        self.beyond += usize::from((0..4).any(is_beyond));
+        RigStage::sense(&mut self.rig)
     }
 }
 
@@ -102,10 +189,19 @@ fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String
         Err(error) => return none(error.to_string()),
     };
     let plan = scene.plan_on(stated.knowledge.measured(linear));
-    let tracked = match Simulated::of(scene)
-        .map_err(Failure::from)
-        .and_then(|mut rig| Ok(tracked(&mut *rig, &plan, 20.0)?))
-    {
+    let Some(structure) = scene.structure.clone() else {
+        return none("no structure".into());
+    };
+    let rig = match SimulatedStructure::new(&structure, scene.plant, scene.start) {
+        Ok(rig) => rig,
+        Err(error) => return none(error.to_string()),
+    };
+    let mut rig = Watched { rig, structure, beyond: 0 };
+    let tracked = tracked(&mut rig, &plan, 20.0);
+    if rig.beyond > 1 {
+        return none(format!("driven beyond a limit in {} samples", rig.beyond));
+    }
+    let tracked = match tracked {
         Ok(tracked) => tracked,
         Err(error) => return none(error.to_string()),
     };
@@ -131,7 +227,15 @@ fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String
     for point in tracked.points.iter().filter(|_| std::env::var("POINTS").is_ok()) {
         println!("{point:?}");
     }
-    let why = tracked.ended.as_ref().map_or_else(String::new, ToString::to_string);
+    let mut why = tracked.ended.as_ref().map_or_else(String::new, ToString::to_string);
+    if why.is_empty() && 2 * settled < tracked.points.len() {
+        let reason = |point: &LevelPoint| point.unsettled(plan.knowledge.is_symmetric);
+        why = tracked
+            .points
+            .iter()
+            .find_map(reason)
+            .unwrap_or_else(|| "motions without impacts".into());
+    }
     (tracked.points.len(), settled, beyond, worst, tracked.periods, why)
 }
 
@@ -141,9 +245,10 @@ fn main() -> Result<(), Failure> {
     let [count, seed, only @ ..] = &given[..] else {
         return Err("arguments: SHAKERS SEED [SHAKER] [KEY=VALUE ...]".into());
     };
-    let mut uniform = uniform(seed.parse()?);
+    let seed_of_limits = !seed.parse::<u64>()?;
+    let [mut uniform, mut limits] = [seed.parse()?, seed_of_limits].map(uniform);
     let scenes: Vec<_> = (0..count.parse()?)
-        .map(|_| drawn(&mut uniform, &settings))
+        .map(|_| drawn(&mut uniform, &mut limits, &settings))
         .collect::<Result<_, _>>()?;
     if let [only] = only {
         let (points, settled, beyond, worst, periods, why) = run(&scenes[only.parse::<usize>()?]);
@@ -166,9 +271,13 @@ fn main() -> Result<(), Failure> {
     let tracked = found.iter().filter(|one| one.1 >= 4 && one.2 == 0).count();
     let wrong: usize = found.iter().map(|one| one.2).sum();
     let settled: usize = found.iter().map(|one| one.1).sum();
-    let refused = found.iter().filter(|one| one.5.starts_with("refused")).count();
+    let counted = |words: &str| found.iter().filter(|one| one.5.contains(words)).count();
+    let [refused, beyond] = ["refused", "driven beyond"].map(counted);
+    let limited = found.iter().filter(|one| one.1 < 4 && one.5.contains(" limit")).count();
+    let silent = found.iter().filter(|one| one.1 < 4 && one.5.is_empty()).count();
     println!(
-        "{refused} refused by the check; {tracked} of {count} tracked with at least half of the levels settled and none beyond 3 u; {wrong} of {settled} settled points beyond 3 u"
+        "{refused} refused by the check; {tracked} of {count} tracked with at least half of the levels settled and none beyond 3 u; {wrong} of {settled} settled points beyond 3 u; \
+         of the others {limited} end at a limit, {silent} without a reason; {beyond} driven beyond a limit"
     );
     let header = "seed,shaker,mass_ratio,suspension,stinger,coil,drop_out,bandwidth,points,settled,beyond_3u,worst_u,periods,ended";
     write("shakers", header, 2, &rows)

@@ -107,7 +107,14 @@ impl Reference {
             errors.push(state.q2 - expected[1 + 2 * n]);
             errors.push((state.dq2 - expected[2 + 2 * n]) / first);
             let got = plant.point(&outputs.current)[0] + outputs.current_per_command * plant.base_displacement();
-            let of_current = (got - current).abs() / largest;
+            let mut of_current = (got - current).abs() / largest;
+            let Shaker { amplifier, resistance, force_factor, .. } = self.shaker();
+            if amplifier == Amplifier::Current {
+                let voltage =
+                    plant.point(&outputs.voltage)[0] + outputs.voltage_per_command * plant.base_displacement();
+                let expected = resistance * current + force_factor * expected[2 * n];
+                of_current = of_current.max((voltage - expected).abs() / (resistance * largest));
+            }
             let error = errors.iter().fold(0f64, |worst, error| worst.max(error.abs()));
             worst = worst.max(error / plant.parameters().half_width).max(of_current);
             if self.scene.get("chatter").is_none() {

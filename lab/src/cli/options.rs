@@ -46,7 +46,7 @@ impl SceneArguments {
         let named: Vec<String> = named.map(|text| text.trim_end().into()).collect();
         if !named.is_empty() {
             log::warn!(
-                "{}: is this meant? A scene has k in N/m, M and m in kg, c in N s/m, b in m",
+                "{}: is this meant? A scene has k in N/m, M and m in kg, c in N s/m, b in m, and a shaker is in the same units",
                 named.join(", ")
             );
         }

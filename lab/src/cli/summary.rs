@@ -309,6 +309,7 @@ fn agreement(result: &Comparison) -> String {
 /// The points of a tracked backbone, and the periods that they took. A rig that does not report impacts has columns in SI units.
 pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
     let (points, units) = (|| result.points.iter(), Units::of(scene));
+    let is_symmetric = scene.knowledge().is_symmetric;
     let in_metres = points().all(|compared| compared.point.regime_by_impacts.is_none());
     let rows = points().map(|TrackedPoint { point, exact }| {
         let at = &point.at;
@@ -316,11 +317,8 @@ pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
         if let Some(by_impacts) = point.regime_by_impacts {
             remarks += &format!(" / {by_impacts}");
         }
-        if !point.settled {
-            remarks += "; not settled";
-        }
-        if !point.reached {
-            remarks += &format!("; level {:.3} not reached", point.level);
+        if let Some(why) = point.unsettled(is_symmetric) {
+            remarks += &format!("; not settled: {why}");
         }
         if let Some(tone) = point.tone {
             remarks += &format!("; {tone}");

@@ -218,6 +218,24 @@ pub struct LevelPoint {
     pub clipped_percent: Option<f64>,
 }
 
+impl LevelPoint {
+    /// Why the point has not settled, on a rig whose motions have mirror images or not; `None` if it has.
+    pub fn unsettled(&self, is_symmetric: bool) -> Option<String> {
+        let ResonancePoint { e_m, u_e_m, .. } = self.at;
+        Some(match self.regime {
+            _ if self.settled => return None,
+            _ if !self.reached => "the response does not reach the level".into(),
+            Regime::Other => "the motion is irregular".into(),
+            Regime::Asymmetric if is_symmetric => "the motion is asymmetric".into(),
+            _ => format!(
+                "{} periods give the drive to {:.2} % only",
+                self.averaged,
+                100.0 * u_e_m / e_m
+            ),
+        })
+    }
+}
+
 /// The tracked backbone.
 #[derive(Debug)]
 pub struct Tracked {
@@ -396,7 +414,11 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let [response, drive, omega] = *self.states.last().unwrap_or(&self.closed);
         let slowest = (level - response).abs() / (MOVE_SHARE * 0.5 * drive * TAU);
         // A smooth move is twice as fast in its middle as on average.
-        let late = self.plan.knowledge.shaker().map_or(0.0, |_| 2.0 * OFF / TAU);
+        let late = self
+            .plan
+            .knowledge
+            .shaker()
+            .map_or(0.0, |path| 2.0 * OFF / (TAU * path.speed));
         let periods = MOVE.max(2.0 * slowest) + late;
         let expected = extrapolated(&self.states, level);
         let [amplitude, omega] = expected.map_or([0.0; 2], |there| [there[0] - drive, there[1] - omega]);

@@ -162,6 +162,8 @@ pub struct ShakerPath {
     pub by_force: bool,
     /// Largest command, m; infinite without a limit.
     pub largest: f64,
+    /// Bandwidths of the control of the reference, over those without another resonance of structure and shaker.
+    pub speed: f64,
     /// Base displacement per reference, m/N or m/m.
     pub base_per_reference: f64,
 }

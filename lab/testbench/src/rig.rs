@@ -15,11 +15,11 @@ use thiserror::Error;
 use vines_model::{Definition, Sensor};
 
 pub use crate::scene::has_friction;
-use crate::scene::{Excitation, Limits, Release, Scene, SceneShaker, Structure};
+use crate::scene::{Excitation, Release, Scene, SceneShaker, Structure};
 
 pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
-pub(crate) use reference_control::{BANDWIDTH, OFF};
+pub(crate) use reference_control::{BANDWIDTH, OFF, speed};
 pub(crate) use stages::derivative;
 pub use stages::{Interrupted, Measured, Scaled, SensorsOnly, Stoppable};
 
@@ -213,11 +213,12 @@ pub enum RigError {
         unit: &'static str,
     },
     #[error(
-        "the shaker does not follow: {asked:.4} {unit} are asked for, and the measured fundamental is off by {error:.4} {unit} for 1.5 periods; {cause}"
+        "the shaker does not follow: {asked:.4} {unit} are asked for, and the measured fundamental is off by {error:.4} {unit} for {periods:.1} periods; {cause}"
     )]
     ReferenceOff {
         asked: f64,
         error: f64,
+        periods: f64,
         unit: &'static str,
         cause: &'static str,
     },
@@ -507,16 +508,35 @@ impl SimulatedStructure {
         plant.advance_within(self.clipped_at, drive, step)?;
         clock.advance(step);
         let rows = &shaker.rows;
-        let current = plant.point(&rows.current)[0] + rows.current_per_command * plant.base_displacement();
-        let [force, stroke] = [&rows.force, &rows.armature].map(|row| plant.point(row)[0]);
-        let Limits {
-            current: current_max, stroke: stroke_max, force: force_max, ..
-        } = shaker.limits;
-        for (name, key, value, limit, unit) in [
-            ("current", "current_max", current, current_max, "A"),
-            ("displacement of the armature", "stroke_max", stroke, stroke_max, "m"),
-            ("force", "force_max", force, force_max, "N"),
+        let limits = &shaker.limits;
+        for (name, key, row, per_command, limit, unit) in [
+            (
+                "voltage",
+                "voltage_max",
+                &rows.voltage,
+                rows.voltage_per_command,
+                limits.voltage,
+                "V",
+            ),
+            (
+                "current",
+                "current_max",
+                &rows.current,
+                rows.current_per_command,
+                limits.current,
+                "A",
+            ),
+            (
+                "displacement of the armature",
+                "stroke_max",
+                &rows.armature,
+                0.0,
+                limits.stroke,
+                "m",
+            ),
+            ("force", "force_max", &rows.force, 0.0, limits.force, "N"),
         ] {
+            let value = plant.point(row)[0] + per_command * plant.base_displacement();
             // The command is clipped at the limit itself.
             if let Some(limit) = limit.filter(|limit| value.abs() > limit * (1.0 + 1e-9)) {
                 return Err(RigError::ShakerLimit { name, key, value, limit, unit });

@@ -186,7 +186,7 @@ impl Scene {
     pub fn implausible(&self) -> impl Iterator<Item = Implausible> {
         let d = Dimensionless::of(&self.plant, 0.0);
         let hertz = d.omega0 / TAU;
-        let [heavy, shaken] = self.heavy_shaker().unwrap_or_default();
+        let [heavy, shaken, lift, sag, stroke] = self.doubtful_shaker().unwrap_or_default();
         [
             ("epsilon = m/M", d.epsilon, "", d.epsilon > 0.3),
             ("lambda = c/(m omega0)", d.lambda, "", d.lambda > 30.0),
@@ -198,21 +198,49 @@ impl Scene {
                 "",
                 heavy > 1.0,
             ),
+            (
+                "largest force of the coil over the weight of the armature",
+                lift,
+                "",
+                lift < 1.0,
+            ),
+            (
+                "sag of the armature under its weight, over shaker.stroke_max",
+                sag,
+                "",
+                sag > 1.0,
+            ),
+            ("shaker.stroke_max", stroke, "m", stroke > 1.0),
         ]
         .into_iter()
         .filter_map(|(name, value, unit, is)| is.then_some(Implausible { name, value, unit }))
     }
 
-    /// Mass of the armature over the mass that the driven mode has at its point, and the frequency of the pole with which structure and shaker
-    /// answer the command, over the natural frequency.
-    fn heavy_shaker(&self) -> Option<[f64; 2]> {
+    /// Mass of the armature over the mass that all modes have at its point, and the frequency of the pole with which structure and shaker answer the
+    /// command, over the natural frequency. What the amplifier's limit gives as a force, over the weight of the armature, whose sag, over the
+    /// stroke, and the stroke, m: other units than SI are wrong by a factor of 1000.
+    fn doubtful_shaker(&self) -> Option<[f64; 5]> {
         let (structure, path) = (self.structure.as_ref()?, self.knowledge().shaker?);
-        let (shaker, mode) = (&structure.shaker.as_ref()?.shaker, structure.mode());
+        let SceneShaker { shaker, limits, .. } = structure.shaker.as_ref()?;
+        let squares = |point: usize| {
+            structure
+                .modes
+                .iter()
+                .map(|mode| mode.shape[point].powi(2))
+                .sum::<f64>()
+        };
         // A heavy armature under a table is what a slip table is.
-        let share = structure
-            .drive
-            .map_or(0.0, |point| shaker.mass * mode.shape[point].powi(2));
-        Some([share, 1.0 - path.pole.im / mode.omega])
+        let share = structure.drive.map_or(0.0, |point| shaker.mass * squares(point));
+        let current = limits.voltage.map(|voltage| voltage / shaker.resistance).into_iter();
+        let current = current.chain(limits.current).fold(f64::INFINITY, f64::min);
+        let (weight, stroke) = (shaker.mass * GRAVITY, limits.stroke);
+        Some([
+            share,
+            1.0 - path.pole.im / structure.mode().omega,
+            shaker.force_factor * current / weight,
+            stroke.map_or(0.0, |stroke| weight / (shaker.suspension[0] * stroke)),
+            stroke.unwrap_or(0.0),
+        ])
     }
 
     /// The controller's sample time, s: rig and controller agree on it before anything is measured.
@@ -389,8 +417,13 @@ impl Sections {
         let shaken = scene.structure.as_ref().filter(|one| one.shaker.is_some());
         if let Some(structure) = shaken.filter(|_| cfg!(feature = "tables")) {
             if !scene.chain.reference {
-                let message = "[shaker] with chain.reference = false: the command is not the force; the loop needs the force cell, or the sensor of \
-                               the table, as its reference";
+                let turn = structure
+                    .shaker_path()
+                    .map_or(f64::NAN, |path| path.turn().to_degrees());
+                let message = format!(
+                    "[shaker] with chain.reference = false: the drive's phase turns by {turn:.1} degrees within the half-power bandwidth; the loop \
+                     needs the force cell, or the sensor of the table, as its reference"
+                );
                 return Err(SceneError::text(origin, message));
             }
             // The least response at which particles hit: half of the cavity.

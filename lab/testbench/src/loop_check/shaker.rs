@@ -17,7 +17,7 @@ use super::{
 use crate::linear::{MeasuredLinear, ParticleState};
 use crate::plan::{Plan, ShakerPath};
 use crate::rig::{Rig, RigError, Scaled};
-use crate::scene::{PLACES, Reference, frequencies};
+use crate::scene::{PLACES, frequencies};
 
 /// Periods of a window, and most windows at a frequency.
 const WINDOW: [usize; 2] = [8, 100];
@@ -113,13 +113,10 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
     let damping = natural * (0.5 * root.arg()).tan();
     let gain = Complex64::new(damping / natural, 1.0) / slope;
     let mut measured = measured(plan, [natural, damping, u_rate], gain, u_gain);
-    // A table also moves the structure through its damper.
-    let through = 2.0 * damping / natural;
-    let expected = match plan.knowledge.numbers.definition.reference {
-        Reference::Base => Complex64::new(through, -1.0),
-        reference => Complex64::new(0.0, -reference.per_base(through)),
-    };
-    let ratio = gain / (expected * (0.5 * natural));
+    // At the root the other pole is twice the frequency away.
+    let (response, reference) = (measured.response(), plan.knowledge.numbers.definition.reference);
+    let expected = response.oscillator_gain(natural, reference) * response.rate(-natural).conj();
+    let ratio = gain * Complex64::new(0.0, 2.0 * natural) / expected;
     let mut quantities = of_response(&measured, ratio, plan).to_vec();
     let values: Vec<(f64, Complex64)> = frequencies
         .into_iter()

@@ -122,7 +122,7 @@ impl ReferenceControl {
     /// Takes the scaled readings of response and reference. Returns the command for the coming `step`, s, in which the controller asks for `drive`.
     ///
     /// # Errors
-    /// A reference that has not followed for 1.5 periods.
+    /// A reference that has not followed for [`OFF`], or for longer under a slow control.
     pub fn command(&mut self, [response, reading]: [f64; 2], drive: Drive, step: f64) -> Result<Drive, RigError> {
         let Drive { omega, amplitude, .. } = drive;
         let [of_response, displacement] = [0, 1].map(|channel| self.target.displacement(channel, omega));
@@ -134,10 +134,10 @@ impl ReferenceControl {
             let driven = self.gain * self.path.gain * self.command / of_response;
             self.response.phasors[0] += step * (driven + self.impacts - rate * self.response.phasors[0]);
             let predicted = self.response.phasors[0];
-            let share = |bandwidth: f64| 1.0 - (-bandwidth * self.omega0 * step).exp();
+            let share = |bandwidth: f64| 1.0 - (-bandwidth * self.path.speed * self.omega0 * step).exp();
             self.error.take(error, phase, omega * step, share(DETECTOR));
             self.response.take(response, phase, omega * step, share(OBSERVER));
-            self.impacts += SECOND * OBSERVER * self.omega0 * (self.response.phasors[0] - predicted);
+            self.impacts += SECOND * OBSERVER * self.path.speed * self.omega0 * (self.response.phasors[0] - predicted);
         }
         let error = self.error.phasors[0] * displacement;
         let moved = (self.path.pole - self.damping_rate) / self.gain * self.response.phasors[0] * of_response;
@@ -146,23 +146,25 @@ impl ReferenceControl {
         let longer = |phase: f64, is: bool| if is && is_driven { phase + omega * step } else { 0.0 };
         self.off = longer(self.off, error.norm() > largest || self.times > 1.0);
         self.quiet = longer(self.quiet, reading.abs() * displacement.norm() < SHARE * self.asked);
-        if self.off > OFF && self.times > 1.0 {
+        let longest = OFF / self.path.speed;
+        if self.off > longest && self.times > 1.0 {
             return Err(RigError::AmplifierLimit { times: self.times });
         }
-        if self.off.max(self.quiet) > OFF {
+        if self.off.max(self.quiet) > longest {
             let unit = ["m", "N"][usize::from(self.path.by_force)];
-            let cause = if self.quiet > OFF {
+            let cause = if self.quiet > longest {
                 "next to nothing is left: the sensor of the reference is dead, or the stinger is broken"
             } else {
                 "the amplifier clips or is off, or the sensor of the reference or its sign is wrong"
             };
             let [asked, error] = [self.asked, error.norm()].map(|value| value / self.path.base_per_reference);
-            return Err(RigError::ReferenceOff { asked, error, unit, cause });
+            let periods = longest / TAU;
+            return Err(RigError::ReferenceOff { asked, error, periods, unit, cause });
         }
         if amplitude == 0.0 {
             self.correction = Complex64::ZERO;
         } else if self.times <= 1.0 {
-            self.correction += BANDWIDTH * self.omega0 * step * error;
+            self.correction += BANDWIDTH * self.path.speed * self.omega0 * step * error;
         }
         let inverse = (amplitude + self.correction + moved) / self.path.gain;
         self.times = inverse.norm() / self.path.largest;
@@ -194,6 +196,68 @@ impl ReferenceControl {
             displacement: amplitude * of_rig.sin(),
         }
     }
+}
+
+/// Share of the bandwidths at which the control is slow enough for the other resonances of structure and shaker: 1, or the largest power of 1/2 at
+/// which it is stable (Nyquist) also when it is twice as fast. `exact`: reference and response per command at a frequency, rad/s.
+pub(crate) fn speed(path: &ShakerPath, omega0: f64, exact: impl Fn(f64) -> [Complex64; 2]) -> f64 {
+    let is_stable = |speed: &f64| {
+        let of = |x: f64| return_difference(path, omega0, *speed, x, exact(omega0 * (1.0 + x)));
+        let turns: f64 = (-REACH..REACH)
+            .map(|n| turned(&of, [n, n + 1].map(|n| f64::from(n) * GRID), FINEST))
+            .sum();
+        turns > -PI
+    };
+    let slower = [1.0, 0.5, 0.25, 0.125].into_iter().find(is_stable);
+    match slower {
+        Some(1.0) => 1.0,
+        stable => 0.5 * stable.unwrap_or(0.125),
+    }
+}
+
+/// Detunings at which stability is judged, over omega0: a multiple of this to each side, and between where the phase turns fast.
+const GRID: f64 = 0.01;
+const REACH: i32 = 70;
+/// Number of times that such an interval is halved at most.
+const FINEST: u32 = 12;
+
+/// Phase by which a function turns between two points, rad.
+fn turned(of: &impl Fn(f64) -> Complex64, [begin, end]: [f64; 2], finest: u32) -> f64 {
+    let turn = (of(end) / of(begin)).arg();
+    if finest == 0 || turn.abs() < 0.5 {
+        return turn;
+    }
+    let middle = 0.5 * (begin + end);
+    turned(of, [begin, middle], finest - 1) + turned(of, [middle, end], finest - 1)
+}
+
+/// Return difference of the control at `omega0 (1 + x)`, times `s/(s + bandwidth)`, which takes the pole of the integrator away. It turns by -2 pi
+/// for every unstable pole of the closed loop.
+fn return_difference(
+    path: &ShakerPath,
+    omega0: f64,
+    speed: f64,
+    x: f64,
+    [reference, response]: [Complex64; 2],
+) -> Complex64 {
+    let s = Complex64::new(0.0, x);
+    let [observer, detector, bandwidth] = [OBSERVER, DETECTOR, BANDWIDTH].map(|bandwidth| bandwidth * speed);
+    // What offset and harmonics of a detector take of what it reads; the fundamental is at x = 0.
+    let orders = (0..HARMONICS).flat_map(|n| [1.0, -1.0].map(|sign| (n, sign * (2 * n + 1) as f64)));
+    let others = orders.filter(|(_, order)| *order != 1.0);
+    let comb: Complex64 = others
+        .map(|(n, order)| if n < FAST { 1.0 } else { SLOW } / Complex64::new(0.0, 1.0 + x - order))
+        .sum();
+    let comb = comb + 1.0 / Complex64::new(0.0, 1.0 + x);
+    let (pole, damping) = (path.pole / omega0, path.damping_rate / omega0);
+    let gain = Complex64::new(0.0, -0.5);
+    // All times s.
+    let corrected = observer * (s + SECOND * observer) / (1.0 + observer * comb);
+    let rate = s * (s + pole) + corrected;
+    let observed = (s * gain * path.gain + corrected * response) / rate;
+    let error = detector / (s * (1.0 + detector * comb) + detector);
+    let moved = (pole - damping) / gain * observed;
+    (s * (1.0 - moved / path.gain) + bandwidth * error * reference / path.gain) / (s + bandwidth)
 }
 
 #[cfg(test)]

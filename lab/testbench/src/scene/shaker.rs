@@ -7,10 +7,10 @@ use lovines::{Amplifier, Excitation as HostExcitation, Plant, Shaker, ShakerRows
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
-use super::structure::rows;
+use super::structure::{HIGHEST, rows};
 use super::{Excitation, Structure};
 use crate::plan::ShakerPath;
-use crate::rig::BANDWIDTH;
+use crate::rig::{BANDWIDTH, speed};
 
 /// Points that a shaker adds to those of a structure.
 pub const ARMATURE: &str = "armature";
@@ -56,7 +56,7 @@ pub enum Release {
 /// Limits of a shaker. What the amplifier controls is clipped at its limit; reaching another one ends the experiment.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Limits {
-    /// Voltage of the coil, V.
+    /// Voltage of the coil, V; behind an amplifier that controls the current, what this can supply.
     pub voltage: Option<f64>,
     /// Its current, A.
     pub current: Option<f64>,
@@ -138,7 +138,7 @@ impl Structure {
         };
         let points = self.points.iter().map(String::as_str).zip(&self.rows);
         let mut channels: Vec<_> = points.map(point).collect();
-        let Some(SceneShaker { limits, rows, .. }) = &self.shaker else {
+        let Some(SceneShaker { shaker, limits, rows, .. }) = &self.shaker else {
             return channels;
         };
         if self.excitation == Excitation::Base {
@@ -158,6 +158,16 @@ impl Structure {
             meaning: Some("current of the coil"),
             ..point(("current", &rows.current))
         });
+        // An amplifier that controls the voltage clips it.
+        if limits.voltage.is_some() && shaker.amplifier == Amplifier::Current {
+            channels.push(Channel {
+                per_drive: rows.voltage_per_command,
+                unit: "V",
+                limit: limits.voltage,
+                meaning: Some("voltage of the coil"),
+                ..point(("voltage", &rows.voltage))
+            });
+        }
         channels
     }
 
@@ -186,8 +196,9 @@ impl Structure {
         };
         let (rows, limits) = (&shaker.rows, &shaker.limits);
         let current = at(&rows.current) + rows.current_per_command * command;
+        let voltage = at(&rows.voltage) + rows.voltage_per_command * command;
         let needed = [
-            ("voltage_max", "V", command * shaker.shaker.gain, limits.voltage),
+            ("voltage_max", "V", voltage, limits.voltage),
             ("current_max", "A", current, limits.current),
             ("stroke_max", "m", at(&rows.armature), limits.stroke),
             ("force_max", "N", at(&rows.force), limits.force),
@@ -224,9 +235,21 @@ impl Structure {
             damping_rate,
             by_force: self.excitation == Excitation::Force,
             largest: shaker.largest_command() * self.base_per_command(),
+            speed: 1.0,
             base_per_reference: self.base_per_drive(),
         };
-        Some(path.fitted(mode.omega, damping_rate, &values))
+        let path = path.fitted(mode.omega, damping_rate, &values);
+        // A small module has no code for it, as it has no structures.
+        if !cfg!(feature = "tables") {
+            return Some(path);
+        }
+        let response = self.response();
+        let per_response = self.base_per_command() * self.reading_per_response().abs();
+        let exact = |omega: f64| {
+            let reference = self.reference_by_command(shaker, omega) / shaker.reference_per_command;
+            [reference, self.host.frequency_response(&response, omega) / per_response]
+        };
+        Some(ShakerPath { speed: speed(&path, mode.omega, exact), ..path })
     }
 }
 
@@ -303,6 +326,11 @@ impl ShakerSection {
                 );
             }
         };
+        if let Some(cut_off) = self.cut_off.filter(|hertz| !(*hertz > 0.0 && *hertz <= HIGHEST)) {
+            return Err(format!(
+                "cut_off = {cut_off} Hz: it must be positive and at most {HIGHEST:e}; leave it out for an amplifier that follows at once"
+            ));
+        }
         let compensated = self.compensated_mass;
         if !(compensated >= 0.0 && compensated.is_finite()) || compensated > 0.0 && self.table_mass.is_some() {
             return Err(format!(
@@ -339,8 +367,12 @@ impl ShakerSection {
                 ));
             }
         }
-        if self.amplifier == Amplifier::Current && limits.voltage.is_some() {
-            return Err("voltage_max belongs to amplifier = \"voltage\"; an amplifier that controls the current has current_max".into());
+        if self.amplifier == Amplifier::Current
+            && limits.voltage.is_some()
+            && self.inductance > 0.0
+            && self.cut_off.is_none()
+        {
+            return Err("voltage_max of an amplifier that controls the current through an inductance needs its `cut_off`, Hz: without it the current jumps".into());
         }
         if let Some(point) = structure
             .points
@@ -373,6 +405,8 @@ impl Structure {
     ) -> Result<Self, String> {
         let text = |error: lovines::InvalidHost| error.to_string();
         let without = Box::new(self.clone());
+        let by = self.excitation.of_host();
+        let equations = shaker.attach(&without.equations, by).map_err(text)?;
         // What a force cell does not compensate belongs to the structure.
         let in_front = self.drive.map(|drive| (drive, shaker.end_mass - compensated_mass));
         let in_front = in_front.filter(|(_, mass)| *mass != 0.0);
@@ -381,8 +415,6 @@ impl Structure {
                 format!("compensated_mass = {compensated_mass} kg leaves {mass} kg in front of the force cell: {error}")
             })?;
         }
-        let by = self.excitation.of_host();
-        let equations = shaker.attach(&without.equations, by).map_err(text)?;
         let host = equations.host(HostExcitation::Force).map_err(text)?;
         let of_shaker = shaker.rows(&host, &without.equations, by).map_err(text)?;
         let beyond = vec![0.0; rows_beyond(self.excitation)];

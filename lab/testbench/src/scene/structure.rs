@@ -383,6 +383,9 @@ const ROUNDING: f64 = 1e-9;
 /// Largest difference of the norm of a mass-normalised shape from 1: shapes are measured, or written to three digits.
 const NORM: f64 = 0.02;
 
+/// Highest frequency, Hz: the plant takes 1e12 rad/s.
+pub(super) const HIGHEST: f64 = 1e11;
+
 impl StructureSection {
     /// The structure; paths are relative to `folder`.
     pub(super) fn resolve(self, origin: &str, folder: &Path) -> Result<Structure, SceneError> {
@@ -505,10 +508,11 @@ impl StructureSection {
             let number = n + 1;
             let ModeSection { frequency, damping, shape, participation } = mode;
             let numbers = shape.values().chain([frequency, damping]).chain(participation);
-            if !numbers.clone().all(|number| number.is_finite()) || *frequency <= 0.0 || *damping < 0.0 {
+            let in_range = *frequency > 0.0 && *frequency <= HIGHEST && *damping >= 0.0;
+            if !numbers.clone().all(|number| number.is_finite()) || !in_range {
                 return Err(format!(
-                    "mode {number} has frequency = {frequency} Hz and damping = {damping}: the frequency must be positive, the damping ratio at \
-                     least 0, and all numbers finite"
+                    "mode {number} has frequency = {frequency} Hz and damping = {damping}: the frequency must be positive and at most {HIGHEST:e} Hz, \
+                     the damping ratio at least 0, and all numbers finite"
                 ));
             }
             if shape.len() != points.len() || !shape.keys().eq(points.iter()) {
