@@ -316,13 +316,7 @@ where
 
     /// Matrix and gradient of the normal equations. An unknown that its limit holds has the equation "no step".
     fn free(&self, limits: &[[f64; 2]; N]) -> (SMatrix<f64, N, N>, SVector<f64, N>) {
-        let mut gradient: SVector<f64, N> = self
-            .residuals
-            .iter()
-            .zip(&self.derivatives)
-            .map(|(one, row)| row * *one)
-            .sum();
-        let mut normal = self.normal();
+        let (mut normal, mut gradient) = self.equations();
         for i in 0..N {
             let [low, high] = limits[i];
             if self.x[i] <= low && gradient[i] > 0.0 || self.x[i] >= high && gradient[i] < 0.0 {
@@ -334,17 +328,20 @@ where
         (normal, gradient)
     }
 
-    fn normal(&self) -> SMatrix<f64, N, N> {
-        let mut normal = SMatrix::<f64, N, N>::zeros();
-        for row in &self.derivatives {
+    /// Matrix and right-hand side of the normal equations; their solution is the step to the minimum, with the opposite sign.
+    pub fn equations(&self) -> (SMatrix<f64, N, N>, SVector<f64, N>) {
+        let (mut normal, mut gradient) = (SMatrix::<f64, N, N>::zeros(), SVector::zeros());
+        for (residual, row) in self.residuals.iter().zip(&self.derivatives) {
             normal.ger(1.0, row, row, 1.0);
+            gradient += row * *residual;
         }
-        normal
+        (normal, gradient)
     }
 
     /// Covariance of the unknowns: NaN where the residuals do not determine them.
     pub fn covariance(&self) -> SMatrix<f64, N, N> {
-        self.normal()
+        let (normal, _) = self.equations();
+        normal
             .cholesky()
             .map_or(SMatrix::from_element(f64::NAN), |matrix| matrix.inverse())
     }

@@ -78,6 +78,8 @@ const STILL: f64 = 0.1;
 const HOLD: f64 = 1e3;
 /// Half-width of a cavity that no response fills, over the expected one.
 const WIDE: f64 = 1e3;
+/// Rounding of sums of squares, relative.
+const ROUNDING: f64 = 1e-9;
 /// Rise of chi-square at the end of an interval of three standard uncertainties.
 const END: f64 = 9.0;
 
@@ -88,6 +90,8 @@ struct Base {
     scale: f64,
     /// Jump of the base after the sample, m, if its amplitude changes only there.
     jump: f64,
+    /// Variance of a sample by noise in this period, m²: it ends where the base comes to rest, whose jump counts as noise.
+    noise: f64,
     /// Mean square of what is not a sine in this period, m².
     rest: f64,
     /// Variance of a sample by what is near the sine, if it is white, m².
@@ -98,9 +102,7 @@ struct Base {
 #[derive(Clone)]
 struct Measured<'a> {
     recording: &'a Recording,
-    /// Variance of a sample of the base, m², in each piece of [`PIECE`] periods.
-    base_noise: Vec<f64>,
-    /// Covariance of the first harmonic of the response in a period, m², in each piece.
+    /// Covariance of the first harmonic of the response in a period, m², in each piece of [`PIECE`] periods.
     response_noise: Vec<Matrix2<f64>>,
     /// The displacement of the base at each sample, m.
     drive: Vec<f64>,
@@ -193,16 +195,16 @@ pub struct RecordFit {
     pub colour: f64,
 }
 
-/// Variance of white noise on a smooth signal, from sixth differences, which leave 1e-7 of a sine that is sampled 100 times a period.
+/// Variance of white noise on a smooth signal, from sixth differences, which leave 1e-7 of a sine that is sampled 100 times a period. The median of
+/// their squares leaves out a jump.
 fn noise(values: &[f64]) -> f64 {
     let difference = |v: &[f64]| 20.0 * v[3] - 15.0 * (v[2] + v[4]) + 6.0 * (v[1] + v[5]) - (v[0] + v[6]);
-    let differences = values.windows(7).map(difference);
-    // White noise of variance 1 gives them the sum of the squares.
-    if differences.len() == 0 {
-        0.0
-    } else {
-        mean_square(differences) / 924.0
-    }
+    let mut squares: Vec<f64> = values.windows(7).map(|seven| difference(seven).powi(2)).collect();
+    squares.sort_by(f64::total_cmp);
+    // White noise of variance 1 gives them the sum of the squares of the factors, and a normal square of mean 1 has this median.
+    squares
+        .get(squares.len() / 2)
+        .map_or(0.0, |middle| middle / (924.0 * 0.4549))
 }
 
 /// First harmonic of the values of one period.
@@ -252,9 +254,10 @@ fn period_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
     let phases: Vec<f64> = (0..values.len()).map(|i| i as f64 * step).collect();
     let basis = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(0)]);
     let vector = DVector::from_column_slice(values);
+    let noise = noise(values);
     let is_moving = |fit: &HarmonicFit| values.len() == period && fit.harmonic(1).norm() > 0.0;
     let Some(fit) = basis.fit(&vector).filter(is_moving) else {
-        return vec![Base { scale, ..Base::default() }; values.len()];
+        return vec![Base { scale, noise, ..Base::default() }; values.len()];
     };
     let residual = basis.residual(&vector, &fit);
     let near = variance_near(residual.as_slice()) * values.len() as f64 / 2.0;
@@ -269,7 +272,7 @@ fn period_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
     let jump = |phase: f64| {
         let angle = phase + first.arg();
         let rate = growth - 2.0 * step * (swing * Complex64::from_polar(1.0, 2.0 * angle + step)).im;
-        Base { scale, jump: rate * angle.sin(), rest, near }
+        Base { scale, jump: rate * angle.sin(), noise, rest, near }
     };
     phases.into_iter().map(jump).collect()
 }
@@ -277,50 +280,42 @@ fn period_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
 impl<'a> Measured<'a> {
     fn new(recording: &'a Recording, omega: f64, omega0: f64) -> Self {
         let period = (TAU / omega / recording.sample_time).round() as usize;
-        let [response_noise, mut base_noise] = [&recording.response, &recording.drive].map(|values| {
-            let mut noise: Vec<f64> = values.chunks(PIECE * period).map(noise).collect();
-            // The last piece may have few samples.
-            if let [.., whole, last] = &mut noise[..] {
-                *last = *whole;
-            }
-            noise
-        });
-        let of_harmonic = |noise: &f64| Matrix2::from_diagonal_element(2.0 * noise / period as f64);
-        let response_noise: Vec<Matrix2<f64>> = response_noise.iter().map(of_harmonic).collect();
+        let of_harmonic = |piece: &[f64]| Matrix2::from_diagonal_element(2.0 * noise(piece) / period as f64);
+        let mut response_noise: Vec<Matrix2<f64>> =
+            recording.response.chunks(PIECE * period).map(of_harmonic).collect();
+        // The last piece may have few samples.
+        if let [.., whole, last] = &mut response_noise[..] {
+            *last = *whole;
+        }
         let of_base = recording.measurands[1];
         let drive = displacements(&recording.drive, of_base, period, omega0 * recording.sample_time);
         let bases = |drive: &[f64]| -> Vec<Base> {
             let starts = (0..drive.len()).step_by(period);
             starts.flat_map(|from| period_of_base(drive, from, period)).collect()
         };
+        let mut base = bases(&drive);
         if of_base != Measurand::Displacement {
             // Differences show every jump of the base as well.
-            let near = bases(&recording.drive);
-            for (noise, near) in base_noise.iter_mut().zip(near.chunks(PIECE * period)) {
-                *noise = noise.min(mean(near.iter().map(|one| one.near)));
+            let size = PIECE * period;
+            for (base, measured) in base.chunks_mut(size).zip(bases(&recording.drive).chunks(size)) {
+                let near = mean(measured.iter().map(|one| one.near));
+                for (one, measured) in base.iter_mut().zip(measured) {
+                    one.noise = measured.noise.min(near);
+                }
             }
         }
-        let base = bases(&drive);
-        Self {
-            recording,
-            base_noise,
-            response_noise,
-            drive,
-            base,
-            omega0,
-            period,
-        }
+        Self { recording, response_noise, drive, base, omega0, period }
     }
 
     fn piece(&self, sample: usize) -> usize {
-        (sample / (PIECE * self.period)).min(self.base_noise.len() - 1)
+        (sample / (PIECE * self.period)).min(self.response_noise.len() - 1)
     }
 
     /// Variance of the first harmonic of the base in a period, m², by noise, and by what the base may do between two samples: what is no sine in
     /// it changes in half a sample as the sine does.
     fn base_variance(&self, begin: usize, end: usize) -> f64 {
-        let noise = self.base_noise[self.piece(begin)];
-        let rest = mean(self.base[begin..end].iter().map(|one| one.rest));
+        let [noise, rest] =
+            [|one: &Base| one.noise, |one: &Base| one.rest].map(|of| mean(self.base[begin..end].iter().map(of)));
         let n = (end - begin) as f64;
         2.0 * noise / n + (rest - noise).max(0.0) * (PI / n).powi(2)
     }
@@ -686,20 +681,36 @@ impl Followed<'_> {
         left_out
     }
 
-    /// The pieces whose innovations contradict their covariance. A piece that does not belong bends the fit, so that others seem not to: the worst
-    /// ones come first.
-    fn contradicting(&self, x: &Unknowns) -> Vec<Vec<bool>> {
-        let squares = |piece: &[Vector2<f64>]| piece.iter().map(Vector2::norm_squared).sum::<f64>();
-        let sizes: Vec<Vec<f64>> = self
-            .each(x)
-            .iter()
-            .map(|one| one.chunks(PIECE).map(squares).collect())
-            .collect();
-        let most = sizes.iter().flatten().copied().fold(0.0, f64::max);
-        let p = FALSE_ALARM / sizes.concat().len().max(1) as f64;
+    /// The pieces that contradict the others: chi-square would fall too far without them, and with parameters fitted to the rest. A piece that does
+    /// not belong bends the fit, so that its own innovations are small and others seem not to belong: the worst ones come first.
+    fn contradicting(&self, minimum: &Minimum) -> Vec<Vec<bool>> {
+        let counts: Vec<usize> = self.courses.iter().map(|one| one.counted().len()).collect();
+        let first = minimum.residuals.len() - 2 * counts.iter().sum::<usize>();
+        let (normal, gradient) = minimum.equations();
+        let step = normal.cholesky().map_or(Unknowns::zeros(), |one| one.solve(&gradient));
+        // What chi-square falls by: the innovations, and what all others gain by the step of the parameters to their own minimum.
+        let fall = |rows: std::ops::Range<usize>| -> f64 {
+            let (mut rest, mut pull, mut own) = (normal * (1.0 + ROUNDING), Unknowns::zeros(), 0.0);
+            for (residual, row) in minimum.residuals[rows.clone()].iter().zip(&minimum.derivatives[rows]) {
+                let residual = residual - row.dot(&step);
+                rest.ger(-1.0, row, row, 1.0);
+                (pull, own) = (pull + row * residual, own + residual * residual);
+            }
+            own + rest.cholesky().map_or(0.0, |one| one.solve(&pull).dot(&pull))
+        };
+        let mut from = first;
+        let pieces = |count: &usize| -> Vec<f64> {
+            let begin = from;
+            from += 2 * count;
+            let starts = (begin..from).step_by(2 * PIECE);
+            starts.map(|start| fall(start..from.min(start + 2 * PIECE))).collect()
+        };
+        let falls: Vec<Vec<f64>> = counts.iter().map(pieces).collect();
+        let most = falls.iter().flatten().copied().fold(0.0, f64::max);
+        let p = FALSE_ALARM / falls.concat().len().max(1) as f64;
         let limit = ChiSquared::new(2.0 * PIECE as f64).map_or(f64::INFINITY, |one| one.inverse_cdf(1.0 - p));
-        let flags = |one: &Vec<f64>| one.iter().map(|size| *size > limit.max(0.5 * most)).collect();
-        sizes.iter().map(flags).collect()
+        let flags = |one: &Vec<f64>| one.iter().map(|fall| *fall > limit.max(0.5 * most)).collect();
+        falls.iter().map(flags).collect()
     }
 }
 
@@ -761,7 +772,7 @@ impl Followed<'_> {
             if is_first || moves.sum::<f64>() >= STILL {
                 continue;
             }
-            let more = self.cut(&self.contradicting(&x));
+            let more = self.cut(&self.contradicting(&minimum));
             if more.is_empty() {
                 let followed: usize = self.stretches.iter().map(|one| one.span[1] - one.span[0]).sum();
                 return Some((minimum, out)).filter(|_| followed >= self.fewest);
@@ -989,8 +1000,12 @@ pub fn follow(
     fit.covariance = covariance;
     fit.degrees = (2 * count + problem.equations()).checked_sub(5 + usize::from(problem.has_scale))?;
     let channel = |i: usize| innovations.iter().map(move |one| one[i]);
+    let free = minimum.covariance();
+    let rows = &minimum.derivatives[minimum.derivatives.len() - 2 * count..];
     for i in 0..2 {
-        fit.channels[i] = ChannelTest::of(channel(i).map(|one| one * one).sum(), count as f64 - 2.5);
+        // Degrees of freedom that the parameters take of the channel.
+        let taken: f64 = rows.iter().skip(i).step_by(2).map(|row| row.dot(&(free * row))).sum();
+        fit.channels[i] = ChannelTest::of(channel(i).map(|one| one * one).sum(), count as f64 - taken);
     }
     let neighbours =
         |i: usize| mean(innovations.windows(2).map(|pair| pair[0][i] * pair[1][i])) / mean_square(channel(i));
