@@ -4,11 +4,12 @@
 //! 30 %, k by 1 %. The client fits f0, zeta, r, b and epsilon to the backbone that it tracks (`points`), also with the linear response that a loop
 //! check of the rig at rest measures (`linear`), or to a recording, cut at both ends, which the plant follows: of the tracked backbone (`levels`), also
 //! by accelerometers on mass and base, beside the noiseless sensors of the loop (`accelerations`), of a lock whose drive then changes slowly
-//! (`sweeps`), or of the search, the hold and the decay of `vines identify` (`decays`). For each parameter, of the fits that are not rejected: the share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the
-//! error over u, and that over the Cramér–Rao bound of the same points (of recordings, u is this bound); the numbers of fits that are rejected, of
-//! recordings of which only the points were fitted, and of rigs without a fit; and the probabilities by Kolmogorov and Smirnov that the p-values of
-//! each channel's chi-square are uniform: of response, frequency and drive, or of the innovations of a record, in phase with the response and a
-//! quarter of a period beside it.
+//! (`sweeps`), or of the search, the hold and the decay of `vines identify` (`decays`). For each parameter, of the fits that are not rejected: the
+//! share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the error over u, and that over the
+//! Cramér–Rao bound, of the same points or of a whole recording of levels or sweeps; the numbers of fits that are rejected, of recordings of which
+//! only the points were fitted, and of rigs without a fit; and the probabilities by Kolmogorov and Smirnov that the p-values of each channel's chi-
+//! square are uniform: of response, frequency and drive, or of the innovations of a record, in phase with the response and a quarter of a period
+//! beside it.
 //!
 //! `effects` gives each rig one hidden effect, in turn friction, tilt, two laws of restitution, and a cubic stiffness, which moves the measured
 //! frequencies by harmonic balance; and as many rigs none. Half of the rigs with friction are at rest when a loop check measures them. A rig is drawn
@@ -22,7 +23,11 @@
 
 mod common;
 
+use std::f64::consts::TAU;
+
 use common::*;
+use lovines::{Plant, State};
+use nalgebra::{Matrix4, Matrix5, RowVector4, SMatrix, Vector4};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -80,7 +85,7 @@ fn main() -> Result<(), Failure> {
         // One value of each rig whose fit is kept.
         let gather = |values: fn(&Found) -> &[f64]| -> Vec<f64> {
             let values = found.iter().filter_map(|one| values(one).get(n));
-            values.map(|value| value.abs()).collect()
+            values.map(|value| value.abs()).filter(|value| value.is_finite()).collect()
         };
         let (ratios, over_bound) = (gather(|one| &one.ratios), gather(|one| &one.errors));
         let rms = |values: &[f64]| mean_square(values.iter().copied()).sqrt();
@@ -310,6 +315,7 @@ fn measured(tracked: &Tracked) -> Vec<MeasuredPoint> {
 struct Recorder<'a> {
     rig: Box<dyn Rig>,
     read: Vec<Sensors>,
+    driven: Vec<Drive>,
     factor: &'a dyn Fn(usize) -> f64,
 }
 
@@ -325,8 +331,112 @@ impl RigStage for Recorder<'_> {
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         let factor = (self.factor)(self.read.len());
-        self.rig
-            .advance(Drive { amplitude: factor * drive.amplitude, ..drive }, step)
+        self.driven.push(Drive { amplitude: factor * drive.amplitude, ..drive });
+        self.rig.advance(self.driven[self.driven.len() - 1], step)
+    }
+}
+
+/// A recording of a rig, with the scene of the client and what drove the rig at each sample before its end.
+struct Recorded {
+    recording: Recording,
+    scene: Scene,
+    truth: Parameters,
+    driven: Vec<Drive>,
+}
+
+/// Relative change of a parameter, and change of a state, for a derivative.
+const BESIDE: f64 = 1e-8;
+
+impl Recorded {
+    /// Standard uncertainties of the five parameters by the Cramér–Rao bound of the whole recording of displacements, without the parts, s, of another
+    /// motion: an information filter at the true parameters. It follows the rig sample by sample; the noise of the base is that of the process, and the
+    /// state at the start, and after each of these parts, is unknown.
+    fn bound(&self, snr: &str, without: &[[f64; 2]]) -> Option<[f64; 5]> {
+        let ratio = 10_f64.powf(-snr.parse::<f64>().ok()? / 20.0);
+        let values: [f64; 5] = std::array::from_fn(|n| Quantity::ALL[n].of_plant(&self.truth));
+        let beside = |changed: Option<usize>| {
+            let factor = |n: usize| if changed == Some(n) { 1.0 + BESIDE } else { 1.0 };
+            let [f0, zeta, restitution, half_width, epsilon] = std::array::from_fn(|n| values[n] * factor(n));
+            let Parameters { primary_mass, .. } = self.truth;
+            let (omega0, particle_mass) = (TAU * f0, epsilon * primary_mass);
+            let (stiffness, damping) = (primary_mass * omega0 * omega0, 2.0 * zeta * omega0 * primary_mass);
+            Parameters {
+                stiffness,
+                damping,
+                particle_mass,
+                half_width,
+                restitution,
+                ..self.truth
+            }
+        };
+        let plant = |changed| Plant::new(beside(changed), self.scene.start).ok();
+        let plants = [None, Some(0), Some(1), Some(2), Some(3), Some(4)].map(plant);
+        let share = match self.scene.resonance.sensor {
+            Sensor::V => self.truth.mass_ratio(),
+            Sensor::Q1 => 0.0,
+        };
+        let step = self.recording.sample_time;
+        // A new plant has no base yet that could jump.
+        let next = |n: usize, x: &Vector4<f64>, signal: [f64; 4]| -> Option<Vector4<f64>> {
+            let [q1, dq1, q2, dq2] = <[f64; 4]>::from(*x);
+            let mut plant = plants[n]?;
+            plant.set_state(State { q1, dq1, q2, dq2 }).ok()?;
+            plant
+                .advance(lovines::Drive { signal, ..Default::default() }, step)
+                .ok()?;
+            let State { q1, dq1, q2, dq2 } = plant.state();
+            Some(Vector4::new(q1, dq1, q2, dq2))
+        };
+        let mut rig = Plant::new(self.truth, self.scene.start).ok()?;
+        let (mut covariance, mut by_parameters) = (Matrix4::identity(), SMatrix::<f64, 4, 5>::zeros());
+        let (mut information, mut powers, mut phase) = (Matrix5::zeros(), [0.0; 2], 0.0_f64);
+        // As the recording is cut.
+        let cut = self.driven.len() / 40;
+        for (n, Drive { omega, amplitude, .. }) in self.driven[..self.driven.len() - cut].iter().enumerate() {
+            let (sin, cos) = phase.sin_cos();
+            phase = (phase + omega * step) % TAU;
+            let turn = |power: i32, factor: f64| amplitude * omega.powi(power) * factor;
+            let signal = [turn(0, sin), turn(1, cos), turn(2, -sin / 2.0), turn(3, -cos / 6.0)];
+            let State { q1, dq1, q2, dq2 } = rig.state();
+            let x = Vector4::new(q1, dq1, q2, dq2);
+            // Held levels may be unstable: only the rig's own steps stay on them.
+            rig.advance(lovines::Drive::harmonic(*amplitude, *omega), step).ok()?;
+            let row = RowVector4::new(1.0, 0.0, share, 0.0);
+            // Mean squares over a period, as the noise of the sensors has them.
+            for (power, value) in powers.iter_mut().zip([(row * x)[0], signal[0]]) {
+                *power += (value * value - *power) / self.scene.controller.samples_per_period;
+            }
+            let [of_response, of_base] = powers.map(|power| ratio * ratio * power);
+            let seconds = (n as f64 - cut as f64) * step;
+            if seconds < 0.0 || without.iter().any(|[from, to]| (*from..*to).contains(&seconds)) {
+                (covariance, by_parameters) = (Matrix4::identity(), SMatrix::zeros());
+                continue;
+            }
+            let there = next(0, &x, signal)?;
+            let variance = (row * covariance * row.transpose())[0] + of_response;
+            let mut by_innovation = row * by_parameters;
+            by_innovation[4] += share * x[2];
+            information += by_innovation.transpose() * by_innovation / variance;
+            let gain = covariance * row.transpose() / variance;
+            by_parameters -= gain * by_innovation;
+            covariance -= gain * row * covariance;
+            let slope = |other: Option<Vector4<f64>>| other.map_or(Vector4::zeros(), |other| (other - there) / BESIDE);
+            let mut transition = Matrix4::zeros();
+            for i in 0..4 {
+                transition.set_column(i, &slope(next(0, &(x + Vector4::ith(i, BESIDE)), signal)));
+            }
+            let [e, rest @ ..] = signal;
+            let by_base = slope(next(0, &x, [e + BESIDE, rest[0], rest[1], rest[2]]));
+            by_parameters = transition * by_parameters;
+            for i in 0..5 {
+                let column = by_parameters.column(i) + slope(next(i + 1, &x, signal));
+                by_parameters.set_column(i, &column);
+            }
+            covariance = transition * covariance * transition.transpose() + by_base * by_base.transpose() * of_base;
+            covariance = 0.5 * (covariance + covariance.transpose());
+        }
+        let relative = information.try_inverse()?.diagonal();
+        Some(std::array::from_fn(|n| values[n] * relative[n].sqrt()))
     }
 }
 
@@ -346,9 +456,10 @@ fn recording(read: &[Sensors], sample_time: f64) -> Recording {
 }
 
 /// A recording of a tracked backbone by accelerometers, each with noise of its own: second differences of the displacements of mass and base.
-fn accelerations(case: &Case, snr: &str) -> Result<(Recording, Scene, Parameters), Failure> {
+fn accelerations(case: &Case, snr: &str) -> Result<Recorded, Failure> {
     let of_mass = Definition { sensor: Sensor::Q1, ..Definition::default() };
-    let (mut recording, scene, truth) = levels(case, "none", of_mass)?;
+    let mut recorded = levels(case, "none", of_mass)?;
+    let recording = &mut recorded.recording;
     let step = recording.sample_time;
     let mut random = ChaCha8Rng::seed_from_u64(case.1);
     for values in [&mut recording.response, &mut recording.drive] {
@@ -364,26 +475,32 @@ fn accelerations(case: &Case, snr: &str) -> Result<(Recording, Scene, Parameters
         }
     }
     recording.measurands = [Measurand::Acceleration; 2];
-    Ok((recording, scene, truth))
+    Ok(recorded)
 }
 
 /// A recording of a tracked backbone.
-fn levels(case: &Case, snr: &str, resonance: Definition) -> Result<(Recording, Scene, Parameters), Failure> {
+fn levels(case: &Case, snr: &str, resonance: Definition) -> Result<Recorded, Failure> {
     let (truth, scene, plan) = client(case, snr)?;
     let scene = Scene { resonance, ..scene };
     let plan = scene.plan_on(scene.knowledge().measured(plan.knowledge.linear));
     let mut rig = Recorder {
         rig: behind_chain(truth, &scene)?,
         read: Vec::new(),
+        driven: Vec::new(),
         factor: &|_| 1.0,
     };
     let sample_time = plan.knowledge.sample_time;
     tracked(&mut rig, &plan, 20.0)?;
-    Ok((recording(&rig.read, sample_time), scene, truth))
+    Ok(Recorded {
+        recording: recording(&rig.read, sample_time),
+        scene,
+        truth,
+        driven: rig.driven,
+    })
 }
 
 /// A recording of a lock whose drive then changes slowly, down and up.
-fn sweep(case: &Case, snr: &str) -> Result<(Recording, Scene, Parameters), Failure> {
+fn sweep(case: &Case, snr: &str) -> Result<Recorded, Failure> {
     let (truth, scene, mut plan) = client(case, snr)?;
     let d = Dimensionless::of(&truth, 0.0);
     let (low, high) = range(
@@ -407,27 +524,38 @@ fn sweep(case: &Case, snr: &str) -> Result<(Recording, Scene, Parameters), Failu
     let mut rig = Recorder {
         rig: behind_chain(truth, &scene)?,
         read: Vec::new(),
+        driven: Vec::new(),
         factor: &factor,
     };
     let found = record(&mut rig, &plan)?;
-    Ok((recording(&rig.read[..found.released], found.sample_time), scene, truth))
+    rig.driven.truncate(found.released);
+    Ok(Recorded {
+        recording: recording(&rig.read[..found.released], found.sample_time),
+        scene,
+        truth,
+        driven: rig.driven,
+    })
 }
 
 /// A recording of the search, the hold and the decay of `vines identify`.
-fn lock_and_decay(case: &Case, snr: &str) -> Result<(Recording, Scene, Parameters), Failure> {
+fn lock_and_decay(case: &Case, snr: &str) -> Result<Recorded, Failure> {
     let (truth, scene, plan) = client(case, snr)?;
     let scene = scene.at_rest();
     let record = record(&mut SensorsOnly::around(behind_chain(truth, &scene)?), &plan)?;
     let read: Vec<Sensors> = record.samples.iter().map(|one| one.sensors).collect();
-    Ok((recording(&read, record.sample_time), scene, truth))
+    Ok(Recorded {
+        recording: recording(&read, record.sample_time),
+        scene,
+        truth,
+        driven: Vec::new(),
+    })
 }
 
-type Recorded = fn(&Case, &str) -> Result<(Recording, Scene, Parameters), Failure>;
-
 /// Fits a record as a record.
-fn follow_one(case: &Case, snr: &str, record: Recorded) -> Result<Found, Failure> {
-    let (recording, scene, truth) = record(case, snr)?;
-    let parts = parts(std::slice::from_ref(&recording), &scene)?;
+fn follow_one(case: &Case, snr: &str, record: fn(&Case, &str) -> Result<Recorded, Failure>) -> Result<Found, Failure> {
+    let recorded = record(case, snr)?;
+    let Recorded { recording, scene, truth, .. } = &recorded;
+    let parts = parts(std::slice::from_ref(recording), scene)?;
     let prepared = [recording.prepared(&scene.knowledge())?];
     let found = follow(&prepared, &parts, &[], scene.resonance, &scene.plant, &[]);
     let by_points = usize::from(found.is_none());
@@ -441,20 +569,30 @@ fn follow_one(case: &Case, snr: &str, record: Recorded) -> Result<Found, Failure
     };
     let over = |quantity: &Quantity| {
         let Estimate { value, uncertainty } = fit.estimate(*quantity).expect("a fitted parameter");
-        (value - quantity.of_plant(&truth)) / uncertainty
+        (value - quantity.of_plant(truth)) / uncertainty
     };
-    let errors: Vec<f64> = Quantity::ALL[..5].iter().map(over).collect();
+    let ratios: Vec<f64> = Quantity::ALL[..5].iter().map(over).collect();
     let spans: Vec<[f64; 2]> = left_out.iter().map(|one| one.seconds).collect();
+    let is_known = recording.measurands == [Measurand::Displacement; 2] && !recorded.driven.is_empty() && periods > 0;
+    let bound = Some(&recorded)
+        .filter(|_| is_known)
+        .and_then(|one| one.bound(snr, &spans));
+    let of_bound = |n: usize| {
+        let uncertainty = fit.estimate(Quantity::ALL[n]).map_or(f64::NAN, |one| one.uncertainty);
+        bound.map_or(f64::NAN, |bound| uncertainty / bound[n])
+    };
+    let of_bound = [0, 1, 2, 3, 4].map(of_bound);
+    let errors = ratios.iter().zip(of_bound).map(|(ratio, u)| ratio * u).collect();
     let p_values = if by_points == 1 { Vec::new() } else { p_values(&fit) };
     println!(
-        "{:.4?}: {errors:.1?} u, {periods} periods, chi-square {:.1} of {}; p of channels {p_values:.3?}, colour {colour:.2}; \
+        "{:.4?}: {ratios:.1?} u, u {of_bound:.2?} bounds, {periods} periods, chi-square {:.1} of {}; p of channels {p_values:.3?}, colour {colour:.2}; \
          left out {spans:.0?}",
         case.0, fit.chi_square, fit.degrees
     );
     Ok(match fit.is_rejected() {
         true => Found { counts: [0, 1, by_points, 0, 0, 0], ..Found::default() },
         false => Found {
-            ratios: [errors.clone(), p_values].concat(),
+            ratios: [ratios, p_values].concat(),
             errors,
             periods: None,
             counts: [1, 0, by_points, 0, 0, 0],
