@@ -83,6 +83,11 @@ pub struct Powers {
 }
 
 impl Balance {
+    /// Largest change of the response by an impact, m.
+    pub fn impact(&self) -> Real {
+        GROWTH * self.drive
+    }
+
     /// Takes a sample. Returns whether it contradicts the balance.
     #[inline]
     pub fn contradicts(&mut self, config: &Config, sample: &Powers) -> bool {

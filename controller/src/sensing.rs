@@ -48,12 +48,12 @@ impl Channel {
         self.unchanged > 2.0 * PAUSE
     }
 
-    /// Takes a reading, m, after a turn of the oscillator, rad. `limit`: `residual_max`. `change`: factor by which the drive has changed and the
-    /// detector has still to learn; `None`: the signal is not known yet.
+    /// Takes a reading, m, after a turn of the oscillator, rad. `limits`: `residual_max`, and the largest other difference that no fault makes, m.
+    /// `change`: factor by which the drive has changed and the detector has still to learn; `None`: the signal is not known yet.
     fn take(
         &mut self,
         detector: &PhaseDetector,
-        limit: Option<Real>,
+        limits: Option<[Real; 2]>,
         reading: Real,
         rotors: &Rotors,
         turn: Real,
@@ -74,11 +74,15 @@ impl Channel {
         self.since += turn;
         self.is_implausible = false;
         let [now, last, earlier] = self.largest;
-        if let Some(limit) = limit {
+        if let Some([limit, moves]) = limits {
             let (amplitude, lag) = (self.estimate.amplitude, (factor - 1.0).abs());
-            let share = if self.unchanged > PAUSE { 0.0 } else { limit * factor };
+            let moves = if self.unchanged > PAUSE {
+                0.0
+            } else {
+                limit * factor * amplitude + moves
+            };
             // A fault may have begun at the end of the last period.
-            let expected = (share + lag) * amplitude + NORMAL * smaller(last, earlier);
+            let expected = moves + lag * amplitude + NORMAL * smaller(last, earlier);
             let is_clear = detector.harmonics_within(&self.estimate, (DISTORTION * limit + lag) * amplitude);
             self.distorted = longer(self.distorted, turn, !is_clear);
             if change.is_some() && (difference > expected || self.distorted > LASTS) {
@@ -121,6 +125,10 @@ pub struct Channels {
     balance: Balance,
     /// The drive with the lag of the detector, m.
     drive: Real,
+    /// The drive at the last sample, and its change since the one before, m; and what derivatives of the base still show of changes, m.
+    last: Real,
+    rise: Real,
+    shown: Real,
     /// Time in the closed loop, s.
     closed: Real,
     /// Time since the loop was closed or the measurement was last valid, s.
@@ -166,6 +174,10 @@ impl Sensing {
         let is_read = fault != Some(Fault::Sensor);
         if is_read {
             let rotors = self.detector.rotors(drive.rotor);
+            let take = |channel: &mut Channel, reading: Real, change: Option<Real>, moves: Real| {
+                let limits = config.residual_max.map(|share| [share, moves]);
+                channel.take(&self.detector, limits, reading, &rotors, turn, change);
+            };
             // The base follows the drive at once; the response grows, and its detector lags.
             let is_known = state.closed > self.warm_up;
             let change = if state.drive > 0.0 {
@@ -173,12 +185,18 @@ impl Sensing {
             } else {
                 1.0
             };
-            let take = |channel: &mut Channel, reading: Real, change: Option<Real>| {
-                channel.take(&self.detector, config.residual_max, reading, &rotors, turn, change);
-            };
-            take(&mut state.response, input.response, is_known.then_some(1.0));
+            let impact = state.balance.impact();
+            take(&mut state.response, input.response, is_known.then_some(1.0), impact);
             if let Some(reading) = base {
-                take(&mut state.base, reading, Some(change));
+                // What velocity and acceleration of the base show of a change.
+                let rise = drive.amplitude - state.last;
+                state.shown -= turn / PAUSE * state.shown;
+                if rise != 0.0 || state.rise != 0.0 {
+                    let shown = (2.0 * rise.abs() + (rise - state.rise).abs() / turn) / turn;
+                    state.shown = larger(shown, state.shown);
+                }
+                (state.last, state.rise) = (drive.amplitude, rise);
+                take(&mut state.base, reading, Some(change), state.shown);
                 if drive.amplitude == 0.0 {
                     // A base without a drive rests.
                     state.base.unchanged = 0.0;

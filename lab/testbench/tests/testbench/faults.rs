@@ -106,6 +106,26 @@ fn faults_in_the_first_periods_of_the_drive_are_found_within_a_second() {
     assert!(ended && zero.is_some_and(|time| time < 0.06), "{zero:?}");
 }
 
+#[test]
+fn an_impact_on_a_small_response_and_the_acceleration_of_a_base_whose_drive_changes_are_no_faults() {
+    let accelerations = [
+        "resonance.sensor=q1",
+        "resonance.sensor_quantity=acceleration",
+        "resonance.reference_quantity=acceleration",
+        "plant.r=0.56",
+        "excitation.G=1.11",
+    ];
+    for settings in [
+        &["plant.m=0.0783", "plant.r=0.845", "plant.c=5.905", "excitation.G=1.19"][..],
+        &accelerations,
+    ] {
+        let scene = scene(settings);
+        let ended = record(&mut *Simulated::of(&scene).unwrap(), &scene);
+        let is_fault = matches!(ended, Err(ExperimentError::Tripped { .. }));
+        assert!(!is_fault, "{settings:?}: {:?}", ended.err());
+    }
+}
+
 /// A controller that fails at a sample.
 struct Broken(BuiltIn, usize, fn(Command) -> Result<Command, ControllerError>);
 
