@@ -186,7 +186,8 @@ impl Scene {
     pub fn implausible(&self) -> impl Iterator<Item = Implausible> {
         let d = Dimensionless::of(&self.plant, 0.0);
         let hertz = d.omega0 / TAU;
-        let [heavy, shaken, lift, sag, stroke] = self.doubtful_shaker().unwrap_or_default();
+        let nothing = [0.0, 0.0, f64::INFINITY, 0.0, 0.0];
+        let [heavy, shaken, lift, sag, stroke] = self.doubtful_shaker().unwrap_or(nothing);
         [
             ("epsilon = m/M", d.epsilon, "", d.epsilon > 0.3),
             ("lambda = c/(m omega0)", d.lambda, "", d.lambda > 30.0),

@@ -19,7 +19,7 @@ use vines_testbench::scene::{Scene, SceneError, StructureMode};
 use vines_testbench::survey::{BehindShaker, Survey, phase_resonant};
 
 use super::common::{at, demodulated, mean_square};
-use super::{Altered, identified, record, tracked};
+use super::{Altered, identified, paper, record, tracked};
 
 const PRESETS: [&str; 3] = [
     include_str!("../../../../scenes/shaker-cantilever.toml"),
@@ -433,6 +433,8 @@ fn a_heavy_shaker_or_one_in_other_units_is_doubted() {
         let is_named = |name: &&str| name.contains(named);
         assert_eq!(names.iter().any(is_named), !named.is_empty(), "{n}, {to}: {names:?}");
     }
+    // Without a shaker.
+    assert_eq!(paper(&[]).implausible().count(), 0);
 }
 
 #[test]
