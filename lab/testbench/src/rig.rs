@@ -407,7 +407,7 @@ pub enum ShakerFault {
     StingerBreaks,
     /// The amplifier clips at half of the present command.
     AmplifierClips,
-    /// The armature is at its stop: where it is now.
+    /// The armature is at its stop: where it is now, or as soon as it moves outwards.
     AtStop,
 }
 
@@ -476,9 +476,13 @@ impl SimulatedStructure {
         let is_released = command == 0.0 && self.driven > 0.0 && shaker.release == Release::Cut;
         match fault {
             Some(ShakerFault::AmplifierClips) => self.clipped_at = 0.5 * command,
-            Some(ShakerFault::AtStop) => {
-                let row = shaker.rows.armature.clone();
-                shaker.limits.stroke = Some(self.simulated.plant.point(&row)[0].abs());
+            Some(fault @ ShakerFault::AtStop) => {
+                let [at, velocity, _] = self.simulated.plant.point(&shaker.rows.armature);
+                if at * velocity > 0.0 {
+                    shaker.limits.stroke = Some(at.abs());
+                } else {
+                    self.fault = Some((fault, 0.0));
+                }
             }
             None if !is_released => {}
             Some(ShakerFault::StingerBreaks) | None => {
