@@ -165,6 +165,22 @@ pub fn drive_harmonics(samples: &[Sample], knowledge: &Knowledge, omega: f64) ->
     (first > 0.0).then(|| std::array::from_fn(|n| fit.harmonic(n + 2).norm() / first))
 }
 
+/// Whether the reference shows an asymmetric motion: behind a shaker it also contains the impacts, and more of them where the stinger resonates.
+fn is_asymmetric_by_reference(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> bool {
+    if knowledge.shaker().is_none() {
+        return false;
+    }
+    let values: Vec<f64> = samples.iter().filter_map(|sample| sample.sensors.reference).collect();
+    let turn = omega * knowledge.sample_time;
+    let phases: Vec<f64> = (0..values.len()).map(|n| n as f64 * turn).collect();
+    let basis = HarmonicBasis::new(&phases, 1, &degrees(ALL, TAU / turn));
+    if values.len() < 2 * basis.terms() {
+        return false;
+    }
+    let content = Content::fitted(&basis, &DVector::from_vec(values));
+    content.is_some_and(|(content, _)| content.is_asymmetric(knowledge.target.measurands[1].order()))
+}
+
 /// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase target,
 /// and `omega` (rad/s) its frequency.
 ///
@@ -202,6 +218,7 @@ pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estim
         Impacts::NotNeeded if is_known => Regime::NoImpacts,
         Impacts::NotNeeded | Impacts::Doubtful => Regime::NotEstablished,
         Impacts::Needed if content.is_asymmetric(target.measurands[0].order()) => Regime::Asymmetric,
+        Impacts::Needed if is_asymmetric_by_reference(samples, knowledge, omega.value) => Regime::Asymmetric,
         Impacts::Needed if third_harmonic > significant => Regime::Symmetric,
         Impacts::Needed => Regime::Unresolved,
     }
