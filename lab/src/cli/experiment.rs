@@ -221,6 +221,12 @@ impl Session {
                             advice::reason(scene, &plan.knowledge.numbers, advice::last_regime(&samples, plan))
                         })
                     }
+                    // An irregular motion may resemble a failed sensor: was there another one to lock on?
+                    ExperimentError::Tripped {
+                        stage: Stage::Locking,
+                        fault: Fault::Implausible | Fault::LockLost,
+                        ..
+                    } => advice::reason(scene, &plan.knowledge.numbers, None),
                     _ => None,
                 };
                 let reason = reason.map(|reason| summary::not_locked(&reason, scene));

@@ -159,6 +159,10 @@ fn a_drive_without_a_stable_orbit_is_told_at_which_drives_one_is_stable() {
     let part = "there is no stable symmetric 1:1 orbit at G = 1.1000; it is stable for G from 0.788 to 0.811";
     let out = folder.path().display();
     fails(&format!("identify --rig built-in --out {out} {undamped}"), 1, part);
+    // The irregular motion at this drive resembles a failed sensor.
+    let irregular = "--set=plant.r=0.85 --set=excitation.G=1.016 --set=plant.m=0.052537 --set=plant.c=3.4047";
+    let part = "there is no stable symmetric 1:1 orbit at G = 1.0160; it is stable for G from 0.504 to 0.933";
+    fails(&format!("identify --rig built-in --out {out} {irregular}"), 1, part);
 }
 
 #[test]
