@@ -16,7 +16,7 @@
 //! beside them: a floor of the uncertainty, which in simulations without noise exceeds the errors several times.
 //!
 //! The fit begins at the parameters of the points of the record. A piece of the record is left out where the plant has not two impacts per period,
-//! where a deviation of the particle grows, where the response has a second harmonic, where the innovations contradict their covariance, and where
+//! where a deviation of the particle grows, where the response has a second harmonic, where the piece contradicts all others, and where
 //! they are not linear in the parameters: near the fold, and beyond it for other parameters within their uncertainties. Whether a part shows impacts
 //! by itself does not matter, because that depends on the natural frequency of the scene: what is followed needs them if no linear structure follows
 //! it.
