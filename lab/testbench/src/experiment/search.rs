@@ -166,9 +166,12 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Goes to a symmetric motion with impacts: raises the response until they have begun, and lowers it until the motion is symmetric.
     fn symmetric(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         let largest = self.bench.config.amplitude_max.unwrap_or(f64::INFINITY);
-        let spare = SHARE * self.gain() * (largest - self.damping() * (1.0 + DRAWING) * self.b);
+        // A drive that does not reach the walls from the middle still moves the structure to a particle that moves.
+        let end = (UNREACHED * self.b).min(largest / (self.damping() * (1.0 + DRAWING)));
+        let highest = self.b.min(end / (1.0 + DRAWING));
+        let spare = SHARE * self.gain() * (largest - self.damping() * (1.0 + DRAWING) * highest);
         let rate = (self.b / (RISE * self.period)).min(spare);
-        while !leg.departed || leg.response < (1.0 - DRAWING) * self.b {
+        while !leg.departed || leg.response < (1.0 - DRAWING) * highest {
             if leg.symmetric {
                 // A rise may resemble impacts; at rest the setpoint tells them apart.
                 leg = self.leg(0.0, FOLLOWED, 0.0)?;
@@ -177,10 +180,13 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 }
             }
             let change = rate * FOLLOWED as f64 * self.period;
-            if leg.last + change > UNREACHED * self.b || rate <= 0.0 {
+            if leg.last + change > end {
                 break;
             }
             leg = self.leg(leg.last + change - self.setpoint, FOLLOWED, rate)?;
+        }
+        if highest < self.b && !leg.departed {
+            return Ok(leg);
         }
         self.fall(leg, step)
     }

@@ -82,6 +82,9 @@ fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most_and_six_bits_s
     // The drive stays within the range of the converter that reads it.
     let damped = at("plant.lambda=4.5 start.dq2=0 excitation.G=2 chain.adc_bits=12").unwrap_err();
     assert!(matches!(damped, ExperimentError::NotReached { .. }), "{damped}");
+    // From the middle, impacts would begin at G = 4.5; a particle that moves needs less.
+    let moving = at("plant.lambda=4.5 start.dq2=0.8 excitation.G=2 chain.adc_bits=12").unwrap();
+    assert!((moving.c - 0.336333).abs() < 1e-4, "{moving:?}");
     // A delay that nobody compensates is seen, and one common to both sensors is not.
     let late = at("chain.delay=1 chain.reference=false phase_lock.delay=0").unwrap();
     assert!((late.sigma - ideal.sigma + 0.078).abs() < 0.005);
