@@ -262,8 +262,6 @@ fn period_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
     let residual = basis.residual(&vector, &fit);
     let near = variance_near(residual.as_slice()) * values.len() as f64 / 2.0;
     let rest = residual.norm_squared() / (values.len() - basis.terms()) as f64;
-    // Over a period, a harmonic has half of the square of its amplitude, and one that grows linearly from -1 to 1 a sixth.
-    let rest = rest + fit.harmonic(3).norm_sqr() / 2.0 + fit.drift(1).norm_sqr() / 6.0;
     // The amplitude E0 + E1 n + Re(E2 exp(2i phase)) has a third harmonic.
     let [first, growth, third] = [fit.harmonic(1), fit.drift(1), fit.harmonic(3)];
     let turn = first.conj() / first.norm();
