@@ -19,7 +19,7 @@ target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 
 # The libraries in the FMUs must not contain paths of this machine, which panic messages would bring in. (Cargo's
 # trim-paths is not stable.) All builds need the same flags: cargo compiles everything again for others.
-for folder in "${CARGO_HOME:-$HOME/.cargo}=/cargo" "$PWD=/vines"; do
+for folder in "${CARGO_HOME:-$HOME/.cargo}=/cargo" "$(rustc --print sysroot)=/rustc" "$PWD=/vines"; do
     case $folder in
         *" "*) say "warning: libraries will contain the path ${folder%=*}, because it has a space" ;;
         *) case " ${RUSTFLAGS:-} " in
