@@ -190,7 +190,7 @@ impl Sensing {
             if let Some(reading) = base {
                 // What velocity and acceleration of the base show of a change.
                 let rise = drive.amplitude - state.last;
-                state.shown -= turn / PAUSE * state.shown;
+                state.shown *= larger(1.0 - turn / PAUSE, 0.0);
                 if rise != 0.0 || state.rise != 0.0 {
                     let shown = (2.0 * rise.abs() + (rise - state.rise).abs() / turn) / turn;
                     state.shown = larger(shown, state.shown);
