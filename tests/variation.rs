@@ -29,20 +29,22 @@ fn kinds(events: &[Event]) -> Vec<(std::mem::Discriminant<Event>, bool)> {
         Event::Slip { direction, .. } | Event::Reversal { direction, .. } => direction > 0.0,
         Event::Sticking { .. } => false,
     };
-    let mut kinds = Vec::new();
+    // Friction reverses the particle between them.
+    let accumulates = |event: &&&Event| matches!(event, Event::Impact { .. } | Event::Reversal { .. });
+    let mut kept: Vec<&Event> = Vec::new();
     for event in events {
-        let kind = (std::mem::discriminant(event), side(event));
         if matches!(event, Event::Stuck { .. }) {
-            let impacts = kinds
+            let last = kept
                 .iter()
                 .rev()
-                .take_while(|last| matches!(last, (_, at) if *at == kind.1))
-                .count();
-            kinds.truncate(kinds.len() - impacts);
+                .take_while(|last| accumulates(last) && side(last) == side(event));
+            kept.truncate(kept.len() - last.count());
         }
-        kinds.push(kind);
+        kept.push(event);
     }
-    kinds
+    kept.into_iter()
+        .map(|event| (std::mem::discriminant(event), side(event)))
+        .collect()
 }
 
 fn cavity() -> impl Strategy<Value = Cavity> {

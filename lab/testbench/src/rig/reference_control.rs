@@ -199,7 +199,7 @@ impl ReferenceControl {
 }
 
 /// Share of the bandwidths at which the control is slow enough for the other resonances of structure and shaker: 1, or the largest power of 1/2 at
-/// which it is stable (Nyquist) also when it is twice as fast. `exact`: reference and response per command at a frequency, rad/s.
+/// which it is stable (Nyquist) also when it is twice as fast; 1/16 if none is. `exact`: reference and response per command at a frequency, rad/s.
 pub(crate) fn speed(path: &ShakerPath, omega0: f64, exact: impl Fn(f64) -> [Complex64; 2]) -> f64 {
     let is_stable = |speed: &f64| {
         let of = |x: f64| return_difference(path, omega0, *speed, x, exact(omega0 * (1.0 + x)));
