@@ -277,6 +277,11 @@ fn decay(result: &Comparison) -> String {
         DecayEnd::Synchrony => "where the impacts lose synchrony",
         DecayEnd::Linear => "where the impacts end",
         DecayEnd::Record => "where the record ends; a larger record.decay_periods shows more",
+        DecayEnd::OtherMode => {
+            return "Free decay: no points, because another mode moves freely after the release, too near the driven one to be told apart. Behind a \
+                    shaker, short its coil (amplifier = \"voltage\"), or cut the stinger (release = \"cut\")"
+                .into();
+        }
     };
     match &result.decay[..] {
         [] => format!("Free decay: no points, because it is shorter than the window of the fit; it ends {end}"),

@@ -11,7 +11,9 @@ use vines_model::{Reference, Sensor};
 use crate::experiment::DECAYED;
 use crate::linear::{MeasuredLinear, ParticleState};
 use crate::rig::Sensors;
-use crate::scene::{Definition, Dimensionless, Measurand, Parameters, Scene, carried_up_to, has_mirror_images};
+use crate::scene::{
+    Definition, Dimensionless, Measurand, Parameters, Scene, Structure, carried_up_to, has_mirror_images,
+};
 
 /// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -235,6 +237,8 @@ pub struct Knowledge {
     pub shaker: Option<ShakerPath>,
     /// Response of the other modes of a structure over the base, at the natural frequency: nearly constant there.
     pub other_modes: Complex64,
+    /// Distance of the nearest other pole of a structure from the pole of its driven mode after the release, rad/s; infinite without one.
+    pub nearest_pole: f64,
 }
 
 impl Knowledge {
@@ -257,6 +261,7 @@ impl Knowledge {
             target,
             shaker: None,
             other_modes: Complex64::ZERO,
+            nearest_pole: f64::INFINITY,
         }
     }
 
@@ -347,6 +352,7 @@ impl Scene {
         );
         knowledge.shaker = self.structure().and_then(|structure| structure.shaker_path());
         knowledge.target.through_shaker = knowledge.shaker.is_some();
+        knowledge.nearest_pole = self.structure().map_or(f64::INFINITY, Structure::nearest_pole);
         if let Some(structure) = self.structure().filter(|one| one.shaker.is_none()) {
             let (linear, omega0) = (knowledge.linear, knowledge.linear.omega0);
             let alone = linear.oscillator_gain(omega0, knowledge.numbers.definition.reference) / linear.rate(omega0);

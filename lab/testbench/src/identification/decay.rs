@@ -61,6 +61,9 @@ pub enum DecayEnd {
     /// The impacts took away less than half of what they did at the release, on a rig that does not report impacts.
     #[serde(rename = "end of the impacts")]
     Linear,
+    /// There are none: another mode moves freely beside the driven one, nearer than a window can tell apart.
+    #[serde(rename = "another mode")]
+    OtherMode,
 }
 
 /// The points along a decay, and what ended them.
@@ -108,6 +111,9 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
     } else {
         (TERMS, window)
     };
+    if knowledge.nearest_pole * window / omega < terms.lobe() {
+        return DecayPoints { points: Vec::new(), end: DecayEnd::OtherMode };
+    }
     let mut windows = fitted(&values, [dt, window], omega, terms);
     for window in &mut windows {
         window.fit = window.fit.displacement(0, &knowledge.target);
@@ -219,6 +225,14 @@ struct Terms {
     harmonics: &'static [Option<usize>],
     /// Whether residuals have the weights of Hann's window, in which what is not fitted leaks least into the fundamental.
     is_hann: bool,
+}
+
+impl Terms {
+    /// Distance of a pole from the fundamental's, over 2 pi and the length of a window, up to which the fit takes its motion for a part of the
+    /// fundamental: the main lobe of the window, wider by 1 because of the amplitude's second degree.
+    fn lobe(&self) -> f64 {
+        if self.is_hann { 3.0 } else { 2.0 }
+    }
 }
 
 /// A constant, and harmonics 1 and 3 with drift.

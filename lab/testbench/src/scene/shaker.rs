@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use lovines::host::Row;
+use lovines::oscillator::Regime;
 use lovines::{Amplifier, Excitation as HostExcitation, Plant, Shaker, ShakerRows};
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
@@ -219,6 +220,24 @@ impl Structure {
     pub fn reference_by_command(&self, shaker: &SceneShaker, omega: f64) -> Complex64 {
         let reference = shaker.reference(self.excitation, omega);
         self.host.frequency_response(&reference, omega)
+    }
+
+    /// Distance of the nearest other pole from the pole of the driven mode after the release, rad/s: of what moves at the sensor, and oscillates.
+    pub(crate) fn nearest_pole(&self) -> f64 {
+        let cut = self.shaker.as_ref().filter(|shaker| shaker.release == Release::Cut);
+        let free = cut.map_or(self, |shaker| &*shaker.without);
+        let sections = free.host.sections().iter().zip(&free.rows[free.sensor]);
+        let poles = sections.filter_map(|(section, row)| match section.oscillator.regime {
+            Regime::Oscillating { omega_d } if *row != [0.0; 2] => {
+                Some(Complex64::new(-section.oscillator.delta, omega_d))
+            }
+            _ => None,
+        });
+        let mut poles: Vec<_> = poles.collect();
+        let driven = Complex64::new(0.0, self.mode().omega);
+        poles.sort_by(|one, other| (one - driven).norm().total_cmp(&(other - driven).norm()));
+        let distances = poles.iter().skip(1).map(|pole| (pole - poles[0]).norm());
+        distances.fold(f64::INFINITY, f64::min)
     }
 
     /// What the shaker makes of its command, from the frequency response at the frequencies of the check.

@@ -9,8 +9,9 @@ use num_complex::Complex;
 use vines_testbench::backbone::track;
 use vines_testbench::comparison::COMPARED_ABOVE;
 use vines_testbench::experiment::{ExperimentError, run};
-use vines_testbench::identification::{WINDOW, decay_points, identify};
+use vines_testbench::identification::{DecayEnd, DecayPoints, WINDOW, decay_points, identify};
 use vines_testbench::loop_check::{Verdict, check};
+use vines_testbench::record::Record;
 use vines_testbench::rig::{
     BuiltIn, Command, Controller, ControllerError, RigError, RigFault, SensorFault, Sensors, SensorsOnly, Simulated,
     faulty,
@@ -301,7 +302,7 @@ fn the_share_of_clipped_samples_is_that_of_the_commands_at_the_limit() {
 #[test]
 fn the_decay_after_the_stinger_is_cut_is_that_of_the_simulation() {
     let scene = preset(1, &[("[shaker]", "[shaker]\nrelease = \"cut\"")]).unwrap();
-    let record = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+    let record = record_of(&scene);
     let truth = demodulated(&record, &scene);
     let points = decay_points(&record, &scene.knowledge(), WINDOW).points;
     let errors = points.iter().filter(|point| point.c > COMPARED_ABOVE);
@@ -312,6 +313,28 @@ fn the_decay_after_the_stinger_is_cut_is_that_of_the_simulation() {
     println!("{count} points, RMS error {error:.1e} of sigma");
     // The same fit of the default scene, without a shaker, has an error of 3e-3, because the window blurs the end.
     assert!(count > 20 && error < 2e-3, "{count} {error}");
+}
+
+#[test]
+fn a_decay_beside_a_mode_that_a_window_cannot_tell_apart_has_no_points() {
+    // The oscillator on a free table: poles of the 6 x 6 matrix of both, -0.97 + 59.17i and -2.26 + 38.84i.
+    let open = preset(2, &[("amplifier = \"voltage\"", "amplifier = \"current\"")]).unwrap();
+    let apart = open.knowledge().nearest_pole;
+    assert!((apart - 20.372).abs() < 1e-3, "{apart}");
+    let DecayPoints { points, end } = decay_points(&record_of(&open), &open.knowledge(), WINDOW);
+    assert_eq!((points.len(), end), (0, DecayEnd::OtherMode));
+    // Behind a voltage the coil holds the table, whose poles are real.
+    let shorted = preset(2, &[]).unwrap();
+    let DecayPoints { points, end } = decay_points(&record_of(&shorted), &shorted.knowledge(), WINDOW);
+    assert!(
+        points.len() > 40 && end == DecayEnd::Synchrony,
+        "{} {end:?}",
+        points.len()
+    );
+}
+
+fn record_of(scene: &Scene) -> Record {
+    record(&mut *Simulated::of(scene).unwrap(), scene).unwrap()
 }
 
 #[test]
