@@ -24,11 +24,11 @@
 use core::fmt;
 
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 use num_complex::Complex64;
 
 use crate::arithmetic::{plus, product, times};
-use crate::oscillator::Oscillator;
+use crate::oscillator::{Oscillator, Transition};
 use crate::parameters::FASTEST;
 
 /// What drives a structure.
@@ -362,33 +362,62 @@ pub(crate) fn mobility(sections: &[Section]) -> f64 {
 }
 
 impl Section {
-    /// Velocity of a point with the pair `[a, b]` per impulse at the cavity, 1/kg.
-    pub fn velocity_per_impulse(&self, [a, b]: [f64; 2]) -> f64 {
-        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
-        let [k0, k1] = self.kick;
-        a * k1 - b * (omega0_squared * k0 + 2.0 * delta * k1)
+    /// `(x, v)` after `t` seconds without drive, as a linear map of `(x, v)` now.
+    pub fn propagator(&self, t: f64) -> Matrix2<f64> {
+        let Transition { xx, xv, vx, vv } = self.oscillator.flow(t).0;
+        Matrix2::new(xx, xv, vx, vv)
     }
 
-    /// Steady `(x, v)` per unit of a harmonic drive with the angular frequency `omega`, rad/s.
-    pub fn steady(&self, omega: f64) -> [Complex64; 2] {
+    /// The time derivative of `(x, v)` without drive.
+    pub fn rate(&self, state: Vector2<f64>) -> Vector2<f64> {
+        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
+        Vector2::new(state[1], -(omega0_squared * state[0] + 2.0 * delta * state[1]))
+    }
+
+    /// Displacement and velocity of a point with the pair `[a, b]`, without drive.
+    pub fn at(&self, [a, b]: [f64; 2], state: Vector2<f64>) -> Vector2<f64> {
+        state * a + self.rate(state) * b
+    }
+
+    /// Velocity of a point with the pair `[a, b]` per impulse at the cavity, 1/kg.
+    pub fn velocity_per_impulse(&self, pair: [f64; 2]) -> f64 {
+        self.at(pair, self.kick.into())[1]
+    }
+
+    /// `omega0² - omega² + 2 i delta omega`, 1/s².
+    pub fn stiffness(&self, omega: f64) -> Complex64 {
+        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
+        Complex64::new(omega0_squared - omega * omega, 2.0 * delta * omega)
+    }
+
+    /// Steady `(x, v)` times [`Self::stiffness`], per unit of a harmonic drive with the angular frequency `omega`, rad/s.
+    pub fn driven(&self, omega: f64) -> [Complex64; 2] {
         let Oscillator { delta, omega0_squared, .. } = self.oscillator;
         let [c, d] = self.drive;
-        let denominator = Complex64::new(omega0_squared - omega * omega, 2.0 * delta * omega);
         [
-            Complex64::new(c, d * omega) / denominator,
-            Complex64::new(-d * omega0_squared, (c - 2.0 * delta * d) * omega) / denominator,
+            Complex64::new(c, d * omega),
+            Complex64::new(-d * omega0_squared, (c - 2.0 * delta * d) * omega),
         ]
+    }
+
+    /// The same per unit of a harmonic force at the cavity.
+    pub fn kicked(&self, omega: f64) -> [Complex64; 2] {
+        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
+        let [k0, k1] = self.kick;
+        [
+            Complex64::new(k1 + 2.0 * delta * k0, k0 * omega),
+            Complex64::new(-k0 * omega0_squared, k1 * omega),
+        ]
+    }
+
+    /// Steady `(x, v)` per unit of a harmonic drive.
+    pub fn steady(&self, omega: f64) -> [Complex64; 2] {
+        self.driven(omega).map(|state| state / self.stiffness(omega))
     }
 
     /// Steady `(x, v)` per unit of a harmonic force at the cavity.
     fn steady_of_cavity_force(&self, omega: f64) -> [Complex64; 2] {
-        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
-        let [k0, k1] = self.kick;
-        let denominator = Complex64::new(omega0_squared - omega * omega, 2.0 * delta * omega);
-        [
-            Complex64::new(k1 + 2.0 * delta * k0, k0 * omega) / denominator,
-            Complex64::new(-k0 * omega0_squared, k1 * omega) / denominator,
-        ]
+        self.kicked(omega).map(|state| state / self.stiffness(omega))
     }
 }
 

@@ -95,7 +95,8 @@ impl Oscillator {
         } else {
             let half_gap = libm::sqrt(-discriminant);
             let fast = -(delta + half_gap);
-            let slow = omega0_squared / fast;
+            // A mass without spring and damper has no rates.
+            let slow = omega0_squared / fast.min(-f64::MIN_POSITIVE);
             let regime = Regime::Overdamped { slow, fast, half_gap };
             (regime, -1.0 / fast, -fast)
         };
@@ -301,6 +302,12 @@ mod tests {
         let m = o.flow(1e6).0;
         assert!((m.xx - (-1e6f64 / 2e8).exp()).abs() < 1e-12);
         assert!(m.vv.abs() < 1e-12 && m.xv.is_finite() && m.vx.is_finite());
+    }
+
+    #[test]
+    fn a_mass_without_spring_and_damper_moves_in_a_straight_line() {
+        let expected = Transition { xx: 1.0, vx: 0.0, xv: 3.0, vv: 1.0 };
+        assert_eq!(Oscillator::new(0.5, 0.0, 0.0).flow(3.0).0, expected);
     }
 
     #[test]

@@ -7,11 +7,12 @@
 
 use std::f64::consts::PI;
 
+use lovines::Section;
+use lovines::oscillator::Oscillator;
 use nalgebra::{Complex, DMatrix, Matrix2, RowVector2, Vector2};
 
 use super::impact_map::first_contact;
-use super::oscillator::Section;
-use super::symmetric::{Particle, SymmetricMotion};
+use super::symmetric::{Particle, SymmetricMotion, alternating};
 
 /// Largest difference of the flight from half a period, rad: a slow impact is that ill-defined in time.
 const EXACT: f64 = 1e-8;
@@ -37,11 +38,17 @@ impl HalfPeriod {
     /// The half period after the impact on the wall w = +b; `None` where the particle does not reach the other wall at its end, and not before.
     pub(super) fn new(sections: &[Section], particle: &Particle, motion: &SymmetricMotion) -> Option<Self> {
         let duration = PI / motion.omega;
-        let all = sections.iter().copied().chain([Section::particle(particle.mass)]);
+        let of_particle = Section {
+            oscillator: Oscillator::new(particle.mass, 0.0, 0.0),
+            drive: [0.0; 2],
+            kick: [0.0, -1.0 / particle.mass],
+            cavity: [-1.0, 0.0],
+        };
+        let all = sections.iter().copied().chain([of_particle]);
         let parts: Vec<Part> = all
             .map(|section| {
                 let flow = section.propagator(duration);
-                let after = section.alternating(&flow)? * motion.impulse;
+                let after = alternating(&section, &flow)? * motion.impulse;
                 Some(Part { section, flow, after })
             })
             .collect::<Option<_>>()?;
@@ -65,7 +72,7 @@ impl HalfPeriod {
     /// Shares of every section and, last, of the particle in the energy of the disturbance with a multiplier. `omega` is the frequency of a
     /// section without a natural one.
     pub(super) fn shares(&self, multiplier: Complex<f64>, omega: f64) -> Option<Vec<f64>> {
-        let scales = self.parts.iter().flat_map(|part| part.section.energy_scales(omega));
+        let scales = self.parts.iter().flat_map(|part| energy_scales(&part.section, omega));
         let scales: Vec<f64> = scales.collect();
         let shifted = DMatrix::from_fn(scales.len(), scales.len(), |row, column| {
             let entry = Complex::from(self.map[(row, column)] * scales[row] / scales[column]);
@@ -82,15 +89,31 @@ impl HalfPeriod {
     }
 }
 
+/// Factors of (x, v) whose squares sum up to twice the energy, up to a factor that all sections have in common: those of a
+/// mass-normalised mode are omega0 and 1. Without a natural frequency, the displacement counts as at the frequency `omega`.
+fn energy_scales(section: &Section, omega: f64) -> [f64; 2] {
+    let omega0 = Some(section.oscillator.omega0)
+        .filter(|omega0| *omega0 > 0.0)
+        .unwrap_or(omega);
+    let ([a, b], [x, dx]) = (section.cavity, section.kick);
+    let (seen, kicked) = (a.hypot(omega0 * b), dx.hypot(omega0 * x));
+    let scale = if seen > 0.0 && kicked > 0.0 {
+        (seen / kicked).sqrt()
+    } else {
+        1.0
+    };
+    [scale * omega0, scale]
+}
+
 /// Time and wall of the first contact; phases of the drive stand for times, and lengths are over b.
 fn contact(parts: &[Part], particle: &Particle, motion: &SymmetricMotion) -> Option<(f64, f64)> {
     let (b, omega) = (particle.half_width, motion.omega);
     // The energy of the free motion of a section never grows, nor does that of its derivatives.
     let bound = |part: &Part| {
         let Part { section, after, .. } = part;
-        let omega0 = section.omega0_squared.sqrt();
+        let Oscillator { delta, omega0, .. } = section.oscillator;
         let rate = section.rate(*after);
-        let ceiling = |state: Vector2<f64>| (2.0 * section.delta + omega0) * state[1].hypot(omega0 * state[0]);
+        let ceiling = |state: Vector2<f64>| (2.0 * delta + omega0) * state[1].hypot(omega0 * state[0]);
         section.cavity[0].abs() * ceiling(*after) + section.cavity[1].abs() * ceiling(rate)
     };
     let curvature = motion.cavity.norm() * omega * omega + parts.iter().map(bound).sum::<f64>();
@@ -103,7 +126,7 @@ fn contact(parts: &[Part], particle: &Particle, motion: &SymmetricMotion) -> Opt
             omega * harmonic.re - motion.speed,
         );
         for Part { section, after, .. } in sections {
-            w += section.at_cavity(section.propagator(t) * after);
+            w += section.at(section.cavity, section.propagator(t) * after);
         }
         [w[0] / b, w[1] / (b * omega)]
     };
@@ -117,14 +140,15 @@ fn map(parts: &[Part], motion: &SymmetricMotion) -> DMatrix<f64> {
     let mut acceleration = -motion.omega * motion.omega * motion.cavity.im;
     for Part { section, after, .. } in parts {
         let before = after - Vector2::from(section.kick) * motion.impulse;
-        acceleration += section.at_cavity(section.rate(before))[1];
+        acceleration += section.at(section.cavity, section.rate(before))[1];
     }
     let mu = -motion.impulse / motion.impact_velocity;
     let mut map = DMatrix::zeros(2 * parts.len(), 2 * parts.len());
     for (column, Part { section, flow, .. }) in parts.iter().enumerate() {
         let [a, b] = section.cavity;
         let by_w = RowVector2::new(a, b) * flow;
-        let by_dw = RowVector2::new(-section.omega0_squared * b, a - 2.0 * section.delta * b) * flow;
+        let Oscillator { delta, omega0_squared, .. } = section.oscillator;
+        let by_dw = RowVector2::new(-omega0_squared * b, a - 2.0 * delta * b) * flow;
         for (row, Part { section, .. }) in parts.iter().enumerate() {
             let kick = Vector2::from(section.kick);
             // The vector field jumps by that of the kick.

@@ -140,7 +140,7 @@ impl ImpactMap {
         // The condition w = wall at the end gives the change of the flight time.
         let by_w = fixed.row(0) - by_q1 - by_dq2 * t;
         let t_by = by_w / -dw;
-        let acceleration = self.oscillator.free.free_acceleration(next.q1, dq1) + self.oscillator.force(end);
+        let acceleration = self.oscillator.free.rate(Vector2::new(next.q1, dq1))[1] + self.oscillator.force(end);
         let q1_by = fixed.row(0) + t_by * dq1;
         let dq1_by = fixed.row(1) + t_by * acceleration;
         let phase_by = unit_row(0) + unit_row(4) * t + t_by * self.oscillator.omega;
@@ -199,7 +199,7 @@ impl<'a> ParticleFlight<'a> {
             w,
             dw: dq1 - dq2,
             free,
-            curvature: oscillator.acceleration() + free.norm() * (1.0 + 2.0 * oscillator.free.delta),
+            curvature: oscillator.acceleration() + free.norm() * (1.0 + 2.0 * oscillator.free.oscillator.delta),
         }
     }
 

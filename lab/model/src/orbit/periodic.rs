@@ -160,7 +160,7 @@ fn harmonic(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern, sum
     // particle is the opposite one.
     let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
     let particle = f64::from(u8::from(sensor == Sensor::V));
-    let inner = free.compliance(omega) + particle / (omega * omega);
+    let inner = free.stiffness(omega).inv() + particle / (omega * omega);
     let [direct, impulses] = [unit, weight * inner].map(|z| z * turned);
     map.oscillator.driven(direct * g) + impulses * sum
 }

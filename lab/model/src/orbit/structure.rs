@@ -8,14 +8,17 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use lovines::{Excitation, Host, InvalidHost};
+use lovines::oscillator::Oscillator;
+use lovines::{Excitation, Host, InvalidHost, Section};
 use nalgebra::{Complex, Vector2};
 use serde::Serialize;
 
 use super::half_period::HalfPeriod;
-use super::oscillator::{Section, harmonic};
+use super::oscillator::section;
 use super::periodic::wrapped;
-use super::symmetric::{Interval, Particle, Reading, SEARCHED, SymmetricMotion, SymmetricMotions, intervals, search};
+use super::symmetric::{
+    Interval, Particle, Reading, SEARCHED, SymmetricMotion, SymmetricMotions, harmonic, intervals, search,
+};
 use super::{AfterImpact, Bifurcation, Orbit};
 use crate::numerics::{self, equally_spaced, try_bisection};
 use crate::theory::SlowFlow;
@@ -67,10 +70,7 @@ impl StructureStart {
             let unit: Vec<f64> = (0..count).map(|other| f64::from(u8::from(other == n))).collect();
             let parts = host.row(&unit)?.into_iter().zip(host.sections()).zip(&self.sections);
             // The drive is 0 here.
-            let states = parts.map(|((pair, section), state)| {
-                let point = Section { cavity: pair, ..Section::from(section) };
-                point.at_cavity(Vector2::from(*state))
-            });
+            let states = parts.map(|((pair, section), state)| section.at(pair, Vector2::from(*state)));
             Ok(states.sum::<Vector2<f64>>())
         };
         let points = (0..count).map(point).collect::<Result<Vec<_>, InvalidHost>>()?;
@@ -301,7 +301,7 @@ impl StructureOrbits {
     pub fn new(host: &Host, particle: Particle) -> Self {
         Self {
             excitation: host.excitation(),
-            sections: host.sections().iter().map(Section::from).collect(),
+            sections: host.sections().to_vec(),
             particle,
             response: None,
             reference: None,
@@ -316,7 +316,7 @@ impl StructureOrbits {
         let Definition { reference, sensor, .. } = scene.definition;
         Self {
             excitation: Excitation::Base,
-            sections: vec![Section::oscillator(scene.epsilon * scene.lambda)],
+            sections: vec![section(scene.epsilon * scene.lambda)],
             particle: Particle { mass: scene.epsilon, half_width: 1.0, restitution: scene.r },
             response: None,
             reference: None,
@@ -411,13 +411,13 @@ impl StructureOrbits {
     pub fn first_order(&self, n: usize) -> Option<FirstOrder> {
         let section = self.sections.get(n)?;
         let Particle { mass, half_width, restitution } = self.particle;
-        let omega0 = section.omega0_squared.sqrt();
-        let epsilon = mass * section.mobility();
+        let Oscillator { delta, omega0, omega0_squared, .. } = section.oscillator;
+        let epsilon = mass * section.velocity_per_impulse(section.cavity);
         let [cavity, response] = [None, self.response.as_ref()].map(|rows| {
             let row = rows.map_or(section.cavity, |rows| rows[n]);
             harmonic(row, section.driven(omega0)).norm()
         });
-        if !(section.delta < omega0 && epsilon > 0.0 && cavity > 0.0) {
+        if !(delta < omega0 && epsilon > 0.0 && cavity > 0.0) {
             return None;
         }
         let reference = match self.excitation {
@@ -429,21 +429,21 @@ impl StructureOrbits {
                 omega0,
                 b: half_width,
                 definition: Definition { reference, sensor: Sensor::Q1, ..Definition::default() },
-                ..Dimensionless::new(epsilon, 2.0 * section.delta / (epsilon * omega0), restitution, 0.0)
+                ..Dimensionless::new(epsilon, 2.0 * delta / (epsilon * omega0), restitution, 0.0)
             },
-            base_per_drive: cavity / section.omega0_squared.hypot(2.0 * section.delta * omega0),
+            base_per_drive: cavity / omega0_squared.hypot(2.0 * delta * omega0),
             response_per_cavity: response / cavity,
         })
     }
 
     /// The modes, in the order of the sections, beside the section `driven`.
     pub fn modes(&self, driven: usize) -> Option<Vec<ModeFacts>> {
-        let omega = self.sections.get(driven)?.omega0_squared.sqrt();
+        let omega = self.sections.get(driven)?.oscillator.omega0;
         let conditions =
             |keep: &dyn Fn(usize) -> bool| Some(self.with_sections(keep).motions(omega)?.impact_conditions());
         let alone = conditions(&|n| n == driven)?;
         let facts = |(n, section): (usize, &Section)| {
-            let omega0 = section.omega0_squared.sqrt();
+            let Oscillator { delta, omega0, .. } = section.oscillator;
             let ratio = omega0 / omega;
             let distance = |order: &u32| (ratio - f64::from(*order)).abs();
             let nearest = [3, 5, 7]
@@ -458,8 +458,8 @@ impl StructureOrbits {
             };
             Some(ModeFacts {
                 omega0,
-                zeta: section.delta / omega0,
-                mass_ratio: self.particle.mass * section.mobility(),
+                zeta: delta / omega0,
+                mass_ratio: self.particle.mass * section.velocity_per_impulse(section.cavity),
                 ratio,
                 harmonic: (order, distance(&order)),
                 influence,
@@ -498,7 +498,7 @@ impl StructureOrbits {
 
     /// All symmetric motions at the frequency `omega`.
     pub(super) fn motions(&self, omega: f64) -> Option<SymmetricMotions> {
-        let force = Some(self.sections.first()?.drive_force(omega)).filter(|_| self.by_force);
+        let force = Some(self.sections.first()?.driven(omega)[0]).filter(|_| self.by_force);
         let reading = Reading {
             sections: self.response.as_deref(),
             reference_sections: self.reference.as_ref(),
@@ -568,7 +568,7 @@ impl StructureOrbits {
                 // Without a drive there is no harmonic part, even at an undamped resonance.
                 return impulsive.into();
             }
-            let per_force = section.compliance(motion.omega) * orbit.drive;
+            let per_force = section.stiffness(motion.omega).inv() * orbit.drive;
             let [x, v] = section.driven(motion.omega).map(|response| (response * per_force).im);
             [x + impulsive[0], v + impulsive[1]]
         };

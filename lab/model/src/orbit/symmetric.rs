@@ -16,9 +16,9 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use nalgebra::{Complex, Vector2};
+use lovines::Section;
+use nalgebra::{Complex, Matrix2, Vector2};
 
-use super::oscillator::{Section, harmonic};
 use super::{Orbit, OrbitCurve, StructureOrbit, StructureOrbits, StructureRange};
 use crate::Dimensionless;
 use crate::numerics::{bisection, golden_section, quadratic, secant};
@@ -87,6 +87,21 @@ pub(super) struct SymmetricMotion {
     pub after: [f64; 2],
 }
 
+/// (x, v) of a section after one of the unit impulses of alternating sign that the propagator `flow` separates: minus the state after the one
+/// before.
+#[inline(always)]
+pub(super) fn alternating(section: &Section, flow: &Matrix2<f64>) -> Option<Vector2<f64>> {
+    let sum = Matrix2::identity() + flow;
+    let (determinant, [x, dx]) = (sum.determinant(), section.kick);
+    let solution = Vector2::new(sum.m22 * x - sum.m12 * dx, sum.m11 * dx - sum.m21 * x) / determinant;
+    (determinant != 0.0).then_some(solution)
+}
+
+/// The harmonic `a x + b v` of (x, v).
+pub(super) fn harmonic([a, b]: [f64; 2], [x, v]: [Complex<f64>; 2]) -> Complex<f64> {
+    x * a + v * b
+}
+
 impl SymmetricMotions {
     #[inline(always)]
     pub(super) fn new(sections: &[Section], particle: Particle, reading: &Reading<'_>, omega: f64) -> Option<Self> {
@@ -96,9 +111,9 @@ impl SymmetricMotions {
         let mut reference = [Complex::<f64>::ZERO; 2];
         for (n, section) in sections.iter().enumerate() {
             let kick = Vector2::from(section.kick);
-            let p_before = section.alternating(&section.propagator(PI / omega))? - kick;
-            before += section.at_cavity(p_before);
-            mobility += section.mobility();
+            let p_before = alternating(section, &section.propagator(PI / omega))? - kick;
+            before += section.at(section.cavity, p_before);
+            mobility += section.velocity_per_impulse(section.cavity);
 
             let (driven, stiffness) = (section.driven(omega), section.stiffness(omega));
             let to_cavity = harmonic(section.cavity, driven);

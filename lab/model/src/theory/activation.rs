@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::slow_flow::{B_SYMMETRY_BREAKING, SlowFlow, impacts_stable};
 use crate::numerics::{bisection, equally_spaced, golden_section};
-use crate::orbit::oscillator::Section;
+use crate::orbit::oscillator::section;
 
 /// Smallest base amplitudes G, over `b epsilon`, at one detuning (docs/theory.md, eq. 19).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -106,8 +106,8 @@ const LONGEST: f64 = 20_000.0;
 /// is a jump of the base, which the damper passes on as an impulse.
 fn impacts_from_rest(epsilon: f64, lambda: f64, sigma: f64) -> [f64; 2] {
     let (zeta, omega) = (epsilon * lambda / 2.0, 1.0 + epsilon * sigma);
-    let oscillator = Section::oscillator(epsilon * lambda);
-    let steady = oscillator.drive_force(omega) * oscillator.compliance(omega) * epsilon;
+    let oscillator = section(epsilon * lambda);
+    let steady = oscillator.steady(omega)[0] * epsilon;
     if !steady.is_finite() {
         // Undamped resonance: the response grows beyond all bounds.
         return [0.0; 2];
