@@ -294,7 +294,7 @@ impl CellRun {
         let [q1, dq1, q2, dq2] = self.states[n];
         let oscillator = ForcedOscillator::new(&self.scene, self.drive.omega, self.scene.g);
         let [steady, velocity] = oscillator.harmonic(0.0).into();
-        let reach = (q1 - steady).hypot(dq1 - velocity) + oscillator.acceleration() / self.drive.omega.powi(2);
+        let reach = (q1 - steady).hypot(dq1 - velocity) + oscillator.response(0.0).norm();
         (dq2 == 0.0 && reach + q2.abs() < 1.0).then(|| {
             let last = self.impacts.last().map_or(0.0, |impact| impact.time / TAU);
             self.result(Regime::NoImpacts, (last.ceil() as usize).min(n - 1))

@@ -6,6 +6,7 @@
 //! one quadratic equation for B remains. There is no first-order approximation.
 
 mod continuation;
+mod flight;
 mod half_period;
 mod impact_map;
 pub(crate) mod oscillator;

@@ -11,7 +11,7 @@ use lovines::Section;
 use lovines::oscillator::Oscillator;
 use nalgebra::{Complex, DMatrix, Matrix2, RowVector2, Vector2};
 
-use super::impact_map::first_contact;
+use super::flight::Flight;
 use super::symmetric::{Particle, SymmetricMotion, alternating};
 
 /// Largest difference of the flight from half a period, rad: a slow impact is that ill-defined in time.
@@ -19,19 +19,10 @@ const EXACT: f64 = 1e-8;
 
 /// The map of half a period, and its multipliers.
 pub(super) struct HalfPeriod {
-    /// The sections and, last, the particle.
-    parts: Vec<Part>,
+    /// The sections and, last, the particle, with (x, v) of the periodic response to the impulses after the impact.
+    parts: Vec<(Section, Vector2<f64>)>,
     /// Derivative of the state (x, v) of every section and of the particle.
     map: DMatrix<f64>,
-}
-
-/// A section and what the motion has in it.
-struct Part {
-    section: Section,
-    /// The propagator over half a period.
-    flow: Matrix2<f64>,
-    /// (x, v) of the periodic response to the impulses, after the impact.
-    after: Vector2<f64>,
 }
 
 impl HalfPeriod {
@@ -45,16 +36,21 @@ impl HalfPeriod {
             cavity: [-1.0, 0.0],
         };
         let all = sections.iter().copied().chain([of_particle]);
-        let parts: Vec<Part> = all
-            .map(|section| {
-                let flow = section.propagator(duration);
-                let after = alternating(&section, &flow)? * motion.impulse;
-                Some(Part { section, flow, after })
-            })
-            .collect::<Option<_>>()?;
-        let (elapsed, wall) = contact(&parts, particle, motion)?;
-        let is_half_a_period = wall < 0.0 && (elapsed - PI).abs() < EXACT;
-        is_half_a_period.then(|| Self { map: map(&parts, motion), parts })
+        let flows: Vec<_> = all.clone().map(|section| section.propagator(duration)).collect();
+        let after = |(section, flow)| Some((section, alternating(&section, flow)? * motion.impulse));
+        let parts: Vec<_> = all.zip(&flows).map(after).collect::<Option<_>>()?;
+        let ([sections @ .., (_, line)], b) = (&parts[..], particle.half_width) else {
+            return None;
+        };
+        let flight = Flight {
+            sections,
+            harmonic: motion.cavity,
+            omega: motion.omega,
+            particle: [line[0], motion.speed],
+        };
+        let (elapsed, wall) = flight.contact([b, motion.after[1] - motion.speed], b, 1.0)?;
+        let is_half_a_period = wall < 0.0 && ((elapsed - duration) * motion.omega).abs() < EXACT;
+        is_half_a_period.then(|| Self { map: map(&parts, &flows, motion), parts })
     }
 
     /// The multipliers of the half period, by rising modulus.
@@ -66,13 +62,13 @@ impl HalfPeriod {
 
     /// The part of (x, v) of every section after the impact that the impulses make.
     pub(super) fn impulsive(&self) -> impl Iterator<Item = Vector2<f64>> {
-        self.parts.iter().map(|part| part.after)
+        self.parts.iter().map(|part| part.1)
     }
 
     /// Shares of every section and, last, of the particle in the energy of the disturbance with a multiplier. `omega` is the frequency of a
     /// section without a natural one.
     pub(super) fn shares(&self, multiplier: Complex<f64>, omega: f64) -> Option<Vec<f64>> {
-        let scales = self.parts.iter().flat_map(|part| energy_scales(&part.section, omega));
+        let scales = self.parts.iter().flat_map(|part| energy_scales(&part.0, omega));
         let scales: Vec<f64> = scales.collect();
         let shifted = DMatrix::from_fn(scales.len(), scales.len(), |row, column| {
             let entry = Complex::from(self.map[(row, column)] * scales[row] / scales[column]);
@@ -105,51 +101,21 @@ fn energy_scales(section: &Section, omega: f64) -> [f64; 2] {
     [scale * omega0, scale]
 }
 
-/// Time and wall of the first contact; phases of the drive stand for times, and lengths are over b.
-fn contact(parts: &[Part], particle: &Particle, motion: &SymmetricMotion) -> Option<(f64, f64)> {
-    let (b, omega) = (particle.half_width, motion.omega);
-    // The energy of the free motion of a section never grows, nor does that of its derivatives.
-    let bound = |part: &Part| {
-        let Part { section, after, .. } = part;
-        let Oscillator { delta, omega0, .. } = section.oscillator;
-        let rate = section.rate(*after);
-        let ceiling = |state: Vector2<f64>| (2.0 * delta + omega0) * state[1].hypot(omega0 * state[0]);
-        section.cavity[0].abs() * ceiling(*after) + section.cavity[1].abs() * ceiling(rate)
-    };
-    let curvature = motion.cavity.norm() * omega * omega + parts.iter().map(bound).sum::<f64>();
-    let (line, sections) = parts.split_last()?;
-    let flight = |phase: f64| {
-        let t = phase / omega;
-        let harmonic = motion.cavity * Complex::from_polar(1.0, phase);
-        let mut w = Vector2::new(
-            harmonic.im - line.after[0] - motion.speed * t,
-            omega * harmonic.re - motion.speed,
-        );
-        for Part { section, after, .. } in sections {
-            w += section.at(section.cavity, section.propagator(t) * after);
-        }
-        [w[0] / b, w[1] / (b * omega)]
-    };
-    let particle_speed = motion.after[1] - motion.speed;
-    let start = [1.0, particle_speed / (b * omega)];
-    first_contact(start, curvature / (b * omega * omega), 2.0 * PI, flight)
-}
-
 /// The derivative of the state after an impact by the state half a period before, relative to the motion, which has the opposite sign there.
-fn map(parts: &[Part], motion: &SymmetricMotion) -> DMatrix<f64> {
+fn map(parts: &[(Section, Vector2<f64>)], flows: &[Matrix2<f64>], motion: &SymmetricMotion) -> DMatrix<f64> {
     let mut acceleration = -motion.omega * motion.omega * motion.cavity.im;
-    for Part { section, after, .. } in parts {
+    for (section, after) in parts {
         let before = after - Vector2::from(section.kick) * motion.impulse;
         acceleration += section.at(section.cavity, section.rate(before))[1];
     }
     let mu = -motion.impulse / motion.impact_velocity;
     let mut map = DMatrix::zeros(2 * parts.len(), 2 * parts.len());
-    for (column, Part { section, flow, .. }) in parts.iter().enumerate() {
+    for (column, ((section, _), flow)) in parts.iter().zip(flows).enumerate() {
         let [a, b] = section.cavity;
         let by_w = RowVector2::new(a, b) * flow;
         let Oscillator { delta, omega0_squared, .. } = section.oscillator;
         let by_dw = RowVector2::new(-omega0_squared * b, a - 2.0 * delta * b) * flow;
-        for (row, Part { section, .. }) in parts.iter().enumerate() {
+        for (row, (section, _)) in parts.iter().enumerate() {
             let kick = Vector2::from(section.kick);
             // The vector field jumps by that of the kick.
             let early = section.rate(kick) * motion.impulse + kick * (mu * acceleration);

@@ -1,14 +1,18 @@
 //! The impact map: from the state just after an impact to that just after the next, with its derivatives (docs/theory.md, eqs. 24 and 25).
 //!
-//! Between impacts the motion has a closed form. The first contact is found by steps that a bound of `|w''|` proves free of contact. They
-//! become Newton steps near the wall, so no contact is missed and the last is accurate to the last bits. The derivative covers flight
-//! and impact: a disturbed motion reaches the wall a little earlier or later (saltation).
+//! Between impacts the motion has a closed form ([`Flight`]). The derivative covers flight and impact: a disturbed motion reaches the wall a
+//! little earlier or later (saltation).
 
-use nalgebra::{Matrix2, RowSVector, SMatrix, Vector2, Vector4};
+use lovines::Section;
+use nalgebra::{RowSVector, SMatrix, Vector2, Vector4};
 use serde::Serialize;
 
+use super::flight::Flight;
 use super::oscillator::ForcedOscillator;
 use crate::Dimensionless;
+
+/// Longest flight, periods.
+const LONGEST: f64 = 64.0;
 
 /// State just after an impact. The base displacement is `epsilon G sin(phase)` there, and the particle is at `q1 - wall`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -90,27 +94,45 @@ impl ImpactMap {
     /// The state just after the next impact; None if there is none within many periods, if it grazes, or if
     /// impacts accumulate.
     pub fn next(&self, from: &Bounce) -> Option<Bounce> {
-        Some(self.landed(&ParticleFlight::new(&self.oscillator, from))?.0)
+        Some(self.landed(from.phase, self.after(from), from.wall)?.0)
     }
 
     /// The state just after the first impact that follows from (q1, q1', q2, q2') at phase 0 of the base, with the
     /// particle inside its cavity; `None` where [`Self::next`] has none.
     pub fn first(&self, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
-        let flight = ParticleFlight::between(&self.oscillator, 0.0, [q1, dq1, q2, dq2], q1 - q2);
-        Some(self.landed(&flight)?.0)
+        Some(self.landed(0.0, [q1, dq1, q2, dq2], q1 - q2)?.0)
     }
 
-    /// The state after the impact that ends a flight, the duration of the flight, and the velocity of the primary mass just before the impact.
-    fn landed(&self, flight: &ParticleFlight) -> Option<(Bounce, f64, f64)> {
-        let (duration, wall) = flight.contact()?;
-        let [q1, dq1] = flight.primary(duration).into();
-        let dw = dq1 - flight.dq2;
+    /// (q1, q1', q2, q2') after a bounce.
+    fn after(&self, from: &Bounce) -> [f64; 4] {
+        [from.q1, from.dq1, from.q2(), from.dq2]
+    }
+
+    /// The flight from a state at a phase of the base.
+    fn flight(&self, phase: f64, [q1, dq1, q2, dq2]: [f64; 4]) -> Flight<[(Section, Vector2<f64>); 1]> {
+        let ForcedOscillator { free, omega, .. } = self.oscillator;
+        let state = Vector2::new(q1, dq1) - self.oscillator.harmonic(phase);
+        Flight {
+            sections: [(free, state)],
+            harmonic: self.oscillator.response(phase),
+            omega,
+            particle: [q2, dq2],
+        }
+    }
+
+    /// The state after the impact that ends the flight from a state with the relative displacement `w`, the duration of the flight, and the
+    /// velocity of the primary mass just before the impact.
+    fn landed(&self, phase: f64, state: [f64; 4], w: f64) -> Option<(Bounce, f64, f64)> {
+        let (flight, [_, start, _, dq2]) = (self.flight(phase, state), state);
+        let (duration, wall) = flight.contact([w, start - dq2], 1.0, LONGEST)?;
+        let [q1, dq1] = flight.cavity(duration).into();
+        let dw = dq1 - dq2;
         let particle = self.particle();
         let next = Bounce {
-            phase: flight.phase + self.oscillator.omega * duration,
+            phase: phase + self.oscillator.omega * duration,
             q1,
             dq1: dq1 - self.epsilon * particle * dw,
-            dq2: flight.dq2 + particle * dw,
+            dq2: dq2 + particle * dw,
             wall,
         };
         Some((next, duration, dq1))
@@ -123,7 +145,7 @@ impl ImpactMap {
 
     /// The next impact with its derivatives by state, frequency and excitation.
     pub(super) fn step(&self, from: &Bounce) -> Option<Step> {
-        let (next, t, dq1) = self.landed(&ParticleFlight::new(&self.oscillator, from))?;
+        let (next, t, dq1) = self.landed(from.phase, self.after(from), from.wall)?;
         let dw = dq1 - from.dq2;
 
         // (q1, q1') just before the impact, at a fixed time of flight.
@@ -154,112 +176,7 @@ impl ImpactMap {
 
     /// (q1, q1', q2, q2') at the time `t` after a bounce, before the next.
     pub(super) fn state(&self, from: &Bounce, t: f64) -> [f64; 4] {
-        let [q1, dq1] = ParticleFlight::new(&self.oscillator, from).primary(t).into();
+        let [q1, dq1] = self.flight(from.phase, self.after(from)).cavity(t).into();
         [q1, dq1, from.q2() + from.dq2 * t, from.dq2]
     }
-}
-
-/// A contact slower than this is a graze, where the map has no derivative.
-const GRAZING: f64 = 1e-9;
-/// Longest flight, periods.
-const LONGEST: f64 = 64.0;
-/// Most steps of a flight: far more than any flight needs, except in chatter.
-const STEPS: usize = 4000;
-
-struct ParticleFlight<'a> {
-    oscillator: &'a ForcedOscillator,
-    /// Where it begins: phase of the base, particle, and relative displacement and velocity.
-    phase: f64,
-    q2: f64,
-    dq2: f64,
-    w: f64,
-    dw: f64,
-    /// State of the free part of the oscillator's motion at the start.
-    free: Vector2<f64>,
-    /// Bound of `|w''|`.
-    curvature: f64,
-}
-
-impl<'a> ParticleFlight<'a> {
-    /// The flight after a bounce.
-    fn new(oscillator: &'a ForcedOscillator, from: &Bounce) -> Self {
-        let state = [from.q1, from.dq1, from.q2(), from.dq2];
-        Self::between(oscillator, from.phase, state, from.wall)
-    }
-
-    /// The flight from a state with the relative displacement `w`.
-    fn between(oscillator: &'a ForcedOscillator, phase: f64, [q1, dq1, q2, dq2]: [f64; 4], w: f64) -> Self {
-        let free = Vector2::new(q1, dq1) - oscillator.harmonic(phase);
-        // Of the free motion q^2 + q'^2 never grows.
-        Self {
-            oscillator,
-            phase,
-            q2,
-            dq2,
-            w,
-            dw: dq1 - dq2,
-            free,
-            curvature: oscillator.acceleration() + free.norm() * (1.0 + 2.0 * oscillator.free.oscillator.delta),
-        }
-    }
-
-    /// (q1, q1') at the time `t`.
-    fn primary(&self, t: f64) -> Vector2<f64> {
-        let propagator: Matrix2<f64> = self.oscillator.free.propagator(t);
-        propagator * self.free + self.oscillator.harmonic(self.phase + self.oscillator.omega * t)
-    }
-
-    /// Time and wall of the first contact.
-    fn contact(&self) -> Option<(f64, f64)> {
-        let horizon = LONGEST * std::f64::consts::TAU / self.oscillator.omega;
-        first_contact([self.w, self.dw], self.curvature, horizon, |t| {
-            let primary = self.primary(t);
-            [primary[0] - self.q2 - self.dq2 * t, primary[1] - self.dq2]
-        })
-    }
-}
-
-/// Time and wall of the first contact of a flight within `horizon`: from (w, w'), with the bound `curvature` of `|w''|`, and (w, w') after a
-/// time. Lengths are over b, and times over a time of the size of the period.
-pub(super) fn first_contact(
-    [mut w, mut dw]: [f64; 2],
-    curvature: f64,
-    horizon: f64,
-    flight: impl Fn(f64) -> [f64; 2],
-) -> Option<(f64, f64)> {
-    let k = curvature;
-    if !k.is_finite() || k <= 0.0 {
-        return None;
-    }
-    // Time before which the wall at the distance `gap`, approached at `speed`, cannot be reached.
-    let free_for = |gap: f64, speed: f64| {
-        let root = (speed * speed + 2.0 * k * gap).sqrt();
-        if speed > 0.0 {
-            2.0 * gap / (speed + root)
-        } else {
-            (root - speed) / k
-        }
-    };
-    if w.abs() >= 1.0 && w * dw >= 0.0 {
-        return None;
-    }
-    let mut t = 0.0;
-    for _ in 0..STEPS {
-        let step = free_for(1.0 - w, dw).min(free_for(1.0 + w, -dw));
-        t += step;
-        if t > horizon {
-            return None;
-        }
-        [w, dw] = flight(t);
-        let side = dw.signum();
-        let gap = 1.0 - side * w;
-        if gap <= 1e-15 || step <= 1e-16 * (1.0 + t) {
-            let fast = dw.abs() > GRAZING;
-            // A wall is reached in its own direction; the step over the remaining gap corrects the rounding.
-            return fast.then(|| (t + gap / dw.abs(), side));
-        }
-        // Rounding may place w just beyond the wall behind.
-        w = w.clamp(-1.0, 1.0);
-    }
-    None
 }

@@ -44,20 +44,20 @@ impl ForcedOscillator {
         }
     }
 
-    /// Bound of the acceleration of the steady response.
-    pub(crate) fn acceleration(&self) -> f64 {
-        self.driven(self.unit[0] * self.g).norm() * self.omega * self.omega
-    }
-
     /// Force of the base on the primary mass.
     pub(super) fn force(&self, phase: f64) -> f64 {
         let amplitude = self.free.driven(self.omega)[0] * (self.epsilon * self.g);
         (amplitude * Complex::from_polar(1.0, phase)).im
     }
 
+    /// Harmonic of q1 from a phase of the base on.
+    pub(crate) fn response(&self, phase: f64) -> Complex<f64> {
+        self.driven(self.unit[0] * self.g) * Complex::from_polar(1.0, phase)
+    }
+
     /// Harmonic response (q, q') at a phase of the base.
     pub(crate) fn harmonic(&self, phase: f64) -> Vector2<f64> {
-        let z = self.driven(self.unit[0] * self.g) * Complex::from_polar(1.0, phase);
+        let z = self.response(phase);
         Vector2::new(z.im, self.omega * z.re)
     }
 
