@@ -98,14 +98,14 @@ fn doubt_in_words(doubt: Doubt, of: usize, scene: &Scene) -> String {
         Doubt::NotSettled => {
             let levels = advice::stable_orbits_of(scene, &scene.dimensionless());
             let (low, high) = range((f64::INFINITY, 0.0), levels.iter().map(|orbit| orbit.c));
-            let stable = match low <= high {
-                true => format!("in the ideal cavity it is stable for C from {low:.3} to {high:.3}"),
-                false => "in the ideal cavity it is nowhere stable".into(),
-            };
-            format!(
-                "none of {of} points is a settled point of a symmetric 1:1 motion: {stable}. Set backbone.C_from and backbone.C_to to \
-                 levels within this range"
-            )
+            let settled = format!("none of {of} points is a settled point of a symmetric 1:1 motion");
+            match low <= high {
+                true => format!(
+                    "{settled}: in the ideal cavity it is stable for C from {low:.3} to {high:.3}. Set backbone.C_from and backbone.C_to to \
+                     levels within this range"
+                ),
+                false => format!("{settled}: in the ideal cavity it is nowhere stable"),
+            }
         }
     }
 }

@@ -126,14 +126,20 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
         false => orbits.text(),
     };
     text += "\nStable stretches of the backbone, with the driven mode alone and with all modes, and what ends them\n";
-    let rows = [("driven", &survey.facts.alone), ("all", &survey.facts.all)].map(|(modes, branches)| {
+    let [alone, all] = [("driven", &survey.facts.alone), ("all", &survey.facts.all)].map(|(modes, branches)| {
         let stretches = branches.iter().flat_map(StructureBranch::stable);
-        stretches.map(move |(run, ends)| stretch(modes, run, ends, b))
+        stretches
+            .map(|(run, ends)| stretch(modes, run, ends, b))
+            .collect::<Vec<_>>()
     });
+    let is_lost = all.is_empty() && !alone.is_empty();
     let stretches = Table::new(&format!(
         "modes | C | frequency, Hz | {command} | lower end | upper end"
     ));
-    text += &stretches.rows(rows.into_iter().flatten()).text();
+    text += &stretches.rows(alone.into_iter().chain(all)).text();
+    if is_lost {
+        text += "warning: with all modes no orbit of the backbone is stable\n";
+    }
     let rows = survey.behind_shaker.iter().map(|one| {
         let percent = |of: f64| format!("{:+.3}", 100.0 * of);
         let [omega, drive] = one.at;

@@ -1,5 +1,6 @@
 //! Guards the program as its users meet it: output, exit codes and messages.
 
+use std::fs;
 use std::time::{Duration, Instant};
 
 use crate::{fails, json, text, vines};
@@ -294,6 +295,28 @@ fn theory_and_response_are_drawn_for_a_file() {
         );
     }
     fails("orbit --figure figure.svg", 2, "--response");
+}
+
+#[test]
+fn a_structure_whose_other_modes_leave_no_orbit_stable_is_told_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().display();
+    let modes = "
+        { frequency = 93.7622, damping = 0.00107488, shape = { cavity = 1.20929 } },
+        { frequency = 3703.54, damping = 0.00399092, shape = { cavity = 1.70028 } },
+    ";
+    let scene = format!(
+        "[plant]\nm = 0.0121282\nb = 0.00906816\nr = 0.5215\n[start]\ndq2 = 5\n[excitation]\nG = 0.86\n[backbone]\nC_from = 0.5\nC_to = 0.46\npoints = 3\n\
+         [structure]\nexcitation = \"force\"\ncavity = \"cavity\"\ndrive = \"cavity\"\nmodes = [{modes}]\n"
+    );
+    fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let survey = text(&vines(&format!("structure --scene {path}/scene.toml")));
+    assert!(
+        survey.contains("warning: with all modes no orbit of the backbone is stable"),
+        "{survey}"
+    );
+    let tracked = text(&vines(&format!("backbone --scene {path}/scene.toml --out {path}")));
+    assert!(tracked.contains("it is nowhere stable\n"), "{tracked}");
 }
 
 #[test]

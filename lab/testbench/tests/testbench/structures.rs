@@ -335,6 +335,10 @@ fn matrices_that_are_not_symmetric_or_not_positive_are_refused_with_the_eigenval
     says(of(&folder, &scene, &[]), "2 columns and 1 rows | square");
     fs::write(folder.path().join("k.csv"), "2, -1\n-1, 4\n").unwrap();
     says(of(&folder, &scene, &[]), "no line of names");
+    fs::write(folder.path().join("k.csv"), "").unwrap();
+    says(of(&folder, &scene, &[]), "no line of names");
+    fs::write(folder.path().join("k.csv"), "tip, tip\n2, -1\n-1, 4\n").unwrap();
+    says(of(&folder, &scene, &[]), "two columns with the name tip");
     fs::write(folder.path().join("k.csv"), "tip, root\n2, x\n-1, 4\n").unwrap();
     says(of(&folder, &scene, &[]), "`x` in row 1");
     fs::write(folder.path().join("k.csv"), "root, tip\n4, -1\n-1, 2\n").unwrap();

@@ -18,10 +18,13 @@ fn table(folder: &Path, key: &str, file: &Path) -> Result<(Vec<String>, Vec<Vec<
         .map_err(|error| format!("{title} cannot be read: {error}; paths are relative to the scene file"))?;
     let unreadable = |error: csv::Error| format!("{title} cannot be read: {error}");
     let header: Vec<String> = reader.headers().map_err(unreadable)?.iter().map(Into::into).collect();
-    if header.iter().any(|name| name.is_empty() || name.parse::<f64>().is_ok()) {
+    if header.is_empty() || header.iter().any(|name| name.is_empty() || name.parse::<f64>().is_ok()) {
         return Err(format!(
             "{title} has no line of names at its top: give each column the name of its point"
         ));
+    }
+    if let Some((_, name)) = (1..).zip(&header).find(|(n, name)| header[*n..].contains(name)) {
+        return Err(format!("{title} has two columns with the name {name}"));
     }
     let mut rows = Vec::new();
     for (n, record) in reader.records().enumerate() {
