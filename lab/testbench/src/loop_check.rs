@@ -7,7 +7,7 @@ mod shaker;
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
-use nalgebra::{DVector, Matrix3, RowVector3, Vector3};
+use nalgebra::{DVector, Matrix3, RowVector3, Vector2, Vector3};
 use num_complex::Complex64;
 use phase_lock::Gains;
 use serde::Serialize;
@@ -119,21 +119,24 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
         (expected[1], 0.0)
     };
     let period = samples(1);
-    let phasors = |of: usize| -> Vec<Complex64> {
-        let periods = readings[begins..].chunks_exact(period);
-        periods.map(|readings| fitted(readings, of, &target, omega).0).collect()
+    let phasors = |readings: &[[f64; 3]], of: usize| -> (Vec<Complex64>, Vec<f64>) {
+        let periods = readings.chunks_exact(period);
+        periods.map(|readings| fitted(readings, of, &target, omega)).unzip()
     };
-    let linear = Linear::of(&phasors(1), base, omega, period, plan);
+    let readings = &readings[begins..];
+    let (response, rests) = phasors(readings, 1);
+    let (beside, _) = phasors(&beside_driven_mode(readings, plan, omega, amplitude), 1);
+    let alone: Vec<Complex64> = response.iter().zip(&beside).map(|(z, other)| z - other).collect();
+    let linear = Linear::of(&alone, mean_square(rests).sqrt(), base, omega, period, plan);
     let mut quantities = Vec::new();
     if has_base {
-        quantities.extend(of_base(base, amplitude, &phasors(2), plan));
+        quantities.extend(of_base(base, amplitude, &phasors(readings, 2).0, plan));
     }
     if let Some(linear) = &linear {
         // Amplitude and phase of the response for the natural frequency and the damping that the rig has.
         let gain = Complex64::from_polar(linear.response_gain, linear.phase.to_radians());
-        let (found, knowledge) = (linear.response(), &plan.knowledge);
-        let alone = found.oscillator_gain(omega, knowledge.numbers.definition.reference);
-        let ratio = gain / (alone + knowledge.other_modes * found.rate(omega));
+        let reference = plan.knowledge.numbers.definition.reference;
+        let ratio = gain / linear.response().oscillator_gain(omega, reference);
         channels[0] = channels[0].at(ratio * base.0 / expected[1], omega * step);
         quantities.extend(of_response(linear, ratio, plan));
     }
@@ -148,6 +151,37 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
         base: has_base.then_some(channels[1]),
         quantities,
     })
+}
+
+/// What the drawing's structure adds to the response of its driven mode, from rest, at the phases of these readings: the beat of two modes may last
+/// longer than the check.
+fn beside_driven_mode(readings: &[[f64; 3]], plan: &Plan, omega: f64, amplitude: f64) -> Vec<[f64; 3]> {
+    let (target, step, delay) = (plan.knowledge.target, plan.knowledge.sample_time, plan.lock.delay);
+    let (order, begin) = (target.measurands[0].order(), readings[0][0]);
+    let mut beside: Vec<_> = readings.iter().map(|[phase, ..]| [*phase, 0.0, 0.0]).collect();
+    for (section, pair) in &plan.beside {
+        let [x, v] = section.steady(omega).map(|steady| steady * amplitude);
+        let started = Vector2::from([x, v].map(|steady| (steady * Complex64::cis(begin)).im));
+        let harmonic = (x * pair[0] + v * pair[1]) * Complex64::new(0.0, omega).powi(order);
+        if !harmonic.is_finite() {
+            continue;
+        }
+        for (n, reading) in beside.iter_mut().enumerate() {
+            let time = n as f64 * step - delay;
+            if time < 0.0 {
+                continue;
+            }
+            let mut free = section.propagator(time) * started;
+            if order == 2 {
+                free = section.rate(free);
+            }
+            let free = section.at(*pair, free)[usize::from(order > 0)];
+            let driven = (harmonic * Complex64::cis(begin + omega * time)).im;
+            reading[1] += (driven - free) * target.scale(0);
+        }
+    }
+    without_drift(&mut beside);
+    beside
 }
 
 /// Removes the drift of the response: a particle that flies slowly moves the centre of mass, which looks like a response in every period.
@@ -500,7 +534,8 @@ fn verdict(channels: &[CheckedChannel; 2], expected: &[f64; 2], has_base: bool, 
 // `s = -i g E/r`, less what the growth within a period adds at twice the frequency, `conj(a q^n) (1 - p)/(1 - p exp(-4 pi i/N))` with
 // `p = exp(-conj(r) T/N)` and N samples per period; it turns against the drive.
 // Least squares over all periods (Gauss and Newton) give `s`, `a` and `q`; `a` is free because of delays and of what was left of an
-// earlier motion. The covariance of the fit gives the uncertainties. The natural frequency is `omega_0 = |omega_d + i delta|`.
+// earlier motion. The covariance of the fit gives the uncertainties. The modes of a drawing are not quite those of the rig: beside them, what the
+// residual has beyond the noise within the periods does not average out. The natural frequency is `omega_0 = |omega_d + i delta|`.
 
 /// The linear response, and the tuning of the loop for it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -532,10 +567,11 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// The response whose phasors, m, are given period by period, each of `samples` samples; `base` is the phasor of the base, m, and `u_base`
-    /// its relative standard uncertainty. `None` without a growth from rest that is more than noise.
+    /// The response whose phasors, m, are given period by period, each of `samples` samples; `noise` is the RMS of the readings about them, m,
+    /// `base` the phasor of the base, m, and `u_base` its relative standard uncertainty. `None` without a growth from rest that is more than noise.
     fn of(
         phasors: &[Complex64],
+        noise: f64,
         (base, u_base): (Complex64, f64),
         omega: f64,
         samples: usize,
@@ -564,7 +600,13 @@ impl Linear {
             let inverse = normal.try_inverse()?;
             let change = inverse * right;
             // Two components of each phasor, and of each of three unknowns.
-            let variance = rest / (2.0 * phasors.len() as f64 - 6.0);
+            let degrees = 2.0 * phasors.len() as f64 - 6.0;
+            let explained = 2.0 * noise * noise / samples as f64 * (1.0 + SIGNIFICANT * (2.0 / degrees).sqrt());
+            let misfit = match plan.beside.is_empty() {
+                true => 0.0,
+                false => (rest / degrees - explained).max(0.0),
+            };
+            let variance = rest / degrees + misfit * phasors.len() as f64;
             u_q = (variance * inverse[(2, 2)].re).sqrt();
             // Relative change of the gain, which is proportional to `s r`.
             let slope = RowVector3::new(1.0 / steady, Complex64::ZERO, 1.0 / (q * q.ln()));

@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use lovines::Section;
 use nalgebra::{Matrix2, RowVector2, Vector2};
 use num_complex::Complex64;
 use phase_lock::Config;
@@ -235,8 +236,6 @@ pub struct Knowledge {
     pub target: Target,
     /// The shaker, if one stands between the command and the reference, which then drives the structure as it is measured.
     pub shaker: Option<ShakerPath>,
-    /// Response of the other modes of a structure over the base, at the natural frequency: nearly constant there.
-    pub other_modes: Complex64,
     /// Distance of the nearest other pole of a structure from the pole of its driven mode after the release, rad/s; infinite without one.
     pub nearest_pole: f64,
 }
@@ -260,7 +259,6 @@ impl Knowledge {
             sample_time,
             target,
             shaker: None,
-            other_modes: Complex64::ZERO,
             nearest_pole: f64::INFINITY,
         }
     }
@@ -320,6 +318,9 @@ impl Knowledge {
 pub struct Plan {
     /// What is known of the rig.
     pub knowledge: Knowledge,
+    /// What a structure adds to the response of its driven mode: all sections, and this mode with the opposite sign, each with the weights of its state
+    /// in the response per unit of the base. Empty for one oscillator, and behind a shaker.
+    pub beside: Vec<(Section, [f64; 2])>,
     /// Requested amplitude of the base, m.
     pub amplitude: f64,
     /// Configuration of the controller for the lock; its limits guard the rig whatever controls it.
@@ -353,11 +354,6 @@ impl Scene {
         knowledge.shaker = self.structure().and_then(|structure| structure.shaker_path());
         knowledge.target.through_shaker = knowledge.shaker.is_some();
         knowledge.nearest_pole = self.structure().map_or(f64::INFINITY, Structure::nearest_pole);
-        if let Some(structure) = self.structure().filter(|one| one.shaker.is_none()) {
-            let (linear, omega0) = (knowledge.linear, knowledge.linear.omega0);
-            let alone = linear.oscillator_gain(omega0, knowledge.numbers.definition.reference) / linear.rate(omega0);
-            knowledge.other_modes = structure.response_per_base(omega0) - alone;
-        }
         knowledge
     }
 
@@ -371,8 +367,10 @@ impl Scene {
         // The decay lasts as long as the linear rig takes to fall to the share that is recorded.
         let relaxed = -DECAYED.ln() * knowledge.linear.relaxation_periods();
         let decay = self.record.decay_periods.unwrap_or(relaxed.min(LONGEST_DECAY));
+        let structure = self.structure().filter(|one| one.shaker.is_none());
         Plan {
             knowledge,
+            beside: structure.map_or(Vec::new(), Structure::beside_driven_mode),
             amplitude: self.amplitude,
             lock: self.lock_config(&knowledge),
             tracking: self.tracking_config(&knowledge),

@@ -7,9 +7,9 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 use lovines::host::{Equations, Row, natural_modes};
-use lovines::{Host, Mode};
+use lovines::oscillator::Oscillator;
+use lovines::{Host, Mode, Section};
 use nalgebra::{DMatrix, DVector};
-use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use super::shaker::SceneShaker;
@@ -237,10 +237,25 @@ impl Structure {
         (self.at_cavity(mode) * mode.drive).abs() * per_stiffness
     }
 
-    /// Response of all modes without impacts over the drive, as those of the driven mode's oscillator and its base, at the frequency `omega`, rad/s.
-    pub(crate) fn response_per_base(&self, omega: f64) -> Complex64 {
-        let per_drive = self.host.frequency_response(&self.response(), omega);
-        per_drive / (self.reading_per_response().abs() * self.base_per_drive())
+    /// All sections, and the driven mode with the opposite sign, each with the weights of its state in the response: per displacement of the base that
+    /// moves the driven mode's oscillator, and per displacement of the latter.
+    pub(crate) fn beside_driven_mode(&self) -> Vec<(Section, [f64; 2])> {
+        let mode = self.mode();
+        let (square, damping) = (mode.omega * mode.omega, 2.0 * mode.zeta * mode.omega);
+        let drive = match self.excitation {
+            Excitation::Base => [square, damping],
+            Excitation::Force => [square * Reference::Force.per_base(2.0 * mode.zeta), 0.0],
+        };
+        let alone = Section {
+            oscillator: Oscillator::new(1.0, square, damping),
+            drive,
+            kick: [0.0; 2],
+            cavity: [0.0; 2],
+        };
+        let unit = self.reading_per_response().abs() * self.base_per_drive();
+        let rows = self.response().into_iter().map(|pair| pair.map(|weight| weight / unit));
+        let sections = self.host.sections().iter().copied().zip(rows);
+        sections.chain([(alone, [-1.0, 0.0])]).collect()
     }
 
     /// Displacement at the sensor per displacement at the cavity in the driven mode. Its sign is chosen so that the response in resonance lags

@@ -10,7 +10,7 @@ use vines_model::orbit::{Orbit, StructureOrbit};
 use vines_testbench::comparison::ExactCurve;
 use vines_testbench::fit::{MeasuredPoint, contradiction};
 use vines_testbench::identification::IdentificationError;
-use vines_testbench::loop_check::{Verdict, check};
+use vines_testbench::loop_check::{CheckedQuantity, Verdict, check};
 use vines_testbench::rig::Simulated;
 use vines_testbench::scene::{Excitation, Scene, SceneError, Structure};
 use vines_testbench::survey::{Survey, phase_resonant, structure_backbone, without_other_modes};
@@ -114,6 +114,34 @@ fn the_check_of_a_damped_beam_takes_no_other_mode_for_a_late_response() {
     let scene = beam(&damped).unwrap();
     let found = check(&mut *Simulated::of(&scene).unwrap(), &scene.plan()).unwrap();
     assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+}
+
+#[test]
+fn the_check_of_two_close_modes_takes_no_beat_for_a_delay_whether_the_drawing_is_exact_or_not() {
+    let close = [
+        (
+            "frequency = 8.8156, damping = 0.006",
+            "frequency = 8.8156, damping = 0.00015",
+        ),
+        (
+            "frequency = 55.274, damping = 0.006",
+            "frequency = 9.2488, damping = 0.00126",
+        ),
+        ("root = 0.3, tip = -0.51252", "root = 0.06, tip = 0.18"),
+    ];
+    let scene = beam(&close).unwrap();
+    let on = |rig: &Scene| check(&mut *Simulated::of(rig).unwrap(), &scene.plan()).unwrap();
+    let found = on(&scene);
+    assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+    // The beat lasts longer than the check: it is known from the drawing.
+    assert_eq!(found.quantities.len(), 6);
+    let off = |one: &CheckedQuantity| (one.measured - one.expected).abs();
+    assert!(found.quantities.iter().all(|one| off(one) < 2e-4), "{found:?}");
+    let found = on(&beam(&[&close[..], &[("9.2488", "9.26")]].concat()).unwrap());
+    assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+    // Where the rig has another beat, the uncertainties cover what it does.
+    let covered = |one: &CheckedQuantity| off(one) <= 1e-6 + 4.0 * one.uncertainty;
+    assert!(found.quantities.iter().all(covered), "{found:?}");
 }
 
 #[test]
