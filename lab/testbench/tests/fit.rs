@@ -289,13 +289,13 @@ fn points_of_another_rig_contradict_the_scene_and_those_of_its_own_do_not() {
 
 /// A recording of a backbone at 60 dB that is tracked on [`RIG`], and cut in the middle of its first and its last level.
 fn recording() -> Recording {
-    recorded("")
+    recorded(" chain.snr=60")
 }
 
 /// That recording by sensors of q1 and the base that measure these quantities.
 fn recorded_as([response, base]: [Measurand; 2]) -> Recording {
     recorded(&format!(
-        " resonance.sensor=q1 resonance.sensor_quantity={} resonance.reference_quantity={}",
+        " chain.snr=60 resonance.sensor=q1 resonance.sensor_quantity={} resonance.reference_quantity={}",
         response.name(),
         base.name()
     ))
@@ -303,7 +303,7 @@ fn recorded_as([response, base]: [Measurand; 2]) -> Recording {
 
 fn recorded(settings: &str) -> Recording {
     let scene = scene(&format!(
-        "backbone.C_from=0.65 backbone.C_to=0.25 backbone.points=10 chain.snr=60{settings}"
+        "backbone.C_from=0.65 backbone.C_to=0.25 backbone.points=10{settings}"
     ));
     let rig = Simulated::new(RIG, scene.start).unwrap().with_sensors(scene.resonance);
     let mut rig = Recorder { rig: Chain::around(Box::new(rig), &scene), read: Vec::new() };
@@ -394,6 +394,25 @@ fn the_plant_follows_a_record_and_determines_the_parameters_better_than_its_poin
             followed.left_out
         );
     }
+}
+
+#[test]
+fn a_record_without_noise_is_followed_to_its_end() {
+    let (scene, record) = (wrong_scene(), recorded(""));
+    let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
+    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+    let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
+    assert!(
+        worst(&followed.fit) < 3.0 && !followed.fit.is_rejected(),
+        "{followed:?}"
+    );
+    let seconds = record.response.len() as f64 * record.sample_time;
+    let followed_for = followed.periods as f64 * std::f64::consts::TAU / RIG.natural_frequency();
+    let r = followed.fit.estimate(Quantity::R).unwrap();
+    assert!(
+        followed_for > 0.8 * seconds && r.uncertainty < 1e-4,
+        "{followed_for} s of {seconds} s, r = {r:?}"
+    );
 }
 
 /// A recording of a lock and its decay, on [`RIG`] with this cavity.

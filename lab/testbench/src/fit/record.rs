@@ -130,15 +130,20 @@ struct Step {
     impacts: u64,
     /// Covariance of the first harmonic of the response, m², by what the prediction leaves beside it.
     noise: Matrix2<f64>,
+    /// Square of the innovation over its standard deviations.
+    innovation: f64,
     /// Second harmonic of what the prediction leaves, over the standard deviation of the first.
     second: Complex64,
     /// Derivatives of the state at the end over the state at the begin.
     transition: Matrix4<f64>,
 }
 
-/// Chi-square (two degrees of freedom) of the second harmonic of a piece: impacts at uneven intervals have one, which lasts for many periods.
-fn unevenness(piece: &[Step]) -> f64 {
-    piece.iter().map(|step| step.second).sum::<Complex64>().norm_sqr() / piece.len() as f64
+/// Chi-square (two degrees of freedom) of the second harmonic of a piece: impacts at uneven intervals have one, which lasts for many periods. The
+/// innovations of wrong parameters have all harmonics: with `beside` they are the measure where they exceed their standard deviations.
+fn unevenness(piece: &[Step], beside: bool) -> f64 {
+    let innovations = 0.5 * mean(piece.iter().map(|step| step.innovation));
+    let measure = if beside { innovations.max(1.0) } else { 1.0 };
+    piece.iter().map(|step| step.second).sum::<Complex64>().norm_sqr() / (piece.len() as f64 * measure)
 }
 
 /// The periods of a stretch, and the state at the first one, for plants of other parameters as well: it has its own uncertainty.
@@ -169,6 +174,8 @@ struct Followed<'a> {
     held: Option<(Unknowns, f64)>,
     /// Impacts in a period: two, or none of a structure that no particle touches.
     impacts: u64,
+    /// Whether a second harmonic is measured beside the innovations.
+    beside: bool,
     /// Fewest samples to be followed: half of those of parts that show 1:1 by themselves.
     fewest: usize,
 }
@@ -243,10 +250,13 @@ fn displacements(values: &[f64], of: Measurand, period: usize, natural: f64) -> 
     values
 }
 
-/// The base in a period of its samples, which begins at sample `from`.
-fn period_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
-    let values = &drive[from..drive.len().min(from + period)];
-    let around = &drive[from.saturating_sub(period)..drive.len().min(from + 2 * period)];
+/// The base in a quarter of a period of its samples, from sample `from` on, by the period around it.
+fn quarter_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
+    let quarter = from..drive.len().min(from + period.div_ceil(4));
+    let begin = (from + period / 8).saturating_sub(period / 2);
+    let begin = begin.min(drive.len().saturating_sub(period));
+    let values = &drive[begin..drive.len().min(begin + period)];
+    let around = &drive[begin.saturating_sub(period)..drive.len().min(begin + 2 * period)];
     let harmonics: Vec<Complex64> = around.chunks_exact(period).map(harmonic).collect();
     let turned: Complex64 = harmonics.windows(2).map(|pair| pair[1] * pair[0].conj()).sum();
     let step = (TAU + turned.arg()) / period as f64;
@@ -257,22 +267,24 @@ fn period_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
     let noise = noise(values);
     let is_moving = |fit: &HarmonicFit| values.len() == period && fit.harmonic(1).norm() > 0.0;
     let Some(fit) = basis.fit(&vector).filter(is_moving) else {
-        return vec![Base { scale, noise, ..Base::default() }; values.len()];
+        return vec![Base { scale, noise, ..Base::default() }; quarter.len()];
     };
     let residual = basis.residual(&vector, &fit);
     let near = variance_near(residual.as_slice()) * values.len() as f64 / 2.0;
-    let rest = residual.norm_squared() / (values.len() - basis.terms()) as f64;
+    // The part of a sine that a polygon lacks, `scale - 1`, is known to the first order only.
+    let polygon = 0.5 * ((scale - 1.0) * fit.harmonic(1).norm()).powi(2);
+    let rest = residual.norm_squared() / (values.len() - basis.terms()) as f64 + polygon;
     // The amplitude E0 + E1 n + Re(E2 exp(2i phase)) has a third harmonic.
     let [first, growth, third] = [fit.harmonic(1), fit.drift(1), fit.harmonic(3)];
     let turn = first.conj() / first.norm();
     let growth = (growth * turn).re * 2.0 / (values.len() - 1) as f64;
     let swing = 2.0 * third * turn.powi(3);
-    let jump = |phase: f64| {
-        let angle = phase + first.arg();
+    let jump = |n: usize| {
+        let angle = phases[n - begin] + first.arg();
         let rate = growth - 2.0 * step * (swing * Complex64::from_polar(1.0, 2.0 * angle + step)).im;
         Base { scale, jump: rate * angle.sin(), noise, rest, near }
     };
-    phases.into_iter().map(jump).collect()
+    quarter.map(jump).collect()
 }
 
 impl<'a> Measured<'a> {
@@ -288,8 +300,8 @@ impl<'a> Measured<'a> {
         let of_base = recording.measurands[1];
         let drive = displacements(&recording.drive, of_base, period, omega0 * recording.sample_time);
         let bases = |drive: &[f64]| -> Vec<Base> {
-            let starts = (0..drive.len()).step_by(period);
-            starts.flat_map(|from| period_of_base(drive, from, period)).collect()
+            let starts = (0..drive.len()).step_by(period.div_ceil(4));
+            starts.flat_map(|from| quarter_of_base(drive, from, period)).collect()
         };
         let mut base = bases(&drive);
         if of_base != Measurand::Displacement {
@@ -519,12 +531,14 @@ impl Followed<'_> {
             _ => Matrix2::from_diagonal_element(variance_near(&errors)),
         };
         one.moved(&(gain * innovation))?;
+        let whitening = total.cholesky()?.l().try_inverse()?;
         Some(Step {
             begin,
             end,
             turn,
             gain,
-            whitening: total.cholesky()?.l().try_inverse()?,
+            whitening,
+            innovation: (whitening * innovation).norm_squared(),
             impacts: one.plant.totals().impacts - from.plant.totals().impacts,
             noise: left,
             second: harmonic_of(&errors, 2.0) * turn * turn / (0.5 * (total - noise + left).trace()).sqrt(),
@@ -604,7 +618,7 @@ impl Followed<'_> {
                 let moved = piece
                     .iter()
                     .fold(Vector4::ith(3, 1.0), |moved, step| step.transition * moved);
-                self.impacts > 0 && (moved.norm() >= 1.0 || unevenness(piece) > limit)
+                self.impacts > 0 && (moved.norm() >= 1.0 || unevenness(piece, self.beside) > limit)
                     || piece.iter().any(|step| step.impacts != self.impacts)
             };
             let flags: Vec<Vec<bool>> = self
@@ -961,11 +975,14 @@ pub fn follow(
         least_noise: STRONG,
         held: None,
         impacts: 2,
+        beside: false,
         fewest: (0.5 * shown.sum::<f64>()) as usize,
     };
     let all = followed.stretches.clone();
-    let mut searched = starts.into_iter().flatten().map(|x| {
-        let mut followed = followed.clone();
+    // Without noise, a second harmonic shows wrong parameters first.
+    let tried = [false, true].map(|beside| starts.into_iter().flatten().map(move |x| (x, beside)));
+    let mut searched = tried.into_iter().flatten().map(|(x, beside)| {
+        let mut followed = Followed { beside, ..followed.clone() };
         followed.search(x).map(|found| (followed, found))
     });
     let (mut followed, (mut minimum, mut out)) = searched.find_map(|found| found)?;
