@@ -203,7 +203,7 @@ pub enum RigError {
     #[error("the rig: {0}")]
     Structure(#[from] Refused),
     #[error(
-        "the shaker reached its limit: the {name} is {value:.4} {unit}, and shaker.{key} allows {limit} {unit}; its amplifier has switched off"
+        "the shaker reached its limit: the {name} is {value:.3e} {unit}, and shaker.{key} allows {limit} {unit}; its amplifier has switched off"
     )]
     ShakerLimit {
         name: &'static str,
@@ -213,7 +213,7 @@ pub enum RigError {
         unit: &'static str,
     },
     #[error(
-        "the shaker does not follow: {asked:.4} {unit} are asked for, and the measured fundamental is off by {error:.4} {unit} for {periods:.1} periods; {cause}"
+        "the shaker does not follow: {asked:.3e} {unit} are asked for, and the measured fundamental is off by {error:.3e} {unit} for {periods:.1} periods; {cause}"
     )]
     ReferenceOff {
         asked: f64,

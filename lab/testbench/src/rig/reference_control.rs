@@ -5,7 +5,7 @@
 //! the inverse, `u = (F + (r - d) z)/K`, with the *measured* response z: an observer predicts z and I from the command, `z' = K u + I - (s + r) z` and
 //! `I' = 0`, and corrects both by the reading. What is left of the error of the measured reference, by errors of K and r, is integrated.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{LN_2, PI, TAU};
 
 use num_complex::Complex64;
 
@@ -17,24 +17,25 @@ use crate::plan::{Knowledge, ShakerPath, Target};
 const OBSERVER: f64 = 0.6;
 /// Bandwidth of the detector of the error.
 const DETECTOR: f64 = 0.5 * OBSERVER;
-/// Rate of a second integrator over the bandwidth of the first: both roots of the loop are then equal, at half of this bandwidth.
+/// Rate of a second integrator over the bandwidth of the first: both roots of the loop are then equal, at half of this bandwidth. The
+/// harmonics above [`FAST`] change at this share of a detector's bandwidth.
 const SECOND: f64 = 0.25;
 /// Bandwidth of the control.
 pub(crate) const BANDWIDTH: f64 = SECOND * DETECTOR;
 /// Number of odd harmonics that both detectors know, as far as they are sampled. Impacts of one period are alternating impulses. A resonance of armature
 /// and stinger can make a harmonic of the force ten times the fundamental: unknown, it would be in the command, and another motion the result.
 const HARMONICS: usize = 15;
-/// How many of them change as fast as the motion does, and the rate of the others, which then hardly acts on the loop, over that of the fundamental.
+/// How many of them change as fast as the fundamental. With 1, two of 180 random shakers (development seeds of studies/shakers.rs) overshoot limits that
+/// they keep with 3.
 const FAST: usize = 3;
-const SLOW: f64 = 0.1;
 
 /// Share of the command's fundamental that an amplifier loses which has failed; clipping at half of the command loses 0.39. At the natural frequency
 /// this is the share of the reference, over the drop-out. An error of the whole reference is a failure whatever the drop-out: it is not the reference
 /// asked for that is left then. And a reference that never reaches this share is not there, of a broken stinger.
 const SHARE: f64 = 0.25;
-/// Phase for which such an error lasts, rad. A step by 1.7 times the reference is seen as an error of more than the reference for so long, until the
-/// control has corrected it: impacts and drive change the reference all the time while the controller searches, where little of it is left.
-pub(crate) const OFF: f64 = 1.5 * TAU;
+/// Phase for which such an error lasts, rad: in this time the control halves an error. Impacts and drive change the reference all the time while the
+/// controller searches, where little of it is left.
+pub(crate) const OFF: f64 = LN_2 / BANDWIDTH;
 
 /// Offset and harmonics of a signal: an adaptive filter, as the controller's.
 #[derive(Debug, Clone, Default)]
@@ -56,10 +57,15 @@ impl Detector {
         let residual = reading - self.offset - predicted;
         self.offset += share * residual;
         for (n, (of, rotor)) in self.phasors.iter_mut().zip(rotors).enumerate() {
-            let rate = if n < FAST { 1.0 } else { SLOW };
+            let rate = rate_of(n);
             *of += 2.0 * rate * share * residual * Complex64::I * rotor.conj();
         }
     }
+}
+
+/// Rate at which a detector changes a harmonic, by its place among the odd ones, over the rate of the fundamental.
+fn rate_of(n: usize) -> f64 {
+    if n < FAST { 1.0 } else { SECOND }
 }
 
 /// The control, and its state. Phasors are those of sines, relative to the controller's oscillator.
@@ -155,7 +161,8 @@ impl ReferenceControl {
             let cause = if self.quiet > longest {
                 "next to nothing is left: the sensor of the reference is dead, or the stinger is broken"
             } else {
-                "the amplifier clips or is off, or the sensor of the reference or its sign is wrong"
+                "the amplifier clips or is off, the sensor of the reference or its sign is wrong, or too little is left at the resonance (the drop-out of \
+                 `vines check`)"
             };
             let [asked, error] = [self.asked, error.norm()].map(|value| value / self.path.base_per_reference);
             let periods = longest / TAU;
@@ -246,7 +253,7 @@ fn return_difference(
     let orders = (0..HARMONICS).flat_map(|n| [1.0, -1.0].map(|sign| (n, sign * (2 * n + 1) as f64)));
     let others = orders.filter(|(_, order)| *order != 1.0);
     let comb: Complex64 = others
-        .map(|(n, order)| if n < FAST { 1.0 } else { SLOW } / Complex64::new(0.0, 1.0 + x - order))
+        .map(|(n, order)| rate_of(n) / Complex64::new(0.0, 1.0 + x - order))
         .sum();
     let comb = comb + 1.0 / Complex64::new(0.0, 1.0 + x);
     let (pole, damping) = (path.pole / omega0, path.damping_rate / omega0);
