@@ -3,11 +3,12 @@
 //! One to three modes as in `structures.rs`, a force at the drive point, and r 0.5 to 0.8. The armature has 0.001 to 0.5 of the modal mass at the drive
 //! point; its suspension 0.3 to 3 times, and the stinger 3 to 30 times the natural frequency of the driven mode; the coil's damping Bl²/R is 0.03
 //! to 3 times m omega0 of the armature, its rate R/L 3 to 100 omega0 in half of the cases, and the amplifier controls the voltage or the current (uniform logarithms).
-//! Limits of voltage, current, stroke and force are 1 to 100 times what the exact orbit at the first level needs, or as much more as a scene needs that
-//! is not refused: a drive beyond one of them in more than the last sample is a failure.
+//! Limits of voltage, current, stroke and force, unless LIMITS is `none`, are 1 to 100 times what the exact orbit at the first level needs, or as much more
+//! as a scene needs that is not refused: a drive beyond one of them in more than the last sample is a failure.
 //! Tracked in 8 levels over the range of responses in which the exact backbone with the shaker has stable orbits, at least a factor of 1.2. A point is right within 3 u of the exact backbone in sigma and G.
 //!
-//! Arguments: SHAKERS, SEED, settings of the scene, `KEY=VALUE`, and the number of the only SHAKER to run, which writes nothing. Writes validation/shakers.csv: a row per shaker.
+//! Arguments: SHAKERS, SEED, LIMITS, `drawn` or `none`, settings of the scene, `KEY=VALUE`, and the number of the only SHAKER to run, which writes
+//! nothing. Writes validation/shakers.csv: a row per shaker.
 
 mod common;
 
@@ -65,7 +66,7 @@ fn text(uniform: Uniform) -> (String, [f64; 4]) {
 }
 
 /// A scene with a drive at which a stable orbit exists, and its levels.
-fn drawn(uniform: Uniform, limits: Uniform, settings: &[String]) -> Result<(Scene, [f64; 4]), Failure> {
+fn drawn(uniform: Uniform, limits: Option<Uniform>, settings: &[String]) -> Result<(Scene, [f64; 4]), Failure> {
     loop {
         let (text, numbers) = text(uniform);
         let share = uniform(0.0, 1.0);
@@ -91,6 +92,9 @@ fn drawn(uniform: Uniform, limits: Uniform, settings: &[String]) -> Result<(Scen
             "[excitation]\nG = {g:?}\n[start]\ndq2 = 5\n[backbone]\nC_from = {from:?}\nC_to = {to:?}\npoints = 8\n"
         );
         let bare = scene(&format!("{text}{rest}"), settings)?;
+        let Some(limits) = limits else {
+            return Ok((bare, numbers));
+        };
         let mut shares = [0; 4].map(|_| limits(0.0, 100_f64.ln()).exp());
         let distance = |orbit: &&Orbit| (orbit.c - from).abs();
         let levels = all.iter().filter(is_level);
@@ -242,13 +246,19 @@ fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String
 fn main() -> Result<(), Failure> {
     let given = std::env::args().skip(1);
     let (settings, given): (Vec<String>, Vec<String>) = given.partition(|one| one.contains('='));
-    let [count, seed, only @ ..] = &given[..] else {
-        return Err("arguments: SHAKERS SEED [SHAKER] [KEY=VALUE ...]".into());
+    let [count, seed, kind, only @ ..] = &given[..] else {
+        return Err("arguments: SHAKERS SEED LIMITS [SHAKER] [KEY=VALUE ...]".into());
     };
+    if !["drawn", "none"].contains(&&kind[..]) {
+        return Err(format!("limits {kind}: drawn or none").into());
+    }
     let seed_of_limits = !seed.parse::<u64>()?;
     let [mut uniform, mut limits] = [seed.parse()?, seed_of_limits].map(uniform);
     let scenes: Vec<_> = (0..count.parse()?)
-        .map(|_| drawn(&mut uniform, &mut limits, &settings))
+        .map(|_| {
+            let limits: Option<Uniform> = if kind == "drawn" { Some(&mut limits) } else { None };
+            drawn(&mut uniform, limits, &settings)
+        })
         .collect::<Result<_, _>>()?;
     if let [only] = only {
         let (points, settled, beyond, worst, periods, why) = run(&scenes[only.parse::<usize>()?]);
@@ -264,7 +274,7 @@ fn main() -> Result<(), Failure> {
         let bandwidth = scene.plan().tracking.bandwidth / std::f64::consts::TAU;
         let (points, settled, beyond, worst, periods, why) = found;
         format!(
-            "{seed},{n},{share:.4},{suspension:.3},{stinger:.2},{coil:.3},{drop_out:.4},{bandwidth:.4},{points},{settled},{beyond},{worst:.2},{periods:.0},\"{}\"",
+            "{seed},{kind},{n},{share:.4},{suspension:.3},{stinger:.2},{coil:.3},{drop_out:.4},{bandwidth:.4},{points},{settled},{beyond},{worst:.2},{periods:.0},\"{}\"",
             why.split([';', '"']).next().and_then(|why| why.split(": ").next()).unwrap_or_default()
         )
     }).collect();
@@ -279,6 +289,6 @@ fn main() -> Result<(), Failure> {
         "{refused} refused by the check; {tracked} of {count} tracked with at least half of the levels settled and none beyond 3 u; {wrong} of {settled} settled points beyond 3 u; \
          of the others {limited} end at a limit, {silent} without a reason; {beyond} driven beyond a limit"
     );
-    let header = "seed,shaker,mass_ratio,suspension,stinger,coil,drop_out,bandwidth,points,settled,beyond_3u,worst_u,periods,ended";
-    write("shakers", header, 2, &rows)
+    let header = "seed,limits,shaker,mass_ratio,suspension,stinger,coil,drop_out,bandwidth,points,settled,beyond_3u,worst_u,periods,ended";
+    write("shakers", header, 3, &rows)
 }
