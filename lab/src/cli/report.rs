@@ -176,7 +176,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let text = written(&folder.replace(files)?[..1]);
     match &failed[..] {
         [] => Ok(text),
-        titles => Err(Failure::run(format!("{text}without a result: {}", titles.join(", ")))),
+        titles => Err(Failure::run(format!(
+            "without a result: {}\n{}",
+            titles.join(", "),
+            text.trim_end()
+        ))),
     }
 }
 

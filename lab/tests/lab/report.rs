@@ -80,7 +80,7 @@ fn a_report_says_which_commands_failed_and_shows_why() {
     let done = vines(&format!("report {idle} --out {out}"));
     assert_eq!(done.status.code(), Some(1));
     assert!(
-        text(&done).contains("without a result: Lock and free decay"),
+        text(&done).contains("error: without a result: Lock and free decay, "),
         "{}",
         text(&done)
     );
