@@ -198,6 +198,18 @@ impl Endpoint {
                 structure.section()
             )));
         }
+        let jumps = scene.chain.hold
+            && scene
+                .structure
+                .as_ref()
+                .is_none_or(|structure| structure.shaker.is_none());
+        if jumps && scene.chain.reference && !matches!(self, Self::Network(_)) {
+            log::warn!(
+                "chain.hold = true: a simulated base jumps from sample to sample, and its sensor reads it half a sample late; the lock is \
+                 {:.2} degrees off. Set chain.reference = false",
+                180.0 / scene.controller.samples_per_period
+            );
+        }
         let (mut pace, mut timing) = (None, Arc::default());
         let rig: Box<dyn Rig> = match self {
             Self::BuiltIn => Simulated::without_chain(scene)?,

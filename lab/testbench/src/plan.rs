@@ -11,7 +11,7 @@ use vines_model::{Reference, Sensor};
 
 use crate::experiment::DECAYED;
 use crate::linear::{MeasuredLinear, ParticleState};
-use crate::rig::Sensors;
+use crate::rig::{LowPass, Sensors};
 use crate::scene::{
     Definition, Dimensionless, Measurand, Parameters, Scene, Structure, carried_up_to, has_mirror_images,
 };
@@ -107,6 +107,10 @@ pub struct Target {
     pub omega0: f64,
     /// A shaker stands between the command and the reference, so that the reference drives the structure as it is measured.
     pub through_shaker: bool,
+    /// Cut-off of the anti-alias filter in both channels, rad/s: its gain is known. Its phase cancels, or the controller compensates it as a delay.
+    pub filter: Option<f64>,
+    /// The base is held from sample to sample: its fundamental is smaller than that of the samples.
+    pub held: bool,
 }
 
 impl Target {
@@ -135,7 +139,14 @@ impl Target {
     pub fn displacement(&self, channel: usize, omega: f64) -> Complex64 {
         let order = self.measurands[channel].order();
         let turned = [Complex64::ONE, -Complex64::I, -Complex64::ONE][order as usize];
-        turned * (self.omega0 / omega).powi(order)
+        let passed = self.filter.map_or(1.0, |cut_off| LowPass::gain(cut_off, omega));
+        turned * (self.omega0 / omega).powi(order) / passed
+    }
+
+    /// Fundamental of the base over that of its samples, `sample_time` seconds apart, at the frequency `omega`, rad/s.
+    pub(crate) fn base_per_sample(&self, omega: f64, sample_time: f64) -> f64 {
+        let half = 0.5 * omega * sample_time;
+        if self.held { half.sin() / half } else { 1.0 }
     }
 
     /// Amplitude of the scaled response whose displacement has this amplitude, m, at the frequency `omega`, rad/s.
@@ -249,6 +260,8 @@ impl Knowledge {
             measurands: definition.measurands(),
             omega0: linear.omega0,
             through_shaker: false,
+            filter: None,
+            held: false,
         };
         Self {
             linear,
@@ -354,6 +367,8 @@ impl Scene {
         knowledge.shaker = self.structure().and_then(|structure| structure.shaker_path());
         knowledge.target.through_shaker = knowledge.shaker.is_some();
         knowledge.nearest_pole = self.structure().map_or(f64::INFINITY, Structure::nearest_pole);
+        knowledge.target.held = self.chain.hold;
+        knowledge.target.filter = self.chain.filter.map(|cut_off| cut_off * knowledge.linear.omega0);
         knowledge
     }
 

@@ -18,6 +18,7 @@ pub use crate::scene::has_friction;
 use crate::scene::{Excitation, Release, Scene, SceneShaker, Structure};
 
 pub use chain::Chain;
+pub(crate) use chain::LowPass;
 pub use faulty::{RigFault, SensorFault, faulty};
 pub(crate) use reference_control::{BANDWIDTH, OFF, speed};
 pub(crate) use stages::derivative;

@@ -455,8 +455,8 @@ impl Sections {
         if sensor == Sensor::V && sensor_quantity != Measurand::Displacement {
             let name = sensor_quantity.name();
             let message = format!(
-                "resonance.sensor_quantity = \"{name}\" with resonance.sensor = \"v\": v contains the particle, which no sensor of a {name} on the \
-                 structure reads; set resonance.sensor = \"q1\""
+                "resonance.sensor_quantity = \"{name}\" with resonance.sensor = \"v\": v contains the particle, which no sensor on the structure \
+                 reads; set resonance.sensor = \"q1\""
             );
             return Err(SceneError::text(origin, message));
         }

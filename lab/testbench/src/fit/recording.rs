@@ -212,8 +212,8 @@ impl Recording {
         if of_response != Measurand::Displacement && knowledge.numbers.definition.sensor == Sensor::V {
             let (Self { origin, channels: [response, _], .. }, name) = (self, of_response.name());
             return Err(RecordingError(format!(
-                "{origin}: the response {response} is one of {name}, and the scene's sensor reads v, which contains the particle: no sensor of a {name} on the \
-                 structure does; set resonance.sensor = \"q1\" in the scene, or with --set"
+                "{origin}: the response {response} measures {name}, and the scene's sensor reads v, which contains the particle: no sensor on the structure \
+                 does; set resonance.sensor = \"q1\" in the scene, or with --set"
             )));
         }
         for (channel, values) in [&mut one.response, &mut one.drive].into_iter().enumerate() {

@@ -475,7 +475,8 @@ impl Cycle {
             let (base, noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
             (base * commanded[0] / as_read, noise)
         } else {
-            (Complex::new(mean(|s| s.command.drive.amplitude), 0.0), 0.0)
+            let base = mean(|s| s.command.drive.amplitude) * target.base_per_sample(mean_omega, sample_time);
+            (Complex::new(base, 0.0), 0.0)
         };
         let phase_error = if measured {
             (response * base.conj() * Complex::from_polar(1.0, -target.phase)).arg()
@@ -529,6 +530,8 @@ mod tests {
             measurands: [Measurand::Displacement; 2],
             omega0: 1.0,
             through_shaker: true,
+            filter: None,
+            held: false,
         };
         for in_period in [100.03, 100.1, 100.3, 100.51, 100.97] {
             let sample_time = TAU / in_period;

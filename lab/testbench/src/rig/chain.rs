@@ -138,13 +138,15 @@ impl RigStage for Chain {
 
 // The anti-alias filter.
 
-/// A Butterworth low pass of second order, `y'' + sqrt(2) wc y' + wc^2 y = wc^2 u`, exact for a signal that is
-/// linear between samples.
+/// A Butterworth low pass of second order, `y'' + sqrt(2) wc y' + wc^2 y = wc^2 u`, exact for a signal that is a parabola through the last three
+/// samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowPass {
     cut_off: f64,
     /// Last sample of the signal.
     input: f64,
+    /// Mean slope of the signal between the last two samples, and the time between them, s.
+    before: Option<(f64, f64)>,
     output: f64,
     slope: f64,
 }
@@ -152,26 +154,43 @@ pub struct LowPass {
 impl LowPass {
     /// A filter at rest with the cut-off frequency `cut_off`, rad/s.
     pub fn new(cut_off: f64) -> Self {
-        Self { cut_off, input: 0.0, output: 0.0, slope: 0.0 }
+        Self { cut_off, input: 0.0, before: None, output: 0.0, slope: 0.0 }
     }
 
     /// The output `elapsed` seconds after the last sample, when the signal is `input`.
     pub fn pass(&mut self, input: f64, elapsed: f64) -> f64 {
         if elapsed > 0.0 {
             let rise = (input - self.input) / elapsed;
+            let bend = self
+                .before
+                .map_or(0.0, |(rise_before, time)| 2.0 * (rise - rise_before) / (elapsed + time));
+            self.before = Some((rise, elapsed));
             let rate = FRAC_1_SQRT_2 * self.cut_off;
-            // On a ramp the output lags by sqrt(2)/wc; the initial transient decays.
-            let lag = SQRT_2 / self.cut_off * rise;
-            let cosine = self.output - (self.input - lag);
-            let sine = (self.slope - rise) / rate + cosine;
+            let delay = SQRT_2 / self.cut_off;
+            // On a parabola the output is late, and ahead by the bend; the initial transient decays.
+            let steady = |value: f64, slope: f64| {
+                [
+                    value - delay * slope + bend / self.cut_off.powi(2),
+                    slope - delay * bend,
+                ]
+            };
+            let half = 0.5 * bend * elapsed;
+            let (begin, end) = (steady(self.input, rise - half), steady(input, rise + half));
+            let cosine = self.output - begin[0];
+            let sine = (self.slope - begin[1]) / rate + cosine;
             let (sin, cos) = (rate * elapsed).sin_cos();
             let decay = (-rate * elapsed).exp();
             let (ringing, quadrature) = (decay * (cosine * cos + sine * sin), decay * (sine * cos - cosine * sin));
-            self.output = input - lag + ringing;
-            self.slope = rise + rate * (quadrature - ringing);
+            self.output = end[0] + ringing;
+            self.slope = end[1] + rate * (quadrature - ringing);
         }
         self.input = input;
         self.output
+    }
+
+    /// Gain of a filter with the cut-off frequency `cut_off` at the frequency `omega`.
+    pub fn gain(cut_off: f64, omega: f64) -> f64 {
+        1.0 / (omega / cut_off).powi(2).hypot(1.0)
     }
 }
 
@@ -235,14 +254,14 @@ mod tests {
     /// Amplitude and lag of the output for a sine of frequency 1.
     fn response(cut_off: f64) -> (f64, f64) {
         let mut filter = LowPass::new(cut_off);
-        let dt = std::f64::consts::TAU / 1000.0;
+        let dt = std::f64::consts::TAU / 200.0;
         let (mut sine, mut cosine) = (0.0, 0.0);
-        for n in 0..20_000 {
+        for n in 0..8_000 {
             let t = f64::from(n) * dt;
             let output = filter.pass(t.sin(), dt);
-            if n >= 19_000 {
-                sine += output * t.sin() / 500.0;
-                cosine += output * t.cos() / 500.0;
+            if n >= 7_800 {
+                sine += output * t.sin() / 100.0;
+                cosine += output * t.cos() / 100.0;
             }
         }
         (sine.hypot(cosine), -cosine.atan2(sine))
@@ -253,8 +272,11 @@ mod tests {
         for cut_off in [0.5, 1.0, 3.0, 20.0] {
             let (amplitude, lag) = response(cut_off);
             let x: f64 = 1.0 / cut_off;
-            assert!((amplitude - 1.0 / (1.0 + x.powi(4)).sqrt()).abs() < 1e-4, "{cut_off}");
-            assert!((lag - (SQRT_2 * x).atan2(1.0 - x * x)).abs() < 1e-4, "{cut_off}: {lag}");
+            assert!(
+                (amplitude - LowPass::gain(cut_off, 1.0)).abs() < 1e-6,
+                "{cut_off}: {amplitude}"
+            );
+            assert!((lag - (SQRT_2 * x).atan2(1.0 - x * x)).abs() < 2e-5, "{cut_off}: {lag}");
         }
     }
 

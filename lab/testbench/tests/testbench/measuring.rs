@@ -104,6 +104,21 @@ fn a_delay_of_more_than_a_period_that_the_controller_knows_does_not_keep_it_from
     }
 }
 
+#[test]
+fn the_gain_of_an_anti_alias_filter_is_corrected() {
+    let ideal = at("").unwrap();
+    // The gain at the lock is 0.9992 and 0.97.
+    for settings in [
+        "chain.filter=5",
+        "chain.filter=2",
+        "chain.filter=5 chain.reference=false",
+    ] {
+        let filtered = at(settings).unwrap();
+        let [c, sigma] = [filtered.c - ideal.c, filtered.sigma - ideal.sigma];
+        assert!(c.abs() < 3e-6 && sigma.abs() < 1e-4, "{settings}: {c:e}, {sigma:e}");
+    }
+}
+
 /// A rig without an input for samples of the base, counting what it reads.
 struct Counter(f64);
 

@@ -160,7 +160,7 @@ fn text_on_the_command_line_needs_no_quotes_and_what_is_no_assignment_is_refused
         "chain.hold=1 => chain.hold=1 | expected true or false",
         "resonance.sensor=q3 => resonance.sensor=q3 | `q3` | `v` or `q1`",
         "resonance.sensor_quantity=jerk => `jerk` | `displacement`, `velocity`, `acceleration`",
-        "resonance.sensor_quantity=velocity => which no sensor of a velocity on the structure reads | set resonance.sensor",
+        "resonance.sensor_quantity=velocity => which no sensor on the structure reads | set resonance.sensor",
         "resonance.sensor=1 => resonance.sensor=1 | expected a word in quotes",
     ]);
     for argument in ["plant.r", "r=0.7", "plant.r=1\nx=2"] {
