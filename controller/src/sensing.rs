@@ -48,12 +48,13 @@ impl Channel {
         self.unchanged > 2.0 * PAUSE
     }
 
-    /// Takes a reading, m, after a turn of the oscillator, rad. `limits`: `residual_max`, and the largest other difference that no fault makes, m.
-    /// `change`: factor by which the drive has changed and the detector has still to learn; `None`: the signal is not known yet.
+    /// Takes a reading, m, after a turn of the oscillator, rad. `limits`: `residual_max`; the largest difference that the signal may make, m; and the
+    /// largest that a derivative shows of a change of the drive, m: such a reading says nothing of the signal. `change`: factor by which the drive
+    /// has changed and the detector has still to learn; `None`: the signal is not known yet.
     fn take(
         &mut self,
         detector: &PhaseDetector,
-        limits: Option<[Real; 2]>,
+        limits: Option<[Real; 3]>,
         reading: Real,
         rotors: &Rotors,
         turn: Real,
@@ -74,17 +75,21 @@ impl Channel {
         self.since += turn;
         self.is_implausible = false;
         let [now, last, earlier] = self.largest;
-        if let Some([limit, moves]) = limits {
+        if let Some([limit, own, shown]) = limits {
             let (amplitude, lag) = (self.estimate.amplitude, (factor - 1.0).abs());
             let moves = if self.unchanged > PAUSE {
                 0.0
             } else {
-                limit * factor * amplitude + moves
+                limit * factor * amplitude + own
             };
             // A fault may have begun at the end of the last period.
             let expected = moves + lag * amplitude + NORMAL * smaller(last, earlier);
             let is_clear = detector.harmonics_within(&self.estimate, (DISTORTION * limit + lag) * amplitude);
             self.distorted = longer(self.distorted, turn, !is_clear);
+            if difference > expected && difference <= expected + shown && self.unchanged <= PAUSE {
+                self.estimate = before;
+                return;
+            }
             if change.is_some() && (difference > expected || self.distorted > LASTS) {
                 self.is_implausible = self.since <= PAUSE;
                 self.since = 0.0;
@@ -125,10 +130,12 @@ pub struct Channels {
     balance: Balance,
     /// The drive with the lag of the detector, m.
     drive: Real,
-    /// The drive at the last sample, and its change since the one before, m; and what derivatives of the base still show of changes, m.
+    /// The drive at the last sample, and its change since the one before, m; what derivatives of the base still show of changes, m; and for how
+    /// long, rad.
     last: Real,
     rise: Real,
     shown: Real,
+    showing: Real,
     /// Time in the closed loop, s.
     closed: Real,
     /// Time since the loop was closed or the measurement was last valid, s.
@@ -174,8 +181,8 @@ impl Sensing {
         let is_read = fault != Some(Fault::Sensor);
         if is_read {
             let rotors = self.detector.rotors(drive.rotor);
-            let take = |channel: &mut Channel, reading: Real, change: Option<Real>, moves: Real| {
-                let limits = config.residual_max.map(|share| [share, moves]);
+            let take = |channel: &mut Channel, reading: Real, change: Option<Real>, [own, shown]: [Real; 2]| {
+                let limits = config.residual_max.map(|share| [share, own, shown]);
                 channel.take(&self.detector, limits, reading, &rotors, turn, change);
             };
             // The base follows the drive at once; the response grows, and its detector lags.
@@ -186,17 +193,29 @@ impl Sensing {
                 1.0
             };
             let impact = state.balance.impact();
-            take(&mut state.response, input.response, is_known.then_some(1.0), impact);
+            take(
+                &mut state.response,
+                input.response,
+                is_known.then_some(1.0),
+                [impact, 0.0],
+            );
             if let Some(reading) = base {
-                // What velocity and acceleration of the base show of a change.
+                // What velocity and acceleration of the base show of a change, the delay later.
                 let rise = drive.amplitude - state.last;
-                state.shown *= larger(1.0 - turn / PAUSE, 0.0);
+                state.showing += turn;
+                if state.showing > drive.omega * config.delay {
+                    state.shown *= larger(1.0 - turn / PAUSE, 0.0);
+                }
                 if rise != 0.0 || state.rise != 0.0 {
                     let shown = (2.0 * rise.abs() + (rise - state.rise).abs() / turn) / turn;
-                    state.shown = larger(shown, state.shown);
+                    if shown > state.shown {
+                        (state.shown, state.showing) = (shown, 0.0);
+                    }
                 }
                 (state.last, state.rise) = (drive.amplitude, rise);
-                take(&mut state.base, reading, Some(change), state.shown);
+                let shown = state.shown;
+                let limits = if is_known { [0.0, shown] } else { [shown, 0.0] };
+                take(&mut state.base, reading, Some(change), limits);
                 if drive.amplitude == 0.0 {
                     // A base without a drive rests.
                     state.base.unchanged = 0.0;
