@@ -201,12 +201,19 @@ pub fn equally_spaced(from: f64, to: f64, count: usize) -> impl Iterator<Item = 
 
 /// Standard deviation of the white noise on a smooth signal, from third differences; 0 for fewer than six values.
 pub fn noise(values: &[f64]) -> f64 {
-    let differences = values.windows(4).map(|v| v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]);
-    if differences.len() < 3 {
+    noise_at(values, 1, [0.0; 3])
+}
+
+/// As [`noise`], of values `stride` apart, and of noise whose correlation over one, two and three strides is this.
+pub fn noise_at(values: &[f64], stride: usize, [one, two, three]: [f64; 3]) -> f64 {
+    let windows = values.windows(3 * stride + 1);
+    if windows.len() < 3 {
         return 0.0;
     }
+    let differences = windows.map(|v| v[3 * stride] - 3.0 * v[2 * stride] + 3.0 * v[stride] - v[0]);
     // White noise of variance 1 gives them the variance 1 + 9 + 9 + 1.
-    (mean_square(differences) / 20.0).sqrt()
+    let variance = 20.0 - 30.0 * one + 12.0 * two - 2.0 * three;
+    (mean_square(differences) / variance).sqrt()
 }
 
 /// Slope of the straight line that fits equally spaced values best, from a value to the next.

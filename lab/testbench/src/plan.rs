@@ -6,7 +6,7 @@ use lovines::Section;
 use nalgebra::{Matrix2, RowVector2, Vector2};
 use num_complex::Complex64;
 use phase_lock::Config;
-use vines_model::numerics::Estimate;
+use vines_model::numerics::{Estimate, mean, noise, noise_at};
 use vines_model::{Reference, Sensor};
 
 use crate::experiment::DECAYED;
@@ -109,6 +109,8 @@ pub struct Target {
     pub through_shaker: bool,
     /// Cut-off of the anti-alias filter in both channels, rad/s: its gain is known. Its phase cancels, or the controller compensates it as a delay.
     pub filter: Option<f64>,
+    /// How late the readings of the response are, s: without a reference, the drive of so long ago is the reference.
+    pub delay: f64,
     /// The base is held from sample to sample: its fundamental is smaller than that of the samples.
     pub held: bool,
 }
@@ -141,6 +143,33 @@ impl Target {
         let turned = [Complex64::ONE, -Complex64::I, -Complex64::ONE][order as usize];
         let passed = self.filter.map_or(1.0, |cut_off| LowPass::gain(cut_off, omega));
         turned * (self.omega0 / omega).powi(order) / passed
+    }
+
+    /// Standard deviation of the noise on a smooth signal of a sensor: white, or, behind the filter, as correlated as that makes it.
+    pub(crate) fn noise(&self, values: &[f64], sample_time: f64) -> f64 {
+        let Some(cut_off) = self.filter else {
+            return noise(values);
+        };
+        // Over a quarter of the filter's period most of the correlation is gone.
+        let stride = (FRAC_PI_2 / (cut_off * sample_time)).max(1.0).floor();
+        let correlation = [1.0, 2.0, 3.0].map(|n| LowPass::correlation(cut_off, n * stride * sample_time));
+        noise_at(values, stride as usize, correlation)
+    }
+
+    /// Power density of the noise of a sensor at the frequency `omega`, rad/s, over that of white noise with the same variance.
+    pub(crate) fn colour(&self, omega: f64, sample_time: f64) -> f64 {
+        self.filter
+            .map_or(1.0, |cut_off| LowPass::colour(cut_off, omega, sample_time))
+    }
+
+    /// Power density of the noise at the fundamental, of the frequency `omega`, rad/s, over its mean above this number of harmonics.
+    pub(crate) fn colour_of_fundamental(&self, omega: f64, sample_time: f64, harmonics: usize) -> f64 {
+        let at = |k: usize| self.colour(k as f64 * omega, sample_time);
+        let highest = (PI / (omega * sample_time)) as usize;
+        match self.filter {
+            Some(_) if highest > harmonics => at(1) / mean((harmonics + 1..=highest).map(at)),
+            _ => 1.0,
+        }
     }
 
     /// Fundamental of the base over that of its samples, `sample_time` seconds apart, at the frequency `omega`, rad/s.
@@ -261,6 +290,7 @@ impl Knowledge {
             omega0: linear.omega0,
             through_shaker: false,
             filter: None,
+            delay: 0.0,
             held: false,
         };
         Self {
@@ -378,16 +408,18 @@ impl Scene {
     }
 
     /// The experiment on a rig of which this is known.
-    pub fn plan_on(&self, knowledge: Knowledge) -> Plan {
+    pub fn plan_on(&self, mut knowledge: Knowledge) -> Plan {
         // The decay lasts as long as the linear rig takes to fall to the share that is recorded.
         let relaxed = -DECAYED.ln() * knowledge.linear.relaxation_periods();
         let decay = self.record.decay_periods.unwrap_or(relaxed.min(LONGEST_DECAY));
         let structure = self.structure().filter(|one| one.shaker.is_none());
+        let lock = self.lock_config(&knowledge);
+        knowledge.target.delay = lock.delay;
         Plan {
             knowledge,
             beside: structure.map_or(Vec::new(), Structure::beside_driven_mode),
             amplitude: self.amplitude,
-            lock: self.lock_config(&knowledge),
+            lock,
             tracking: self.tracking_config(&knowledge),
             hold: knowledge.samples(self.record.hold_periods),
             decay: knowledge.samples(decay),

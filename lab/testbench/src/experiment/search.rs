@@ -15,14 +15,13 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::DVector;
-use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, noise, range};
+use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, Stage};
 use crate::identification::{ASYMMETRIC, Cycle, ResonanceFit, Slopes, degrees, without_tones};
 use crate::linear::{Impacts, impacts_by_resonance};
 use crate::plan::{LinearResponse, Plan, Target};
 use crate::rig::{Controller, ControllerError, LoopState, Move, Rig};
-use crate::scene::Measurand;
 
 /// Phase error, rad, below which the control of the response begins: the drive then does 94 % of its largest work.
 const NEAR: f64 = 0.35;
@@ -401,7 +400,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 continue;
             };
             let two = &samples[(2 * begin).saturating_sub(end)..end];
-            harmonics.extend(even_and_odd(two, step * cycle.omega, self.target.measurands[0]));
+            harmonics.extend(even_and_odd(two, self.target, cycle.omega, step));
             all.push(cycle);
         }
         let Some(fit) = ResonanceFit::of(&all, &self.bench.plan.knowledge, Slopes::Unknown) else {
@@ -457,20 +456,22 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     }
 }
 
-/// Squares of the second and the third harmonic of the response, m², and their mean by noise; `step` is the phase between two samples, rad.
-fn even_and_odd(samples: &[Sample], step: f64, measurand: Measurand) -> Option<[f64; 3]> {
-    let count = samples.len();
+/// Squares of the second and the third harmonic of the response, m², and their mean by noise, for samples `sample_time` seconds apart and a motion of
+/// the frequency `omega`, rad/s.
+fn even_and_odd(samples: &[Sample], target: Target, omega: f64, sample_time: f64) -> Option<[f64; 3]> {
+    let (count, step) = (samples.len(), omega * sample_time);
     let phases: Vec<f64> = (0..count).map(|n| n as f64 * step).collect();
     // With the squares of these weights, Hann's window, what is not fitted leaks into the harmonics a hundred times less.
     let weights = DVector::from_fn(count, |n, _| (PI * (n as f64 + 0.5) / count as f64).sin());
-    let basis = HarmonicBasis::new(&phases, 0, &degrees(measurand, TAU / step)).weighted(&weights);
+    let basis = HarmonicBasis::new(&phases, 0, &degrees(target.measurands[0], TAU / step)).weighted(&weights);
     let values = DVector::from_iterator(count, samples.iter().map(|sample| sample.sensors.response));
     let values = values.component_mul(&weights);
     let fit = basis.fit(&values)?;
-    let rest = noise(basis.residual(&values, &fit).as_slice());
+    let rest = target.noise(basis.residual(&values, &fit).as_slice(), sample_time);
     let [even, odd] = [2, 3].map(|n| fit.harmonic(n).norm_sqr());
     // The weights halve the variance of the residuals, and make that of a harmonic 3/2 of its value without weights: together a factor of 3.
-    Some([even, odd, 3.0 * rest * rest * 4.0 / count as f64])
+    let coloured = target.colour(2.0 * omega, sample_time);
+    Some([even, odd, 3.0 * rest * rest * 4.0 * coloured / count as f64])
 }
 
 /// What a sweep has passed: levels of the response, m, near which the requested drive is, or an extremum of the drive that may reach it, the

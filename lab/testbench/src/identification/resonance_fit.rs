@@ -453,7 +453,11 @@ impl Cycle {
             let fit = basis.fit(&values)?;
             let residual = drifting.residual(&values, &drifting.fit(&values)?);
             let variance = residual.norm_squared() / (samples.len() - drifting.terms()) as f64;
-            let variance = variance * 2.0 / samples.len() as f64;
+            let harmonics = if channel == 0 { in_response } else { in_base };
+            // Above many harmonics a sensor shows impacts rather than noise.
+            let least = if harmonics > HARMONICS { 0 } else { HARMONICS };
+            let coloured = target.colour_of_fundamental(mean_omega, sample_time, least);
+            let variance = variance * coloured * 2.0 / samples.len() as f64;
             Some((fit.harmonic(1) * displacement, variance * displacement.norm_sqr()))
         };
         let (response, noise) = fitted(0, |s| s.sensors.response)?;
@@ -478,11 +482,16 @@ impl Cycle {
             let base = mean(|s| s.command.drive.amplitude) * target.base_per_sample(mean_omega, sample_time);
             (Complex::new(base, 0.0), 0.0)
         };
+        let asked = DVector::from_iterator(samples.len(), samples.iter().map(|s| s.command.drive.displacement));
+        let asked = basis.fit(&asked)?.harmonic(1);
         let phase_error = if measured {
             (response * base.conj() * Complex::from_polar(1.0, -target.phase)).arg()
-        } else {
-            // The controller compensates the delay.
+        } else if asked == Complex::ZERO {
+            // A controller that tells no displacement compensates the delay.
             mean(|s| s.command.phase_error.unwrap_or(0.0))
+        } else {
+            // The drive of then. (The estimate of a controller is of some periods before.)
+            (response * asked.conj() * Complex::from_polar(1.0, mean_omega * target.delay - target.phase)).arg()
         };
         Some(Self {
             commanded,
@@ -531,6 +540,7 @@ mod tests {
             omega0: 1.0,
             through_shaker: true,
             filter: None,
+            delay: 0.0,
             held: false,
         };
         for in_period in [100.03, 100.1, 100.3, 100.51, 100.97] {

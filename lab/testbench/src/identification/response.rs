@@ -9,13 +9,14 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::{self, Display, Formatter};
 
 use nalgebra::DVector;
+use num_complex::Complex64;
 use serde::Serialize;
-use vines_model::numerics::{Estimate, HarmonicBasis, golden_section, noise};
+use vines_model::numerics::{Estimate, HarmonicBasis, HarmonicFit, golden_section};
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
 use super::harmonics_of;
 use crate::linear::{Impacts, impacts_by_harmonic, impacts_by_resonance};
-use crate::plan::Knowledge;
+use crate::plan::{Knowledge, Target};
 use crate::record::Sample;
 use crate::scene::{Definition, Dimensionless, Measurand, Sensor};
 
@@ -42,6 +43,12 @@ pub(crate) fn degrees(measurand: Measurand, samples_per_period: f64) -> Vec<Opti
     [Some(2)].into_iter().chain(vec![Some(0); count - 1]).collect()
 }
 
+/// The harmonics that belong to what `measurand` says, for `n` samples `turn` rad of the motion apart.
+fn basis(n: usize, turn: f64, measurand: Measurand) -> HarmonicBasis {
+    let phases: Vec<f64> = (0..n).map(|n| n as f64 * turn).collect();
+    HarmonicBasis::new(&phases, 1, &degrees(measurand, TAU / turn))
+}
+
 /// Harmonic content of the response, relative to its fundamental.
 #[derive(Debug, Clone)]
 struct Content {
@@ -49,9 +56,8 @@ struct Content {
     amplitude: f64,
     /// Amplitudes of the harmonics from the second on, relative.
     harmonics: Vec<f64>,
-    /// Standard error of either: by noise, and what a change of the motion adds to a harmonic, as the fourth shows. The impacts excite the
-    /// fourth harmonic twenty times less than the second.
-    error: f64,
+    /// Their standard errors: by noise, and what a change of the motion adds, as both halves of the samples show.
+    errors: Vec<f64>,
     /// RMS of the residual, relative, and its part that is noise.
     rest: f64,
     noise: f64,
@@ -74,24 +80,25 @@ impl Content {
                 .map_or(0.0, |harmonic| harmonic / (n as f64).powi(order))
         };
         let even = (2..self.harmonics.len() + 2).step_by(2);
-        let significant = (SIGNIFICANT.powi(2) + 2.0 * (even.len() as f64).ln()).sqrt() * self.error;
+        let significant = (SIGNIFICANT.powi(2) + 2.0 * (even.len() as f64).ln()).sqrt();
         let neighbour = |n: usize| displacement(n + 1).max(if n > 2 { displacement(n - 1) } else { 0.0 });
-        even.clone()
-            .any(|n| self.harmonics[n - 2] > significant && displacement(n) > ASYMMETRIC * neighbour(n))
+        even.clone().any(|n| {
+            self.harmonics[n - 2] > significant * self.errors[n - 2] && displacement(n) > ASYMMETRIC * neighbour(n)
+        })
     }
 
     /// Fits the samples, with as many harmonics as belong to what `measurand` says; `None` for too few samples or no motion.
     fn of(samples: &[Sample], knowledge: &Knowledge, omega: f64, measurand: Measurand) -> Option<Self> {
         let (n, sample_time, d) = (samples.len(), knowledge.sample_time, knowledge.numbers);
         // The phase of the response is more uniform than the phase of a drive that a loop still corrects.
-        let phases: Vec<f64> = (0..n).map(|n| n as f64 * sample_time * omega).collect();
-        let per_period = TAU / (omega * sample_time);
-        let basis = HarmonicBasis::new(&phases, 1, &degrees(measurand, per_period));
+        let turn = omega * sample_time;
+        let basis = basis(n, turn, measurand);
         if n < 2 * basis.terms() {
             return None;
         }
         let mut values = DVector::from_iterator(n, samples.iter().map(|s| s.sensors.response));
-        let (mut content, mut rest) = Self::fitted(&basis, &values)?;
+        let fitted = |values: &DVector<f64>| Self::fitted(&basis, values, [omega, sample_time], knowledge.target);
+        let (mut content, mut rest) = fitted(&values)?;
         let mut lines: Vec<Line> = Vec::new();
         // Tones and harmonics are fitted in turn: what a tone has in common with the harmonics remains in the residual.
         while content.is_irregular() && lines.len() < LINES {
@@ -102,13 +109,36 @@ impl Content {
             }
             values -= DVector::from_fn(n, |n, _| line.at(n));
             lines.push(line);
-            (content, rest) = Self::fitted(&basis, &values)?;
+            (content, rest) = fitted(&values)?;
         }
+        let content = content.with_change(&values, turn, measurand)?;
         Some(Self { tones: lines, ..content })
     }
 
-    /// The content of these values, and their residual.
-    fn fitted(basis: &HarmonicBasis, values: &DVector<f64>) -> Option<(Self, DVector<f64>)> {
+    /// This content of values that are `turn` rad of the motion apart, with what both halves of them differ by in the errors.
+    fn with_change(mut self, values: &DVector<f64>, turn: f64, measurand: Measurand) -> Option<Self> {
+        let half = values.len() / 2;
+        let basis = basis(half, turn, measurand);
+        let fits = [0, values.len() - half].map(|from| basis.fit(&values.rows(from, half).into_owned()));
+        let [first, second] = [fits[0].as_ref()?, fits[1].as_ref()?];
+        for (n, error) in (2..).zip(&mut self.errors) {
+            // Harmonics keep their phase relative to the fundamental.
+            let relative = |fit: &HarmonicFit| {
+                let (size, phase) = fit.harmonic(1).to_polar();
+                fit.harmonic(n) * Complex64::cis(-(n as f64) * phase) / size
+            };
+            *error = error.hypot(0.5 * (relative(first) - relative(second)).norm());
+        }
+        Some(self)
+    }
+
+    /// The content of these values, and their residual, for a motion of the frequency `omega`, rad/s.
+    fn fitted(
+        basis: &HarmonicBasis,
+        values: &DVector<f64>,
+        [omega, sample_time]: [f64; 2],
+        target: Target,
+    ) -> Option<(Self, DVector<f64>)> {
         let n = values.len();
         let fit = basis.fit(values)?;
         let rest = basis.residual(values, &fit);
@@ -122,10 +152,14 @@ impl Content {
             .collect();
         let content = Self {
             amplitude,
-            error: (rms * (2.0 / n as f64).sqrt()).hypot(harmonics[2]),
+            // Behind a filter a converter and a remainder of the motion are as white as before.
+            errors: (2..=fit.harmonics())
+                .map(|k| target.colour(k as f64 * omega, sample_time).max(1.0))
+                .map(|coloured| rms * (2.0 * coloured / n as f64).sqrt())
+                .collect(),
             harmonics,
             rest: rms,
-            noise: noise(rest.as_slice()) / amplitude,
+            noise: target.noise(rest.as_slice(), sample_time) / amplitude,
             tones: Vec::new(),
         };
         Some((content, rest))
@@ -171,14 +205,16 @@ fn is_asymmetric_by_reference(samples: &[Sample], knowledge: &Knowledge, omega: 
         return false;
     }
     let values: Vec<f64> = samples.iter().filter_map(|sample| sample.sensors.reference).collect();
-    let turn = omega * knowledge.sample_time;
-    let phases: Vec<f64> = (0..values.len()).map(|n| n as f64 * turn).collect();
-    let basis = HarmonicBasis::new(&phases, 1, &degrees(ALL, TAU / turn));
+    let (sample_time, target) = (knowledge.sample_time, knowledge.target);
+    let turn = omega * sample_time;
+    let basis = basis(values.len(), turn, ALL);
     if values.len() < 2 * basis.terms() {
         return false;
     }
-    let content = Content::fitted(&basis, &DVector::from_vec(values));
-    content.is_some_and(|(content, _)| content.is_asymmetric(knowledge.target.measurands[1].order()))
+    let values = DVector::from_vec(values);
+    let content = Content::fitted(&basis, &values, [omega, sample_time], target);
+    let content = content.and_then(|(content, _)| content.with_change(&values, turn, ALL));
+    content.is_some_and(|content| content.is_asymmetric(target.measurands[1].order()))
 }
 
 /// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase target,
@@ -195,7 +231,8 @@ pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estim
     }
     let Dimensionless { epsilon, definition, omega0, .. } = knowledge.numbers;
     let target = knowledge.target;
-    let noise = content.rest * (2.0 / samples.len() as f64).sqrt();
+    let coloured = target.colour(omega.value, knowledge.sample_time);
+    let noise = content.rest * (2.0 * coloured / samples.len() as f64).sqrt();
     let amplitude = content.amplitude * target.displacement(0, omega.value).norm();
     let response = Estimate::new(amplitude, &[noise * amplitude]);
     // The parameters of a simulation are known.
@@ -206,9 +243,9 @@ pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estim
     let third_harmonic = content.harmonics[1];
     let third = Estimate {
         value: force(third_harmonic),
-        uncertainty: force(content.error),
+        uncertainty: force(content.errors[1]),
     };
-    let significant = SIGNIFICANT * content.error;
+    let significant = SIGNIFICANT * content.errors[1];
     let impacts = match is_known {
         true => impacts_by_resonance(&knowledge.linear, [response, base, omega], target.phase, epsilon),
         false if third_harmonic > significant => impacts_by_harmonic(third, epsilon),

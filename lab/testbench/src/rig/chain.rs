@@ -7,6 +7,7 @@
 use std::collections::VecDeque;
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
+use num_complex::Complex64;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 
@@ -188,6 +189,24 @@ impl LowPass {
         self.output
     }
 
+    /// Correlation of the noise behind a filter with the cut-off frequency `cut_off` over `time`, if the noise before it is white.
+    pub fn correlation(cut_off: f64, time: f64) -> f64 {
+        let angle = FRAC_1_SQRT_2 * cut_off * time;
+        (-angle).exp() * (angle.cos() + angle.sin())
+    }
+
+    /// Power density of samples of this noise, `sample_time` apart, at the frequency `omega`, over that of white noise with the same variance.
+    pub fn colour(cut_off: f64, omega: f64, sample_time: f64) -> f64 {
+        // The sum of `correlation cos(omega time)` over all times, as geometric series: the correlation is the real part of (1 - i) exp((i - 1) angle).
+        let step = FRAC_1_SQRT_2 * cut_off * sample_time;
+        let turn = omega * sample_time;
+        let series = |turn: f64| {
+            let factor = Complex64::from_polar((-step).exp(), step + turn);
+            (Complex64::new(1.0, -1.0) * factor / (1.0 - factor)).re
+        };
+        1.0 + series(turn) + series(-turn)
+    }
+
     /// Gain of a filter with the cut-off frequency `cut_off` at the frequency `omega`.
     pub fn gain(cut_off: f64, omega: f64) -> f64 {
         1.0 / (omega / cut_off).powi(2).hypot(1.0)
@@ -277,6 +296,31 @@ mod tests {
                 "{cut_off}: {amplitude}"
             );
             assert!((lag - (SQRT_2 * x).atan2(1.0 - x * x)).abs() < 2e-5, "{cut_off}: {lag}");
+        }
+    }
+
+    #[test]
+    fn noise_behind_a_filter_is_as_correlated_and_as_coloured_as_stated() {
+        let (cut_off, step, count) = (5.0, std::f64::consts::TAU / 100.0, 200_000);
+        let (mut filter, mut random) = (LowPass::new(cut_off), ChaCha8Rng::seed_from_u64(3));
+        let values: Vec<f64> = (0..count).map(|_| filter.pass(normal(&mut random), step)).collect();
+        let product = |lag: usize| values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>();
+        for lag in [1, 5, 10, 20] {
+            let correlation = product(lag) / product(0);
+            let stated = LowPass::correlation(cut_off, lag as f64 * step);
+            assert!((correlation - stated).abs() < 0.02, "{lag}: {correlation}, {stated}");
+        }
+        for omega in [1.0, 3.0, 5.0, 10.0] {
+            // Of many pieces, 5 periods long.
+            let power = |piece: &[f64]| {
+                let turned = (0..)
+                    .zip(piece)
+                    .map(|(n, value)| Complex64::cis(omega * f64::from(n) * step) * value);
+                turned.sum::<Complex64>().norm_sqr()
+            };
+            let density = values.chunks(500).map(power).sum::<f64>() / product(0);
+            let stated = LowPass::colour(cut_off, omega, step);
+            assert!((density / stated - 1.0).abs() < 0.15, "{omega}: {density}, {stated}");
         }
     }
 

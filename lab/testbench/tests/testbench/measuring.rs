@@ -119,6 +119,49 @@ fn the_gain_of_an_anti_alias_filter_is_corrected() {
     }
 }
 
+#[test]
+fn noise_behind_an_anti_alias_filter_keeps_neither_a_lock_nor_a_level_from_settling() {
+    let ideal = at("").unwrap();
+    for settings in [
+        "chain.filter=10 chain.snr=40",
+        "chain.filter=4 chain.snr=40",
+        "chain.filter=10 chain.snr=40 chain.reference=false",
+    ] {
+        let filtered = at(settings).unwrap();
+        assert!(
+            (filtered.c - ideal.c).abs() < 3.0 * filtered.u_c,
+            "{settings}: {filtered:?}"
+        );
+    }
+    let scene = paper(&[
+        "chain.filter=10",
+        "chain.snr=40",
+        "backbone.points=2",
+        "backbone.C_to=0.4",
+    ]);
+    let levels = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+    assert!(levels.points.iter().all(|point| point.settled), "{:?}", levels.points);
+}
+
+#[test]
+fn what_an_accelerometer_of_the_base_shows_of_a_change_of_the_drive_does_not_keep_the_loop_from_its_phase() {
+    // The drive is asked to change before the last change is forgotten.
+    let scene = paper(&[
+        "plant.m=0.05061",
+        "plant.c=2.711",
+        "plant.r=0.706",
+        "excitation.G=1.365",
+        "resonance.sensor=q1",
+        "resonance.sensor_quantity=velocity",
+        "resonance.reference_quantity=acceleration",
+        "controller.samples_per_period=400",
+        "backbone.C_from=0.56",
+        "backbone.points=1",
+    ]);
+    let levels = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+    assert!(levels.points.iter().all(|point| point.settled), "{:?}", levels.points);
+}
+
 /// A rig without an input for samples of the base, counting what it reads.
 struct Counter(f64);
 
