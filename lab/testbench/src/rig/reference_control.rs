@@ -25,8 +25,7 @@ pub(crate) const BANDWIDTH: f64 = SECOND * DETECTOR;
 /// Number of odd harmonics that both detectors know, as far as they are sampled. Impacts of one period are alternating impulses. A resonance of armature
 /// and stinger can make a harmonic of the force ten times the fundamental: unknown, it would be in the command, and another motion the result.
 const HARMONICS: usize = 15;
-/// How many of them change as fast as the fundamental. With 1, two of 180 random shakers (development seeds of studies/shakers.rs) overshoot limits that
-/// they keep with 3.
+/// How many of them change as fast as the fundamental: chosen by trial on random shakers (studies/shakers.rs), a few of which overshoot limits with 1.
 const FAST: usize = 3;
 
 /// Share of the command's fundamental that an amplifier loses which has failed; clipping at half of the command loses 0.39. At the natural frequency
