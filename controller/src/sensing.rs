@@ -77,16 +77,17 @@ impl Channel {
         let [now, last, earlier] = self.largest;
         if let Some([limit, own, shown]) = limits {
             let (amplitude, lag) = (self.estimate.amplitude, (factor - 1.0).abs());
-            let moves = if self.unchanged > PAUSE {
-                0.0
-            } else {
+            let is_alive = self.unchanged <= PAUSE;
+            let moves = if is_alive {
                 limit * factor * amplitude + own
+            } else {
+                0.0
             };
             // A fault may have begun at the end of the last period.
             let expected = moves + lag * amplitude + NORMAL * smaller(last, earlier);
             let is_clear = detector.harmonics_within(&self.estimate, (DISTORTION * limit + lag) * amplitude);
             self.distorted = longer(self.distorted, turn, !is_clear);
-            if difference > expected && difference <= expected + shown && self.unchanged <= PAUSE {
+            if is_alive && difference > expected && difference <= expected + shown {
                 self.estimate = before;
                 return;
             }

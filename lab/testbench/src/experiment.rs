@@ -475,7 +475,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
 
     /// Whether the bench judges the lock: of a controller that does not, and behind a filter, as controllers take noise for white.
     fn judges(&self, command: &Command) -> bool {
-        command.settled.is_none() || self.plan.knowledge.target.filter.is_some()
+        command.settled.is_none() || self.plan.knowledge.target.cut_off().is_some()
     }
 }
 

@@ -141,13 +141,18 @@ impl Target {
     pub fn displacement(&self, channel: usize, omega: f64) -> Complex64 {
         let order = self.measurands[channel].order();
         let turned = [Complex64::ONE, -Complex64::I, -Complex64::ONE][order as usize];
-        let passed = self.filter.map_or(1.0, |cut_off| LowPass::gain(cut_off, omega));
+        let passed = self.cut_off().map_or(1.0, |cut_off| LowPass::gain(cut_off, omega));
         turned * (self.omega0 / omega).powi(order) / passed
+    }
+
+    /// Cut-off of the filter, rad/s, if there is one; a small module has no code for it.
+    pub(crate) fn cut_off(&self) -> Option<f64> {
+        self.filter.filter(|_| cfg!(feature = "tables"))
     }
 
     /// Standard deviation of the noise on a smooth signal of a sensor: white, or, behind the filter, as correlated as that makes it.
     pub(crate) fn noise(&self, values: &[f64], sample_time: f64) -> f64 {
-        let Some(cut_off) = self.filter else {
+        let Some(cut_off) = self.cut_off() else {
             return noise(values);
         };
         // Over a quarter of the filter's period most of the correlation is gone.
@@ -158,7 +163,7 @@ impl Target {
 
     /// Power density of the noise of a sensor at the frequency `omega`, rad/s, over that of white noise with the same variance.
     pub(crate) fn colour(&self, omega: f64, sample_time: f64) -> f64 {
-        self.filter
+        self.cut_off()
             .map_or(1.0, |cut_off| LowPass::colour(cut_off, omega, sample_time))
     }
 
@@ -166,7 +171,7 @@ impl Target {
     pub(crate) fn colour_of_fundamental(&self, omega: f64, sample_time: f64, harmonics: usize) -> f64 {
         let at = |k: usize| self.colour(k as f64 * omega, sample_time);
         let highest = (PI / (omega * sample_time)) as usize;
-        match self.filter {
+        match self.cut_off() {
             Some(_) if highest > harmonics => at(1) / mean((harmonics + 1..=highest).map(at)),
             _ => 1.0,
         }
@@ -175,7 +180,11 @@ impl Target {
     /// Fundamental of the base over that of its samples, `sample_time` seconds apart, at the frequency `omega`, rad/s.
     pub(crate) fn base_per_sample(&self, omega: f64, sample_time: f64) -> f64 {
         let half = 0.5 * omega * sample_time;
-        if self.held { half.sin() / half } else { 1.0 }
+        if self.held && cfg!(feature = "tables") {
+            half.sin() / half
+        } else {
+            1.0
+        }
     }
 
     /// Amplitude of the scaled response whose displacement has this amplitude, m, at the frequency `omega`, rad/s.

@@ -400,7 +400,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 continue;
             };
             let two = &samples[(2 * begin).saturating_sub(end)..end];
-            harmonics.extend(even_and_odd(two, self.target, cycle.omega, step));
+            harmonics.extend(even_and_odd(two, &self.target, cycle.omega, step));
             all.push(cycle);
         }
         let Some(fit) = ResonanceFit::of(&all, &self.bench.plan.knowledge, Slopes::Unknown) else {
@@ -458,7 +458,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
 /// Squares of the second and the third harmonic of the response, m², and their mean by noise, for samples `sample_time` seconds apart and a motion of
 /// the frequency `omega`, rad/s.
-fn even_and_odd(samples: &[Sample], target: Target, omega: f64, sample_time: f64) -> Option<[f64; 3]> {
+fn even_and_odd(samples: &[Sample], target: &Target, omega: f64, sample_time: f64) -> Option<[f64; 3]> {
     let (count, step) = (samples.len(), omega * sample_time);
     let phases: Vec<f64> = (0..count).map(|n| n as f64 * step).collect();
     // With the squares of these weights, Hann's window, what is not fitted leaks into the harmonics a hundred times less.

@@ -111,7 +111,8 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
     } else {
         (TERMS, window)
     };
-    if knowledge.nearest_pole * window / omega < terms.lobe() {
+    // A small module has no code for structures.
+    if cfg!(feature = "tables") && knowledge.nearest_pole * window / omega < terms.lobe() {
         return DecayPoints { points: Vec::new(), end: DecayEnd::OtherMode };
     }
     let mut windows = fitted(&values, [dt, window], omega, terms);

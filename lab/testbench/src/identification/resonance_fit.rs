@@ -482,16 +482,21 @@ impl Cycle {
             let base = mean(|s| s.command.drive.amplitude) * target.base_per_sample(mean_omega, sample_time);
             (Complex::new(base, 0.0), 0.0)
         };
-        let asked = DVector::from_iterator(samples.len(), samples.iter().map(|s| s.command.drive.displacement));
-        let asked = basis.fit(&asked)?.harmonic(1);
         let phase_error = if measured {
             (response * base.conj() * Complex::from_polar(1.0, -target.phase)).arg()
-        } else if asked == Complex::ZERO {
-            // A controller that tells no displacement compensates the delay.
-            mean(|s| s.command.phase_error.unwrap_or(0.0))
         } else {
-            // The drive of then. (The estimate of a controller is of some periods before.)
-            (response * asked.conj() * Complex::from_polar(1.0, mean_omega * target.delay - target.phase)).arg()
+            let asked = DVector::from_iterator(samples.len(), samples.iter().map(|s| s.command.drive.displacement));
+            // The rigs of a small module measure their base.
+            let asked = cfg!(feature = "tables").then(|| basis.fit(&asked)).flatten();
+            match asked.map(|fit| fit.harmonic(1)).filter(|asked| *asked != Complex::ZERO) {
+                // The drive of then. (The estimate of a controller is of some periods before.)
+                Some(asked) => {
+                    let late = Complex::from_polar(1.0, mean_omega * target.delay - target.phase);
+                    (response * asked.conj() * late).arg()
+                }
+                // A controller that tells no displacement compensates the delay.
+                None => mean(|s| s.command.phase_error.unwrap_or(0.0)),
+            }
         };
         Some(Self {
             commanded,

@@ -11,7 +11,7 @@ use std::fmt::{self, Display, Formatter};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use serde::Serialize;
-use vines_model::numerics::{Estimate, HarmonicBasis, HarmonicFit, golden_section};
+use vines_model::numerics::{Estimate, HarmonicBasis, golden_section};
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
 use super::harmonics_of;
@@ -97,7 +97,7 @@ impl Content {
             return None;
         }
         let mut values = DVector::from_iterator(n, samples.iter().map(|s| s.sensors.response));
-        let fitted = |values: &DVector<f64>| Self::fitted(&basis, values, [omega, sample_time], knowledge.target);
+        let fitted = |values: &DVector<f64>| Self::fitted(&basis, values, [omega, sample_time], &knowledge.target);
         let (mut content, mut rest) = fitted(&values)?;
         let mut lines: Vec<Line> = Vec::new();
         // Tones and harmonics are fitted in turn: what a tone has in common with the harmonics remains in the residual.
@@ -119,15 +119,16 @@ impl Content {
     fn with_change(mut self, values: &DVector<f64>, turn: f64, measurand: Measurand) -> Option<Self> {
         let half = values.len() / 2;
         let basis = basis(half, turn, measurand);
-        let fits = [0, values.len() - half].map(|from| basis.fit(&values.rows(from, half).into_owned()));
+        let fits = [0, values.len() - half]
+            .map(|from| basis.fit(&DVector::from_column_slice(&values.as_slice()[from..][..half])));
         let [first, second] = [fits[0].as_ref()?, fits[1].as_ref()?];
         for (n, error) in (2..).zip(&mut self.errors) {
             // Harmonics keep their phase relative to the fundamental.
-            let relative = |fit: &HarmonicFit| {
+            let [one, two] = [first, second].map(|fit| {
                 let (size, phase) = fit.harmonic(1).to_polar();
                 fit.harmonic(n) * Complex64::cis(-(n as f64) * phase) / size
-            };
-            *error = error.hypot(0.5 * (relative(first) - relative(second)).norm());
+            });
+            *error = error.hypot(0.5 * (one - two).norm());
         }
         Some(self)
     }
@@ -137,7 +138,7 @@ impl Content {
         basis: &HarmonicBasis,
         values: &DVector<f64>,
         [omega, sample_time]: [f64; 2],
-        target: Target,
+        target: &Target,
     ) -> Option<(Self, DVector<f64>)> {
         let n = values.len();
         let fit = basis.fit(values)?;
@@ -147,16 +148,15 @@ impl Content {
             return None;
         }
         let rms = (rest.norm_squared() / (n - basis.terms()) as f64).sqrt() / amplitude;
+        // Behind a filter a converter and a remainder of the motion are as white as before.
+        let coloured = |k: usize| target.colour(k as f64 * omega, sample_time).max(1.0);
+        let error = |k: usize| rms * (2.0 / n as f64 * coloured(k)).sqrt();
         let harmonics: Vec<f64> = (2..=fit.harmonics())
             .map(|n| fit.harmonic(n).norm() / amplitude)
             .collect();
         let content = Self {
             amplitude,
-            // Behind a filter a converter and a remainder of the motion are as white as before.
-            errors: (2..=fit.harmonics())
-                .map(|k| target.colour(k as f64 * omega, sample_time).max(1.0))
-                .map(|coloured| rms * (2.0 * coloured / n as f64).sqrt())
-                .collect(),
+            errors: (2..=fit.harmonics()).map(error).collect(),
             harmonics,
             rest: rms,
             noise: target.noise(rest.as_slice(), sample_time) / amplitude,
@@ -212,7 +212,7 @@ fn is_asymmetric_by_reference(samples: &[Sample], knowledge: &Knowledge, omega: 
         return false;
     }
     let values = DVector::from_vec(values);
-    let content = Content::fitted(&basis, &values, [omega, sample_time], target);
+    let content = Content::fitted(&basis, &values, [omega, sample_time], &target);
     let content = content.and_then(|(content, _)| content.with_change(&values, turn, ALL));
     content.is_some_and(|content| content.is_asymmetric(target.measurands[1].order()))
 }
