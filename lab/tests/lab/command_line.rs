@@ -298,6 +298,13 @@ fn theory_and_response_are_drawn_for_a_file() {
 }
 
 #[test]
+fn a_simulated_base_that_is_held_and_read_is_warned_of() {
+    assert!(text(&vines("check --set chain.hold=true")).contains("half a sample late; the lock is 1.80 degrees off"));
+    let without = vines("check --set chain.hold=true --set chain.reference=false");
+    assert!(!text(&without).contains("half a sample late"));
+}
+
+#[test]
 fn a_structure_whose_other_modes_leave_no_orbit_stable_is_told_so() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().display();

@@ -10,7 +10,7 @@ use phase_lock_f32 as single;
 use vines_model::numerics::{Estimate, mean_square};
 use vines_model::orbit::phase_resonant;
 use vines_testbench::backbone::LevelPoint;
-use vines_testbench::comparison::COMPARED_ABOVE;
+use vines_testbench::comparison::{COMPARED_ABOVE, ExactCurve};
 use vines_testbench::experiment::ExperimentError;
 use vines_testbench::identification::{
     IdentificationError, Lock, Regime, ResonancePoint, WINDOW, decay_points, foreign_tone, identify, regime_by_response,
@@ -105,7 +105,7 @@ fn a_delay_of_more_than_a_period_that_the_controller_knows_does_not_keep_it_from
 }
 
 #[test]
-fn the_gain_of_an_anti_alias_filter_is_corrected() {
+fn the_gains_of_an_anti_alias_filter_and_of_a_held_base_are_corrected() {
     let ideal = at("").unwrap();
     // The gain at the lock is 0.9992 and 0.97.
     for settings in [
@@ -116,6 +116,47 @@ fn the_gain_of_an_anti_alias_filter_is_corrected() {
         let filtered = at(settings).unwrap();
         let [c, sigma] = [filtered.c - ideal.c, filtered.sigma - ideal.sigma];
         assert!(c.abs() < 3e-6 && sigma.abs() < 1e-4, "{settings}: {c:e}, {sigma:e}");
+    }
+    // The fundamental of a base that is held for a hundredth of a period is 1.6e-4 smaller than that of its samples.
+    let held = at("chain.hold=true chain.reference=false").unwrap();
+    let half = 0.5 * (TAU * held.f_hz) * (TAU / 100.0);
+    assert!((held.g - 1.1 * half.sin() / half).abs() < 1e-6, "{held:?}");
+}
+
+#[test]
+fn an_asymmetric_motion_is_none_of_noise_whatever_the_sensor_measures() {
+    let scene = paper(&[
+        "plant.m=0.066271",
+        "plant.c=8.068",
+        "plant.r=0.723",
+        "resonance.sensor=q1",
+        "resonance.reference_quantity=velocity",
+        "backbone.C_from=0.75",
+        "backbone.points=1",
+    ]);
+    let levels = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+    let [level] = &levels.points[..] else {
+        panic!("{levels:?}")
+    };
+    assert_eq!(
+        [Some(level.regime), level.regime_by_impacts],
+        [Some(Regime::Asymmetric); 2]
+    );
+    assert!(!level.settled);
+}
+
+#[test]
+fn a_point_without_a_base_sensor_is_as_right_as_one_with_it() {
+    let rig = ["plant.m=0.04993", "plant.c=5.044", "plant.r=0.805", "backbone.points=1"];
+    for reference in ["chain.reference=true", "chain.reference=false"] {
+        let scene = paper(&[&rig[..], &[reference]].concat());
+        let levels = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+        let at = levels.points[0].at;
+        let [sigma, _] = ExactCurve::of(&scene.dimensionless()).at(at.c).unwrap();
+        assert!(
+            (at.sigma - sigma).abs() < 3.0 * at.u_sigma,
+            "{reference}: {at:?}, {sigma}"
+        );
     }
 }
 
