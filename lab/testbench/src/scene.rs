@@ -29,7 +29,7 @@ mod shaker;
 mod structure;
 pub mod unit;
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -42,6 +42,7 @@ use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use shaker::ShakerSection;
 use structure::StructureSection;
+use toml::Table;
 use vines_model::ArgumentError;
 
 use crate::rig::SimulatedStructure;
@@ -58,6 +59,9 @@ pub use vines_model::{Definition, Dimensionless, Measurand, Reference, Sensor};
 
 /// The default scene, embedded so that the program works from any folder.
 pub const PAPER: &str = include_str!("../../../scenes/paper.toml");
+
+/// Largest number of times the default samples that a scene takes by itself: with more, a simulation takes minutes.
+const OVERSAMPLED: f64 = 16.0;
 
 /// A checked scene in SI units; build one with [`Scene::load`] or [`Scene::parse`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -180,6 +184,39 @@ impl Scene {
         let samples_per_period = factor * self.controller.samples_per_period;
         let controller = ControllerSettings { samples_per_period, ..self.controller };
         Self { controller, ..self }
+    }
+
+    /// Number of times the default samples that a shaker needs: a power of two, at most [`OVERSAMPLED`]; 1 without a shaker.
+    ///
+    /// Impacts put edges into its force, and harmonics beside the sampling frequency look like the fundamental. They are smaller than the precision
+    /// asked of a tracked drive where the impacts on a particle of the speed b omega0, whose harmonics are 4/pi m b omega0², make as little of
+    /// the force through structure and shaker, and through an anti-alias filter.
+    fn oversampling(&self) -> f64 {
+        let shaken = self.structure().and_then(|one| Some((one, one.shaker.as_ref()?)));
+        let Some((structure, shaker)) = shaken.filter(|_| self.amplitude > 0.0) else {
+            return 1.0;
+        };
+        let [reference, _] = shaker.reference_and_inertia(structure.excitation);
+        let (omega, order) = (structure.mode().omega, self.resonance.reference_quantity.order());
+        let impacts = 4.0 / PI * self.plant.particle_mass * self.plant.half_width * omega * omega;
+        let allowed = self.backbone.precision * self.amplitude / structure.base_per_drive();
+        let is_enough = |times: &f64| {
+            let at = times * self.controller.samples_per_period;
+            let passed = self
+                .chain
+                .filter
+                .map_or(1.0, |cut_off| (at / cut_off).powi(4).hypot(1.0).recip());
+            let aliased = structure
+                .host
+                .frequency_response_to_cavity(&reference, at * omega)
+                .norm();
+            aliased * impacts * at.powi(order) * passed <= allowed
+        };
+        let times = std::iter::successors(Some(1.0), |times| Some(2.0 * times));
+        times
+            .take_while(|times| *times < OVERSAMPLED)
+            .find(is_enough)
+            .unwrap_or(OVERSAMPLED)
     }
 
     /// What is possible, but hardly meant: a value in another unit, such as kN/m, g or mm.
@@ -362,7 +399,8 @@ impl ExcitationSection {
 }
 
 impl Sections {
-    fn resolve(self, origin: &str) -> Result<Scene, SceneError> {
+    /// The checked scene; `table`: the sections as written, which show what is not given.
+    fn resolve(self, origin: &str, table: &Table) -> Result<Scene, SceneError> {
         // Paths are relative to the scene file.
         let folder = Path::new(origin).parent().unwrap_or(Path::new(""));
         let mut plant = self.plant;
@@ -397,7 +435,7 @@ impl Sections {
         }
         let plant = plant.resolve(origin)?;
         let d = Dimensionless::of(&plant, 0.0);
-        let scene = Scene {
+        let mut scene = Scene {
             start: self.start.resolve(&plant)?,
             amplitude: self.excitation.in_metres(origin, &d, structure.as_ref())?,
             plant,
@@ -431,6 +469,11 @@ impl Sections {
             if let Some(message) = structure.beyond_limits(scene.amplitude, 0.5 * scene.plant.half_width) {
                 return Err(SceneError::text(origin, message));
             }
+        }
+        let controller = table.get("controller");
+        let is_sampled = || controller.is_some_and(|keys| keys.get("samples_per_period").is_some());
+        if cfg!(feature = "tables") && !is_sampled() {
+            scene.controller.samples_per_period *= scene.oversampling();
         }
         scene.controller.check()?;
         scene.backbone.check()?;
@@ -499,7 +542,8 @@ impl Scene {
 
     /// Reads a scene from `text`; `origin` names it in messages.
     pub fn parse(origin: &str, text: &str, overrides: &[Override]) -> Result<Self, SceneError> {
-        let scene = overrides::read(origin, text, overrides)?.0.resolve(origin)?;
+        let (sections, table) = overrides::read(origin, text, overrides)?;
+        let scene = sections.resolve(origin, &table)?;
         scene.controller_config().build()?;
         Ok(scene)
     }

@@ -16,7 +16,7 @@ use super::{Measurand, Scene, SceneError, Structure, check, given, positive, wit
 settings! {
     /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
     pub struct ControllerSettings {
-        /// Samples per natural period `2 pi/omega0`.
+        /// Samples per natural period `2 pi/omega0`; behind a shaker, a scene without this key takes more where the force has sharp edges.
         samples_per_period: f64 = 100.0,
         /// Bandwidth of the phase detector, in units of omega0: the only tuning parameter; the gains of the loop follow from it.
         bandwidth: f64 = 0.1,

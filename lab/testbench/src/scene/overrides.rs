@@ -123,7 +123,7 @@ impl Family {
     pub fn parse(origin: &str, text: Option<&str>, overrides: &[Override]) -> Result<Self, SceneError> {
         let (origin, text) = text.map_or(("paper.toml (the default scene)", PAPER), |text| (origin, text));
         let (sections, table) = read(origin, text, overrides)?;
-        sections.resolve(origin)?.controller_config().build()?;
+        sections.resolve(origin, &table)?.controller_config().build()?;
         Ok(Self { origin: origin.into(), table, keys: Vec::new() })
     }
 
@@ -150,7 +150,8 @@ impl Family {
             }
         }
         let refused = |error: toml::de::Error| SceneError::text(&self.origin, plain(error.message()));
-        Sections::deserialize(table).map_err(refused)?.resolve(&self.origin)
+        let sections = Sections::deserialize(table.clone()).map_err(refused)?;
+        sections.resolve(&self.origin, &table)
     }
 }
 

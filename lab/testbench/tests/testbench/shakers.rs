@@ -70,6 +70,65 @@ fn distance_of_lock(scene: &Scene) -> f64 {
     distance.fold(f64::INFINITY, f64::min)
 }
 
+/// An armature of half of the mass, whose stiff stinger passes the impacts on to the force cell; `rest`: more sections and keys.
+fn edged(rest: &str) -> Scene {
+    let text = "[plant]\nm = 0.01\nb = 1\nr = 0.65\n[structure]\ncavity = \"mass\"\nexcitation = \"force\"\ndrive = \"mass\"\nsensor = \"mass\"\n\
+                modes = [{ frequency = 1, damping = 0.005, shape = { mass = 1.0 } }]\n[shaker]\nmass = 0.5\nstiffness = 4.0\ndamping = 0.1\n\
+                stinger_stiffness = 1e4\nstinger_damping = 1.0\nresistance = 1\nBl = 0.3\n[excitation]\nG = 1\n";
+    Scene::parse("edged", &format!("{text}{rest}"), &[]).unwrap()
+}
+
+#[test]
+fn edges_of_a_force_that_alias_are_smaller_than_the_precision_by_default() {
+    let scene = edged("");
+    let samples = scene.controller.samples_per_period;
+    let structure = scene.structure.as_ref().unwrap();
+    let rows = &structure.shaker.as_ref().unwrap().rows;
+    let orbits = scene.structure_orbits().unwrap();
+    let orbit = orbits
+        .at_phase_resonance(0.99 * TAU)
+        .into_iter()
+        .find(|orbit| orbit.stable)
+        .unwrap();
+    let mut plant = Plant::with_host(structure.host.clone(), scene.plant, &StructureState::default()).unwrap();
+    let drive = Drive::harmonic(orbit.drive, orbit.omega);
+    plant.begin(drive).unwrap();
+    let start = &orbit.start;
+    plant.set_sections(&start.sections, [start.q2, start.dq2]).unwrap();
+    let count = 20_000;
+    let mut force = Vec::new();
+    for _ in 0..count {
+        plant.advance(drive, TAU / orbit.omega / f64::from(count)).unwrap();
+        force.push(plant.point(&rows.force)[0]);
+    }
+    let harmonic = |n: f64| {
+        let turned = |(k, force): (usize, &f64)| force * Complex::cis(TAU * n * k as f64 / f64::from(count));
+        force.iter().enumerate().map(turned).sum::<Complex<f64>>().norm()
+    };
+    let beside = |samples: f64| harmonic(samples - 1.0) / harmonic(1.0) / scene.backbone.precision;
+    assert!(
+        samples > 200.0 && beside(samples) < 1.2,
+        "{samples}: {}",
+        beside(samples)
+    );
+    assert!(
+        beside(0.5 * samples) > 0.8,
+        "half of {samples}: {}",
+        beside(0.5 * samples)
+    );
+}
+
+#[test]
+fn a_scene_takes_more_samples_for_a_shaker_only_if_it_does_not_say_how_many() {
+    let samples = |rest: &str| edged(rest).controller.samples_per_period;
+    assert_eq!(samples("[controller]\nsamples_per_period = 100\n"), 100.0);
+    assert_eq!(samples("[controller]\nsamples_per_period = 130\n"), 130.0);
+    assert!(samples("[chain]\nfilter = 10\n") < samples(""));
+    assert!(samples("[backbone]\nprecision = 0.1\n") < samples(""));
+    let of_presets = [0, 1, 2].map(|n| preset(n, &[]).unwrap().controller.samples_per_period);
+    assert_eq!(of_presets, [100.0, 200.0, 100.0]);
+}
+
 /// The receptance of the cantilever of the preset at its tip, by forces at its root and at its tip, m/N.
 fn receptance(scene: &Scene, omega: f64) -> [Complex<f64>; 2] {
     let bare = preset(0, &[("cell_mass = 0.02", "")]).unwrap();
