@@ -8,12 +8,9 @@ use crate::contact::{Resolution, Touch, Wall};
 use crate::fast::Next;
 use crate::flight::{Flight, FlightEnd, Grip, until_released};
 use crate::parameters::InvalidValue;
-use crate::plant::{Event, MOST_EVALUATIONS, MOST_IMPACTS, Outcome, Plant};
+use crate::plant::{Event, MOST_EVALUATIONS, MOST_IMPACTS, MOST_RELEASES, Outcome, Plant};
 use crate::primary::Primary;
 use crate::system::{Contact, Masses};
-
-/// Largest number of releases per step: rounding can tear a particle off its wall again and again where values are extreme.
-const MOST_RELEASES: u64 = 2_000_000;
 
 /// A step under way.
 pub(crate) struct Step<F> {

@@ -14,6 +14,9 @@ use crate::system::{Masses, Moving, System};
 
 /// Largest number of impacts per step.
 pub const MOST_IMPACTS: u64 = 10_000_000;
+/// Largest number of releases and reversals per step: rounding can tear a particle off its wall again and again where values are extreme, and on a
+/// tilted floor each hop of a particle that loses little at its wall has a reversal.
+pub const MOST_RELEASES: u64 = 2_000_000;
 /// Largest number of evaluations of the motion per step: bounds the work of any input. [`MOST_IMPACTS`] impacts need fewer.
 pub const MOST_EVALUATIONS: u64 = 500_000_000;
 

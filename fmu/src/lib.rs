@@ -262,7 +262,7 @@ impl Component for LoViNes {
         let resolved = self.keep_outputs();
         if outcome.cut_short || !resolved {
             self.outputs = Outputs::default();
-            return Err(lost(resolved, time, (step, outcome.elapsed)));
+            return Err(lost(resolved, time, step, &outcome));
         }
         match (&self.adopted, &self.simulation) {
             (Some(adopted), Simulation::Structure(plant)) => adopted.check(plant),

@@ -3,8 +3,7 @@
 
 use super::LoViNes;
 use fmi2_component::Refusal;
-use lovines::plant::MOST_IMPACTS;
-use lovines::{Drive, InvalidValue, Parameters, State};
+use lovines::{Drive, InvalidValue, Outcome, Parameters, State};
 
 /// Limit in half-widths: there the spacing of doubles is one half-width.
 const RESOLUTION: f64 = 1.0 / f64::EPSILON;
@@ -81,11 +80,13 @@ const LONGEST_STEP: f64 = 1e7;
 
 /// Why a step could not be finished.
 #[cold]
-pub(super) fn lost(resolved: bool, time: f64, (step, elapsed): (f64, f64)) -> Refusal {
+pub(super) fn lost(resolved: bool, time: f64, step: f64, outcome: &Outcome) -> Refusal {
+    let Outcome { impacts, released, elapsed, evaluations, .. } = outcome;
     Refusal::error(if resolved {
         format!(
-            "there are {MOST_IMPACTS} impacts within the first {elapsed} s of the step of {step} s at t = {time} s; expected \
-             velocities and a half-width of the cavity that make sense together, or a shorter step"
+            "there are {impacts} impacts, {released} releases and {evaluations} evaluations of the motion within the first {elapsed} s of \
+             the step of {step} s at t = {time} s, of one of them the most in a step; expected velocities and a half-width of the cavity \
+             that make sense together, or a shorter step"
         )
     } else {
         format!(

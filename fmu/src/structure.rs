@@ -163,6 +163,9 @@ pub(super) fn step(
         // Lines that are not wanted are not written: one copy of the code.
         let outcome = plant.advance_with(piece.drive, piece.duration, |event| log::tell(log, begin, event))?;
         whole.elapsed += outcome.elapsed;
+        whole.impacts += outcome.impacts;
+        whole.released += outcome.released;
+        whole.evaluations += outcome.evaluations;
         whole.cut_short = outcome.cut_short;
         if whole.cut_short {
             break;
