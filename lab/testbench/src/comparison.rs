@@ -163,9 +163,9 @@ pub struct ExactCurve {
 pub struct Distance {
     /// Largest of the differences in C, sigma and G, at the place on the curve where it is smallest.
     pub nearest: f64,
-    /// Difference in sigma at the same C; absent outside the curve.
+    /// Difference in sigma from the nearest place with the same C; absent outside the curve.
     pub sigma: Option<f64>,
-    /// Difference in G at the same C; absent outside the curve.
+    /// Difference in G from this place; absent outside the curve.
     #[serde(rename = "G")]
     pub g: Option<f64>,
 }
@@ -234,7 +234,9 @@ impl ExactCurve {
             .windows(2)
             .map(|pair| to_segment([c, sigma, g], pair[0], pair[1]));
         let nearest = segments.reduce(f64::min)?;
-        let same = self.at(c);
+        let away = |[exact, drive]: &[f64; 2]| (sigma - exact).abs().max((g - drive).abs());
+        let places = self.places.windows(2).filter_map(|pair| at(pair, c));
+        let same = places.min_by(|one, other| away(one).total_cmp(&away(other)));
         Some(Distance {
             nearest,
             sigma: same.map(|[exact, _]| sigma - exact),
@@ -487,5 +489,21 @@ mod tests {
         let off = curve.distance(orbit.c, orbit.sigma + 0.01, orbit.g).unwrap();
         assert!((off.sigma.unwrap() - 0.01).abs() < 1e-5);
         assert!(off.nearest > 1e-3 && off.nearest < 0.01);
+    }
+
+    #[test]
+    fn of_two_places_with_the_same_amplitude_the_nearer_one_is_compared() {
+        let curve = ExactCurve {
+            places: vec![[0.6, -1.0, 1.2], [0.4, -1.2, 0.8], [0.6, 0.4, 2.0]],
+            curves: Vec::new(),
+            is_of_structure: true,
+        };
+        for (sigma, g) in [(-1.1, 1.0), (-0.4, 1.4)] {
+            let distance = curve.distance(0.5, sigma, g).unwrap();
+            assert!(
+                distance.sigma.unwrap().abs() < 1e-12 && distance.g.unwrap().abs() < 1e-12,
+                "{distance:?}"
+            );
+        }
     }
 }

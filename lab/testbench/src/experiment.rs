@@ -564,7 +564,11 @@ fn failed(samples: &[Sample], period: usize) -> Option<&'static str> {
         |of: fn(Sensors) -> f64| -> Vec<f64> { samples[begin..].iter().map(|sample| of(sample.sensors)).collect() };
     let force = channel(|sensors| sensors.reference.unwrap_or(0.0));
     let response = channel(|sensors| sensors.response);
-    match (how(&force, period), how(&response, period)) {
+    let (force, motion) = (how(&force, period), how(&response, period));
+    match (force, motion) {
+        (None | Some(Failure::Other), Some(Failure::Other)) if !leaps(&response, period) => {
+            Some("response and force change from period to period: the motion is irregular, or becomes another one")
+        }
         (_, Some(_)) => Some("the response jumped, as no structure does: check its sensor and cable"),
         (Some(Failure::Nothing), _) => {
             Some("the force cell reads nothing: it or its cable is dead, or the stinger is broken")
@@ -578,6 +582,15 @@ fn failed(samples: &[Sample], period: usize) -> Option<&'static str> {
         ),
         (None, None) => None,
     }
+}
+
+/// Whether the largest change from sample to sample has doubled since a period before: a motion that changes does not leap.
+fn leaps(readings: &[f64], period: usize) -> bool {
+    let largest = |readings: &[f64]| {
+        let steps = readings.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        steps.fold(0.0, f64::max)
+    };
+    largest(&readings[period - 1..]) > 2.0 * largest(&readings[..period])
 }
 
 /// How a channel differs from what it read a period before.
@@ -649,6 +662,26 @@ mod tests {
         ] {
             let text = evidence(&samples, &scene.controller_config(), fault).to_string();
             assert!(text.contains(read) && text.contains(limit), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_motion_that_changes_is_not_taken_for_a_sensor_that_fails_but_a_jump_is() {
+        let read = |changed: fn(usize, f64) -> f64| {
+            let mut samples = vec![Sample::default(); 200];
+            for (n, sample) in samples.iter_mut().enumerate() {
+                let sine = (TAU * n as f64 / 100.0).sin();
+                sample.sensors = Sensors { response: changed(n, sine), reference: Some(0.1 * sine) };
+            }
+            failed(&samples, 100).unwrap()
+        };
+        let irregular = read(|n, sine| sine * (0.5 + 0.5 * (n as f64 / 200.0).powi(2)));
+        assert!(irregular.contains("irregular"), "{irregular}");
+        for jump in [
+            read(|n, sine| if n < 130 { sine } else { 0.0 }),
+            read(|n, sine| if n < 130 { sine } else { -sine }),
+        ] {
+            assert!(jump.contains("jumped"), "{jump}");
         }
     }
 }

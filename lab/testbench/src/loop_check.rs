@@ -95,7 +95,7 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
     readings.truncate(ends);
     without_drift(&mut readings[begins..]);
     let mut channels = [0, 1].map(|n| {
-        let (phasor, noise) = fitted(&readings[begins + driven - window..], n + 1, &target, omega);
+        let (phasor, noise) = fitted(&readings[begins + driven - window..], n + 1, 0, &target, omega);
         let ratio = phasor / expected[n];
         let floor = scatter(&readings[begins - quiet..begins], n + 1);
         let channel = CheckedChannel { noise, floor, ..CheckedChannel::default() };
@@ -112,7 +112,7 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
         .map(|[phase, ..]| channels[1].gain * amplitude * (phase + target.measurands[1].lead()).sin());
     let waits = moved < 0.5 * mean_square(moves);
     // Without a sensor, the base moves as expected.
-    let (phasor, noise) = fitted(&readings[begins + driven - window..], 2, &target, omega);
+    let (phasor, noise) = fitted(&readings[begins + driven - window..], 2, 0, &target, omega);
     let base = if has_base {
         (phasor, noise / phasor.norm() * (2.0 / window as f64).sqrt())
     } else {
@@ -121,7 +121,7 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
     let period = samples(1);
     let phasors = |readings: &[[f64; 3]], of: usize| -> (Vec<Complex64>, Vec<f64>) {
         let periods = readings.chunks_exact(period);
-        periods.map(|readings| fitted(readings, of, &target, omega)).unzip()
+        periods.map(|readings| fitted(readings, of, 0, &target, omega)).unzip()
     };
     let readings = &readings[begins..];
     let (response, rests) = phasors(readings, 1);
@@ -207,11 +207,12 @@ fn expected(plan: &Plan, omega: f64, amplitude: f64) -> [Complex64; 2] {
     [growth * amplitude * stated, stated * amplitude]
 }
 
-/// The displacement of a signal at the frequency of the drive, `omega` (rad/s), m, and the rest of it, RMS; NaN for readings that are no numbers.
-fn fitted(readings: &[[f64; 3]], channel: usize, target: &Target, omega: f64) -> (Complex64, f64) {
+/// The displacement of a signal at the frequency of the drive, `omega` (rad/s), m, beside an offset that is a polynomial of the degree `trend`, and the
+/// rest of it, RMS; NaN for readings that are no numbers.
+fn fitted(readings: &[[f64; 3]], channel: usize, trend: usize, target: &Target, omega: f64) -> (Complex64, f64) {
     let displacement = target.displacement(channel - 1, omega);
     let phases: Vec<f64> = readings.iter().map(|reading| reading[0]).collect();
-    let basis = HarmonicBasis::new(&phases, 0, &[Some(0)]);
+    let basis = HarmonicBasis::new(&phases, trend, &[Some(0)]);
     let values = DVector::from_iterator(readings.len(), readings.iter().map(|reading| reading[channel]));
     basis
         .fit(&values)
