@@ -509,7 +509,8 @@ fn sweep(case: &Case, snr: &str) -> Result<Recorded, Failure> {
     );
     let middle = 0.5 * (low + high);
     let (least, most) = (1.08 * low / middle, 0.95 * high / middle);
-    let begin = plan.knowledge.samples(600.0);
+    // The same run as far as the lock.
+    let begin = record(&mut *behind_chain(truth, &scene)?, &plan)?.settled;
     let turn = plan
         .knowledge
         .samples(10.0 * plan.knowledge.linear.relaxation_periods().max(30.0));

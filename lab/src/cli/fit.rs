@@ -9,7 +9,7 @@ use clap::Args;
 use serde::Serialize;
 use vines::fit::{
     Candidate, Effect, EffectReport, Explanation, Fit, FitReport, FittedParameter, Found, Known, LeftOut,
-    LinearVerdict, MeasuredPoint, Measurements, Part, Selection, decimals, find,
+    LinearVerdict, MeasuredPoint, Measurements, Part, Quantity, Selection, decimals, find,
 };
 use vines::numerics::Estimate;
 use vines::report::fitted;
@@ -136,8 +136,8 @@ struct Output<'a> {
     notes: Vec<String>,
 }
 
-/// What the intervals depend on: other cavities that would give the same points.
-fn only_if_ideal(alternatives: &[EffectReport]) -> String {
+/// What the intervals depend on: other cavities that would give the same points. `b_is_known`: whether a measured half-width would have shown them.
+fn only_if_ideal(alternatives: &[EffectReport], b_is_known: bool) -> String {
     let texts: Vec<String> = alternatives
         .iter()
         .map(|EffectReport { effect, symbol, unit, possible_strength, possible_b_m, .. }| {
@@ -149,7 +149,12 @@ fn only_if_ideal(alternatives: &[EffectReport]) -> String {
         })
         .collect();
     if texts.is_empty() {
-        return String::new();
+        let text = if b_is_known {
+            ""
+        } else {
+            "the intervals hold if the cavity is ideal\n"
+        };
+        return text.into();
     }
     format!(
         "the intervals hold if the cavity is ideal: {}. Measure b with a ruler and the masses with a scale, and give --known b=VALUE±U and \
@@ -175,7 +180,7 @@ fn explained(explanation: &Explanation) -> String {
             }
         };
         let chi_square = chi_square(&candidate.fit);
-        format!("{effect} ({symbol} = {strength}{space}{unit}, chi-square {chi_square}{without})")
+        format!("{effect} alone ({symbol} = {strength}{space}{unit}, chi-square {chi_square}{without})")
     });
     let possible: Vec<String> = possible.collect();
     match &possible[..] {
@@ -303,6 +308,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         found.explanation.as_ref().map(explained),
     );
     let alternatives: Vec<EffectReport> = found.alternatives.iter().map(Candidate::report).collect();
+    let is_ideal = found.explanation.is_none() && !found.fit.is_rejected();
+    let b_is_known = arguments
+        .known
+        .iter()
+        .any(|known| matches!(known, Known::Value { quantity: Quantity::B, .. }));
     let printed = Output {
         report: &report,
         verdict: verdict.clone(),
@@ -321,7 +331,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
             summary(&report, &found, skipped),
             found.linear.iter().map(of_linear).collect(),
             verdict.unwrap_or_default(),
-            only_if_ideal(&alternatives),
+            if is_ideal {
+                only_if_ideal(&alternatives, b_is_known)
+            } else {
+                String::new()
+            },
         ]
         .concat()
     })?;

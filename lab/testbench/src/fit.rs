@@ -131,6 +131,14 @@ fn model(x: &Unknowns, definition: Definition) -> Dimensionless {
     }
 }
 
+/// Smallest and largest responses of the 1:1 motion, m: at the fold, and at the loss of symmetry.
+fn range_of(x: &Unknowns, definition: Definition) -> Option<[f64; 2]> {
+    let manifold = SlowFlow::new(0.0, x[2]).manifold;
+    let [fold, loss] = [manifold.b_min(), B_SYMMETRY_BREAKING]
+        .map(|speed| Some(x[3].exp() * backbone_at_speed(&model(x, definition), speed)?[1]));
+    Some([fold?, loss?])
+}
+
 /// The gradient of a quantity.
 fn gradient(x: &Unknowns, of: impl Fn(&Unknowns) -> f64) -> Unknowns {
     Unknowns::from_fn(|i, _| {
@@ -291,14 +299,6 @@ impl Fit {
         fitted
             .filter(|quantity| !self.estimate(*quantity).is_some_and(is_determined))
             .collect()
-    }
-
-    /// Smallest and largest responses of the 1:1 motion, m: at the fold, and at the loss of symmetry.
-    fn range(&self, definition: Definition) -> Option<[f64; 2]> {
-        let manifold = SlowFlow::new(0.0, self.x[2]).manifold;
-        let [fold, loss] = [manifold.b_min(), B_SYMMETRY_BREAKING]
-            .map(|speed| Some(self.x[3].exp() * backbone_at_speed(&model(&self.x, definition), speed)?[1]));
-        Some([fold?, loss?])
     }
 
     /// The plant of the fit; without a known mass, stiffness or damping, its primary mass is that of `scene`.
@@ -527,7 +527,7 @@ impl<'a> Problem<'a> {
         let ends = ends.filter(|(high, low)| self.may_keep(order.len().saturating_sub(high + low)));
         let ends = ends.filter_map(|(high, low)| {
             let (rest, next) = self.rest(&order[high..order.len() - low], fit, expected)?;
-            let [smallest, largest] = next.range(self.definition)?;
+            let [smallest, largest] = range_of(&next.x, self.definition)?;
             let outermost = self.points[if high > 0 { order[0] } else { order[order.len() - 1] }].response;
             let aside = SIGNIFICANT * outermost.uncertainty;
             let has_ended = match high {

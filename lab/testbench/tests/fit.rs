@@ -302,10 +302,15 @@ fn recorded_as([response, base]: [Measurand; 2]) -> Recording {
 }
 
 fn recorded(settings: &str) -> Recording {
+    recorded_on(RIG, settings)
+}
+
+fn recorded_on(rig: Parameters, settings: &str) -> Recording {
     let scene = scene(&format!(
         "backbone.C_from=0.65 backbone.C_to=0.25 backbone.points=10{settings}"
     ));
-    let rig = Simulated::new(RIG, scene.start).unwrap().with_sensors(scene.resonance);
+    let rig = Simulated::new(rig, scene.start).unwrap();
+    let rig = rig.with_sensors(scene.resonance);
     let mut rig = Recorder { rig: Chain::around(Box::new(rig), &scene), read: Vec::new() };
     let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
     track(&mut rig, &mut controller, &scene.plan(), |_, _| {}).unwrap();
@@ -397,6 +402,18 @@ fn the_plant_follows_a_record_and_determines_the_parameters_better_than_its_poin
 }
 
 #[test]
+fn a_record_that_contradicts_the_plant_in_the_range_of_its_motion_is_not_followed() {
+    // Tilt and friction: b would be 8 % off, 23 times its uncertainty.
+    let scene = scene("chain.snr=60");
+    let cavity = Cavity { tilt: 0.03, kinetic_friction: 0.02, ..Cavity::IDEAL };
+    let record = recorded_on(Parameters { cavity, ..scene.plant }, " chain.snr=60");
+    let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
+    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+    let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]);
+    assert!(followed.is_none(), "{followed:?}");
+}
+
+#[test]
 fn a_record_without_noise_is_followed_to_its_end() {
     let (scene, record) = (wrong_scene(), recorded(""));
     let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
@@ -472,6 +489,15 @@ fn without_knowns_an_ideal_fit_says_which_cavity_would_give_the_same_points() {
     assert!(!found.fit.is_rejected() && found.explanation.is_none(), "{found:?}");
     let effects: Vec<Effect> = found.alternatives.iter().map(|one| one.effect).collect();
     assert!(effects.contains(&Effect::Friction), "{effects:?}");
+    // So does one without a point that contradicts the others.
+    let mut strange = measured.clone();
+    strange.points[4].drive.value *= 1.01;
+    let found = find(&strange, &wrong_scene(), |_| {}).unwrap();
+    let effects = found.alternatives.iter().map(|one| one.effect);
+    assert!(
+        found.fit.left_out == [4] && effects.collect::<Vec<_>>().contains(&Effect::Friction),
+        "{found:?}"
+    );
     // A tilt contradicts every ideal cavity, and is found without knowns as well.
     let tilt = Cavity { tilt: 0.06, ..Cavity::IDEAL };
     let motions = (0..9).map(|n| motion_at(tilt, (0.3 + 0.04 * f64::from(n)) * RIG.half_width));

@@ -321,7 +321,7 @@ pub struct Found {
     pub record: Option<RecordFit>,
     /// What the effects say, if the ideal cavity does not describe all points.
     pub explanation: Option<Explanation>,
-    /// If the ideal cavity describes all points: effects that describe them as well, with a half-width outside the interval of the fit.
+    /// If the ideal cavity describes the points: effects that describe them as well, with a half-width outside the interval of the fit.
     pub alternatives: Vec<Candidate>,
 }
 
@@ -330,7 +330,7 @@ pub struct Found {
 ///
 /// # Errors
 /// As [`fit()`] and [`parts()`].
-pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize)) -> Result<Found, FitError> {
+pub fn find(measured: &Measurements, scene: &Scene, mut progress: impl FnMut(usize)) -> Result<Found, FitError> {
     let Measurements { points: measured_points, recordings, linear, known } = measured;
     let (definition, expected) = (scene.definition(), &scene.plant);
     let parts = parts(recordings, scene)?;
@@ -372,20 +372,23 @@ pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize))
     if points.len() < FEWEST {
         return Ok(found);
     }
-    if !found.fit.is_rejected() && found.fit.left_out.is_empty() {
-        let problem = Problem::new(points.clone(), definition, &known);
-        found.alternatives = problem.alternatives(&found.fit, expected, progress);
-        return Ok(found);
-    }
-    let explanation = explain(points, definition, expected, &known, progress)?;
     let is_rejected = found.fit.is_rejected();
-    let best = explanation.explains();
-    let best = best.filter(|best| is_rejected || best.fit.left_out.len() <= found.fit.left_out.len());
-    let is_told = is_rejected || best.is_some();
-    if let Some(best) = best {
-        (found.fit, found.plant) = (best.fit.clone(), best.plant(expected));
+    if is_rejected || !found.fit.left_out.is_empty() {
+        let explanation = explain(points, definition, expected, &known, &mut progress)?;
+        let best = explanation.explains();
+        let best = best.filter(|best| is_rejected || best.fit.left_out.len() <= found.fit.left_out.len());
+        let is_explained = best.is_some();
+        if let Some(best) = best {
+            (found.fit, found.plant) = (best.fit.clone(), best.plant(expected));
+        }
+        if is_rejected || is_explained {
+            found.explanation = Some(explanation);
+            return Ok(found);
+        }
     }
-    found.explanation = is_told.then_some(explanation);
+    let kept: Vec<usize> = (0..points.len()).filter(|n| !found.fit.left_out.contains(n)).collect();
+    let problem = Problem::new(points.clone(), definition, &known).of(&kept);
+    found.alternatives = problem.alternatives(&found.fit, expected, progress);
     Ok(found)
 }
 

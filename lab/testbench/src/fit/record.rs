@@ -37,7 +37,7 @@ use vines_model::{Definition, Dimensionless, Measurand, Sensor};
 use super::recording::remove_drift;
 use super::{
     ChannelTest, Covariance, Fit, Kind, Known, LIMITS, MeasuredPoint, Nearest, Part, Problem, Quantity, Recording,
-    UNKNOWNS, Unknowns, fit, plant, probability, shifted, unknowns,
+    UNKNOWNS, Unknowns, fit, plant, probability, range_of, shifted, unknowns,
 };
 use crate::rig::derivative;
 
@@ -46,6 +46,14 @@ use crate::rig::derivative;
 struct Stretch {
     record: usize,
     span: [usize; 2],
+}
+
+/// A stretch that does not belong to the motion.
+#[derive(Clone, Copy)]
+struct Cut {
+    stretch: Stretch,
+    /// Whether the record contradicts the plant there; otherwise it is the plant that has another motion, or has lost this one.
+    contradicts: bool,
 }
 
 /// Periods of a piece: innovations are tested piece by piece.
@@ -285,6 +293,11 @@ fn quarter_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
         Base { scale, jump: rate * angle.sin(), noise, rest, near }
     };
     quarter.map(jump).collect()
+}
+
+/// Number of samples.
+fn samples(stretches: impl Iterator<Item = Stretch>) -> usize {
+    stretches.map(|one| one.span[1] - one.span[0]).sum()
 }
 
 impl<'a> Measured<'a> {
@@ -600,7 +613,7 @@ impl Followed<'_> {
     }
 
     /// Lets the plant follow the stretches, without the pieces in which it has another motion. Returns what is left out.
-    fn linearise(&mut self, x: &Unknowns) -> Vec<Stretch> {
+    fn linearise(&mut self, x: &Unknowns) -> Vec<Cut> {
         let mut left_out = Vec::new();
         loop {
             let courses = self
@@ -614,17 +627,19 @@ impl Followed<'_> {
                 .map(|one| one.counted().chunks(PIECE).len())
                 .sum::<usize>();
             let limit = -2.0 * (FALSE_ALARM / pieces.max(1) as f64).ln();
-            let is_another = |piece: &[Step]| {
+            let contradicts = |piece: &[Step]| {
                 let moved = piece
                     .iter()
                     .fold(Vector4::ith(3, 1.0), |moved, step| step.transition * moved);
-                self.impacts > 0 && (moved.norm() >= 1.0 || unevenness(piece, self.beside) > limit)
-                    || piece.iter().any(|step| step.impacts != self.impacts)
+                let grows = self.impacts > 0 && moved.norm() >= 1.0;
+                let is_uneven = self.impacts > 0 && unevenness(piece, self.beside) > limit;
+                let is_another = grows || piece.iter().any(|step| step.impacts != self.impacts);
+                (is_another || is_uneven).then_some(!is_another)
             };
-            let flags: Vec<Vec<bool>> = self
+            let flags: Vec<Vec<Option<bool>>> = self
                 .courses
                 .iter()
-                .map(|one| one.counted().chunks(PIECE).map(is_another).collect())
+                .map(|one| one.counted().chunks(PIECE).map(contradicts).collect())
                 .collect();
             let more = self.cut(&flags);
             if more.is_empty() {
@@ -657,8 +672,9 @@ impl Followed<'_> {
         }
     }
 
-    /// Cuts the flagged pieces, and what the plant did not reach, out of the stretches; returns them.
-    fn cut(&mut self, flags: &[Vec<bool>]) -> Vec<Stretch> {
+    /// Cuts the flagged pieces, and what the plant did not reach, out of the stretches; returns them. `flags`: [`Cut::contradicts`] of pieces that do
+    /// not belong.
+    fn cut(&mut self, flags: &[Vec<Option<bool>>]) -> Vec<Cut> {
         let (mut kept, mut left_out) = (Vec::new(), Vec::new());
         for ((Stretch { record, span: [from, to] }, course), flags) in
             self.stretches.iter().zip(&self.courses).zip(flags)
@@ -666,11 +682,11 @@ impl Followed<'_> {
             let period = self.records[*record].period;
             let of = |from: usize, to: usize| Stretch { record: *record, span: [from, to] };
             let (mut begin, mut reached) = (*from, *from);
-            for (piece, is_cut) in course.counted().chunks(PIECE).zip(flags) {
+            for (piece, flag) in course.counted().chunks(PIECE).zip(flags) {
                 let [first, last] = [piece[0].begin, piece[piece.len() - 1].end];
-                if *is_cut {
+                if let Some(contradicts) = *flag {
                     kept.push(of(begin, first));
-                    left_out.push(of(first, last));
+                    left_out.push(Cut { stretch: of(first, last), contradicts });
                     begin = last;
                 }
                 reached = last;
@@ -679,7 +695,7 @@ impl Followed<'_> {
                 // Lost: what follows may be another motion, or the same again.
                 kept.push(of(begin, reached));
                 let again = (reached + PIECE * period).min(*to);
-                left_out.push(of(reached, again));
+                left_out.push(Cut { stretch: of(reached, again), contradicts: false });
                 begin = again;
             }
             kept.push(of(begin, *to));
@@ -695,7 +711,7 @@ impl Followed<'_> {
 
     /// The pieces that contradict the others: chi-square would fall too far without them, and with parameters fitted to the rest. A piece that does
     /// not belong bends the fit, so that its own innovations are small and others seem not to belong: the worst ones come first.
-    fn contradicting(&self, minimum: &Minimum) -> Vec<Vec<bool>> {
+    fn contradicting(&self, minimum: &Minimum) -> Vec<Vec<Option<bool>>> {
         let counts: Vec<usize> = self.courses.iter().map(|one| one.counted().len()).collect();
         let first = minimum.residuals.len() - 2 * counts.iter().sum::<usize>();
         let (normal, gradient) = minimum.equations();
@@ -721,7 +737,8 @@ impl Followed<'_> {
         let most = falls.iter().flatten().copied().fold(0.0, f64::max);
         let p = FALSE_ALARM / falls.concat().len().max(1) as f64;
         let limit = ChiSquared::new(2.0 * PIECE as f64).map_or(f64::INFINITY, |one| one.inverse_cdf(1.0 - p));
-        let flags = |one: &Vec<f64>| one.iter().map(|fall| *fall > limit.max(0.5 * most)).collect();
+        let flag = |fall: &f64| (*fall > limit.max(0.5 * most)).then_some(true);
+        let flags = |one: &Vec<f64>| one.iter().map(flag).collect();
         falls.iter().map(flags).collect()
     }
 }
@@ -765,7 +782,7 @@ type Minimum = LeastSquares<UNKNOWNS, Vec<Nearest>>;
 
 impl Followed<'_> {
     /// The minimum that is reached from these parameters, and what is left out; `None` where too little belongs.
-    fn search(&mut self, mut x: Unknowns) -> Option<(Minimum, Vec<Stretch>)> {
+    fn search(&mut self, mut x: Unknowns) -> Option<(Minimum, Vec<Cut>)> {
         let mut out = self.linearise(&x);
         for _ in 0..ROUNDS {
             out.extend(self.linearise(&x));
@@ -786,12 +803,32 @@ impl Followed<'_> {
             }
             let more = self.cut(&self.contradicting(&minimum));
             if more.is_empty() {
-                let followed: usize = self.stretches.iter().map(|one| one.span[1] - one.span[0]).sum();
-                return Some((minimum, out)).filter(|_| followed >= self.fewest);
+                let is_found = self.followed() >= self.fewest && !self.is_contradicted(&out, &x);
+                return Some((minimum, out)).filter(|_| is_found);
             }
             out.extend(more);
         }
         None
+    }
+
+    /// Whether a third of what lies in the range of the fitted motion contradicts it: then the model is wrong, and the rest only looks like it. Beyond
+    /// this range it is another motion, which says nothing about the model.
+    fn is_contradicted(&self, left_out: &[Cut], x: &Unknowns) -> bool {
+        let Some([fold, loss]) = range_of(x, self.problem.definition) else {
+            return false;
+        };
+        let is_within = |Stretch { record, span: [from, _] }: &Stretch| {
+            let Measured { recording, period, .. } = &self.records[*record];
+            let first = recording.response.get(*from..from + period);
+            first.is_some_and(|first| (fold..loss).contains(&harmonic(first).norm()))
+        };
+        let cut = left_out.iter().filter(|cut| cut.contradicts).map(|cut| cut.stretch);
+        2 * samples(cut.filter(is_within)) > self.followed()
+    }
+
+    /// Samples that are followed.
+    fn followed(&self) -> usize {
+        samples(self.stretches.iter().copied())
     }
 
     /// Covariance of the unknowns, by the likelihood ratio in the direction that is determined least: chi-square may be far from a parabola there, as
@@ -1027,7 +1064,7 @@ pub fn follow(
     let colour = 0.5 * (neighbours(0) + neighbours(1));
     // Sums of coloured innovations vary more, by this factor if each is a part of the one before and new noise.
     fit.covariance *= ((1.0 + colour) / (1.0 - colour)).max(1.0);
-    let left_out = out.iter().map(|Stretch { record, span }| {
+    let left_out = out.iter().map(|Cut { stretch: Stretch { record, span }, .. }| {
         let Recording { origin, sample_time, .. } = &recordings[*record];
         LeftOut {
             origin: origin.clone(),
