@@ -566,9 +566,10 @@ fn failed(samples: &[Sample], period: usize) -> Option<&'static str> {
     let response = channel(|sensors| sensors.response);
     let (force, motion) = (how(&force, period), how(&response, period));
     match (force, motion) {
-        (None | Some(Failure::Other), Some(Failure::Other)) if !leaps(&response, period) => {
-            Some("response and force change from period to period: the motion is irregular, or becomes another one")
-        }
+        (None | Some(Failure::Other), Some(Failure::Other)) if !leaps(&response, period) => Some(
+            "response and force change from period to period: the motion is irregular or becomes another one, the amplifier clips or is off, or \
+                 a sensor is noisy",
+        ),
         (_, Some(_)) => Some("the response jumped, as no structure does: check its sensor and cable"),
         (Some(Failure::Nothing), _) => {
             Some("the force cell reads nothing: it or its cable is dead, or the stinger is broken")
