@@ -254,25 +254,34 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64)> {
 fn limits(approach: &[Cycle], wide: &[Cycle], knowledge: &Knowledge, command: f64) -> Option<[Estimate; 2]> {
     let slopes = ResonanceFit::of(wide, knowledge, Slopes::Rising)?.slopes();
     let slopes = slopes.map(|slope| Estimate::new(slope.value, &[slope.uncertainty, SLOPE_UNCERTAINTY * slope.value]));
-    let limit = |cycles: &[Cycle]| Some(ResonanceFit::of(cycles, knowledge, Slopes::Known(slopes))?.limit(command));
+    let limit = |cycles: &[Cycle]| {
+        let fit = ResonanceFit::of(cycles, knowledge, Slopes::Known(slopes))?;
+        Some((fit.limit(command), fit.excess))
+    };
     let mut windows = vec![limit(approach)?];
     let mut cycles = approach;
     while cycles.len() >= 4 * ResonanceFit::FEWEST {
         cycles = &cycles[cycles.len() / 2..];
         windows.push(limit(cycles)?);
     }
+    // Harmonics above the third count as noise of a period, but do not scatter. A small module has no code for this.
+    let scatter = |n: usize| match cfg!(feature = "tables") {
+        true => windows[n..].iter().map(|window| window.1).fold(0.0, f64::max).min(1.0),
+        false => 1.0,
+    };
     let beyond = |n: usize, late: &[Estimate; 2]| {
-        [0, 1].map(|i| ((windows[n][i].value - late[i].value).abs() - RANDOM * late[i].uncertainty).max(0.0))
+        let allowed = RANDOM * scatter(n + 1);
+        [0, 1].map(|i| ((windows[n].0[i].value - late[i].value).abs() - allowed * late[i].uncertainty).max(0.0))
     };
     let last = windows.len() - 1;
-    let agrees = |n: &usize| windows[n + 1..].iter().all(|late| beyond(*n, late) == [0.0; 2]);
+    let agrees = |n: &usize| windows[n + 1..].iter().all(|late| beyond(*n, &late.0) == [0.0; 2]);
     let longest = (0..last).find(agrees);
     let difference = if last > 0 && longest.is_none() {
-        beyond(last - 1, &windows[last])
+        beyond(last - 1, &windows[last].0)
     } else {
         [0.0; 2]
     };
-    let whole = windows[longest.unwrap_or(last)];
+    let whole = windows[longest.unwrap_or(last)].0;
     Some([0, 1].map(|i| Estimate::new(whole[i].value, &[whole[i].uncertainty, difference[i]])))
 }
 
