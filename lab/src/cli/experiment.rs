@@ -227,6 +227,9 @@ impl Session {
                         fault: Fault::Implausible | Fault::LockLost,
                         ..
                     } => advice::reason(scene, &plan.knowledge.numbers, None),
+                    ExperimentError::Tripped { fault: Fault::NoSignal, .. } => {
+                        advice::is_hit_at_once(scene, &samples).then_some(advice::Reason::HitAtOnce)
+                    }
                     _ => None,
                 };
                 let reason = reason.map(|reason| summary::not_locked(&reason, scene));

@@ -82,6 +82,11 @@ pub(super) fn not_locked(reason: &Reason, scene: &Scene) -> String {
                     controller's gain, or of its phase, is wrong"
                 .into();
         }
+        Reason::HitAtOnce => {
+            return "the particle moves at the start and hits before the controller knows the signal, in which an impact is a step or a peak; set \
+                    start.dq2 = 0: the search brings impacts about"
+                .into();
+        }
         Reason::Unstable { g, range } => {
             let range = range.map_or_else(
                 || "at no G".into(),
@@ -227,6 +232,14 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     if let Some(smallest) = smallest.filter(|g| (at.g - g).abs() < SIGNIFICANT * at.u_g) {
         note(&format!(
             "the drive lies at the fold within its uncertainty: the smallest of the exact backbone is G = {smallest:.6}"
+        ));
+    }
+    let there = result.curve.distance(at.c, at.sigma, at.g).filter(|_| lock.held);
+    if let Some((sigma, g)) = there.and_then(|there| there.sigma.zip(there.g)) {
+        note(&format!(
+            "at the C that is held, the exact backbone has sigma = {:.6}, G = {:.6}",
+            at.sigma - sigma,
+            at.g - g
         ));
     }
     for orbit in result.others() {

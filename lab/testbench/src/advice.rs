@@ -9,7 +9,7 @@ use vines_model::regime::Regime;
 use crate::identification::{Cycle, classify};
 use crate::plan::Plan;
 use crate::record::Sample;
-use crate::scene::{Dimensionless, Scene};
+use crate::scene::{Dimensionless, Measurand, Scene};
 use crate::survey::{phase_resonant, structure_backbone};
 
 /// Detunings at which the backbone is searched for stable orbits, and their distance.
@@ -50,6 +50,8 @@ fn drives(orbits: &[Orbit]) -> Option<[f64; 2]> {
 pub enum Reason {
     /// The loop runs away from resonance ([`runs_away`]).
     WrongSign,
+    /// The first impacts are of a particle that moves at the start ([`is_hit_at_once`]).
+    HitAtOnce,
     /// No orbit at the drive `g` is stable; the range of drives is that of [`stable_range`].
     Unstable { g: f64, range: Option<[f64; 2]> },
     /// The controller may not set the frequency of any of these stable orbits.
@@ -63,13 +65,28 @@ pub enum Reason {
 /// Whether the loop runs away from resonance: its frequency has left the first one in the direction opposite to the one that the phase asks for,
 /// and the phase is beyond that of the half-power point. Above resonance the response lags, and the frequency must fall.
 pub fn runs_away(samples: &[Sample], plan: &Plan) -> bool {
-    let last = &samples[samples.len().saturating_sub(plan.hold)..];
-    let cycle = Cycle::of(last, plan.knowledge.sample_time, 0.0, plan.knowledge.target);
+    // Before that many periods a phase says nothing yet.
+    let Some(begin) = samples.len().checked_sub(plan.hold) else {
+        return false;
+    };
+    let cycle = Cycle::of(
+        &samples[begin..],
+        plan.knowledge.sample_time,
+        0.0,
+        plan.knowledge.target,
+    );
     let first = samples.iter().find(|sample| sample.command.drive.amplitude > 0.0);
     cycle.zip(first).is_some_and(|(cycle, first)| {
         let moved = cycle.omega - first.command.drive.omega;
         cycle.phase_error.abs() > FRAC_PI_4 && moved * cycle.phase_error < 0.0
     })
+}
+
+/// Whether the sensor of a simulated rig reads velocities or accelerations, and the particle moves at the start: it then hits before the controller
+/// knows the signal, which shows an impact as a step or a peak.
+pub fn is_hit_at_once(scene: &Scene, samples: &[Sample]) -> bool {
+    let is_simulated = samples.iter().any(|sample| sample.ground_truth.is_some());
+    is_simulated && scene.resonance.sensor_quantity != Measurand::Displacement && scene.start.dq2 != 0.0
 }
 
 /// The reason from the scene, the numbers of its rig and the regime of the last periods; it holds for the ideal cavity.
@@ -132,6 +149,8 @@ mod tests {
             };
             let samples: Vec<Sample> = (0..plan.knowledge.samples(300.0)).map(&mut sample).collect();
             assert_eq!(runs_away(&samples, &plan), is_wrong, "from {from} to {to}");
+            // A phase before the response has come says nothing.
+            assert!(!runs_away(&samples[..plan.hold - 1], &plan));
         }
     }
 }

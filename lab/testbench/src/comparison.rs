@@ -1,5 +1,7 @@
 //! Measurements beside first-order theory and exact orbits at the same parameters.
 
+use std::f64::consts::TAU;
+
 use lovines::State;
 use serde::Serialize;
 use vines_model::numerics::{golden_section, mean_square};
@@ -79,11 +81,16 @@ impl Comparison {
         let (knowledge, lock) = (found.knowledge, found.lock);
         let (parameters, at_resonance) = (knowledge.numbers, knowledge.is_at_phase_resonance());
         let distance = |sigma: f64, c: f64| (sigma - lock.at.sigma).hypot(c - lock.at.c);
-        let mut solutions = resonant(&parameters);
+        // A base that is held from sample to sample moves a little less than was asked for.
+        let omega = TAU * lock.at.f_hz;
+        let moved = knowledge.target.base_per_sample(omega, knowledge.sample_time);
+        let driven = Dimensionless { g: moved * parameters.g, ..parameters };
+        let mut solutions = resonant(&driven);
         solutions.retain(|point| at_resonance && point.stable());
         solutions.sort_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
         let theory = solutions.first().copied();
-        let mut orbits = phase_resonant(scene, &parameters);
+        let as_driven = Scene { amplitude: moved * scene.amplitude, ..scene.clone() };
+        let mut orbits = phase_resonant(&as_driven, &driven);
         orbits.retain(|_| at_resonance);
         let by_distance = |a: &&Orbit, b: &&Orbit| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c));
         let exact = orbits.iter().min_by(by_distance).copied();
@@ -152,6 +159,8 @@ pub type DrawnCurve = Vec<([f64; 2], bool)>;
 pub struct ExactCurve {
     /// C, sigma and G.
     places: Vec<[f64; 3]>,
+    /// The same of all curves of a structure, each along its way: near another mode the speed of the particle does not order them.
+    ways: Vec<Vec<[f64; 3]>>,
     /// All curves, to be drawn; of one oscillator beyond the fold.
     pub curves: Vec<DrawnCurve>,
     /// It has more modes than the theory beside it.
@@ -184,7 +193,11 @@ impl ExactCurve {
     /// to `near`, sigma and C.
     pub fn of_scene(scene: &Scene, numbers: &Dimensionless, near: [f64; 2]) -> Self {
         match structure_backbone(scene, numbers) {
-            Some(curves) => Self { is_of_structure: true, ..Self::nearest(&curves, near) },
+            Some(curves) => {
+                let way = |curve: &Vec<Orbit>| curve.iter().map(|orbit| [orbit.c, orbit.sigma, orbit.g]).collect();
+                let ways = curves.iter().map(way).collect();
+                Self { ways, is_of_structure: true, ..Self::nearest(&curves, near) }
+            }
             None => Self::of(numbers),
         }
     }
@@ -212,6 +225,7 @@ impl ExactCurve {
         let place = |orbit: &Orbit| ([orbit.sigma, orbit.c], orbit.stable);
         Self {
             places: nearest.unwrap_or_default(),
+            ways: Vec::new(),
             curves: curves.iter().map(|curve| curve.iter().map(place).collect()).collect(),
             is_of_structure: false,
         }
@@ -229,13 +243,12 @@ impl ExactCurve {
 
     /// How far `(C, sigma, G)` lies from the curve; `None` where there is no curve.
     pub fn distance(&self, c: f64, sigma: f64, g: f64) -> Option<Distance> {
-        let segments = self
-            .places
-            .windows(2)
-            .map(|pair| to_segment([c, sigma, g], pair[0], pair[1]));
+        let pairs = || self.ways.iter().flat_map(|way| way.windows(2));
+        let pairs = || pairs().chain(self.places.windows(2).filter(|_| self.ways.is_empty()));
+        let segments = pairs().map(|pair| to_segment([c, sigma, g], pair[0], pair[1]));
         let nearest = segments.reduce(f64::min)?;
         let away = |[exact, drive]: &[f64; 2]| (sigma - exact).abs().max((g - drive).abs());
-        let places = self.places.windows(2).filter_map(|pair| at(pair, c));
+        let places = pairs().filter_map(|pair| at(pair, c));
         let same = places.min_by(|one, other| away(one).total_cmp(&away(other)));
         Some(Distance {
             nearest,
@@ -495,6 +508,7 @@ mod tests {
     fn of_two_places_with_the_same_amplitude_the_nearer_one_is_compared() {
         let curve = ExactCurve {
             places: vec![[0.6, -1.0, 1.2], [0.4, -1.2, 0.8], [0.6, 0.4, 2.0]],
+            ways: Vec::new(),
             curves: Vec::new(),
             is_of_structure: true,
         };

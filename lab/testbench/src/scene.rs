@@ -520,6 +520,15 @@ impl Sections {
             );
             return Err(SceneError::text(origin, message));
         }
+        // A small module has no code for this.
+        if cfg!(feature = "tables") && !scene.chain.reference && reference_quantity != Measurand::Displacement {
+            let name = reference_quantity.name();
+            let message = format!(
+                "resonance.reference_quantity = \"{name}\" with chain.reference = false: no sensor reads the base, and the reference is the displacement \
+                 that is commanded; drop one of the keys"
+            );
+            return Err(SceneError::text(origin, message));
+        }
         let fastest = scene.controller.omega_max * scene.dimensionless().omega0;
         lovines::Drive::harmonic(scene.amplitude, fastest)
             .validate()

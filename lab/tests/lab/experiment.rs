@@ -12,7 +12,7 @@ use vines::rig::{
 };
 use vines::scene::Scene;
 
-use crate::{built_in, rig, scene, text, vines};
+use crate::{built_in, is_failure, rig, scene, text, vines};
 
 /// The record of an experiment; its error and its samples where it ends early.
 fn run(
@@ -194,6 +194,40 @@ fn a_decay_too_short_for_points_keeps_the_lock_and_says_that_the_record_ended() 
         folder.path().display()
     ));
     assert!(text(&printed).contains("Free decay: no points"), "{printed:?}");
+}
+
+#[test]
+fn the_exact_orbit_beside_a_held_base_is_that_of_the_base_as_it_moves() {
+    let found = identified_in(&scene(
+        "chain.hold=true chain.reference=false controller.samples_per_period=64",
+    ));
+    let (at, exact) = (found.lock.at, found.exact.unwrap());
+    // The fundamental of this staircase is 4e-4 smaller than that of the samples, which moves C by 2e-4.
+    assert!(
+        (exact.c - at.c).abs() < 1e-5 && (exact.sigma - at.sigma).abs() < 1e-4,
+        "{at:?} {exact:?}"
+    );
+}
+
+#[test]
+fn a_particle_that_hits_before_the_signal_is_known_is_named_beside_the_fault() {
+    let settings = [
+        "start.dq2=3",
+        "resonance.sensor=q1",
+        "resonance.sensor_quantity=acceleration",
+    ];
+    let settings: String = settings.iter().map(|setting| format!("--set {setting} ")).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let printed = vines(&format!(
+        "identify --rig built-in {settings} --out {}",
+        folder.path().display()
+    ));
+    is_failure(&printed, 1, "set start.dq2 = 0");
+    let message = String::from_utf8_lossy(&printed.stderr);
+    assert!(
+        message.contains("set start.dq2 = 0") && !message.contains("signal_timeout"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -163,6 +163,9 @@ fn text_on_the_command_line_needs_no_quotes_and_what_is_no_assignment_is_refused
         "resonance.sensor_quantity=velocity => which no sensor on the structure reads | set resonance.sensor",
         "resonance.sensor=1 => resonance.sensor=1 | expected a word in quotes",
     ]);
+    let unread = ["resonance.reference_quantity=velocity", "chain.reference=false"].map(|one| one.parse().unwrap());
+    let message = Scene::load(None, &unread).unwrap_err().to_string();
+    assert!(message.contains("no sensor reads the base"), "{message}");
     for argument in ["plant.r", "r=0.7", "plant.r=1\nx=2"] {
         assert!(argument.parse::<Override>().is_err(), "{argument}");
     }

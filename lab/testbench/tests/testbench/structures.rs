@@ -524,6 +524,70 @@ fn the_loop_finds_the_stable_exact_orbits_of_the_presets_and_refuses_what_is_asy
     );
 }
 
+#[test]
+fn an_exact_orbit_of_a_structure_with_close_modes_lies_on_its_exact_backbone() {
+    let shapes = [(0.649, 1.246), (0.165, -0.775)];
+    let modes = [(5.0704, 0.01589), (6.2527, 0.00943)].into_iter().zip(shapes);
+    let modes: String = modes
+        .map(|((hertz, zeta), (cavity, base))| {
+            format!(
+                "{{ frequency = {hertz}, damping = {zeta}, participation = {base}, shape = {{ tip = {cavity} }} }},"
+            )
+        })
+        .collect();
+    let plant = "[plant]\nm = 0.0382595\nb = 0.0111956\nr = 0.837702\n[excitation]\nG = 1.1\n";
+    let text = format!("{plant}[structure]\ncavity = \"tip\"\nmodes = [{modes}]\n");
+    let scene = of(&TempDir::new().unwrap(), &text, &[]).unwrap();
+    let d = scene.dimensionless();
+    for orbit in structure_backbone(&scene, &d)
+        .unwrap()
+        .iter()
+        .flatten()
+        .filter(|orbit| orbit.stable)
+    {
+        let curve = ExactCurve::of_scene(&scene, &d, [orbit.sigma, orbit.c]);
+        let distance = curve.distance(orbit.c, orbit.sigma, orbit.g).unwrap();
+        let largest = distance
+            .nearest
+            .max(distance.sigma.unwrap().abs())
+            .max(distance.g.unwrap().abs());
+        assert!(largest < 1e-9, "{orbit:?}: {distance:?}");
+    }
+}
+
+/// Three modes driven at a fold of the drive, where the response under a constant drive creeps for 170 periods.
+const CREEPS: &str = "\
+[plant]
+m = 0.003720020936297249
+b = 1
+r = 0.6870721082506526
+[controller]
+omega_min = 0.8
+omega_max = 1.2
+[record]
+decay_periods = 3
+[structure]
+cavity = \"cavity\"
+modes = [
+    { frequency = 1.0, damping = 0.0009944962363544133, participation = 0.5486082929398451, shape = { cavity = 1.0 } },
+    { frequency = 1.673000632248855, damping = 0.0025446822037978305, participation = -0.5005783797770201, shape = { cavity = -0.18136673640084544 } },
+    { frequency = 3.4275159041901726, damping = 0.0011474693065931267, participation = 0.16328510963539963, shape = { cavity = 0.3859031127171879 } },
+]
+[excitation]
+G = 0.8772107836386811
+";
+
+#[test]
+fn the_uncertainty_of_a_lock_covers_what_a_response_that_still_creeps_is_off() {
+    let scene = of(&TempDir::new().unwrap(), CREEPS, &[]).unwrap();
+    let at = identified(&scene).unwrap().lock.at;
+    let orbits = phase_resonant(&scene, &scene.dimensionless());
+    let is_covered = |orbit: &Orbit| {
+        orbit.stable && (at.sigma - orbit.sigma).abs() < 2.0 * at.u_sigma && (at.c - orbit.c).abs() < 2.0 * at.u_c
+    };
+    assert!(at.u_sigma < 2e-3 && orbits.iter().any(is_covered), "{at:?}");
+}
+
 /// Receptances and base responses of modes at points, by the sum over the modes.
 struct Modal<'a>(&'a Structure, f64);
 
