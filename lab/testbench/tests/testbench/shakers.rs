@@ -271,8 +271,6 @@ fn a_check_behind_a_shaker_measures_the_structure_and_names_a_fault() {
     }
 }
 
-/// The check leaves the rig's oscillator where a controller expects it: a command of another phase would be a force that does not follow. An
-/// anti-alias filter makes the readings late, which the control knows.
 #[test]
 fn a_heavy_table_that_floats_on_a_soft_suspension_is_not_taken_for_a_late_response() {
     let text = "[plant]\nM = 1\nk = 39.478\nc = 0.014\nm = 0.004\nb = 1\nr = 0.7\n[shaker]\nmass = 0.0105\nstiffness = 0.0112\n\
@@ -287,6 +285,8 @@ fn a_heavy_table_that_floats_on_a_soft_suspension_is_not_taken_for_a_late_respon
     assert!(error.abs() < 1e-2, "{error:e}");
 }
 
+/// The check leaves the rig's oscillator where a controller expects it: a command of another phase would be a force that does not follow. An
+/// anti-alias filter makes the readings late, which the control knows.
 #[test]
 fn a_rig_that_was_checked_locks_also_behind_a_filter() {
     // The check measures what the filter takes of the readings, and the results are corrected by it.
