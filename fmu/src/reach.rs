@@ -3,6 +3,7 @@
 
 use super::LoViNes;
 use fmi2_component::Refusal;
+use lovines::plant::{MOST_EVALUATIONS, MOST_IMPACTS, MOST_RELEASES};
 use lovines::{Drive, InvalidValue, Outcome, Parameters, State};
 
 /// Limit in half-widths: there the spacing of doubles is one half-width.
@@ -85,8 +86,8 @@ pub(super) fn lost(resolved: bool, time: f64, step: f64, outcome: &Outcome) -> R
     Refusal::error(if resolved {
         format!(
             "there are {impacts} impacts, {released} releases and {evaluations} evaluations of the motion within the first {elapsed} s of \
-             the step of {step} s at t = {time} s, of one of them the most in a step; expected velocities and a half-width of the cavity \
-             that make sense together, or a shorter step"
+             the step of {step} s at t = {time} s; a step ends at {MOST_IMPACTS}, {MOST_RELEASES} or {MOST_EVALUATIONS} of them; expected \
+             velocities and a half-width of the cavity that make sense together, or a shorter step"
         )
     } else {
         format!(

@@ -136,8 +136,9 @@ struct Output<'a> {
     notes: Vec<String>,
 }
 
-/// What the intervals depend on: other cavities that would give the same points. `b_is_known`: whether a measured half-width would have shown them.
-fn only_if_ideal(alternatives: &[EffectReport], b_is_known: bool) -> String {
+/// What the intervals depend on: other cavities that would give the same points. `is_assumed`: whether an ideal cavity is assumed, and no measured
+/// half-width confirms it.
+fn only_if_ideal(alternatives: &[EffectReport], is_assumed: bool) -> String {
     let texts: Vec<String> = alternatives
         .iter()
         .map(|EffectReport { effect, symbol, unit, possible_strength, possible_b_m, .. }| {
@@ -149,12 +150,8 @@ fn only_if_ideal(alternatives: &[EffectReport], b_is_known: bool) -> String {
         })
         .collect();
     if texts.is_empty() {
-        let text = if b_is_known {
-            ""
-        } else {
-            "the intervals hold if the cavity is ideal\n"
-        };
-        return text.into();
+        let text = "the intervals hold if the cavity is ideal\n";
+        return if is_assumed { text.into() } else { String::new() };
     }
     format!(
         "the intervals hold if the cavity is ideal: {}. Measure b with a ruler and the masses with a scale, and give --known b=VALUE±U and \
@@ -308,11 +305,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         found.explanation.as_ref().map(explained),
     );
     let alternatives: Vec<EffectReport> = found.alternatives.iter().map(Candidate::report).collect();
+    let is_width = |known: &Known| matches!(known, Known::Value { quantity: Quantity::B, .. });
     let is_ideal = found.explanation.is_none() && !found.fit.is_rejected();
-    let b_is_known = arguments
-        .known
-        .iter()
-        .any(|known| matches!(known, Known::Value { quantity: Quantity::B, .. }));
+    let is_assumed = is_ideal && !arguments.known.iter().any(is_width);
     let printed = Output {
         report: &report,
         verdict: verdict.clone(),
@@ -331,11 +326,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
             summary(&report, &found, skipped),
             found.linear.iter().map(of_linear).collect(),
             verdict.unwrap_or_default(),
-            if is_ideal {
-                only_if_ideal(&alternatives, b_is_known)
-            } else {
-                String::new()
-            },
+            only_if_ideal(&alternatives, is_assumed),
         ]
         .concat()
     })?;

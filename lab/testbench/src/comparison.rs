@@ -157,10 +157,11 @@ pub type DrawnCurve = Vec<([f64; 2], bool)>;
 /// The exact backbone beyond the fold as a fine polygon, by increasing particle speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExactCurve {
-    /// C, sigma and G.
+    /// C, sigma and G of the curve nearest to the measurement, by increasing speed of the particle.
     places: Vec<[f64; 3]>,
-    /// The same of all curves of a structure, each along its way: near another mode the speed of the particle does not order them.
-    ways: Vec<Vec<[f64; 3]>>,
+    /// C, sigma and G of the curves with which points are compared: of one oscillator the one of `places`; of a structure all of them, in the order in
+    /// which they were continued, because near another mode the speed of the particle rises and falls along a curve.
+    compared: Vec<Vec<[f64; 3]>>,
     /// All curves, to be drawn; of one oscillator beyond the fold.
     pub curves: Vec<DrawnCurve>,
     /// It has more modes than the theory beside it.
@@ -194,9 +195,13 @@ impl ExactCurve {
     pub fn of_scene(scene: &Scene, numbers: &Dimensionless, near: [f64; 2]) -> Self {
         match structure_backbone(scene, numbers) {
             Some(curves) => {
-                let way = |curve: &Vec<Orbit>| curve.iter().map(|orbit| [orbit.c, orbit.sigma, orbit.g]).collect();
-                let ways = curves.iter().map(way).collect();
-                Self { ways, is_of_structure: true, ..Self::nearest(&curves, near) }
+                let places = |curve: &Vec<Orbit>| curve.iter().map(|orbit| [orbit.c, orbit.sigma, orbit.g]).collect();
+                let compared = curves.iter().map(places).collect();
+                Self {
+                    compared,
+                    is_of_structure: true,
+                    ..Self::nearest(&curves, near)
+                }
             }
             None => Self::of(numbers),
         }
@@ -222,10 +227,11 @@ impl ExactCurve {
         };
         let rising = curves.iter().map(|curve| right_of_fold(curve));
         let nearest = rising.min_by(|one, other| distance(one).total_cmp(&distance(other)));
+        let places = nearest.unwrap_or_default();
         let place = |orbit: &Orbit| ([orbit.sigma, orbit.c], orbit.stable);
         Self {
-            places: nearest.unwrap_or_default(),
-            ways: Vec::new(),
+            compared: vec![places.clone()],
+            places,
             curves: curves.iter().map(|curve| curve.iter().map(place).collect()).collect(),
             is_of_structure: false,
         }
@@ -243,8 +249,7 @@ impl ExactCurve {
 
     /// How far `(C, sigma, G)` lies from the curve; `None` where there is no curve.
     pub fn distance(&self, c: f64, sigma: f64, g: f64) -> Option<Distance> {
-        let pairs = || self.ways.iter().flat_map(|way| way.windows(2));
-        let pairs = || pairs().chain(self.places.windows(2).filter(|_| self.ways.is_empty()));
+        let pairs = || self.compared.iter().flat_map(|places| places.windows(2));
         let segments = pairs().map(|pair| to_segment([c, sigma, g], pair[0], pair[1]));
         let nearest = segments.reduce(f64::min)?;
         let away = |[exact, drive]: &[f64; 2]| (sigma - exact).abs().max((g - drive).abs());
@@ -507,8 +512,8 @@ mod tests {
     #[test]
     fn of_two_places_with_the_same_amplitude_the_nearer_one_is_compared() {
         let curve = ExactCurve {
-            places: vec![[0.6, -1.0, 1.2], [0.4, -1.2, 0.8], [0.6, 0.4, 2.0]],
-            ways: Vec::new(),
+            places: Vec::new(),
+            compared: vec![vec![[0.6, -1.0, 1.2], [0.4, -1.2, 0.8], [0.6, 0.4, 2.0]]],
             curves: Vec::new(),
             is_of_structure: true,
         };

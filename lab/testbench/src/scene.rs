@@ -60,7 +60,7 @@ pub use vines_model::{Definition, Dimensionless, Measurand, Reference, Sensor};
 /// The default scene, embedded so that the program works from any folder.
 pub const PAPER: &str = include_str!("../../../scenes/paper.toml");
 
-/// Largest number of times the default samples that a scene takes by itself: with more, a simulation takes minutes.
+/// Largest number of times the default samples that a scene takes by itself, a limit of run time: a backbone then takes about a minute.
 const OVERSAMPLED: f64 = 16.0;
 
 /// A checked scene in SI units; build one with [`Scene::load`] or [`Scene::parse`].

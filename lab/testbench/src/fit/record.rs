@@ -781,7 +781,7 @@ impl Misfit<UNKNOWNS> for Followed<'_> {
 type Minimum = LeastSquares<UNKNOWNS, Vec<Nearest>>;
 
 impl Followed<'_> {
-    /// The minimum that is reached from these parameters, and what is left out; `None` where too little belongs.
+    /// The minimum that is reached from these parameters, and what is left out; `None` where too little belongs, or too much contradicts it.
     fn search(&mut self, mut x: Unknowns) -> Option<(Minimum, Vec<Cut>)> {
         let mut out = self.linearise(&x);
         for _ in 0..ROUNDS {
