@@ -262,6 +262,9 @@ const MOVE_SHARE: f64 = 0.8;
 const LONGEST: usize = 150;
 /// Shortest duration of a move, periods.
 const MOVE: f64 = 4.0;
+/// Largest ratio of successive levels. The points before predict drive and frequency of the next one; where it is farther away, the error of the
+/// prediction moves the response past a fold. Levels between are held, but no points.
+const LARGEST_STEP: f64 = 1.5;
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
 
@@ -352,9 +355,15 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let levels = &self.plan.levels;
         for (n, &level) in levels.iter().enumerate() {
             progress(n, levels.len());
-            let before = n
+            let mut before = n
                 .checked_sub(1)
                 .map(|before| (levels[before], self.points[before].regime));
+            // A small module has no code for levels between.
+            if let Some((from, _)) = before.filter(|_| cfg!(feature = "tables")) {
+                for between in between(from, level) {
+                    before = Some((between, self.hold(between)?.regime));
+                }
+            }
             let point = self.hold(level)?;
             self.points.push(point);
             if let Some((held, Regime::Symmetric | Regime::Unresolved)) = before
@@ -372,7 +381,13 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let (start, clipped) = (self.run.periods, self.run.clipped());
         let (to, periods) = self.step(level);
         self.run.hold_response(to)?;
-        self.run.samples.clear();
+        if self.plan.knowledge.shaker().is_some() {
+            // A fault is named from the last two periods.
+            let kept = self.plan.knowledge.samples(2.5);
+            self.run.samples.drain(..self.run.samples.len().saturating_sub(kept));
+        } else {
+            self.run.samples.clear();
+        }
         let late = FOLLOWED + FIRST * usize::from(self.states.is_empty());
         while self.run.periods - start < periods + late as f64 {
             self.cycle()?;
@@ -487,6 +502,13 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             before: [before(1), before(0)],
         }
     }
+}
+
+/// Levels, m, between two that are more than [`LARGEST_STEP`] apart, at equal ratios.
+fn between(from: f64, to: f64) -> impl Iterator<Item = f64> {
+    let ratio = (to / from).ln();
+    let steps = (ratio.abs() / LARGEST_STEP.ln()).ceil();
+    (1..steps as usize).map(move |n| from * (ratio * n as f64 / steps).exp())
 }
 
 /// Whether a response, m, is at the level, m.

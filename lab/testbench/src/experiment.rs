@@ -457,7 +457,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         }
         let mut evidence = evidence(self.samples, self.config, fault);
         if self.plan.knowledge.shaker().is_some() {
-            evidence.failed = failed(self.samples, self.plan.knowledge.samples(1.0));
+            evidence.failed = failed(self.samples, self.sample_time);
         }
         let evidence = evidence.into();
         ExperimentError::Tripped { periods: self.periods, stage, fault, evidence }
@@ -562,33 +562,69 @@ fn evidence(samples: &[Sample], config: &Config, fault: Fault) -> Evidence {
     }
 }
 
-/// Which channel of a shaker has failed, and how, from the readings of the last period beside those of the period before it.
-fn failed(samples: &[Sample], period: usize) -> Option<&'static str> {
+/// Which channel of a shaker has failed, and how: from the last readings, and from those of the last period beside those of the period before it.
+fn failed(samples: &[Sample], sample_time: f64) -> Option<&'static str> {
+    if let Some(stopped) = stopped(samples, sample_time) {
+        return Some(stopped);
+    }
+    // The loop may have changed the frequency since the fault.
+    let mut left = TAU;
+    let is_in_period = |sample: &&Sample| {
+        let turn = sample.command.drive.omega * sample_time;
+        left -= turn;
+        left > 0.5 * turn
+    };
+    let period = 1 + samples.iter().rev().take_while(is_in_period).count();
     let begin = samples.len().checked_sub(2 * period)?;
     let channel =
         |of: fn(Sensors) -> f64| -> Vec<f64> { samples[begin..].iter().map(|sample| of(sample.sensors)).collect() };
     let force = channel(|sensors| sensors.reference.unwrap_or(0.0));
     let response = channel(|sensors| sensors.response);
-    let (force, motion) = (how(&force, period), how(&response, period));
-    match (force, motion) {
-        (None | Some(Failure::Other), Some(Failure::Other)) if !leaps(&response, period) => Some(
-            "response and force change from period to period: the motion is irregular or becomes another one, the amplifier clips or is off, or \
-                 a sensor is noisy",
-        ),
-        (_, Some(_)) => Some("the response jumped, as no structure does: check its sensor and cable"),
-        (Some(Failure::Nothing), _) => {
-            Some("the force cell reads nothing: it or its cable is dead, or the stinger is broken")
+    Some(match (how(&force, period), how(&response, period)) {
+        (_, Some(_)) if leaps(&response, period) => {
+            "the response jumped, as no structure does: check its sensor and cable"
         }
-        (Some(Failure::Reversed), _) => Some("the force cell reads the opposite sign: check its cable and factor"),
-        (Some(Failure::Clipped), _) => {
-            Some("the force cell stays at one value: it saturates or is frozen; check its range")
+        (Some(Failure::Nothing), _) => NOTHING,
+        (Some(Failure::Reversed), _) => "the force cell reads the opposite sign: check its cable and factor",
+        (Some(Failure::Clipped), _) => CLIPPED,
+        (_, Some(_)) => {
+            "response and force change from period to period: the motion is irregular or becomes another one, the amplifier clips or is off, or a \
+             sensor is noisy"
         }
-        (Some(Failure::Other), _) => Some(
-            "the force does not follow the command: the amplifier clips, is off or overloaded, or the force cell is noisy or late",
-        ),
-        (None, None) => None,
+        (Some(Failure::Other), _) => {
+            "the force does not follow the command: the amplifier clips, is off or overloaded, or the force cell is noisy or late"
+        }
+        (None, None) => return None,
+    })
+}
+
+/// Share of a period for which a reading that has not changed has stopped: one of more than 26 steps of its converter changes in this time.
+const STOPPED: f64 = 1.0 / 16.0;
+
+/// Which channel reads no number, or still reads what it did before.
+fn stopped(samples: &[Sample], sample_time: f64) -> Option<&'static str> {
+    let last = samples.last()?.sensors;
+    let has_stopped = |of: fn(Sensors) -> f64| {
+        let is_last = |sample: &&Sample| of(sample.sensors) == of(last);
+        let unchanged = samples.iter().rev().take_while(is_last);
+        let turns = unchanged.map(|sample| sample.command.drive.omega * sample_time / TAU);
+        turns.sum::<f64>() > STOPPED
+    };
+    let force = |sensors: Sensors| sensors.reference.unwrap_or(0.0);
+    match (has_stopped(force), has_stopped(|sensors| sensors.response)) {
+        _ if !force(last).is_finite() => Some("the force cell reads no number"),
+        _ if !last.response.is_finite() => Some("the sensor of the response reads no number"),
+        (true, true) => Some("response and force stay at one value: both sensors, or the clock, have stopped"),
+        (false, true) => Some("the response stays at one value: its sensor is dead, frozen or saturates"),
+        (true, false) if force(last) == 0.0 => Some(NOTHING),
+        (true, false) => Some(CLIPPED),
+        (false, false) => None,
     }
 }
+
+/// A force cell that reads zero, and one that reads one value.
+const NOTHING: &str = "the force cell reads nothing: it or its cable is dead, or the stinger is broken";
+const CLIPPED: &str = "the force cell stays at one value: it saturates or is frozen; check its range";
 
 /// Whether the largest change from sample to sample has doubled since a period before: a motion that changes does not leap.
 fn leaps(readings: &[f64], period: usize) -> bool {
@@ -671,23 +707,60 @@ mod tests {
         }
     }
 
+    /// The words for these readings of response and force, which begin as sines of 100 samples per period.
+    fn words(read: fn(usize, f64) -> [f64; 2]) -> &'static str {
+        let mut samples = vec![Sample::default(); 200];
+        for (n, sample) in samples.iter_mut().enumerate() {
+            let [response, force] = read(n, (TAU * n as f64 / 100.0).sin());
+            sample.sensors = Sensors { response, reference: Some(force) };
+            sample.command.drive.omega = TAU;
+        }
+        failed(&samples, 0.01).unwrap_or_default()
+    }
+
     #[test]
     fn a_motion_that_changes_is_not_taken_for_a_sensor_that_fails_but_a_jump_is() {
-        let read = |changed: fn(usize, f64) -> f64| {
-            let mut samples = vec![Sample::default(); 200];
-            for (n, sample) in samples.iter_mut().enumerate() {
-                let sine = (TAU * n as f64 / 100.0).sin();
-                sample.sensors = Sensors { response: changed(n, sine), reference: Some(0.1 * sine) };
-            }
-            failed(&samples, 100).unwrap()
-        };
-        let irregular = read(|n, sine| sine * (0.5 + 0.5 * (n as f64 / 200.0).powi(2)));
+        let irregular = words(|n, sine| [sine * (0.5 + 0.5 * (n as f64 / 200.0).powi(2)), 0.1 * sine]);
         assert!(irregular.contains("irregular"), "{irregular}");
         for jump in [
-            read(|n, sine| if n < 130 { sine } else { 0.0 }),
-            read(|n, sine| if n < 130 { sine } else { -sine }),
+            words(|n, sine| [if n < 130 { sine } else { 0.3 * sine }, 0.1 * sine]),
+            words(|n, sine| [if n < 130 { sine } else { -sine }, 0.1 * sine]),
         ] {
             assert!(jump.contains("jumped"), "{jump}");
+        }
+    }
+
+    #[test]
+    fn a_reading_that_has_stopped_is_named_whatever_the_other_channel_does() {
+        for (words, expected) in [
+            (words(|_, sine| [sine, f64::NAN]), "force cell reads no number"),
+            (words(|_, sine| [f64::NAN, sine]), "response reads no number"),
+            (
+                words(|n, sine| [sine, if n < 180 { sine } else { 0.9 }]),
+                "it saturates",
+            ),
+            (
+                words(|n, sine| [sine, if n < 180 { sine } else { 0.0 }]),
+                "reads nothing",
+            ),
+            (
+                words(|n, sine| [if n < 180 { sine } else { 0.9 }, sine]),
+                "the response stays",
+            ),
+            (words(|n, sine| [if n < 180 { sine } else { 0.9 }; 2]), "both sensors"),
+            // The loop has already answered.
+            (
+                words(|n, sine| {
+                    if n < 130 {
+                        [sine; 2]
+                    } else {
+                        [sine * (n as f64 - 30.0) / 100.0, -sine]
+                    }
+                }),
+                "opposite sign",
+            ),
+        ] {
+            assert!(words.contains(expected), "{words}");
         }
     }
 }

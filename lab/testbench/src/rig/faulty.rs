@@ -24,7 +24,7 @@ pub enum RigFault {
     Shaker(f64),
     /// The natural frequency rises by a tenth.
     Structure,
-    /// The rig's clock jumps forward by this many samples.
+    /// The rig's clock jumps forward by this many hundredths of a natural period.
     Forward(usize),
     /// The electrodynamic shaker of a scene that has one.
     Electrodynamic(ShakerFault),
@@ -39,7 +39,7 @@ pub enum SensorFault {
     Frozen,
     /// Reads the opposite sign.
     Reversed,
-    /// Saturates at half the amplitude.
+    /// Saturates at half of the largest value before the fault, or so far if it begins with the motion.
     Saturated,
     /// Reads the end of its range, 2 b.
     Stuck,
@@ -53,12 +53,12 @@ pub enum SensorFault {
     Loose,
     /// Reads this value, m.
     Value(f64),
-    /// Reads the value of this many samples ago.
+    /// Reads the value of this many hundredths of a natural period ago.
     Late(usize),
 }
 
 impl RigFault {
-    /// The faults by name, as `vines rig --fault` takes them; the sample numbers are a quarter and 37 % of a default period.
+    /// The faults by name, as `vines rig --fault` takes them.
     pub const ALL: [(&'static str, Self); 27] = {
         use RigFault::*;
         use SensorFault::*;
@@ -101,7 +101,7 @@ impl RigFault {
     ];
 }
 
-/// Healthy readings that are kept: more than a default period.
+/// Healthy readings that are kept, in hundredths of a natural period: more than one period.
 const KEPT: usize = 128;
 /// A natural frequency that is a tenth higher needs this many times the stiffness.
 const STIFFER: f64 = 1.21;
@@ -115,6 +115,9 @@ struct Faulty {
     sample_time: f64,
     /// End of the range of the sensors, m.
     range: f64,
+    /// Largest value of the channel before the fault, m.
+    before: Option<f64>,
+    samples_per_period: f64,
     /// Samples that the rig was advanced before the fault begins, and until now.
     begins: usize,
     taken: usize,
@@ -158,6 +161,8 @@ pub fn faulty(
         fault,
         sample_time: scene.sample_time(),
         range: 2.0 * scene.plant.half_width,
+        before: None,
+        samples_per_period: scene.controller.samples_per_period,
         begins,
         taken: 0,
         driven: begins,
@@ -174,6 +179,11 @@ impl Faulty {
         self.taken.checked_sub(self.begins)
     }
 
+    /// Samples in hundredths of a natural period.
+    fn samples(&self, hundredths: usize) -> usize {
+        (0.01 * self.samples_per_period * hundredths as f64).round() as usize
+    }
+
     /// The reading, m, of a channel whose sensor fails.
     fn read(&mut self, channel: usize, sensor: SensorFault, elapsed: usize) -> f64 {
         let kept = self.past.len();
@@ -187,7 +197,15 @@ impl Faulty {
             SensorFault::Dead => 0.0,
             SensorFault::Frozen => ago(elapsed + 1),
             SensorFault::Reversed => -value,
-            SensorFault::Saturated => value.clamp(-0.5 * largest, 0.5 * largest),
+            SensorFault::Saturated => {
+                // A fault from the start meets no motion yet.
+                let level = if self.begins < self.samples(KEPT) {
+                    largest
+                } else {
+                    *self.before.get_or_insert(largest)
+                };
+                value.clamp(-0.5 * level, 0.5 * level)
+            }
             SensorFault::Stuck => self.range,
             SensorFault::Gain(gain) => gain * value,
             SensorFault::Offset => value + largest,
@@ -195,7 +213,7 @@ impl Faulty {
             SensorFault::Loose if elapsed % 10 < 5 => 0.0,
             SensorFault::Loose => value,
             SensorFault::Value(value) => value,
-            SensorFault::Late(samples) => ago(samples),
+            SensorFault::Late(hundredths) => ago(self.samples(hundredths)),
         }
     }
 
@@ -217,8 +235,8 @@ impl Faulty {
             apply(&mut **changed, drive)?;
         }
         match (self.fault, elapsed) {
-            (RigFault::Forward(samples), Some(0)) => {
-                for _ in 0..samples {
+            (RigFault::Forward(hundredths), Some(0)) => {
+                for _ in 0..self.samples(hundredths) {
                     apply(&mut *self.rig, drive)?;
                 }
             }
@@ -239,7 +257,7 @@ impl Rig for Faulty {
         let mut sensors = changed.unwrap_or(&mut self.rig).sense()?;
         self.past
             .push_back([sensors.response, sensors.reference.unwrap_or(0.0)]);
-        if self.past.len() > KEPT + elapsed.unwrap_or(0) {
+        if self.past.len() > self.samples(KEPT) + elapsed.unwrap_or(0) {
             self.past.pop_front();
         }
         let Some(elapsed) = elapsed else {

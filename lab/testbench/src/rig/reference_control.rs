@@ -160,8 +160,8 @@ impl ReferenceControl {
             let cause = if self.quiet > longest {
                 "next to nothing is left: the sensor of the reference is dead, or the stinger is broken"
             } else {
-                "the amplifier clips or is off, the sensor of the reference or its sign is wrong, too little is left at the resonance (the drop-out of \
-                 `vines check`), or irregular impacts on a heavy armature or table change it faster than the control follows"
+                "the amplifier clips or is off, a sensor or its sign is wrong, too little is left at the resonance (the drop-out of `vines check`), or \
+                 irregular impacts on a heavy armature or table change it faster than the control follows"
             };
             let [asked, error] = [self.asked, error.norm()].map(|value| value / self.path.base_per_reference);
             let periods = longest / TAU;

@@ -430,6 +430,16 @@ fn a_held_sample_of_zero_does_not_cut_the_stinger() {
     );
 }
 
+#[test]
+fn a_backbone_of_a_few_levels_is_tracked_to_the_last_one_near_the_fold() {
+    let few = preset(1, &[("[start]", "[backbone]\npoints = 4\n\n[start]")]).unwrap();
+    for scene in [few, paper(&["backbone.points=4"])] {
+        let found = tracked(Simulated::of(&scene).unwrap().as_mut(), &scene).unwrap();
+        let settled = found.points.iter().filter(|point| point.settled);
+        assert_eq!((found.points.len(), settled.count()), (4, 4), "{:?}", found.ended);
+    }
+}
+
 /// Asserts that a fault, which begins while the lock is held, ends the drive within 0.3 s, and that the error has this text.
 fn assert_named(scene: &Scene, begins: f64, fault: RigFault, name: &str) {
     for phase in [0.0, 0.3] {
@@ -467,7 +477,7 @@ fn faults_of_a_shaker_end_the_drive_with_their_name() {
 }
 
 #[test]
-fn faults_before_the_lock_are_found_as_fast_where_little_of_the_force_is_left() {
+fn faults_are_found_as_fast_where_little_of_the_force_is_left() {
     let scene = preset(1, &[]).unwrap();
     let [stinger, amplifier, _] = RigFault::OF_SHAKER.map(|(_, fault)| fault);
     let begins = 60.0 * scene.dimensionless().natural_period();
@@ -477,6 +487,11 @@ fn faults_before_the_lock_are_found_as_fast_where_little_of_the_force_is_left() 
         (stinger, "stinger is broken"),
     ] {
         assert_named(&scene, begins, fault, name);
+    }
+    let healthy = record_of(&scene);
+    let settled = healthy.settled as f64 * healthy.sample_time;
+    for begins in [2.0 * begins, settled] {
+        assert_named(&scene, begins, RigFault::Base(SensorFault::Saturated), "it saturates");
     }
 }
 
