@@ -12,6 +12,9 @@
 //! to grow to 1. Otherwise it is `unseen` if the result says that it does not exclude this growth, and `steady` if it does not say so. `wrong` are
 //! near no orbit.
 //!
+//! Orbits are stable here at a fixed frequency and drive. A phase loop has integral action: it cannot be stable where, under a constant drive, the
+//! response lags less at a higher frequency. The words on a structure say where this is so, and their number counts refusals at such orbits alone.
+//!
 //! Arguments: STRUCTURES (of each kind), SEED. Writes validation/structures.csv. With `stable` or `unstable` it runs this kind alone; with numbers of
 //! structures behind it these alone: it then says what the loop did, and writes nothing.
 
@@ -28,6 +31,8 @@ const TOLERANCE: f64 = 2e-3;
 const SMALL: f64 = 1e-6;
 /// Intervals into which the exact backbone is divided between two orbits.
 const FINE: usize = 20;
+/// Change of the phase target by which this slope is computed, degrees.
+const TURN: f64 = 0.02;
 
 /// What became of a structure.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -199,6 +204,24 @@ fn lock(scene: &Scene, is_stable: bool) -> (Outcome, [f64; 2], f64, String) {
     (outcome, errors, periods, found)
 }
 
+/// Whether a phase loop can hold a stable orbit under the drive of a scene: one whose response lags more at a higher frequency.
+fn is_lockable(scene: &Scene) -> bool {
+    let d = scene.dimensionless();
+    let [before, at, after] = [-TURN, 0.0, TURN].map(|turn| {
+        let mut scene = scene.clone();
+        scene.controller.phase_target += turn;
+        orbits_of(&scene, &d)
+    });
+    let near = |orbits: &[Orbit], sigma: f64| {
+        let sigmas = orbits.iter().map(|orbit| orbit.sigma);
+        sigmas.min_by(|one, other| (one - sigma).abs().total_cmp(&(other - sigma).abs()))
+    };
+    let stable = at.iter().filter(|orbit| orbit.stable).map(|orbit| orbit.sigma);
+    stable
+        .map(|sigma| (near(&before, sigma), near(&after, sigma)))
+        .any(|(before, after)| after < before)
+}
+
 /// The orbits under the drive of a scene, and where those of its backbone are stable.
 fn orbits_in_words(scene: &Scene) -> String {
     let d = scene.dimensionless();
@@ -251,9 +274,21 @@ fn main() -> Result<(), Failure> {
                     "{kind} {n}: {outcome:?}, errors {:.1e} and {:.1e}, {periods:.0} periods: {found}",
                     errors[0], errors[1]
                 );
-                println!("  {}", orbits_in_words(scene));
+                println!(
+                    "  a phase loop can hold one: {}; {}",
+                    is_lockable(scene),
+                    orbits_in_words(scene)
+                );
             }
         }
+        let refused = scenes
+            .iter()
+            .zip(&found)
+            .filter(|(_, (outcome, ..))| *outcome == Outcome::Refused);
+        let hopeless = refused
+            .filter(|((_, scene), _)| is_stable && !is_lockable(scene))
+            .count();
+        println!("{kind}: refused where no phase loop can hold a stable orbit: {hopeless}");
         if only.len() > 1 {
             continue;
         }
