@@ -118,7 +118,7 @@ impl Fault {
                 "the response or the base could not be measured: too small an amplitude, or too much noise"
             }
             Self::Implausible => {
-                "a reading differed from its prediction, or the response from its drive: a sensor, the drive or the clock has failed"
+                "a reading or the response is implausible: a sensor, the drive or the clock has failed, or the motion is irregular"
             }
         }
     }

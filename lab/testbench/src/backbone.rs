@@ -5,7 +5,7 @@
 //! the *response*, and the drive follows. The points before predict drive and frequency of the next one,
 //! so that the loops have little to correct.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use serde::Serialize;
 use vines_model::numerics::{Estimate, RANDOM};
@@ -50,8 +50,9 @@ pub struct LevelEstimate {
     pub phase_error: Estimate,
     /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
     pub at: [Estimate; 2],
-    /// What the phase error adds to their uncertainties where friction or gravity move the fold. A level does not wait for it.
-    pub detuned: [f64; 2],
+    /// What no level waits for, in addition to their uncertainties: the phase error where friction or gravity move the fold, and edges of the force of
+    /// a shaker that alias, whose phase is arbitrary.
+    pub added: [f64; 2],
     /// Whether only noise is larger than the precision: the fit describes the window, and the systematic part of the uncertainty is small
     /// enough.
     pub steady: bool,
@@ -163,7 +164,13 @@ impl Criterion {
             response: whole.response,
             phase_error: whole.phase_error,
             at,
-            detuned: [0, 1].map(|i| slope(i) * whole.remainders[2]),
+            added: [0, 1].map(|i| {
+                let detuned = slope(i) * whole.remainders[2];
+                let path = self.knowledge.shaker.filter(|_| cfg!(feature = "tables"));
+                path.map_or(detuned, |path| {
+                    detuned.hypot(FRAC_1_SQRT_2 * f64::from(path.aliased) / units[i])
+                })
+            }),
             steady: whole.excess <= EXCESS && systematic <= allowed[0].min(units[1] * allowed[1]),
         })
     }
@@ -178,7 +185,7 @@ impl LevelEstimate {
             response: mean(&Cycle::amplitude),
             phase_error: mean(&|cycle| cycle.phase_error),
             at: [mean(&|cycle| cycle.base.norm()), mean(&|cycle| cycle.omega)],
-            detuned: [0.0; 2],
+            added: [0.0; 2],
             steady: false,
         }
     }
@@ -259,7 +266,7 @@ const FIRST: usize = 24;
 /// Largest additional drive of a move, as a share of the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
 /// Periods after which a point is taken, settled or not.
-const LONGEST: usize = 150;
+pub(crate) const LONGEST: usize = 150;
 /// Shortest duration of a move, periods.
 const MOVE: f64 = 4.0;
 /// Largest ratio of successive levels. The points before predict drive and frequency of the next one; where it is farther away, the error of the
@@ -359,7 +366,9 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
                 .checked_sub(1)
                 .map(|before| (levels[before], self.points[before].regime));
             // A small module has no code for levels between.
-            if let Some((from, _)) = before.filter(|_| cfg!(feature = "tables")) {
+            if cfg!(feature = "tables")
+                && let Some((from, _)) = before
+            {
                 for between in between(from, level) {
                     before = Some((between, self.hold(between)?.regime));
                 }
@@ -381,14 +390,14 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let (start, clipped) = (self.run.periods, self.run.clipped());
         let (to, periods) = self.step(level);
         self.run.hold_response(to)?;
-        if self.plan.knowledge.shaker().is_some() {
+        if cfg!(feature = "tables") && self.plan.knowledge.shaker.is_some() {
             // A fault is named from the last two periods.
             let kept = self.plan.knowledge.samples(2.5);
             self.run.samples.drain(..self.run.samples.len().saturating_sub(kept));
         } else {
             self.run.samples.clear();
         }
-        let late = FOLLOWED + FIRST * usize::from(self.states.is_empty());
+        let late = self.followed() + FIRST * usize::from(self.states.is_empty());
         while self.run.periods - start < periods + late as f64 {
             self.cycle()?;
         }
@@ -420,6 +429,15 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             clipped_percent,
             ..self.point(level, start, &estimate, &cycles, &criterion)
         })
+    }
+
+    /// Periods within which the loops, and behind a shaker what is slower, follow a move.
+    fn followed(&self) -> usize {
+        // A small module has no code for shakers.
+        match self.plan.knowledge.shaker {
+            Some(path) if cfg!(feature = "tables") => FOLLOWED.max(path.followed.into()),
+            _ => FOLLOWED,
+        }
     }
 
     /// The move to a level, m, and its periods: [`MOVE`], or as many as the drive needs for this change of the response; and behind a shaker, before and
@@ -466,7 +484,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let regime = regime_by_response(averaged, knowledge, base, omega);
         let reached = is_reached(estimate.response, level);
         let [stated_base, stated_omega] =
-            [(base, 0), (omega, 1)].map(|(at, i)| Estimate::new(at.value, &[at.uncertainty, estimate.detuned[i]]));
+            [(base, 0), (omega, 1)].map(|(at, i)| Estimate::new(at.value, &[at.uncertainty, estimate.added[i]]));
         LevelPoint {
             at: ResonancePoint::new([estimate.response, stated_base, stated_omega, estimate.phase_error], &d),
             // The level as a person would write it.

@@ -263,7 +263,9 @@ pub fn run_into(
 
 // Rig and controller, sample by sample. Whatever fails, the rig is left with a drive of zero as far as it still takes one.
 
-/// Periods within which the loops, whose slowest time constant is five periods, and the particle follow a change of their setpoint.
+/// Slowest time constant of the loops, periods.
+pub(crate) const SLOWEST_LOOP: f64 = 5.0;
+/// Periods within which the loops and the particle follow a change of their setpoint.
 pub(crate) const FOLLOWED: usize = 8;
 /// Observations in succession that are not taken for chance: periods, or legs of the search.
 pub(crate) const CONFIRMED: u32 = 3;
@@ -589,10 +591,11 @@ fn failed(samples: &[Sample], sample_time: f64) -> Option<&'static str> {
         (Some(Failure::Clipped), _) => CLIPPED,
         (_, Some(_)) => {
             "response and force change from period to period: the motion is irregular or becomes another one, the amplifier clips or is off, or a \
-             sensor is noisy"
+             sensor fails"
         }
         (Some(Failure::Other), _) => {
-            "the force does not follow the command: the amplifier clips, is off or overloaded, or the force cell is noisy or late"
+            "the force does not follow the command: the amplifier clips, is off or overloaded, the force cell is noisy or late, or impacts change it \
+             faster than the control follows"
         }
         (None, None) => return None,
     })
@@ -626,13 +629,18 @@ fn stopped(samples: &[Sample], sample_time: f64) -> Option<&'static str> {
 const NOTHING: &str = "the force cell reads nothing: it or its cable is dead, or the stinger is broken";
 const CLIPPED: &str = "the force cell stays at one value: it saturates or is frozen; check its range";
 
-/// Whether the largest change from sample to sample has doubled since a period before: a motion that changes does not leap.
+/// Whether the largest change from sample to sample has doubled since a period before, and is twice that of a sine of the present amplitude: a motion
+/// that changes or grows does not leap.
 fn leaps(readings: &[f64], period: usize) -> bool {
     let largest = |readings: &[f64]| {
         let steps = readings.windows(2).map(|pair| (pair[1] - pair[0]).abs());
         steps.fold(0.0, f64::max)
     };
-    largest(&readings[period - 1..]) > 2.0 * largest(&readings[..period])
+    let amplitude = readings[period..]
+        .iter()
+        .fold(0.0_f64, |amplitude, reading| amplitude.max(reading.abs()));
+    let of_sine = amplitude * TAU / period as f64;
+    largest(&readings[period - 1..]) > 2.0 * largest(&readings[..period]).max(of_sine)
 }
 
 /// How a channel differs from what it read a period before.
@@ -720,8 +728,13 @@ mod tests {
 
     #[test]
     fn a_motion_that_changes_is_not_taken_for_a_sensor_that_fails_but_a_jump_is() {
-        let irregular = words(|n, sine| [sine * (0.5 + 0.5 * (n as f64 / 200.0).powi(2)), 0.1 * sine]);
-        assert!(irregular.contains("irregular"), "{irregular}");
+        for irregular in [
+            words(|n, sine| [sine * (0.5 + 0.5 * (n as f64 / 200.0).powi(2)), 0.1 * sine]),
+            // A response that grows from rest.
+            words(|n, sine| [sine * (n as f64 / 200.0).powi(3), 0.1 * sine]),
+        ] {
+            assert!(irregular.contains("irregular"), "{irregular}");
+        }
         for jump in [
             words(|n, sine| [if n < 130 { sine } else { 0.3 * sine }, 0.1 * sine]),
             words(|n, sine| [if n < 130 { sine } else { -sine }, 0.1 * sine]),

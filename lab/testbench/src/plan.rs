@@ -218,6 +218,10 @@ pub struct ShakerPath {
     pub speed: f64,
     /// Base displacement per reference, m/N or m/m.
     pub base_per_reference: f64,
+    /// Periods within which the control, and what rings beside the driven mode, follow a change of the response.
+    pub followed: u16,
+    /// Largest amplitude, m, by which harmonics of the force beside the sampling frequency change its fundamental as it is read.
+    pub aliased: f32,
 }
 
 impl ShakerPath {
@@ -404,6 +408,9 @@ impl Scene {
             phase,
         );
         knowledge.shaker = self.structure().and_then(|structure| structure.shaker_path());
+        if let Some(path) = knowledge.shaker.as_mut().filter(|_| cfg!(feature = "tables")) {
+            path.aliased = self.aliased(1.0).unwrap_or(0.0) as f32;
+        }
         knowledge.target.through_shaker = knowledge.shaker.is_some();
         knowledge.nearest_pole = self.structure().map_or(f64::INFINITY, Structure::nearest_pole);
         knowledge.target.held = self.chain.hold;

@@ -188,35 +188,37 @@ impl Scene {
 
     /// Number of times the default samples that a shaker needs: a power of two, at most [`OVERSAMPLED`]; 1 without a shaker.
     ///
-    /// Impacts put edges into its force, and harmonics beside the sampling frequency look like the fundamental. They are smaller than the precision
-    /// asked of a tracked drive where the impacts on a particle of the speed b omega0, whose harmonics are 4/pi m b omega0², make as little of
-    /// the force through structure and shaker, and through an anti-alias filter.
+    /// Impacts put edges into its force, and harmonics beside the sampling frequency look like the fundamental: smaller than the precision asked of a
+    /// tracked drive.
     fn oversampling(&self) -> f64 {
-        let shaken = self.structure().and_then(|one| Some((one, one.shaker.as_ref()?)));
-        let Some((structure, shaker)) = shaken.filter(|_| self.amplitude > 0.0) else {
-            return 1.0;
-        };
-        let [reference, _] = shaker.reference_and_inertia(structure.excitation);
-        let (omega, order) = (structure.mode().omega, self.resonance.reference_quantity.order());
-        let impacts = 4.0 / PI * self.plant.particle_mass * self.plant.half_width * omega * omega;
-        let allowed = self.backbone.precision * self.amplitude / structure.base_per_drive();
-        let is_enough = |times: &f64| {
-            let at = times * self.controller.samples_per_period;
-            let passed = self
-                .chain
-                .filter
-                .map_or(1.0, |cut_off| (at / cut_off).powi(4).hypot(1.0).recip());
-            let aliased = structure
-                .host
-                .frequency_response_to_cavity(&reference, at * omega)
-                .norm();
-            aliased * impacts * at.powi(order) * passed <= allowed
-        };
+        let allowed = self.backbone.precision * self.amplitude;
+        let is_enough = |times: &f64| self.aliased(*times).is_none_or(|aliased| aliased <= allowed);
         let times = std::iter::successors(Some(1.0), |times| Some(2.0 * times));
         times
             .take_while(|times| *times < OVERSAMPLED)
             .find(is_enough)
             .unwrap_or(OVERSAMPLED)
+    }
+
+    /// Amplitude of the base, m, that a harmonic of the force of a shaker beside the sampling frequency seems to be, with this many times the samples:
+    /// what the impacts on a particle of the speed b omega0, whose harmonics are 4/pi m b omega0², make of the force through structure and shaker, and
+    /// through an anti-alias filter. `None` without a shaker or a drive.
+    pub(crate) fn aliased(&self, times: f64) -> Option<f64> {
+        let (structure, shaker) = self.structure().and_then(|one| Some((one, one.shaker.as_ref()?)))?;
+        if self.amplitude <= 0.0 {
+            return None;
+        }
+        let [reference, _] = shaker.reference_and_inertia(structure.excitation);
+        let (omega, order) = (structure.mode().omega, self.resonance.reference_quantity.order());
+        let impacts = 4.0 / PI * self.plant.particle_mass * self.plant.half_width * omega * omega;
+        let at = times * self.controller.samples_per_period;
+        let filter = self.chain.filter;
+        let passed = filter.map_or(1.0, |cut_off| (at / cut_off).powi(4).hypot(1.0).recip());
+        let force = structure
+            .host
+            .frequency_response_to_cavity(&reference, at * omega)
+            .norm();
+        Some(force * impacts * at.powi(order) * passed * structure.base_per_drive())
     }
 
     /// What is possible, but hardly meant: a value in another unit, such as kN/m, g or mm.

@@ -1,6 +1,6 @@
 //! The `[shaker]` section: an electrodynamic shaker between the command and a structure.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use lovines::host::Row;
 use lovines::oscillator::Regime;
@@ -10,8 +10,14 @@ use serde::{Deserialize, Serialize};
 
 use super::structure::{HIGHEST, rows};
 use super::{Excitation, Structure};
+use crate::backbone::LONGEST;
+use crate::experiment::{FOLLOWED, SLOWEST_LOOP};
 use crate::plan::ShakerPath;
 use crate::rig::{BANDWIDTH, speed};
+
+/// Time constants after which 5 % are left of what rings beside the driven mode. It changes the force of the impacts, and in a window that is shorter
+/// than its beat the halves can agree.
+const RUNG_DOWN: f64 = 3.0;
 
 /// Points that a shaker adds to those of a structure.
 pub const ARMATURE: &str = "armature";
@@ -226,7 +232,16 @@ impl Structure {
     pub(crate) fn nearest_pole(&self) -> f64 {
         let cut = self.shaker.as_ref().filter(|shaker| shaker.release == Release::Cut);
         let free = cut.map_or(self, |shaker| &*shaker.without);
-        let sections = free.host.sections().iter().zip(&free.rows[free.sensor]);
+        let [driven, others @ ..] = &free.poles()[..] else {
+            return f64::INFINITY;
+        };
+        let distances = others.iter().map(|pole| (pole - driven).norm());
+        distances.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Poles of what oscillates at the sensor, rad/s, the nearest to that of the driven mode first.
+    fn poles(&self) -> Vec<Complex64> {
+        let sections = self.host.sections().iter().zip(&self.rows[self.sensor]);
         let poles = sections.filter_map(|(section, row)| match section.oscillator.regime {
             Regime::Oscillating { omega_d } if *row != [0.0; 2] => {
                 Some(Complex64::new(-section.oscillator.delta, omega_d))
@@ -236,8 +251,7 @@ impl Structure {
         let mut poles: Vec<_> = poles.collect();
         let driven = Complex64::new(0.0, self.mode().omega);
         poles.sort_by(|one, other| (one - driven).norm().total_cmp(&(other - driven).norm()));
-        let distances = poles.iter().skip(1).map(|pole| (pole - poles[0]).norm());
-        distances.fold(f64::INFINITY, f64::min)
+        poles
     }
 
     /// What the shaker makes of its command, from the frequency response at the frequencies of the check.
@@ -256,6 +270,8 @@ impl Structure {
             largest: shaker.largest_command() * self.base_per_command(),
             speed: 1.0,
             base_per_reference: self.base_per_drive(),
+            followed: 0,
+            aliased: 0.0,
         };
         let path = path.fitted(mode.omega, damping_rate, &values);
         // A small module has no code for it, as it has no structures.
@@ -268,7 +284,13 @@ impl Structure {
             let reference = self.reference_by_command(shaker, omega) / shaker.reference_per_command;
             [reference, self.host.frequency_response(&response, omega) / per_response]
         };
-        Some(ShakerPath { speed: speed(&path, mode.omega, exact), ..path })
+        let speed = speed(&path, mode.omega, exact);
+        // Both roots of the control are at half of its bandwidth.
+        let of_control = FOLLOWED as f64 / SLOWEST_LOOP / (PI * BANDWIDTH * speed);
+        let others = self.poles().into_iter().skip(1);
+        let rings = others.map(|pole| RUNG_DOWN * mode.omega / (TAU * -pole.re));
+        let followed = rings.fold(of_control, f64::max).min(LONGEST as f64).ceil() as u16;
+        Some(ShakerPath { speed, followed, ..path })
     }
 }
 

@@ -119,6 +119,21 @@ fn edges_of_a_force_that_alias_are_smaller_than_the_precision_by_default() {
 }
 
 #[test]
+fn a_level_waits_for_what_rings_beside_the_driven_mode_and_states_the_edges_that_alias() {
+    let scene = edged("");
+    let share = f64::from(scene.knowledge().shaker.unwrap().aliased) / scene.amplitude / scene.backbone.precision;
+    assert!(share > 0.1 && share <= 1.0, "{share}");
+    // The second mode of the cantilever, whose pole the shaker hardly moves.
+    let scene = preset(0, &[]).unwrap();
+    let structure = scene.structure.as_ref().unwrap();
+    let driven = structure.mode();
+    let second = &structure.modes[1];
+    let rings = 3.0 * driven.omega / (TAU * second.zeta * second.omega);
+    let followed = f64::from(scene.knowledge().shaker.unwrap().followed);
+    assert!(followed > 0.3 * rings && followed > 6.0, "{followed} {rings}");
+}
+
+#[test]
 fn a_scene_takes_more_samples_for_a_shaker_only_if_it_does_not_say_how_many() {
     let samples = |rest: &str| edged(rest).controller.samples_per_period;
     assert_eq!(samples("[controller]\nsamples_per_period = 100\n"), 100.0);
