@@ -76,6 +76,14 @@ struct Leg {
     even: f64,
 }
 
+/// What a search is for: motions with impacts, or the requested drive, unless this has been reached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Goal {
+    Impacts,
+    Drive,
+    Reached,
+}
+
 /// The search.
 pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     bench: &'b mut ControlLoop<'a, R, C>,
@@ -89,6 +97,8 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     period: f64,
     /// Setpoint of the response, m.
     setpoint: f64,
+    /// What the search is for.
+    goal: Goal,
     /// Slopes of drive and frequency over the response in the last sweep; 0 where they are not known.
     slopes: [f64; 2],
     /// Smallest and largest drive that held a symmetric motion, m; infinite before the first.
@@ -107,6 +117,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             period: TAU / knowledge.linear.omega0,
             bench,
             setpoint: 0.0,
+            goal: Goal::Impacts,
             slopes: [0.0; 2],
             held: (f64::INFINITY, 0.0),
         }
@@ -123,9 +134,18 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             self.bench.controller.hold_drive()?;
             return Ok(None);
         }
+        // Behind a shaker a constant command is no constant force.
+        self.goal = if self.target.through_shaker {
+            Goal::Impacts
+        } else {
+            Goal::Drive
+        };
         for search in 0..SEARCHES {
             let step = STEP / f64::from(1 << search);
             leg = self.symmetric(leg, step)?;
+            if self.goal == Goal::Reached {
+                return Ok(Some(false));
+            }
             if let Some(held) = self.solve(&mut leg, step, search >= SEARCHES / 2)? {
                 return Ok(Some(held));
             }
@@ -201,10 +221,34 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             && (leg.departed || leg.asymmetry > 0.0 || !seen)
             && self.setpoint > (LOWEST * self.b).max(LOST * leg.last)
         {
+            let before = leg.drive;
             leg = self.sweep(&leg, -step * leg.last)?;
             seen |= leg.departed;
+            let is_passed = before > self.requested && leg.drive <= self.requested;
+            if cfg!(feature = "tables") && self.goal == Goal::Drive && is_passed && leg.departed && !leg.symmetric {
+                leg = self.calm()?;
+            }
         }
         Ok(leg)
+    }
+
+    /// Keeps the requested drive as long as the even harmonics become smaller: beside a stable symmetric motion, a lightly damped mode takes long to
+    /// settle. A lock there is the goal; otherwise the response is controlled again. A small module has no code for this.
+    fn calm(&mut self) -> Result<Leg, ExperimentError> {
+        self.bench.controller.hold_drive()?;
+        let mut before = f64::INFINITY;
+        loop {
+            let leg = self.measure(FOLLOWED)?;
+            self.setpoint = leg.last;
+            if leg.symmetric && self.bench.settled {
+                self.goal = Goal::Reached;
+                return Ok(leg);
+            }
+            if !leg.departed || leg.even >= before {
+                return self.leg(0.0, FOLLOWED, 0.0);
+            }
+            before = leg.even;
+        }
     }
 
     /// Follows the symmetric motion to the response that the requested drive holds. Returns whether it stays under control there; `None` if
@@ -245,6 +289,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
             // Above the symmetric motion is one without symmetry, which may go on far below.
             *leg = self.fall(*leg, step)?;
+            if self.goal == Goal::Reached {
+                return Ok(Some(false));
+            }
             (swept, upwards) = (vec![*leg], false);
         }
         Ok(None)
