@@ -432,6 +432,25 @@ fn a_record_without_noise_is_followed_to_its_end() {
     );
 }
 
+#[test]
+fn a_record_behind_an_anti_alias_filter_determines_the_parameters_as_well() {
+    let scene = wrong_scene();
+    let u = |filter: &str| {
+        let record = recorded(&format!(" chain.snr=60{filter}"));
+        let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
+        let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+        let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
+        assert!(
+            worst(&followed.fit) < 3.0 && !followed.fit.is_rejected(),
+            "{filter}: {followed:?}"
+        );
+        followed.fit.estimate(Quantity::R).unwrap().uncertainty
+    };
+    // Noise is white, or is so only below the cut-off.
+    let [white, filtered] = ["", " chain.filter=10"].map(u);
+    assert!(filtered < 1.3 * white, "{filtered} {white}");
+}
+
 /// A recording of a lock and its decay, on [`RIG`] with this cavity.
 fn locked(scene: &Scene, cavity: Cavity) -> Recording {
     let rig = Simulated::new(Parameters { cavity, ..RIG }, scene.start).unwrap();

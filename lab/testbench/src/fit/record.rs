@@ -28,7 +28,9 @@ use nalgebra::{DVector, Matrix2, Matrix2x4, Matrix4, Matrix4x2, Vector2, Vector4
 use num_complex::Complex64;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use vines_model::numerics::{Estimate, HarmonicBasis, HarmonicFit, LeastSquares, Misfit, mean, mean_square};
+use vines_model::numerics::{
+    Estimate, HarmonicBasis, HarmonicFit, LeastSquares, Misfit, SIGNIFICANT, mean, mean_square,
+};
 use vines_model::orbit::{AfterImpact, Orbit, backbone_at_speed, exact_backbone};
 use vines_model::regime::Regime;
 use vines_model::theory::{BranchSide, Manifold};
@@ -104,6 +106,8 @@ struct Base {
     rest: f64,
     /// Variance of a sample by what is near the sine, if it is white, m².
     near: f64,
+    /// Second and fourth harmonic of what is not a sine, m, turned by the phase of the sine.
+    even: [Complex64; 2],
 }
 
 /// A record with its noise.
@@ -136,11 +140,15 @@ struct Step {
     whitening: Matrix2<f64>,
     /// Impacts of the plant for which this is.
     impacts: u64,
-    /// Covariance of the first harmonic of the response, m², by what the prediction leaves beside it.
+    /// Covariance of the first harmonic of the response, m², by what the prediction leaves beside it, if that is white.
     noise: Matrix2<f64>,
+    /// Variance of the second and fourth harmonic of what it leaves, m².
+    near: f64,
+    /// Variance of the first harmonic by the uncertainty of the state, m².
+    of_state: f64,
     /// Square of the innovation over its standard deviations.
     innovation: f64,
-    /// Second harmonic of what the prediction leaves, over the standard deviation of the first.
+    /// Second harmonic of what the prediction leaves, m.
     second: Complex64,
     /// Derivatives of the state at the end over the state at the begin.
     transition: Matrix4<f64>,
@@ -148,10 +156,12 @@ struct Step {
 
 /// Chi-square (two degrees of freedom) of the second harmonic of a piece: impacts at uneven intervals have one, which lasts for many periods. The
 /// innovations of wrong parameters have all harmonics: with `beside` they are the measure where they exceed their standard deviations.
-fn unevenness(piece: &[Step], beside: bool) -> f64 {
+fn unevenness(piece: &[Step], colour: f64, beside: bool) -> f64 {
     let innovations = 0.5 * mean(piece.iter().map(|step| step.innovation));
     let measure = if beside { innovations.max(1.0) } else { 1.0 };
-    piece.iter().map(|step| step.second).sum::<Complex64>().norm_sqr() / (piece.len() as f64 * measure)
+    let deviation = |step: &Step| (step.of_state + 0.5 * colour * step.noise.trace()).sqrt();
+    let sum: Complex64 = piece.iter().map(|step| step.second / deviation(step)).sum();
+    sum.norm_sqr() / (piece.len() as f64 * measure)
 }
 
 /// The periods of a stretch, and the state at the first one, for plants of other parameters as well: it has its own uncertainty.
@@ -235,6 +245,21 @@ fn harmonic_of(values: &[f64], order: f64) -> Complex64 {
     sum * Complex64::new(0.0, 2.0 / values.len() as f64)
 }
 
+/// By how much noise is larger near the first harmonic than white noise of its variance is: behind an anti-alias filter. `ratios`: of the variances by
+/// the second and fourth harmonic (four degrees of freedom) to those of white noise, of each period. What is larger by chance is white.
+fn colour(ratios: impl Iterator<Item = f64>) -> f64 {
+    let mut ratios: Vec<f64> = ratios.collect();
+    ratios.sort_by(f64::total_cmp);
+    // The mean of a chi-square of four degrees of freedom over its median, whose standard error is 1.25 times that of the mean.
+    let colour = ratios.get(ratios.len() / 2).map_or(1.0, |middle| middle * 4.0 / 3.357);
+    let error = 1.25 * (0.5 / ratios.len().max(1) as f64).sqrt();
+    if colour > 1.0 + SIGNIFICANT * error {
+        colour
+    } else {
+        1.0
+    }
+}
+
 /// Variance of the first harmonic in a period by the even ones next to it, in which the impulses of both impacts cancel, however a sensor shows them.
 /// The inverse of the mean over a piece is that of the variance on average: it has four degrees of freedom in a period.
 fn variance_near(errors: &[f64]) -> f64 {
@@ -285,12 +310,13 @@ fn quarter_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
     // The amplitude E0 + E1 n + Re(E2 exp(2i phase)) has a third harmonic.
     let [first, growth, third] = [fit.harmonic(1), fit.drift(1), fit.harmonic(3)];
     let turn = first.conj() / first.norm();
+    let even = [2, 4].map(|order| harmonic_of(residual.as_slice(), f64::from(order)) * turn.powi(order));
     let growth = (growth * turn).re * 2.0 / (values.len() - 1) as f64;
     let swing = 2.0 * third * turn.powi(3);
     let jump = |n: usize| {
         let angle = phases[n - begin] + first.arg();
         let rate = growth - 2.0 * step * (swing * Complex64::from_polar(1.0, 2.0 * angle + step)).im;
-        Base { scale, jump: rate * angle.sin(), noise, rest, near }
+        Base { scale, jump: rate * angle.sin(), noise, rest, near, even }
     };
     quarter.map(jump).collect()
 }
@@ -317,7 +343,19 @@ impl<'a> Measured<'a> {
             starts.flat_map(|from| quarter_of_base(drive, from, period)).collect()
         };
         let mut base = bases(&drive);
-        if of_base != Measurand::Displacement {
+        if of_base == Measurand::Displacement {
+            // By the changes from period to period: a harmonic that stays is no noise.
+            let size = PIECE * period;
+            let ratios = base.chunks(size).flat_map(|piece| {
+                let white = 2.0 * mean(piece.iter().map(|one| one.noise)) / period as f64;
+                let periods = piece.iter().step_by(period).map(|one| one.even);
+                let changes = periods.clone().zip(periods.skip(1));
+                let square = |(one, next): (Complex64, Complex64)| (one - next).norm_sqr();
+                changes.map(move |(one, next)| one.into_iter().zip(next).map(square).sum::<f64>() / 8.0 / white)
+            });
+            let colour = colour(ratios);
+            base.iter_mut().for_each(|one| one.noise *= colour);
+        } else {
             // Differences show every jump of the base as well.
             let size = PIECE * period;
             for (base, measured) in base.chunks_mut(size).zip(bases(&recording.drive).chunks(size)) {
@@ -539,9 +577,10 @@ impl Followed<'_> {
             transition * kept * transition.transpose() + process * 0.5 + Matrix4::from_diagonal_element(square);
         let gain = transition * gain;
         let errors = one.errors(begin, &readings);
+        let near = variance_near(&errors);
         let left = match record.recording.measurands[0] {
             Measurand::Displacement => noise_of(&errors, turn),
-            _ => Matrix2::from_diagonal_element(variance_near(&errors)),
+            _ => Matrix2::from_diagonal_element(near),
         };
         one.moved(&(gain * innovation))?;
         let whitening = total.cholesky()?.l().try_inverse()?;
@@ -554,7 +593,9 @@ impl Followed<'_> {
             innovation: (whitening * innovation).norm_squared(),
             impacts: one.plant.totals().impacts - from.plant.totals().impacts,
             noise: left,
-            second: harmonic_of(&errors, 2.0) * turn * turn / (0.5 * (total - noise + left).trace()).sqrt(),
+            near,
+            of_state: 0.5 * (total - noise).trace(),
+            second: harmonic_of(&errors, 2.0) * turn * turn,
             transition,
         })
     }
@@ -627,19 +668,24 @@ impl Followed<'_> {
                 .map(|one| one.counted().chunks(PIECE).len())
                 .sum::<usize>();
             let limit = -2.0 * (FALSE_ALARM / pieces.max(1) as f64).ln();
-            let contradicts = |piece: &[Step]| {
+            let colours: Vec<f64> = (0..self.records.len()).map(|record| self.colour(record)).collect();
+            let contradicts = |piece: &[Step], colour: f64| {
                 let moved = piece
                     .iter()
                     .fold(Vector4::ith(3, 1.0), |moved, step| step.transition * moved);
                 let grows = self.impacts > 0 && moved.norm() >= 1.0;
-                let is_uneven = self.impacts > 0 && unevenness(piece, self.beside) > limit;
+                let is_uneven = self.impacts > 0 && unevenness(piece, colour, self.beside) > limit;
                 let is_another = grows || piece.iter().any(|step| step.impacts != self.impacts);
                 (is_another || is_uneven).then_some(!is_another)
             };
-            let flags: Vec<Vec<Option<bool>>> = self
-                .courses
-                .iter()
-                .map(|one| one.counted().chunks(PIECE).map(contradicts).collect())
+            let courses = self.stretches.iter().zip(&self.courses);
+            let flags: Vec<Vec<Option<bool>>> = courses
+                .map(|(stretch, course)| {
+                    let pieces = course.counted().chunks(PIECE);
+                    pieces
+                        .map(|piece| contradicts(piece, colours[stretch.record]))
+                        .collect()
+                })
                 .collect();
             let more = self.cut(&flags);
             if more.is_empty() {
@@ -651,8 +697,20 @@ impl Followed<'_> {
         left_out
     }
 
+    /// The colour of the noise of the response in a record; that of velocities and accelerations is measured near the harmonic anyway.
+    fn colour(&self, record: usize) -> f64 {
+        let courses = self.stretches.iter().zip(&self.courses);
+        let of_record = courses.filter(|(stretch, _)| stretch.record == record);
+        let steps = of_record.flat_map(|(_, course)| course.counted());
+        match self.records[record].recording.measurands[0] {
+            Measurand::Displacement => colour(steps.map(|step| step.near / (0.5 * step.noise.trace()))),
+            _ => 1.0,
+        }
+    }
+
     /// The noise of the response in each piece of the records.
     fn measure_noise(&mut self) {
+        let colours: Vec<f64> = (0..self.records.len()).map(|record| self.colour(record)).collect();
         for (number, record) in self.records.iter_mut().enumerate() {
             let mut sums = vec![(Matrix2::zeros(), 0.0); record.response_noise.len()];
             let of_record = self
@@ -666,7 +724,7 @@ impl Followed<'_> {
             }
             for (noise, (sum, count)) in record.response_noise.iter_mut().zip(sums) {
                 if count > 0.0 {
-                    *noise = sum / count;
+                    *noise = sum * (colours[number] / count);
                 }
             }
         }
