@@ -3,7 +3,7 @@
 //! A rig is drawn (epsilon 0.002 to 0.03, lambda 0.4 to 2.5, r 0.4 to 0.9), and a client's scene that is wrong: r by 0.2, b by 10 %, m by 20 %, c by
 //! 30 %, k by 1 %. The client fits f0, zeta, r, b and epsilon to the backbone that it tracks (`points`), also with the linear response that a loop
 //! check of the rig at rest measures (`linear`), or to a recording, cut at both ends, which the plant follows: of the tracked backbone (`levels`), also
-//! by accelerometers on mass and base, beside the noiseless sensors of the loop (`accelerations`), of a lock whose drive then changes slowly
+//! behind an anti-alias filter at 10 to 40 times the natural frequency (`filtered`), and by accelerometers on mass and base, beside the noiseless sensors of the loop (`accelerations`), of a lock whose drive then changes slowly
 //! (`sweeps`), or of the search, the hold and the decay of `vines identify` (`decays`). For each parameter, of the fits that are not rejected: the
 //! share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the error over u, and that over the
 //! Cramér–Rao bound, of the same points or of a whole recording of levels or sweeps; the numbers of fits that are rejected, of recordings of which
@@ -18,8 +18,8 @@
 //! effect alone, by wrong ones, and by the right one among others; and the coverage of the strength. `two effects` gives each rig two of them:
 //! `named` counts the rigs for which both are possible, `among_others` those for which one is.
 //!
-//! Arguments: `points`, `linear`, `levels`, `accelerations`, `sweeps`, `decays`, `effects`, the name of one effect, `two effects` or `none`, RIGS, SEED,
-//! SNR in dB or `none`. Writes validation/fit.csv or, for `effects`, validation/fit_effects.csv.
+//! Arguments: `points`, `linear`, `levels`, `filtered`, `accelerations`, `sweeps`, `decays`, `effects`, the name of one effect, `two effects` or `none`,
+//! RIGS, SEED, SNR in dB or `none`. Writes validation/fit.csv or, for `effects`, validation/fit_effects.csv.
 
 mod common;
 
@@ -44,7 +44,7 @@ type Points = (Vec<MeasuredPoint>, Scene, Parameters);
 
 fn main() -> Result<(), Failure> {
     let [source, count, seed, snr] = &arguments([
-        "points|linear|levels|accelerations|sweeps|decays|effects|EFFECT",
+        "points|linear|levels|filtered|accelerations|sweeps|decays|effects|EFFECT",
         "RIGS",
         "SEED",
         "SNR|none",
@@ -57,7 +57,13 @@ fn main() -> Result<(), Failure> {
             println!("{verdicts:?}");
             fitted(measured, &[Known::Linear(verdicts[0].linear)])
         },
-        "levels" => |case, snr| follow_one(case, snr, |case, snr| levels(case, snr, Definition::default())),
+        "levels" => |case, snr| follow_one(case, snr, |case, snr| levels(case, snr, Definition::default(), None)),
+        "filtered" => |case, snr| {
+            follow_one(case, snr, |case, snr| {
+                let cut_off = 10.0 * 4_f64.powf((case.1 % 1000) as f64 / 1000.0);
+                levels(case, snr, Definition::default(), Some(cut_off))
+            })
+        },
         "accelerations" => |case, snr| follow_one(case, snr, accelerations),
         "sweeps" => |case, snr| follow_one(case, snr, sweep),
         "decays" => |case, snr| follow_one(case, snr, lock_and_decay),
@@ -150,7 +156,7 @@ fn effects(source: &str, count: usize, seed: u64, snr: &str) -> Result<(), Failu
     if chosen.is_empty() {
         let names = names.join(", ");
         return Err(format!(
-            "{source}: there are points, linear, levels, accelerations, sweeps, decays, effects, {names}"
+            "{source}: there are points, linear, levels, filtered, accelerations, sweeps, decays, effects, {names}"
         )
         .into());
     }
@@ -458,7 +464,7 @@ fn recording(read: &[Sensors], sample_time: f64) -> Recording {
 /// A recording of a tracked backbone by accelerometers, each with noise of its own: second differences of the displacements of mass and base.
 fn accelerations(case: &Case, snr: &str) -> Result<Recorded, Failure> {
     let of_mass = Definition { sensor: Sensor::Q1, ..Definition::default() };
-    let mut recorded = levels(case, "none", of_mass)?;
+    let mut recorded = levels(case, "none", of_mass, None)?;
     let recording = &mut recorded.recording;
     let step = recording.sample_time;
     let mut random = ChaCha8Rng::seed_from_u64(case.1);
@@ -479,9 +485,10 @@ fn accelerations(case: &Case, snr: &str) -> Result<Recorded, Failure> {
 }
 
 /// A recording of a tracked backbone.
-fn levels(case: &Case, snr: &str, resonance: Definition) -> Result<Recorded, Failure> {
+fn levels(case: &Case, snr: &str, resonance: Definition, filter: Option<f64>) -> Result<Recorded, Failure> {
     let (truth, scene, plan) = client(case, snr)?;
-    let scene = Scene { resonance, ..scene };
+    let mut scene = Scene { resonance, ..scene };
+    scene.chain.filter = filter;
     let plan = scene.plan_on(scene.knowledge().measured(plan.knowledge.linear));
     let mut rig = Recorder {
         rig: behind_chain(truth, &scene)?,

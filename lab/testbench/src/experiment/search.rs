@@ -76,14 +76,6 @@ struct Leg {
     even: f64,
 }
 
-/// What a search is for: motions with impacts, or the requested drive, unless this has been reached.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Goal {
-    Impacts,
-    Drive,
-    Reached,
-}
-
 /// The search.
 pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     bench: &'b mut ControlLoop<'a, R, C>,
@@ -97,10 +89,6 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     period: f64,
     /// Setpoint of the response, m.
     setpoint: f64,
-    /// What the search is for.
-    goal: Goal,
-    /// Slopes of drive and frequency over the response in the last sweep; 0 where they are not known.
-    slopes: [f64; 2],
     /// Smallest and largest drive that held a symmetric motion, m; infinite before the first.
     held: (f64, f64),
 }
@@ -117,8 +105,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             period: TAU / knowledge.linear.omega0,
             bench,
             setpoint: 0.0,
-            goal: Goal::Impacts,
-            slopes: [0.0; 2],
             held: (f64::INFINITY, 0.0),
         }
     }
@@ -134,18 +120,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             self.bench.controller.hold_drive()?;
             return Ok(None);
         }
-        // Behind a shaker a constant command is no constant force.
-        self.goal = if self.target.through_shaker {
-            Goal::Impacts
-        } else {
-            Goal::Drive
-        };
         for search in 0..SEARCHES {
             let step = STEP / f64::from(1 << search);
             leg = self.symmetric(leg, step)?;
-            if self.goal == Goal::Reached {
-                return Ok(Some(false));
-            }
             if let Some(held) = self.solve(&mut leg, step, search >= SEARCHES / 2)? {
                 return Ok(Some(held));
             }
@@ -221,41 +198,16 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             && (leg.departed || leg.asymmetry > 0.0 || !seen)
             && self.setpoint > (LOWEST * self.b).max(LOST * leg.last)
         {
-            let before = leg.drive;
             leg = self.sweep(&leg, -step * leg.last)?;
             seen |= leg.departed;
-            let is_passed = before > self.requested && leg.drive <= self.requested;
-            if cfg!(feature = "tables") && self.goal == Goal::Drive && is_passed && leg.departed && !leg.symmetric {
-                leg = self.calm()?;
-            }
         }
         Ok(leg)
-    }
-
-    /// Keeps the requested drive as long as the even harmonics become smaller: beside a stable symmetric motion, a lightly damped mode takes long to
-    /// settle. A lock there is the goal; otherwise the response is controlled again. A small module has no code for this.
-    fn calm(&mut self) -> Result<Leg, ExperimentError> {
-        self.bench.controller.hold_drive()?;
-        let mut before = f64::INFINITY;
-        loop {
-            let leg = self.measure(FOLLOWED)?;
-            self.setpoint = leg.last;
-            if leg.symmetric && self.bench.settled {
-                self.goal = Goal::Reached;
-                return Ok(leg);
-            }
-            if !leg.departed || leg.even >= before {
-                return self.leg(0.0, FOLLOWED, 0.0);
-            }
-            before = leg.even;
-        }
     }
 
     /// Follows the symmetric motion to the response that the requested drive holds. Returns whether it stays under control there; `None` if
     /// the motion is lost. `any`: also one that a constant drive does not hold.
     fn solve(&mut self, leg: &mut Leg, step: f64, any: bool) -> Result<Option<bool>, ExperimentError> {
         let (mut swept, mut upwards) = (vec![*leg], leg.drive < self.requested);
-        let mut handed_over = false;
         while leg.symmetric && self.setpoint > LOWEST * self.b {
             let change = step / self.steepness(&swept).max(1.0) * leg.last;
             *leg = self.sweep(leg, if upwards { change } else { -change })?;
@@ -265,21 +217,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
             if leg.symmetric {
                 swept.push(*leg);
-                let is_steep = self.steepness(&swept) > 1.0;
-                let Some(levels) = passed(&swept, self.requested, any, is_steep) else {
+                let Some(levels) = passed(&swept, self.requested, any) else {
                     continue;
                 };
-                let is_held = is_steep && levels.0.len() == 1 && self.is_held_by_drive(levels.1, leg);
-                if cfg!(feature = "tables") && is_held && !upwards && !handed_over {
-                    // Control of the response would take the motion beyond the fold meanwhile. A small module has no code for this.
-                    handed_over = true;
-                    self.bench.controller.hold_drive()?;
-                    if self.settle(leg)? {
-                        return Ok(Some(false));
-                    }
-                    *leg = self.leg(0.0, FOLLOWED, 0.0)?;
-                    upwards = leg.drive < self.requested;
-                } else if let Some(held) = self.refine(leg, levels, any, upwards)? {
+                if let Some(held) = self.refine(leg, levels, any, upwards)? {
                     return Ok(Some(held));
                 }
                 if leg.symmetric {
@@ -289,9 +230,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
             // Above the symmetric motion is one without symmetry, which may go on far below.
             *leg = self.fall(*leg, step)?;
-            if self.goal == Goal::Reached {
-                return Ok(Some(false));
-            }
             (swept, upwards) = (vec![*leg], false);
         }
         Ok(None)
@@ -342,7 +280,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 continue;
             }
             // The condition of stability under a constant drive.
-            let is_stable = predicted.is_root && self.is_held_by_drive(predicted.slope, leg);
+            let is_stable = by_drive && predicted.slope > SMALLEST_SLOPE * leg.drive / leg.response;
             if is_stable {
                 self.bench.controller.hold_drive()?;
             }
@@ -360,12 +298,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         // The sweep goes on from there.
         *leg = self.level(leg, end)?;
         Ok(None)
-    }
-
-    /// Whether a constant drive holds a motion whose holding drive has this slope over the response. Behind a shaker a constant command is no constant
-    /// force.
-    fn is_held_by_drive(&self, slope: f64, leg: &Leg) -> bool {
-        !self.target.through_shaker && slope > SMALLEST_SLOPE * leg.drive / leg.response
     }
 
     /// Whether a held level is where the requested drive holds the response.
@@ -416,44 +348,16 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// A leg that changes the response by `change`, m, and lets it go on at this rate.
     fn sweep(&mut self, leg: &Leg, change: f64) -> Result<Leg, ExperimentError> {
         let periods = self.periods(STEP * leg.response, leg);
-        // Near the fold drive and frequency change much faster than the response. Loops that had to find these changes by their errors would let the
-        // response run ahead, beyond the fold. A small module has no code for this.
-        let expected = if cfg!(feature = "tables") {
-            self.slopes.map(|slope| slope * change)
-        } else {
-            [0.0; 2]
-        };
-        let next = self.expecting(expected, change, periods, change / (periods as f64 * self.period))?;
-        let moved = next.response - leg.response;
-        // The drive of an irregular motion scatters.
-        let is_known = leg.symmetric
-            && next.symmetric
-            && moved / change > SHARE
-            && SIGNIFICANT * leg.noise.hypot(next.noise) < (next.drive - leg.drive).abs();
-        let slopes = [next.drive - leg.drive, next.omega - leg.omega].map(|difference| difference / moved);
-        self.slopes = if is_known { slopes } else { [0.0; 2] };
-        Ok(next)
+        self.leg(change, periods, change / (periods as f64 * self.period))
     }
 
     /// Moves the setpoint by `change`, m, within `periods` and measures meanwhile. The setpoint ends, and goes on, with the growth `onward`, m/s.
     fn leg(&mut self, change: f64, periods: usize, onward: f64) -> Result<Leg, ExperimentError> {
-        self.expecting([0.0; 2], change, periods, onward)
-    }
-
-    /// [`Self::leg`] with expected changes of drive, m, and frequency, rad/s.
-    fn expecting(
-        &mut self,
-        [amplitude, omega]: [f64; 2],
-        change: f64,
-        periods: usize,
-        onward: f64,
-    ) -> Result<Leg, ExperimentError> {
         let to = Move {
             response: (self.setpoint + change).max(LOWEST * self.b),
             duration: periods as f64 * self.period,
             growth: onward,
-            amplitude,
-            omega,
+            ..Move::default()
         };
         self.bench.hold_response(to)?;
         self.setpoint = to.response;
@@ -571,15 +475,15 @@ fn even_and_odd(samples: &[Sample], target: &Target, omega: f64, sample_time: f6
 }
 
 /// What a sweep has passed: levels of the response, m, near which the requested drive is, or an extremum of the drive that may reach it, the
-/// highest first; and the slope of the drive over the response there. `is_steep`: drive or frequency change faster than in proportion to the response.
-fn passed(swept: &[Leg], requested: f64, any: bool, is_steep: bool) -> Option<(Vec<f64>, f64, f64)> {
+/// highest first; and the slope of the drive over the response there.
+fn passed(swept: &[Leg], requested: f64, any: bool) -> Option<(Vec<f64>, f64, f64)> {
     let beyond = |leg: &Leg| leg.drive - requested;
     let [.., two, last] = swept else { return None };
     let slope = (last.drive - two.drive) / (last.response - two.response);
     let has_passed = |n: f64| beyond(two) * (last.drive - requested + n * (last.drive - two.drive)) <= 0.0;
     let levels = match () {
-        // Where drive or frequency change faster than in proportion, the motion may be lost below.
-        () if has_passed(1.0) && slope > 0.0 && is_steep => vec![last.last],
+        // Where the drive rises faster than in proportion, the motion may be lost below.
+        () if has_passed(1.0) && slope * last.response > last.drive => vec![last.last],
         () if has_passed(0.0) && (any || slope > 0.0) => vec![last.response - beyond(last) / slope],
         () => {
             let nearest =

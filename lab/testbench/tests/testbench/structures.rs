@@ -555,79 +555,6 @@ fn an_exact_orbit_of_a_structure_with_close_modes_lies_on_its_exact_backbone() {
     }
 }
 
-/// Four modes with a drive that is held 1 % above the smallest response of the backbone.
-const NEAR_FOLD: &str = "\
-[plant]
-m = 0.0198130545526333
-b = 1
-r = 0.5654831308359959
-[controller]
-omega_min = 0.8
-omega_max = 1.2
-[record]
-decay_periods = 3
-[structure]
-cavity = \"cavity\"
-excitation = \"force\"
-drive = \"drive\"
-sensor = \"drive\"
-modes = [
-    { frequency = 1.0, damping = 0.0031137239308823114, shape = { cavity = 1.0, drive = 1.0842985299074366 } },
-    { frequency = 1.6671849780666317, damping = 0.0054448148465558515, shape = { cavity = 0.38003017212135115, drive = 0.1576000147824234 } },
-    { frequency = 6.378766482228382, damping = 0.009811884469483077, shape = { cavity = -0.1488003848435685, drive = -0.14301327775677594 } },
-    { frequency = 9.062515651607042, damping = 0.0017892997687119713, shape = { cavity = 0.3585084595182745, drive = -0.107813150340689 } },
-]
-[excitation]
-G = 0.8702188778747658
-";
-
-/// Five modes, of which the second leaves the symmetric motion asymmetric for 160 periods.
-const BEATS: &str = "\
-[plant]
-m = 0.004042166853393704
-b = 1
-r = 0.6223885907726464
-[controller]
-omega_min = 0.8
-omega_max = 1.2
-[record]
-decay_periods = 3
-[structure]
-cavity = \"cavity\"
-excitation = \"force\"
-drive = \"drive\"
-sensor = \"cavity\"
-modes = [
-    { frequency = 1.0, damping = 0.005987000515072584, shape = { cavity = 1.0, drive = 0.8142982401896645 } },
-    { frequency = 2.3379913915647066, damping = 0.002791765606021149, shape = { cavity = -1.2469467944325758, drive = 0.28241483793254113 } },
-    { frequency = 5.945700230806511, damping = 0.015045911411938855, shape = { cavity = -0.6878558461304634, drive = -0.4015933505526738 } },
-    { frequency = 8.51041606128821, damping = 0.007073745518565608, shape = { cavity = -0.30556994517730457, drive = -0.11624172500459012 } },
-    { frequency = 17.317126143794223, damping = 0.01880797477959447, shape = { cavity = -1.3618881248030599, drive = 0.1332425520946523 } },
-]
-[excitation]
-G = 1.2742353149921262
-";
-
-/// Whether the lock of a scene is within 2e-3 of a stable orbit.
-fn is_at_a_stable_orbit(text: &str) -> bool {
-    let scene = of(&TempDir::new().unwrap(), text, &[]).unwrap();
-    let at = identified(&scene).unwrap().lock.at;
-    let orbits = phase_resonant(&scene, &scene.dimensionless());
-    let is_near =
-        |orbit: &Orbit| orbit.stable && (at.sigma - orbit.sigma).abs() < 2e-3 && (at.c - orbit.c).abs() < 2e-3;
-    orbits.iter().any(is_near)
-}
-
-#[test]
-fn a_drive_just_above_the_fold_is_locked_before_control_of_the_response_passes_it() {
-    assert!(is_at_a_stable_orbit(NEAR_FOLD));
-}
-
-#[test]
-fn an_asymmetric_motion_gets_the_requested_drive_as_long_as_it_becomes_more_symmetric() {
-    assert!(is_at_a_stable_orbit(BEATS));
-}
-
 /// Three modes driven at a fold of the drive, where the response under a constant drive creeps for 170 periods.
 const CREEPS: &str = "\
 [plant]
@@ -658,8 +585,7 @@ fn the_uncertainty_of_a_lock_covers_what_a_response_that_still_creeps_is_off() {
     let is_covered = |orbit: &Orbit| {
         orbit.stable && (at.sigma - orbit.sigma).abs() < 2.0 * at.u_sigma && (at.c - orbit.c).abs() < 2.0 * at.u_c
     };
-    // It tells the orbit from the other one under this drive, 0.1 away.
-    assert!(at.u_sigma < 1e-2 && orbits.iter().any(is_covered), "{at:?}");
+    assert!(at.u_sigma < 2e-3 && orbits.iter().any(is_covered), "{at:?}");
 }
 
 /// Receptances and base responses of modes at points, by the sum over the modes.
