@@ -261,10 +261,10 @@ fn colour(ratios: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Variance of the first harmonic in a period by the even ones next to it, in which the impulses of both impacts cancel, however a sensor shows them.
-/// The inverse of the mean over a piece is that of the variance on average: it has four degrees of freedom in a period.
+/// It has four degrees of freedom.
 fn variance_near(errors: &[f64]) -> f64 {
     let squares = [2.0, 4.0].map(|order| harmonic_of(errors, order).norm_sqr());
-    0.5 * mean(squares) * PIECE as f64 / (PIECE as f64 - 0.5)
+    0.5 * mean(squares)
 }
 
 /// The displacements, m, of a base whose velocities or accelerations are given, over omega0 or its square: their integrals, without what changes
@@ -580,7 +580,8 @@ impl Followed<'_> {
         let near = variance_near(&errors);
         let left = match record.recording.measurands[0] {
             Measurand::Displacement => noise_of(&errors, turn),
-            _ => Matrix2::from_diagonal_element(near),
+            // The inverse of the mean over a piece is that of the variance on average.
+            _ => Matrix2::from_diagonal_element(near * PIECE as f64 / (PIECE as f64 - 0.5)),
         };
         one.moved(&(gain * innovation))?;
         let whitening = total.cholesky()?.l().try_inverse()?;
