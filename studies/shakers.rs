@@ -84,7 +84,7 @@ fn drawn(uniform: Uniform, limits: Option<Uniform>, settings: &[String]) -> Resu
             .filter(|orbit| (to..=from).contains(&orbit.c))
             .map(|orbit| orbit.g);
         let (least, largest) = range((f64::INFINITY, 0.0), drives);
-        if from < 1.2 * to || largest > 3.0 {
+        if from < 1.2 * to || !(least..=3.0).contains(&largest) {
             continue;
         }
         let g = least + share * (largest - least);
