@@ -2,14 +2,14 @@
 //!
 //! A rig is drawn (epsilon 0.002 to 0.03, lambda 0.4 to 2.5, r 0.4 to 0.9), and a client's scene that is wrong: r by 0.2, b by 10 %, m by 20 %, c by
 //! 30 %, k by 1 %. The client fits f0, zeta, r, b and epsilon to the backbone that it tracks (`points`), also with the linear response that a loop
-//! check of the rig at rest measures (`linear`), or to a recording, cut at both ends, which the plant follows: of the tracked backbone (`levels`), also
-//! behind an anti-alias filter at 10 to 40 times the natural frequency (`filtered`), and by accelerometers on mass and base, beside the noiseless sensors of the loop (`accelerations`), of a lock whose drive then changes slowly
-//! (`sweeps`), or of the search, the hold and the decay of `vines identify` (`decays`). For each parameter, of the fits that are not rejected: the
-//! share within 1.96 of the stated standard uncertainty u, the largest error over u, the root mean square of the error over u, and that over the
-//! Cramér–Rao bound, of the same points or of a whole recording of levels or sweeps; the numbers of fits that are rejected, of recordings of which
-//! only the points were fitted, and of rigs without a fit; and the probabilities by Kolmogorov and Smirnov that the p-values of each channel's chi-
-//! square are uniform: of response, frequency and drive, or of the innovations of a record, in phase with the response and a quarter of a period
-//! beside it.
+//! check of the rig at rest measures (`linear`), or to a recording, cut at both ends, which the plant follows: of the tracked backbone (`levels`),
+//! also behind an anti-alias filter at 10 to 40 times the natural frequency (`filtered`) and by accelerometers on mass and base, beside the noiseless
+//! sensors of the loop (`accelerations`), of a lock whose drive then changes slowly (`sweeps`), or of the search, the hold and the decay of `vines
+//! identify` (`decays`). For each parameter, of the fits that are not rejected: the share within 1.96 of the stated standard uncertainty u, the
+//! largest error over u, the root mean square of the error over u, and that over the Cramér–Rao bound, of the same points or of a whole recording of
+//! levels or sweeps; the numbers of fits that are rejected, of recordings of which only the points were fitted, and of rigs without a fit; and the
+//! probabilities by Kolmogorov and Smirnov that the p-values of each channel's chi- square are uniform: of response, frequency and drive, or of the
+//! innovations of a record, in phase with the response and a quarter of a period beside it.
 //!
 //! `effects` gives each rig one hidden effect, in turn friction, tilt, two laws of restitution, and a cubic stiffness, which moves the measured
 //! frequencies by harmonic balance; and as many rigs none. Half of the rigs with friction are at rest when a loop check measures them. A rig is drawn

@@ -260,11 +260,14 @@ fn colour(ratios: impl Iterator<Item = f64>) -> f64 {
     }
 }
 
-/// Variance of the first harmonic in a period by the even ones next to it, in which the impulses of both impacts cancel, however a sensor shows them.
-/// It has four degrees of freedom.
-fn variance_near(errors: &[f64]) -> f64 {
-    let squares = [2.0, 4.0].map(|order| harmonic_of(errors, order).norm_sqr());
-    0.5 * mean(squares)
+/// The second and fourth harmonic of the values of one period, in which the impulses of both impacts cancel, however a sensor shows them.
+fn even_harmonics(values: &[f64]) -> [Complex64; 2] {
+    [2.0, 4.0].map(|order| harmonic_of(values, order))
+}
+
+/// Variance of the first harmonic in a period by these next to it. It has four degrees of freedom.
+fn variance_near(even: &[Complex64; 2]) -> f64 {
+    0.5 * mean(even.iter().map(Complex64::norm_sqr))
 }
 
 /// The displacements, m, of a base whose velocities or accelerations are given, over omega0 or its square: their integrals, without what changes
@@ -303,14 +306,15 @@ fn quarter_of_base(drive: &[f64], from: usize, period: usize) -> Vec<Base> {
         return vec![Base { scale, noise, ..Base::default() }; quarter.len()];
     };
     let residual = basis.residual(&vector, &fit);
-    let near = variance_near(residual.as_slice()) * values.len() as f64 / 2.0;
+    let even = even_harmonics(residual.as_slice());
+    let near = variance_near(&even) * values.len() as f64 / 2.0;
     // The part of a sine that a polygon lacks, `scale - 1`, is known to the first order only.
     let polygon = 0.5 * ((scale - 1.0) * fit.harmonic(1).norm()).powi(2);
     let rest = residual.norm_squared() / (values.len() - basis.terms()) as f64 + polygon;
     // The amplitude E0 + E1 n + Re(E2 exp(2i phase)) has a third harmonic.
     let [first, growth, third] = [fit.harmonic(1), fit.drift(1), fit.harmonic(3)];
     let turn = first.conj() / first.norm();
-    let even = [2, 4].map(|order| harmonic_of(residual.as_slice(), f64::from(order)) * turn.powi(order));
+    let even = [even[0] * turn.powi(2), even[1] * turn.powi(4)];
     let growth = (growth * turn).re * 2.0 / (values.len() - 1) as f64;
     let swing = 2.0 * third * turn.powi(3);
     let jump = |n: usize| {
@@ -343,9 +347,9 @@ impl<'a> Measured<'a> {
             starts.flat_map(|from| quarter_of_base(drive, from, period)).collect()
         };
         let mut base = bases(&drive);
+        let size = PIECE * period;
         if of_base == Measurand::Displacement {
             // By the changes from period to period: a harmonic that stays is no noise.
-            let size = PIECE * period;
             let ratios = base.chunks(size).flat_map(|piece| {
                 let white = 2.0 * mean(piece.iter().map(|one| one.noise)) / period as f64;
                 let periods = piece.iter().step_by(period).map(|one| one.even);
@@ -357,7 +361,6 @@ impl<'a> Measured<'a> {
             base.iter_mut().for_each(|one| one.noise *= colour);
         } else {
             // Differences show every jump of the base as well.
-            let size = PIECE * period;
             for (base, measured) in base.chunks_mut(size).zip(bases(&recording.drive).chunks(size)) {
                 let near = mean(measured.iter().map(|one| one.near));
                 for (one, measured) in base.iter_mut().zip(measured) {
@@ -577,7 +580,8 @@ impl Followed<'_> {
             transition * kept * transition.transpose() + process * 0.5 + Matrix4::from_diagonal_element(square);
         let gain = transition * gain;
         let errors = one.errors(begin, &readings);
-        let near = variance_near(&errors);
+        let even = even_harmonics(&errors);
+        let near = variance_near(&even);
         let left = match record.recording.measurands[0] {
             Measurand::Displacement => noise_of(&errors, turn),
             // The inverse of the mean over a piece is that of the variance on average.
@@ -596,7 +600,7 @@ impl Followed<'_> {
             noise: left,
             near,
             of_state: 0.5 * (total - noise).trace(),
-            second: harmonic_of(&errors, 2.0) * turn * turn,
+            second: even[0] * turn * turn,
             transition,
         })
     }

@@ -123,14 +123,14 @@ fn a_level_waits_for_what_rings_beside_the_driven_mode_and_states_the_edges_that
     let scene = edged("");
     let share = f64::from(scene.knowledge().shaker.unwrap().aliased) / scene.amplitude / scene.backbone.precision;
     assert!(share > 0.1 && share <= 1.0, "{share}");
-    // The second mode of the cantilever, whose pole the shaker hardly moves.
+    // The second mode of the cantilever, which the shaker damps a little more.
     let scene = preset(0, &[]).unwrap();
     let structure = scene.structure.as_ref().unwrap();
     let driven = structure.mode();
     let second = &structure.modes[1];
     let rings = 3.0 * driven.omega / (TAU * second.zeta * second.omega);
     let followed = f64::from(scene.knowledge().shaker.unwrap().followed);
-    assert!(followed > 0.3 * rings && followed > 6.0, "{followed} {rings}");
+    assert!((followed - rings).abs() < 0.3 * rings, "{followed} {rings}");
 }
 
 #[test]
