@@ -13,7 +13,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 pub use rayon::prelude::*;
 pub use vines_model::numerics::{Estimate, mean, mean_square, range};
-pub use vines_model::orbit::{exact_backbone, phase_resonant, resonant_motion};
+pub use vines_model::orbit::{Orbit, exact_backbone, phase_resonant, resonant_motion};
 pub use vines_model::{Definition, Dimensionless};
 use vines_testbench::advice;
 pub use vines_testbench::backbone::{LevelPoint, Tracked, track};
@@ -27,6 +27,7 @@ pub use vines_testbench::rig::{
     BuiltIn, Chain, ControllerError, Rig, RigFault, SensorFault, SensorsOnly, Simulated, faulty,
 };
 pub use vines_testbench::scene::{Override, Scene};
+pub use vines_testbench::survey::structure_backbone;
 
 /// Any error of a study.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -148,6 +149,41 @@ pub fn write(name: &str, header: &str, key: usize, rows: &[String]) -> Result<()
     lines.extend(rows.iter().map(String::as_str));
     println!("{header}\n{}", rows.join("\n"));
     Ok(fs::write(path, lines.join("\n") + "\n")?)
+}
+
+/// A drive, a start and 8 levels on stable orbits of a structure's backbone, as text of a scene; `None` where these span less than a factor of 1.2.
+pub fn levels(scene: &Scene) -> Option<String> {
+    let curves = structure_backbone(scene, &scene.dimensionless())?;
+    let all: Vec<Orbit> = curves.into_iter().flatten().collect();
+    let is_level = |orbit: &&Orbit| orbit.stable && (0.85..=1.15).contains(&orbit.omega) && orbit.b < 1.35;
+    let (low, high) = range((f64::INFINITY, 0.0), all.iter().filter(is_level).map(|orbit| orbit.c));
+    let [from, to] = [0.95 * high.min(1.0), 1.1 * low];
+    let on = all
+        .iter()
+        .filter(is_level)
+        .filter(|orbit| (to..=from).contains(&orbit.c));
+    let (least, largest) = range((f64::INFINITY, 0.0), on.map(|orbit| orbit.g));
+    let text = format!(
+        "[excitation]\nG = {:?}\n[start]\ndq2 = 5\n[backbone]\nC_from = {from:?}\nC_to = {to:?}\npoints = 8\n",
+        0.5 * (least + largest)
+    );
+    (from >= 1.2 * to && (least..=3.0).contains(&largest)).then_some(text)
+}
+
+/// Distance of a point from the exact orbit at the same response, on the nearest of these curves, in sigma or G, and over the standard uncertainties,
+/// whichever is larger; `shared`: standard uncertainty that all detunings share. Infinite beside the curves.
+pub fn off_backbone(curves: &[Vec<Orbit>], at: &ResonancePoint, shared: f64) -> [f64; 2] {
+    let distances = curves.iter().flat_map(|curve| curve.windows(2)).filter_map(|pair| {
+        let x = (at.c - pair[0].c) / (pair[1].c - pair[0].c);
+        let between = |one: f64, other: f64| one + x * (other - one);
+        (0.0..=1.0).contains(&x).then(|| {
+            let sigma = (at.sigma - between(pair[0].sigma, pair[1].sigma)).abs();
+            let g = (at.g - between(pair[0].g, pair[1].g)).abs();
+            [sigma.max(g), (sigma / at.u_sigma.hypot(shared)).max(g / at.u_g)]
+        })
+    });
+    let nearest = distances.min_by(|one, other| one[1].total_cmp(&other[1]));
+    nearest.unwrap_or([f64::INFINITY; 2])
 }
 
 /// The record of an experiment.

@@ -10,7 +10,6 @@
 mod common;
 
 use common::*;
-use vines_model::orbit::Orbit;
 
 /// Locks a rig, and counts it as correct, uncertain or wrong.
 fn lock(scene: &Scene) -> Result<Found, Failure> {

@@ -14,10 +14,8 @@ mod common;
 
 use common::*;
 use lovines::StructureState;
-use vines_model::orbit::Orbit;
 use vines_testbench::rig::{RigError, RigStage, Sensors, SimulatedStructure};
 use vines_testbench::scene::{SceneShaker, Structure};
-use vines_testbench::survey::structure_backbone;
 
 /// A structure with its shaker, and the dimensionless numbers of the shaker: mass ratio, suspension and stinger over omega0, coil.
 fn text(uniform: Uniform) -> (String, [f64; 4]) {
@@ -215,16 +213,7 @@ fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String
     let shared = plan.knowledge.linear.uncertainty / plan.knowledge.numbers.omega_change(1.0);
     for LevelPoint { at, .. } in kept(&tracked) {
         settled += 1;
-        // The orbit at the same response, on any of the curves.
-        let ratios = curves.iter().flat_map(|curve| curve.windows(2)).filter_map(|pair| {
-            let x = (at.c - pair[0].c) / (pair[1].c - pair[0].c);
-            let between = |one: f64, other: f64| one + x * (other - one);
-            (0.0..=1.0).contains(&x).then(|| {
-                let sigma = (at.sigma - between(pair[0].sigma, pair[1].sigma)).abs() / at.u_sigma.hypot(shared);
-                sigma.max((at.g - between(pair[0].g, pair[1].g)).abs() / at.u_g)
-            })
-        });
-        let ratio = ratios.fold(f64::INFINITY, f64::min);
+        let [_, ratio] = off_backbone(&curves, at, shared);
         worst = ratio.max(worst);
         beyond += usize::from(ratio > 3.0);
     }

@@ -22,8 +22,7 @@ mod common;
 
 use common::*;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
-use vines_model::orbit::Orbit;
-use vines_testbench::survey::{phase_resonant as orbits_of, structure_backbone};
+use vines_testbench::survey::phase_resonant as orbits_of;
 
 /// Largest error of a correct lock: in sigma and C, and of the drive of a held response, relative.
 const TOLERANCE: f64 = 2e-3;

@@ -218,7 +218,7 @@ pub struct ShakerPath {
     pub speed: f64,
     /// Base displacement per reference, m/N or m/m.
     pub base_per_reference: f64,
-    /// Periods within which the control, and what rings beside the driven mode, follow a change of the response.
+    /// Periods within which the control follows a change of the response.
     pub followed: u16,
     /// Largest amplitude, m, by which harmonics of the force beside the sampling frequency change its fundamental as it is read.
     pub aliased: f32,
@@ -291,6 +291,8 @@ pub struct Knowledge {
     pub shaker: Option<ShakerPath>,
     /// Distance of the nearest other pole of a structure from the pole of its driven mode after the release, rad/s; infinite without one.
     pub nearest_pole: f64,
+    /// Periods in which what rings beside the driven mode of a structure falls by a factor of e; 0 without it.
+    pub ringing: f64,
 }
 
 impl Knowledge {
@@ -316,6 +318,7 @@ impl Knowledge {
             target,
             shaker: None,
             nearest_pole: f64::INFINITY,
+            ringing: 0.0,
         }
     }
 
@@ -413,6 +416,7 @@ impl Scene {
         }
         knowledge.target.through_shaker = knowledge.shaker.is_some();
         knowledge.nearest_pole = self.structure().map_or(f64::INFINITY, Structure::nearest_pole);
+        knowledge.ringing = self.structure().map_or(0.0, Structure::ringing);
         knowledge.target.held = self.chain.hold;
         knowledge.target.filter = self.chain.filter.map(|cut_off| cut_off * knowledge.linear.omega0);
         knowledge

@@ -15,10 +15,6 @@ use crate::experiment::{FOLLOWED, SLOWEST_LOOP};
 use crate::plan::ShakerPath;
 use crate::rig::{BANDWIDTH, speed};
 
-/// Time constants after which 5 % are left of what rings beside the driven mode. It changes the force of the impacts, and in a window that is shorter
-/// than its beat the halves can agree.
-const RUNG_DOWN: f64 = 3.0;
-
 /// Points that a shaker adds to those of a structure.
 pub const ARMATURE: &str = "armature";
 /// The table that carries a structure which is moved by its base.
@@ -254,6 +250,13 @@ impl Structure {
         poles
     }
 
+    /// Periods in which what rings beside the driven mode falls by a factor of e; 0 for one oscillator.
+    pub(crate) fn ringing(&self) -> f64 {
+        let others = self.poles().into_iter().skip(1);
+        let periods = others.map(|pole| self.mode().omega / (TAU * -pole.re));
+        periods.fold(0.0, f64::max)
+    }
+
     /// What the shaker makes of its command, from the frequency response at the frequencies of the check.
     pub(crate) fn shaker_path(&self) -> Option<ShakerPath> {
         let (shaker, mode) = (self.shaker.as_ref()?, self.mode());
@@ -287,9 +290,7 @@ impl Structure {
         let speed = speed(&path, mode.omega, exact);
         // Both roots of the control are at half of its bandwidth.
         let of_control = FOLLOWED as f64 / SLOWEST_LOOP / (PI * BANDWIDTH * speed);
-        let others = self.poles().into_iter().skip(1);
-        let rings = others.map(|pole| RUNG_DOWN * mode.omega / (TAU * -pole.re));
-        let followed = rings.fold(of_control, f64::max).min(LONGEST as f64).ceil() as u16;
+        let followed = of_control.min(LONGEST as f64).ceil() as u16;
         Some(ShakerPath { speed, followed, ..path })
     }
 }

@@ -119,7 +119,7 @@ fn edges_of_a_force_that_alias_are_smaller_than_the_precision_by_default() {
 }
 
 #[test]
-fn a_level_waits_for_what_rings_beside_the_driven_mode_and_states_the_edges_that_alias() {
+fn what_rings_beside_the_driven_mode_is_that_of_structure_and_shaker_and_edges_that_alias_are_stated() {
     let scene = edged("");
     let share = f64::from(scene.knowledge().shaker.unwrap().aliased) / scene.amplitude / scene.backbone.precision;
     assert!(share > 0.1 && share <= 1.0, "{share}");
@@ -128,9 +128,9 @@ fn a_level_waits_for_what_rings_beside_the_driven_mode_and_states_the_edges_that
     let structure = scene.structure.as_ref().unwrap();
     let driven = structure.mode();
     let second = &structure.modes[1];
-    let rings = 3.0 * driven.omega / (TAU * second.zeta * second.omega);
-    let followed = f64::from(scene.knowledge().shaker.unwrap().followed);
-    assert!((followed - rings).abs() < 0.3 * rings, "{followed} {rings}");
+    let alone = driven.omega / (TAU * second.zeta * second.omega);
+    let ringing = scene.knowledge().ringing;
+    assert!((0.7..1.0).contains(&(ringing / alone)), "{ringing} {alone}");
 }
 
 #[test]

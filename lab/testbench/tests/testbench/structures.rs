@@ -15,6 +15,7 @@ use vines_testbench::rig::Simulated;
 use vines_testbench::scene::{Excitation, Scene, SceneError, Structure};
 use vines_testbench::survey::{Survey, phase_resonant, structure_backbone, without_other_modes};
 
+use super::common::off_backbone;
 use super::{identified, paper, tracked};
 
 /// A beam by two modes; `changes` are pairs of a text and its replacement.
@@ -498,6 +499,26 @@ fn preset(name: &str, settings: &[&str]) -> Scene {
     let file = format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let settings: Vec<_> = settings.iter().map(|one| one.parse().unwrap()).collect();
     Scene::load(Some(file.as_ref()), &settings).unwrap()
+}
+
+#[test]
+fn a_level_of_a_structure_waits_until_less_than_the_precision_is_left_of_what_rings_beside_the_driven_mode() {
+    assert_eq!(paper(&[]).knowledge().ringing, 0.0);
+    // The second mode at three times the frequency takes nine periods to fall by a factor of e.
+    let settings = [
+        "backbone.precision=9e-4",
+        "backbone.C_from=0.7",
+        "backbone.C_to=0.54",
+        "backbone.points=5",
+    ];
+    let scene = preset("resonant", &settings);
+    let tracked = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+    let curves = structure_backbone(&scene, &scene.dimensionless()).unwrap();
+    for point in &tracked.points {
+        let [_, ratio] = off_backbone(&curves, &point.at, 0.0);
+        // Without the wait up to 5 u.
+        assert!(point.settled && ratio < 2.5, "{ratio} u: {point:?}");
+    }
 }
 
 #[test]
