@@ -2,7 +2,7 @@
 
 use clap::Args;
 use vines::comparison::{Doubt, TrackedComparison};
-use vines::{advice, backbone::track_into, fit::contradiction, numerics::range, report, scene::Scene};
+use vines::{advice, backbone::track_into, numerics::range, report, scene::Scene, survey::contradiction};
 
 use super::experiment::{ExperimentArguments, INTERRUPTED_FILE};
 use super::failure::Failure;
@@ -64,8 +64,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         text += &format!("{settled} of {of} points are settled points of a motion with impacts\n");
     }
     if tracked.ended.is_none()
-        && scene.left_out().is_none()
-        && let Some(found) = contradiction(&points, scene.definition(), &scene.plant)
+        && let Some(found) = contradiction(&scene, points)
     {
         text += &format!("\n{}; run `vines fit`\n", summary::contradicts(&found));
     }

@@ -3,9 +3,8 @@
 use clap::Args;
 use indicatif::ProgressBar;
 use vines::experiment::{Stage, run_into};
-use vines::fit::contradiction;
 use vines::identification::{IdentificationError, identify};
-use vines::{advice, comparison::Comparison, pack::File, report};
+use vines::{advice, comparison::Comparison, pack::File, report, survey::contradiction};
 
 use super::experiment::{ExperimentArguments, INTERRUPTED_FILE};
 use super::options::Endpoint;
@@ -88,11 +87,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     }
     // A rig that reports its impacts is a simulation of the scene.
     let is_simulated = !identification.lock.impacts_per_period.is_nan();
-    let lock = [(&identification.lock.at).into()];
-    if !is_simulated
-        && scene.left_out().is_none()
-        && let Some(found) = contradiction(&lock, scene.definition(), &scene.plant)
-    {
+    let lock = vec![(&identification.lock.at).into()];
+    if !is_simulated && let Some(found) = contradiction(&scene, lock) {
         text += &format!(
             "\n{}: track the backbone with `vines backbone`, and run `vines fit`\n",
             summary::contradicts(&found)

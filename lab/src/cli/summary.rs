@@ -137,7 +137,7 @@ pub(super) fn contradicts(contradiction: &Contradiction) -> String {
                 "the points do not belong to this scene ({size}), nor to the ideal cavity with other parameters"
             );
         }
-        Some([]) => "several parameters differ a little".into(),
+        Some([]) => format!("several parameters differ together ({size})"),
         Some(parameters) => {
             let texts = parameters.iter().map(|parameter| {
                 let FittedParameter { symbol, unit, value, uncertainty, expected } = parameter;

@@ -387,7 +387,8 @@ pub struct Contradiction {
 }
 
 /// How the points contradict the rig `expected`. `None` where they do not, or cannot tell, or where the rig has effects of a real cavity, which
-/// the model has not.
+/// the model has not. What is systematic in the uncertainties of points is alike
+/// from point to point. Where no parameter differs, it may be one error, whose square all of chi-square repeats.
 #[must_use]
 pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected: &Parameters) -> Option<Contradiction> {
     let scene = Some(expected).filter(|expected| expected.cavity == Cavity::IDEAL)?;
@@ -397,7 +398,12 @@ pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected:
         fitted => Some(fitted.ok()?).filter(|fit| !fit.is_rejected()),
     };
     let differs = |one: &FittedParameter| (one.value - one.expected).abs() > SIGNIFICANT * one.uncertainty;
-    let parameters = fitted.map(|fit| fit.report(expected).parameters.into_iter().filter(differs).collect());
+    let parameters: Option<Vec<_>> =
+        fitted.map(|fit| fit.report(expected).parameters.into_iter().filter(differs).collect());
+    let may_be_one = || probability(chi_square / degrees as f64, 1.0).is_none_or(|p| p >= REJECTED);
+    if parameters.as_ref().is_some_and(Vec::is_empty) && may_be_one() {
+        return None;
+    }
     Some(Contradiction { points: points.len(), chi_square, degrees, parameters })
 }
 

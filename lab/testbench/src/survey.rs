@@ -9,7 +9,7 @@ use vines_model::orbit::{
     StructureOrbits, StructureRange, at_amplitude,
 };
 
-use crate::fit::MeasuredPoint;
+use crate::fit::{self, Contradiction, MeasuredPoint};
 use crate::scene::{Scene, Structure};
 
 /// Orbits on a curve.
@@ -220,6 +220,16 @@ pub fn without_other_modes(scene: &Scene, points: Vec<MeasuredPoint>) -> Vec<Mea
         Some(point)
     };
     points.into_iter().filter_map(moved).collect()
+}
+
+/// How measured points contradict their scene; `None` where they do not, or cannot tell, or where the cavity of the scene is not ideal. The points of a
+/// structure are compared as its driven mode alone would have them.
+pub fn contradiction(scene: &Scene, points: Vec<MeasuredPoint>) -> Option<Contradiction> {
+    if scene.left_out_of_cavity().is_some() {
+        return None;
+    }
+    let points = without_other_modes(scene, points);
+    fit::contradiction(&points, scene.definition(), &scene.plant)
 }
 
 /// An orbit of a structure in the numbers of its driven mode: C is the response over that of the mode with the amplitude b at the cavity.
