@@ -7,8 +7,11 @@
 //! as a scene needs that is not refused: a drive beyond one of them in more than the last sample is a failure.
 //! Tracked in 8 levels over the range of responses in which the exact backbone with the shaker has stable orbits, at least a factor of 1.2. A point is right within 3 u of the exact backbone in sigma and G.
 //!
-//! Arguments: SHAKERS, SEED, LIMITS, `drawn` or `none`, settings of the scene, `KEY=VALUE`, and the number of the only SHAKER to run, which writes
-//! nothing. Writes validation/shakers.csv: a row per shaker.
+//! With `lock` for LIMITS there are none, and the loop locks at the drive of the scene instead: is what `identify` says within 3 u of the exact backbone
+//! at the same C, and if it does not lock, why? A shaker at a fixed drive may lock on an asymmetric motion, which is refused.
+//!
+//! Arguments: SHAKERS, SEED, LIMITS, `drawn`, `none` or `lock`, settings of the scene, `KEY=VALUE`, and the number of the only SHAKER to run, which writes
+//! nothing. Writes validation/shakers.csv: a row per shaker; of locks validation/shaker_locks.csv: a row per seed and settings.
 
 mod common;
 
@@ -178,6 +181,13 @@ impl RigStage for Watched {
     }
 }
 
+/// Largest error of a point in sigma and G over its u, from the orbit at the same response on any of the curves.
+fn distance(curves: &[Vec<Orbit>], at: &ResonancePoint, plan: &Plan) -> f64 {
+    // All detunings share the uncertainty of the natural frequency.
+    let shared = plan.knowledge.linear.uncertainty / plan.knowledge.numbers.omega_change(1.0);
+    off_backbone(curves, at, shared)[1]
+}
+
 /// Points, settled ones, those beyond 3 u, the largest error over u, periods, and why it ended.
 fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String) {
     let none = |why: String| (0, 0, 0, f64::NAN, f64::NAN, why);
@@ -209,11 +219,9 @@ fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String
     };
     let curves = structure_backbone(scene, &scene.dimensionless()).unwrap_or_default();
     let (mut settled, mut beyond, mut worst) = (0, 0, 0.0);
-    // All detunings share the uncertainty of the natural frequency.
-    let shared = plan.knowledge.linear.uncertainty / plan.knowledge.numbers.omega_change(1.0);
     for LevelPoint { at, .. } in kept(&tracked) {
         settled += 1;
-        let [_, ratio] = off_backbone(&curves, at, shared);
+        let ratio = distance(&curves, at, &plan);
         worst = ratio.max(worst);
         beyond += usize::from(ratio > 3.0);
     }
@@ -232,14 +240,68 @@ fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String
     (tracked.points.len(), settled, beyond, worst, tracked.periods, why)
 }
 
+/// Error of the lock over its u, and periods to the lock; or why there is none.
+fn locked((scene, _): &(Scene, [f64; 4])) -> Result<[f64; 2], String> {
+    let stated = scene.plan();
+    let mut rig = Simulated::of(&scene.clone().at_rest()).map_err(|error| error.to_string())?;
+    let checked = check(&mut *rig, &stated).map_err(|error| error.to_string())?;
+    let linear = checked
+        .linear
+        .ok_or_else(|| format!("refused by the check, {}", checked.verdict))?;
+    let plan = scene.plan_on(stated.knowledge.measured(linear.response()));
+    let mut rig = Simulated::of(scene).map_err(|error| error.to_string())?;
+    let record = record(&mut *rig, &plan).map_err(|error| error.to_string())?;
+    let lock = identify(&record, &plan).map_err(|error| error.to_string())?.lock;
+    let curves = structure_backbone(scene, &scene.dimensionless()).unwrap_or_default();
+    Ok([distance(&curves, &lock.at, &plan), lock.periods_to_lock])
+}
+
+/// Rows of locks.
+fn locks(seed: &str, settings: &[String], scenes: &[(Scene, [f64; 4])]) -> Result<(), Failure> {
+    let found: Vec<_> = scenes.par_iter().map(locked).collect();
+    for (n, found) in found.iter().enumerate() {
+        match found {
+            Ok([ratio, periods]) => println!("{n}: {ratio:.2} u after {periods:.0} periods"),
+            Err(why) => println!("{n}: {why}"),
+        }
+    }
+    let values = |n: usize| found.iter().flatten().map(|values| values[n]).collect::<Vec<f64>>();
+    let (ratios, [median, longest]) = (values(0), ends(&values(1)));
+    let beyond = ratios.iter().filter(|ratio| **ratio > 3.0).count();
+    let counted = |words: &str| {
+        found
+            .iter()
+            .flat_map(|one| one.as_ref().err())
+            .filter(|why| why.contains(words))
+            .count()
+    };
+    let [refused, asymmetric, unsteady, timed_out] = [
+        "refused by the check",
+        "but the regime is",
+        "is not steady",
+        "no lock within",
+    ]
+    .map(counted);
+    let header = "seed,settings,shakers,locked,beyond_3u,worst_u,median_periods,longest,refused_by_check,asymmetric,not_steady,timed_out,others";
+    let others = scenes.len() - ratios.len() - refused - asymmetric - unsteady - timed_out;
+    let row = format!(
+        "{seed},{},{},{},{beyond},{:.2},{median:.0},{longest:.0},{refused},{asymmetric},{unsteady},{timed_out},{others}",
+        settings.join(" "),
+        scenes.len(),
+        ratios.len(),
+        ends(&ratios)[1]
+    );
+    write("shaker_locks", header, 2, &[row])
+}
+
 fn main() -> Result<(), Failure> {
     let given = std::env::args().skip(1);
     let (settings, given): (Vec<String>, Vec<String>) = given.partition(|one| one.contains('='));
     let [count, seed, kind, only @ ..] = &given[..] else {
         return Err("arguments: SHAKERS SEED LIMITS [SHAKER] [KEY=VALUE ...]".into());
     };
-    if !["drawn", "none"].contains(&&kind[..]) {
-        return Err(format!("limits {kind}: drawn or none").into());
+    if !["drawn", "none", "lock"].contains(&&kind[..]) {
+        return Err(format!("limits {kind}: drawn, none or lock").into());
     }
     let seed_of_limits = !seed.parse::<u64>()?;
     let [mut uniform, mut limits] = [seed.parse()?, seed_of_limits].map(uniform);
@@ -249,6 +311,13 @@ fn main() -> Result<(), Failure> {
             drawn(&mut uniform, limits, &settings)
         })
         .collect::<Result<_, _>>()?;
+    if kind == "lock" {
+        let [only] = only else {
+            return locks(seed, &settings, &scenes);
+        };
+        println!("{:?}", locked(&scenes[only.parse::<usize>()?]));
+        return Ok(());
+    }
     if let [only] = only {
         let (points, settled, beyond, worst, periods, why) = run(&scenes[only.parse::<usize>()?]);
         println!(

@@ -12,7 +12,7 @@ use phase_lock::Config;
 use thiserror::Error;
 use vines_model::numerics::mean;
 
-use crate::identification::Cycle;
+use crate::identification::{Cycle, Unsteady};
 use crate::plan::{Plan, Target};
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError, Scaled, Sensors};
@@ -166,6 +166,8 @@ pub enum ExperimentError {
         /// Largest C of the response that was tried, and largest G of the drive that was allowed.
         tried: [f64; 2],
     },
+    #[error("no lock: the motion, held at C = {c:.4} for {periods} periods, is not steady: {why}")]
+    NotSteady { periods: usize, c: f64, why: Unsteady },
     #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}; {evidence}", stage.name())]
     Tripped {
         periods: f64,

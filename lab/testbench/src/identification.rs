@@ -1,6 +1,7 @@
 //! What a record says: the locked point, its regime, and the backbone along the free decay.
 
 mod decay;
+mod level;
 mod resonance_fit;
 mod response;
 
@@ -16,6 +17,8 @@ use crate::scene::{Dimensionless, Measurand};
 
 pub(crate) use decay::PER_PERIOD;
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
+pub use level::{Criterion, LevelEstimate, Unsteady};
+pub(crate) use level::{LAG, LONGEST};
 pub use resonance_fit::{Cycle, ResonanceFit, Slopes};
 pub(crate) use response::{ASYMMETRIC, Line, degrees, without_tones};
 pub use response::{Tone, classify, drive_harmonics, foreign_tone, impacts, regime_by_response};
@@ -194,7 +197,7 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64)> {
     let held = Cycle::all(hold, dt, target);
     let cycles = before_release(record, knowledge);
     let [approach, wide] = SPREADS.map(|spread| approached(&cycles, &held, spread));
-    let [base, phase_error, response] = means(&held);
+    let [base, phase_error, response] = means(&held, knowledge);
     let [base, omega, limit] = if record.held {
         // The response is kept, and the balances say which drive it needs.
         let fit = ResonanceFit::of(approach, knowledge, Slopes::Unknown)?;
@@ -305,13 +308,18 @@ fn approached<'a>(cycles: &'a [Cycle], held: &[Cycle], spread: f64) -> &'a [Cycl
 }
 
 /// Means over the hold: base amplitude, m, phase error, rad, and response amplitude, m.
-fn means(held: &[Cycle]) -> [Estimate; 3] {
-    let values = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&held.iter().map(value).collect::<Vec<f64>>()).value;
+fn means(held: &[Cycle], knowledge: &Knowledge) -> [Estimate; 3] {
+    let estimates = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&held.iter().map(value).collect::<Vec<f64>>());
+    let values = |value: &dyn Fn(&Cycle) -> f64| estimates(value).value;
     let [response, base] = [values(&Cycle::amplitude), values(&|cycle| cycle.base.norm())];
     let [noise, base_noise] =
         [0, 1].map(|i| mean(held.iter().map(|cycle| cycle.noise[i])).sqrt() / (held.len() as f64).sqrt());
-    let phase_noise = (noise / response).hypot(base_noise / base);
+    let mut phase_noise = (noise / response).hypot(base_noise / base);
     let phase_error = values(&|cycle| cycle.phase_error);
+    // Behind a shaker noise of the readings turns the force itself, by more than that noise.
+    if knowledge.shaker().is_some() {
+        phase_noise = phase_noise.hypot(estimates(&|cycle| cycle.phase_error).uncertainty);
+    }
     [
         // Rounding and the steps of the command.
         (base, base_noise.max(1e-8 * base)),

@@ -15,10 +15,10 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::DVector;
-use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, range};
+use vines_model::numerics::{Estimate, HarmonicBasis, RANDOM, SIGNIFICANT, mean, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, Stage};
-use crate::identification::{ASYMMETRIC, Cycle, ResonanceFit, Slopes, degrees, without_tones};
+use crate::identification::{ASYMMETRIC, Criterion, Cycle, LONGEST, ResonanceFit, Slopes, degrees, without_tones};
 use crate::linear::{Impacts, impacts_by_resonance};
 use crate::plan::{LinearResponse, Plan, Target};
 use crate::rig::{Controller, ControllerError, LoopState, Move, Rig};
@@ -91,6 +91,8 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     setpoint: f64,
     /// Smallest and largest drive that held a symmetric motion, m; infinite before the first.
     held: (f64, f64),
+    /// The periods at the level that is to settle.
+    cycles: Vec<Cycle>,
 }
 
 impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
@@ -106,6 +108,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             bench,
             setpoint: 0.0,
             held: (f64::INFINITY, 0.0),
+            cycles: Vec::new(),
         }
     }
 
@@ -253,14 +256,24 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         any: bool,
         upwards: bool,
     ) -> Result<Option<bool>, ExperimentError> {
-        let mut levels = Levels { legs: Vec::new(), slope, share };
+        let mut levels = Levels {
+            legs: Vec::new(),
+            slope,
+            share,
+            by_noise: self.behind_shaker(),
+        };
         let end = if upwards { first[0] } else { first[first.len() - 1] };
         let mut first = first.into_iter();
-        let mut next = first.next();
-        while let Some(to) = next.filter(|_| levels.legs.len() < LEGS) {
+        let (mut next, mut settled) = (first.next(), 0);
+        while let Some(to) = next.filter(|_| levels.legs.len().max(settled) < LEGS) {
             *leg = self.level(leg, to)?;
+            settled += usize::from(self.behind_shaker());
             if !leg.symmetric {
                 return Ok(None);
+            }
+            // Such a level has settled, and as far as noise explains what is left, no other one is nearer.
+            if self.behind_shaker() && (leg.drive - self.requested).abs() < RANDOM * leg.noise {
+                return Ok(Some(true));
             }
             levels.add(*leg);
             next = first.next();
@@ -271,6 +284,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 break;
             };
             // Behind a shaker a constant command is no constant force: the response stays under control.
+            if self.behind_shaker() {
+                next = Some(predicted.response);
+                continue;
+            }
             let by_drive = predicted.is_root && !self.target.through_shaker;
             // A motion that follows the drive faster than in proportion settles by itself.
             let is_steep = by_drive && predicted.slope * leg.response > leg.drive;
@@ -309,11 +326,16 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         predicted.is_root && is_near || (self.requested - leg.drive).abs() < leg.noise
     }
 
-    /// Holds the response at a level, m, until its drive changes by less than by what it differs from the requested one.
+    /// Holds the response at a level, m, until its drive changes by less than by what it differs from the requested one; behind a shaker, until it has
+    /// settled.
     fn level(&mut self, leg: &Leg, to: f64) -> Result<Leg, ExperimentError> {
         let periods = self.periods(to - leg.last, leg) / 2;
         self.leg(to - self.setpoint, periods, 0.0)?;
         let mut before = self.leg(0.0, FOLLOWED, 0.0)?;
+        if self.behind_shaker() {
+            before.symmetric = self.settle(&mut before)?;
+            return Ok(before);
+        }
         for _ in 0..LEGS {
             let held = self.leg(0.0, FOLLOWED, 0.0)?;
             // A change may disturb the symmetry for a while.
@@ -329,12 +351,18 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Waits until the lock has settled. Returns whether it has; if not, the motion has lost its symmetry.
     fn settle(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
         let (mut asymmetric, mut grown, first) = (0, 0, leg.response);
+        let mut confirmed = 0;
+        self.cycles.clear();
         while asymmetric < 2 {
             let before = leg.even;
             *leg = self.measure(FOLLOWED)?;
             // Beside symmetry breaking the symmetry is lost slowly; noise grows as often in one of 24 cases.
             grown = if leg.even > before { grown + 1 } else { 0 };
-            if self.bench.settled && grown < CONFIRMED {
+            let settled = match self.behind_shaker() {
+                true => self.has_settled(leg, &mut confirmed)?,
+                false => self.bench.settled,
+            };
+            if settled && grown < CONFIRMED {
                 return Ok(true);
             }
             // Noise may hide an asymmetry, but not where the motion goes.
@@ -343,6 +371,44 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             self.setpoint = leg.last;
         }
         Ok(false)
+    }
+
+    /// Whether the response is held behind a shaker. The noise of the readings is then in the command, and through it in the force: the motion moves
+    /// by more than the noise of the readings, which is all that controllers and [`Judge`](super::judge::Judge) allow for.
+    fn behind_shaker(&self) -> bool {
+        self.bench.plan.knowledge.shaker().is_some()
+    }
+
+    /// Whether the periods at this level have settled, as a level of the tracked backbone does: drive and frequency are known as precisely as the scene
+    /// asks, or, after the longest time, as noise allows. The leg is then what all of them say. `confirmed`: legs in succession that were precise enough.
+    fn has_settled(&mut self, leg: &mut Leg, confirmed: &mut u32) -> Result<bool, ExperimentError> {
+        let criterion = Criterion {
+            knowledge: self.bench.plan.knowledge,
+            precision: self.bench.plan.precision,
+            largest: leg.response,
+            before: [None; 2],
+        };
+        let Some(estimate) = criterion.best(&self.cycles) else {
+            return Ok(false);
+        };
+        *confirmed = if criterion.is_met(&estimate) { *confirmed + 1 } else { 0 };
+        let is_long = self.cycles.len() >= LONGEST;
+        if let Some(why) = estimate.unsteady.filter(|_| is_long && *confirmed == 0) {
+            let (periods, c) = (self.cycles.len(), leg.response / self.b);
+            return Err(ExperimentError::NotSteady { periods, c, why });
+        }
+        let settled = is_long || *confirmed >= CONFIRMED;
+        if settled {
+            let [drive, omega] = estimate.at;
+            *leg = Leg {
+                response: estimate.response.value,
+                drive: drive.value,
+                noise: drive.uncertainty,
+                omega: omega.value,
+                ..*leg
+            };
+        }
+        Ok(settled)
     }
 
     /// A leg that changes the response by `change`, m, and lets it go on at this rate.
@@ -406,6 +472,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let Some(fit) = ResonanceFit::of(&all, &self.bench.plan.knowledge, Slopes::Unknown) else {
             return self.measure(periods);
         };
+        if self.behind_shaker() {
+            self.cycles.extend_from_slice(&all);
+        }
         // Harmonics above the third count as noise of a period, but do not scatter.
         let scatter = fit.excess.min(1.0);
         let certain = |estimate: Estimate| Estimate::new(estimate.value, &[scatter * estimate.uncertainty]);
@@ -520,6 +589,8 @@ struct Levels {
     slope: f64,
     /// Share of a straight line that is followed: [`CAUTIOUS`] unless the sweep has passed the requested drive.
     share: f64,
+    /// Levels whose drives differ by noise only say nothing of a slope, and the last one of them stays alone.
+    by_noise: bool,
 }
 
 /// Where held levels predict the requested drive, or the drive that is nearest to it.
@@ -538,6 +609,10 @@ struct Predicted {
 impl Levels {
     fn add(&mut self, leg: Leg) {
         self.legs.retain(|level| level.response != leg.response);
+        if self.by_noise {
+            let noise = |level: &Leg| SIGNIFICANT * level.noise.hypot(leg.noise);
+            self.legs.retain(|level| (level.drive - leg.drive).abs() > noise(level));
+        }
         self.legs.push(leg);
         self.legs.sort_by(|one, other| one.response.total_cmp(&other.response));
     }

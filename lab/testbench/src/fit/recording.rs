@@ -23,8 +23,9 @@ use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
 use vines_model::{Measurand, Sensor};
 
 use super::{MeasuredPoint, decimals};
-use crate::backbone::{Criterion, LAG, LevelEstimate};
-use crate::identification::{Cycle, Harmonic, Line, ResonanceFit, harmonic, regime_by_response};
+use crate::identification::{
+    Criterion, Cycle, Harmonic, LAG, LevelEstimate, Line, ResonanceFit, harmonic, regime_by_response,
+};
 use crate::plan::{Knowledge, LinearResponse, Target};
 use crate::record::Sample;
 use crate::rig::{Command, Drive, Sensors};

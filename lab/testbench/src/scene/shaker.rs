@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::structure::{HIGHEST, rows};
 use super::{Excitation, Structure};
-use crate::backbone::LONGEST;
 use crate::experiment::{FOLLOWED, SLOWEST_LOOP};
+use crate::identification::LONGEST;
 use crate::plan::ShakerPath;
 use crate::rig::{BANDWIDTH, speed};
 

@@ -17,7 +17,7 @@ use vines_testbench::rig::{
     faulty,
 };
 use vines_testbench::scene::{Scene, SceneError, StructureMode};
-use vines_testbench::survey::{BehindShaker, Survey, phase_resonant};
+use vines_testbench::survey::{BehindShaker, Survey, contradiction, phase_resonant};
 
 use super::common::{at, demodulated, mean_square};
 use super::{Altered, identified, paper, record, tracked};
@@ -48,6 +48,64 @@ fn presets_lock_on_the_exact_orbit_with_their_shaker() {
     for (n, scene) in presets.chain([compensated("0.02")]).enumerate() {
         let nearest = distance_of_lock(&scene.unwrap());
         assert!(nearest < 3.0, "preset {n}: {nearest} u");
+    }
+}
+
+/// The noise of the readings is in the command, and through it in the force, of which 1.8 % is left: the motion moves more than the readings' noise.
+#[test]
+fn noise_of_the_readings_keeps_no_lock_from_settling_behind_a_shaker() {
+    for chain in ["snr = 60", "snr = 40", "adc_bits = 16", "delay = 2\nsnr = 60"] {
+        let scene = preset(1, &[("[start]", &format!("[chain]\n{chain}\n\n[start]"))]).unwrap();
+        let nearest = distance_of_lock(&scene);
+        let periods = identified(&scene).unwrap().lock.periods_to_lock;
+        assert!(
+            nearest < 3.0 && periods < 400.0,
+            "{chain}: {nearest} u, {periods} periods"
+        );
+    }
+}
+
+#[test]
+fn a_motion_that_is_not_steady_behind_a_shaker_ends_the_search_with_its_reason() {
+    let scene = preset(2, &[]).unwrap();
+    let mut n = 0.0;
+    let read = |sensors: Sensors| {
+        n += 1.0;
+        // The sensor of the response changes its sensitivity by 3 % in a beat of 41 periods of 100 samples, which the loop follows.
+        let response = sensors.response * (1.0 + 0.03 * f64::sin(TAU * n / 4100.0));
+        Ok(Sensors { response, ..sensors })
+    };
+    let mut rig = Altered {
+        rig: Simulated::of(&scene).unwrap(),
+        read: Box::new(read),
+        drive: Box::new(|drive, step| (drive, step)),
+    };
+    let error = record(&mut rig, &scene).map(|_| ()).unwrap_err();
+    assert!(
+        matches!(error, ExperimentError::NotSteady { periods: 150..170, .. }),
+        "{error}"
+    );
+    assert!(error.to_string().contains("is not steady: its "), "{error}");
+}
+
+/// The points are those of structure and shaker, and are compared as the driven mode alone would have them.
+#[test]
+fn tracked_points_behind_a_shaker_belong_to_their_scene_and_not_to_a_wrong_one() {
+    for n in [1, 2] {
+        let scene = preset(
+            n,
+            &[(
+                "[start]",
+                "[backbone]\npoints = 8\nC_from = 0.6\nC_to = 0.25\n\n[start]",
+            )],
+        )
+        .unwrap();
+        let found = tracked(Simulated::of(&scene).unwrap().as_mut(), &scene).unwrap();
+        let points: Vec<_> = found.points.iter().map(|point| (&point.at).into()).collect();
+        assert!(contradiction(&scene, points.clone()).is_none(), "preset {n}");
+        let mut wrong = scene.clone();
+        wrong.plant.restitution = 0.6;
+        assert!(contradiction(&wrong, points).is_some(), "preset {n}");
     }
 }
 
