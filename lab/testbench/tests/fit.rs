@@ -1,5 +1,7 @@
 //! Guards the fit of a rig's parameters to points of its backbone: exact points, noise, points that do not belong, and what is refused.
 
+use std::f64::consts::TAU;
+
 use lovines::Cavity;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -661,6 +663,29 @@ fn a_decay_without_impacts_gives_the_natural_frequency_and_the_damping_with_and_
         }
     }
     assert_eq!(recording().linear_decay(&scene.knowledge()).unwrap(), None);
+}
+
+#[test]
+fn levels_whose_base_is_not_recorded_are_no_linear_decay() {
+    let (scene, omega0, dt) = (wrong_scene(), wrong_scene().dimensionless().omega0, 1e-3);
+    // Each level is 3 % below the one before, and is held for 20 periods.
+    let level = |time: f64| 1e-3 * 0.97_f64.powf((time * omega0 / TAU / 20.0).floor());
+    let response = (0..30_000)
+        .map(|n| f64::from(n) * dt)
+        .map(|time| level(time) * (omega0 * time).sin());
+    let record = Recording {
+        sample_time: dt,
+        drive: vec![0.0; 30_000],
+        response: response.collect(),
+        ..recording()
+    };
+    assert_eq!(record.linear_decay(&scene.knowledge()).unwrap(), None);
+    let measured = Measurements { recordings: vec![record], ..Measurements::default() };
+    let message = find(&measured, &scene, |_| {}).unwrap_err().to_string();
+    assert!(
+        message.contains("the base x rests") && message.contains("connected"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -140,7 +140,8 @@ const SEEN: f64 = 8.0;
 const CLIPPED: f64 = 0.06;
 /// Largest relative distance of the frequency from the natural frequency near resonance.
 const FARTHEST: f64 = 0.2;
-/// Largest ratio of the damping in the two halves of a linear decay, and of its inverse: impacts in 1:1 motion double the loss near the fold.
+/// Largest ratio of the damping in the two halves of a linear decay, and in a piece and the whole, and of its inverse: impacts in 1:1 motion double
+/// the loss near the fold.
 const STEADY: f64 = 1.5;
 /// Relative standard uncertainty of the damping that a scene states: three of them are 30 %.
 const DAMPING: f64 = 0.1;
@@ -244,8 +245,7 @@ impl Recording {
             .skip_while(|(_, one)| one.is_none_or(|one| one.amplitude < largest))
             .map_while(|(time, one)| Some((time, one?)))
             .collect();
-        let (first, second) = decaying.split_at(decaying.len() / 2);
-        let [all, first, second] = [&decaying, first, second].map(rate);
+        let all = rate(&decaying);
         let mean_omega = omega(&decaying);
         if decaying.len() < LEAST || all.value < SEEN * all.uncertainty {
             let Self { origin, channels: [response, drive], .. } = self;
@@ -259,8 +259,13 @@ impl Recording {
                  it connected?"
             )));
         }
-        let is_steady = (1.0 / STEADY..STEADY).contains(&(first.value / second.value));
-        Ok(is_steady.then(|| LinearDecay { omega: mean_omega, zeta: all.scaled(1.0 / mean_omega.value) }))
+        let (first, second) = decaying.split_at(decaying.len() / 2);
+        let is_steady = |[one, other]: [Estimate; 2]| (1.0 / STEADY..STEADY).contains(&(one.value / other.value));
+        // Held levels whose base is not recorded fall as slowly in both halves, but in steps.
+        let is_step = |one: Estimate| !is_steady([one, all]) && (one.value - all.value).abs() > SEEN * one.uncertainty;
+        let has_steps = decaying.chunks_exact(2 * LEAST).any(|piece| is_step(rate(piece)));
+        let is_linear = is_steady([first, second].map(rate)) && !has_steps;
+        Ok(is_linear.then(|| LinearDecay { omega: mean_omega, zeta: all.scaled(1.0 / mean_omega.value) }))
     }
 
     fn drive_is_named(&self) -> bool {
@@ -429,6 +434,12 @@ impl Recording {
             none if none.is_empty() => "no such stretch".into(),
             some => format!("found: {some}"),
         };
+        if parts.iter().all(|part| part.kind == Kind::Decay) && self.drive_is_named() {
+            return RecordingError(format!(
+                "{origin}: the base {drive} rests, and the response {response} decays neither without impacts nor with those of a 1:1 motion: is channel \
+                 {drive} connected?"
+            ));
+        }
         RecordingError(format!(
             "{origin}: no stretch of {LEAST} periods near phase resonance is symmetric 1:1 ({found}). A point needs a held response, a slow sweep, or a \
              decay, where the response {response} lags the base {drive} by a quarter of a period"
