@@ -221,6 +221,10 @@ pub fn client(&([epsilon, lambda, r], noise, scales): &Case, snr: &str) -> Resul
     let first = orbits.iter().max_by(|one, other| one.c.total_cmp(&other.c));
     let first = first.ok_or("no stable orbit")?;
     let (low, high) = range((f64::INFINITY, 0.0), orbits.iter().map(|orbit| orbit.g));
+    // The middle may lie in a gap of the stable drives.
+    let from_middle = |g: f64| (g - 0.5 * (low + high)).abs();
+    let drives = orbits.iter().map(|orbit| orbit.g);
+    let nearest = drives.min_by(|one, other| from_middle(*one).total_cmp(&from_middle(*other)));
     // The largest stable response over b, to a twentieth of the distance at which the orbits were searched.
     let finer = (1..20).flat_map(|n| exact_backbone(&d, 1.0 + epsilon * (first.sigma + 0.005 * f64::from(n) / 20.0)));
     let stable = finer.filter(|orbit| orbit.stable);
@@ -233,7 +237,7 @@ pub fn client(&([epsilon, lambda, r], noise, scales): &Case, snr: &str) -> Resul
         epsilon * lambda * c,
         epsilon * m,
         r * dr,
-        0.5 * (low + high) * epsilon,
+        nearest.unwrap_or(low) * epsilon,
         0.95 * largest.min(0.75) / width,
         1.05 * fold / width,
     );

@@ -514,8 +514,8 @@ fn sweep(case: &Case, snr: &str) -> Result<Recorded, Failure> {
         (f64::INFINITY, 0.0),
         advice::stable_orbits(&d).iter().map(|orbit| orbit.g),
     );
-    let middle = 0.5 * (low + high);
-    let (least, most) = (1.08 * low / middle, 0.95 * high / middle);
+    let at_lock = plan.amplitude / d.epsilon;
+    let (least, most) = (1.08 * low / at_lock, 0.95 * high / at_lock);
     // The same run as far as the lock.
     let begin = record(&mut *behind_chain(truth, &scene)?, &plan)?.settled;
     let turn = plan

@@ -52,8 +52,7 @@ class Fit(Result):
         that do are joined by " or ".
     effects : dict of ndarray or None
         Of each effect that was tried then: effect, symbol, unit, strength, uncertainty, chi_square, degrees, left_out,
-        describes, and possible_strength and possible_b_m, a strength and the half-width (m) that the points do not
-        exclude.
+        describes, and possible_b_m, the half-width (m) that goes with it.
     alternatives : dict of ndarray
         The same columns: effects with which the points agree as well as with the ideal cavity, with another half-width.
     linear : tuple of dict

@@ -141,10 +141,13 @@ struct Output<'a> {
 fn only_if_ideal(alternatives: &[EffectReport], is_assumed: bool) -> String {
     let texts: Vec<String> = alternatives
         .iter()
-        .map(|EffectReport { effect, symbol, unit, possible_strength, possible_b_m, .. }| {
-            let (space, digits) = (if unit.is_empty() { "" } else { " " }, decimals(*possible_strength));
+        .map(|one| {
+            let EffectReport { effect, symbol, unit, strength, uncertainty, possible_b_m, .. } = one;
+            let (space, digits) = (if unit.is_empty() { "" } else { " " }, decimals(strength.abs()));
+            // Of those whose strength is given this is the largest.
+            let up_to = if *uncertainty == 0.0 { "up to" } else { "with" };
             format!(
-                "{effect} with {symbol} = {possible_strength:.digits$}{space}{unit} would give the same points with b = {:.2} mm",
+                "{effect} {up_to} {symbol} = {strength:.digits$}{space}{unit} would give the same points, with that b = {:.2} mm",
                 1e3 * possible_b_m
             )
         })

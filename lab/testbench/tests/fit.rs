@@ -502,6 +502,32 @@ fn a_record_without_impacts_is_not_followed_whatever_the_natural_frequency_that_
 
 #[test]
 fn without_knowns_an_ideal_fit_says_which_cavity_would_give_the_same_points() {
+    // From the fold on, where a motion with other parameters may not exist.
+    let rig = Parameters {
+        particle_mass: 0.0064 * RIG.primary_mass,
+        damping: 0.0064 * 0.98 * RIG.primary_mass * RIG.natural_frequency(),
+        restitution: 0.79,
+        cavity: Cavity { kinetic_friction: 0.09, ..Cavity::IDEAL },
+        ..RIG
+    };
+    let motion = |c: f64| {
+        let motion = resonant_motion(&rig, Definition::default(), c * RIG.half_width, None).ok()?;
+        Some([c * RIG.half_width, motion.omega, motion.amplitude])
+    };
+    let motions = (0..29).filter_map(|n| motion(0.14 + 0.02 * f64::from(n)));
+    let points = measured(motions, 1e-3, 12);
+    let found = find(
+        &Measurements { points, ..Measurements::default() },
+        &wrong_scene(),
+        |_| {},
+    )
+    .unwrap();
+    let with_friction = found.alternatives.iter().find(|one| one.effect == Effect::Friction);
+    let with_friction = with_friction.unwrap_or_else(|| panic!("{:?}", found.explanation));
+    // The largest friction that the points allow, and with it the half-width: the rig is between this and the ideal cavity.
+    let (b, ideal) = (with_friction.half_width(), found.plant.half_width);
+    let reaches = with_friction.strength.value >= 0.09 && (0.98 * b..ideal).contains(&RIG.half_width);
+    assert!(reaches, "{:?}: {b} to {ideal}", with_friction.strength);
     let friction = Cavity { kinetic_friction: 0.05, ..Cavity::IDEAL };
     let motions = || (0..10).map(|n| motion_at(friction, (0.36 + 0.03 * f64::from(n)) * RIG.half_width));
     let points = measured(motions(), 1e-4, 12);

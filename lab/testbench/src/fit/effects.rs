@@ -71,6 +71,8 @@ const SMALLEST: f64 = 1e-3;
 const TYPICAL: f64 = 0.01;
 /// Strengths from which a search begins, over a typical one: a typical, a weak and a strong one.
 const STRENGTHS: [f64; 3] = [1.0, 0.1, 5.0];
+/// Smallest step to the largest strength that points allow, as a factor.
+const FINEST: f64 = 1.1;
 /// Step of a difference: of the unknowns, of the strength relative, and along the curve.
 const STEP: f64 = 1e-4;
 impl Effect {
@@ -219,36 +221,23 @@ impl Candidate {
         first(self).cmp(&first(other)).then(by_criterion)
     }
 
-    /// Strength one standard uncertainty above the fitted one, but at most a strong one, and the half-width, m, that goes with it. A law of
-    /// restitution has the fitted values.
+    /// Half-width of the fit, m.
     #[must_use]
-    pub fn one_more(&self) -> [f64; 2] {
-        let (x, covariance) = (&self.fit.x, &self.fit.covariance);
-        let b = Quantity::B.of(x);
-        if !self.effect.adds_a_parameter() {
-            return [self.strength.value, b];
-        }
-        let most = self.effect.start(x, STRENGTHS[2])[6] - x[6];
-        let more = covariance[(6, 6)].sqrt().min(most.max(0.0));
-        [
-            self.effect.strength(x[6] + more, x[2], self.speed),
-            b * (covariance[(3, 6)] / covariance[(6, 6)] * more).exp(),
-        ]
+    pub fn half_width(&self) -> f64 {
+        Quantity::B.of(&self.fit.x)
     }
 
     /// Its numbers, for programs.
     #[must_use]
     pub fn report(&self) -> EffectReport {
-        let ([symbol, unit], [possible_strength, possible_b_m]) = (self.effect.symbol(), self.one_more());
-        let Estimate { value: strength, uncertainty } = self.strength;
+        let ([symbol, unit], Estimate { value: strength, uncertainty }) = (self.effect.symbol(), self.strength);
         EffectReport {
             effect: self.effect.name(),
             symbol,
             unit,
             strength,
             uncertainty,
-            possible_strength,
-            possible_b_m,
+            possible_b_m: self.half_width(),
             chi_square: self.fit.chi_square,
             degrees: self.fit.degrees,
             left_out: self.fit.left_out.len(),
@@ -275,10 +264,8 @@ pub struct EffectReport {
     pub unit: &'static str,
     /// The fitted strength.
     pub strength: f64,
-    /// Its standard uncertainty.
+    /// Its standard uncertainty; 0 if it was given.
     pub uncertainty: f64,
-    /// A strength that the points do not exclude ([`Candidate::one_more`]).
-    pub possible_strength: f64,
     /// The half-width that goes with it, m.
     pub possible_b_m: f64,
     /// Chi-square.
@@ -424,19 +411,60 @@ impl Problem<'_> {
         candidates
     }
 
-    /// Effects with which the points agree as well as with the ideal cavity, while the half-width differs from it significantly.
+    /// Effects with which the points agree as well as with the ideal cavity, while the half-width differs from it significantly: laws of restitution,
+    /// and the others at the largest strength.
     fn alternatives(&self, ideal: &Fit, expected: &Parameters, mut progress: impl FnMut(usize)) -> Vec<Candidate> {
         let Some((b, same_points)) = ideal.estimate(Quantity::B).zip(self.fit(expected).ok()) else {
             return Vec::new();
         };
-        let mut found = self.candidates(expected, &mut progress);
-        found.retain(|candidate| {
-            let agrees = !candidate.fit.is_rejected() && candidate.fit.left_out.is_empty();
-            let [_, other] = candidate.one_more();
-            let excess = candidate.criterion() - same_points.chi_square;
-            agrees && excess < -2.0 * REJECTED.ln() && (b.value - other).abs() > SIGNIFICANT * b.uncertainty
-        });
+        let limit = same_points.chi_square - 2.0 * REJECTED.ln();
+        let agrees =
+            |one: &Candidate| !one.fit.is_rejected() && one.fit.left_out.is_empty() && one.fit.chi_square < limit;
+        let of = |(n, effect): (usize, Effect)| {
+            progress(n);
+            match effect {
+                Effect::Viscoelastic | Effect::Plastic => {
+                    vec![self.with_effect(effect, expected).filter(|one| agrees(one))]
+                }
+                Effect::Hardening => [1.0, -1.0]
+                    .map(|sign| self.strongest(effect, sign, &same_points, agrees))
+                    .into(),
+                _ => vec![self.strongest(effect, 1.0, &same_points, agrees)],
+            }
+        };
+        let found = Effect::ALL.into_iter().enumerate().flat_map(of).flatten();
         found
+            .filter(|one| (b.value - one.half_width()).abs() > SIGNIFICANT * b.uncertainty)
+            .collect()
+    }
+
+    /// The fit with the largest strength that the points allow. Half-width and mass ratio make up for an effect, so that all strengths up to this one give
+    /// the same points, and a search for the strength ends anywhere between. With a given strength the other parameters have one place: from a weak
+    /// effect on the strength is doubled, and where this goes too far, by less and less.
+    fn strongest(
+        &self,
+        effect: Effect,
+        sign: f64,
+        ideal: &Fit,
+        agrees: impl Fn(&Candidate) -> bool,
+    ) -> Option<Candidate> {
+        let held = |x: Unknowns| self.with_effect_from(effect, x, ideal, false).filter(|one| agrees(one));
+        let mut x = ideal.x;
+        x[6] = sign * effect.start(&ideal.x, STRENGTHS[1])[6];
+        let mut best = held(x)?;
+        let (mut before, mut factor) = (ideal.x, 2.0);
+        before[6] = 0.0;
+        for _ in 0..ROUNDS {
+            // On the straight line through the last two.
+            let here = best.fit.x;
+            let further = (factor - 1.0) * here[6] / (here[6] - before[6]);
+            match held(here + (here - before) * further) {
+                Some(next) => (before, best) = (here, next),
+                None if factor < FINEST => break,
+                None => factor = factor.sqrt(),
+            }
+        }
+        Some(best)
     }
 
     /// The fit with an effect; `None` if the plant has no such motions.
@@ -458,7 +486,10 @@ impl Problem<'_> {
             let mut x = effect.start(&ideal.x, factor);
             for count in [most, all] {
                 let kept = largest(count);
-                let Some(mut next) = self.of(&kept).with_effect_from(effect, x, &ideal) else {
+                let Some(mut next) = self
+                    .of(&kept)
+                    .with_effect_from(effect, x, &ideal, effect.adds_a_parameter())
+                else {
                     break;
                 };
                 next.fit.left_out = (0..all).filter(|n| !kept.contains(n)).collect();
@@ -473,12 +504,12 @@ impl Problem<'_> {
         best
     }
 
-    /// The fit with an effect, from the unknowns `x`.
-    fn with_effect_from(&self, effect: Effect, x: Unknowns, ideal: &Fit) -> Option<Candidate> {
+    /// The fit with an effect, from the unknowns `x`; `free`: whether its strength is one.
+    fn with_effect_from(&self, effect: Effect, x: Unknowns, ideal: &Fit, free: bool) -> Option<Candidate> {
         // The particle turns from -B to B: its speed relative to the wall before the impact is 2 B (1 + epsilon)/(1 + r).
         let particle = mean(ideal.speeds.iter().copied()) * Quantity::B.of(&ideal.x) * ideal.x[0].exp();
         let speed = 2.0 * particle * (1.0 + ideal.x[4].exp()) / (1.0 + ideal.x[2]);
-        let problem = Problem { free: effect.adds_a_parameter(), ..self.clone() };
+        let problem = Problem { free, ..self.clone() };
         let fit = if effect == Effect::Hardening {
             problem.fit_from([x].into_iter()).ok()?
         } else {
@@ -494,7 +525,9 @@ impl Problem<'_> {
         let value = |x: &Unknowns| effect.strength(x[6], x[2], speed);
         let gradient = gradient(&fit.x, value);
         let variance = (gradient.transpose() * fit.covariance * gradient)[0];
-        let strength = Estimate { value: value(&fit.x), uncertainty: variance.max(0.0).sqrt() };
+        let is_given = effect.adds_a_parameter() && !free;
+        let uncertainty = if is_given { 0.0 } else { variance.max(0.0).sqrt() };
+        let strength = Estimate { value: value(&fit.x), uncertainty };
         Some(Candidate { effect, strength, fit, speed })
     }
 }
@@ -580,7 +613,10 @@ impl PlantCurve<'_> {
                     break;
                 }
                 let ahead = (rest / place.tangent[0]).clamp(-FARTHEST, FARTHEST);
-                place = self.place(x, n, &place.motion, place.tangent, ahead)?;
+                // Where the curve bends, a long step along its tangent finds no motion.
+                let steps = (0..ROUNDS).map(|n| ahead * 0.5_f64.powi(n as i32));
+                let mut steps = steps.take_while(|step| step.abs() >= NEAR.min(ahead.abs()));
+                place = steps.find_map(|step| self.place(x, n, &place.motion, place.tangent, step))?;
             }
             (near, tangent) = (place.motion.clone(), place.tangent);
             places.push((n, place));
