@@ -9,7 +9,7 @@ use num_complex::Complex;
 use vines_testbench::backbone::track;
 use vines_testbench::comparison::COMPARED_ABOVE;
 use vines_testbench::experiment::{ExperimentError, run};
-use vines_testbench::identification::{DecayEnd, DecayPoints, WINDOW, decay_points, identify};
+use vines_testbench::identification::{DecayEnd, DecayPoints, Regime, WINDOW, decay_points, identify};
 use vines_testbench::loop_check::{Verdict, check};
 use vines_testbench::record::Record;
 use vines_testbench::rig::{
@@ -106,6 +106,31 @@ fn tracked_points_behind_a_shaker_belong_to_their_scene_and_not_to_a_wrong_one()
         let mut wrong = scene.clone();
         wrong.plant.restitution = 0.6;
         assert!(contradiction(&wrong, points).is_some(), "preset {n}");
+    }
+}
+
+#[test]
+fn all_levels_of_the_presets_with_a_shaker_settle() {
+    for n in 0..PRESETS.len() {
+        let scene = preset(n, &[]).unwrap();
+        let found = tracked(Simulated::of(&scene).unwrap().as_mut(), &scene).unwrap();
+        let unsettled: Vec<_> = found
+            .points
+            .iter()
+            .filter_map(|point| Some((point.level, point.unsettled(true)?)))
+            .collect();
+        assert!(
+            found.ended.is_none() && unsettled.is_empty(),
+            "preset {n}: {unsettled:?}, {:?}",
+            found.ended
+        );
+        assert!(
+            found
+                .points
+                .iter()
+                .all(|point| point.regime_by_impacts == Some(Regime::Symmetric)),
+            "preset {n}"
+        );
     }
 }
 
