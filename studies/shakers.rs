@@ -15,10 +15,14 @@
 
 mod common;
 
+use std::cell::Cell;
+use std::rc::Rc;
+
 use common::*;
 use lovines::StructureState;
 use vines_testbench::rig::{RigError, RigStage, Sensors, SimulatedStructure};
 use vines_testbench::scene::{SceneShaker, Structure};
+use vines_testbench::survey::contradiction;
 
 /// A structure with its shaker, and the dimensionless numbers of the shaker: mass ratio, suspension and stinger over omega0, coil.
 fn text(uniform: Uniform) -> (String, [f64; 4]) {
@@ -161,7 +165,7 @@ fn needed(scene: &Scene, omega: f64) -> Result<[f64; 4], Failure> {
 struct Watched {
     rig: SimulatedStructure,
     structure: Structure,
-    beyond: usize,
+    beyond: Rc<Cell<usize>>,
 }
 
 impl RigStage for Watched {
@@ -176,7 +180,7 @@ impl RigStage for Watched {
         });
         let now = now(&self.structure, self.rig.plant());
         let is_beyond = |n: usize| limits[n].is_some_and(|limit| now[n] > limit * (1.0 + 1e-9));
-        self.beyond += usize::from((0..4).any(is_beyond));
+        self.beyond.set(self.beyond.get() + usize::from((0..4).any(is_beyond)));
         RigStage::sense(&mut self.rig)
     }
 }
@@ -188,9 +192,11 @@ fn distance(curves: &[Vec<Orbit>], at: &ResonancePoint, plan: &Plan) -> f64 {
     off_backbone(curves, at, shared)[1]
 }
 
-/// Points, settled ones, those beyond 3 u, the largest error over u, periods, and why it ended.
-fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String) {
-    let none = |why: String| (0, 0, 0, f64::NAN, f64::NAN, why);
+/// Points, settled ones, those beyond 3 u, the largest error over u, periods, why it ended, and [`contradicted`].
+type Run = (usize, usize, usize, f64, f64, String, [Option<bool>; 4]);
+
+fn run((scene, _): &(Scene, [f64; 4])) -> Run {
+    let none = |why: String| (0, 0, 0, f64::NAN, f64::NAN, why, [None; 4]);
     let stated = scene.plan();
     let checked = Simulated::of(&scene.clone().at_rest()).and_then(|mut rig| check(&mut *rig, &stated));
     let linear = match checked {
@@ -208,10 +214,11 @@ fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String
         Ok(rig) => rig,
         Err(error) => return none(error.to_string()),
     };
-    let mut rig = Watched { rig, structure, beyond: 0 };
-    let tracked = tracked(&mut rig, &plan, 20.0);
-    if rig.beyond > 1 {
-        return none(format!("driven beyond a limit in {} samples", rig.beyond));
+    let beyond = Rc::default();
+    let rig = Watched { rig, structure, beyond: Rc::clone(&beyond) };
+    let tracked = tracked(&mut *Chain::around(Box::new(rig), scene), &plan, 20.0);
+    if beyond.get() > 1 {
+        return none(format!("driven beyond a limit in {} samples", beyond.get()));
     }
     let tracked = match tracked {
         Ok(tracked) => tracked,
@@ -237,7 +244,33 @@ fn run((scene, _): &(Scene, [f64; 4])) -> (usize, usize, usize, f64, f64, String
             .find_map(reason)
             .unwrap_or_else(|| "motions without impacts".into());
     }
-    (tracked.points.len(), settled, beyond, worst, tracked.periods, why)
+    let contradicted = contradicted(scene, &tracked);
+    (
+        tracked.points.len(),
+        settled,
+        beyond,
+        worst,
+        tracked.periods,
+        why,
+        contradicted,
+    )
+}
+
+/// Whether `vines backbone` says that the points do not belong to the scene, and to scenes with another r, b or m; `None` of a backbone that ended early.
+fn contradicted(scene: &Scene, tracked: &Tracked) -> [Option<bool>; 4] {
+    let points: Vec<_> = kept(tracked).map(|point| (&point.at).into()).collect();
+    let alter: [fn(&mut Parameters); 4] = [
+        |_| (),
+        |plant| plant.restitution -= 0.05,
+        |plant| plant.half_width *= 1.03,
+        |plant| plant.particle_mass *= 1.05,
+    ];
+    alter.map(|alter| {
+        let mut scene = scene.clone();
+        alter(&mut scene.plant);
+        let is_whole = tracked.ended.is_none() && points.len() >= 4;
+        is_whole.then(|| contradiction(&scene, points.clone()).is_some())
+    })
 }
 
 /// Error of the lock over its u, and periods to the lock; or why there is none.
@@ -319,7 +352,7 @@ fn main() -> Result<(), Failure> {
         return Ok(());
     }
     if let [only] = only {
-        let (points, settled, beyond, worst, periods, why) = run(&scenes[only.parse::<usize>()?]);
+        let (points, settled, beyond, worst, periods, why, _) = run(&scenes[only.parse::<usize>()?]);
         println!(
             "{points} points, {settled} settled, {beyond} beyond 3 u, worst {worst:.2} u, {periods:.0} periods; {why}"
         );
@@ -330,7 +363,7 @@ fn main() -> Result<(), Failure> {
         let [share, suspension, stinger, coil] = numbers;
         let drop_out = scene.knowledge().shaker.map_or(f64::NAN, |shaker| shaker.drop_out());
         let bandwidth = scene.plan().tracking.bandwidth / std::f64::consts::TAU;
-        let (points, settled, beyond, worst, periods, why) = found;
+        let (points, settled, beyond, worst, periods, why, _) = found;
         format!(
             "{seed},{kind},{n},{share:.4},{suspension:.3},{stinger:.2},{coil:.3},{drop_out:.4},{bandwidth:.4},{points},{settled},{beyond},{worst:.2},{periods:.0},\"{}\"",
             why.split([';', '"']).next().and_then(|why| why.split(": ").next()).unwrap_or_default()
@@ -346,6 +379,11 @@ fn main() -> Result<(), Failure> {
     println!(
         "{refused} refused by the check; {tracked} of {count} tracked with at least half of the levels settled and none beyond 3 u; {wrong} of {settled} settled points beyond 3 u; \
          of the others {limited} end at a limit, {silent} without a reason; {beyond} driven beyond a limit"
+    );
+    let [false_alarms, r, b, m] = [0, 1, 2, 3].map(|n| found.iter().filter(|one| one.6[n] == Some(true)).count());
+    let whole = found.iter().filter(|one| one.6[0].is_some()).count();
+    println!(
+        "the points of {false_alarms} of {whole} backbones contradict their scene; of scenes with another r {r}, b {b}, m {m} are noticed"
     );
     let header = "seed,limits,shaker,mass_ratio,suspension,stinger,coil,drop_out,bandwidth,points,settled,beyond_3u,worst_u,periods,ended";
     write("shakers", header, 3, &rows)
