@@ -313,8 +313,12 @@ fn exact_orbits_with_a_shaker_are_motions_of_the_plant() {
 
 #[test]
 fn measured_harmonics_of_the_force_are_those_of_the_exact_orbits_under_a_voltage() {
-    let levels = "[backbone]\nC_from = 0.44\nC_to = 0.42\npoints = 3\n\n[start]";
-    let scene = preset(0, &[("[start]", levels)]).unwrap();
+    let levels = [
+        ("C_from = 0.5 ", "C_from = 0.44 "),
+        ("C_to = 0.16 ", "C_to = 0.42 "),
+        ("points = 18", "points = 3"),
+    ];
+    let scene = preset(0, &levels).unwrap();
     let exact = Survey::of(&scene).unwrap().behind_shaker;
     let b = scene.plant.half_width * scene.structure.as_ref().unwrap().reading_per_response().abs();
     let points = tracked(Simulated::of(&scene).unwrap().as_mut(), &scene).unwrap().points;
