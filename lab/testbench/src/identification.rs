@@ -74,7 +74,7 @@ pub struct Identification {
 /// No motion, a lock in another regime than the symmetric 1:1 one or off its phase, a response that still moves, and a sensor that fails in the decay.
 pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, IdentificationError> {
     let knowledge = plan.knowledge;
-    let (lock, held) = measure(record, &knowledge).ok_or(IdentificationError::NoMotion)?;
+    let (lock, held, slope) = measure(record, &knowledge).ok_or(IdentificationError::NoMotion)?;
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
     let is_expected = match lock.regime {
         Regime::Symmetric | Regime::Unresolved => true,
@@ -85,7 +85,7 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
         return Err(IdentificationError::Regime { regime: lock.regime, sigma: lock.at.sigma, c: lock.at.c });
     }
     on_target(&lock, plan.lock.lock.phase_tolerance)?;
-    at_rest(&lock, held)?;
+    at_rest(&lock, held, slope)?;
     sensors_after_release(record, &knowledge)?;
     let decay = decay_points(record, &knowledge, WINDOW);
     Ok(Identification { knowledge, lock, decay })
@@ -189,8 +189,9 @@ const SLOPE_UNCERTAINTY: f64 = 0.3;
 /// Largest phase error of a period that is evaluated, rad: the balances are of the first order in it.
 const PHASE_RANGE: f64 = 0.1;
 
-/// The locked point of a record, and the amplitude of its hold, m; `None` without a motion.
-fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64)> {
+/// The locked point of a record, the amplitude of its hold, m, and the slope of the drive over the response with which the point is extrapolated from
+/// there, infinite under control; `None` without a motion.
+fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64, f64)> {
     let d = &knowledge.numbers;
     let (dt, hold) = (record.sample_time, record.hold());
     let target = knowledge.target;
@@ -198,7 +199,7 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64)> {
     let cycles = before_release(record, knowledge);
     let [approach, wide] = SPREADS.map(|spread| approached(&cycles, &held, spread));
     let [base, phase_error, response] = means(&held, knowledge);
-    let [base, omega, limit] = if record.held {
+    let ([base, omega, limit], slope) = if record.held {
         // The response is kept, and the balances say which drive it needs.
         let fit = ResonanceFit::of(approach, knowledge, Slopes::Unknown)?;
         let (at, slopes) = (fit.at(0.0), fit.slopes());
@@ -207,12 +208,12 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64)> {
             let aside = slopes[i].value * fit.u_level;
             Estimate::new(at[i].value, &[at[i].uncertainty, aside, fit.remainders[i]])
         });
-        [drive, omega, fit.response]
+        ([drive, omega, fit.response], f64::INFINITY)
     } else {
         // The drive of the hold decides where the approach ends.
         let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
-        let [omega, limit] = limits(approach, wide, knowledge, command)?;
-        [base, omega, limit]
+        let ([omega, limit], slope) = limits(approach, wide, knowledge, command)?;
+        ([base, omega, limit], slope)
     };
     let speed = |sample: &Sample| Some(d.speed(sample.ground_truth?.particle_velocity.abs()));
     let speeds: Option<Vec<f64>> = hold.iter().map(speed).collect();
@@ -247,14 +248,15 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64)> {
         friction: Friction::of(hold, (hold.len() - 1) as f64 * dt * omega.value / TAU),
         tone,
     };
-    Some((lock, response.value))
+    Some((lock, response.value, slope))
 }
 
-/// Frequency, rad/s, and amplitude, m, at the end of the approach: from the longest window that its later halves agree with.
+/// Frequency, rad/s, and amplitude, m, at the end of the approach, and the slope of the drive over the amplitude: from the longest window that its later
+/// halves agree with.
 ///
 /// A long window has less noise, a late one is nearer to the end. Where even the shortest two disagree, the difference is a part of the
 /// uncertainty.
-fn limits(approach: &[Cycle], wide: &[Cycle], knowledge: &Knowledge, command: f64) -> Option<[Estimate; 2]> {
+fn limits(approach: &[Cycle], wide: &[Cycle], knowledge: &Knowledge, command: f64) -> Option<([Estimate; 2], f64)> {
     let slopes = ResonanceFit::of(wide, knowledge, Slopes::Rising)?.slopes();
     let slopes = slopes.map(|slope| Estimate::new(slope.value, &[slope.uncertainty, SLOPE_UNCERTAINTY * slope.value]));
     let limit = |cycles: &[Cycle]| {
@@ -285,7 +287,8 @@ fn limits(approach: &[Cycle], wide: &[Cycle], knowledge: &Knowledge, command: f6
         [0.0; 2]
     };
     let whole = windows[longest.unwrap_or(last)].0;
-    Some([0, 1].map(|i| Estimate::new(whole[i].value, &[whole[i].uncertainty, difference[i]])))
+    let limits = [0, 1].map(|i| Estimate::new(whole[i].value, &[whole[i].uncertainty, difference[i]]));
+    Some((limits, slopes[0].value))
 }
 
 /// The last periods before the release.
@@ -415,10 +418,17 @@ fn on_target(lock: &Lock, tolerance: f64) -> Result<(), IdentificationError> {
 }
 
 /// Refuses a lock at a constant drive whose limit may lie farther from the amplitude of the hold, m, than the slopes reach that lead there: near a fold
-/// of the backbone a response creeps for hundreds of periods, and noise hides it.
-fn at_rest(lock: &Lock, held: f64) -> Result<(), IdentificationError> {
-    let ResonancePoint { a_m: limit, u_a_m: uncertainty, .. } = lock.at;
-    let (farthest, allowed) = ((limit - held).abs() + SIGNIFICANT * uncertainty, SPREADS[1] * held);
+/// of the backbone a response creeps for hundreds of periods, and noise hides it. `slope`: of the drive over the response, with which the limit is
+/// extrapolated. On the way it changes by `E/A²` times the way, its natural scale: where it is small, the limit may be much farther, or nowhere.
+fn at_rest(lock: &Lock, held: f64, slope: f64) -> Result<(), IdentificationError> {
+    let ResonancePoint { a_m: limit, u_a_m: uncertainty, e_m: drive, .. } = lock.at;
+    let way = (limit - held).abs();
+    // A small module has no code for this.
+    let uncertainty = match cfg!(feature = "tables") {
+        true => uncertainty.hypot(drive / slope * (way / held).powi(2)),
+        false => uncertainty,
+    };
+    let (farthest, allowed) = (way + SIGNIFICANT * uncertainty, SPREADS[1] * held);
     if lock.held || farthest <= allowed {
         return Ok(());
     }

@@ -384,21 +384,27 @@ fn friction_from_rest_is_never_called_a_motion_with_impacts() {
 
 #[test]
 fn a_response_that_creeps_below_the_fold_behind_noise_is_not_called_a_lock() {
-    let scene = dimensionless(&[
-        "plant.epsilon=0.00408",
-        "plant.lambda=0.3234",
-        "plant.r=0.4172",
-        "excitation.G=0.9218",
-        "start.dq2=0",
-        "controller.omega_min=0.8",
-        "controller.omega_max=1.2",
-        "chain.snr=20",
-    ]);
-    // Of the exact backbone, no motion between C = 0.3 and 0.6 needs so little drive: the response falls from one to the other for 800 periods.
-    for seed in [1, 2, 3] {
-        let mut scene = scene.clone();
-        scene.chain.seed = seed;
-        match identified(&scene) {
+    // Of the exact backbone, no motion between C = 0.3 and 0.6 needs so little drive: the response falls from one to the other for 800 periods. On the
+    // second rig it falls by 1e-5 a period at C = 0.371, where the least drive is G = 0.9581, on its way to C = 0.207.
+    let fast = ["0.00408", "0.3234", "0.4172", "0.9218", "20"];
+    let slow = [
+        "0.003955700581273307",
+        "0.6797041112321551",
+        "0.5164337547784803",
+        "0.9572666777756323",
+        "40",
+    ];
+    for (numbers, seed) in [(fast, 1), (fast, 2), (fast, 3), (slow, 28)] {
+        let names = ["plant.epsilon", "plant.lambda", "plant.r", "excitation.G", "chain.snr"];
+        let mut settings: Vec<String> = names
+            .iter()
+            .zip(numbers)
+            .map(|(name, value)| format!("{name}={value}"))
+            .collect();
+        settings.extend(["start.dq2=0", "controller.omega_min=0.8", "controller.omega_max=1.2"].map(String::from));
+        settings.extend([format!("chain.seed={seed}"), "record.decay_periods=3".into()]);
+        let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
+        match identified(&dimensionless(&settings)) {
             Ok(found) => assert!(found.lock.at.c < 0.3, "{:?}", found.lock),
             Err(error) => assert!(matches!(error, IdentificationError::Moving { .. }), "{error}"),
         }
