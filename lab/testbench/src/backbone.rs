@@ -264,17 +264,20 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     /// Periods within which the loops, the control of a shaker and what rings beside the driven mode follow a move to this level, m.
     ///
     /// The move changes what rings by its own share at most, of which less than the precision is left.
+    #[cfg(feature = "tables")]
     fn followed(&self, level: f64) -> usize {
-        // A small module has no code for structures.
-        if !cfg!(feature = "tables") {
-            return FOLLOWED;
-        }
         let Knowledge { shaker, ringing, .. } = self.plan.knowledge;
         let of_control = shaker.map_or(0, |path| path.followed);
         let [from, ..] = self.states.last().unwrap_or(&self.closed);
         let share = (level / from - 1.0).abs() / self.plan.precision;
         let rung_down = (ringing * share.ln()).clamp(0.0, LONGEST as f64).ceil();
         FOLLOWED.max(of_control.into()).max(rung_down as usize)
+    }
+
+    /// A small module has no code for structures.
+    #[cfg(not(feature = "tables"))]
+    fn followed(&self, _: f64) -> usize {
+        FOLLOWED
     }
 
     /// The move to a level, m, and its periods: [`MOVE`], or as many as the drive needs for this change of the response; and behind a shaker, before and

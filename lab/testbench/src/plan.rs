@@ -291,7 +291,8 @@ pub struct Knowledge {
     pub shaker: Option<ShakerPath>,
     /// Distance of the nearest other pole of a structure from the pole of its driven mode after the release, rad/s; infinite without one.
     pub nearest_pole: f64,
-    /// Periods in which what rings beside the driven mode of a structure falls by a factor of e; 0 without it.
+    /// Periods in which what rings beside the driven mode of a structure falls by a factor of e; 0 without it. A small module has no structures.
+    #[cfg(feature = "tables")]
     pub ringing: f64,
 }
 
@@ -318,6 +319,7 @@ impl Knowledge {
             target,
             shaker: None,
             nearest_pole: f64::INFINITY,
+            #[cfg(feature = "tables")]
             ringing: 0.0,
         }
     }
@@ -416,7 +418,10 @@ impl Scene {
         }
         knowledge.target.through_shaker = knowledge.shaker.is_some();
         knowledge.nearest_pole = self.structure().map_or(f64::INFINITY, Structure::nearest_pole);
-        knowledge.ringing = self.structure().map_or(0.0, Structure::ringing);
+        #[cfg(feature = "tables")]
+        {
+            knowledge.ringing = self.structure().map_or(0.0, Structure::ringing);
+        }
         knowledge.target.held = self.chain.hold;
         knowledge.target.filter = self.chain.filter.map(|cut_off| cut_off * knowledge.linear.omega0);
         knowledge

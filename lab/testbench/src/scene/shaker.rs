@@ -251,6 +251,7 @@ impl Structure {
     }
 
     /// Periods in which what rings beside the driven mode falls by a factor of e; 0 for one oscillator.
+    #[cfg(feature = "tables")]
     pub(crate) fn ringing(&self) -> f64 {
         let others = self.poles().into_iter().skip(1);
         let periods = others.map(|pole| self.mode().omega / (TAU * -pole.re));
