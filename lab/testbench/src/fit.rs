@@ -387,8 +387,8 @@ pub struct Contradiction {
 }
 
 /// How the points contradict the rig `expected`. `None` where they do not, or cannot tell, or where the rig has effects of a real cavity, which
-/// the model has not. What is systematic in the uncertainties of points is alike
-/// from point to point. Where no parameter differs, it may be one error, whose square all of chi-square repeats.
+/// the model has not. What is systematic in the uncertainties of points is alike from point to point. Where no parameter differs, it may be one error,
+/// whose square all of chi-square repeats.
 #[must_use]
 pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected: &Parameters) -> Option<Contradiction> {
     let scene = Some(expected).filter(|expected| expected.cavity == Cavity::IDEAL)?;
