@@ -109,6 +109,7 @@ fn shells_and_readers_get_all_commands_from_the_command_line_itself() {
 
 #[test]
 fn input_without_sense_ends_with_one_message_and_code_two_and_without_a_result_with_one() {
+    let folder = tempfile::tempdir().unwrap();
     for (line, code, part) in [
         ("orbit --set=plant.r=1.5", 2, "r (coefficient of restitution) = 1.5"),
         ("orbit --set=plant.rr=0.5", 2, "`rr`"),
@@ -139,18 +140,22 @@ fn input_without_sense_ends_with_one_message_and_code_two_and_without_a_result_w
         ("map --x G=1:2:3 --y G=1:2:3", 2, "excitation.G is on two axes"),
         ("map --sigma=-1.1", 2, "sigma is an axis and a constant"),
         ("report --x r=0.5:1:3 --y r=0.5:1:3", 2, "plant.r is on two axes"),
-        ("pack --out no-such --binary win64", 2, "PLATFORM=PATH"),
-        ("pack --out no-such --binary amiga=x.so", 2, "linux64, linux32"),
+        ("pack --out FOLDER/no-such --binary win64", 2, "PLATFORM=PATH"),
+        ("pack --out FOLDER/no-such --binary amiga=x.so", 2, "linux64, linux32"),
         (
-            "pack --out no-such --set=plant.r=2",
+            "pack --out FOLDER/no-such --set=plant.r=2",
             2,
             "r (coefficient of restitution) = 2",
         ),
     ] {
-        fails(line, code, part);
+        fails(
+            &line.replace("FOLDER", &folder.path().display().to_string()),
+            code,
+            part,
+        );
     }
     // Refused before anything is written.
-    assert!(!std::env::temp_dir().join("no-such").exists());
+    assert!(!folder.path().join("no-such").exists());
 }
 
 #[test]

@@ -19,6 +19,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+use tempfile::TempDir;
 use vines::rig::{BuiltIn, Rig, Simulated};
 use vines::scene::{Override, Scene};
 
@@ -60,14 +61,16 @@ fn is_failure(output: &Output, code: i32, part: &str) {
 }
 
 /// A program in a process of its own; it ends by itself, or where this is dropped.
-struct Running(Child);
+struct Running(Child, #[expect(dead_code, reason = "removed with it")] TempDir);
 
 impl Running {
     fn start(arguments: &[&str]) -> Self {
         let mut command = Command::new(PROGRAM);
-        command.args(arguments).current_dir(std::env::temp_dir());
+        // A folder of its own: two runs do not write into the same `out`.
+        let folder = tempfile::tempdir().unwrap();
+        command.args(arguments).current_dir(folder.path());
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
-        Self(command.spawn().unwrap())
+        Self(command.spawn().unwrap(), folder)
     }
 
     /// The last word of the next line of its stdout.
