@@ -147,7 +147,7 @@ fn only_if_ideal(alternatives: &[EffectReport], is_assumed: bool) -> String {
             // Of those whose strength is given this is the largest.
             let up_to = if *uncertainty == 0.0 { "up to" } else { "with" };
             format!(
-                "{effect} {up_to} {symbol} = {strength:.digits$}{space}{unit} would give the same points, with that b = {:.2} mm",
+                "{effect} {up_to} {symbol} = {strength:.digits$}{space}{unit} (b = {:.2} mm) would give the same points",
                 1e3 * possible_b_m
             )
         })

@@ -48,9 +48,9 @@ pub struct LevelEstimate {
 /// What is not noise in a window of periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Unsteady {
-    /// The periods scatter so many times as much as the noise of the sensors explains; of means without a fit, an unknown number of times.
+    /// Scatter of the periods over what the noise of the sensors explains; `None` where no balance describes them.
     Scatter(Option<f64>),
-    /// The systematic part of the uncertainty of drive and frequency is so many times as large as the precision allows.
+    /// Systematic part of the uncertainty of drive or frequency over what the precision allows.
     Drift(f64),
 }
 
