@@ -3,7 +3,7 @@
 use clap::Args;
 use indicatif::ProgressBar;
 use vines::experiment::{Stage, run_into};
-use vines::identification::{IdentificationError, identify};
+use vines::identification::{IdentificationError, Regime, identify};
 use vines::{advice, comparison::Comparison, pack::File, report, survey::contradiction};
 
 use super::experiment::{ExperimentArguments, INTERRUPTED_FILE};
@@ -66,6 +66,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
             let reason = match &error {
                 IdentificationError::Regime { regime, .. } => {
                     advice::reason(&scene, &plan.knowledge.numbers, Some(*regime))
+                }
+                IdentificationError::Subharmonic { .. } => {
+                    advice::reason(&scene, &plan.knowledge.numbers, Some(Regime::Symmetric))
                 }
                 _ => None,
             };

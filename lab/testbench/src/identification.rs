@@ -20,7 +20,7 @@ pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_p
 pub use level::{Criterion, LevelEstimate, Unsteady};
 pub(crate) use level::{LAG, LONGEST};
 pub use resonance_fit::{Cycle, ResonanceFit, Slopes};
-pub(crate) use response::{ASYMMETRIC, Line, degrees, without_tones};
+pub(crate) use response::{ASYMMETRIC, Line, degrees, subharmonic, without_tones};
 pub use response::{Tone, classify, drive_harmonics, foreign_tone, impacts, regime_by_response};
 pub use vines_model::regime::{Impact, Regime};
 
@@ -33,6 +33,11 @@ pub enum IdentificationError {
          impacts per period. Try another [start] (the particle must be moving) or another G"
     )]
     Regime { regime: Regime, sigma: f64, c: f64 },
+    #[error(
+        "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the motion repeats only after {periods} periods of the drive: it is not 1:1. Try \
+         another [start] (the particle must be moving) or another G"
+    )]
+    Subharmonic { periods: usize, sigma: f64, c: f64 },
     #[error(
         "the hold contains no periodic motion: the response or the base reads zero; check the sensors and record.hold_periods"
     )]
@@ -83,6 +88,10 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
     };
     if !is_expected {
         return Err(IdentificationError::Regime { regime: lock.regime, sigma: lock.at.sigma, c: lock.at.c });
+    }
+    let ResonancePoint { f_hz, sigma, c, .. } = lock.at;
+    if let Some(periods) = subharmonic(record.hold(), &knowledge, TAU * f_hz) {
+        return Err(IdentificationError::Subharmonic { periods, sigma, c });
     }
     on_target(&lock, plan.lock.lock.phase_tolerance)?;
     at_rest(&lock, held, slope)?;

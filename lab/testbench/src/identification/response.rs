@@ -11,10 +11,10 @@ use std::fmt::{self, Display, Formatter};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use serde::Serialize;
-use vines_model::numerics::{Estimate, HarmonicBasis, golden_section};
+use vines_model::numerics::{Estimate, HarmonicBasis, golden_section, mean};
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
-use super::harmonics_of;
+use super::{Cycle, harmonics_of};
 use crate::linear::{Impacts, impacts_by_harmonic, impacts_by_resonance};
 use crate::plan::{Knowledge, Target};
 use crate::record::Sample;
@@ -215,6 +215,52 @@ fn is_asymmetric_by_reference(samples: &[Sample], knowledge: &Knowledge, omega: 
     let content = Content::fitted(&basis, &values, [omega, sample_time], &target);
     let content = content.and_then(|(content, _)| content.with_change(&values, turn, ALL));
     content.is_some_and(|content| content.is_asymmetric(target.measurands[1].order()))
+}
+
+/// Longest cycle of periods that a bifurcation of a 1:1 motion leads to and locks in place: the strong resonances are those of one to four periods.
+const LONGEST_CYCLE: usize = 4;
+
+/// The number of periods after which the motion in these samples of a hold repeats, if it is more than one. `omega` (rad/s): its frequency.
+///
+/// The amplitude and the phase of the periods are a complex number each. Without their trend, noise is as large at a subharmonic as at other frequencies,
+/// or smaller, because loops are slow. A subharmonic of the power P, of n periods with the remaining power Q, then exceeds `P/Q` with the probability
+/// `(1 + P/Q)^-(n-4)`. The samples that differ from their harmonics within a period are noise at least.
+pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<usize> {
+    let cleaned = without_tones(samples, knowledge, omega);
+    let cycles = Cycle::all(
+        cleaned.as_deref().unwrap_or(samples),
+        knowledge.sample_time,
+        knowledge.target,
+    );
+    let trend = HarmonicBasis::new(&vec![0.0; cycles.len()], 2, &[]);
+    let deviations = |value: fn(&Cycle) -> f64| {
+        let values = DVector::from_iterator(cycles.len(), cycles.iter().map(value));
+        Some(trend.residual(&values, &trend.fit(&values)?))
+    };
+    let response = mean(cycles.iter().map(Cycle::amplitude));
+    let (amplitudes, phases) = (
+        deviations(Cycle::amplitude)? / response,
+        deviations(|cycle| cycle.phase_error)?,
+    );
+    let noise = cycles.iter().map(|cycle| {
+        let shares = [response, cycle.base.norm()].map(|amplitude| amplitude * amplitude);
+        2.0 * (cycle.noise[0] / shares[0] + cycle.noise[1] / shares[1])
+    });
+    let free = cycles.len() as f64 - 4.0;
+    let (total, least) = (amplitudes.norm_squared() + phases.norm_squared(), free * mean(noise));
+    let chance = |turns: f64| {
+        let values = amplitudes.iter().zip(&phases).map(|(re, im)| Complex64::new(*re, *im));
+        let line = values
+            .enumerate()
+            .map(|(k, value)| value * Complex64::cis(-TAU * turns * k as f64));
+        let power = line.sum::<Complex64>().norm_sqr() / cycles.len() as f64;
+        (1.0 + power / (total - power).max(least)).powf(-free)
+    };
+    // Two quarters of a turn are a half.
+    let turns = (2..=LONGEST_CYCLE).flat_map(|m| (1..m).filter(move |j| *j == 1 || m % j > 0).map(move |j| (m, j)));
+    let lines: Vec<(usize, f64)> = turns.map(|(m, j)| (m, chance(j as f64 / m as f64))).collect();
+    let (periods, chance) = lines.iter().min_by(|one, other| one.1.total_cmp(&other.1))?;
+    (chance * (lines.len() as f64) < (-0.5 * SIGNIFICANT.powi(2)).exp()).then_some(*periods)
 }
 
 /// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase target,

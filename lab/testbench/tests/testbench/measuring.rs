@@ -2,6 +2,7 @@
 //! rigs and of real cavities from rest, foreign tones, how fast the phase locks, and single precision. The programs in `studies/` take more rigs
 //! and settings.
 
+use std::cell::Cell;
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -578,6 +579,29 @@ fn through_mains_hum_and_ripple_a_backbone_is_tracked_and_a_lock_identified_whic
             "{text}"
         );
         assert!(is_near(&humming.at, &clean.at) && clean.tone.is_none());
+    }
+}
+
+#[test]
+fn a_response_that_repeats_after_two_to_four_periods_is_not_called_1_1_also_through_noise() {
+    for noise in [&[][..], &["chain.snr=60"]] {
+        for periods in 2..=4 {
+            let scene = paper(&[noise, &["record.decay_periods=3"]].concat());
+            let turns = Cell::new(0.0);
+            // The impacts stay even: only the response shows it.
+            let line = |turns: f64| 3e-4 * scene.plant.half_width * (TAU * turns / periods as f64).sin();
+            let mut rig = Altered {
+                rig: Simulated::of(&scene).unwrap(),
+                read: Box::new(|sensors| Ok(Sensors { response: sensors.response + line(turns.get()), ..sensors })),
+                drive: Box::new(|drive, step| {
+                    turns.set(turns.get() + drive.omega * step / TAU);
+                    (drive, step)
+                }),
+            };
+            let found = identify(&record(&mut rig, &scene).unwrap(), &scene.plan());
+            let is_named = matches!(found, Err(IdentificationError::Subharmonic { periods: n, .. }) if n == periods);
+            assert!(is_named, "{periods}: {found:?}");
+        }
     }
 }
 
