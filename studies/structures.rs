@@ -22,6 +22,7 @@ mod common;
 
 use common::*;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
+use vines_testbench::advice::can_be_held;
 use vines_testbench::survey::phase_resonant as orbits_of;
 
 /// Largest error of a correct lock: in sigma and C, and of the drive of a held response, relative.
@@ -30,8 +31,6 @@ const TOLERANCE: f64 = 2e-3;
 const SMALL: f64 = 1e-6;
 /// Intervals into which the exact backbone is divided between two orbits.
 const FINE: usize = 20;
-/// Change of the phase target by which this slope is computed, degrees.
-const TURN: f64 = 0.02;
 
 /// What became of a structure.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -203,22 +202,12 @@ fn lock(scene: &Scene, is_stable: bool) -> (Outcome, [f64; 2], f64, String) {
     (outcome, errors, periods, found)
 }
 
-/// Whether a phase loop can hold a stable orbit under the drive of a scene: one whose response lags more at a higher frequency.
+/// Whether a phase loop can hold a stable orbit under the drive of a scene.
 fn is_lockable(scene: &Scene) -> bool {
     let d = scene.dimensionless();
-    let [before, at, after] = [-TURN, 0.0, TURN].map(|turn| {
-        let mut scene = scene.clone();
-        scene.controller.phase_target += turn;
-        orbits_of(&scene, &d)
-    });
-    let near = |orbits: &[Orbit], sigma: f64| {
-        let sigmas = orbits.iter().map(|orbit| orbit.sigma);
-        sigmas.min_by(|one, other| (one - sigma).abs().total_cmp(&(other - sigma).abs()))
-    };
-    let stable = at.iter().filter(|orbit| orbit.stable).map(|orbit| orbit.sigma);
-    stable
-        .map(|sigma| (near(&before, sigma), near(&after, sigma)))
-        .any(|(before, after)| after < before)
+    orbits_of(scene, &d)
+        .iter()
+        .any(|orbit| orbit.stable && can_be_held(scene, &d, orbit))
 }
 
 /// The orbits under the drive of a scene, and where those of its backbone are stable.

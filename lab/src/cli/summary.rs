@@ -104,6 +104,10 @@ pub(super) fn not_locked(reason: &Reason, scene: &Scene) -> String {
             scene.controller.omega_min,
             scene.controller.omega_max
         ),
+        Reason::LagsLess { stable } => format!(
+            "{}, where under a constant drive the response lags less at a higher frequency: no phase loop holds it. Try another G",
+            places(stable)
+        ),
         Reason::NoImpacts { stable, onset } => format!(
             "the particle does not reach the walls: under a constant drive, impacts begin at G = {onset:.3}; give it a velocity in [start]; {}",
             places(stable)

@@ -56,6 +56,8 @@ pub enum Reason {
     Unstable { g: f64, range: Option<[f64; 2]> },
     /// The controller may not set the frequency of any of these stable orbits.
     Excluded { stable: Vec<Orbit> },
+    /// No phase loop can hold any of these stable orbits ([`can_be_held`]).
+    LagsLess { stable: Vec<Orbit> },
     /// The particle does not reach the walls; under a constant drive, impacts begin at `G = onset`.
     NoImpacts { stable: Vec<Orbit>, onset: f64 },
     /// The motion is of this regime, and coexists with these stable orbits.
@@ -89,6 +91,24 @@ pub fn is_hit_at_once(scene: &Scene, samples: &[Sample]) -> bool {
     is_simulated && scene.resonance.sensor_quantity != Measurand::Displacement && scene.start.dq2 != 0.0
 }
 
+/// Change of the phase target, degrees, by which the frequency of an orbit changes without rounding and without a bend.
+const TURN: f64 = 0.02;
+
+/// Whether a phase loop can hold an orbit of a scene under its drive. Its control is integral: the response has to lag more at a higher frequency, as it
+/// does on one oscillator. `d` has the numbers of the driven mode.
+pub fn can_be_held(scene: &Scene, d: &Dimensionless, orbit: &Orbit) -> bool {
+    if scene.structure.is_none() {
+        return true;
+    }
+    let [before, after] = [-TURN, TURN].map(|turn| {
+        let mut scene = scene.clone();
+        scene.controller.phase_target += turn;
+        let sigmas = phase_resonant(&scene, d).into_iter().map(|orbit| orbit.sigma);
+        sigmas.min_by(|one, other| (one - orbit.sigma).abs().total_cmp(&(other - orbit.sigma).abs()))
+    });
+    after < before
+}
+
 /// The reason from the scene, the numbers of its rig and the regime of the last periods; it holds for the ideal cavity.
 /// `None` where the exact orbits give no reason.
 pub fn reason(scene: &Scene, d: &Dimensionless, regime: Option<Regime>) -> Option<Reason> {
@@ -100,6 +120,9 @@ pub fn reason(scene: &Scene, d: &Dimensionless, regime: Option<Regime>) -> Optio
     let allowed = scene.controller.omega_min..=scene.controller.omega_max;
     if !stable.iter().any(|orbit| allowed.contains(&orbit.omega)) {
         return Some(Reason::Excluded { stable });
+    }
+    if !stable.iter().any(|orbit| can_be_held(scene, d, orbit)) {
+        return Some(Reason::LagsLess { stable });
     }
     match regime? {
         Regime::Unknown | Regime::Unresolved | Regime::NotEstablished => None,

@@ -20,7 +20,6 @@ use crate::scene::key;
 
 pub use judge::Condition;
 use judge::Judge;
-use search::SEARCHES;
 pub(crate) use search::Search;
 
 /// Share of its amplitude to which the response of the linear rig falls in the recorded decay. The 1:1 motion has a smaller range, from symmetry
@@ -82,17 +81,57 @@ fn unmet_in_words(unmet: Option<Condition>) -> String {
     })
 }
 
-/// What a search for the requested drive has found, in words.
-fn search_in_words(held: Option<[f64; 2]>, [highest, strongest]: [f64; 2]) -> String {
-    match held {
-        Some([low, high]) => format!(
-            "with the response under control, symmetric 1:1 motions were held at drives from G = {low:.4} to {high:.4}, and lost {SEARCHES} times; a \
-             constant drive does not hold all of them"
-        ),
-        None => format!(
-            "no symmetric 1:1 motion was found at responses up to C = {highest:.3}, with drives up to G = {strongest:.2} (phase_lock.amplitude_max, \
-             which a converter's chain.base_range bounds)"
-        ),
+/// What a search for the requested drive has found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchFound {
+    /// Least and largest C of the response that was tried.
+    pub tried: [f64; 2],
+    /// Whether impacts have begun.
+    pub impacts: bool,
+    /// Least and largest G at which a symmetric 1:1 motion was held, and G, C and sigma where G was nearest to the requested one; `None` without one.
+    pub held: Option<([f64; 2], [f64; 3])>,
+    /// Largest G that was allowed.
+    pub strongest: f64,
+    /// Requested G.
+    pub requested: f64,
+    /// How often the motion was lost, or not found.
+    pub lost: u32,
+    /// Whether the time ended while a motion was to settle, and if so, whether under the constant drive.
+    pub unsettled: Option<bool>,
+}
+
+impl Display for SearchFound {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let [low, high] = self.tried;
+        let Some(([least, largest], [g, c, sigma])) = self.held else {
+            write!(f, "at responses from C = {low:.3} to {high:.3} ")?;
+            return match (self.impacts, self.lost) {
+                (_, 0) => f.write_str("no motion was symmetric 1:1 yet. Allow more time (phase_lock.acquire_timeout)"),
+                (true, _) => f.write_str("impacts began, but no motion was symmetric 1:1. Try another G"),
+                (false, _) => write!(
+                    f,
+                    "no impacts began, with drives up to G = {:.2}. Give the particle a velocity (start.dq2), or allow a larger drive \
+                     (phase_lock.amplitude_max, which a converter's chain.base_range bounds)",
+                    self.strongest
+                ),
+            };
+        };
+        write!(
+            f,
+            "with the response under control, the motion was symmetric 1:1 at drives from G = {least:.4} to {largest:.4}, nearest at G = {g:.4}, \
+             C = {c:.4}, sigma = {sigma:.4}; "
+        )?;
+        f.write_str(match (self.unsettled, self.lost) {
+            (Some(true), _) => {
+                "there it did not settle under the constant drive. Allow more time (phase_lock.acquire_timeout), or try another G"
+            }
+            (Some(false), _) => {
+                "there it did not settle, although its response was under control. Allow more time (phase_lock.acquire_timeout), or try another G"
+            }
+            (None, 0) => "the time ended on the way. Allow more (phase_lock.acquire_timeout)",
+            _ if (least..=largest).contains(&self.requested) => "nearer it was lost. Try another G",
+            _ => "beyond it was lost. Ask for a G well within this range",
+        })
     }
 }
 
@@ -154,18 +193,8 @@ pub enum ExperimentError {
         /// What kept the bench from taking the motion as settled, if the controller does not judge its lock itself.
         unmet: Option<Condition>,
     },
-    #[error(
-        "the requested drive G = {g:.4} was not reached within {periods:.0} periods: {}",
-        search_in_words(*held, *tried)
-    )]
-    NotReached {
-        periods: f64,
-        g: f64,
-        /// Least and largest G at which a symmetric 1:1 motion was held, if any was.
-        held: Option<[f64; 2]>,
-        /// Largest C of the response that was tried, and largest G of the drive that was allowed.
-        tried: [f64; 2],
-    },
+    #[error("no lock within {periods:.0} periods at the requested drive, G = {:.4}: {found}", found.requested)]
+    NotReached { periods: f64, found: Box<SearchFound> },
     #[error("no lock: the motion, held at C = {c:.4} for {periods} periods, is not steady: {why}")]
     NotSteady { periods: usize, c: f64, why: Unsteady },
     #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}; {evidence}", stage.name())]

@@ -17,7 +17,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::DVector;
 use vines_model::numerics::{Estimate, HarmonicBasis, RANDOM, SIGNIFICANT, mean, range};
 
-use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, Stage};
+use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, SearchFound, Stage};
 use crate::identification::{ASYMMETRIC, Criterion, Cycle, LONGEST, ResonanceFit, Slopes, degrees, without_tones};
 use crate::linear::{Impacts, impacts_by_resonance};
 use crate::plan::{LinearResponse, Plan, Target};
@@ -54,7 +54,7 @@ const CAUTIOUS: f64 = 0.5;
 /// Largest number of levels that are held for it.
 const LEGS: usize = 20;
 /// Number of searches, each twice as slow as the one before.
-pub(super) const SEARCHES: u32 = 4;
+const SEARCHES: u32 = 4;
 
 /// What a leg measured.
 #[derive(Debug, Clone, Copy)]
@@ -91,6 +91,13 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     setpoint: f64,
     /// Smallest and largest drive that held a symmetric motion, m; infinite before the first.
     held: (f64, f64),
+    /// Smallest and largest response of the legs, m, whether impacts have begun, and the symmetric leg with the drive nearest to the requested one.
+    tried: (f64, f64),
+    impacts: bool,
+    nearest: Option<Leg>,
+    /// How often the motion was lost or not found, and whether one is to settle now, under a constant drive or not.
+    lost: u32,
+    unsettled: Option<bool>,
     /// The periods at the level that is to settle.
     cycles: Vec<Cycle>,
 }
@@ -108,6 +115,11 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             bench,
             setpoint: 0.0,
             held: (f64::INFINITY, 0.0),
+            tried: (f64::INFINITY, 0.0),
+            impacts: false,
+            nearest: None,
+            lost: 0,
+            unsettled: None,
             cycles: Vec::new(),
         }
     }
@@ -115,6 +127,14 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Goes to the lock at the requested drive. Returns whether the response is held by control there, or `None` where the controller cannot
     /// control it.
     pub fn lock(&mut self) -> Result<Option<bool>, ExperimentError> {
+        self.reach_requested().map_err(|error| match error {
+            // What a foreign controller or a filter left open says more.
+            ExperimentError::NoLock { unmet: None, .. } if self.tried.0 < self.tried.1 => self.not_reached(),
+            error => error,
+        })
+    }
+
+    fn reach_requested(&mut self) -> Result<Option<bool>, ExperimentError> {
         let mut leg = match self.begin() {
             Err(ExperimentError::Controller(ControllerError::NoResponseLoop(_))) => return Ok(None),
             leg => leg?,
@@ -129,6 +149,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             if let Some(held) = self.solve(&mut leg, step, search >= SEARCHES / 2)? {
                 return Ok(Some(held));
             }
+            self.lost += 1;
         }
         Err(self.not_reached())
     }
@@ -301,9 +322,12 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             if is_stable {
                 self.bench.controller.hold_drive()?;
             }
+            self.unsettled = Some(is_stable);
             if !self.settle(leg)? {
+                self.unsettled = None;
                 return Ok(None);
             }
+            self.unsettled = None;
             if is_stable || self.is_found(leg, &predicted) {
                 return Ok(Some(!is_stable));
             }
@@ -494,10 +518,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let is_even_small =
             !self.bench.plan.knowledge.is_symmetric || even <= (asymmetric * asymmetric * odd).max(doubtful);
         let symmetric = departed && possible && is_even_small;
-        if symmetric {
-            self.held = range(self.held, [drive.value]);
-        }
-        Ok(Leg {
+        let leg = Leg {
             response,
             last: all[all.len() - 1].amplitude(),
             drive: drive.value,
@@ -507,21 +528,44 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             symmetric,
             asymmetry: ((even - doubtful).max(0.0) / odd.max(doubtful)).sqrt(),
             even: squares,
-        })
+        };
+        self.note(&leg);
+        Ok(leg)
+    }
+
+    /// Notes a leg for the words of a search without a result. A small module has none.
+    fn note(&mut self, leg: &Leg) {
+        if !cfg!(feature = "tables") {
+            return;
+        }
+        self.tried = range(self.tried, [leg.response]);
+        self.impacts |= leg.departed;
+        if !leg.symmetric {
+            return;
+        }
+        self.held = range(self.held, [leg.drive]);
+        let distance = |leg: &Leg| (leg.drive - self.requested).abs();
+        if self.nearest.is_none_or(|nearest| distance(leg) < distance(&nearest)) {
+            self.nearest = Some(*leg);
+        }
     }
 
     /// The requested drive was not reached.
     fn not_reached(&self) -> ExperimentError {
         let (d, (low, high)) = (self.bench.plan.knowledge.numbers, self.held);
-        ExperimentError::NotReached {
-            periods: self.bench.periods,
-            g: d.g,
-            held: (low <= high).then(|| [low, high].map(|drive| d.excitation(drive))),
-            tried: [
-                self.setpoint / self.b,
-                d.excitation(self.bench.config.amplitude_max.unwrap_or(f64::INFINITY)),
-            ],
-        }
+        let of = |leg: Leg| [d.excitation(leg.drive), leg.response / d.b, d.sigma(leg.omega)];
+        let found = SearchFound {
+            tried: [self.tried.0, self.tried.1].map(|response| response / d.b),
+            impacts: self.impacts,
+            held: self
+                .nearest
+                .map(|leg| ([low, high].map(|drive| d.excitation(drive)), of(leg))),
+            strongest: d.excitation(self.bench.config.amplitude_max.unwrap_or(f64::INFINITY)),
+            requested: d.g,
+            lost: self.lost,
+            unsettled: self.unsettled,
+        };
+        ExperimentError::NotReached { periods: self.bench.periods, found: found.into() }
     }
 }
 

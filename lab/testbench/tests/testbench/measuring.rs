@@ -83,6 +83,10 @@ fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most_and_six_bits_s
     // The drive stays within the range of the converter that reads it.
     let damped = at("plant.lambda=4.5 start.dq2=0 excitation.G=2 chain.adc_bits=12").unwrap_err();
     assert!(matches!(damped, ExperimentError::NotReached { .. }), "{damped}");
+    assert!(
+        damped.to_string().contains("no impacts began, with drives up to G = "),
+        "{damped}"
+    );
     // From the middle, impacts would begin at G = 4.5; a particle that moves needs less.
     let moving = at("plant.lambda=4.5 start.dq2=0.8 excitation.G=2 chain.adc_bits=12").unwrap();
     assert!((moving.c - 0.336333).abs() < 1e-4, "{moving:?}");
@@ -579,6 +583,27 @@ fn through_mains_hum_and_ripple_a_backbone_is_tracked_and_a_lock_identified_whic
             "{text}"
         );
         assert!(is_near(&humming.at, &clean.at) && clean.tone.is_none());
+    }
+}
+
+#[test]
+fn a_search_without_a_lock_says_what_it_found_and_what_to_do() {
+    for (settings, parts) in [
+        (
+            "start.dq2=0 phase_lock.acquire_timeout=830",
+            ["no motion was symmetric 1:1 yet", "Allow more time"],
+        ),
+        (
+            "start.dq2=0 phase_lock.acquire_timeout=1385",
+            ["symmetric 1:1 at drives from G = 1.29", "Allow more"],
+        ),
+        (
+            "start.dq2=0 excitation.G=0.5",
+            ["nearest at G = ", "Ask for a G well within this range"],
+        ),
+    ] {
+        let error = at(settings).unwrap_err().to_string();
+        assert!(parts.iter().all(|part| error.contains(part)), "{settings}: {error}");
     }
 }
 
