@@ -147,7 +147,7 @@ fn p_values(fit: &Fit) -> Vec<f64> {
 
 fn effects(source: &str, count: usize, seed: u64, snr: &str) -> Result<(), Failure> {
     let header = "effect,snr_dB,seed,drawn,rigs,flagged,named,misnamed,among_others,strength_within_1.96u,largest_u";
-    let names = [&Effect::ALL.map(Effect::name)[..], &["none", "two effects"]].concat();
+    let names = [&Effect::ALL.map(|one| one.names()[0])[..], &["none", "two effects"]].concat();
     let chosen = names.iter().filter(|name| match source {
         "effects" => **name != "two effects",
         source => **name == source,
@@ -171,7 +171,7 @@ fn effects(source: &str, count: usize, seed: u64, snr: &str) -> Result<(), Failu
         let is_its = |n: &usize| match name {
             "none" => *n >= count,
             "two effects" => *n < count,
-            _ => *n < count && Effect::ALL[n % 5].name() == name,
+            _ => *n < count && Effect::ALL[n % 5].names()[0] == name,
         };
         let rigs: Vec<usize> = (0..2 * count).filter(is_its).collect();
         // The rigs that the loop does not lock, and those that the effect hardly moves, are drawn again.
@@ -232,7 +232,7 @@ fn named(hidden: &[Effect], uniform: Uniform, snr: &str) -> Result<Option<Found>
         let scene = scene.clone().at_rest();
         let mut bench = behind_chain(rig, &scene)?;
         let checked = check(&mut *bench, &plan)?;
-        let linear = checked.linear.ok_or_else(|| checked.verdict.to_string())?.response();
+        let linear = checked.linear.ok_or_else(|| checked.verdict.to_string())?.response;
         tracked(&mut *bench, &scene.plan_on(plan.knowledge.measured(linear)), 20.0)?
     } else {
         tracked(&mut *behind_chain(rig, &scene)?, &plan, 20.0)?

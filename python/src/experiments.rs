@@ -127,7 +127,7 @@ pub fn fit(
         .collect();
     let names = |one: &Explanation| {
         one.possible()
-            .map(|one| one.effect.name())
+            .map(|one| one.effect.names()[0])
             .collect::<Vec<_>>()
             .join(" or ")
     };

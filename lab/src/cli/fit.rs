@@ -186,7 +186,7 @@ fn explained(explanation: &Explanation) -> String {
     match &possible[..] {
         [] => {
             let tried = explanation.candidates.iter();
-            let tried = tried.map(|one| format!("{} ({})", one.effect, chi_square(&one.fit)));
+            let tried = tried.map(|one| format!("{} ({})", one.effect.names()[0], chi_square(&one.fit)));
             let tried = match tried.collect::<Vec<String>>().join(", ") {
                 none if none.is_empty() => "none of them a motion exists".into(),
                 some => some,

@@ -509,9 +509,10 @@ impl<'a> Problem<'a> {
         2 * self.points.len() + self.known.iter().map(Known::equations).sum::<usize>()
     }
 
-    /// The problem of some of the points.
+    /// The problem of some of the points, in their order.
     fn of(&self, kept: &[usize]) -> Self {
-        let points = kept.iter().map(|n| self.points[*n]).collect();
+        let points = (0..self.points.len()).filter(|n| kept.contains(n));
+        let points = points.map(|n| self.points[n]).collect();
         Self { points, ..self.clone() }
     }
 

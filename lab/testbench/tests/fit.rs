@@ -525,7 +525,7 @@ fn without_knowns_an_ideal_fit_says_which_cavity_would_give_the_same_points() {
     let with_friction = found.alternatives.iter().find(|one| one.effect == Effect::Friction);
     let with_friction = with_friction.unwrap_or_else(|| panic!("{:?}", found.explanation));
     // The largest friction that the points allow, and with it the half-width: the rig is between this and the ideal cavity.
-    let (b, ideal) = (with_friction.half_width(), found.plant.half_width);
+    let (b, ideal) = (with_friction.report().possible_b_m, found.plant.half_width);
     let reaches = with_friction.strength.value >= 0.09 && (0.98 * b..ideal).contains(&RIG.half_width);
     assert!(reaches, "{:?}: {b} to {ideal}", with_friction.strength);
     let friction = Cavity { kinetic_friction: 0.05, ..Cavity::IDEAL };

@@ -9,7 +9,6 @@
 //! half of the distance between the walls.
 
 use std::cmp::Ordering;
-use std::fmt::{self, Display, Formatter};
 
 use lovines::cavity::GRAVITY;
 use lovines::{Cavity, Restitution};
@@ -48,7 +47,7 @@ pub enum Effect {
 pub struct Candidate {
     /// Which.
     pub effect: Effect,
-    /// Its strength, in the unit of [`Effect::symbol`].
+    /// Its strength, in the unit of [`Effect::names`].
     pub strength: Estimate,
     /// The fit; its chi-square is that of the plant's own motions.
     pub fit: Fit,
@@ -66,11 +65,9 @@ const NEAR: f64 = 1e-3;
 const FOUND: f64 = 1e-4;
 /// Smallest strength, over that from which the search begins.
 const SMALLEST: f64 = 1e-3;
-/// Strength from which the search begins, over that which gives the particle the acceleration `b omega0²`, or the suspension the additional
-/// stiffness `m omega0²`: friction and tilt of this size are about 0.03 and 2 degrees on the default rig.
-const TYPICAL: f64 = 0.01;
-/// Strengths from which a search begins, over a typical one: a typical, a weak and a strong one.
-const STRENGTHS: [f64; 3] = [1.0, 0.1, 5.0];
+/// Strengths from which a search begins, a typical, a weak and a strong one, over that which gives the particle the acceleration `b omega0²`, or the
+/// suspension the additional stiffness `m omega0²`: a typical friction and tilt are about 0.03 and 2 degrees on the default rig.
+const STRENGTHS: [f64; 3] = [0.01, 0.001, 0.05];
 /// Smallest step to the largest strength that points allow, as a factor.
 const FINEST: f64 = 1.1;
 /// Step of a difference: of the unknowns, of the strength relative, and along the curve.
@@ -85,39 +82,27 @@ impl Effect {
         Self::Hardening,
     ];
 
-    /// Its name.
+    /// Its name, and symbol and unit of its strength.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub fn names(self) -> [&'static str; 3] {
         match self {
-            Self::Friction => "friction",
-            Self::Tilt => "tilt",
-            Self::Viscoelastic => "viscoelastic restitution",
-            Self::Plastic => "plastic restitution",
-            Self::Hardening => "cubic stiffness",
+            Self::Friction => ["friction", "mu", ""],
+            Self::Tilt => ["tilt", "theta", "deg"],
+            Self::Viscoelastic => ["viscoelastic restitution", "k_r", "(s/m)^(1/5)"],
+            Self::Plastic => ["plastic restitution", "v_y", "m/s"],
+            Self::Hardening => ["cubic stiffness", "h", ""],
         }
     }
 
-    /// Symbol and unit of its strength.
-    #[must_use]
-    pub fn symbol(self) -> [&'static str; 2] {
-        match self {
-            Self::Friction => ["mu", ""],
-            Self::Tilt => ["theta", "deg"],
-            Self::Viscoelastic => ["k_r", "(s/m)^(1/5)"],
-            Self::Plastic => ["v_y", "m/s"],
-            Self::Hardening => ["h", ""],
-        }
-    }
-
-    /// Unknowns from which a search begins: those of an ideal cavity, with a typical strength times `factor`.
-    fn start(self, ideal: &Unknowns, factor: f64) -> Unknowns {
+    /// Unknowns from which a search begins: those of an ideal cavity, with a strength as in [`STRENGTHS`].
+    fn start(self, ideal: &Unknowns, strength: f64) -> Unknowns {
         let mut x = *ideal;
-        let typical = factor * TYPICAL * x[3].exp() * x[0].exp().powi(2) / GRAVITY;
+        let over_gravity = strength * x[3].exp() * x[0].exp().powi(2) / GRAVITY;
         x[6] = match self {
-            Self::Friction => typical,
-            Self::Tilt => 4.0 * typical * typical,
+            Self::Friction => over_gravity,
+            Self::Tilt => 4.0 * over_gravity * over_gravity,
             Self::Viscoelastic | Self::Plastic => 0.0,
-            Self::Hardening => factor * TYPICAL * x[4].exp(),
+            Self::Hardening => strength * x[4].exp(),
         };
         x
     }
@@ -141,7 +126,7 @@ impl Effect {
         }
     }
 
-    /// The strength in the unit of [`Effect::symbol`], of what [`Effect::cavity`] takes.
+    /// The strength in the unit of [`Effect::names`], of what [`Effect::cavity`] takes.
     #[must_use]
     pub fn strength(self, strength: f64, r: f64, speed: f64) -> f64 {
         match self {
@@ -150,12 +135,6 @@ impl Effect {
             Self::Viscoelastic => (1.0 - r) / speed.powf(0.2),
             Self::Plastic => speed * r.powi(4),
         }
-    }
-}
-
-impl Display for Effect {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
     }
 }
 
@@ -221,23 +200,17 @@ impl Candidate {
         first(self).cmp(&first(other)).then(by_criterion)
     }
 
-    /// Half-width of the fit, m.
-    #[must_use]
-    pub fn half_width(&self) -> f64 {
-        Quantity::B.of(&self.fit.x)
-    }
-
     /// Its numbers, for programs.
     #[must_use]
     pub fn report(&self) -> EffectReport {
-        let ([symbol, unit], Estimate { value: strength, uncertainty }) = (self.effect.symbol(), self.strength);
+        let ([effect, symbol, unit], Estimate { value: strength, uncertainty }) = (self.effect.names(), self.strength);
         EffectReport {
-            effect: self.effect.name(),
+            effect,
             symbol,
             unit,
             strength,
             uncertainty,
-            possible_b_m: self.half_width(),
+            possible_b_m: Quantity::B.of(&self.fit.x),
             chi_square: self.fit.chi_square,
             degrees: self.fit.degrees,
             left_out: self.fit.left_out.len(),
@@ -392,25 +365,17 @@ pub fn explain(
 ) -> Result<Explanation, FitError> {
     let problem = Problem::new(checked(points)?, definition, known);
     let ideal = problem.fit(expected)?;
-    let candidates = if ideal.is_rejected() {
-        problem.candidates(expected, &mut progress)
-    } else {
-        Vec::new()
+    let tried = Effect::ALL.iter().enumerate().filter(|_| ideal.is_rejected());
+    let with_effect = |(n, effect): (usize, &Effect)| {
+        progress(n);
+        problem.with_effect(*effect, expected)
     };
+    let mut candidates: Vec<Candidate> = tried.filter_map(with_effect).collect();
+    candidates.sort_by(Candidate::order);
     Ok(Explanation { ideal, candidates })
 }
 
 impl Problem<'_> {
-    /// The fits with each effect alone, the best one first.
-    fn candidates(&self, expected: &Parameters, progress: &mut impl FnMut(usize)) -> Vec<Candidate> {
-        let numbered = Effect::ALL.into_iter().enumerate().inspect(|(n, _)| progress(*n));
-        let mut candidates: Vec<_> = numbered
-            .filter_map(|(_, effect)| self.with_effect(effect, expected))
-            .collect();
-        candidates.sort_by(Candidate::order);
-        candidates
-    }
-
     /// Effects with which the points agree as well as with the ideal cavity, while the half-width differs from it significantly: laws of restitution,
     /// and the others at the largest strength.
     fn alternatives(&self, ideal: &Fit, expected: &Parameters, mut progress: impl FnMut(usize)) -> Vec<Candidate> {
@@ -422,19 +387,16 @@ impl Problem<'_> {
             |one: &Candidate| !one.fit.is_rejected() && one.fit.left_out.is_empty() && one.fit.chi_square < limit;
         let of = |(n, effect): (usize, Effect)| {
             progress(n);
+            let strongest = |sign| self.strongest(effect, sign, &same_points, agrees);
             match effect {
-                Effect::Viscoelastic | Effect::Plastic => {
-                    vec![self.with_effect(effect, expected).filter(|one| agrees(one))]
-                }
-                Effect::Hardening => [1.0, -1.0]
-                    .map(|sign| self.strongest(effect, sign, &same_points, agrees))
-                    .into(),
-                _ => vec![self.strongest(effect, 1.0, &same_points, agrees)],
+                Effect::Viscoelastic | Effect::Plastic => vec![self.with_effect(effect, expected).filter(agrees)],
+                Effect::Hardening => vec![strongest(1.0), strongest(-1.0)],
+                Effect::Friction | Effect::Tilt => vec![strongest(1.0)],
             }
         };
         let found = Effect::ALL.into_iter().enumerate().flat_map(of).flatten();
         found
-            .filter(|one| (b.value - one.half_width()).abs() > SIGNIFICANT * b.uncertainty)
+            .filter(|one| (b.value - Quantity::B.of(&one.fit.x)).abs() > SIGNIFICANT * b.uncertainty)
             .collect()
     }
 
@@ -474,25 +436,17 @@ impl Problem<'_> {
     /// are left out if the others agree.
     fn with_effect(&self, effect: Effect, expected: &Parameters) -> Option<Candidate> {
         let (order, all) = (self.by_falling_response(), self.points.len());
-        let largest = |count: usize| {
-            let mut kept = order[..count].to_vec();
-            kept.sort_unstable();
-            kept
-        };
         let most = all - all / LEFT_OUT;
-        let ideal = self.of(&largest(most)).fit(expected).ok()?;
+        let ideal = self.of(&order[..most]).fit(expected).ok()?;
         let mut best: Option<Candidate> = None;
-        for factor in STRENGTHS {
-            let mut x = effect.start(&ideal.x, factor);
+        for strength in STRENGTHS {
+            let mut x = effect.start(&ideal.x, strength);
             for count in [most, all] {
-                let kept = largest(count);
-                let Some(mut next) = self
-                    .of(&kept)
-                    .with_effect_from(effect, x, &ideal, effect.adds_a_parameter())
-                else {
+                let (problem, free) = (self.of(&order[..count]), effect.adds_a_parameter());
+                let Some(mut next) = problem.with_effect_from(effect, x, &ideal, free) else {
                     break;
                 };
-                next.fit.left_out = (0..all).filter(|n| !kept.contains(n)).collect();
+                next.fit.left_out = (0..all).filter(|n| order[count..].contains(n)).collect();
                 x = next.fit.x;
                 best = best.into_iter().chain([next]).min_by(Candidate::order);
             }
