@@ -19,6 +19,13 @@ pub struct Channel {
     pub clock: Option<[f64; 2]>,
 }
 
+impl Channel {
+    /// The last part of its path.
+    fn last(&self) -> &str {
+        self.name.rsplit(['/', '.']).next().unwrap_or("")
+    }
+}
+
 /// What a file contains.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Contents {
@@ -103,18 +110,25 @@ impl Contents {
                 [start, rate.map_or(step, |rate| 1.0 / rate)]
             }
         };
+        let counts = [&response, &drive].map(|one| one.values.len());
+        let own = match (&time, response.clock, drive.clock) {
+            (None, Some(one), Some(other)) => Some([one, other]).filter(|_| one != other || counts[0] != counts[1]),
+            _ => None,
+        };
+        let late = selection.late.filter(|_| !drive.name.is_empty());
         let mut begins = 0;
-        if let (None, Some(clock), Some(other)) = (&time, response.clock, drive.clock)
-            && (clock != other || response.values.len() != drive.values.len())
-        {
-            let counts = [&response, &drive].map(|one| one.values.len());
-            let Some(first) = align(&mut response, &mut drive, clock, other) else {
-                return Err(self.refused(&format!(
-                    ": channels {} and {} have no common time; were they recorded together?",
+        if own.is_some() || late.is_some() {
+            let [clock, [first, step]] = own.unwrap_or([[0.0, sample_time]; 2]);
+            let other = [first - late.unwrap_or(0.0), step];
+            begins = align(&mut response, &mut drive, clock, other).ok_or_else(|| {
+                let late = late.map_or_else(String::new, |late| format!(", {} samples later", late / sample_time));
+                self.refused(&format!(
+                    ": channels {} and {}{late} have no common time; were they recorded together?",
                     response.name, drive.name
-                )));
-            };
-            begins = first;
+                ))
+            })?;
+        }
+        if let Some([clock, other]) = own {
             notes.push(format!(
                 "{}: channel {} begins {:.6e} s after {} and has {} samples of {:.6e} s, not {} of {:.6e} s; the common {} samples are used",
                 self.origin,
@@ -128,18 +142,7 @@ impl Contents {
                 response.values.len()
             ));
         }
-        if let Some(late) = selection.late.filter(|_| !drive.name.is_empty()) {
-            let clocks = [0.0, -late].map(|start| [start, sample_time]);
-            let Some(first) = align(&mut response, &mut drive, clocks[0], clocks[1]) else {
-                return Err(self.refused(&format!(
-                    ": channel {} cannot be {} samples later than {}: it has {}",
-                    drive.name,
-                    late / sample_time,
-                    response.name,
-                    drive.values.len()
-                )));
-            };
-            begins += first;
+        if let Some(late) = late {
             notes.push(format!(
                 "{}: channel {} is {late} s later than {}, as given, and is corrected",
                 self.origin, drive.name, response.name
@@ -183,15 +186,8 @@ impl Contents {
     /// A channel by its name, the last part of its path, or its number.
     fn find(&self, name: &str) -> Result<Option<&Channel>, RecordingError> {
         let name = name.trim().trim_start_matches('/');
-        let is_last = |channel: &Channel| channel.name.rsplit(['/', '.']).next() == Some(name);
         let has_one = self.channels.iter().any(|channel| channel.name == name);
-        let is_it = |channel: &Channel| {
-            if has_one {
-                channel.name == name
-            } else {
-                is_last(channel)
-            }
-        };
+        let is_it = |channel: &Channel| name == if has_one { &channel.name } else { channel.last() };
         let mut found = (0..self.channels.len()).filter(|n| is_it(&self.channels[*n]));
         let (first, second) = (found.next(), found.next());
         if let Some((one, other)) = first.zip(second) {
@@ -266,7 +262,9 @@ impl Contents {
             )));
         };
         let of_file = unit::parse(stated, "").map_or("", |(_, unit)| unit);
-        if !is_time && written.is_empty() && !self.is_of_vines() {
+        // A recording of `vines` is in SI units.
+        let has = |name| self.find(name).is_ok_and(|one| one.is_some());
+        if !is_time && written.is_empty() && !(has("omega") && has("E")) {
             notes.push(format!("{}: channel {name} has no unit and is read in m", self.origin));
         } else if ![unit, "", "V"].contains(&of_file) {
             notes.push(format!(
@@ -276,13 +274,6 @@ impl Contents {
         }
         let values = values.iter().map(|value| factor * value).collect();
         Ok(Channel { name: name.clone(), unit: unit.into(), values, clock: *clock })
-    }
-
-    /// Whether the table has the columns of a recording of `vines`, which is in SI units.
-    fn is_of_vines(&self) -> bool {
-        ["omega", "E"]
-            .into_iter()
-            .all(|name| self.find(name).is_ok_and(|one| one.is_some()))
     }
 
     /// The base that a run of `vines` without a base sensor commanded: from its columns omega and E.
@@ -314,8 +305,8 @@ impl Contents {
 
     /// The channel of the time, s.
     fn time(&self, selection: &Selection, notes: &mut Vec<String>) -> Result<Option<Channel>, RecordingError> {
-        let last = |channel: &Channel| channel.name.rsplit(['/', '.']).next().unwrap_or("").to_lowercase();
-        let mut usual = self.channels.iter().filter(|channel| TIMES.contains(&&*last(channel)));
+        let is_time = |channel: &&Channel| TIMES.contains(&&*channel.last().to_lowercase());
+        let mut usual = self.channels.iter().filter(is_time);
         let (first, second) = (usual.next(), usual.next());
         if let (None, Some(first), Some(second)) = (&selection.time, first, second) {
             let names = format!("{} and {}", first.name, second.name);
