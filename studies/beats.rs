@@ -69,7 +69,7 @@ fn run(scene: &Scene, prints: bool) -> Result<Found, Failure> {
     let linear = checked
         .linear
         .ok_or_else(|| format!("refused by the check, {}", checked.verdict))?;
-    let plan = scene.plan_on(stated.knowledge.measured(linear.response()));
+    let plan = scene.plan_on(stated.knowledge.measured(linear.response));
     let tracked = tracked(&mut *Simulated::of(scene)?, &plan, 20.0)?;
     let curves = structure_backbone(scene, &scene.dimensionless()).unwrap_or_default();
     // All detunings share the uncertainty of the natural frequency.

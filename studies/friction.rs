@@ -41,7 +41,7 @@ fn measure([rig, client]: &[Scene; 2]) -> Result<Found, Failure> {
     let mut bench = behind_chain(rig.plant, rig)?;
     let plan = client.plan();
     let checked = check(&mut *bench, &plan)?;
-    let linear = checked.linear.ok_or_else(|| checked.verdict.to_string())?.response();
+    let linear = checked.linear.ok_or_else(|| checked.verdict.to_string())?.response;
     let plan = client.plan_on(plan.knowledge.measured(linear));
     let tracked = tracked(&mut *bench, &plan, 20.0)?;
     let (own, epsilon) = (plan.knowledge.numbers, rig.plant.mass_ratio());

@@ -201,7 +201,7 @@ fn run((scene, _): &(Scene, [f64; 4])) -> Run {
     let checked = Simulated::of(&scene.clone().at_rest()).and_then(|mut rig| check(&mut *rig, &stated));
     let linear = match checked {
         Ok(checked) => match checked.linear {
-            Some(linear) => linear.response(),
+            Some(linear) => linear.response,
             None => return none(format!("refused by the check, {}", checked.verdict)),
         },
         Err(error) => return none(error.to_string()),
@@ -281,7 +281,7 @@ fn locked((scene, _): &(Scene, [f64; 4])) -> Result<[f64; 2], String> {
     let linear = checked
         .linear
         .ok_or_else(|| format!("refused by the check, {}", checked.verdict))?;
-    let plan = scene.plan_on(stated.knowledge.measured(linear.response()));
+    let plan = scene.plan_on(stated.knowledge.measured(linear.response));
     let mut rig = Simulated::of(scene).map_err(|error| error.to_string())?;
     let record = record(&mut *rig, &plan).map_err(|error| error.to_string())?;
     let lock = identify(&record, &plan).map_err(|error| error.to_string())?.lock;

@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use nalgebra::{Complex, Const, DMatrix, DVector, DimMin, Dyn, SMatrix, SVector, linalg::QR};
+use nalgebra::{Complex, Const, DMatrix, DVector, DimMin, Dyn, RowSVector, SMatrix, SVector, linalg::QR};
 
 /// Standard errors from which on a difference is not noise: 0.3 % of normal noise is beyond.
 pub const SIGNIFICANT: f64 = 3.0;
@@ -224,6 +224,20 @@ pub fn slope(values: &[f64]) -> f64 {
     let spread = n * (n * n - 1.0) / 12.0;
     let moment = |(i, value): (usize, &f64)| (i as f64 - middle) * (value - mean);
     values.iter().enumerate().map(moment).sum::<f64>() / spread
+}
+
+/// Linear least squares of complex numbers, from rows and their values: the coefficients, and the inverse of the matrix of the normal equations.
+/// `None` where the rows do not determine them.
+pub fn complex_fit<const N: usize>(
+    rows: impl Iterator<Item = (RowSVector<Complex<f64>, N>, Complex<f64>)>,
+) -> Option<(SVector<Complex<f64>, N>, SMatrix<Complex<f64>, N, N>)> {
+    let (mut normal, mut right) = (SMatrix::zeros(), SVector::zeros());
+    for (row, value) in rows {
+        normal += row.adjoint() * row;
+        right += row.adjoint() * value;
+    }
+    let inverse = normal.try_inverse()?;
+    Some((inverse * right, inverse))
 }
 
 /// Residuals over their standard uncertainties, whose sum of squares is to be minimised.

@@ -147,7 +147,7 @@ impl ExperimentArguments {
             )));
         };
         let Some(linear) = checked.linear else { return Ok(plan) };
-        let knowledge = plan.knowledge.measured(linear.response());
+        let knowledge = plan.knowledge.measured(linear.response);
         eprintln!(
             "All values of sigma share a standard uncertainty of {:.1e}, that of the natural frequency.",
             knowledge.linear.uncertainty / knowledge.numbers.omega_change(1.0)

@@ -7,14 +7,14 @@ mod shaker;
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
-use nalgebra::{DVector, Matrix3, RowVector3, Vector2, Vector3};
+use nalgebra::{DVector, RowVector3, Vector2};
 use num_complex::Complex64;
 use phase_lock::Gains;
 use serde::Serialize;
-use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, mean_square, standard_deviation};
+use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, complex_fit, mean, mean_square, standard_deviation};
 
 use crate::linear::{MeasuredLinear, ParticleState};
-use crate::plan::{LinearResponse, Plan, ShakerPath, Target};
+use crate::plan::{LinearResponse, Plan, Target};
 use crate::rig::{Drive, Rig, RigError, Scaled};
 
 /// Drives of the check, over the scene's drive: too small for impacts. The smaller one follows where the particle may have slid.
@@ -81,10 +81,9 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
     let step = plan.knowledge.sample_time;
     let samples = |periods: usize| (periods as f64 * TAU / (omega * step)).round() as usize;
     let [quiet, driven, window] = PERIODS.map(samples);
-    let (phase, readings, has_base) = (0.0, Vec::new(), false);
     let target = plan.knowledge.target;
     let mut rig = Scaled::new(rig, target);
-    let mut rig = OpenLoop { rig: &mut rig, step, phase, readings, has_base };
+    let mut rig = OpenLoop::new(&mut rig, step);
     let expected = expected(plan, omega, amplitude);
     rig.rest(omega, [quiet, samples(WAIT)], waits, NOISE * expected[0].norm())?;
     let begins = rig.readings.len();
@@ -94,8 +93,9 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
     let OpenLoop { mut readings, has_base, .. } = rig;
     readings.truncate(ends);
     without_drift(&mut readings[begins..]);
+    let fits = [1, 2].map(|channel| fitted(&readings[begins + driven - window..], channel, 0, &target, omega));
     let mut channels = [0, 1].map(|n| {
-        let (phasor, noise) = fitted(&readings[begins + driven - window..], n + 1, 0, &target, omega);
+        let (phasor, noise) = fits[n];
         let ratio = phasor / expected[n];
         let floor = scatter(&readings[begins - quiet..begins], n + 1);
         let channel = CheckedChannel { noise, floor, ..CheckedChannel::default() };
@@ -112,7 +112,7 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
         .map(|[phase, ..]| channels[1].gain * amplitude * (phase + target.measurands[1].lead()).sin());
     let waits = moved < 0.5 * mean_square(moves);
     // Without a sensor, the base moves as expected.
-    let (phasor, noise) = fitted(&readings[begins + driven - window..], 2, 0, &target, omega);
+    let (phasor, noise) = fits[1];
     let base = if has_base {
         (phasor, noise / phasor.norm() * (2.0 / window as f64).sqrt())
     } else {
@@ -134,11 +134,10 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
     }
     if let Some(linear) = &linear {
         // Amplitude and phase of the response for the natural frequency and the damping that the rig has.
-        let gain = Complex64::from_polar(linear.response_gain, linear.phase.to_radians());
-        let reference = plan.knowledge.numbers.definition.reference;
-        let ratio = gain / linear.response().oscillator_gain(omega, reference);
+        let (response, reference) = (linear.response, plan.knowledge.numbers.definition.reference);
+        let ratio = response.gain / response.oscillator_gain(omega, reference);
         channels[0] = channels[0].at(ratio * base.0 / expected[1], omega * step);
-        quantities.extend(of_response(linear, ratio, plan));
+        quantities.extend(of_response(&response, ratio, plan));
     }
     let verdict = verdict(&channels, &amplitudes, has_base, waits);
     let refused = quantities.iter().find_map(CheckedQuantity::refusal);
@@ -239,7 +238,11 @@ struct OpenLoop<'a, R: ?Sized> {
     has_base: bool,
 }
 
-impl<R: Rig + ?Sized> OpenLoop<'_, R> {
+impl<'a, R: Rig + ?Sized> OpenLoop<'a, R> {
+    fn new(rig: &'a mut R, step: f64) -> Self {
+        Self { rig, step, phase: 0.0, readings: Vec::new(), has_base: false }
+    }
+
     /// Takes `samples` without a drive, at whose end the phase of the rig's oscillator is a multiple of 2 pi, as at the start of a controller.
     fn end(&mut self, samples: usize) -> Result<(), RigError> {
         let last = (TAU - self.phase % TAU) / (samples as f64 * self.step);
@@ -325,10 +328,10 @@ impl CheckedQuantity {
 }
 
 /// Natural frequency, damping, and the response over the expected response (`ratio`) of an oscillator that has both.
-fn of_response(linear: &Linear, ratio: Complex64, plan: &Plan) -> [CheckedQuantity; 4] {
+fn of_response(linear: &LinearResponse, ratio: Complex64, plan: &Plan) -> [CheckedQuantity; 4] {
     let stated = plan.knowledge.linear;
-    let u = linear.u_damping_rate;
-    let hertz = [linear.omega_0, u, stated.omega0].map(|omega| omega / TAU);
+    let u = linear.uncertainty;
+    let hertz = [linear.omega0, u, stated.omega0].map(|omega| omega / TAU);
     let damping = [linear.damping_rate, u, stated.damping_rate];
     let phase = [ratio.arg().to_degrees(), linear.u_gain.to_degrees(), 0.0];
     let late = [Verdict::ResponseLate, Verdict::BaseLate][usize::from(ratio.arg() > 0.0)];
@@ -560,15 +563,35 @@ pub struct Linear {
     pub gains: [f64; 2],
     /// Phase margin of the loop with a delay of one sample, degrees.
     pub phase_margin: f64,
-    /// What a shaker makes of its command.
+    /// The frequency response. The particle is carried if the friction in the drawing holds it at the largest acceleration of the check.
     #[serde(skip)]
-    pub shaker: Option<ShakerPath>,
-    /// The linear response as data. The particle is carried if the friction in the drawing holds it at the largest acceleration of the check.
+    pub response: LinearResponse,
+    /// It as data.
     #[serde(flatten)]
     pub data: MeasuredLinear,
 }
 
 impl Linear {
+    /// A frequency response, and the tuning for it.
+    fn new(response: LinearResponse, plan: &Plan) -> Self {
+        let (bandwidth, rate) = (plan.lock.bandwidth, response.damping_rate.max(0.0));
+        let gains = Gains::from_bandwidth(bandwidth, rate);
+        let margin = gains.phase_margin(bandwidth, rate, plan.knowledge.sample_time);
+        Self {
+            omega_0: response.omega0,
+            damping_rate: response.damping_rate,
+            u_damping_rate: response.uncertainty,
+            response_gain: response.gain.norm(),
+            u_gain: response.u_gain,
+            phase: response.gain.arg().to_degrees(),
+            bandwidth,
+            gains: [gains.proportional, gains.integral],
+            phase_margin: margin.to_degrees(),
+            data: response.data(),
+            response,
+        }
+    }
+
     /// The response whose phasors, m, are given period by period, each of `samples` samples; `noise` is the RMS of the readings about them, m,
     /// `base` the phasor of the base, m, and `u_base` its relative standard uncertainty. `None` without a growth from rest that is more than noise.
     fn of(
@@ -586,21 +609,18 @@ impl Linear {
         let (mut q, [mut steady, mut initial]) = start(phasors)?;
         let [mut u_q, mut u_gain] = [f64::NAN; 2];
         for _ in 0..ROUNDS {
-            let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
             let (mut power, mut turned, mut rest) = (Complex64::ONE, Complex64::ONE, 0.0);
             let p = q.conj().powf(1.0 / samples as f64);
             let within = (1.0 - p) / (1.0 - p * Complex64::cis(-4.0 * PI / samples as f64));
-            for (n, z) in phasors.iter().enumerate() {
+            let rows = phasors.iter().enumerate().map(|(n, z)| {
                 let row = RowVector3::new(Complex64::ONE, power, initial * power / q * n as f64);
                 let residual = z - steady - initial * power + (initial * power).conj() * within * turned;
-                normal += row.adjoint() * row;
-                right += row.adjoint() * residual;
                 rest += residual.norm_sqr();
                 power *= q;
                 turned *= turn;
-            }
-            let inverse = normal.try_inverse()?;
-            let change = inverse * right;
+                (row, residual)
+            });
+            let (change, inverse) = complex_fit(rows)?;
             // Two components of each phasor, and of each of three unknowns.
             let degrees = 2.0 * phasors.len() as f64 - 6.0;
             let explained = 2.0 * noise * noise / samples as f64 * (1.0 + SIGNIFICANT * (2.0 / degrees).sqrt());
@@ -621,47 +641,21 @@ impl Linear {
         if !(gain.norm().is_finite() && u_gain < DETERMINED && q.norm() > 0.0 && is_growth) {
             return None;
         }
-        let bandwidth = plan.lock.bandwidth;
-        let gains = Gains::from_bandwidth(bandwidth, rate.re.max(0.0));
         let largest = omega * omega * phasors.iter().map(|z| z.norm()).fold(0.0, f64::max);
         let particle = match FRICTION * largest < plan.knowledge.carried_up_to {
             true => ParticleState::Carried,
             false => ParticleState::Unknown,
         };
-        let (omega_0, u_rate) = ((omega - rate.im).hypot(rate.re), u_q / (q.norm() * period));
-        Some(Self {
-            shaker: None,
-            data: MeasuredLinear {
-                f0: omega_0 / TAU,
-                u_f0: u_rate / TAU,
-                zeta: rate.re / omega_0,
-                u_zeta: u_rate / omega_0,
-                correlation: 0.0,
-                particle,
-            },
-            omega_0,
+        let response = LinearResponse {
+            omega0: (omega - rate.im).hypot(rate.re),
             damping_rate: rate.re,
-            u_damping_rate: u_rate,
-            response_gain: gain.norm(),
+            uncertainty: u_q / (q.norm() * period),
+            gain,
             u_gain: u_gain.hypot(u_base),
-            phase: gain.arg().to_degrees(),
-            bandwidth,
-            gains: [gains.proportional, gains.integral],
-            phase_margin: gains.phase_margin(bandwidth, rate.re.max(0.0), step).to_degrees(),
-        })
-    }
-
-    /// The frequency response.
-    pub fn response(&self) -> LinearResponse {
-        LinearResponse {
-            omega0: self.omega_0,
-            damping_rate: self.damping_rate,
-            uncertainty: self.u_damping_rate,
-            gain: Complex64::from_polar(self.response_gain, self.phase.to_radians()),
-            u_gain: self.u_gain,
-            particle: self.data.particle,
-            shaker: self.shaker,
-        }
+            particle,
+            shaker: None,
+        };
+        Some(Self::new(response, plan))
     }
 }
 

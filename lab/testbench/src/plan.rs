@@ -3,10 +3,10 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use lovines::Section;
-use nalgebra::{Matrix2, RowVector2, Vector2};
+use nalgebra::RowVector2;
 use num_complex::Complex64;
 use phase_lock::Config;
-use vines_model::numerics::{Estimate, mean, noise, noise_at};
+use vines_model::numerics::{Estimate, complex_fit, mean, noise, noise_at};
 use vines_model::{Reference, Sensor};
 
 use crate::experiment::DECAYED;
@@ -228,17 +228,12 @@ impl ShakerPath {
     /// Least squares of the relative errors of reference over command at some frequencies, rad/s, for a structure with this natural frequency
     /// and damping rate, rad/s.
     pub(crate) fn fitted(self, omega0: f64, damping_rate: f64, values: &[(f64, Complex64)]) -> Self {
-        let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
-        for (omega, value) in values {
+        let rows = values.iter().map(|(omega, value)| {
             let s = Complex64::new(0.0, omega - omega0);
             let row = RowVector2::new(s, Complex64::ONE) * (value / (s + damping_rate));
-            normal += row.adjoint() * row;
-            right += row.adjoint();
-        }
-        let [inverse, of_pole] = normal.try_inverse().map_or([Complex64::ONE; 2], |inverse| {
-            let found: Vector2<Complex64> = inverse * right;
-            [found[0], found[1]]
+            (row, Complex64::ONE)
         });
+        let [inverse, of_pole] = complex_fit(rows).map_or([Complex64::ONE; 2], |(found, _)| found.into());
         Self {
             gain: 1.0 / inverse,
             pole: of_pole / inverse,

@@ -122,7 +122,7 @@ fn tracked_from_sensors(
     let mut rig = SensorsOnly::around(Simulated::of(&other).unwrap());
     if checked {
         let linear = check(&mut rig, &plan).unwrap().linear.expect("a linear response");
-        plan = scene.plan_on(plan.knowledge.measured(linear.response()));
+        plan = scene.plan_on(plan.knowledge.measured(linear.response));
     }
     tracked_by(&mut rig, &scene, &plan)
 }

@@ -8,14 +8,14 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::{Matrix3, RowVector3, Vector3};
 use num_complex::Complex64;
-use phase_lock::Gains;
+use vines_model::numerics::complex_fit;
 
 use super::{
     CheckedChannel, CheckedQuantity, DEAD, FACTOR, Linear, LoopCheck, NOTED, OpenLoop, PHASE, ROUNDS, SHARES, Verdict,
     fitted, of_response, quantity,
 };
-use crate::linear::{MeasuredLinear, ParticleState};
-use crate::plan::{Plan, ShakerPath};
+use crate::linear::ParticleState;
+use crate::plan::{LinearResponse, Plan, ShakerPath};
 use crate::rig::{Rig, RigError, Scaled};
 use crate::scene::{PLACES, frequencies};
 
@@ -33,13 +33,7 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
     let (target, linear) = (plan.knowledge.target, plan.knowledge.linear);
     let amplitude = SHARES[0] * plan.amplitude;
     let mut scaled = Scaled::new(rig, target);
-    let mut rig = OpenLoop {
-        rig: &mut scaled,
-        step: plan.knowledge.sample_time,
-        phase: 0.0,
-        readings: Vec::new(),
-        has_base: false,
-    };
+    let mut rig = OpenLoop::new(&mut scaled, plan.knowledge.sample_time);
     let window = |omega: f64| (WINDOW[0] as f64 * TAU / (omega * plan.knowledge.sample_time)).round() as usize;
     // Response and reference at the end of two windows, their noise, and the frequency, which is complex while the response still changes.
     let mut steady = |omega: f64| -> Result<(Complex64, [Complex64; 2], [f64; 2]), RigError> {
@@ -83,16 +77,9 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
     let (x, unit) = (centre(&abscissas), 2.0 * linear.damping_rate);
     let row = |at: Complex64| RowVector3::new(Complex64::ONE, at, at * at);
     let rows: Vec<_> = abscissas.iter().map(|one| row((one - x) / unit)).collect();
-    let normal: Matrix3<Complex64> = rows.iter().map(|row| row.adjoint() * row).sum();
-    let right: Vector3<Complex64> = rows
-        .iter()
-        .zip(&ratios)
-        .map(|(row, ratio)| row.adjoint() * *ratio)
-        .sum();
-    let inverse = normal
-        .try_inverse()
-        .unwrap_or_else(|| Matrix3::from_element(Complex64::new(f64::NAN, 0.0)));
-    let found = inverse * right;
+    let nothing = Complex64::new(f64::NAN, 0.0);
+    let (found, inverse) = complex_fit(rows.iter().copied().zip(ratios.iter().copied()))
+        .unwrap_or_else(|| (Vector3::from_element(nothing), Matrix3::from_element(nothing)));
     let slope_at = |at: Complex64| RowVector3::new(Complex64::ZERO, Complex64::ONE, 2.0 * at);
     let mut root = -found[0] / found[1];
     for _ in 0..ROUNDS {
@@ -112,13 +99,6 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
     let root = x + unit * root;
     let natural = (2.0 * linear.omega0 * root.norm()).sqrt();
     let damping = natural * (0.5 * root.arg()).tan();
-    let gain = Complex64::new(damping / natural, 1.0) / slope;
-    let mut measured = measured(plan, [natural, damping, u_rate], gain, u_gain);
-    // At the root the other pole is twice the frequency away.
-    let (response, reference) = (measured.response(), plan.knowledge.numbers.definition.reference);
-    let expected = response.oscillator_gain(natural, reference) * response.rate(-natural).conj();
-    let ratio = gain * Complex64::new(0.0, 2.0 * natural) / expected;
-    let mut quantities = of_response(&measured, ratio, plan).to_vec();
     let values: Vec<(f64, Complex64)> = frequencies
         .into_iter()
         .zip(&all)
@@ -126,7 +106,20 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
         .map(|(omega, (_, both, _))| (omega, both[1] / amplitude * Complex64::cis(omega * plan.lock.delay)))
         .collect();
     let path = stated.fitted(natural, damping, &values);
-    measured.shaker = Some(path);
+    let response = LinearResponse {
+        omega0: natural,
+        damping_rate: damping,
+        uncertainty: u_rate.max(NOTED[0] * STEADY * natural),
+        gain: Complex64::new(damping / natural, 1.0) / slope,
+        u_gain,
+        particle: ParticleState::Unknown,
+        shaker: Some(path),
+    };
+    // At the root the other pole is twice the frequency away.
+    let reference = plan.knowledge.numbers.definition.reference;
+    let expected = response.oscillator_gain(natural, reference) * response.rate(-natural).conj();
+    let ratio = response.gain * Complex64::new(0.0, 2.0 * natural) / expected;
+    let mut quantities = of_response(&response, ratio, plan).to_vec();
     quantities.extend([
         noted(
             "reference over command at the natural frequency",
@@ -179,7 +172,7 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
         amplitude,
         response: channel(0, ratio),
         base: Some(channel(1, at[1] / amplitude)),
-        linear: Some(measured).filter(|_| verdict == Verdict::Healthy),
+        linear: Some(Linear::new(response, plan)).filter(|_| verdict == Verdict::Healthy),
         quantities,
     })
 }
@@ -193,33 +186,4 @@ fn noted(name: &'static str, unit: &'static str, measured: f64, expected: f64, t
         tolerance,
         None,
     )
-}
-
-/// The linear response from natural frequency, damping rate and their uncertainty, rad/s, and the gain with its relative uncertainty.
-fn measured(plan: &Plan, [omega_0, damping_rate, u_rate]: [f64; 3], gain: Complex64, u_gain: f64) -> Linear {
-    let (bandwidth, rate) = (plan.lock.bandwidth, damping_rate.max(0.0));
-    let gains = Gains::from_bandwidth(bandwidth, rate);
-    let u_rate = u_rate.max(NOTED[0] * STEADY * omega_0);
-    Linear {
-        shaker: None,
-        data: MeasuredLinear {
-            f0: omega_0 / TAU,
-            u_f0: u_rate / TAU,
-            zeta: damping_rate / omega_0,
-            u_zeta: u_rate / omega_0,
-            correlation: 0.0,
-            particle: ParticleState::Unknown,
-        },
-        omega_0,
-        damping_rate,
-        u_damping_rate: u_rate,
-        response_gain: gain.norm(),
-        u_gain,
-        phase: gain.arg().to_degrees(),
-        bandwidth,
-        gains: [gains.proportional, gains.integral],
-        phase_margin: gains
-            .phase_margin(bandwidth, rate, plan.knowledge.sample_time)
-            .to_degrees(),
-    }
 }

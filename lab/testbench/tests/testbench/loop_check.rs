@@ -150,7 +150,7 @@ fn natural_frequency_and_damping_of_the_rig_replace_those_of_the_scene() {
         assert!(linear.u_damping_rate < 3e-4 * omega0);
         assert!((50.0..60.0).contains(&linear.phase_margin));
         let step = scene.sample_time();
-        let plan = scene.plan_on(scene.knowledge().measured(linear.response()));
+        let plan = scene.plan_on(scene.knowledge().measured(linear.response));
         let (measured, config) = (plan.knowledge.numbers, plan.lock);
         assert_eq!((measured.omega0, config.sample_time), (linear.omega_0, step));
         assert!((config.damping_rate.unwrap() / linear.damping_rate - 1.0).abs() < 1e-12);

@@ -375,7 +375,7 @@ fn friction_from_rest_is_never_called_a_motion_with_impacts() {
         let client = settings(if n == 1 { mu } else { "0" });
         let mut rig = Simulated::of(&settings(mu)).unwrap();
         let linear = check(&mut *rig, &client.plan()).unwrap().linear.unwrap();
-        let plan = client.plan_on(client.knowledge().measured(linear.response()));
+        let plan = client.plan_on(client.knowledge().measured(linear.response));
         let found = common::tracked(&mut *rig, &plan, 20.0).unwrap();
         for point in common::kept(&found) {
             assert_ne!(

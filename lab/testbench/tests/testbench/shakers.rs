@@ -396,7 +396,7 @@ fn a_rig_that_was_checked_locks_also_behind_a_filter() {
         let scene = preset(0, &[("[start]", &format!("{filter}[start]"))]).unwrap();
         let mut rig = SensorsOnly::around(Simulated::of(&scene).unwrap());
         let linear = check(&mut rig, &scene.plan()).unwrap().linear.unwrap();
-        let plan = scene.plan_on(scene.knowledge().measured(linear.response()));
+        let plan = scene.plan_on(scene.knowledge().measured(linear.response));
         let mut controller = BuiltIn::new(&plan.lock).unwrap();
         let record = run(&mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
         let at = identify(&record, &plan).unwrap().lock.at;
