@@ -87,21 +87,26 @@ impl Content {
         })
     }
 
-    /// Fits the samples, with as many harmonics as belong to what `measurand` says; `None` for too few samples or no motion.
-    fn of(samples: &[Sample], knowledge: &Knowledge, omega: f64, measurand: Measurand) -> Option<Self> {
-        let (n, sample_time, d) = (samples.len(), knowledge.sample_time, knowledge.numbers);
+    /// Fits what a channel reads, 0 the response or 1 the reference, with as many harmonics as belong to what `measurand` says; `None` for too few
+    /// samples or no motion.
+    fn of(samples: &[Sample], knowledge: &Knowledge, omega: f64, channel: usize, measurand: Measurand) -> Option<Self> {
+        let (sample_time, d) = (knowledge.sample_time, knowledge.numbers);
+        let reading = |sample: &Sample| match channel {
+            0 => sample.sensors.response,
+            _ => sample.sensors.reference.unwrap_or(f64::NAN),
+        };
         // The phase of the response is more uniform than the phase of a drive that a loop still corrects.
-        let turn = omega * sample_time;
-        let basis = basis(n, turn, measurand);
-        if n < 2 * basis.terms() {
+        let (n, turn) = (samples.len(), omega * sample_time);
+        let mut values = DVector::from_iterator(n, samples.iter().map(reading));
+        let of_all = basis(n, turn, measurand);
+        if n < 2 * of_all.terms() {
             return None;
         }
-        let mut values = DVector::from_iterator(n, samples.iter().map(|s| s.sensors.response));
-        let fitted = |values: &DVector<f64>| Self::fitted(&basis, values, [omega, sample_time], &knowledge.target);
+        let fitted = |values: &DVector<f64>| Self::fitted(&of_all, values, [omega, sample_time], &knowledge.target);
         let (mut content, mut rest) = fitted(&values)?;
         let mut lines: Vec<Line> = Vec::new();
         // Tones and harmonics are fitted in turn: what a tone has in common with the harmonics remains in the residual.
-        while content.is_irregular() && lines.len() < LINES {
+        while channel == 0 && content.is_irregular() && lines.len() < LINES {
             let line = Line::strongest(rest.as_slice());
             let is_known = |known: &Line| (known.turn - line.turn).abs() < TAU / n as f64;
             if !line.is_foreign(&d, sample_time) && !lines.iter().any(is_known) {
@@ -111,26 +116,21 @@ impl Content {
             lines.push(line);
             (content, rest) = fitted(&values)?;
         }
-        let content = content.with_change(&values, turn, measurand)?;
-        Some(Self { tones: lines, ..content })
-    }
-
-    /// This content of values that are `turn` rad of the motion apart, with what both halves of them differ by in the errors.
-    fn with_change(mut self, values: &DVector<f64>, turn: f64, measurand: Measurand) -> Option<Self> {
-        let half = values.len() / 2;
-        let basis = basis(half, turn, measurand);
-        let fits = [0, values.len() - half]
-            .map(|from| basis.fit(&DVector::from_column_slice(&values.as_slice()[from..][..half])));
-        let [first, second] = [fits[0].as_ref()?, fits[1].as_ref()?];
-        for (n, error) in (2..).zip(&mut self.errors) {
+        // A change of the motion shows in both halves.
+        let half = n / 2;
+        let of_half = basis(half, turn, measurand);
+        let [first, second] =
+            [0, n - half].map(|from| of_half.fit(&DVector::from_column_slice(&values.as_slice()[from..][..half])));
+        let halves = [first?, second?];
+        for (n, error) in (2..).zip(&mut content.errors) {
             // Harmonics keep their phase relative to the fundamental.
-            let [one, two] = [first, second].map(|fit| {
+            let [one, two] = halves.each_ref().map(|fit| {
                 let (size, phase) = fit.harmonic(1).to_polar();
                 fit.harmonic(n) * Complex64::cis(-(n as f64) * phase) / size
             });
             *error = error.hypot(0.5 * (one - two).norm());
         }
-        Some(self)
+        Some(Self { tones: lines, ..content })
     }
 
     /// The content of these values, and their residual, for a motion of the frequency `omega`, rad/s.
@@ -168,7 +168,7 @@ impl Content {
 
 /// The largest foreign tone in the response of these samples, if they would be irregular with it. `omega` (rad/s) is the frequency of the motion.
 pub fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Tone> {
-    let content = Content::of(samples, knowledge, omega, ALL)?;
+    let content = Content::of(samples, knowledge, omega, 0, ALL)?;
     let tones = content.tones.iter();
     let largest = tones.max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
     Some(Tone {
@@ -179,7 +179,7 @@ pub fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Op
 
 /// These samples without the foreign tones in their response; `None` if there are none.
 pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Vec<Sample>> {
-    let tones = Content::of(samples, knowledge, omega, knowledge.target.measurands[0])?.tones;
+    let tones = Content::of(samples, knowledge, omega, 0, knowledge.target.measurands[0])?.tones;
     let mut cleaned = samples.to_vec();
     for (n, sample) in cleaned.iter_mut().enumerate() {
         sample.sensors.response -= tones.iter().map(|line| line.at(n)).sum::<f64>();
@@ -201,20 +201,10 @@ pub fn drive_harmonics(samples: &[Sample], knowledge: &Knowledge, omega: f64) ->
 
 /// Whether the reference shows an asymmetric motion: behind a shaker it also contains the impacts, and more of them where the stinger resonates.
 fn is_asymmetric_by_reference(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> bool {
-    if knowledge.shaker().is_none() {
-        return false;
-    }
-    let values: Vec<f64> = samples.iter().filter_map(|sample| sample.sensors.reference).collect();
-    let (sample_time, target) = (knowledge.sample_time, knowledge.target);
-    let turn = omega * sample_time;
-    let basis = basis(values.len(), turn, ALL);
-    if values.len() < 2 * basis.terms() {
-        return false;
-    }
-    let values = DVector::from_vec(values);
-    let content = Content::fitted(&basis, &values, [omega, sample_time], &target);
-    let content = content.and_then(|(content, _)| content.with_change(&values, turn, ALL));
-    content.is_some_and(|content| content.is_asymmetric(target.measurands[1].order()))
+    let content = knowledge
+        .shaker()
+        .and_then(|_| Content::of(samples, knowledge, omega, 1, ALL));
+    content.is_some_and(|content| content.is_asymmetric(knowledge.target.measurands[1].order()))
 }
 
 /// Longest cycle of periods that a bifurcation of a 1:1 motion leads to and locks in place: the strong resonances are those of one to four periods.
@@ -269,7 +259,7 @@ pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64)
 /// Impacts need evidence: frequency and loss that no particle between carried and free produces; without a linear response that was measured on
 /// the rig, a third harmonic that none produces.
 pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
-    let Some(content) = Content::of(samples, knowledge, omega.value, ALL) else {
+    let Some(content) = Content::of(samples, knowledge, omega.value, 0, ALL) else {
         return Regime::Unknown;
     };
     if content.is_irregular() {
