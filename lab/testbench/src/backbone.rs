@@ -254,11 +254,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
                 .retain(|state| (state[0] - response).abs() > REACHED * level);
             self.states.push([response, drive, omega]);
         }
-        let clipped_percent = self.run.clipped_percent(clipped);
-        Ok(LevelPoint {
-            clipped_percent,
-            ..self.point(level, start, &estimate, &cycles, &criterion)
-        })
+        Ok(self.point(level, (start, clipped), &estimate, &cycles, &criterion))
     }
 
     /// Periods within which the loops, the control of a shaker and what rings beside the driven mode follow a move to this level, m.
@@ -305,11 +301,11 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         (to, periods)
     }
 
-    /// The point of an estimate from the last of some periods, for a move that began at `start`, in periods.
+    /// The point of an estimate from the last of some periods, for a move that began at `start`, in periods, after samples at the limit of a shaker.
     fn point(
         &self,
         level: f64,
-        start: f64,
+        (start, clipped): (f64, [usize; 2]),
         estimate: &LevelEstimate,
         cycles: &[Cycle],
         criterion: &Criterion,
@@ -347,7 +343,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             drive_harmonics: knowledge
                 .shaker()
                 .and_then(|_| drive_harmonics(averaged, knowledge, omega.value)),
-            clipped_percent: None,
+            clipped_percent: self.run.clipped_percent(clipped),
         }
     }
 

@@ -238,11 +238,6 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64, f64)> {
         by_impacts => by_impacts,
     };
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
-    let tone = if is_simulated {
-        None
-    } else {
-        foreign_tone(hold, knowledge, omega.value)
-    };
     let lock = Lock {
         at: ResonancePoint::new([limit, base, omega, phase_error], d),
         b: b.map(|b| b.value),
@@ -255,7 +250,9 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64, f64)> {
         regime,
         clipped_percent: record.clipped_percent,
         friction: Friction::of(hold, (hold.len() - 1) as f64 * dt * omega.value / TAU),
-        tone,
+        tone: (!is_simulated)
+            .then(|| foreign_tone(hold, knowledge, omega.value))
+            .flatten(),
     };
     Some((lock, response.value, slope))
 }

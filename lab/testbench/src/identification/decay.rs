@@ -106,13 +106,14 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
         f64::INFINITY
     };
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
-    let (terms, window) = if knowledge.shaker().is_some() {
-        (BEHIND_SHAKER, HANN * window)
-    } else {
-        (TERMS, window)
+    // A pole nearer than the main lobe of the window, over 2 pi and its length and wider by 1 because of the amplitude's second degree, looks like a
+    // part of the fundamental.
+    let (terms, window, lobe) = match knowledge.shaker() {
+        Some(_) => (BEHIND_SHAKER, HANN * window, 3.0),
+        None => (TERMS, window, 2.0),
     };
     // A small module has no code for structures.
-    if cfg!(feature = "tables") && knowledge.nearest_pole * window / omega < terms.lobe() {
+    if cfg!(feature = "tables") && knowledge.nearest_pole * window / omega < lobe {
         return DecayPoints { points: Vec::new(), end: DecayEnd::OtherMode };
     }
     let mut windows = fitted(&values, [dt, window], omega, terms);
@@ -226,14 +227,6 @@ struct Terms {
     harmonics: &'static [Option<usize>],
     /// Whether residuals have the weights of Hann's window, in which what is not fitted leaks least into the fundamental.
     is_hann: bool,
-}
-
-impl Terms {
-    /// Distance of a pole from the fundamental's, over 2 pi and the length of a window, up to which the fit takes its motion for a part of the
-    /// fundamental: the main lobe of the window, wider by 1 because of the amplitude's second degree.
-    fn lobe(&self) -> f64 {
-        if self.is_hann { 3.0 } else { 2.0 }
-    }
 }
 
 /// A constant, and harmonics 1 and 3 with drift.
