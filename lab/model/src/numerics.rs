@@ -226,11 +226,13 @@ pub fn slope(values: &[f64]) -> f64 {
     values.iter().enumerate().map(moment).sum::<f64>() / spread
 }
 
-/// Linear least squares of complex numbers, from rows and their values: the coefficients, and the inverse of the matrix of the normal equations.
-/// `None` where the rows do not determine them.
+/// Coefficients, and the inverse of the matrix of the normal equations.
+pub type ComplexFit<const N: usize> = (SVector<Complex<f64>, N>, SMatrix<Complex<f64>, N, N>);
+
+/// Linear least squares of complex numbers, from rows and their values. `None` where the rows do not determine the coefficients.
 pub fn complex_fit<const N: usize>(
     rows: impl Iterator<Item = (RowSVector<Complex<f64>, N>, Complex<f64>)>,
-) -> Option<(SVector<Complex<f64>, N>, SMatrix<Complex<f64>, N, N>)> {
+) -> Option<ComplexFit<N>> {
     let (mut normal, mut right) = (SMatrix::zeros(), SVector::zeros());
     for (row, value) in rows {
         normal += row.adjoint() * row;
