@@ -69,7 +69,7 @@ type Covariance = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
 /// Step of a difference, relative or, of zeta and r, absolute: the curve is exact to 1e-13, and smooth.
 const STEP: f64 = 1e-6;
-/// Restitution coefficients from which the minimisation begins, besides the expected one: chi-square may have several minima.
+/// Restitution coefficients from which the minimisation begins: chi-square may have several minima.
 const STARTS: [f64; 4] = [0.3, 0.5, 0.7, 0.9];
 /// Number of half-widths that are tried at the start of a search.
 const WIDTHS: usize = 8;
@@ -328,7 +328,7 @@ pub fn fit(
     let problem = Problem::new(checked(points)?, definition, known);
     let all = problem.fit(expected)?;
     let (mut kept, mut fit): (Vec<usize>, _) = ((0..points.len()).collect(), all.clone());
-    while let Some(rest) = problem.without_strangers(&kept, &fit, expected) {
+    while let Some(rest) = problem.without_strangers(&kept, &fit) {
         (kept, fit) = rest;
     }
     if fit.is_rejected() {
@@ -527,13 +527,13 @@ impl<'a> Problem<'a> {
     /// probable are left out, if that is significant: k of the largest or of the smallest responses, because the 1:1 motion exists between two
     /// unknown amplitudes, or, where the model is rejected, the one that contradicts it most. By the fit of the others, the 1:1 motion must
     /// have ended at the outermost response of several: a model that is wrong everywhere shows most at both ends.
-    fn without_strangers(&self, kept: &[usize], fit: &Fit, expected: &Parameters) -> Option<(Vec<usize>, Fit)> {
+    fn without_strangers(&self, kept: &[usize], fit: &Fit) -> Option<(Vec<usize>, Fit)> {
         let mut order = self.by_falling_response();
         order.retain(|n| kept.contains(n));
         let ends = TRIMMED.iter().flat_map(|k| [(*k, 0), (0, *k)]);
         let ends = ends.filter(|(high, low)| self.may_keep(order.len().saturating_sub(high + low)));
         let ends = ends.filter_map(|(high, low)| {
-            let (rest, next) = self.rest(&order[high..order.len() - low], fit, expected)?;
+            let (rest, next) = self.rest(&order[high..order.len() - low], fit)?;
             let [smallest, largest] = range_of(&next.x, self.definition)?;
             let outermost = self.points[if high > 0 { order[0] } else { order[order.len() - 1] }].response;
             let aside = SIGNIFICANT * outermost.uncertainty;
@@ -548,7 +548,7 @@ impl<'a> Problem<'a> {
         let worst = (0..kept.len()).max_by(|first, second| size(*first).total_cmp(&size(*second)))?;
         let worst = Some(worst).filter(|_| fit.is_rejected() && self.may_keep(kept.len() - 1));
         let worst = worst.and_then(|worst| {
-            let (rest, next) = self.rest(&[&kept[..worst], &kept[worst + 1..]].concat(), fit, expected)?;
+            let (rest, next) = self.rest(&[&kept[..worst], &kept[worst + 1..]].concat(), fit)?;
             let p = Self::gain(fit, &next, self.points.len());
             Some((p, rest, next))
         });
@@ -564,12 +564,11 @@ impl<'a> Problem<'a> {
     }
 
     /// Some of the points, in their order, and their fit from that of more points.
-    fn rest(&self, kept: &[usize], fit: &Fit, expected: &Parameters) -> Option<(Vec<usize>, Fit)> {
+    fn rest(&self, kept: &[usize], fit: &Fit) -> Option<(Vec<usize>, Fit)> {
         let mut kept = kept.to_vec();
         kept.sort_unstable();
         let problem = self.of(&kept);
-        let starts = [Some(fit.x), problem.start(&fit.plant(expected))];
-        let next = problem.fit_from(starts.into_iter().flatten()).ok()?;
+        let next = problem.fit_from(std::iter::once(fit.x)).ok()?;
         Some((kept, next))
     }
 
@@ -583,8 +582,11 @@ impl<'a> Problem<'a> {
 
     /// The smallest of the minima that are reached from several restitution coefficients.
     fn fit(&self, expected: &Parameters) -> Result<Fit, FitError> {
-        let starts = [expected.restitution].into_iter().chain(STARTS);
-        self.fit_from(starts.filter_map(|restitution| self.start(&Parameters { restitution, ..*expected })))
+        self.fit_from(
+            STARTS
+                .into_iter()
+                .filter_map(|restitution| self.start(&Parameters { restitution, ..*expected })),
+        )
     }
 
     /// The smallest of the minima that are reached from these starts.
@@ -620,29 +622,20 @@ impl<'a> Problem<'a> {
         let omega = mean(self.points.iter().map(|point| point.omega.value));
         let fits = equally_spaced(from.ln(), to.ln(), WIDTHS).filter_map(|width| {
             let b = width.exp();
-            let (mut columns, mut values) = ([const { Vec::new() }; 3], Vec::new());
-            let mut add = |row: [f64; 3], value: f64, u: f64| {
-                columns
-                    .iter_mut()
-                    .zip(row)
-                    .for_each(|(column, one)| column.push(one / u));
-                values.push(value / u);
-            };
+            let mut rows = Vec::new();
             for MeasuredPoint { response, omega: at, drive } in &self.points {
                 let c = (response.value / b).max(manifold.c(manifold.b_min()));
                 let motion = undamped.backbone_at(manifold.b(c, BranchSide::Right)?);
                 let [u_omega, u_drive] = [expected.mass_ratio() * omega, drive.value].map(|one| THEORY * one);
-                add(
-                    [1.0, 0.0, omega * motion.sigma],
-                    at.value,
-                    at.uncertainty.hypot(u_omega),
-                );
-                add(
-                    [0.0, 2.0 * response.value, b * motion.g],
-                    drive.value,
-                    drive.uncertainty.hypot(u_drive),
-                );
+                let of_omega =
+                    [1.0, 0.0, omega * motion.sigma, at.value].map(|one| one / at.uncertainty.hypot(u_omega));
+                let of_drive = [0.0, 2.0 * response.value, b * motion.g, drive.value]
+                    .map(|one| one / drive.uncertainty.hypot(u_drive));
+                rows.extend([of_omega, of_drive]);
             }
+            let [first, second, third, values] =
+                [0, 1, 2, 3].map(|n| rows.iter().map(|row| row[n]).collect::<Vec<f64>>());
+            let columns = [first, second, third];
             let fit = Regression::fit(&columns, &values, None, 1.0)?;
             let [omega0, zeta, epsilon] = [0, 1, 2].map(|n| fit.coefficient(n));
             let at = [omega0, zeta, r, b, epsilon];

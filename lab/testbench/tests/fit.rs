@@ -183,6 +183,23 @@ fn a_local_minimum_does_not_reject_the_right_model() {
 }
 
 #[test]
+fn the_restitution_that_the_scene_states_does_not_matter() {
+    let rig = Parameters { restitution: 0.9, ..RIG };
+    let d = Dimensionless::of(&rig, 0.0);
+    let motions = (0..10).map(|n| {
+        let [omega, c, g] = backbone_at_speed(&d, 0.67 + 0.04 * f64::from(n)).unwrap();
+        [c * d.b, d.omega0 * omega, d.amplitude(g)]
+    });
+    let points = measured(motions, 2e-3, 2);
+    for restitution in [0.1, 0.3, 0.5, 0.7, 0.99] {
+        let expected = Parameters { restitution, ..RIG };
+        let r = fit(&points, Definition::default(), &expected, &[]).map(|fit| fit.estimate(Quantity::R).unwrap());
+        let is_right = |r: &Estimate| (r.value - 0.9).abs() < 3.0 * r.uncertainty && r.uncertainty < 0.05;
+        assert!(r.as_ref().is_ok_and(is_right), "{restitution}: {r:?}");
+    }
+}
+
+#[test]
 fn the_largest_responses_are_left_out_where_they_belong_to_another_motion() {
     let d = Dimensionless::of(&RIG, 0.0);
     let motions = || {
