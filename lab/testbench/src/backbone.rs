@@ -254,7 +254,11 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
                 .retain(|state| (state[0] - response).abs() > REACHED * level);
             self.states.push([response, drive, omega]);
         }
-        Ok(self.point(level, (start, clipped), &estimate, &cycles, &criterion))
+        let clipped_percent = self.run.clipped_percent(clipped);
+        Ok(LevelPoint {
+            clipped_percent,
+            ..self.point(level, start, &estimate, &cycles, &criterion)
+        })
     }
 
     /// Periods within which the loops, the control of a shaker and what rings beside the driven mode follow a move to this level, m.
@@ -301,11 +305,11 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         (to, periods)
     }
 
-    /// The point of an estimate from the last of some periods, for a move that began at `start`, in periods, after samples at the limit of a shaker.
+    /// The point of an estimate from the last of some periods, for a move that began at `start`, in periods.
     fn point(
         &self,
         level: f64,
-        (start, clipped): (f64, [usize; 2]),
+        start: f64,
         estimate: &LevelEstimate,
         cycles: &[Cycle],
         criterion: &Criterion,
@@ -343,7 +347,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             drive_harmonics: knowledge
                 .shaker()
                 .and_then(|_| drive_harmonics(averaged, knowledge, omega.value)),
-            clipped_percent: self.run.clipped_percent(clipped),
+            clipped_percent: None,
         }
     }
 

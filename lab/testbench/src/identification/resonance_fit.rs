@@ -470,14 +470,14 @@ impl Cycle {
         let as_read = basis.fit(&motion(&before))?.harmonic(1);
         let measured = samples.iter().all(|s| s.sensors.reference.is_some());
         let mut commanded = [commanded.harmonic(1), commanded.drift(1)];
-        let (base, base_noise) = if measured && target.through_shaker {
-            let (base, noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
-            // One period does not separate a drift of the fundamental from the harmonics of a force cell.
-            commanded = [base, Complex::ZERO];
+        let (base, base_noise) = if measured {
+            let (mut base, noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
+            match target.through_shaker {
+                // One period does not separate a drift of the fundamental from the harmonics of a force cell.
+                true => commanded = [base, Complex::ZERO],
+                false => base = base * commanded[0] / as_read,
+            }
             (base, noise)
-        } else if measured {
-            let (base, noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
-            (base * commanded[0] / as_read, noise)
         } else {
             let base = mean(|s| s.command.drive.amplitude) * target.base_per_sample(mean_omega, sample_time);
             (Complex::new(base, 0.0), 0.0)
