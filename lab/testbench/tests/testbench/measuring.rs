@@ -614,7 +614,7 @@ fn a_response_that_repeats_after_two_to_four_periods_is_not_called_1_1_also_thro
             let scene = paper(&[noise, &["record.decay_periods=3"]].concat());
             let turns = Cell::new(0.0);
             // The impacts stay even: only the response shows it.
-            let line = |turns: f64| 3e-4 * scene.plant.half_width * (TAU * turns / periods as f64).sin();
+            let line = |turns: f64| 5e-4 * scene.plant.half_width * (TAU * turns / periods as f64).sin();
             let mut rig = Altered {
                 rig: Simulated::of(&scene).unwrap(),
                 read: Box::new(|sensors| Ok(Sensors { response: sensors.response + line(turns.get()), ..sensors })),
