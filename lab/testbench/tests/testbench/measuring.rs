@@ -587,6 +587,17 @@ fn through_mains_hum_and_ripple_a_backbone_is_tracked_and_a_lock_identified_whic
 }
 
 #[test]
+fn beside_symmetry_breaking_a_lock_waits_until_the_even_harmonics_have_stopped_growing() {
+    // Orbits are stable up to G = 1.414. Here the symmetry is lost so slowly that phase and frequency are steady before.
+    let found = identified(&paper(&["start.dq2=0", "excitation.G=1.424"]));
+    let is_named = matches!(
+        found,
+        Err(IdentificationError::Regime { regime: Regime::Asymmetric, .. })
+    );
+    assert!(is_named, "{found:?}");
+}
+
+#[test]
 fn a_search_without_a_lock_says_what_it_found_and_what_to_do() {
     for (settings, parts) in [
         (
