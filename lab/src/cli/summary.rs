@@ -209,7 +209,7 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     text += SYMBOLS;
     let mut note = |note: &str| text += &format!("  ({note})\n");
     note(&format!(
-        "steady over {} periods, which would not show a disturbance that grows by less than {:.1} % per period",
+        "stability: over {} periods a disturbance would show that grows by {:.1} % per period or more; slower growth is not excluded",
         lock.averaged,
         100.0 * lock.unseen_growth
     ));

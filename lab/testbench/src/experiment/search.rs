@@ -374,19 +374,19 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Waits until the lock has settled. Returns whether it has; if not, the motion has lost its symmetry.
     fn settle(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
-        let (mut asymmetric, first) = (0, leg.response);
+        let (mut asymmetric, mut grown, first) = (0, 0, leg.response);
         let mut confirmed = 0;
         self.cycles.clear();
         while asymmetric < 2 {
             let before = leg.even;
             *leg = self.measure(FOLLOWED)?;
-            // Beside symmetry breaking the symmetry is lost slowly: even harmonics grow from leg to leg. Of noise every second one does.
-            let grows = leg.even > before;
+            // Beside symmetry breaking the symmetry is lost slowly; noise grows twice in succession in one of six cases.
+            grown = if leg.even > before { grown + 1 } else { 0 };
             let settled = match self.behind_shaker() {
                 true => self.has_settled(leg, &mut confirmed)?,
                 false => self.bench.settled,
             };
-            if settled && !grows {
+            if settled && grown < 2 {
                 return Ok(true);
             }
             // Noise may hide an asymmetry, but not where the motion goes.
