@@ -284,15 +284,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         ),
         );
     }
-    let is_exact = |known: &&Known| matches!(known, Known::Value { estimate, .. } if estimate.uncertainty == 0.0);
-    notes.extend(arguments.known.iter().filter(is_exact).filter_map(|known| {
-        let Known::Value { quantity, estimate } = known else {
-            return None;
-        };
-        Some(format!(
-            "{quantity} = {} has no uncertainty and counts as exact; give it as --known {quantity}={0}±U unless it is",
-            estimate.value
-        ))
+    notes.extend(arguments.known.iter().filter_map(|known| match known {
+        Known::Value { quantity, estimate: Estimate { value, uncertainty: 0.0 } } => Some(format!(
+            "{symbol} = {value} has no uncertainty and counts as exact; give it as --known {symbol}={value}±U unless it is",
+            symbol = quantity.symbol()[0]
+        )),
+        _ => None,
     }));
     let lines: String = notes.iter().map(|note| format!("{note}\n")).collect();
     if measured.points.is_empty() && measured.recordings.is_empty() && skipped == 0 && !notes.is_empty() {

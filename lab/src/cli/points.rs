@@ -128,16 +128,16 @@ pub(super) fn read(path: &Path, columns: &[Column], selection: &Selection) -> Re
     }
     let table = Table::parse(&file.to_string(), &bytes).map_err(refused)?;
     let is_named = selection.response.is_some() || selection.drive.is_some();
-    let has_points = !columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| table.has(name));
+    let has_points = !columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| table.unit(name).is_some());
     if has_points && !is_named {
         let row = |row: Vec<(&str, String)>| row.into_iter().map(|(name, cell)| (name.to_string(), cell)).collect();
         let rows: Vec<Row> = table.rows().map(row).collect();
         return points(path, &rows, columns, rows.first().and_then(linear_of), |column| {
-            table.unit(column)
+            table.unit(column).unwrap_or_default()
         });
     }
     let contents = table.contents();
-    if !is_named && !table.has("response") {
+    if !is_named && table.unit("response").is_none() {
         let names = COLUMNS.map(|(_, name, _)| name).join(", ");
         return Err(refused(contents.refused(&format!(
             " has neither the channels of a recording nor columns of points ({names}). Name the channels with --response NAME:UNIT and --drive \

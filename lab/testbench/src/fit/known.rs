@@ -1,7 +1,6 @@
 //! The quantities of a rig, and what is known of them beside its points: values from elsewhere, and the linear response, with the state of the particle.
 
 use std::f64::consts::TAU;
-use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
 use serde::Serialize;
@@ -99,12 +98,6 @@ impl Quantity {
     /// The gradient over the unknowns.
     pub(super) fn gradient(self, x: &Unknowns) -> Unknowns {
         gradient(x, |x| self.of(x))
-    }
-}
-
-impl Display for Quantity {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.write_str(self.symbol()[0])
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use chrono::{NaiveDateTime, NaiveTime, Timelike};
+use chrono::{NaiveDateTime, Timelike};
 use csv::StringRecord;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
@@ -36,9 +36,8 @@ const LAYOUTS: [(u8, char); 8] = [
 ];
 /// Number of rows, at the end of the table, by which the layout is found: a preamble is at the beginning.
 const JUDGED: usize = 200;
-/// Formats of a date, ISO 8601, and of the time of a day.
-const DATES: [&str; 2] = ["%Y-%m-%dT%H:%M:%S%.f", "%Y-%m-%d %H:%M:%S%.f"];
-const CLOCK: &str = "%H:%M:%S%.f";
+/// Format of a date, ISO 8601, with a space for its T.
+const DATE: &str = "%Y-%m-%d %H:%M:%S%.f";
 
 /// What rows say about a layout.
 struct Judgement {
@@ -156,17 +155,11 @@ impl Table {
         })
     }
 
-    /// Whether a column has this name.
+    /// The unit that the head of the column with this name states, empty without one; `None` without such a column.
     #[must_use]
-    pub fn has(&self, name: &str) -> bool {
-        self.names.iter().any(|one| one == name)
-    }
-
-    /// The unit that the head of a column states; empty without one.
-    #[must_use]
-    pub fn unit(&self, name: &str) -> &str {
+    pub fn unit(&self, name: &str) -> Option<&str> {
         let column = self.names.iter().position(|one| one == name);
-        column.map_or("", |column| &self.units[column])
+        column.map(|column| &*self.units[column])
     }
 
     /// The rows: cells with a point as decimal mark, by the names of the columns.
@@ -310,15 +303,12 @@ fn number(cell: &str, decimal: char) -> Option<f64> {
     if !cell.contains(':') {
         return None;
     }
-    let text = replaced.trim_end_matches('Z');
-    let date = DATES
-        .iter()
-        .find_map(|format| NaiveDateTime::parse_from_str(text, format).ok());
-    let seconds = |time: NaiveTime| f64::from(time.num_seconds_from_midnight()) + 1e-9 * f64::from(time.nanosecond());
-    match date {
-        Some(date) => Some(date.and_utc().timestamp() as f64 + 1e-9 * f64::from(date.nanosecond())),
-        None => NaiveTime::parse_from_str(text, CLOCK).ok().map(seconds),
-    }
+    let text = replaced.trim_end_matches('Z').replacen('T', " ", 1);
+    // The first day of the epoch gives the seconds of a day.
+    let of_day = format!("1970-01-01 {text}");
+    let mut dates = [&text, &of_day].into_iter();
+    let date = dates.find_map(|text| NaiveDateTime::parse_from_str(text, DATE).ok())?;
+    Some(date.and_utc().timestamp() as f64 + 1e-9 * f64::from(date.nanosecond()))
 }
 
 fn shown(delimiter: u8) -> String {
