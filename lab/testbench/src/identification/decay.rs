@@ -245,8 +245,6 @@ const BEHIND_SHAKER: Terms = Terms {
 
 /// Number of fits, each about the frequency that the fit before found; each reduces the error by orders of magnitude.
 const ROUNDS: usize = 6;
-/// Largest relative distance of the frequency from the guess: beyond it, the fits diverge.
-const FARTHEST: f64 = 0.5;
 
 /// Fits `values`, sampled every `sample_time` seconds, by a fundamental near `omega` (rad/s) and its third harmonic, both
 /// with linear drift, and a constant.
@@ -272,7 +270,7 @@ fn harmonic_of(values: &[f64], sample_time: f64, omega: f64, terms: Terms) -> Op
     };
     // Half a window, s.
     let half = middle * sample_time;
-    let (guess, mut omega, mut last) = (omega, omega, None);
+    let (mut omega, mut last) = (omega, None);
     for _ in 0..ROUNDS {
         let phases: Vec<f64> = (0..values.len())
             .map(|n| (n as f64 - middle) * sample_time * omega)
@@ -293,9 +291,6 @@ fn harmonic_of(values: &[f64], sample_time: f64, omega: f64, terms: Terms) -> Op
         // The phase of a turns by Im(drift/a) per half window.
         let change = fit.drift(1) * a.conj() / half;
         omega += change.im / square;
-        if (omega / guess - 1.0).abs() > FARTHEST {
-            return None;
-        }
         last = Some((basis, fit, a, change.re));
     }
     let (basis, fit, a, growth) = last?;
