@@ -15,7 +15,7 @@ use crate::identification::{
     Criterion, Cycle, LONGEST, LevelEstimate, Regime, ResonancePoint, Tone, Unsteady, classify, drive_harmonics,
     foreign_tone, regime_by_response,
 };
-use crate::plan::{Knowledge, Plan, Target};
+use crate::plan::{Knowledge, Plan};
 use crate::record::Sample;
 use crate::rig::{Controller, Move, OFF, Rig};
 
@@ -110,8 +110,6 @@ struct Tracker<'a, R: Rig + ?Sized, C: ?Sized> {
     run: experiment::ControlLoop<'a, R, C>,
     plan: &'a Plan,
     stage: Stage,
-    /// Phase target, and what the channels measure.
-    target: Target,
     /// Where the loop was closed.
     closed: Held,
     /// The points so far.
@@ -145,7 +143,6 @@ pub fn track_into(
         run: experiment::ControlLoop::new(rig, controller, plan, &plan.tracking, samples, &mut quiet)?,
         plan,
         stage: Stage::Locking,
-        target: plan.knowledge.target,
         closed: [0.0; 3],
         states: Vec::new(),
         points: Vec::new(),
@@ -173,7 +170,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     fn cycle(&mut self) -> Result<Cycle, ExperimentError> {
         loop {
             let period = self.run.period(self.stage)?;
-            if let Some(cycle) = self.run.cycle(period, self.target) {
+            if let Some(cycle) = self.run.cycle(period, self.plan.knowledge.target) {
                 return Ok(cycle);
             }
         }

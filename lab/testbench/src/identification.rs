@@ -287,11 +287,7 @@ fn limits(approach: &[Cycle], wide: &[Cycle], knowledge: &Knowledge, command: f6
     let last = windows.len() - 1;
     let agrees = |n: &usize| windows[n + 1..].iter().all(|late| beyond(*n, &late.0) == [0.0; 2]);
     let longest = (0..last).find(agrees);
-    let difference = if last > 0 && longest.is_none() {
-        beyond(last - 1, &windows[last].0)
-    } else {
-        [0.0; 2]
-    };
+    let difference = beyond(longest.unwrap_or(last.saturating_sub(1)), &windows[last].0);
     let whole = windows[longest.unwrap_or(last)].0;
     let limits = [0, 1].map(|i| Estimate::new(whole[i].value, &[whole[i].uncertainty, difference[i]]));
     Some((limits, slopes[0].value))

@@ -410,14 +410,13 @@ pub struct Cycle {
 
 /// Harmonics that are fitted to a displacement.
 const HARMONICS: usize = 3;
-/// Offset, sine and cosine of three harmonics, and the drift of the first.
-const TERMS: usize = 9;
 
 impl Cycle {
     /// The samples of one period; `phase` (rad): phase of the drive at the first, `target`: phase target of the response relative to the base, and
     /// what both channels measure. `None` for too few samples.
     pub fn of(samples: &[Sample], sample_time: f64, phase: f64, target: Target) -> Option<Self> {
-        if samples.len() <= TERMS {
+        // Offset, sine and cosine of the harmonics, and the drift of the first.
+        if samples.len() <= 2 * HARMONICS + 3 {
             return None;
         }
         let phases = drive_phases(samples, sample_time, phase);
