@@ -314,24 +314,20 @@ fn approached<'a>(cycles: &'a [Cycle], held: &[Cycle], spread: f64) -> &'a [Cycl
 
 /// Means over the hold: base amplitude, m, phase error, rad, and response amplitude, m.
 fn means(held: &[Cycle], knowledge: &Knowledge) -> [Estimate; 3] {
-    let estimates = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&held.iter().map(value).collect::<Vec<f64>>());
-    let values = |value: &dyn Fn(&Cycle) -> f64| estimates(value).value;
-    let [response, base] = [values(&Cycle::amplitude), values(&|cycle| cycle.base.norm())];
+    let LevelEstimate { response, phase_error, at: [base, _], .. } = LevelEstimate::means(held);
     let [noise, base_noise] =
         [0, 1].map(|i| mean(held.iter().map(|cycle| cycle.noise[i])).sqrt() / (held.len() as f64).sqrt());
-    let mut phase_noise = (noise / response).hypot(base_noise / base);
-    let phase_error = values(&|cycle| cycle.phase_error);
+    let mut phase_noise = (noise / response.value).hypot(base_noise / base.value);
     // Behind a shaker noise of the readings turns the force itself, by more than that noise.
     if knowledge.shaker().is_some() {
-        phase_noise = phase_noise.hypot(estimates(&|cycle| cycle.phase_error).uncertainty);
+        phase_noise = phase_noise.hypot(phase_error.uncertainty);
     }
     [
         // Rounding and the steps of the command.
-        (base, base_noise.max(1e-8 * base)),
-        (phase_error, phase_noise),
-        (response, noise),
+        Estimate { uncertainty: base_noise.max(1e-8 * base.value), ..base },
+        Estimate { uncertainty: phase_noise, ..phase_error },
+        Estimate { uncertainty: noise, ..response },
     ]
-    .map(|(value, uncertainty)| Estimate { value, uncertainty })
 }
 
 // A measured point of phase resonance.

@@ -72,9 +72,9 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
         .map(|(omega, ..)| omega * omega / (2.0 * linear.omega0))
         .collect();
     let ratios: Vec<Complex64> = near.iter().map(|(_, both, _)| both[1] / both[0]).collect();
-    let centre = |values: &[Complex64]| values.iter().sum::<Complex64>() / values.len() as f64;
     // In half-power bandwidths from the middle.
-    let (x, unit) = (centre(&abscissas), 2.0 * linear.damping_rate);
+    let x = abscissas.iter().sum::<Complex64>() / abscissas.len() as f64;
+    let unit = 2.0 * linear.damping_rate;
     let row = |at: Complex64| RowVector3::new(Complex64::ONE, at, at * at);
     let rows: Vec<_> = abscissas.iter().map(|one| row((one - x) / unit)).collect();
     let nothing = Complex64::new(f64::NAN, 0.0);
