@@ -93,10 +93,11 @@ fn main() -> Result<(), Failure> {
             let values = found.iter().filter_map(|one| values(one).get(n));
             values.map(|value| value.abs()).filter(|value| value.is_finite()).collect()
         };
+        let [symbol, _] = quantity.symbol();
         let (ratios, over_bound) = (gather(|one| &one.ratios), gather(|one| &one.errors));
         let rms = |values: &[f64]| mean_square(values.iter().copied()).sqrt();
         format!(
-            "{source},{snr},{quantity},{count},{seed},{kept},{:.3},{:.1},{:.2},{:.2},{rejected},{by_points},{failed},{uniform}",
+            "{source},{snr},{symbol},{count},{seed},{kept},{:.3},{:.1},{:.2},{:.2},{rejected},{by_points},{failed},{uniform}",
             share(&ratios, 1.96),
             ends(&ratios)[1],
             rms(&ratios),
