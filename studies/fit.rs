@@ -6,8 +6,8 @@
 //! also behind an anti-alias filter at 10 to 40 times the natural frequency (`filtered`) and by accelerometers on mass and base, beside the noiseless
 //! sensors of the loop (`accelerations`), of a lock whose drive then changes slowly (`sweeps`), or of the search, the hold and the decay of `vines
 //! identify` (`decays`). For each parameter, of the fits that are not rejected: the share within 1.96 of the stated standard uncertainty u, the
-//! largest error over u, the root mean square of the error over u, and that over the Cramér–Rao bound, of the same points or of a whole recording of
-//! levels or sweeps; the numbers of fits that are rejected, of recordings of which only the points were fitted, and of rigs without a fit; and the
+//! largest error over u, the root mean square of the error over u, and that over the Cramér–Rao bound, of the same points or of all symmetric 1:1
+//! motion in a recording of levels or sweeps; the numbers of fits that are rejected, of recordings of which only the points were fitted, and of rigs without a fit; and the
 //! probabilities by Kolmogorov and Smirnov that the p-values of each channel's chi- square are uniform: of response, frequency and drive, or of the
 //! innovations of a record, in phase with the response and a quarter of a period beside it.
 //!
@@ -353,12 +353,45 @@ struct Recorded {
 
 /// Relative change of a parameter, and change of a state, for a derivative.
 const BESIDE: f64 = 1e-8;
+/// Periods around a sample that tell whether a motion is symmetric.
+const PIECE: f64 = 16.0;
+/// Largest deviation of a time between impacts from half a period, in periods.
+const UNEVEN: f64 = 0.05;
 
 impl Recorded {
-    /// Standard uncertainties of the five parameters by the Cramér–Rao bound of the whole recording of displacements, without the parts, s, of another
-    /// motion: an information filter at the true parameters. It follows the rig sample by sample; the noise of the base is that of the process, and the
-    /// state at the start, and after each of these parts, is unknown.
-    fn bound(&self, snr: &str, without: &[[f64; 2]]) -> Option<[f64; 5]> {
+    /// Whether each sample belongs to a symmetric 1:1 motion: half a period lies between any impact and the next one in the piece of [`PIECE`] periods
+    /// around it, up to [`UNEVEN`].
+    fn symmetric(&self) -> Option<Vec<bool>> {
+        let mut rig = Plant::new(self.truth, self.scene.start).ok()?;
+        let (mut turns, mut phase) = (Vec::new(), 0.0);
+        let mut impacts = vec![0.0];
+        for Drive { omega, amplitude, .. } in &self.driven {
+            let before = rig.totals().impacts;
+            let step = self.recording.sample_time;
+            rig.advance(lovines::Drive::harmonic(*amplitude, *omega), step).ok()?;
+            turns.push(phase);
+            phase += omega * step / TAU;
+            impacts.extend((before..rig.totals().impacts).map(|_| phase));
+        }
+        impacts.push(phase);
+        let strange: Vec<[f64; 2]> = impacts
+            .windows(2)
+            .filter(|pair| ((pair[1] - pair[0]) - 0.5).abs() > UNEVEN)
+            .map(|pair| [pair[0], pair[1]])
+            .collect();
+        // Of those that begin at the latest half a piece after a sample, the last one ends last.
+        let is_far = |turn: &f64| {
+            let begun = strange.partition_point(|[from, _]| from - 0.5 * PIECE <= *turn);
+            begun == 0 || strange[begun - 1][1] + 0.5 * PIECE <= *turn
+        };
+        Some(turns.iter().map(is_far).collect())
+    }
+
+    /// Standard uncertainties of the five parameters by the Cramér–Rao bound of all symmetric 1:1 motion in the recording of displacements: an information filter
+    /// at the true parameters. It follows the rig sample by sample; the noise of the base is that of the process, and the state at the start of each
+    /// such part is unknown.
+    fn bound(&self, snr: &str) -> Option<[f64; 5]> {
+        let symmetric = self.symmetric()?;
         let ratio = 10_f64.powf(-snr.parse::<f64>().ok()? / 20.0);
         let values: [f64; 5] = std::array::from_fn(|n| Quantity::ALL[n].of_plant(&self.truth));
         let beside = |changed: Option<usize>| {
@@ -414,8 +447,7 @@ impl Recorded {
                 *power += (value * value - *power) / self.scene.controller.samples_per_period;
             }
             let [of_response, of_base] = powers.map(|power| ratio * ratio * power);
-            let seconds = (n as f64 - cut as f64) * step;
-            if seconds < 0.0 || without.iter().any(|[from, to]| (*from..*to).contains(&seconds)) {
+            if n < cut || !symmetric[n] {
                 (covariance, by_parameters) = (Matrix4::identity(), SMatrix::zeros());
                 continue;
             }
@@ -583,9 +615,7 @@ fn follow_one(case: &Case, snr: &str, record: fn(&Case, &str) -> Result<Recorded
     let ratios: Vec<f64> = Quantity::ALL[..5].iter().map(over).collect();
     let spans: Vec<[f64; 2]> = left_out.iter().map(|one| one.seconds).collect();
     let is_known = recording.measurands == [Measurand::Displacement; 2] && !recorded.driven.is_empty() && periods > 0;
-    let bound = Some(&recorded)
-        .filter(|_| is_known)
-        .and_then(|one| one.bound(snr, &spans));
+    let bound = Some(&recorded).filter(|_| is_known).and_then(|one| one.bound(snr));
     let of_bound = |n: usize| {
         let uncertainty = fit.estimate(Quantity::ALL[n]).map_or(f64::NAN, |one| one.uncertainty);
         bound.map_or(f64::NAN, |bound| uncertainty / bound[n])

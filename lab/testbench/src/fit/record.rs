@@ -16,8 +16,10 @@
 //! beside them: a floor of the uncertainty, which in simulations without noise exceeds the errors several times.
 //!
 //! The fit begins at the parameters of the points of the record. A piece of the record is left out where the plant has not two impacts per period,
-//! where a deviation of the particle grows, where the response has a second harmonic, where the piece contradicts all others, and where
-//! they are not linear in the parameters: near the fold, and beyond it for other parameters within their uncertainties. Whether a part shows impacts
+//! where a deviation of the particle grows in spite of the corrections, where the response has a second harmonic, where the piece contradicts all
+//! others, and where the innovations have no derivative by the parameters, because the motion is another one beside them. By the parameters that are
+//! found more pieces belong: with all of them the search begins again, until no more do. Periods count where the start is forgotten: this takes long
+//! near the loss of symmetry. Whether a part shows impacts
 //! by itself does not matter, because that depends on the natural frequency of the scene: what is followed needs them if no linear structure follows
 //! it.
 
@@ -84,6 +86,8 @@ const EXPECTED: [f64; 5] = [0.01, 0.3, 0.2, 0.2, 0.3];
 const JUMP: Estimate = Estimate { value: 0.5, uncertainty: 0.5 };
 /// Square of the move of the parameters, in standard uncertainties, below which the filter need not be linearised again.
 const STILL: f64 = 0.1;
+/// Largest relative error of a derivative.
+const ROUGH: f64 = 0.1;
 /// Weight that holds a function of the unknowns, over its standard uncertainty.
 const HOLD: f64 = 1e3;
 /// Half-width of a cavity that no response fills, over the expected one.
@@ -150,8 +154,10 @@ struct Step {
     innovation: f64,
     /// Second harmonic of what the prediction leaves, m.
     second: Complex64,
-    /// Derivatives of the state at the end over the state at the begin.
+    /// Derivatives of the corrected state at the end over that at the begin.
     transition: Matrix4<f64>,
+    /// Variance of the innovation by what the uncertainty of the start has left, over that of the noise.
+    of_start: f64,
 }
 
 /// Chi-square (two degrees of freedom) of the second harmonic of a piece: impacts at uneven intervals have one, which lasts for many periods. The
@@ -172,9 +178,11 @@ struct Course {
 }
 
 impl Course {
-    /// The periods that count. In those before, as many as in a piece, the particle forgets its start.
+    /// The periods that count: those in which the start is forgotten, as far as a piece can show.
     fn counted(&self) -> &[Step] {
-        self.steps.get(PIECE..).unwrap_or_default()
+        let is_forgotten = |step: &Step| step.of_start < 1.0 / PIECE as f64;
+        let first = self.steps.iter().position(is_forgotten);
+        &self.steps[first.unwrap_or(self.steps.len())..]
     }
 }
 
@@ -539,14 +547,15 @@ impl Followed<'_> {
         one.crossing([1, 3].map(|periods| stretch.span[0] + periods * period), end)?;
         let amplitude = harmonic(&response[one.n - period..one.n]).norm();
         let [masses, particle] = PRIOR.map(|prior| (prior * amplitude).powi(2));
-        let mut covariance = Matrix4::from_diagonal(&Vector4::new(masses, masses, particle, particle));
+        let mut covariances = [Matrix4::from_diagonal(&Vector4::new(masses, masses, particle, particle)); 2];
         let start = one.plant.state();
-        let steps: Vec<Step> = std::iter::from_fn(|| self.step(&mut one, &mut covariance, end)).collect();
-        (steps.len() > PIECE).then_some(Course { start, steps })
+        let steps: Vec<Step> = std::iter::from_fn(|| self.step(&mut one, &mut covariances, end)).collect();
+        Some(Course { start, steps })
     }
 
-    /// Follows a period, if it ends before the sample `last`, and corrects the state, whose covariance is given; `None` where the motion is lost.
-    fn step(&self, one: &mut Follower, covariance: &mut Matrix4<f64>, last: usize) -> Option<Step> {
+    /// Follows a period, if it ends before the sample `last`, and corrects the state, whose covariance is given, with the part of it that the start
+    /// has left; `None` where the motion is lost.
+    fn step(&self, one: &mut Follower, [covariance, of_start]: &mut [Matrix4<f64>; 2], last: usize) -> Option<Step> {
         let (begin, from, record) = (one.n, one.clone(), one.record);
         let readings = one.crossing([3, 5].map(|quarters| begin + quarters * record.period / 4), last)?;
         let (end, state) = (one.n, one.state());
@@ -579,6 +588,9 @@ impl Followed<'_> {
         *covariance =
             transition * kept * transition.transpose() + process * 0.5 + Matrix4::from_diagonal_element(square);
         let gain = transition * gain;
+        let transition = transition - gain * reading;
+        let left_of_start = (reading * *of_start * reading.transpose()).trace() / noise.trace();
+        *of_start = transition * *of_start * transition.transpose();
         let errors = one.errors(begin, &readings);
         let even = even_harmonics(&errors);
         let near = variance_near(&even);
@@ -602,11 +614,13 @@ impl Followed<'_> {
             of_state: 0.5 * (total - noise).trace(),
             second: even[0] * turn * turn,
             transition,
+            of_start: left_of_start,
         })
     }
 
     /// The innovations of a plant along the steps of a stretch, over their standard deviations, up to the step that it cannot take.
-    fn innovations(&self, x: &Unknowns, stretch: &Stretch, Course { start, steps }: &Course) -> Vec<Vector2<f64>> {
+    fn innovations(&self, x: &Unknowns, stretch: &Stretch, course: &Course) -> Vec<Vector2<f64>> {
+        let Course { start, steps } = course;
         let begin = steps.first().map_or(0, |step| step.begin);
         let mut one = self.follower(x, stretch, *start, begin);
         let period = |step: &Step| {
@@ -616,7 +630,11 @@ impl Followed<'_> {
             follower.moved(&(step.gain * innovation))?;
             Some(step.whitening * innovation)
         };
-        steps.iter().map_while(period).skip(PIECE).collect()
+        let innovations: Vec<Vector2<f64>> = steps.iter().map_while(period).collect();
+        innovations
+            .get(course.steps.len() - course.counted().len()..)
+            .unwrap_or_default()
+            .to_vec()
     }
 
     /// A plant in a state at a sample of a stretch.
@@ -744,6 +762,10 @@ impl Followed<'_> {
         {
             let period = self.records[*record].period;
             let of = |from: usize, to: usize| Stretch { record: *record, span: [from, to] };
+            if course.counted().is_empty() && course.steps.len() > PIECE {
+                left_out.push(Cut { stretch: of(*from, *to), contradicts: false });
+                continue;
+            }
             let (mut begin, mut reached) = (*from, *from);
             for (piece, flag) in course.counted().chunks(PIECE).zip(flags) {
                 let [first, last] = [piece[0].begin, piece[piece.len() - 1].end];
@@ -770,6 +792,31 @@ impl Followed<'_> {
         kept.retain(is_long);
         self.stretches = kept;
         left_out
+    }
+
+    /// The pieces whose innovations have no derivative by a parameter, up to [`ROUGH`]: beside these parameters, the plant has another motion there.
+    fn rough(&self, x: &Unknowns) -> Vec<Vec<Option<bool>>> {
+        let unknowns = (0..UNKNOWNS).filter(|i| *i != 5);
+        let beside: Vec<_> = unknowns
+            .map(|i| [STEP, -STEP].map(|step| self.each(&shifted(x, i, step))))
+            .collect();
+        let flags = |(stretch, here): (usize, &Vec<Vector2<f64>>)| {
+            let pieces = here.chunks(PIECE).enumerate().map(|(n, piece)| {
+                let is_rough = |[up, down]: &[Vec<Vec<Vector2<f64>>>; 2]| {
+                    let [up, down] = [up, down].map(|one| one[stretch].iter().skip(n * PIECE));
+                    let (mut even, mut odd, mut count) = (0.0, 0.0, 0);
+                    for ((here, up), down) in piece.iter().zip(up).zip(down) {
+                        even += (up + down - here * 2.0).norm_squared();
+                        odd += (up - down).norm_squared();
+                        count += 1;
+                    }
+                    count < piece.len() || even > ROUGH * ROUGH * odd
+                };
+                beside.iter().any(is_rough).then_some(false)
+            });
+            pieces.collect()
+        };
+        self.each(x).iter().enumerate().map(flags).collect()
     }
 
     /// The pieces that contradict the others: chi-square would fall too far without them, and with parameters fitted to the rest. A piece that does
@@ -864,6 +911,11 @@ impl Followed<'_> {
             if is_first || moves.sum::<f64>() >= STILL {
                 continue;
             }
+            let rough = self.cut(&self.rough(&x));
+            if !rough.is_empty() {
+                out.extend(rough);
+                continue;
+            }
             let more = self.cut(&self.contradicting(&minimum));
             if more.is_empty() {
                 let is_found = self.followed() >= self.fewest && !self.is_contradicted(&out, &x);
@@ -887,6 +939,13 @@ impl Followed<'_> {
         };
         let cut = left_out.iter().filter(|cut| cut.contradicts).map(|cut| cut.stretch);
         2 * samples(cut.filter(is_within)) > self.followed()
+    }
+
+    /// The search from other parameters, with all stretches.
+    fn again(&self, all: &[Stretch], x: Unknowns) -> Option<(Self, (Minimum, Vec<Cut>))> {
+        let mut again = Self { stretches: all.to_vec(), ..self.clone() };
+        let found = again.search(x)?;
+        Some((again, found))
     }
 
     /// Samples that are followed.
@@ -1087,16 +1146,24 @@ pub fn follow(
     });
     let (mut followed, (mut minimum, mut out)) = searched.find_map(|found| found)?;
     let covariance = loop {
+        // By better parameters, more belongs.
+        let again = followed.again(&all, minimum.x);
+        if let Some(found) = again.filter(|(again, _)| again.followed() > followed.followed()) {
+            (followed, (minimum, out)) = found;
+            continue;
+        }
         let (covariance, lower) = followed.covariance(&minimum);
-        // A narrow valley ends the search early. Farther on, other pieces belong.
-        let mut again = Followed { stretches: all.clone(), ..followed.clone() };
+        // A narrow valley ends the search early.
+        let again = lower.and_then(|lower| followed.again(&all, lower));
         let each = |minimum: &Minimum| minimum.chi_square / minimum.residuals.len() as f64;
-        let found = lower.and_then(|lower| again.search(lower));
-        let Some(found) = found.filter(|(next, _)| each(next) < each(&minimum)) else {
+        let is_better = |(again, (next, _)): &(Followed, (Minimum, _))| {
+            let more = again.followed().cmp(&followed.followed());
+            more.is_gt() || more.is_eq() && each(next) < each(&minimum)
+        };
+        let Some(found) = again.filter(is_better) else {
             break covariance;
         };
-        (minimum, out) = found;
-        followed = again;
+        (followed, (minimum, out)) = found;
     };
     // A particle that slides looks like one in another cavity: without a third harmonic of impacts, the rig must be about the expected one.
     let is_shown = parts.iter().flatten().any(|part| part.regime == Regime::Symmetric);
