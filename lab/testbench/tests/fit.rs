@@ -454,6 +454,28 @@ fn a_record_without_noise_is_followed_to_its_end() {
 }
 
 #[test]
+fn a_record_is_followed_near_the_fold_where_only_its_filter_holds_the_particle() {
+    let scene = scene("chain.snr=60");
+    let Parameters { primary_mass, stiffness, .. } = RIG;
+    let rig = Parameters {
+        damping: 0.035 * (stiffness * primary_mass).sqrt(),
+        particle_mass: 0.0163 * primary_mass,
+        restitution: 0.75,
+        ..RIG
+    };
+    let record = recorded_on(rig, " chain.snr=60 backbone.C_to=0.1 backbone.points=14");
+    let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
+    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+    let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
+    assert!(followed.left_out.is_empty(), "{:?}", followed.left_out);
+    for quantity in FITTED {
+        let Estimate { value, uncertainty } = followed.fit.estimate(*quantity).unwrap();
+        let error = (value - quantity.of_plant(&rig)) / uncertainty;
+        assert!(error.abs() < 3.0, "{quantity:?}: {error} u");
+    }
+}
+
+#[test]
 fn a_record_behind_an_anti_alias_filter_determines_the_parameters_as_well() {
     let scene = wrong_scene();
     let u = |filter: &str| {
