@@ -178,11 +178,13 @@ struct Course {
 }
 
 impl Course {
-    /// The periods that count: those in which the start is forgotten, as far as a piece can show.
+    /// The periods that count: those in which the start is forgotten, as far as a piece can show, and at least a piece after it, because its error is
+    /// not linear.
     fn counted(&self) -> &[Step] {
         let is_forgotten = |step: &Step| step.of_start < 1.0 / PIECE as f64;
         let first = self.steps.iter().position(is_forgotten);
-        &self.steps[first.unwrap_or(self.steps.len())..]
+        let first = first.map_or(self.steps.len(), |first| first.max(PIECE));
+        self.steps.get(first..).unwrap_or_default()
     }
 }
 
