@@ -7,9 +7,9 @@
 //! sensors of the loop (`accelerations`), of a lock whose drive then changes slowly (`sweeps`), or of the search, the hold and the decay of `vines
 //! identify` (`decays`). For each parameter, of the fits that are not rejected: the share within 1.96 of the stated standard uncertainty u, the
 //! largest error over u, the root mean square of the error over u, and that over the Cramér–Rao bound, of the same points or of all symmetric 1:1
-//! motion in a recording of levels or sweeps; the numbers of fits that are rejected, of recordings of which only the points were fitted, and of rigs without a fit; and the
-//! probabilities by Kolmogorov and Smirnov that the p-values of each channel's chi- square are uniform: of response, frequency and drive, or of the
-//! innovations of a record, in phase with the response and a quarter of a period beside it.
+//! motion in a recording of levels or sweeps; the numbers of fits that are rejected, of recordings of which only the points were fitted, and of rigs
+//! without a fit; and the probabilities by Kolmogorov and Smirnov that the p-values of each channel's chi-square are uniform: of response, frequency
+//! and drive, or of the innovations of a record, in phase with the response and a quarter of a period beside it.
 //!
 //! `effects` gives each rig one hidden effect, in turn friction, tilt, two laws of restitution, and a cubic stiffness, which moves the measured
 //! frequencies by harmonic balance; and as many rigs none. Half of the rigs with friction are at rest when a loop check measures them. A rig is drawn
@@ -359,8 +359,8 @@ const PIECE: f64 = 16.0;
 const UNEVEN: f64 = 0.05;
 
 impl Recorded {
-    /// Whether each sample belongs to a symmetric 1:1 motion: half a period lies between any impact and the next one in the piece of [`PIECE`] periods
-    /// around it, up to [`UNEVEN`].
+    /// Whether each sample belongs to a symmetric 1:1 motion: half a period lies between any impact and the next one in the piece of [`PIECE`]
+    /// periods around it, up to [`UNEVEN`].
     fn symmetric(&self) -> Option<Vec<bool>> {
         let mut rig = Plant::new(self.truth, self.scene.start).ok()?;
         let (mut turns, mut phase) = (Vec::new(), 0.0);
@@ -387,9 +387,9 @@ impl Recorded {
         Some(turns.iter().map(is_far).collect())
     }
 
-    /// Standard uncertainties of the five parameters by the Cramér–Rao bound of all symmetric 1:1 motion in the recording of displacements: an information filter
-    /// at the true parameters. It follows the rig sample by sample; the noise of the base is that of the process, and the state at the start of each
-    /// such part is unknown.
+    /// Standard uncertainties of the five parameters by the Cramér–Rao bound of all symmetric 1:1 motion in the recording of displacements: an information
+    /// filter at the true parameters. It follows the rig sample by sample; the noise of the base is that of the process, and the state at the start of
+    /// each such part is unknown.
     fn bound(&self, snr: &str) -> Option<[f64; 5]> {
         let symmetric = self.symmetric()?;
         let ratio = 10_f64.powf(-snr.parse::<f64>().ok()? / 20.0);

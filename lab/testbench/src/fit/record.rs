@@ -19,9 +19,8 @@
 //! where a deviation of the particle grows in spite of the corrections, where the response has a second harmonic, where the piece contradicts all
 //! others, and where the innovations have no derivative by the parameters, because the motion is another one beside them. By the parameters that are
 //! found more pieces belong: with all of them the search begins again, until no more do. Periods count where the start is forgotten: this takes long
-//! near the loss of symmetry. Whether a part shows impacts
-//! by itself does not matter, because that depends on the natural frequency of the scene: what is followed needs them if no linear structure follows
-//! it.
+//! near the loss of symmetry. Whether a part shows impacts by itself does not matter, because that depends on the natural frequency of the scene:
+//! what is followed needs them if no linear structure follows it.
 
 use std::f64::consts::{PI, TAU};
 
@@ -1149,7 +1148,8 @@ pub fn follow(
     let (mut followed, (mut minimum, mut out)) = searched.find_map(|found| found)?;
     let covariance = loop {
         // By better parameters, more belongs.
-        let again = followed.again(&all, minimum.x);
+        let again = Some(minimum.x).filter(|_| followed.stretches != all);
+        let again = again.and_then(|x| followed.again(&all, x));
         if let Some(found) = again.filter(|(again, _)| again.followed() > followed.followed()) {
             (followed, (minimum, out)) = found;
             continue;
