@@ -18,9 +18,8 @@
 //! The fit begins at the parameters of the points of the record. A piece of the record is left out where the plant has not two impacts per period,
 //! where a deviation of the particle grows in spite of the corrections, where the response has a second harmonic, where the piece contradicts all
 //! others, and where the innovations have no derivative by the parameters, because the motion is another one beside them. By the parameters that are
-//! found more pieces belong: with all of them the search begins again, until no more do. Periods count where the start is forgotten: this takes long
-//! near the loss of symmetry. Whether a part shows impacts by itself does not matter, because that depends on the natural frequency of the scene:
-//! what is followed needs them if no linear structure follows it.
+//! found more pieces belong: with all of them the search begins again, until no more do. Whether a part shows impacts by itself does not matter,
+//! because that depends on the natural frequency of the scene: what is followed needs them if no linear structure follows it.
 
 use std::f64::consts::{PI, TAU};
 
@@ -155,8 +154,6 @@ struct Step {
     second: Complex64,
     /// Derivatives of the corrected state at the end over that at the begin.
     transition: Matrix4<f64>,
-    /// Variance of the innovation by what the uncertainty of the start has left, over that of the noise.
-    of_start: f64,
 }
 
 /// Chi-square (two degrees of freedom) of the second harmonic of a piece: impacts at uneven intervals have one, which lasts for many periods. The
@@ -177,13 +174,9 @@ struct Course {
 }
 
 impl Course {
-    /// The periods that count: those in which the start is forgotten, as far as a piece can show, and at least a piece after it, because its error is
-    /// not linear.
+    /// The periods that count: those after the first piece, because the error of the start is not linear.
     fn counted(&self) -> &[Step] {
-        let is_forgotten = |step: &Step| step.of_start < 1.0 / PIECE as f64;
-        let first = self.steps.iter().position(is_forgotten);
-        let first = first.map_or(self.steps.len(), |first| first.max(PIECE));
-        self.steps.get(first..).unwrap_or_default()
+        self.steps.get(PIECE..).unwrap_or_default()
     }
 }
 
@@ -548,15 +541,14 @@ impl Followed<'_> {
         one.crossing([1, 3].map(|periods| stretch.span[0] + periods * period), end)?;
         let amplitude = harmonic(&response[one.n - period..one.n]).norm();
         let [masses, particle] = PRIOR.map(|prior| (prior * amplitude).powi(2));
-        let mut covariances = [Matrix4::from_diagonal(&Vector4::new(masses, masses, particle, particle)); 2];
+        let mut covariance = Matrix4::from_diagonal(&Vector4::new(masses, masses, particle, particle));
         let start = one.plant.state();
-        let steps: Vec<Step> = std::iter::from_fn(|| self.step(&mut one, &mut covariances, end)).collect();
+        let steps: Vec<Step> = std::iter::from_fn(|| self.step(&mut one, &mut covariance, end)).collect();
         Some(Course { start, steps })
     }
 
-    /// Follows a period, if it ends before the sample `last`, and corrects the state, whose covariance is given, with the part of it that the start
-    /// has left; `None` where the motion is lost.
-    fn step(&self, one: &mut Follower, [covariance, of_start]: &mut [Matrix4<f64>; 2], last: usize) -> Option<Step> {
+    /// Follows a period, if it ends before the sample `last`, and corrects the state, whose covariance is given; `None` where the motion is lost.
+    fn step(&self, one: &mut Follower, covariance: &mut Matrix4<f64>, last: usize) -> Option<Step> {
         let (begin, from, record) = (one.n, one.clone(), one.record);
         let readings = one.crossing([3, 5].map(|quarters| begin + quarters * record.period / 4), last)?;
         let (end, state) = (one.n, one.state());
@@ -590,8 +582,6 @@ impl Followed<'_> {
             transition * kept * transition.transpose() + process * 0.5 + Matrix4::from_diagonal_element(square);
         let gain = transition * gain;
         let transition = transition - gain * reading;
-        let left_of_start = (reading * *of_start * reading.transpose()).trace() / noise.trace();
-        *of_start = transition * *of_start * transition.transpose();
         let errors = one.errors(begin, &readings);
         let even = even_harmonics(&errors);
         let near = variance_near(&even);
@@ -615,7 +605,6 @@ impl Followed<'_> {
             of_state: 0.5 * (total - noise).trace(),
             second: even[0] * turn * turn,
             transition,
-            of_start: left_of_start,
         })
     }
 
