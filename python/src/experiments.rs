@@ -119,7 +119,15 @@ pub fn fit(
         })
     };
     let Found {
-        fit, plant, parts, linear, record, explanation, alternatives, ..
+        fit,
+        plant,
+        parts,
+        linear,
+        record,
+        points_instead,
+        explanation,
+        alternatives,
+        ..
     } = found;
     let parts: Vec<_> = parts
         .iter()
@@ -139,6 +147,7 @@ pub fn fit(
         "alternatives": reports(&alternatives),
         "linear": linear,
         "followed_periods": record.map(|one| one.periods),
+        "points_instead": points_instead,
         "parts": parts,
         "plant": {
             "M": plant.primary_mass, "k": plant.stiffness, "c": plant.damping,

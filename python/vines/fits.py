@@ -60,6 +60,8 @@ class Fit(Result):
         the particle carried along and free. A response whose state is `unknown` is left out.
     followed_periods : int or None
         Periods of recordings that the plant follows; None if the result is the fit of points.
+    points_instead : str or None
+        Why the points of recordings are fitted instead of the recordings themselves.
     parts : tuple of dict
         Parts of recordings: seconds, kind (held, sweep or decay), regime, and the point or None.
     """
@@ -80,6 +82,7 @@ class Fit(Result):
     alternatives: Table
     linear: tuple[dict[str, Any], ...]
     followed_periods: int | None
+    points_instead: str | None
     parts: tuple[dict[str, Any], ...]
 
     def __getitem__(self, symbol: str) -> tuple[float, float]:
@@ -231,6 +234,7 @@ def _result(text: str) -> Fit:
         alternatives=_table(found["alternatives"]),
         linear=tuple(found["linear"]),
         followed_periods=found["followed_periods"],
+        points_instead=found["points_instead"],
         parts=tuple(part["part"] | {"point": part["point"]} for part in found["parts"]),
         **{key: report[key] for key in ("describes", "chi_square", "p_value", "degrees")},
     )

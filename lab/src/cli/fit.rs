@@ -131,6 +131,9 @@ struct Output<'a> {
     /// Parts of recordings that do not belong to the motion.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     left_out_of_record: &'a [LeftOut],
+    /// Why the points of recordings are fitted instead of the recordings themselves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    points_instead: Option<&'a str>,
     /// How recordings were read, linear decays, and what counts as exact.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     notes: Vec<String>,
@@ -316,14 +319,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         parts: &found.parts,
         followed_periods: found.record.as_ref().map(|record| record.periods),
         left_out_of_record: found.record.as_ref().map_or(&[], |record| &record.left_out),
+        points_instead: found.points_instead.as_deref(),
         notes,
     };
     let text = output(arguments.json, &printed, || {
+        let instead = found.points_instead.as_ref().map(|instead| format!("{instead}\n"));
         let verdict = verdict.as_ref().map(|verdict| format!("{verdict}\n"));
         [
             lines,
             recorded(&found.parts),
             summary(&report, &found, skipped),
+            instead.unwrap_or_default(),
             found.linear.iter().map(of_linear).collect(),
             verdict.unwrap_or_default(),
             only_if_ideal(&alternatives, is_assumed),

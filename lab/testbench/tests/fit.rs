@@ -423,15 +423,30 @@ fn the_plant_follows_a_record_and_determines_the_parameters_better_than_its_poin
 }
 
 #[test]
-fn a_record_that_contradicts_the_plant_in_the_range_of_its_motion_is_not_followed() {
-    // Tilt and friction: b would be 8 % off, 23 times its uncertainty.
+fn a_record_that_contradicts_the_plant_leaves_its_points_and_says_so() {
     let scene = scene("chain.snr=60");
+    let found = |record: Recording| {
+        let recordings = vec![record];
+        let found = find(&Measurements { recordings, ..Measurements::default() }, &scene, |_| {}).unwrap();
+        assert!(found.record.is_none());
+        found.points_instead.unwrap()
+    };
+    // Tilt and friction: b would be 8 % off, 23 times its uncertainty.
     let cavity = Cavity { tilt: 0.03, kinetic_friction: 0.02, ..Cavity::IDEAL };
-    let record = recorded_on(Parameters { cavity, ..scene.plant }, " chain.snr=60");
-    let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
-    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
-    let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]);
-    assert!(followed.is_none(), "{followed:?}");
+    let strange = recorded_on(Parameters { cavity, ..scene.plant }, " chain.snr=60");
+    assert_eq!(
+        found(strange),
+        "the plant does not follow the recordings: their points are fitted instead, and show less"
+    );
+    // An amplifier whose gain changes from period to period, by as much as the noise of a period.
+    let mut unsteady = recording();
+    for (n, period) in unsteady.response.chunks_mut(100).enumerate() {
+        let gain = 1.0 + 4e-4 * ((0.618 * n as f64).fract() - 0.5);
+        period.iter_mut().for_each(|value| *value *= gain);
+    }
+    let instead = found(unsteady);
+    let says = "the recordings, followed period by period, contradict the model (chi-square ";
+    assert!(instead.starts_with(says), "{instead}");
 }
 
 #[test]

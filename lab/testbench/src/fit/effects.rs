@@ -279,6 +279,8 @@ pub struct Found {
     pub linear: Vec<LinearVerdict>,
     /// The fit of the recordings themselves, if it is the result.
     pub record: Option<RecordFit>,
+    /// Why their points are fitted instead.
+    pub points_instead: Option<String>,
     /// What the effects say, if the ideal cavity does not describe all points.
     pub explanation: Option<Explanation>,
     /// If the ideal cavity describes the points: effects that describe them as well, with a half-width outside the interval of the fit.
@@ -301,8 +303,20 @@ pub fn find(measured: &Measurements, scene: &Scene, mut progress: impl FnMut(usi
     let known: Vec<Known> = known.iter().copied().chain(of_linear).collect();
     let prepared = recordings.iter().map(|one| one.prepared(&scene.knowledge()));
     let prepared: Vec<Recording> = prepared.collect::<Result<_, _>>()?;
-    let record = follow(&prepared, &parts, measured_points, definition, expected, &known)
-        .filter(|record| !recordings.is_empty() && !record.fit.is_rejected());
+    let followed = match recordings[..] {
+        [] => None,
+        _ => follow(&prepared, &parts, measured_points, definition, expected, &known),
+    };
+    let instead = |found: &str| format!("{found}: their points are fitted instead, and show less");
+    let points_instead = match &followed {
+        Some(RecordFit { fit, .. }) if fit.is_rejected() => Some(instead(&format!(
+            "the recordings, followed period by period, contradict the model (chi-square {:.1} for {} degrees of freedom)",
+            fit.chi_square, fit.degrees
+        ))),
+        None if !recordings.is_empty() => Some(instead("the plant does not follow the recordings")),
+        _ => None,
+    };
+    let record = followed.filter(|_| points_instead.is_none());
     let fit = match &record {
         Some(record) => record.fit.clone(),
         // Nothing that was measured shows impacts.
@@ -318,6 +332,7 @@ pub fn find(measured: &Measurements, scene: &Scene, mut progress: impl FnMut(usi
         points,
         linear,
         record,
+        points_instead,
         explanation: None,
         alternatives: Vec::new(),
     };
