@@ -434,10 +434,11 @@ fn summary(report: &FitReport, found: &Found, skipped: usize) -> String {
             Some(Ordering::Greater) => "large",
             _ => continue,
         };
+        let [found, expected] = [test.chi_square, test.expected];
+        let decimals = decimals(found.min(expected));
         let _ = writeln!(
             text,
-            "the uncertainties of the {channel} are too {size}: their chi-square is {:.1}, and {:.1} is expected",
-            test.chi_square, test.expected
+            "the uncertainties of the {channel} are too {size}: their chi-square is {found:.decimals$}, and {expected:.decimals$} is expected"
         );
     }
     if skipped > 0 {
