@@ -14,7 +14,7 @@ use vines_testbench::backbone::LevelPoint;
 use vines_testbench::comparison::{COMPARED_ABOVE, ExactCurve};
 use vines_testbench::experiment::ExperimentError;
 use vines_testbench::identification::{
-    Lock, Regime, ResonancePoint, WINDOW, decay_points, foreign_tone, identify, regime_by_response,
+    IdentificationError, Lock, Regime, ResonancePoint, WINDOW, decay_points, foreign_tone, identify, regime_by_response,
 };
 use vines_testbench::loop_check::check;
 use vines_testbench::record::{Record, Sample};
@@ -120,12 +120,12 @@ fn the_gains_of_an_anti_alias_filter_and_of_a_held_base_are_corrected() {
     ] {
         let filtered = at(settings).unwrap();
         let [c, sigma] = [filtered.c - ideal.c, filtered.sigma - ideal.sigma];
-        assert!(c.abs() < 3e-6 && sigma.abs() < 1e-4, "{settings}: {c:e}, {sigma:e}");
+        assert!(c.abs() < 1e-5 && sigma.abs() < 1e-4, "{settings}: {c:e}, {sigma:e}");
     }
     // The fundamental of a base that is held for a hundredth of a period is 1.6e-4 smaller than that of its samples.
     let held = at("chain.hold=true chain.reference=false").unwrap();
     let half = 0.5 * (TAU * held.f_hz) * (TAU / 100.0);
-    assert!((held.g - 1.1 * half.sin() / half).abs() < 1e-6, "{held:?}");
+    assert!((held.g - 1.1 * half.sin() / half).abs() < 1e-5, "{held:?}");
 }
 
 #[test]
@@ -167,16 +167,18 @@ fn a_point_without_a_base_sensor_is_as_right_as_one_with_it() {
 
 #[test]
 fn noise_behind_an_anti_alias_filter_keeps_neither_a_lock_nor_a_level_from_settling() {
-    let ideal = at("").unwrap();
+    let curve = ExactCurve::of(&dimensionless(&[]).dimensionless());
     for settings in [
         "chain.filter=10 chain.snr=40",
         "chain.filter=4 chain.snr=40",
         "chain.filter=10 chain.snr=40 chain.reference=false",
     ] {
         let filtered = at(settings).unwrap();
+        let distance = curve.distance(filtered.c, filtered.sigma, filtered.g).unwrap();
+        let (sigma, g) = (distance.sigma.unwrap().abs(), distance.g.unwrap().abs());
         assert!(
-            (filtered.c - ideal.c).abs() < 3.0 * filtered.u_c,
-            "{settings}: {filtered:?}"
+            sigma < 3.0 * filtered.u_sigma && g < 3.0 * filtered.u_g,
+            "{settings}: {distance:?}, {filtered:?}"
         );
     }
     let scene = paper(&[
