@@ -116,8 +116,8 @@ def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "a
     Examples
     --------
     >>> found = identify()
-    >>> round(found.lock["sigma"], 5), found.lock["regime"]
-    (-1.13938, 'symmetric 1:1')
+    >>> round(found.lock["sigma"], 4), found.lock["regime"]
+    (-1.1394, 'symmetric 1:1')
     """
     if results not in ("all", "lock"):
         raise ValueError(f"results = {results!r}: 'all' and 'lock' are allowed")

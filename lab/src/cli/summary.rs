@@ -238,10 +238,10 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
             "the drive lies at the fold within its uncertainty: the smallest of the exact backbone is G = {smallest:.6}"
         ));
     }
-    let there = result.curve.distance(at.c, at.sigma, at.g).filter(|_| lock.held);
+    let there = result.exact.and_then(|_| result.curve.distance(at.c, at.sigma, at.g));
     if let Some((sigma, g)) = there.and_then(|there| there.sigma.zip(there.g)) {
         note(&format!(
-            "at the C that is held, the exact backbone has sigma = {:.6}, G = {:.6}",
+            "at the measured C, the exact backbone has sigma = {:.6}, G = {:.6}",
             at.sigma - sigma,
             at.g - g
         ));

@@ -320,8 +320,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let [base, omega] = estimate.at;
         let regime = regime_by_response(averaged, knowledge, base, omega);
         let reached = is_reached(estimate.response, level);
-        let [stated_base, stated_omega] =
-            [(base, 0), (omega, 1)].map(|(at, i)| Estimate::new(at.value, &[at.uncertainty, estimate.added[i]]));
+        let [stated_base, stated_omega] = estimate.stated();
         LevelPoint {
             at: ResonancePoint::new([estimate.response, stated_base, stated_omega, estimate.phase_error], &d),
             // The level as a person would write it.

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 use thiserror::Error;
-use vines_model::numerics::{Estimate, RANDOM, SIGNIFICANT, mean, standard_deviation};
+use vines_model::numerics::{Estimate, SIGNIFICANT, mean, standard_deviation};
 
 use crate::plan::{Knowledge, Plan};
 use crate::record::{Record, Sample};
@@ -19,7 +19,7 @@ pub(crate) use decay::PER_PERIOD;
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
 pub use level::{Criterion, LevelEstimate, Unsteady};
 pub(crate) use level::{LAG, LONGEST};
-pub use resonance_fit::{Cycle, ResonanceFit, Slopes};
+pub use resonance_fit::{Cycle, ResonanceFit};
 pub(crate) use response::{ASYMMETRIC, Line, degrees, subharmonic, without_tones};
 pub use response::{Tone, classify, drive_harmonics, foreign_tone, impacts, regime_by_response};
 pub use vines_model::regime::{Impact, Regime};
@@ -52,11 +52,6 @@ pub enum IdentificationError {
         tolerance: f64,
     },
     #[error(
-        "the response has not come to rest under its drive: from {held:.4e} m it may move on by {farthest:.1e} m, more \
-         than the {allowed:.1e} m within which the record shows where it goes. Hold it longer (record.hold_periods), or ask for a drive farther from the fold of the backbone"
-    )]
-    Moving { held: f64, farthest: f64, allowed: f64 },
-    #[error(
         "a sensor {what} {seconds:.3} s after the release, so that the decay is not recorded: check its cable and converter"
     )]
     SensorAfterRelease { seconds: f64, what: &'static str },
@@ -76,10 +71,10 @@ pub struct Identification {
 /// Identifies the record of an experiment.
 ///
 /// # Errors
-/// No motion, a lock in another regime than the symmetric 1:1 one or off its phase, a response that still moves, and a sensor that fails in the decay.
+/// No motion, a lock in another regime than the symmetric 1:1 one or off its phase, and a sensor that fails in the decay.
 pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, IdentificationError> {
     let knowledge = plan.knowledge;
-    let (lock, held, slope) = measure(record, &knowledge).ok_or(IdentificationError::NoMotion)?;
+    let lock = measure(record, &knowledge).ok_or(IdentificationError::NoMotion)?;
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
     let is_expected = match lock.regime {
         Regime::Symmetric | Regime::Unresolved => true,
@@ -94,7 +89,6 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
         return Err(IdentificationError::Subharmonic { periods, sigma, c });
     }
     on_target(&lock, plan.lock.lock.phase_tolerance)?;
-    at_rest(&lock, held, slope)?;
     sensors_after_release(record, &knowledge)?;
     let decay = decay_points(record, &knowledge, WINDOW);
     Ok(Identification { knowledge, lock, decay })
@@ -114,10 +108,10 @@ pub(crate) fn harmonics_of(measurand: Measurand, samples_per_period: f64, least:
 
 // The locked point.
 
-/// The locked point as measured over the hold.
+/// The locked point as measured.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lock {
-    /// The point.
+    /// The point: frequency and base amplitude of phase resonance at the mean amplitude of the response before the release.
     #[serde(flatten)]
     pub at: ResonancePoint,
     /// Mean particle speed over `b omega0`; absent if the rig does not report it.
@@ -126,7 +120,7 @@ pub struct Lock {
     /// Standard uncertainty of B; absent where B is.
     #[serde(rename = "u_B")]
     pub u_b: Option<f64>,
-    /// Number of periods that sigma and C are estimated from: the hold, and the periods before it with about the same amplitude.
+    /// Number of periods that the point is estimated from: the hold, and the periods before it with about the same amplitude and drive.
     pub averaged: usize,
     /// Growth of a disturbance per period, relative, up to which these periods would not show it: from 1e-6 of the response to the deviation that ends
     /// them.
@@ -188,62 +182,56 @@ impl Lock {
 
 /// Largest number of periods before the release that are evaluated.
 const MOST: f64 = 240.0;
-/// Largest relative deviations from the amplitude of the hold, in addition to noise: of the periods from which the lock is evaluated, and of
-/// those from which the slopes of drive and frequency over the amplitude are evaluated.
-const SPREADS: [f64; 2] = [0.008, 0.1];
+/// Largest relative deviation from the amplitude of the hold, in addition to noise, of the periods from which the lock is evaluated.
+const SPREAD: f64 = 0.008;
 /// Smallest disturbance of a motion, relative to the response: less than the noise of any rig.
 const SMALLEST: f64 = 1e-6;
-/// Relative uncertainty of these slopes, because the backbone is curved within the second deviation.
-const SLOPE_UNCERTAINTY: f64 = 0.3;
 /// Largest phase error of a period that is evaluated, rad: the balances are of the first order in it.
 const PHASE_RANGE: f64 = 0.1;
 
-/// The locked point of a record, the amplitude of its hold, m, and the slope of the drive over the response with which the point is extrapolated from
-/// there, infinite under control; `None` without a motion.
-fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64, f64)> {
+/// The locked point of a record; `None` without a motion.
+fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
     let d = &knowledge.numbers;
     let (dt, hold) = (record.sample_time, record.hold());
-    let target = knowledge.target;
-    let held = Cycle::all(hold, dt, target);
+    let held = Cycle::all(hold, dt, knowledge.target);
     let cycles = before_release(record, knowledge);
-    let [approach, wide] = SPREADS.map(|spread| approached(&cycles, &held, spread));
-    let [base, phase_error, response] = means(&held, knowledge);
-    let ([base, omega, limit], slope) = if record.held {
-        // The response is kept, and the balances say which drive it needs.
-        let fit = ResonanceFit::of(approach, knowledge, Slopes::Unknown)?;
-        let (at, slopes) = (fit.at(0.0), fit.slopes());
-        // The noise of the amplitude moves drive and frequency along their slopes.
-        let [drive, omega] = [0, 1].map(|i| {
-            let aside = slopes[i].value * fit.u_level;
-            Estimate::new(at[i].value, &[at[i].uncertainty, aside, fit.remainders[i]])
-        });
-        ([drive, omega, fit.response], f64::INFINITY)
-    } else {
-        // The drive of the hold decides where the approach ends.
-        let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
-        let ([omega, limit], slope) = limits(approach, wide, knowledge, command)?;
-        ([base, omega, limit], slope)
-    };
+    let approach = approached(&cycles, &held);
+    let largest = mean(held.iter().map(Cycle::amplitude));
+    // The balances say which drive and frequency belong to a response, whether it rests or not.
+    let level = Criterion {
+        knowledge: *knowledge,
+        precision: 1.0,
+        largest,
+        before: [None; 2],
+    }
+    .best(approach)?;
+    let [base, omega] = level.at;
+    let of_level = &approach[approach.len() - level.periods..];
+    let averaged = of_level.iter().map(|cycle| cycle.samples).sum::<usize>();
     let speed = |sample: &Sample| Some(d.speed(sample.ground_truth?.particle_velocity.abs()));
-    let speeds: Option<Vec<f64>> = hold.iter().map(speed).collect();
-    // The speed belongs to the amplitude of the hold, and changes about as it does.
-    let aside = ((limit.value - response.value).abs() + limit.uncertainty) / limit.value;
+    let speeds: Option<Vec<f64>> = record.samples[record.released - averaged..record.released]
+        .iter()
+        .map(speed)
+        .collect();
     let b = speeds.map(|speeds| {
-        let periods = speeds.chunks(hold.len().div_ceil(held.len()));
-        let speed = Estimate::mean(&periods.map(|c| mean(c.iter().copied())).collect::<Vec<f64>>());
-        Estimate::new(speed.value, &[speed.uncertainty, speed.value * aside])
+        let periods = speeds.chunks(averaged.div_ceil(level.periods));
+        Estimate::mean(&periods.map(|c| mean(c.iter().copied())).collect::<Vec<f64>>())
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
         (count, Regime::Unknown) => (count, regime_by_response(hold, knowledge, base, omega)),
         by_impacts => by_impacts,
     };
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
-    let lock = Lock {
-        at: ResonancePoint::new([limit, base, omega, phase_error], d),
+    let [stated_base, stated_omega] = level.stated();
+    Some(Lock {
+        at: ResonancePoint::new(
+            [level.response, stated_base, stated_omega, phase_error(&held, knowledge)],
+            d,
+        ),
         b: b.map(|b| b.value),
         u_b: b.map(|b| b.uncertainty),
         averaged: approach.len(),
-        unseen_growth: (SPREADS[0] / SMALLEST).powf(1.0 / approach.len() as f64) - 1.0,
+        unseen_growth: (SPREAD / SMALLEST).powf(1.0 / approach.len() as f64) - 1.0,
         periods_to_lock: record.settled as f64 * dt * omega.value / TAU,
         held: record.held,
         impacts_per_period,
@@ -253,44 +241,7 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<(Lock, f64, f64)> {
         tone: (!is_simulated)
             .then(|| foreign_tone(hold, knowledge, omega.value))
             .flatten(),
-    };
-    Some((lock, response.value, slope))
-}
-
-/// Frequency, rad/s, and amplitude, m, at the end of the approach, and the slope of the drive over the amplitude: from the longest window that its later
-/// halves agree with.
-///
-/// A long window has less noise, a late one is nearer to the end. Where even the shortest two disagree, the difference is a part of the
-/// uncertainty.
-fn limits(approach: &[Cycle], wide: &[Cycle], knowledge: &Knowledge, command: f64) -> Option<([Estimate; 2], f64)> {
-    let slopes = ResonanceFit::of(wide, knowledge, Slopes::Rising)?.slopes();
-    let slopes = slopes.map(|slope| Estimate::new(slope.value, &[slope.uncertainty, SLOPE_UNCERTAINTY * slope.value]));
-    let limit = |cycles: &[Cycle]| {
-        let fit = ResonanceFit::of(cycles, knowledge, Slopes::Known(slopes))?;
-        Some((fit.limit(command), fit.excess))
-    };
-    let mut windows = vec![limit(approach)?];
-    let mut cycles = approach;
-    while cycles.len() >= 4 * ResonanceFit::FEWEST {
-        cycles = &cycles[cycles.len() / 2..];
-        windows.push(limit(cycles)?);
-    }
-    // Harmonics above the third count as noise of a period, but do not scatter. A small module has no code for this.
-    let scatter = |n: usize| match cfg!(feature = "tables") {
-        true => windows[n..].iter().map(|window| window.1).fold(0.0, f64::max).min(1.0),
-        false => 1.0,
-    };
-    let beyond = |n: usize, late: &[Estimate; 2]| {
-        let allowed = RANDOM * scatter(n + 1);
-        [0, 1].map(|i| ((windows[n].0[i].value - late[i].value).abs() - allowed * late[i].uncertainty).max(0.0))
-    };
-    let last = windows.len() - 1;
-    let agrees = |n: &usize| windows[n + 1..].iter().all(|late| beyond(*n, &late.0) == [0.0; 2]);
-    let longest = (0..last).find(agrees);
-    let difference = beyond(longest.unwrap_or(last.saturating_sub(1)), &windows[last].0);
-    let whole = windows[longest.unwrap_or(last)].0;
-    let limits = [0, 1].map(|i| Estimate::new(whole[i].value, &[whole[i].uncertainty, difference[i]]));
-    Some((limits, slopes[0].value))
+    })
 }
 
 /// The last periods before the release.
@@ -300,20 +251,22 @@ fn before_release(record: &Record, knowledge: &Knowledge) -> Vec<Cycle> {
     Cycle::all(samples, record.sample_time, knowledge.target)
 }
 
-/// Those whose amplitude deviates from the hold by the share `spread` at most; at least as many as the hold has.
-fn approached<'a>(cycles: &'a [Cycle], held: &[Cycle], spread: f64) -> &'a [Cycle] {
-    let level = mean(held.iter().map(Cycle::amplitude));
-    let noise = 4.0 * mean(held.iter().map(|cycle| cycle.noise[0])).sqrt();
-    let is_near = |cycle: &&Cycle| {
-        let deviation = (cycle.amplitude() - level).abs();
-        deviation <= (spread * level).max(noise) && cycle.phase_error.abs() <= PHASE_RANGE
+/// Those with about the amplitude and the drive of the hold; at least as many as the hold has, and as a level needs.
+fn approached<'a>(cycles: &'a [Cycle], held: &[Cycle]) -> &'a [Cycle] {
+    let near = |value: fn(&Cycle) -> f64| {
+        let values: Vec<f64> = held.iter().map(value).collect();
+        let (level, scatter) = (mean(values.iter().copied()), standard_deviation(&values));
+        move |cycle: &Cycle| (value(cycle) - level).abs() <= (SPREAD * level).max(4.0 * scatter)
     };
+    let (response, drive) = (near(Cycle::amplitude), near(|cycle| cycle.base.norm()));
+    let is_near = |cycle: &&Cycle| response(cycle) && drive(cycle) && cycle.phase_error.abs() <= PHASE_RANGE;
     let near = cycles.iter().rev().take_while(is_near).count();
-    &cycles[cycles.len() - near.max(held.len()).min(cycles.len())..]
+    let fewest = held.len().max(2 * ResonanceFit::FEWEST);
+    &cycles[cycles.len() - near.max(fewest).min(cycles.len())..]
 }
 
-/// Means over the hold: base amplitude, m, phase error, rad, and response amplitude, m.
-fn means(held: &[Cycle], knowledge: &Knowledge) -> [Estimate; 3] {
+/// Mean phase error over the hold, rad.
+fn phase_error(held: &[Cycle], knowledge: &Knowledge) -> Estimate {
     let LevelEstimate { response, phase_error, at: [base, _], .. } = LevelEstimate::means(held);
     let [noise, base_noise] =
         [0, 1].map(|i| mean(held.iter().map(|cycle| cycle.noise[i])).sqrt() / (held.len() as f64).sqrt());
@@ -322,12 +275,7 @@ fn means(held: &[Cycle], knowledge: &Knowledge) -> [Estimate; 3] {
     if knowledge.shaker().is_some() {
         phase_noise = phase_noise.hypot(phase_error.uncertainty);
     }
-    [
-        // Rounding and the steps of the command.
-        Estimate { uncertainty: base_noise.max(1e-8 * base.value), ..base },
-        Estimate { uncertainty: phase_noise, ..phase_error },
-        Estimate { uncertainty: noise, ..response },
-    ]
+    Estimate { uncertainty: phase_noise, ..phase_error }
 }
 
 // A measured point of phase resonance.
@@ -397,7 +345,7 @@ impl ResonancePoint {
     }
 }
 
-// What makes a record useless: a phase off its target while the lock was held, a response that moves, and a sensor that fails after the release.
+// What makes a record useless: a phase off its target while the lock was held, and a sensor that fails after the release.
 
 /// Share of a free response that impacts leave in two periods at least. They take the share pi epsilon G_imp/C in each, with
 /// G_imp = (4/pi) R B^2/C: 0.14 at epsilon = 0.05, r = 0.65, C = 0.5.
@@ -413,24 +361,6 @@ fn on_target(lock: &Lock, tolerance: f64) -> Result<(), IdentificationError> {
         return Ok(());
     }
     Err(IdentificationError::OffTarget { error, uncertainty: lock.at.u_phase_deg, tolerance })
-}
-
-/// Refuses a lock at a constant drive whose limit may lie farther from the amplitude of the hold, m, than the slopes reach that lead there: near a fold
-/// of the backbone a response creeps for hundreds of periods, and noise hides it. `slope`: of the drive over the response, with which the limit is
-/// extrapolated. On the way it changes by `E/A²` times the way, its natural scale: where it is small, the limit may be much farther, or nowhere.
-fn at_rest(lock: &Lock, held: f64, slope: f64) -> Result<(), IdentificationError> {
-    let ResonancePoint { a_m: limit, u_a_m: uncertainty, e_m: drive, .. } = lock.at;
-    let way = (limit - held).abs();
-    // A small module has no code for this.
-    let uncertainty = match cfg!(feature = "tables") {
-        true => uncertainty.hypot(drive / slope * (way / held).powi(2)),
-        false => uncertainty,
-    };
-    let (farthest, allowed) = (way + SIGNIFICANT * uncertainty, SPREADS[1] * held);
-    if lock.held || farthest <= allowed {
-        return Ok(());
-    }
-    Err(IdentificationError::Moving { held, farthest, allowed })
 }
 
 /// Refuses a decay in which a sensor reads no number, or in which the response is lost within two periods.

@@ -18,7 +18,7 @@ use nalgebra::DVector;
 use vines_model::numerics::{Estimate, HarmonicBasis, RANDOM, SIGNIFICANT, mean, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, SearchFound, Stage};
-use crate::identification::{ASYMMETRIC, Criterion, Cycle, LONGEST, ResonanceFit, Slopes, degrees, without_tones};
+use crate::identification::{ASYMMETRIC, Criterion, Cycle, LONGEST, ResonanceFit, degrees, without_tones};
 use crate::linear::{Impacts, impacts_by_resonance};
 use crate::plan::{LinearResponse, Plan, Target};
 use crate::rig::{Controller, ControllerError, LoopState, Move, Rig};
@@ -493,7 +493,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             harmonics.extend(even_and_odd(two, &self.target, cycle.omega, step));
             all.push(cycle);
         }
-        let Some(fit) = ResonanceFit::of(&all, &self.bench.plan.knowledge, Slopes::Unknown) else {
+        let Some(fit) = ResonanceFit::of(&all, &self.bench.plan.knowledge, None) else {
             return self.measure(periods);
         };
         if self.behind_shaker() {

@@ -10,7 +10,7 @@ use std::fmt::{self, Display, Formatter};
 
 use vines_model::numerics::{Estimate, RANDOM};
 
-use super::{Cycle, ResonanceFit, Slopes};
+use super::{Cycle, ResonanceFit};
 use crate::plan::Knowledge;
 
 /// What is asked of a level.
@@ -141,12 +141,11 @@ impl Criterion {
     /// The point of a window.
     fn of(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
         let fit = |cycles: &[Cycle], slopes| ResonanceFit::of(cycles, &self.knowledge, slopes);
-        let whole = fit(cycles, Slopes::Unknown)?;
+        let whole = fit(cycles, None)?;
         let [base, omega] = whole.at(0.0).map(|value| value.value);
         let known = self.slopes([whole.response.value, base, omega]);
-        let slopes = known.map_or(Slopes::Unknown, Slopes::Known);
         let (first, second) = cycles.split_at(cycles.len() / 2);
-        let (whole, first, second) = (fit(cycles, slopes)?, fit(first, slopes)?, fit(second, slopes)?);
+        let (whole, first, second) = (fit(cycles, known)?, fit(first, known)?, fit(second, known)?);
         let amplitude = whole.response.value;
         let [first, second] = [first, second].map(|half| half.at(amplitude - half.response.value));
         let (estimates, own) = (whole.at(0.0), whole.slopes());
@@ -206,5 +205,10 @@ impl LevelEstimate {
             added: [0.0; 2],
             unsteady: Some(Unsteady::Scatter(None)),
         }
+    }
+
+    /// Drive, m, and frequency, rad/s, with all of their uncertainty.
+    pub fn stated(&self) -> [Estimate; 2] {
+        [0, 1].map(|i| Estimate::new(self.at[i].value, &[self.at[i].uncertainty, self.added[i]]))
     }
 }

@@ -28,17 +28,6 @@ use crate::plan::{Knowledge, LinearResponse, Target};
 use crate::record::{Sample, drive_phases};
 use crate::scene::{Definition, Measurand, Reference, Sensor};
 
-/// Prior knowledge of the slopes of `E_R` and `omega_R` over the amplitude.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Slopes {
-    /// Nothing.
-    Unknown,
-    /// The motion is stable under a constant drive: `E_R` rises with the amplitude, by about E/A.
-    Rising,
-    /// Estimates from neighbouring points of the backbone.
-    Known([Estimate; 2]),
-}
-
 /// The two lines, fitted to some periods.
 #[derive(Debug, Clone)]
 pub struct ResonanceFit {
@@ -54,8 +43,6 @@ pub struct ResonanceFit {
     pub excess: f64,
     /// g, 1/s.
     pub gain: f64,
-    /// Measured over commanded amplitude of the base.
-    calibration: f64,
     /// Coefficients: constant, time, and integral of the amplitude's deviation.
     drive: Regression,
     turning: Regression,
@@ -78,8 +65,9 @@ impl ResonanceFit {
     /// Fewest periods: one more than the coefficients.
     pub const FEWEST: usize = 4;
 
-    /// From at least four periods of a rig of which this is known.
-    pub fn of(cycles: &[Cycle], knowledge: &Knowledge, slopes: Slopes) -> Option<Self> {
+    /// From at least four periods of a rig of which this is known; `slopes`: of `E_R` and `omega_R` over the amplitude, from neighbouring points of the
+    /// backbone.
+    pub fn of(cycles: &[Cycle], knowledge: &Knowledge, slopes: Option<[Estimate; 2]>) -> Option<Self> {
         let n = cycles.len() as f64;
         if cycles.len() < Self::FEWEST {
             return None;
@@ -132,12 +120,8 @@ impl ResonanceFit {
             });
         let (amplitudes, phases): (Vec<f64>, Vec<f64>) = balanced.unzip();
         let scale = [base / response, gain * base / (response * response)];
-        let unknown = |scale: f64| Estimate { value: 0.0, uncertainty: WIDE * scale };
-        let [by_base, by_omega] = match slopes {
-            Slopes::Unknown => scale.map(unknown),
-            Slopes::Rising => [Estimate { value: scale[0], uncertainty: scale[0] }, unknown(scale[1])],
-            Slopes::Known(slopes) => slopes,
-        };
+        let unknown = || scale.map(|scale| Estimate { value: 0.0, uncertainty: WIDE * scale });
+        let [by_base, by_omega] = slopes.unwrap_or_else(unknown);
         let drive = Regression::fit(&columns, &amplitudes, Some((2, by_base.scaled(-gain))), noise)?;
         let turning = Regression::fit(&columns, &phases, Some((2, by_omega)), noise / response)?;
         let duration = cycles[cycles.len() - 1].time - cycles[0].time;
@@ -159,7 +143,6 @@ impl ResonanceFit {
             phase_error: of(phase_error, phase_noise),
             excess: drive.excess.max(turning.excess),
             gain,
-            calibration,
             drive,
             turning,
             remainders: [
@@ -189,23 +172,6 @@ impl ResonanceFit {
         [
             self.drive.estimate(&weights).scaled(-1.0 / self.gain),
             self.turning.estimate(&weights),
-        ]
-    }
-
-    /// Frequency, rad/s, and amplitude, m, that a constant base of the commanded amplitude `command`, m, leads to.
-    ///
-    /// The base sensor calibrates both this base and the drive that it is compared with; its noise cancels.
-    pub fn limit(&self, command: f64) -> [Estimate; 2] {
-        let [by_base, by_omega] = self.slopes().map(|slope| slope.value);
-        let ahead = (command * self.calibration - self.at(0.0)[0].value) / by_base;
-        // The uncertainty of the drive at the limit contains the uncertainty of the slope.
-        let at_limit = self.drive.estimate(&[0.0, 1.0, ahead]);
-        let aside = at_limit.scaled(1.0 / self.gain).uncertainty / by_base;
-        let turning = self.at(ahead)[1];
-        // The noise within the integrals moves the amplitude that the frequency belongs to as it moves the limit: it cancels.
-        [
-            Estimate::new(turning.value, &[turning.uncertainty, by_omega * aside]),
-            Estimate::new(self.response.value + ahead, &[self.u_level, aside]),
         ]
     }
 }

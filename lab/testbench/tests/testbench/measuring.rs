@@ -120,12 +120,12 @@ fn the_gains_of_an_anti_alias_filter_and_of_a_held_base_are_corrected() {
     ] {
         let filtered = at(settings).unwrap();
         let [c, sigma] = [filtered.c - ideal.c, filtered.sigma - ideal.sigma];
-        assert!(c.abs() < 3e-6 && sigma.abs() < 1e-4, "{settings}: {c:e}, {sigma:e}");
+        assert!(c.abs() < 1e-5 && sigma.abs() < 1e-4, "{settings}: {c:e}, {sigma:e}");
     }
     // The fundamental of a base that is held for a hundredth of a period is 1.6e-4 smaller than that of its samples.
     let held = at("chain.hold=true chain.reference=false").unwrap();
     let half = 0.5 * (TAU * held.f_hz) * (TAU / 100.0);
-    assert!((held.g - 1.1 * half.sin() / half).abs() < 1e-6, "{held:?}");
+    assert!((held.g - 1.1 * half.sin() / half).abs() < 1e-5, "{held:?}");
 }
 
 #[test]
@@ -167,16 +167,18 @@ fn a_point_without_a_base_sensor_is_as_right_as_one_with_it() {
 
 #[test]
 fn noise_behind_an_anti_alias_filter_keeps_neither_a_lock_nor_a_level_from_settling() {
-    let ideal = at("").unwrap();
+    let curve = ExactCurve::of(&dimensionless(&[]).dimensionless());
     for settings in [
         "chain.filter=10 chain.snr=40",
         "chain.filter=4 chain.snr=40",
         "chain.filter=10 chain.snr=40 chain.reference=false",
     ] {
         let filtered = at(settings).unwrap();
+        let distance = curve.distance(filtered.c, filtered.sigma, filtered.g).unwrap();
+        let (sigma, g) = (distance.sigma.unwrap().abs(), distance.g.unwrap().abs());
         assert!(
-            (filtered.c - ideal.c).abs() < 3.0 * filtered.u_c,
-            "{settings}: {filtered:?}"
+            sigma < 3.0 * filtered.u_sigma && g < 3.0 * filtered.u_g,
+            "{settings}: {distance:?}, {filtered:?}"
         );
     }
     let scene = paper(&[
@@ -388,7 +390,7 @@ fn friction_from_rest_is_never_called_a_motion_with_impacts() {
 }
 
 #[test]
-fn a_response_that_creeps_below_the_fold_behind_noise_is_not_called_a_lock() {
+fn a_response_that_creeps_below_the_fold_behind_noise_is_a_point_of_the_backbone() {
     // Of the exact backbone, no motion between C = 0.3 and 0.6 needs so little drive: the response falls from one to the other for 800 periods. On the
     // second rig it falls by 1e-5 a period at C = 0.371, where the least drive is G = 0.9581, on its way to C = 0.207.
     let fast = ["0.00408", "0.3234", "0.4172", "0.9218", "20"];
@@ -409,10 +411,11 @@ fn a_response_that_creeps_below_the_fold_behind_noise_is_not_called_a_lock() {
         settings.extend(["start.dq2=0", "controller.omega_min=0.8", "controller.omega_max=1.2"].map(String::from));
         settings.extend([format!("chain.seed={seed}"), "record.decay_periods=3".into()]);
         let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
-        match identified(&dimensionless(&settings)) {
-            Ok(found) => assert!(found.lock.at.c < 0.3, "{:?}", found.lock),
-            Err(error) => assert!(matches!(error, IdentificationError::Moving { .. }), "{error}"),
-        }
+        let scene = dimensionless(&settings);
+        let at = lock(&scene).at;
+        let distance = ExactCurve::of(&scene.dimensionless()).distance(at.c, at.sigma, at.g);
+        let u = at.u_c.max(at.u_sigma).max(at.u_g);
+        assert!(distance.unwrap().nearest <= 2.0 * u, "{distance:?}: {at:?}");
     }
 }
 
