@@ -238,13 +238,18 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
             "the drive lies at the fold within its uncertainty: the smallest of the exact backbone is G = {smallest:.6}"
         ));
     }
-    let there = result.exact.and_then(|_| result.curve.distance(at.c, at.sigma, at.g));
-    if let Some((sigma, g)) = there.and_then(|there| there.sigma.zip(there.g)) {
-        note(&format!(
-            "at the measured C, the exact backbone has sigma = {:.6}, G = {:.6}",
-            at.sigma - sigma,
-            at.g - g
-        ));
+    // The polygon of a structure is not fine enough.
+    let is_fine = result.exact.is_some() && !result.curve.is_of_structure;
+    let there = result.curve.distance(at.c, at.sigma, at.g).filter(|_| is_fine);
+    let there = there.and_then(|there| there.sigma.zip(there.g)).map(|(sigma, g)| {
+        let (sigma, g) = (at.sigma - sigma, at.g - g);
+        format!("at the measured C, the exact backbone has sigma = {sigma:.6}, G = {g:.6}")
+    });
+    let asked = result.parameters.g;
+    let is_another = (at.g - asked).abs() > SIGNIFICANT * at.u_g;
+    let asked = is_another.then(|| format!("G = {asked} was asked for"));
+    if there.is_some() || asked.is_some() {
+        note(&[there, asked].into_iter().flatten().collect::<Vec<String>>().join("; "));
     }
     for orbit in result.others() {
         note(&format!(
