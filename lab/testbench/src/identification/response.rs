@@ -212,7 +212,7 @@ const LONGEST_CYCLE: usize = 4;
 
 /// The number of periods after which the motion in these samples of a hold repeats, if it is more than one. `omega` (rad/s): its frequency.
 ///
-/// The amplitude and the phase of the periods are a complex number each. Without their trend, noise is as large at a subharmonic as at other frequencies,
+/// The responses of the periods are a complex number each. Without their trend, noise is as large at a subharmonic as at other frequencies,
 /// or smaller, because loops are slow. A subharmonic of the power P, of n periods with the remaining power Q, then exceeds `P/Q` with the probability
 /// `(1 + P/Q)^-(n-4)`. The samples that differ from their harmonics within a period are noise at least.
 pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<usize> {
@@ -223,23 +223,19 @@ pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64)
         knowledge.target,
     );
     let trend = HarmonicBasis::new(&vec![0.0; cycles.len()], 2, &[]);
-    let deviations = |value: fn(&Cycle) -> f64| {
-        let values = DVector::from_iterator(cycles.len(), cycles.iter().map(value));
+    let sum: Complex64 = cycles.iter().map(|cycle| cycle.response).sum();
+    // Parts in phase with the mean, and a quarter of a period beside it.
+    let deviations = |turn: Complex64| {
+        let part = |cycle: &Cycle| (cycle.response * turn * sum.conj()).re / sum.norm();
+        let values = DVector::from_iterator(cycles.len(), cycles.iter().map(part));
         Some(trend.residual(&values, &trend.fit(&values)?))
     };
-    let response = mean(cycles.iter().map(Cycle::amplitude));
-    let (amplitudes, phases) = (
-        deviations(Cycle::amplitude)? / response,
-        deviations(|cycle| cycle.phase_error)?,
-    );
-    let noise = cycles.iter().map(|cycle| {
-        let shares = [response, cycle.base.norm()].map(|amplitude| amplitude * amplitude);
-        2.0 * (cycle.noise[0] / shares[0] + cycle.noise[1] / shares[1])
-    });
+    let (along, beside) = (deviations(Complex64::ONE)?, deviations(-Complex64::I)?);
     let free = cycles.len() as f64 - 4.0;
-    let (total, least) = (amplitudes.norm_squared() + phases.norm_squared(), free * mean(noise));
+    let noise = 2.0 * mean(cycles.iter().map(|cycle| cycle.noise[0]));
+    let (total, least) = (along.norm_squared() + beside.norm_squared(), free * noise);
     let chance = |turns: f64| {
-        let values = amplitudes.iter().zip(&phases).map(|(re, im)| Complex64::new(*re, *im));
+        let values = along.iter().zip(&beside).map(|(re, im)| Complex64::new(*re, *im));
         let line = values
             .enumerate()
             .map(|(k, value)| value * Complex64::cis(-TAU * turns * k as f64));

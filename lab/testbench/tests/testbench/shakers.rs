@@ -51,6 +51,16 @@ fn presets_lock_on_the_exact_orbit_with_their_shaker() {
     }
 }
 
+/// Samples of 120.33 in a period see the edges of the force at another phase in each third one.
+#[test]
+fn edges_that_alias_are_no_motion_of_several_periods_and_a_coil_that_damps_the_decay_is_no_dead_sensor() {
+    let filtered = "[chain]\nfilter = 4.0\n\n[controller]\nsamples_per_period = 120.33\n\n[start]";
+    for change in [("[start]", filtered), ("resistance = 2.0", "resistance = 0.5")] {
+        let nearest = distance_of_lock(&preset(1, &[change]).unwrap());
+        assert!(nearest < 3.0, "{change:?}: {nearest} u");
+    }
+}
+
 /// The noise of the readings is in the command, and through it in the force, of which 1.8 % is left: the motion moves more than the readings' noise.
 #[test]
 fn noise_of_the_readings_keeps_no_lock_from_settling_behind_a_shaker() {
