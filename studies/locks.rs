@@ -2,10 +2,10 @@
 //!
 //! epsilon 0.001 to 0.05, lambda 0.1 to 3 (uniform logarithms), r 0.2 to 0.97, and a drive at which a stable symmetric 1:1 orbit exists
 //! within 20 % of omega0. A lock is compared with the nearest place of the exact backbone. As in `vines fit`, this is where the differences in C,
-//! sigma and G, each over its standard uncertainty u, have the smallest sum of squares. Its root, over that of the two degrees of freedom, is the
-//! distance in u. A lock is correct within 2e-3 in all three, uncertain within four u, and wrong beyond; other runs are refused, with a reason. Under
-//! a constant drive it is also wrong where the orbit there is unstable and grows by more than the result says it would show; `unseen` counts locks
-//! where it grows by less.
+//! sigma and G, each over its standard uncertainty u, have the smallest sum of squares. Its root is the distance in u, scaled so that 95 % of such
+//! distances, with two degrees of freedom, are below 1.96. A lock is correct within 2e-3 in all three, uncertain within four u, and wrong beyond;
+//! other runs are refused, with a reason. Under a constant drive it is also wrong where the orbit there is unstable and grows by more than the result
+//! says it would show; `unseen` counts locks where it grows by less.
 //!
 //! Arguments: RIGS, SEED, SNR in dB or `none`. Writes validation/locks.csv.
 
@@ -16,6 +16,8 @@ use vines_model::orbit::backbone;
 
 /// Orbits of the exact backbone: the error of the polygon is about 2e-7.
 const POINTS: usize = 20_000;
+/// Squares that 95 % of chi-squares with one and with two degrees of freedom are below.
+const LIMITS: [f64; 2] = [3.8415, 5.9915];
 
 /// Locks a rig, and counts it as correct, uncertain or wrong.
 fn lock(scene: &Scene) -> Result<Found, Failure> {
@@ -32,7 +34,7 @@ fn lock(scene: &Scene) -> Result<Found, Failure> {
         let along = [0, 1, 2].map(|i| to[i] - from[i]);
         let share = (-product(from, along) / product(along, along)).clamp(0.0, 1.0);
         let differences = [0, 1, 2].map(|i| from[i] + share * along[i]);
-        let distance = (0.5 * product(differences, differences)).sqrt();
+        let distance = (LIMITS[0] / LIMITS[1] * product(differences, differences)).sqrt();
         (distance, differences, &pair[usize::from(share > 0.5)])
     });
     let nearest = places.min_by(|one, other| one.0.total_cmp(&other.0));

@@ -187,7 +187,7 @@ const SPREAD: f64 = 0.008;
 /// Smallest disturbance of a motion, relative to the response: less than the noise of any rig.
 const SMALLEST: f64 = 1e-6;
 /// Largest phase error of a period that is evaluated, rad: the balances are of the first order in it.
-const PHASE_RANGE: f64 = 0.1;
+pub(crate) const PHASE_RANGE: f64 = 0.1;
 
 /// The locked point of a record; `None` without a motion.
 fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {

@@ -24,7 +24,7 @@ use vines_model::{Measurand, Sensor};
 
 use super::{MeasuredPoint, decimals};
 use crate::identification::{
-    Criterion, Cycle, Harmonic, LAG, LevelEstimate, Line, ResonanceFit, harmonic, regime_by_response,
+    Criterion, Cycle, Harmonic, LAG, LevelEstimate, Line, PHASE_RANGE, ResonanceFit, harmonic, regime_by_response,
 };
 use crate::plan::{Knowledge, LinearResponse, Target};
 use crate::record::Sample;
@@ -127,8 +127,6 @@ const RANGE: f64 = 0.04;
 /// Largest such distance within a window of more periods, whose response is held. A change by twice this is a sweep; so far apart, two points give a
 /// slope.
 const HELD: f64 = 0.005;
-/// Largest phase error of a period, rad: the balances are of the first order in it.
-const PHASE_RANGE: f64 = 0.1;
 /// Largest relative standard uncertainty of the drive of a point.
 const LARGEST_DRIVE_UNCERTAINTY: f64 = 0.2;
 /// Base over its largest amplitude below which it rests, unless the noise is larger.
