@@ -5,7 +5,8 @@
 //! sigma and G, each over its standard uncertainty u, have the smallest sum of squares. Its root is the distance in u, scaled so that 95 % of such
 //! distances, with two degrees of freedom, are below 1.96. A lock is correct within 2e-3 in all three, uncertain within four u, and wrong beyond;
 //! other runs are refused, with a reason. Under a constant drive it is also wrong where the orbit there is unstable and grows by more than the result
-//! says it would show; `unseen` counts locks where it grows by less.
+//! says it would show; `unseen` counts locks where it grows by less. `other_drive` counts locks whose measured drive is another than the requested
+//! one, by more than 2e-3 of it and three u: a response that has not come to rest. The result tells them.
 //!
 //! Arguments: RIGS, SEED, SNR in dB or `none`. Writes validation/locks.csv.
 
@@ -52,11 +53,13 @@ fn lock(scene: &Scene) -> Result<Found, Failure> {
         _ => 2,
     }] = 1;
     counts[4] = usize::from(is_unseen);
-    if counts[0] == 0 || unstable {
+    let is_other = (at.g - d.g).abs() > f64::max(2e-3 * d.g, 3.0 * at.u_g);
+    counts[5] = usize::from(is_other);
+    if counts[0] == 0 || unstable || is_other {
         let (is, held) = (lock.regime, if lock.held { ", held" } else { "" });
         println!(
-            "{d:?}: C {:.5} G {:.5}, {is}{held}: errors {differences:?}, {distance:.1} u; growth {growth:.2e}, unseen {:.2e}",
-            at.c, at.g, lock.unseen_growth
+            "{d:?}: C {:.5} G {:.5} ± {:.5}, {is}{held}: errors {differences:?}, {distance:.1} u; growth {growth:.2e}, unseen {:.2e}",
+            at.c, at.g, at.u_g, lock.unseen_growth
         );
     }
     let periods = Some(record.settled as f64 / scene.controller.samples_per_period);
@@ -71,8 +74,8 @@ fn main() -> Result<(), Failure> {
         rig_with_stable_orbit(&mut uniform, &chain)
     };
     let found = survey(count, scene, lock)?;
-    let ([correct, uncertain, wrong, refused, unseen, _], text) = (counts(&found), statistics(&found));
-    let header = format!("rigs,seed,snr_dB,correct,uncertain,wrong,refused,unseen,{STATISTICS}");
-    let row = format!("{count},{seed},{snr},{correct},{uncertain},{wrong},{refused},{unseen},{text}");
+    let ([correct, uncertain, wrong, refused, unseen, other], text) = (counts(&found), statistics(&found));
+    let header = format!("rigs,seed,snr_dB,correct,uncertain,wrong,refused,unseen,other_drive,{STATISTICS}");
+    let row = format!("{count},{seed},{snr},{correct},{uncertain},{wrong},{refused},{unseen},{other},{text}");
     write("locks", &header, 3, &[row])
 }

@@ -7,10 +7,9 @@
 //!
 //! `correct` counts locks of a constant drive, and `held` locks whose response stays under control, of which the result says so: within 2e-3 of the
 //! measured drive, itself within 2e-3 of the requested one, there is a stable exact orbit within 2e-3 in sigma and C, or within 3 u. Both are
-//! locks at the drive that was asked for. `held_unstable` counts held ones near an orbit that is not stable at a
-//! fixed frequency. A constant drive near such an orbit is `stabilised` if the phase loop keeps it for as long as a disturbance of 1e-6 would need
-//! to grow to 1. Otherwise it is `unseen` if the result says that it does not exclude this growth, and `steady` if it does not say so. `wrong` are
-//! near no orbit.
+//! locks at the drive that was asked for. `held_unstable` counts held ones near an orbit that is not stable at a fixed frequency. A constant drive
+//! near such an orbit is `stabilised` if the phase loop keeps it for as long as a disturbance of 1e-6 would need to grow to 1. Otherwise it is
+//! `unseen` if the result says that it does not exclude this growth, and `steady` if it does not say so. `wrong` are near no orbit.
 //!
 //! Orbits are stable here at a fixed frequency and drive. A phase loop has integral action: it cannot be stable where, under a constant drive, the
 //! response lags less at a higher frequency. The words on a structure say where this is so, and their number counts refusals at such orbits alone.
