@@ -18,7 +18,7 @@ use std::hint::black_box;
 use std::process::Command;
 
 use lovines::{Cavity, Drive, Excitation, Host, Parameters, Plant, Restitution, State, StructureState};
-use vines_benchmarks::structures::CANTILEVER;
+use vines_benchmarks::structures::{CANTILEVER, PLATE};
 
 const OMEGA: f64 = 0.990_417;
 const PERIOD: f64 = TAU / OMEGA;
@@ -231,9 +231,6 @@ fn all(plant: &Plant) {
     black_box((plant.state(), plant.relative_displacement(), plant.relative_velocity()));
     black_box(plant.energy(plant.base_displacement()));
 }
-
-/// Frequencies of a frame or a plate.
-const PLATE: [f64; 8] = [1.0, 2.2, 3.4, 4.7, 6.1, 7.4, 8.6, 9.9];
 
 /// The default rig with further modes, driven near its 1:1 motion for `periods`; 0 modes: the plain solver of one oscillator. Returns the number of
 /// impacts.

@@ -1,4 +1,4 @@
-"""Run time per impact on a structure of 1, 2, 3, 5 and 8 modes: plant, closed form and Brent's method, heyoka, CVODE.
+"""Run time per impact on a cantilever and a plate with 1, 2, 3, 5 and 8 modes: plant, closed form and Brent's method, heyoka, CVODE.
 
     python structures.py --worker PROGRAM -o FILE.csv [--pairs N]      scripts/bench --structures
 
@@ -10,12 +10,14 @@ displacement or velocity at the end; the motion of many modes amplifies them.
 import argparse
 import csv
 import time
+from itertools import product
 from math import cos, nan, sin
 from pathlib import Path
 
 from worker import Worker
 
 HERE = Path(__file__).resolve().parent.parent
+FAMILIES = ("plate", "cantilever")
 MODES = (1, 2, 3, 5, 8)
 RUNS = 9
 
@@ -118,12 +120,12 @@ def main():
     options = parser.parse_args()
     worker = Worker([options.worker, HERE], greets=False)
     rows = []
-    for count in MODES:
+    for family, count in product(FAMILIES, MODES):
         # What interrupts a run only adds to its time.
-        problems = [worker.ask({"structure": count, "pairs": 1}, 60) for _ in range(options.pairs)]
+        problems = [worker.ask({"structure": count, "family": family, "pairs": 1}, 60) for _ in range(options.pairs)]
         problem = problems[-1]
         plant, brent = (min(one["ns_per_impact"][n] for one in problems) for n in (0, 1))
-        row = {"modes": count, "impacts": problem["impacts"][0], "plant_ns_per_impact": round(plant)}
+        row = {"structure": family, "modes": count, "impacts": problem["impacts"][0], "plant_ns_per_impact": round(plant)}
         row |= {"brent_over_plant": f"{brent / plant:.3g}", "brent_difference": f"{problem['brent_off']:.0e}"}
         for name, method in (("heyoka", heyoka), ("cvode_python", cvode)):
             seconds, impacts, off = method(problem)

@@ -74,7 +74,8 @@ fn answer(folder: &Path, request: &str) -> anyhow::Result<Value> {
     } else if asks("record") {
         json!({"drives": cost::record(field(r, "record")?)})
     } else if asks("structure") {
-        structures::compare(field(r, "structure")?, field(r, "pairs")?)?
+        let family: String = field(r, "family")?;
+        structures::compare(&family, field(r, "structure")?, field(r, "pairs")?)?
     } else if asks("closed_loop") {
         cost::closed_loop(field(r, "closed_loop")?, field(r, "budget")?)
     } else if asks("map_g") {

@@ -1,4 +1,4 @@
-//! The default rig with the further modes of a cantilever: the plant and the closed form with Brent's method, in turns, and what other programs need
+//! The default rig with the further modes of a cantilever or a plate: the plant and the closed form with Brent's method, in turns, and what other programs need
 //! to follow the same motion.
 
 use core::f64::consts::TAU;
@@ -14,6 +14,8 @@ use crate::median;
 
 /// Frequencies of a cantilever over its first.
 pub const CANTILEVER: [f64; 8] = [1.0, 6.267, 17.55, 34.39, 56.84, 84.91, 118.6, 157.9];
+/// Frequencies of a frame or a plate over its first.
+pub const PLATE: [f64; 8] = [1.0, 2.2, 3.4, 4.7, 6.1, 7.4, 8.6, 9.9];
 /// Frequency of the drive, and its amplitude.
 const DRIVE: [f64; 2] = [0.990_417, 0.0084 * 1.1];
 /// A start on the steady motion of the first mode: q1, q1', q2, q2'.
@@ -41,8 +43,8 @@ pub fn modes(frequencies: &[f64]) -> Vec<Mode> {
 }
 
 /// Nanoseconds per impact of the plant and of Brent's method, the largest difference of their states at the end, and the problem itself.
-fn measured<const N: usize>(pairs: usize) -> anyhow::Result<Value> {
-    let modes = modes(&CANTILEVER[..N]);
+fn measured<const N: usize>(frequencies: &[f64; 8], pairs: usize) -> anyhow::Result<Value> {
+    let modes = modes(&frequencies[..N]);
     let [q1, dq1, q2, dq2] = LOCK;
     let first = |value: f64| (0..N).map(|n| if n == 0 { value } else { 0.0 }).collect::<Vec<_>>();
     let start = StructureState { displacements: first(q1), velocities: first(dq1), q2, dq2 };
@@ -108,17 +110,22 @@ fn measured<const N: usize>(pairs: usize) -> anyhow::Result<Value> {
     }))
 }
 
-/// The comparison for a number of modes.
+/// The comparison for a number of modes of a family: `cantilever` or `plate`.
 ///
 /// # Errors
-/// Another number of modes.
-pub fn compare(count: usize, pairs: usize) -> anyhow::Result<Value> {
+/// Another number of modes, or another family.
+pub fn compare(family: &str, count: usize, pairs: usize) -> anyhow::Result<Value> {
+    let frequencies = match family {
+        "cantilever" => &CANTILEVER,
+        "plate" => &PLATE,
+        _ => anyhow::bail!("{family}: there are cantilever and plate"),
+    };
     match count {
-        1 => measured::<1>(pairs),
-        2 => measured::<2>(pairs),
-        3 => measured::<3>(pairs),
-        5 => measured::<5>(pairs),
-        8 => measured::<8>(pairs),
+        1 => measured::<1>(frequencies, pairs),
+        2 => measured::<2>(frequencies, pairs),
+        3 => measured::<3>(frequencies, pairs),
+        5 => measured::<5>(frequencies, pairs),
+        8 => measured::<8>(frequencies, pairs),
         _ => anyhow::bail!("{count} modes: there are 1, 2, 3, 5 and 8"),
     }
 }

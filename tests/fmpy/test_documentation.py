@@ -147,6 +147,110 @@ class Shell:
             server.wait()
 
 
+def tables(text: str) -> list[tuple[str, str]]:
+    """Tables, each with the line above it that is not empty."""
+    found, above, table = [], "", []
+    for line in [*re.sub(r"^```.*?^```$", "```", text, flags=re.DOTALL | re.MULTILINE).splitlines(), ""]:
+        if line.lstrip().startswith("|"):
+            table.append(line)
+        else:
+            if table:
+                found.append((above, "\n".join(table[2:])))
+                table = []
+            above = line.strip() or above
+    return found
+
+
+NUMBER = r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+|·10[⁻⁰¹²³⁴-⁹]+)?"
+
+
+def numbers(text: str) -> list[str]:
+    """Numbers of a text outside code, links and names of standards."""
+    text = re.sub(r"`[^`]*`|\]\([^)]*\)|\bFMI \d\.\d", " ", text)
+    return re.findall(rf"(?<![\w.,⁻₀]){NUMBER}(?![\w.]*\w)", text)
+
+
+def value(number: str) -> tuple[float, float]:
+    """A number, without its sign, and half a unit of its last digit."""
+    number = number.lstrip("-+−").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")).replace("·10", "e")
+    mantissa, _, exponent = number.partition("e")
+    digits = len(mantissa.partition(".")[2])
+    return float(number), 0.5 * 10.0 ** (int(exponent or 0) - digits)
+
+
+def is_made(text: str, above: str) -> bool:
+    return bool(numbers(text)) and not above.startswith("<!-- not made by a command: ")
+
+
+def numbered_tables() -> list:
+    made = [
+        pytest.param(above, rows, id=f"{page.name}-{count}")
+        for page in (README, *PAGES)
+        if page.name not in MADE
+        for count, (above, rows) in enumerate(tables(page.read_text()))
+        if is_made(rows, above)
+    ]
+    assert made
+    return made
+
+
+@pytest.mark.parametrize("above, rows", numbered_tables())
+def test_every_number_of_a_table_is_made_by_its_command_or_stands_in_its_file(above, rows, vines, tmp_path):
+    source = re.fullmatch(r"<!-- (by|from): (.*) -->", above)
+    assert source, f"say where the numbers come from, above the table: {rows}"
+    if source[1] == "from":
+        made = "\n".join((ROOT / name).read_text() for name in source[2].split())
+    else:
+        made = output_of(source[2], vines, tmp_path)
+    printed = [value(number)[0] for number in re.findall(NUMBER, made)]
+    missing = []
+    for number in numbers(rows):
+        expected, tolerance = value(number)
+        # A printed number is itself rounded.
+        if not any(abs(one - expected) <= tolerance * (1 + 1e-9) for one in printed):
+            missing.append(number)
+    assert not missing, f"{source[0]}: {missing}"
+
+
+def missing_lines(shown: str, output: str) -> list[str]:
+    """Lines of a block that a program has not printed."""
+    lines = [" ".join(line.split()) for line in output.splitlines()]
+    shown = [" ".join(line.split()) for line in textwrap.dedent(shown).splitlines() if line.strip()]
+    return [line for line in shown if line not in lines]
+
+
+def output_of(commands: str, vines: Path, folder: Path) -> str:
+    """What commands, separated by semicolons, print in a folder with the scenes."""
+    shutil.copytree(ROOT / "scenes", folder / "scenes")
+    shell = Shell(vines, folder)
+    return "\n".join(shell.run(line.strip(), False) for line in commands.split(";"))
+
+
+def printed_blocks() -> list[tuple[Path, str, str]]:
+    """Text blocks of pages that no command of their page prints: page, line above, text."""
+    found = []
+    for page in (README, *PAGES):
+        runs = False
+        for above, kind, text in re.findall(
+            r"^([^\n]*)\n```([\w,]*)\n(.*?)^```$", page.read_text(), re.DOTALL | re.MULTILINE
+        ):
+            language, *flags = kind.split(",")
+            runs = runs or (language == "sh" and "norun" not in flags and page != README)
+            if language == "text" and (not runs or above.startswith("<!--")):
+                found.append((page, above, text))
+    return found
+
+
+@pytest.mark.parametrize("page, above, text", printed_blocks())
+def test_a_block_that_no_command_of_its_page_prints_says_what_does(page, above, text, vines, tmp_path):
+    if above.startswith("<!-- not made by a command: "):
+        return
+    command = re.fullmatch("<!-- by: (.*) -->", above)
+    assert command, f"{page.name}: say what prints this, in the line above: {text}"
+    missing = missing_lines(text, output_of(command[1], vines, tmp_path))
+    assert not missing, f"{page.name} shows what the program does not print: {missing}"
+
+
 def git(*words: str | Path) -> str:
     return subprocess.run(["git", *words], check=True, capture_output=True, text=True).stdout
 
@@ -165,13 +269,12 @@ def test_the_commands_of_a_page_run_in_a_clone_print_what_it_shows_and_leave_the
                 (shell.folder / name[1]).write_text(text)
             language, *flags = kind.split(",")
             if language == "sh" and "norun" not in flags:
-                for line in text.replace("\\\n", " ").splitlines():
-                    if line.strip() and not line.startswith("#"):
-                        output = shell.run(line, "fails" in flags) + output
+                lines = text.replace("\\\n", " ").splitlines()
+                output = "".join(
+                    shell.run(line, "fails" in flags) for line in lines if line.strip() and not line.startswith("#")
+                )
             elif language == "text" and output:
-                lines = [" ".join(line.split()) for line in output.splitlines()]
-                shown = [" ".join(line.split()) for line in textwrap.dedent(text).splitlines() if line.strip()]
-                missing = [line for line in shown if line not in lines]
+                missing = missing_lines(text, output)
                 assert not missing, f"{page.name} shows what the program does not print: {missing}"
     finally:
         shell.close()
