@@ -8,7 +8,10 @@
 //! Sources: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems", PhD thesis, UC Berkeley 1996, chapter 2
 //! (conservative advancement); R. E. Moore, "Interval Analysis", Prentice-Hall 1966 (bounding by Taylor's remainder).
 
-use crate::segment::Look;
+use core::ops::Index;
+
+/// What is known of a motion at one instant: by index, position and its first six derivatives; and what its bounds follow from.
+pub trait Look: Copy + Index<usize, Output = f64> {}
 
 /// A gap and how it closes now: `g(t+h) = gap - closing h - acceleration h²/2 - jerk h³/6 - ...`
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,6 @@
-//! What the system is made of, in SI units, validated once.
+//! What the system is made of, in SI units. Its values are checked by the rows of `table.rs`.
 
 use core::fmt;
-
-use crate::table::{self, Range};
 
 /// Fastest rate that is accepted, rad/s: the series of the motion contain its powers, up to the fifteenth.
 pub(crate) const FASTEST: f64 = 1e12;
@@ -65,26 +63,6 @@ impl Parameters {
     pub fn gaps(&self) -> [f64; 2] {
         [self.cavity.b_plus, self.cavity.b_minus].map(|gap| gap.unwrap_or(self.half_width))
     }
-
-    /// Checks every value and the rates that follow from them.
-    ///
-    /// # Errors
-    /// The first invalid value, with its unit and the allowed range.
-    pub fn validate(&self) -> Result<(), InvalidValue> {
-        table::check(self)?;
-        let rate = |name, value: f64, least, allowed| {
-            InvalidValue::unless((least..=FASTEST).contains(&value), name, value, "rad/s", allowed)
-        };
-        let name = "sqrt(k/M) (natural frequency)";
-        rate(name, self.natural_frequency(), 1e-12, "a number from 1e-12 to 1e12")?;
-        rate(
-            "c/M (decay rate)",
-            self.damping / self.primary_mass,
-            0.0,
-            "at most 1e12 rad/s",
-        )?;
-        self.cavity.validate()
-    }
 }
 
 /// How a wall returns the particle: the coefficient of restitution `r` at the speed of approach `v`.
@@ -97,24 +75,6 @@ pub enum Restitution {
     Viscoelastic(f64),
     /// `r = min(1, (v/v_y)^(-1/4))`, with the yield speed `v_y` in m/s: plastic impact (Johnson, "Contact Mechanics", 1985, chapter 11).
     Plastic(f64),
-}
-
-impl Restitution {
-    /// Refuses a parameter that is not allowed for this law.
-    fn validate(self) -> Result<(), InvalidValue> {
-        let (name, value, unit, range) = match self {
-            Self::Constant(r) => ("r of a wall (coefficient of restitution)", r, "", Range::Ratio),
-            Self::Viscoelastic(k) => (
-                "k of a wall (viscoelastic restitution)",
-                k,
-                "(s/m)^(1/5)",
-                Range::NotNegative,
-            ),
-            Self::Plastic(v) => ("v_y of a wall (yield speed)", v, "m/s", Range::Positive),
-        };
-        let [low, high] = range.bounds();
-        InvalidValue::unless((low..=high).contains(&value), name, value, unit, range.allowed())
-    }
 }
 
 /// What distinguishes a real cavity from the ideal one. The default is the ideal one.
@@ -154,17 +114,6 @@ impl Cavity {
         scatter: 0.0,
         seed: 0,
     };
-
-    /// Refuses values that contradict each other.
-    fn validate(&self) -> Result<(), InvalidValue> {
-        let mu = self.kinetic_friction;
-        let (held, allowed) = (self.static_friction.unwrap_or(mu), "a number from mu_k to 100");
-        InvalidValue::unless(held >= mu, "mu_s (static friction)", held, "", allowed)?;
-        self.restitution
-            .into_iter()
-            .flatten()
-            .try_for_each(Restitution::validate)
-    }
 }
 
 impl Default for Cavity {

@@ -5,11 +5,9 @@
 //! motion its Taylor series about the start is summed instead. It keeps the *relative* digits of what has changed since the
 //! start, which is what a particle hopping on its wall is made of.
 
-use core::ops::Index;
-
 use crate::arithmetic::sincos_of_product;
 use crate::base_motion::BaseMotion;
-use crate::clearance::Gap;
+use crate::clearance::{Gap, Look};
 use crate::forcing::Forcing;
 use crate::oscillator::{Oscillator, is_apart, pushed};
 use num_complex::Complex64;
@@ -20,9 +18,6 @@ pub(crate) const SERIES_DEGREE: usize = 15;
 
 /// Position and its first six derivatives.
 pub type Derivatives = [f64; 7];
-
-/// What is known of a motion at one instant: by index, position and its first six derivatives; and what its bounds follow from.
-pub trait Look: Copy + Index<usize, Output = f64> {}
 
 impl Look for Derivatives {}
 

@@ -10,7 +10,7 @@ use num_complex::Complex64;
 
 use crate::arithmetic::Sums;
 use crate::base_motion::{BaseMotion, Drive, shift};
-use crate::clearance::Gap;
+use crate::clearance::{Gap, Look};
 use crate::contact::Wall;
 use crate::flight::{FlightEnd, Sticking};
 use crate::forcing::Forcing;
@@ -19,7 +19,7 @@ use crate::oscillator::{Oscillator, Regime, is_apart};
 use crate::parameters::{InvalidValue, Parameters};
 use crate::plant::Plant;
 use crate::primary::Primary;
-use crate::segment::{Derivatives, Instant, Look, Motion, SERIES_DEGREE, SERIES_REACH, Series, phasor};
+use crate::segment::{Derivatives, Instant, Motion, SERIES_DEGREE, SERIES_REACH, Series, phasor};
 use crate::system::{Masses, Moving, System};
 
 /// A structure with the state of its sections.

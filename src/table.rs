@@ -6,7 +6,7 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use crate::parameters::{Cavity, InvalidValue, Parameters, Restitution};
+use crate::parameters::{Cavity, FASTEST, InvalidValue, Parameters, Restitution};
 
 /// Numbers that a parameter may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -254,6 +254,59 @@ pub(crate) fn check(p: &Parameters) -> Result<(), InvalidValue> {
     let values = Values::from(p);
     let mut given = values.given().filter(|(row, _)| !matches!(row.place, Place::Seed));
     given.try_for_each(|(row, value)| row.check(value))
+}
+
+impl Parameters {
+    /// Checks every value and the rates that follow from them.
+    ///
+    /// # Errors
+    /// The first invalid value, with its unit and the allowed range.
+    pub fn validate(&self) -> Result<(), InvalidValue> {
+        check(self)?;
+        let rate = |name, value: f64, least, allowed| {
+            InvalidValue::unless((least..=FASTEST).contains(&value), name, value, "rad/s", allowed)
+        };
+        let name = "sqrt(k/M) (natural frequency)";
+        rate(name, self.natural_frequency(), 1e-12, "a number from 1e-12 to 1e12")?;
+        rate(
+            "c/M (decay rate)",
+            self.damping / self.primary_mass,
+            0.0,
+            "at most 1e12 rad/s",
+        )?;
+        self.cavity.validate()
+    }
+}
+
+impl Restitution {
+    /// Refuses a parameter that is not allowed for this law.
+    fn validate(self) -> Result<(), InvalidValue> {
+        let (name, value, unit, range) = match self {
+            Self::Constant(r) => ("r of a wall (coefficient of restitution)", r, "", Range::Ratio),
+            Self::Viscoelastic(k) => (
+                "k of a wall (viscoelastic restitution)",
+                k,
+                "(s/m)^(1/5)",
+                Range::NotNegative,
+            ),
+            Self::Plastic(v) => ("v_y of a wall (yield speed)", v, "m/s", Range::Positive),
+        };
+        let [low, high] = range.bounds();
+        InvalidValue::unless((low..=high).contains(&value), name, value, unit, range.allowed())
+    }
+}
+
+impl Cavity {
+    /// Refuses values that contradict each other.
+    fn validate(&self) -> Result<(), InvalidValue> {
+        let mu = self.kinetic_friction;
+        let (held, allowed) = (self.static_friction.unwrap_or(mu), "a number from mu_k to 100");
+        InvalidValue::unless(held >= mu, "mu_s (static friction)", held, "", allowed)?;
+        self.restitution
+            .into_iter()
+            .flatten()
+            .try_for_each(Restitution::validate)
+    }
 }
 
 #[cfg(test)]

@@ -2,7 +2,6 @@
 
 import { csv, link } from "./link.js";
 import { sound } from "./sound.js";
-import { begin, slug } from "./story.js";
 
 export const SPEEDS = [0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30];
 
@@ -47,17 +46,6 @@ export function control(page, { key, symbol, name, unit, min, max, step, help })
   input.onchange = () => set(input.value === "" ? NaN : Number(input.value));
   box.append(label, input, slider);
   return box;
-}
-
-// The list of scenes, in groups.
-export function bindScenes(page) {
-  const { scenes } = page.table;
-  $("scene").replaceChildren(...[...new Set(scenes.map((scene) => scene.group))].map((label) => {
-    const group = Object.assign(document.createElement("optgroup"), { label });
-    group.append(...scenes.filter((scene) => scene.group === label).map((scene) => new Option(scene.name, slug(scene))));
-    return group;
-  }));
-  $("scene").onchange = () => { say(""); begin(page, scenes.find((scene) => slug(scene) === $("scene").value)); };
 }
 
 // Buttons and keys.

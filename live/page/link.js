@@ -1,6 +1,7 @@
 // The link, which contains the settings and, if it fits, the motion; the record as CSV.
 
-import { slug } from "./story.js";
+// The scene of a link.
+export const slug = ({ name }) => name.toLowerCase().replace(/[^a-z0-9]+/g, "-");
 
 // Changes that a link repeats; more would make it too long.
 const MOST_CHANGES = 150;

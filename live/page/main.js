@@ -1,10 +1,10 @@
 // The start of the page: on the module, or on an experiment that `vines ... --watch` serves.
 
 import { $, bind, say } from "./controls.js";
-import { read } from "./link.js";
+import { read, slug } from "./link.js";
 import { load } from "./module.js";
 import { Page, calm } from "./page.js";
-import { begin, judge, slug, story } from "./story.js";
+import { begin, judge, story } from "./story.js";
 import { Watching } from "./watch.js";
 
 // Starts what the address asks for.

@@ -1,8 +1,9 @@
 // The page: clock, motion and changes.
 
-import { $, SPEEDS, bindScenes, control, say } from "./controls.js";
+import { $, SPEEDS, control, say } from "./controls.js";
 import { MINUTE, Pictures } from "./pictures.js";
 import { Record } from "./record.js";
+import { bindScenes } from "./story.js";
 
 // Most samples in one frame: a slower machine falls behind the clock instead of freezing the page.
 const MOST_SAMPLES = 6000;

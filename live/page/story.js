@@ -1,6 +1,7 @@
 // The panel above the bench: the introduction in three steps, shown once, and what to try in a scene.
 
-import { $, SPEEDS } from "./controls.js";
+import { $, SPEEDS, say } from "./controls.js";
+import { slug } from "./link.js";
 
 const KEY = "vines-story";
 const INTRODUCTION = [
@@ -36,9 +37,6 @@ function introduce(page, step) {
   begin(page);
 }
 
-// The scene of a link.
-export const slug = ({ name }) => name.toLowerCase().replace(/[^a-z0-9]+/g, "-");
-
 // Starts a scene `scene.from` seconds after its start, and says what to try. The button does it, or shows how a challenge is solved: by
 // the changes `scene.tries`, [seconds from now, setting, value]. `scene.after` seconds later the motion is the last of `scene.shows`.
 export function begin(page, scene) {
@@ -57,6 +55,17 @@ export function begin(page, scene) {
     page.play(true);
   };
   panel(scene.name, scene.help, tries ? (goal ? "Show how" : "Do it") : "", act, "Close", () => { $("story").hidden = true; page.challenge = undefined; });
+}
+
+// The list of scenes, in groups.
+export function bindScenes(page) {
+  const { scenes } = page.table;
+  $("scene").replaceChildren(...[...new Set(scenes.map((scene) => scene.group))].map((label) => {
+    const group = Object.assign(document.createElement("optgroup"), { label });
+    group.append(...scenes.filter((scene) => scene.group === label).map((scene) => new Option(scene.name, slug(scene))));
+    return group;
+  }));
+  $("scene").onchange = () => { say(""); begin(page, scenes.find((scene) => slug(scene) === $("scene").value)); };
 }
 
 // Whether the challenge is solved: its regime, and the ranges of its settings and numbers.

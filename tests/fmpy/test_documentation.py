@@ -161,18 +161,18 @@ def tables(text: str) -> list[tuple[str, str]]:
     return found
 
 
-NUMBER = r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+|·10[⁻⁰¹²³⁴-⁹]+)?"
+NUMBER = r"\d+(?:\.\d+)?(?:e[-+]?\d+|·10[⁻⁰¹²³⁴-⁹]+)?"
 
 
 def numbers(text: str) -> list[str]:
-    """Numbers of a text outside code, links and names of standards."""
+    """Numbers, without their signs, of a text outside code, links and names of standards."""
     text = re.sub(r"`[^`]*`|\]\([^)]*\)|\bFMI \d\.\d", " ", text)
     return re.findall(rf"(?<![\w.,⁻₀]){NUMBER}(?![\w.]*\w)", text)
 
 
 def value(number: str) -> tuple[float, float]:
-    """A number, without its sign, and half a unit of its last digit."""
-    number = number.lstrip("-+−").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")).replace("·10", "e")
+    """A number and half a unit of its last digit."""
+    number = number.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")).replace("·10", "e")
     mantissa, _, exponent = number.partition("e")
     digits = len(mantissa.partition(".")[2])
     return float(number), 0.5 * 10.0 ** (int(exponent or 0) - digits)
@@ -194,7 +194,7 @@ def numbered_tables() -> list:
     return made
 
 
-@pytest.mark.parametrize("above, rows", numbered_tables())
+@pytest.mark.parametrize(("above", "rows"), numbered_tables())
 def test_every_number_of_a_table_is_made_by_its_command_or_stands_in_its_file(above, rows, vines, tmp_path):
     source = re.fullmatch(r"<!-- (by|from): (.*) -->", above)
     assert source, f"say where the numbers come from, above the table: {rows}"
@@ -241,7 +241,7 @@ def printed_blocks() -> list[tuple[Path, str, str]]:
     return found
 
 
-@pytest.mark.parametrize("page, above, text", printed_blocks())
+@pytest.mark.parametrize(("page", "above", "text"), printed_blocks())
 def test_a_block_that_no_command_of_its_page_prints_says_what_does(page, above, text, vines, tmp_path):
     if above.startswith("<!-- not made by a command: "):
         return
