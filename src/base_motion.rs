@@ -9,8 +9,6 @@ use crate::parameters::{FASTEST, InvalidValue};
 /// 2π as the nearest double and its rounding error.
 const TAU: (f64, f64) = (core::f64::consts::TAU, 2.449_293_598_294_706_5e-16);
 
-/// Largest coefficient of a drive, in SI units.
-const LARGEST: f64 = 1e100;
 const ALLOWED: &str = "a finite number from -1e100 to 1e100";
 
 /// What drives the base during one communication step: held until it is changed.
@@ -27,6 +25,11 @@ pub struct Drive {
 }
 
 impl Drive {
+    /// Largest coefficient, in SI units.
+    pub const LARGEST: f64 = 1e100;
+    /// Highest frequency of the oscillator, rad/s.
+    pub const FASTEST: f64 = FASTEST;
+
     /// A harmonic base motion from the built-in oscillator alone.
     #[inline]
     pub fn harmonic(amplitude: f64, omega: f64) -> Self {
@@ -47,9 +50,20 @@ impl Drive {
 
     /// Whether the signal is constant.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub(crate) fn is_held(&self) -> bool {
+    pub fn is_held(&self) -> bool {
         let [_, u1, u2, u3] = self.signal.map(f64::to_bits);
         (u1 | u2 | u3) << 1 == 0
+    }
+
+    /// A step of `duration` seconds under this drive as equal steps of at most `longest` seconds, but for rounding: drive and length of each.
+    /// The phase of the oscillator continues from step to step.
+    pub fn parts(self, duration: f64, longest: f64) -> impl Iterator<Item = (Self, f64)> {
+        let count = (duration / longest * (1.0 - 1e-9)).ceil().max(1.0);
+        let part = duration / count;
+        (0..count as u64).map(move |n| {
+            let begin = n as f64 * part;
+            (Self { signal: shift(self.signal, begin), ..self }, part)
+        })
     }
 
     /// Checks every value.
@@ -61,7 +75,7 @@ impl Drive {
         let [u0, u1, u2, u3] = self.signal.map(|u| u * u);
         // The sum is not a number if one of them is not.
         let sum = (u0 + u2) + (u1 + u3) + self.amplitude * self.amplitude;
-        if sum < LARGEST * LARGEST {
+        if sum < Self::LARGEST * Self::LARGEST {
             return self.validate_frequency();
         }
         self.explain()
@@ -85,10 +99,16 @@ impl Drive {
             ("der(e, 3)/6 (third-order coefficient of the base signal)", "m/s^3"),
         ];
         for (value, (name, unit)) in self.signal.into_iter().zip(NAMES) {
-            InvalidValue::unless(value.abs() <= LARGEST, name, value, unit, ALLOWED)?;
+            InvalidValue::unless(value.abs() <= Self::LARGEST, name, value, unit, ALLOWED)?;
         }
         let name = "E (amplitude of the base oscillator)";
-        InvalidValue::unless(self.amplitude.abs() <= LARGEST, name, self.amplitude, "m", ALLOWED)?;
+        InvalidValue::unless(
+            self.amplitude.abs() <= Self::LARGEST,
+            name,
+            self.amplitude,
+            "m",
+            ALLOWED,
+        )?;
         let name = "omega (frequency of the base oscillator)";
         let allowed = "a finite number from -1e12 to 1e12";
         InvalidValue::unless(self.omega.abs() <= FASTEST, name, self.omega, "rad/s", allowed)
@@ -182,6 +202,27 @@ mod tests {
                 assert!((0.0..TAU.0).contains(&phase), "{omega} {t}: {phase}");
             }
         }
+    }
+
+    #[test]
+    fn parts_of_a_step_are_equal_and_short_enough_and_follow_its_signal() {
+        let drive = Drive { signal: [1.0, -0.5, 2.0, 0.25], amplitude: 0.3, omega: 7.0 };
+        let whole = BaseMotion { drive, ..BaseMotion::default() }.after(1.0);
+        for (longest, count) in [(f64::INFINITY, 1), (1.0, 1), (0.5, 2), (0.1, 10), (0.3, 4)] {
+            let parts: Vec<_> = drive.parts(1.0, longest).collect();
+            assert_eq!(parts.len(), count);
+            assert!(
+                parts
+                    .iter()
+                    .all(|(_, part)| *part == 1.0 / count as f64 && *part <= longest)
+            );
+            let ended = parts.iter().fold(BaseMotion::default(), |base, (drive, part)| {
+                BaseMotion { drive: *drive, ..base }.after(*part)
+            });
+            assert!((ended.drive.signal[0] - whole.drive.signal[0]).abs() < 1e-14);
+            assert!((ended.phase.radians() - whole.phase.radians()).abs() < 1e-14);
+        }
+        assert_eq!(drive.parts(1.0, 1.0).next(), Some((drive, 1.0)));
     }
 
     #[test]

@@ -100,6 +100,7 @@ impl<C> Handle<C> {
 }
 
 impl From<()> for Status {
+    #[inline]
     fn from((): ()) -> Self {
         Self::Ok
     }

@@ -37,6 +37,7 @@ macro_rules! states {
                 }
             }
 
+            #[inline]
             const fn bit(self) -> u16 {
                 1 << self as u8
             }
@@ -73,6 +74,7 @@ impl States {
         Self(bits)
     }
 
+    #[inline]
     pub(crate) const fn contains(self, state: State) -> bool {
         self.0 & state.bit() != 0
     }
@@ -100,6 +102,7 @@ macro_rules! functions {
             pub(crate) const ALL: &'static [Self] = &[$(Self::$function),*];
 
             /// The states that it is legal in.
+            #[inline]
             pub(crate) const fn legal_in(self) -> States {
                 match self {
                     $(Self::$function => const { States::of(&[$(State::$state),*]) },)*
@@ -152,6 +155,7 @@ functions! {
 
 impl Function {
     /// The interface that alone has it; none where both do.
+    #[inline]
     pub(crate) const fn only_in(self) -> Option<Interface> {
         match self {
             Self::SetRealInputDerivatives

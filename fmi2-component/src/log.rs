@@ -73,6 +73,7 @@ impl Log {
     }
 
     /// Whether lines of `category` are wanted.
+    #[inline]
     pub fn wants(&self, category: Category) -> bool {
         self.enabled & category.bit != 0
     }

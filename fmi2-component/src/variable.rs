@@ -123,12 +123,14 @@ impl<T> Variable<T> {
     /// Whether a master may set it in `state`, among states in which setting is legal at all.
     #[inline]
     pub(crate) const fn settable_in(&self, state: State) -> bool {
-        match state {
-            State::Instantiated => self.settable_at_start(false),
-            State::InitializationMode => self.settable_at_start(true),
-            State::ContinuousTimeMode => self.settable_in_continuous_time(),
-            _ => self.settable_between_steps(),
-        }
+        // A continuous input may be set in each of these states.
+        self.settable_in_continuous_time()
+            || match state {
+                State::Instantiated => self.settable_at_start(false),
+                State::InitializationMode => self.settable_at_start(true),
+                State::ContinuousTimeMode => false,
+                _ => self.settable_between_steps(),
+            }
     }
 
     /// Whether its value is the component's to compute, not the master's to set.

@@ -17,14 +17,13 @@ use crate::reach::lost;
 use fmi2_component::{Archive, Component, Key, Log, Refusal, Resources};
 use lovines::plant::Contact;
 use lovines::table::Values;
-use lovines::{BaseMotion, Drive, Parameters, Plant, State, Structure};
+use lovines::{BaseMotion, Drive, Outcome, Parameters, Plant, State, Structure};
 use outputs::Outputs;
 use reach::Reach;
-use std::cell::Cell;
 use std::ops::Range;
 use std::sync::Arc;
 use structure::Adopted;
-use variables::{Integer, Model, Real, category};
+use variables::{Integer, Model, Real};
 
 mod variables {
     include!(concat!(env!("OUT_DIR"), "/variables.rs"));
@@ -37,7 +36,7 @@ fmi2_component::export!(LoViNes, model_exchange);
 struct LoViNes {
     simulation: Simulation,
     /// What moves the base; the derivatives of its signal hold for one step.
-    drive: Drive,
+    inputs: Inputs,
     /// Whether an input was set since the last step: the inputs then determine the base, not the end of the step.
     inputs_set: bool,
     /// Progress of the simulation.
@@ -46,13 +45,8 @@ struct LoViNes {
     outputs: Outputs,
     /// The mass ratio m/M.
     epsilon: f64,
-    /// The fastest rate of the motion without that of the drive, rad/s.
-    fastest: f64,
     #[serde(skip)]
     reach: Reach,
-    /// The longest step that has been found acceptable with these parameters and inputs, s; NaN before.
-    #[serde(skip, default = "unknown")]
-    longest: Cell<f64>,
     /// What was set, and the parameters of the rig: those set last that did not contradict each other.
     values: Values,
     /// Whether what was set is known not to contradict itself.
@@ -65,8 +59,25 @@ struct LoViNes {
     adopted: Option<Arc<Adopted>>,
 }
 
-fn unknown() -> Cell<f64> {
-    Cell::new(f64::NAN)
+/// What a master sets of the drive. Its time derivatives are coefficients of a Taylor polynomial, as in [`Drive`].
+///
+/// Amplitude and frequency are not side by side, as they are in [`Drive`]: one load of both would have to wait until the stores of both have
+/// reached the cache, which takes as long as a step.
+#[derive(Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
+#[repr(C)]
+struct Inputs {
+    amplitude: f64,
+    signal: f64,
+    omega: f64,
+    derivatives: [f64; 3],
+}
+
+impl Inputs {
+    #[inline]
+    fn drive(&self) -> Drive {
+        let Self { amplitude, signal, omega, derivatives: [u1, u2, u3] } = *self;
+        Drive { signal: [signal, u1, u2, u3], amplitude, omega }
+    }
 }
 
 /// The simulation for the interface that the master has chosen.
@@ -114,14 +125,12 @@ impl Component for LoViNes {
         let start = State::default();
         Self {
             simulation: Simulation::Steps(Plant::new(parameters, start).expect("unit parameters make sense")),
-            drive: Drive::default(),
+            inputs: Inputs::default(),
             inputs_set: false,
             progress: Progress::None,
             outputs: Outputs::default(),
             epsilon: 1.0,
-            fastest: 0.0,
             reach: Reach::default(),
-            longest: unknown(),
             parameters,
             values: Values::from(&parameters),
             valid: false,
@@ -156,9 +165,9 @@ impl Component for LoViNes {
     #[inline]
     fn set_real(&mut self, variable: Real, value: f64) -> Result<(), Refusal> {
         let input = match variable {
-            Real::e => &mut self.drive.signal[0],
-            Real::E => &mut self.drive.amplitude,
-            Real::omega => &mut self.drive.omega,
+            Real::e => &mut self.inputs.signal,
+            Real::E => &mut self.inputs.amplitude,
+            Real::omega => &mut self.inputs.omega,
             _ => return self.configure(variable, value),
         };
         // Masters set all inputs before every step, whether they have changed or not.
@@ -195,12 +204,11 @@ impl Component for LoViNes {
             plant => {
                 self.reach.check(&self.start)?;
                 plant.set_time(start_time);
-                plant.begin(self.drive)?;
+                plant.begin(self.inputs.drive())?;
             },
             else hybrid => hybrid.time = start_time
         );
         self.epsilon = self.parameters.mass_ratio();
-        self.longest = unknown();
         self.progress = Progress::Initialised;
         self.inputs_set = false;
         self.outputs = Outputs::default();
@@ -216,58 +224,21 @@ impl Component for LoViNes {
 
     #[inline]
     fn accept_step(&self, step: f64) -> Result<(), Refusal> {
-        if step <= self.longest.get() {
-            return Ok(());
-        }
-        self.judge(step)
+        if self.accepts(step) { Ok(()) } else { self.judge(step) }
     }
 
     #[inline]
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
-        let limit = self.largest_drive();
         let outcome = match &mut self.simulation {
             Simulation::Steps(plant) => {
                 plant.set_time(time);
-                // One call for both cases: each is a copy of the plant's code.
-                let logs = log.wants(category::logEvents) || log.wants(category::logImpacts);
-                plant.advance_with(self.drive, step, |event| {
-                    if logs {
-                        log::tell(log, time, event);
-                    }
-                })?
+                // Lines that are not wanted are not written: one copy of the plant's code for both cases.
+                plant.advance_with(self.inputs.drive(), step, |event| log::tell(log, time, event))?
             }
-            Simulation::Structure(plant) => {
-                plant.set_time(time);
-                structure::step(plant, limit, self.drive, step, log)?
-            }
+            Simulation::Structure(_) => return self.step_of_structure(time, step, log),
             Simulation::Equations(_) => return Err(Refusal::error("steps exist in co-simulation only")),
         };
-        let [_, derivatives @ ..] = self.drive.signal;
-        if derivatives != [0.0; 3] {
-            // The signal stays where its polynomial has led.
-            let led = match &self.simulation {
-                Simulation::Steps(plant) => plant.base().drive,
-                // Whether it was clipped or not.
-                _ => {
-                    BaseMotion { drive: self.drive, ..BaseMotion::default() }
-                        .after(step)
-                        .drive
-                }
-            };
-            self.drive.signal = [led.signal[0], 0.0, 0.0, 0.0];
-            self.longest = unknown();
-        }
-        self.progress = Progress::UnderWay;
-        self.inputs_set = false;
-        let resolved = self.keep_outputs();
-        if outcome.cut_short || !resolved {
-            self.outputs = Outputs::default();
-            return Err(lost(resolved, time, step, &outcome));
-        }
-        match (&self.adopted, &self.simulation) {
-            (Some(adopted), Simulation::Structure(plant)) => adopted.check(plant),
-            _ => Ok(()),
-        }
+        self.finish(time, step, &outcome)
     }
 
     fn set_real_input_derivative(&mut self, variable: Real, order: u32, value: f64, log: &Log) -> Result<(), Refusal> {
@@ -288,13 +259,12 @@ impl Component for LoViNes {
             }
             return Ok(());
         }
-        self.longest = unknown();
         // The coefficients of a Taylor polynomial.
-        let signal = &mut self.drive.signal;
+        let derivatives = &mut self.inputs.derivatives;
         match order {
-            1 => signal[1] = value,
-            2 => signal[2] = value / 2.0,
-            _ => signal[3] = value / 6.0,
+            1 => derivatives[0] = value,
+            2 => derivatives[1] = value / 2.0,
+            _ => derivatives[2] = value / 6.0,
         }
         Ok(())
     }
@@ -338,10 +308,37 @@ impl LoViNes {
         }
         match &mut self.simulation {
             Simulation::Steps(plant) => *plant = Plant::new(self.parameters, self.start)?,
-            Simulation::Equations(hybrid) => *hybrid = Hybrid::new(self.parameters, self.start, self.drive)?,
+            Simulation::Equations(hybrid) => *hybrid = Hybrid::new(self.parameters, self.start, self.inputs.drive())?,
             Simulation::Structure(_) => {}
         }
         Ok(())
+    }
+
+    /// What follows the motion of every step.
+    #[inline(always)]
+    fn finish(&mut self, time: f64, step: f64, outcome: &Outcome) -> Result<(), Refusal> {
+        if !self.inputs.drive().is_held() {
+            self.hold_signal(step);
+        }
+        self.progress = Progress::UnderWay;
+        self.inputs_set = false;
+        let resolved = self.keep_outputs();
+        if outcome.cut_short || !resolved {
+            self.outputs = Outputs::default();
+            return Err(lost(resolved, time, step, outcome));
+        }
+        Ok(())
+    }
+
+    /// The signal stays where its polynomial has led in a step.
+    #[inline(never)]
+    fn hold_signal(&mut self, step: f64) {
+        let led = match &self.simulation {
+            Simulation::Steps(plant) => plant.base(),
+            // Whether it was clipped or not.
+            _ => BaseMotion { drive: self.inputs.drive(), ..BaseMotion::default() }.after(step),
+        };
+        (self.inputs.signal, self.inputs.derivatives) = (led.drive.signal[0], [0.0; 3]);
     }
 
     fn archive_oscillator(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {

@@ -1,6 +1,6 @@
 //! Events as lines for the master's log.
 
-use super::category;
+use super::variables::category;
 use crate::model_exchange::hybrid::Rest;
 use fmi2_component::Log;
 use lovines::{Event, Wall};

@@ -159,7 +159,7 @@ impl LoViNes {
     /// The present base with the present inputs.
     pub(super) fn base_motion(&self, base: BaseMotion) -> BaseMotion {
         if self.inputs_set {
-            BaseMotion { drive: self.drive, ..base }
+            BaseMotion { drive: self.inputs.drive(), ..base }
         } else {
             base
         }

@@ -18,6 +18,11 @@ pub(super) struct Reach {
     velocity: f64,
     /// Displacement of the cavity that a constant drive gives, m per unit: 1 for a base.
     per_drive: f64,
+    /// The largest sum of a held signal and an amplitude, m or N or V.
+    drive: f64,
+    /// The fastest rate of the motion without that of the drive, rad/s, and its inverse.
+    fastest: f64,
+    briefest: f64,
     /// The middle between the walls and half their distance, m.
     cavity: (f64, f64),
 }
@@ -32,6 +37,9 @@ impl Reach {
             displacement,
             velocity: displacement * fastest,
             per_drive,
+            drive: Drive::LARGEST.min(displacement / per_drive),
+            fastest,
+            briefest: 1.0 / fastest,
         }
     }
 
@@ -47,15 +55,29 @@ impl Reach {
         (w - self.cavity.0).abs() <= self.cavity.1
     }
 
-    /// Whether the base stays within for `span` seconds under `drive`.
+    /// Whether a step is short enough under a drive of the frequency `omega`, rad/s.
     #[inline]
-    pub fn holds_base(&self, drive: &Drive, span: f64) -> bool {
-        let [u0, derivatives @ ..] = drive.signal;
-        let moved = if derivatives == [0.0; 3] {
+    fn holds_step(&self, step: f64, omega: f64) -> bool {
+        step * self.fastest <= LONGEST_STEP && step * omega.abs() <= LONGEST_STEP
+    }
+
+    /// Whether a held drive is within its limits.
+    #[inline]
+    fn holds_held(&self, drive: &Drive) -> bool {
+        drive.is_held()
+            && drive.signal[0].abs() + drive.amplitude.abs() < self.drive
+            && drive.omega.abs() < Drive::FASTEST
+    }
+
+    /// Whether the base stays within during a step under `drive`.
+    fn holds_base(&self, drive: &Drive, step: f64) -> bool {
+        let [u0, u1, u2, u3] = drive.signal;
+        let moved = if drive.is_held() {
             0.0
         } else {
-            let [u1, u2, u3] = derivatives.map(f64::abs);
-            span * (u1 + span * (u2 + span * u3))
+            // However short the step: derivatives of the base displacement cause forces.
+            let span = step.max(self.briefest);
+            span * (u1.abs() + span * (u2.abs() + span * u3.abs()))
         };
         (u0.abs() + drive.amplitude.abs() + moved) * self.per_drive <= self.displacement
     }
@@ -118,20 +140,25 @@ fn too_long(step: f64, rate: f64) -> Refusal {
 }
 
 impl LoViNes {
-    /// Whether a step can be done; steps up to that length need not be checked again.
+    /// Whether a step can certainly be done, as most can: with held inputs. [`Self::judge`] decides on all others.
+    #[inline]
+    pub(super) fn accepts(&self, step: f64) -> bool {
+        let drive = self.inputs.drive();
+        self.valid && self.reach.holds_step(step, drive.omega) && self.reach.holds_held(&drive)
+    }
+
+    /// Refuses a step that cannot be done.
     #[inline(never)]
     pub(super) fn judge(&self, step: f64) -> Result<(), Refusal> {
+        let drive = self.inputs.drive();
         self.check_settings()?;
-        let rate = self.fastest.max(self.drive.omega.abs());
-        self.drive.validate()?;
-        if step * rate > LONGEST_STEP {
-            return Err(too_long(step, rate));
+        drive.validate()?;
+        if !self.reach.holds_step(step, drive.omega) {
+            return Err(too_long(step, self.reach.fastest.max(drive.omega.abs())));
         }
-        // However short the step: derivatives of the base displacement cause forces.
-        if !self.reach.holds_base(&self.drive, step.max(1.0 / self.fastest)) {
-            return Err(too_far(&self.drive));
+        if !self.reach.holds_base(&drive, step) {
+            return Err(too_far(&drive));
         }
-        self.longest.set(step);
         Ok(())
     }
 }

@@ -4,7 +4,7 @@ use super::outputs::Outputs;
 use super::reach::Reach;
 use super::structure;
 use super::variables::{Integer, Real};
-use super::{LoViNes, Progress, Simulation, unknown, with_plant};
+use super::{LoViNes, Progress, Simulation, with_plant};
 use fmi2_component::{Causality, Key, Refusal};
 use lovines::table::{PARAMETERS, Parameter, Values};
 use lovines::{InvalidValue, Parameters};
@@ -19,9 +19,9 @@ impl LoViNes {
     /// A parameter or an input, as it was set.
     pub(super) fn setting(&self, variable: Real) -> Option<f64> {
         Some(match variable {
-            Real::e => self.drive.signal[0],
-            Real::E => self.drive.amplitude,
-            Real::omega => self.drive.omega,
+            Real::e => self.inputs.signal,
+            Real::E => self.inputs.amplitude,
+            Real::omega => self.inputs.omega,
             Real::q1_start => self.start.q1,
             Real::der_q1_start => self.start.dq1,
             Real::q2_start => self.start.q2,
@@ -41,9 +41,8 @@ impl LoViNes {
     pub(super) fn input(&mut self) {
         self.inputs_set = true;
         self.outputs.forget_base();
-        self.longest = unknown();
         if let Simulation::Equations(hybrid) = &mut self.simulation {
-            hybrid.drive = self.drive;
+            hybrid.drive = self.inputs.drive();
         }
     }
 
@@ -84,7 +83,6 @@ impl LoViNes {
         }
         self.values.0[n] = (!is_default).then_some(value);
         self.outputs = Outputs::default();
-        self.longest = unknown();
         let parameters = self.values.parameters();
         self.valid = parameters.validate().is_ok();
         if self.progress == Progress::None || self.valid {
@@ -115,12 +113,12 @@ impl LoViNes {
 
     /// Fits the limits of displacements and steps to the parameters, and to the structure.
     pub(super) fn fit_limits(&mut self) {
-        self.fastest = self.parameters.fastest_rate();
+        let mut fastest = self.parameters.fastest_rate();
         let mut per_drive = 1.0;
         if let (Some(adopted), Simulation::Structure(plant)) = (&self.adopted, &self.simulation) {
-            self.fastest = self.fastest.max(plant.parameters().fastest_rate());
+            fastest = fastest.max(plant.parameters().fastest_rate());
             per_drive = adopted.displacement_per_drive();
         }
-        self.reach = Reach::of(&self.parameters, self.fastest, per_drive);
+        self.reach = Reach::of(&self.parameters, fastest, per_drive);
     }
 }

@@ -41,6 +41,9 @@ struct File {
     /// The drive is clipped at this limit to each side.
     #[serde(default = "unlimited")]
     largest_drive: f64,
+    /// Longest time between two checks of the outputs that have a limit, s.
+    #[serde(default = "unlimited")]
+    check_interval: f64,
     /// Start values of parameters, by symbol.
     parameters: BTreeMap<String, f64>,
     /// Displacement and velocity of the particle at the start, m and m/s.
@@ -55,7 +58,7 @@ struct Point {
     row: Row,
     #[serde(default)]
     per_drive: f64,
-    /// Beyond it a step fails.
+    /// A step in which it is found beyond this fails.
     #[serde(default = "unlimited")]
     limit: f64,
 }
@@ -70,6 +73,7 @@ pub(super) struct Adopted {
     host: Host,
     points: Vec<Point>,
     pub largest_drive: f64,
+    check_interval: f64,
     /// Values at the start.
     pub values: Values,
     pub particle: [f64; 2],
@@ -98,11 +102,13 @@ impl Adopted {
         }
         let host = file.equations.host(file.excitation)?;
         let size = host.sections().len();
-        if file.largest_drive <= 0.0 {
-            return Err(refused(format!(
-                "largest_drive = {}; it must be positive",
-                file.largest_drive
-            )));
+        for (name, value) in [
+            ("largest_drive", file.largest_drive),
+            ("check_interval", file.check_interval),
+        ] {
+            if value <= 0.0 {
+                return Err(refused(format!("{name} = {value}; it must be positive")));
+            }
         }
         if let Some(point) = file.points.iter().find(|point| point.row.len() != size) {
             return Err(refused(format!(
@@ -111,8 +117,15 @@ impl Adopted {
                 point.row.len()
             )));
         }
-        let File { points, largest_drive, particle, .. } = file;
-        Ok(Self { host, points, largest_drive, values, particle })
+        let File { points, largest_drive, check_interval, particle, .. } = file;
+        Ok(Self {
+            host,
+            points,
+            largest_drive,
+            check_interval,
+            values,
+            particle,
+        })
     }
 
     /// A plant at its start.
@@ -134,44 +147,49 @@ impl Adopted {
             .sum()
     }
 
-    /// Refuses a motion with an output beyond its limit; that of the command is where it is clipped.
-    pub fn check(&self, plant: &Plant<Structure>) -> Result<(), Refusal> {
-        for point in &self.points {
-            let [value, ..] = point.of(plant);
-            if value.abs() > point.limit * (1.0 + 1e-9) {
-                return Err(Refusal::error(format!(
-                    "the shaker reached its limit: the {} is {value}, and {} is allowed to each side; its amplifier has switched off",
-                    point.name, point.limit
-                )));
+    /// Why the motion cannot go on: an output is beyond its limit; that of the command is where it is clipped.
+    fn beyond_limit(&self, plant: &Plant<Structure>) -> Option<Refusal> {
+        self.points.iter().find_map(|point| {
+            let ([value, ..], Point { name, limit, .. }) = (point.of(plant), point);
+            (value.abs() > limit * (1.0 + 1e-9)).then(|| {
+                Refusal::error(format!(
+                    "the shaker reached its limit: the {name} is {value} at t = {} s, and {limit} is allowed to each side; its amplifier has \
+                     switched off",
+                    plant.time()
+                ))
+            })
+        })
+    }
+
+    /// A step under a drive that is clipped at its limit, and why it ended early, if an output passed its limit.
+    fn step(
+        &self,
+        plant: &mut Plant<Structure>,
+        drive: Drive,
+        step: f64,
+        log: &Log,
+    ) -> Result<(Outcome, Option<Refusal>), InvalidValue> {
+        let mut whole = Outcome::default();
+        for (drive, duration) in drive.parts(step, self.check_interval) {
+            for piece in plant.clipped(self.largest_drive, drive, duration)? {
+                let begin = plant.time();
+                // Lines that are not wanted are not written: one copy of the code.
+                let outcome = plant.advance_with(piece.drive, piece.duration, |event| log::tell(log, begin, event))?;
+                whole.elapsed += outcome.elapsed;
+                whole.impacts += outcome.impacts;
+                whole.released += outcome.released;
+                whole.evaluations += outcome.evaluations;
+                if outcome.cut_short {
+                    return Ok((Outcome { cut_short: true, ..whole }, None));
+                }
+            }
+            let beyond = self.beyond_limit(plant);
+            if beyond.is_some() {
+                return Ok((whole, beyond));
             }
         }
-        Ok(())
+        Ok((whole, None))
     }
-}
-
-/// A step under a drive that is clipped at its limit.
-pub(super) fn step(
-    plant: &mut Plant<Structure>,
-    limit: f64,
-    drive: Drive,
-    step: f64,
-    log: &Log,
-) -> Result<Outcome, InvalidValue> {
-    let mut whole = Outcome::default();
-    for piece in plant.clipped(limit, drive, step)? {
-        let begin = plant.time();
-        // Lines that are not wanted are not written: one copy of the code.
-        let outcome = plant.advance_with(piece.drive, piece.duration, |event| log::tell(log, begin, event))?;
-        whole.elapsed += outcome.elapsed;
-        whole.impacts += outcome.impacts;
-        whole.released += outcome.released;
-        whole.evaluations += outcome.evaluations;
-        whole.cut_short = outcome.cut_short;
-        if whole.cut_short {
-            break;
-        }
-    }
-    Ok(whole)
 }
 
 impl Point {
@@ -183,6 +201,17 @@ impl Point {
 }
 
 impl LoViNes {
+    /// A step of a structure.
+    pub(super) fn step_of_structure(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
+        let (Some(adopted), Simulation::Structure(plant)) = (&self.adopted, &mut self.simulation) else {
+            return Err(Refusal::error("there is no structure"));
+        };
+        plant.set_time(time);
+        let (outcome, beyond) = adopted.step(plant, self.inputs.drive(), step, log)?;
+        self.finish(time, step, &outcome)?;
+        beyond.map_or(Ok(()), Err)
+    }
+
     /// Limit of the drive to each side.
     pub(super) fn largest_drive(&self) -> f64 {
         self.adopted

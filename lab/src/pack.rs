@@ -242,6 +242,14 @@ fn documentation(component: &Component, description: &Description) -> String {
     page.into_string()
 }
 
+/// Outputs of the plant whose start is a parameter, too, under another name.
+const STARTS: [(&str, &str); 4] = [
+    ("q1", "q1_start"),
+    ("der(q1)", "der_q1_start"),
+    ("q2", "q2_start"),
+    ("der(q2)", "der_q2_start"),
+];
+
 /// The structure of the coupled system; step size and end of the default experiment are filled in.
 const STRUCTURE: &str = include_str!("pack/SystemStructure.ssd");
 
@@ -259,12 +267,9 @@ fn system(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
         structure = structure.replace(&derived, &own);
     }
     // The start of the plant goes by its parameters: some masters set no start value of an output.
-    let plant = scene.start_values().into_iter().map(|(name, value)| match name {
-        "q1" => ("q1_start", value),
-        "der(q1)" => ("der_q1_start", value),
-        "q2" => ("q2_start", value),
-        "der(q2)" => ("der_q2_start", value),
-        name => (name, value),
+    let plant = scene.start_values().into_iter().map(|(name, value)| {
+        let parameter = STARTS.iter().find(|(output, _)| *output == name);
+        (parameter.map_or(name, |(_, parameter)| parameter), value)
     });
     // The controller is armed from the start.
     let config = scene.controller_config();

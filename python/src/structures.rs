@@ -24,6 +24,8 @@ use crate::{
 pub struct StructurePlant {
     structure: Structure,
     plant: SimulatedStructure,
+    /// Longest time between two checks of the shaker's limits, s; infinite without limits.
+    check_interval: f64,
 }
 
 /// Columns before those of the channels: time, drive, q2, impacts.
@@ -54,7 +56,9 @@ impl StructurePlant {
             invalid("the scene has no [structure] and no [shaker]: its oscillator is vines.Plant(scene)")
         })?;
         let plant = SimulatedStructure::new(&structure, scene.plant, scene.start).map_err(invalid)?;
-        Ok(Self { structure, plant })
+        let is_limited = structure.channels().iter().any(|channel| channel.limit.is_some());
+        let check_interval = if is_limited { scene.sample_time() } else { f64::INFINITY };
+        Ok(Self { structure, plant, check_interval })
     }
 
     /// Names and units of the channels; the first is the drive.
@@ -82,21 +86,24 @@ impl StructurePlant {
             ..Drive::harmonic(amplitude.0, omega.0)
         };
         let (stop, before) = (AtomicBool::new(false), self.plant.clone());
+        let (step, interval) = (duration.0 / steps as f64, self.check_interval);
         let channels = self.structure.channels().len();
         let plant = &mut self.plant;
         let mut run = || -> Result<Vec<f64>, Option<RigError>> {
             let mut rows = row(plant);
             for _ in 0..steps {
-                plant.step(drive, duration.0 / steps as f64).map_err(Some)?;
-                rows.extend(row(plant));
-                if stop.load(Relaxed) {
-                    return Err(None);
+                for (drive, part) in drive.parts(step, interval) {
+                    plant.step(drive, part).map_err(Some)?;
+                    if stop.load(Relaxed) {
+                        return Err(None);
+                    }
                 }
+                rows.extend(row(plant));
             }
             Ok(rows)
         };
         // A thread costs more than a step.
-        let result = if steps == 1 {
+        let result = if steps == 1 && drive.parts(step, interval).nth(1).is_none() {
             run()
         } else {
             wait(py, &stop, |_| Ok(()), run)?

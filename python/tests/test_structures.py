@@ -183,6 +183,18 @@ def test_a_limit_of_the_shaker_is_an_error_and_leaves_the_plant_as_it_was():
         vines.StructurePlant(vines.Scene())
 
 
+def test_a_limit_that_is_passed_within_a_step_is_an_error_too():
+    drive, period = {"amplitude": 8.0, "omega": 53.0}, 2 * np.pi / 53.0
+    free = vines.StructurePlant(vines.Scene(SCENES / "shaker-cantilever.toml"))
+    force = np.abs(free.trajectory(period, 128, **drive)["force"])
+    limit = 0.5 * (force[-1] + force.max())
+    assert force[-1] < 0.8 * limit
+    plant = vines.StructurePlant(vines.Scene(SCENES / "shaker-cantilever.toml", shaker={"force_max": limit}))
+    with pytest.raises(RuntimeError, match=r"the force is .* shaker.force_max"):
+        plant.advance(period, **drive)
+    assert plant["time"] == 0.0
+
+
 @pytest.mark.parametrize(
     "changes", [{}, {"shaker": {"compensated_mass": 0.02}, "structure": {"masses": {"tip": 0.005}}}]
 )

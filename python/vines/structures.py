@@ -162,7 +162,8 @@ class StructurePlant(_StructurePlant):
     """One structure with its particle, and with its shaker if the scene has one, from rest.
 
     The drive is the displacement of the base, m, the force, N, or with a shaker the command of its amplifier, V, which
-    is clipped at the amplifier's limit.
+    is clipped at the amplifier's limit. The other limits of the shaker (force, stroke, current or voltage) are checked
+    at the end of every step, and within a longer step at least once per sample time of the scene.
 
     Parameters
     ----------
@@ -228,7 +229,8 @@ class StructurePlant(_StructurePlant):
         ValueError
             A value that is not allowed. The plant is not advanced then.
         RuntimeError
-            The shaker reached a limit. The plant is not advanced then.
+            The shaker passed a limit at one of the instants at which limits are checked. The plant is not advanced
+            then.
         """
         self.trajectory(duration, 1, held=held, amplitude=amplitude, omega=omega)
 

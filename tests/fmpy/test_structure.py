@@ -161,3 +161,35 @@ def test_a_shaker_that_reaches_its_limit_ends_the_simulation_in_one_sentence(pac
             rig.step(1e-3, 1000)
         assert "the shaker reached its limit: the armature is" in rig.messages[-1].text
         assert "0.0001 is allowed" in rig.messages[-1].text
+
+
+def test_a_limit_passed_within_a_step_ends_that_step_with_an_error(pack):
+    start, step = {"u_amplitude": 8.0, "omega": 53.0}, 1e-3
+    period = 2 * math.pi / 53.0
+    with closing(Component(pack("shaker-cantilever"))) as free:
+        free.start(start)
+        # The force at every sample, and at the ends of steps of a period.
+        forces = []
+        for _ in range(200):
+            free.step(step)
+            forces.append(abs(free.get("force")))
+    with closing(Component(pack("shaker-cantilever"))) as free:
+        free.start(start)
+        free.step(period)
+        at_point = abs(free.get("force"))
+    limit = 0.5 * (at_point + max(forces[: int(period / step)]))
+    assert at_point < 0.8 * limit
+    limited = pack("shaker-cantilever", f"shaker.force_max={limit}")
+    first = next(n for n, force in enumerate(forces) if force > limit)
+    assert first * step < period
+    meaning = limited.variable("force").description
+    assert f"beyond {limit} N to either side the simulation ends with an error" in meaning
+    for length in (period, step):
+        with closing(Component(limited, logging=True)) as rig:
+            rig.start(start)
+            with pytest.raises(FMICallException):
+                rig.step(length, 200)
+            text = rig.messages[-1].text
+            assert "the shaker reached its limit: the force is" in text
+            assert float(text.split("at t = ")[1].split(" s")[0]) == pytest.approx((first + 1) * step, abs=2.5 * step)
+            assert abs(rig.get("force")) > limit

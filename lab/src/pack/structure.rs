@@ -14,7 +14,7 @@ use serde_json::json;
 use xml::reader::{EventReader, XmlEvent};
 use xml::writer::{EmitterConfig, EventWriter, XmlEvent as Written};
 
-use super::Component;
+use super::{Component, STARTS};
 use crate::scene::{ARMATURE, Channel, Excitation, Scene, SceneShaker, Structure, TABLE};
 use crate::table::Table;
 
@@ -41,13 +41,14 @@ pub fn component(
             Value::Boolean(_) => None,
         });
     let starts: Vec<(&str, f64)> = starts.collect();
-    let content = resource(structure, &starts);
+    let step = scene.sample_time();
+    let content = resource(structure, &starts, step);
     let facts = Facts {
         guid: guid_of(&oscillator.library_guid, &content),
         drive: DriveKind::of(structure),
         channels: structure.channels(),
         starts,
-        step: scene.sample_time(),
+        step,
         stop: PERIODS * TAU / structure.mode().omega,
     };
     let xml = describe(&oscillator.xml, &facts)?;
@@ -57,7 +58,7 @@ pub fn component(
         xml,
         library_guid: oscillator.library_guid.clone(),
         png: b"",
-        page: page(structure),
+        page: page(structure, step),
         resources: vec![(FILE.into(), content)],
     })
 }
@@ -65,8 +66,8 @@ pub fn component(
 /// The end of the default experiment, periods of the driven mode.
 const PERIODS: f64 = 100.0;
 
-/// What the description cannot say, as HTML.
-fn page(structure: &Structure) -> Cow<'static, str> {
+/// What the description cannot say, as HTML; `step` is that of the default experiment, s.
+fn page(structure: &Structure, step: f64) -> Cow<'static, str> {
     let modes = structure.modes.iter().map(|mode| {
         let shape = structure
             .points
@@ -85,8 +86,11 @@ fn page(structure: &Structure) -> Cow<'static, str> {
         Excitation::Force => "A force drives it; <em>drive</em> is the shape at the force's point, 1/sqrt(kg).".into(),
     };
     if structure.shaker.is_some() {
-        drive += " A shaker moves the structure, by the command <code>u</code> of its amplifier, V, which is clipped at the amplifier's limit. \
-                  Reaching another limit of the shaker ends the simulation with an error.";
+        drive += &format!(
+            " A shaker moves the structure, by the command <code>u</code> of its amplifier, V, which is clipped at the amplifier's limit. \
+             The other limits of the shaker are checked at every communication point, and within a step at least every {step} s. A step \
+             that finds one passed ends there with an error, which names it."
+        );
     }
     let text = format!(
         "<p>A linear structure carries a cavity, in which a particle flies freely and hits the walls. {drive} Between impacts the motion is a \
@@ -109,8 +113,8 @@ struct Facts<'a> {
     stop: f64,
 }
 
-/// The structure as its library reads it.
-fn resource(structure: &Structure, starts: &[(&str, f64)]) -> Vec<u8> {
+/// The structure as its library reads it. Limits are checked at least every `interval` seconds, as often as the simulated rig checks them.
+fn resource(structure: &Structure, starts: &[(&str, f64)], interval: f64) -> Vec<u8> {
     let point = |channel: Channel<'_>| {
         let mut point = json!({"name": channel.name, "row": channel.row});
         if channel.per_drive != 0.0 {
@@ -142,6 +146,9 @@ fn resource(structure: &Structure, starts: &[(&str, f64)]) -> Vec<u8> {
     let largest = structure.shaker.as_ref().map(SceneShaker::largest_command);
     if let Some(largest) = largest.filter(|largest| largest.is_finite()) {
         file["largest_drive"] = json!(largest);
+    }
+    if structure.channels().iter().any(|channel| channel.limit.is_some()) {
+        file["check_interval"] = json!(interval);
     }
     let mut text = serde_json::to_vec_pretty(&file).unwrap_or_default();
     text.push(b'\n');
@@ -402,6 +409,12 @@ fn variables_of(oscillator: Vec<Element>, facts: &Facts<'_>) -> Vec<Element> {
     }
     for (n, channel) in facts.channels.iter().enumerate() {
         let name = channel.name;
+        let limit = channel.limit.map_or(String::new(), |limit| {
+            format!(
+                "; beyond {limit} {} to either side the simulation ends with an error: checked at communication points and at least every {} s",
+                channel.unit, facts.step
+            )
+        });
         let mut add = |k: usize, name: String, meaning: String, content: Element| {
             let variable = Element::new(
                 "ScalarVariable",
@@ -423,7 +436,7 @@ fn variables_of(oscillator: Vec<Element>, facts: &Facts<'_>) -> Vec<Element> {
                 "ElectricCurrent"
             };
             let content = Element::new("Real", &[("quantity", &quantity), ("unit", &channel.unit)]);
-            add(0, name.to_owned(), meaning.to_owned(), content);
+            add(0, name.to_owned(), meaning.to_owned() + &limit, content);
             continue;
         }
         for (k, (symbol, quantity, kind, [unit, display])) in QUANTITIES.into_iter().enumerate() {
@@ -436,6 +449,7 @@ fn variables_of(oscillator: Vec<Element>, facts: &Facts<'_>) -> Vec<Element> {
                 TABLE => format!("{quantity} of the table of the shaker"),
                 _ => format!("{quantity} of the structure at the point {name}"),
             };
+            let meaning = if k == 0 { meaning + &limit } else { meaning };
             add(k, format!("{symbol}[{name}]"), meaning, content);
         }
     }
@@ -464,6 +478,9 @@ fn adapt(variable: &mut Element, facts: &Facts<'_>) {
         variable.children[0].remove("start");
         return;
     }
+    // A start has the same value under both of its names.
+    let output = STARTS.iter().find(|(_, parameter)| *parameter == name);
+    let name = output.map_or(&*name, |(output, _)| output);
     if let Some((_, start)) = facts.starts.iter().find(|(other, _)| *other == name) {
         variable.children[0].set("start", start);
     }
