@@ -21,8 +21,7 @@ use vines_testbench::{
     comparison::{Comparison, TrackedComparison},
     experiment,
     fit::{
-        Candidate, Channel, Contents, EffectReport, Explanation, Found, Known, MeasuredPoint, Measurements, Recording,
-        Selection, Table, find,
+        Candidate, EffectReport, Explanation, Found, Known, MeasuredPoint, Measurements, Recording, Selection, find,
     },
     identification,
     linear::MeasuredLinear,
@@ -30,7 +29,8 @@ use vines_testbench::{
 };
 
 use crate::{
-    number::Real,
+    files::{ContentsTuple, contents_of},
+    number::{Metre, Real},
     saved,
     scene::{Scene, invalid, json},
     wait::wait,
@@ -156,8 +156,6 @@ pub fn fit(
     }))
 }
 
-/// A channel: name, unit, samples, and start and step (s) of a clock of its own.
-type ChannelTuple = (String, String, Vec<f64>, Option<[f64; 2]>);
 /// A recording: origin, names of the channels, start and step (s), what both measure, response, base, and notes.
 type RecordingTuple = (
     String,
@@ -169,31 +167,19 @@ type RecordingTuple = (
     Vec<String>,
 );
 
-/// The recording of two channels of a file: a table as text if `channels` is absent. `options`: response, drive and time.
+/// The recording of two channels of a file. `options`: response, drive and time.
 #[pyfunction]
-#[pyo3(signature = (path, channels, options, rate, late))]
 pub fn recording(
     py: Python<'_>,
     path: &str,
-    channels: Option<Vec<ChannelTuple>>,
+    contents: ContentsTuple<'_>,
     options: [Option<String>; 3],
     rate: Option<f64>,
     late: Option<f64>,
 ) -> PyResult<RecordingTuple> {
     let [response, drive, time] = options;
     let selection = Selection { response, drive, time, rate, late };
-    let channel = |(name, unit, values, clock)| Channel { name, unit, values, clock };
-    let read = || {
-        let contents = match channels {
-            None => Table::read(path.as_ref())?.contents(),
-            Some(channels) => Contents {
-                origin: path.into(),
-                channels: channels.into_iter().map(channel).collect(),
-                ..Contents::default()
-            },
-        };
-        contents.recording(&selection)
-    };
+    let contents = contents_of(path, contents);
     let Recording {
         origin,
         channels,
@@ -203,7 +189,7 @@ pub fn recording(
         response,
         drive,
         notes,
-    } = py.detach(read).map_err(invalid)?;
+    } = py.detach(|| contents.recording(&selection)).map_err(invalid)?;
     Ok((
         origin,
         channels,
@@ -375,8 +361,8 @@ impl PhaseLock {
     #[allow(clippy::type_complexity)]
     fn sample(
         &mut self,
-        response: Real,
-        reference: Option<Real>,
+        response: Real<Metre>,
+        reference: Option<Real<Metre>>,
         active: bool,
     ) -> (f64, f64, f64, Option<f64>, f64, f64, bool, bool, u8, u8) {
         let (response, reference) = (response.0, reference.map(|one| one.0));

@@ -14,7 +14,7 @@ use vines_testbench::{
 };
 
 use crate::{
-    number::Real,
+    number::{RadPerSecond, Real, Second},
     scene::{Scene, invalid},
     wait::wait,
 };
@@ -76,9 +76,9 @@ impl StructurePlant {
     fn _trajectory<'py>(
         &mut self,
         py: Python<'py>,
-        duration: Real,
+        duration: Real<Second>,
         steps: usize,
-        drive: (Real, Real, Real),
+        drive: (Real, Real, Real<RadPerSecond>),
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (held, amplitude, omega) = drive;
         let drive = Drive {

@@ -1,10 +1,13 @@
 """Recordings in files of other programs, and their fit."""
 
 import importlib.util
+import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import samples
@@ -33,7 +36,12 @@ def test_a_file_as_other_programs_write_it_is_read_or_refused_for_the_true_reaso
     times = samples.TIME[shift : shift + count] if "uneven" not in sample.kind else times
     # The uneven abscissa of UFF58 has six digits.
     share = 3e-3 if "uneven" in sample.kind else 1e-4
-    assert np.allclose(read.response, 3e-3 * np.sin(55.0 * times - np.pi / 2), atol=3e-3 * share)
+    missing = np.isnan(read.response)
+    assert missing.sum() == sample.missing
+    assert np.allclose(read.response[~missing], 3e-3 * np.sin(55.0 * times[~missing] - np.pi / 2), atol=3e-3 * share)
+    if sample.missing:
+        with pytest.raises(ValueError, match=r"sample \d+ .* is not a finite number"):
+            vines.fit_recordings(read)
     assert np.allclose(read.drive, 2e-5 * np.sin(55.0 * times), atol=2e-5 * share)
     if sample.note:
         assert any(sample.note in note for note in read.notes), read.notes
@@ -76,6 +84,112 @@ def test_two_formats_give_the_same_fit(channels, tmp_path):
     for name in ("value", "uncertainty"):
         assert np.array_equal(*(fit.parameters[name] for fit in fits))
     assert fits[0].channels["expected"].sum() == pytest.approx(fits[0].degrees)
+
+
+def call(*words, **environment):
+    """Run a command line: exit code, standard output and standard error."""
+    known = os.environ | environment
+    done = subprocess.run([str(word) for word in words], capture_output=True, check=False, env=known)
+    return done.returncode, done.stdout.decode(errors="replace"), done.stderr.decode(errors="replace")
+
+
+PYTHON = [sys.executable, "-m", "vines"]
+
+
+def test_the_command_line_is_that_of_the_program_for_every_option_and_format(channels, tmp_path):
+    time, response, drive = (channel[300:-400] for channel in channels)
+    table = np.column_stack([time, response, drive])
+    np.savetxt(tmp_path / "record.csv", table, delimiter=",", header="t,y,x", comments="", fmt="%.17g")
+    with h5py.File(tmp_path / "record.h5", "w") as file:
+        file["t"], file["y"], file["x"] = time, response, drive
+    lines = [",".join(f'"{value:.17g}"'.replace(".", ",") for value in row) for row in table]
+    (tmp_path / "record.txt").write_text("\n".join(["t,y,x", *lines]), encoding="utf-16")
+    options = ["--response", "y:mm", "--drive", "x:um", "--set", "plant.r=0.7", "--known", "m=0.032±0.0003"]
+    found = {}
+    for program, name in (([os.environ["VINES"]], "record.csv"), (PYTHON, "record.h5"), (PYTHON, "record.txt")):
+        file = tmp_path / name
+        files = ["--out", file.with_suffix(".toml"), "--figure", file.with_suffix(".svg")]
+        texts = [call(*program, "fit", file, *options, *more) for more in (files, ["--json"])]
+        texts += [
+            call(*program, "fit", file, *options[:4], "--set", "plant.r=7"),
+            call(*program, "fit", file, "--rote", "1"),
+        ]
+        written = [file.with_suffix(suffix).read_text() for suffix in (".toml", ".svg")]
+        plain = [[str(part).replace(str(tmp_path / name), "FILE") for part in text] for text in texts]
+        plain = [[part.replace(str(file.with_suffix("")), "BASE") for part in text] for text in plain]
+        found[name] = plain, [one.replace(str(tmp_path / name), "FILE") for one in written]
+        assert [code for code, *_ in texts] == [0, 0, 2, 2]
+        assert "the model describes them" in texts[0][1]
+        assert json.loads(texts[1][1])["describes"]
+    (texts, files), *others = found.values()
+    for other, other_files in others:
+        assert [one[:2] for one in other] == [one[:2] for one in texts]
+        assert other_files == files
+        for one, two in zip(other, texts, strict=True):
+            assert one[2].replace("python -m vines", "vines") == two[2]
+
+
+def test_results_are_not_lost_where_the_encoding_has_no_sign_for_them(channels, tmp_path):
+    np.savetxt(
+        tmp_path / "a.csv", np.column_stack(channels), delimiter=",", header="t,y,µ", comments="", encoding="utf-8"
+    )
+    words = [*PYTHON, "fit", tmp_path / "a.csv", "--response", "y:mm", "--drive", "µ:um"]
+    code, out, err = call(*words, PYTHONIOENCODING="utf-8")
+    assert (code, *call(*words, PYTHONIOENCODING="ascii")[1:]) == (0, out.replace("±", "?").replace("µ", "?"), err)
+    code, out, err = call(*words[:-1], "ξ", PYTHONIOENCODING="ascii")
+    assert (code, out) == (2, "")
+    assert "has no channel `?`" in err
+    assert "Traceback" not in err
+
+
+def test_tables_of_points_of_other_programs_give_the_counts_of_the_program(tmp_path):
+    code, out, err = call(os.environ["VINES"], "backbone", "--set", "backbone.points=8", "--out", tmp_path)
+    assert code == 0, err
+    head, *rows = (tmp_path / "tracked.csv").read_text().splitlines()
+    place = head.split(",").index("settled")
+
+    def unsettled(row, words, delimiter=","):
+        cells = row.split(",")
+        cells[place] = words[1] if row in rows[6:] else words[0]
+        return delimiter.join(cell.replace(".", ",") if delimiter == ";" else cell for cell in cells)
+
+    expected = None
+    for words, delimiter in (
+        (("true", "false"), ","),
+        (("True", "False"), ","),
+        (("WAHR", "FALSCH"), ";"),
+        (("1", "0"), ";"),
+    ):
+        lines = [head.replace(",", delimiter), *(unsettled(row, words, delimiter) for row in rows)]
+        (tmp_path / "filtered.csv").write_text("\n".join(lines), encoding="utf-16" if delimiter == ";" else "utf-8")
+        code, out, err = call(*PYTHON, "fit", tmp_path / "filtered.csv")
+        assert code == 0, err
+        assert "6 points; " in out
+        assert "2 points are not settled" in out
+        expected = expected or out
+        assert out == expected
+
+
+def test_an_option_of_another_command_is_refused(tmp_path):
+    for option in ("--json", "--figure=a.svg", "--rate=3"):
+        code, out, err = call(*PYTHON, "structure", tmp_path / "a.uff", "--cavity", "1Z", option)
+        assert (code, out) == (2, "")
+        assert f"unrecognized arguments: {option}" in err
+    assert call(*PYTHON, "fit", "--help")[1].startswith("Fit the parameters of a rig")
+    assert "structure" in call(*PYTHON, "--help")[1]
+
+
+def test_a_scene_of_another_encoding_is_refused_with_what_it_is(tmp_path):
+    file = tmp_path / "scene.toml"
+    for encoding, words in (("utf-16", "is UTF-16; save it as UTF-8"), ("latin-1", "is not UTF-8 in line 2")):
+        file.write_text("[plant]\nr = 0.7 # µ\n", encoding=encoding)
+        with pytest.raises(ValueError, match=words):
+            vines.Scene(file)
+        code, out, err = call(os.environ["VINES"], "theory", "--scene", file)
+        assert (code, out) == (2, "")
+        assert words in err
+    file.write_text("[excitation]\nG = 1.2 # µ\n", encoding="utf-8-sig")
+    assert vines.Scene(file).settings["excitation"]["G"] == 1.2
 
 
 def test_a_ring_down_without_a_base_is_a_linear_decay_in_the_package_and_on_the_command_line(tmp_path):

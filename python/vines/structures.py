@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._native import StructurePlant as _StructurePlant
+from .numbers import real
 from .recordings import _package
 from .scenes import Scene
 
@@ -261,6 +262,8 @@ class StructurePlant(_StructurePlant):
         """
         if not 1 <= operator.index(steps) <= 10**7:
             raise ValueError(f"steps = {steps}: a whole number from 1 to 10^7 is allowed")
-        rows = self._trajectory(duration, steps, (held, amplitude, omega))
+        unit = self.channels["drive"]
+        drive = real(held, unit, "held"), real(amplitude, unit, "amplitude"), omega
+        rows = self._trajectory(duration, steps, drive)
         self._last = rows[-1]
         return dict(zip(self._columns(), np.ascontiguousarray(rows.T), strict=True))

@@ -87,9 +87,7 @@ impl SceneArguments {
     /// The text of the scene's file.
     fn text(&self) -> Result<Option<String>, SceneError> {
         let Some(path) = &self.scene else { return Ok(None) };
-        let text = std::fs::read_to_string(path);
-        text.map(Some)
-            .map_err(|source| SceneError::Read { path: path.clone(), source })
+        Scene::text(path).map(Some)
     }
 }
 

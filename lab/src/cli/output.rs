@@ -97,6 +97,17 @@ impl Results {
         Failure::first_of(failures).map_or(Ok(()), Err)
     }
 
+    /// What [`Self::show`] prints, and the failures of writing the files.
+    pub(super) fn texts(self) -> (String, Option<Failure>) {
+        let Written { paths, failures } = (self.write)();
+        let files = if paths.is_empty() {
+            String::new()
+        } else {
+            written(&paths)
+        };
+        (self.text + &files, Failure::first_of(failures))
+    }
+
     /// The text, and the failures of writing the files.
     pub(super) fn unseen(self) -> (String, Option<Failure>) {
         (self.text, Failure::first_of((self.write)().failures))

@@ -547,8 +547,17 @@ impl Scene {
         let Some(path) = path else {
             return Self::parse("paper.toml (the default scene)", PAPER, overrides);
         };
-        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.into(), source })?;
-        Self::parse(&path.display().to_string(), &text, overrides)
+        Self::parse(&path.display().to_string(), &Self::text(path)?, overrides)
+    }
+
+    /// The text of the scene file at `path`.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is not in UTF-8.
+    pub fn text(path: &Path) -> Result<String, SceneError> {
+        let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.into(), source })?;
+        let text = utf8(&bytes).map_err(|message| SceneError::text(&path.display().to_string(), message))?;
+        Ok(text.into())
     }
 
     /// Reads a scene from `text`; `origin` names it in messages.
@@ -558,6 +567,27 @@ impl Scene {
         scene.controller_config().build()?;
         Ok(scene)
     }
+}
+
+/// The text of a file in UTF-8, without its byte order mark.
+///
+/// # Errors
+/// What the file is instead, and what to do.
+pub fn utf8(bytes: &[u8]) -> Result<&str, String> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err("is UTF-16; save it as UTF-8".into());
+    }
+    if bytes.contains(&0) {
+        return Err("has bytes of zero, as UTF-16 or a binary file has; save it as text in UTF-8".into());
+    }
+    let text = std::str::from_utf8(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+    text.map_err(|error| {
+        let line = 1 + bytes[..error.valid_up_to()]
+            .iter()
+            .filter(|byte| **byte == b'\n')
+            .count();
+        format!("is not UTF-8 in line {line}; save it as UTF-8")
+    })
 }
 
 // The `[plant]` section, in SI units or dimensionless, and the `[start]` section.
