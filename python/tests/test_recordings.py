@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -87,10 +88,11 @@ def test_two_formats_give_the_same_fit(channels, tmp_path):
 
 
 def call(*words, **environment):
-    """Run a command line: exit code, standard output and standard error."""
+    """Run a command line: exit code, standard output, and standard error without lines of progress."""
     known = os.environ | environment
     done = subprocess.run([str(word) for word in words], capture_output=True, check=False, env=known)
-    return done.returncode, done.stdout.decode(errors="replace"), done.stderr.decode(errors="replace")
+    out, err = (text.decode(errors="replace") for text in (done.stdout, done.stderr))
+    return done.returncode, out, re.sub(r".*: \d+ of \d+ .*\n", "", err)
 
 
 PYTHON = [sys.executable, "-m", "vines"]

@@ -38,6 +38,9 @@ _UFF_TYPES = {
 class Recording:
     """Two channels of a measurement, sampled at equal distances.
 
+    Response and base that carry a unit are converted to SI units. Masked and absent samples are NaN, which a fit
+    refuses with the number of the sample.
+
     Attributes
     ----------
     origin : str
@@ -54,9 +57,6 @@ class Recording:
         What response and base are: "displacement", "velocity" or "acceleration".
     notes : tuple of str
         What is to be known of the way it was read: the clock, and what was cut or interpolated.
-
-    Response and base that carry a unit are converted to SI units. Masked and absent samples are NaN, which a fit
-    refuses with the number of the sample.
 
     Raises
     ------
@@ -192,9 +192,8 @@ def contents_of(path: str | PathLike[str]) -> bytes | tuple[Any, ...]:
         raise ValueError(f"{file} cannot be read as {suffix[1:].upper()}: {error}") from error
     channels = [_tuple(*one) for one in every if not isinstance(one[1], str)]
     refused = [[name, reason] for name, reason, *_ in every if isinstance(reason, str)]
-    if not channels:
-        reasons = "; ".join(f"{name}: {reason}" for name, reason in refused)
-        raise ValueError(f"{file} has no channel of numbers{': ' if reasons else ''}{reasons}")
+    if not every:
+        raise ValueError(f"{file} has no channel of numbers")
     return "", 0, channels, refused
 
 
