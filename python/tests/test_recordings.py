@@ -192,8 +192,9 @@ def test_a_scene_of_another_encoding_is_refused_with_what_it_is(tmp_path):
         code, out, err = call(os.environ["VINES"], "theory", "--scene", file)
         assert (code, out) == (2, "")
         assert words in err
-    file.write_text("[excitation]\nG = 1.2 # µ\n", encoding="utf-8-sig")
-    assert vines.Scene(file).settings["excitation"]["G"] == 1.2
+    plant = "[plant]\nepsilon = 0.0084\nlambda = 1.4\nr = 0.7 # µ\n[excitation]\nG = 1.1\n"
+    file.write_text(plant, encoding="utf-8-sig")
+    assert vines.Scene(file).dimensionless["r"] == 0.7
 
 
 def test_a_ring_down_without_a_base_is_a_linear_decay_in_the_package_and_on_the_command_line(tmp_path):

@@ -56,12 +56,12 @@ pub fn plain_table(origin: &str, bytes: &[u8]) -> Result<Contents, RecordingErro
         rows.pop();
         layout += ", the last row is cut off and left out";
     }
-    if let Some(cell) = rows.first().and_then(|row| row.get(0)) {
-        if cell.starts_with(['#', '%']) || cell.starts_with("//") {
-            return refused(format!(
-                ", row 1: `{cell}` begins a comment, and a plain table begins with the names"
-            ));
-        }
+    if let Some(cell) = rows.first().and_then(|row| row.get(0))
+        && (cell.starts_with(['#', '%']) || cell.starts_with("//"))
+    {
+        return refused(format!(
+            ", row 1: `{cell}` begins a comment, and a plain table begins with the names"
+        ));
     }
     let line = |row: &StringRecord| row.position().map_or(0, |position| position.line() as usize);
     if let Some(row) = rows.iter().find(|row| row.len() != width) {
@@ -87,14 +87,15 @@ pub fn plain_table(origin: &str, bytes: &[u8]) -> Result<Contents, RecordingErro
         false => vec![String::new(); width],
     };
     let mut grouped = rows.iter().flatten().filter(|cell| cell.contains(decimal));
-    if delimiter != b',' && grouped.clone().all(|cell| is_grouped(cell, decimal)) {
-        if let Some(cell) = grouped.next() {
-            return refused(format!(
-                ": `{cell}` may be {} or {} ({layout}); write a number with another number of decimals",
-                cell.replace(decimal, "."),
-                cell.replace(decimal, "")
-            ));
-        }
+    if delimiter != b','
+        && grouped.clone().all(|cell| is_grouped(cell, decimal))
+        && let Some(cell) = grouped.next()
+    {
+        return refused(format!(
+            ": `{cell}` may be {} or {} ({layout}); write a number with another number of decimals",
+            cell.replace(decimal, "."),
+            cell.replace(decimal, "")
+        ));
     }
     let channel = |(column, (name, unit)): (usize, (String, String))| {
         let (short, stated) = unit::split(&name);
