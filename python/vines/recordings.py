@@ -13,17 +13,9 @@ from numpy.typing import NDArray
 
 from . import _native, texts
 from .numbers import factor, real, reals, symbol
+from .packages import package
 from .scenes import Scene, checked
 
-_NEEDED = {
-    "pymatreader": "MAT",
-    "h5py": "HDF5",
-    "xarray": "HDF5 with missing values, scales or times",
-    "nptdms": "TDMS",
-    "pyuff": "UFF",
-    "lvm_read": "LVM",
-    "pandas": "a table with dates or times",
-}
 # SI units of what an ordinate of UFF58 is, and the factor of its data set 164, for files without labels.
 _UFF_UNITS = {8: ("m", "length"), 9: ("N", "force"), 11: ("m/s", "length"), 12: ("m/s²", "length"), 13: ("N", "force")}
 _UFF_TYPES = {
@@ -263,21 +255,12 @@ def _columns(name: str, values: Any, unit: str = "") -> Iterator[_Channel]:
         yield name, f"it has the shape {array.shape}; a channel is one row or column of numbers"
 
 
-def _package(name: str) -> Any:
-    import importlib
-
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise ImportError(f"{_NEEDED[name]} needs the package {name}: pip install './python[io]'") from error
-
-
 def _mat(file: Path) -> Iterator[_Channel]:
     import warnings
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found = _package("pymatreader").read_mat(file)
+        found = package("pymatreader").read_mat(file)
     return _variables("", {name: value for name, value in found.items() if not name.startswith(("__", "#"))})
 
 
@@ -306,7 +289,7 @@ def _variables(name: str, value: Any) -> Iterator[_Channel]:
 
 
 def _hdf5(file: Path) -> Iterator[_Channel]:
-    h5py = _package("h5py")
+    h5py = package("h5py")
     with h5py.File(file) as content:
         yield from _group(h5py, content, "", frozenset())
 
@@ -338,7 +321,7 @@ def _decoded(dataset: Any) -> tuple[Any, str]:
         low, high = (side if one is None else one for one, side in zip(limits, (-np.inf, np.inf), strict=True))
         values = np.where((values >= low) & (values <= high), values, np.nan)
         attributes |= {key: float(attributes[key]) for key in ("_FillValue", "missing_value") if key in attributes}
-    xarray = _package("xarray")
+    xarray = package("xarray")
     dimensions = [f"d{n}" for n in range(np.ndim(values))]
     given = xarray.Dataset({"v": (dimensions, values, attributes | ({"units": unit} if unit else {}))})
     found = xarray.decode_cf(given, decode_timedelta=False)["v"]
@@ -361,7 +344,7 @@ def _attribute(value: Any) -> Any:
 
 
 def _tdms(file: Path) -> Iterator[_Channel]:
-    channels = [channel for group in _package("nptdms").TdmsFile.read(file).groups() for channel in group.channels()]
+    channels = [channel for group in package("nptdms").TdmsFile.read(file).groups() for channel in group.channels()]
     starts = [one.properties.get("wf_start_time") for one in channels]
     # A channel without a waveform begins with the others.
     first = min((np.datetime64(start) for start in starts if start is not None), default=None)
@@ -375,7 +358,7 @@ def _tdms(file: Path) -> Iterator[_Channel]:
 
 
 def _uff(file: Path) -> Iterator[_Channel]:
-    sets = _package("pyuff").UFF(str(file)).read_sets()
+    sets = package("pyuff").UFF(str(file)).read_sets()
     sets = sets if isinstance(sets, list) else [sets]
     functions = [one for one in sets if one.get("type") == 58]
     stated = next((one for one in sets if one.get("type") == 164), {})
@@ -438,7 +421,7 @@ def _uff_unit(function: Mapping[str, Any], stated: Mapping[str, Any]) -> str:
 
 
 def _lvm(file: Path) -> Iterator[_Channel]:
-    found = _package("lvm_read").read(str(file), read_from_pickle=False, dump_file=False)
+    found = package("lvm_read").read(str(file), read_from_pickle=False, dump_file=False)
     blocks = [found[n] for n in range(found["Segments"])]
     same = [one for one in blocks if one["Channel names"] == blocks[0]["Channel names"]]
     if len(same) != len(blocks):

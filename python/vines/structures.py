@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ._native import StructurePlant as _StructurePlant
 from .numbers import real
-from .recordings import _package
+from .packages import package
 from .scenes import Scene
 
 _DIRECTIONS = ("X", "Y", "Z", "RX", "RY", "RZ")
@@ -44,7 +44,7 @@ def structure_from_uff(path: str | PathLike[str], *, units: str | None = None) -
     file = Path(path)
     if not file.is_file():
         raise ValueError(f"cannot read {file}: it is no file")
-    pyuff = _package("pyuff")
+    pyuff = package("pyuff")
     try:
         sets = pyuff.UFF(str(file)).read_sets()
     except Exception as error:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from . import _native
 from .numbers import symbol
+from .packages import package
 
 #: Delimiters and decimal marks. Of two that read a table equally well, and as the same numbers, it is the first.
 _LAYOUTS = tuple((delimiter, mark) for delimiter in ",;\t |" for mark in ".,")
@@ -235,9 +236,7 @@ def _column(unit: str, cells: Sequence[str], read: Mark, numeric: bool) -> tuple
 
 def _times(cells: Sequence[str]) -> NDArray[np.float64] | None:
     """Return times of the day, durations or dates in seconds; dates from the first one."""
-    from .recordings import _package
-
-    pandas: Any = _package("pandas")
+    pandas: Any = package("pandas")
     texts = [re.sub(r"(:\d\d),(\d)", r"\1.\2", cell) for cell in cells]
     try:
         if all(re.fullmatch(r"\d+:\d\d:\d\d(\.\d*)?|", cell) for cell in texts):
