@@ -4,6 +4,7 @@
 """
 
 import argparse
+import signal
 import sys
 from pathlib import Path
 
@@ -84,5 +85,21 @@ def _structure(given: argparse.Namespace) -> int:
     return 0
 
 
+def _run() -> int:
+    """`main`, which ends upon a signal as `vines` does: with 130 for Ctrl-C (SIGINT), and 143 for SIGTERM."""
+
+    def interrupt(number: int, _: object) -> None:
+        raise KeyboardInterrupt(signal.Signals(number))
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, interrupt)
+    try:
+        return main()
+    except KeyboardInterrupt as interrupted:
+        number = interrupted.args[0] if interrupted.args else signal.SIGINT
+        print(f"error: interrupted by {number.name}", file=sys.stderr)
+        return 128 + number
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(_run())

@@ -78,7 +78,9 @@ impl FmuController {
             .into_iter()
             .map(str::to_owned)
             .chain(moves);
-        let inputs: Vec<_> = inputs.map(|name| fmu.find(&name, Use::Set).ok_or(format!("`{name}`"))).collect();
+        let inputs: Vec<_> = inputs
+            .map(|name| fmu.find(&name, Use::Set).ok_or(format!("`{name}`")))
+            .collect();
         let missing = inputs.iter().filter_map(|input| input.clone().err()).collect();
         let inputs: Result<Vec<Variable>, String> = inputs.into_iter().collect();
         let values = PARAMETERS

@@ -131,7 +131,10 @@ impl Use {
     /// What the bench does, and for which variables FMI allows it.
     fn in_words(self) -> [&'static str; 2] {
         match self {
-            Self::Start => ["sets it before the start", "inputs, parameters and start values that are not calculated"],
+            Self::Start => [
+                "sets it before the start",
+                "inputs, parameters and start values that are not calculated",
+            ],
             Self::Set => ["sets it at samples", "inputs and tunable parameters"],
             Self::Get => ["reads it", "variables other than inputs"],
         }
@@ -266,7 +269,12 @@ impl Fmu {
         let connection = self.connections.iter().find(|one| one.ours == ours);
         let theirs = connection.and_then(|one| Some(one.theirs.as_ref()?.0.clone()));
         let name = theirs.unwrap_or_else(|| ours.into());
-        FmuError::Causality { path: self.path.clone(), name, causality: variable.causality, of }
+        FmuError::Causality {
+            path: self.path.clone(),
+            name,
+            causality: variable.causality,
+            of,
+        }
     }
 
     /// Sets the values that the FMU has variables for, and initialises it at time 0. It keeps its own values for the others.
@@ -401,7 +409,14 @@ fn connect(
     else {
         return match names.mapped(ours) {
             Some(_) => Err(FmuError::Variable { path: path.into(), name }),
-            None => Ok(Connection { ours: ours.into(), si, theirs: None, factor, keeps_its_start: false, variable: None }),
+            None => Ok(Connection {
+                ours: ours.into(),
+                si,
+                theirs: None,
+                factor,
+                keeps_its_start: false,
+                variable: None,
+            }),
         };
     };
     let unit = description.unit_of(variable);

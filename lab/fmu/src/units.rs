@@ -126,7 +126,12 @@ mod tests {
             ("g", None, "m/s2", Some(9.806_65)),
             ("1", None, "", Some(1.0)),
             ("", None, "m", Some(1.0)),
-            ("V", Some(BaseUnit { kg: 1, ampere: -1, ..defined(-3, 2, 0, 1.0) }), "V", Some(1.0)),
+            (
+                "V",
+                Some(BaseUnit { kg: 1, ampere: -1, ..defined(-3, 2, 0, 1.0) }),
+                "V",
+                Some(1.0),
+            ),
             // Nothing says what these are.
             ("mil", None, "m", None),
             ("r/min", None, "rad/s", None),

@@ -180,7 +180,11 @@ impl Endpoint {
             }
         }
         let mut text = format!("Variables of the {role} {}\n", file.display());
-        for (what, names) in [("as on the bench", same), ("not there", lacks), ("not set before the start, by their causality", kept)] {
+        for (what, names) in [
+            ("as on the bench", same),
+            ("not there", lacks),
+            ("not set before the start, by their causality", kept),
+        ] {
             if !names.is_empty() {
                 text += &format!("  {what}: {}\n", names.join(", "));
             }
