@@ -819,7 +819,7 @@ impl RecordSettings {
         positive("record.decay_periods", self.decay_periods.unwrap_or(1.0), unit)?;
         let periods = self.hold_periods + self.decay_periods.unwrap_or(0.0);
         let longest = scene.controller_config().acquire_timeout.unwrap_or(f64::INFINITY);
-        let samples = longest / scene.sample_time() + scene.controller.samples_per_period * periods;
+        let samples = (longest / scene.sample_time()).round() + scene.controller.samples_per_period * periods;
         check(
             "samples of phase_lock.acquire_timeout and of all periods of [record]",
             samples,

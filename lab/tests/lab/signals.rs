@@ -132,7 +132,7 @@ fn every_command_that_waits_ends_with_the_code_of_the_signal() {
 
 #[test]
 fn a_map_and_servers_end_at_the_first_signal() {
-    let long = "--x sigma=-5:5:2001 --y G=0.1:3:2001";
+    let long = "--x sigma=-5:5:2000 --y G=0.1:3:2000";
     let folder = tempfile::tempdir().unwrap();
     let made = folder.path().join("made");
     let out = made.join("out");
