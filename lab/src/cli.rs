@@ -16,6 +16,7 @@ mod recording;
 mod report;
 mod serve;
 mod shell;
+mod signals;
 mod structure;
 mod summary;
 mod tap;
@@ -29,6 +30,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::ArgumentError;
+use crate::fmu::process::Signal;
 use failure::Failure;
 use output::Results;
 pub use points::Source;
@@ -54,7 +56,7 @@ Exit codes:
     1  no result, a result that is not what was asked for, or a file that could not be written
     2  wrong usage, a value that is not allowed, or a target that cannot be written: nothing has moved
     3  results of a rig in real time that are doubtful, because too many samples were late
-  130  ended by Ctrl-C or SIGTERM
+  130  ended by Ctrl-C (SIGINT) within two seconds; 143 by SIGTERM, 129 by SIGHUP. The message says whether the drive is zero
 
 `vines completions SHELL` prints completions for bash, elvish, fish, powershell or zsh, and `vines man [COMMAND]` a manual page:
   vines completions bash > ~/.local/share/bash-completion/completions/vines
@@ -92,13 +94,24 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     let cli = Cli::try_parse().unwrap_or_else(|error| shell::with_advice(error).exit());
-    match dispatch(cli.command).and_then(Results::show) {
-        Ok(()) => ExitCode::SUCCESS,
+    signals::start();
+    if let Err(error) = output::keep_stdout() {
+        eprintln!("error: cannot keep stdout for the results: {error}");
+        return ExitCode::FAILURE;
+    }
+    let outcome = dispatch(cli.command).and_then(Results::show);
+    let signal = signals::arrived();
+    let code = match outcome {
+        Ok(()) => 0,
         Err(failure) => {
             eprintln!("error: {}", failure.message);
-            failure.code.into()
+            if let Some(signal) = signal.filter(|_| failure.code != failure::INTERRUPTED) {
+                eprintln!("error: {}", signals::ended(signal));
+            }
+            failure.code
         }
-    }
+    };
+    signal.map_or(code, Signal::exit_code).into()
 }
 
 /// The command line of the Python package: `vines fit`, for the files that `vines` does not read.

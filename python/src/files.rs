@@ -1,6 +1,10 @@
 //! Files: plain tables, what Python has read, and the command line of `vines fit`.
 
-use std::{ffi::OsString, path::Path, sync::atomic::AtomicBool};
+use std::{
+    ffi::OsString,
+    path::Path,
+    sync::{Arc, atomic::AtomicBool},
+};
 
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyBytes};
@@ -11,7 +15,7 @@ use vines::{
     scene::{self, unit},
 };
 
-use crate::{scene::invalid, wait::wait};
+use crate::{scene::invalid, wait::wait_apart};
 
 /// Samples of a channel, and its cells if some are no numbers.
 type Values<'py> = (Bound<'py, PyArray1<f64>>, Vec<String>);
@@ -80,7 +84,7 @@ pub fn is_unit(text: &str) -> bool {
 /// file, or JSON as bytes.
 #[pyfunction]
 pub fn command_line(py: Python<'_>, words: Vec<OsString>, read: Py<PyAny>) -> PyResult<(u8, String, String)> {
-    let source = |path: &Path| -> Result<Source, ArgumentError> {
+    let source = move |path: &Path| -> Result<Source, ArgumentError> {
         Python::attach(|py| -> PyResult<Source> {
             let found = read.bind(py).call1((path,))?;
             if let Ok(json) = found.cast::<PyBytes>() {
@@ -93,8 +97,7 @@ pub fn command_line(py: Python<'_>, words: Vec<OsString>, read: Py<PyAny>) -> Py
         })
         .map_err(|error| Python::attach(|py| error.value(py).to_string()).into())
     };
-    // The signals end the process: nothing is left to stop.
-    let stop = AtomicBool::new(false);
-    let printed = wait(py, &stop, |_| Ok(()), || cli::fit(&words, &source))?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let printed = wait_apart(py, &stop, move || cli::fit(&words, &source))?;
     Ok((printed.code, printed.out, printed.err))
 }

@@ -69,12 +69,21 @@ def _printed(text: str, stream: TextIO) -> int:
     return 0
 
 
-def _end(number: int, _frame: object) -> None:
-    # The compiled part is not interrupted elsewhere; it writes its files atomically.
-    os._exit(128 + number)
+def _run() -> int:
+    """`main`, which ends upon a signal as `vines` does: with 130 for Ctrl-C (SIGINT), and 143 for SIGTERM."""
+
+    def interrupt(number: int, _: object) -> None:
+        raise KeyboardInterrupt(signal.Signals(number))
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, interrupt)
+    try:
+        return main()
+    except KeyboardInterrupt as interrupted:
+        number = interrupted.args[0] if interrupted.args else signal.SIGINT
+        print(f"error: interrupted by {number.name}", file=sys.stderr)
+        return 128 + number
 
 
 if __name__ == "__main__":
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _end)
-    sys.exit(main())
+    sys.exit(_run())

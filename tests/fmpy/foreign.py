@@ -42,6 +42,19 @@ def library(folder: Path, omega: float = 1, amplitude: float = 1) -> bytes:
     return (folder / "mine.so").read_bytes()
 
 
+def compiled(folder: Path, source: str, *options: str) -> bytes:
+    """A library of tests/foreign."""
+    compiler = ["cc", "-O2", "-shared", "-fPIC", *options, ROOT / "tests/foreign" / source, "-lm", "-o", "mine.so"]
+    subprocess.run(compiler, cwd=folder, check=True)
+    return (folder / "mine.so").read_bytes()
+
+
+def example(path: Path, folder: Path) -> Path:
+    """The FMU of docs/controller-fmu.md, with its description."""
+    (text,) = re.findall(r"```xml\n(.*?)```", (ROOT / "docs/controller-fmu.md").read_text(), re.DOTALL)
+    return pack(path, text, library(folder))
+
+
 def pack(
     path: Path, description: str | bytes, binary: bytes | None = None, *, prefix: str = "", platform: str = "linux64"
 ) -> Path:

@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         })
     });
     bar.finish_and_clear();
-    let (record, ended) = measured?;
+    let (record, mut ended) = measured?;
     let identification = match identify(&record, &plan) {
         Ok(identification) => identification,
         Err(error) => {
@@ -73,7 +73,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
                 _ => None,
             };
             let reason = reason.map(|reason| summary::not_locked(&reason, &scene));
-            return Err(ended.without_result(Failure::from(error), reason, &record.samples, &plan));
+            ended.keep(&record.samples, &plan);
+            return Err(ended.without_result(Failure::from(error), reason));
         }
     };
     let result = Comparison::of(&identification, &scene);

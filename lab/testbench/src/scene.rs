@@ -283,11 +283,17 @@ impl Scene {
         ])
     }
 
-    /// The controller's sample time, s: rig and controller agree on it before anything is measured.
+    /// The controller's sample time, s: rig and controller agree on it before anything is measured. It has 31 significant bits (2e-10 of it is
+    /// rounded), so that sums and multiples of it are exact and equal for four million samples: components with a clock of their own compare times
+    /// with a tolerance that may be the rounding error of a number near 1.
     pub fn sample_time(&self) -> f64 {
-        TAU / self.plant.natural_frequency() / self.controller.samples_per_period
+        let exact = TAU / self.plant.natural_frequency() / self.controller.samples_per_period;
+        f64::from_bits((exact.to_bits() + DROPPED / 2) / DROPPED * DROPPED)
     }
 }
+
+/// Multiple of which the last bits of a sample time are: 22 of 53 are zero.
+const DROPPED: u64 = 1 << 22;
 
 /// A value of a scene that is possible, but hardly meant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -843,7 +849,7 @@ impl RecordSettings {
         positive("record.decay_periods", self.decay_periods.unwrap_or(1.0), unit)?;
         let periods = self.hold_periods + self.decay_periods.unwrap_or(0.0);
         let longest = scene.controller_config().acquire_timeout.unwrap_or(f64::INFINITY);
-        let samples = longest / scene.sample_time() + scene.controller.samples_per_period * periods;
+        let samples = (longest / scene.sample_time()).round() + scene.controller.samples_per_period * periods;
         check(
             "samples of phase_lock.acquire_timeout and of all periods of [record]",
             samples,
