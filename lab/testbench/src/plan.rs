@@ -222,6 +222,11 @@ pub struct ShakerPath {
     pub followed: u16,
     /// Largest amplitude, m, by which harmonics of the force beside the sampling frequency change its fundamental as it is read.
     pub aliased: f32,
+    /// Largest relative error of these numbers at the frequencies of the check, up to the bandwidth of the control to each side.
+    pub error: f64,
+    /// Reference per command of a structure that moves as it does, over [`Self::gain`], by the drawing: without impacts the response follows from the
+    /// reference, and no check can tell the two apart.
+    pub coupling: Complex64,
 }
 
 impl ShakerPath {
@@ -234,18 +239,15 @@ impl ShakerPath {
             (row, Complex64::ONE)
         });
         let [inverse, of_pole] = complex_fit(rows).map_or([Complex64::ONE; 2], |(found, _)| found.into());
-        Self {
+        let path = Self {
             gain: 1.0 / inverse,
             pole: of_pole / inverse,
             damping_rate,
             ..self
-        }
-    }
-
-    /// Largest relative error of reference over command at these frequencies.
-    pub(crate) fn error(&self, omega0: f64, values: &[(f64, Complex64)]) -> f64 {
-        let error = |(omega, value): &(f64, Complex64)| (value / self.at(omega - omega0) - 1.0).norm();
-        values.iter().map(error).fold(0.0, f64::max)
+        };
+        let error = |(omega, value): &(f64, Complex64)| (value / path.at(omega - omega0) - 1.0).norm();
+        let error = values.iter().map(error).fold(0.0, f64::max);
+        Self { error, ..path }
     }
 
     /// Reference over command at `omega0 + detuning`, rad/s.
@@ -391,6 +393,19 @@ pub struct Plan {
     pub levels: Vec<f64>,
     /// Largest relative uncertainty of a level, as in [`BackboneSettings`](crate::scene::BackboneSettings).
     pub precision: f64,
+    /// The units of the scene.
+    pub units: Units,
+}
+
+/// In which units a scene gives limits: those of the drive and of the displacement at the sensor, where the bench has the metres of an oscillator.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Units {
+    /// Drive of the scene per metre of the bench.
+    pub drive: f64,
+    /// Unit of this drive, m or N.
+    pub name: &'static str,
+    /// Displacement at the sensor per metre of the bench.
+    pub response: f64,
 }
 
 /// Longest recorded decay, natural periods, unless the scene asks for a longer one: a bound for rigs with little damping.
@@ -445,6 +460,7 @@ impl Scene {
             decay: knowledge.samples(decay),
             levels: self.backbone.levels(self.plant.half_width),
             precision: self.backbone.precision,
+            units: self.units(),
         }
     }
 }

@@ -570,7 +570,7 @@ impl Scene {
     pub fn parse(origin: &str, text: &str, overrides: &[Override]) -> Result<Self, SceneError> {
         let (sections, table) = overrides::read(origin, text, overrides)?;
         let scene = sections.resolve(origin, &table)?;
-        scene.controller_config().build()?;
+        scene.check_controller()?;
         Ok(scene)
     }
 }

@@ -145,7 +145,7 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
         quantity(
             "reference over command, largest relative error of its model",
             "",
-            [path.error(natural, &values), STEADY, 0.0],
+            [path.error, STEADY, 0.0],
             ROBUST,
             Some(Verdict::ShakerResonance),
         ),
