@@ -10,7 +10,7 @@ use vines::scene::{Scene, Structure};
 use vines::survey::Survey;
 use vines::table::{Table, number};
 
-use super::output::{Results, output, writable};
+use super::output::{Results, output, stability, writable};
 use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
@@ -20,7 +20,7 @@ The first table has the modes:
   influence   what the mode adds to the conditions of impact, over what the driven mode alone has; far below 1 it leaves the motion, though
               not always its stability, as it is
 The second table has all exact symmetric 1:1 orbits at phase resonance under the scene's drive. The third has the stretches of the backbone
-that are stable, with the driven mode alone and with all modes, and the mode that carries the disturbance at each end. Warnings name the ends at
+that are stable or neutral, with the driven mode alone and with all modes, and the mode that carries the disturbance at each end. Warnings name the ends at
 which it is not the driven one.
 
 Examples:
@@ -127,7 +127,7 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
     };
     text += "\nStable stretches of the backbone, with the driven mode alone and with all modes, and what ends them\n";
     let [alone, all] = [("driven", &survey.facts.alone), ("all", &survey.facts.all)].map(|(modes, branches)| {
-        let stretches = branches.iter().flat_map(StructureBranch::stable);
+        let stretches = branches.iter().flat_map(StructureBranch::stretches);
         stretches
             .map(|(run, ends)| stretch(modes, run, ends, b))
             .collect::<Vec<_>>()
@@ -186,6 +186,7 @@ fn words(kind: Bifurcation) -> &'static str {
 
 /// A stretch of stable orbits, from its smaller to its larger C.
 fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>; 2], b: f64) -> Vec<String> {
+    let modes = if run[0].neutral { format!("{modes}, neutral") } else { modes.into() };
     let mut ends = [(&run[0], ends[0]), (&run[run.len() - 1], ends[1])]
         .map(|(orbit, change)| (change.map_or(orbit, |change| &change.orbit), change));
     ends.sort_by(|one, other| one.0.response.total_cmp(&other.0.response));
@@ -203,7 +204,7 @@ fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>;
     };
     let [lower, upper] = ends.map(|(_, change)| reason(change));
     vec![
-        modes.into(),
+        modes,
         between(|orbit| orbit.response, b),
         between(|orbit| orbit.omega, TAU),
         drives.join(" to "),
@@ -216,6 +217,6 @@ fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>;
 fn row(orbit: &StructureOrbit, b: f64) -> Vec<String> {
     let [response, drive] = [orbit.response, orbit.drive].map(|value| format!("{value:.4e}"));
     let [hertz, c, growth] = [orbit.omega / TAU, orbit.response / b, orbit.growth()].map(number);
-    let stable = if orbit.stable { "yes" } else { "no" };
+    let stable = stability(orbit.stable, orbit.neutral);
     vec![hertz, response, c, drive, growth, stable.into()]
 }

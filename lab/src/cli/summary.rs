@@ -257,7 +257,7 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
             orbit.sigma, orbit.c, orbit.b
         ));
     }
-    if result.exact.as_ref().is_some_and(|exact| !exact.stable) {
+    if result.exact.as_ref().is_some_and(Orbit::is_unstable) {
         note("the nearest exact orbit is unstable under a constant drive and frequency; the loop holds it");
     }
     format!("{text}\n{}\n{}\n", decay(result), agreement(result))

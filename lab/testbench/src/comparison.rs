@@ -151,7 +151,7 @@ const POINTS: usize = 3000;
 /// Largest particle speed of the curve: beyond symmetry breaking.
 const SPEED_MAX: f64 = 1.35;
 
-/// A curve to draw: sigma and C of its points, and whether the motion is stable there.
+/// A curve to draw: sigma and C of its points, and whether the motion is stable or neutral there.
 pub type DrawnCurve = Vec<([f64; 2], bool)>;
 
 /// The exact backbone beyond the fold as a fine polygon, by increasing particle speed.
@@ -228,7 +228,7 @@ impl ExactCurve {
         let rising = curves.iter().map(|curve| right_of_fold(curve));
         let nearest = rising.min_by(|one, other| distance(one).total_cmp(&distance(other)));
         let places = nearest.unwrap_or_default();
-        let place = |orbit: &Orbit| ([orbit.sigma, orbit.c], orbit.stable);
+        let place = |orbit: &Orbit| ([orbit.sigma, orbit.c], !orbit.is_unstable());
         Self {
             compared: vec![places.clone()],
             places,

@@ -19,7 +19,7 @@ use super::periodic::wrapped;
 use super::symmetric::{
     Interval, Particle, Reading, SEARCHED, SymmetricMotion, SymmetricMotions, harmonic, intervals, search,
 };
-use super::{AfterImpact, Bifurcation, Orbit};
+use super::{AfterImpact, Bifurcation, ON_CIRCLE, Orbit, stability};
 use crate::numerics::{self, equally_spaced, try_bisection};
 use crate::theory::SlowFlow;
 use crate::{Definition, Dimensionless, Reference, Sensor};
@@ -49,6 +49,8 @@ pub struct StructureOrbit {
     pub multipliers: Vec<[f64; 2]>,
     /// All of them are inside the unit circle.
     pub stable: bool,
+    /// The largest are on the unit circle, within 1e-7: disturbances neither grow nor decay.
+    pub neutral: bool,
 }
 
 /// The state where the phase of the drive is 0, so that the drive is `sin(omega t)` times its amplitude from there on.
@@ -114,7 +116,13 @@ impl StructureOrbit {
             },
             multipliers,
             stable: self.stable,
+            neutral: self.neutral,
         }
+    }
+
+    /// Whether a multiplier is outside the unit circle.
+    pub fn is_unstable(&self) -> bool {
+        !self.stable && !self.neutral
     }
 
     /// Number of multipliers outside the unit circle.
@@ -147,16 +155,30 @@ pub struct OrbitCurve {
 }
 
 impl StructureBranch {
-    /// The stretches of stable orbits, each with the changes at its ends; `None` where the curve ends.
-    pub fn stable(&self) -> impl Iterator<Item = (&[StructureOrbit], [Option<&StabilityChange>; 2])> {
+    /// The stretches of stable orbits, and of neutral ones, each with the changes at its ends; `None` where the curve ends.
+    pub fn stretches(&self) -> impl Iterator<Item = (&[StructureOrbit], [Option<&StabilityChange>; 2])> {
         let mut from = 0;
-        let runs = self.orbits.chunk_by(|one, other| one.stable == other.stable);
+        let kind = |orbit: &StructureOrbit| [orbit.stable, orbit.neutral];
+        let runs = self.orbits.chunk_by(move |one, other| kind(one) == kind(other));
         let with_ends = runs.map(move |run| {
             let ends = [from, from + run.len()].map(|n| self.changes.iter().find(|change| change.after + 1 == n));
             from += run.len();
             (run, ends)
         });
-        with_ends.filter(|(run, _)| run[0].stable)
+        with_ends.filter(|(run, _)| !run[0].is_unstable())
+    }
+
+    /// The stretches of stable orbits.
+    pub fn stable(&self) -> impl Iterator<Item = (&[StructureOrbit], [Option<&StabilityChange>; 2])> {
+        self.stretches().filter(|(run, _)| run[0].stable)
+    }
+
+    /// The stretches of stable orbits, with the orbits where they begin and end.
+    pub fn stable_to_their_ends(&self) -> impl Iterator<Item = Vec<&StructureOrbit>> {
+        self.stable().map(|(run, [first, last])| {
+            let [first, last] = [first, last].map(|end| end.map(|change| &change.orbit));
+            first.into_iter().chain(run).chain(last).collect()
+        })
     }
 
     /// This curve in the numbers of an oscillator, as [`StructureOrbit::in_numbers`].
@@ -291,8 +313,6 @@ pub struct StructureOrbits {
 const GRID: usize = 4000;
 /// Widths, in the angle along a loop, to which a change of stability and the end of a branch are located.
 const LOCATED: f64 = 1e-11;
-/// Distance from the unit circle at which a multiplier counts as on it: a double one has half of the digits.
-const ON_CIRCLE: f64 = 1e-7;
 /// Amplitudes over b that are rounding: of a response that is zero, and of the harmonic part of an orbit that needs no drive.
 const ROUNDING: f64 = 1e-12;
 
@@ -363,13 +383,13 @@ impl StructureOrbits {
 
     /// All orbits at the frequency `omega`, rad/s, with a reference of the amplitude `reference`, at any phase: none or up to two.
     pub fn at(&self, omega: f64, reference: f64) -> Vec<StructureOrbit> {
-        self.both(omega, |motions| motions.driven(reference), |motion| self.accept(motion))
+        self.both(omega, |motions| motions.driven(reference), |motion| self.accept(motion, None))
     }
 
     /// All orbits at phase resonance at the frequency `omega`, rad/s, under any drive: none or up to two.
     pub fn at_phase_resonance(&self, omega: f64) -> Vec<StructureOrbit> {
         let roots = SymmetricMotions::phase_resonant;
-        self.both(omega, roots, |motion| self.accept_resonant(motion))
+        self.both(omega, roots, |motion| self.accept_resonant(motion, None))
     }
 
     /// All orbits at phase resonance with a reference of the amplitude `reference` and frequencies in a range, rad/s, by rising response.
@@ -380,7 +400,7 @@ impl StructureOrbits {
     /// As [`Self::resonant`], at frequencies of a grid and between them.
     pub(super) fn resonant_at(&self, grid: impl IntoIterator<Item = f64>, reference: f64) -> Vec<StructureOrbit> {
         let found = search(grid, reference, |omega| self.motions(omega));
-        let mut orbits: Vec<_> = found.iter().filter_map(|motion| self.accept_resonant(motion)).collect();
+        let mut orbits: Vec<_> = found.iter().filter_map(|motion| self.accept_resonant(motion, None)).collect();
         orbits.sort_unstable_by(|first, second| first.response.total_cmp(&second.response));
         let same = |first: f64, second: f64| (first - second).abs() < 1e-9 * first.abs();
         orbits.dedup_by(|first, second| same(first.omega, second.omega) && same(first.speed, second.speed));
@@ -390,12 +410,13 @@ impl StructureOrbits {
     /// The exact backbone: the orbits at phase resonance within `range`, as curves.
     pub fn backbone(&self, range: &StructureRange) -> Vec<StructureBranch> {
         let roots = SymmetricMotions::phase_resonant;
-        self.branches(range, roots, |motion| self.accept_resonant(motion))
+        self.branches(range, roots, |motion, near| self.accept_resonant(motion, near))
     }
 
     /// The frequency response of the symmetric 1:1 motions with a reference of the amplitude `reference` within `range`, as curves.
     pub fn frequency_response(&self, reference: f64, range: &StructureRange) -> Vec<StructureBranch> {
-        self.branches(range, |motions| motions.driven(reference), |motion| self.accept(motion))
+        let roots = |motions: &SymmetricMotions| motions.driven(reference);
+        self.branches(range, roots, |motion, near| self.accept(motion, near))
     }
 
     /// What each section and, last, the particle contribute to the disturbance of an orbit that grows fastest or decays slowest: shares
@@ -520,18 +541,18 @@ impl StructureOrbits {
         both.iter().flatten().filter_map(accept).collect()
     }
 
-    /// The orbit with its stability, if the phase of its response has the sign that is wanted.
-    fn accept_resonant(&self, motion: &SymmetricMotion) -> Option<StructureOrbit> {
+    /// The orbit with its stability, if the phase of its response has the sign that is wanted; `near`: an orbit near it.
+    fn accept_resonant(&self, motion: &SymmetricMotion, near: Option<&StructureOrbit>) -> Option<StructureOrbit> {
         if motion.cavity.norm() < ROUNDING * self.particle.half_width {
             // Without a drive, its phase is free.
             let turned = wrapped(motion.drive.arg() + motion.phase + FRAC_PI_2);
-            let mut orbit = self.accept(motion)?;
+            let mut orbit = self.accept(motion, near)?;
             orbit.phase = self.target;
             orbit.impact_phase = turned;
             return Some(orbit);
         }
         let resonant = motion.phase.sin() < -1e-12;
-        resonant.then(|| self.accept(motion)).flatten()
+        resonant.then(|| self.accept(motion, near)).flatten()
     }
 
     /// A motion as an orbit, of which neither start nor stability are examined.
@@ -548,11 +569,13 @@ impl StructureOrbits {
             start: StructureStart { sections: Vec::new(), q2: f64::NAN, dq2: f64::NAN },
             multipliers: Vec::new(),
             stable: false,
+            neutral: false,
         }
     }
 
     /// The orbit with its stability, if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
-    fn accept(&self, motion: &SymmetricMotion) -> Option<StructureOrbit> {
+    /// `near`: an orbit near it.
+    fn accept(&self, motion: &SymmetricMotion, near: Option<&StructureOrbit>) -> Option<StructureOrbit> {
         let orbit = self.told(motion);
         let sizes = [orbit.speed, orbit.response, orbit.drive];
         let is_motion = orbit.speed > 0.0 && orbit.response > ROUNDING * self.particle.half_width;
@@ -560,7 +583,8 @@ impl StructureOrbits {
             return None;
         }
         let half = HalfPeriod::new(&self.sections, &self.particle, motion)?;
-        let multipliers = half.multipliers();
+        let multipliers = half.multipliers(near.map(|near| &near.multipliers[..]));
+        let [stable, neutral] = stability(multipliers.last()?.norm());
         let (t, sign) = since_impact(motion);
         let state = |(section, impulsive): (&Section, Vector2<f64>)| {
             let impulsive = section.propagator(t) * impulsive * sign;
@@ -579,7 +603,8 @@ impl StructureOrbits {
                 q2: sign * (q2 + motion.speed * t),
                 dq2: sign * motion.speed,
             },
-            stable: multipliers.iter().all(|multiplier| multiplier.norm() < 1.0),
+            stable,
+            neutral,
             multipliers: multipliers.iter().map(|one| [one.re, one.im]).collect(),
             ..orbit
         })
@@ -595,7 +620,7 @@ impl StructureOrbits {
         &self,
         range: &StructureRange,
         roots: impl Fn(&SymmetricMotions) -> Option<[f64; 2]>,
-        accept: impl Fn(&SymmetricMotion) -> Option<StructureOrbit>,
+        accept: impl Fn(&SymmetricMotion, Option<&StructureOrbit>) -> Option<StructureOrbit>,
     ) -> Vec<StructureBranch> {
         let both = |omega: f64| {
             let motions = self.motions(omega)?;
@@ -608,11 +633,11 @@ impl StructureOrbits {
         {
             let [low, high] = [points[0].0, points[points.len() - 1].0];
             // Angles 0 to pi lead up along the first root, and pi to 2 pi back along the second one.
-            let at = |angle: f64| {
+            let at = |angle: f64, near: Option<&StructureOrbit>| {
                 let omega = 0.5 * (low + high) - 0.5 * (high - low) * angle.cos();
                 let second = usize::from(angle.rem_euclid(TAU) >= PI);
                 let motion = &both(omega.clamp(low, high))?[second];
-                accept(motion).filter(|orbit| orbit.speed <= range.speed)
+                (motion.speed <= range.speed).then(|| accept(motion, near)).flatten()
             };
             let arcs = match turns {
                 [true, true] => vec![[0.0, TAU]],
@@ -633,13 +658,16 @@ impl StructureOrbits {
         [from, to]: [f64; 2],
         is_loop: bool,
         points: usize,
-        at: &impl Fn(f64) -> Option<StructureOrbit>,
+        at: &impl Fn(f64, Option<&StructureOrbit>) -> Option<StructureOrbit>,
     ) -> Vec<StructureBranch> {
         let count = (points as f64 * (to - from) / PI).ceil().max(2.0);
         let step = (to - from) / count;
         let angle = |n: usize| from + (n as f64 + 0.5) * step;
-        let mut samples: Vec<(f64, Option<StructureOrbit>)> =
-            (0..count as usize).map(|n| (angle(n), at(angle(n)))).collect();
+        let mut samples: Vec<(f64, Option<StructureOrbit>)> = Vec::with_capacity(count as usize);
+        for n in 0..count as usize {
+            let orbit = at(angle(n), samples.last().and_then(|last| last.1.as_ref()));
+            samples.push((angle(n), orbit));
+        }
         // A loop begins where it is interrupted, or ends where it begins.
         let closed = is_loop && samples.iter().all(|(_, orbit)| orbit.is_some());
         if is_loop {
@@ -654,8 +682,8 @@ impl StructureOrbits {
         for run in samples.chunk_by(|one, other| one.1.is_some() == other.1.is_some()) {
             let to = from + run.len();
             let towards = |n: Option<usize>| n.and_then(|n| samples.get(n)).map(|sample| sample.0);
-            let first = towards(from.checked_sub(1)).and_then(|gap| end(at, run[0].0, gap));
-            let last = towards(Some(to)).and_then(|gap| end(at, run[run.len() - 1].0, gap));
+            let first = towards(from.checked_sub(1)).and_then(|gap| end(at, &run[0], gap));
+            let last = towards(Some(to)).and_then(|gap| end(at, &run[run.len() - 1], gap));
             let inside: Vec<(f64, &StructureOrbit)> = run
                 .iter()
                 .filter_map(|(angle, orbit)| Some((*angle, orbit.as_ref()?)))
@@ -683,7 +711,7 @@ impl StructureOrbits {
     /// Where the number of multipliers outside the unit circle changes between two neighbours.
     fn change(
         &self,
-        at: &impl Fn(f64) -> Option<StructureOrbit>,
+        at: &impl Fn(f64, Option<&StructureOrbit>) -> Option<StructureOrbit>,
         (from, first): (f64, &StructureOrbit),
         (to, second): (f64, &StructureOrbit),
     ) -> Option<StabilityChange> {
@@ -691,6 +719,7 @@ impl StructureOrbits {
         if outside == second.unstable() {
             return None;
         }
+        let at = |angle: f64| at(angle, Some(first));
         let like_first = |angle: f64| at(angle).map(|orbit| orbit.unstable() == outside).ok_or(());
         let (before, beyond) = try_bisection(from, to, LOCATED, like_first).ok()?;
         // The multipliers rise in modulus: the first one outside has just left, or is about to enter.
@@ -717,8 +746,13 @@ fn since_impact(motion: &SymmetricMotion) -> (f64, f64) {
 }
 
 /// The last orbit from `from`, where there is one, towards `to`, where there is none.
-fn end(at: &impl Fn(f64) -> Option<StructureOrbit>, from: f64, to: f64) -> Option<StructureOrbit> {
+fn end(
+    at: &impl Fn(f64, Option<&StructureOrbit>) -> Option<StructureOrbit>,
+    (from, orbit): &(f64, Option<StructureOrbit>),
+    to: f64,
+) -> Option<StructureOrbit> {
+    let at = |angle: f64| at(angle, orbit.as_ref());
     let is_orbit = |angle: f64| Ok::<_, ()>(at(angle).is_some());
-    let (last, _) = try_bisection(from, to, LOCATED, is_orbit).ok()?;
-    (last != from).then(|| at(last)).flatten()
+    let (last, _) = try_bisection(*from, to, LOCATED, is_orbit).ok()?;
+    (last != *from).then(|| at(last)).flatten()
 }
