@@ -5,6 +5,7 @@
 
 import argparse
 import sys
+import warnings
 from pathlib import Path
 
 from . import Scene, fit_recordings, linear_decay, read_recording, scene_from_uff
@@ -73,7 +74,11 @@ def _structure(given: argparse.Namespace) -> int:
     try:
         if len(given.files) != 1 or not given.cavity:
             raise ValueError("structure needs one file and --cavity POINT; --drive POINT is the cavity unless given")
-        text = scene_from_uff(given.files[0], given.cavity, given.drive or given.cavity, units=given.units)
+        with warnings.catch_warnings(record=True) as noted:
+            warnings.simplefilter("always")
+            text = scene_from_uff(given.files[0], given.cavity, given.drive or given.cavity, units=given.units)
+        for note in noted:
+            print(f"warning: {note.message}", file=sys.stderr)
         if given.out is None:
             print(text, end="")
         else:

@@ -30,6 +30,11 @@ pub fn exact(scene: &Dimensionless, points: usize) -> impl Iterator<Item = [f64;
         let nearest = orbits
             .into_iter()
             .min_by(|first, second| distance(first.c).total_cmp(&distance(second.c)))?;
-        Some([nearest.sigma, nearest.c, f64::from(u8::from(!nearest.is_unstable())), nearest.g])
+        Some([
+            nearest.sigma,
+            nearest.c,
+            f64::from(u8::from(!nearest.is_unstable())),
+            nearest.g,
+        ])
     })
 }

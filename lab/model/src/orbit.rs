@@ -33,8 +33,8 @@ pub use structure::{
     StructureOrbits, StructureRange, StructureStart,
 };
 pub use symmetric::{
-    Particle, at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_resonant,
-    symmetric_orbits,
+    Particle, at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_backbone,
+    stable_resonant, symmetric_orbits, with_amplitude,
 };
 
 /// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.

@@ -13,7 +13,7 @@ use vines::orbit::{
     stable_resonant,
 };
 use vines::report::responses;
-use vines::survey::{detunings, structure_curves};
+use vines::survey::{DETUNINGS, detunings, structure_curves};
 use vines::table::{Table, number, row};
 use vines::{
     ArgumentError,
@@ -106,7 +106,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let range = arguments
         .range
         .or_else(|| detunings(&loaded, &scene))
-        .unwrap_or([-6.0, 6.0]);
+        .unwrap_or(DETUNINGS);
     if arguments.backbone {
         let of_structure = structure_curves(&loaded, &scene, range, false);
         let curves = of_structure.unwrap_or_else(|| backbone(&scene, Some(range), POINTS));
@@ -392,7 +392,17 @@ struct Place {
 
 impl From<&Orbit> for Place {
     fn from(orbit: &Orbit) -> Self {
-        let Orbit { sigma, g, c, gamma, b, multipliers: [.., largest], stable, neutral, .. } = *orbit;
+        let Orbit {
+            sigma,
+            g,
+            c,
+            gamma,
+            b,
+            multipliers: [.., largest],
+            stable,
+            neutral,
+            ..
+        } = *orbit;
         Self {
             numbers: [sigma, g, c, gamma, b],
             largest,

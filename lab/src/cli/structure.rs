@@ -10,7 +10,7 @@ use vines::scene::{Scene, Structure};
 use vines::survey::Survey;
 use vines::table::{Table, number};
 
-use super::output::{Results, output, stability, writable};
+use super::output::{Results, output, progress_bar, stability, writable};
 use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
@@ -48,8 +48,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let scene = arguments.scene.load()?;
     let no_structure = || Failure::input("the scene has no [structure]: its host is one oscillator, see `vines orbit`");
     let structure = scene.structure.as_ref().ok_or_else(no_structure)?;
-    let survey =
-        Survey::of(&scene).ok_or_else(|| Failure::run("the exact orbits have no closed form at this frequency"))?;
+    let bar = progress_bar(Survey::ORBITS as u64, "computing the backbone", "orbits");
+    let survey = Survey::with(&scene, &|| {
+        bar.inc(1);
+        if bar.position() > bar.length().unwrap_or(0) {
+            bar.inc_length(Survey::ORBITS as u64);
+        }
+    });
+    bar.finish_and_clear();
+    let survey = survey.ok_or_else(|| Failure::run("the exact orbits have no closed form at this frequency"))?;
     let result = json!({ "structure": structure, "survey": survey });
     let text = output(arguments.json, &result, || described(&scene, structure, &survey))?;
     let (figure, json, scene) = (arguments.figure.clone(), arguments.json, scene.clone());
@@ -186,7 +193,11 @@ fn words(kind: Bifurcation) -> &'static str {
 
 /// A stretch of stable orbits, from its smaller to its larger C.
 fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>; 2], b: f64) -> Vec<String> {
-    let modes = if run[0].neutral { format!("{modes}, neutral") } else { modes.into() };
+    let modes = if run[0].neutral {
+        format!("{modes}, neutral")
+    } else {
+        modes.into()
+    };
     let mut ends = [(&run[0], ends[0]), (&run[run.len() - 1], ends[1])]
         .map(|(orbit, change)| (change.map_or(orbit, |change| &change.orbit), change));
     ends.sort_by(|one, other| one.0.response.total_cmp(&other.0.response));

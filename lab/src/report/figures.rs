@@ -234,7 +234,7 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
     let expected = exact
         .places()
         .iter()
-        .map(|[c, sigma, _]| (1e3 * c * p.b, (p.omega0 + p.omega_change(*sigma)) / TAU));
+        .map(|[c, sigma, ..]| (1e3 * c * p.b, (p.omega0 + p.omega_change(*sigma)) / TAU));
     let expected: Vec<Place> = expected
         .filter(|(amplitude, _)| (x.0..x.1).contains(amplitude))
         .collect();

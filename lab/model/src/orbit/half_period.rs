@@ -8,7 +8,7 @@
 use std::f64::consts::PI;
 
 use lovines::Section;
-use lovines::oscillator::Oscillator;
+use lovines::oscillator::{Oscillator, Regime};
 use nalgebra::{Complex, DMatrix, Matrix2, RowVector2, Vector2};
 
 use super::flight::Flight;
@@ -25,6 +25,8 @@ pub(super) struct HalfPeriod {
     /// Their flows over half a period.
     flows: Vec<(Section, Matrix2<f64>)>,
     impact: Impact,
+    /// s
+    duration: f64,
 }
 
 impl HalfPeriod {
@@ -56,16 +58,50 @@ impl HalfPeriod {
             impact: impact(&parts, motion),
             flows: parts.iter().map(|part| part.0).zip(flows).collect(),
             parts,
+            duration,
         })
     }
 
-    /// The multipliers of the half period, by rising modulus; `near` has those of an orbit near this one.
-    pub(super) fn multipliers(&self, near: Option<&[[f64; 2]]>) -> Vec<Complex<f64>> {
-        let found = near.and_then(|near| multipliers::multipliers(&self.flows, self.impact, near));
+    /// The multipliers of the half period, by rising modulus; `near`: frequency, rad/s, and multipliers of an orbit near this one.
+    pub(super) fn multipliers(&self, near: Option<(f64, &[[f64; 2]])>) -> Vec<Complex<f64>> {
+        let found = near.and_then(|(omega, multipliers)| {
+            let start = self.turned(PI / omega, multipliers);
+            multipliers::multipliers(&self.flows, self.impact, &start)
+        });
         let mut multipliers =
             found.unwrap_or_else(|| map(&self.flows, self.impact).complex_eigenvalues().as_slice().to_vec());
         multipliers.sort_unstable_by(|first, second| first.norm().total_cmp(&second.norm()));
         multipliers
+    }
+
+    /// Multipliers of half a period of the duration `before`, turned as the nearest multipliers of the sections without an impact turn: those of high
+    /// modes turn fast.
+    fn turned(&self, before: f64, multipliers: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let rates = self
+            .flows
+            .iter()
+            .filter_map(|(section, _)| match section.oscillator.regime {
+                Regime::Oscillating { omega_d } => Some(Complex::new(-section.oscillator.delta, omega_d)),
+                Regime::Overdamped { .. } => None,
+            });
+        let rates = rates.flat_map(|rate| [rate, rate.conj()]);
+        let free: Vec<_> = rates
+            .map(|rate| (-(rate * before).exp(), (rate * (self.duration - before)).exp()))
+            .collect();
+        let turn = |&[re, im]: &[f64; 2]| {
+            let multiplier = Complex::new(re, im);
+            let distance = |(free, _): &&(Complex<f64>, Complex<f64>)| (free - multiplier).norm_sqr();
+            let nearest = free
+                .iter()
+                .min_by(|one, other| distance(one).total_cmp(&distance(other)));
+            let turned = match nearest {
+                // A real one stays real.
+                Some((_, turn)) if im != 0.0 => multiplier * turn,
+                _ => multiplier,
+            };
+            [turned.re, turned.im]
+        };
+        multipliers.iter().map(turn).collect()
     }
 
     /// The part of (x, v) of every section after the impact that the impulses make.
@@ -165,7 +201,9 @@ mod tests {
         let mut left = eigenvalues.to_vec();
         let nearest = found.iter().map(|one| {
             let distance = |n: &usize| (left[*n] - one).norm();
-            let n = (0..left.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
+            let n = (0..left.len())
+                .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+                .unwrap();
             (left.swap_remove(n) - one).norm()
         });
         nearest.fold(0.0, f64::max)
@@ -174,7 +212,8 @@ mod tests {
     #[test]
     fn the_multipliers_of_random_structures_are_the_eigenvalues_of_their_maps() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let mut uniform = |low: f64, high: f64| low + (high - low) * (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+        let mut uniform =
+            |low: f64, high: f64| low + (high - low) * (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
         let (mut worst, mut by_eigenvalues) = (0.0_f64, 0);
         for _ in 0..400 {
             let count = uniform(1.0, 30.0) as usize;

@@ -84,8 +84,8 @@ pub(super) fn multipliers(
     start: &[[f64; 2]],
 ) -> Option<Vec<Complex<f64>>> {
     let mut sections: Vec<(Section, Part)> = Vec::new();
-    let mut factors = factors_of(start);
-    let mut multipliers = Vec::new();
+    // The factors of sections whose flow another one has.
+    let mut alike = Vec::new();
     for (section, flow) in flows {
         let free = Quadratic::of_flow(flow);
         let field = field(section);
@@ -95,40 +95,45 @@ pub(super) fn multipliers(
             row *= field;
             part
         });
-        // Sections with one flow act as one. What they do against each other meets no wall: of its factor, the nearest is not corrected.
+        // Such sections act as one. What they do against each other meets no wall.
         let same = |(other, _): &&mut (Section, Part)| other.oscillator == section.oscillator;
         if let Some((_, other)) = sections.iter_mut().find(same) {
             for (sum, part) in other.parts.iter_mut().zip(parts) {
                 *sum = [sum[0] + part[0], sum[1] + part[1]];
             }
-            let distance = |n: &usize| (factors[*n].u - free.u).hypot(factors[*n].v - free.v);
-            let nearest = (0..factors.len()).min_by(|one, other| distance(one).total_cmp(&distance(other)))?;
-            factors.swap_remove(nearest);
-            multipliers.extend(free.roots());
+            alike.push(free);
         } else {
             sections.push((*section, Part { free, parts }));
         }
     }
     let parts: Vec<Part> = sections.into_iter().map(|(_, part)| part).collect();
-    if factors.len() != parts.len() {
-        return None;
-    }
-    correct(&mut factors, &parts, impact)?;
-    multipliers.extend(factors.iter().flat_map(Quadratic::roots));
-    Some(multipliers)
+    // Real zeros that meet and become complex must be of one factor.
+    let factors = [false, true].into_iter().find_map(|shifted| {
+        let mut factors = factors_of(start, shifted);
+        for free in &alike {
+            let distance = |n: &usize| (factors[*n].u - free.u).hypot(factors[*n].v - free.v);
+            let nearest = (0..factors.len()).min_by(|one, other| distance(one).total_cmp(&distance(other)))?;
+            factors.swap_remove(nearest);
+        }
+        let is_whole = factors.len() == parts.len();
+        (is_whole && correct(&mut factors, &parts, impact).is_some()).then_some(factors)
+    })?;
+    Some(factors.iter().chain(&alike).flat_map(Quadratic::roots).collect())
 }
 
-/// Factors with these zeros, of which the complex ones are in pairs.
-fn factors_of(zeros: &[[f64; 2]]) -> Vec<Quadratic> {
+/// Factors with these zeros, of which the complex ones are in pairs. Real ones are paired as they follow each other, from the first, or `shifted` from
+/// the second, with the first and the last as a pair.
+fn factors_of(zeros: &[[f64; 2]], shifted: bool) -> Vec<Quadratic> {
     let pairs = zeros.iter().filter(|[_, im]| *im > 0.0);
     let pairs = pairs.map(|[re, im]| Quadratic { u: -2.0 * re, v: re * re + im * im });
     let mut real: Vec<f64> = zeros.iter().filter(|[_, im]| *im == 0.0).map(|[re, _]| *re).collect();
-    // Both of a double zero belong to one factor.
     real.sort_unstable_by(f64::total_cmp);
-    let real = real.chunks_exact(2).map(|pair| Quadratic {
-        u: -pair[0] - pair[1],
-        v: pair[0] * pair[1],
-    });
+    if shifted && !real.is_empty() {
+        real.rotate_left(1);
+    }
+    let real = real
+        .chunks_exact(2)
+        .map(|pair| Quadratic { u: -pair[0] - pair[1], v: pair[0] * pair[1] });
     pairs.chain(real).collect()
 }
 
@@ -152,11 +157,20 @@ fn correct(factors: &mut [Quadratic], parts: &[Part], impact: Impact) -> Option<
             largest = largest.max(u.abs()).max(v.abs());
         }
         if largest < CONVERGED || largest < ROUNDING && largest > 0.5 * last {
-            return Some(());
+            return has_trace(factors, parts, impact).then_some(());
         }
         last = largest;
     }
     None
+}
+
+/// Whether the sum of the zeros is the trace of the map: a zero that has left towards infinity is lost.
+fn has_trace(factors: &[Quadratic], parts: &[Part], Impact { mu, kappa }: Impact) -> bool {
+    let own = |Part { free, parts: [own, rate, _] }: &Part| 2.0 * mu * rate[1] - kappa * own[1] - free.u;
+    let trace: f64 = parts.iter().map(own).sum();
+    let sum: f64 = factors.iter().map(|factor| -factor.u).sum();
+    let size: f64 = parts.iter().map(|part| own(part).abs()).sum();
+    (trace - sum).abs() <= ROUNDING * size
 }
 
 /// The correction `a + b z` of a factor: the polynomial over all other factors, modulo this one.
@@ -164,7 +178,13 @@ fn correction(parts: &[Part], factors: &[Quadratic], Impact { mu, kappa }: Impac
     let own = factors[n];
     // Sums of the other sections in h_j, and their polynomials over the other factors.
     let (mut sums, mut ratio) = ([[0.0; 2]; 3], [1.0, 0.0]);
-    for (part, factor) in parts.iter().zip(factors).enumerate().filter(|(other, _)| *other != n).map(|(_, both)| both) {
+    for (part, factor) in parts
+        .iter()
+        .zip(factors)
+        .enumerate()
+        .filter(|(other, _)| *other != n)
+        .map(|(_, both)| both)
+    {
         let free = own.reduced(&part.free);
         let inverse = own.inverse(free);
         for (sum, part) in sums.iter_mut().zip(part.parts) {
@@ -218,7 +238,9 @@ pub(super) fn disturbance(
     let parts = parts?;
     let coupling = parts
         .iter()
-        .fold(Matrix::identity(), |sum, (columns, rows, inverse)| sum - rows * inverse * columns)
+        .fold(Matrix::identity(), |sum, (columns, rows, inverse)| {
+            sum - rows * inverse * columns
+        })
         .try_inverse()?;
     let mut vector = vec![Vector::from_element(Complex::ONE); parts.len()];
     for _ in 0..3 {
