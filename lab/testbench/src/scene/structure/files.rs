@@ -134,11 +134,11 @@ impl Matrix {
         let largest = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let (title, count, smallest) = (self.title(), values.len(), values[0]);
         let rounding = f64::EPSILON * largest;
+        let what = if may_be_singular { "semidefinite" } else { "definite" };
+        let start =
+            format!("{title} is not positive {what}: eigenvalue 1 of {count}, the smallest, is {smallest:.4e} {unit}");
         if smallest < -ROUNDING * largest {
-            return Err(format!(
-                "{title} has a negative eigenvalue: 1 of {count}, the smallest, is {smallest:.4e} {unit}, so that it is not positive definite; check \
-                 the signs of its elements"
-            ));
+            return Err(format!("{start}; check the signs of its elements"));
         }
         if may_be_singular || smallest > rounding {
             return Ok(());
@@ -146,11 +146,7 @@ impl Matrix {
         // Rounding of the file as far as it shows, by the negative ones.
         let rounding = (count as f64 * rounding).max(-smallest);
         let zeros = values.iter().filter(|value| **value <= rounding).count();
-        let plural = if zeros == 1 { "eigenvalue is" } else { "eigenvalues are" };
-        Err(format!(
-            "{title} is singular: {zeros} of its {count} {plural} 0 within rounding, the smallest {smallest:.4e} {unit} beside the largest {largest:.4e} \
-             {unit}. {zero}"
-        ))
+        Err(format!("{start}; {zeros} of them are 0 within rounding. {zero}"))
     }
 
     /// Refuses a stiffness that is not positive definite.
