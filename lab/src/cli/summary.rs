@@ -182,10 +182,10 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let b = lock.b.zip(lock.u_b).map_or("-".into(), |(b, u)| with_uncertainty(b, u));
     let [sigma, c] = [(at.sigma, at.u_sigma), (at.c, at.u_c)].map(|(value, u)| with_uncertainty(value, u));
     let g = with_uncertainty(at.g, at.u_g);
-    let measured = ["measured at the lock".to_string(), sigma, c, g.clone(), b];
+    let measured = ["measured at the lock".to_string(), sigma, c, b, g.clone()];
     let exact = result.exact.map(|orbit| {
         let Orbit { sigma, c, g, b, .. } = orbit;
-        row("exact orbit", [sigma, c, g, b])
+        row("exact orbit", [sigma, c, b, g])
     });
     let name = match result.curve.is_of_structure {
         true => "driven mode alone, first order",
@@ -193,8 +193,8 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     };
     let theory = result
         .theory
-        .map(|point| row(name, [point.sigma, point.c, point.g, point.b]));
-    let table = Table::new(" | sigma | C | G | B")
+        .map(|point| row(name, [point.sigma, point.c, point.b, point.g]));
+    let table = Table::new(" | sigma | C | B | G")
         .rows([measured])
         .rows(exact)
         .rows(theory);
