@@ -182,22 +182,17 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let b = lock.b.zip(lock.u_b).map_or("-".into(), |(b, u)| with_uncertainty(b, u));
     let [sigma, c] = [(at.sigma, at.u_sigma), (at.c, at.u_c)].map(|(value, u)| with_uncertainty(value, u));
     let g = with_uncertainty(at.g, at.u_g);
-    let measured = ["measured at the lock".to_string(), sigma, c, b, g.clone()];
+    let measured = ["measured at the lock".to_string(), sigma, c, b];
     let exact = result.exact.map(|orbit| {
-        let Orbit { sigma, c, g, b, .. } = orbit;
-        row("exact orbit", [sigma, c, b, g])
+        let Orbit { sigma, c, b, .. } = orbit;
+        row("exact orbit", [sigma, c, b])
     });
     let name = match result.curve.is_of_structure {
         true => "driven mode alone, first order",
         false => "theory, first order",
     };
-    let theory = result
-        .theory
-        .map(|point| row(name, [point.sigma, point.c, point.b, point.g]));
-    let table = Table::new(" | sigma | C | B | G")
-        .rows([measured])
-        .rows(exact)
-        .rows(theory);
+    let theory = result.theory.map(|point| row(name, [point.sigma, point.c, point.b]));
+    let table = Table::new(" | sigma | C | B").rows([measured]).rows(exact).rows(theory);
     let held = match lock.held {
         true => " (the response is held by control: a constant drive holds it hardly, or not)",
         false => "",
@@ -214,8 +209,10 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
         table.text(),
     );
     text += SYMBOLS;
-    if result.exact.is_some() {
-        text += "  (the exact orbit is the one with the measured C; theory is at the requested G)\n";
+    if let Some(Orbit { g, .. }) = result.exact {
+        text += &format!(
+            "  (the exact orbit has the measured C, and the drive G = {g:.6}; theory is at the requested G)\n"
+        );
     }
     let mut note = |note: &str| text += &format!("  ({note})\n");
     note(&format!(

@@ -208,7 +208,7 @@ impl View {
     /// The row of a sample.
     fn row(&mut self, now: Numbered) -> Row {
         let Numbered { sample, step, .. } = now;
-        let Sample { time, sensors, command, ground_truth } = sample;
+        let Sample { time, sensors, command, ground_truth, .. } = sample;
         let (drive, before) = (command.drive, self.last.sample.command.drive);
         let [driven, was_driven] = [drive, before].map(|drive| drive.amplitude != 0.0 || drive.displacement != 0.0);
         let follows = now.number == self.last.number + 1;
