@@ -10,6 +10,7 @@ import io
 import os
 import signal
 import sys
+import warnings
 from pathlib import Path
 from typing import TextIO
 
@@ -44,7 +45,11 @@ def main(words: list[str] | None = None) -> int:
 
 def _structure(given: argparse.Namespace) -> int:
     try:
-        text = scene_from_uff(given.file, given.cavity, given.drive or given.cavity, units=given.units)
+        with warnings.catch_warnings(record=True) as noted:
+            warnings.simplefilter("always")
+            text = scene_from_uff(given.file, given.cavity, given.drive or given.cavity, units=given.units)
+        for note in noted:
+            print(f"warning: {note.message}", file=sys.stderr)
         if given.out is None:
             return _printed(text, sys.stdout)
         partial = Path(f"{given.out}.partial")

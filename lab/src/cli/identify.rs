@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let mut text = summary::identification(&result, &scene) + &summary::structure(&scene);
     let unstable = result
         .exact
-        .filter(|orbit| scene.structure.is_some() && !orbit.stable && !record.held);
+        .filter(|orbit| scene.structure.is_some() && orbit.is_unstable() && !record.held);
     if let Some(orbit) = unstable {
         text += &format!(
             "warning: the exact orbit there is unstable under a constant drive (largest multiplier {:.4}): the motion is modulated around it, or \

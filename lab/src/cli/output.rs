@@ -47,6 +47,15 @@ pub(super) fn output(as_json: bool, result: &impl Serialize, text: impl FnOnce()
     }
 }
 
+/// Stability in a column `stable`.
+pub(super) fn stability(stable: bool, neutral: bool) -> &'static str {
+    match (stable, neutral) {
+        (true, _) => "yes",
+        (_, true) => "neutral",
+        _ => "no",
+    }
+}
+
 pub(super) fn yes_no(value: bool) -> String {
     if value { "yes" } else { "no" }.into()
 }

@@ -181,10 +181,12 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let [(of_response, m), (of_drive, unit)] = units.names;
     let b = lock.b.zip(lock.u_b).map_or("-".into(), |(b, u)| with_uncertainty(b, u));
     let [sigma, c] = [(at.sigma, at.u_sigma), (at.c, at.u_c)].map(|(value, u)| with_uncertainty(value, u));
+    let g = with_uncertainty(at.g, at.u_g);
     let measured = ["measured at the lock".to_string(), sigma, c, b];
-    let exact = result
-        .exact
-        .map(|orbit| row("exact orbit", [orbit.sigma, orbit.c, orbit.b]));
+    let exact = result.exact.map(|orbit| {
+        let Orbit { sigma, c, b, .. } = orbit;
+        row("exact orbit", [sigma, c, b])
+    });
     let name = match result.curve.is_of_structure {
         true => "driven mode alone, first order",
         false => "theory, first order",
@@ -198,7 +200,7 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let mut text = format!(
         "Measured: {hertz} Hz, {of_response} {response} {m}, {of_drive} {drive} {unit}\n{}, G = {}\nLocked after {:.0} periods{held}: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}",
         rig(&result.parameters),
-        with_uncertainty(at.g, at.u_g),
+        g,
         lock.periods_to_lock,
         lock.regime,
         lock.impacts(),
@@ -207,6 +209,11 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
         table.text(),
     );
     text += SYMBOLS;
+    if let Some(Orbit { g, .. }) = result.exact {
+        text += &format!(
+            "  (the exact orbit has the measured C, and the drive G = {g:.6}; theory is at the requested G)\n"
+        );
+    }
     let mut note = |note: &str| text += &format!("  ({note})\n");
     note(&format!(
         "stability: over {} periods a disturbance would show that grows by {:.1} % per period or more; slower growth is not excluded",
@@ -232,24 +239,18 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
             "{tone}: more than the particle can cause, so it is no part of the motion; check the cable of the sensor"
         ));
     }
-    let smallest = result.curve.places().iter().map(|[.., g]| *g).reduce(f64::min);
+    let smallest = result.curve.places().iter().map(|[_, _, g, _]| *g).reduce(f64::min);
     if let Some(smallest) = smallest.filter(|g| (at.g - g).abs() < SIGNIFICANT * at.u_g) {
         note(&format!(
             "the drive lies at the fold within its uncertainty: the smallest of the exact backbone is G = {smallest:.6}"
         ));
     }
-    // The polygon of a structure is not fine enough.
-    let is_fine = result.exact.is_some() && !result.curve.is_of_structure;
-    let there = result.curve.distance(at.c, at.sigma, at.g).filter(|_| is_fine);
-    let there = there.and_then(|there| there.sigma.zip(there.g)).map(|(sigma, g)| {
-        let (sigma, g) = (at.sigma - sigma, at.g - g);
-        format!("at the measured C, the exact backbone has sigma = {sigma:.6}, G = {g:.6}")
-    });
     let asked = result.parameters.g;
-    let is_another = (at.g - asked).abs() > SIGNIFICANT * at.u_g;
-    let asked = is_another.then(|| format!("G = {asked} was asked for"));
-    if there.is_some() || asked.is_some() {
-        note(&[there, asked].into_iter().flatten().collect::<Vec<String>>().join("; "));
+    if (at.g - asked).abs() > SIGNIFICANT * at.u_g {
+        note(&format!("G = {asked} was asked for"));
+    }
+    if result.exact.is_none() && !result.orbits.is_empty() {
+        note("no exact orbit has the measured C");
     }
     for orbit in result.others() {
         note(&format!(
@@ -257,8 +258,8 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
             orbit.sigma, orbit.c, orbit.b
         ));
     }
-    if result.exact.as_ref().is_some_and(|exact| !exact.stable) {
-        note("the nearest exact orbit is unstable under a constant drive and frequency; the loop holds it");
+    if result.exact.as_ref().is_some_and(Orbit::is_unstable) {
+        note("the exact orbit is unstable under a constant drive and frequency; the loop holds it");
     }
     format!("{text}\n{}\n{}\n", decay(result), agreement(result))
 }

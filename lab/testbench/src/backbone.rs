@@ -13,7 +13,7 @@ use vines_model::numerics::Estimate;
 use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stage};
 use crate::identification::{
     Criterion, Cycle, LONGEST, LevelEstimate, Regime, ResonancePoint, Tone, Unsteady, classify, drive_harmonics,
-    foreign_tone, regime_by_response,
+    foreign_tone, mean_command, regime_by_response,
 };
 use crate::plan::{Knowledge, Plan};
 use crate::record::Sample;
@@ -52,6 +52,9 @@ pub struct LevelPoint {
     /// Share of the samples of the move to this level and at it with the command at the limit of the shaker's amplifier, per cent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clipped_percent: Option<f64>,
+    /// Mean amplitude of the command of a shaker over the averaged periods, V.
+    #[serde(rename = "command_V", skip_serializing_if = "Option::is_none")]
+    pub command_v: Option<f64>,
 }
 
 impl LevelPoint {
@@ -322,7 +325,10 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let reached = is_reached(estimate.response, level);
         let [stated_base, stated_omega] = estimate.stated();
         LevelPoint {
-            at: ResonancePoint::new([estimate.response, stated_base, stated_omega, estimate.phase_error], &d),
+            at: ResonancePoint::new(
+                [estimate.response, stated_base, stated_omega, estimate.phase_error],
+                knowledge,
+            ),
             // The level as a person would write it.
             level: (1e9 * level / d.b).round() / 1e9,
             periods: self.run.periods - start,
@@ -344,6 +350,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
                 .shaker()
                 .and_then(|_| drive_harmonics(averaged, knowledge, omega.value)),
             clipped_percent: None,
+            command_v: mean_command(averaged, knowledge),
         }
     }
 

@@ -364,7 +364,7 @@ pub fn exchange(
     let sensors = rig.sense()?;
     let command = controller.sample(sensors, active)?;
     let ground_truth = rig.ground_truth()?;
-    let sample = Sample { time, sensors, command, ground_truth };
+    let sample = Sample { time, sensors, command, ground_truth, ..Sample::default() };
     before_drive(&sample)?;
     rig.advance(command.drive, step)?;
     Ok(sample)
@@ -425,6 +425,9 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             Ok(())
         };
         let Sample { command, .. } = exchange(&mut self.rig, self.controller, active, clock, before_drive)?;
+        if let Some((last, command)) = self.samples.last_mut().zip(self.rig.shaker_command()) {
+            last.shaker_command = command;
+        }
         self.driven = command.drive.amplitude != 0.0;
         self.taken += 1;
         self.last = command;

@@ -13,7 +13,7 @@ use vines_model::numerics::{Estimate, SIGNIFICANT, mean, standard_deviation};
 
 use crate::plan::{Knowledge, Plan};
 use crate::record::{Record, Sample};
-use crate::scene::{Dimensionless, Measurand};
+use crate::scene::Measurand;
 
 pub(crate) use decay::PER_PERIOD;
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
@@ -136,6 +136,9 @@ pub struct Lock {
     /// Share of the samples before the release with the command at the limit of a shaker's amplifier, per cent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clipped_percent: Option<f64>,
+    /// Mean amplitude of the command of a shaker over the averaged periods, V.
+    #[serde(rename = "command_V", skip_serializing_if = "Option::is_none")]
+    pub command_v: Option<f64>,
     /// What friction did over the hold; absent without friction, or if the rig does not report it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<Friction>,
@@ -226,7 +229,7 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
     Some(Lock {
         at: ResonancePoint::new(
             [level.response, stated_base, stated_omega, phase_error(&held, knowledge)],
-            d,
+            knowledge,
         ),
         b: b.map(|b| b.value),
         u_b: b.map(|b| b.uncertainty),
@@ -237,11 +240,18 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
         impacts_per_period,
         regime,
         clipped_percent: record.clipped_percent,
+        command_v: mean_command(&record.samples[record.released - averaged..record.released], knowledge),
         friction: Friction::of(hold, (hold.len() - 1) as f64 * dt * omega.value / TAU),
         tone: (!is_simulated)
             .then(|| foreign_tone(hold, knowledge, omega.value))
             .flatten(),
     })
+}
+
+/// Mean amplitude of the command of a shaker in samples, V; `None` without a shaker.
+pub(crate) fn mean_command(samples: &[Sample], knowledge: &Knowledge) -> Option<f64> {
+    let path = knowledge.shaker()?;
+    Some(mean(samples.iter().map(|sample| sample.shaker_command)) / path.base_per_command)
 }
 
 /// The last periods before the release.
@@ -301,6 +311,12 @@ pub struct ResonancePoint {
     /// Standard uncertainty of the base amplitude, m.
     #[serde(rename = "u_E_m")]
     pub u_e_m: f64,
+    /// Of a structure that a force drives, its amplitude, N.
+    #[serde(rename = "F_N", skip_serializing_if = "Option::is_none")]
+    pub f_n: Option<f64>,
+    /// Standard uncertainty of the force, N.
+    #[serde(rename = "u_F_N", skip_serializing_if = "Option::is_none")]
+    pub u_f_n: Option<f64>,
     /// Detuning.
     pub sigma: f64,
     /// Amplitude of the fundamental of the response over b.
@@ -325,7 +341,9 @@ pub struct ResonancePoint {
 
 impl ResonancePoint {
     /// From the amplitudes of response and base, m, the frequency, rad/s, and the phase error, rad.
-    pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], d: &Dimensionless) -> Self {
+    pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], knowledge: &Knowledge) -> Self {
+        let d = &knowledge.numbers;
+        let force = |amplitude: f64| Some(amplitude / knowledge.base_per_newton?);
         Self {
             f_hz: omega.value / TAU,
             a_m: response.value,
@@ -333,6 +351,8 @@ impl ResonancePoint {
             u_f_hz: omega.uncertainty / TAU,
             u_a_m: response.uncertainty,
             u_e_m: base.uncertainty,
+            f_n: force(base.value),
+            u_f_n: force(base.uncertainty),
             sigma: d.sigma(omega.value),
             c: response.value / d.b,
             g: d.excitation(base.value),

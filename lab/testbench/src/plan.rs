@@ -13,7 +13,7 @@ use crate::experiment::DECAYED;
 use crate::linear::{MeasuredLinear, ParticleState};
 use crate::rig::{LowPass, Sensors};
 use crate::scene::{
-    Definition, Dimensionless, Measurand, Parameters, Scene, Structure, carried_up_to, has_mirror_images,
+    Definition, Dimensionless, Excitation, Measurand, Parameters, Scene, Structure, carried_up_to, has_mirror_images,
 };
 
 /// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
@@ -218,6 +218,8 @@ pub struct ShakerPath {
     pub speed: f64,
     /// Base displacement per reference, m/N or m/m.
     pub base_per_reference: f64,
+    /// Base displacement per command, m/V, as the bench converts commands.
+    pub base_per_command: f64,
     /// Periods within which the control follows a change of the response.
     pub followed: u16,
     /// Largest amplitude, m, by which harmonics of the force beside the sampling frequency change its fundamental as it is read.
@@ -284,6 +286,8 @@ pub struct Knowledge {
     pub sample_time: f64,
     /// Phase of the response relative to the reference that the loop holds, and what is measured of both.
     pub target: Target,
+    /// Base displacement per newton of a structure that a force drives, m/N.
+    pub base_per_newton: Option<f64>,
     /// The shaker, if one stands between the command and the reference, which then drives the structure as it is measured.
     pub shaker: Option<ShakerPath>,
     /// Distance of the nearest other pole of a structure from the pole of its driven mode after the release, rad/s; infinite without one.
@@ -314,6 +318,7 @@ impl Knowledge {
             carried_up_to: carried_up_to(plant),
             sample_time,
             target,
+            base_per_newton: None,
             shaker: None,
             nearest_pole: f64::INFINITY,
             #[cfg(feature = "tables")]
@@ -427,6 +432,8 @@ impl Scene {
             path.aliased = self.aliased(1.0).unwrap_or(0.0) as f32;
         }
         knowledge.target.through_shaker = knowledge.shaker.is_some();
+        let forced = self.structure().filter(|one| one.excitation == Excitation::Force);
+        knowledge.base_per_newton = forced.map(Structure::base_per_drive);
         knowledge.nearest_pole = self.structure().map_or(f64::INFINITY, Structure::nearest_pole);
         #[cfg(feature = "tables")]
         {

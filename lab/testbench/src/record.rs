@@ -17,6 +17,8 @@ pub struct Sample {
     pub command: Command,
     /// The ground truth of a simulated rig.
     pub ground_truth: Option<GroundTruth>,
+    /// Amplitude of the command of a shaker from this sample to the next, m as the bench converts commands; 0 without a shaker.
+    pub shaker_command: f64,
 }
 
 /// First line of a recording (CSV), with the units of channels that are no displacements.

@@ -442,6 +442,11 @@ impl Sections {
             resonance.sensor = Sensor::Q1;
         }
         let plant = plant.resolve(origin)?;
+        if let Some(structure) = &structure {
+            structure
+                .reached_by(plant.particle_mass)
+                .map_err(|message| SceneError::text(origin, format!("[structure]: {message}")))?;
+        }
         let d = Dimensionless::of(&plant, 0.0);
         let mut scene = Scene {
             start: self.start.resolve(&plant)?,

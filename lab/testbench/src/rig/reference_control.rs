@@ -224,6 +224,11 @@ impl ReferenceControl {
         Ok(self.drive(omega, step))
     }
 
+    /// Amplitude of the last command, m.
+    pub fn amplitude(&self) -> f64 {
+        self.command.norm()
+    }
+
     /// The command as a sine of the rig's oscillator, whose phase changes by its frequency only: at most to twice, at least to half of `omega`.
     fn drive(&mut self, omega: f64, step: f64) -> Drive {
         let [phase, of_rig] = self.phases;

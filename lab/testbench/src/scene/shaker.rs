@@ -284,6 +284,7 @@ impl Structure {
             largest: shaker.largest_command() * self.base_per_command(),
             speed: 1.0,
             base_per_reference: self.base_per_drive(),
+            base_per_command: self.base_per_command(),
             followed: 0,
             aliased: 0.0,
             error: 0.0,

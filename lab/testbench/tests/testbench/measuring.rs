@@ -679,7 +679,7 @@ fn no_motion_of_a_particle_is_a_foreign_tone() {
                 let (time, sensors) = (step * f64::from(n), knowledge.target.scaled(rig.sense().unwrap()));
                 rig.advance(drive, step).unwrap();
                 let command = Command { drive, ..Command::default() };
-                Sample { time, sensors, command, ground_truth: None }
+                Sample { time, sensors, command, ..Sample::default() }
             })
             .collect();
         // The first of these windows contains the transient.

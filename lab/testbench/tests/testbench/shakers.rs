@@ -6,6 +6,7 @@ use std::rc::Rc;
 
 use lovines::{Drive, Plant, StructureState};
 use num_complex::Complex;
+use vines_model::orbit::StructureOrbit;
 use vines_testbench::backbone::track;
 use vines_testbench::comparison::COMPARED_ABOVE;
 use vines_testbench::experiment::{ExperimentError, run};
@@ -84,6 +85,39 @@ fn published_modal_shakers_lock_on_the_exact_orbit() {
             assert!(nearest < 3.0, "preset {n}, shaker {number}: {nearest} u");
         }
     }
+}
+
+#[test]
+fn a_lock_behind_a_shaker_states_its_force_in_newtons_and_its_command_in_volts() {
+    let scene = preset(0, &[]).unwrap();
+    let lock = identified(&scene).unwrap().lock;
+    let per_newton = scene.structure.as_ref().unwrap().base_per_drive();
+    let (force, u_force) = (lock.at.f_n.unwrap(), lock.at.u_f_n.unwrap());
+    assert!((force * per_newton / lock.at.e_m - 1.0).abs() < 1e-12);
+    assert!((u_force * per_newton / lock.at.u_e_m - 1.0).abs() < 1e-12);
+    // The exact orbits of structure and shaker state both.
+    let orbits = Survey::of(&scene).unwrap().orbits;
+    let apart = |orbit: &StructureOrbit| (orbit.omega / (TAU * lock.at.f_hz) - 1.0).abs();
+    let exact = orbits
+        .iter()
+        .min_by(|one, other| apart(one).total_cmp(&apart(other)))
+        .unwrap();
+    assert!(
+        (force / exact.reference - 1.0).abs() < 2e-3,
+        "{force} N, {}",
+        exact.reference
+    );
+    assert!(
+        (lock.command_v.unwrap() / exact.drive - 1.0).abs() < 1e-2,
+        "{:?} V, {}",
+        lock.command_v,
+        exact.drive
+    );
+    // On a base there are no newtons, and without a shaker no volts.
+    let table = identified(&preset(2, &[]).unwrap()).unwrap().lock;
+    assert!(table.at.f_n.is_none() && table.command_v.unwrap() > 0.0);
+    let lock = identified(&paper(&[])).unwrap().lock;
+    assert!(lock.at.f_n.is_none() && lock.command_v.is_none());
 }
 
 /// Samples of 120.33 in a period see the edges of the force at another phase in each third one.
