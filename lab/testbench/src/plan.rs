@@ -13,7 +13,7 @@ use crate::experiment::DECAYED;
 use crate::linear::{MeasuredLinear, ParticleState};
 use crate::rig::{LowPass, Sensors};
 use crate::scene::{
-    Definition, Dimensionless, Measurand, Parameters, Scene, Structure, carried_up_to, has_mirror_images,
+    Definition, Dimensionless, Excitation, Measurand, Parameters, Scene, Structure, carried_up_to, has_mirror_images,
 };
 
 /// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
@@ -369,6 +369,19 @@ impl Knowledge {
     }
 }
 
+/// What lengths of the bench, which are those of the driven mode's oscillator, are at the sensors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Units {
+    /// Displacement at the sensor per response.
+    pub response: f64,
+    /// Force or displacement per amplitude of the base, N/m or 1.
+    pub drive_per_base: f64,
+    /// Name and unit of the drive.
+    pub drive: &'static str,
+    /// m or N
+    pub drive_unit: &'static str,
+}
+
 /// An experiment on a rig: what is known of it, and what is done.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
@@ -377,6 +390,8 @@ pub struct Plan {
     /// What a structure adds to the response of its driven mode: all sections, and this mode with the opposite sign, each with the weights of its state
     /// in the response per unit of the base. Empty for one oscillator, and behind a shaker.
     pub beside: Vec<(Section, [f64; 2])>,
+    /// In what messages state readings.
+    pub units: Units,
     /// Requested amplitude of the base, m.
     pub amplitude: f64,
     /// Configuration of the controller for the lock; its limits guard the rig whatever controls it.
@@ -385,12 +400,22 @@ pub struct Plan {
     pub tracking: Config,
     /// Samples of the hold.
     pub hold: usize,
+    /// Longest ramp of the drive after the controller was asked to release it, samples: in this time the response of the linear rig falls to
+    /// [`DECAYED`], so that after a longer ramp nothing is left to decay.
+    pub ramp: usize,
     /// Samples of the recorded decay.
     pub decay: usize,
     /// Levels of the tracked backbone, amplitudes of the response, m, in the order in which they are visited.
     pub levels: Vec<f64>,
     /// Largest relative uncertainty of a level, as in [`BackboneSettings`](crate::scene::BackboneSettings).
     pub precision: f64,
+}
+
+impl Plan {
+    /// Requested amplitude of the base, m, as it moves with the frequency `omega`, rad/s: a held base moves a little less than its samples.
+    pub fn requested(&self, omega: f64) -> f64 {
+        self.amplitude * self.knowledge.target.base_per_sample(omega, self.knowledge.sample_time)
+    }
 }
 
 /// Longest recorded decay, natural periods, unless the scene asks for a longer one: a bound for rigs with little damping.
@@ -422,6 +447,24 @@ impl Scene {
         knowledge
     }
 
+    fn units_at_sensors(&self) -> Units {
+        let oscillator = Units {
+            response: 1.0,
+            drive_per_base: 1.0,
+            drive: "base",
+            drive_unit: "m",
+        };
+        self.structure().map_or(oscillator, |structure| Units {
+            response: structure.reading_per_response().abs(),
+            drive_per_base: structure.base_per_drive().recip(),
+            drive: match structure.excitation {
+                Excitation::Base => "base",
+                Excitation::Force => "force",
+            },
+            drive_unit: structure.excitation.unit(),
+        })
+    }
+
     /// The experiment on a rig that is as the scene says.
     pub fn plan(&self) -> Plan {
         self.plan_on(self.knowledge())
@@ -430,18 +473,20 @@ impl Scene {
     /// The experiment on a rig of which this is known.
     pub fn plan_on(&self, mut knowledge: Knowledge) -> Plan {
         // The decay lasts as long as the linear rig takes to fall to the share that is recorded.
-        let relaxed = -DECAYED.ln() * knowledge.linear.relaxation_periods();
-        let decay = self.record.decay_periods.unwrap_or(relaxed.min(LONGEST_DECAY));
+        let relaxed = (-DECAYED.ln() * knowledge.linear.relaxation_periods()).min(LONGEST_DECAY);
+        let decay = self.record.decay_periods.unwrap_or(relaxed);
         let structure = self.structure().filter(|one| one.shaker.is_none());
         let lock = self.lock_config(&knowledge);
         knowledge.target.delay = lock.delay;
         Plan {
             knowledge,
             beside: structure.map_or(Vec::new(), Structure::beside_driven_mode),
+            units: self.units_at_sensors(),
             amplitude: self.amplitude,
             lock,
             tracking: self.tracking_config(&knowledge),
             hold: knowledge.samples(self.record.hold_periods),
+            ramp: knowledge.samples(relaxed),
             decay: knowledge.samples(decay),
             levels: self.backbone.levels(self.plant.half_width),
             precision: self.backbone.precision,
