@@ -41,6 +41,8 @@ COLUMNS = {
     "unseen_growth": "growth of a disturbance per period, relative, that they would not show (from 1e-6 to 0.8 %)",
     "settled": "whether all uncertainties are within backbone.precision",
     "reached": "whether the response reached the level; if not, the drive is at a limit",
+    "E_requested_m": "requested amplitude of the base, m; of a held base (chain.hold) what is left of it",
+    "at_requested_drive": "whether E_m is the requested drive, within 1 % or three standard uncertainties",
     "held": "whether the response is under control at the lock, not the drive",
     "periods_to_lock": "periods from the start to the settled lock",
     "impacts_per_period": "impacts per period of the drive (simulations only)",

@@ -106,6 +106,8 @@ def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "a
     Returns
     -------
     Identification
+        A warning says so if its lock is at another drive than the requested one, by more than 1 % and three standard
+        uncertainties.
 
     Raises
     ------
@@ -123,9 +125,14 @@ def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "a
     if results not in ("all", "lock"):
         raise ValueError(f"results = {results!r}: 'all' and 'lock' are allowed")
     found = json.loads(_native.identify(checked(scene)._native, results == "all"))
+    lock = found["lock"]
+    if not lock["at_requested_drive"]:
+        asked = lock["E_requested_m"]
+        message = f"the lock is at another drive: E = {lock['E_m']:.5e} m, and {asked:.5e} m was asked for"
+        warnings.warn(message, stacklevel=2)
     return Identification(
         theory=theory(scene),
-        lock=found["lock"],
+        lock=lock,
         exact=Orbit._of(found["exact"]) if found["exact"] else None,
         decay=_table(found["decay"]),
         **{key: found[key] for key in ("decay_end", "rms_sigma_error", "rms_sigma_exact", "rms_sigma_predicted")},

@@ -2,7 +2,11 @@
 
 import json
 import os
+import re
+import socket
 import subprocess
+import sys
+import time
 from math import pi
 from random import Random
 
@@ -11,6 +15,7 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from foreign import TOOLS, UNITS, compiled, damaged, describe, drawn, example, library, pack
+from references import ROOT
 
 CYCLES = (
     '<Unit name="Hz"><BaseUnit s="-1"/></Unit><Unit name="mm"><BaseUnit m="1" factor="0.001"/></Unit></UnitDefinitions>'
@@ -132,6 +137,70 @@ def test_what_a_backbone_lacks_and_where_nothing_can_be_unpacked_is_said(vines, 
         nowhere = run(vines, "identify", *arguments, "--out", tmp_path / "out", env={"TMPDIR": "/nonexistent"})
         assert "set TMPDIR to a folder" in nowhere.stderr
         assert "built-in" in nowhere.stderr
+
+
+DRIVE = "s->x[E] = s->x[ACTIVE] ? amplitude : 0;"
+PHASE = "carg(s->response / s->base * I)"
+
+
+@pytest.mark.parametrize(
+    ("code", "instead", "said"),
+    [
+        (DRIVE, "s->x[E] = amplitude;", "it commands E = 9.246e-5 m, "),
+        (DRIVE, "s->x[E] = s->x[ACTIVE] ? amplitude : 1e-9;", "it commands E = 1e-9 m"),
+        (DRIVE, "s->x[E] = s->x[ACTIVE] ? amplitude : s->x[E] * 0.999;", "does not release the drive"),
+        (PHASE, "carg(s->response / s->base * I * cexp(-0.349 * I))", "is 20.00 ± "),
+        (DRIVE, "s->x[E] = s->x[ACTIVE] ? 2 * amplitude : 0;", "2.000 times the requested G = 1.1000"),
+        (DRIVE, "s->x[E] = s->x[ACTIVE] ? 0.5 * amplitude : 0;", "0.500 times the requested G = 1.1000"),
+        (DRIVE, "s->x[E] = s->x[ACTIVE] ? 1.09 * amplitude : 0;", "the result is at another drive than"),
+    ],
+)
+def test_a_controller_that_does_not_do_what_it_is_asked_for_is_named_with_exit_code_1(
+    vines, tmp_path, code, instead, said
+):
+    fmu = pack(tmp_path / "mine.fmu", describe(), library(tmp_path, changed=(code, instead)))
+    settings = ["--set", "record.decay_periods=20", "--set", "phase_lock.acquire_timeout=60"]
+    done = run(vines, "identify", "--rig", "built-in", "--controller", fmu, "--out", tmp_path / "out", *settings)
+    assert done.returncode == 1, done.stdout
+    assert said in done.stderr, done.stderr
+    # The result is kept.
+    assert (tmp_path / "out" / "identification.json").exists() == ("the result is" in said)
+
+
+def test_a_decay_begins_at_the_end_of_a_slow_ramp(vines, tmp_path):
+    ramp = (DRIVE, "s->x[E] = s->x[ACTIVE] ? amplitude : fmax(s->x[E] - amplitude / 400, 0);")
+    fmu = pack(tmp_path / "mine.fmu", describe(), library(tmp_path, changed=ramp))
+    done = run(vines, "identify", "--rig", "built-in", "--controller", fmu, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    first = float(done.stdout.split("points from C = ")[1].split()[0])
+    assert 0.3 < first < 0.44, done.stdout
+
+
+def test_a_network_controller_that_does_not_release_the_drive_is_an_error(vines, tmp_path):
+    page = (ROOT / "docs/own-controller.md").read_text()
+    (code,) = re.findall(r"```python\n(# controller.py.*?)```", page, re.DOTALL)
+    released = "AMPLITUDE if flags & 1 else 0.0, 0.0, error"
+    assert released in code
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    for instead, said in [
+        ("AMPLITUDE, 0.0, error", "it commands E = "),
+        ("AMPLITUDE if flags & 1 else 0.0, AMPLITUDE * math.sin(theta), error", "E = 0, but a displacement of"),
+    ]:
+        (tmp_path / "controller.py").write_text(code.replace(released, instead))
+        with subprocess.Popen([sys.executable, tmp_path / "controller.py", str(port)]) as server:
+            try:
+                for _ in range(100):
+                    with socket.socket() as link:
+                        if link.connect_ex(("127.0.0.1", port)) == 0:
+                            break
+                    time.sleep(0.1)
+                address = f"tcp://127.0.0.1:{port}"
+                done = run(vines, "identify", "--rig", "built-in", "--controller", address, "--out", tmp_path / "out")
+            finally:
+                server.kill()
+        assert done.returncode == 1, done.stdout
+        assert said in done.stderr, done.stderr
 
 
 def test_a_controller_that_logs_without_end_does_not_stop_the_loop(vines, tmp_path):

@@ -352,7 +352,7 @@ impl NetController {
                     return Err(self.client.silent());
                 }
                 self.client.counters.hold(self.client.at + 1 - self.answered);
-                break self.held(active);
+                break self.held();
             };
             self.good = self.read(&frame)?;
             self.waiting = None;
@@ -366,16 +366,10 @@ impl NetController {
         Ok(command)
     }
 
-    /// The last answer, for a sample without one.
-    fn held(&self, active: bool) -> Command {
-        let last = self.good.drive;
-        let drive = if active {
-            last
-        } else {
-            Drive { omega: last.omega, ..Drive::default() }
-        };
+    /// The last answer, for a sample without one. It also lasts beyond the release: the bench waits for the answer to that.
+    fn held(&self) -> Command {
         let settled = self.good.settled.map(|_| false);
-        Command { drive, settled, ..self.good }
+        Command { settled, ..self.good }
     }
 
     /// The answer to this sample or an earlier one.

@@ -229,13 +229,14 @@ impl Session {
         match result {
             Ok(result) => Ok((result, ended)),
             Err(error) => {
+                let runs_away = || advice::runs_away(&samples, plan).then_some(advice::Reason::WrongSign);
                 let reason = match error {
+                    // The orbits are those at the requested phase and drive.
+                    ExperimentError::OtherThanAsked { .. } => runs_away(),
                     ExperimentError::NoLock { .. }
                     | ExperimentError::NotReached { .. }
                     | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. } => {
-                        let runs_away = advice::runs_away(&samples, plan);
-                        let reason = runs_away.then_some(advice::Reason::WrongSign);
-                        reason.or_else(|| {
+                        runs_away().or_else(|| {
                             advice::reason(scene, &plan.knowledge.numbers, advice::last_regime(&samples, plan))
                         })
                     }

@@ -132,6 +132,10 @@ impl From<LinkError> for Failure {
     }
 }
 
+/// What to do about a controller that does otherwise than asked.
+const ADVICE_AS_ASKED: &str = "; set phase and drive of the controller, or controller.phase_target and [excitation] of the scene, and check the gains \
+                               of the rig with `vines check`";
+
 impl From<ExperimentError> for Failure {
     fn from(error: ExperimentError) -> Self {
         let code = match &error {
@@ -141,6 +145,7 @@ impl From<ExperimentError> for Failure {
             _ => 1,
         };
         let advice = match error {
+            ExperimentError::OtherThanAsked { .. } => ADVICE_AS_ASKED,
             ExperimentError::Tripped { .. } => ". `vines check` looks for the cause",
             ExperimentError::NoLock { unmet: None, .. } => {
                 "; see phase_lock.acquire_timeout and the [controller] section"
@@ -157,6 +162,7 @@ impl From<ExperimentError> for Failure {
 impl From<IdentificationError> for Failure {
     fn from(error: IdentificationError) -> Self {
         let advice = match error {
+            IdentificationError::OtherThanAsked { .. } => ADVICE_AS_ASKED,
             IdentificationError::OffTarget { .. } => ": `vines check` measures its delay",
             _ => "",
         };

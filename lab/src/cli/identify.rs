@@ -109,7 +109,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         }
         Ok(files)
     });
-    experiment.finish(ended, &result, &text, files, None)
+    let failures = summary::not_as_asked(&result, &scene).map(Failure::run);
+    experiment.finish(ended, &result, &text, files, Failure::first_of(failures.collect()))
 }
 
 fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {

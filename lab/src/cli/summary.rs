@@ -193,7 +193,13 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     };
     let theory = result.theory.map(|point| row(name, [point.sigma, point.c, point.b]));
     let table = Table::new(" | sigma | C | B").rows([measured]).rows(exact).rows(theory);
+    let behind_shaker = scene
+        .structure
+        .as_ref()
+        .is_some_and(|structure| structure.shaker.is_some());
     let held = match lock.held {
+        // A constant command is no constant force.
+        true if behind_shaker => " (the response is held by control, as always behind a shaker)",
         true => " (the response is held by control: a constant drive holds it hardly, or not)",
         false => "",
     };
@@ -284,6 +290,31 @@ pub(super) fn structure(scene: &Scene) -> String {
     )
 }
 
+/// In what the result is not the requested one.
+pub(super) fn not_as_asked(result: &Comparison, scene: &Scene) -> impl Iterator<Item = String> {
+    let lock = &result.lock;
+    let Units { factors: [_, factor], names: [_, (of_drive, unit)] } = Units::of(scene);
+    let ratio = lock.at.e_m / lock.requested_e_m;
+    let another = (!lock.at_requested_drive).then(|| {
+        format!(
+            "the result is at another drive than the requested one: {of_drive} {:.5e} ± {:.1e} {unit}, {ratio:.4} times the requested {:.5e} {unit}",
+            lock.at.e_m * factor,
+            lock.at.u_e_m * factor,
+            lock.requested_e_m * factor
+        )
+    });
+    let moves = result.base_after_release.map(|[base, u]| {
+        format!(
+            "there is no free decay: the drive was released, but the {of_drive} goes on with the drive's frequency, with at least {:.2e} ± {:.1e} {unit}, \
+             {:.1e} times the requested drive",
+            base * factor,
+            u * factor,
+            base / lock.requested_e_m
+        )
+    });
+    [another, moves].into_iter().flatten()
+}
+
 /// What friction did, as a sentence.
 pub(super) fn friction_text(friction: &Friction) -> String {
     let Friction { sticks_per_period, stuck_time, loss } = friction;
@@ -300,6 +331,7 @@ fn decay(result: &Comparison) -> String {
         DecayEnd::Synchrony => "where the impacts lose synchrony",
         DecayEnd::Linear => "where the impacts end",
         DecayEnd::Record => "where the record ends; a larger record.decay_periods shows more",
+        DecayEnd::Driven => return "Free decay: no points, because the base goes on moving after the release".into(),
         DecayEnd::OtherMode => {
             return "Free decay: no points, because another mode moves freely after the release, too near the driven one to be told apart. Behind a \
                     shaker, short its coil (amplifier = \"voltage\"), or cut the stinger (release = \"cut\")"

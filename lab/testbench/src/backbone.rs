@@ -13,7 +13,7 @@ use vines_model::numerics::Estimate;
 use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stage};
 use crate::identification::{
     Criterion, Cycle, LONGEST, LevelEstimate, Regime, ResonancePoint, Tone, Unsteady, classify, drive_harmonics,
-    foreign_tone, mean_command, regime_by_response,
+    foreign_tone, is_off_target, mean_command, regime_by_response,
 };
 use crate::plan::{Knowledge, Plan};
 use crate::record::Sample;
@@ -64,6 +64,12 @@ impl LevelPoint {
         Some(match self.regime {
             _ if self.settled => return None,
             _ if !self.reached => "the response does not reach the level".into(),
+            _ if is_off_target(self.at.phase_error_deg.to_radians(), self.at.u_phase_deg.to_radians()) => {
+                format!(
+                    "the phase is {:+.2} degrees off controller.phase_target",
+                    self.at.phase_error_deg
+                )
+            }
             Regime::Other => "the motion is irregular".into(),
             Regime::Asymmetric if is_symmetric => "the motion is asymmetric".into(),
             _ => match self.unsteady {

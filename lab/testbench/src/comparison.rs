@@ -48,6 +48,9 @@ pub struct Comparison {
     pub decay: Vec<ComparedPoint>,
     /// What ended its points.
     pub decay_end: DecayEnd,
+    /// Amplitude of the base after the release, m, where it is least, if the base never rests; with its standard uncertainty.
+    #[serde(rename = "E_after_release_m", skip_serializing_if = "Option::is_none")]
+    pub base_after_release: Option<[f64; 2]>,
     /// The exact backbone that the decay is compared with.
     #[serde(skip)]
     pub curve: ExactCurve,
@@ -126,6 +129,7 @@ impl Comparison {
             orbits,
             decay,
             decay_end: found.decay.end,
+            base_after_release: found.base_after_release.map(|base| [base.value, base.uncertainty]),
             curve,
         }
     }
@@ -530,6 +534,7 @@ fn predicted(orbit: &Orbit, scene: &Scene, plan: &Plan) -> Vec<[f64; 3]> {
         sample_time: step,
         samples,
         settled: 0,
+        hold_end: 1,
         released: 1,
         held: false,
         clipped_percent: None,

@@ -12,7 +12,7 @@ use phase_lock::Config;
 use thiserror::Error;
 use vines_model::numerics::mean;
 
-use crate::identification::{Cycle, Unsteady};
+use crate::identification::{Cycle, Departure, Unsteady};
 use crate::plan::{Plan, Target, Units};
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError, Scaled, Sensors};
@@ -32,6 +32,8 @@ pub enum Stage {
     Locking,
     /// Phase resonance is held and measured.
     Holding,
+    /// The controller ramps the drive down.
+    Releasing,
     /// The drive is off.
     Decaying,
     /// The response is held at one level after another.
@@ -39,14 +41,15 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Samples of the stage in an experiment, at most: the time limit for the lock, the hold, or the recorded decay.
+    /// Samples of the stage in an experiment, at most: the time limits for the lock and for the release, the hold, or the recorded decay.
     pub fn samples(self, plan: &Plan) -> usize {
-        let Plan { lock, hold, decay, .. } = plan;
+        let Plan { lock, hold, ramp, decay, .. } = plan;
         match self {
             Self::Locking => lock
                 .acquire_timeout
                 .map_or(usize::MAX, |seconds| (seconds / lock.sample_time).round() as usize),
             Self::Holding => *hold,
+            Self::Releasing => *ramp,
             Self::Decaying => *decay,
             Self::Tracking => usize::MAX,
         }
@@ -58,6 +61,7 @@ impl Stage {
             Self::Locking => "searching for phase resonance",
             Self::Holding => "holding the lock",
             Self::Tracking => "tracking the backbone",
+            Self::Releasing => "releasing the drive",
             Self::Decaying => "recording the decay",
         }
     }
@@ -69,6 +73,16 @@ fn phase_in_words(error: Option<f64>) -> String {
         || "the phase cannot be measured, or the controller does not report its phase error".into(),
         |degrees| format!("the phase error is {degrees:.3} degrees"),
     )
+}
+
+/// A drive beside the requested amplitude, m, in words.
+fn drive_in_words(drive: Drive, requested: f64) -> String {
+    let (of, value) = match drive.amplitude {
+        0.0 => ("E = 0, but a displacement of", drive.displacement.abs()),
+        amplitude => ("E =", amplitude),
+    };
+    let share = short(value / requested);
+    format!("{of} {} m, {share} times the requested drive", short(value))
 }
 
 /// What a lock waits for that the bench judges, in words.
@@ -218,6 +232,32 @@ pub enum ExperimentError {
         b: f64,
         regime: crate::identification::Regime,
     },
+    #[error("phase or drive are not as asked: {departure}. The run ended with: {error}")]
+    OtherThanAsked { departure: Departure, error: Box<Self> },
+    #[error(
+        "the controller does not release the drive: {periods:.1} periods after `active` became false, it commands {}. A ramp may take {allowed:.1} \
+         periods, in which a free response falls to {} %; the drive is off",
+        drive_in_words(*drive, *requested), 100.0 * DECAYED
+    )]
+    NotReleased {
+        /// Natural periods.
+        periods: f64,
+        allowed: f64,
+        drive: Drive,
+        /// m
+        requested: f64,
+    },
+    #[error(
+        "the controller drives again: {periods:.1} periods after it released the drive, it commands {}; the drive is off",
+        drive_in_words(*drive, *requested)
+    )]
+    DrivesAgain {
+        /// Natural periods.
+        periods: f64,
+        drive: Drive,
+        /// m
+        requested: f64,
+    },
     #[error("the scene has no drive, E = 0, so that nothing can lock")]
     NoDrive,
     #[error("the controller answered {name} = {value} {unit}; it must be {allowed}. The drive is off")]
@@ -279,11 +319,27 @@ pub fn run_into(
     plan: &Plan,
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
-    let counts = [Stage::Locking, Stage::Holding, Stage::Decaying].map(|stage| stage.samples(plan));
-    let mut report = |stage, taken| progress(stage, taken, counts[stage as usize]);
+    let mut report = |stage: Stage, taken| progress(stage, taken, stage.samples(plan));
     let mut bench = ControlLoop::new(rig, controller, plan, &plan.lock, samples, &mut report)?;
+    let conducted = match conduct(&mut bench) {
+        Ok(conducted) => conducted,
+        Err(error) => {
+            bench.switch_off();
+            return Err(bench.beside_what_was_asked(error));
+        }
+    };
+    drop(bench);
+    let samples = std::mem::take(samples);
+    Ok(Record { samples, ..conducted })
+}
+
+/// The experiment from the search to the end of the decay; the record is without its samples.
+fn conduct<R: Rig + ?Sized, C: Controller + ?Sized>(
+    bench: &mut ControlLoop<'_, R, C>,
+) -> Result<Record, ExperimentError> {
+    let plan = bench.plan;
     let held = if plan.knowledge.is_at_phase_resonance() {
-        Search::new(&mut bench).lock()?
+        Search::new(bench).lock()?
     } else {
         None
     };
@@ -292,21 +348,24 @@ pub fn run_into(
         bench.sample(Stage::Locking)?;
     }
     let settled = bench.taken - 1;
-    for _ in 0..counts[Stage::Holding as usize] {
+    for _ in 0..plan.hold {
         bench.sample(Stage::Holding)?;
     }
-    let clipped_percent = bench.clipped_percent([0; 2]);
-    for _ in 0..counts[Stage::Decaying as usize] {
-        bench.sample(Stage::Decaying)?;
+    let (hold_end, clipped_percent) = (bench.taken, bench.clipped_percent([0; 2]));
+    let mut released = hold_end;
+    if plan.decay > 0 {
+        released = bench.release()?;
+        for _ in 1..plan.decay {
+            bench.sample(Stage::Decaying)?;
+        }
     }
-    drop(bench);
-    let samples = std::mem::take(samples);
     Ok(Record {
         sample_time: plan.knowledge.sample_time,
-        released: samples.len() - counts[Stage::Decaying as usize],
-        samples,
+        samples: Vec::new(),
         settled,
         held: held == Some(true),
+        hold_end,
+        released,
         clipped_percent,
     })
 }
@@ -345,6 +404,8 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
     progress: &'a mut dyn FnMut(Stage, usize),
     /// The present stage, and the samples before it.
     stage: (Stage, usize),
+    /// Whether the response is under control, so that the drive is what holds it and not the requested one.
+    holds_response: bool,
     /// Whether the rig was left with a drive.
     driven: bool,
 }
@@ -401,24 +462,31 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             limit: Stage::Locking.samples(plan),
             progress,
             stage: (Stage::Locking, 0),
+            holds_response: false,
             driven: false,
         })
     }
 
-    /// One sample; in a stage other than the decay, a controller that switches the drive off is an error.
+    /// One sample. Before the release, a controller that switches the drive off is an error; after it, one that drives.
     pub fn sample(&mut self, stage: Stage) -> Result<(), ExperimentError> {
         if self.stage.0 != stage {
             self.stage = (stage, self.taken);
         }
-        let active = stage != Stage::Decaying;
+        let active = !matches!(stage, Stage::Releasing | Stage::Decaying);
         let clock = [self.taken as f64 * self.sample_time, self.sample_time];
         let is_latched = |command: &Command| command.state.is_some_and(LoopState::is_latched);
+        let (requested, since_release) = (self.plan.amplitude, self.natural_periods(self.taken - self.stage.1 + 1));
         let (config, units) = (self.config, self.plan.units);
         let (samples, driven) = (&mut *self.samples, &mut self.driven);
         let before_drive = |sample: &Sample| {
             let command = checked(sample.command)?;
             samples.push(*sample);
-            if active && !is_latched(&command) {
+            let is_off = is_off(command.drive);
+            if stage == Stage::Decaying && !is_off {
+                let drive = command.drive;
+                return Err(ExperimentError::DrivesAgain { periods: since_release, drive, requested });
+            }
+            if (active || !is_off) && !is_latched(&command) {
                 guard(config, units, sample.sensors.response, command.drive)?;
             }
             *driven = true;
@@ -428,7 +496,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         if let Some((last, command)) = self.samples.last_mut().zip(self.rig.shaker_command()) {
             last.shaker_command = command;
         }
-        self.driven = command.drive.amplitude != 0.0;
+        self.driven = !is_off(command.drive);
         self.taken += 1;
         self.last = command;
         self.periods += command.drive.omega * self.sample_time / TAU;
@@ -447,6 +515,29 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             return Err(self.no_lock(&command));
         }
         Ok(())
+    }
+
+    /// These samples, in natural periods.
+    fn natural_periods(&self, samples: usize) -> f64 {
+        samples as f64 * self.sample_time * self.plan.knowledge.linear.omega0 / TAU
+    }
+
+    /// Asks the controller to release the drive, and waits for the end of its ramp. Returns the index of the first sample without a drive.
+    fn release(&mut self) -> Result<usize, ExperimentError> {
+        let Plan { ramp, amplitude, .. } = *self.plan;
+        for _ in 0..ramp.max(1) {
+            self.sample(Stage::Releasing)?;
+            if is_off(self.last.drive) {
+                return Ok(self.taken - 1);
+            }
+        }
+        let allowed = self.natural_periods(ramp);
+        Err(ExperimentError::NotReleased {
+            periods: allowed,
+            allowed,
+            drive: self.last.drive,
+            requested: amplitude,
+        })
     }
 
     /// Samples so far, and of these the ones with the command of a shaker at the limit of its amplifier.
@@ -478,7 +569,15 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             growth: target.reading(to.growth, omega),
             ..to
         };
-        self.controller.hold_response(to, target.phase_of_readings())
+        self.controller.hold_response(to, target.phase_of_readings())?;
+        self.holds_response = true;
+        Ok(())
+    }
+
+    /// Controls the drive again.
+    pub fn hold_drive(&mut self) -> Result<(), ControllerError> {
+        self.holds_response = false;
+        self.controller.hold_drive()
     }
 
     /// The fit of the samples since the beginning of the last period; `None` without a motion.
@@ -489,7 +588,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     fn advance(&mut self, drive: Drive) -> Result<(), ExperimentError> {
         self.driven = true;
         self.rig.advance(drive, self.sample_time)?;
-        self.driven = drive.amplitude != 0.0;
+        self.driven = !is_off(drive);
         Ok(())
     }
 
@@ -499,8 +598,8 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             let asked = self.controller.sample(self.rig.sense()?, true)?;
             // A ramp never rises, whatever the controller says.
             let falls = |amplitude: &f64| *amplitude < command.drive.amplitude;
-            let amplitude = Some(asked.drive.amplitude).filter(falls).unwrap_or(0.0);
-            command = checked(Command { drive: Drive { amplitude, ..asked.drive }, ..asked })?;
+            let falling = Some(asked.drive).filter(|drive| falls(&drive.amplitude));
+            command = checked(Command { drive: falling.unwrap_or_default(), ..asked })?;
             self.advance(command.drive)?;
         }
         Ok(())
@@ -519,6 +618,21 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         ExperimentError::Tripped { periods: self.periods, stage, fault, evidence }
     }
 
+    /// The error at the end of a run, after what the controller does otherwise than asked: that another phase or drive has another motion is no fault of
+    /// the motion. While the response is under control, the drive follows from it.
+    fn beside_what_was_asked(&self, error: ExperimentError) -> ExperimentError {
+        let is_of_motion = matches!(
+            error,
+            ExperimentError::NoLock { .. } | ExperimentError::ResponseTooLarge { .. } | ExperimentError::Tripped { .. }
+        );
+        let last = &self.samples[self.samples.len().saturating_sub(self.plan.hold)..];
+        let departure = Departure::of(last, self.plan).filter(|_| is_of_motion && !self.holds_response);
+        match departure {
+            Some(departure) => ExperimentError::OtherThanAsked { departure, error: error.into() },
+            None => error,
+        }
+    }
+
     /// The error of a search without a result.
     fn no_lock(&self, command: &Command) -> ExperimentError {
         ExperimentError::NoLock {
@@ -535,14 +649,26 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     }
 }
 
-/// An error or a panic must not leave the rig driven.
-impl<R: Rig + ?Sized, C: ?Sized> Drop for ControlLoop<'_, R, C> {
-    fn drop(&mut self) {
+impl<R: Rig + ?Sized, C: ?Sized> ControlLoop<'_, R, C> {
+    fn switch_off(&mut self) {
         if self.driven {
+            self.driven = false;
             // The run has ended; an error of the rig would not change its result.
             let _ = self.rig.advance(Drive::default(), self.sample_time);
         }
     }
+}
+
+/// An error or a panic must not leave the rig driven.
+impl<R: Rig + ?Sized, C: ?Sized> Drop for ControlLoop<'_, R, C> {
+    fn drop(&mut self) {
+        self.switch_off();
+    }
+}
+
+/// Whether a drive moves nothing: neither a rig that takes its amplitude nor one that takes its samples.
+fn is_off(drive: Drive) -> bool {
+    drive.amplitude == 0.0 && drive.displacement == 0.0
 }
 
 /// Refuses a drive or a response beyond the limits of the scene, before the rig gets the drive.
@@ -715,6 +841,20 @@ mod tests {
             let text = evidence(&samples, &scene.controller_config(), scene.plan().units, fault).to_string();
             assert!(text.contains(read) && text.contains(limit), "{text}");
         }
+        // Under a force, 0.01 m of the driven mode's base are newtons, and its response is read at the sensor.
+        let text = include_str!("../../../scenes/frame.toml");
+        let force = Scene::parse("frame.toml", text, &[]).unwrap();
+        let structure = force.structure.as_ref().unwrap();
+        let [newtons, metres] = [
+            0.01 / structure.base_per_drive(),
+            0.2 * structure.reading_per_response().abs(),
+        ]
+        .map(short);
+        let text = evidence(&samples, &force.controller_config(), force.plan().units, Fault::Sensor).to_string();
+        assert!(
+            text.contains(&format!("the response read {metres} m, and the force {newtons} N")),
+            "{text}"
+        );
     }
 
     /// What is said of these readings of response and force, which begin as sines of 100 samples per period.

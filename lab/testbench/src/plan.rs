@@ -392,6 +392,9 @@ pub struct Plan {
     pub tracking: Config,
     /// Samples of the hold.
     pub hold: usize,
+    /// Longest ramp of the drive after the controller was asked to release it, samples: in this time the response of the linear rig falls to
+    /// [`DECAYED`], so that after a longer ramp nothing is left to decay.
+    pub ramp: usize,
     /// Samples of the recorded decay.
     pub decay: usize,
     /// Levels of the tracked backbone, amplitudes of the response, m, in the order in which they are visited.
@@ -411,6 +414,13 @@ pub struct Units {
     pub name: &'static str,
     /// Displacement at the sensor per metre of the bench.
     pub response: f64,
+}
+
+impl Plan {
+    /// Requested amplitude of the base, m, as it moves with the frequency `omega`, rad/s: a held base moves a little less than its samples.
+    pub fn requested(&self, omega: f64) -> f64 {
+        self.amplitude * self.knowledge.target.base_per_sample(omega, self.knowledge.sample_time)
+    }
 }
 
 /// Longest recorded decay, natural periods, unless the scene asks for a longer one: a bound for rigs with little damping.
@@ -452,8 +462,8 @@ impl Scene {
     /// The experiment on a rig of which this is known.
     pub fn plan_on(&self, mut knowledge: Knowledge) -> Plan {
         // The decay lasts as long as the linear rig takes to fall to the share that is recorded.
-        let relaxed = -DECAYED.ln() * knowledge.linear.relaxation_periods();
-        let decay = self.record.decay_periods.unwrap_or(relaxed.min(LONGEST_DECAY));
+        let relaxed = (-DECAYED.ln() * knowledge.linear.relaxation_periods()).min(LONGEST_DECAY);
+        let decay = self.record.decay_periods.unwrap_or(relaxed);
         let structure = self.structure().filter(|one| one.shaker.is_none());
         let lock = self.lock_config(&knowledge);
         knowledge.target.delay = lock.delay;
@@ -464,6 +474,7 @@ impl Scene {
             lock,
             tracking: self.tracking_config(&knowledge),
             hold: knowledge.samples(self.record.hold_periods),
+            ramp: knowledge.samples(relaxed),
             decay: knowledge.samples(decay),
             levels: self.backbone.levels(self.plant.half_width),
             precision: self.backbone.precision,
