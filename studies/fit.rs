@@ -389,9 +389,12 @@ impl Recorded {
     /// Standard uncertainties of the five parameters by the Cramér–Rao bound of all symmetric 1:1 motion in the recording of displacements: an information
     /// filter at the true parameters. It follows the rig sample by sample; the noise of the base is that of the process, and the state at the start of
     /// each such part is unknown.
-    fn bound(&self, snr: &str) -> Option<[f64; 5]> {
+    fn bound(&self) -> Option<[f64; 5]> {
         let symmetric = self.symmetric()?;
-        let ratio = 10_f64.powf(-snr.parse::<f64>().ok()? / 20.0);
+        let [of_response, of_base] = self.scene.noise().map(|deviation| deviation * deviation);
+        if of_response == 0.0 {
+            return None;
+        }
         let values: [f64; 5] = std::array::from_fn(|n| Quantity::ALL[n].of_plant(&self.truth));
         let beside = |changed: Option<usize>| {
             let factor = |n: usize| if changed == Some(n) { 1.0 + BESIDE } else { 1.0 };
@@ -428,7 +431,7 @@ impl Recorded {
         };
         let mut rig = Plant::new(self.truth, self.scene.start).ok()?;
         let (mut covariance, mut by_parameters) = (Matrix4::identity(), SMatrix::<f64, 4, 5>::zeros());
-        let (mut information, mut powers, mut phase) = (Matrix5::zeros(), [0.0; 2], 0.0_f64);
+        let (mut information, mut phase) = (Matrix5::zeros(), 0.0_f64);
         // As the recording is cut.
         let cut = self.driven.len() / 40;
         for (n, Drive { omega, amplitude, .. }) in self.driven[..self.driven.len() - cut].iter().enumerate() {
@@ -441,11 +444,6 @@ impl Recorded {
             // Held levels may be unstable: only the rig's own steps stay on them.
             rig.advance(lovines::Drive::harmonic(*amplitude, *omega), step).ok()?;
             let row = RowVector4::new(1.0, 0.0, share, 0.0);
-            // Mean squares over a period, as the noise of the sensors has them.
-            for (power, value) in powers.iter_mut().zip([(row * x)[0], signal[0]]) {
-                *power += (value * value - *power) / self.scene.controller.samples_per_period;
-            }
-            let [of_response, of_base] = powers.map(|power| ratio * ratio * power);
             if n < cut || !symmetric[n] {
                 (covariance, by_parameters) = (Matrix4::identity(), SMatrix::zeros());
                 continue;
@@ -497,15 +495,19 @@ fn recording(read: &[Sensors], sample_time: f64) -> Recording {
 fn accelerations(case: &Case, snr: &str) -> Result<Recorded, Failure> {
     let of_mass = Definition { sensor: Sensor::Q1, ..Definition::default() };
     let mut recorded = levels(case, "none", of_mass, None)?;
+    // The natural frequency is 1: the noise of accelerations is that of displacements.
+    let (_, noisy, _) = client(case, snr)?;
+    let deviations = noisy.noise();
     let recording = &mut recorded.recording;
     let step = recording.sample_time;
     let mut random = ChaCha8Rng::seed_from_u64(case.1);
-    for values in [&mut recording.response, &mut recording.drive] {
+    for (values, deviation) in [&mut recording.response, &mut recording.drive]
+        .into_iter()
+        .zip(deviations)
+    {
         // Exact for a sine of the natural frequency 1.
         let second = |three: &[f64]| (three[0] - 2.0 * three[1] + three[2]) / (2.0 * (0.5 * step).sin()).powi(2);
         let accelerations: Vec<f64> = values.windows(3).map(second).collect();
-        let size = mean_square(accelerations.iter().copied()).sqrt();
-        let deviation = snr.parse().map_or(0.0, |snr: f64| size * 10_f64.powf(-snr / 20.0));
         *values = accelerations;
         for value in values {
             let normal: f64 = StandardNormal.sample(&mut random);
@@ -611,7 +613,7 @@ fn follow_one(case: &Case, snr: &str, record: fn(&Case, &str) -> Result<Recorded
     let ratios: Vec<f64> = Quantity::ALL[..5].iter().map(over).collect();
     let spans: Vec<[f64; 2]> = left_out.iter().map(|one| one.seconds).collect();
     let is_known = recording.measurands == [Measurand::Displacement; 2] && !recorded.driven.is_empty() && periods > 0;
-    let bound = Some(&recorded).filter(|_| is_known).and_then(|one| one.bound(snr));
+    let bound = Some(&recorded).filter(|_| is_known).and_then(Recorded::bound);
     let of_bound = |n: usize| {
         let uncertainty = fit.estimate(Quantity::ALL[n]).map_or(f64::NAN, |one| one.uncertainty);
         bound.map_or(f64::NAN, |bound| uncertainty / bound[n])

@@ -205,9 +205,9 @@ fn locked(scene: &CheckedScene, stop: &Arc<AtomicBool>) -> Result<Lock, Box<dyn 
     Ok(identification::identify(&record, &plan)?.lock)
 }
 
-/// Unit of a number that a sweep varies: `1` for a count, and for what a scene states relative to omega0, b or a period.
+/// Unit of a number of a scene that a sweep varies: `1` for a count, and for what a scene states relative to omega0, b or a period.
 #[pyfunction]
-pub fn unit(key: &str) -> &'static str {
+pub fn unit(key: &str, scene: &Scene) -> &'static str {
     match key {
         "plant.M" | "plant.m" => "kg",
         "plant.k" => "N/m",
@@ -216,6 +216,8 @@ pub fn unit(key: &str) -> &'static str {
         "start.dq1" | "start.dq2" => "m/s",
         "controller.phase_target" => "degree",
         "chain.snr" => "dB",
+        "chain.response_noise" => scene.scene.reading_units()[0],
+        "chain.reference_noise" => scene.scene.reading_units()[1],
         key => match key.strip_prefix("phase_lock.").and_then(Parameter::find) {
             Some(parameter) if !parameter.unit.is_empty() => parameter.unit,
             _ => "1",

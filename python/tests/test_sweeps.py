@@ -76,6 +76,10 @@ def test_axes_are_coordinates_of_xarray_and_results_have_units():
     units = {"sigma": "1", "plant.c": "N s/m", "chain.snr": "dB", "phase_lock.base_bandwidth": "rad/s"}
     for key, unit in units.items():
         assert vines.sweep(None, {key: [1.0]}, periods=200)[key].attrs["units"] == unit
+    # Noise is in the unit of the sensor.
+    forced = vines.Scene(resonance={"sensor": "q1", "sensor_quantity": "velocity", "reference": "force"})
+    for key, unit in (("chain.response_noise", "m/s"), ("chain.reference_noise", "N")):
+        assert vines.sweep(forced, {key: [1e-6]}, periods=200)[key].attrs["units"] == unit
     assert json.loads(cells.attrs["vines"])["scene"]["plant"]["M"] == 3.807
     allowed = (str, int, float, np.number, np.ndarray, list)
     for one in (cells, *cells.variables.values()):

@@ -132,13 +132,12 @@ def sweep(
     ({'sigma': 5, 'plant.r': 2}, '1')
     """
     module = needed("xarray")
-    variables = {name: _axis(name, values) for name, values in axes.items()}
+    scene = checked(scene)
+    variables = {name: _axis(name, values, scene) for name, values in axes.items()}
     if not variables:
         raise ValueError('a sweep needs at least one axis, for instance {"plant.r": [0.5, 0.65]}')
     asked = (results,) if isinstance(results, str) else tuple(results)
-    cells = _Cells(
-        checked(scene), tuple(variables), None if sigma is None else real(sigma, name="sigma"), asked, periods
-    )
+    cells = _Cells(scene, tuple(variables), None if sigma is None else real(sigma, name="sigma"), asked, periods)
     attributes = {"title": "Sweep of a linear oscillator with a vibro-impact nonlinear energy sink"}
     attributes["vines"] = json.dumps(_identity(cells, variables))
     sizes: dict[str, int] = {}
@@ -165,7 +164,7 @@ def sweep(
     return found
 
 
-def _axis(name: str, values: Any) -> "xarray.Variable":
+def _axis(name: str, values: Any, scene: Scene) -> "xarray.Variable":
     """Return the values of an axis as a variable of xarray, checked."""
     dimensions: Any = (name,)
     if isinstance(values, tuple):
@@ -185,7 +184,7 @@ def _axis(name: str, values: Any) -> "xarray.Variable":
     if not np.isfinite(numbers).all():
         raise ValueError(f"{name} = {numbers[~np.isfinite(numbers)][0]}: finite numbers are allowed")
     found: xarray.Variable = needed("xarray").Variable(
-        dimensions, numbers, {"long_name": name, "units": _native.unit(name)}
+        dimensions, numbers, {"long_name": name, "units": _native.unit(name, scene._native)}
     )
     return found
 

@@ -15,7 +15,8 @@ use super::summary::{Units, structure};
 
 const HELP: &str = "\
 Drives the rig at a hundredth of the drive for 24 periods with the loop open, and compares amplitude and phase of response and base with
-those of the scene's linear resonator at rest:
+those of the scene's linear resonator at rest. Where the noise of the sensors hides the phase, the drive is raised fourfold, again and again,
+up to the drive of the scene or to a response of b/2:
   gain   measured over expected amplitude; a wrong unit shows as a power of ten
   phase  measured minus expected phase, degrees; 180 for a reversed sensor
   delay  the difference of phase in samples; in the response it includes the effect of a wrong natural frequency
@@ -142,6 +143,13 @@ pub(super) fn described(checked: &LoopCheck, scene: &Scene) -> String {
     };
     let (amplitude, verdict) = (checked.amplitude * drive, named(&checked.verdict.to_string(), scene));
     text += &format!("At {symbol} = {amplitude:.2e} {unit}: {verdict}\n");
+    if checked.is_raised() {
+        text += &format!(
+            "The noise of the sensors needed {:.0} % of the drive; the check took {:.0} periods.\n",
+            100.0 * checked.share,
+            checked.periods
+        );
+    }
     if let Some(linear) = &checked.linear {
         text += &format!(
             "Gains at a bandwidth of {:.3} rad/s: {:.4} 1/s and {:.4} 1/s²; phase margin {:.0} degrees.\n",

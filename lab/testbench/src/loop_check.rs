@@ -1,4 +1,5 @@
-//! Check of the loop before the drive rises: an open loop at a hundredth of the drive shows what is connected to what.
+//! Check of the loop before the drive rises: an open loop at a hundredth of the drive shows what is connected to what. Where the noise of the sensors
+//! leaves the phase uncertain, the drive is raised.
 //!
 //! A linear resonator at rest that is driven at its natural frequency with the amplitude E responds with `-i g E (1 - exp(-d t))/d`
 //! (`g`: half the frequency, `d`: damping rate). Response and base are compared with this and with E, by amplitude and phase.
@@ -19,6 +20,8 @@ use crate::rig::{Drive, Rig, RigError, Scaled};
 
 /// Drives of the check, over the scene's drive: too small for impacts. The smaller one follows where the particle may have slid.
 const SHARES: [f64; 2] = [0.01, 0.01 / 16.0];
+/// Factor by which the drive is raised at a time: a fault that noise has hidden is seen at little more.
+const RAISE: f64 = 4.0;
 /// Numbers of periods: without a drive, with it, and evaluated at the end of it.
 const PERIODS: [usize; 3] = [2, 24, 4];
 
@@ -29,6 +32,10 @@ pub struct LoopCheck {
     pub verdict: Verdict,
     /// Amplitude of the drive, m.
     pub amplitude: f64,
+    /// It over the scene's drive.
+    pub share: f64,
+    /// Duration with all waits and smaller drives, periods.
+    pub periods: f64,
     /// The response.
     pub response: CheckedChannel,
     /// The base, if a sensor measures it.
@@ -37,9 +44,27 @@ pub struct LoopCheck {
     pub linear: Option<Linear>,
     /// What was measured, beside what the scene says.
     pub quantities: Vec<CheckedQuantity>,
+    /// Standard uncertainty by the noise of the sensors: of the gain, relative, and of its phase, rad.
+    #[serde(skip)]
+    u_noise: f64,
 }
 
 impl LoopCheck {
+    /// Whether the drive was raised, because noise hid what is measured at a hundredth of it.
+    pub fn is_raised(&self) -> bool {
+        self.share > SHARES[0]
+    }
+
+    /// Whether noise hides a phase that is to be refused: the drive is too small.
+    fn is_too_weak(&self) -> bool {
+        // Noise does not look like exchanged channels, and more response would exceed the range of the base.
+        let is_certain = matches!(
+            self.verdict,
+            Verdict::NotANumber | Verdict::NotAtRest | Verdict::Swapped
+        );
+        !is_certain && SIGNIFICANT * self.u_noise > PHASE.to_radians()
+    }
+
     /// Whether another check is healthy and contradicts each quantity that this one refuses, beyond the uncertainties.
     fn is_contradicted_by(&self, other: &Self) -> bool {
         let pairs = self.quantities.iter().zip(&other.quantities);
@@ -55,42 +80,62 @@ impl LoopCheck {
 /// a multiple of 2 pi before and after.
 ///
 /// A response that is refused is checked again at less drive: a sensor is late or has a wrong factor at every drive, but a particle that slides on
-/// the floor sticks to it.
+/// the floor sticks to it. Where noise hides the phase, the drive is raised: to the scene's drive at most, or to a response of half the half-width,
+/// which hits no particle in the inner half of the cavity.
 pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, RigError> {
-    if let Some(stated) = &plan.knowledge.shaker {
-        return shaker::check(rig, plan, stated);
-    }
-    let found = at_share(rig, plan, SHARES[0], MOST_WAITS)?;
-    if matches!(
+    let LinearResponse { omega0, damping_rate, .. } = plan.knowledge.linear;
+    let response = match plan.knowledge.shaker {
+        Some(_) => 0.5 * omega0 / damping_rate,
+        None => expected(plan)[0].norm(),
+    };
+    let most = f64::min(1.0, 0.5 * plan.knowledge.numbers.b / (response * plan.amplitude));
+    let mut found = at_share(rig, plan, SHARES[0], MOST_WAITS)?;
+    let is_refused = matches!(
         found.verdict,
         Verdict::ResponseLate | Verdict::BaseLate | Verdict::ResponseGain
-    ) {
-        // The response to the first check falls to 1 % in five relaxation times; what is left then is noise.
-        let relaxed = (5.0 * plan.knowledge.linear.relaxation_periods() / WAIT as f64).ceil();
-        let again = at_share(rig, plan, SHARES[1], MOST_WAITS.min(relaxed as usize))?;
-        if found.is_contradicted_by(&again) {
-            return Ok(again);
-        }
+    );
+    // The response to a check falls to 1 % in five relaxation times; what is left then is noise.
+    let relaxed = (5.0 * plan.knowledge.linear.relaxation_periods() / WAIT as f64).ceil() as usize;
+    if plan.knowledge.shaker.is_none() && is_refused {
+        let again = at_share(rig, plan, SHARES[1], MOST_WAITS.min(relaxed))?;
+        let periods = found.periods + again.periods;
+        let is_contradicted = found.is_contradicted_by(&again);
+        found = if is_contradicted { again } else { found };
+        found.periods = periods;
+    }
+    while found.is_too_weak() && found.share < most {
+        let raised = at_share(rig, plan, most.min(RAISE * found.share), MOST_WAITS.max(relaxed))?;
+        found = LoopCheck { periods: found.periods + raised.periods, ..raised };
     }
     Ok(found)
 }
 
 /// The check at this share of the drive, after `waits` at most.
 fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize) -> Result<LoopCheck, RigError> {
+    if let Some(stated) = &plan.knowledge.shaker {
+        return shaker::check(rig, plan, stated, share);
+    }
     let (omega, amplitude) = (plan.lock.omega_start, share * plan.amplitude);
     let step = plan.knowledge.sample_time;
     let samples = |periods: usize| (periods as f64 * TAU / (omega * step)).round() as usize;
     let [quiet, driven, window] = PERIODS.map(samples);
     let target = plan.knowledge.target;
     let mut rig = Scaled::new(rig, target);
-    let mut rig = OpenLoop::new(&mut rig, step);
-    let expected = expected(plan, omega, amplitude);
-    rig.rest(omega, [quiet, samples(WAIT)], waits, NOISE * expected[0].norm())?;
+    let mut rig = OpenLoop::new(&mut rig, target, step);
+    let expected = expected(plan).map(|per_drive| per_drive * amplitude);
+    rig.rest(
+        omega,
+        [quiet, samples(WAIT)],
+        waits,
+        expected.map(|phasor| NOISE * phasor.norm()),
+    )?;
     let begins = rig.readings.len();
     rig.drive(driven, omega, amplitude)?;
     let ends = rig.readings.len();
     rig.end(samples(1))?;
     let OpenLoop { mut readings, has_base, .. } = rig;
+    let periods = readings.len() as f64 / samples(1) as f64;
+    let white = [1, 2].map(|of| noise_of(&readings[begins - quiet..begins], of, &target, step));
     readings.truncate(ends);
     without_drift(&mut readings[begins..]);
     let fits = [1, 2].map(|channel| fitted(&readings[begins + driven - window..], channel, 0, &target, omega));
@@ -102,15 +147,11 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
         channel.at(ratio, omega * step)
     });
     let amplitudes = expected.map(|response| response.norm());
-    // A delay that looks like the opposite sign is at least this long. Meanwhile a delayed base rests, but a base of the opposite sign moves.
+    // A delay that looks like the opposite sign is at least this long.
     let first = (samples(1) as f64 * (PI - IN_TIME) / TAU) as usize;
-    let begin = &readings[begins..begins + first];
-    let rest = mean(readings[begins - quiet..begins].iter().map(|reading| reading[2]));
-    let moved = mean_square(begin.iter().map(|reading| reading[2] - rest));
-    let moves = begin
-        .iter()
-        .map(|[phase, ..]| channels[1].gain * amplitude * (phase + target.measurands[1].lead()).sin());
-    let waits = moved < 0.5 * mean_square(moves);
+    let lead = target.measurands[1].lead();
+    let begin = &readings[begins - quiet..begins + first];
+    let waits = is_late(begin, quiet, channels[1].gain * amplitude, lead);
     // Without a sensor, the base moves as expected.
     let (phasor, noise) = fits[1];
     let base = if has_base {
@@ -127,7 +168,9 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
     let (response, rests) = phasors(readings, 1);
     let (beside, _) = phasors(&beside_driven_mode(readings, plan, omega, amplitude), 1);
     let alone: Vec<Complex64> = response.iter().zip(&beside).map(|(z, other)| z - other).collect();
-    let linear = Linear::of(&alone, mean_square(rests).sqrt(), base, omega, period, plan);
+    let (linear, per_noise) =
+        Linear::of(&alone, mean_square(rests).sqrt(), base, omega, period, plan).unwrap_or((None, 0.0));
+    let u_noise = by_noise(white, per_noise, &expected, window);
     let mut quantities = Vec::new();
     if has_base {
         quantities.extend(of_base(base, amplitude, &phasors(readings, 2).0, plan));
@@ -146,10 +189,30 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
         verdict,
         linear: linear.filter(|_| verdict == Verdict::Healthy),
         amplitude,
+        share,
+        periods,
         response: channels[0],
         base: has_base.then_some(channels[1]),
         quantities,
+        u_noise,
     })
+}
+
+/// Whether the base rests in the readings after the first `quiet` ones, although the drive has begun: a delayed base rests, but a base of the opposite
+/// sign moves with this amplitude, m, and this lead, rad.
+fn is_late(readings: &[[f64; 3]], quiet: usize, amplitude: f64, lead: f64) -> bool {
+    let (before, begin) = readings.split_at(quiet);
+    let rest = mean(before.iter().map(|reading| reading[2]));
+    let moved = mean_square(begin.iter().map(|reading| reading[2] - rest));
+    let moves = begin.iter().map(|[phase, ..]| amplitude * (phase + lead).sin());
+    moved < 0.5 * mean_square(moves)
+}
+
+/// Standard uncertainty of response over base, relative, and of its phase, rad, by white noise of these standard deviations, m, in both channels;
+/// `per_noise`, 1/m: the part of the growth. Where noise hides the growth, it is at least the error of the phasor of the last `window` samples.
+fn by_noise(white: [f64; 2], per_noise: f64, expected: &[Complex64; 2], window: usize) -> f64 {
+    let of_phasor = expected.map(|phasor| (2.0 / window as f64).sqrt() / phasor.norm());
+    (white[0] * per_noise.max(of_phasor[0])).hypot(white[1] * of_phasor[1])
 }
 
 /// What the drawing's structure adds to the response of its driven mode, from rest, at the phases of these readings: the beat of two modes may last
@@ -195,15 +258,16 @@ fn without_drift(readings: &mut [[f64; 3]]) {
     }
 }
 
-/// Phasors of response and base, m, at the end of a check of the scene's linear resonator; frequency of the drive, rad/s, and its amplitude, m.
-fn expected(plan: &Plan, omega: f64, amplitude: f64) -> [Complex64; 2] {
+/// Phasors of response and base over the amplitude of the drive, at the end of a check of the scene's linear resonator.
+fn expected(plan: &Plan) -> [Complex64; 2] {
+    let omega = plan.lock.omega_start;
     let LinearResponse { omega0, damping_rate, .. } = plan.knowledge.linear;
     let time = (PERIODS[1] as f64 - 0.5 * PERIODS[2] as f64) * TAU / omega;
     let rate = Complex64::new(damping_rate, omega - omega0);
     let growth = Complex64::new(0.0, -0.5 * omega0) * (1.0 - (-rate * time).exp()) / rate;
     // A delay that the chain states is expected.
     let stated = Complex64::from_polar(1.0, -plan.lock.delay * omega);
-    [growth * amplitude * stated, stated * amplitude]
+    [growth * stated, stated]
 }
 
 /// The displacement of a signal at the frequency of the drive, `omega` (rad/s), m, beside an offset that is a polynomial of the degree `trend`, and the
@@ -232,6 +296,7 @@ const WAIT: usize = 10;
 /// A rig whose loop is open, and what it has read: the phase of its oscillator, rad, response and base.
 struct OpenLoop<'a, R: ?Sized> {
     rig: &'a mut R,
+    target: Target,
     step: f64,
     phase: f64,
     readings: Vec<[f64; 3]>,
@@ -239,8 +304,15 @@ struct OpenLoop<'a, R: ?Sized> {
 }
 
 impl<'a, R: Rig + ?Sized> OpenLoop<'a, R> {
-    fn new(rig: &'a mut R, step: f64) -> Self {
-        Self { rig, step, phase: 0.0, readings: Vec::new(), has_base: false }
+    fn new(rig: &'a mut R, target: Target, step: f64) -> Self {
+        Self {
+            rig,
+            target,
+            step,
+            phase: 0.0,
+            readings: Vec::new(),
+            has_base: false,
+        }
     }
 
     /// Takes `samples` without a drive, at whose end the phase of the rig's oscillator is a multiple of 2 pi, as at the start of a controller.
@@ -264,13 +336,20 @@ impl<'a, R: Rig + ?Sized> OpenLoop<'a, R> {
         Ok(())
     }
 
-    /// Waits until the response is at most `enough` (RMS, m) over the last `quiet` samples; looks after every `pause`, `waits` times at most.
-    fn rest(&mut self, omega: f64, [quiet, pause]: [usize; 2], waits: usize, enough: f64) -> Result<(), RigError> {
+    /// Waits until response and base are at most `enough` (RMS, m) over the last `quiet` samples, beside the noise of their sensors; looks after every
+    /// `pause`, `waits` times at most. The base is at rest already, unless the channels are exchanged.
+    fn rest(&mut self, omega: f64, [quiet, pause]: [usize; 2], waits: usize, enough: [f64; 2]) -> Result<(), RigError> {
         self.drive(quiet, omega, 0.0)?;
+        // Variances of normal noise, over the window and from its third differences, differ by this part of it.
+        let random = SIGNIFICANT * (8.0 / quiet as f64).sqrt();
         for _ in 0..waits {
-            let response = scatter(&self.readings[self.readings.len() - quiet..], 1);
+            let last = &self.readings[self.readings.len() - quiet..];
+            let moves = |n: usize| {
+                let noise = noise_of(last, n + 1, &self.target, self.step);
+                scatter(last, n + 1).powi(2) > enough[n].powi(2) + (1.0 + random) * noise.powi(2)
+            };
             // A sensor that reads no number never rests.
-            if response <= enough || response.is_nan() {
+            if !(moves(0) || moves(1)) {
                 break;
             }
             self.drive(pause, omega, 0.0)?;
@@ -282,6 +361,12 @@ impl<'a, R: Rig + ?Sized> OpenLoop<'a, R> {
 /// RMS of a reading about its mean: a sensor has an offset, and so has the centre of mass of a rig whose particle does not lie in the middle.
 fn scatter(readings: &[[f64; 3]], of: usize) -> f64 {
     standard_deviation(&readings.iter().map(|reading| reading[of]).collect::<Vec<f64>>())
+}
+
+/// Standard deviation of the noise on a reading that is smooth.
+fn noise_of(readings: &[[f64; 3]], of: usize, target: &Target, step: f64) -> f64 {
+    let values: Vec<f64> = readings.iter().map(|reading| reading[of]).collect();
+    target.noise(&values, step)
 }
 
 // What the check of a loop measures, beside what the scene says.
@@ -510,7 +595,7 @@ fn verdict(channels: &[CheckedChannel; 2], expected: &[f64; 2], has_base: bool, 
     // The response's converter may be too coarse for the motion of the base.
     let as_base = dead[0] || near(crossed[0]) && in_time(crossed_phases[0]);
     match () {
-        () if response.floor > (SIGNIFICANT * response.noise).max(NOISE * expected[0]) => Verdict::NotAtRest,
+        () if response.floor > (SIGNIFICANT * response.noise).hypot(NOISE * expected[0]) => Verdict::NotAtRest,
         () if dead[0] && (dead[1] || !has_base) => Verdict::ShakerOff,
         () if has_base && as_base && near(crossed[1]) && in_time(crossed_phases[1]) => Verdict::Swapped,
         () if dead[0] => Verdict::ResponseDead,
@@ -594,6 +679,7 @@ impl Linear {
 
     /// The response whose phasors, m, are given period by period, each of `samples` samples; `noise` is the RMS of the readings about them, m,
     /// `base` the phasor of the base, m, and `u_base` its relative standard uncertainty. `None` without a growth from rest that is more than noise.
+    /// And the standard uncertainty of the gain, relative, by white noise of the standard deviation 1 m in the readings, 1/m.
     fn of(
         phasors: &[Complex64],
         noise: f64,
@@ -601,13 +687,13 @@ impl Linear {
         omega: f64,
         samples: usize,
         plan: &Plan,
-    ) -> Option<Self> {
+    ) -> Option<(Option<Self>, f64)> {
         let step = plan.knowledge.sample_time;
         let period = samples as f64 * step;
         // The counter-rotating part turns by this in a period, whose number of samples is rounded.
         let turn = Complex64::cis(-2.0 * omega * period);
         let (mut q, [mut steady, mut initial]) = start(phasors)?;
-        let [mut u_q, mut u_gain] = [f64::NAN; 2];
+        let [mut u_q, mut u_gain, mut per_noise] = [f64::NAN; 3];
         for _ in 0..ROUNDS {
             let (mut power, mut turned, mut rest) = (Complex64::ONE, Complex64::ONE, 0.0);
             let p = q.conj().powf(1.0 / samples as f64);
@@ -632,14 +718,16 @@ impl Linear {
             u_q = (variance * inverse[(2, 2)].re).sqrt();
             // Relative change of the gain, which is proportional to `s r`.
             let slope = RowVector3::new(1.0 / steady, Complex64::ZERO, 1.0 / (q * q.ln()));
-            u_gain = (variance * (slope * inverse * slope.adjoint())[0].re).sqrt();
+            let spread = (slope * inverse * slope.adjoint())[0].re;
+            u_gain = (variance * spread).sqrt();
+            per_noise = (2.0 / samples as f64 * spread).sqrt();
             (steady, initial, q) = (steady + change[0], initial + change[1], q + change[2]);
         }
         let rate = -q.ln() / period;
         let gain = steady * rate / base;
         let is_growth = (steady + initial).norm() < FROM_REST * steady.norm();
         if !(gain.norm().is_finite() && u_gain < DETERMINED && q.norm() > 0.0 && is_growth) {
-            return None;
+            return Some((None, per_noise));
         }
         let largest = omega * omega * phasors.iter().map(|z| z.norm()).fold(0.0, f64::max);
         let particle = match FRICTION * largest < plan.knowledge.carried_up_to {
@@ -655,7 +743,7 @@ impl Linear {
             particle,
             shaker: None,
         };
-        Some(Self::new(response, plan))
+        Some((Some(Self::new(response, plan)), per_noise))
     }
 }
 

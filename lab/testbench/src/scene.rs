@@ -491,7 +491,7 @@ impl Sections {
         scene.controller.check()?;
         scene.backbone.check()?;
         scene.record.check(&scene)?;
-        scene.chain.check(&scene.controller)?;
+        scene.chain.check(&scene.controller, scene.reading_units())?;
         check(
             "chain.base_range",
             scene.chain.base_range,

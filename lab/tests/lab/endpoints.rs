@@ -187,6 +187,25 @@ fn from_a_rig_that_shows_its_sensors_only_and_is_at_rest_lock_and_backbone_are_t
 }
 
 #[test]
+#[ignore = "mended with the estimator: G is 6e-4 low at a cut-off of 5 (on the default scene 8.0e-4, and 2.0e-3 at 4)"]
+fn the_gain_of_an_anti_alias_filter_is_corrected_across_the_network_as_built_in() {
+    // The drive is G = 1.1. Clients whose scene does not have the filter, and clients whose scene has it.
+    for (cut_off, is_known) in [("5", false), ("5", true), ("4", false), ("4", true)] {
+        let filter = format!("--set=chain.filter={cut_off}");
+        let own = if is_known { &*filter } else { "" };
+        let rig = Server::start(&format!("rig --lock-step --sensors-only {filter}"));
+        let far = identified(&format!("--rig {} {own}", rig.1));
+        let direct = identified(&format!("--rig built-in {filter}"));
+        let [far, direct] = [far, direct].map(|found| ["G", "C"].map(|key| found["lock"][key].as_f64().unwrap()));
+        println!("cut-off {cut_off}, {own}: G and C are {far:?}, built-in {direct:?}");
+        assert!(
+            (far[0] - 1.1).abs() < 2e-4 && (far[1] - direct[1]).abs() < 2e-4,
+            "{far:?}, {direct:?}"
+        );
+    }
+}
+
+#[test]
 fn measured_points_of_another_rig_end_with_the_parameters_that_fit_instead() {
     let few = "backbone --set=backbone.points=6 --set=backbone.C_to=0.4";
     for (command, line) in [

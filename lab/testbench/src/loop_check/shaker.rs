@@ -11,8 +11,8 @@ use num_complex::Complex64;
 use vines_model::numerics::complex_fit;
 
 use super::{
-    CheckedChannel, CheckedQuantity, DEAD, FACTOR, Linear, LoopCheck, NOTED, OpenLoop, PHASE, ROUNDS, SHARES, Verdict,
-    fitted, of_response, quantity,
+    CheckedChannel, CheckedQuantity, DEAD, FACTOR, Linear, LoopCheck, NOTED, OpenLoop, PHASE, ROUNDS, Verdict, fitted,
+    of_response, quantity,
 };
 use crate::linear::ParticleState;
 use crate::plan::{LinearResponse, Plan, ShakerPath};
@@ -28,12 +28,18 @@ const STEADY: f64 = 1e-4;
 /// it is a gain margin of 2.
 const ROBUST: f64 = 0.5;
 
-/// Checks a rig with a shaker at a hundredth of the drive.
-pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerPath) -> Result<LoopCheck, RigError> {
+/// Checks a rig with a shaker at this share of the drive.
+pub(super) fn check(
+    rig: &mut (impl Rig + ?Sized),
+    plan: &Plan,
+    stated: &ShakerPath,
+    share: f64,
+) -> Result<LoopCheck, RigError> {
     let (target, linear) = (plan.knowledge.target, plan.knowledge.linear);
-    let amplitude = SHARES[0] * plan.amplitude;
+    let amplitude = share * plan.amplitude;
+    let mut periods = 0.0;
     let mut scaled = Scaled::new(rig, target);
-    let mut rig = OpenLoop::new(&mut scaled, plan.knowledge.sample_time);
+    let mut rig = OpenLoop::new(&mut scaled, target, plan.knowledge.sample_time);
     let window = |omega: f64| (WINDOW[0] as f64 * TAU / (omega * plan.knowledge.sample_time)).round() as usize;
     // Response and reference at the end of two windows, their noise, and the frequency, which is complex while the response still changes.
     let mut steady = |omega: f64| -> Result<(Complex64, [Complex64; 2], [f64; 2]), RigError> {
@@ -42,6 +48,7 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
         for _ in 0..WINDOW[1] {
             rig.readings.clear();
             rig.drive(window(omega), omega, amplitude)?;
+            periods += WINDOW[0] as f64;
             // A heavy table on the suspension of a light armature floats for hundreds of periods: a parabola in a window.
             let both = [1, 2].map(|channel| fitted(&rig.readings, channel, 2, &target, omega));
             let change = (0..2)
@@ -94,6 +101,9 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
     let u = |row: RowVector3<Complex64>| scatter * (row * inverse * row.adjoint())[0].re.sqrt();
     let slope = (slope_at(root) * found)[0] / unit;
     let u_gain = u(slope_at(root)) / (slope.norm() * unit);
+    // By the noise of both phasors alone.
+    let of_noise = [0, 1].map(|n| noise[n] * (2.0 / window(linear.omega0) as f64).sqrt() / at[n].norm());
+    let u_noise = u_gain / scatter * of_noise[0].hypot(of_noise[1]) * (at[1] / at[0]).norm();
     let u_rate = u(row(root)) / slope.norm();
     // The root is `omega0²/(2 w) (omega0 + i delta)/(omega0 - i delta)` with `w` of the scene, and the slope is proportional to `omega0 - i delta`.
     let root = x + unit * root;
@@ -170,6 +180,9 @@ pub(super) fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan, stated: &ShakerP
     Ok(LoopCheck {
         verdict,
         amplitude,
+        share,
+        periods,
+        u_noise,
         response: channel(0, ratio),
         base: Some(channel(1, at[1] / amplitude)),
         linear: Some(Linear::new(response, plan)).filter(|_| verdict == Verdict::Healthy),

@@ -36,14 +36,18 @@ pub struct Chain {
 
 /// The stages of one input.
 struct InputChannel {
-    sensor: Option<NoisySensor>,
+    /// Standard deviation of the white noise of its sensor: constant, whatever the signal.
+    noise: f64,
     filter: Option<LowPass>,
     converter: Option<Converter>,
 }
 
 impl InputChannel {
     fn read(&mut self, value: f64, elapsed: f64, random: &mut ChaCha8Rng) -> f64 {
-        let noisy = self.sensor.as_mut().map_or(value, |sensor| sensor.read(value, random));
+        let noisy = match self.noise {
+            0.0 => value,
+            noise => value + noise * normal(random),
+        };
         let filtered = self.filter.as_mut().map_or(noisy, |filter| filter.pass(noisy, elapsed));
         self.converter.map_or(filtered, |converter| converter.convert(filtered))
     }
@@ -61,10 +65,9 @@ impl Chain {
 
     /// The chain of a scene around `rig`.
     pub fn new(rig: Box<dyn Rig>, scene: &Scene) -> Self {
-        let (settings, snr, d) = (&scene.chain, scene.chain.snr, scene.dimensionless());
-        // The power of a signal is averaged over about one period.
-        let channel = |range: f64| InputChannel {
-            sensor: snr.map(|snr| NoisySensor::new(snr, scene.controller.samples_per_period)),
+        let (settings, d, noise) = (&scene.chain, scene.dimensionless(), scene.noise());
+        let channel = |range: f64, noise: f64| InputChannel {
+            noise,
             filter: settings.filter.map(|cut_off| LowPass::new(cut_off * d.omega0)),
             converter: settings.adc_bits.map(|bits| Converter::new(bits, range)),
         };
@@ -76,8 +79,8 @@ impl Chain {
             .map(|measurand| d.omega0.powi(measurand.order()));
         Self {
             rig,
-            response: channel(settings.response_range * d.b * units[0]),
-            base: settings.reference.then(|| channel(base_range * units[1])),
+            response: channel(settings.response_range * d.b * units[0], noise[0]),
+            base: settings.reference.then(|| channel(base_range * units[1], noise[1])),
             holds: settings.hold,
             output: settings.dac_bits.map(|bits| Converter::new(bits, base_range)),
             random: ChaCha8Rng::seed_from_u64(settings.seed),
@@ -243,29 +246,6 @@ pub fn normal(random: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(random)
 }
 
-/// Adds white noise to a signal.
-pub struct NoisySensor {
-    /// Standard deviation of the noise relative to the RMS of the signal.
-    ratio: f64,
-    /// Mean square of the signal.
-    power: f64,
-    /// Weight of a new sample in the running mean square.
-    follow: f64,
-}
-
-impl NoisySensor {
-    /// A sensor with the signal-to-noise ratio `snr` (dB), relative to the mean power of about the last `memory` samples.
-    pub fn new(snr: f64, memory: f64) -> Self {
-        let (ratio, follow) = (10_f64.powf(-snr / 20.0), 1.0 / memory);
-        Self { ratio, power: 0.0, follow }
-    }
-
-    pub fn read(&mut self, value: f64, random: &mut ChaCha8Rng) -> f64 {
-        self.power += self.follow * (value * value - self.power);
-        value + self.ratio * self.power.sqrt() * normal(random)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -330,19 +310,5 @@ mod tests {
         let mut seen: Vec<f64> = (-300..300).map(|n| converter.convert(f64::from(n) / 100.0)).collect();
         seen.dedup();
         assert_eq!(seen, [-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75]);
-    }
-
-    #[test]
-    fn noise_has_the_power_that_was_asked_for() {
-        let (mut sensor, mut random) = (NoisySensor::new(40.0, 100.0), ChaCha8Rng::seed_from_u64(7));
-        let mut noise = 0.0;
-        for n in 0..200_000 {
-            let value = 3.0 * (f64::from(n) * 0.0628).sin();
-            let added = sensor.read(value, &mut random) - value;
-            noise += if n < 1000 { 0.0 } else { added * added };
-        }
-        // Of a sine of amplitude 3.
-        let ratio = 10.0 * (4.5 / (noise / 199_000.0)).log10();
-        assert!((ratio - 40.0).abs() < 0.1, "{ratio} dB");
     }
 }

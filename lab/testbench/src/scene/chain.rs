@@ -1,10 +1,12 @@
 //! The `[chain]` section: the measurement chain between rig and controller, off by default.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use serde::{Deserialize, Serialize};
 
-use super::{ControllerSettings, SceneError, check, option, positive, within};
+use super::{
+    ControllerSettings, Excitation, Reference, Scene, SceneError, check, not_negative, option, positive, within,
+};
 
 settings! {
     /// The stages between the rig and the controller; each can be switched off.
@@ -21,9 +23,16 @@ settings! {
         base_range: f64 = 4.0,
         /// The base follows held samples instead of an oscillator in the rig.
         hold: bool = false,
-        /// Signal-to-noise ratio of the sensors, dB: the noise is proportional to the RMS of the signal. Absent: no noise.
+        /// RMS of both channels at the working level over the RMS of their noise, dB. The noise is white, and constant in time. Its level belongs to a
+        /// response of 0.4 b, in the quantity of its sensor at omega0, and to the requested drive. Absent: no noise.
         #[serde(deserialize_with = "option")]
         snr: Option<f64> = None,
+        /// Standard deviation of a sample of the response, in the unit of its sensor (m, m/s or m/s²); replaces what `snr` says of it.
+        #[serde(deserialize_with = "option")]
+        response_noise: Option<f64> = None,
+        /// Standard deviation of a sample of the reference, in the unit of its sensor (m, m/s, m/s²; of a force N); replaces what `snr` says of it.
+        #[serde(deserialize_with = "option")]
+        reference_noise: Option<f64> = None,
         /// Seed of noise and jitter.
         seed: u64 = 1,
         /// Cut-off of the anti-alias filter (Butterworth, second order), in units of omega0; absent: no filter.
@@ -38,6 +47,45 @@ settings! {
     }
 }
 
+/// Amplitude of the response over b to which `chain.snr` belongs.
+const WORKING_LEVEL: f64 = 0.4;
+
+impl Scene {
+    /// Units of what the sensors of response and reference read: m, m/s, m/s², or N of a force.
+    pub fn reading_units(&self) -> [&'static str; 2] {
+        let [response, reference] = self.resonance.measurands().map(|measurand| measurand.unit());
+        match self.definition().reference {
+            Reference::Base => [response, reference],
+            Reference::Force => [response, Excitation::Force.unit()],
+        }
+    }
+
+    /// Standard deviations of a sample of response and reference by the noise of their sensors, in the units in which a rig is read: the response as
+    /// that of the oscillator or driven mode, and a force as the base that makes it at omega0.
+    pub fn noise(&self) -> [f64; 2] {
+        let (chain, d) = (&self.chain, self.dimensionless());
+        let ratio = chain.snr.map_or(0.0, |snr| FRAC_1_SQRT_2 * 10_f64.powf(-snr / 20.0));
+        let levels = [WORKING_LEVEL * d.b, self.amplitude];
+        let per_reading = match self.structure() {
+            Some(structure) => [
+                structure.reading_per_response().abs().recip(),
+                structure.base_per_drive(),
+            ],
+            None if self.resonance.reference == Reference::Force => {
+                let static_force = self.plant.stiffness * Reference::Force.per_base(d.epsilon * d.lambda);
+                [1.0, static_force.recip()]
+            }
+            None => [1.0; 2],
+        };
+        let measurands = self.resonance.measurands();
+        let stated = [chain.response_noise, chain.reference_noise];
+        [0, 1].map(|n| match stated[n] {
+            Some(noise) => noise * per_reading[n],
+            None => ratio * levels[n] * d.omega0.powi(measurands[n].order()),
+        })
+    }
+}
+
 impl ChainSettings {
     /// Whether anything is switched on.
     pub fn is_on(&self) -> bool {
@@ -46,13 +94,22 @@ impl ChainSettings {
             dac_bits,
             hold,
             snr,
+            response_noise,
+            reference_noise,
             filter,
             jitter,
             delay,
             reference,
             ..
         } = *self;
-        adc_bits.or(dac_bits).is_some() || hold || snr.or(filter).is_some() || jitter > 0.0 || delay > 0 || !reference
+        let is_noisy = snr.or(response_noise).or(reference_noise).is_some();
+        adc_bits.or(dac_bits).is_some()
+            || hold
+            || is_noisy
+            || filter.is_some()
+            || jitter > 0.0
+            || delay > 0
+            || !reference
     }
 
     /// Delay from the drive to the sensors, in units of 1/omega0, for samples `step` apart: on average, a held sample lags by half a
@@ -70,7 +127,8 @@ impl ChainSettings {
         })
     }
 
-    pub(super) fn check(&self, controller: &ControllerSettings) -> Result<(), SceneError> {
+    /// Checks the keys; `units`: of the readings of response and reference.
+    pub(super) fn check(&self, controller: &ControllerSettings, units: [&'static str; 2]) -> Result<(), SceneError> {
         for (key, bits) in [("chain.adc_bits", self.adc_bits), ("chain.dac_bits", self.dac_bits)] {
             within(key, bits.unwrap_or(1).into(), "bits", [1.0, 32.0])?;
         }
@@ -84,6 +142,16 @@ impl ChainSettings {
         positive("chain.response_range", self.response_range, "(over b)")?;
         positive("chain.base_range", self.base_range, "(over b epsilon)")?;
         within("chain.snr", self.snr.unwrap_or(0.0), "dB", [-40.0, 300.0])?;
+        not_negative("chain.response_noise", self.response_noise.unwrap_or(0.0), units[0])?;
+        let of_reference = self.reference_noise;
+        not_negative("chain.reference_noise", of_reference.unwrap_or(0.0), units[1])?;
+        check(
+            "chain.reference_noise",
+            of_reference.unwrap_or(0.0),
+            units[1],
+            of_reference.is_none() || self.reference,
+            "needs chain.reference = true: no sensor reads the reference",
+        )?;
         // Up to half the sampling frequency.
         let nyquist = 0.5 * controller.samples_per_period;
         within(

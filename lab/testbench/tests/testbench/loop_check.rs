@@ -72,6 +72,51 @@ fn the_check_drives_at_a_hundredth_and_ends_at_the_phase_where_it_began() {
 }
 
 #[test]
+fn where_noise_hides_the_phase_the_check_raises_its_drive_up_to_that_of_the_scene_and_says_how_long_it_took() {
+    for (snr, shares, most) in [
+        ("chain.snr=120", 0.01..=0.01, 30.0),
+        ("chain.snr=60", 0.16..=0.16, 200.0),
+        ("chain.snr=40", 0.64..=1.0, 300.0),
+        ("chain.snr=30", 1.0..=1.0, 400.0),
+    ] {
+        for seed in ["chain.seed=1", "chain.seed=2", "chain.seed=3"] {
+            let scene = at_rest(&[snr, seed]);
+            let (found, [largest, turns]) = altered(&scene, 1.0, 0.0);
+            assert_eq!(found.verdict, Verdict::Healthy, "{snr}, {seed}: {found:?}");
+            assert!(
+                shares.contains(&found.share) && found.periods < most,
+                "{snr}, {seed}: {found:?}"
+            );
+            assert!(largest <= found.share * scene.amplitude * (1.0 + 1e-12), "{largest}");
+            assert!((turns - found.periods).abs() < 2.0, "{turns} {}", found.periods);
+            let linear = found.linear.unwrap();
+            let omega0 = scene.plant.natural_frequency();
+            assert!(
+                (linear.omega_0 - omega0).abs() < 4.0 * linear.u_damping_rate,
+                "{linear:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_fault_that_noise_hides_at_a_hundredth_of_the_drive_is_named_at_more() {
+    use {RigFault::*, SensorFault::*};
+    let scene = at_rest(&["chain.snr=50"]);
+    for (fault, expected) in [
+        (Response(Dead), Verdict::ResponseDead),
+        (Base(Dead), Verdict::BaseDead),
+        (Response(Reversed), Verdict::ResponseReversed),
+        (Base(Reversed), Verdict::BaseReversed),
+        (Swapped, Verdict::Swapped),
+        (Shaker(0.0), Verdict::ShakerOff),
+    ] {
+        let found = check(&mut faulty(&scene, fault, 0.0, |_| {}).unwrap(), &scene.plan()).unwrap();
+        assert_eq!(found.verdict, expected, "{fault:?}: {found:?}");
+    }
+}
+
+#[test]
 fn a_rig_that_moves_before_the_drive_comes_to_rest_first_or_is_named() {
     let mut scene = at_rest(&[]);
     let b = scene.plant.half_width;

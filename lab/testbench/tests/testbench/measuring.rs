@@ -61,6 +61,114 @@ fn noise_is_that_of_its_seed() {
     assert_ne!(readings("chain.seed=3"), readings("chain.seed=4"));
 }
 
+/// Standard deviations of the noise of both channels in a rig without a drive, at these shares of the scene's drive, and in the decay after them, in
+/// the units of the readings.
+fn noise_of(scene: &Scene) -> Vec<[f64; 2]> {
+    let [mut noisy, mut clean] = [Simulated::of(scene), Simulated::without_chain(scene)].map(Result::unwrap);
+    let omega = scene.dimensionless().omega0;
+    let stretch = |share: f64| {
+        let drive = Drive { omega, amplitude: share * scene.amplitude, displacement: 0.0 };
+        let mut squares = [0.0; 2];
+        for _ in 0..SAMPLES {
+            let [one, other] = [&mut noisy, &mut clean].map(|rig| {
+                let Sensors { response, reference } = rig.sense().unwrap();
+                rig.advance(drive, scene.sample_time()).unwrap();
+                // Before the first drive no velocity is read.
+                [response, reference.unwrap_or(0.0)]
+            });
+            (0..2).for_each(|n| squares[n] += (one[n] - other[n]).powi(2));
+        }
+        squares.map(|sum| (sum / SAMPLES as f64).sqrt())
+    };
+    [0.0, 0.01, 1.0, 0.0].into_iter().map(stretch).collect()
+}
+
+/// Samples of a standard deviation, whose standard error is 1.1 %.
+const SAMPLES: usize = 4000;
+
+fn are(found: &[[f64; 2]], expected: [f64; 2]) {
+    for one in found {
+        let is_near = |n: usize| (one[n] - expected[n]).abs() <= 0.05 * expected[n];
+        assert!(is_near(0) && is_near(1), "{found:?}, not {expected:?}");
+    }
+}
+
+#[test]
+fn the_noise_of_a_sensor_is_the_same_at_rest_at_a_hundredth_of_the_drive_at_the_working_level_and_in_a_decay() {
+    // omega0, rad/s, and E of G = 1.1, m, of the default scene. 40 dB below a sine of the amplitude 1 are 7.071e-3.
+    let (omega0, drive) = (55.390_12_f64, 9.246_126e-5);
+    let cases = ["displacement", "velocity", "acceleration"].into_iter().enumerate();
+    for (order, quantity) in cases {
+        let settings = [
+            "resonance.sensor=q1".to_string(),
+            format!("resonance.sensor_quantity={quantity}"),
+            format!("resonance.reference_quantity={quantity}"),
+            "chain.snr=40".into(),
+        ];
+        let found = noise_of(&paper(&settings.each_ref().map(String::as_str)));
+        are(
+            &found,
+            [4e-3, drive].map(|level| 7.071e-3 * level * omega0.powi(order as i32)),
+        );
+    }
+    // A sensor of the centre of mass, and a force, which is read as the base that makes it at omega0.
+    are(&noise_of(&paper(&["chain.snr=60"])), [2.828e-6, 7.071e-4 * drive]);
+    let by_force = paper(&["chain.snr=40", "resonance.reference=force"]);
+    are(&noise_of(&by_force), [2.828e-5, 7.071e-3 * drive]);
+    // Behind the force on a structure: the requested force.
+    let structure = common::scene(FORCED, &["chain.snr=40"]).unwrap();
+    are(&noise_of(&structure), [2.828e-5, 7.071e-3 * structure.amplitude]);
+}
+
+/// A beam under a force, whose sensor reads a third of the motion at the cavity.
+const FORCED: &str = "\
+[plant]
+m = 0.032
+b = 0.01
+r = 0.65
+[structure]
+excitation = \"force\"
+cavity = \"tip\"
+sensor = \"middle\"
+drive = \"root\"
+modes = [
+    { frequency = 8.8156, damping = 0.006, shape = { root = 0.1, tip = 0.51, middle = 0.17 } },
+    { frequency = 55.274, damping = 0.006, shape = { root = 0.3, tip = -0.51, middle = 0.4 } },
+]
+[excitation]
+F = 1.2
+";
+
+#[test]
+fn keys_in_si_units_replace_the_noise_of_their_channel_whatever_it_measures() {
+    let noisy = |settings: &[&str]| noise_of(&paper(settings));
+    // Without the other channel, or with its decibels.
+    are(&noisy(&["chain.response_noise=2e-5"]), [2e-5, 0.0]);
+    are(
+        &noisy(&["chain.snr=40", "chain.reference_noise=3e-6"]),
+        [2.828e-5, 3e-6],
+    );
+    are(
+        &noisy(&["chain.snr=40", "chain.response_noise=0"]),
+        [0.0, 7.071e-3 * 9.246_126e-5],
+    );
+    let rates = [
+        "resonance.sensor=q1",
+        "resonance.sensor_quantity=acceleration",
+        "resonance.reference_quantity=velocity",
+        "chain.response_noise=0.05",
+        "chain.reference_noise=1e-4",
+    ];
+    are(&noisy(&rates), [0.05, 1e-4]);
+    // N. The force of 1 m of the base is k (1 + (2 zeta)²)^(1/2) at omega0, with 2 zeta = 0.012.
+    let by_force = ["resonance.reference=force", "chain.reference_noise=0.02"];
+    are(&noisy(&by_force), [0.0, 0.02 / 11_680.84]);
+    // The sensor of the structure reads a third of the motion at the cavity.
+    let settings = ["chain.response_noise=1e-5", "chain.reference_noise=0.02"];
+    let structure = common::scene(FORCED, &settings).unwrap();
+    are(&noise_of(&structure), [3e-5, 0.02 / 1.2 * structure.amplitude]);
+}
+
 /// The lock behind the chain of a scene, held for 200 periods.
 fn at(settings: &str) -> Result<ResonancePoint, ExperimentError> {
     let settings: Vec<&str> = ["record.hold_periods=200"]
@@ -371,18 +479,15 @@ fn measurements_in_si_units_have_the_same_bits_whatever_the_scene_says_of_the_pa
 #[test]
 fn friction_from_rest_is_never_called_a_motion_with_impacts() {
     for (n, mu) in ["0.02", "0.05", "0.1"].into_iter().enumerate() {
-        // Half of the clients know of the friction.
-        let settings = |mu: &str| {
-            paper(&[
-                "start.dq2=0",
-                "chain.snr=40",
-                "backbone.points=9",
-                &format!("plant.mu_k={mu}"),
-            ])
+        // Half of the clients know of the friction. More noise in the check would raise its drive until the particle slides.
+        let settings = |mu: &str, snr: &str| {
+            let mu = format!("plant.mu_k={mu}");
+            paper(&["start.dq2=0", snr, "backbone.points=9", &mu])
         };
-        let client = settings(if n == 1 { mu } else { "0" });
-        let mut rig = Simulated::of(&settings(mu)).unwrap();
-        let linear = check(&mut *rig, &client.plan()).unwrap().linear.unwrap();
+        let client = settings(if n == 1 { mu } else { "0" }, "chain.snr=40");
+        let mut quiet = Simulated::of(&settings(mu, "chain.snr=90")).unwrap();
+        let linear = check(&mut *quiet, &client.plan()).unwrap().linear.unwrap();
+        let mut rig = Simulated::of(&settings(mu, "chain.snr=40")).unwrap();
         let plan = client.plan_on(client.knowledge().measured(linear.response));
         let found = common::tracked(&mut *rig, &plan, 20.0).unwrap();
         for point in common::kept(&found) {

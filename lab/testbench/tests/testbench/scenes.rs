@@ -101,6 +101,10 @@ fn settings_replace_values_and_what_makes_no_sense_is_named_with_unit_and_range(
         "chain.filter=80.0 => chain.filter | 80",
         "chain.jitter=0.5 => chain.jitter | 0.5",
         "chain.snr=-100 => chain.snr | -100",
+        "chain.response_noise=-1e-6 => chain.response_noise = -1e-6 m | zero or positive",
+        "chain.response_noise=nan => chain.response_noise = NaN m | zero or positive",
+        "chain.reference_noise=-1e-6 => chain.reference_noise = -1e-6 m | zero or positive",
+        "chain.reference_noise=inf => chain.reference_noise = inf m | finite",
         "chain.response_range=0 => chain.response_range | 0",
         "phase_lock.omega_start=70 => phase_lock.omega_start | omega_max",
         "phase_lock.amplitude_max=8e-5 => phase_lock.amplitude_max = 8e-5 m: at least the drive of [excitation], 9.2461e-5 m",
@@ -111,6 +115,26 @@ fn settings_replace_values_and_what_makes_no_sense_is_named_with_unit_and_range(
         "phase_lock.omega_min=1.0 => phase_lock.omega_min | controller.omega_min",
         "phase_lock.base_bandwidth=99.0 => phase_lock.base_bandwidth: base_bandwidth = 99 rad/s | bandwidth is controller.bandwidth",
     ]);
+}
+
+#[test]
+fn noise_in_si_units_is_refused_in_the_unit_of_its_sensor_and_where_there_is_no_sensor() {
+    let accelerations = ["resonance.sensor=q1", "resonance.sensor_quantity=acceleration"];
+    let settings = [&accelerations[..], &["chain.response_noise=-1"]].concat();
+    says(
+        Scene::load(None, &set(&settings)),
+        "chain.response_noise = -1 m/s² | zero or positive",
+    );
+    let by_force = ["resonance.reference=force", "chain.reference_noise=-1"];
+    says(
+        Scene::load(None, &set(&by_force)),
+        "chain.reference_noise = -1 N | zero or positive",
+    );
+    let unread = ["chain.reference=false", "chain.reference_noise=1e-6"];
+    says(
+        Scene::load(None, &set(&unread)),
+        "chain.reference_noise | no sensor reads the reference",
+    );
 }
 
 #[test]
@@ -261,15 +285,23 @@ fn an_option_is_switched_off_by_none_or_false_and_not_by_zero() {
         }
     }
     let chain = |setting: &str| Ok::<_, SceneError>(Scene::load(None, &set(&["chain.hold=true", setting]))?.chain);
-    for (key, on) in [("adc_bits", 12), ("dac_bits", 12), ("filter", 10), ("snr", 40)] {
+    for (key, on) in [
+        ("adc_bits", 12),
+        ("dac_bits", 12),
+        ("filter", 10),
+        ("snr", 40),
+        ("response_noise", 1),
+        ("reference_noise", 1),
+    ] {
         let with = chain(&format!("chain.{key}={on}.0").replace("12.0", "12")).unwrap();
         for off in ["'none'", "false"] {
             let without = chain(&format!("chain.{key}={off}")).unwrap();
             assert!(without != with && without == chain("chain.delay=0").unwrap());
         }
-        // 0 dB is a ratio, 0 bits or a cut-off of 0 are none.
+        // 0 dB is a ratio, and a sensor may have no noise; 0 bits or a cut-off of 0 are none.
         let zero = chain(&format!("chain.{key}=0"));
-        assert_eq!(zero.is_err(), key != "snr", "{key}");
+        let is_number = ["snr", "response_noise", "reference_noise"].contains(&key);
+        assert_eq!(zero.is_ok(), is_number, "{key}");
     }
 }
 
