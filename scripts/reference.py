@@ -22,7 +22,8 @@ COLUMNS = {
     "t_s": "time since the release, s",
     "f_Hz": "frequency of the response, Hz",
     "A_m": "amplitude of the first harmonic of the response, m",
-    "E_m": "amplitude of the base, m",
+    "E_m": "amplitude of the base, m; of a structure, of the base that drives its mode alike",
+    "F_N": "amplitude of the force, N (structures that a force drives only)",
     "tau": "time since the release, omega0 t",
     "C": "amplitude of the response over b",
     "B": "speed of the particle over b omega0 (simulations only)",
@@ -40,6 +41,8 @@ COLUMNS = {
     "unseen_growth": "growth of a disturbance per period, relative, that they would not show (from 1e-6 to 0.8 %)",
     "settled": "whether all uncertainties are within backbone.precision",
     "reached": "whether the response reached the level; if not, the drive is at a limit",
+    "E_requested_m": "requested amplitude of the base, m; of a held base (chain.hold) what is left of it",
+    "at_requested_drive": "whether E_m is the requested drive, within 1 % or three standard uncertainties",
     "held": "whether the response is under control at the lock, not the drive",
     "periods_to_lock": "periods from the start to the settled lock",
     "impacts_per_period": "impacts per period of the drive (simulations only)",
@@ -49,6 +52,7 @@ COLUMNS = {
     "tone_share": "its amplitude over the amplitude of the response",
     **{f"drive_{n}": f"harmonic {n} of the measured drive over the first, behind a shaker" for n in range(2, 8)},
     "clipped_percent": "share of the samples with the amplifier at its limit, behind a shaker",
+    "command_V": "mean amplitude of the amplifier's command over the averaged periods, V, behind a shaker",
     "linear_f0_Hz": "natural frequency measured by the check of the loop, Hz, in this state of the particle",
     "linear_u_f0_Hz": "its standard uncertainty, Hz",
     "linear_zeta": "damping ratio measured there",
@@ -153,8 +157,9 @@ def outputs(program):
         out = Path(folder)
         run(program, "identify", "--rig", "built-in", "--out", out)
         run(program, "backbone", "--set", "backbone.points=8", "--out", out)
-        shaken = [program, "backbone", "--scene", ROOT / "scenes" / "slip-table.toml", "--set", "backbone.points=8"]
-        run(*shaken, "--out", out / "shaken")
+        shaken = ["--scene", ROOT / "scenes" / "shaker-cantilever.toml", "--out", out / "shaken"]
+        run(program, "backbone", *shaken, "--set", "backbone.points=3")
+        run(program, "identify", *shaken)
         grids = ["--x", "sigma=-2:-1:3", "--y", "G=1:1.2:3", "--periods", "200", "--confirmations", "0"]
         run(program, "map", *grids, "--out", out)
         page = "# Output files\n\n" + NOTE + "\n"
@@ -171,7 +176,10 @@ def outputs(program):
             unknown = [column for column in columns if not meaning(column)]
             assert not unknown, f"scripts/reference.py has no meaning for the columns {unknown} of {name}"
             page += f"\n## {name}\n\n" + table(["column", "meaning"], [[f"`{one}`", meaning(one)] for one in columns])
-        lock = json.loads((out / "identification.json").read_text())["lock"]
+        runs = [out, out / "shaken"]
+        lock = {}
+        for folder in runs:
+            lock |= json.loads((folder / "identification.json").read_text())["lock"]
         unknown = [key for key in lock if not meaning(key)]
         assert not unknown, f"scripts/reference.py has no meaning for the keys {unknown} of the lock"
         page += "\n## identification.json: lock\n\n"

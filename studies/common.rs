@@ -15,7 +15,6 @@ pub use rayon::prelude::*;
 pub use vines_model::numerics::{Estimate, mean, mean_square, range};
 pub use vines_model::orbit::{Orbit, exact_backbone, phase_resonant, resonant_motion};
 pub use vines_model::{Definition, Dimensionless};
-use vines_testbench::advice;
 pub use vines_testbench::backbone::{LevelPoint, Tracked, track};
 pub use vines_testbench::comparison::{COMPARED_ABOVE, ExactCurve};
 use vines_testbench::experiment::{ExperimentError, run};
@@ -213,11 +212,18 @@ pub type Case = ([f64; 3], u64, [f64; 5]);
 /// Largest relative errors of k, c, m, b and r.
 pub const SCALES: [f64; 5] = [0.01, 0.3, 0.2, 0.1, 0.2];
 
+/// The stable symmetric 1:1 orbits at phase resonance, at any drive, on a grid of detunings.
+pub fn stable_orbits(d: &Dimensionless) -> Vec<Orbit> {
+    let omega = |n: i32| 1.0 + d.epsilon * (-6.0 + 0.005 * f64::from(n));
+    let orbits = (0..=1800).flat_map(|n| exact_backbone(d, omega(n)));
+    orbits.filter(|orbit| orbit.stable).collect()
+}
+
 /// The rig, and the scene of the client, who knows the linear response.
 pub fn client(&([epsilon, lambda, r], noise, scales): &Case, snr: &str) -> Result<(Parameters, Scene, Plan), Failure> {
     let [k, c, m, width, dr] = scales.map(|error| 1.0 + error);
     let d = Dimensionless::new(epsilon, lambda, r, 0.0);
-    let orbits = advice::stable_orbits(&d);
+    let orbits = stable_orbits(&d);
     let first = orbits.iter().max_by(|one, other| one.c.total_cmp(&other.c));
     let first = first.ok_or("no stable orbit")?;
     let (low, high) = range((f64::INFINITY, 0.0), orbits.iter().map(|orbit| orbit.g));
@@ -339,7 +345,9 @@ pub fn rig_with_stable_orbit(uniform: Uniform, settings: &[impl AsRef<str>]) -> 
         let lambda = uniform(0.1_f64.ln(), 3_f64.ln()).exp();
         let (r, share) = (uniform(0.2, 0.97), uniform(0.0, 1.0));
         let d = Dimensionless::new(epsilon, lambda, r, 0.0);
-        let Some([low, high]) = advice::stable_range(&d) else {
+        let drives = stable_orbits(&d).into_iter().map(|orbit| orbit.g);
+        let (low, high) = range((f64::INFINITY, 0.0), drives);
+        if low > high {
             continue;
         };
         let d = Dimensionless { g: low + share * (high - low), ..d };

@@ -31,7 +31,6 @@ use nalgebra::{Matrix4, Matrix5, RowVector4, SMatrix, Vector4};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
-use vines_testbench::advice;
 use vines_testbench::fit::{
     Effect, Fit, Known, MeasuredPoint, Quantity, RecordFit, Recording, at, explain, fit, follow, linear_verdicts, parts,
 };
@@ -545,10 +544,7 @@ fn levels(case: &Case, snr: &str, resonance: Definition, filter: Option<f64>) ->
 fn sweep(case: &Case, snr: &str) -> Result<Recorded, Failure> {
     let (truth, scene, mut plan) = client(case, snr)?;
     let d = Dimensionless::of(&truth, 0.0);
-    let (low, high) = range(
-        (f64::INFINITY, 0.0),
-        advice::stable_orbits(&d).iter().map(|orbit| orbit.g),
-    );
+    let (low, high) = range((f64::INFINITY, 0.0), stable_orbits(&d).iter().map(|orbit| orbit.g));
     let at_lock = plan.amplitude / d.epsilon;
     let (least, most) = (1.08 * low / at_lock, 0.95 * high / at_lock);
     // The same run as far as the lock.

@@ -2,7 +2,8 @@
 //!
 //! One to three modes as in `structures.rs`, a force at the drive point, and r 0.5 to 0.8. The armature has 0.001 to 0.5 of the modal mass at the drive
 //! point; its suspension 0.3 to 3 times, and the stinger 3 to 30 times the natural frequency of the driven mode; the coil's damping Bl²/R is 0.03
-//! to 3 times m omega0 of the armature, its rate R/L 3 to 100 omega0 in half of the cases, and the amplifier controls the voltage or the current (uniform logarithms).
+//! to 54 times m omega0 of the armature, as published shakers have, its rate R/L 3 to 100 omega0 in half of the cases, and the amplifier controls the
+//! voltage or the current (uniform logarithms).
 //! Limits of voltage, current, stroke and force, unless LIMITS is `none`, are 1 to 100 times what the exact orbit at the first level needs, or as much more
 //! as a scene needs that is not refused: a drive beyond one of them in more than the last sample is a failure.
 //! Tracked in 8 levels over the range of responses in which the exact backbone with the shaker has stable orbits, at least a factor of 1.2. A point is right within 3 u of the exact backbone in sigma and G.
@@ -46,7 +47,7 @@ fn text(uniform: Uniform) -> (String, [f64; 4]) {
         ));
         ratio *= log(1.5, 5.0);
     }
-    let [share, suspension, stinger, coil] = [log(0.001, 0.5), log(0.3, 3.0), log(3.0, 30.0), log(0.03, 3.0)];
+    let [share, suspension, stinger, coil] = [log(0.001, 0.5), log(0.3, 3.0), log(3.0, 30.0), log(0.03, 54.0)];
     let (omega, mass) = (std::f64::consts::TAU, share / (drive * drive));
     let spring = |times: f64| mass * (times * omega).powi(2);
     let damped = |times: f64, zeta: f64| 2.0 * zeta * mass * times * omega;

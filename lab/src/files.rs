@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use same_file::Handle;
 use tempfile::NamedTempFile;
+use vines_fmu::process::Cleanup;
 
 /// Why a file could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -100,8 +101,8 @@ pub struct ResultFolder {
     path: PathBuf,
     /// What the command may write.
     names: &'static [&'static str],
-    /// Folders that did not exist, the deepest first.
-    created: Vec<PathBuf>,
+    /// Removes the lock's file, and the folders that were created, if they are empty.
+    _cleanup: Cleanup,
     /// Holds the lock, if the file system has locks.
     _lock: File,
 }
@@ -112,11 +113,22 @@ impl ResultFolder {
     /// # Errors
     /// A folder that another run holds, or that cannot be written to; a file that cannot be replaced.
     pub fn open(path: &Path, names: &'static [&'static str]) -> Result<Self, FileError> {
-        let missing = path.ancestors().take_while(|folder| !folder.exists());
-        let created = missing.map(PathBuf::from).collect();
+        // Absolute: an FMU may change the working folder.
+        let absolute = std::path::absolute(path).map_err(FileError::at(path))?;
+        // The deepest first.
+        let missing = absolute.ancestors().take_while(|folder| !folder.exists());
+        let created: Vec<PathBuf> = missing.map(PathBuf::from).collect();
         fs::create_dir_all(path).map_err(FileError::at(path))?;
-        let _lock = lock(&path.join(LOCK)).map_err(FileError::at(path))?;
-        let folder = Self { path: path.into(), names, created, _lock };
+        let file = absolute.join(LOCK);
+        let _lock = lock(&file).map_err(FileError::at(path))?;
+        let _cleanup = Cleanup::new(move || {
+            // Both are best effort: an old lock file locks nothing, and a folder with files in it stays.
+            let _ = fs::remove_file(file);
+            for folder in created {
+                let _ = fs::remove_dir(folder);
+            }
+        });
+        let folder = Self { path: path.into(), names, _cleanup, _lock };
         for name in names {
             writable(&path.join(name))?;
         }
@@ -167,16 +179,6 @@ impl ResultFolder {
             }
         }
         Ok((write_file(&self.path.join(name), content)?, previous))
-    }
-}
-
-impl Drop for ResultFolder {
-    fn drop(&mut self) {
-        // Both are best effort: an old lock file locks nothing, and a folder with files in it stays.
-        let _ = fs::remove_file(self.path.join(LOCK));
-        for folder in &self.created {
-            let _ = fs::remove_dir(folder);
-        }
     }
 }
 

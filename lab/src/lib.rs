@@ -2,6 +2,10 @@
 
 #![forbid(unsafe_code)]
 
+// The command line uses the library under the name that its users see.
+extern crate self as vines;
+
+pub mod cli;
 mod files;
 pub mod pack;
 pub mod regime_map;

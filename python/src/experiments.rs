@@ -21,19 +21,20 @@ use vines_testbench::{
     comparison::{Comparison, TrackedComparison},
     experiment,
     fit::{
-        Candidate, Channel, Contents, EffectReport, Explanation, Found, Known, MeasuredPoint, Measurements, Recording,
-        Selection, Table, find,
+        Candidate, EffectReport, Explanation, Found, Known, MeasuredPoint, Measurements, Recording, Selection, find,
     },
     identification,
     linear::MeasuredLinear,
     rig::{BuiltIn, Simulated, Stoppable},
+    scene::Scene as Checked,
 };
 
 use crate::{
-    number::Real,
+    files::{ContentsTuple, contents_of},
+    number::{Metre, Real},
     saved,
     scene::{Scene, invalid, json},
-    wait::wait,
+    wait::wait_apart,
 };
 
 /// Why an experiment ended without a result.
@@ -42,17 +43,22 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 /// Runs an experiment on the scene's rig, and returns its result as JSON; its failure is a `RuntimeError`.
 fn experiment<T: serde::Serialize>(
     py: Python<'_>,
-    scene: &vines_testbench::scene::Scene,
-    work: impl FnOnce(&mut Stoppable) -> Result<T, Failure> + Send,
+    scene: &Checked,
+    work: impl FnOnce(&mut Stoppable, &Checked) -> Result<T, Failure> + Send + 'static,
 ) -> PyResult<String> {
     let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    let run = || -> Result<String, Failure> {
-        let rig = Simulated::of(scene)?;
-        let result = work(&mut Stoppable::around(rig, scene.sample_time(), &flag))?;
+    let (flag, scene) = (Arc::clone(&stop), scene.clone());
+    let run = move || -> Result<String, Failure> {
+        let rig = Simulated::of(&scene)?;
+        let result = work(&mut Stoppable::around(rig, scene.sample_time(), &flag), &scene)?;
         Ok(serde_json::to_string(&result)?)
     };
-    wait(py, &stop, |_| Ok(()), run)?.map_err(|error| PyRuntimeError::new_err(error.to_string()))
+    wait_apart(py, &stop, run)?.map_err(|error| PyRuntimeError::new_err(error.to_string()))
+}
+
+/// Calculates as [`wait_apart`] does, what only its searches end early.
+fn calculate<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
+    wait_apart(py, &Arc::default(), work)
 }
 
 #[pyfunction]
@@ -63,7 +69,7 @@ pub fn identify(py: Python<'_>, scene: &Scene, decay: bool) -> PyResult<String> 
         plan.decay = 0;
     }
     let mut controller = BuiltIn::new(&plan.lock).map_err(invalid)?;
-    experiment(py, scene, |rig| {
+    experiment(py, scene, move |rig, scene| {
         let record = experiment::run(rig, &mut controller, &plan, |_, _, _| {})?;
         let found = identification::identify(&record, &plan)?;
         Ok(Comparison::of(&found, scene))
@@ -75,7 +81,7 @@ pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
     let scene = &scene.scene;
     let plan = scene.plan();
     let mut controller = BuiltIn::new(&plan.tracking).map_err(invalid)?;
-    experiment(py, scene, |rig| {
+    experiment(py, scene, move |rig, scene| {
         let tracked = track(rig, &mut controller, &plan, |_, _| {})?;
         Ok(TrackedComparison::of(&tracked, scene))
     })
@@ -102,14 +108,18 @@ pub fn fit(
         .iter()
         .map(|one| serde_json::from_str::<MeasuredLinear>(one).map_err(invalid));
     let points = points.into_iter().map(point).collect();
-    let measured = Measurements {
-        points: vines_testbench::survey::without_other_modes(&scene.scene, points),
+    let mut measured = Measurements {
+        points,
         recordings: recordings.into_iter().map(recording_of).collect::<PyResult<_>>()?,
         known: known.collect::<PyResult<_>>()?,
         linear: linear.collect::<PyResult<_>>()?,
     };
-    let scene = &scene.scene;
-    let found = py.detach(|| find(&measured, scene, |_| {})).map_err(invalid)?;
+    let (checked, scene) = (scene.scene.clone(), &scene.scene);
+    let found = calculate(py, move || {
+        measured.points = vines_testbench::survey::without_other_modes(&checked, measured.points);
+        find(&measured, &checked, |_| {})
+    })?;
+    let found = found.map_err(invalid)?;
     let numbers = |point: MeasuredPoint| {
         let MeasuredPoint { response, omega, drive } = point;
         let omega = omega.scaled(1.0 / std::f64::consts::TAU);
@@ -156,8 +166,6 @@ pub fn fit(
     }))
 }
 
-/// A channel: name, unit, samples, and start and step (s) of a clock of its own.
-type ChannelTuple = (String, String, Vec<f64>, Option<[f64; 2]>);
 /// A recording: origin, names of the channels, start and step (s), what both measure, response, base, and notes.
 type RecordingTuple = (
     String,
@@ -169,31 +177,20 @@ type RecordingTuple = (
     Vec<String>,
 );
 
-/// The recording of two channels of a file: a table as text if `channels` is absent. `options`: response, drive and time.
+/// The recording of two channels of a file. `options`: response, drive and time.
 #[pyfunction]
-#[pyo3(signature = (path, channels, options, rate, late))]
 pub fn recording(
     py: Python<'_>,
     path: &str,
-    channels: Option<Vec<ChannelTuple>>,
+    contents: ContentsTuple<'_>,
     options: [Option<String>; 3],
     rate: Option<f64>,
     late: Option<f64>,
 ) -> PyResult<RecordingTuple> {
     let [response, drive, time] = options;
     let selection = Selection { response, drive, time, rate, late };
-    let channel = |(name, unit, values, clock)| Channel { name, unit, values, clock };
-    let read = || {
-        let contents = match channels {
-            None => Table::read(path.as_ref())?.contents(),
-            Some(channels) => Contents {
-                origin: path.into(),
-                channels: channels.into_iter().map(channel).collect(),
-                ..Contents::default()
-            },
-        };
-        contents.recording(&selection)
-    };
+    let contents = contents_of(path, contents);
+    let read = move || contents.recording(&selection);
     let Recording {
         origin,
         channels,
@@ -203,7 +200,7 @@ pub fn recording(
         response,
         drive,
         notes,
-    } = py.detach(read).map_err(invalid)?;
+    } = calculate(py, read)?.map_err(invalid)?;
     Ok((
         origin,
         channels,
@@ -243,9 +240,8 @@ fn recording_of(
 #[pyfunction]
 pub fn linear_decay(py: Python<'_>, scene: &Scene, recording: RecordingTuple) -> PyResult<Option<([f64; 4], String)>> {
     let recording = recording_of(recording)?;
-    let decay = py
-        .detach(|| recording.linear_decay(&scene.scene.knowledge()))
-        .map_err(invalid)?;
+    let knowledge = scene.scene.knowledge();
+    let decay = calculate(py, move || recording.linear_decay(&knowledge))?.map_err(invalid)?;
     Ok(decay.map(|decay| {
         let MeasuredLinear { f0, u_f0, zeta, u_zeta, .. } = decay.into();
         ([f0, u_f0, zeta, u_zeta], decay.to_string())
@@ -260,10 +256,11 @@ pub fn orbits(py: Python<'_>, scene: &Scene, sigma: Option<Real>) -> PyResult<St
     if sigma.is_some() {
         scene.one_oscillator("orbits at a detuning are of")?;
     }
-    json(&py.detach(|| match sigma {
+    let scene = scene.scene.clone();
+    json(&calculate(py, move || match sigma {
         Some(sigma) => orbit::symmetric_orbits(&numbers, sigma),
-        None => vines_testbench::survey::phase_resonant(&scene.scene, &numbers),
-    }))
+        None => vines_testbench::survey::phase_resonant(&scene, &numbers),
+    })?)
 }
 
 #[pyfunction]
@@ -277,14 +274,14 @@ pub fn theory(py: Python<'_>, scene: &Scene, points: i64) -> PyResult<String> {
     let flow = SlowFlow::new(numbers.lambda, numbers.r);
     let manifold = vines_model::theory::Manifold::new(numbers.r);
     let to = vines_model::theory::B_SYMMETRY_BREAKING;
-    json(&py.detach(|| {
+    json(&calculate(py, move || {
         json!({
             "solutions": resonant(&numbers),
             "backbone": flow.backbone(manifold.b_min(), to, points as usize),
             "B_min": manifold.b_min(),
             "C_min": manifold.c_min(),
         })
-    }))
+    })?)
 }
 
 #[pyfunction]
@@ -306,22 +303,17 @@ pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<Real>, periods: i64) 
     }
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
-    let point = wait(
-        py,
-        &stop,
-        |_| Ok(()),
-        || {
-            let sigma = sigma.unwrap_or_else(|| {
-                let orbits = orbit::phase_resonant(&numbers);
-                orbits
-                    .iter()
-                    .find(|orbit| orbit.stable)
-                    .map_or(0.0, |orbit| orbit.sigma)
-            });
-            let mut run = CellRun::new(&numbers, sigma, start)?.stopped_by(flag);
-            run.decided(0, periods as usize).map(|point| (sigma, point))
-        },
-    )?;
+    let point = wait_apart(py, &stop, move || {
+        let sigma = sigma.unwrap_or_else(|| {
+            let orbits = orbit::phase_resonant(&numbers);
+            orbits
+                .iter()
+                .find(|orbit| orbit.stable)
+                .map_or(0.0, |orbit| orbit.sigma)
+        });
+        let mut run = CellRun::new(&numbers, sigma, start)?.stopped_by(flag);
+        run.decided(0, periods as usize).map(|point| (sigma, point))
+    })?;
     let (sigma, point) = point.map_err(|error: lovines::InvalidValue| invalid(error))?;
     json(&json!({ "sigma": sigma, "point": point }))
 }
@@ -375,8 +367,8 @@ impl PhaseLock {
     #[allow(clippy::type_complexity)]
     fn sample(
         &mut self,
-        response: Real,
-        reference: Option<Real>,
+        response: Real<Metre>,
+        reference: Option<Real<Metre>>,
         active: bool,
     ) -> (f64, f64, f64, Option<f64>, f64, f64, bool, bool, u8, u8) {
         let (response, reference) = (response.0, reference.map(|one| one.0));

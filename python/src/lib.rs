@@ -1,6 +1,7 @@
 //! The compiled part of the Python package: thin functions; `vines/*.py` has the interface with its documentation.
 
 mod experiments;
+mod files;
 mod number;
 mod plants;
 mod saved;
@@ -26,6 +27,11 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(experiments::fit, module)?,
         wrap_pyfunction!(experiments::linear_decay, module)?,
         wrap_pyfunction!(experiments::recording, module)?,
+        wrap_pyfunction!(files::command_line, module)?,
+        wrap_pyfunction!(files::is_unit, module)?,
+        wrap_pyfunction!(files::si, module)?,
+        wrap_pyfunction!(files::table, module)?,
+        wrap_pyfunction!(files::utf8, module)?,
         wrap_pyfunction!(experiments::orbits, module)?,
         wrap_pyfunction!(experiments::theory, module)?,
         wrap_pyfunction!(experiments::regime, module)?,

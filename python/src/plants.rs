@@ -19,7 +19,7 @@ use pyo3::{
 use rayon::prelude::*;
 
 use crate::{
-    number::Real,
+    number::{Metre, RadPerSecond, Real, Second},
     saved,
     scene::invalid,
     wait::{own_threads, wait},
@@ -212,9 +212,9 @@ impl Plant {
     fn _advance<'py>(
         &mut self,
         py: Python<'py>,
-        duration: Real,
-        amplitude: Real,
-        omega: Real,
+        duration: Real<Second>,
+        amplitude: Real<Metre>,
+        omega: Real<RadPerSecond>,
     ) -> PyResult<Option<EventArrays<'py>>> {
         let motion = (Drive::harmonic(amplitude.0, omega.0), duration.0);
         let found = self.run(py, motion, move |plant, stop| {
@@ -229,10 +229,10 @@ impl Plant {
     fn _trajectory<'py>(
         &mut self,
         py: Python<'py>,
-        duration: Real,
+        duration: Real<Second>,
         steps: usize,
-        amplitude: Real,
-        omega: Real,
+        amplitude: Real<Metre>,
+        omega: Real<RadPerSecond>,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, EventArrays<'py>)> {
         let drive = Drive::harmonic(amplitude.0, omega.0);
         let step = duration.0 / steps as f64;

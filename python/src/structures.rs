@@ -1,6 +1,9 @@
 //! A structure with its particle and its shaker.
 
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering::Relaxed},
+};
 
 use lovines::Drive;
 use numpy::{IntoPyArray, PyArray2, ndarray::Array2};
@@ -14,9 +17,9 @@ use vines_testbench::{
 };
 
 use crate::{
-    number::Real,
+    number::{RadPerSecond, Real, Second},
     scene::{Scene, invalid},
-    wait::wait,
+    wait::wait_apart,
 };
 
 /// The plant, and what is measured on it.
@@ -28,6 +31,8 @@ pub struct StructurePlant {
     check_interval: f64,
 }
 
+/// Oscillations of the fastest mode or the drive (radians) that take about a millisecond.
+const SHORT: f64 = 1e3;
 /// Columns before those of the channels: time, drive, q2, impacts.
 const COLUMNS: usize = 4;
 
@@ -76,46 +81,46 @@ impl StructurePlant {
     fn _trajectory<'py>(
         &mut self,
         py: Python<'py>,
-        duration: Real,
+        duration: Real<Second>,
         steps: usize,
-        drive: (Real, Real, Real),
+        drive: (Real, Real, Real<RadPerSecond>),
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (held, amplitude, omega) = drive;
         let drive = Drive {
             signal: [held.0, 0.0, 0.0, 0.0],
             ..Drive::harmonic(amplitude.0, omega.0)
         };
-        let (stop, before) = (AtomicBool::new(false), self.plant.clone());
         let (step, interval) = (duration.0 / steps as f64, self.check_interval);
         let channels = self.structure.channels().len();
-        let plant = &mut self.plant;
-        let mut run = || -> Result<Vec<f64>, Option<RigError>> {
-            let mut rows = row(plant);
+        let stop = Arc::new(AtomicBool::new(false));
+        let (mut plant, flag) = (self.plant.clone(), Arc::clone(&stop));
+        let run = move || -> Result<_, Option<RigError>> {
+            let mut rows = row(&plant);
             for _ in 0..steps {
                 for (drive, part) in drive.parts(step, interval) {
                     plant.step(drive, part).map_err(Some)?;
-                    if stop.load(Relaxed) {
+                    if flag.load(Relaxed) {
                         return Err(None);
                     }
                 }
-                rows.extend(row(plant));
+                rows.extend(row(&plant));
             }
-            Ok(rows)
+            Ok((plant, rows))
         };
-        // A thread costs more than a step.
-        let result = if steps == 1 && drive.parts(step, interval).nth(1).is_none() {
+        let omegas = self.structure.modes.iter().map(|mode| mode.omega);
+        let fastest = omegas.fold(omega.0.abs(), f64::max);
+        // A thread costs more than a short motion.
+        let result = if duration.0 * fastest < SHORT {
             run()
         } else {
-            wait(py, &stop, |_| Ok(()), run)?
+            wait_apart(py, &stop, run)?
         };
-        let rows = result.map_err(|failure| {
-            self.plant = before;
-            match failure {
-                None => PyKeyboardInterrupt::new_err(()),
-                Some(error @ RigError::ShakerLimit { .. }) => PyRuntimeError::new_err(error.to_string()),
-                Some(error) => invalid(error),
-            }
+        let (plant, rows) = result.map_err(|failure| match failure {
+            None => PyKeyboardInterrupt::new_err(()),
+            Some(error @ RigError::ShakerLimit { .. }) => PyRuntimeError::new_err(error.to_string()),
+            Some(error) => invalid(error),
         })?;
+        self.plant = plant;
         let shape = (steps + 1, COLUMNS + channels);
         Ok(Array2::from_shape_vec(shape, rows).map_err(invalid)?.into_pyarray(py))
     }

@@ -64,7 +64,7 @@ type Variable = (
 
 /// All results of a cell; what does not exist is NaN.
 #[rustfmt::skip]
-const VARIABLES: [Variable; 23] = [
+const VARIABLES: [Variable; 24] = [
     ("regime", "regime", "1", "regime of the response", |c| Some(c.result.map_or(FAILED, |result| result.regime as u8).into())),
     ("regime", "followed", "1", "periods of the base that were simulated", |c| Some(c.result?.followed as f64)),
     ("regime", "settling", "1", "periods of the base before the regime began", |c| Some(c.result?.transient)),
@@ -81,6 +81,7 @@ const VARIABLES: [Variable; 23] = [
     ("response", "damper_power", "W", "mean power that the damper dissipates", |c| Some(c.power * c.response?.damper_power)),
     ("orbits", "orbits", "1", "number of exact symmetric 1:1 orbits at this drive", |c| Some(c.orbits.as_ref()?.len() as f64)),
     ("orbits", "stable_orbits", "1", "number of those that are stable", |c| Some(c.orbits.as_ref()?.iter().filter(|orbit| orbit.stable).count() as f64)),
+    ("orbits", "neutral_orbits", "1", "number of those that are neutral: their largest multiplier is 1 within 1e-7", |c| Some(c.orbits.as_ref()?.iter().filter(|orbit| orbit.neutral).count() as f64)),
     ("orbits", "orbit_C", "1", "amplitude of the first harmonic of v over b, on the orbit with the larger B", |c| Some(c.orbit()?.c)),
     ("orbits", "orbit_B", "1", "speed of the particle over b omega0, on the orbit with the larger B", |c| Some(c.orbit()?.b)),
     ("orbits", "orbit_multiplier", "1", "largest modulus of the multipliers of that orbit over half a period", |c| Some(c.orbit()?.multipliers[3])),

@@ -2,6 +2,7 @@
 
 use std::{
     sync::{
+        Arc,
         atomic::{AtomicBool, AtomicU32, Ordering::Relaxed},
         mpsc::{RecvTimeoutError, channel},
     },
@@ -10,9 +11,43 @@ use std::{
 };
 
 use pyo3::{exceptions::PyRuntimeError, prelude::*};
+use vines_model::numerics::stop_thread_with;
 
 /// Time between two looks at the signals.
 const LOOK: Duration = Duration::from_millis(25);
+
+/// Stack of the thread of [`wait_apart`], bytes: that of a main thread.
+const STACK: usize = 8 << 20;
+
+/// Runs `work` without the interpreter lock, in a thread of its own. A signal ends this call at once, whatever `work` does; `stop` is then true, and
+/// the thread ends at its next iteration of a search, or where `work` looks at it.
+pub fn wait_apart<T: Send + 'static>(
+    py: Python<'_>,
+    stop: &Arc<AtomicBool>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    py.detach(|| {
+        let (done, is_done) = channel();
+        let of_thread = Arc::clone(stop);
+        let thread = thread::Builder::new().stack_size(STACK).spawn(move || {
+            stop_thread_with(&of_thread);
+            // Nobody listens after a signal.
+            let _ = done.send(work());
+        })?;
+        loop {
+            match is_done.recv_timeout(LOOK) {
+                Ok(result) => return Ok(result),
+                Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals()).inspect_err(|_| {
+                    stop.store(true, Relaxed);
+                })?,
+                Err(RecvTimeoutError::Disconnected) => match thread.join() {
+                    Err(panic) => std::panic::resume_unwind(panic),
+                    Ok(()) => return Err(PyRuntimeError::new_err("the calculation ended without a result")),
+                },
+            }
+        }
+    })
+}
 
 /// Runs `work` without the interpreter lock. `look` is called at intervals with it; its error, or that of a signal, sets `stop`, upon
 /// which `work` must end soon.

@@ -7,6 +7,7 @@ the samples for that time instead: every one must be read, or refused by a `Valu
 import csv
 import logging
 import random
+import re
 import sys
 import tempfile
 import time as clocks
@@ -55,6 +56,7 @@ class Sample:
     options: dict[str, Any] = field(default_factory=dict)
     refusal: str = ""
     note: str = ""
+    missing: int = 0
 
     def __post_init__(self) -> None:
         self.name, *channels = FORMATS[self.kind.replace(":", "").split()[0]]
@@ -79,6 +81,47 @@ def dated(file: Path) -> None:
     times = np.datetime64("2024-03-01T23:59:58") + (TIME * 1e6).astype("timedelta64[us]")
     rows = (f"{at},{y},{x}" for at, y, x in zip(times, RESPONSE, DRIVE, strict=True))
     file.write_text("Timestamp,y,x\n" + "\n".join(rows))
+
+
+def cells(header: str, row: Callable[[float, float, float], str], encoding: str = "utf-8"):
+    """Write a table whose rows are formatted by hand."""
+
+    def write(file: Path) -> None:
+        rows = (row(*one) for one in zip(TIME, RESPONSE, DRIVE, strict=True))
+        file.write_text(header + "\n" + "\n".join(rows) + "\n", encoding=encoding)
+
+    return write
+
+
+def quoted(time: float, y: float, x: float) -> str:
+    return ",".join(f'"{value:.9f}"'.replace(".", ",") for value in (time, y, x))
+
+
+def fortran(time: float, y: float, x: float) -> str:
+    return ",".join(f"{value:.9E}".replace("E", "D") for value in (time, y, x))
+
+
+def without_letter(time: float, y: float, x: float) -> str:
+    # The third digit of an exponent takes the place of its letter.
+    return re.sub(r"E-(\d{3})", r"-\1", f"{time:.9E},{y:.9E},{1e-120 * x:.9E}")
+
+
+def grouped(mark: str, decimal: str = ".", delimiter: str = ","):
+    """Write micrometres and picometres with marks between thousands."""
+
+    def number(value: float) -> str:
+        text = f"{value:,.6f}".replace(",", "T").replace(".", decimal).replace("T", mark)
+        return f'"{text}"' if delimiter in text else text
+
+    return lambda time, y, x: delimiter.join(number(value) for value in (time, 1e3 * y, 1e6 * x))
+
+
+def ambiguous(time: float, _y: float, _x: float) -> str:
+    return f"{round(1e3 * time)};{1 + round(1e3 * time) % 9},125;2,250"
+
+
+def stamped(time: float, y: float, x: float) -> str:
+    return f"10:00:{int(time):02};{y:.9f};{x:.9f}".replace(".", ",")
 
 
 def mat(**variables: Any):
@@ -136,6 +179,29 @@ def angle(content: Any) -> None:
     content["y"].attrs["units"] = "deg"
 
 
+def filled(content: Any) -> None:
+    """Counts with missing values and a scale, and times as netCDF has them."""
+    content["time"] = (TIME * 1e6).round().astype(np.int64) + 5
+    content["time"].attrs["units"] = "microseconds since 2024-03-01"
+    for name, values, unit in (("y", RESPONSE, "mm"), ("x", DRIVE, "um")):
+        packed = np.round((values - 1.0) * 1e6).astype(np.int32)
+        packed[4000:4010] = -9999 if name == "y" else packed[4000:4010]
+        content[name] = packed
+        attributes = {
+            "_FillValue": np.array([-9999], np.int32),
+            "scale_factor": 1e-6,
+            "add_offset": [1.0],
+            "units": unit,
+        }
+        content[name].attrs.update(attributes)
+
+
+def out_of_range(content: Any) -> None:
+    plain(content)
+    content["y"][100] = 1e20
+    content["y"].attrs["valid_max"] = 10.0
+
+
 def compound(content: Any) -> None:
     content["log"] = np.array(
         list(zip(TIME, RESPONSE, DRIVE, strict=True)), dtype=[("t", "f8"), ("y", "f8"), ("x", "f8")]
@@ -190,8 +256,11 @@ def uff(
     uneven: bool = False,
     units: tuple[str, str] = ("mm", "um"),
     ordinate: int = 8,
+    per_metre: float = 0.0,
+    time: str = "s",
+    end: str = "",
 ):
-    """Write UFF58; `ordinate` 8: displacement, 12: acceleration, 13: excitation force."""
+    """Write UFF58; `ordinate` 8: displacement, 12: acceleration, 13: excitation force. `per_metre`: of data set 164."""
 
     def write(file: Path) -> None:
         times = TIME + (2e-4 * np.sin(7.0 * TIME) if uneven else 0.0)
@@ -201,12 +270,27 @@ def uff(
             "abscissa_spec_data_type": 17,
             "ordinate_spec_data_type": ordinate,
         }
-        both |= {"orddenom_spec_data_type": 0, "ref_ent_name": "NONE", "x": times, "rsp_ent_name": "NONE"}
-        both |= {"abscissa_inc": STEP, "abscissa_min": 0.0}
+        abscissa = 1e3 * times if time == "ms" else times
+        both |= {"orddenom_spec_data_type": 0, "ref_ent_name": "NONE", "x": abscissa, "rsp_ent_name": "NONE"}
+        both |= {"abscissa_inc": STEP * (1e3 if time == "ms" else 1.0), "abscissa_min": 0.0}
+        both |= {"abscissa_axis_units_lab": time}
+        if per_metre:
+            about = {
+                "units_code": 5,
+                "units_description": "mm",
+                "temp_mode": 1,
+                "length": per_metre,
+                "force": per_metre,
+            }
+            pyuff.UFF(str(file)).write_sets(about | {"type": 164, "temp": 1.0, "temp_offset": 273.15}, "add")
         data = (3.0 * np.sin(55.0 * times - np.pi / 2), 20.0 * np.sin(55.0 * times))
         for node, (name, values, unit) in enumerate(zip(names, data, units, strict=True), 1):
             more = {"data": values, "id1": name, "rsp_node": node, "ordinate_axis_units_lab": unit}
             pyuff.UFF(str(file)).write_sets(both | more, "add")
+        if end:
+            blocks = file.read_text().split("    -1\n")
+            damaged = blocks[1].rstrip("\n") + end if end != "cut" else "".join(blocks[1].splitlines(True)[:-9])
+            file.write_text("    -1\n".join([blocks[0], damaged.rstrip("\n") + "\n", *blocks[2:]]))
 
     return write
 
@@ -297,7 +381,12 @@ SAMPLES = [
         text(PLAIN, columns=np.vstack([NUMBERED, NUMBERED])),
         refusal="interrupted there",
     ),
-    Sample("CSV: constant time", "a broken logger", text(PLAIN, columns=NUMBERED * [0, 1, 1]), refusal="must rise"),
+    Sample(
+        "CSV: constant time",
+        "a broken logger",
+        text(PLAIN, columns=NUMBERED * [0, 1, 1]),
+        refusal="give the samples a second",
+    ),
     Sample(
         "CSV: volts without a sensitivity",
         "data loggers",
@@ -306,6 +395,70 @@ SAMPLES = [
         refusal="the unit V is a voltage",
     ),
     Sample("CSV: volts with a sensitivity", "data loggers", text("time,y [V],x [um]\n"), ("y:1V/mm", "x")),
+    Sample("CSV: quoted decimal commas", "Excel, databases", cells('"t","y [mm]","x [um]"', quoted), ("y", "x")),
+    Sample("CSV: exponents with D", "Fortran", cells("t,y [mm],x [um]", fortran), ("y", "x")),
+    Sample("CSV: exponents without a letter", "Fortran", cells("t,y [mm],x", without_letter), ("y", "x:1e114")),
+    Sample("CSV: commas between thousands", "Excel", cells("t,y [um],x [nm]", grouped(",")), ("y", "x:0.001nm")),
+    Sample(
+        "CSV: points between thousands",
+        "Excel (German)",
+        cells("t;y [um];x [nm]", grouped(".", ",", ";")),
+        ("y", "x:0.001nm"),
+    ),
+    Sample(
+        "CSV: narrow spaces between thousands",
+        "Excel (French)",
+        cells("t;y [um];x [nm]", grouped("\u202f", ",", ";")),
+        ("y", "x:0.001nm"),
+    ),
+    Sample(
+        "CSV: thousands or decimals",
+        "Excel",
+        cells("t;y;x", ambiguous),
+        refusal="may be",
+    ),
+    Sample(
+        "CSV: durations",
+        "MATLAB (writetimetable)",
+        cells("Time,y [mm],x [um]", lambda time, y, x: f"{time:.6f} sec,{y:.9f},{x:.9f}"),
+        ("y", "x"),
+    ),
+    Sample(
+        "CSV: units in the cells that change",
+        "data loggers",
+        cells("Time,y,x", lambda t, y, x: (f"{1e3 * t:.3f} ms" if t < 1 else f"{t:.6f} s") + f",{y:.9f} mm,{x:.9f} um"),
+        ("y", "x"),
+    ),
+    Sample(
+        "CSV: hours, minutes and seconds with a comma",
+        "DIAdem",
+        cells("Time;y;x", lambda t, y, x: f"00:00:{t:09.6f};{y:.9f};{x:.9f}".replace(".", ",")),
+    ),
+    Sample(
+        "CSV: time stamps of one second", "loggers", cells("Time;y;x", stamped), refusal="give the samples a second"
+    ),
+    Sample(
+        "CSV: time stamps of one second, and a rate",
+        "loggers",
+        cells("Time;y;x", stamped),
+        options={"rate": 1000.0},
+        note="steps of 1.000000 s",
+    ),
+    Sample(
+        "CSV: names that are numbers above units in words",
+        "Keysight oscilloscopes",
+        text("x-axis,1,2\nsecond,Volt,Volt\n"),
+        ("1:1V/mm", "2:1V/um"),
+    ),
+    Sample(
+        "CSV: first row damaged",
+        "loggers",
+        text("t,y [mm],x [um]\n0.0,0.1,0.2,extra\n"),
+        ("y", "x"),
+        refusal="row 2: it has 4 values, 0.0, 0.1, 0.2, extra",
+    ),
+    Sample("CSV: first row with a word", "loggers", text("t,y,x\n0.0,??,0.2\n"), refusal="row 2: it has 3 values"),
+    Sample("CSV: time by its unit", "German programs", text("Zeit [s],y,x\n")),
     Sample("CSV: rate of 0", "", text(PLAIN), options={"rate": 0.0}, refusal="must be above 0"),
     Sample("CSV: empty file", "a full disk", lambda file: file.touch(), refusal="is empty"),
     Sample("MAT 5: vectors", "MATLAB, SciPy", mat(t=TIME, y=RESPONSE, x=DRIVE.reshape(-1, 1))),
@@ -331,6 +484,8 @@ SAMPLES = [
     Sample("HDF5: compound table", "PyTables, pandas", hdf5(compound)),
     Sample("HDF5: columns of a matrix", "h5py", hdf5(matrix), ("data/2:mm", "data/3:um"), {"time": "data/1"}),
     Sample("HDF5: complex data", "spectra", hdf5(spectra), ("frf", "x:um"), refusal="complex"),
+    Sample("HDF5: times since a date, missing values", "netCDF, xarray", hdf5(filled), ("y", "x"), missing=10),
+    Sample("HDF5: values out of their valid range", "netCDF", hdf5(out_of_range), missing=1),
     Sample("HDF5: an angle", "h5py", hdf5(angle), ("y", "x:um"), refusal="deg is one of angles"),
     Sample("TDMS: an angular velocity", "LabVIEW", tdms(unit="rad/s"), refusal="one of frequencies"),
     Sample("TDMS: waveforms", "LabVIEW", tdms()),
@@ -343,6 +498,18 @@ SAMPLES = [
         "UFF58: names with a colon", "LMS Test.Lab", uff(("1x : m/s²", "2x : m/s²")), ("1x : m/s²:mm", "2x : m/s²:um")
     ),
     Sample("UFF58: uneven abscissa", "pyuff, simulations", uff(uneven=True), note="interpolated"),
+    Sample(
+        "UFF58: unit by data set 164",
+        "sdtools, simulations",
+        uff(units=("NONE", "NONE"), per_metre=1e3),
+        ("1+X", "2+X:um"),
+    ),
+    Sample("UFF58: label against data set 164", "LMS Test.Lab", uff(per_metre=1.0), refusal="mm by its label"),
+    Sample("UFF58: label against data set 164, and a unit", "LMS Test.Lab", uff(per_metre=1.0), ("1+X:mm", "2+X:um")),
+    Sample("UFF58: abscissa in ms", "simulations", uff(time="ms")),
+    Sample("UFF58: abscissa in revolutions", "order analysis", uff(time="rev"), refusal="abscissa is in rev"),
+    Sample("UFF58: last line filled with zeros", "older programs", uff(end="\n" + "  0.000000000000E+00" * 4)),
+    Sample("UFF58: cut off", "a full disk", uff(end="cut"), refusal="the file is cut off"),
     Sample("UFF58: frequency response function", "LMS Test.Lab", uff(kind=4), refusal="frequency response function"),
     Sample("UFF58: power spectral density", "LMS Test.Lab", uff(kind=9), refusal="power spectral density"),
     Sample("UFF58: a force cell", "LMS Test.Lab", uff(units=("mm", "N")), refusal="N is a force"),

@@ -1,10 +1,14 @@
 """Recordings in files of other programs, and their fit."""
 
 import importlib.util
+import json
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import samples
@@ -33,7 +37,12 @@ def test_a_file_as_other_programs_write_it_is_read_or_refused_for_the_true_reaso
     times = samples.TIME[shift : shift + count] if "uneven" not in sample.kind else times
     # The uneven abscissa of UFF58 has six digits.
     share = 3e-3 if "uneven" in sample.kind else 1e-4
-    assert np.allclose(read.response, 3e-3 * np.sin(55.0 * times - np.pi / 2), atol=3e-3 * share)
+    missing = np.isnan(read.response)
+    assert missing.sum() == sample.missing
+    assert np.allclose(read.response[~missing], 3e-3 * np.sin(55.0 * times[~missing] - np.pi / 2), atol=3e-3 * share)
+    if sample.missing:
+        with pytest.raises(ValueError, match=r"sample \d+ .* is not a finite number"):
+            vines.fit_recordings(read)
     assert np.allclose(read.drive, 2e-5 * np.sin(55.0 * times), atol=2e-5 * share)
     if sample.note:
         assert any(sample.note in note for note in read.notes), read.notes
@@ -76,6 +85,116 @@ def test_two_formats_give_the_same_fit(channels, tmp_path):
     for name in ("value", "uncertainty"):
         assert np.array_equal(*(fit.parameters[name] for fit in fits))
     assert fits[0].channels["expected"].sum() == pytest.approx(fits[0].degrees)
+
+
+def call(*words, **environment):
+    """Run a command line: exit code, standard output, and standard error without lines of progress."""
+    known = os.environ | environment
+    done = subprocess.run([str(word) for word in words], capture_output=True, check=False, env=known)
+    out, err = (text.decode(errors="replace") for text in (done.stdout, done.stderr))
+    return done.returncode, out, re.sub(r".*: \d+ of \d+ .*\n", "", err)
+
+
+PYTHON = [sys.executable, "-m", "vines"]
+
+
+@pytest.fixture(scope="module")
+def tracked(tmp_path_factory):
+    """The lines of tracked.csv."""
+    folder = tmp_path_factory.mktemp("tracked")
+    code, _, err = call(os.environ["VINES"], "backbone", "--set", "backbone.points=8", "--out", folder)
+    assert code == 0, err
+    return (folder / "tracked.csv").read_text().splitlines()
+
+
+def test_the_command_line_is_that_of_the_program_for_every_option_and_format(tracked, tmp_path):
+    names = ("f_Hz", "A_m", "E_m", "u_f_Hz", "u_A_m", "u_E_m")
+    places = [tracked[0].split(",").index(name) for name in names]
+    table = np.array([[float(row.split(",")[place]) for place in places] for row in tracked[1:]])
+    table[:, 1] *= 1e3
+    head = ",".join(names).replace(",A_m", ",response")
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=head, comments="", fmt="%.17g")
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        for name, column in zip(head.split(","), table.T, strict=True):
+            file[name] = column
+    lines = [",".join(f'"{value:.17g}"'.replace(".", ",") for value in row) for row in table]
+    (tmp_path / "c.txt").write_text("\n".join([head, *lines]), encoding="utf-16")
+    options = ["--column", "A=response:mm", "--set", "plant.r=0.7", "--known", "m=0.032±0.0003"]
+    found = []
+    for program, name in (([os.environ["VINES"]], "a.csv"), (PYTHON, "b.h5"), (PYTHON, "c.txt")):
+        file = tmp_path / name
+        base = file.with_suffix("")
+        files = ["--out", f"{base}.toml", "--figure", f"{base}.svg"]
+        texts = [call(*program, "fit", file, *options, *more) for more in (files, ["--json"])]
+        texts += [call(*program, "fit", file, *wrong) for wrong in (["--set", "plant.r=7"], ["--rote", "1"], [])]
+        assert [code for code, *_ in texts] == [0, 0, 2, 2, 2]
+        assert "the model describes them" in texts[0][1]
+        assert json.loads(texts[1][1])["describes"]
+        written = [Path(f"{base}.{suffix}").read_text() for suffix in ("toml", "svg")]
+
+        def common(text, file=file, base=base):
+            layout = text.split("\nThe file as it was read")[0].replace("python -m vines", "vines")
+            return layout.replace(str(file), "FILE").replace(str(base), "BASE")
+
+        found.append([[common(str(part)) for part in text] for text in (*texts, written)])
+    assert found[1] == found[0]
+    assert found[2] == found[0]
+
+
+def test_results_are_not_lost_where_the_encoding_has_no_sign_for_them(tracked, tmp_path):
+    (tmp_path / "a.csv").write_text("\n".join(tracked))
+    words = [*PYTHON, "fit", tmp_path / "a.csv"]
+    code, out, err = call(*words, PYTHONIOENCODING="utf-8")
+    assert (code, err, "±" in out) == (0, "", True)
+    assert call(*words, PYTHONIOENCODING="ascii") == (0, out.replace("±", "?"), "")
+    code, out, err = call(*words, "--response", "ξ", PYTHONIOENCODING="ascii")
+    assert (code, out) == (2, "")
+    assert "has no channel `?`" in err
+    assert "Traceback" not in err
+
+
+def test_tables_of_points_of_other_programs_give_the_counts_of_the_program(tracked, tmp_path):
+    head, *rows = tracked
+    place = head.split(",").index("settled")
+
+    def row(number, words, delimiter):
+        cells = rows[number].split(",")
+        cells[place] = words[number >= 6]
+        return delimiter.join(cell.replace(".", ",") if delimiter == ";" else cell for cell in cells)
+
+    printed = set()
+    for words, delimiter in (("true false", ","), ("True False", ","), ("WAHR FALSCH", ";"), ("1 0", ";")):
+        lines = [head.replace(",", delimiter), *(row(number, words.split(), delimiter) for number in range(8))]
+        (tmp_path / "a.csv").write_text("\n".join(lines), encoding="utf-16" if delimiter == ";" else "utf-8")
+        code, out, err = call(*PYTHON, "fit", tmp_path / "a.csv")
+        assert code == 0, err
+        assert "6 points; " in out
+        assert "2 points are not settled" in out
+        printed.add(out)
+    assert len(printed) == 1
+
+
+def test_an_option_of_another_command_is_refused(tmp_path):
+    for option in ("--json", "--figure=a.svg", "--rate=3"):
+        code, out, err = call(*PYTHON, "structure", tmp_path / "a.uff", "--cavity", "1Z", option)
+        assert (code, out) == (2, "")
+        assert f"unrecognized arguments: {option}" in err
+    assert call(*PYTHON, "fit", "--help")[1].startswith("Fit the parameters of a rig")
+    assert "structure" in call(*PYTHON, "--help")[1]
+
+
+def test_a_scene_of_another_encoding_is_refused_with_what_it_is(tmp_path):
+    file = tmp_path / "scene.toml"
+    for encoding, words in (("utf-16", "is UTF-16; save it as UTF-8"), ("latin-1", "is not UTF-8 in line 2")):
+        file.write_text("[plant]\nr = 0.7 # µ\n", encoding=encoding)
+        with pytest.raises(ValueError, match=words):
+            vines.Scene(file)
+        code, out, err = call(os.environ["VINES"], "theory", "--scene", file)
+        assert (code, out) == (2, "")
+        assert words in err
+    plant = "[plant]\nepsilon = 0.0084\nlambda = 1.4\nr = 0.7 # µ\n[excitation]\nG = 1.1\n"
+    file.write_text(plant, encoding="utf-8-sig")
+    assert vines.Scene(file).dimensionless["r"] == 0.7
 
 
 def test_a_ring_down_without_a_base_is_a_linear_decay_in_the_package_and_on_the_command_line(tmp_path):

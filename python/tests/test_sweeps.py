@@ -220,6 +220,47 @@ def test_damaged_chunks_are_named_and_only_they_and_missing_ones_are_computed(wh
     assert files(out) == whole
 
 
+def test_metadata_of_arrays_that_are_cut_or_missing_are_written_again_and_no_chunk_is_computed(whole, tmp_path):
+    out = tmp_path / "store"
+    vines.sweep(None, AXES, store=out, **SETTINGS)
+    before = written(out)
+    damaged = [out / name / "zarr.json" for name in ("regime", "exponent", "failure", "sigma")]
+    for file, length in zip(damaged, (100, 0, None, 300), strict=True):
+        if length is None:
+            file.unlink()
+        else:
+            file.write_bytes(file.read_bytes()[:length])
+    with pytest.warns(RuntimeWarning) as warned:
+        vines.sweep(None, AXES, store=out, **SETTINGS)
+    message = str(warned[0].message)
+    assert len(warned) == 1
+    assert all(str(file) in message for file in damaged), message
+    after = written(out)
+    assert not chunks(name for name in after if after[name] != before.get(name))
+    assert files(out) == whole
+
+
+def test_without_the_metadata_of_the_store_the_refusal_says_how_its_chunks_are_kept(whole, tmp_path):
+    out, other = tmp_path / "store", tmp_path / "other"
+    for damage in (b"", None):
+        vines.sweep(None, AXES, store=out, **SETTINGS)
+        before = written(out)
+        file = out / "zarr.json"
+        if damage is None:
+            file.unlink()
+        else:
+            file.write_bytes(damage)
+        with pytest.raises(ValueError, match=r"copy zarr\.json from there: all chunks are kept") as refused:
+            vines.sweep(None, AXES, store=out, **SETTINGS)
+        assert str(file) in str(refused.value)
+        vines.sweep(None, AXES, store=other, **SETTINGS)
+        file.write_bytes((other / "zarr.json").read_bytes())
+        vines.sweep(None, AXES, store=out, **SETTINGS)
+        after = written(out)
+        assert not chunks(name for name in after if after[name] != before.get(name))
+        assert files(out) == whole
+
+
 WRITER = f"""
 import numpy, vines
 axes = {{"sigma": numpy.linspace(-3.0, 3.0, 31), "start.dq2": numpy.linspace(-0.6, 0.7, 40)}}

@@ -3,7 +3,8 @@
 Quantities have the units and names of the scenes: SI units for the plant, and dimensionless numbers for theory, orbits
 and regimes (C over b, B over b omega0, sigma = (omega/omega0 - 1)/epsilon, G = E/(b epsilon)). A value that is not
 allowed is a `ValueError` with the value, its unit and what is allowed; an experiment that fails, such as one without a
-lock, is a `RuntimeError`. Long calculations release the interpreter lock and end soon after Ctrl-C. Nothing is printed.
+lock, is a `RuntimeError`. Long calculations release the interpreter lock; after Ctrl-C,
+`KeyboardInterrupt` follows within a second. Nothing is printed.
 """
 
 from importlib.resources import files as _files

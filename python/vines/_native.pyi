@@ -13,16 +13,21 @@ __all__ = [
     "Scene",
     "StructurePlant",
     "backbone",
+    "command_line",
     "fit",
     "identify",
+    "is_unit",
     "linear_decay",
     "orbits",
     "plant_table",
     "recording",
     "regime",
     "regimes",
+    "si",
+    "table",
     "theory",
     "unit",
+    "utf8",
     "version",
 ]
 
@@ -151,11 +156,18 @@ def fit(
 def linear_decay(scene: Scene, recording: tuple[Any, ...]) -> tuple[list[float], str] | None: ...
 def recording(
     path: str,
-    channels: list[tuple[Any, ...]] | None,
+    contents: tuple[Any, ...],
     options: list[str | None],
     rate: float | None,
     late: float | None,
 ) -> tuple[str, list[str], list[float], list[str], list[float], list[float], list[str]]: ...
+def table(
+    path: str, content: bytes
+) -> tuple[str, int, list[tuple[str, str, tuple[NDArray[np.float64], list[str]]]]]: ...
+def utf8(path: str, content: bytes) -> str: ...
+def si(unit: str) -> tuple[float, str] | None: ...
+def is_unit(text: str) -> bool: ...
+def command_line(words: list[str], read: Callable[[str], bytes | tuple[Any, ...]]) -> tuple[int, str, str]: ...
 def orbits(scene: Scene, sigma: float | None) -> str: ...
 def theory(scene: Scene, points: int) -> str: ...
 def plant_table() -> tuple[list[tuple[str, str]], list[tuple[str, str]], list[str]]: ...

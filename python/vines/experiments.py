@@ -33,6 +33,7 @@ def _column(values: list[Any]) -> NDArray[Any]:
 
 
 SI = {"t_s": "s", "f_Hz": "Hz", "u_f_Hz": "Hz", "A_m": "m", "u_A_m": "m", "E_m": "m", "u_E_m": "m"}
+SI |= {"F_N": "N", "u_F_N": "N", "command_V": "V"}
 """Units of the columns that are not dimensionless."""
 
 
@@ -51,9 +52,9 @@ class Identification(Result):
     ----------
     lock : dict
         The locked point: f_Hz, A_m, E_m, G, sigma, C, B, phase_error_deg, their standard uncertainties u_*, regime
-        and others.
+        and others; of a force test also F_N and u_F_N, and behind a shaker its command, command_V.
     exact : Orbit or None
-        The exact phase-resonant orbit nearest to the lock.
+        The exact phase-resonant orbit with the measured C, if there is one.
     decay : dict of ndarray
         Points along the free decay: t_s, f_Hz, A_m, tau, C, B, sigma, standard uncertainties, and at the same C
         sigma_theory and sigma_exact of steady motions, and sigma_slow_flow and sigma_predicted of the decay that theory
@@ -105,6 +106,8 @@ def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "a
     Returns
     -------
     Identification
+        A warning says so if its lock is at another drive than the requested one, by more than 1 % and three standard
+        uncertainties.
 
     Raises
     ------
@@ -122,9 +125,14 @@ def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "a
     if results not in ("all", "lock"):
         raise ValueError(f"results = {results!r}: 'all' and 'lock' are allowed")
     found = json.loads(_native.identify(checked(scene)._native, results == "all"))
+    lock = found["lock"]
+    if not lock["at_requested_drive"]:
+        asked = lock["E_requested_m"]
+        message = f"the lock is at another drive: E = {lock['E_m']:.5e} m, and {asked:.5e} m was asked for"
+        warnings.warn(message, stacklevel=2)
     return Identification(
         theory=theory(scene),
-        lock=found["lock"],
+        lock=lock,
         exact=Orbit._of(found["exact"]) if found["exact"] else None,
         decay=_table(found["decay"]),
         **{key: found[key] for key in ("decay_end", "rms_sigma_error", "rms_sigma_exact", "rms_sigma_predicted")},
@@ -139,7 +147,7 @@ class Backbone(Result):
     ----------
     points : dict of ndarray
         f_Hz, A_m, E_m, C, sigma, G, their standard uncertainties u_*, level, periods, settled, reached, regime
-        and others.
+        and others; of a force test also F_N and u_F_N, and behind a shaker its command, command_V.
     periods : float
         All periods, from the start to the last point.
     theory : Theory
@@ -211,6 +219,8 @@ class Orbit(Result):
         Moduli of the multipliers over half a period, ascending.
     stable : bool
         All multipliers are inside the unit circle.
+    neutral : bool
+        The largest are on it within 1e-7: disturbances neither grow nor decay.
     """
 
     G: float
@@ -220,6 +230,7 @@ class Orbit(Result):
     gamma: float
     multipliers: tuple[float, float, float, float]
     stable: bool
+    neutral: bool
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return a dataset whose only dimension is `multiplier`, with units as attributes."""
@@ -229,7 +240,7 @@ class Orbit(Result):
 
     @classmethod
     def _of(cls, found: dict[str, Any]) -> "Orbit":
-        names = ("G", "sigma", "C", "B", "gamma", "stable")
+        names = ("G", "sigma", "C", "B", "gamma", "stable", "neutral")
         return cls(**{name: found[name] for name in names}, multipliers=tuple(found["multipliers"]))
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from . import _native
 from .experiments import Table, _table
+from .numbers import real, reals
 from .recordings import LinearDecay, Recording, linear_decay
 from .results import Result, axes
 from .scenes import Scene, checked
@@ -146,11 +147,12 @@ def fit(
         missing = [name for name in _COLUMNS if name not in table]
         if missing:
             raise ValueError(f"the points have no column {', '.join(missing)}; a fit needs {', '.join(_COLUMNS)}")
-        columns = [np.atleast_1d(np.asarray(table[name], dtype=float)) for name in _COLUMNS]
+        units = {name: "Hz" if name.endswith("_Hz") else "m" for name in _COLUMNS}
+        columns = [np.atleast_1d(reals(name, table[name], units[name], missing=True)) for name in _COLUMNS]
         kept = np.ones(columns[0].shape, dtype=bool)
         for name in ("settled", "reached"):
             if name in table:
-                kept &= np.atleast_1d(np.asarray(table[name], dtype=bool))
+                kept &= _truths(name, table[name])
         if "regime" in table:
             kept &= np.isin(np.atleast_1d(np.asarray(table["regime"])), _REGIMES)
         rows += np.column_stack(columns)[kept].tolist()
@@ -201,12 +203,40 @@ def fit_recordings(
     return _result(_native.fit(given._native, [], kept, _texts(known), _responses(linear)))
 
 
+#: What columns of truth values have, as `vines fit` reads them: of Python and NumPy, and of spreadsheets.
+_TRUTHS = {
+    "true": True,
+    "wahr": True,
+    "1": True,
+    "1.0": True,
+    "false": False,
+    "falsch": False,
+    "0": False,
+    "0.0": False,
+}
+
+
+def _truths(name: str, values: Any) -> NDArray[np.bool_]:
+    """Return a column of truth values; any other value is a `ValueError`."""
+    given = np.atleast_1d(np.asarray(values, dtype=object)).ravel()
+    found = [_TRUTHS.get(str(one).strip().lower()) for one in given]
+    if None in found:
+        row = found.index(None)
+        raise ValueError(f"{name} = {given[row]!r} in row {row + 1}: True or False is allowed")
+    return np.array(found, dtype=np.bool_)
+
+
+#: Units of values from elsewhere.
+_KNOWN_UNITS = {"f0": "Hz", "b": "m", "M": "kg", "m": "kg", "k": "N/m", "c": "N s/m"}
+
+
 def _responses(linear: Iterable[Mapping[str, Any] | LinearDecay]) -> list[str]:
     def mapping(one: Mapping[str, Any] | LinearDecay) -> dict[str, Any]:
         if isinstance(one, LinearDecay):
             # A decay does not tell the state of the particle.
             return dict(zip(_LINEAR, (*one.f0, *one.zeta, 0.0, "unknown"), strict=True))
-        return {name: one[name] for name in _LINEAR}
+        numbers = zip(_LINEAR[:5], ("Hz", "Hz", "1", "1", "1"), strict=True)
+        return {name: real(one[name], unit, name) for name, unit in numbers} | {"particle": one["particle"]}
 
     return list(dict.fromkeys(json.dumps(mapping(one)) for one in linear))
 
@@ -214,8 +244,9 @@ def _responses(linear: Iterable[Mapping[str, Any] | LinearDecay]) -> list[str]:
 def _texts(known: Mapping[str, float | tuple[float, float]] | Iterable[str] | None) -> list[str]:
     if not isinstance(known, Mapping):
         return list(known or [])
-    values = {name: value if isinstance(value, tuple) else (value, 0.0) for name, value in known.items()}
-    return [f"{name}={value}±{uncertainty}" for name, (value, uncertainty) in values.items()]
+    pairs = {name: value if isinstance(value, tuple) else (value, 0.0) for name, value in known.items()}
+    numbers = {name: [real(one, _KNOWN_UNITS.get(name, "1"), name) for one in pair] for name, pair in pairs.items()}
+    return [f"{name}={value}±{uncertainty}" for name, (value, uncertainty) in numbers.items()]
 
 
 def _result(text: str) -> Fit:

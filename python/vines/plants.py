@@ -13,7 +13,7 @@ from ._native import Plant as _Plant
 from ._native import Plants as _Plants
 from ._native import plant_table
 from .datasets import dataset
-from .numbers import reals
+from .numbers import real, reals
 from .results import Result, axes
 from .scenes import Scene
 
@@ -25,7 +25,7 @@ _PARAMETERS = tuple(name for name, _ in _NEEDED)
 #: Parameters of a real cavity; what is left out is ideal.
 _CAVITY = tuple(name for name, _ in _OF_CAVITY)
 _START = ("q1", "dq1", "q2", "dq2")
-_UNITS = {name: unit or "1" for name, unit in _NEEDED}
+_UNITS = {name: unit or "1" for name, unit in (*_NEEDED, *_OF_CAVITY)}
 _STATE_UNITS = {
     "q1": "m", "dq1": "m/s", "q2": "m", "dq2": "m/s", "time": "s", "impacts": "1", "dissipated": "J",
     "sticks": "1", "stuck_time": "s", "friction_loss": "J",
@@ -166,13 +166,13 @@ class Batch:
             A value that is not allowed. No plant is advanced then.
         """
 
-        def array(name: str, given: ArrayLike) -> NDArray[np.float64]:
-            values = reals(name, given)
+        def array(name: str, given: ArrayLike, unit: str) -> NDArray[np.float64]:
+            values = reals(name, given, unit)
             if values.shape not in ((), (1,), (len(self),)):
                 raise ValueError(f"{name} of shape {values.shape}: a number or {len(self)} numbers are allowed")
             return np.ascontiguousarray(np.broadcast_to(values, (len(self),)))
 
-        drive = array("duration", duration), array("amplitude", amplitude), array("omega", omega)
+        drive = array("duration", duration, "s"), array("amplitude", amplitude, "m"), array("omega", omega, "rad/s")
         found = self._native.advance(*drive, events)
         return None if found is None else Events(*found)
 
@@ -427,7 +427,7 @@ class Plant(_Plant):
     def state(self, values: Mapping[str, float]) -> None:
         merged = self.state | dict(values)
         _check("state", merged, _START)
-        self._set_state([merged[name] for name in _START])
+        self._set_state([real(merged[name], _STATE_UNITS[name], name) for name in _START])
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the present state as a dataset without dimensions, with units as attributes."""
@@ -467,11 +467,11 @@ def _values(
     _check("starts", given, _START)
     if values.get("r_law") in _LAWS[1:] and "r_plus" not in values:
         raise ValueError(f"parameters: r_law = {values['r_law']!r} without r_plus, which is its parameter k or v_y")
-    columns = [reals(name, values[name]) for name in _PARAMETERS]
+    columns = [reals(name, values[name], _UNITS[name]) for name in _PARAMETERS]
     # Most batches have an ideal cavity: without its columns they need less memory.
     if any(name in values for name in _CAVITY):
         columns += [_of_cavity(name, values[name]) if name in values else np.array(np.nan) for name in _CAVITY]
-    return columns + [reals(name, given[name]) for name in _START]
+    return columns + [reals(name, given[name], _STATE_UNITS[name]) for name in _START]
 
 
 def _of_cavity(name: str, given: Any) -> NDArray[np.float64]:
@@ -480,7 +480,7 @@ def _of_cavity(name: str, given: Any) -> NDArray[np.float64]:
         if given not in _LAWS:
             raise ValueError(f"r_law = {given!r}: {', '.join(_LAWS)} are allowed")
         given = _LAWS.index(given)
-    values = reals(name, given)
+    values = reals(name, given, _UNITS[name])
     if np.isnan(values).any():
         raise ValueError(f"{name} = nan: a number is allowed")
     return values

@@ -1,5 +1,6 @@
-"""Recordings of two channels over time: MAT, HDF5, TDMS, UFF58 and LVM are read here, CSV by the compiled part."""
+"""Recordings of two channels over time: tables as text, MAT, HDF5, TDMS, UFF58 and LVM."""
 
+import csv
 import itertools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -10,12 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _native
+from . import _native, texts
+from .numbers import factor, real, reals, symbol
+from .packages import package
 from .scenes import Scene, checked
 
-_NEEDED = {"pymatreader": "MAT", "h5py": "HDF5", "nptdms": "TDMS", "pyuff": "UFF", "lvm_read": "LVM"}
-# SI units of what an ordinate of UFF58 is, for files without labels.
-_UFF_UNITS = {8: "m", 9: "N", 11: "m/s", 12: "m/s²", 13: "N"}
+# SI units of what an ordinate of UFF58 is, and the factor of its data set 164, for files without labels.
+_UFF_UNITS = {8: ("m", "length"), 9: ("N", "force"), 11: ("m/s", "length"), 12: ("m/s²", "length"), 13: ("N", "force")}
 _UFF_TYPES = {
     2: "an auto spectrum",
     3: "a cross spectrum",
@@ -27,6 +29,9 @@ _UFF_TYPES = {
 @dataclass(frozen=True)
 class Recording:
     """Two channels of a measurement, sampled at equal distances.
+
+    Response and base that carry a unit are converted to SI units. Masked and absent samples are NaN, which a fit
+    refuses with the number of the sample.
 
     Attributes
     ----------
@@ -44,6 +49,11 @@ class Recording:
         What response and base are: "displacement", "velocity" or "acceleration".
     notes : tuple of str
         What is to be known of the way it was read: the clock, and what was cut or interpolated.
+
+    Raises
+    ------
+    ValueError
+        A unit of another quantity, or what is no number.
     """
 
     origin: str
@@ -55,9 +65,17 @@ class Recording:
     measured: tuple[str, str] = ("displacement", "displacement")
     notes: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        kinds = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s²"}
+        for name, kind in zip(("response", "drive"), self.measured, strict=True):
+            values = reals(name, getattr(self, name), kinds.get(kind, "1"), missing=True)
+            object.__setattr__(self, name, values.ravel())
+        for name in ("sample_time", "start"):
+            object.__setattr__(self, name, real(getattr(self, name), "s", name))
+
     def _tuple(self) -> tuple[Any, ...]:
         clock = [self.start, self.sample_time]
-        values = (np.asarray(one, dtype=np.float64).ravel() for one in (self.response, self.drive))
+        values = self.response, self.drive
         return self.origin, list(self.channels), clock, list(self.measured), *values, list(self.notes)
 
 
@@ -109,8 +127,8 @@ def read_recording(
     Parameters
     ----------
     path : path-like
-        A file .csv, .txt, .dat, .mat (5 and 7.3), .h5, .hdf5, .tdms, .uff, .unv or .lvm. All but tables as text need
-        `vines-testbench[io]`.
+        A file .mat (5 and 7.3), .h5, .hdf5, .nc, .tdms, .uff, .unv or .lvm; any other is a table as text, such as .csv.
+        All but tables of numbers as text need `vines-testbench[io]`.
     response, drive : str, optional
         Channels of the response and of the base, by default `response` and `reference`: a name or a number, and after a
         colon a unit if the file has none (m, mm, µm, mm/s, m/s², g) or a multiple of it ("-1g"), the sensitivity of the
@@ -120,7 +138,7 @@ def read_recording(
         Samples a second. Without it the file says it: a channel of the time, or the clock of a channel in TDMS,
         UFF58 or LVM.
     time : str, optional
-        Channel of the time, by default `time` or `t`.
+        Channel of the time, by default `time` or `t`, or the only one in a unit of time.
     late : float, optional
         Time by which the channel of the base is later than that of the response, s: channels that a logger samples in
         turn. Nothing in a recording shows it.
@@ -136,35 +154,72 @@ def read_recording(
     ImportError
         A package that is not installed.
     """
-    file = Path(path)
-    suffix = file.suffix.lower()
-    if suffix not in _READERS:
-        raise ValueError(f"{file}: the format {suffix or 'without extension'} is unknown; {', '.join(_READERS)} are")
-    read, channels = _READERS[suffix], None
-    if read is not None:
-        if not file.is_file():
-            raise ValueError(f"cannot read {file}: it is no file")
-        try:
-            every = list(read(file))
-        except ImportError:
-            raise
-        except Exception as error:
-            raise ValueError(f"{file} cannot be read as {suffix[1:].upper()}: {error}") from error
-        channels = [_tuple(*one) for one in every if not isinstance(one[1], str)]
-        refused = {name: reason for name, reason, *_ in every if isinstance(reason, str)}
-        for text in (response, drive, time):
-            name = (text or "").lstrip("/")
-            for asked in (name, name.rpartition(":")[0]):
-                if asked in refused:
-                    raise ValueError(f"{file}, channel {asked}: {refused[asked]}")
-        if not channels:
-            reasons = "; ".join(f"{name}: {reason}" for name, reason in refused.items())
-            raise ValueError(f"{file} has no channel of numbers{': ' if reasons else ''}{reasons}")
+    contents = contents_of(path)
+    if isinstance(contents, bytes):
+        raise ValueError(f"{path} is JSON: a recording has two channels over time")
+    numbers = (
+        None if one is None else real(one, unit, name)
+        for one, unit, name in ((rate, "Hz", "rate"), (late, "s", "late"))
+    )
     origin, names, (start, step), measured, y, x, notes = _native.recording(
-        str(file), channels, [response, drive, time], rate, late
+        str(path), contents, [response, drive, time], *numbers
     )
     pair = (measured[0], measured[1])
     return Recording(origin, (names[0], names[1]), step, np.array(y), np.array(x), start, pair, tuple(notes))
+
+
+def contents_of(path: str | PathLike[str]) -> bytes | tuple[Any, ...]:
+    """Return the channels of a file as the compiled part takes them; bytes of a file in JSON."""
+    file = Path(path)
+    suffix = file.suffix.lower()
+    if not file.is_file():
+        raise ValueError(f"cannot read {file}: it is no file")
+    if suffix not in _READERS:
+        return _text(file)
+    try:
+        every = list(_READERS[suffix](file))
+    except ImportError:
+        raise
+    except Exception as error:
+        raise ValueError(f"{file} cannot be read as {suffix[1:].upper()}: {error}") from error
+    channels = [_tuple(*one) for one in every if not isinstance(one[1], str)]
+    refused = [[name, reason] for name, reason, *_ in every if isinstance(reason, str)]
+    if not every:
+        raise ValueError(f"{file} has no channel of numbers")
+    return "", 0, channels, refused
+
+
+def _text(file: Path) -> bytes | tuple[Any, ...]:
+    """Return the columns of a table: a plain one as `vines` reads it, others by their dialect."""
+    content = file.read_bytes()
+    text = texts.decoded(content[:100_000]).lstrip()
+    if "\0" in text:
+        raise ValueError(
+            f"{file}: the format {file.suffix or 'without extension'} is unknown; text and {', '.join(_READERS)} are "
+            "known"
+        )
+    if text.startswith("{"):
+        return texts.decoded(content).lstrip("\ufeff").encode()
+    try:
+        layout, line, columns = _native.table(str(file), content)
+        if not _is_plain(columns):
+            raise ValueError
+        named = [(name, unit, values, cells) for name, unit, (values, cells) in columns]
+    except ValueError:
+        try:
+            layout, line, named = texts.table(str(file), content)
+        except csv.Error as error:
+            raise ValueError(f"{file} cannot be read as a table: {error}") from error
+    return layout, line, [(name, unit, values, cells, None) for name, unit, values, cells in named], []
+
+
+def _is_plain(columns: list[Any]) -> bool:
+    """Return whether no column has numbers among its texts, of this dialect or another."""
+    marks = [texts.Mark(mark) for mark in ".,"]
+    mixed = any(cells and np.isfinite(values).any() for _, _, (values, cells) in columns)
+    return not mixed and not any(
+        mark.reads(cell) for _, _, (_, cells) in columns for cell in cells if cell for mark in marks
+    )
 
 
 # A channel of a file: name, samples or the reason why it has none, unit, and start and step of its clock.
@@ -172,12 +227,15 @@ _Channel = tuple[Any, ...]
 
 
 def _tuple(name: str, values: Any, unit: str = "", clock: tuple[float, float] | None = None) -> _Channel:
-    return name, unit, np.ascontiguousarray(values, dtype=np.float64), None if clock is None else list(clock)
+    short = symbol(unit) if unit.strip() else ""
+    return name, short, np.ascontiguousarray(values, dtype=np.float64), [], None if clock is None else list(clock)
 
 
-def _columns(name: str, values: Any, unit: str = "", factor: float = 1.0, offset: float = 0.0) -> Iterator[_Channel]:
+def _columns(name: str, values: Any, unit: str = "") -> Iterator[_Channel]:
     """Channels of an array: itself, its fields, or its columns with numbers from 1; the longer side is the time."""
-    array = np.asarray(values)
+    # What is masked is missing.
+    masked = isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values)
+    array = np.asarray(np.ma.filled(values.astype(np.float64), np.nan) if masked else values)
     if array.dtype.names:
         for field in array.dtype.names:
             yield from _columns(f"{name}/{field}", array[field], unit)
@@ -188,22 +246,13 @@ def _columns(name: str, values: Any, unit: str = "", factor: float = 1.0, offset
     elif array.dtype.kind not in "fiu":
         yield name, f"its values are no numbers ({array.dtype})"
     elif array.size == max(array.shape, default=0):
-        yield name, array.ravel() * factor + offset, unit
+        yield name, array.ravel(), unit
     elif array.ndim == 2:
         table = array if array.shape[0] >= array.shape[1] else array.T
         for number, column in enumerate(table.T[:1000], 1):
-            yield f"{name}/{number}", column * factor + offset, unit
+            yield f"{name}/{number}", column, unit
     else:
         yield name, f"it has the shape {array.shape}; a channel is one row or column of numbers"
-
-
-def _package(name: str) -> Any:
-    import importlib
-
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise ImportError(f"{_NEEDED[name]} needs the package {name}: pip install './python[io]'") from error
 
 
 def _mat(file: Path) -> Iterator[_Channel]:
@@ -211,7 +260,7 @@ def _mat(file: Path) -> Iterator[_Channel]:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found = _package("pymatreader").read_mat(file)
+        found = package("pymatreader").read_mat(file)
     return _variables("", {name: value for name, value in found.items() if not name.startswith(("__", "#"))})
 
 
@@ -240,7 +289,7 @@ def _variables(name: str, value: Any) -> Iterator[_Channel]:
 
 
 def _hdf5(file: Path) -> Iterator[_Channel]:
-    h5py = _package("h5py")
+    h5py = package("h5py")
     with h5py.File(file) as content:
         yield from _group(h5py, content, "", frozenset())
 
@@ -257,16 +306,45 @@ def _group(h5py: Any, group: Any, path: str, above: frozenset[Any]) -> Iterator[
         if isinstance(one, h5py.Group) and one.id not in above:
             yield from _group(h5py, one, f"{full}/", above | {group.id})
         elif isinstance(one, h5py.Dataset):
-            unit = next((one.attrs[key] for key in ("units", "unit", "Units", "Unit") if key in one.attrs), "")
-            unit = unit.decode() if isinstance(unit, bytes) else str(unit)
-            factor, offset = (
-                float(np.ravel(one.attrs.get(key, d))[0]) for key, d in (("scale_factor", 1), ("add_offset", 0))
-            )
-            yield from _columns(full, one[()], unit, factor, offset)
+            yield from _columns(full, *_decoded(one))
+
+
+def _decoded(dataset: Any) -> tuple[Any, str]:
+    """Return values and unit of a dataset, with the attributes of netCDF that change the values (CF conventions)."""
+    attributes = {key: _attribute(dataset.attrs[key]) for key in _CF if key in dataset.attrs}
+    unit = next((str(attributes.pop(key)) for key in _UNITS if key in attributes), "")
+    values = dataset[()]
+    if not attributes and " since " not in unit:
+        return values, unit
+    limits = attributes.pop("valid_range", (attributes.pop("valid_min", None), attributes.pop("valid_max", None)))
+    if any(one is not None for one in limits):
+        low, high = (side if one is None else one for one, side in zip(limits, (-np.inf, np.inf), strict=True))
+        values = np.where((values >= low) & (values <= high), values, np.nan)
+        attributes |= {key: float(attributes[key]) for key in ("_FillValue", "missing_value") if key in attributes}
+    xarray = package("xarray")
+    dimensions = [f"d{n}" for n in range(np.ndim(values))]
+    given = xarray.Dataset({"v": (dimensions, values, attributes | ({"units": unit} if unit else {}))})
+    found = xarray.decode_cf(given, decode_timedelta=False)["v"]
+    return found.values, str(found.attrs.get("units", ""))
+
+
+#: Attributes with the unit of a dataset, and all that change its values.
+_UNITS = ("units", "unit", "Units", "Unit")
+_CF = (
+    *_UNITS, "calendar", "scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned",
+    "valid_min", "valid_max", "valid_range",
+)  # fmt: skip
+
+
+def _attribute(value: Any) -> Any:
+    """Return an attribute as a text, a number, or an array."""
+    array = np.ravel(value)
+    one = array[0] if array.size == 1 else value
+    return one.decode() if isinstance(one, bytes) else one
 
 
 def _tdms(file: Path) -> Iterator[_Channel]:
-    channels = [channel for group in _package("nptdms").TdmsFile.read(file).groups() for channel in group.channels()]
+    channels = [channel for group in package("nptdms").TdmsFile.read(file).groups() for channel in group.channels()]
     starts = [one.properties.get("wf_start_time") for one in channels]
     # A channel without a waveform begins with the others.
     first = min((np.datetime64(start) for start in starts if start is not None), default=None)
@@ -280,8 +358,10 @@ def _tdms(file: Path) -> Iterator[_Channel]:
 
 
 def _uff(file: Path) -> Iterator[_Channel]:
-    sets = _package("pyuff").UFF(str(file)).read_sets()
-    functions = [one for one in (sets if isinstance(sets, list) else [sets]) if one.get("type") == 58]
+    sets = package("pyuff").UFF(str(file)).read_sets()
+    sets = sets if isinstance(sets, list) else [sets]
+    functions = [one for one in sets if one.get("type") == 58]
+    stated = next((one for one in sets if one.get("type") == 164), {})
     directions = {n: f"{'+' if n > 0 else '-'}{'XYZ'[(abs(n) - 1) % 3]}" for n in range(-6, 7) if n}
 
     def texts(key: str) -> list[str]:
@@ -300,20 +380,48 @@ def _uff(file: Path) -> Iterator[_Channel]:
             what = _UFF_TYPES.get(kind, f"a function of type {kind}")
             yield name, f"it is {what} (func_type {kind}), not a time response (1)"
             continue
-        unit = str(one.get("ordinate_axis_units_lab") or "").strip()
-        if unit.upper() in ("", "NONE"):
-            unit = _UFF_UNITS.get(int(one.get("ordinate_spec_data_type") or 0), "")
-        clock = float(one.get("abscissa_min") or 0.0), float(one.get("abscissa_inc") or 0.0)
+        second = factor(_label(one, "abscissa") or "s", "s")
+        if second is None:
+            yield name, f"its abscissa is in {_label(one, 'abscissa')}, and a time needs s, ms, us or min"
+            continue
+        clock = second * float(one.get("abscissa_min") or 0.0), second * float(one.get("abscissa_inc") or 0.0)
+        # Zeros fill the last line of a block.
+        count = int(one.get("num_pts") or 0)
+        values = np.asarray(one["data"])
+        if values.size < count:
+            yield name, f"it has {values.size} samples, and its header says {count}: the file is cut off"
+            continue
+        values = values[: count or None]
         if not one.get("abscissa_spacing"):
-            uneven[np.asarray(one["x"]).tobytes()] = np.asarray(one["x"])
-        for column, values, *_ in _columns(name, one["data"]):
-            yield column, values, unit, clock if clock[1] > 0.0 else None
+            times = second * np.asarray(one["x"])[: count or None]
+            uneven[times.tobytes()] = times
+        for column, samples, *_ in _columns(name, values):
+            yield column, samples, _uff_unit(one, stated), clock if clock[1] > 0.0 else None
     for number, times in enumerate(uneven.values(), 1):
         yield "time" if len(uneven) == 1 else f"abscissa {number}", times, "s"
 
 
+def _label(function: Mapping[str, Any], axis: str) -> str:
+    """Return the label of the unit of an axis; empty without one."""
+    text = str(function.get(f"{axis}_axis_units_lab") or "").strip()
+    return "" if text.upper() == "NONE" else text
+
+
+def _uff_unit(function: Mapping[str, Any], stated: Mapping[str, Any]) -> str:
+    """Return the unit of a response: by its label, or by the kind of its ordinate and data set 164."""
+    label, kind = _label(function, "ordinate"), int(function.get("ordinate_spec_data_type") or 0)
+    unit, side = _UFF_UNITS.get(kind, ("", ""))
+    per_si = float(stated.get(side) or 0.0)
+    by_set = f"{1.0 / per_si:.12g}{unit}" if per_si > 0.0 and per_si != 1.0 else unit
+    if not label or not per_si:
+        return label or by_set
+    same = factor(label, by_set)
+    # What is no unit asks for one.
+    return label if same is None or abs(same - 1.0) < 1e-6 else f"{label} by its label, and {by_set} by data set 164"
+
+
 def _lvm(file: Path) -> Iterator[_Channel]:
-    found = _package("lvm_read").read(str(file), read_from_pickle=False, dump_file=False)
+    found = package("lvm_read").read(str(file), read_from_pickle=False, dump_file=False)
     blocks = [found[n] for n in range(found["Segments"])]
     same = [one for one in blocks if one["Channel names"] == blocks[0]["Channel names"]]
     if len(same) != len(blocks):
@@ -342,14 +450,12 @@ def _lvm(file: Path) -> Iterator[_Channel]:
         yield name, data[:, number], unit, clock
 
 
-_READERS: dict[str, Callable[[Path], Iterator[_Channel]] | None] = {
-    ".csv": None,
-    ".txt": None,
-    ".dat": None,
+_READERS: dict[str, Callable[[Path], Iterator[_Channel]]] = {
     ".mat": _mat,
     ".h5": _hdf5,
     ".hdf5": _hdf5,
     ".hdf": _hdf5,
+    ".nc": _hdf5,
     ".tdms": _tdms,
     ".uff": _uff,
     ".unv": _uff,

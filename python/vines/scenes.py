@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _native
-from .numbers import real, scalar
+from .numbers import real, scalar, stated
 
 
 class Scene:
@@ -48,7 +48,7 @@ class Scene:
             raise ValueError("path and text are both given: give one of them")
         origin = "text"
         if path is not None:
-            origin, text = str(path), Path(path).read_text(encoding="utf-8")
+            origin, text = str(path), _native.utf8(str(path), Path(path).read_bytes())
         self._arguments = (text, origin, [*_overrides(sections)])
         self._native = _native.Scene(*self._arguments)
 
@@ -106,14 +106,14 @@ class Scene:
         >>> plant = Plant(Scene())
         >>> events = plant.advance(1.0, **Scene().drive(sigma=-1.1, G=1.2))
         """
-        n, sigma = self.dimensionless, real(sigma)
+        n, sigma = self.dimensionless, real(sigma, name="sigma")
         omega = n["omega0"] * (1.0 + n["epsilon"] * sigma)
         if not omega > 0.0:
             raise ValueError(
                 f"sigma = {sigma} (dimensionless): a number above {-1.0 / n['epsilon']:.6g} is allowed, "
                 "so that the frequency is above 0"
             )
-        return {"amplitude": n["epsilon"] * (n["G"] if G is None else real(G)) * n["b"], "omega": omega}
+        return {"amplitude": n["epsilon"] * (n["G"] if G is None else real(G, name="G")) * n["b"], "omega": omega}
 
     def detuning(self, omega: float, amplitude: float | None = None) -> dict[str, float]:
         """Return sigma and, with an amplitude, G: the inverse of `drive`.
@@ -137,8 +137,10 @@ class Scene:
         (-1.1, 1.2)
         """
         n = self.dimensionless
-        found = {"sigma": (real(omega) / n["omega0"] - 1.0) / n["epsilon"]}
-        return found if amplitude is None else found | {"G": real(amplitude) / (n["epsilon"] * n["b"])}
+        found = {"sigma": (real(omega, "rad/s", "omega") / n["omega0"] - 1.0) / n["epsilon"]}
+        return (
+            found if amplitude is None else found | {"G": real(amplitude, "m", "amplitude") / (n["epsilon"] * n["b"])}
+        )
 
 
 def checked(scene: Scene | None) -> Scene:
@@ -163,6 +165,8 @@ def _toml(name: str, given: Any) -> str:
     if isinstance(given, Mapping):
         pairs = [f"{json.dumps(key)} = {_toml(f'{name}.{key}', value)}" for key, value in given.items()]
         return f"{{ {', '.join(pairs)} }}"
+    if stated(given) is not None:
+        return repr(real(given, _native.unit(name), name))
     try:
         value = scalar(given)
         if isinstance(value, (bool, int, str)):

@@ -1,6 +1,7 @@
 """Structures: as plants, and modal tests in universal files (UFF 55) as the section `[structure]` of a scene."""
 
 import operator
+import warnings
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
@@ -9,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._native import StructurePlant as _StructurePlant
-from .recordings import _package
+from .numbers import real
+from .packages import package
 from .scenes import Scene
 
 _DIRECTIONS = ("X", "Y", "Z", "RX", "RY", "RZ")
@@ -31,7 +33,12 @@ def structure_from_uff(path: str | PathLike[str], *, units: str | None = None) -
     -------
     dict
         `modes`, as a scene has them: frequency (Hz), damping (ratio), shape by points such as "12Z", and
-        `out_of_phase`, the largest share of a complex shape that is left out.
+        `out_of_phase`, the share of every shape that is left out, because a scene has real shapes.
+
+    Warns
+    -----
+    UserWarning
+        For every mode with a share that is left out.
 
     Raises
     ------
@@ -43,7 +50,7 @@ def structure_from_uff(path: str | PathLike[str], *, units: str | None = None) -
     file = Path(path)
     if not file.is_file():
         raise ValueError(f"cannot read {file}: it is no file")
-    pyuff = _package("pyuff")
+    pyuff = package("pyuff")
     try:
         sets = pyuff.UFF(str(file)).read_sets()
     except Exception as error:
@@ -56,10 +63,13 @@ def structure_from_uff(path: str | PathLike[str], *, units: str | None = None) -
             f"{file} has no data set 55 of normal modes or complex eigenvalues: export the modes, not the responses"
         )
     read = [_mode(file, number, one, mass) for number, one in enumerate(modes, 1)]
+    for number, (_, _, share) in enumerate(read, 1):
+        if note := _left_out(number, share):
+            warnings.warn(f"{file}: {note}", stacklevel=2)
     points = sorted({point for _, shape, _ in read for point, value in shape.items() if value != 0.0}, key=_order)
     return {
         "modes": [{**mode, "shape": {point: shape.get(point, 0.0) for point in points}} for mode, shape, _ in read],
-        "out_of_phase": max(share for *_, share in read),
+        "out_of_phase": [share for *_, share in read],
     }
 
 
@@ -98,12 +108,20 @@ def scene_from_uff(path: str | PathLike[str], cavity: str, drive: str, *, units:
         f'drive = "{drive}"',
         "modes = [",
     ]
-    for mode in found["modes"]:
+    for number, (mode, share) in enumerate(zip(found["modes"], found["out_of_phase"], strict=True), 1):
+        if note := _left_out(number, share):
+            lines.append(f"    # {note}")
         shape = ", ".join(f'"{point}" = {value:.9e}' for point, value in mode["shape"].items())
         lines.append(
             f"    {{ frequency = {mode['frequency']:.9e}, damping = {mode['damping']:.9e}, shape = {{ {shape} }} }},"
         )
     return "\n".join([*lines, "]", "", "[excitation]", "G = 1.1", ""])
+
+
+def _left_out(number: int, share: float) -> str:
+    """Say what is left out of a complex shape, as `vines structure` does; nothing below a tenth of a per cent."""
+    percent = f"{100 * share:.1f}"
+    return f"mode {number}: {percent} % of the shape are out of phase and left out" if float(percent) else ""
 
 
 def _kilograms(file: Path, sets: list[dict[str, Any]], units: str | None) -> float:
@@ -261,6 +279,8 @@ class StructurePlant(_StructurePlant):
         """
         if not 1 <= operator.index(steps) <= 10**7:
             raise ValueError(f"steps = {steps}: a whole number from 1 to 10^7 is allowed")
-        rows = self._trajectory(duration, steps, (held, amplitude, omega))
+        unit = self.channels["drive"]
+        drive = real(held, unit, "held"), real(amplitude, unit, "amplitude"), omega
+        rows = self._trajectory(duration, steps, drive)
         self._last = rows[-1]
         return dict(zip(self._columns(), np.ascontiguousarray(rows.T), strict=True))

@@ -121,7 +121,8 @@ def sweep(
     Warns
     -----
     RuntimeWarning
-        Chunks of the store were damaged, and have been computed again; their files are named.
+        Chunks of the store were damaged, and have been computed again, or metadata of arrays were, and have been
+        written again; their files are named.
 
     Examples
     --------
@@ -136,7 +137,7 @@ def sweep(
     if not variables:
         raise ValueError('a sweep needs at least one axis, for instance {"plant.r": [0.5, 0.65]}')
     asked = (results,) if isinstance(results, str) else tuple(results)
-    cells = _Cells(scene, tuple(variables), None if sigma is None else real(sigma), asked, periods)
+    cells = _Cells(scene, tuple(variables), None if sigma is None else real(sigma, name="sigma"), asked, periods)
     attributes = {"title": "Sweep of a linear oscillator with a vibro-impact nonlinear energy sink"}
     attributes["vines"] = json.dumps(_identity(cells, variables))
     sizes: dict[str, int] = {}
@@ -175,7 +176,7 @@ def _axis(name: str, values: Any, scene: Scene) -> "xarray.Variable":
         dimensions, values = (values[0],), values[1]
     dimensions = getattr(values, "dims", dimensions)
     try:
-        numbers = reals(name, values)
+        numbers = reals(name, values, _native.unit(name))
     except ValueError as error:
         raise ValueError(f"{error}: a list of numbers is allowed") from None
     if numbers.ndim != len(dimensions) or numbers.size == 0:
@@ -273,6 +274,7 @@ class _Store:
         damaged: list[str] = []
         try:
             self._open(attributes)
+            self._metadata_restored()
             damaged += self._axes_restored()
             with _bar(len(indices), progress) as bar:
                 tasks = ((self.folder, self.cells, index, self._values(index)) for index in indices)
@@ -312,14 +314,25 @@ class _Store:
                 self._create(zarr.open_group(f"{partial}/store", mode="w", attributes=attributes))
                 Path(partial, "store").rename(folder)
         try:
-            group = zarr.open_group(self.folder, mode="r")
-            found = json.loads(group.attrs["vines"]) | {"chunks": [*group["regime"].chunks]}
-        except (KeyError, ValueError, TypeError):
+            found = json.loads(zarr.open_group(self.folder, mode="r").attrs["vines"])
+        except (KeyError, ValueError, TypeError) as error:
+            if not (folder / "regime").is_dir():
+                raise ValueError(
+                    f"{folder} is not the store of a sweep; it stays as it is. Name another folder"
+                ) from None
+            file = folder / "zarr.json"
+            why = f"is damaged ({error})" if file.exists() else "is missing"
             raise ValueError(
-                f"{self.folder} is not the store of a sweep: its zarr.json, which says to which sweep it belongs, is "
-                "missing or damaged. It stays as it is; name another folder"
+                f"{file}, which says to which sweep the store belongs, {why}. The folder stays as it is. If it is the "
+                "store of this sweep, start the same call with an empty folder, end it with Ctrl-C, and copy zarr.json "
+                "from there: all chunks are kept. Otherwise name another folder"
             ) from None
-        here = json.loads(attributes["vines"]) | {"chunks": [*self.chunks.values()]}
+        here = json.loads(attributes["vines"])
+        # The chunks of an array whose zarr.json is damaged are those of the others.
+        stored = (_document(folder / name / "zarr.json") for name in self.cells.dtype().names or ())
+        if (known := next((one for one in stored if one is not None), None)) is not None:
+            found["chunks"] = known.get("chunk_grid", {}).get("configuration", {}).get("chunk_shape")
+            here["chunks"] = [*self.chunks.values()]
         differs = [f"`{key}`" for key, value in here.items() if found.get(key) != value]
         if differs:
             raise ValueError(
@@ -359,6 +372,29 @@ class _Store:
         # By this attribute, xarray knows the axes that share a dimension.
         group.attrs["coordinates"] = " ".join(name for name, one in self.variables.items() if one.dims != (name,))
 
+    def _metadata_restored(self) -> None:
+        """Write the zarr.json of arrays again where it is missing or damaged: it follows from the sweep."""
+        restored = []
+        with tempfile.TemporaryDirectory() as partial:
+            self._create(needed("zarr").open_group(partial, mode="w"))
+            for name in [*(self.cells.dtype().names or ()), *self.variables]:
+                fresh, file = Path(partial, name, "zarr.json"), Path(self.folder, name, "zarr.json")
+                # Attributes are for readers.
+                found, right = ((_document(one) or {}) | {"attributes": None} for one in (file, fresh))
+                if found == right:
+                    continue
+                restored.append(f"{file} ({'damaged' if file.exists() else 'missing'})")
+                file.parent.mkdir(exist_ok=True)
+                written = file.with_name("zarr.json.partial")
+                written.write_bytes(fresh.read_bytes())
+                written.replace(file)
+        if restored:
+            warnings.warn(
+                f"metadata of arrays were written again, and their chunks are kept: {'; '.join(restored)}",
+                RuntimeWarning,
+                stacklevel=4,
+            )
+
     def _axes_restored(self) -> list[str]:
         group, damaged = needed("zarr").open_group(self.folder, mode="r+"), []
         for name, one in self.variables.items():
@@ -367,6 +403,15 @@ class _Store:
                 group[name][...] = one.values
                 damaged += [state] if state else []
         return damaged
+
+
+def _document(file: Path) -> dict[str, Any] | None:
+    """Return the object in a file of JSON; None if it is missing or damaged."""
+    try:
+        found = json.loads(file.read_bytes())
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        return None
+    return found if isinstance(found, dict) else None
 
 
 def _state(array: Any, folder: str, index: tuple[int, ...]) -> str | None:

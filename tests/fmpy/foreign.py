@@ -29,17 +29,32 @@ UNITS = """<UnitDefinitions>
 </UnitDefinitions>"""
 
 
-def library(folder: Path, omega: float = 1, amplitude: float = 1) -> bytes:
-    """The controller of docs/controller-fmu.md, compiled; SI units per unit of its two outputs."""
+def library(folder: Path, omega: float = 1, amplitude: float = 1, changed: tuple[str, str] = ("", "")) -> bytes:
+    """The controller of docs/controller-fmu.md, compiled; SI units per unit of its outputs, and replaced code."""
     (code,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs/controller-fmu.md").read_text(), re.DOTALL)
     plain = "COPY(fmi2GetReal, double, value[n], STORED)"
     assert plain in code
     scaled = f"static const double si[] = {{1, 1, 1, {omega!r}, {amplitude!r}, 1}};\n"
     code = code.replace(plain, scaled + "COPY(fmi2GetReal, double, value[n], STORED / si[r[n]])")
+    assert changed[0] in code
+    code = code.replace(*changed) if changed[0] else code
     (folder / "mine.c").write_text(code)
     compiler = ["cc", "-O2", "-shared", "-fPIC", "mine.c", "-lm", "-o", "mine.so"]
     subprocess.run(compiler, cwd=folder, check=True)
     return (folder / "mine.so").read_bytes()
+
+
+def compiled(folder: Path, source: str, *options: str) -> bytes:
+    """A library of tests/foreign."""
+    compiler = ["cc", "-O2", "-shared", "-fPIC", *options, ROOT / "tests/foreign" / source, "-lm", "-o", "mine.so"]
+    subprocess.run(compiler, cwd=folder, check=True)
+    return (folder / "mine.so").read_bytes()
+
+
+def example(path: Path, folder: Path) -> Path:
+    """The FMU of docs/controller-fmu.md, with its description."""
+    (text,) = re.findall(r"```xml\n(.*?)```", (ROOT / "docs/controller-fmu.md").read_text(), re.DOTALL)
+    return pack(path, text, library(folder))
 
 
 def pack(

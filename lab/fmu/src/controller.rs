@@ -6,7 +6,7 @@ use phase_lock::{Config, MOVE, PARAMETERS};
 use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Sensors};
 use vines_testbench::scene::Names;
 
-use crate::instance::{Connection, Fmu, FmuError, Variable, unpack};
+use crate::instance::{Connection, Fmu, FmuError, Use, Variable, connections};
 
 /// What the bench uses beside the parameters and the fields of a move, with SI units.
 const NAMES: [(&str, &str); 13] = [
@@ -65,7 +65,8 @@ impl FmuController {
     /// Loads the controller at `path` and initialises it with a configuration.
     pub fn load(path: &Path, config: &Config, names: &Names) -> Result<Self, FmuError> {
         let fmu = Fmu::load(path, "controller", names, &used(), config.sample_time)?;
-        let (settled, locked, phase_error) = (fmu.find("settled"), fmu.find("locked"), fmu.find("phase_error"));
+        let read = |name: &str| fmu.find(name, Use::Get);
+        let (settled, locked, phase_error) = (read("settled"), read("locked"), read("phase_error"));
         if settled.is_none() && locked.is_none() && phase_error.is_none() {
             log::warn!(
                 "{} has none of `settled`, `locked` and `phase_error`: its lock is judged by its frequency alone",
@@ -77,7 +78,9 @@ impl FmuController {
             .into_iter()
             .map(str::to_owned)
             .chain(moves);
-        let inputs: Vec<_> = inputs.map(|name| fmu.find(&name).ok_or(format!("`{name}`"))).collect();
+        let inputs: Vec<_> = inputs
+            .map(|name| fmu.find(&name, Use::Set).ok_or(format!("`{name}`")))
+            .collect();
         let missing = inputs.iter().filter_map(|input| input.clone().err()).collect();
         let inputs: Result<Vec<Variable>, String> = inputs.into_iter().collect();
         let values = PARAMETERS
@@ -85,18 +88,18 @@ impl FmuController {
             .map(|parameter| (parameter.name, parameter.get(config)));
         let mut controller = Self {
             sample_time: config.sample_time,
-            response: fmu.need("response")?,
-            reference: fmu.find("reference"),
-            active: fmu.need("active")?,
-            omega: fmu.need("omega")?,
-            amplitude: fmu.need("E")?,
-            displacement: fmu.find("drive"),
+            response: fmu.need("response", Use::Set)?,
+            reference: fmu.find("reference", Use::Set),
+            active: fmu.need("active", Use::Set)?,
+            omega: fmu.need("omega", Use::Get)?,
+            amplitude: fmu.need("E", Use::Get)?,
+            displacement: read("drive"),
             phase_error,
-            phase_measured: fmu.find("phase_measured"),
+            phase_measured: read("phase_measured"),
             settled,
             locked,
-            state: fmu.find("state"),
-            fault: fmu.find("fault"),
+            state: read("state"),
+            fault: read("fault"),
             response_loop: inputs.map_err(|_| missing),
             fmu,
         };
@@ -106,7 +109,8 @@ impl FmuController {
 
     /// What the bench uses, and what of it the FMU at `path` has.
     pub fn connections(path: &Path, names: &Names) -> Result<Vec<Connection>, FmuError> {
-        Ok(unpack(path, names, &used())?.1)
+        let starts: Vec<&str> = PARAMETERS.iter().map(|parameter| parameter.name).collect();
+        connections(path, names, &used(), &starts)
     }
 
     fn response_loop(&self) -> Result<Vec<Variable>, ControllerError> {

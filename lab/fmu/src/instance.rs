@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use fmi2_description::{Description, FmiType, ScalarVariable};
+use fmi2_description::{Causality, Description, FmiType, Initial, ScalarVariable, Variability};
 use phase_lock::Value;
 use thiserror::Error;
 use vines_testbench::rig::{Clock, ControllerError, RigError};
@@ -29,13 +29,27 @@ pub enum FmuError {
         "[rig.names] or [controller_names] of the scene maps `{name}`, which this bench does not have; it has: {names}"
     )]
     Name { name: String, names: String },
-    #[error("{} declares `{name}` in {unit}, which is not converted to {ours}; correct its unit, or map it with one in [rig.names] or \
-             [controller_names] of the scene, such as {name} = {{ name = \"{name}\", factor = 1.0 }}", path.display())]
+    #[error("{} declares `{name}` in {unit}, {} {}; correct its unit, or map it with one in [rig.names] or \
+             [controller_names] of the scene, such as {name} = {{ name = \"{name}\", factor = 1.0 }}",
+            path.display(),
+            if *defined { "which is not converted to" } else { "a unit that its description does not define, and that is not known to be one of" },
+            if ours.is_empty() { "a pure number" } else { ours })]
     Unit {
         path: PathBuf,
         name: String,
         unit: String,
         ours: &'static str,
+        /// Whether the description defines the unit.
+        defined: bool,
+    },
+    #[error("{} declares `{name}` as {}, and the bench {}; FMI 2.0 (section 2.2.7) allows that for {} only. Correct its causality, or map \
+             another variable in [rig.names] or [controller_names] of the scene", path.display(), causality_in_words(*causality),
+            of.in_words()[0], of.in_words()[1])]
+    Causality {
+        path: PathBuf,
+        name: String,
+        causality: Causality,
+        of: Use,
     },
     #[error(
         "[rig.names] or [controller_names] of the scene gives `{name}` a unit of {unit}, and the bench needs one of {ours}; velocities and \
@@ -102,6 +116,58 @@ impl From<FmuError> for ControllerError {
     }
 }
 
+/// What the bench does with a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// Sets it before the start: a parameter or a start value.
+    Start,
+    /// Sets it at samples.
+    Set,
+    /// Reads it.
+    Get,
+}
+
+impl Use {
+    /// What the bench does, and for which variables FMI allows it.
+    fn in_words(self) -> [&'static str; 2] {
+        match self {
+            Self::Start => [
+                "sets it before the start",
+                "inputs, parameters and start values that are not calculated",
+            ],
+            Self::Set => ["sets it at samples", "inputs and tunable parameters"],
+            Self::Get => ["reads it", "variables other than inputs"],
+        }
+    }
+
+    /// Whether FMI 2.0 allows it (sections 2.2.7 and 4.2.4). Reading an input is allowed, and says nothing of the FMU.
+    fn is_allowed(self, variable: &ScalarVariable) -> bool {
+        let ScalarVariable { causality, variability, initial, .. } = variable;
+        match (self, causality) {
+            (Self::Get, causality) => *causality != Causality::Input,
+            (_, Causality::Input) => true,
+            (Self::Start, Causality::Parameter) => true,
+            (Self::Start, Causality::Independent) => false,
+            (Self::Start, _) => {
+                matches!(initial, Some(Initial::Exact | Initial::Approx)) && *variability != Variability::Constant
+            }
+            (Self::Set, Causality::Parameter) => *variability == Variability::Tunable,
+            (Self::Set, _) => false,
+        }
+    }
+}
+
+fn causality_in_words(causality: Causality) -> &'static str {
+    match causality {
+        Causality::Parameter => "a parameter that is not tunable",
+        Causality::CalculatedParameter => "a calculated parameter",
+        Causality::Input => "an input",
+        Causality::Output => "an output",
+        Causality::Local => "a local variable",
+        Causality::Independent => "the independent variable",
+    }
+}
+
 /// A variable that the bench uses where an FMU has it: its name, its SI unit, and the FMU's variable.
 #[derive(Clone, Debug)]
 pub struct Connection {
@@ -113,6 +179,8 @@ pub struct Connection {
     pub theirs: Option<(String, Option<String>)>,
     /// SI units per unit of the FMU's variable.
     pub factor: f64,
+    /// Whether the bench would set it before the start, and its causality does not allow that.
+    pub keeps_its_start: bool,
     pub(super) variable: Option<Variable>,
 }
 
@@ -122,6 +190,15 @@ pub(super) struct Variable {
     kind: FmiType,
     reference: u32,
     scale: Scale,
+    causality: Causality,
+    /// Whether it can be used as [`Use`] says, in this order.
+    allows: [bool; 3],
+}
+
+impl Variable {
+    fn allows(&self, of: Use) -> bool {
+        self.allows[of as usize]
+    }
 }
 
 /// A loaded FMU at its simulated time.
@@ -169,14 +246,35 @@ impl Fmu {
     }
 
     /// The variable for `ours`.
-    pub fn find(&self, ours: &str) -> Option<Variable> {
-        self.connections.iter().find(|one| one.ours == ours)?.variable
+    pub fn find(&self, ours: &str, of: Use) -> Option<Variable> {
+        let variable = self.connections.iter().find(|one| one.ours == ours)?.variable?;
+        if !variable.allows(of) && of != Use::Start {
+            log::warn!("{}; it is not used", self.unusable(ours, variable, of));
+        }
+        Some(variable).filter(|variable| variable.allows(of))
     }
 
     /// A variable that the bench needs.
-    pub fn need(&self, ours: &str) -> Result<Variable, FmuError> {
+    pub fn need(&self, ours: &str, of: Use) -> Result<Variable, FmuError> {
+        let connection = self.connections.iter().find(|one| one.ours == ours);
         let missing = || FmuError::Variable { path: self.path.clone(), name: ours.into() };
-        self.find(ours).ok_or_else(missing)
+        let variable = connection.and_then(|one| one.variable).ok_or_else(missing)?;
+        match variable.allows(of) {
+            true => Ok(variable),
+            false => Err(self.unusable(ours, variable, of)),
+        }
+    }
+
+    fn unusable(&self, ours: &str, variable: Variable, of: Use) -> FmuError {
+        let connection = self.connections.iter().find(|one| one.ours == ours);
+        let theirs = connection.and_then(|one| Some(one.theirs.as_ref()?.0.clone()));
+        let name = theirs.unwrap_or_else(|| ours.into());
+        FmuError::Causality {
+            path: self.path.clone(),
+            name,
+            causality: variable.causality,
+            of,
+        }
     }
 
     /// Sets the values that the FMU has variables for, and initialises it at time 0. It keeps its own values for the others.
@@ -187,7 +285,7 @@ impl Fmu {
                 Value::Integer(value) => value.into(),
                 Value::Boolean(value) => f64::from(u8::from(value)),
             };
-            if let Some(variable) = self.find(name) {
+            if let Some(variable) = self.find(name, Use::Start) {
                 self.set(variable, value)?;
             }
         }
@@ -221,7 +319,7 @@ impl Fmu {
 
     /// Value of a variable, SI units; of a boolean one 0 or 1.
     pub fn get(&mut self, variable: Variable) -> Result<f64, FmuError> {
-        let Variable { kind, reference, scale } = variable;
+        let Variable { kind, reference, scale, .. } = variable;
         let value = self.instance.get(kind, reference);
         let value = self.refused("give a value", value)?;
         Ok(scale.factor * value + scale.offset)
@@ -234,7 +332,7 @@ impl Fmu {
 
     /// Sets a variable, SI units.
     pub fn set(&mut self, variable: Variable, value: f64) -> Result<(), FmuError> {
-        let Variable { kind, reference, scale } = variable;
+        let Variable { kind, reference, scale, .. } = variable;
         let set = self
             .instance
             .set(kind, reference, (value - scale.offset) / scale.factor);
@@ -251,6 +349,21 @@ impl Fmu {
 /// The name of a file: the plant's own FMU lies in a temporary folder, whose path says nothing.
 fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// What of `bench` the FMU at `path` has; `starts`: what the bench sets before the start.
+pub(super) fn connections(
+    path: &Path,
+    names: &Names,
+    bench: &[(String, &'static str)],
+    starts: &[&str],
+) -> Result<Vec<Connection>, FmuError> {
+    let mut connections = unpack(path, names, bench)?.1;
+    for one in &mut connections {
+        let keeps = one.variable.is_some_and(|variable| !variable.allows(Use::Start));
+        one.keeps_its_start = keeps && starts.contains(&one.ours.as_str());
+    }
+    Ok(connections)
 }
 
 /// Unpacks an FMU, and finds what of `bench` it has.
@@ -296,15 +409,23 @@ fn connect(
     else {
         return match names.mapped(ours) {
             Some(_) => Err(FmuError::Variable { path: path.into(), name }),
-            None => Ok(Connection { ours: ours.into(), si, theirs: None, factor, variable: None }),
+            None => Ok(Connection {
+                ours: ours.into(),
+                si,
+                theirs: None,
+                factor,
+                keeps_its_start: false,
+                variable: None,
+            }),
         };
     };
     let unit = description.unit_of(variable);
     let scale = match unit {
         Some(unit) if !names.is_explicit(ours) => {
-            let scale = scale(unit, description.base_unit(unit), si);
-            let unit = unit.to_owned();
-            scale.ok_or_else(|| FmuError::Unit { path: path.into(), name: ours.into(), unit, ours: si })?
+            let base = description.base_unit(unit);
+            let (scale, unit) = (scale(unit, base, si), unit.to_owned());
+            let (path, name, defined) = (path.into(), ours.into(), base.is_some());
+            scale.ok_or(FmuError::Unit { path, name, unit, ours: si, defined })?
         }
         _ => Scale { factor, offset: 0.0 },
     };
@@ -312,7 +433,14 @@ fn connect(
         ours: ours.into(),
         si,
         factor: scale.factor,
-        variable: Some(Variable { kind, reference: variable.value_reference, scale }),
+        keeps_its_start: false,
+        variable: Some(Variable {
+            kind,
+            reference: variable.value_reference,
+            scale,
+            causality: variable.causality,
+            allows: [Use::Start, Use::Set, Use::Get].map(|of| of.is_allowed(variable)),
+        }),
         theirs: Some((name, unit.map(str::to_owned))),
     })
 }

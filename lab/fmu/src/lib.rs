@@ -5,11 +5,12 @@ mod archive;
 mod controller;
 mod instance;
 mod library;
+pub mod process;
 mod rig;
 mod units;
 
 pub use archive::{PLATFORMS, own_platforms};
 pub use controller::FmuController;
-pub use instance::{Connection, FmuError, Obstacle};
+pub use instance::{Connection, FmuError, Obstacle, Use};
 pub use library::check;
 pub use rig::FmuRig;

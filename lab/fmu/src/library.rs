@@ -12,6 +12,7 @@ use fmi2_description::FmiType;
 use libloading::Library;
 
 use crate::archive::Unpacked;
+use crate::process::WorkingFolder;
 
 /// `fmi2Component`.
 type Component = *mut c_void;
@@ -150,9 +151,14 @@ pub(crate) struct Instance {
     runs: bool,
     log: Box<Log>,
     _callbacks: Box<Callbacks>,
-    // Unloaded last.
+    // Unloaded last but for the working folder, which is restored then.
     _library: Library,
+    working_folder: WorkingFolder,
 }
+
+// SAFETY: an instance is not bound to a thread: FMI 2.0 (section 2.1) asks only that no two of its functions run at the same time, and all calls
+// here need `&mut self`. The pointers lead to memory of the instance or of the fields beside them.
+unsafe impl Send for Instance {}
 
 /// Calls a function of the instance: `Err` has the reason, as the end of a sentence.
 macro_rules! call {
@@ -178,6 +184,7 @@ impl Instance {
         let interface = fmu.description.co_simulation.as_ref();
         let interface = interface.ok_or("it is for model exchange only; export it for co-simulation")?;
         let path = fmu.library(&interface.model_identifier)?;
+        let working_folder = WorkingFolder::new();
         // SAFETY: as the contract of this module.
         let library = unsafe { Library::new(&path) }.map_err(|error| unloadable(&error, fmu))?;
         // SAFETY: the contract of this module: the functions have the types of FMI 2.0.
@@ -221,6 +228,7 @@ impl Instance {
                 .unwrap_or("fmi2Instantiate returned NULL without a message".into());
             return Err(format!("it makes no instance: {reason}{tool}"));
         }
+        working_folder.restore();
         Ok(Self {
             component,
             functions,
@@ -228,6 +236,7 @@ impl Instance {
             log,
             _callbacks: callbacks,
             _library: library,
+            working_folder,
         })
     }
 
@@ -236,6 +245,7 @@ impl Instance {
         call!(self, fmi2SetupExperiment(0, 0.0, 0.0, 0, 0.0))?;
         call!(self, fmi2EnterInitializationMode())?;
         call!(self, fmi2ExitInitializationMode())?;
+        self.working_folder.restore();
         self.runs = true;
         Ok(())
     }

@@ -8,7 +8,7 @@ use vines_testbench::scene::{
     Definition, Excitation, Measurand, Names, PLANT_PARAMETERS, Reference as ReferenceSignal, Scene, Sensor, Structure,
 };
 
-use crate::instance::{Connection, Fmu, FmuError, Variable, unpack};
+use crate::instance::{Connection, Fmu, FmuError, Use, Variable, connections};
 
 /// What the bench uses beside the parameters, with SI units.
 const NAMES: [(&str, &str); 16] = [
@@ -29,6 +29,9 @@ const NAMES: [(&str, &str); 16] = [
     ("q2", "m"),
     ("der(q2)", "m/s"),
 ];
+
+/// Variables with a start value in the scene.
+const STARTS: [&str; 4] = ["q1", "der(q1)", "q2", "der(q2)"];
 
 /// All that the bench uses, with SI units: of response and base those of the scene's definition where the scene maps them.
 fn used(names: &Names, definition: Definition) -> Vec<(String, &'static str)> {
@@ -137,12 +140,12 @@ impl FmuRig {
         let mut fmu = Fmu::load(path, "plant", names, &used, scene.sample_time())?;
         let [amplitude, signal, total] = drive.map(|(name, _)| name);
         let inputs = fmu
-            .find("omega")
-            .zip(fmu.find(amplitude))
+            .find("omega", Use::Set)
+            .zip(fmu.find(amplitude, Use::Set))
             .map(|(omega, amplitude)| [omega, amplitude]);
         let held = match inputs {
-            Some(_) => fmu.find(signal),
-            None => Some(fmu.need(signal)?),
+            Some(_) => fmu.find(signal, Use::Set),
+            None => Some(fmu.need(signal, Use::Set)?),
         };
         let ours = match (structure, definition.sensor) {
             _ if names.mapped("response").is_some() => "response".to_owned(),
@@ -150,12 +153,12 @@ impl FmuRig {
             (None, Sensor::V) => "v".to_owned(),
             (None, Sensor::Q1) => "q1".to_owned(),
         };
-        let response = fmu.need(&ours)?;
+        let response = fmu.need(&ours, Use::Get)?;
         let reference = match definition.reference {
-            ReferenceSignal::Base => fmu.find(total),
-            ReferenceSignal::Force => Some(fmu.need(total)?),
+            ReferenceSignal::Base => fmu.find(total, Use::Get),
+            ReferenceSignal::Force => Some(fmu.need(total, Use::Get)?),
         };
-        let cell = cell.map(|name| fmu.need(&name)).transpose()?;
+        let cell = cell.map(|name| fmu.need(&name, Use::Get)).transpose()?;
         let mut starts = scene.start_values();
         // A structure starts at rest.
         starts.retain(|(name, _)| structure.is_none() || !["q1", "der(q1)"].contains(name));
@@ -196,13 +199,15 @@ impl FmuRig {
 
     /// What the bench uses, and what of it the FMU at `path` has.
     pub fn connections(path: &Path, names: &Names, definition: Definition) -> Result<Vec<Connection>, FmuError> {
-        Ok(unpack(path, names, &used(names, definition))?.1)
+        let parameters = PLANT_PARAMETERS.iter().map(|row| row.symbol);
+        let starts: Vec<&str> = STARTS.into_iter().chain(parameters).collect();
+        connections(path, names, &used(names, definition), &starts)
     }
 }
 
 impl Inside {
     fn of(fmu: &Fmu, has_friction: bool) -> Option<Self> {
-        let found = |ours| fmu.find(ours);
+        let found = |ours| fmu.find(ours, Use::Get);
         let reals = [found("impact_time"), found("impact_velocity"), found("der(q2)")];
         let (Some(impacts), [Some(a), Some(b), Some(c)]) = (found("impacts"), reals) else {
             return None;

@@ -22,7 +22,7 @@ pub fn backbone(scene: &Dimensionless, points: usize) -> impl Iterator<Item = [f
     })
 }
 
-/// Points (sigma, C, 1 if stable, G) of the backbone by exact orbits, at the detunings of the theory's backbone.
+/// Points (sigma, C, 0 if unstable, G) of the backbone by exact orbits, at the detunings of the theory's backbone.
 pub fn exact(scene: &Dimensionless, points: usize) -> impl Iterator<Item = [f64; 4]> {
     backbone(scene, points).filter_map(|[sigma, c, _]| {
         let orbits = exact_backbone(scene, 1.0 + scene.epsilon * sigma);
@@ -30,6 +30,11 @@ pub fn exact(scene: &Dimensionless, points: usize) -> impl Iterator<Item = [f64;
         let nearest = orbits
             .into_iter()
             .min_by(|first, second| distance(first.c).total_cmp(&distance(second.c)))?;
-        Some([nearest.sigma, nearest.c, f64::from(u8::from(nearest.stable)), nearest.g])
+        Some([
+            nearest.sigma,
+            nearest.c,
+            f64::from(u8::from(!nearest.is_unstable())),
+            nearest.g,
+        ])
     })
 }

@@ -1,6 +1,9 @@
 //! Numerical methods that several modules share: roots and minima, statistics, linear and nonlinear least squares with uncertainties.
 
+use std::cell::RefCell;
 use std::convert::Infallible;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{Complex, Const, DMatrix, DVector, DimMin, Dyn, RowSVector, SMatrix, SVector, linalg::QR};
 
@@ -23,6 +26,23 @@ pub fn quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
     } else {
         let q = (root - b) / 2.0;
         Some([c / q, q / a])
+    }
+}
+
+thread_local! {
+    static STOP: RefCell<Option<Arc<AtomicBool>>> = const { RefCell::new(None) };
+}
+
+/// Lets `stop` end this thread: once it is true, the next iteration of a search unwinds the thread, without a message.
+pub fn stop_thread_with(stop: &Arc<AtomicBool>) {
+    STOP.set(Some(Arc::clone(stop)));
+}
+
+/// An iteration of a search.
+fn iteration() {
+    let stop = STOP.with_borrow(|stop| stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed)));
+    if stop {
+        std::panic::resume_unwind(Box::new("stopped"));
     }
 }
 
@@ -103,6 +123,7 @@ const SINGULAR: f64 = 1e-14;
 pub fn secant(mut f: impl FnMut(f64) -> Option<f64>, [mut before, mut here]: [f64; 2], tolerance: f64) -> Option<f64> {
     let mut at_before = f(before)?;
     for _ in 0..ROUNDS {
+        iteration();
         let at_here = f(here)?;
         let step = if at_here == 0.0 {
             0.0
@@ -132,6 +153,7 @@ pub fn try_bisection<E>(
     mut like_a: impl FnMut(f64) -> Result<bool, E>,
 ) -> Result<(f64, f64), E> {
     while (b - a).abs() > width {
+        iteration();
         let middle = a + (b - a) / 2.0;
         if middle <= a.min(b) || middle >= a.max(b) {
             break;
@@ -321,6 +343,7 @@ where
                 let straight = -factors.solve(&gradient);
                 let (mut step, mut last) = (straight, f64::INFINITY);
                 let better = loop {
+                    iteration();
                     let next = SVector::from_fn(|i, _| (here.x[i] + step[i]).clamp(limits[i][0], limits[i][1]));
                     let Some((values, trace)) = model.residuals(&next, &here.trace) else {
                         break None;

@@ -9,6 +9,7 @@ mod continuation;
 mod flight;
 mod half_period;
 mod impact_map;
+mod multipliers;
 pub(crate) mod oscillator;
 mod periodic;
 mod plant;
@@ -32,8 +33,8 @@ pub use structure::{
     StructureOrbits, StructureRange, StructureStart,
 };
 pub use symmetric::{
-    Particle, at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_resonant,
-    symmetric_orbits,
+    Particle, at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_backbone,
+    stable_resonant, symmetric_orbits, with_amplitude,
 };
 
 /// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
@@ -63,6 +64,16 @@ pub struct Orbit {
     pub multipliers: [f64; 4],
     /// All multipliers are inside the unit circle.
     pub stable: bool,
+    /// The largest multipliers are on the unit circle, within 1e-7: disturbances neither grow nor decay.
+    pub neutral: bool,
+}
+
+/// Distance from the unit circle up to which a multiplier counts as on it: of a double one, rounding leaves half of the digits.
+const ON_CIRCLE: f64 = 1e-7;
+
+/// Whether a motion whose largest multiplier has this modulus is stable, and whether it is neutral.
+fn stability(largest: f64) -> [bool; 2] {
+    [largest < 1.0 - ON_CIRCLE, (largest - 1.0).abs() <= ON_CIRCLE]
 }
 
 /// The state just after an impact on the wall w = +1, where the base displacement is `epsilon G sin(Omega tau + phase)`
@@ -82,6 +93,11 @@ pub struct AfterImpact {
 }
 
 impl Orbit {
+    /// Whether a multiplier is outside the unit circle.
+    pub fn is_unstable(&self) -> bool {
+        !self.stable && !self.neutral
+    }
+
     /// The unknowns that shooting starts from: (phase, q1, q1', q2') after the impact on w = +1, sigma, G.
     pub fn unknowns(&self) -> Unknowns {
         let AfterImpact { phase, q1, dq1, dq2, .. } = self.start;

@@ -7,7 +7,7 @@ use vines_model::{
     Dimensionless,
     orbit::{
         Bifurcation, Branch, BranchBifurcation, Condition, ContinuationLimits, Orbit, Periodic, backbone,
-        backbone_at_speed, continue_both_ways, exact_backbone, phase_resonant, response, settle,
+        backbone_at_speed, continue_both_ways, exact_backbone, phase_resonant, response, settle, stable_backbone,
     },
     theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow},
 };
@@ -186,4 +186,40 @@ fn without_damping_drive_and_loss_the_backbone_is_the_conservative_mode() {
         // The phase of a base at rest is that of resonance.
         assert!((orbit.gamma + FRAC_PI_2).abs() < 1e-9);
     }
+}
+
+#[test]
+fn a_conservative_mode_is_neutral_where_no_multiplier_is_off_the_unit_circle_and_nowhere_stable() {
+    for epsilon in [1e-3, 0.0084, 0.03] {
+        let scene = Dimensionless::new(epsilon, 0.0, 1.0, 0.0);
+        let curves = backbone(&scene, Some([-6.0, 6.0]), 400);
+        let orbits = || curves.iter().flat_map(|curve| &curve.points);
+        let neutral = orbits().filter(|orbit| orbit.neutral).count();
+        // The largest multiplier of such an orbit is 1 but for the root of rounding, which a double one has.
+        let off = |orbit: &Orbit| (orbit.multipliers[3] - 1.0).abs();
+        assert!(neutral > 100, "{neutral}");
+        assert!(orbits().all(|orbit| !orbit.stable && orbit.neutral == (off(orbit) <= 1e-7)));
+        let between = orbits().filter(|orbit| off(orbit) > 1e-7 && off(orbit) < 1e-5).count();
+        assert!(
+            20 * between < neutral,
+            "{between} orbits are unstable by little, {neutral} neutral"
+        );
+    }
+}
+
+#[test]
+fn the_drives_of_stable_orbits_end_where_the_backbone_loses_its_stability() {
+    let scene = Dimensionless::new(0.032 / 3.807, 1.43, 0.65, 1.1);
+    let stretches = stable_backbone(&scene, [-6.0, 6.0], 400);
+    let largest = stretches.iter().flatten().map(|orbit| orbit.g).fold(0.0, f64::max);
+    let broken = backbone(&scene, Some([-6.0, 6.0]), 400)
+        .into_iter()
+        .flat_map(|curve| curve.special)
+        .filter(|(kind, _)| *kind == Bifurcation::SymmetryBreaking)
+        .map(|(_, orbit)| orbit.g)
+        .fold(f64::INFINITY, f64::min);
+    assert!(
+        (largest - broken).abs() < 1e-9 && (largest - 1.423).abs() < 2e-3,
+        "{largest} {broken}"
+    );
 }

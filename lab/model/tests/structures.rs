@@ -119,7 +119,7 @@ fn changes(branches: &[StructureBranch]) -> (Vec<Change>, Vec<[f64; 2]>) {
 
 #[test]
 fn the_facts_say_where_the_backbone_loses_its_stability_and_to_which_mode() {
-    let facts = two_modes(6.27, 3.0).facts(0, [omega0(); 2], 300).unwrap();
+    let facts = two_modes(6.27, 3.0).facts(0, [omega0(); 2], 300, &|| ()).unwrap();
     let (alone, stable_alone) = changes(&facts.alone);
     assert_eq!(
         alone,

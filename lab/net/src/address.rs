@@ -141,6 +141,8 @@ pub enum LinkError {
          for too long"
     )]
     Closed { peer: Address, time: f64 },
+    #[error("{peer} has ended with an error, at t = {time:.3} s of the experiment: {message}")]
+    Failed { peer: Address, time: f64, message: String },
     #[error(
         "{peer} sent a frame that is not the answer to a reading, at t = {time} s of the experiment: another kind, or of a later sample"
     )]

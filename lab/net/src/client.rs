@@ -13,8 +13,8 @@ use vines_testbench::scene::Definition;
 
 use crate::address::{Address, LinkError};
 use crate::frame::{
-    Frame, FrameError, Kind, Reading, Refusal, bit, flag, read_command, read_reading, write_command, write_move,
-    write_reading,
+    Frame, FrameError, Kind, Message, Reading, Refusal, bit, flag, read_command, read_reading, write_command,
+    write_move, write_reading,
 };
 use crate::link::Link;
 use crate::readings::Readings;
@@ -45,6 +45,8 @@ struct Client {
     /// Number of the present sample.
     at: u64,
     last: Frame,
+    /// What the server says of its failure.
+    message: Message,
 }
 
 impl Client {
@@ -80,6 +82,7 @@ impl Client {
             counters: Counters::default(),
             at: 0,
             last: hello,
+            message: Message::default(),
         };
         client.send(hello)?;
         let end = Instant::now() + CONNECT;
@@ -121,8 +124,15 @@ impl Client {
                 Some(Err(FrameError::Closed)) => return Err(LinkError::Closed { peer, time }),
                 Some(Err(_)) => self.counters.malformed += 1,
                 Some(Ok(frame)) if frame.session != self.session => self.counters.foreign += 1,
+                Some(Ok(frame)) if frame.kind == Kind::Text => self.message.take(&frame),
                 Some(Ok(frame)) if frame.kind == Kind::Refusal => {
-                    return Err(LinkError::Refused { peer, reason: Refusal::read(&frame) });
+                    return Err(match Refusal::read(&frame) {
+                        Refusal::Failed { bytes } => {
+                            let message = self.message.text(bytes);
+                            LinkError::Failed { peer, time: frame.time, message }
+                        }
+                        reason => LinkError::Refused { peer, reason },
+                    });
                 }
                 Some(Ok(frame)) if frame.has(flag::SHUT_DOWN) => {
                     let seconds = self.silence.as_secs_f64();
@@ -342,7 +352,7 @@ impl NetController {
                     return Err(self.client.silent());
                 }
                 self.client.counters.hold(self.client.at + 1 - self.answered);
-                break self.held(active);
+                break self.held();
             };
             self.good = self.read(&frame)?;
             self.waiting = None;
@@ -356,16 +366,10 @@ impl NetController {
         Ok(command)
     }
 
-    /// The last answer, for a sample without one.
-    fn held(&self, active: bool) -> Command {
-        let last = self.good.drive;
-        let drive = if active {
-            last
-        } else {
-            Drive { omega: last.omega, ..Drive::default() }
-        };
+    /// The last answer, for a sample without one. It also lasts beyond the release: the bench waits for the answer to that.
+    fn held(&self) -> Command {
         let settled = self.good.settled.map(|_| false);
-        Command { drive, settled, ..self.good }
+        Command { settled, ..self.good }
     }
 
     /// The answer to this sample or an earlier one.

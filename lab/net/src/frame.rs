@@ -1,6 +1,8 @@
 //! The frame: 84 bytes, little-endian, one layout for all kinds, and the readings, drives, moves and refusals that it carries.
 //! The specification is `docs/network-protocol.md`.
 
+use std::collections::BTreeMap;
+
 use thiserror::Error;
 use vines_testbench::rig::{Command, ControllerError, Drive, Fault, GroundTruth, LoopState, Move, Sensors};
 
@@ -34,12 +36,14 @@ pub enum Kind {
     Report = 7,
     /// A move of the response amplitude, to a controller server.
     Move = 8,
+    /// A part of the message of an error that ends the session, before the refusal.
+    Text = 9,
 }
 
 /// All kinds, in the order of their codes, from 1.
-const KINDS: [Kind; 8] = {
-    use Kind::{Drive, Farewell, Hello, Move, Refusal, Report, Sensors, Welcome};
-    [Hello, Welcome, Refusal, Sensors, Drive, Farewell, Report, Move]
+const KINDS: [Kind; 9] = {
+    use Kind::{Drive, Farewell, Hello, Move, Refusal, Report, Sensors, Text, Welcome};
+    [Hello, Welcome, Refusal, Sensors, Drive, Farewell, Report, Move, Text]
 };
 
 /// Booleans of a frame. A bit without a meaning in a kind is 0.
@@ -234,6 +238,60 @@ pub(crate) fn read_move(frame: &Frame) -> (Move, f64) {
     (Move { response, duration, amplitude, omega, growth }, phase_target)
 }
 
+/// Bytes of a message in a frame, and most bytes of a message.
+const PART: usize = 8 * VALUES;
+const MESSAGE: usize = 64 * PART;
+
+/// The frames of a message, whose numbers are their places, and the refusal that ends the session with it.
+pub(crate) fn write_failure(frame: Frame, message: &str) -> Vec<Frame> {
+    let end = (0..=message.len().min(MESSAGE))
+        .rev()
+        .find(|end| message.is_char_boundary(*end));
+    let message = &message.as_bytes()[..end.unwrap_or(0)];
+    let part = |(place, part): (usize, &[u8])| {
+        let mut bytes = [0; PART];
+        bytes[..part.len()].copy_from_slice(part);
+        let words = bytes.as_chunks().0;
+        let values = std::array::from_fn(|n| f64::from_bits(u64::from_le_bytes(words[n])));
+        Frame {
+            kind: Kind::Text,
+            flags: 0,
+            sequence: place as u64,
+            values,
+            ..frame
+        }
+    };
+    let parts = message.chunks(PART).enumerate().map(part);
+    parts
+        .chain([Refusal::Failed { bytes: message.len() }.answer(&frame)])
+        .collect()
+}
+
+/// The parts of a message that have arrived.
+#[derive(Debug, Default)]
+pub(crate) struct Message(BTreeMap<u64, [f64; VALUES]>);
+
+impl Message {
+    /// Takes a part.
+    pub fn take(&mut self, frame: &Frame) {
+        if frame.sequence < (MESSAGE / PART) as u64 {
+            self.0.insert(frame.sequence, frame.values);
+        }
+    }
+
+    /// The message of this many bytes, or that it has not arrived.
+    pub fn text(&self, bytes: usize) -> String {
+        let parts = (0..).map_while(|place| self.0.get(&place)).flatten();
+        let mut text: Vec<u8> = parts.flat_map(|value| value.to_bits().to_le_bytes()).collect();
+        let is_whole = bytes > 0 && text.len() >= bytes;
+        text.truncate(bytes);
+        String::from_utf8(text)
+            .ok()
+            .filter(|_| is_whole)
+            .unwrap_or_else(|| "its message was lost in the network; the server has printed it".into())
+    }
+}
+
 /// A bit of the flags, if it is set.
 pub(crate) fn bit(flag: u8, set: bool) -> u8 {
     if set { flag } else { 0 }
@@ -267,6 +325,9 @@ pub enum Refusal {
     /// 7: what the controller cannot move, and the value that it refuses.
     #[error("its controller {}: {value}", MOVE.get(*index).map_or("refuses a move", |(_, reason)| reason))]
     Move { index: usize, value: f64 },
+    /// 8: its rig or controller has failed, with a message of this many bytes.
+    #[error("its rig or controller has failed")]
+    Failed { bytes: usize },
     #[error("reason {0}")]
     Other(f64),
 }
@@ -281,6 +342,7 @@ impl Refusal {
             Self::Drive { index, value, limit } => [5.0, index as f64, value, limit],
             Self::Unexpected => [6.0, 0.0, 0.0, 0.0],
             Self::Move { index, value } => [7.0, index as f64, value, 0.0],
+            Self::Failed { bytes } => [8.0, bytes as f64, 0.0, 0.0],
             Self::Other(code) => [code, 0.0, 0.0, 0.0],
         };
         let (kind, values) = (Kind::Refusal, [code, first, value, limit, 0.0, 0.0]);
@@ -297,6 +359,7 @@ impl Refusal {
             5 => Self::Drive { index: first as usize, value, limit },
             6 => Self::Unexpected,
             7 => Self::Move { index: first as usize, value },
+            8 => Self::Failed { bytes: first as usize },
             _ => Self::Other(code),
         }
     }
@@ -380,6 +443,26 @@ mod tests {
             let command = Command { drive, phase_error, settled, state, fault };
             let frame = write_command(Frame::new(Kind::Hello, 1), &command);
             prop_assert_eq!(read_command(&Frame::decode(&frame.encode()).unwrap()), command);
+        }
+    }
+
+    #[test]
+    fn a_message_arrives_in_any_order_and_a_part_that_is_lost_is_said() {
+        let limit = "the displacement of the armature is 8.801e-3 m, and shaker.stroke_max allows 0.0088 m: µ";
+        for message in [limit, &"µ".repeat(MESSAGE), "short"] {
+            let frames = write_failure(Frame::new(Kind::Hello, 1), message);
+            let (refusal, parts) = frames.split_last().unwrap();
+            let Refusal::Failed { bytes } = Refusal::read(refusal) else {
+                panic!("{refusal:?}");
+            };
+            let mut arrived = Message::default();
+            for (n, part) in parts.iter().rev().enumerate() {
+                let is_whole = message.starts_with(&arrived.text(bytes));
+                assert!(!is_whole, "{n}");
+                arrived.take(&Frame::decode(&part.encode()).unwrap());
+            }
+            assert_eq!(arrived.text(bytes), message[..message.len().min(bytes)]);
+            assert_eq!(bytes, message.len().min(MESSAGE));
         }
     }
 

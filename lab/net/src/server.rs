@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use crate::address::{Address, LinkError, ServerError};
 use crate::frame::{
     Frame, FrameError, Kind, Reading, Refusal, VERSION, bit, flag, read_command, read_move, read_reading,
-    write_command, write_reading,
+    write_command, write_failure, write_reading,
 };
 use crate::link::{Link, Received};
 use crate::seal::Key;
@@ -108,6 +108,9 @@ impl Server {
 
     /// Serves sessions until `stop` returns true. `make` creates the rig, or the controller, of a session;
     /// `report` receives the report on it.
+    ///
+    /// # Errors
+    /// An error of the rig, of the controller or of the system. The client gets its message.
     pub fn serve(
         &mut self,
         mut make: impl FnMut() -> Result<Served, ServerError>,
@@ -123,13 +126,19 @@ impl Server {
             let received = if may_read { self.link.receive(deadline)? } else { None };
             let late = u32::from(Instant::now() >= deadline);
             burst = received.as_ref().map_or(0, |_| burst + late);
-            match (received, &mut run) {
+            let outcome = match (received, &mut run) {
                 (Some((Ok(frame), from)), None) if frame.kind == Kind::Hello => {
-                    run = self.open(&frame, from, &mut make)?
+                    self.open(&frame, from, &mut make, &mut run)
                 }
-                (Some((received, from)), run) => self.sort(run.as_mut(), received, from)?,
-                (None, Some(run)) if due.is_some_and(|due| Instant::now() >= due) => run.pass(&mut self.link)?,
-                (None, _) => {}
+                (Some((received, from)), run) => self.sort(run.as_mut(), received, from),
+                (None, Some(run)) if due.is_some_and(|due| Instant::now() >= due) => run.pass(&mut self.link),
+                (None, _) => Ok(()),
+            };
+            if let Err(error) = outcome {
+                if let Some(run) = run {
+                    report(&run.fail(&error, &mut self.link));
+                }
+                return Err(error);
             }
             let stopped = stop();
             if let Some(run) = run.as_mut().filter(|_| stopped) {
@@ -152,20 +161,25 @@ impl Server {
         hello: &Frame,
         from: SocketAddr,
         make: &mut impl FnMut() -> Result<Served, ServerError>,
-    ) -> Result<Option<Run>, ServerError> {
+        run: &mut Option<Run>,
+    ) -> Result<(), ServerError> {
         let mut welcome = match self.service.welcome(hello) {
             Ok(welcome) => welcome,
-            Err(refusal) => {
-                self.refuse(refusal, hello, from)?;
-                return Ok(None);
-            }
+            Err(refusal) => return Ok(self.refuse(refusal, hello, from)?),
         };
         let drawn = self.link.seal.draw().map_err(io::Error::other)?;
         welcome.values[3..5].copy_from_slice(&drawn);
         self.link.seal.begin(hello.session, drawn);
         let opened = Instant::now();
-        let mut run = Run {
-            served: make()?,
+        let served = make().inspect_err(|error| {
+            // Only in a session the message has a code.
+            for frame in [vec![welcome], write_failure(welcome, &error.to_string())].concat() {
+                // The error itself is returned.
+                let _ = self.link.send(&frame, from);
+            }
+        })?;
+        let run = run.insert(Run {
+            served,
             service: self.service,
             real_time: self.link.is_real_time(),
             peer: from,
@@ -178,9 +192,8 @@ impl Server {
             drive: Ramp::default(),
             clock: None,
             ended: None,
-        };
-        run.welcome(&mut self.link)?;
-        Ok(Some(run))
+        });
+        run.welcome(&mut self.link)
     }
 
     /// Handles a frame that does not open a session.
@@ -400,6 +413,20 @@ impl Run {
         let mut frame = write_reading(Frame { sequence, time, ..self.welcome }, &reading);
         frame.flags |= bit(flag::SHUT_DOWN, self.drive.is_shut_down());
         Ok(link.send(&frame, self.peer)?)
+    }
+
+    /// Sends the client the message of an error, shuts the drive down, and reports.
+    fn fail(mut self, error: &ServerError, link: &mut Link) -> Session {
+        let (sequence, time) = (self.at, self.at as f64 * self.service.sample_time);
+        let mut frames = write_failure(Frame { sequence, time, ..self.welcome }, &error.to_string());
+        // The client of a rig in real time waits for it.
+        frames.extend(self.real_time.then(|| self.report()));
+        for frame in frames {
+            // The error itself is returned.
+            let _ = link.send(&frame, self.peer);
+        }
+        self.end(Ended::Failed);
+        self.finish()
     }
 
     fn timing(&self) -> Option<Timing> {

@@ -165,6 +165,8 @@ pub enum Ended {
     Refused,
     /// The server was stopped.
     Stopped,
+    /// The rig or the controller has failed; the drive was shut down, and the server ends.
+    Failed,
 }
 
 /// Frames and samples of a session in real time, counted by client or server.
@@ -236,6 +238,7 @@ impl Display for Session {
             Ended::Silence => "SHUT DOWN: the client was silent, or behind, for too long",
             Ended::Refused => "SHUT DOWN: the client sent a drive or a frame that is not allowed",
             Ended::Stopped => "stopped by the server",
+            Ended::Failed => "SHUT DOWN: the rig or controller has failed",
         };
         let rate = if *seconds > 0.0 { *samples as f64 / seconds } else { 0.0 };
         let nominal = 1.0 / self.sample_time;

@@ -2,7 +2,8 @@
 
 use clap::Args;
 use vines::comparison::{Doubt, TrackedComparison};
-use vines::{advice, backbone::track_into, numerics::range, report, scene::Scene, survey::contradiction};
+use vines::survey::{contradiction, stable_backbone};
+use vines::{backbone::track_into, numerics::range, report, scene::Scene};
 
 use super::experiment::{ExperimentArguments, INTERRUPTED_FILE};
 use super::failure::Failure;
@@ -95,7 +96,7 @@ fn doubt_in_words(doubt: Doubt, of: usize, scene: &Scene) -> String {
              noise that hides the harmonic"
         ),
         Doubt::NotSettled => {
-            let levels = advice::stable_orbits_of(scene, &scene.dimensionless());
+            let levels = stable_backbone(scene, &scene.dimensionless());
             let (low, high) = range((f64::INFINITY, 0.0), levels.iter().map(|orbit| orbit.c));
             let settled = format!("none of {of} points is a settled point of a symmetric 1:1 motion");
             match low <= high {

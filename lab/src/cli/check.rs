@@ -10,6 +10,7 @@ use vines::table::{Table, number, with_uncertainty};
 use super::failure::Failure;
 use super::options::{Endpoint, ReachArguments, SceneArguments};
 use super::output::{output, print};
+use super::signals::Orderly;
 use super::summary::{Units, structure};
 
 const HELP: &str = "\
@@ -60,6 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut variables = arguments.rig.variables("rig", |file| {
         FmuRig::connections(file, &scene.rig_names, scene.resonance)
     })?;
+    let _orderly = Orderly::new();
     let mut open = arguments.rig.rig(&scene, scope)?;
     if let Some(controller) = &arguments.controller {
         let names = &scene.controller_names;

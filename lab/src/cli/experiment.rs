@@ -14,8 +14,9 @@ use vines::rig::{BuiltIn, Controller, Fault, Rig};
 use vines::{FileError, ResultFolder, advice, scene::Scene};
 
 use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
-use super::output::{Results, Written, output, results, written};
+use super::output::{Results, Temporary, Written, output, results, written};
 use super::recording::Recording;
+use super::signals::Orderly;
 use super::watch::{Watch, WatchArguments};
 use super::{check, failure::Failure, pack::fmus, summary};
 
@@ -65,11 +66,15 @@ pub(super) struct Session {
     watch: Option<Watch>,
     recording: Option<Recording>,
     folder: ResultFolder,
+    orderly: Orderly,
 }
 
 /// What remains of a session after the measurement.
 pub(super) struct Ended {
+    _orderly: Orderly,
     folder: ResultFolder,
+    /// What [`Ended::keep`] has written, and what to say about it.
+    kept: (Vec<PathBuf>, Vec<String>),
     /// The file of --record.
     recorded: Result<Option<PathBuf>, FileError>,
     /// What a rig in real time reports.
@@ -93,6 +98,7 @@ impl ExperimentArguments {
         let watch = self.watch.start(command, &scene)?;
         let scope = self.reach.reach()?;
         BuiltIn::new(&config(&scene.plan()))?;
+        let orderly = Orderly::new();
         let folder = results(&self.out, names)?;
         let recording = self
             .record
@@ -104,7 +110,7 @@ impl ExperimentArguments {
             Some(endpoint) => endpoint.rig(&scene, scope)?,
             None if scene.structure.is_some() => Endpoint::BuiltIn.rig(&scene, scope)?,
             None => {
-                let temporary = tempfile::tempdir().map_err(|error| {
+                let temporary = tempfile::tempdir().map(Temporary::new).map_err(|error| {
                     let place = std::env::temp_dir();
                     let advice = "set TMPDIR to a folder that can be written to, or use --rig built-in";
                     Failure::run(format!(
@@ -128,7 +134,8 @@ impl ExperimentArguments {
         if let Some(recording) = &recording {
             open.rig = recording.rig(open.rig);
         }
-        Ok((scene, plan, Session { controller, rig: open, watch, recording, folder }))
+        let session = Session { controller, rig: open, watch, recording, folder, orderly };
+        Ok((scene, plan, session))
     }
 
     /// The plan of the experiment, with what the check of a rig that is not a simulation has measured. Refuses a rig that is not as expected.
@@ -169,7 +176,7 @@ impl ExperimentArguments {
         let json = self.json;
         let text = output(json, result, || format!("{text}\n"))?;
         Ok(Results::new(text, move || {
-            let Ended { folder, recorded, timing } = ended;
+            let Ended { folder, recorded, timing, .. } = ended;
             let mut written = Written::default();
             written.failures.extend(failure);
             written.add(files.and_then(|files| Ok(folder.replace(files)?)));
@@ -204,20 +211,32 @@ impl Session {
     ) -> Result<(T, Ended), Failure> {
         let mut samples = Vec::new();
         let result = measure(&mut samples, self.rig.rig.as_mut(), self.controller.as_mut());
+        // Before rig and controller are closed, which may not answer.
+        let kept = match &result {
+            Ok(_) => Default::default(),
+            Err(_) => keep(&self.folder, &samples, plan),
+        };
         drop(self.controller);
         let timing = self.rig.close();
         let recorded = self.recording.map_or(Ok(None), Recording::finish);
-        let ended = Ended { folder: self.folder, recorded, timing };
+        let ended = Ended {
+            _orderly: self.orderly,
+            folder: self.folder,
+            kept,
+            recorded,
+            timing,
+        };
         match result {
             Ok(result) => Ok((result, ended)),
             Err(error) => {
+                let runs_away = || advice::runs_away(&samples, plan).then_some(advice::Reason::WrongSign);
                 let reason = match error {
+                    // The orbits are those at the requested phase and drive.
+                    ExperimentError::OtherThanAsked { .. } => runs_away(),
                     ExperimentError::NoLock { .. }
                     | ExperimentError::NotReached { .. }
                     | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. } => {
-                        let runs_away = advice::runs_away(&samples, plan);
-                        let reason = runs_away.then_some(advice::Reason::WrongSign);
-                        reason.or_else(|| {
+                        runs_away().or_else(|| {
                             advice::reason(scene, &plan.knowledge.numbers, advice::last_regime(&samples, plan))
                         })
                     }
@@ -237,40 +256,27 @@ impl Session {
                 if let Some(watch) = &mut self.watch {
                     watch.failure = Some(failure.message.clone());
                 }
-                Err(ended.without_result(failure, reason, &samples, plan))
+                Err(ended.without_result(failure, reason))
             }
         }
     }
 }
 
 impl Ended {
-    /// The failure with its reason, and what was measured in a file.
-    pub(super) fn without_result(
-        self,
-        mut failure: Failure,
-        reason: Option<String>,
-        samples: &[Sample],
-        plan: &Plan,
-    ) -> Failure {
+    /// Writes what was measured, for a failure.
+    pub(super) fn keep(&mut self, samples: &[Sample], plan: &Plan) {
+        self.kept = keep(&self.folder, samples, plan);
+    }
+
+    /// The failure with its reason, and the files with what was measured.
+    pub(super) fn without_result(self, mut failure: Failure, reason: Option<String>) -> Failure {
         let mut lines = Vec::from_iter(reason);
-        let mut files = Vec::new();
+        let (mut files, said) = self.kept;
         match self.recorded {
             Ok(file) => files.extend(file),
             Err(error) => lines.push(error.to_string()),
         }
-        if !samples.is_empty() {
-            match self
-                .folder
-                .interrupt(INTERRUPTED_FILE, &table(samples, &plan.knowledge.target))
-            {
-                Ok((file, previous)) => {
-                    files.insert(0, file);
-                    let moved = |folder: PathBuf| format!("The results of an earlier run are in {}", folder.display());
-                    lines.extend(previous.map(moved));
-                }
-                Err(error) => lines.push(error.to_string()),
-            }
-        }
+        lines.extend(said);
         if !files.is_empty() {
             lines.push(written(&files).trim_end().into());
         }
@@ -278,5 +284,19 @@ impl Ended {
             failure.message += &format!("\n{line}");
         }
         failure
+    }
+}
+
+/// Writes what was measured to the file of a run without a result. Returns its path, and what to say about other files.
+fn keep(folder: &ResultFolder, samples: &[Sample], plan: &Plan) -> (Vec<PathBuf>, Vec<String>) {
+    if samples.is_empty() {
+        return Default::default();
+    }
+    match folder.interrupt(INTERRUPTED_FILE, &table(samples, &plan.knowledge.target)) {
+        Ok((file, previous)) => {
+            let moved = |folder: PathBuf| format!("The results of an earlier run are in {}", folder.display());
+            (vec![file], previous.map(moved).into_iter().collect())
+        }
+        Err(error) => (Vec::new(), vec![error.to_string()]),
     }
 }

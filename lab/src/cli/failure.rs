@@ -1,10 +1,7 @@
-//! How a command ends early: the failure with its message and exit code, and the signals Ctrl-C and SIGTERM.
+//! How a command ends early: the failure with its message and exit code.
 
 use std::fmt::Display;
 use std::io;
-use std::process;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
 
 use lovines::InvalidValue;
 use phase_lock::ConfigError;
@@ -22,7 +19,7 @@ use vines::{
     pack::PackError,
 };
 
-/// Exit code of a program that a signal ended: 128 and the number of SIGINT.
+/// Exit code of an experiment that a signal ended; that of the program is of the signal ([`super::signals`]).
 pub(super) const INTERRUPTED: u8 = 130;
 
 /// A message and an exit code.
@@ -135,6 +132,10 @@ impl From<LinkError> for Failure {
     }
 }
 
+/// What to do about a controller that does otherwise than asked.
+const ADVICE_AS_ASKED: &str = "; set phase and drive of the controller, or controller.phase_target and [excitation] of the scene, and check the gains \
+                               of the rig with `vines check`";
+
 impl From<ExperimentError> for Failure {
     fn from(error: ExperimentError) -> Self {
         let code = match &error {
@@ -144,6 +145,7 @@ impl From<ExperimentError> for Failure {
             _ => 1,
         };
         let advice = match error {
+            ExperimentError::OtherThanAsked { .. } => ADVICE_AS_ASKED,
             ExperimentError::Tripped { .. } => ". `vines check` looks for the cause",
             ExperimentError::NoLock { unmet: None, .. } => {
                 "; see phase_lock.acquire_timeout and the [controller] section"
@@ -160,27 +162,10 @@ impl From<ExperimentError> for Failure {
 impl From<IdentificationError> for Failure {
     fn from(error: IdentificationError) -> Self {
         let advice = match error {
+            IdentificationError::OtherThanAsked { .. } => ADVICE_AS_ASKED,
             IdentificationError::OffTarget { .. } => ": `vines check` measures its delay",
             _ => "",
         };
         Self::run(format!("{error}{advice}"))
     }
-}
-
-/// A flag that Ctrl-C and SIGTERM set: a driven rig stops, and the session ends before the program does. A second signal ends the program
-/// at once.
-pub(super) fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
-    static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
-    if let Some(flag) = FLAG.get() {
-        return Ok(Arc::clone(flag));
-    }
-    let flag = Arc::clone(FLAG.get_or_init(Arc::default));
-    let signal = Arc::clone(&flag);
-    ctrlc::set_handler(move || {
-        if signal.swap(true, Ordering::Relaxed) {
-            process::exit(INTERRUPTED.into());
-        }
-    })
-    .map_err(|error| Failure::run(format!("cannot wait for Ctrl-C: {error}")))?;
-    Ok(flag)
 }

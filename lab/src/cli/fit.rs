@@ -3,10 +3,11 @@
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
+use vines::ArgumentError;
 use vines::fit::{
     Candidate, Effect, EffectReport, Explanation, Fit, FitReport, FittedParameter, Found, Known, LeftOut,
     LinearVerdict, MeasuredPoint, Measurements, Part, Quantity, Selection, decimals, find,
@@ -19,7 +20,7 @@ use vines::table::Table;
 use super::failure::Failure;
 use super::options::{SceneArguments, positive};
 use super::output::{Results, Written, output, progress_bar, writable};
-use super::points::{Column, Measurement, read};
+use super::points::{Column, Measurement, Source, measurement};
 
 const HELP: &str = "\
 A point has the frequency of phase resonance f, the amplitude A of the response and the amplitude E of the base, each with its standard
@@ -27,8 +28,8 @@ uncertainty: a locked point of `vines identify` (identification.json), the point
 with the columns f_Hz, A_m, E_m, u_f_Hz, u_A_m and u_E_m, or others that --column names. Points that are not settled, or not symmetric
 1:1, are left out.
 
-A recording has two channels over time, the response and the base. Delimiter, decimal mark, encoding, names and units
-are found; a file of `vines` needs no options. A channel is NAME or NAME:UNIT, with a name or a number of a column, and a unit (mm, µm, mm/s,
+A recording has two channels over time, the response and the base. Delimiter, decimal mark, names and units are found;
+a file of `vines` needs no options. `python -m vines fit` has the same options, and reads other tables and formats. A channel is NAME or NAME:UNIT, with a name or a number of a column, and a unit (mm, µm, mm/s,
 m/s², g) or a multiple of it (-1g), the sensitivity of a sensor (100mV/g, 8V/mm, 125mm/s/V), or metres per unit. Velocities and accelerations
 become displacements harmonic by harmonic. Held stretches, slow sweeps and decays near phase resonance become points.
 The scene says what the sensor reads, and about which natural frequency and damping the structure has.
@@ -229,7 +230,11 @@ fn with_decimals(Estimate { value, uncertainty }: Estimate) -> String {
     format!("{value:.decimals$} ± {uncertainty:.decimals$}")
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
+/// `read` reads the files: the program plain tables and its own files, the Python package others as well.
+pub(super) fn run(
+    arguments: &Arguments,
+    read: &dyn Fn(&Path) -> Result<Source, ArgumentError>,
+) -> Result<Results, Failure> {
     let scene = arguments.scene.load()?;
     let modes = scene.structure.as_ref().map_or(1, |structure| structure.modes.len());
     writable([&arguments.figure, &arguments.out].into_iter().flatten())?;
@@ -243,7 +248,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let mut measured = Measurements { known: arguments.known.clone(), ..Measurements::default() };
     let (mut skipped, mut notes) = (0, Vec::new());
     for path in &arguments.points {
-        match read(path, &arguments.column, &selection).map_err(Failure::input)? {
+        let source = read(path).map_err(Failure::input)?;
+        match measurement(path, source, &arguments.column, &selection).map_err(Failure::input)? {
             Measurement::Points(points, left_out, linear) => {
                 measured.points.extend(points);
                 skipped += left_out;

@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         })
     });
     bar.finish_and_clear();
-    let (record, ended) = measured?;
+    let (record, mut ended) = measured?;
     let identification = match identify(&record, &plan) {
         Ok(identification) => identification,
         Err(error) => {
@@ -73,14 +73,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
                 _ => None,
             };
             let reason = reason.map(|reason| summary::not_locked(&reason, &scene));
-            return Err(ended.without_result(Failure::from(error), reason, &record.samples, &plan));
+            ended.keep(&record.samples, &plan);
+            return Err(ended.without_result(Failure::from(error), reason));
         }
     };
     let result = Comparison::of(&identification, &scene);
     let mut text = summary::identification(&result, &scene) + &summary::structure(&scene);
     let unstable = result
         .exact
-        .filter(|orbit| scene.structure.is_some() && !orbit.stable && !record.held);
+        .filter(|orbit| scene.structure.is_some() && orbit.is_unstable() && !record.held);
     if let Some(orbit) = unstable {
         text += &format!(
             "warning: the exact orbit there is unstable under a constant drive (largest multiplier {:.4}): the motion is modulated around it, or \
@@ -108,7 +109,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         }
         Ok(files)
     });
-    experiment.finish(ended, &result, &text, files, None)
+    let failures = summary::not_as_asked(&result, &scene).map(Failure::run);
+    experiment.finish(ended, &result, &text, files, Failure::first_of(failures.collect()))
 }
 
 fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {

@@ -14,8 +14,9 @@ use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
 use vines::scene::{Family, Implausible, Measurand, Names, Override, PAPER, Scene, SceneError};
 use vines::table::{Table, number};
 
-use super::failure::{Failure, stop_flag};
+use super::failure::Failure;
 use super::output::log_warnings;
+use super::signals::{reachable, stop_flag};
 use super::summary::ideal;
 
 #[derive(Debug, Clone, Args)]
@@ -87,9 +88,7 @@ impl SceneArguments {
     /// The text of the scene's file.
     fn text(&self) -> Result<Option<String>, SceneError> {
         let Some(path) = &self.scene else { return Ok(None) };
-        let text = std::fs::read_to_string(path);
-        text.map(Some)
-            .map_err(|source| SceneError::Read { path: path.clone(), source })
+        Scene::text(path).map(Some)
     }
 }
 
@@ -159,9 +158,12 @@ impl Endpoint {
             return Ok(String::new());
         };
         let connections = connections(file)?;
-        let [mut same, mut lacks] = [Vec::new(), Vec::new()];
+        let [mut same, mut lacks, mut kept] = [Vec::new(), Vec::new(), Vec::new()];
         let mut rows = Vec::new();
-        for Connection { ours, si, theirs, factor, .. } in &connections {
+        for Connection { ours, si, theirs, factor, keeps_its_start, .. } in &connections {
+            if *keeps_its_start {
+                kept.push(ours.as_str());
+            }
             match theirs {
                 None => lacks.push(ours.as_str()),
                 Some((name, unit))
@@ -176,7 +178,11 @@ impl Endpoint {
             }
         }
         let mut text = format!("Variables of the {role} {}\n", file.display());
-        for (what, names) in [("as on the bench", same), ("not there", lacks)] {
+        for (what, names) in [
+            ("as on the bench", same),
+            ("not there", lacks),
+            ("not set before the start, by their causality", kept),
+        ] {
             if !names.is_empty() {
                 text += &format!("  {what}: {}\n", names.join(", "));
             }
@@ -213,18 +219,20 @@ impl Endpoint {
         let (mut pace, mut timing) = (None, Arc::default());
         let rig: Box<dyn Rig> = match self {
             Self::BuiltIn => Simulated::without_chain(scene)?,
-            Self::Fmu(file) => Box::new(FmuRig::load(file, scene)?),
-            Self::Network(address) if address.starts_with("helic://") => Box::new(helic(address, scene, scope)?),
+            Self::Fmu(file) => reachable(FmuRig::load(file, scene)?, scene.sample_time()),
+            Self::Network(address) if address.starts_with("helic://") => {
+                reachable(helic(address, scene, scope)?, scene.sample_time())
+            }
             Self::Network(address) => {
                 let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time(), scope.key())?;
                 let rig = rig.with_sensors(scene.resonance)?;
                 pace = rig.pace();
                 timing = rig.timing();
-                Box::new(rig)
+                reachable(rig, scene.sample_time())
             }
         };
         let rig = Chain::around(rig, scene);
-        let rig = Box::new(Stoppable::around(rig, scene.sample_time(), &stop_flag()?));
+        let rig = Box::new(Stoppable::around(rig, scene.sample_time(), &stop_flag()));
         Ok(OpenRig { rig, pace, timing })
     }
 

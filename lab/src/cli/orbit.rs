@@ -13,7 +13,7 @@ use vines::orbit::{
     stable_resonant,
 };
 use vines::report::responses;
-use vines::survey::{detunings, structure_curves};
+use vines::survey::{DETUNINGS, detunings, structure_curves};
 use vines::table::{Table, number, row};
 use vines::{
     ArgumentError,
@@ -21,7 +21,7 @@ use vines::{
     scene::{Dimensionless, Scene},
 };
 
-use super::output::{Results, output, writable};
+use super::output::{Results, output, stability, writable};
 use super::summary::{self, parameters};
 use super::{
     failure::Failure,
@@ -32,7 +32,7 @@ const HELP: &str = "\
 Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon sigma:
   C            amplitude of the first harmonic of the response: of v = q1 + epsilon q2, or as resonance.sensor says
   B            speed of the particle in flight
-  multipliers  moduli of the multipliers of the half-period map: stable if all are below 1, neutral if the largest is 1
+  multipliers  moduli of the multipliers of the half-period map: stable if all are below 1, neutral if the largest is 1 within 1e-7
 
 With --backbone or --response, stable and unstable orbits are followed through folds and symmetry breaking; --json prints all of them.
 --response lists the components: all symmetric 1:1 orbits over the whole range, and the branches from symmetry breakings and period
@@ -106,7 +106,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let range = arguments
         .range
         .or_else(|| detunings(&loaded, &scene))
-        .unwrap_or([-6.0, 6.0]);
+        .unwrap_or(DETUNINGS);
     if arguments.backbone {
         let of_structure = structure_curves(&loaded, &scene, range, false);
         let curves = of_structure.unwrap_or_else(|| backbone(&scene, Some(range), POINTS));
@@ -158,7 +158,7 @@ fn of_a_structure(arguments: &Arguments, scene: &Scene, range: [f64; 2]) -> Resu
     Ok(Results::with_figure(text, json, figure, move || {
         let middle = [0.5 * (range[0] + range[1]), 0.0];
         let backbone = ExactCurve::of_scene(&scene, &numbers, middle);
-        let place = |orbit: &Orbit| ([orbit.sigma, orbit.c, orbit.b], orbit.stable);
+        let place = |orbit: &Orbit| ([orbit.sigma, orbit.c, orbit.b], !orbit.is_unstable());
         let curves = curves.iter().map(|curve| curve.points.iter().map(place).collect());
         responses(&numbers, curves, &backbone, range).svg()
     }))
@@ -197,7 +197,7 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Continuatio
     })?;
     let (figure, json, scene, range) = (arguments.figure.clone(), arguments.json, *scene, limits.sigma);
     Ok(Results::with_figure(text, json, figure, move || {
-        let place = |motion: &Periodic| ([motion.sigma, motion.c, motion.b], motion.stable);
+        let place = |motion: &Periodic| ([motion.sigma, motion.c, motion.b], !motion.is_unstable());
         let components = response.components.iter();
         let curves = components.map(|component| component.branch.points.iter().map(place).collect());
         responses(&scene, curves, &ExactCurve::of(&scene), range).svg()
@@ -285,7 +285,8 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
     } = motion;
     let (f_hz, sigma) = (omega / TAU, numbers.sigma(omega));
     let (a_m, phase_deg) = (response.norm(), response.arg().to_degrees());
-    let (roots, stable) = (motion.multipliers.map(|z| [z.re, z.im]), motion.is_stable());
+    let roots = motion.multipliers.map(|z| [z.re, z.im]);
+    let [stable, neutral] = [motion.is_stable(), motion.is_neutral()];
     let mut result = json!({
         "f_hz": f_hz,
         "sigma": sigma,
@@ -298,6 +299,7 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
         "sticks": sticks,
         "multipliers": roots,
         "stable": stable,
+        "neutral": neutral,
         "state": [q1, dq1, q2, dq2],
         "events": events.iter().map(|(phase_deg, event, side, velocity)| {
             json!({ "phase_deg": phase_deg, "event": event, "side": side, "velocity": velocity })
@@ -324,7 +326,11 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
              impacts {impacts}, at rest on a wall {rests}, sticking to the floor {sticks}\n  multipliers {}: {}\n{ideal}\n{}",
             if periods == 1 { "" } else { "s" },
             multipliers(roots),
-            if stable { "stable" } else { "unstable" },
+            match [stable, neutral] {
+                [true, _] => "stable",
+                [_, true] => "neutral",
+                _ => "unstable",
+            },
             table.text(),
         )
     })
@@ -377,37 +383,41 @@ fn described(pattern: &str, motion: &Periodic) -> String {
     )
 }
 
-/// Largest distance of a neutral multiplier from the unit circle, where every motion of a system without losses has one: rounding.
-const NEUTRAL: f64 = 1e-9;
-
-/// Whether a motion with this largest modulus of its multipliers is stable.
-fn stability(largest: f64) -> &'static str {
-    match largest {
-        _ if (largest - 1.0).abs() < NEUTRAL => "neutral",
-        _ if largest < 1.0 => "yes",
-        _ => "no",
-    }
-}
-
 /// A motion of a curve, as a line of a table.
 struct Place {
     numbers: [f64; 5],
     largest: f64,
+    stability: &'static str,
 }
 
 impl From<&Orbit> for Place {
     fn from(orbit: &Orbit) -> Self {
-        let Orbit { sigma, g, c, gamma, b, multipliers: [.., largest], .. } = *orbit;
-        Self { numbers: [sigma, g, c, gamma, b], largest }
+        let Orbit {
+            sigma,
+            g,
+            c,
+            gamma,
+            b,
+            multipliers: [.., largest],
+            stable,
+            neutral,
+            ..
+        } = *orbit;
+        Self {
+            numbers: [sigma, g, c, gamma, b],
+            largest,
+            stability: stability(stable, neutral),
+        }
     }
 }
 
 impl From<&Periodic> for Place {
     fn from(motion: &Periodic) -> Self {
-        let Periodic { sigma, g, c, gamma, b, .. } = *motion;
+        let Periodic { sigma, g, c, gamma, b, stable, neutral, .. } = *motion;
         Self {
             numbers: [sigma, g, c, gamma, b],
             largest: motion.moduli()[3],
+            stability: stability(stable, neutral),
         }
     }
 }
@@ -450,7 +460,7 @@ fn branch_text(name: &str, branch: &Branch) -> String {
 
 /// A curve: its ends, at most 24 of its orbits, its bifurcations.
 fn curve(name: &str, ends: &str, points: Vec<Place>, special: Vec<(Bifurcation, Place)>) -> String {
-    let count = |word: &str| points.iter().filter(|place| stability(place.largest) == word).count();
+    let count = |word: &str| points.iter().filter(|place| place.stability == word).count();
     let [stable, neutral] = ["yes", "neutral"].map(count);
     let neutral = if neutral > 0 {
         format!(" and {neutral} neutral")
@@ -463,9 +473,9 @@ fn curve(name: &str, ends: &str, points: Vec<Place>, special: Vec<(Bifurcation, 
         points.len()
     );
     let thinned = points.iter().step_by(points.len().div_ceil(24));
-    let rows = thinned.map(|Place { numbers: [sigma, g, c, gamma, b], largest }| {
+    let rows = thinned.map(|Place { numbers: [sigma, g, c, gamma, b], largest, stability }| {
         let numbers = [*sigma, *g, *c, gamma.to_degrees(), *b, *largest].map(number);
-        [numbers.to_vec(), vec![stability(*largest).into()]].concat()
+        [numbers.to_vec(), vec![(*stability).into()]].concat()
     });
     let table = Table::new("sigma | G | C | phase, degrees | B | largest mult. | stable");
     text += &table.rows(rows).text();
@@ -491,7 +501,7 @@ fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
         [
             &numbers.map(number)[..],
             &multipliers,
-            &[stability(orbit.multipliers[3]).into()],
+            &[stability(orbit.stable, orbit.neutral).into()],
         ]
         .concat()
     });

@@ -1,19 +1,34 @@
 //! What all commands print and write.
 
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::thread;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
+use tempfile::TempDir;
 use vines::ResultFolder;
+use vines::fmu::process::{self, Cleanup};
 
 use super::failure::Failure;
+use super::signals::Orderly;
+
+/// The program's own stdout: what FMUs print goes to stderr.
+static STDOUT: OnceLock<File> = OnceLock::new();
+
+/// Keeps stdout for [`print`], before any FMU is loaded.
+pub(super) fn keep_stdout() -> io::Result<()> {
+    let own = process::keep_stdout()?;
+    STDOUT.get_or_init(|| own);
+    Ok(())
+}
 
 /// Prints; a reader that closes early, such as `head`, is not a failure.
 pub(super) fn print(text: &str) -> Result<(), Failure> {
-    let mut out = io::stdout().lock();
+    let Some(mut out) = STDOUT.get() else { return Ok(()) };
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Failure::run(format!("cannot write the result: {error}")))
@@ -29,6 +44,15 @@ pub(super) fn output(as_json: bool, result: &impl Serialize, text: impl FnOnce()
             .map(|json| json + "\n")
             .map_err(|error| Failure::run(format!("cannot write JSON: {error}"))),
         false => Ok(text()),
+    }
+}
+
+/// Stability in a column `stable`.
+pub(super) fn stability(stable: bool, neutral: bool) -> &'static str {
+    match (stable, neutral) {
+        (true, _) => "yes",
+        (_, true) => "neutral",
+        _ => "no",
     }
 }
 
@@ -88,6 +112,8 @@ impl Results {
 
     /// Prints the text and the paths of the files, and returns the failures of all steps.
     pub(super) fn show(self) -> Result<(), Failure> {
+        // The files of a result are replaced together.
+        let _orderly = Orderly::new();
         let printed = print(&self.text);
         let Written { paths, mut failures } = (self.write)();
         if !paths.is_empty() {
@@ -95,6 +121,17 @@ impl Results {
         }
         failures.extend(printed.err());
         Failure::first_of(failures).map_or(Ok(()), Err)
+    }
+
+    /// What [`Self::show`] prints, and the failures of writing the files.
+    pub(super) fn texts(self) -> (String, Option<Failure>) {
+        let Written { paths, failures } = (self.write)();
+        let files = if paths.is_empty() {
+            String::new()
+        } else {
+            written(&paths)
+        };
+        (self.text + &files, Failure::first_of(failures))
     }
 
     /// The text, and the failures of writing the files.
@@ -125,6 +162,26 @@ pub(super) fn results(folder: &Path, names: &'static [&'static str]) -> Result<R
         };
         Failure::input(format!("{error}{advice}"))
     })
+}
+
+/// A temporary folder that is also removed if the program is ended from outside.
+pub(super) struct Temporary(PathBuf, #[expect(dead_code, reason = "removes it")] Cleanup);
+
+impl Temporary {
+    pub(super) fn new(folder: TempDir) -> Self {
+        let folder = folder.keep();
+        let path = std::path::absolute(&folder).unwrap_or(folder);
+        let removed = path.clone();
+        let cleanup = Cleanup::new(move || {
+            // Best effort: an empty folder does no harm.
+            let _ = std::fs::remove_dir_all(removed);
+        });
+        Self(path, cleanup)
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.0
+    }
 }
 
 /// Warnings go to stderr: warnings of connections, and what an FMU logs.

@@ -1,5 +1,5 @@
 //! Measurements in files: points of a backbone, from tables of any program (CSV) and from what `vines identify` and `vines backbone` write (CSV and
-//! JSON); and recordings, two channels over time (CSV; [`Table`] reads both).
+//! JSON); and recordings, two channels over time.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -9,7 +9,7 @@ use std::str::FromStr;
 use serde::Deserialize;
 use serde_json::Value;
 use vines::ArgumentError;
-use vines::fit::{MeasuredPoint, Recording, RecordingError, Selection, Table};
+use vines::fit::{Contents, MeasuredPoint, Recording, RecordingError, Selection, plain_table};
 use vines::identification::Regime;
 use vines::linear::MeasuredLinear;
 use vines::numerics::Estimate;
@@ -96,48 +96,65 @@ pub(super) enum Measurement {
     Recording(Recording),
 }
 
+/// What a file contains.
+#[derive(Debug)]
+pub enum Source {
+    /// Results of `vines` as JSON.
+    Json(Vec<u8>),
+    /// Columns of a table, or channels of another format.
+    Channels(Contents),
+}
+
+/// Reads JSON or a plain table. Other files are refused with the command that reads them.
+///
+/// # Errors
+/// A file that cannot be read, or is neither.
+pub(super) fn plain(path: &Path) -> Result<Source, ArgumentError> {
+    let file = path.display();
+    let python = |reason: &str| {
+        ArgumentError::from(format!(
+            "{reason}\n`python -m vines fit {file}` with the same options reads other tables, and MAT, HDF5, TDMS, UFF58 and LVM; install it with \
+             `pip install './python[io]'`"
+        ))
+    };
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    if PYTHON.contains(&&*extension) {
+        return Err(python(&format!("{file}: this program reads recordings as plain CSV")));
+    }
+    let bytes = std::fs::read(path).map_err(|error| cannot_read(path, error))?;
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+    if text.trim_ascii_start().starts_with(b"{") {
+        return Ok(Source::Json(text.into()));
+    }
+    let table = plain_table(&file.to_string(), &bytes);
+    table.map(Source::Channels).map_err(|error| python(&error.to_string()))
+}
+
 /// What is measured in a file: points if it has one of their columns or `columns` names some, otherwise a recording.
 ///
 /// # Errors
-/// A file that cannot be read, without one of the columns, or with a value that is not a number.
-pub(super) fn read(path: &Path, columns: &[Column], selection: &Selection) -> Result<Measurement, ArgumentError> {
-    let file = path.display();
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    if PYTHON.contains(&&*extension) {
-        return Err(format!(
-            "{file}: this program reads recordings as CSV. `python -m vines fit {file}` with the same options reads MAT, HDF5, TDMS, UFF58 and LVM; \
-             install it with `pip install './python[io]'`"
-        )
-        .into());
-    }
+/// A file without one of the columns, or with a value that is not a number.
+pub(super) fn measurement(
+    path: &Path,
+    source: Source,
+    columns: &[Column],
+    selection: &Selection,
+) -> Result<Measurement, ArgumentError> {
     let refused = |error: RecordingError| ArgumentError::from(error.to_string());
-    let bytes = std::fs::read(path).map_err(|error| cannot_read(path, error))?;
-    if bytes.trim_ascii_start().starts_with(b"{") {
-        let value: Value = serde_json::from_slice(&bytes).map_err(|error| cannot_read(path, error))?;
-        let linear = value
-            .get("linear")
-            .and_then(|linear| MeasuredLinear::deserialize(linear).ok());
-        // A loop check has no points.
-        let rows = objects(&value).or(linear.map(|_| Vec::new())).ok_or_else(|| {
-            format!(
-                "{file} has neither a locked point (`lock`) nor `points` nor a linear response (`linear`): expected identification.json, \
-                 tracked.json, the JSON of `vines check`, or a table (CSV)"
-            )
-        })?;
-        return points(path, &rows, columns, linear, |_| "");
-    }
-    let table = Table::parse(&file.to_string(), &bytes).map_err(refused)?;
+    let contents = match source {
+        Source::Channels(contents) => contents,
+        Source::Json(bytes) => return of_json(path, &bytes, columns),
+    };
     let is_named = selection.response.is_some() || selection.drive.is_some();
-    let has_points = !columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| table.unit(name).is_some());
+    let has_points = !columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| contents.unit(name).is_some());
     if has_points && !is_named {
         let row = |row: Vec<(&str, String)>| row.into_iter().map(|(name, cell)| (name.to_string(), cell)).collect();
-        let rows: Vec<Row> = table.rows().map(row).collect();
+        let rows: Vec<Row> = contents.rows().map(row).collect();
         return points(path, &rows, columns, rows.first().and_then(linear_of), |column| {
-            table.unit(column).unwrap_or_default()
+            contents.unit(column).unwrap_or_default()
         });
     }
-    let contents = table.contents();
-    if !is_named && table.unit("response").is_none() {
+    if !is_named && contents.unit("response").is_none() {
         let names = COLUMNS.map(|(_, name, _)| name).join(", ");
         return Err(refused(contents.refused(&format!(
             " has neither the channels of a recording nor columns of points ({names}). Name the channels with --response NAME:UNIT and --drive \
@@ -147,8 +164,25 @@ pub(super) fn read(path: &Path, columns: &[Column], selection: &Selection) -> Re
     Ok(Measurement::Recording(contents.recording(selection).map_err(refused)?))
 }
 
+/// Points in what `vines identify`, `backbone` and `check` write as JSON.
+fn of_json(path: &Path, bytes: &[u8], columns: &[Column]) -> Result<Measurement, ArgumentError> {
+    let file = path.display();
+    let value: Value = serde_json::from_slice(bytes).map_err(|error| cannot_read(path, error))?;
+    let linear = value
+        .get("linear")
+        .and_then(|linear| MeasuredLinear::deserialize(linear).ok());
+    // A loop check has no points.
+    let rows = objects(&value).or(linear.map(|_| Vec::new())).ok_or_else(|| {
+        format!(
+            "{file} has neither a locked point (`lock`) nor `points` nor a linear response (`linear`): expected identification.json, tracked.json, \
+             the JSON of `vines check`, or a table (CSV)"
+        )
+    })?;
+    points(path, &rows, columns, linear, |_| "")
+}
+
 /// Formats that the Python package reads.
-const PYTHON: [&str; 9] = ["mat", "h5", "hdf5", "hdf", "tdms", "uff", "unv", "uf", "lvm"];
+const PYTHON: [&str; 10] = ["mat", "h5", "hdf5", "hdf", "nc", "tdms", "uff", "unv", "uf", "lvm"];
 
 fn cannot_read(path: &Path, reason: impl Display) -> ArgumentError {
     format!("cannot read {}: {reason}", path.display()).into()

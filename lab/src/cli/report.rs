@@ -10,13 +10,10 @@ use vines::rig::BuiltIn;
 use vines::scene::Scene;
 
 use super::experiment::INTERRUPTED_FILE;
-use super::output::{results, written};
+use super::output::{Temporary, results, written};
 use super::summary::{ideal, parameters};
 use super::{Cli, dispatch};
-use super::{
-    failure::{Failure, INTERRUPTED},
-    options::SceneArguments,
-};
+use super::{failure::Failure, options::SceneArguments, signals};
 
 const HELP: &str = "\
 Runs `vines identify`, `backbone`, `theory`, `orbit --response`, `map` and `fit` on one scene, and writes report.html beside their files:
@@ -129,7 +126,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     BuiltIn::new(&scene.controller_config())?;
     let folder = results(&arguments.out, &FILES)?;
     // The files of all commands are put in place together.
-    let new = tempfile::Builder::new().prefix(".vines-").tempdir_in(&arguments.out)?;
+    let new = Temporary::new(tempfile::Builder::new().prefix(".vines-").tempdir_in(&arguments.out)?);
     let mut failed = Vec::new();
     let mut sections = Vec::new();
     for section in SECTIONS {
@@ -149,7 +146,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             Err(failure) => (String::new(), Some(failure)),
         };
         if let Some(failure) = failure {
-            if failure.code == INTERRUPTED {
+            if signals::arrived().is_some() {
                 return Err(failure);
             }
             failed.push(title);

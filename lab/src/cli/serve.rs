@@ -1,7 +1,9 @@
 //! Servers: `vines rig`, the plant at a network address, and `vines controller`, the phase-locked loop.
 
+use std::cell::Cell;
+use std::rc::Rc;
 use std::str::FromStr;
-use std::sync::{Arc, atomic::Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
@@ -12,9 +14,10 @@ use vines::net::{Address, LinkError, Role, Served, Server, ServerError, Service,
 use vines::rig::{BuiltIn, Rig, RigError, RigFault, SensorsOnly, Simulated, faulty};
 use vines::scene::Measurand;
 
-use super::failure::{Failure, stop_flag};
+use super::failure::Failure;
 use super::options::{Endpoint, ReachArguments, SceneArguments, no_key, positive};
 use super::output::print;
+use super::signals::{Orderly, reachable, stop_flag};
 use super::watch::WatchArguments;
 
 const RIG_HELP: &str = "\
@@ -177,7 +180,7 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
     let watch = arguments.watch.start("vines rig", &scene)?;
     let make = || -> Result<Box<dyn Rig>, RigError> {
         let rig: Box<dyn Rig> = match (&arguments.rig, arguments.fault) {
-            (Endpoint::Fmu(file), _) => Box::new(FmuRig::load(file, &scene)?),
+            (Endpoint::Fmu(file), _) => reachable(FmuRig::load(file, &scene)?, scene.sample_time()),
             (_, Some(Fault { kind, seconds })) => {
                 Box::new(faulty(&scene, kind, seconds, move |zero| print_reaction(zero, json))?)
             }
@@ -301,13 +304,16 @@ impl ServingArguments {
         what: &str,
         serve: impl FnOnce(&mut dyn FnMut() -> bool, &mut dyn FnMut(&Session)) -> Result<(), ServerError>,
     ) -> Result<String, Failure> {
-        let stop = stop_flag()?;
+        let _orderly = Orderly::new();
+        let stop = stop_flag();
         print(&format!("{what}\n"))?;
-        let enough = Arc::clone(&stop);
+        let enough = Rc::new(Cell::new(false));
+        let is_enough = Rc::clone(&enough);
         let end = self
             .duration
             .map(|seconds| Instant::now() + Duration::from_secs_f64(seconds));
-        let mut stop = move || stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end);
+        let mut stop =
+            move || stop.load(Ordering::Relaxed) || is_enough.get() || end.is_some_and(|end| Instant::now() >= end);
         let (json, sessions, mut served) = (self.json, self.sessions, 0);
         let mut report_session = move |session: &Session| {
             let text = match json {
@@ -318,7 +324,7 @@ impl ServingArguments {
             let _ = print(&text);
             served += 1;
             if sessions == Some(served) {
-                enough.store(true, Ordering::Relaxed);
+                enough.set(true);
             }
         };
         serve(&mut stop, &mut report_session).map_err(Failure::run)?;

@@ -10,7 +10,7 @@ use vines::scene::{Scene, Structure};
 use vines::survey::Survey;
 use vines::table::{Table, number};
 
-use super::output::{Results, output, writable};
+use super::output::{Results, output, progress_bar, stability, writable};
 use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
@@ -20,7 +20,7 @@ The first table has the modes:
   influence   what the mode adds to the conditions of impact, over what the driven mode alone has; far below 1 it leaves the motion, though
               not always its stability, as it is
 The second table has all exact symmetric 1:1 orbits at phase resonance under the scene's drive. The third has the stretches of the backbone
-that are stable, with the driven mode alone and with all modes, and the mode that carries the disturbance at each end. Warnings name the ends at
+that are stable or neutral, with the driven mode alone and with all modes, and the mode that carries the disturbance at each end. Warnings name the ends at
 which it is not the driven one.
 
 Examples:
@@ -48,8 +48,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let scene = arguments.scene.load()?;
     let no_structure = || Failure::input("the scene has no [structure]: its host is one oscillator, see `vines orbit`");
     let structure = scene.structure.as_ref().ok_or_else(no_structure)?;
-    let survey =
-        Survey::of(&scene).ok_or_else(|| Failure::run("the exact orbits have no closed form at this frequency"))?;
+    let bar = progress_bar(Survey::ORBITS as u64, "computing the backbone", "orbits");
+    let survey = Survey::with(&scene, &|| {
+        bar.inc(1);
+        if bar.position() > bar.length().unwrap_or(0) {
+            bar.inc_length(Survey::ORBITS as u64);
+        }
+    });
+    bar.finish_and_clear();
+    let survey = survey.ok_or_else(|| Failure::run("the exact orbits have no closed form at this frequency"))?;
     let result = json!({ "structure": structure, "survey": survey });
     let text = output(arguments.json, &result, || described(&scene, structure, &survey))?;
     let (figure, json, scene) = (arguments.figure.clone(), arguments.json, scene.clone());
@@ -127,7 +134,7 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
     };
     text += "\nStable stretches of the backbone, with the driven mode alone and with all modes, and what ends them\n";
     let [alone, all] = [("driven", &survey.facts.alone), ("all", &survey.facts.all)].map(|(modes, branches)| {
-        let stretches = branches.iter().flat_map(StructureBranch::stable);
+        let stretches = branches.iter().flat_map(StructureBranch::stretches);
         stretches
             .map(|(run, ends)| stretch(modes, run, ends, b))
             .collect::<Vec<_>>()
@@ -186,6 +193,11 @@ fn words(kind: Bifurcation) -> &'static str {
 
 /// A stretch of stable orbits, from its smaller to its larger C.
 fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>; 2], b: f64) -> Vec<String> {
+    let modes = if run[0].neutral {
+        format!("{modes}, neutral")
+    } else {
+        modes.into()
+    };
     let mut ends = [(&run[0], ends[0]), (&run[run.len() - 1], ends[1])]
         .map(|(orbit, change)| (change.map_or(orbit, |change| &change.orbit), change));
     ends.sort_by(|one, other| one.0.response.total_cmp(&other.0.response));
@@ -203,7 +215,7 @@ fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>;
     };
     let [lower, upper] = ends.map(|(_, change)| reason(change));
     vec![
-        modes.into(),
+        modes,
         between(|orbit| orbit.response, b),
         between(|orbit| orbit.omega, TAU),
         drives.join(" to "),
@@ -216,6 +228,6 @@ fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>;
 fn row(orbit: &StructureOrbit, b: f64) -> Vec<String> {
     let [response, drive] = [orbit.response, orbit.drive].map(|value| format!("{value:.4e}"));
     let [hertz, c, growth] = [orbit.omega / TAU, orbit.response / b, orbit.growth()].map(number);
-    let stable = if orbit.stable { "yes" } else { "no" };
+    let stable = stability(orbit.stable, orbit.neutral);
     vec![hertz, response, c, drive, growth, stable.into()]
 }

@@ -181,24 +181,32 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let [(of_response, m), (of_drive, unit)] = units.names;
     let b = lock.b.zip(lock.u_b).map_or("-".into(), |(b, u)| with_uncertainty(b, u));
     let [sigma, c] = [(at.sigma, at.u_sigma), (at.c, at.u_c)].map(|(value, u)| with_uncertainty(value, u));
+    let g = with_uncertainty(at.g, at.u_g);
     let measured = ["measured at the lock".to_string(), sigma, c, b];
-    let exact = result
-        .exact
-        .map(|orbit| row("exact orbit", [orbit.sigma, orbit.c, orbit.b]));
+    let exact = result.exact.map(|orbit| {
+        let Orbit { sigma, c, b, .. } = orbit;
+        row("exact orbit", [sigma, c, b])
+    });
     let name = match result.curve.is_of_structure {
         true => "driven mode alone, first order",
         false => "theory, first order",
     };
     let theory = result.theory.map(|point| row(name, [point.sigma, point.c, point.b]));
     let table = Table::new(" | sigma | C | B").rows([measured]).rows(exact).rows(theory);
+    let behind_shaker = scene
+        .structure
+        .as_ref()
+        .is_some_and(|structure| structure.shaker.is_some());
     let held = match lock.held {
+        // A constant command is no constant force.
+        true if behind_shaker => " (the response is held by control, as always behind a shaker)",
         true => " (the response is held by control: a constant drive holds it hardly, or not)",
         false => "",
     };
     let mut text = format!(
         "Measured: {hertz} Hz, {of_response} {response} {m}, {of_drive} {drive} {unit}\n{}, G = {}\nLocked after {:.0} periods{held}: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}",
         rig(&result.parameters),
-        with_uncertainty(at.g, at.u_g),
+        g,
         lock.periods_to_lock,
         lock.regime,
         lock.impacts(),
@@ -207,6 +215,11 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
         table.text(),
     );
     text += SYMBOLS;
+    if let Some(Orbit { g, .. }) = result.exact {
+        text += &format!(
+            "  (the exact orbit has the measured C, and the drive G = {g:.6}; theory is at the requested G)\n"
+        );
+    }
     let mut note = |note: &str| text += &format!("  ({note})\n");
     note(&format!(
         "stability: over {} periods a disturbance would show that grows by {:.1} % per period or more; slower growth is not excluded",
@@ -232,24 +245,18 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
             "{tone}: more than the particle can cause, so it is no part of the motion; check the cable of the sensor"
         ));
     }
-    let smallest = result.curve.places().iter().map(|[.., g]| *g).reduce(f64::min);
+    let smallest = result.curve.places().iter().map(|[_, _, g, _]| *g).reduce(f64::min);
     if let Some(smallest) = smallest.filter(|g| (at.g - g).abs() < SIGNIFICANT * at.u_g) {
         note(&format!(
             "the drive lies at the fold within its uncertainty: the smallest of the exact backbone is G = {smallest:.6}"
         ));
     }
-    // The polygon of a structure is not fine enough.
-    let is_fine = result.exact.is_some() && !result.curve.is_of_structure;
-    let there = result.curve.distance(at.c, at.sigma, at.g).filter(|_| is_fine);
-    let there = there.and_then(|there| there.sigma.zip(there.g)).map(|(sigma, g)| {
-        let (sigma, g) = (at.sigma - sigma, at.g - g);
-        format!("at the measured C, the exact backbone has sigma = {sigma:.6}, G = {g:.6}")
-    });
     let asked = result.parameters.g;
-    let is_another = (at.g - asked).abs() > SIGNIFICANT * at.u_g;
-    let asked = is_another.then(|| format!("G = {asked} was asked for"));
-    if there.is_some() || asked.is_some() {
-        note(&[there, asked].into_iter().flatten().collect::<Vec<String>>().join("; "));
+    if (at.g - asked).abs() > SIGNIFICANT * at.u_g {
+        note(&format!("G = {asked} was asked for"));
+    }
+    if result.exact.is_none() && !result.orbits.is_empty() {
+        note("no exact orbit has the measured C");
     }
     for orbit in result.others() {
         note(&format!(
@@ -257,8 +264,8 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
             orbit.sigma, orbit.c, orbit.b
         ));
     }
-    if result.exact.as_ref().is_some_and(|exact| !exact.stable) {
-        note("the nearest exact orbit is unstable under a constant drive and frequency; the loop holds it");
+    if result.exact.as_ref().is_some_and(Orbit::is_unstable) {
+        note("the exact orbit is unstable under a constant drive and frequency; the loop holds it");
     }
     format!("{text}\n{}\n{}\n", decay(result), agreement(result))
 }
@@ -283,6 +290,31 @@ pub(super) fn structure(scene: &Scene) -> String {
     )
 }
 
+/// In what the result is not the requested one.
+pub(super) fn not_as_asked(result: &Comparison, scene: &Scene) -> impl Iterator<Item = String> {
+    let lock = &result.lock;
+    let Units { factors: [_, factor], names: [_, (of_drive, unit)] } = Units::of(scene);
+    let ratio = lock.at.e_m / lock.requested_e_m;
+    let another = (!lock.at_requested_drive).then(|| {
+        format!(
+            "the result is at another drive than the requested one: {of_drive} {:.5e} ± {:.1e} {unit}, {ratio:.4} times the requested {:.5e} {unit}",
+            lock.at.e_m * factor,
+            lock.at.u_e_m * factor,
+            lock.requested_e_m * factor
+        )
+    });
+    let moves = result.base_after_release.map(|[base, u]| {
+        format!(
+            "there is no free decay: the drive was released, but the {of_drive} goes on with the drive's frequency, with at least {:.2e} ± {:.1e} {unit}, \
+             {:.1e} times the requested drive",
+            base * factor,
+            u * factor,
+            base / lock.requested_e_m
+        )
+    });
+    [another, moves].into_iter().flatten()
+}
+
 /// What friction did, as a sentence.
 pub(super) fn friction_text(friction: &Friction) -> String {
     let Friction { sticks_per_period, stuck_time, loss } = friction;
@@ -299,6 +331,7 @@ fn decay(result: &Comparison) -> String {
         DecayEnd::Synchrony => "where the impacts lose synchrony",
         DecayEnd::Linear => "where the impacts end",
         DecayEnd::Record => "where the record ends; a larger record.decay_periods shows more",
+        DecayEnd::Driven => return "Free decay: no points, because the base goes on moving after the release".into(),
         DecayEnd::OtherMode => {
             return "Free decay: no points, because another mode moves freely after the release, too near the driven one to be told apart. Behind a \
                     shaker, short its coil (amplifier = \"voltage\"), or cut the stinger (release = \"cut\")"

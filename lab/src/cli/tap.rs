@@ -6,7 +6,13 @@ use vines::rig::{Command, Drive, GroundTruth, Rig, RigError, RigStage, Sensors};
 /// Before the first sample.
 pub(super) fn no_sample() -> Sample {
     let (sensors, command) = (Sensors::default(), Command::default());
-    Sample { time: 0.0, sensors, command, ground_truth: None }
+    Sample {
+        time: 0.0,
+        sensors,
+        command,
+        ground_truth: None,
+        shaker_command: 0.0,
+    }
 }
 
 /// A rig whose samples are shown to a function, each with the time to the next one, s.

@@ -208,7 +208,7 @@ impl View {
     /// The row of a sample.
     fn row(&mut self, now: Numbered) -> Row {
         let Numbered { sample, step, .. } = now;
-        let Sample { time, sensors, command, ground_truth } = sample;
+        let Sample { time, sensors, command, ground_truth, .. } = sample;
         let (drive, before) = (command.drive, self.last.sample.command.drive);
         let [driven, was_driven] = [drive, before].map(|drive| drive.amplitude != 0.0 || drive.displacement != 0.0);
         let follows = now.number == self.last.number + 1;
@@ -305,7 +305,7 @@ fn particle_in_response(scene: &Scene) -> Option<f64> {
     }
 }
 
-/// Points (sigma, C, 1 if stable, G) of the exact backbone; not-a-number between two curves.
+/// Points (sigma, C, 0 if unstable, G) of the exact backbone; not-a-number between two curves.
 fn exact(scene: &Scene) -> Vec<[f64; 4]> {
     let d = scene.dimensionless();
     let Some(branches) = structure_backbone(scene, &d) else {
@@ -315,7 +315,7 @@ fn exact(scene: &Scene) -> Vec<[f64; 4]> {
     let points = branches.iter().flat_map(|branch| {
         let points = branch
             .iter()
-            .map(|orbit| [orbit.sigma, orbit.c, f64::from(u8::from(orbit.stable)), orbit.g]);
+            .map(|orbit| [orbit.sigma, orbit.c, f64::from(u8::from(!orbit.is_unstable())), orbit.g]);
         points.chain([gap])
     });
     points.collect()

@@ -234,7 +234,7 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
     let expected = exact
         .places()
         .iter()
-        .map(|[c, sigma, _]| (1e3 * c * p.b, (p.omega0 + p.omega_change(*sigma)) / TAU));
+        .map(|[c, sigma, ..]| (1e3 * c * p.b, (p.omega0 + p.omega_change(*sigma)) / TAU));
     let expected: Vec<Place> = expected
         .filter(|(amplitude, _)| (x.0..x.1).contains(amplitude))
         .collect();
@@ -405,7 +405,7 @@ pub fn structure(scene: &Scene, survey: &Survey) -> Option<Figure> {
     let d = scene.dimensionless();
     let unit = scene.structure.as_ref()?.reading_per_response().abs() * d.b;
     let curves = |branches: &[StructureBranch]| -> Vec<Vec<Marked>> {
-        let place = |orbit: &StructureOrbit| ((d.sigma(orbit.omega), orbit.response / unit), orbit.stable);
+        let place = |orbit: &StructureOrbit| ((d.sigma(orbit.omega), orbit.response / unit), !orbit.is_unstable());
         branches
             .iter()
             .map(|branch| branch.orbits.iter().map(place).collect())

@@ -111,14 +111,16 @@ fn decay_csv(result: &Comparison) -> Result<String, ReportError> {
 fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
     let headings = "f_Hz,A_m,E_m,u_f_Hz,u_A_m,u_E_m,sigma,C,G,phase_error_deg,u_sigma,u_C,u_G,u_phase_deg,level,periods,averaged,settled,\
                     reached,regime,regime_by_impacts,tone_Hz,tone_share,distance,sigma_less_exact,G_less_exact";
+    let is_forced = result.points.iter().any(|compared| compared.point.at.f_n.is_some());
+    let headings = match is_forced {
+        true => headings.replace("u_E_m,", "u_E_m,F_N,u_F_N,"),
+        false => headings.into(),
+    };
     let mut headings = format!("{headings},{}", MeasuredLinear::COLUMNS.join(","));
-    let is_shaken = result
-        .points
-        .iter()
-        .any(|compared| compared.point.drive_harmonics.is_some());
+    let is_shaken = result.points.iter().any(|compared| compared.point.command_v.is_some());
     if is_shaken {
         headings += &(2..8).map(|n| format!(",drive_{n}")).collect::<String>();
-        headings += ",clipped_percent";
+        headings += ",clipped_percent,command_V";
     }
     let numbers = |one: MeasuredLinear| [one.f0, one.u_f0, one.zeta, one.u_zeta, one.correlation];
     let linear = result.linear.map_or([None; 5], |one| numbers(one).map(Some));
@@ -129,7 +131,7 @@ fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
         let exact = exact.map_or((None, None, None), |exact| (Some(exact.nearest), exact.sigma, exact.g));
         let regime = (point.regime, point.regime_by_impacts);
         let harmonics = point.drive_harmonics.map(|values| values.map(Some)).unwrap_or_default();
-        let clipped = [point.clipped_percent];
+        let clipped = [point.clipped_percent, point.command_v];
         let of_shaker = harmonics.into_iter().chain(clipped).filter(|_| is_shaken);
         (
             point.at,

@@ -3,40 +3,14 @@
 use std::f64::consts::FRAC_PI_4;
 
 use vines_model::numerics::range;
-use vines_model::orbit::{Orbit, exact_backbone};
+use vines_model::orbit::Orbit;
 use vines_model::regime::Regime;
 
 use crate::identification::{Cycle, classify};
 use crate::plan::Plan;
 use crate::record::Sample;
 use crate::scene::{Dimensionless, Measurand, Scene};
-use crate::survey::{phase_resonant, structure_backbone};
-
-/// Detunings at which the backbone is searched for stable orbits, and their distance.
-const SEARCHED: [f64; 2] = [-6.0, 3.0];
-const STEP: f64 = 0.005;
-
-/// The stable symmetric 1:1 orbits of a scene at phase resonance, at any drive; `d` has the numbers of its oscillator or driven mode.
-pub fn stable_orbits_of(scene: &Scene, d: &Dimensionless) -> Vec<Orbit> {
-    let of_structure = structure_backbone(scene, d).map(|curves| curves.into_iter().flatten());
-    of_structure.map_or_else(
-        || stable_orbits(d),
-        |orbits| orbits.filter(|orbit| orbit.stable).collect(),
-    )
-}
-
-/// The stable symmetric 1:1 orbits at phase resonance, at any drive, by rising detuning.
-pub fn stable_orbits(d: &Dimensionless) -> Vec<Orbit> {
-    let steps = ((SEARCHED[1] - SEARCHED[0]) / STEP) as i32;
-    let omega = |n: i32| 1.0 + d.epsilon * (SEARCHED[0] + STEP * f64::from(n));
-    let orbits = (0..=steps).flat_map(|n| exact_backbone(d, omega(n)));
-    orbits.filter(|orbit| orbit.stable).collect()
-}
-
-/// The range of drives, base amplitude over `b epsilon`, with a stable symmetric 1:1 orbit at phase resonance; there may be gaps in it.
-pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
-    drives(&stable_orbits(d))
-}
+use crate::survey::{phase_resonant, stable_backbone};
 
 /// The smallest and the largest drive of orbits.
 fn drives(orbits: &[Orbit]) -> Option<[f64; 2]> {
@@ -52,7 +26,7 @@ pub enum Reason {
     WrongSign,
     /// The first impacts are of a particle that moves at the start ([`is_hit_at_once`]).
     HitAtOnce,
-    /// No orbit at the drive `g` is stable; the range of drives is that of [`stable_range`].
+    /// No orbit at the drive `g` is stable; on the exact backbone they are stable for drives in a range, in which there may be gaps.
     Unstable { g: f64, range: Option<[f64; 2]> },
     /// The controller may not set the frequency of any of these stable orbits.
     Excluded { stable: Vec<Orbit> },
@@ -115,7 +89,7 @@ pub fn reason(scene: &Scene, d: &Dimensionless, regime: Option<Regime>) -> Optio
     let mut stable = phase_resonant(scene, d);
     stable.retain(|orbit| orbit.stable);
     if stable.is_empty() {
-        return Some(Reason::Unstable { g: d.g, range: drives(&stable_orbits_of(scene, d)) });
+        return Some(Reason::Unstable { g: d.g, range: drives(&stable_backbone(scene, d)) });
     }
     let allowed = scene.controller.omega_min..=scene.controller.omega_max;
     if !stable.iter().any(|orbit| allowed.contains(&orbit.omega)) {
@@ -167,7 +141,7 @@ mod tests {
                     time: n as f64 * plan.knowledge.sample_time,
                     sensors,
                     command: Command { drive, ..Command::default() },
-                    ground_truth: None,
+                    ..Sample::default()
                 }
             };
             let samples: Vec<Sample> = (0..plan.knowledge.samples(300.0)).map(&mut sample).collect();

@@ -13,11 +13,11 @@ use vines_model::numerics::Estimate;
 use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stage};
 use crate::identification::{
     Criterion, Cycle, LONGEST, LevelEstimate, Regime, ResonancePoint, Tone, Unsteady, classify, drive_harmonics,
-    foreign_tone, regime_by_response,
+    foreign_tone, is_off_target, mean_command, regime_by_response,
 };
 use crate::plan::{Knowledge, Plan};
 use crate::record::Sample;
-use crate::rig::{Controller, Move, OFF, Rig};
+use crate::rig::{Controller, HALVED, Move, Rig};
 
 /// One point of the backbone.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -52,6 +52,9 @@ pub struct LevelPoint {
     /// Share of the samples of the move to this level and at it with the command at the limit of the shaker's amplifier, per cent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clipped_percent: Option<f64>,
+    /// Mean amplitude of the command of a shaker over the averaged periods, V.
+    #[serde(rename = "command_V", skip_serializing_if = "Option::is_none")]
+    pub command_v: Option<f64>,
 }
 
 impl LevelPoint {
@@ -61,6 +64,12 @@ impl LevelPoint {
         Some(match self.regime {
             _ if self.settled => return None,
             _ if !self.reached => "the response does not reach the level".into(),
+            _ if is_off_target(self.at.phase_error_deg.to_radians(), self.at.u_phase_deg.to_radians()) => {
+                format!(
+                    "the phase is {:+.2} degrees off controller.phase_target",
+                    self.at.phase_error_deg
+                )
+            }
             Regime::Other => "the motion is irregular".into(),
             Regime::Asymmetric if is_symmetric => "the motion is asymmetric".into(),
             _ => match self.unsteady {
@@ -288,7 +297,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             .plan
             .knowledge
             .shaker()
-            .map_or(0.0, |path| 2.0 * OFF / (TAU * path.speed));
+            .map_or(0.0, |path| 2.0 * HALVED / (TAU * path.speed));
         let periods = MOVE.max(2.0 * slowest) + late;
         let expected = extrapolated(&self.states, level);
         let [amplitude, omega] = expected.map_or([0.0; 2], |there| [there[0] - drive, there[1] - omega]);
@@ -322,7 +331,10 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let reached = is_reached(estimate.response, level);
         let [stated_base, stated_omega] = estimate.stated();
         LevelPoint {
-            at: ResonancePoint::new([estimate.response, stated_base, stated_omega, estimate.phase_error], &d),
+            at: ResonancePoint::new(
+                [estimate.response, stated_base, stated_omega, estimate.phase_error],
+                knowledge,
+            ),
             // The level as a person would write it.
             level: (1e9 * level / d.b).round() / 1e9,
             periods: self.run.periods - start,
@@ -344,6 +356,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
                 .shaker()
                 .and_then(|_| drive_harmonics(averaged, knowledge, omega.value)),
             clipped_percent: None,
+            command_v: mean_command(averaged, knowledge),
         }
     }
 

@@ -15,7 +15,7 @@ use crate::plan::Plan;
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Drive, Rig, Scaled, Simulated};
 use crate::scene::{Dimensionless, Scene};
-use crate::survey::{phase_resonant, structure_backbone};
+use crate::survey::{ExactOrbits, phase_resonant, structure_backbone};
 
 /// Amplitudes above which the decay is compared with theory, C.
 ///
@@ -40,14 +40,17 @@ pub struct Comparison {
     /// First-order theory at the same G: the stable solution nearest to the lock; absent if the phase target is not
     /// phase resonance.
     pub theory: Option<BackbonePoint>,
-    /// The exact phase-resonant orbit at the same G nearest to the lock; absent if the phase target is not phase resonance.
+    /// The exact phase-resonant orbit with the C of the lock; absent if there is none, and if the phase target is not phase resonance.
     pub exact: Option<Orbit>,
-    /// All exact phase-resonant orbits at the same G, by rising C; the lock followed `exact`.
+    /// All exact phase-resonant orbits at the same G, by rising C; the lock followed the nearest one.
     pub orbits: Vec<Orbit>,
     /// The decay, from the release on.
     pub decay: Vec<ComparedPoint>,
     /// What ended its points.
     pub decay_end: DecayEnd,
+    /// Amplitude of the base after the release, m, where it is least, if the base never rests; with its standard uncertainty.
+    #[serde(rename = "E_after_release_m", skip_serializing_if = "Option::is_none")]
+    pub base_after_release: Option<[f64; 2]>,
     /// The exact backbone that the decay is compared with.
     #[serde(skip)]
     pub curve: ExactCurve,
@@ -92,9 +95,13 @@ impl Comparison {
         let as_driven = Scene { amplitude: moved * scene.amplitude, ..scene.clone() };
         let mut orbits = phase_resonant(&as_driven, &driven);
         orbits.retain(|_| at_resonance);
-        let by_distance = |a: &&Orbit, b: &&Orbit| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c));
-        let exact = orbits.iter().min_by(by_distance).copied();
         let curve = ExactCurve::of_scene(scene, &parameters, [lock.at.sigma, lock.at.c]);
+        // The orbit that the lock followed, moved along the backbone to the measured C.
+        let near = followed(&orbits, &lock)
+            .map(|orbit| [orbit.sigma, orbit.b])
+            .or_else(|| Some(curve.place(lock.at.c, lock.at.sigma, lock.at.g)?.1));
+        let exact = near.filter(|_| at_resonance);
+        let exact = exact.and_then(|near| curve.orbits.with_amplitude(lock.at.c, near));
         let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene, &scene.plan_on(knowledge)));
         let decay: Vec<ComparedPoint> = found
             .decay
@@ -103,9 +110,9 @@ impl Comparison {
             .map(|point| ComparedPoint {
                 point: *point,
                 sigma_theory: free_sigma(&parameters, point.c),
-                sigma_exact: at(&curve.places, point.c).map(|[sigma, _]| sigma),
+                sigma_exact: at(&curve.places, point.c).map(|place| place[1]),
                 sigma_slow_flow: by_slow_flow(&parameters, point.c),
-                sigma_predicted: at(&predicted, point.c).map(|[sigma, _]| sigma),
+                sigma_predicted: at(&predicted, point.c).map(|place| place[1]),
             })
             .collect();
         Self {
@@ -122,16 +129,24 @@ impl Comparison {
             orbits,
             decay,
             decay_end: found.decay.end,
+            base_after_release: found.base_after_release.map(|base| [base.value, base.uncertainty]),
             curve,
         }
     }
 
     /// The stable orbits at this G that the lock did not follow.
     pub fn others(&self) -> impl Iterator<Item = &Orbit> {
+        let followed = followed(&self.orbits, &self.lock);
         self.orbits
             .iter()
-            .filter(|orbit| orbit.stable && self.exact.as_ref() != Some(*orbit))
+            .filter(move |orbit| orbit.stable && followed != Some(*orbit))
     }
+}
+
+/// The orbit that a lock followed: the nearest one.
+fn followed<'a>(orbits: &'a [Orbit], lock: &Lock) -> Option<&'a Orbit> {
+    let distance = |orbit: &Orbit| (orbit.sigma - lock.at.sigma).hypot(orbit.c - lock.at.c);
+    orbits.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// RMS of an error over the points above [`COMPARED_ABOVE`]; `None` where there is none.
@@ -151,42 +166,52 @@ const POINTS: usize = 3000;
 /// Largest particle speed of the curve: beyond symmetry breaking.
 const SPEED_MAX: f64 = 1.35;
 
-/// A curve to draw: sigma and C of its points, and whether the motion is stable there.
+/// A curve to draw: sigma and C of its points, and whether the motion is stable or neutral there.
 pub type DrawnCurve = Vec<([f64; 2], bool)>;
+
+/// C, sigma, G and speed of the particle of an exact orbit.
+type Place = [f64; 4];
 
 /// The exact backbone beyond the fold as a fine polygon, by increasing particle speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExactCurve {
-    /// C, sigma and G of the curve nearest to the measurement, by increasing speed of the particle.
-    places: Vec<[f64; 3]>,
-    /// C, sigma and G of the curves with which points are compared: of one oscillator the one of `places`; of a structure all of them, in the order in
-    /// which they were continued, because near another mode the speed of the particle rises and falls along a curve.
-    compared: Vec<Vec<[f64; 3]>>,
+    /// The orbits of which it is the polygon.
+    orbits: ExactOrbits,
+    /// The curve nearest to the measurement, by increasing speed of the particle.
+    places: Vec<Place>,
+    /// The curves near which the orbits are that points are compared with: of one oscillator the one of `places`; of a structure all of them, in the
+    /// order in which they were continued, because near another mode the speed of the particle rises and falls along a curve.
+    compared: Vec<Vec<Place>>,
     /// All curves, to be drawn; of one oscillator beyond the fold.
     pub curves: Vec<DrawnCurve>,
     /// It has more modes than the theory beside it.
     pub is_of_structure: bool,
 }
 
-/// Difference of a point from the exact backbone.
+/// Difference of a point from the exact backbone, by exact orbits; `nearest` beyond the curve by its polygon.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Distance {
     /// Largest of the differences in C, sigma and G, at the place on the curve where it is smallest.
     pub nearest: f64,
-    /// Difference in sigma from the nearest place with the same C; absent outside the curve.
+    /// Difference in sigma from the exact orbit with the same C, the nearest of several; absent without one.
     pub sigma: Option<f64>,
-    /// Difference in G from this place; absent outside the curve.
+    /// Difference in G from this orbit; absent without one.
     #[serde(rename = "G")]
     pub g: Option<f64>,
 }
 
-/// C, sigma and G of a curve from its smallest response towards faster particles.
-fn right_of_fold(curve: &[Orbit]) -> Vec<[f64; 3]> {
+/// The place of an orbit.
+fn place(orbit: &Orbit) -> Place {
+    [orbit.c, orbit.sigma, orbit.g, orbit.b]
+}
+
+/// The places of a curve from its smallest response towards faster particles.
+fn right_of_fold(curve: &[Orbit]) -> Vec<Place> {
     let mut orbits: Vec<&Orbit> = curve.iter().filter(|orbit| orbit.b < SPEED_MAX).collect();
     orbits.sort_by(|one, other| one.b.total_cmp(&other.b));
     let fold = (0..orbits.len()).min_by(|&a, &b| orbits[a].c.total_cmp(&orbits[b].c));
     let rising = orbits.iter().skip(fold.unwrap_or(0));
-    rising.map(|orbit| [orbit.c, orbit.sigma, orbit.g]).collect()
+    rising.map(|orbit| place(orbit)).collect()
 }
 
 impl ExactCurve {
@@ -195,12 +220,11 @@ impl ExactCurve {
     pub fn of_scene(scene: &Scene, numbers: &Dimensionless, near: [f64; 2]) -> Self {
         match structure_backbone(scene, numbers) {
             Some(curves) => {
-                let places = |curve: &Vec<Orbit>| curve.iter().map(|orbit| [orbit.c, orbit.sigma, orbit.g]).collect();
-                let compared = curves.iter().map(places).collect();
+                let compared = curves.iter().map(|curve| curve.iter().map(place).collect()).collect();
                 Self {
                     compared,
                     is_of_structure: true,
-                    ..Self::nearest(&curves, near)
+                    ..Self::nearest(ExactOrbits::of(scene, numbers), &curves, near)
                 }
             }
             None => Self::of(numbers),
@@ -216,20 +240,21 @@ impl ExactCurve {
         };
         let curves: Vec<_> = backbone(scene, None, POINTS).into_iter().map(beyond_fold).collect();
         let middle = flow.backbone_at(0.5 * (flow.manifold.b_min() + B_SYMMETRY_BREAKING));
-        Self::nearest(&curves, [middle.sigma, middle.c])
+        Self::nearest(ExactOrbits::of_oscillator(scene), &curves, [middle.sigma, middle.c])
     }
 
     /// The one of some curves that is nearest to `near`.
-    fn nearest(curves: &[Vec<Orbit>], near: [f64; 2]) -> Self {
-        let distance = |curve: &[[f64; 3]]| {
-            let distances = curve.iter().map(|[c, sigma, _]| (sigma - near[0]).hypot(c - near[1]));
+    fn nearest(orbits: ExactOrbits, curves: &[Vec<Orbit>], near: [f64; 2]) -> Self {
+        let distance = |curve: &[Place]| {
+            let distances = curve.iter().map(|[c, sigma, ..]| (sigma - near[0]).hypot(c - near[1]));
             distances.fold(f64::INFINITY, f64::min)
         };
         let rising = curves.iter().map(|curve| right_of_fold(curve));
         let nearest = rising.min_by(|one, other| distance(one).total_cmp(&distance(other)));
         let places = nearest.unwrap_or_default();
-        let place = |orbit: &Orbit| ([orbit.sigma, orbit.c], orbit.stable);
+        let place = |orbit: &Orbit| ([orbit.sigma, orbit.c], !orbit.is_unstable());
         Self {
+            orbits,
             compared: vec![places.clone()],
             places,
             curves: curves.iter().map(|curve| curve.iter().map(place).collect()).collect(),
@@ -237,39 +262,72 @@ impl ExactCurve {
         }
     }
 
-    /// C, sigma and G of its orbits, from the fold on.
-    pub fn places(&self) -> &[[f64; 3]] {
+    /// C, sigma, G and speed of the particle of its orbits, from the fold on.
+    pub fn places(&self) -> &[Place] {
         &self.places
     }
 
     /// `[sigma, G]` at the amplitude `c`; `None` outside the curve.
     pub fn at(&self, c: f64) -> Option<[f64; 2]> {
-        at(&self.places, c)
+        at(&self.places, c).map(|[_, sigma, g, _]| [sigma, g])
+    }
+
+    /// The distance of `(C, sigma, G)` from the polygon, and sigma and speed of the place with the same C, the nearest of several.
+    fn place(&self, c: f64, sigma: f64, g: f64) -> Option<(f64, [f64; 2])> {
+        let pairs = || self.compared.iter().flat_map(|places| places.windows(2));
+        let away = |[_, exact, drive, _]: &Place| (sigma - exact).abs().max((g - drive).abs());
+        let places = pairs().filter_map(|pair| at(pair, c));
+        let [_, exact, _, speed] = places.min_by(|one, other| away(one).total_cmp(&away(other)))?;
+        Some((self.from_polygon([c, sigma, g])?, [exact, speed]))
+    }
+
+    /// The distance of `(C, sigma, G)` from the polygon.
+    fn from_polygon(&self, point: [f64; 3]) -> Option<f64> {
+        let pairs = self.compared.iter().flat_map(|places| places.windows(2));
+        let segments = pairs.map(|pair| {
+            let [from, to] = [pair[0], pair[1]].map(|[c, sigma, g, _]| [c, sigma, g]);
+            to_segment(point, from, to)
+        });
+        segments.reduce(f64::min)
     }
 
     /// How far `(C, sigma, G)` lies from the curve; `None` where there is no curve.
     pub fn distance(&self, c: f64, sigma: f64, g: f64) -> Option<Distance> {
-        let pairs = || self.compared.iter().flat_map(|places| places.windows(2));
-        let segments = pairs().map(|pair| to_segment([c, sigma, g], pair[0], pair[1]));
-        let nearest = segments.reduce(f64::min)?;
-        let away = |[exact, drive]: &[f64; 2]| (sigma - exact).abs().max((g - drive).abs());
-        let places = pairs().filter_map(|pair| at(pair, c));
-        let same = places.min_by(|one, other| away(one).total_cmp(&away(other)));
+        let polygon = self.from_polygon([c, sigma, g])?;
+        let at = |c: f64, near: [f64; 2]| self.orbits.with_amplitude(c, near);
+        let same = self.place(c, sigma, g).and_then(|(_, near)| at(c, near));
+        let Some(same) = same else {
+            return Some(Distance { nearest: polygon, sigma: None, g: None });
+        };
+        let differences = [sigma - same.sigma, g - same.g];
+        // The curve there, as straight as it is over the difference.
+        let largest = differences[0].abs().max(differences[1].abs());
+        let beside = at(c * (1.0 + BESIDE), [same.sigma, same.b]);
+        let nearest = beside.map_or(polygon, |beside| {
+            let from = [same.c, same.sigma, same.g];
+            let tangent = [beside.c - same.c, beside.sigma - same.sigma, beside.g - same.g];
+            let size = tangent.iter().fold(0.0_f64, |size, part| size.max(part.abs()));
+            let end = |side: f64| [0, 1, 2].map(|n| from[n] + side * 2.0 * largest * tangent[n] / size);
+            to_segment([c, sigma, g], end(-1.0), end(1.0))
+        });
         Some(Distance {
             nearest,
-            sigma: same.map(|[exact, _]| sigma - exact),
-            g: same.map(|[_, exact]| g - exact),
+            sigma: Some(differences[0]),
+            g: Some(differences[1]),
         })
     }
 }
 
-/// The second and the third value, interpolated linearly at the first value `c`, in the last pair of places around it.
-fn at(places: &[[f64; 3]], c: f64) -> Option<[f64; 2]> {
+/// Relative difference in C of the orbit that gives the direction of the curve.
+const BESIDE: f64 = 1e-5;
+
+/// The places, interpolated linearly at their first value `c`, in the last pair around it.
+fn at<const N: usize>(places: &[[f64; N]], c: f64) -> Option<[f64; N]> {
     let pair = places
         .windows(2)
         .rfind(|pair| (pair[0][0] - c) * (pair[1][0] - c) <= 0.0 && pair[0][0] != pair[1][0])?;
     let x = (c - pair[0][0]) / (pair[1][0] - pair[0][0]);
-    Some([1, 2].map(|i| pair[0][i] + x * (pair[1][i] - pair[0][i])))
+    Some(std::array::from_fn(|i| pair[0][i] + x * (pair[1][i] - pair[0][i])))
 }
 
 /// Smallest value, over a segment, of the largest difference; it is convex along the segment.
@@ -465,6 +523,7 @@ fn predicted(orbit: &Orbit, scene: &Scene, plan: &Plan) -> Vec<[f64; 3]> {
                 ..Command::default()
             },
             ground_truth: rig.ground_truth().ok()?,
+            ..Sample::default()
         };
         rig.advance(Drive::default(), step).ok()?;
         Some(sample)
@@ -475,6 +534,7 @@ fn predicted(orbit: &Orbit, scene: &Scene, plan: &Plan) -> Vec<[f64; 3]> {
         sample_time: step,
         samples,
         settled: 0,
+        hold_end: 1,
         released: 1,
         held: false,
         clipped_percent: None,
@@ -501,28 +561,27 @@ mod tests {
         let curve = ExactCurve::of(&scene);
         let orbits = vines_model::orbit::phase_resonant(&scene);
         let orbit = orbits.iter().find(|orbit| orbit.stable).unwrap();
-        let distance = curve.distance(orbit.c, orbit.sigma, orbit.g).unwrap();
-        assert!(distance.nearest < 1e-5, "{distance:?}");
-        assert!(distance.sigma.unwrap().abs() < 1e-5 && distance.g.unwrap().abs() < 1e-5);
-        let off = curve.distance(orbit.c, orbit.sigma + 0.01, orbit.g).unwrap();
-        assert!((off.sigma.unwrap() - 0.01).abs() < 1e-5);
+        let distance = |sigma: f64| curve.distance(orbit.c, sigma, orbit.g).unwrap();
+        let on = distance(orbit.sigma);
+        assert!(on.nearest < 1e-9, "{on:?}");
+        assert!(on.sigma.unwrap().abs() < 1e-9 && on.g.unwrap().abs() < 1e-9, "{on:?}");
+        let off = distance(orbit.sigma + 0.01);
+        assert!((off.sigma.unwrap() - 0.01).abs() < 1e-9);
         assert!(off.nearest > 1e-3 && off.nearest < 0.01);
     }
 
     #[test]
     fn of_two_places_with_the_same_amplitude_the_nearer_one_is_compared() {
         let curve = ExactCurve {
+            orbits: ExactOrbits::of_oscillator(&Dimensionless::new(0.0084, 1.43, 0.65, 1.1)),
             places: Vec::new(),
-            compared: vec![vec![[0.6, -1.0, 1.2], [0.4, -1.2, 0.8], [0.6, 0.4, 2.0]]],
+            compared: vec![vec![[0.6, -1.0, 1.2, 1.0], [0.4, -1.2, 0.8, 0.8], [0.6, 0.4, 2.0, 0.6]]],
             curves: Vec::new(),
             is_of_structure: true,
         };
-        for (sigma, g) in [(-1.1, 1.0), (-0.4, 1.4)] {
-            let distance = curve.distance(0.5, sigma, g).unwrap();
-            assert!(
-                distance.sigma.unwrap().abs() < 1e-12 && distance.g.unwrap().abs() < 1e-12,
-                "{distance:?}"
-            );
+        for (sigma, g, speed) in [(-1.1, 1.0, 0.9), (-0.4, 1.4, 0.7)] {
+            let (nearest, near) = curve.place(0.5, sigma, g).unwrap();
+            assert!(nearest < 1e-12 && (near[0] - sigma).abs() < 1e-12 && (near[1] - speed).abs() < 1e-12);
         }
     }
 }

@@ -12,8 +12,8 @@ use phase_lock::Config;
 use thiserror::Error;
 use vines_model::numerics::mean;
 
-use crate::identification::{Cycle, Unsteady};
-use crate::plan::{Plan, Target};
+use crate::identification::{Cycle, Departure, Unsteady};
+use crate::plan::{Plan, Target, Units};
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError, Scaled, Sensors};
 use crate::scene::key;
@@ -32,6 +32,8 @@ pub enum Stage {
     Locking,
     /// Phase resonance is held and measured.
     Holding,
+    /// The controller ramps the drive down.
+    Releasing,
     /// The drive is off.
     Decaying,
     /// The response is held at one level after another.
@@ -39,14 +41,15 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Samples of the stage in an experiment, at most: the time limit for the lock, the hold, or the recorded decay.
+    /// Samples of the stage in an experiment, at most: the time limits for the lock and for the release, the hold, or the recorded decay.
     pub fn samples(self, plan: &Plan) -> usize {
-        let Plan { lock, hold, decay, .. } = plan;
+        let Plan { lock, hold, ramp, decay, .. } = plan;
         match self {
             Self::Locking => lock
                 .acquire_timeout
                 .map_or(usize::MAX, |seconds| (seconds / lock.sample_time).round() as usize),
             Self::Holding => *hold,
+            Self::Releasing => *ramp,
             Self::Decaying => *decay,
             Self::Tracking => usize::MAX,
         }
@@ -58,6 +61,7 @@ impl Stage {
             Self::Locking => "searching for phase resonance",
             Self::Holding => "holding the lock",
             Self::Tracking => "tracking the backbone",
+            Self::Releasing => "releasing the drive",
             Self::Decaying => "recording the decay",
         }
     }
@@ -69,6 +73,16 @@ fn phase_in_words(error: Option<f64>) -> String {
         || "the phase cannot be measured, or the controller does not report its phase error".into(),
         |degrees| format!("the phase error is {degrees:.3} degrees"),
     )
+}
+
+/// A drive beside the requested amplitude, m, in words.
+fn drive_in_words(drive: Drive, requested: f64) -> String {
+    let (of, value) = match drive.amplitude {
+        0.0 => ("E = 0, but a displacement of", drive.displacement.abs()),
+        amplitude => ("E =", amplitude),
+    };
+    let share = short(value / requested);
+    format!("{of} {} m, {share} times the requested drive", short(value))
 }
 
 /// What a lock waits for that the bench judges, in words.
@@ -135,21 +149,23 @@ impl Display for SearchFound {
     }
 }
 
-/// What the sensors read in the last period before a fault, and the limit of the scene that was exceeded. Lengths in m.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// What the sensors read in the last period before a fault, and the limit of the scene that was exceeded, in the units of the scene.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
-    /// Last reading of the response.
+    /// Last reading of the response, m.
     pub response: f64,
-    /// Last reading of the base, if a sensor reads it.
-    pub base: Option<f64>,
-    /// Largest response of the period.
+    /// Last reading of the base or the force, if a sensor reads it.
+    pub reference: Option<f64>,
+    /// Its unit, m or N.
+    pub unit: &'static str,
+    /// Largest response of the period, m.
     pub largest: f64,
     /// After the loss of a lock, the mean phase error of the period, degrees; `None` inside: it is not known.
     pub phase_error: Option<Option<f64>>,
     /// Setting of the controller, its value, and the value's unit.
     pub limit: Option<(&'static str, Option<f64>, &'static str)>,
-    /// Which channel behind a shaker has failed, and how.
-    pub failed: Option<&'static str>,
+    /// Which channel behind a shaker contradicts the drive, and how.
+    pub contradicts: Option<String>,
 }
 
 impl Display for Evidence {
@@ -157,12 +173,13 @@ impl Display for Evidence {
         if let Some(error) = self.phase_error {
             write!(f, "over the last period {}; ", phase_in_words(error))?;
         }
-        if let Some(failed) = self.failed {
-            write!(f, "{failed}; ")?;
+        if let Some(contradicts) = &self.contradicts {
+            write!(f, "{contradicts}; ")?;
         }
         write!(f, "the response read {} m", short(self.response))?;
-        if let Some(base) = self.base {
-            write!(f, ", and the base {} m", short(base))?;
+        if let Some(reference) = self.reference {
+            let name = ["base", "force"][usize::from(self.unit == "N")];
+            write!(f, ", and the {name} {} {}", short(reference), self.unit)?;
         }
         write!(f, "; in the last period at most {} m", short(self.largest))?;
         if let Some((name, value, unit)) = self.limit {
@@ -215,6 +232,32 @@ pub enum ExperimentError {
         b: f64,
         regime: crate::identification::Regime,
     },
+    #[error("phase or drive are not as asked: {departure}. The run ended with: {error}")]
+    OtherThanAsked { departure: Departure, error: Box<Self> },
+    #[error(
+        "the controller does not release the drive: {periods:.1} periods after `active` became false, it commands {}. A ramp may take {allowed:.1} \
+         periods, in which a free response falls to {} %; the drive is off",
+        drive_in_words(*drive, *requested), 100.0 * DECAYED
+    )]
+    NotReleased {
+        /// Natural periods.
+        periods: f64,
+        allowed: f64,
+        drive: Drive,
+        /// m
+        requested: f64,
+    },
+    #[error(
+        "the controller drives again: {periods:.1} periods after it released the drive, it commands {}; the drive is off",
+        drive_in_words(*drive, *requested)
+    )]
+    DrivesAgain {
+        /// Natural periods.
+        periods: f64,
+        drive: Drive,
+        /// m
+        requested: f64,
+    },
     #[error("the scene has no drive, E = 0, so that nothing can lock")]
     NoDrive,
     #[error("the controller answered {name} = {value} {unit}; it must be {allowed}. The drive is off")]
@@ -225,15 +268,31 @@ pub enum ExperimentError {
         allowed: &'static str,
     },
     #[error(
-        "the controller asked for E = {} m, and {} allows {} m; the drive is off. E is the amplitude of the base in metres",
-        short(*amplitude), key("amplitude_max"), short(*limit)
+        "the controller asked for {} {}, and {} allows {} {}; the drive is off. Its output E is {}",
+        short(*amplitude * units.drive), units.name, key("amplitude_max"), short(*limit * units.drive), units.name,
+        match units.name {
+            "N" => format!("the force over {} N/m, in m", short(units.drive)),
+            _ => "the amplitude of the base in metres".into(),
+        }
     )]
-    DriveTooLarge { amplitude: f64, limit: f64 },
+    DriveTooLarge {
+        /// m
+        amplitude: f64,
+        /// m
+        limit: f64,
+        units: Units,
+    },
     #[error(
         "the response read {} m, and {} allows {} m, but the controller did not stop; the drive is off",
-        short(*response), key("response_max"), short(*limit)
+        short(*response * units.response), key("response_max"), short(*limit * units.response)
     )]
-    ResponseTooLarge { response: f64, limit: f64 },
+    ResponseTooLarge {
+        /// m
+        response: f64,
+        /// m
+        limit: f64,
+        units: Units,
+    },
     #[error(
         "the controller asked for omega = {} rad/s; the scene allows {} to {} rad/s ({}, {}), and a factor of 2 pi lies between. omega is an \
          angular frequency in rad/s, not in Hz; the drive is off",
@@ -260,11 +319,27 @@ pub fn run_into(
     plan: &Plan,
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
-    let counts = [Stage::Locking, Stage::Holding, Stage::Decaying].map(|stage| stage.samples(plan));
-    let mut report = |stage, taken| progress(stage, taken, counts[stage as usize]);
+    let mut report = |stage: Stage, taken| progress(stage, taken, stage.samples(plan));
     let mut bench = ControlLoop::new(rig, controller, plan, &plan.lock, samples, &mut report)?;
+    let conducted = match conduct(&mut bench) {
+        Ok(conducted) => conducted,
+        Err(error) => {
+            bench.switch_off();
+            return Err(bench.beside_what_was_asked(error));
+        }
+    };
+    drop(bench);
+    let samples = std::mem::take(samples);
+    Ok(Record { samples, ..conducted })
+}
+
+/// The experiment from the search to the end of the decay; the record is without its samples.
+fn conduct<R: Rig + ?Sized, C: Controller + ?Sized>(
+    bench: &mut ControlLoop<'_, R, C>,
+) -> Result<Record, ExperimentError> {
+    let plan = bench.plan;
     let held = if plan.knowledge.is_at_phase_resonance() {
-        Search::new(&mut bench).lock()?
+        Search::new(bench).lock()?
     } else {
         None
     };
@@ -273,21 +348,24 @@ pub fn run_into(
         bench.sample(Stage::Locking)?;
     }
     let settled = bench.taken - 1;
-    for _ in 0..counts[Stage::Holding as usize] {
+    for _ in 0..plan.hold {
         bench.sample(Stage::Holding)?;
     }
-    let clipped_percent = bench.clipped_percent([0; 2]);
-    for _ in 0..counts[Stage::Decaying as usize] {
-        bench.sample(Stage::Decaying)?;
+    let (hold_end, clipped_percent) = (bench.taken, bench.clipped_percent([0; 2]));
+    let mut released = hold_end;
+    if plan.decay > 0 {
+        released = bench.release()?;
+        for _ in 1..plan.decay {
+            bench.sample(Stage::Decaying)?;
+        }
     }
-    drop(bench);
-    let samples = std::mem::take(samples);
     Ok(Record {
         sample_time: plan.knowledge.sample_time,
-        released: samples.len() - counts[Stage::Decaying as usize],
-        samples,
+        samples: Vec::new(),
         settled,
         held: held == Some(true),
+        hold_end,
+        released,
         clipped_percent,
     })
 }
@@ -326,6 +404,8 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
     progress: &'a mut dyn FnMut(Stage, usize),
     /// The present stage, and the samples before it.
     stage: (Stage, usize),
+    /// Whether the response is under control, so that the drive is what holds it and not the requested one.
+    holds_response: bool,
     /// Whether the rig was left with a drive.
     driven: bool,
 }
@@ -345,7 +425,7 @@ pub fn exchange(
     let sensors = rig.sense()?;
     let command = controller.sample(sensors, active)?;
     let ground_truth = rig.ground_truth()?;
-    let sample = Sample { time, sensors, command, ground_truth };
+    let sample = Sample { time, sensors, command, ground_truth, ..Sample::default() };
     before_drive(&sample)?;
     rig.advance(command.drive, step)?;
     Ok(sample)
@@ -382,30 +462,41 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             limit: Stage::Locking.samples(plan),
             progress,
             stage: (Stage::Locking, 0),
+            holds_response: false,
             driven: false,
         })
     }
 
-    /// One sample; in a stage other than the decay, a controller that switches the drive off is an error.
+    /// One sample. Before the release, a controller that switches the drive off is an error; after it, one that drives.
     pub fn sample(&mut self, stage: Stage) -> Result<(), ExperimentError> {
         if self.stage.0 != stage {
             self.stage = (stage, self.taken);
         }
-        let active = stage != Stage::Decaying;
+        let active = !matches!(stage, Stage::Releasing | Stage::Decaying);
         let clock = [self.taken as f64 * self.sample_time, self.sample_time];
         let is_latched = |command: &Command| command.state.is_some_and(LoopState::is_latched);
-        let (config, samples, driven) = (self.config, &mut *self.samples, &mut self.driven);
+        let (requested, since_release) = (self.plan.amplitude, self.natural_periods(self.taken - self.stage.1 + 1));
+        let (config, units) = (self.config, self.plan.units);
+        let (samples, driven) = (&mut *self.samples, &mut self.driven);
         let before_drive = |sample: &Sample| {
             let command = checked(sample.command)?;
             samples.push(*sample);
-            if active && !is_latched(&command) {
-                guard(config, sample.sensors.response, command.drive)?;
+            let is_off = is_off(command.drive);
+            if stage == Stage::Decaying && !is_off {
+                let drive = command.drive;
+                return Err(ExperimentError::DrivesAgain { periods: since_release, drive, requested });
+            }
+            if (active || !is_off) && !is_latched(&command) {
+                guard(config, units, sample.sensors.response, command.drive)?;
             }
             *driven = true;
             Ok(())
         };
         let Sample { command, .. } = exchange(&mut self.rig, self.controller, active, clock, before_drive)?;
-        self.driven = command.drive.amplitude != 0.0;
+        if let Some((last, command)) = self.samples.last_mut().zip(self.rig.shaker_command()) {
+            last.shaker_command = command;
+        }
+        self.driven = !is_off(command.drive);
         self.taken += 1;
         self.last = command;
         self.periods += command.drive.omega * self.sample_time / TAU;
@@ -424,6 +515,29 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             return Err(self.no_lock(&command));
         }
         Ok(())
+    }
+
+    /// These samples, in natural periods.
+    fn natural_periods(&self, samples: usize) -> f64 {
+        samples as f64 * self.sample_time * self.plan.knowledge.linear.omega0 / TAU
+    }
+
+    /// Asks the controller to release the drive, and waits for the end of its ramp. Returns the index of the first sample without a drive.
+    fn release(&mut self) -> Result<usize, ExperimentError> {
+        let Plan { ramp, amplitude, .. } = *self.plan;
+        for _ in 0..ramp.max(1) {
+            self.sample(Stage::Releasing)?;
+            if is_off(self.last.drive) {
+                return Ok(self.taken - 1);
+            }
+        }
+        let allowed = self.natural_periods(ramp);
+        Err(ExperimentError::NotReleased {
+            periods: allowed,
+            allowed,
+            drive: self.last.drive,
+            requested: amplitude,
+        })
     }
 
     /// Samples so far, and of these the ones with the command of a shaker at the limit of its amplifier.
@@ -455,7 +569,15 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             growth: target.reading(to.growth, omega),
             ..to
         };
-        self.controller.hold_response(to, target.phase_of_readings())
+        self.controller.hold_response(to, target.phase_of_readings())?;
+        self.holds_response = true;
+        Ok(())
+    }
+
+    /// Controls the drive again.
+    pub fn hold_drive(&mut self) -> Result<(), ControllerError> {
+        self.holds_response = false;
+        self.controller.hold_drive()
     }
 
     /// The fit of the samples since the beginning of the last period; `None` without a motion.
@@ -466,7 +588,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     fn advance(&mut self, drive: Drive) -> Result<(), ExperimentError> {
         self.driven = true;
         self.rig.advance(drive, self.sample_time)?;
-        self.driven = drive.amplitude != 0.0;
+        self.driven = !is_off(drive);
         Ok(())
     }
 
@@ -476,8 +598,8 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             let asked = self.controller.sample(self.rig.sense()?, true)?;
             // A ramp never rises, whatever the controller says.
             let falls = |amplitude: &f64| *amplitude < command.drive.amplitude;
-            let amplitude = Some(asked.drive.amplitude).filter(falls).unwrap_or(0.0);
-            command = checked(Command { drive: Drive { amplitude, ..asked.drive }, ..asked })?;
+            let falling = Some(asked.drive).filter(|drive| falls(&drive.amplitude));
+            command = checked(Command { drive: falling.unwrap_or_default(), ..asked })?;
             self.advance(command.drive)?;
         }
         Ok(())
@@ -488,12 +610,27 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         if fault == Fault::TimedOut {
             return self.no_lock(command);
         }
-        let mut evidence = evidence(self.samples, self.config, fault);
+        let mut evidence = evidence(self.samples, self.config, self.plan.units, fault);
         if self.plan.knowledge.shaker().is_some() {
-            evidence.failed = failed(self.samples, self.sample_time);
+            evidence.contradicts = contradicts(self.samples, self.sample_time);
         }
         let evidence = evidence.into();
         ExperimentError::Tripped { periods: self.periods, stage, fault, evidence }
+    }
+
+    /// The error at the end of a run, after what the controller does otherwise than asked: that another phase or drive has another motion is no fault of
+    /// the motion. While the response is under control, the drive follows from it.
+    fn beside_what_was_asked(&self, error: ExperimentError) -> ExperimentError {
+        let is_of_motion = matches!(
+            error,
+            ExperimentError::NoLock { .. } | ExperimentError::ResponseTooLarge { .. } | ExperimentError::Tripped { .. }
+        );
+        let last = &self.samples[self.samples.len().saturating_sub(self.plan.hold)..];
+        let departure = Departure::of(last, self.plan).filter(|_| is_of_motion && !self.holds_response);
+        match departure {
+            Some(departure) => ExperimentError::OtherThanAsked { departure, error: error.into() },
+            None => error,
+        }
     }
 
     /// The error of a search without a result.
@@ -512,27 +649,39 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     }
 }
 
-/// An error or a panic must not leave the rig driven.
-impl<R: Rig + ?Sized, C: ?Sized> Drop for ControlLoop<'_, R, C> {
-    fn drop(&mut self) {
+impl<R: Rig + ?Sized, C: ?Sized> ControlLoop<'_, R, C> {
+    fn switch_off(&mut self) {
         if self.driven {
+            self.driven = false;
             // The run has ended; an error of the rig would not change its result.
             let _ = self.rig.advance(Drive::default(), self.sample_time);
         }
     }
 }
 
+/// An error or a panic must not leave the rig driven.
+impl<R: Rig + ?Sized, C: ?Sized> Drop for ControlLoop<'_, R, C> {
+    fn drop(&mut self) {
+        self.switch_off();
+    }
+}
+
+/// Whether a drive moves nothing: neither a rig that takes its amplitude nor one that takes its samples.
+fn is_off(drive: Drive) -> bool {
+    drive.amplitude == 0.0 && drive.displacement == 0.0
+}
+
 /// Refuses a drive or a response beyond the limits of the scene, before the rig gets the drive.
-fn guard(config: &Config, response: f64, drive: Drive) -> Result<(), ExperimentError> {
+fn guard(config: &Config, units: Units, response: f64, drive: Drive) -> Result<(), ExperimentError> {
     let Config { amplitude_max, response_max, omega_min, omega_max, .. } = *config;
     let Drive { omega, amplitude, .. } = drive;
     // A controller may compute in single precision.
     let beyond = |value: f64, limit: Option<f64>| limit.filter(|limit| value > limit * (1.0 + 1e-6));
     if let Some(limit) = beyond(amplitude, amplitude_max) {
-        return Err(ExperimentError::DriveTooLarge { amplitude, limit });
+        return Err(ExperimentError::DriveTooLarge { amplitude, limit, units });
     }
     if let Some(limit) = beyond(response.abs(), response_max) {
-        return Err(ExperimentError::ResponseTooLarge { response, limit });
+        return Err(ExperimentError::ResponseTooLarge { response, limit, units });
     }
     let allowed = [omega_min, omega_max];
     let is_allowed = |omega: f64| (omega_min..=omega_max).contains(&omega);
@@ -561,7 +710,7 @@ fn checked(command: Command) -> Result<Command, ExperimentError> {
 }
 
 /// What was read before a fault.
-fn evidence(samples: &[Sample], config: &Config, fault: Fault) -> Evidence {
+fn evidence(samples: &[Sample], config: &Config, units: Units, fault: Fault) -> Evidence {
     let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
     let driven = samples.len() as f64 * config.sample_time;
     let samples = &samples[samples.len().saturating_sub(period)..];
@@ -575,7 +724,10 @@ fn evidence(samples: &[Sample], config: &Config, fault: Fault) -> Evidence {
         errors.map(|errors| mean(errors).to_degrees())
     });
     let limit = match fault {
-        Fault::ResponseTooLarge => Some(("response_max", config.response_max, " m")),
+        Fault::ResponseTooLarge => {
+            let limit = config.response_max.map(|limit| limit * units.response);
+            Some(("response_max", limit, " m"))
+        }
         Fault::LockLost => Some(("lock.unlock_tolerance", Some(config.lock.unlock_tolerance), " rad")),
         // The first periods contradict their drive. A small module has no code for this.
         Fault::NoSignal if cfg!(feature = "tables") && config.signal_timeout.is_some_and(|limit| driven < limit) => {
@@ -586,19 +738,20 @@ fn evidence(samples: &[Sample], config: &Config, fault: Fault) -> Evidence {
         Fault::Sensor | Fault::TimedOut => None,
     };
     Evidence {
-        response: last.response,
-        base: last.reference,
-        largest,
+        response: last.response * units.response,
+        reference: last.reference.map(|value| value * units.drive),
+        unit: units.name,
+        largest: largest * units.response,
         phase_error,
         limit,
-        failed: None,
+        contradicts: None,
     }
 }
 
-/// Which channel of a shaker has failed, and how: from the last readings, and from those of the last period beside those of the period before it.
-fn failed(samples: &[Sample], sample_time: f64) -> Option<&'static str> {
+/// Which channel behind a shaker contradicts the drive: one whose reading has stopped, or the one that differs more from what it read a period before.
+fn contradicts(samples: &[Sample], sample_time: f64) -> Option<String> {
     if let Some(stopped) = stopped(samples, sample_time) {
-        return Some(stopped);
+        return Some(stopped.into());
     }
     // The loop may have changed the frequency since the fault.
     let mut left = TAU;
@@ -608,27 +761,25 @@ fn failed(samples: &[Sample], sample_time: f64) -> Option<&'static str> {
         left > 0.5 * turn
     };
     let period = 1 + samples.iter().rev().take_while(is_in_period).count();
-    let begin = samples.len().checked_sub(2 * period)?;
-    let channel =
-        |of: fn(Sensors) -> f64| -> Vec<f64> { samples[begin..].iter().map(|sample| of(sample.sensors)).collect() };
-    let force = channel(|sensors| sensors.reference.unwrap_or(0.0));
-    let response = channel(|sensors| sensors.response);
-    Some(match (how(&force, period), how(&response, period)) {
-        (_, Some(_)) if leaps(&response, period) => {
-            "the response jumped, as no structure does: check its sensor and cable"
-        }
-        (Some(Failure::Nothing), _) => NOTHING,
-        (Some(Failure::Reversed), _) => "the force cell reads the opposite sign: check its cable and factor",
-        (Some(Failure::Clipped), _) => CLIPPED,
-        (_, Some(_)) => {
-            "response and force change from period to period: the motion is irregular or becomes another one, the amplifier clips or is off, or a \
-             sensor fails"
-        }
-        (Some(Failure::Other), _) => {
-            "the force does not follow the command: the amplifier clips, is off or overloaded, the force cell is noisy or late, or impacts change it \
-             faster than the control follows"
-        }
-        (None, None) => return None,
+    let (before, now) = samples[samples.len().checked_sub(2 * period)?..].split_at(period);
+    let percent = |of: fn(Sensors) -> f64| {
+        let pairs = now.iter().zip(before);
+        let changes = pairs.map(|(now, before)| (of(now.sensors) - of(before.sensors)).abs());
+        let readings = before.iter().map(|sample| of(sample.sensors).abs());
+        100.0 * changes.fold(0.0, f64::max) / readings.fold(0.0, f64::max)
+    };
+    let response = percent(|sensors| sensors.response);
+    let force = percent(|sensors| sensors.reference.unwrap_or(0.0));
+    Some(if force > response {
+        format!(
+            "the force contradicts its past: it changed by {force:.0} % of its amplitude from one period to the next, the response by {response:.0} %. \
+             Check the amplifier, the stinger, and the force cell with its cable"
+        )
+    } else {
+        format!(
+            "the response contradicts its past: it changed by {response:.0} % of its amplitude from one period to the next, the force by {force:.0} %. \
+             Check its sensor and cable, and whether the motion is irregular"
+        )
     })
 }
 
@@ -660,60 +811,6 @@ fn stopped(samples: &[Sample], sample_time: f64) -> Option<&'static str> {
 const NOTHING: &str = "the force cell reads nothing: it or its cable is dead, or the stinger is broken";
 const CLIPPED: &str = "the force cell stays at one value: it saturates or is frozen; check its range";
 
-/// Whether the largest change from sample to sample has doubled since a period before, and is twice that of a sine of the present amplitude: a motion
-/// that changes or grows does not leap.
-fn leaps(readings: &[f64], period: usize) -> bool {
-    let largest = |readings: &[f64]| {
-        let steps = readings.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-        steps.fold(0.0, f64::max)
-    };
-    let amplitude = readings[period..]
-        .iter()
-        .fold(0.0_f64, |amplitude, reading| amplitude.max(reading.abs()));
-    let of_sine = amplitude * TAU / period as f64;
-    largest(&readings[period - 1..]) > 2.0 * largest(&readings[..period]).max(of_sine)
-}
-
-/// How a channel differs from what it read a period before.
-enum Failure {
-    Nothing,
-    Reversed,
-    /// It stays at its largest value.
-    Clipped,
-    Other,
-}
-
-/// Change from period to period, over the amplitude, of a channel that has failed. It chooses the words, not whether a run ends.
-const CHANGED: f64 = 0.3;
-
-fn how(readings: &[f64], period: usize) -> Option<Failure> {
-    let (before, now) = readings.split_at(period);
-    let largest = before.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-    let begin = now
-        .iter()
-        .zip(before)
-        .position(|(now, before)| (now - before).abs() > CHANGED * largest)?;
-    let (now, before) = (&now[begin..], &before[begin..]);
-    let [least, most] = now
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| {
-            [least.min(*value), most.max(*value)]
-        });
-    let is_same = |one: f64, other: f64| (one - other).abs() < 1e-6 * largest;
-    let power: f64 = before.iter().map(|value| value * value).sum();
-    let ratio = now.iter().zip(before).map(|(now, before)| now * before).sum::<f64>() / power;
-    let at_limit = now
-        .iter()
-        .filter(|value| is_same(value.abs(), most.max(-least)))
-        .count();
-    Some(match () {
-        () if is_same(least, 0.0) && is_same(most, 0.0) => Failure::Nothing,
-        () if (ratio + 1.0).abs() < CHANGED => Failure::Reversed,
-        () if at_limit > 2 => Failure::Clipped,
-        () => Failure::Other,
-    })
-}
-
 /// Five digits, with an exponent if the number is very small or large.
 fn short(value: f64) -> String {
     let rounded: f64 = format!("{value:.4e}").parse().unwrap_or(value);
@@ -741,36 +838,59 @@ mod tests {
             (Fault::LockLost, "phase_lock.lock.unlock_tolerance is 0.2 rad"),
             (Fault::LockLost, "the phase error is 14.324 degrees"),
         ] {
-            let text = evidence(&samples, &scene.controller_config(), fault).to_string();
+            let text = evidence(&samples, &scene.controller_config(), scene.plan().units, fault).to_string();
             assert!(text.contains(read) && text.contains(limit), "{text}");
         }
+        // Under a force, 0.01 m of the driven mode's base are newtons, and its response is read at the sensor.
+        let text = include_str!("../../../scenes/frame.toml");
+        let force = Scene::parse("frame.toml", text, &[]).unwrap();
+        let structure = force.structure.as_ref().unwrap();
+        let [newtons, metres] = [
+            0.01 / structure.base_per_drive(),
+            0.2 * structure.reading_per_response().abs(),
+        ]
+        .map(short);
+        let text = evidence(&samples, &force.controller_config(), force.plan().units, Fault::Sensor).to_string();
+        assert!(
+            text.contains(&format!("the response read {metres} m, and the force {newtons} N")),
+            "{text}"
+        );
     }
 
-    /// The words for these readings of response and force, which begin as sines of 100 samples per period.
-    fn words(read: fn(usize, f64) -> [f64; 2]) -> &'static str {
+    /// What is said of these readings of response and force, which begin as sines of 100 samples per period.
+    fn words(read: fn(usize, f64) -> [f64; 2]) -> String {
         let mut samples = vec![Sample::default(); 200];
         for (n, sample) in samples.iter_mut().enumerate() {
             let [response, force] = read(n, (TAU * n as f64 / 100.0).sin());
             sample.sensors = Sensors { response, reference: Some(force) };
             sample.command.drive.omega = TAU;
         }
-        failed(&samples, 0.01).unwrap_or_default()
+        contradicts(&samples, 0.01).unwrap_or_default()
     }
 
     #[test]
-    fn a_motion_that_changes_is_not_taken_for_a_sensor_that_fails_but_a_jump_is() {
-        for irregular in [
-            words(|n, sine| [sine * (0.5 + 0.5 * (n as f64 / 200.0).powi(2)), 0.1 * sine]),
-            // A response that grows from rest.
-            words(|n, sine| [sine * (n as f64 / 200.0).powi(3), 0.1 * sine]),
+    fn the_channel_that_contradicts_its_past_is_named_with_its_change() {
+        for (words, expected) in [
+            (
+                words(|n, sine| [if n < 130 { sine } else { -sine }, 0.1 * sine]),
+                "the response contradicts its past: it changed by 200 %",
+            ),
+            (
+                words(|n, sine| [sine, if n < 130 { sine } else { 0.3 * sine }]),
+                "the force contradicts its past: it changed by 70 %",
+            ),
+            // The loop has already answered.
+            (
+                words(|n, sine| {
+                    [
+                        sine * if n < 130 { 1.0 } else { 1.2 },
+                        if n < 130 { sine } else { -sine },
+                    ]
+                }),
+                "by 200 % of its amplitude from one period to the next, the response by 20 %",
+            ),
         ] {
-            assert!(irregular.contains("irregular"), "{irregular}");
-        }
-        for jump in [
-            words(|n, sine| [if n < 130 { sine } else { 0.3 * sine }, 0.1 * sine]),
-            words(|n, sine| [if n < 130 { sine } else { -sine }, 0.1 * sine]),
-        ] {
-            assert!(jump.contains("jumped"), "{jump}");
+            assert!(words.contains(expected), "{words}");
         }
     }
 
@@ -792,17 +912,6 @@ mod tests {
                 "the response stays",
             ),
             (words(|n, sine| [if n < 180 { sine } else { 0.9 }; 2]), "both sensors"),
-            // The loop has already answered.
-            (
-                words(|n, sine| {
-                    if n < 130 {
-                        [sine; 2]
-                    } else {
-                        [sine * (n as f64 - 30.0) / 100.0, -sine]
-                    }
-                }),
-                "opposite sign",
-            ),
         ] {
             assert!(words.contains(expected), "{words}");
         }

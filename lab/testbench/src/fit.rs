@@ -37,7 +37,7 @@ pub use known::{Known, LinearVerdict, Quantity, linear_verdicts};
 pub use record::{LeftOut, RecordFit, follow};
 pub use recording::{Kind, LinearDecay, Part, Recording, RecordingError, parts};
 #[cfg(feature = "tables")]
-pub use table::Table;
+pub use table::plain_table;
 
 /// A measured point of phase resonance.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,5 +1,6 @@
 //! What a record says: the locked point, its regime, and the backbone along the free decay.
 
+mod asked;
 mod decay;
 mod level;
 mod resonance_fit;
@@ -13,12 +14,13 @@ use vines_model::numerics::{Estimate, SIGNIFICANT, mean, standard_deviation};
 
 use crate::plan::{Knowledge, Plan};
 use crate::record::{Record, Sample};
-use crate::scene::{Dimensionless, Measurand};
+use crate::scene::Measurand;
 
+pub use asked::Departure;
 pub(crate) use decay::PER_PERIOD;
-pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
+pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, base_at_rest, decay_points, harmonic};
 pub use level::{Criterion, LevelEstimate, Unsteady};
-pub(crate) use level::{LAG, LONGEST};
+pub(crate) use level::{LAG, LONGEST, is_off_target};
 pub use resonance_fit::{Cycle, ResonanceFit};
 pub(crate) use response::{ASYMMETRIC, Line, degrees, subharmonic, without_tones};
 pub use response::{Tone, classify, drive_harmonics, foreign_tone, impacts, regime_by_response};
@@ -28,6 +30,8 @@ pub use vines_model::regime::{Impact, Regime};
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum IdentificationError {
+    #[error("the loop is locked, but not as asked: {departure}. There the regime is {regime}")]
+    OtherThanAsked { departure: Departure, regime: Regime },
     #[error(
         "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the regime is {regime}, not symmetric 1:1 with two \
          impacts per period. Try another [start] (the particle must be moving) or another G"
@@ -44,7 +48,7 @@ pub enum IdentificationError {
     NoMotion,
     #[error(
         "the phase was {error:.3} ± {uncertainty:.3} degrees off its target while the lock was held; phase_lock.lock.phase_tolerance allows \
-         {tolerance:.3} degrees. A channel may have become late"
+         {tolerance:.3} degrees. The controller holds another phase than controller.phase_target, or a channel has become late"
     )]
     OffTarget {
         error: f64,
@@ -66,6 +70,8 @@ pub struct Identification {
     pub lock: Lock,
     /// The decay, from the release on; without points if it is shorter than the window of the fit.
     pub decay: DecayPoints,
+    /// Amplitude of the base after the release, m, where it is least, if the base never rests.
+    pub base_after_release: Option<Estimate>,
 }
 
 /// Identifies the record of an experiment.
@@ -74,24 +80,35 @@ pub struct Identification {
 /// No motion, a lock in another regime than the symmetric 1:1 one or off its phase, and a sensor that fails in the decay.
 pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, IdentificationError> {
     let knowledge = plan.knowledge;
-    let lock = measure(record, &knowledge).ok_or(IdentificationError::NoMotion)?;
+    let lock = measure(record, plan).ok_or(IdentificationError::NoMotion)?;
+    let subharmonic = subharmonic(record.hold(), &knowledge, TAU * lock.at.f_hz);
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
     let is_expected = match lock.regime {
         Regime::Symmetric | Regime::Unresolved => true,
         Regime::Asymmetric => !knowledge.is_symmetric,
         _ => false,
     };
+    // Another phase or drive has another motion, of which the wanted one says nothing.
+    if (!is_expected || subharmonic.is_some())
+        && let Some(departure) = Departure::of(record.hold(), plan)
+    {
+        return Err(IdentificationError::OtherThanAsked { departure, regime: lock.regime });
+    }
     if !is_expected {
         return Err(IdentificationError::Regime { regime: lock.regime, sigma: lock.at.sigma, c: lock.at.c });
     }
-    let ResonancePoint { f_hz, sigma, c, .. } = lock.at;
-    if let Some(periods) = subharmonic(record.hold(), &knowledge, TAU * f_hz) {
+    let ResonancePoint { sigma, c, .. } = lock.at;
+    if let Some(periods) = subharmonic {
         return Err(IdentificationError::Subharmonic { periods, sigma, c });
     }
     on_target(&lock, plan.lock.lock.phase_tolerance)?;
     sensors_after_release(record, &knowledge)?;
-    let decay = decay_points(record, &knowledge, WINDOW);
-    Ok(Identification { knowledge, lock, decay })
+    Ok(Identification {
+        knowledge,
+        lock,
+        decay: decay_points(record, &knowledge, WINDOW),
+        base_after_release: base_at_rest(record, &knowledge).err(),
+    })
 }
 
 /// Largest number of harmonics that are fitted: a bound of the work.
@@ -114,6 +131,11 @@ pub struct Lock {
     /// The point: frequency and base amplitude of phase resonance at the mean amplitude of the response before the release.
     #[serde(flatten)]
     pub at: ResonancePoint,
+    /// Requested amplitude of the base, m; of a base that is held from sample to sample, which moves a little less than its samples, what is left.
+    #[serde(rename = "E_requested_m")]
+    pub requested_e_m: f64,
+    /// Whether the drive of the point is the requested one: within 1 %, or within three standard uncertainties if these are more.
+    pub at_requested_drive: bool,
     /// Mean particle speed over `b omega0`; absent if the rig does not report it.
     #[serde(rename = "B")]
     pub b: Option<f64>,
@@ -136,6 +158,9 @@ pub struct Lock {
     /// Share of the samples before the release with the command at the limit of a shaker's amplifier, per cent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clipped_percent: Option<f64>,
+    /// Mean amplitude of the command of a shaker over the averaged periods, V.
+    #[serde(rename = "command_V", skip_serializing_if = "Option::is_none")]
+    pub command_v: Option<f64>,
     /// What friction did over the hold; absent without friction, or if the rig does not report it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<Friction>,
@@ -190,7 +215,8 @@ const SMALLEST: f64 = 1e-6;
 pub(crate) const PHASE_RANGE: f64 = 0.1;
 
 /// The locked point of a record; `None` without a motion.
-fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
+fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
+    let knowledge = &plan.knowledge;
     let d = &knowledge.numbers;
     let (dt, hold) = (record.sample_time, record.hold());
     let held = Cycle::all(hold, dt, knowledge.target);
@@ -209,7 +235,7 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
     let of_level = &approach[approach.len() - level.periods..];
     let averaged = of_level.iter().map(|cycle| cycle.samples).sum::<usize>();
     let speed = |sample: &Sample| Some(d.speed(sample.ground_truth?.particle_velocity.abs()));
-    let speeds: Option<Vec<f64>> = record.samples[record.released - averaged..record.released]
+    let speeds: Option<Vec<f64>> = record.samples[record.hold_end - averaged..record.hold_end]
         .iter()
         .map(speed)
         .collect();
@@ -223,11 +249,14 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
     };
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
     let [stated_base, stated_omega] = level.stated();
+    let requested = plan.requested(omega.value);
     Some(Lock {
         at: ResonancePoint::new(
             [level.response, stated_base, stated_omega, phase_error(&held, knowledge)],
-            d,
+            knowledge,
         ),
+        requested_e_m: requested,
+        at_requested_drive: !asked::is_another(stated_base.value - requested, stated_base.uncertainty, requested),
         b: b.map(|b| b.value),
         u_b: b.map(|b| b.uncertainty),
         averaged: approach.len(),
@@ -237,6 +266,7 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
         impacts_per_period,
         regime,
         clipped_percent: record.clipped_percent,
+        command_v: mean_command(&record.samples[record.released - averaged..record.released], knowledge),
         friction: Friction::of(hold, (hold.len() - 1) as f64 * dt * omega.value / TAU),
         tone: (!is_simulated)
             .then(|| foreign_tone(hold, knowledge, omega.value))
@@ -244,10 +274,16 @@ fn measure(record: &Record, knowledge: &Knowledge) -> Option<Lock> {
     })
 }
 
+/// Mean amplitude of the command of a shaker in samples, V; `None` without a shaker.
+pub(crate) fn mean_command(samples: &[Sample], knowledge: &Knowledge) -> Option<f64> {
+    let path = knowledge.shaker()?;
+    Some(mean(samples.iter().map(|sample| sample.shaker_command)) / path.base_per_command)
+}
+
 /// The last periods before the release.
 fn before_release(record: &Record, knowledge: &Knowledge) -> Vec<Cycle> {
     let most = knowledge.samples(MOST);
-    let samples = &record.samples[record.released.saturating_sub(most.max(record.hold().len()))..record.released];
+    let samples = &record.samples[record.hold_end.saturating_sub(most.max(record.hold().len()))..record.hold_end];
     Cycle::all(samples, record.sample_time, knowledge.target)
 }
 
@@ -301,6 +337,12 @@ pub struct ResonancePoint {
     /// Standard uncertainty of the base amplitude, m.
     #[serde(rename = "u_E_m")]
     pub u_e_m: f64,
+    /// Of a structure that a force drives, its amplitude, N.
+    #[serde(rename = "F_N", skip_serializing_if = "Option::is_none")]
+    pub f_n: Option<f64>,
+    /// Standard uncertainty of the force, N.
+    #[serde(rename = "u_F_N", skip_serializing_if = "Option::is_none")]
+    pub u_f_n: Option<f64>,
     /// Detuning.
     pub sigma: f64,
     /// Amplitude of the fundamental of the response over b.
@@ -325,7 +367,9 @@ pub struct ResonancePoint {
 
 impl ResonancePoint {
     /// From the amplitudes of response and base, m, the frequency, rad/s, and the phase error, rad.
-    pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], d: &Dimensionless) -> Self {
+    pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], knowledge: &Knowledge) -> Self {
+        let d = &knowledge.numbers;
+        let force = |amplitude: f64| Some(amplitude / knowledge.base_per_newton?);
         Self {
             f_hz: omega.value / TAU,
             a_m: response.value,
@@ -333,6 +377,8 @@ impl ResonancePoint {
             u_f_hz: omega.uncertainty / TAU,
             u_a_m: response.uncertainty,
             u_e_m: base.uncertainty,
+            f_n: force(base.value),
+            u_f_n: force(base.uncertainty),
             sigma: d.sigma(omega.value),
             c: response.value / d.b,
             g: d.excitation(base.value),

@@ -13,7 +13,7 @@ use crate::experiment::DECAYED;
 use crate::linear::{MeasuredLinear, ParticleState};
 use crate::rig::{LowPass, Sensors};
 use crate::scene::{
-    Definition, Dimensionless, Measurand, Parameters, Scene, Structure, carried_up_to, has_mirror_images,
+    Definition, Dimensionless, Excitation, Measurand, Parameters, Scene, Structure, carried_up_to, has_mirror_images,
 };
 
 /// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
@@ -218,10 +218,17 @@ pub struct ShakerPath {
     pub speed: f64,
     /// Base displacement per reference, m/N or m/m.
     pub base_per_reference: f64,
+    /// Base displacement per command, m/V, as the bench converts commands.
+    pub base_per_command: f64,
     /// Periods within which the control follows a change of the response.
     pub followed: u16,
     /// Largest amplitude, m, by which harmonics of the force beside the sampling frequency change its fundamental as it is read.
     pub aliased: f32,
+    /// Largest relative error of these numbers at the frequencies of the check, up to the bandwidth of the control to each side.
+    pub error: f64,
+    /// Reference per command of a structure that moves as it does, over [`Self::gain`], by the drawing: without impacts the response follows from the
+    /// reference, and no check can tell the two apart.
+    pub coupling: Complex64,
 }
 
 impl ShakerPath {
@@ -234,18 +241,15 @@ impl ShakerPath {
             (row, Complex64::ONE)
         });
         let [inverse, of_pole] = complex_fit(rows).map_or([Complex64::ONE; 2], |(found, _)| found.into());
-        Self {
+        let path = Self {
             gain: 1.0 / inverse,
             pole: of_pole / inverse,
             damping_rate,
             ..self
-        }
-    }
-
-    /// Largest relative error of reference over command at these frequencies.
-    pub(crate) fn error(&self, omega0: f64, values: &[(f64, Complex64)]) -> f64 {
-        let error = |(omega, value): &(f64, Complex64)| (value / self.at(omega - omega0) - 1.0).norm();
-        values.iter().map(error).fold(0.0, f64::max)
+        };
+        let error = |(omega, value): &(f64, Complex64)| (value / path.at(omega - omega0) - 1.0).norm();
+        let error = values.iter().map(error).fold(0.0, f64::max);
+        Self { error, ..path }
     }
 
     /// Reference over command at `omega0 + detuning`, rad/s.
@@ -282,6 +286,8 @@ pub struct Knowledge {
     pub sample_time: f64,
     /// Phase of the response relative to the reference that the loop holds, and what is measured of both.
     pub target: Target,
+    /// Base displacement per newton of a structure that a force drives, m/N.
+    pub base_per_newton: Option<f64>,
     /// The shaker, if one stands between the command and the reference, which then drives the structure as it is measured.
     pub shaker: Option<ShakerPath>,
     /// Distance of the nearest other pole of a structure from the pole of its driven mode after the release, rad/s; infinite without one.
@@ -312,6 +318,7 @@ impl Knowledge {
             carried_up_to: carried_up_to(plant),
             sample_time,
             target,
+            base_per_newton: None,
             shaker: None,
             nearest_pole: f64::INFINITY,
             #[cfg(feature = "tables")]
@@ -385,12 +392,35 @@ pub struct Plan {
     pub tracking: Config,
     /// Samples of the hold.
     pub hold: usize,
+    /// Longest ramp of the drive after the controller was asked to release it, samples: in this time the response of the linear rig falls to
+    /// [`DECAYED`], so that after a longer ramp nothing is left to decay.
+    pub ramp: usize,
     /// Samples of the recorded decay.
     pub decay: usize,
     /// Levels of the tracked backbone, amplitudes of the response, m, in the order in which they are visited.
     pub levels: Vec<f64>,
     /// Largest relative uncertainty of a level, as in [`BackboneSettings`](crate::scene::BackboneSettings).
     pub precision: f64,
+    /// The units of the scene.
+    pub units: Units,
+}
+
+/// In which units a scene gives limits: those of the drive and of the displacement at the sensor, where the bench has the metres of an oscillator.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Units {
+    /// Drive of the scene per metre of the bench.
+    pub drive: f64,
+    /// Unit of this drive, m or N.
+    pub name: &'static str,
+    /// Displacement at the sensor per metre of the bench.
+    pub response: f64,
+}
+
+impl Plan {
+    /// Requested amplitude of the base, m, as it moves with the frequency `omega`, rad/s: a held base moves a little less than its samples.
+    pub fn requested(&self, omega: f64) -> f64 {
+        self.amplitude * self.knowledge.target.base_per_sample(omega, self.knowledge.sample_time)
+    }
 }
 
 /// Longest recorded decay, natural periods, unless the scene asks for a longer one: a bound for rigs with little damping.
@@ -412,6 +442,8 @@ impl Scene {
             path.aliased = self.aliased(1.0).unwrap_or(0.0) as f32;
         }
         knowledge.target.through_shaker = knowledge.shaker.is_some();
+        let forced = self.structure().filter(|one| one.excitation == Excitation::Force);
+        knowledge.base_per_newton = forced.map(Structure::base_per_drive);
         knowledge.nearest_pole = self.structure().map_or(f64::INFINITY, Structure::nearest_pole);
         #[cfg(feature = "tables")]
         {
@@ -430,8 +462,8 @@ impl Scene {
     /// The experiment on a rig of which this is known.
     pub fn plan_on(&self, mut knowledge: Knowledge) -> Plan {
         // The decay lasts as long as the linear rig takes to fall to the share that is recorded.
-        let relaxed = -DECAYED.ln() * knowledge.linear.relaxation_periods();
-        let decay = self.record.decay_periods.unwrap_or(relaxed.min(LONGEST_DECAY));
+        let relaxed = (-DECAYED.ln() * knowledge.linear.relaxation_periods()).min(LONGEST_DECAY);
+        let decay = self.record.decay_periods.unwrap_or(relaxed);
         let structure = self.structure().filter(|one| one.shaker.is_none());
         let lock = self.lock_config(&knowledge);
         knowledge.target.delay = lock.delay;
@@ -442,9 +474,11 @@ impl Scene {
             lock,
             tracking: self.tracking_config(&knowledge),
             hold: knowledge.samples(self.record.hold_periods),
+            ramp: knowledge.samples(relaxed),
             decay: knowledge.samples(decay),
             levels: self.backbone.levels(self.plant.half_width),
             precision: self.backbone.precision,
+            units: self.units(),
         }
     }
 }

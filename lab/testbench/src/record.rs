@@ -17,6 +17,8 @@ pub struct Sample {
     pub command: Command,
     /// The ground truth of a simulated rig.
     pub ground_truth: Option<GroundTruth>,
+    /// Amplitude of the command of a shaker from this sample to the next, m as the bench converts commands; 0 without a shaker.
+    pub shaker_command: f64,
 }
 
 /// First line of a recording (CSV), with the units of channels that are no displacements.
@@ -77,7 +79,9 @@ pub struct Record {
     pub settled: usize,
     /// Whether the response is held by control, because the requested drive alone would hold it hardly, or not.
     pub held: bool,
-    /// Index of the first sample with the drive off.
+    /// Index of the sample at which the controller was asked to release the drive.
+    pub hold_end: usize,
+    /// Index of the first sample with the drive off, after the controller's ramp.
     pub released: usize,
     /// Share of the samples before it with the command at the limit of a shaker's amplifier, per cent; `None` without a shaker.
     pub clipped_percent: Option<f64>,
@@ -86,10 +90,10 @@ pub struct Record {
 impl Record {
     /// The samples between the settled lock and the release.
     pub fn hold(&self) -> &[Sample] {
-        &self.samples[self.settled..self.released]
+        &self.samples[self.settled..self.hold_end]
     }
 
-    /// The samples from the release on.
+    /// The samples with the drive off.
     pub fn decay(&self) -> &[Sample] {
         &self.samples[self.released..]
     }

@@ -283,11 +283,17 @@ impl Scene {
         ])
     }
 
-    /// The controller's sample time, s: rig and controller agree on it before anything is measured.
+    /// The controller's sample time, s: rig and controller agree on it before anything is measured. It has 31 significant bits (2e-10 of it is
+    /// rounded), so that sums and multiples of it are exact and equal for four million samples: components with a clock of their own compare times
+    /// with a tolerance that may be the rounding error of a number near 1.
     pub fn sample_time(&self) -> f64 {
-        TAU / self.plant.natural_frequency() / self.controller.samples_per_period
+        let exact = TAU / self.plant.natural_frequency() / self.controller.samples_per_period;
+        f64::from_bits((exact.to_bits() + DROPPED / 2) / DROPPED * DROPPED)
     }
 }
+
+/// Multiple of which the last bits of a sample time are: 22 of 53 are zero.
+const DROPPED: u64 = 1 << 22;
 
 /// A value of a scene that is possible, but hardly meant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -436,6 +442,11 @@ impl Sections {
             resonance.sensor = Sensor::Q1;
         }
         let plant = plant.resolve(origin)?;
+        if let Some(structure) = &structure {
+            structure
+                .reached_by(plant.particle_mass)
+                .map_err(|message| SceneError::text(origin, format!("[structure]: {message}")))?;
+        }
         let d = Dimensionless::of(&plant, 0.0);
         let mut scene = Scene {
             start: self.start.resolve(&plant)?,
@@ -547,17 +558,47 @@ impl Scene {
         let Some(path) = path else {
             return Self::parse("paper.toml (the default scene)", PAPER, overrides);
         };
-        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.into(), source })?;
-        Self::parse(&path.display().to_string(), &text, overrides)
+        Self::parse(&path.display().to_string(), &Self::text(path)?, overrides)
+    }
+
+    /// The text of the scene file at `path`.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is not in UTF-8.
+    pub fn text(path: &Path) -> Result<String, SceneError> {
+        let bytes = std::fs::read(path).map_err(|source| SceneError::Read { path: path.into(), source })?;
+        let text = utf8(&bytes).map_err(|message| SceneError::text(&path.display().to_string(), message))?;
+        Ok(text.into())
     }
 
     /// Reads a scene from `text`; `origin` names it in messages.
     pub fn parse(origin: &str, text: &str, overrides: &[Override]) -> Result<Self, SceneError> {
         let (sections, table) = overrides::read(origin, text, overrides)?;
         let scene = sections.resolve(origin, &table)?;
-        scene.controller_config().build()?;
+        scene.check_controller()?;
         Ok(scene)
     }
+}
+
+/// The text of a file in UTF-8, without its byte order mark.
+///
+/// # Errors
+/// What the file is instead, and what to do.
+pub fn utf8(bytes: &[u8]) -> Result<&str, String> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err("is UTF-16; save it as UTF-8".into());
+    }
+    if bytes.contains(&0) {
+        return Err("has bytes of zero, as UTF-16 or a binary file has; save it as text in UTF-8".into());
+    }
+    let text = std::str::from_utf8(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+    text.map_err(|error| {
+        let line = 1 + bytes[..error.valid_up_to()]
+            .iter()
+            .filter(|byte| **byte == b'\n')
+            .count();
+        format!("is not UTF-8 in line {line}; save it as UTF-8")
+    })
 }
 
 // The `[plant]` section, in SI units or dimensionless, and the `[start]` section.
@@ -813,7 +854,7 @@ impl RecordSettings {
         positive("record.decay_periods", self.decay_periods.unwrap_or(1.0), unit)?;
         let periods = self.hold_periods + self.decay_periods.unwrap_or(0.0);
         let longest = scene.controller_config().acquire_timeout.unwrap_or(f64::INFINITY);
-        let samples = longest / scene.sample_time() + scene.controller.samples_per_period * periods;
+        let samples = (longest / scene.sample_time()).round() + scene.controller.samples_per_period * periods;
         check(
             "samples of phase_lock.acquire_timeout and of all periods of [record]",
             samples,

@@ -3,7 +3,6 @@
 
 use serde::Serialize;
 use vines_model::Dimensionless;
-use vines_model::numerics::secant;
 use vines_model::orbit::{
     self, Orbit, OrbitCurve, Particle, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
     StructureOrbits, StructureRange, at_amplitude,
@@ -14,9 +13,8 @@ use crate::scene::{Scene, Structure};
 
 /// Orbits on a curve.
 const POINTS: usize = 400;
-/// Relative difference of the first two frequencies of a search near one, and its largest last step: far below the curvature, and rounding.
-const SECANT: f64 = 1e-7;
-const CONVERGED: f64 = 1e-13;
+/// Detunings of one oscillator's backbone.
+pub const DETUNINGS: [f64; 2] = [-6.0, 6.0];
 
 /// What is known of a structure without driving it. The response is the displacement at the sensor, m.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -80,11 +78,19 @@ impl Scene {
 }
 
 impl Survey {
+    /// Number of orbits that are tried where the backbone is one curve.
+    pub const ORBITS: usize = 2 * POINTS;
+
     /// The survey of a scene's structure; `None` without one.
     pub fn of(scene: &Scene) -> Option<Self> {
+        Self::with(scene, &|| ())
+    }
+
+    /// The survey; `progress` is called for every orbit of the backbone that is tried, about [`Self::ORBITS`] times.
+    pub fn with(scene: &Scene, progress: &dyn Fn()) -> Option<Self> {
         let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
         let driven = section_of(structure);
-        let facts = orbits.facts(driven, scene.frequencies(), POINTS)?;
+        let facts = orbits.facts(driven, scene.frequencies(), POINTS, progress)?;
         Some(Self {
             behind_shaker: behind_shaker(scene, &facts.all).unwrap_or_default(),
             facts,
@@ -137,12 +143,9 @@ fn behind_shaker(scene: &Scene, backbone: &[StructureBranch]) -> Option<Vec<Behi
 /// The orbit at phase resonance with this response, m, near a frequency, rad/s.
 fn with_response(orbits: &StructureOrbits, response: f64, omega: f64) -> Option<StructureOrbit> {
     let distance = |orbit: &StructureOrbit| (orbit.response - response).abs();
-    let near = |omega: f64| {
-        let found = orbits.at_phase_resonance(omega).into_iter();
-        found.min_by(|one, other| distance(one).total_cmp(&distance(other)))
-    };
-    let miss = |omega: f64| Some(near(omega)?.response / response - 1.0);
-    near(secant(miss, [omega * (1.0 + SECANT), omega], CONVERGED * omega)?)
+    let found = orbits.at_phase_resonance(omega).into_iter();
+    let near = found.min_by(|one, other| distance(one).total_cmp(&distance(other)))?;
+    orbits.at_response(response, [omega, near.speed])
 }
 
 /// The exact phase-resonant orbits of a scene under its drive, by rising C; `numbers` are those of its oscillator or driven mode.
@@ -168,6 +171,63 @@ pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<
     let told = |orbit: &StructureOrbit| of_driven_mode(orbit, structure, numbers);
     let curves = orbits.backbone(&range).into_iter();
     Some(curves.map(|branch| branch.orbits.iter().map(told).collect()).collect())
+}
+
+/// The stable orbits of a scene's exact backbone, with those where its stable stretches begin and end.
+pub fn stable_backbone(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
+    let of_structure = || {
+        let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
+        let range = orbits.range(section_of(structure), POINTS)?.with(scene.frequencies());
+        let branches = orbits.backbone(&range);
+        let stable = branches
+            .iter()
+            .flat_map(StructureBranch::stable_to_their_ends)
+            .flatten();
+        Some(stable.map(|orbit| of_driven_mode(orbit, structure, numbers)).collect())
+    };
+    let alone = || {
+        orbit::stable_backbone(numbers, DETUNINGS, POINTS)
+            .into_iter()
+            .flatten()
+            .collect()
+    };
+    of_structure().unwrap_or_else(alone)
+}
+
+/// The exact orbits of a scene at phase resonance, one by one, in the numbers of its oscillator or driven mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExactOrbits {
+    numbers: Dimensionless,
+    /// Of a structure: its orbits, base per drive and reading per response.
+    structure: Option<(StructureOrbits, [f64; 2])>,
+}
+
+impl ExactOrbits {
+    /// Those of the oscillator or the structure of a scene.
+    pub fn of(scene: &Scene, numbers: &Dimensionless) -> Self {
+        let structure = scene.structure.as_ref().zip(scene.structure_orbits());
+        let structure = structure.map(|(structure, orbits)| {
+            let units = [structure.base_per_drive(), structure.reading_per_response().abs()];
+            (orbits, units)
+        });
+        Self { numbers: *numbers, structure }
+    }
+
+    /// Those of an oscillator.
+    pub fn of_oscillator(numbers: &Dimensionless) -> Self {
+        Self { numbers: *numbers, structure: None }
+    }
+
+    /// The orbit with the response C, near a detuning and a speed of the particle.
+    pub fn with_amplitude(&self, c: f64, [sigma, speed]: [f64; 2]) -> Option<Orbit> {
+        let d = &self.numbers;
+        let Some((orbits, [per_drive, per_response])) = &self.structure else {
+            return orbit::with_amplitude(d, c, [sigma, speed]);
+        };
+        let near = [d.omega(sigma), speed * d.b * d.omega0];
+        let found = orbits.at_response(c * d.b * per_response, near)?;
+        Some(found.in_numbers(d, *per_drive, *per_response))
+    }
 }
 
 /// Curves of the exact symmetric 1:1 orbits of a scene's structure at these detunings: at phase resonance, or the frequency response under the

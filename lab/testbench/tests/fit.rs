@@ -11,7 +11,7 @@ use vines_testbench::backbone::track;
 use vines_testbench::experiment::run;
 use vines_testbench::fit::{
     Channel, Contents, Effect, Fit, FitError, Kind, Known, MeasuredPoint, Measurements, Quantity, RecordFit, Recording,
-    RecordingError, Selection, Table, contradiction, explain, find, fit, follow, linear_verdicts, parts,
+    RecordingError, Selection, contradiction, explain, find, fit, follow, linear_verdicts, parts, plain_table,
 };
 use vines_testbench::linear::{MeasuredLinear, ParticleState};
 use vines_testbench::rig::{BuiltIn, Chain, Rig, RigError, RigStage, Sensors, Simulated};
@@ -833,11 +833,11 @@ fn read(text: &[u8], response: &str, drive: &str, time: Option<&str>) -> Result<
         time: time.map(Into::into),
         ..Selection::default()
     };
-    Table::parse("mine.csv", text)?.contents().recording(&selection)
+    plain_table("mine.csv", text)?.recording(&selection)
 }
 
 #[test]
-fn tables_are_read_as_people_have_them() {
+fn plain_tables_are_read_with_any_delimiter_names_and_units() {
     let rows = |delimiter: &str, decimal: &str| -> String {
         let row = |n: i32| {
             let [time, y, x] = [
@@ -854,60 +854,130 @@ fn tables_are_read_as_people_have_them() {
     };
     let plain = read(format!("time,y,x\n{}", rows(",", ".")).as_bytes(), "y:mm", "x:µm", None).unwrap();
     assert!((plain.sample_time - 1e-3).abs() < 1e-15 && plain.response.len() == 200);
-    let utf16 = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>();
-    let latin = |text: &str| text.chars().map(|one| one as u8).collect::<Vec<u8>>();
-    let named = |rows: &str| format!("time;y;x\ns;mm;µm\n{rows}");
     let (y, x) = ("y", "x");
-    let cases: [(Vec<u8>, &str, &str, Option<&str>); 10] = [
-        (named(&rows(";", ",")).into(), y, x, None),
-        (latin(&named(&rows(";", ","))), y, x, None),
-        (utf16(&named(&rows(";", "."))), y, x, None),
-        ([vec![0xff, 0xfe], utf16(&named(&rows(";", ",")))].concat(), y, x, None),
+    let cases: [(String, &str, &str, Option<&str>); 7] = [
+        (format!("time;y;x\ns;mm;µm\n{}", rows(";", ",")), y, x, None),
         (
-            format!(
-                "Rig 3, 2024-03-01\nSamples, 200\n\ntime [s]\ty (mm)\tx [um]\n{}",
-                rows("\t", ".")
-            )
-            .into(),
+            format!("\u{feff}time [s]\ty (mm)\tx [um]\n{}", rows("\t", ".")),
             y,
             x,
-            Some("time [s]"),
+            None,
         ),
-        (format!("# time,y,x\n{}", rows(",", ".")).into(), "y:mm", "x:um", None),
+        (format!("Zeit [s]|y (mm)|x [um]\n{}", rows("|", ".")), y, x, None),
+        (rows("  ", "."), "2:mm", "3:um", Some("1")),
         (
-            format!("% from the logger\n{}", rows("  ", ".")).into(),
-            "2:mm",
-            "3:um",
-            Some("1"),
-        ),
-        (
-            format!("clock,y,x\n{}0.2,0.0", rows(",", ".")).into(),
+            format!("clock,y,x\n{}0.2,0.0", rows(",", ".")),
             "y:mm",
             "x:1e-6",
             Some("clock:s"),
         ),
         (
-            format!("\"time\",\"y : top\",x\n{}", rows(",", ".")).into(),
+            format!("\"time\",\"y : top\",x\n{}", rows(",", ".")),
             "y : top:mm",
             "x:um",
             None,
         ),
-        (
-            format!("time,y,x\n{}# end of the run\n", rows(",", ".")).into(),
-            "y:1V/mm",
-            "x:um",
-            None,
-        ),
+        (format!("time,y,x\n{}", rows(",", ".")), "y:1V/mm", "x:um", None),
     ];
     for (text, response, drive, time) in cases {
-        let one = read(&text, response, drive, time).unwrap_or_else(|error| panic!("{error}"));
+        let one = read(text.as_bytes(), response, drive, time).unwrap_or_else(|error| panic!("{error}"));
         assert!((one.sample_time - plain.sample_time).abs() < 1e-12, "{:?}", one.notes);
         assert_eq!((&one.response, &one.drive), (&plain.response, &plain.drive));
     }
-    let dates = |n: i32| format!("2024-03-01T23:59:59.{:03}Z,{n},{n}\n", 5 * n);
-    let dates: String = (0..100).map(dates).collect();
-    let one = read(format!("Time,y,x\n{dates}").as_bytes(), "y", "x", None).unwrap();
-    assert!((one.sample_time - 5e-3).abs() < 1e-9);
+}
+
+#[test]
+fn a_table_of_another_dialect_is_refused_with_its_row_and_never_read_as_another_number() {
+    let row = |n: i32, cell: &str| format!("{};{cell};{}\n", 1e-3 * f64::from(n), n % 7);
+    let table = |cell: &str| -> Vec<u8> {
+        let rows: String = (0..50).map(|n| row(n, cell)).collect();
+        format!("time;y;x\n{rows}").into_bytes()
+    };
+    let utf16: Vec<u8> = "time;y\n1;2\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let stamps: String = (0..300).map(|n| format!("{};{};{}\n", n / 110, n % 5, n % 7)).collect();
+    let cases = [
+        (
+            table("1,595.442"),
+            "row 2: `1,595.442` is not a number; `python -m vines fit`",
+        ),
+        (table("1.0D-03"), "row 2: `1.0D-03` is not a number"),
+        (table("0.1 mm"), "row 2: `0.1 mm` is not a number"),
+        (
+            [&[0xff, 0xfe], &utf16[..]].concat(),
+            "mine.csv is UTF-16; save it as UTF-8",
+        ),
+        (utf16, "has bytes of zero, as UTF-16"),
+        (b"time;\xb5\n1;2\n".to_vec(), "is not UTF-8 in line 1"),
+        (
+            b"# time;y;x\n0;1;2\n1;2;3\n".to_vec(),
+            "row 1: `# time` begins a comment",
+        ),
+        (
+            b"time;y;x\n0;1;2;3\n1;2;3\n2;3;4\n".to_vec(),
+            "row 2: it has 4 values, and row 1 has 3",
+        ),
+        (
+            b"time;y;x\n1;2,310;1\n2;1,595;2\n3;1,595;3\n".to_vec(),
+            "`2,310` may be 2.310 or 2310",
+        ),
+        (
+            format!("time;y;x\n{stamps}").into_bytes(),
+            "the times have steps of 1.000000 s, and up to 110 samples have the same time, which does not tell the time of a sample: give the \
+             samples a second with --rate",
+        ),
+    ];
+    for (text, words) in cases {
+        let message = read(&text, "y", "x", None).unwrap_err().to_string();
+        assert!(message.starts_with("mine.csv") && message.contains(words), "{message}");
+    }
+}
+
+#[test]
+fn a_rate_replaces_times_that_are_too_coarse_and_contradictions_are_named() {
+    let row = |n: i32| format!("{};{};{}\n", n / 110, n % 5, n % 7);
+    let text = format!("time;y;x\n{}", (0..1000).map(row).collect::<String>());
+    let contents = plain_table("mine.csv", text.as_bytes()).unwrap();
+    for (rate, has_contradiction) in [(110.0, false), (220.0, true)] {
+        let selection = Selection {
+            response: Some("y".into()),
+            drive: Some("x".into()),
+            rate: Some(rate),
+            ..Selection::default()
+        };
+        let one = contents.recording(&selection).unwrap();
+        assert!((one.sample_time * rate - 1.0).abs() < 1e-12 && one.response.len() == 1000);
+        let says = |words: &str| one.notes.iter().any(|note| note.contains(words));
+        assert!(says("samples a second that was given is used"), "{:?}", one.notes);
+        assert_eq!(says("the recording takes"), has_contradiction, "{:?}", one.notes);
+    }
+}
+
+#[test]
+fn the_time_is_the_channel_in_a_unit_of_time_and_no_temperature() {
+    let rows: String = (0..50)
+        .map(|n| format!("{},{n},{n},20\n", 1e-3 * f64::from(n)))
+        .collect();
+    let time = |header: &str| read(format!("{header}\n{rows}").as_bytes(), "y", "x", None);
+    for header in [
+        "Zeit [s],y,x,T [°C]",
+        "clock (s),y,x,T",
+        "t,y,x,T [°C]",
+        "t,y,x,delay [s]",
+    ] {
+        let found = time(header);
+        match header {
+            // Which of the two is the time, is not said.
+            "clock (s),y,x,T" => assert!(
+                found
+                    .unwrap_err()
+                    .to_string()
+                    .contains("all 50 samples have the time 20 s")
+            ),
+            _ => assert!((found.unwrap().sample_time - 1e-3).abs() < 1e-12, "{header}"),
+        }
+    }
+    let message = time("Zeit [s],y,x,delay [s]").unwrap_err().to_string();
+    assert!(message.contains("has several times, Zeit and delay"), "{message}");
 }
 
 #[test]
@@ -1039,6 +1109,7 @@ fn a_channel_of_the_base_that_is_late_by_a_known_time_is_shifted() {
             .map(|n| f64::sin(omega * (step * f64::from(n) - late)))
             .collect(),
         clock: Some([2.0, step]),
+        ..Channel::default()
     };
     for late in [1e-3, 0.4e-3, -0.7e-3] {
         let channels = vec![channel("y", 0.0), channel("x", late)];
@@ -1160,6 +1231,7 @@ fn channels_with_clocks_of_their_own_are_aligned() {
         unit: "mm".into(),
         values: wave(start, step, count),
         clock: Some([start, step]),
+        ..Channel::default()
     };
     let channels = vec![
         channel("rig/y", 0.0, 1e-3, 1000),

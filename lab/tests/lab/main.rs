@@ -9,6 +9,8 @@ mod packing;
 mod pair;
 mod report;
 mod results;
+#[cfg(target_os = "linux")]
+mod signals;
 mod watch;
 
 use std::fs;

@@ -97,13 +97,14 @@ struct DrawnMotion {
     b: f64,
     multipliers: [[f64; 2]; 4],
     stable: bool,
+    neutral: bool,
     start: Bounce,
 }
 
 impl Serialize for Branch {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let drawn = |motion: &Periodic| {
-            let Periodic { g, sigma, c, gamma, b, multipliers, stable, .. } = *motion;
+            let Periodic { g, sigma, c, gamma, b, multipliers, stable, neutral, .. } = *motion;
             DrawnMotion {
                 g,
                 sigma,
@@ -112,6 +113,7 @@ impl Serialize for Branch {
                 b,
                 multipliers,
                 stable,
+                neutral,
                 start: motion.bounces[0],
             }
         };
@@ -131,7 +133,8 @@ impl Branch {
         let points = &self.points;
         let (mut drawn, mut from) = (vec![&points[0]], 0);
         for to in 1..points.len() {
-            let changes = |n: usize| points[n].stable != points[n - 1].stable;
+            let kind = |n: usize| [points[n].stable, points[n].neutral];
+            let changes = |n: usize| kind(n) != kind(n - 1);
             let is_off = |n: usize| off(&points[n], [&points[from], &points[to]]) > DRAWN;
             let ends = changes(to) || to > 1 && changes(to - 1);
             if from + 1 < to && (ends || (from + 1..to).any(is_off)) {
@@ -146,7 +149,7 @@ impl Branch {
     /// Its motions are not 1:1, and the last ones are unstable.
     fn winds(&self) -> bool {
         let last = self.points.len().checked_sub(UNSTABLE).map(|from| &self.points[from..]);
-        !self.pattern().is_one_to_one() && last.is_some_and(|last| last.iter().all(|motion| !motion.stable))
+        !self.pattern().is_one_to_one() && last.is_some_and(|last| last.iter().all(Periodic::is_unstable))
     }
 }
 
@@ -297,7 +300,7 @@ impl Curve<'_> {
             return Some(BranchEnd::Range);
         }
         if branch.winds() {
-            let stable = branch.points.iter().rposition(|motion| motion.stable);
+            let stable = branch.points.iter().rposition(|motion| !motion.is_unstable());
             branch.points.truncate(stable.unwrap_or(0) + 2);
             return Some(BranchEnd::Unstable);
         }

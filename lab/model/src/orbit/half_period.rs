@@ -8,10 +8,11 @@
 use std::f64::consts::PI;
 
 use lovines::Section;
-use lovines::oscillator::Oscillator;
+use lovines::oscillator::{Oscillator, Regime};
 use nalgebra::{Complex, DMatrix, Matrix2, RowVector2, Vector2};
 
 use super::flight::Flight;
+use super::multipliers::{self, Impact};
 use super::symmetric::{Particle, SymmetricMotion, alternating};
 
 /// Largest difference of the flight from half a period, rad: a slow impact is that ill-defined in time.
@@ -21,8 +22,11 @@ const EXACT: f64 = 1e-8;
 pub(super) struct HalfPeriod {
     /// The sections and, last, the particle, with (x, v) of the periodic response to the impulses after the impact.
     parts: Vec<(Section, Vector2<f64>)>,
-    /// Derivative of the state (x, v) of every section and of the particle.
-    map: DMatrix<f64>,
+    /// Their flows over half a period.
+    flows: Vec<(Section, Matrix2<f64>)>,
+    impact: Impact,
+    /// s
+    duration: f64,
 }
 
 impl HalfPeriod {
@@ -50,14 +54,55 @@ impl HalfPeriod {
         };
         let (elapsed, wall) = flight.contact([b, motion.after[1] - motion.speed], b, 1.0)?;
         let is_half_a_period = wall < 0.0 && ((elapsed - duration) * motion.omega).abs() < EXACT;
-        is_half_a_period.then(|| Self { map: map(&parts, &flows, motion), parts })
+        is_half_a_period.then(|| Self {
+            impact: impact(&parts, motion),
+            flows: parts.iter().map(|part| part.0).zip(flows).collect(),
+            parts,
+            duration,
+        })
     }
 
-    /// The multipliers of the half period, by rising modulus.
-    pub(super) fn multipliers(&self) -> Vec<Complex<f64>> {
-        let mut multipliers: Vec<Complex<f64>> = self.map.complex_eigenvalues().iter().copied().collect();
+    /// The multipliers of the half period, by rising modulus; `near`: frequency, rad/s, and multipliers of an orbit near this one.
+    pub(super) fn multipliers(&self, near: Option<(f64, &[[f64; 2]])>) -> Vec<Complex<f64>> {
+        // The matrix of one oscillator is as fast, and keeps half of the digits of a double multiplier.
+        let found = near.filter(|_| self.flows.len() > 2).and_then(|(omega, multipliers)| {
+            let start = self.turned(PI / omega, multipliers);
+            multipliers::multipliers(&self.flows, self.impact, &start)
+        });
+        let mut multipliers =
+            found.unwrap_or_else(|| map(&self.flows, self.impact).complex_eigenvalues().as_slice().to_vec());
         multipliers.sort_unstable_by(|first, second| first.norm().total_cmp(&second.norm()));
         multipliers
+    }
+
+    /// Multipliers of half a period of the duration `before`, turned as the nearest multipliers of the sections without an impact turn: those of high
+    /// modes turn fast.
+    fn turned(&self, before: f64, multipliers: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let rates = self
+            .flows
+            .iter()
+            .filter_map(|(section, _)| match section.oscillator.regime {
+                Regime::Oscillating { omega_d } => Some(Complex::new(-section.oscillator.delta, omega_d)),
+                Regime::Overdamped { .. } => None,
+            });
+        let rates = rates.flat_map(|rate| [rate, rate.conj()]);
+        let free: Vec<_> = rates
+            .map(|rate| (-(rate * before).exp(), (rate * (self.duration - before)).exp()))
+            .collect();
+        let turn = |&[re, im]: &[f64; 2]| {
+            let multiplier = Complex::new(re, im);
+            let distance = |(free, _): &&(Complex<f64>, Complex<f64>)| (free - multiplier).norm_sqr();
+            let nearest = free
+                .iter()
+                .min_by(|one, other| distance(one).total_cmp(&distance(other)));
+            let turned = match nearest {
+                // A real one stays real.
+                Some((_, turn)) if im != 0.0 => multiplier * turn,
+                _ => multiplier,
+            };
+            [turned.re, turned.im]
+        };
+        multipliers.iter().map(turn).collect()
     }
 
     /// The part of (x, v) of every section after the impact that the impulses make.
@@ -68,20 +113,14 @@ impl HalfPeriod {
     /// Shares of every section and, last, of the particle in the energy of the disturbance with a multiplier. `omega` is the frequency of a
     /// section without a natural one.
     pub(super) fn shares(&self, multiplier: Complex<f64>, omega: f64) -> Option<Vec<f64>> {
-        let scales = self.parts.iter().flat_map(|part| energy_scales(&part.0, omega));
-        let scales: Vec<f64> = scales.collect();
-        let shifted = DMatrix::from_fn(scales.len(), scales.len(), |row, column| {
-            let entry = Complex::from(self.map[(row, column)] * scales[row] / scales[column]);
-            if row == column { entry - multiplier } else { entry }
+        let disturbance = multipliers::disturbance(&self.flows, self.impact, multiplier)?;
+        let energies = self.parts.iter().zip(disturbance).map(|((section, _), part)| {
+            let [displacement, velocity] = energy_scales(section, omega);
+            (part[0] * displacement).norm_sqr() + (part[1] * velocity).norm_sqr()
         });
-        // The eigenvector is the direction that the map less the multiplier takes to zero.
-        let svd = shifted.svd(false, true);
-        let vector = svd.v_t?.row(svd.singular_values.imin()).clone_owned();
-        let energies = vector
-            .as_slice()
-            .chunks(2)
-            .map(|pair| pair[0].norm_sqr() + pair[1].norm_sqr());
-        Some(energies.collect())
+        let energies: Vec<f64> = energies.collect();
+        let sum: f64 = energies.iter().sum();
+        (sum > 0.0).then(|| energies.iter().map(|energy| energy / sum).collect())
     }
 }
 
@@ -101,25 +140,29 @@ fn energy_scales(section: &Section, omega: f64) -> [f64; 2] {
     [scale * omega0, scale]
 }
 
-/// The derivative of the state after an impact by the state half a period before, relative to the motion, which has the opposite sign there.
-fn map(parts: &[(Section, Vector2<f64>)], flows: &[Matrix2<f64>], motion: &SymmetricMotion) -> DMatrix<f64> {
+/// What the impact adds to the flows, from (x, v) of every section after it.
+fn impact(parts: &[(Section, Vector2<f64>)], motion: &SymmetricMotion) -> Impact {
     let mut acceleration = -motion.omega * motion.omega * motion.cavity.im;
     for (section, after) in parts {
         let before = after - Vector2::from(section.kick) * motion.impulse;
         acceleration += section.at(section.cavity, section.rate(before))[1];
     }
     let mu = -motion.impulse / motion.impact_velocity;
-    let mut map = DMatrix::zeros(2 * parts.len(), 2 * parts.len());
-    for (column, ((section, _), flow)) in parts.iter().zip(flows).enumerate() {
+    Impact { mu, kappa: mu * acceleration / motion.impact_velocity }
+}
+
+/// The derivative of the state after an impact by the state half a period before, relative to the motion, which has the opposite sign there.
+fn map(flows: &[(Section, Matrix2<f64>)], Impact { mu, kappa }: Impact) -> DMatrix<f64> {
+    let mut map = DMatrix::zeros(2 * flows.len(), 2 * flows.len());
+    for (column, (section, flow)) in flows.iter().enumerate() {
         let [a, b] = section.cavity;
         let by_w = RowVector2::new(a, b) * flow;
         let Oscillator { delta, omega0_squared, .. } = section.oscillator;
         let by_dw = RowVector2::new(-omega0_squared * b, a - 2.0 * delta * b) * flow;
-        for (row, (section, _)) in parts.iter().enumerate() {
+        for (row, (section, _)) in flows.iter().enumerate() {
             let kick = Vector2::from(section.kick);
-            // The vector field jumps by that of the kick.
-            let early = section.rate(kick) * motion.impulse + kick * (mu * acceleration);
-            let mut block = kick * by_dw * mu - early * by_w / motion.impact_velocity;
+            // An early impact also acts on the vector field of the kick.
+            let mut block = kick * (by_dw * mu - by_w * kappa) + section.rate(kick) * by_w * mu;
             if row == column {
                 block -= flow;
             }
@@ -127,4 +170,78 @@ fn map(parts: &[(Section, Vector2<f64>)], flows: &[Matrix2<f64>], motion: &Symme
         }
     }
     map
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::{Rng, SeedableRng};
+
+    use super::*;
+
+    /// Sections of modes (frequency over that of the drive, damping ratio, shape) and of the particle, and their flows over half a period.
+    fn flows(modes: &[[f64; 3]], particle: f64) -> Vec<(Section, Matrix2<f64>)> {
+        let mode = |[omega, zeta, shape]: &[f64; 3]| Section {
+            oscillator: Oscillator::new(1.0, omega * omega, 2.0 * zeta * omega),
+            drive: [0.0; 2],
+            kick: [0.0, *shape],
+            cavity: [*shape, 0.0],
+        };
+        let of_particle = Section {
+            oscillator: Oscillator::new(particle, 0.0, 0.0),
+            drive: [0.0; 2],
+            kick: [0.0, -1.0 / particle],
+            cavity: [-1.0, 0.0],
+        };
+        let sections = modes.iter().map(mode).chain([of_particle]);
+        sections.map(|section| (section, section.propagator(PI))).collect()
+    }
+
+    /// Largest distance of a multiplier from the nearest of the eigenvalues, which are used up.
+    fn apart(found: &[Complex<f64>], eigenvalues: &[Complex<f64>]) -> f64 {
+        let mut left = eigenvalues.to_vec();
+        let nearest = found.iter().map(|one| {
+            let distance = |n: &usize| (left[*n] - one).norm();
+            let n = (0..left.len())
+                .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+                .unwrap();
+            (left.swap_remove(n) - one).norm()
+        });
+        nearest.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_multipliers_of_random_structures_are_the_eigenvalues_of_their_maps() {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut uniform =
+            |low: f64, high: f64| low + (high - low) * (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+        let (mut worst, mut by_eigenvalues) = (0.0_f64, 0);
+        for _ in 0..400 {
+            let count = uniform(1.0, 30.0) as usize;
+            // Half of the structures without damping.
+            let damping = uniform(-0.2, 0.2).max(0.0);
+            let mode = |_| [uniform(0.1, 60.0), uniform(0.0, 1.0) * damping, uniform(-1.0, 1.0)];
+            let mut modes: Vec<[f64; 3]> = (0..count).map(mode).collect();
+            // A mode at a node, and two with one frequency.
+            if count > 5 {
+                modes[0][2] = 0.0;
+                modes[2] = [modes[1][0], modes[1][1], modes[2][2]];
+            }
+            let particle = 10_f64.powf(uniform(-6.0, -0.5));
+            let flows = flows(&modes, particle);
+            let mobility = modes.iter().map(|mode| mode[2] * mode[2]).sum::<f64>() + particle.recip();
+            let mu = (1.0 + uniform(0.1, 1.0)) / mobility;
+            // From a map beside it.
+            let kappa = mu * uniform(-3.0, 3.0);
+            let start = map(&flows, Impact { mu: 0.998 * mu, kappa: 1.002 * kappa }).complex_eigenvalues();
+            let start: Vec<[f64; 2]> = start.iter().map(|one| [one.re, one.im]).collect();
+            let impact = Impact { mu, kappa };
+            let Some(found) = multipliers::multipliers(&flows, impact, &start) else {
+                by_eigenvalues += 1;
+                continue;
+            };
+            worst = worst.max(apart(&found, map(&flows, impact).complex_eigenvalues().as_slice()));
+        }
+        assert!(worst < 1e-9 && by_eigenvalues < 12, "{worst:e}, {by_eigenvalues}");
+    }
 }

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll, unit_row};
 use super::oscillator::ForcedOscillator;
+use super::stability;
 use crate::numerics::{Equations, newton};
 use crate::{Definition, Dimensionless, Sensor};
 
@@ -299,6 +300,8 @@ pub struct Periodic {
     pub multipliers: [[f64; 2]; 4],
     /// All of them are inside the unit circle.
     pub stable: bool,
+    /// The largest are on the unit circle, within 1e-7: disturbances neither grow nor decay.
+    pub neutral: bool,
     /// The map with its derivatives.
     #[serde(skip)]
     pub(super) map: ReturnMap,
@@ -349,6 +352,7 @@ impl Periodic {
         })?;
         let mut multipliers: [Complex<f64>; 4] = map.monodromy.complex_eigenvalues().into();
         multipliers.sort_unstable_by(|first, second| first.norm().total_cmp(&second.norm()));
+        let [stable, neutral] = stability(multipliers[3].norm());
         Some(Self {
             g: x[5],
             sigma: x[4],
@@ -358,9 +362,15 @@ impl Periodic {
             pattern: pattern.clone(),
             bounces,
             multipliers: multipliers.map(|multiplier| [multiplier.re, multiplier.im]),
-            stable: multipliers[3].norm() < 1.0,
+            stable,
+            neutral,
             map,
         })
+    }
+
+    /// Whether a multiplier is outside the unit circle.
+    pub fn is_unstable(&self) -> bool {
+        !self.stable && !self.neutral
     }
 
     /// The unknowns of this motion: (phase, q1, q1', q2') after its first impact, sigma, G.
@@ -450,7 +460,7 @@ const MULTIPLES: usize = 3;
 /// Longest pattern in the search, impacts.
 pub(super) const LONGEST: usize = 48;
 
-/// The stable periodic motion that `start` = (q1, q1', q2, q2') leads to after `periods` at the detuning `sigma` and
+/// The periodic motion, stable or neutral, that `start` = (q1, q1', q2, q2') leads to after `periods` at the detuning `sigma` and
 /// the scene's G; None without a repeating pattern, without impacts, or if the particle sticks.
 pub fn settle(
     scene: &Dimensionless,
@@ -464,11 +474,11 @@ pub fn settle(
         plant.advance(drive, TAU / drive.omega)?;
     }
     let State { q1, dq1, q2, dq2 } = plant.state();
-    Ok(periodic_near(scene, sigma, [q1, dq1, q2, dq2]).filter(|motion| motion.stable))
+    Ok(periodic_near(scene, sigma, [q1, dq1, q2, dq2]).filter(|motion| !motion.is_unstable()))
 }
 
-/// The periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at phase 0 of the base; a
-/// stable one rather than an unstable one.
+/// The periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at phase 0 of the base; one
+/// that is not unstable rather than an unstable one.
 pub(crate) fn periodic_near(scene: &Dimensionless, sigma: f64, state: [f64; 4]) -> Option<Periodic> {
     let map = ImpactMap::new(scene, 1.0 + scene.epsilon * sigma, scene.g);
     let first = map.first(state)?;
@@ -479,7 +489,7 @@ pub(crate) fn periodic_near(scene: &Dimensionless, sigma: f64, state: [f64; 4]) 
     let found = patterns(&map, first, NEAR).take(MULTIPLES).find_map(|pattern| {
         let found = Periodic::find(scene, &pattern, &guess, conditions)?;
         let close = (found.unknowns() - guess).norm() < 10.0 * NEAR;
-        if close && !found.stable {
+        if close && found.is_unstable() {
             unstable.get_or_insert(found);
             return None;
         }

@@ -17,6 +17,7 @@ use thiserror::Error;
 
 use super::Orbit;
 use super::periodic::NEAR;
+use super::stability;
 use super::symmetric::{at_amplitude, at_speed, stable_resonant};
 use crate::numerics::{Equations, newton};
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
@@ -50,7 +51,12 @@ pub struct PlantMotion {
 impl PlantMotion {
     /// Whether all multipliers are inside the unit circle.
     pub fn is_stable(&self) -> bool {
-        self.growth() < 1.0
+        stability(self.growth())[0]
+    }
+
+    /// Whether the largest multipliers are on the unit circle, within 1e-7: disturbances neither grow nor decay.
+    pub fn is_neutral(&self) -> bool {
+        stability(self.growth())[1]
     }
 
     /// Modulus of the largest multiplier.

@@ -10,7 +10,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use lovines::oscillator::Oscillator;
 use lovines::{Excitation, Host, InvalidHost, Section};
-use nalgebra::{Complex, Vector2};
+use nalgebra::{Complex, Matrix2, Vector2};
 use serde::Serialize;
 
 use super::half_period::HalfPeriod;
@@ -19,8 +19,8 @@ use super::periodic::wrapped;
 use super::symmetric::{
     Interval, Particle, Reading, SEARCHED, SymmetricMotion, SymmetricMotions, harmonic, intervals, search,
 };
-use super::{AfterImpact, Bifurcation, Orbit};
-use crate::numerics::{self, equally_spaced, try_bisection};
+use super::{AfterImpact, Bifurcation, ON_CIRCLE, Orbit, stability};
+use crate::numerics::{self, Equations, equally_spaced, newton, try_bisection};
 use crate::theory::SlowFlow;
 use crate::{Definition, Dimensionless, Reference, Sensor};
 
@@ -49,6 +49,8 @@ pub struct StructureOrbit {
     pub multipliers: Vec<[f64; 2]>,
     /// All of them are inside the unit circle.
     pub stable: bool,
+    /// The largest are on the unit circle, within 1e-7: disturbances neither grow nor decay.
+    pub neutral: bool,
 }
 
 /// The state where the phase of the drive is 0, so that the drive is `sin(omega t)` times its amplitude from there on.
@@ -114,7 +116,13 @@ impl StructureOrbit {
             },
             multipliers,
             stable: self.stable,
+            neutral: self.neutral,
         }
+    }
+
+    /// Whether a multiplier is outside the unit circle.
+    pub fn is_unstable(&self) -> bool {
+        !self.stable && !self.neutral
     }
 
     /// Number of multipliers outside the unit circle.
@@ -147,16 +155,30 @@ pub struct OrbitCurve {
 }
 
 impl StructureBranch {
-    /// The stretches of stable orbits, each with the changes at its ends; `None` where the curve ends.
-    pub fn stable(&self) -> impl Iterator<Item = (&[StructureOrbit], [Option<&StabilityChange>; 2])> {
+    /// The stretches of stable orbits, and of neutral ones, each with the changes at its ends; `None` where the curve ends.
+    pub fn stretches(&self) -> impl Iterator<Item = (&[StructureOrbit], [Option<&StabilityChange>; 2])> {
         let mut from = 0;
-        let runs = self.orbits.chunk_by(|one, other| one.stable == other.stable);
+        let kind = |orbit: &StructureOrbit| [orbit.stable, orbit.neutral];
+        let runs = self.orbits.chunk_by(move |one, other| kind(one) == kind(other));
         let with_ends = runs.map(move |run| {
             let ends = [from, from + run.len()].map(|n| self.changes.iter().find(|change| change.after + 1 == n));
             from += run.len();
             (run, ends)
         });
-        with_ends.filter(|(run, _)| run[0].stable)
+        with_ends.filter(|(run, _)| !run[0].is_unstable())
+    }
+
+    /// The stretches of stable orbits.
+    pub fn stable(&self) -> impl Iterator<Item = (&[StructureOrbit], [Option<&StabilityChange>; 2])> {
+        self.stretches().filter(|(run, _)| run[0].stable)
+    }
+
+    /// The stretches of stable orbits, with the orbits where they begin and end.
+    pub fn stable_to_their_ends(&self) -> impl Iterator<Item = Vec<&StructureOrbit>> {
+        self.stable().map(|(run, [first, last])| {
+            let [first, last] = [first, last].map(|end| end.map(|change| &change.orbit));
+            first.into_iter().chain(run).chain(last).collect()
+        })
     }
 
     /// This curve in the numbers of an oscillator, as [`StructureOrbit::in_numbers`].
@@ -291,8 +313,6 @@ pub struct StructureOrbits {
 const GRID: usize = 4000;
 /// Widths, in the angle along a loop, to which a change of stability and the end of a branch are located.
 const LOCATED: f64 = 1e-11;
-/// Distance from the unit circle at which a multiplier counts as on it: a double one has half of the digits.
-const ON_CIRCLE: f64 = 1e-7;
 /// Amplitudes over b that are rounding: of a response that is zero, and of the harmonic part of an orbit that needs no drive.
 const ROUNDING: f64 = 1e-12;
 
@@ -363,13 +383,29 @@ impl StructureOrbits {
 
     /// All orbits at the frequency `omega`, rad/s, with a reference of the amplitude `reference`, at any phase: none or up to two.
     pub fn at(&self, omega: f64, reference: f64) -> Vec<StructureOrbit> {
-        self.both(omega, |motions| motions.driven(reference), |motion| self.accept(motion))
+        self.both(
+            omega,
+            |motions| motions.driven(reference),
+            |motion| self.accept(motion, Multipliers::Alone),
+        )
     }
 
     /// All orbits at phase resonance at the frequency `omega`, rad/s, under any drive: none or up to two.
     pub fn at_phase_resonance(&self, omega: f64) -> Vec<StructureOrbit> {
         let roots = SymmetricMotions::phase_resonant;
-        self.both(omega, roots, |motion| self.accept_resonant(motion))
+        self.both(omega, roots, |motion| self.accept_resonant(motion, Multipliers::Alone))
+    }
+
+    /// The orbit at phase resonance whose response has the amplitude `response`, near a frequency, rad/s, and a speed of the particle.
+    ///
+    /// Along a backbone the frequency has extrema, also where it is stable: both are unknowns.
+    pub fn at_response(&self, response: f64, [omega, speed]: [f64; 2]) -> Option<StructureOrbit> {
+        let mut equations = AtResponse { orbits: self, response, near: [omega, speed] };
+        let found = newton(&mut equations, Vector2::repeat(1.0))?;
+        self.accept_resonant(
+            &self.motions(found[0] * omega)?.at(found[1] * speed),
+            Multipliers::Alone,
+        )
     }
 
     /// All orbits at phase resonance with a reference of the amplitude `reference` and frequencies in a range, rad/s, by rising response.
@@ -380,7 +416,10 @@ impl StructureOrbits {
     /// As [`Self::resonant`], at frequencies of a grid and between them.
     pub(super) fn resonant_at(&self, grid: impl IntoIterator<Item = f64>, reference: f64) -> Vec<StructureOrbit> {
         let found = search(grid, reference, |omega| self.motions(omega));
-        let mut orbits: Vec<_> = found.iter().filter_map(|motion| self.accept_resonant(motion)).collect();
+        let mut orbits: Vec<_> = found
+            .iter()
+            .filter_map(|motion| self.accept_resonant(motion, Multipliers::Alone))
+            .collect();
         orbits.sort_unstable_by(|first, second| first.response.total_cmp(&second.response));
         let same = |first: f64, second: f64| (first - second).abs() < 1e-9 * first.abs();
         orbits.dedup_by(|first, second| same(first.omega, second.omega) && same(first.speed, second.speed));
@@ -389,13 +428,22 @@ impl StructureOrbits {
 
     /// The exact backbone: the orbits at phase resonance within `range`, as curves.
     pub fn backbone(&self, range: &StructureRange) -> Vec<StructureBranch> {
+        self.backbone_with(range, &|| ())
+    }
+
+    /// The exact backbone; `progress` is called for every orbit that is tried.
+    fn backbone_with(&self, range: &StructureRange, progress: &dyn Fn()) -> Vec<StructureBranch> {
         let roots = SymmetricMotions::phase_resonant;
-        self.branches(range, roots, |motion| self.accept_resonant(motion))
+        self.branches(range, roots, |motion, multipliers| {
+            progress();
+            self.accept_resonant(motion, multipliers)
+        })
     }
 
     /// The frequency response of the symmetric 1:1 motions with a reference of the amplitude `reference` within `range`, as curves.
     pub fn frequency_response(&self, reference: f64, range: &StructureRange) -> Vec<StructureBranch> {
-        self.branches(range, |motions| motions.driven(reference), |motion| self.accept(motion))
+        let roots = |motions: &SymmetricMotions| motions.driven(reference);
+        self.branches(range, roots, |motion, multipliers| self.accept(motion, multipliers))
     }
 
     /// What each section and, last, the particle contribute to the disturbance of an orbit that grows fastest or decays slowest: shares
@@ -486,13 +534,13 @@ impl StructureOrbits {
     }
 
     /// The modes, and the backbone of the section `driven` alone over its own range, and with all modes also over the frequencies `omega`, rad/s,
-    /// with about `points` orbits each.
-    pub fn facts(&self, driven: usize, omega: [f64; 2], points: usize) -> Option<StructureFacts> {
+    /// with about `points` orbits each. `progress` is called for every orbit that is tried.
+    pub fn facts(&self, driven: usize, omega: [f64; 2], points: usize, progress: &dyn Fn()) -> Option<StructureFacts> {
         let range = self.range(driven, points)?;
         Some(StructureFacts {
             modes: self.modes(driven)?,
             alone: self.with_sections(|n| n == driven).backbone(&range),
-            all: self.backbone(&range.with(omega)),
+            all: self.backbone_with(&range.with(omega), progress),
         })
     }
 
@@ -521,17 +569,17 @@ impl StructureOrbits {
     }
 
     /// The orbit with its stability, if the phase of its response has the sign that is wanted.
-    fn accept_resonant(&self, motion: &SymmetricMotion) -> Option<StructureOrbit> {
+    fn accept_resonant(&self, motion: &SymmetricMotion, multipliers: Multipliers<'_>) -> Option<StructureOrbit> {
         if motion.cavity.norm() < ROUNDING * self.particle.half_width {
             // Without a drive, its phase is free.
             let turned = wrapped(motion.drive.arg() + motion.phase + FRAC_PI_2);
-            let mut orbit = self.accept(motion)?;
+            let mut orbit = self.accept(motion, multipliers)?;
             orbit.phase = self.target;
             orbit.impact_phase = turned;
             return Some(orbit);
         }
         let resonant = motion.phase.sin() < -1e-12;
-        resonant.then(|| self.accept(motion)).flatten()
+        resonant.then(|| self.accept(motion, multipliers)).flatten()
     }
 
     /// A motion as an orbit, of which neither start nor stability are examined.
@@ -548,11 +596,12 @@ impl StructureOrbits {
             start: StructureStart { sections: Vec::new(), q2: f64::NAN, dq2: f64::NAN },
             multipliers: Vec::new(),
             stable: false,
+            neutral: false,
         }
     }
 
     /// The orbit with its stability, if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
-    fn accept(&self, motion: &SymmetricMotion) -> Option<StructureOrbit> {
+    fn accept(&self, motion: &SymmetricMotion, multipliers: Multipliers<'_>) -> Option<StructureOrbit> {
         let orbit = self.told(motion);
         let sizes = [orbit.speed, orbit.response, orbit.drive];
         let is_motion = orbit.speed > 0.0 && orbit.response > ROUNDING * self.particle.half_width;
@@ -560,7 +609,12 @@ impl StructureOrbits {
             return None;
         }
         let half = HalfPeriod::new(&self.sections, &self.particle, motion)?;
-        let multipliers = half.multipliers();
+        let multipliers = match multipliers {
+            Multipliers::Alone => half.multipliers(None),
+            Multipliers::Near(near) => half.multipliers(Some((near.omega, &near.multipliers))),
+            Multipliers::LeftOut => return Some(orbit),
+        };
+        let [stable, neutral] = stability(multipliers.last()?.norm());
         let (t, sign) = since_impact(motion);
         let state = |(section, impulsive): (&Section, Vector2<f64>)| {
             let impulsive = section.propagator(t) * impulsive * sign;
@@ -579,7 +633,8 @@ impl StructureOrbits {
                 q2: sign * (q2 + motion.speed * t),
                 dq2: sign * motion.speed,
             },
-            stable: multipliers.iter().all(|multiplier| multiplier.norm() < 1.0),
+            stable,
+            neutral,
             multipliers: multipliers.iter().map(|one| [one.re, one.im]).collect(),
             ..orbit
         })
@@ -595,7 +650,7 @@ impl StructureOrbits {
         &self,
         range: &StructureRange,
         roots: impl Fn(&SymmetricMotions) -> Option<[f64; 2]>,
-        accept: impl Fn(&SymmetricMotion) -> Option<StructureOrbit>,
+        accept: impl Fn(&SymmetricMotion, Multipliers<'_>) -> Option<StructureOrbit>,
     ) -> Vec<StructureBranch> {
         let both = |omega: f64| {
             let motions = self.motions(omega)?;
@@ -608,11 +663,13 @@ impl StructureOrbits {
         {
             let [low, high] = [points[0].0, points[points.len() - 1].0];
             // Angles 0 to pi lead up along the first root, and pi to 2 pi back along the second one.
-            let at = |angle: f64| {
+            let at = |angle: f64, multipliers: Multipliers<'_>| {
                 let omega = 0.5 * (low + high) - 0.5 * (high - low) * angle.cos();
                 let second = usize::from(angle.rem_euclid(TAU) >= PI);
                 let motion = &both(omega.clamp(low, high))?[second];
-                accept(motion).filter(|orbit| orbit.speed <= range.speed)
+                (motion.speed <= range.speed)
+                    .then(|| accept(motion, multipliers))
+                    .flatten()
             };
             let arcs = match turns {
                 [true, true] => vec![[0.0, TAU]],
@@ -633,13 +690,19 @@ impl StructureOrbits {
         [from, to]: [f64; 2],
         is_loop: bool,
         points: usize,
-        at: &impl Fn(f64) -> Option<StructureOrbit>,
+        at: &impl Fn(f64, Multipliers<'_>) -> Option<StructureOrbit>,
     ) -> Vec<StructureBranch> {
         let count = (points as f64 * (to - from) / PI).ceil().max(2.0);
         let step = (to - from) / count;
         let angle = |n: usize| from + (n as f64 + 0.5) * step;
-        let mut samples: Vec<(f64, Option<StructureOrbit>)> =
-            (0..count as usize).map(|n| (angle(n), at(angle(n)))).collect();
+        let mut samples: Vec<(f64, Option<StructureOrbit>)> = Vec::with_capacity(count as usize);
+        for n in 0..count as usize {
+            let orbit = at(
+                angle(n),
+                Multipliers::near(samples.last().and_then(|last| last.1.as_ref())),
+            );
+            samples.push((angle(n), orbit));
+        }
         // A loop begins where it is interrupted, or ends where it begins.
         let closed = is_loop && samples.iter().all(|(_, orbit)| orbit.is_some());
         if is_loop {
@@ -654,13 +717,13 @@ impl StructureOrbits {
         for run in samples.chunk_by(|one, other| one.1.is_some() == other.1.is_some()) {
             let to = from + run.len();
             let towards = |n: Option<usize>| n.and_then(|n| samples.get(n)).map(|sample| sample.0);
-            let first = towards(from.checked_sub(1)).and_then(|gap| end(at, run[0].0, gap));
-            let last = towards(Some(to)).and_then(|gap| end(at, run[run.len() - 1].0, gap));
             let inside: Vec<(f64, &StructureOrbit)> = run
                 .iter()
                 .filter_map(|(angle, orbit)| Some((*angle, orbit.as_ref()?)))
                 .collect();
             if !inside.is_empty() {
+                let first = towards(from.checked_sub(1)).and_then(|gap| end(at, &run[0], gap));
+                let last = towards(Some(to)).and_then(|gap| end(at, &run[run.len() - 1], gap));
                 let located = inside.windows(2).enumerate().filter_map(|(n, pair)| {
                     let change = self.change(at, pair[0], pair[1])?;
                     Some(StabilityChange { after: n + usize::from(first.is_some()), ..change })
@@ -683,7 +746,7 @@ impl StructureOrbits {
     /// Where the number of multipliers outside the unit circle changes between two neighbours.
     fn change(
         &self,
-        at: &impl Fn(f64) -> Option<StructureOrbit>,
+        at: &impl Fn(f64, Multipliers<'_>) -> Option<StructureOrbit>,
         (from, first): (f64, &StructureOrbit),
         (to, second): (f64, &StructureOrbit),
     ) -> Option<StabilityChange> {
@@ -691,6 +754,7 @@ impl StructureOrbits {
         if outside == second.unstable() {
             return None;
         }
+        let at = |angle: f64| at(angle, Multipliers::Near(first));
         let like_first = |angle: f64| at(angle).map(|orbit| orbit.unstable() == outside).ok_or(());
         let (before, beyond) = try_bisection(from, to, LOCATED, like_first).ok()?;
         // The multipliers rise in modulus: the first one outside has just left, or is about to enter.
@@ -706,6 +770,35 @@ impl StructureOrbits {
     }
 }
 
+/// Phase resonance, and an amplitude of the response. The unknowns are frequency and speed over those near which the orbit is searched.
+struct AtResponse<'a> {
+    orbits: &'a StructureOrbits,
+    response: f64,
+    near: [f64; 2],
+}
+
+impl AtResponse<'_> {
+    fn residual(&self, x: Vector2<f64>) -> Option<Vector2<f64>> {
+        let [omega, speed] = [0, 1].map(|n| x[n] * self.near[n]);
+        let motions = self.orbits.motions(omega)?;
+        let response = motions.at(speed).response.norm() / self.response - 1.0;
+        let residual = Vector2::new(motions.off_resonance(speed), response);
+        residual.iter().all(|value| value.is_finite()).then_some(residual)
+    }
+}
+
+impl Equations<2> for AtResponse<'_> {
+    fn at(&mut self, x: &Vector2<f64>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+        // Steps of central differences, far below the bandwidth of a resonance and the curvature: they do not bound the accuracy.
+        let slope = |step: Vector2<f64>| {
+            let [after, before] = [self.residual(x + step)?, self.residual(x - step)?];
+            Some((after - before) / (2.0 * step.norm()))
+        };
+        let slopes = [slope(Vector2::new(1e-9, 0.0))?, slope(Vector2::new(0.0, 1e-6))?];
+        Some((self.residual(*x)?, Matrix2::from_columns(&slopes)))
+    }
+}
+
 /// Time since the last impact where the phase of the drive is 0, and -1 where this is the impact on the wall w = -b.
 fn since_impact(motion: &SymmetricMotion) -> (f64, f64) {
     let turned = (-motion.drive.arg()).rem_euclid(TAU);
@@ -717,8 +810,31 @@ fn since_impact(motion: &SymmetricMotion) -> (f64, f64) {
 }
 
 /// The last orbit from `from`, where there is one, towards `to`, where there is none.
-fn end(at: &impl Fn(f64) -> Option<StructureOrbit>, from: f64, to: f64) -> Option<StructureOrbit> {
-    let is_orbit = |angle: f64| Ok::<_, ()>(at(angle).is_some());
-    let (last, _) = try_bisection(from, to, LOCATED, is_orbit).ok()?;
-    (last != from).then(|| at(last)).flatten()
+fn end(
+    at: &impl Fn(f64, Multipliers<'_>) -> Option<StructureOrbit>,
+    (from, orbit): &(f64, Option<StructureOrbit>),
+    to: f64,
+) -> Option<StructureOrbit> {
+    let is_orbit = |angle: f64| Ok::<_, ()>(at(angle, Multipliers::LeftOut).is_some());
+    let (last, _) = try_bisection(*from, to, LOCATED, is_orbit).ok()?;
+    (last != *from)
+        .then(|| at(last, Multipliers::near(orbit.as_ref())))
+        .flatten()
+}
+
+/// How the multipliers of an orbit are found.
+#[derive(Clone, Copy)]
+enum Multipliers<'a> {
+    /// As eigenvalues of the dense matrix of the map.
+    Alone,
+    /// From those of an orbit near it.
+    Near(&'a StructureOrbit),
+    /// Not at all, where only the orbit counts.
+    LeftOut,
+}
+
+impl<'a> Multipliers<'a> {
+    fn near(orbit: Option<&'a StructureOrbit>) -> Self {
+        orbit.map_or(Self::Alone, Self::Near)
+    }
 }

@@ -19,7 +19,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use lovines::Section;
 use nalgebra::{Complex, Matrix2, Vector2};
 
-use super::{Orbit, OrbitCurve, StructureOrbit, StructureOrbits, StructureRange};
+use super::{Orbit, OrbitCurve, StructureBranch, StructureOrbit, StructureOrbits, StructureRange};
 use crate::Dimensionless;
 use crate::numerics::{bisection, golden_section, quadratic, secant};
 use crate::theory::{BranchSide, Manifold, SlowFlow};
@@ -178,6 +178,14 @@ impl SymmetricMotions {
         ]
     }
 
+    /// Distance from phase resonance at the particle speed `speed`, over the largest term of its equation.
+    pub(super) fn off_resonance(&self, speed: f64) -> f64 {
+        let [square, linear, constant] = self.resonance();
+        let terms = [square * speed * speed, linear * speed, constant];
+        let largest = terms.iter().fold(0.0_f64, |largest, term| largest.max(term.abs()));
+        terms.iter().sum::<f64>() / largest
+    }
+
     /// Speeds of the two motions at phase resonance, each a continuous branch where it exists.
     pub(super) fn phase_resonant(&self) -> Option<[f64; 2]> {
         let [square, linear, constant] = self.resonance();
@@ -292,6 +300,27 @@ pub fn backbone(scene: &Dimensionless, sigma: Option<[f64; 2]>, points: usize) -
         .iter()
         .map(|branch| branch.in_numbers(&bare(scene), 1.0, 1.0))
         .collect()
+}
+
+/// The stable stretches of the exact backbone over the detunings `sigma`, curves of about `points` orbits, each with the orbits where it begins and
+/// ends.
+pub fn stable_backbone(scene: &Dimensionless, sigma: [f64; 2], points: usize) -> Vec<Vec<Orbit>> {
+    let range = StructureRange::at_any_speed(&bare(scene), sigma, points);
+    let branches = StructureOrbits::of(scene).backbone(&range);
+    let stretches = branches.iter().flat_map(StructureBranch::stable_to_their_ends);
+    stretches
+        .map(|orbits| {
+            let orbits = orbits.into_iter();
+            orbits.map(|orbit| orbit.in_numbers(&bare(scene), 1.0, 1.0)).collect()
+        })
+        .collect()
+}
+
+/// The orbit at phase resonance whose response has the amplitude `c` over b, near a detuning and a speed of the particle over `b omega0`.
+pub fn with_amplitude(scene: &Dimensionless, c: f64, [sigma, speed]: [f64; 2]) -> Option<Orbit> {
+    let near = [1.0 + scene.epsilon * sigma, speed];
+    let found = StructureOrbits::of(scene).at_response(c, near)?;
+    Some(found.in_numbers(&bare(scene), 1.0, 1.0))
 }
 
 /// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.

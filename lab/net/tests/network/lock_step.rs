@@ -1,12 +1,18 @@
 //! Guards lock-step: every bit equals that of the built-in plant, and a frame that is not allowed is answered at once. Refused sessions say
 //! what to do.
 
-use std::net::TcpStream;
+use std::net::{SocketAddr, TcpStream};
+use std::thread::{self, JoinHandle};
 
 use vines_net::frame::{Frame, Kind};
-use vines_net::{Address, Ended, LinkError, NetController, NetRig, RAMP_SAMPLES, Refusal, Server};
+use vines_net::{
+    Address, Ended, Key, LinkError, NetController, NetRig, RAMP_SAMPLES, Refusal, Role, Served as Offered, Server,
+    ServerError, Service,
+};
 use vines_testbench::experiment;
-use vines_testbench::rig::{BuiltIn, Chain, Controller, Drive, Rig, Simulated};
+use vines_testbench::rig::{
+    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, RigStage, Sensors, Simulated,
+};
 use vines_testbench::scene::Definition;
 
 use crate::fixture::socket;
@@ -199,4 +205,90 @@ fn a_port_in_use_is_named_and_a_server_that_is_stopped_reports_its_session() {
     shake(&mut rig, 10).unwrap();
     server.running.stop.store(true, std::sync::atomic::Ordering::Relaxed);
     assert_eq!(server.session().ended, Ended::Stopped);
+}
+
+/// A plant whose shaker is at its limit after some drives.
+struct AtLimit(Simulated, usize);
+
+impl RigStage for AtLimit {
+    fn inner(&mut self) -> &mut dyn Rig {
+        &mut self.0
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.1 = self.1.saturating_sub(1);
+        if self.1 > 0 {
+            return self.0.advance(drive, step);
+        }
+        Err(RigError::ShakerLimit {
+            name: "displacement of the armature",
+            key: "stroke_max",
+            value: -8.801e-3,
+            limit: 8.8e-3,
+            unit: "m",
+        })
+    }
+}
+
+/// A controller that cannot go on.
+struct Hot;
+
+impl Controller for Hot {
+    fn sample(&mut self, _: Sensors, _: bool) -> Result<Command, ControllerError> {
+        Err(ControllerError::Failed("its processor is too hot, 92 degrees".into()))
+    }
+}
+
+/// How a session and its server end.
+type Outcome = (Option<Ended>, Result<(), ServerError>);
+
+/// Serves one session of what `make` gives, and returns the address, and how session and server end.
+fn serve_once(
+    address: fn(SocketAddr) -> Address,
+    service: Service,
+    key: Option<Key>,
+    mut make: impl FnMut() -> Result<Offered, ServerError> + Send + 'static,
+) -> (Address, JoinHandle<Outcome>) {
+    let mut server = Server::listen(address(([127, 0, 0, 1], 0).into()), service, key).unwrap();
+    let at = server.address().unwrap();
+    let serve = move || {
+        let mut ended = None;
+        let served = server.serve(&mut make, || false, |session| ended = Some(session.ended));
+        (ended, served)
+    };
+    (at, thread::spawn(serve))
+}
+
+#[test]
+fn an_error_of_a_served_rig_or_controller_reaches_the_client_with_its_name_and_numbers() {
+    let limit = "the displacement of the armature is -8.801e-3 m, and shaker.stroke_max allows 0.0088 m";
+    let step = SCENE.sample_time();
+    for address in [Address::Tcp as fn(_) -> _, Address::Udp] {
+        for key in [None, Key::of(b"0123456789abcdef")] {
+            let plant = Simulated::new(SCENE.plant, SCENE.start).unwrap();
+            let make = move || Ok(Offered::Rig(Box::new(AtLimit(plant.clone(), 20))));
+            let (at, served) = serve_once(address, service(&SCENE, 5.0), key, make);
+            let mut rig = NetRig::connect(at, step, key).unwrap();
+            let error = shake(&mut rig, 100_000).unwrap_err();
+            assert!(matches!(link_error(&error), LinkError::Failed { .. }), "{error}");
+            assert!(error.to_string().contains(limit), "{error}");
+            let (ended, served) = served.join().unwrap();
+            assert_eq!(ended, Some(Ended::Failed));
+            assert!(matches!(served, Err(ServerError::Rig(RigError::ShakerLimit { .. }))));
+        }
+    }
+    // A rig that does not begin.
+    let refuses = || Err(RigError::Failed("no calibration of channel 3".into()).into());
+    let (at, _) = serve_once(Address::Tcp, service(&SCENE, 5.0), None, refuses);
+    let error = NetRig::connect(at, step, None)
+        .unwrap()
+        .sense()
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("no calibration of channel 3"), "{error}");
+    let service = Service { role: Role::Controller, ..service(&SCENE, 5.0) };
+    let (at, _) = serve_once(Address::Tcp, service, None, || Ok(Offered::Controller(Box::new(Hot))));
+    let mut hot = NetController::connect(at.socket(), &SCENE.controller_config(), None, None).unwrap();
+    let error = hot.sample(Sensors::default(), true).unwrap_err().to_string();
+    assert!(error.contains("too hot, 92 degrees"), "{error}");
 }

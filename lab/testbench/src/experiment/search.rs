@@ -140,7 +140,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             leg => leg?,
         };
         if self.takes_no_moves() {
-            self.bench.controller.hold_drive()?;
+            self.bench.hold_drive()?;
             return Ok(None);
         }
         for search in 0..SEARCHES {
@@ -320,7 +320,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             // The condition of stability under a constant drive.
             let is_stable = by_drive && predicted.slope > SMALLEST_SLOPE * leg.drive / leg.response;
             if is_stable {
-                self.bench.controller.hold_drive()?;
+                self.bench.hold_drive()?;
             }
             self.unsettled = Some(is_stable);
             if !self.settle(leg)? {

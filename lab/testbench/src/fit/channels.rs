@@ -13,8 +13,10 @@ pub struct Channel {
     pub name: String,
     /// The unit that the file states; empty without one.
     pub unit: String,
-    /// Its samples.
+    /// Its samples; NaN where one is missing.
     pub values: Vec<f64>,
+    /// The cells of a column of which one or more are neither a number nor empty; otherwise empty.
+    pub texts: Vec<String>,
     /// Time of the first sample and distance of two samples, s, if the channel has a clock of its own.
     pub clock: Option<[f64; 2]>,
 }
@@ -23,6 +25,16 @@ impl Channel {
     /// The last part of its path.
     fn last(&self) -> &str {
         self.name.rsplit(['/', '.']).next().unwrap_or("")
+    }
+
+    /// Whether it has the usual name of a time.
+    fn is_named_time(&self) -> bool {
+        TIMES.contains(&&*self.last().to_lowercase())
+    }
+
+    /// Whether it is a time by its unit.
+    fn is_time(&self) -> bool {
+        unit::parse(&self.unit, "").is_some_and(|(_, unit)| unit == "s")
     }
 }
 
@@ -37,6 +49,10 @@ pub struct Contents {
     pub channels: Vec<Channel>,
     /// Line of the first sample; 0 in a file without lines.
     pub first_line: usize,
+    /// What else may read a cell that is not a number.
+    pub advice: &'static str,
+    /// What in the file is no channel: names, and why.
+    pub refused: Vec<[String; 2]>,
 }
 
 /// Which channels of a file are a recording. A channel is its name, or its number from 1, and after a colon its unit, the sensitivity of its sensor,
@@ -47,7 +63,8 @@ pub struct Selection {
     pub response: Option<String>,
     /// The motion of the base; the channel `reference` otherwise. Without a channel the base rests.
     pub drive: Option<String>,
-    /// The time; otherwise a channel with one of the names `time`, `t`, `timestamp` and `x_value`, in any case.
+    /// The time; otherwise a channel with one of the names `time`, `t`, `timestamp` and `x_value`, in any case, or the only one whose unit is that of
+    /// a time.
     pub time: Option<String>,
     /// Samples a second, if the file does not say it.
     pub rate: Option<f64>,
@@ -94,6 +111,7 @@ impl Contents {
                 unit: "m".into(),
                 values: vec![0.0; response.values.len()],
                 clock: response.clock,
+                ..Channel::default()
             },
             (given, _) => self.measured(given.as_deref().unwrap_or("reference"), "drive", &motions, &mut units)?,
         };
@@ -161,14 +179,41 @@ impl Contents {
         })
     }
 
+    /// The unit that the file states for the channel of this name, empty without one; `None` without such a channel.
+    #[must_use]
+    pub fn unit(&self, name: &str) -> Option<&str> {
+        let channel = self.channels.iter().find(|one| one.name == name);
+        channel.map(|channel| &*channel.unit)
+    }
+
+    /// The rows of a table: numbers and texts by the names of the channels. Channels of other lengths have none.
+    pub fn rows(&self) -> impl Iterator<Item = Vec<(&str, String)>> {
+        let cell = |channel: &Channel, n: usize| match channel.texts.get(n) {
+            Some(text) => Some(text.clone()),
+            None => channel.values.get(n).map(f64::to_string),
+        };
+        let row = move |n| {
+            let cells = self.channels.iter();
+            cells
+                .filter_map(|one| Some((one.name.as_str(), cell(one, n)?)))
+                .collect()
+        };
+        let count = self.channels.iter().map(|one| one.values.len()).max();
+        (0..count.unwrap_or(0)).map(row)
+    }
+
     /// A refusal, with the channels as they were read.
     pub fn refused(&self, message: &str) -> RecordingError {
         let after = |sign: char, text: &str, end: char| match text {
             "" => String::new(),
             text => format!(" {sign}{text}{end}"),
         };
-        let line = |(n, Channel { name, unit, values, .. }): (usize, &Channel)| {
-            let first: Vec<String> = values.iter().take(3).map(f64::to_string).collect();
+        let line = |(n, Channel { name, unit, values, texts, .. }): (usize, &Channel)| {
+            let numbers = values.iter().take(3).map(f64::to_string);
+            let first: Vec<String> = match texts.is_empty() {
+                true => numbers.collect(),
+                false => texts.iter().take(3).cloned().collect(),
+            };
             let (unit, first, count) = (after('[', unit, ']'), first.join(", "), values.len());
             format!("\n  {}  {name}{unit}: {first} ... ({count} values)", n + 1)
         };
@@ -211,6 +256,16 @@ impl Contents {
             (Some((name, unit)), _) => (name, Some(unit)),
             (None, (name, unit)) => (name, unit),
         };
+        if let Some([refused, reason]) = self
+            .refused
+            .iter()
+            .find(|[known, _]| [text, name].contains(&known.as_str()))
+        {
+            return Err(RecordingError::new(format!(
+                "{}, channel {refused}: {reason}",
+                self.origin
+            )));
+        }
         let names: Vec<&str> = self.channels.iter().map(|one| one.name.as_str()).collect();
         let channel = self.find(name)?.ok_or_else(|| {
             self.refused(&format!(
@@ -230,7 +285,17 @@ impl Contents {
         notes: &mut Vec<String>,
     ) -> Result<Channel, RecordingError> {
         let (channel, given) = self.named(text, option)?;
-        let Channel { name, unit: stated, values, clock } = channel;
+        let Channel { name, unit: stated, values, texts, clock } = channel;
+        let is_text = |(cell, value): &(&String, &f64)| value.is_nan() && !cell.is_empty() && !is_nan(cell);
+        let mut cells = texts.iter().zip(values);
+        if let Some(n) = cells.position(|one| is_text(&one)) {
+            return Err(self.refused(&format!(
+                ", channel {name}, {}: `{}` is not a number{}",
+                self.place(n),
+                texts[n],
+                self.advice
+            )));
+        }
         let written = given.as_deref().unwrap_or(stated).trim();
         let found = if written.is_empty() {
             Some((1.0, ""))
@@ -273,7 +338,13 @@ impl Contents {
             ));
         }
         let values = values.iter().map(|value| factor * value).collect();
-        Ok(Channel { name: name.clone(), unit: unit.into(), values, clock: *clock })
+        Ok(Channel {
+            name: name.clone(),
+            unit: unit.into(),
+            values,
+            clock: *clock,
+            ..Channel::default()
+        })
     }
 
     /// The base that a run of `vines` without a base sensor commanded: from its columns omega and E.
@@ -299,14 +370,17 @@ impl Contents {
             name: "E".into(),
             unit: "m".into(),
             values: base.collect(),
-            clock: None,
+            ..Channel::default()
         }))
     }
 
     /// The channel of the time, s.
     fn time(&self, selection: &Selection, notes: &mut Vec<String>) -> Result<Option<Channel>, RecordingError> {
-        let is_time = |channel: &&Channel| TIMES.contains(&&*channel.last().to_lowercase());
-        let mut usual = self.channels.iter().filter(is_time);
+        // A `T [°C]` is no time.
+        let named = |channel: &&Channel| channel.is_named_time() && (channel.unit.is_empty() || channel.is_time());
+        let all = |is_it: &dyn Fn(&&Channel) -> bool| self.channels.iter().filter(|one| is_it(one)).collect::<Vec<_>>();
+        let kinds = [all(&named), all(&|one| one.is_time()), all(&|one| one.is_named_time())];
+        let mut usual = kinds.into_iter().find(|kind| !kind.is_empty()).into_iter().flatten();
         let (first, second) = (usual.next(), usual.next());
         if let (None, Some(first), Some(second)) = (&selection.time, first, second) {
             let names = format!("{} and {}", first.name, second.name);
@@ -336,6 +410,9 @@ impl Contents {
         }
         if let Some(n) = times.iter().position(|value| !value.is_finite()) {
             return refused(format!("{} is not a time", self.place(n)));
+        }
+        if let Some(clock) = self.coarse(time, rate, notes)? {
+            return Ok(clock);
         }
         let clock = Clock::of(times);
         let step = clock.step;
@@ -403,6 +480,72 @@ impl Contents {
         Ok([clock.start, given])
     }
 
+    /// Start and step of the clock where several samples have the same time, because its resolution is coarse: only a rate tells the step. `None`
+    /// where the times determine it.
+    fn coarse(
+        &self,
+        time: &Channel,
+        rate: Option<f64>,
+        notes: &mut Vec<String>,
+    ) -> Result<Option<[f64; 2]>, RecordingError> {
+        let (times, name) = (&time.values, &time.name);
+        let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let count = steps.len();
+        let jumps: Vec<usize> = (0..count).filter(|n| steps[*n] != 0.0).collect();
+        let last = jumps.last().map_or(0, |n| n + 1);
+        if count < 3 || 2 * jumps.len() > count {
+            return Ok(None);
+        }
+        let (resolution, duration) = match jumps.len() {
+            0 => (f64::NAN, 0.0),
+            // Dates are large, and their differences rounded.
+            some => {
+                let mut sizes: Vec<f64> = jumps.iter().map(|n| steps[*n]).collect();
+                sizes.sort_by(f64::total_cmp);
+                (sizes[some / 2], times[last] - times[0])
+            }
+        };
+        // Rounding to `resolution` shifts a fitted clock by up to resolution² / duration over the recording.
+        if resolution * resolution < EVEN * duration * (duration / count as f64) {
+            return Ok(None);
+        }
+        if let Some(n) = jumps.iter().find(|n| !(0.0..GAP * resolution).contains(&steps[**n])) {
+            return Err(RecordingError::new(format!(
+                "{}, {}: the time goes from {} s to {} s, where a step is {resolution:.6} s: the recording is interrupted there. Fit the parts as files \
+                 of their own",
+                self.origin,
+                self.place(n + 1),
+                times[*n],
+                times[n + 1]
+            )));
+        }
+        let what = match jumps.len() {
+            0 => format!("all {} samples have the time {} s", count + 1, times[0]),
+            _ => format!(
+                "the times have steps of {resolution:.6} s, and up to {} samples have the same time",
+                longest(&steps)
+            ),
+        };
+        let Some(rate) = rate else {
+            return Err(self.refused(&format!(
+                ", channel {name}: {what}, which does not tell the time of a sample: give the samples a second with --rate (`rate` in Python)"
+            )));
+        };
+        notes.push(format!(
+            "{}: {what} in {name}; the rate of {rate} samples a second that was given is used",
+            self.origin
+        ));
+        let apart = count as f64 / rate - duration;
+        if apart.abs() > resolution {
+            notes.push(format!(
+                "{}: at the rate that was given the recording takes {:.6} s, and {duration:.6} s by {name}",
+                self.origin,
+                count as f64 / rate
+            ));
+        }
+        Ok(Some([times[0], rate.recip()]))
+    }
+
     /// Where a sample is in the file.
     fn place(&self, sample: usize) -> String {
         match self.first_line {
@@ -410,6 +553,19 @@ impl Contents {
             first => format!("row {}", first + sample),
         }
     }
+}
+
+/// Whether the cell says that a number is missing.
+fn is_nan(cell: &str) -> bool {
+    cell.parse::<f64>().is_ok_and(f64::is_nan)
+}
+
+/// Largest number of samples with the same time, from the steps between them.
+fn longest(steps: &[f64]) -> usize {
+    let runs = steps.chunk_by(|one, other| *one == 0.0 && *other == 0.0);
+    runs.map(|run| if run[0] == 0.0 { run.len() + 1 } else { 1 })
+        .max()
+        .unwrap_or(1)
 }
 
 /// The drive at the times of the response, from start and step of both clocks, in their common part: its first sample of the response. `None`

@@ -382,7 +382,7 @@ impl Recording {
                     time: n as f64 * self.sample_time,
                     sensors: Sensors { response: self.response[n], reference: Some(self.drive[n]) },
                     command: Command { drive, ..Command::default() },
-                    ground_truth: None,
+                    ..Sample::default()
                 });
             }
         }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use nalgebra::DVector;
 use serde::Serialize;
-use vines_model::numerics::{HarmonicBasis, mean};
+use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean};
 use vines_model::regime::end_of_synchrony;
 
 use super::response::impacts;
@@ -61,6 +61,9 @@ pub enum DecayEnd {
     /// The impacts took away less than half of what they did at the release, on a rig that does not report impacts.
     #[serde(rename = "end of the impacts")]
     Linear,
+    /// There are none: the base goes on moving with the frequency of the drive ([`base_at_rest`]).
+    #[serde(rename = "base not at rest")]
+    Driven,
     /// There are none: another mode moves freely beside the driven one, nearer than a window can tell apart.
     #[serde(rename = "another mode")]
     OtherMode,
@@ -91,13 +94,16 @@ const KEPT: f64 = 0.5;
 /// the end of the impacts. `window`: length of each fit, periods of the motion, [`WINDOW`] by default; behind a shaker 1.2 times that.
 pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> DecayPoints {
     let d = knowledge.numbers;
-    let decay = record.decay();
+    let none = |end| DecayPoints { points: Vec::new(), end };
+    let Ok(begin) = base_at_rest(record, knowledge) else {
+        return none(DecayEnd::Driven);
+    };
+    let decay = record.decay().get(begin..).unwrap_or_default();
     let dt = record.sample_time;
     let (Some(first), Some(last)) = (decay.first(), decay.last()) else {
-        return DecayPoints { points: Vec::new(), end: DecayEnd::Record };
+        return none(DecayEnd::Record);
     };
-    // Initial frequency: the command of the last held sample.
-    let omega = record.hold().last().map_or(d.omega0, |s| s.command.drive.omega);
+    let omega = last_driven(record).unwrap_or(d.omega0);
     let half_period = PI / omega;
     let has_impacts = first.ground_truth.is_some();
     let until = if has_impacts {
@@ -114,10 +120,11 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
     };
     // A small module has no code for structures.
     if cfg!(feature = "tables") && knowledge.nearest_pole * window / omega < lobe {
-        return DecayPoints { points: Vec::new(), end: DecayEnd::OtherMode };
+        return none(DecayEnd::OtherMode);
     }
     let mut windows = fitted(&values, [dt, window], omega, terms);
     for window in &mut windows {
+        window.time += begin as f64 * dt;
         window.fit = window.fit.displacement(0, &knowledge.target);
     }
     // Loss of amplitude by the impacts alone, m/s; the mean over the first period belongs to the 1:1 motion.
@@ -138,6 +145,58 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
         .map(|window| window.point(decay, &d))
         .collect();
     DecayPoints { points, end }
+}
+
+/// Frequency of the last drive before the release, rad/s.
+fn last_driven(record: &Record) -> Option<f64> {
+    let driven = record.samples[..record.released].iter().rev();
+    driven
+        .map(|sample| sample.command.drive.omega)
+        .find(|omega| *omega > 0.0)
+}
+
+/// Rounding of a fit over the largest reading: the least noise.
+const ROUNDING: f64 = 1e-14;
+
+/// Index of the sample of the decay from which on the rig is free: the base rests as well as the command.
+///
+/// The base rests where a fit of one period finds no motion of the last drive's frequency: its amplitude is not significant against the noise of the
+/// channel, which is what the fit leaves of the readings. Without a sensor of the base, and behind a shaker, whose armature the structure moves, only
+/// the command is known: the rig is then free as soon as the readings are of the time of the release.
+///
+/// # Errors
+/// The amplitude of the base, m, in the period in which it is least, if the base rests nowhere.
+pub fn base_at_rest(record: &Record, knowledge: &Knowledge) -> Result<usize, Estimate> {
+    let (decay, dt, target) = (record.decay(), record.sample_time, &knowledge.target);
+    let readings: Option<Vec<f64>> = decay.iter().map(|sample| sample.sensors.reference).collect();
+    let readings = readings.filter(|_| knowledge.shaker().is_none());
+    let Some((readings, omega)) = readings.zip(last_driven(record)) else {
+        return Ok((target.delay / dt).ceil() as usize);
+    };
+    let period = (TAU / (omega * dt)).round() as usize;
+    let step = ((period as f64 / PER_PERIOD).round() as usize).max(1);
+    let phases: Vec<f64> = (0..period).map(|n| n as f64 * dt * omega).collect();
+    let basis = HarmonicBasis::new(&phases, 1, &[Some(0)]);
+    let displacement = target.displacement(1, omega).norm();
+    let mut least: Option<Estimate> = None;
+    for (n, values) in readings.windows(period).enumerate().step_by(step) {
+        let values = DVector::from_column_slice(values);
+        let Some(fit) = basis.fit(&values).filter(|_| period > basis.terms()) else {
+            break;
+        };
+        let variance = basis.residual(&values, &fit).norm_squared() / (period - basis.terms()) as f64;
+        let variance = variance.max((ROUNDING * values.amax()).powi(2)) * target.colour_of_fundamental(omega, dt, 1);
+        let uncertainty = displacement * (2.0 * variance / period as f64).sqrt();
+        let value = displacement * fit.harmonic(1).norm();
+        if value <= SIGNIFICANT * uncertainty {
+            return Ok(n);
+        }
+        if least.is_none_or(|least| value < least.value) {
+            least = Some(Estimate { value, uncertainty });
+        }
+    }
+    // A decay of less than a period has no points, whatever moves.
+    least.map_or(Ok(0), Err)
 }
 
 /// A fit of some samples; `time`: its middle since the release, s.

@@ -86,6 +86,11 @@ pub(crate) const LONGEST: usize = 150;
 /// Shares of the periods that are considered, from the last one backwards.
 const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
 
+/// Whether a mean phase error, rad, with this standard uncertainty is too large for a level.
+pub(crate) fn is_off_target(error: f64, u: f64) -> bool {
+    error.abs() > LARGEST_PHASE_ERROR + RANDOM * u
+}
+
 impl Criterion {
     /// The window with the smallest uncertainties, from the last of these periods backwards; `None` for too few.
     pub fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
@@ -106,7 +111,7 @@ impl Criterion {
     /// Whether the uncertainties are small enough, and the phase is near its target.
     pub fn is_met(&self, estimate: &LevelEstimate) -> bool {
         let Estimate { value, uncertainty } = estimate.phase_error;
-        self.size(estimate) <= 1.0 && value.abs() <= LARGEST_PHASE_ERROR + RANDOM * uncertainty
+        self.size(estimate) <= 1.0 && !is_off_target(value, uncertainty)
     }
 
     /// Largest uncertainty over the largest allowed.

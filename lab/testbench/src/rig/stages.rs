@@ -173,6 +173,12 @@ impl<'a, R: Rig + ?Sized> Scaled<'a, R> {
         Some(control.clipped)
     }
 
+    /// Amplitude of the last command of a shaker, m as the bench converts commands; `None` without a shaker.
+    pub fn shaker_command(&self) -> Option<f64> {
+        let control = self.control.as_ref().filter(|_| cfg!(feature = "tables"))?;
+        Some(control.amplitude())
+    }
+
     fn command(&mut self, drive: Drive, step: f64) -> Result<Drive, RigError> {
         match &mut self.control {
             // A small module has no code for it, as it has no structures.

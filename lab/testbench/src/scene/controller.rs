@@ -4,14 +4,16 @@ use std::f64::consts::{PI, TAU};
 
 use lovines::State;
 use lovines::oscillator::Oscillator;
-use phase_lock::{Config, ConfigError, LockCriterion, MAX_HARMONICS, NONE, PARAMETERS, Parameter, Value as Setting};
+use phase_lock::{
+    Config, ConfigError, LockCriterion, MAX_HARMONICS, NONE, Number, PARAMETERS, Parameter, Value as Setting,
+};
 use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
 use vines_model::ArgumentError;
 
-use crate::plan::{Knowledge, LinearResponse};
+use crate::plan::{Knowledge, LinearResponse, Units};
 
-use super::{Measurand, Scene, SceneError, Structure, check, given, positive, within};
+use super::{Measurand, Scene, SceneError, check, given, positive, within};
 
 settings! {
     /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
@@ -106,7 +108,8 @@ impl Scene {
         let period = knowledge.numbers.natural_period();
         let step = knowledge.sample_time;
         let delay = self.chain.total_delay(omega0 * step) / omega0;
-        let units = self.units();
+        let Units { drive, response, .. } = self.units();
+        let units = [drive.recip(), response.recip()];
         let defaults = Config {
             amplitude_max: Some((4.0 * self.drive_needed(knowledge)).min(self.drive_range())),
             response_max: Some(4.0 * knowledge.numbers.b),
@@ -151,16 +154,38 @@ impl Scene {
         }
     }
 
-    /// Base displacement per drive, and displacement at the cavity per displacement at the sensor, of the driven mode's oscillator: the controller
-    /// of a structure works with its oscillator, and limits are given for the drive and for the displacement at the sensor.
-    fn units(&self) -> [f64; 2] {
-        let factors = |structure: &Structure| {
-            [
-                structure.base_per_drive(),
-                structure.reading_per_response().abs().recip(),
-            ]
-        };
-        self.structure().map_or([1.0; 2], factors)
+    /// The units of limits: the controller of a structure works with the oscillator of its driven mode.
+    pub(crate) fn units(&self) -> Units {
+        let of_oscillator = Units { drive: 1.0, name: "m", response: 1.0 };
+        self.structure().map_or(of_oscillator, |structure| Units {
+            drive: structure.base_per_drive().recip(),
+            name: structure.excitation.unit(),
+            response: structure.reading_per_response().abs(),
+        })
+    }
+
+    /// Refuses a configuration that the controller refuses.
+    ///
+    /// # Errors
+    /// The value that is refused, in the units of the scene.
+    pub(crate) fn check_controller(&self) -> Result<(), SceneError> {
+        let config = self.controller_config();
+        let Err(error) = config.build() else { return Ok(()) };
+        let Units { drive, name, .. } = self.units();
+        // Five digits: the value has been multiplied and divided.
+        let shown = |metres: f64| format!("{:.4e}", metres * drive).parse().unwrap_or(metres * drive);
+        match config.amplitude_max {
+            Some(limit) if error.name == "amplitude" => Err(SceneError::Value {
+                key: "phase_lock.amplitude_max",
+                value: shown(limit),
+                unit: name,
+                allowed: format!(
+                    "at least the drive of [excitation], {} {name}",
+                    Number(shown(self.amplitude))
+                ),
+            }),
+            _ => Err(error.into()),
+        }
     }
 
     /// Largest plausible difference between a reading and its prediction, as a share of the amplitude.
@@ -404,6 +429,12 @@ fn setting(name: &str, value: &Value) -> Result<(&'static str, Setting), Argumen
         )
     })?;
     let mut config = Config::for_resonance(1.0, 1.0);
+    // The unit is that of the drive, which another section says.
+    let unit = |unit| match parameter.name {
+        "amplitude_max" => "m, or N behind a force,",
+        "ramp_rate" | "release_rate" => "m/s, or N/s behind a force,",
+        _ => unit,
+    };
     let setting = match (parameter.get(&config), value) {
         (Setting::Real(_), Value::Float(number)) => Setting::Real(*number),
         (Setting::Real(_), Value::Integer(number)) => Setting::Real(*number as f64),
@@ -417,6 +448,6 @@ fn setting(name: &str, value: &Value) -> Result<(&'static str, Setting), Argumen
         }
     };
     let accepted = parameter.set(&mut config, setting);
-    accepted.map_err(|error| format!("phase_lock.{error}"))?;
+    accepted.map_err(|error| format!("phase_lock.{}", ConfigError { unit: unit(error.unit), ..error }))?;
     Ok((parameter.name, setting))
 }

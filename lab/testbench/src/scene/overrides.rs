@@ -123,7 +123,7 @@ impl Family {
     pub fn parse(origin: &str, text: Option<&str>, overrides: &[Override]) -> Result<Self, SceneError> {
         let (origin, text) = text.map_or(("paper.toml (the default scene)", PAPER), |text| (origin, text));
         let (sections, table) = read(origin, text, overrides)?;
-        sections.resolve(origin, &table)?.controller_config().build()?;
+        sections.resolve(origin, &table)?.check_controller()?;
         Ok(Self { origin: origin.into(), table, keys: Vec::new() })
     }
 

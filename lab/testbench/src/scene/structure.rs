@@ -140,6 +140,22 @@ impl Structure {
             .collect()
     }
 
+    /// Refuses a cavity where the mass ratio of the driven mode with a particle of the mass `m`, kg, is rounding.
+    pub(super) fn reached_by(&self, m: f64) -> Result<(), String> {
+        let (mode, ratio) = (self.mode(), self.mass_ratio(self.mode(), m));
+        if ratio > ROUNDING {
+            return Ok(());
+        }
+        Err(format!(
+            "the cavity at {} is at a node of the driven mode {} by rising frequency ({:.6} Hz): its shape there, {:.4e} 1/sqrt(kg), makes the mass ratio \
+             m phi² = {ratio:.1e}, and above {ROUNDING:e} a particle can act on it; choose another point or mode, or check the unit of the shape",
+            self.points[self.cavity],
+            self.driven + 1,
+            mode.omega / TAU,
+            self.at_cavity(mode)
+        ))
+    }
+
     /// Modal mass ratio `m phi_n²` of a mode for the particle mass `m`, kg.
     pub fn mass_ratio(&self, mode: &StructureMode, m: f64) -> f64 {
         m * self.at_cavity(mode).powi(2)
@@ -516,19 +532,33 @@ impl StructureSection {
         }
         if let Some(mass) = &mass {
             mass.symmetric()?;
-            mass.positive("kg")?;
+            mass.heavy()?;
         }
         let mut modes = Vec::new();
         for (n, mode) in self.modes.iter().enumerate() {
             let number = n + 1;
             let ModeSection { frequency, damping, shape, participation } = mode;
-            let numbers = shape.values().chain([frequency, damping]).chain(participation);
-            let in_range = *frequency > 0.0 && *frequency <= HIGHEST && *damping >= 0.0;
-            if !numbers.clone().all(|number| number.is_finite()) || !in_range {
+            if !(*frequency > 0.0 && *frequency <= HIGHEST) {
                 return Err(format!(
-                    "mode {number} has frequency = {frequency} Hz and damping = {damping}: the frequency must be positive and at most {HIGHEST:e} Hz, \
-                     the damping ratio at least 0, and all numbers finite"
+                    "mode {number} has frequency = {frequency} Hz: it must be positive and at most {HIGHEST:e} Hz; leave out rigid-body modes (0 Hz)"
                 ));
+            }
+            if !(*damping >= 0.0 && *damping < 1.0) {
+                return Err(format!(
+                    "mode {number} ({frequency} Hz) has damping = {damping}: the damping ratio must be at least 0 and below 1, because a mode must oscillate \
+                     (it is a number, not per cent)"
+                ));
+            }
+            let shapes = shape
+                .iter()
+                .map(|(point, value)| (format!("the shape at {point}"), *value));
+            let numbers = shapes.chain(participation.map(|value| ("participation".to_owned(), value)));
+            for (name, value) in numbers {
+                if !value.is_finite() {
+                    return Err(format!(
+                        "mode {number} ({frequency} Hz) has {name} = {value}: it must be a finite number, mass-normalised"
+                    ));
+                }
             }
             if shape.len() != points.len() || !shape.keys().eq(points.iter()) {
                 let own: Vec<&str> = shape.keys().map(String::as_str).collect();
@@ -630,9 +660,9 @@ impl StructureSection {
         for matrix in [&m, &c, &k] {
             matrix.symmetric()?;
         }
-        m.positive("kg")?;
-        k.positive("N/m")?;
-        c.not_negative("N s/m")?;
+        m.heavy()?;
+        k.stiff()?;
+        c.damped()?;
         let direction = self.direction(&m.names)?;
         Parts::of_matrices(m.names, Coupled::of_points([m.values, c.values, k.values], direction))
     }
@@ -689,14 +719,21 @@ fn check(points: &[String], modes: &[StructureMode], driven: usize, at: &Places)
     for (n, mode) in modes.iter().enumerate() {
         if mode.zeta >= 1.0 {
             return Err(format!(
-                "mode {} has the damping ratio {}: critical or more, and a mode must oscillate; the ratio must be below 1 (it is a number, not \
-                 per cent)",
+                "mode {} by rising frequency ({:.6} Hz) has the damping ratio {}: critical or more, and a mode must oscillate; the ratio must be below 1",
                 n + 1,
+                mode.omega / TAU,
                 mode.zeta
             ));
         }
     }
-    let (mode, number) = (&modes[driven], driven + 1);
+    let mode = &modes[driven];
+    let number = format!("{} by rising frequency ({:.6} Hz)", driven + 1, mode.omega / TAU);
+    if let Some(n) = mode.shape.iter().position(|value| !value.is_finite()) {
+        return Err(format!(
+            "mode {number} has the shape {} at {}: it must be a finite number",
+            mode.shape[n], points[n]
+        ));
+    }
     let largest = mode
         .shape
         .iter()
@@ -704,8 +741,10 @@ fn check(points: &[String], modes: &[StructureMode], driven: usize, at: &Places)
     let is_node = |point: usize| mode.shape[point].abs() <= ROUNDING * largest;
     if is_node(at.cavity) {
         return Err(format!(
-            "the cavity at {} is at a node of the driven mode {number}: no impact can drive it; choose another point or mode",
-            points[at.cavity]
+            "the cavity at {} is at a node of the driven mode {number}, whose shape there is {:e} of its largest: no impact can drive it; choose another \
+             point or mode",
+            points[at.cavity],
+            mode.shape[at.cavity].abs() / largest
         ));
     }
     if at.drive.map_or(mode.drive == 0.0, is_node) {
@@ -713,7 +752,7 @@ fn check(points: &[String], modes: &[StructureMode], driven: usize, at: &Places)
             .drive
             .map_or("the base".into(), |point| format!("the force at {}", points[point]));
         return Err(format!(
-            "{place} does not drive mode {number}: its shape or participation there is 0"
+            "{place} does not drive mode {number}: its shape or participation there is 0; choose another point or mode"
         ));
     }
     if is_node(at.sensor) {

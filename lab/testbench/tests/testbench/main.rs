@@ -2,6 +2,7 @@
 
 #[path = "../../../../studies/common.rs"]
 mod common;
+mod controllers;
 mod faults;
 mod loop_check;
 mod measuring;

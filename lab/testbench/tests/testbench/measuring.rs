@@ -12,7 +12,7 @@ use vines_model::numerics::{Estimate, mean_square};
 use vines_model::orbit::phase_resonant;
 use vines_testbench::backbone::LevelPoint;
 use vines_testbench::comparison::{COMPARED_ABOVE, ExactCurve};
-use vines_testbench::experiment::ExperimentError;
+use vines_testbench::experiment::{ExperimentError, SearchFound};
 use vines_testbench::identification::{
     IdentificationError, Lock, Regime, ResonancePoint, WINDOW, decay_points, foreign_tone, identify, regime_by_response,
 };
@@ -376,6 +376,7 @@ fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04
         samples: fine.decay().iter().step_by(4).copied().collect(),
         settled: 0,
         held: false,
+        hold_end: 0,
         released: 0,
         clipped_percent: None,
     };
@@ -732,6 +733,21 @@ fn a_search_without_a_lock_says_what_it_found_and_what_to_do() {
 }
 
 #[test]
+#[ignore = "a leg of the search can need a drive below zero, until the one estimator replaces the search (issue 65, 13)"]
+fn a_refusal_names_no_drive_below_zero() {
+    let found = SearchFound {
+        tried: [0.1, 0.5],
+        impacts: true,
+        held: Some(([-0.2017, 0.9], [0.9, 0.4, -1.0])),
+        strongest: 4.4,
+        requested: 1.1,
+        lost: 4,
+        unsettled: None,
+    };
+    assert!(!found.to_string().contains("G = -"), "{found}");
+}
+
+#[test]
 fn a_response_that_repeats_after_two_to_four_periods_is_not_called_1_1_also_through_noise() {
     for noise in [&[][..], &["chain.snr=60"]] {
         for periods in 2..=4 {
@@ -784,7 +800,7 @@ fn no_motion_of_a_particle_is_a_foreign_tone() {
                 let (time, sensors) = (step * f64::from(n), knowledge.target.scaled(rig.sense().unwrap()));
                 rig.advance(drive, step).unwrap();
                 let command = Command { drive, ..Command::default() };
-                Sample { time, sensors, command, ground_truth: None }
+                Sample { time, sensors, command, ..Sample::default() }
             })
             .collect();
         // The first of these windows contains the transient.

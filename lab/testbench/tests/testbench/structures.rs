@@ -7,7 +7,7 @@ use num_complex::Complex;
 use tempfile::TempDir;
 use vines_model::numerics::Estimate;
 use vines_model::orbit::{Orbit, StructureOrbit};
-use vines_testbench::comparison::ExactCurve;
+use vines_testbench::comparison::{Comparison, ExactCurve};
 use vines_testbench::fit::{MeasuredPoint, contradiction};
 use vines_testbench::identification::IdentificationError;
 use vines_testbench::loop_check::{CheckedQuantity, Verdict, check};
@@ -334,7 +334,7 @@ fn damping_above_critical_is_refused_where_a_mode_is_asked_for() {
     let folder = matrices([GOOD[0], [8.0, 0.0, 16.0], GOOD[2]]);
     says(
         of(&folder, &format!("{PLANT}{MATRICES}"), &[]),
-        "mode 1 has the damping ratio | below 1",
+        "mode 1 by rising frequency | has the damping ratio | below 1",
     );
 }
 
@@ -544,6 +544,135 @@ fn the_loop_finds_the_stable_exact_orbits_of_the_presets_and_refuses_what_is_asy
         matches!(refused, Err(IdentificationError::Regime { .. })),
         "{refused:?}"
     );
+}
+
+#[test]
+fn points_of_a_structure_are_compared_with_the_exact_orbit_of_their_response_not_with_a_polygon() {
+    let scene = preset("frame", &[]);
+    let (numbers, structure) = (scene.dimensionless(), scene.structure.as_ref().unwrap());
+    let [per_drive, per_response] = [structure.base_per_drive(), structure.reading_per_response().abs()];
+    let orbits = scene.structure_orbits().unwrap();
+    let mut compared = 0;
+    for n in 0..60 {
+        let omega = structure.mode().omega * (0.98 + 0.0007 * f64::from(n));
+        for orbit in orbits.at_phase_resonance(omega) {
+            let orbit = orbit.in_numbers(&numbers, per_drive, per_response);
+            if !orbit.stable {
+                continue;
+            }
+            compared += 1;
+            let curve = ExactCurve::of_scene(&scene, &numbers, [orbit.sigma, orbit.c]);
+            // The polygon is off by up to 2e-4.
+            for off in [0.0, 1e-3] {
+                let distance = curve.distance(orbit.c, orbit.sigma + off, orbit.g).unwrap();
+                let (sigma, g) = (distance.sigma.unwrap() - off, distance.g.unwrap());
+                assert!(
+                    sigma.abs() < 1e-8 && g.abs() < 1e-8 && distance.nearest <= off + 1e-8,
+                    "{distance:?}"
+                );
+            }
+        }
+    }
+    assert!(compared > 5, "{compared}");
+}
+
+#[test]
+fn the_exact_orbit_beside_a_lock_has_the_measured_response() {
+    let scene = preset("resonant", &["chain.snr=40", "chain.seed=3"]);
+    let found = Comparison::of(&identified(&scene).unwrap(), &scene);
+    let (at, exact) = (found.lock.at, found.exact.unwrap());
+    assert!((exact.c / at.c - 1.0).abs() < 1e-9, "{} {}", exact.c, at.c);
+    assert!((exact.sigma - at.sigma).abs() < 4.0 * at.u_sigma && (exact.g - at.g).abs() < 4.0 * at.u_g);
+}
+
+#[test]
+fn mistakes_of_a_modal_model_are_refused_with_the_value_and_what_to_do() {
+    says(
+        beam(&[("frequency = 8.8156", "frequency = 0.0")]),
+        "mode 1 has frequency = 0 Hz | leave out rigid-body modes",
+    );
+    says(
+        beam(&[("tip = 0.51252", "tip = inf")]),
+        "mode 1 (8.8156 Hz) has the shape at tip = inf | finite",
+    );
+    // The number is that of the table as it is written, not that by rising frequency.
+    let swapped = [
+        ("frequency = 8.8156, damping = 0.006", "frequency = 99.0, damping = 1.5"),
+        ("frequency = 55.274", "frequency = 8.8"),
+    ];
+    says(beam(&swapped), "mode 1 (99 Hz) has damping = 1.5 | below 1");
+    says(
+        beam(&[
+            ("tip = 0.51252", "tip = 7e-9"),
+            ("root = 0.1", "root = 1e-9"),
+            ("middle = 0.0", "middle = 1e-9"),
+        ]),
+        "cavity at tip is at a node of the driven mode 1 | 7.0000e-9 1/sqrt(kg) | choose another point or mode",
+    );
+    let scene = format!("{PLANT}{MATRICES}");
+    let with = |name: &str, text: &str| {
+        let folder = matrices(GOOD);
+        fs::write(folder.path().join(name), text).unwrap();
+        of(&folder, &scene, &[])
+    };
+    says(
+        with("k.csv", "tip, root\n2, -2\n-2, 2\n"),
+        "K (k.csv) is not positive definite | eigenvalue 1 of 2 | 1 of them are 0 within rounding | rigid-body modes | suspension",
+    );
+    says(
+        with("m.csv", "tip, root\n1, 0\n0, 0\n"),
+        "M (m.csv) is not positive definite | without mass: here root | static condensation",
+    );
+    says(
+        with("k.csv", "tip, root\n2, -1\n-1.0000001, 4\n"),
+        "K (k.csv) is not symmetric | they differ by 2.5e-8 of its largest | 1e-9 is allowed | mean of both",
+    );
+    says(
+        with("k.csv", "tip; root\n2; -1\n-1; 4\n"),
+        "K (k.csv) has semicolons between its 2 columns | commas",
+    );
+}
+
+/// A mode by its frequency over that of the loop's range, in Hz, with a light particle: a structure, and the same oscillator.
+fn light(epsilon: f64) -> (Scene, Scene) {
+    let zeta = 0.715 * epsilon;
+    let plant = format!("[plant]\nm = {epsilon:?}\nb = 1\nr = 0.65\n[excitation]\nG = 1.1\n");
+    let mode = format!("{{ frequency = 1.0, damping = {zeta:?}, participation = 1.0, shape = {{ tip = 1.0 }} }}");
+    let text = format!("{plant}[structure]\ncavity = \"tip\"\nmodes = [{mode}]\n");
+    let oscillator = paper(&[
+        &format!("plant.epsilon={epsilon:?}"),
+        "plant.lambda=1.43",
+        "resonance.sensor=q1",
+    ]);
+    (of(&TempDir::new().unwrap(), &text, &[]).unwrap(), oscillator)
+}
+
+#[test]
+#[ignore = "orbits of small mass ratios are missed by the 4,000 equal steps of the search; mended with the one continuation"]
+fn a_structure_with_a_light_particle_has_the_orbits_of_the_same_oscillator() {
+    for epsilon in [1e-2, 1e-4, 1e-5, 1e-6] {
+        let (structure, oscillator) = light(epsilon);
+        let survey = Survey::of(&structure).unwrap();
+        let expected = phase_resonant(&oscillator, &oscillator.dimensionless());
+        assert_eq!(survey.orbits.len(), expected.len(), "orbits at epsilon = {epsilon:e}");
+        let stable = survey
+            .facts
+            .all
+            .iter()
+            .flat_map(|branch| &branch.orbits)
+            .any(|orbit| orbit.stable);
+        assert!(stable, "no stable orbit of the backbone at epsilon = {epsilon:e}");
+    }
+}
+
+#[test]
+#[ignore = "orbits are searched at the frequencies that the controller may set only; mended with the one continuation"]
+fn all_orbits_of_a_structure_are_found_also_outside_the_frequencies_of_the_controller() {
+    // An undamped oscillator has orbits far below its resonance: at epsilon = 0.05 and G = 1.1 the frequency over omega0 is below 0.9.
+    let narrow = preset("frame", &["controller.omega_min=0.999", "controller.omega_max=1.001"]);
+    let wide = preset("frame", &["controller.omega_min=0.5", "controller.omega_max=1.8"]);
+    let [narrow, wide] = [narrow, wide].map(|scene| Survey::of(&scene).unwrap().orbits.len());
+    assert_eq!(narrow, wide);
 }
 
 #[test]

@@ -18,6 +18,16 @@ fn table(folder: &Path, key: &str, file: &Path) -> Result<(Vec<String>, Vec<Vec<
         .map_err(|error| format!("{title} cannot be read: {error}; paths are relative to the scene file"))?;
     let unreadable = |error: csv::Error| format!("{title} cannot be read: {error}");
     let header: Vec<String> = reader.headers().map_err(unreadable)?.iter().map(Into::into).collect();
+    if let [line] = &header[..]
+        && let Some((name, separator)) = [("semicolons", ';'), ("tabs", '\t')]
+            .into_iter()
+            .find(|(_, separator)| line.contains(*separator))
+    {
+        let count = line.split(separator).count();
+        return Err(format!(
+            "{title} has {name} between its {count} columns: write it with commas between columns, and with points in numbers"
+        ));
+    }
     if header.is_empty() || header.iter().any(|name| name.is_empty() || name.parse::<f64>().is_ok()) {
         return Err(format!(
             "{title} has no line of names at its top: give each column the name of its point"
@@ -99,8 +109,10 @@ impl Matrix {
         let [first, second] = [row, column].map(|n| &self.names[n]);
         let [below, above] = [self.values[(row, column)], self.values[(column, row)]];
         Err(format!(
-            "{} is not symmetric: its element ({first}, {second}) is {below}, and ({second}, {first}) is {above}",
-            self.title()
+            "{} is not symmetric: its element ({first}, {second}) is {below}, and ({second}, {first}) is {above}; they differ by {:.1e} of its largest \
+             element, and {ROUNDING:e} is allowed, which is rounding: write it with ten digits, or with the mean of both in both places",
+            self.title(),
+            worst / largest
         ))
     }
 
@@ -115,28 +127,63 @@ impl Matrix {
         values
     }
 
-    fn above(&self, unit: &str, least: f64, what: &str) -> Result<(), String> {
+    /// Refuses a matrix that is not positive definite, or, if it `may_be_singular`, not positive semidefinite, by its smallest eigenvalues. `zero`: what
+    /// eigenvalues of zero mean, and what to do.
+    fn checked(&self, unit: &str, may_be_singular: bool, zero: &str) -> Result<(), String> {
         let values = self.eigenvalues();
         let largest = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-        if values[0] > least * largest || (least < 0.0 && largest == 0.0) {
+        let (title, count, smallest) = (self.title(), values.len(), values[0]);
+        let rounding = f64::EPSILON * largest;
+        let what = if may_be_singular { "semidefinite" } else { "definite" };
+        let start =
+            format!("{title} is not positive {what}: eigenvalue 1 of {count}, the smallest, is {smallest:.4e} {unit}");
+        if smallest < -ROUNDING * largest {
+            return Err(format!("{start}; check the signs of its elements"));
+        }
+        if may_be_singular || smallest > rounding {
             return Ok(());
         }
-        Err(format!(
-            "{} is not positive {what}: eigenvalue 1 of {}, the smallest, is {:.4e} {unit}",
-            self.title(),
-            values.len(),
-            values[0]
-        ))
+        // Rounding of the file as far as it shows, by the negative ones.
+        let rounding = (count as f64 * rounding).max(-smallest);
+        let zeros = values.iter().filter(|value| **value <= rounding).count();
+        Err(format!("{start}; {zeros} of them are 0 within rounding. {zero}"))
     }
 
-    /// Refuses a matrix that is not positive definite, by its smallest eigenvalue.
-    pub(super) fn positive(&self, unit: &str) -> Result<(), String> {
-        self.above(unit, f64::EPSILON, "definite")
+    /// Refuses a stiffness that is not positive definite.
+    pub(super) fn stiff(&self) -> Result<(), String> {
+        self.checked(
+            "N/m",
+            false,
+            "They are motions without a force, such as the rigid-body modes of a free structure, and every mode must oscillate: add the stiffness of \
+             its suspension, or describe the structure by its elastic modes (`modes` or `residues`)",
+        )
     }
 
-    /// Refuses a matrix that is not positive semidefinite.
-    pub(super) fn not_negative(&self, unit: &str) -> Result<(), String> {
-        self.above(unit, -ROUNDING, "semidefinite")
+    /// Refuses a mass that is not positive definite.
+    pub(super) fn heavy(&self) -> Result<(), String> {
+        let massless = self
+            .names
+            .iter()
+            .enumerate()
+            .filter(|(n, _)| self.values[(*n, *n)] == 0.0);
+        let massless: Vec<&str> = massless.map(|(_, name)| name.as_str()).collect();
+        let named = match massless.is_empty() {
+            true => String::new(),
+            false => format!(": here {}", massless.join(", ")),
+        };
+        self.checked(
+            "kg",
+            false,
+            &format!(
+                "They are degrees of freedom, or combinations, without mass{named}. Take them out of M, C and K (static condensation), or give them \
+                 their mass"
+            ),
+        )
+    }
+
+    /// Refuses a damping that is not positive semidefinite.
+    pub(super) fn damped(&self) -> Result<(), String> {
+        self.checked("N s/m", true, "")
     }
 }
 
@@ -194,7 +241,8 @@ impl Residues {
             }
             if hertz <= 0.0 || zeta < 0.0 {
                 return Err(format!(
-                    "mode {number} of {title} has {hertz} Hz and the damping ratio {zeta}: the frequency must be positive, the ratio at least 0"
+                    "mode {number} of {title} has {hertz} Hz and the damping ratio {zeta}: the frequency must be positive, the ratio at least 0; leave out \
+                     rigid-body modes (0 Hz)"
                 ));
             }
             let omega = std::f64::consts::TAU * hertz;

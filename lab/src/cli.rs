@@ -1,6 +1,4 @@
-//! `vines`: the command line of the lab, one file per command.
-
-#![forbid(unsafe_code)]
+//! The command line of the lab, one file per command: that of the program `vines`, and `vines fit` for the Python package.
 
 mod backbone;
 mod check;
@@ -18,18 +16,24 @@ mod recording;
 mod report;
 mod serve;
 mod shell;
+mod signals;
 mod structure;
 mod summary;
 mod tap;
 mod theory;
 mod watch;
 
+use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::ArgumentError;
+use crate::fmu::process::Signal;
 use failure::Failure;
 use output::Results;
+pub use points::Source;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -52,7 +56,7 @@ Exit codes:
     1  no result, a result that is not what was asked for, or a file that could not be written
     2  wrong usage, a value that is not allowed, or a target that cannot be written: nothing has moved
     3  results of a rig in real time that are doubtful, because too many samples were late
-  130  ended by Ctrl-C or SIGTERM
+  130  ended by Ctrl-C (SIGINT) within two seconds; 143 by SIGTERM, 129 by SIGHUP. The message says whether the drive is zero
 
 `vines completions SHELL` prints completions for bash, elvish, fish, powershell or zsh, and `vines man [COMMAND]` a manual page:
   vines completions bash > ~/.local/share/bash-completion/completions/vines
@@ -86,14 +90,76 @@ enum Command {
     Man(shell::ManArguments),
 }
 
-fn main() -> ExitCode {
+/// Runs the command of the program's arguments, prints its results, and returns the exit code.
+#[must_use]
+pub fn main() -> ExitCode {
     let cli = Cli::try_parse().unwrap_or_else(|error| shell::with_advice(error).exit());
-    match dispatch(cli.command).and_then(Results::show) {
-        Ok(()) => ExitCode::SUCCESS,
+    signals::start();
+    if let Err(error) = output::keep_stdout() {
+        eprintln!("error: cannot keep stdout for the results: {error}");
+        return ExitCode::FAILURE;
+    }
+    let outcome = dispatch(cli.command).and_then(Results::show);
+    let signal = signals::arrived();
+    let code = match outcome {
+        Ok(()) => 0,
         Err(failure) => {
             eprintln!("error: {}", failure.message);
-            failure.code.into()
+            if let Some(signal) = signal.filter(|_| failure.code != failure::INTERRUPTED) {
+                eprintln!("error: {}", signals::ended(signal));
+            }
+            failure.code
         }
+    };
+    signal.map_or(code, Signal::exit_code).into()
+}
+
+/// The command line of the Python package: `vines fit`, for the files that `vines` does not read.
+#[derive(Debug, Parser)]
+#[command(name = "vines", bin_name = "python -m vines", version)]
+struct FitCli {
+    #[command(subcommand)]
+    command: FitCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum FitCommand {
+    Fit(fit::Arguments),
+}
+
+/// What a command has printed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Printed {
+    /// Exit code.
+    pub code: u8,
+    /// Text on the standard output.
+    pub out: String,
+    /// Text on the standard error.
+    pub err: String,
+}
+
+/// Runs `vines fit` with the words of a command line, the first of which is `fit`; `read` reads the files. Files are written, and nothing is printed.
+pub fn fit(words: &[OsString], read: &dyn Fn(&Path) -> Result<Source, ArgumentError>) -> Printed {
+    let program = std::iter::once(OsString::from("vines"));
+    let arguments = match FitCli::try_parse_from(program.chain(words.iter().cloned())) {
+        Ok(FitCli { command: FitCommand::Fit(arguments) }) => arguments,
+        Err(error) => {
+            let (code, text) = (error.exit_code(), error.render().to_string());
+            let [out, err] = match error.use_stderr() {
+                true => [String::new(), text],
+                false => [text, String::new()],
+            };
+            return Printed { code: u8::try_from(code).unwrap_or(2), out, err };
+        }
+    };
+    let (out, failure) = match fit::run(&arguments, read) {
+        Ok(results) => results.texts(),
+        Err(failure) => (String::new(), Some(failure)),
+    };
+    Printed {
+        code: failure.as_ref().map_or(0, |failure| failure.code),
+        out,
+        err: failure.map_or_else(String::new, |failure| format!("error: {}\n", failure.message)),
     }
 }
 
@@ -102,7 +168,7 @@ fn dispatch(command: Command) -> Result<Results, Failure> {
     match command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Backbone(arguments) => backbone::run(&arguments),
-        Command::Fit(arguments) => fit::run(&arguments),
+        Command::Fit(arguments) => fit::run(&arguments, &points::plain),
         Command::Check(arguments) => check::run(&arguments).map(Results::from),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Structure(arguments) => structure::run(&arguments),

@@ -1,0 +1,217 @@
+//! How every command ends within two seconds of Ctrl-C (SIGINT), SIGTERM or SIGHUP.
+//!
+//! One thread waits for a signal. A command that has something to end (a driven rig, a server, files that are being written) holds an
+//! [`Orderly`]: it looks at the flag of [`stop_flag`], and ends by itself with what it has. The thread ends any other command at once. If an orderly
+//! command has not ended after [`PATIENCE`], something does not answer, such as an FMU or a device. The thread then commands a drive of zero itself,
+//! unless it is the rig that does not answer, says whether it could, and ends the program.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
+use std::sync::mpsc::channel;
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, Weak};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use vines::fmu::process::{self, Signal};
+use vines::rig::{Drive, GroundTruth, Rig, RigError, Sensors};
+
+/// Time between two looks for a signal.
+const LOOK: Duration = Duration::from_millis(20);
+/// Time that an orderly command has for its end, and time for the thread's own drive of zero: together below two seconds on a busy machine, too.
+const PATIENCE: Duration = Duration::from_millis(1000);
+const LAST: Duration = Duration::from_millis(400);
+
+static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+static ORDERLY: AtomicUsize = AtomicUsize::new(0);
+static RIG: Mutex<Option<Brake>> = Mutex::new(None);
+
+/// Begins to wait for signals.
+pub(super) fn start() {
+    process::catch_signals();
+    // Without a thread the system ends the program, as it does without a handler; a program that cannot start one will not come far.
+    let _ = thread::Builder::new().name("signals".into()).spawn(wait);
+}
+
+/// A flag that a signal sets: a driven rig stops, a server ends.
+pub(super) fn stop_flag() -> Arc<AtomicBool> {
+    Arc::clone(&STOP)
+}
+
+/// The signal that has arrived.
+pub(super) fn arrived() -> Option<Signal> {
+    process::signal().map(|(signal, _)| signal)
+}
+
+/// While it exists, the command ends by itself after a signal.
+pub(super) struct Orderly(());
+
+impl Orderly {
+    pub(super) fn new() -> Self {
+        ORDERLY.fetch_add(1, SeqCst);
+        Self(())
+    }
+}
+
+impl Drop for Orderly {
+    fn drop(&mut self) {
+        ORDERLY.fetch_sub(1, SeqCst);
+    }
+}
+
+fn wait() {
+    let first = loop {
+        thread::sleep(LOOK);
+        process::catch_signals();
+        if let Some((signal, _)) = process::signal() {
+            break signal;
+        }
+    };
+    STOP.store(true, SeqCst);
+    if ORDERLY.load(SeqCst) > 0 {
+        let began = Instant::now();
+        // A second signal ends the program at once.
+        while began.elapsed() < PATIENCE && process::signal().is_none_or(|(_, count)| count == 1) {
+            thread::sleep(LOOK);
+        }
+    }
+    eprintln!("error: interrupted by {first}{}", zeroed().in_words());
+    process::end(first.exit_code());
+}
+
+/// What has become of the drive.
+enum Zeroed {
+    /// Nothing but a simulation was driven.
+    Nothing,
+    Yes,
+    No(String),
+}
+
+impl Zeroed {
+    fn in_words(&self) -> String {
+        match self {
+            Self::Nothing => String::new(),
+            Self::Yes => "; the drive is zero".into(),
+            Self::No(reason) => {
+                format!("; zero could not be commanded, because {reason}: switch the drive off at the rig")
+            }
+        }
+    }
+}
+
+/// Commands a drive of zero, unless the rig has it.
+fn zeroed() -> Zeroed {
+    let Some(brake) = lock(&RIG).clone() else {
+        return Zeroed::Nothing;
+    };
+    let no = |reason: &str| Zeroed::No(reason.into());
+    let (done, is_done) = channel();
+    thread::spawn(move || done.send(brake.zero()));
+    is_done
+        .recv_timeout(LAST)
+        .unwrap_or_else(|_| no("the rig does not answer"))
+}
+
+/// After the end of a command upon a signal: whether the drive is zero, in words.
+pub(super) fn ended(signal: Signal) -> String {
+    format!("interrupted by {signal}{}", zeroed().in_words())
+}
+
+// A rig that the thread can reach.
+
+/// The last command that a rig has got.
+#[derive(Clone, Copy, PartialEq)]
+enum Last {
+    Zero,
+    Driven,
+    Held,
+    Failed,
+}
+
+/// A rig that is not a simulation in this program, and that [`zeroed`] can reach.
+struct Reachable<R> {
+    rig: Arc<Mutex<R>>,
+    last: Arc<Mutex<Last>>,
+}
+
+/// The other end of a [`Reachable`] rig.
+#[derive(Clone)]
+struct Brake {
+    rig: Weak<Mutex<dyn Rig + Send>>,
+    last: Arc<Mutex<Last>>,
+    sample_time: f64,
+}
+
+fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Makes a rig reachable for a drive of zero upon a signal. `sample_time` in s.
+pub(super) fn reachable(rig: impl Rig + Send + 'static, sample_time: f64) -> Box<dyn Rig> {
+    let (rig, last) = (Arc::new(Mutex::new(rig)), Arc::new(Mutex::new(Last::Zero)));
+    let weak = Arc::downgrade(&rig);
+    *lock(&RIG) = Some(Brake { rig: weak, last: Arc::clone(&last), sample_time });
+    Box::new(Reachable { rig, last })
+}
+
+impl<R: Rig> Reachable<R> {
+    fn command(
+        &mut self,
+        drive: Drive,
+        kind: Last,
+        call: impl FnOnce(&mut R) -> Result<(), RigError>,
+    ) -> Result<(), RigError> {
+        let result = call(&mut lock(&self.rig));
+        let is_zero = (drive.amplitude, drive.displacement) == (0.0, 0.0);
+        *lock(&self.last) = match &result {
+            Err(_) => Last::Failed,
+            Ok(()) if is_zero => Last::Zero,
+            Ok(()) => kind,
+        };
+        result
+    }
+}
+
+impl<R: Rig> Rig for Reachable<R> {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        lock(&self.rig).sense()
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.command(drive, Last::Driven, |rig| rig.advance(drive, step))
+    }
+
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.command(drive, Last::Held, |rig| rig.hold(drive, step))
+    }
+
+    fn cell_displacement(&mut self) -> Result<f64, RigError> {
+        lock(&self.rig).cell_displacement()
+    }
+
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        lock(&self.rig).ground_truth()
+    }
+}
+
+impl Brake {
+    /// Commands zero, as the last command was given.
+    fn zero(self) -> Zeroed {
+        let last = *lock(&self.last);
+        if last == Last::Zero {
+            return Zeroed::Yes;
+        }
+        let Some(rig) = self.rig.upgrade() else {
+            return Zeroed::No("the rig has failed".into());
+        };
+        // A call that never returns holds the lock, and then the caller does not wait for this.
+        let mut rig = lock(&rig);
+        let zero = Drive::default();
+        let commanded = match last {
+            Last::Held => rig.hold(zero, self.sample_time),
+            _ => rig.advance(zero, self.sample_time),
+        };
+        match commanded {
+            Ok(()) => Zeroed::Yes,
+            Err(error) => Zeroed::No(error.to_string()),
+        }
+    }
+}
