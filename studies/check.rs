@@ -1,7 +1,7 @@
 //! Does the loop check pass healthy rigs, and name what is wrong with others?
 //!
 //! Random rigs, half of them with a fault: mass ratio 0.001 to 0.05, lambda 0.1 to 3, r 0.2 to 0.97, a natural frequency up to 0.5 % and a
-//! damping up to 20 % away from the scene, 30 to 80 dB, 16 to 24 bits, up to 3 samples of delay. Of the healthy ones: relative errors
+//! damping up to 20 % away from the scene, 60 to 80 dB, 16 to 24 bits, up to 3 samples of delay. Of the healthy ones: relative errors
 //! of the loop's integral gain and of the response gain, and the errors of damping rate and natural frequency in standard uncertainties u.
 //!
 //! Arguments: RIGS of each, SEED. Writes validation/check.csv.

@@ -361,7 +361,7 @@ pub fn rig_with_stable_orbit(uniform: Uniform, settings: &[impl AsRef<str>]) -> 
 }
 
 /// A random scene for the loop check, and the scene of a rig that differs: mass ratio 0.001 to 0.05, lambda 0.1 to 3, r 0.2 to 0.97, a stiffness
-/// up to 1 % and a damping up to 20 % away, 30 to 80 dB, 16 to 24 bits, up to 3 samples of delay.
+/// up to 1 % and a damping up to 20 % away, 60 to 80 dB, 16 to 24 bits, up to 3 samples of delay.
 pub fn checked_rig(between: Uniform) -> Result<[Scene; 2], Failure> {
     let mut scene = scene("", &["start.dq2=0"])?;
     let epsilon = between(0.001_f64.ln(), 0.05_f64.ln()).exp();
@@ -370,7 +370,7 @@ pub fn checked_rig(between: Uniform) -> Result<[Scene; 2], Failure> {
     scene.plant.damping = lambda * scene.plant.particle_mass * scene.plant.natural_frequency();
     scene.plant.restitution = between(0.2, 0.97);
     scene.amplitude = epsilon * scene.plant.half_width * between(0.3, 3.0);
-    scene.chain.snr = Some(between(30.0, 80.0));
+    scene.chain.snr = Some(between(60.0, 80.0));
     scene.chain.seed = between(0.0, 1e6) as u64;
     scene.chain.delay = between(0.0, 4.0) as u32;
     scene.chain.filter = Some(between(8.0, 40.0));

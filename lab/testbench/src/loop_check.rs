@@ -104,7 +104,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
         found.periods = periods;
     }
     while found.is_too_weak() && found.share < most {
-        let raised = at_share(rig, plan, most.min(RAISE * found.share), MOST_WAITS.max(relaxed))?;
+        let raised = at_share(rig, plan, most.min(RAISE * found.share), MOST_WAITS)?;
         found = LoopCheck { periods: found.periods + raised.periods, ..raised };
     }
     Ok(found)
