@@ -200,7 +200,10 @@ fn a_conservative_mode_is_neutral_where_no_multiplier_is_off_the_unit_circle_and
         assert!(neutral > 100, "{neutral}");
         assert!(orbits().all(|orbit| !orbit.stable && orbit.neutral == (off(orbit) <= 1e-7)));
         let between = orbits().filter(|orbit| off(orbit) > 1e-7 && off(orbit) < 1e-5).count();
-        assert!(20 * between < neutral, "{between} orbits are unstable by little, {neutral} neutral");
+        assert!(
+            20 * between < neutral,
+            "{between} orbits are unstable by little, {neutral} neutral"
+        );
     }
 }
 
