@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use lovines::Section;
 use lovines::oscillator::{Oscillator, Regime};
-use nalgebra::{Complex, DMatrix, Matrix2, RowVector2, Vector2};
+use nalgebra::{Complex, DMatrix, DVector, Matrix2, RowVector2, Vector2};
 
 use super::flight::Flight;
 use super::multipliers::{self, Impact};
@@ -113,14 +113,34 @@ impl HalfPeriod {
     /// Shares of every section and, last, of the particle in the energy of the disturbance with a multiplier. `omega` is the frequency of a
     /// section without a natural one.
     pub(super) fn shares(&self, multiplier: Complex<f64>, omega: f64) -> Option<Vec<f64>> {
-        let disturbance = multipliers::disturbance(&self.flows, self.impact, multiplier)?;
-        let energies = self.parts.iter().zip(disturbance).map(|((section, _), part)| {
-            let [displacement, velocity] = energy_scales(section, omega);
-            (part[0] * displacement).norm_sqr() + (part[1] * velocity).norm_sqr()
+        /// Relative distance of the shift from the multiplier: the matrix is not singular, and other multipliers are farther.
+        const BESIDE: f64 = 1e-9;
+        let scales: Vec<f64> = self
+            .parts
+            .iter()
+            .flat_map(|part| energy_scales(&part.0, omega))
+            .collect();
+        let (map, shift) = (map(&self.flows, self.impact), multiplier * (1.0 + BESIDE));
+        let shifted = DMatrix::from_fn(scales.len(), scales.len(), |row, column| {
+            let entry = Complex::from(map[(row, column)] * scales[row] / scales[column]);
+            if row == column { entry - shift } else { entry }
         });
-        let energies: Vec<f64> = energies.collect();
-        let sum: f64 = energies.iter().sum();
-        (sum > 0.0).then(|| energies.iter().map(|energy| energy / sum).collect())
+        // Inverse iteration: the disturbance is the eigenvector.
+        let factors = shifted.lu();
+        let mut vector = DVector::from_element(scales.len(), Complex::ONE);
+        for _ in 0..3 {
+            vector = factors.solve(&vector)?;
+            let norm = vector.norm();
+            if !(norm.is_finite() && norm > 0.0) {
+                return None;
+            }
+            vector /= Complex::from(norm);
+        }
+        let energies = vector
+            .as_slice()
+            .chunks(2)
+            .map(|pair| pair[0].norm_sqr() + pair[1].norm_sqr());
+        Some(energies.collect())
     }
 }
 

@@ -633,17 +633,16 @@ fn mistakes_of_a_modal_model_are_refused_with_the_value_and_what_to_do() {
     );
 }
 
-/// A mode by its frequency over that of the loop's range, in Hz, with a light particle: a structure, and the same oscillator.
+/// A structure with one mode and a light particle, and the same oscillator.
 fn light(epsilon: f64) -> (Scene, Scene) {
     let zeta = 0.715 * epsilon;
     let plant = format!("[plant]\nm = {epsilon:?}\nb = 1\nr = 0.65\n[excitation]\nG = 1.1\n");
     let mode = format!("{{ frequency = 1.0, damping = {zeta:?}, participation = 1.0, shape = {{ tip = 1.0 }} }}");
     let text = format!("{plant}[structure]\ncavity = \"tip\"\nmodes = [{mode}]\n");
-    let oscillator = paper(&[
-        &format!("plant.epsilon={epsilon:?}"),
-        "plant.lambda=1.43",
-        "resonance.sensor=q1",
-    ]);
+    let oscillator = format!(
+        "[plant]\nepsilon = {epsilon:?}\nlambda = 1.43\nr = 0.65\n[resonance]\nsensor = \"q1\"\n[excitation]\nG = 1.1\n"
+    );
+    let oscillator = Scene::parse("oscillator", &oscillator, &[]).unwrap();
     (of(&TempDir::new().unwrap(), &text, &[]).unwrap(), oscillator)
 }
 
@@ -668,7 +667,6 @@ fn a_structure_with_a_light_particle_has_the_orbits_of_the_same_oscillator() {
 #[test]
 #[ignore = "orbits are searched at the frequencies that the controller may set only; mended with the one continuation"]
 fn all_orbits_of_a_structure_are_found_also_outside_the_frequencies_of_the_controller() {
-    // An undamped oscillator has orbits far below its resonance: at epsilon = 0.05 and G = 1.1 the frequency over omega0 is below 0.9.
     let narrow = preset("frame", &["controller.omega_min=0.999", "controller.omega_max=1.001"]);
     let wide = preset("frame", &["controller.omega_min=0.5", "controller.omega_max=1.8"]);
     let [narrow, wide] = [narrow, wide].map(|scene| Survey::of(&scene).unwrap().orbits.len());
