@@ -226,7 +226,8 @@ def examine(platform: Platform, sequences: int, once: bool) -> Row:
 
 
 def table(rows: list[Row]) -> str:
-    text = "<!-- not made by a command: `scripts/test-platforms` prints it -->\n| platform | LoViNes, PhaseLock | symbols exported | glibc | hash of 40 000 samples | fuzzed calls |\n"
+    text = "<!-- not made by a command: `scripts/test-platforms` prints it -->\n"
+    text += "| platform | LoViNes, PhaseLock | symbols exported | glibc | hash of 40 000 samples | fuzzed calls |\n"
     text += "|---|---|---|---|---|---|\n"
     for row in rows:
         sizes = ", ".join(f"{size / 1e6:.2f} MB" for size in row.sizes)
