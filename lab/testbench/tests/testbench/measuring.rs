@@ -733,7 +733,7 @@ fn a_search_without_a_lock_says_what_it_found_and_what_to_do() {
 }
 
 #[test]
-#[ignore = "a leg of the search can need a drive below zero, until the one estimator replaces the search (issue 65, 13)"]
+#[ignore = "a leg of the search can need a drive below zero, until the one estimator replaces the search"]
 fn a_refusal_names_no_drive_below_zero() {
     let found = SearchFound {
         tried: [0.1, 0.5],
