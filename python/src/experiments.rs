@@ -26,7 +26,7 @@ use vines_testbench::{
     identification,
     linear::MeasuredLinear,
     rig::{BuiltIn, Simulated, Stoppable},
-    scene::Scene as Checked,
+    scene::{Scene as Checked, phase_target},
 };
 
 use crate::{
@@ -87,27 +87,37 @@ pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
     })
 }
 
-/// `points`: response (m), frequency (rad/s) and drive (m), each with its standard uncertainty; `linear`: linear responses as JSON.
+/// `points`: response (m), frequency (rad/s) and drive (m), each with its standard uncertainty, and the phase target (degrees; NaN: the scene's);
+/// `linear`: linear responses as JSON.
 #[pyfunction]
 pub fn fit(
     py: Python<'_>,
     scene: &Scene,
-    points: Vec<[f64; 6]>,
+    points: Vec<[f64; 7]>,
     recordings: Vec<RecordingTuple>,
     known: Vec<String>,
     linear: Vec<String>,
 ) -> PyResult<String> {
     let estimate = |value, uncertainty| Estimate { value, uncertainty };
-    let point = |[response, u_response, omega, u_omega, drive, u_drive]: [f64; 6]| MeasuredPoint {
-        response: estimate(response, u_response),
-        omega: estimate(omega, u_omega),
-        drive: estimate(drive, u_drive),
+    let point = |[response, u_response, omega, u_omega, drive, u_drive, phase]: [f64; 7]| {
+        let phase = if phase.is_nan() {
+            scene.scene.controller.phase_target
+        } else {
+            phase
+        };
+        phase_target("phase_target_deg", phase).map_err(invalid)?;
+        Ok::<_, PyErr>(MeasuredPoint {
+            response: estimate(response, u_response),
+            omega: estimate(omega, u_omega),
+            drive: estimate(drive, u_drive),
+            phase: phase.to_radians(),
+        })
     };
     let known = known.iter().map(|one| one.parse::<Known>().map_err(invalid));
     let linear = linear
         .iter()
         .map(|one| serde_json::from_str::<MeasuredLinear>(one).map_err(invalid));
-    let points = points.into_iter().map(point).collect();
+    let points = points.into_iter().map(point).collect::<PyResult<_>>()?;
     let mut measured = Measurements {
         points,
         recordings: recordings.into_iter().map(recording_of).collect::<PyResult<_>>()?,
@@ -121,11 +131,12 @@ pub fn fit(
     })?;
     let found = found.map_err(invalid)?;
     let numbers = |point: MeasuredPoint| {
-        let MeasuredPoint { response, omega, drive } = point;
+        let MeasuredPoint { response, omega, drive, phase } = point;
         let omega = omega.scaled(1.0 / std::f64::consts::TAU);
         json!({
             "f_Hz": omega.value, "A_m": response.value, "E_m": drive.value,
             "u_f_Hz": omega.uncertainty, "u_A_m": response.uncertainty, "u_E_m": drive.uncertainty,
+            "phase_target_deg": scene.definition().at_phase(phase).phase_in_degrees(),
         })
     };
     let Found {

@@ -446,7 +446,7 @@ def test_results_become_datasets_with_units():
     assert vines.regime(sigma=-1.1).to_xarray().exponent < 0
     decay = vines.identify().to_xarray()
     assert decay.sizes["point"] == 96
-    assert decay.attrs["lock_regime"] == "symmetric 1:1"
+    assert decay.attrs["lock_regime_by_impacts"] == "symmetric 1:1"
     orbit = vines.orbits()[0].to_xarray()
     assert orbit.gamma.attrs["units"] == "rad"
     assert orbit.multipliers.sizes == {"multiplier": 4}

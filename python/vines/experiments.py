@@ -51,8 +51,9 @@ class Identification(Result):
     Attributes
     ----------
     lock : dict
-        The locked point: f_Hz, A_m, E_m, G, sigma, C, B, phase_error_deg, their standard uncertainties u_*, regime
-        and others; of a force test also F_N and u_F_N, and behind a shaker its command, command_V.
+        The locked point: f_Hz, A_m, E_m, G, sigma, C, B, phase_target_deg, phase_error_deg, their standard
+        uncertainties u_*, motion, regime_by_impacts and others; of a force test also F_N and u_F_N, and behind a shaker
+        its command, command_V.
     exact : Orbit or None
         The exact phase-resonant orbit with the measured C, if there is one.
     decay : dict of ndarray
@@ -119,7 +120,7 @@ def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "a
     Examples
     --------
     >>> found = identify()
-    >>> round(found.lock["sigma"], 4), found.lock["regime"]
+    >>> round(found.lock["sigma"], 4), found.lock["regime_by_impacts"]
     (-1.1394, 'symmetric 1:1')
     """
     if results not in ("all", "lock"):
@@ -146,8 +147,9 @@ class Backbone(Result):
     Attributes
     ----------
     points : dict of ndarray
-        f_Hz, A_m, E_m, C, sigma, G, their standard uncertainties u_*, level, periods, settled, reached, regime
-        and others; of a force test also F_N and u_F_N, and behind a shaker its command, command_V.
+        f_Hz, A_m, E_m, C, sigma, G, their standard uncertainties u_*, phase_target_deg, level, periods, settled,
+        reached, motion, regime_by_impacts and others; of a force test also F_N and u_F_N, and behind a shaker its
+        command, command_V.
     periods : float
         All periods, from the start to the last point.
     theory : Theory
@@ -168,7 +170,7 @@ class Backbone(Result):
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the points as a dataset over the dimension `point`."""
-        units = SI | {"phase_error_deg": "degree", "u_phase_deg": "degree"}
+        units = SI | dict.fromkeys(("phase_target_deg", "phase_error_deg", "u_phase_deg"), "degree")
         return _dataset(self.points, "point", units, periods=self.periods)
 
 

@@ -18,7 +18,10 @@ from .scenes import Scene, checked
 
 _COLUMNS = ("A_m", "u_A_m", "f_Hz", "u_f_Hz", "E_m", "u_E_m")
 _LINEAR = ("f0_Hz", "u_f0_Hz", "zeta", "u_zeta", "correlation", "particle")
-_REGIMES = ("symmetric 1:1", "steady, symmetry unresolved")
+_MOTIONS = {
+    "motion": ("nonlinear, symmetric", "nonlinear, symmetry unresolved"),
+    "regime": ("symmetric 1:1", "steady, symmetry unresolved"),
+}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -114,8 +117,9 @@ def fit(
     ----------
     points : mapping or iterable of mappings
         Columns f_Hz, A_m, E_m and their standard uncertainties u_f_Hz, u_A_m, u_E_m: `backbone().points`, a DataFrame
-        of pandas, or several locks such as `identify().lock`. Points that are not settled, or of another regime than
-        symmetric 1:1, are left out.
+        of pandas, or several locks such as `identify().lock`. Points that are not settled, or whose motion is not
+        nonlinear and symmetric, are left out. The column phase_target_deg (degrees) says at which phase of the response
+        relative to the base they were measured; without it, it is the scene's controller.phase_target.
     scene : Scene, optional
         Where the search begins; default: the default scene.
     known : mapping, optional
@@ -153,8 +157,12 @@ def fit(
         for name in ("settled", "reached"):
             if name in table:
                 kept &= _truths(name, table[name])
-        if "regime" in table:
-            kept &= np.isin(np.atleast_1d(np.asarray(table["regime"])), _REGIMES)
+        for name, words in _MOTIONS.items():
+            if name in table:
+                kept &= np.isin(np.atleast_1d(np.asarray(table[name])), words)
+        columns.append(np.full(columns[0].shape, math.nan))
+        if "phase_target_deg" in table:
+            columns[-1][:] = table["phase_target_deg"]
         rows += np.column_stack(columns)[kept].tolist()
         if "linear_particle" in table and len(columns[0]):
             first = {name: np.atleast_1d(np.asarray(table[f"linear_{name}"]))[0] for name in _LINEAR}

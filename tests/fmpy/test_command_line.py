@@ -41,11 +41,11 @@ def test_identify_writes_its_results_and_they_keep_their_limits(call, tmp_path, 
     found = json.loads((folder / "identification.json").read_text())
     lock, exact, name = found["lock"], found["exact"], f"identify {' '.join(options[1:])}".strip()
     assert lock.keys() >= {
-        "G", "sigma", "C", "B", "phase_error_deg", "periods_to_lock", "impacts_per_period", "regime"
+        "G", "sigma", "C", "B", "phase_error_deg", "periods_to_lock", "impacts_per_period", "motion"
     }  # fmt: skip
     assert found["theory"].keys() >= {"sigma", "C", "B"}
     assert exact.keys() >= {"sigma", "C", "B", "stable"}
-    assert lock["regime"] == "symmetric 1:1"
+    assert lock["regime_by_impacts"] == "symmetric 1:1"
     assert exact["stable"] is True
     figure(f"{name}: lock, sigma off the exact orbit", abs(lock["sigma"] - exact["sigma"]), below=5e-3)
     figure(f"{name}: lock, C off the exact orbit, relative", abs(lock["C"] / exact["C"] - 1), below=5e-3)

@@ -1,13 +1,16 @@
-//! What counts as resonance: the first harmonic of a sensor's response lags a reference by a quarter of a period.
+//! What counts as resonance: the first harmonic of a sensor's response lags a reference by a quarter of a period, or has another phase that is asked for.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use serde::{Deserialize, Serialize};
 
-/// Reference and sensor that define resonance. The default is the definition of the study.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Reference, sensor and phase that define resonance. The default is the definition of the study.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Definition {
+    /// Phase of the response relative to the reference, both as displacements, rad: -pi/2 is phase resonance.
+    #[serde(skip)]
+    pub phase: f64,
     /// What the phase refers to.
     pub reference: Reference,
     /// The point whose displacement is the response.
@@ -16,6 +19,18 @@ pub struct Definition {
     pub sensor_quantity: Measurand,
     /// What the sensor of the base measures of it.
     pub reference_quantity: Measurand,
+}
+
+impl Default for Definition {
+    fn default() -> Self {
+        Self {
+            phase: -FRAC_PI_2,
+            reference: Reference::default(),
+            sensor: Sensor::default(),
+            sensor_quantity: Measurand::default(),
+            reference_quantity: Measurand::default(),
+        }
+    }
 }
 
 /// The quantity that a sensor of a motion measures. All results are displacements: a harmonic of the frequency w is divided by `(i w)^n`.
@@ -108,7 +123,7 @@ impl Definition {
     /// The channels, as a rig at a network address states them: 0 and 1 for v and q1, 4 more for the force, 8 more for each derivative of the
     /// response, and 32 more for each of the base.
     pub fn channels(&self) -> u8 {
-        let Self { reference, sensor, sensor_quantity, reference_quantity } = *self;
+        let Self { reference, sensor, sensor_quantity, reference_quantity, .. } = *self;
         sensor as u8 + 4 * reference as u8 + 8 * sensor_quantity as u8 + 32 * reference_quantity as u8
     }
 
@@ -141,7 +156,33 @@ impl Definition {
 
     /// In words, as in a table.
     pub fn name(&self) -> String {
-        format!("phase of {} to {}", self.sensor.name(), self.reference.name())
+        let of = format!("phase of {} to {}", self.sensor.name(), self.reference.name());
+        match self.is_phase_resonance() {
+            true => of,
+            false => format!("{of}, {} degrees", self.phase_in_degrees()),
+        }
+    }
+
+    /// The phase in degrees, without the rounding of the conversion.
+    pub fn phase_in_degrees(&self) -> f64 {
+        (1e9 * self.phase.to_degrees()).round() / 1e9
+    }
+
+    /// Whether the response lags the reference by a quarter of a period.
+    pub fn is_phase_resonance(&self) -> bool {
+        self.phase == -FRAC_PI_2
+    }
+
+    /// The same channels at another phase, rad.
+    #[must_use]
+    pub fn at_phase(self, phase: f64) -> Self {
+        Self { phase, ..self }
+    }
+
+    /// Phase beyond phase resonance, rad, from -pi/2 to pi/2. A channel with the opposite sign turns it by pi, which leaves the motion as it is.
+    pub fn off_resonance(&self) -> f64 {
+        let off = self.phase + FRAC_PI_2;
+        off - PI * (off / PI).round()
     }
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::fmt::{self, Display, Formatter};
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::numerics::{mean, standard_deviation};
 
@@ -38,7 +38,7 @@ pub enum Regime {
     /// Not 1:1; a record too short, or without impact data, cannot say more.
     #[serde(rename = "other")]
     Other,
-    /// Steady and off the linear mode; noise hides whether it is symmetric.
+    /// Steady and off the linear mode; no harmonic shows whether it is symmetric.
     #[serde(rename = "steady, symmetry unresolved")]
     Unresolved,
     /// The response alone shows neither impacts nor the linear mode.
@@ -62,6 +62,40 @@ impl Regime {
         Regime::Undecided,
     ];
 
+    /// All of them.
+    pub const ALL: [Regime; 12] = [
+        Regime::NoImpacts,
+        Regime::Symmetric,
+        Regime::Asymmetric,
+        Regime::Several,
+        Regime::QuasiPeriodic,
+        Regime::Modulated,
+        Regime::Chaotic,
+        Regime::Undecided,
+        Regime::Other,
+        Regime::Unresolved,
+        Regime::NotEstablished,
+        Regime::Unknown,
+    ];
+
+    /// What the response alone shows of it: words for a rig that may contain no particle.
+    pub fn motion(&self) -> &'static str {
+        match self {
+            Regime::NoImpacts => "near the linear response",
+            Regime::Symmetric => "nonlinear, symmetric",
+            Regime::Asymmetric => "nonlinear, asymmetric",
+            Regime::Unresolved => "nonlinear, symmetry unresolved",
+            Regime::NotEstablished => "not established",
+            Regime::Unknown => "unknown",
+            _ => "irregular",
+        }
+    }
+
+    /// [`Self::motion`] as a field of a file.
+    pub fn serialize_motion<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.motion())
+    }
+
     /// Its short name, as in a table.
     pub fn name(&self) -> &'static str {
         match self {
@@ -74,7 +108,7 @@ impl Regime {
             Regime::Chaotic => "chaotic",
             Regime::Undecided => "undecided",
             Regime::Other => "irregular",
-            Regime::Unresolved => "steady and nonlinear (noise hides its symmetry)",
+            Regime::Unresolved => "steady and nonlinear (symmetry unresolved)",
             Regime::NotEstablished => "not established (no evidence of impacts)",
             Regime::Unknown => "unknown (the rig does not report impacts)",
         }

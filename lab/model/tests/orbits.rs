@@ -4,7 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use vines_model::{
-    Dimensionless,
+    Definition, Dimensionless,
     orbit::{
         Bifurcation, Branch, BranchBifurcation, Condition, ContinuationLimits, Orbit, Periodic, backbone,
         backbone_at_speed, continue_both_ways, exact_backbone, phase_resonant, response, settle, stable_backbone,
@@ -60,15 +60,17 @@ fn from_backbone(scene: &Dimensionless, [omega, c, g]: [f64; 3]) -> f64 {
 }
 
 #[test]
-fn the_curve_of_the_backbone_has_an_orbit_of_every_frequency_that_it_passes() {
+fn the_curve_of_the_backbone_has_an_orbit_of_every_frequency_that_it_passes_at_any_phase() {
     const SCENES: [[f64; 3]; 4] = [
         [0.0084, 1.43, 0.65],
         [0.03, 0.4, 0.9],
         [0.002, 2.5, 0.4],
         [0.0137, 2.36, 0.86],
     ];
-    for [epsilon, lambda, r] in SCENES {
-        let scene = Dimensionless::new(epsilon, lambda, r, 1.0);
+    let phases = [-90.0_f64, -75.0, -110.0];
+    for (phase, [epsilon, lambda, r]) in phases.into_iter().flat_map(|phase| SCENES.map(|scene| (phase, scene))) {
+        let definition = Definition::default().at_phase(phase.to_radians());
+        let scene = Dimensionless { definition, ..Dimensionless::new(epsilon, lambda, r, 1.0) };
         let fold = SlowFlow::new(lambda, r).manifold.b_min();
         let mut before = None;
         for n in 0..2000 {

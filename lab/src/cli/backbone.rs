@@ -13,7 +13,8 @@ use super::summary;
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:
-  frequency, response, base   in Hz and m, on a rig that does not report impacts; in the files always (f_Hz, A_m, E_m)
+  frequency, response, base   in Hz and m: all that is said of a rig that does not report impacts; in the files always (f_Hz, A_m, E_m)
+  motion      what the response shows: near the linear response, nonlinear and symmetric or asymmetric, irregular
   C           amplitude of the first harmonic of the response that the scene's sensor reads, over b
   sigma       detuning (Omega - 1)/epsilon of resonance as [resonance] defines it
   G           base amplitude over b epsilon
@@ -57,12 +58,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     bar.finish_and_clear();
     let (tracked, ended) = measured?;
     let result = TrackedComparison::of(&tracked, &scene);
-    let mut text = summary::tracked(&result, &scene) + &summary::structure(&scene);
+    let mut text = summary::tracked(&result, &scene) + &summary::structure(&scene, result.reports_impacts());
     let settled = result.points.iter().filter(|compared| compared.is_of_backbone());
     let points: Vec<_> = settled.map(|compared| (&compared.point.at).into()).collect();
     let (settled, of) = (points.len(), result.points.len());
     if settled < of {
-        text += &format!("{settled} of {of} points are settled points of a motion with impacts\n");
+        let motion = match result.reports_impacts() {
+            true => "a motion with impacts",
+            false => "a nonlinear motion",
+        };
+        text += &format!("{settled} of {of} points are settled points of {motion}\n");
     }
     if tracked.ended.is_none()
         && let Some(found) = contradiction(&scene, points)
@@ -78,23 +83,30 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         }
         None => result
             .doubt()
-            .map(|doubt| Failure::run(doubt_in_words(doubt, of, &scene))),
+            .map(|doubt| Failure::run(doubt_in_words(doubt, &result, &scene))),
     };
     experiment.finish(ended, &result, &text, files, failure)
 }
 
 /// Why the points are no backbone, and what to do.
-fn doubt_in_words(doubt: Doubt, of: usize, scene: &Scene) -> String {
+fn doubt_in_words(doubt: Doubt, result: &TrackedComparison, scene: &Scene) -> String {
+    let of = result.points.len();
     match doubt {
-        Doubt::NoImpacts => format!(
+        Doubt::Linear if !result.reports_impacts() => format!(
+            "all {of} points are near the linear response: within these levels there is no nonlinear motion. Set backbone.C_from to a larger one"
+        ),
+        Doubt::NotEstablished { points } if !result.reports_impacts() => format!(
+            "whether the motion is linear is not established of {points} of {of} points: their distance from the linear response, which the loop \
+             check measures, is within its uncertainty. Do not skip the loop check; set backbone.C_from to a larger level; reduce noise"
+        ),
+        Doubt::NotSettled if !result.reports_impacts() => {
+            format!("none of {of} points is a settled point of a nonlinear motion: the column `motion` says why")
+        }
+        Doubt::Linear => format!(
             "all {of} points are without impacts (the linear mode): the particle does not reach the walls. Check that it moves freely; give it \
              a velocity in [start]"
         ),
-        Doubt::NotEstablished { points } => format!(
-            "the regime of {points} of {of} points is not established: neither their third harmonic nor a distance from the linear response \
-             that the loop check measures is evidence of impacts. Check that the particle moves freely; do not skip the loop check; reduce \
-             noise that hides the harmonic"
-        ),
+        Doubt::NotEstablished { points } => format!("the regime of {points} of {of} points is not established"),
         Doubt::NotSettled => {
             let levels = stable_backbone(scene, &scene.dimensionless());
             let (low, high) = range((f64::INFINITY, 0.0), levels.iter().map(|orbit| orbit.c));

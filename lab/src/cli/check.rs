@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let checked = check(open.rig.as_mut(), &scene.plan()).map_err(ExperimentError::from)?;
     open.close();
     let text = output(arguments.json, &checked, || {
-        variables + &described(&checked, &scene) + unmeasured(&checked, &scene) + &structure(&scene)
+        variables + &described(&checked, &scene) + unmeasured(&checked, &scene) + &structure(&scene, true)
     })?;
     if checked.verdict == Verdict::Healthy {
         return Ok(text);

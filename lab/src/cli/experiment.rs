@@ -1,5 +1,6 @@
 //! What the commands share that drive a rig through an experiment: options, loop check, doubtful results, and what is kept of a failure.
 
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -156,8 +157,8 @@ impl ExperimentArguments {
         let Some(linear) = checked.linear else { return Ok(plan) };
         let knowledge = plan.knowledge.measured(linear.response);
         eprintln!(
-            "All values of sigma share a standard uncertainty of {:.1e}, that of the natural frequency.",
-            knowledge.linear.uncertainty / knowledge.numbers.omega_change(1.0)
+            "The measured natural frequency has a standard uncertainty of {:.1e} Hz; what is compared with it shares this.",
+            knowledge.linear.uncertainty / TAU
         );
         Ok(scene.plan_on(knowledge))
     }

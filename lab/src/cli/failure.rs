@@ -152,6 +152,9 @@ impl From<ExperimentError> for Failure {
             }
             ExperimentError::NoLock { .. } => "; make the loop slower, or set a larger value",
             ExperimentError::MotionLost { .. } => "; set backbone.C_to nearer to the former, or more backbone.points",
+            ExperimentError::SteadyLost { .. } => {
+                "; set backbone.C_to (over the half-width) nearer to the former, or more backbone.points"
+            }
             ExperimentError::NoDrive => ": set excitation.G or excitation.E above 0",
             _ => "",
         };

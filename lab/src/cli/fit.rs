@@ -25,8 +25,9 @@ use super::points::{Column, Measurement, Source, measurement};
 const HELP: &str = "\
 A point has the frequency of phase resonance f, the amplitude A of the response and the amplitude E of the base, each with its standard
 uncertainty: a locked point of `vines identify` (identification.json), the points of `vines backbone` (tracked.csv), or a table of yours
-with the columns f_Hz, A_m, E_m, u_f_Hz, u_A_m and u_E_m, or others that --column names. Points that are not settled, or not symmetric
-1:1, are left out.
+with the columns f_Hz, A_m, E_m, u_f_Hz, u_A_m and u_E_m, or others that --column names. Points that are not settled (columns settled and
+reached), or whose motion is not nonlinear and symmetric (motion), are left out. The column phase_target_deg is the phase of the response
+relative to the base, degrees, at which a point was measured; without it, it is the scene's controller.phase_target.
 
 A recording has two channels over time, the response and the base. Delimiter, decimal mark, names and units are found;
 a file of `vines` needs no options. `python -m vines fit` has the same options, and reads other tables and formats. A channel is NAME or NAME:UNIT, with a name or a number of a column, and a unit (mm, µm, mm/s,
@@ -135,6 +136,9 @@ struct Output<'a> {
     /// Why the points of recordings are fitted instead of the recordings themselves.
     #[serde(skip_serializing_if = "Option::is_none")]
     points_instead: Option<&'a str>,
+    /// Recordings that are far from the phase target half of the time in which the base moves.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    off_target: &'a [String],
     /// How recordings were read, linear decays, and what counts as exact.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     notes: Vec<String>,
@@ -248,8 +252,8 @@ pub(super) fn run(
     let mut measured = Measurements { known: arguments.known.clone(), ..Measurements::default() };
     let (mut skipped, mut notes) = (0, Vec::new());
     for path in &arguments.points {
-        let source = read(path).map_err(Failure::input)?;
-        match measurement(path, source, &arguments.column, &selection).map_err(Failure::input)? {
+        let (phase, source) = (scene.definition().phase, read(path).map_err(Failure::input)?);
+        match measurement(path, source, (&arguments.column, phase), &selection).map_err(Failure::input)? {
             Measurement::Points(points, left_out, linear) => {
                 measured.points.extend(points);
                 skipped += left_out;
@@ -305,7 +309,7 @@ pub(super) fn run(
         let text = output(arguments.json, &serde_json::json!({ "notes": notes }), || lines)?;
         return Ok(Results::new(text, Written::default));
     }
-    let bar = progress_bar(Effect::ALL.len() as u64, "fitting effects of a real cavity", "effects");
+    let bar = progress_bar(Effect::ALL.len() as u64, "fitting", "effects of a real cavity");
     let found = find(&measured, &scene, |done| bar.set_position(done as u64));
     bar.finish_and_clear();
     let found = found.map_err(Failure::run)?;
@@ -326,6 +330,7 @@ pub(super) fn run(
         followed_periods: found.record.as_ref().map(|record| record.periods),
         left_out_of_record: found.record.as_ref().map_or(&[], |record| &record.left_out),
         points_instead: found.points_instead.as_deref(),
+        off_target: &found.off_target,
         notes,
     };
     let text = output(arguments.json, &printed, || {
@@ -336,6 +341,7 @@ pub(super) fn run(
             recorded(&found.parts),
             summary(&report, &found, skipped),
             instead.unwrap_or_default(),
+            found.off_target.iter().map(|line| format!("{line}\n")).collect(),
             found.linear.iter().map(of_linear).collect(),
             verdict.unwrap_or_default(),
             only_if_ideal(&alternatives, is_assumed),
@@ -377,7 +383,7 @@ fn recorded(parts: &[Part]) -> String {
     let rows = parts.iter().map(|part| {
         let [from, to] = part.seconds.map(|time| format!("{time:.2}"));
         let kind = format!("{:?}", part.kind).to_lowercase();
-        let values = part.point.map(|MeasuredPoint { response, omega, drive }| {
+        let values = part.point.map(|MeasuredPoint { response, omega, drive, .. }| {
             [omega.scaled(1.0 / TAU), response.scaled(1e3), drive.scaled(1e3)].map(with_decimals)
         });
         let [f, a, e] = values.unwrap_or_default();

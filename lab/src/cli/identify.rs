@@ -64,7 +64,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         Ok(identification) => identification,
         Err(error) => {
             let reason = match &error {
-                IdentificationError::Regime { regime, .. } => {
+                IdentificationError::Regime { regime, silent: None, .. } => {
                     advice::reason(&scene, &plan.knowledge.numbers, Some(*regime))
                 }
                 IdentificationError::Subharmonic { .. } => {
@@ -78,10 +78,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         }
     };
     let result = Comparison::of(&identification, &scene);
-    let mut text = summary::identification(&result, &scene) + &summary::structure(&scene);
+    let reports_impacts = identification.lock.regime_by_impacts.is_some();
+    let mut text = summary::identification(&result, &scene) + &summary::structure(&scene, reports_impacts);
     let unstable = result
         .exact
-        .filter(|orbit| scene.structure.is_some() && orbit.is_unstable() && !record.held);
+        .filter(|orbit| reports_impacts && scene.structure.is_some() && orbit.is_unstable() && !record.held);
     if let Some(orbit) = unstable {
         text += &format!(
             "warning: the exact orbit there is unstable under a constant drive (largest multiplier {:.4}): the motion is modulated around it, or \
@@ -90,9 +91,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         );
     }
     // A rig that reports its impacts is a simulation of the scene.
-    let is_simulated = !identification.lock.impacts_per_period.is_nan();
     let lock = vec![(&identification.lock.at).into()];
-    if !is_simulated && let Some(found) = contradiction(&scene, lock) {
+    if !reports_impacts && let Some(found) = contradiction(&scene, lock) {
         text += &format!(
             "\n{}: track the backbone with `vines backbone`, and run `vines fit`\n",
             summary::contradicts(&found)

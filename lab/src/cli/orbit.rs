@@ -247,7 +247,7 @@ fn settled(
 
 /// The motion of the plant with the effects of its cavity.
 fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure> {
-    let (plant, definition, numbers) = (&scene.plant, scene.resonance, scene.dimensionless());
+    let (plant, definition, numbers) = (&scene.plant, scene.definition(), scene.dimensionless());
     let motion = match arguments.sigma {
         None => resonant_motion_under(plant, definition, scene.amplitude)?,
         Some(sigma) => {

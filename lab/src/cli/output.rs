@@ -196,7 +196,7 @@ pub(super) fn log_warnings() {
 /// Time between two lines of progress where stderr is no terminal.
 const PROGRESS: Duration = Duration::from_secs(10);
 
-/// Progress on stderr: a bar in a terminal, else a line every ten seconds.
+/// Progress on stderr: a bar in a terminal, else a line every ten seconds in which there is some.
 pub(super) fn progress_bar(length: u64, message: &'static str, unit: &'static str) -> ProgressBar {
     let template = format!("{{msg}} [{{wide_bar}}] {{pos}}/{{len}} {unit}");
     let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
@@ -204,14 +204,17 @@ pub(super) fn progress_bar(length: u64, message: &'static str, unit: &'static st
     if bar.is_hidden() {
         let watched = bar.downgrade();
         thread::spawn(move || {
+            let mut before = None;
             loop {
                 thread::sleep(PROGRESS);
                 let Some(bar) = watched.upgrade().filter(|bar| !bar.is_finished()) else {
                     return;
                 };
                 let (done, of) = (bar.position(), bar.length().unwrap_or_default());
-                // Progress is no result: a closed stderr does not matter.
-                let _ = writeln!(io::stderr(), "{}: {done} of {of} {unit}", bar.message());
+                if before.replace(done) != Some(done) {
+                    // Progress is no result: a closed stderr does not matter.
+                    let _ = writeln!(io::stderr(), "{}: {done} of {of} {unit}", bar.message());
+                }
             }
         });
     }

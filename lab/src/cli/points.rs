@@ -13,7 +13,7 @@ use vines::fit::{Contents, MeasuredPoint, Recording, RecordingError, Selection, 
 use vines::identification::Regime;
 use vines::linear::MeasuredLinear;
 use vines::numerics::Estimate;
-use vines::scene::{Measurand, Name};
+use vines::scene::{Measurand, Name, phase_target};
 
 /// Quantities of a point, the columns that have them, and their units.
 const COLUMNS: [(&str, &str, &str); 6] = [
@@ -130,29 +130,34 @@ pub(super) fn plain(path: &Path) -> Result<Source, ArgumentError> {
     table.map(Source::Channels).map_err(|error| python(&error.to_string()))
 }
 
-/// What is measured in a file: points if it has one of their columns or `columns` names some, otherwise a recording.
+/// What is measured in a file: points if it has one of their columns or `columns` names some, otherwise a recording. `phase`, rad: at which points
+/// were measured that do not say it.
 ///
 /// # Errors
 /// A file without one of the columns, or with a value that is not a number.
 pub(super) fn measurement(
     path: &Path,
     source: Source,
-    columns: &[Column],
+    (columns, phase): (&[Column], f64),
     selection: &Selection,
 ) -> Result<Measurement, ArgumentError> {
     let refused = |error: RecordingError| ArgumentError::from(error.to_string());
     let contents = match source {
         Source::Channels(contents) => contents,
-        Source::Json(bytes) => return of_json(path, &bytes, columns),
+        Source::Json(bytes) => return of_json(path, &bytes, (columns, phase)),
     };
     let is_named = selection.response.is_some() || selection.drive.is_some();
     let has_points = !columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| contents.unit(name).is_some());
     if has_points && !is_named {
         let row = |row: Vec<(&str, String)>| row.into_iter().map(|(name, cell)| (name.to_string(), cell)).collect();
         let rows: Vec<Row> = contents.rows().map(row).collect();
-        return points(path, &rows, columns, rows.first().and_then(linear_of), |column| {
-            contents.unit(column).unwrap_or_default()
-        });
+        return points(
+            path,
+            &rows,
+            (columns, phase),
+            rows.first().and_then(linear_of),
+            |column| contents.unit(column).unwrap_or_default(),
+        );
     }
     if !is_named && contents.unit("response").is_none() {
         let names = COLUMNS.map(|(_, name, _)| name).join(", ");
@@ -165,7 +170,7 @@ pub(super) fn measurement(
 }
 
 /// Points in what `vines identify`, `backbone` and `check` write as JSON.
-fn of_json(path: &Path, bytes: &[u8], columns: &[Column]) -> Result<Measurement, ArgumentError> {
+fn of_json(path: &Path, bytes: &[u8], columns: (&[Column], f64)) -> Result<Measurement, ArgumentError> {
     let file = path.display();
     let value: Value = serde_json::from_slice(bytes).map_err(|error| cannot_read(path, error))?;
     let linear = value
@@ -193,21 +198,22 @@ fn not_a_number(path: &Path, row: usize, column: &str, value: &str) -> ArgumentE
     format!("{file}, row {row}: {column} = `{value}` is not a finite number").into()
 }
 
-/// The points of a file, and the number of points that are left out.
+/// The points of a file, and the number of points that are left out. `phase`, rad: of points without a column of their phase target.
 fn points<'a>(
     path: &Path,
     rows: &[Row],
-    columns: &[Column],
+    (columns, phase): (&[Column], f64),
     linear: Option<MeasuredLinear>,
     stated: impl Fn(&str) -> &'a str,
 ) -> Result<Measurement, ArgumentError> {
-    let kept: Vec<(usize, &Row)> = rows.iter().enumerate().filter(|(_, row)| is_symmetric(row)).collect();
-    let points = kept.iter().map(|(n, row)| point(path, n + 1, row, columns, &stated));
-    Ok(Measurement::Points(
-        points.collect::<Result<_, _>>()?,
-        rows.len() - kept.len(),
-        linear,
-    ))
+    let mut kept = Vec::new();
+    for (n, row) in rows.iter().enumerate() {
+        if is_symmetric(path, n + 1, row)? {
+            kept.push(point(path, n + 1, row, columns, phase, &stated)?);
+        }
+    }
+    let left_out = rows.len() - kept.len();
+    Ok(Measurement::Points(kept, left_out, linear))
 }
 
 /// The linear response in the columns of a table.
@@ -223,9 +229,13 @@ fn linear_of(row: &Row) -> Option<MeasuredLinear> {
     MeasuredLinear::deserialize(Value::Object(object)).ok()
 }
 
+/// A value without the quotes of a text.
+fn text(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), String::from)
+}
+
 /// The locked point of `vines identify`, or the points of `vines backbone`.
 fn objects(value: &Value) -> Option<Vec<Row>> {
-    let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), String::from);
     let row = |object: &Value| -> Option<Row> {
         let values = object.as_object()?.iter();
         Some(values.map(|(key, value)| (key.clone(), text(value))).collect())
@@ -237,13 +247,47 @@ fn objects(value: &Value) -> Option<Vec<Row>> {
     }
 }
 
-/// Whether a row is a settled point of symmetric 1:1 motion; a table without these columns has only such points.
-fn is_symmetric(row: &Row) -> bool {
-    let is_not_false = |key: &str| row.get(key).is_none_or(|value| value != "false");
-    let regimes = [Regime::Symmetric, Regime::Unresolved].map(|regime| serde_json::to_value(regime).ok());
-    let is_regime = |value: &String| regimes.contains(&Some(Value::String(value.clone())));
-    is_not_false("settled") && is_not_false("reached") && row.get("regime").is_none_or(is_regime)
+/// The words that a column of truth values has, in small letters: of this program, of Python, of spreadsheets in English and German, and numbers.
+const TRUE: [&str; 4] = ["true", "wahr", "1", "1.0"];
+const FALSE: [&str; 4] = ["false", "falsch", "0", "0.0"];
+
+/// Columns of truth values.
+const FLAGS: [&str; 2] = ["settled", "reached"];
+/// Columns of motions and regimes.
+const MOTIONS: [&str; 2] = ["motion", "regime"];
+
+/// Whether a row is a settled point whose motion may be the symmetric 1:1 one; a table without these columns has only such points.
+fn is_symmetric(path: &Path, number: usize, row: &Row) -> Result<bool, ArgumentError> {
+    let refused = |key: &str, value: &str, allowed: &str| {
+        let file = path.display();
+        Err(format!("{file}, row {number}: {key} = `{value}` is not known; allowed is {allowed}").into())
+    };
+    let mut is_kept = true;
+    for (key, value) in FLAGS.into_iter().filter_map(|key| Some((key, row.get(key)?))) {
+        let word = value.trim().to_lowercase();
+        is_kept &= match (TRUE.contains(&&*word), FALSE.contains(&&*word)) {
+            (true, _) => true,
+            (_, true) => false,
+            _ => return refused(key, value, "true or false, WAHR or FALSCH, 1 or 0"),
+        };
+    }
+    for (key, value) in MOTIONS.into_iter().filter_map(|key| Some((key, row.get(key)?))) {
+        let word = |regime: &Regime| match key {
+            "motion" => regime.motion().into(),
+            _ => serde_json::to_value(regime).map_or_else(|_| String::new(), |word| text(&word)),
+        };
+        let Some(regime) = Regime::ALL.iter().find(|regime| word(regime) == value.trim()) else {
+            let mut all: Vec<String> = Regime::ALL.iter().map(word).collect();
+            all.dedup();
+            return refused(key, value, &all.join("; "));
+        };
+        is_kept &= matches!(regime, Regime::Symmetric | Regime::Unresolved);
+    }
+    Ok(is_kept)
 }
+
+/// The column of the phase at which a point was measured, degrees.
+const PHASE: &str = "phase_target_deg";
 
 /// A point. `stated`: the unit that the head of a column states.
 fn point<'a>(
@@ -251,6 +295,7 @@ fn point<'a>(
     number: usize,
     row: &Row,
     columns: &[Column],
+    phase: f64,
     stated: &impl Fn(&str) -> &'a str,
 ) -> Result<MeasuredPoint, ArgumentError> {
     // The value in SI units, and how often a displacement is differentiated.
@@ -285,5 +330,15 @@ fn point<'a>(
     };
     let omega = estimate(0, 1.0)?;
     let [response, drive] = [estimate(1, omega.value)?, estimate(2, omega.value)?];
-    Ok(MeasuredPoint { omega, response, drive })
+    let phase = match row.get(PHASE) {
+        None => phase,
+        Some(text) => {
+            let value = text
+                .parse::<f64>()
+                .map_err(|_| not_a_number(path, number, PHASE, text))?;
+            phase_target(PHASE, value).map_err(|error| format!("{}, row {number}: {error}", path.display()))?;
+            value.to_radians()
+        }
+    };
+    Ok(MeasuredPoint { omega, response, drive, phase })
 }

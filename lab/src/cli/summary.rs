@@ -1,9 +1,10 @@
 //! Results in words and tables.
 
 use vines::advice::Reason;
+use vines::backbone::LevelPoint;
 use vines::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use vines::fit::{Contradiction, FittedParameter};
-use vines::identification::{DecayEnd, Friction, Regime, ResonancePoint};
+use vines::identification::{DecayEnd, Friction, Lock, Regime, ResonancePoint, Tone};
 use vines::numerics::SIGNIFICANT;
 use vines::orbit::Orbit;
 use vines::regime_map::Map;
@@ -137,9 +138,7 @@ pub(super) fn contradicts(contradiction: &Contradiction) -> String {
     let differences = match parameters.as_deref() {
         None if *points < 3 => return format!("the locked point does not belong to this scene ({size})"),
         None => {
-            return format!(
-                "the points do not belong to this scene ({size}), nor to the ideal cavity with other parameters"
-            );
+            return format!("the points do not belong to this scene ({size}), nor to one with other parameters");
         }
         Some([]) => format!("several parameters differ together ({size})"),
         Some(parameters) => {
@@ -173,12 +172,27 @@ pub(super) fn regimes(map: &Map) -> Table {
 const SYMBOLS: &str = "  sigma: detuning (omega/omega0 - 1)/epsilon; C: amplitude of the response over b; B: particle speed over b omega0; G: base amplitude \
                        over b epsilon\n";
 
-/// An identification: the locked point beside theory and exact orbit, then the decay.
+/// An identification: the locked point beside theory and exact orbit, then the decay. Of a rig that does not report impacts, only what is measured.
 pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let (lock, at) = (&result.lock, &result.lock.at);
     let units = Units::of(scene);
     let [hertz, response, drive] = units.values(at);
-    let [(of_response, m), (of_drive, unit)] = units.names;
+    let [(of_response, m), (of_drive, unit)] = &units.names;
+    if lock.regime_by_impacts.is_none() {
+        let mut notes = vec![stability(lock)];
+        notes.extend(lock.clipped_percent.map(clipped));
+        notes.extend(lock.tone.map(tone));
+        let notes: String = notes.iter().map(|note| format!("  ({note})\n")).collect();
+        return format!(
+            "Measured: {hertz} Hz, {of_response} {response} {m}, {of_drive} {drive} {unit}\nLocked after {:.0} periods{}: {}, phase error {:.1e} ± {:.1e} degrees\n{notes}\n{}\n",
+            lock.periods_to_lock,
+            held(lock, scene),
+            lock.regime.motion(),
+            at.phase_error_deg,
+            at.u_phase_deg,
+            decay_in_metres(result, &units)
+        );
+    }
     let b = lock.b.zip(lock.u_b).map_or("-".into(), |(b, u)| with_uncertainty(b, u));
     let [sigma, c] = [(at.sigma, at.u_sigma), (at.c, at.u_c)].map(|(value, u)| with_uncertainty(value, u));
     let g = with_uncertainty(at.g, at.u_g);
@@ -193,16 +207,7 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     };
     let theory = result.theory.map(|point| row(name, [point.sigma, point.c, point.b]));
     let table = Table::new(" | sigma | C | B").rows([measured]).rows(exact).rows(theory);
-    let behind_shaker = scene
-        .structure
-        .as_ref()
-        .is_some_and(|structure| structure.shaker.is_some());
-    let held = match lock.held {
-        // A constant command is no constant force.
-        true if behind_shaker => " (the response is held by control, as always behind a shaker)",
-        true => " (the response is held by control: a constant drive holds it hardly, or not)",
-        false => "",
-    };
+    let held = held(lock, scene);
     let mut text = format!(
         "Measured: {hertz} Hz, {of_response} {response} {m}, {of_drive} {drive} {unit}\n{}, G = {}\nLocked after {:.0} periods{held}: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}",
         rig(&result.parameters),
@@ -221,32 +226,29 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
         );
     }
     let mut note = |note: &str| text += &format!("  ({note})\n");
-    note(&format!(
-        "stability: over {} periods a disturbance would show that grows by {:.1} % per period or more; slower growth is not excluded",
-        lock.averaged,
-        100.0 * lock.unseen_growth
-    ));
+    note(&stability(lock));
     if let Some(friction) = lock.friction {
         note(&friction_text(&friction));
     }
     if let Some(share) = lock.clipped_percent {
-        note(&format!(
-            "before the release the amplifier was at its limit in {share:.1} % of the samples"
-        ));
+        note(&clipped(share));
     }
     if let Some(left_out) = &result.left_out {
         note(&ideal("theory and exact orbits are", left_out));
     }
     if result.exact.is_none() && result.theory.is_none() {
-        note("theory and exact orbits are for phase resonance, -90 degrees; there is none to compare with");
-    }
-    if let Some(tone) = lock.tone {
         note(&format!(
-            "{tone}: more than the particle can cause, so it is no part of the motion; check the cable of the sensor"
+            "at the phase target, {} degrees, neither theory nor exact orbits have a motion to compare with",
+            at.phase_target_deg
         ));
     }
+    if let Some(found) = lock.tone {
+        note(&tone(found));
+    }
+    // The curve is the one of the decay.
+    let is_resonance = result.parameters.definition.is_phase_resonance();
     let smallest = result.curve.places().iter().map(|[_, _, g, _]| *g).reduce(f64::min);
-    if let Some(smallest) = smallest.filter(|g| (at.g - g).abs() < SIGNIFICANT * at.u_g) {
+    if let Some(smallest) = smallest.filter(|g| is_resonance && (at.g - g).abs() < SIGNIFICANT * at.u_g) {
         note(&format!(
             "the drive lies at the fold within its uncertainty: the smallest of the exact backbone is G = {smallest:.6}"
         ));
@@ -270,20 +272,71 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     format!("{text}\n{}\n{}\n", decay(result), agreement(result))
 }
 
+/// That control holds the response, if it does.
+fn held(lock: &Lock, scene: &Scene) -> &'static str {
+    let structure = scene.structure.as_ref();
+    match lock.held {
+        // A constant command is no constant force.
+        true if structure.is_some_and(|structure| structure.shaker.is_some()) => {
+            " (the response is held by control, as always behind a shaker)"
+        }
+        true => " (the response is held by control: a constant drive holds it hardly, or not)",
+        false => "",
+    }
+}
+
+/// Up to which growth of a disturbance the lock is known to be stable.
+fn stability(lock: &Lock) -> String {
+    format!(
+        "stability: over {} periods a disturbance would show that grows by {:.1} % per period or more; slower growth is not excluded",
+        lock.averaged,
+        100.0 * lock.unseen_growth
+    )
+}
+
+fn clipped(share: f64) -> String {
+    format!("before the release the amplifier was at its limit in {share:.1} % of the samples")
+}
+
+fn tone(tone: Tone) -> String {
+    format!("{tone}: no part of the motion; check the cable of the sensor")
+}
+
+/// The decay, without a particle.
+fn decay_in_metres(result: &Comparison, units: &Units) -> String {
+    let (first, last) = match &result.decay[..] {
+        [] => return "Free decay: no points".into(),
+        points => (points[0].point, points[points.len() - 1].point),
+    };
+    let [per_response, _] = units.factors;
+    format!(
+        "Free decay: {} points from {:.4e} m at {:.5} Hz down to {:.4e} m at {:.5} Hz",
+        result.decay.len(),
+        first.a_m * per_response,
+        first.f_hz,
+        last.a_m * per_response,
+        last.f_hz
+    )
+}
+
 /// That `results` of the ideal cavity leave something out.
 pub(super) fn ideal(results: &str, left_out: &str) -> String {
     format!("{results} of the ideal cavity, without {left_out}")
 }
 
-/// Whose numbers the results of a structure are, as a line; empty for one oscillator.
-pub(super) fn structure(scene: &Scene) -> String {
+/// Whose numbers the results of a structure are, as a line; empty for one oscillator. `reports_impacts`: whether there are dimensionless ones.
+pub(super) fn structure(scene: &Scene, reports_impacts: bool) -> String {
     let Some(structure) = &scene.structure else {
         return String::new();
     };
     let masses = structure.mass_loading();
     let masses = masses.map_or(String::new(), |text| format!("{text}; all modes here are with them\n"));
+    let numbers = match reports_impacts {
+        true => "epsilon, lambda, sigma, C and G are those of mode",
+        false => "the results in files are those of mode",
+    };
     format!(
-        "{masses}epsilon, lambda, sigma, C and G are those of mode {}, as are A_m and E_m in files: {:.5e} m and {:.5e} m per unit of response and drive\n",
+        "{masses}{numbers} {}, as are A_m and E_m in files: {:.5e} m and {:.5e} m per unit of response and drive\n",
         structure.driven + 1,
         structure.reading_per_response().abs().recip(),
         structure.base_per_drive()
@@ -366,24 +419,26 @@ fn agreement(result: &Comparison) -> String {
     )
 }
 
-/// The points of a tracked backbone, and the periods that they took. A rig that does not report impacts has columns in SI units.
+/// The points of a tracked backbone, and the periods that they took. Of a rig that does not report impacts, only what is measured.
 pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
-    let (points, units) = (|| result.points.iter(), Units::of(scene));
-    let is_symmetric = scene.knowledge().is_symmetric;
-    let in_metres = points().all(|compared| compared.point.regime_by_impacts.is_none());
+    let duration = format!(
+        "{} points in {:.0} periods, {:.1} of which before the loop held the response: {:.1} periods per point\n",
+        result.points.len(),
+        result.periods,
+        result.periods_to_lock,
+        result.periods_per_point()
+    );
+    if !result.reports_impacts() {
+        return format!(
+            "{}\n{duration}{}",
+            measured(result, scene),
+            drive_harmonics(result, scene)
+        );
+    }
+    let points = || result.points.iter();
     let rows = points().map(|TrackedPoint { point, exact }| {
         let at = &point.at;
-        let mut remarks = point.regime.to_string();
-        if let Some(by_impacts) = point.regime_by_impacts {
-            remarks += &format!(" / {by_impacts}");
-        }
-        if let Some(why) = point.unsettled(is_symmetric) {
-            remarks += &format!("; not settled: {why}");
-        }
-        if let Some(tone) = point.tone {
-            remarks += &format!("; {tone}");
-        }
-        let si = in_metres.then(|| units.values(at)).into_iter().flatten();
+        let by_impacts = point.regime_by_impacts.unwrap_or(Regime::Unknown);
         let pairs = [(at.c, at.u_c), (at.sigma, at.u_sigma), (at.g, at.u_g)];
         let pairs = pairs.map(|(value, u)| with_uncertainty(value, u));
         let error = exact.and_then(|exact| Some(exact.sigma?.abs().max(exact.g?.abs())));
@@ -392,19 +447,12 @@ pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
             format!("{:.1}", point.periods),
             point.averaged.to_string(),
             error.map_or("-".into(), |error| format!("{error:.1e}")),
-            remarks,
+            remarks(point, format!("{} / {by_impacts}", point.regime), scene),
         ];
-        si.chain(pairs).chain(others).collect::<Vec<_>>()
+        pairs.into_iter().chain(others).collect::<Vec<_>>()
     });
-    let si = match in_metres {
-        true => {
-            let [response, drive] = units.names.each_ref().map(|(name, unit)| format!("{name}, {unit}"));
-            format!("frequency, Hz | {response} | {drive} | ")
-        }
-        false => String::new(),
-    };
     let headings = "C | sigma | G | off target | periods | averaged | error | regime by response / by impacts";
-    let table = Table::new(&format!("{si}{headings}")).rows(rows);
+    let table = Table::new(headings).rows(rows);
     let mut worst = result.worst().map_or(String::new(), |worst| {
         format!(
             "Largest error of a settled point, in sigma or G against the exact backbone at the same C: {:.1e} (distance from the nearest \
@@ -412,23 +460,7 @@ pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
             worst.at_equal_c, worst.nearest
         )
     });
-    let rows = points().filter_map(|compared| {
-        let point = &compared.point;
-        let harmonics = point
-            .drive_harmonics?
-            .map(|harmonic| format!("{:.3}", 100.0 * harmonic));
-        let clipped = point.clipped_percent.map(|share| format!("{share:.1}"));
-        let numbers = [format!("{:.4}", point.at.c)].into_iter().chain(harmonics);
-        Some(numbers.chain(clipped).collect::<Vec<_>>())
-    });
-    let harmonics = Table::new("C | 2, % | 3, % | 4, % | 5, % | 6, % | 7, % | clipped, %").rows(rows);
-    if !harmonics.is_empty() {
-        let [_, (drive, _)] = &units.names;
-        worst += &format!(
-            "Harmonics of the {drive}, as measured, over its first, and share of the samples with the amplifier at its limit\n{}",
-            harmonics.text()
-        );
-    }
+    worst += &drive_harmonics(result, scene);
     let hidden = points().map(|compared| &compared.point).filter(|point| {
         let regimes = (point.regime, point.regime_by_impacts);
         point.settled && regimes == (Regime::Symmetric, Some(Regime::Asymmetric))
@@ -439,27 +471,68 @@ pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
             "Settled points whose response looks symmetric, but whose impacts are asymmetric (not the symmetric backbone): {hidden}\n"
         );
     }
-    if let Some([u_sigma, u_lambda]) = result.u_linear {
-        let measured = format!(
-            "The exact backbone has the measured damping, lambda = {:.3} ± {u_lambda:.3}; all sigma share ± {u_sigma:.3}, from the measured natural \
-             frequency",
-            result.parameters.lambda
-        );
-        worst += &match result.unexplained() {
-            0 => format!("{measured}.\nThey explain the distance of all settled points (95 %)\n"),
-            count => format!("{measured}.\nThey do not explain the distance of {count} settled points (95 %)\n"),
-        };
-    }
     if let Some(left_out) = &result.left_out {
         worst += &format!("({})\n", ideal("the exact backbone is", left_out));
     }
+    format!("{}\n\n{}\n{duration}{worst}", rig(&result.parameters), table.text())
+}
+
+/// What is to be said of a point beside its motion.
+fn remarks(point: &LevelPoint, mut motion: String, scene: &Scene) -> String {
+    if let Some(why) = point.unsettled(scene.knowledge().is_symmetric) {
+        motion += &format!("; not settled: {why}");
+    }
+    if let Some(tone) = point.tone {
+        motion += &format!("; {tone}");
+    }
+    motion
+}
+
+/// The measured points as a table, without a particle.
+fn measured(result: &TrackedComparison, scene: &Scene) -> String {
+    let units = Units::of(scene);
+    let rows = result.points.iter().map(|TrackedPoint { point, .. }| {
+        let others = [
+            format!("{:+.2}°", point.at.phase_error_deg),
+            format!("{:.1}", point.periods),
+            point.averaged.to_string(),
+            remarks(point, point.regime.motion().into(), scene),
+        ];
+        units.values(&point.at).into_iter().chain(others).collect::<Vec<_>>()
+    });
+    let [response, drive] = units.names.each_ref().map(|(name, unit)| format!("{name}, {unit}"));
+    let headings = format!("frequency, Hz | {response} | {drive} | off target | periods | averaged | motion");
+    Table::new(&headings).rows(rows).text()
+}
+
+/// Harmonics of what a shaker drives the structure with, as a table; empty without a shaker.
+fn drive_harmonics(result: &TrackedComparison, scene: &Scene) -> String {
+    let [(response, m), (drive, _)] = Units::of(scene).names;
+    let [per_response, _] = Units::of(scene).factors;
+    let rows = result.points.iter().filter_map(|TrackedPoint { point, .. }| {
+        let harmonics = point
+            .drive_harmonics?
+            .map(|harmonic| format!("{:.3}", 100.0 * harmonic));
+        let clipped = point.clipped_percent.map(|share| format!("{share:.1}"));
+        let level = match result.reports_impacts() {
+            true => format!("{:.4}", point.at.c),
+            false => format!("{:.4e}", point.at.a_m * per_response),
+        };
+        Some([level].into_iter().chain(harmonics).chain(clipped).collect::<Vec<_>>())
+    });
+    let level = match result.reports_impacts() {
+        true => "C".into(),
+        false => format!("{response}, {m}"),
+    };
+    let table = Table::new(&format!(
+        "{level} | 2, % | 3, % | 4, % | 5, % | 6, % | 7, % | clipped, %"
+    ))
+    .rows(rows);
+    if table.is_empty() {
+        return String::new();
+    }
     format!(
-        "{}\n\n{}\n{} points in {:.0} periods, {:.1} of which before the loop held the response: {:.1} periods per point\n{worst}",
-        rig(&result.parameters),
-        table.text(),
-        result.points.len(),
-        result.periods,
-        result.periods_to_lock,
-        result.periods_per_point()
+        "Harmonics of the {drive}, as measured, over its first, and share of the samples with the amplifier at its limit\n{}",
+        table.text()
     )
 }

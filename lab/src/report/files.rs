@@ -109,8 +109,8 @@ fn decay_csv(result: &Comparison) -> Result<String, ReportError> {
 
 /// The points of a tracked backbone.
 fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
-    let headings = "f_Hz,A_m,E_m,u_f_Hz,u_A_m,u_E_m,sigma,C,G,phase_error_deg,u_sigma,u_C,u_G,u_phase_deg,level,periods,averaged,settled,\
-                    reached,regime,regime_by_impacts,tone_Hz,tone_share,distance,sigma_less_exact,G_less_exact";
+    let headings = "f_Hz,A_m,E_m,u_f_Hz,u_A_m,u_E_m,sigma,C,G,phase_target_deg,phase_error_deg,u_sigma,u_C,u_G,u_phase_deg,level,periods,averaged,settled,\
+                    reached,motion,regime_by_impacts,tone_Hz,tone_share,distance,sigma_less_exact,G_less_exact";
     let is_forced = result.points.iter().any(|compared| compared.point.at.f_n.is_some());
     let headings = match is_forced {
         true => headings.replace("u_E_m,", "u_E_m,F_N,u_F_N,"),
@@ -129,7 +129,7 @@ fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
         let motion = (point.level, point.periods, point.averaged, point.settled, point.reached);
         let tone = point.tone.map(|tone| (tone.hertz, tone.share)).unzip();
         let exact = exact.map_or((None, None, None), |exact| (Some(exact.nearest), exact.sigma, exact.g));
-        let regime = (point.regime, point.regime_by_impacts);
+        let regime = (point.regime.motion(), point.regime_by_impacts);
         let harmonics = point.drive_harmonics.map(|values| values.map(Some)).unwrap_or_default();
         let clipped = [point.clipped_percent, point.command_v];
         let of_shaker = harmonics.into_iter().chain(clipped).filter(|_| is_shaken);

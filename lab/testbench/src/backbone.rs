@@ -39,7 +39,8 @@ pub struct LevelPoint {
     /// What in its periods is not noise.
     #[serde(skip)]
     pub unsteady: Option<Unsteady>,
-    /// The regime determined from the response alone, as on a real rig.
+    /// The regime that the response alone shows if the rig contains a particle. In files it is the motion without that assumption.
+    #[serde(rename = "motion", serialize_with = "Regime::serialize_motion")]
     pub regime: Regime,
     /// The regime determined from the impacts, if the rig is a simulation.
     pub regime_by_impacts: Option<Regime>,
@@ -211,11 +212,17 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             }
             let point = self.hold(level)?;
             self.points.push(point);
-            if let Some((held, Regime::Symmetric | Regime::Unresolved)) = before
-                && matches!(point.regime, Regime::NoImpacts | Regime::Other)
-            {
-                let b = self.plan.knowledge.numbers.b;
-                return Err(ExperimentError::MotionLost { held, level, b, regime: point.regime });
+            let Some((held, Regime::Symmetric | Regime::Unresolved)) = before else {
+                continue;
+            };
+            // Only where impacts are reported does a motion without them mean that they have ended.
+            match (point.regime, point.regime_by_impacts) {
+                (regime @ (Regime::NoImpacts | Regime::Other), Some(_)) => {
+                    let b = self.plan.knowledge.numbers.b;
+                    return Err(ExperimentError::MotionLost { held, level, b, regime });
+                }
+                (Regime::Other, None) => return Err(ExperimentError::SteadyLost { held, level }),
+                _ => {}
             }
         }
         Ok(())

@@ -33,16 +33,13 @@ pub struct Comparison {
     /// The linear response, if it was measured on the rig.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub linear: Option<MeasuredLinear>,
-    /// The phase of the response relative to the reference that the lock held, degrees.
-    pub phase_target_deg: f64,
     /// The locked point as measured.
     pub lock: Lock,
-    /// First-order theory at the same G: the stable solution nearest to the lock; absent if the phase target is not
-    /// phase resonance.
+    /// First-order theory at the same G and phase target: the stable solution nearest to the lock.
     pub theory: Option<BackbonePoint>,
-    /// The exact phase-resonant orbit with the C of the lock; absent if there is none, and if the phase target is not phase resonance.
+    /// The exact orbit at the same phase target with the C of the lock; absent if there is none.
     pub exact: Option<Orbit>,
-    /// All exact phase-resonant orbits at the same G, by rising C; the lock followed the nearest one.
+    /// All exact orbits at the same G and phase target, by rising C; the lock followed the nearest one.
     pub orbits: Vec<Orbit>,
     /// The decay, from the release on.
     pub decay: Vec<ComparedPoint>,
@@ -51,7 +48,7 @@ pub struct Comparison {
     /// Amplitude of the base after the release, m, where it is least, if the base never rests; with its standard uncertainty.
     #[serde(rename = "E_after_release_m", skip_serializing_if = "Option::is_none")]
     pub base_after_release: Option<[f64; 2]>,
-    /// The exact backbone that the decay is compared with.
+    /// The exact backbone that the decay is compared with: at phase resonance, whatever the phase target, because no drive acts.
     #[serde(skip)]
     pub curve: ExactCurve,
     /// RMS of the decay's sigma minus theory, over the points with C > 0.2.
@@ -82,26 +79,34 @@ impl Comparison {
     /// Compares what was identified on `scene`.
     pub fn of(found: &Identification, scene: &Scene) -> Self {
         let (knowledge, lock) = (found.knowledge, found.lock);
-        let (parameters, at_resonance) = (knowledge.numbers, knowledge.is_at_phase_resonance());
+        let parameters = knowledge.numbers;
         let distance = |sigma: f64, c: f64| (sigma - lock.at.sigma).hypot(c - lock.at.c);
         // A base that is held from sample to sample moves a little less than was asked for.
         let omega = TAU * lock.at.f_hz;
         let moved = knowledge.target.base_per_sample(omega, knowledge.sample_time);
         let driven = Dimensionless { g: moved * parameters.g, ..parameters };
         let mut solutions = resonant(&driven);
-        solutions.retain(|point| at_resonance && point.stable());
+        solutions.retain(|point| point.stable());
         solutions.sort_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
         let theory = solutions.first().copied();
         let as_driven = Scene { amplitude: moved * scene.amplitude, ..scene.clone() };
-        let mut orbits = phase_resonant(&as_driven, &driven);
-        orbits.retain(|_| at_resonance);
-        let curve = ExactCurve::of_scene(scene, &parameters, [lock.at.sigma, lock.at.c]);
+        let orbits = phase_resonant(&as_driven, &driven);
+        let at_target = ExactCurve::of_scene(scene, &parameters, [lock.at.sigma, lock.at.c]);
         // The orbit that the lock followed, moved along the backbone to the measured C.
         let near = followed(&orbits, &lock)
             .map(|orbit| [orbit.sigma, orbit.b])
-            .or_else(|| Some(curve.place(lock.at.c, lock.at.sigma, lock.at.g)?.1));
-        let exact = near.filter(|_| at_resonance);
-        let exact = exact.and_then(|near| curve.orbits.with_amplitude(lock.at.c, near));
+            .or_else(|| Some(at_target.place(lock.at.c, lock.at.sigma, lock.at.g)?.1));
+        let exact = near.and_then(|near| at_target.orbits.with_amplitude(lock.at.c, near));
+        // Without a drive, the decay is at phase resonance.
+        let curve = match knowledge.is_at_phase_resonance() {
+            true => at_target,
+            false => {
+                let mut undriven = scene.clone();
+                undriven.controller.phase_target = -90.0;
+                let resonant = Dimensionless { definition: undriven.definition(), ..parameters };
+                ExactCurve::of_scene(&undriven, &resonant, [lock.at.sigma, lock.at.c])
+            }
+        };
         let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene, &scene.plan_on(knowledge)));
         let decay: Vec<ComparedPoint> = found
             .decay
@@ -122,7 +127,6 @@ impl Comparison {
             parameters,
             left_out: scene.left_out_of_cavity(),
             linear: knowledge.measured_linear(),
-            phase_target_deg: scene.controller.phase_target,
             lock,
             theory,
             exact,
@@ -387,14 +391,14 @@ impl TrackedPoint {
         self.point.regime_by_impacts.unwrap_or(self.point.regime)
     }
 
-    /// Whether this is a settled point of a motion with impacts.
+    /// Whether this is a settled point of a motion with impacts or, where none are reported, of a nonlinear one.
     pub fn is_of_backbone(&self) -> bool {
         self.point.settled && !matches!(self.regime(), Regime::NoImpacts | Regime::NotEstablished)
     }
 }
 
 impl TrackedComparison {
-    /// Compares the points with the exact backbone of the scene; not where the loop holds another phase than resonance.
+    /// Compares the points with the exact backbone of the scene at its phase target.
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
         let knowledge = tracked.knowledge;
         let parameters = knowledge.numbers;
@@ -404,12 +408,7 @@ impl TrackedComparison {
             .map_or([0.0; 2], |point| [point.at.sigma, point.at.c]);
         let curve = ExactCurve::of_scene(scene, &parameters, first);
         let exact = |point: &LevelPoint| curve.distance(point.at.c, point.at.sigma, point.at.g);
-        let compare = |point: &LevelPoint| TrackedPoint {
-            point: *point,
-            exact: Some(point)
-                .filter(|_| knowledge.is_at_phase_resonance())
-                .and_then(exact),
-        };
+        let compare = |point: &LevelPoint| TrackedPoint { point: *point, exact: exact(point) };
         Self {
             points: tracked.points.iter().map(compare).collect(),
             periods_to_lock: tracked.periods_to_lock,
@@ -430,33 +429,23 @@ impl TrackedComparison {
         self.periods / self.points.len() as f64
     }
 
-    /// Why these points are no backbone of a motion with impacts, if they are none.
+    /// Whether the rig reports its impacts. Otherwise nothing says that it contains a particle.
+    pub fn reports_impacts(&self) -> bool {
+        self.points.iter().any(|row| row.point.regime_by_impacts.is_some())
+    }
+
+    /// Why these points are no backbone of a nonlinear motion, if they are none.
     pub fn doubt(&self) -> Option<Doubt> {
         let count = |wanted: Regime| self.points.iter().filter(|row| row.regime() == wanted).count();
         let [linear, doubtful] = [Regime::NoImpacts, Regime::NotEstablished].map(count);
         let of = self.points.len();
         if linear == of {
-            Some(Doubt::NoImpacts)
+            Some(Doubt::Linear)
         } else if linear + doubtful == of {
             Some(Doubt::NotEstablished { points: doubtful })
         } else {
             (!self.points.iter().any(TrackedPoint::is_of_backbone)).then_some(Doubt::NotSettled)
         }
-    }
-
-    /// Number of settled points that are farther from the exact backbone at equal C than 1.96 standard uncertainties of point, natural
-    /// frequency and damping. At equal C, dG/dlambda = C (docs/theory.md, eq. 17).
-    pub fn unexplained(&self) -> usize {
-        let [u_sigma, u_lambda] = self.u_linear.unwrap_or_default();
-        let settled = self.points.iter().filter(|row| row.point.settled);
-        let is_far = |row: &&TrackedPoint| {
-            let at = &row.point.at;
-            let beyond = |error: Option<f64>, u: f64| error.is_some_and(|error| error.abs() > 1.96 * u);
-            row.exact.is_some_and(|exact| {
-                beyond(exact.sigma, at.u_sigma.hypot(u_sigma)) || beyond(exact.g, at.u_g.hypot(u_lambda * at.c))
-            })
-        };
-        settled.filter(is_far).count()
     }
 
     /// Largest error at equal C, in sigma or G, and largest distance from the exact backbone, of the settled points.
@@ -473,17 +462,17 @@ impl TrackedComparison {
     }
 }
 
-/// Why tracked points are no backbone of a motion with impacts.
+/// Why tracked points are no backbone of a nonlinear motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Doubt {
-    /// All points are of the linear mode.
-    NoImpacts,
-    /// A settled point, or all points, without evidence of impacts.
+    /// All points are of the linear mode, or near the linear response of a rig that does not report impacts.
+    Linear,
+    /// Of some points this is not established, and all others are linear.
     NotEstablished {
-        /// Number of points without evidence.
+        /// Number of these points.
         points: usize,
     },
-    /// No point is a settled one of a motion with impacts.
+    /// No point is a settled one of a motion with impacts or, where none are reported, of a nonlinear one.
     NotSettled,
 }
 

@@ -112,10 +112,45 @@ pub struct SearchFound {
     pub lost: u32,
     /// Whether the time ended while a motion was to settle, and if so, whether under the constant drive.
     pub unsettled: Option<bool>,
+    /// Half-width of the drawing, m, if the rig does not report impacts: nothing is then said of a particle.
+    pub silent: Option<f64>,
+}
+
+impl SearchFound {
+    /// The requested drive as G, unless the rig does not report impacts.
+    fn requested_in_words(&self) -> String {
+        self.silent
+            .map_or_else(|| format!(", G = {:.4}", self.requested), |_| String::new())
+    }
+
+    /// What was found on a rig that does not report impacts, in m. `b`: the length of one in C.
+    fn without_impacts(&self, b: f64) -> String {
+        let [low, high] = self.tried.map(|c| short(c * b));
+        let tried = format!("at responses from {low} to {high} m ");
+        match (self.held, self.impacts, self.unsettled) {
+            (None, false, _) => {
+                tried
+                    + "the motion stayed near the linear response. Allow a larger drive (phase_lock.amplitude_max), or track it with `vines backbone`"
+            }
+            (None, true, _) => {
+                tried + "no motion was steady and nonlinear. Try another drive, or track it with `vines backbone`"
+            }
+            (Some(_), _, Some(_)) => {
+                tried + "the motion did not settle. Allow more time (phase_lock.acquire_timeout), or try another drive"
+            }
+            (Some((_, [_, c, _])), _, None) => format!(
+                "{tried}the drive was nearest to the requested one at {} m. Allow more time (phase_lock.acquire_timeout), or try another drive",
+                short(c * b)
+            ),
+        }
+    }
 }
 
 impl Display for SearchFound {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if let Some(b) = self.silent {
+            return f.write_str(&self.without_impacts(b));
+        }
         let [low, high] = self.tried;
         let Some(([least, largest], [g, c, sigma])) = self.held else {
             write!(f, "at responses from C = {low:.3} to {high:.3} ")?;
@@ -210,10 +245,14 @@ pub enum ExperimentError {
         /// What kept the bench from taking the motion as settled, if the controller does not judge its lock itself.
         unmet: Option<Condition>,
     },
-    #[error("no lock within {periods:.0} periods at the requested drive, G = {:.4}: {found}", found.requested)]
+    #[error("no lock within {periods:.0} periods at the requested drive{}: {found}", found.requested_in_words())]
     NotReached { periods: f64, found: Box<SearchFound> },
-    #[error("no lock: the motion, held at C = {c:.4} for {periods} periods, is not steady: {why}")]
-    NotSteady { periods: usize, c: f64, why: Unsteady },
+    #[error("no lock: the motion, held at a response of {response:.4e} m for {periods} periods, is not steady: {why}")]
+    NotSteady {
+        periods: usize,
+        response: f64,
+        why: Unsteady,
+    },
     #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}; {evidence}", stage.name())]
     Tripped {
         periods: f64,
@@ -258,6 +297,10 @@ pub enum ExperimentError {
         /// m
         requested: f64,
     },
+    #[error(
+        "the motion, steady at a response of {held:.4e} m, is irregular at {level:.4e} m: it ends between the two, or the step was too large"
+    )]
+    SteadyLost { held: f64, level: f64 },
     #[error("the scene has no drive, E = 0, so that nothing can lock")]
     NoDrive,
     #[error("the controller answered {name} = {value} {unit}; it must be {allowed}. The drive is off")]

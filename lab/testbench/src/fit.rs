@@ -1,7 +1,7 @@
 //! Parameters of a rig from measured points of its backbone: natural frequency, damping ratio, restitution, half-width of the cavity and mass
 //! ratio, with their covariance.
 //!
-//! The model is the exact symmetric 1:1 motion at phase resonance ([`backbone_at_speed`]): a curve over the particle speed B, with the amplitude
+//! The model is the exact symmetric 1:1 motion at the phase of each point ([`backbone_at_speed`]): a curve over the particle speed B, with the amplitude
 //! `A = b C`, the frequency `omega = omega0 Omega` and the drive `E = b epsilon G`. A measured point has all three, each with a standard
 //! uncertainty. For given parameters, the B of a point is where its weighted distance from the curve is smallest. The sum of the squared distances
 //! is chi-square; the parameters minimise it (Levenberg and Marquardt). Half of its second derivative, with every B eliminated, is the inverse
@@ -16,7 +16,7 @@ mod recording;
 mod table;
 
 use std::cmp::Ordering;
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use lovines::Cavity;
 use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
@@ -39,7 +39,7 @@ pub use recording::{Kind, LinearDecay, Part, Recording, RecordingError, parts};
 #[cfg(feature = "tables")]
 pub use table::plain_table;
 
-/// A measured point of phase resonance.
+/// A measured point of the backbone: of phase resonance, or at another phase target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredPoint {
     /// Amplitude of the fundamental of the response, m.
@@ -48,6 +48,8 @@ pub struct MeasuredPoint {
     pub omega: Estimate,
     /// Amplitude of the base, m.
     pub drive: Estimate,
+    /// Phase of the response relative to the base at which it was measured, rad.
+    pub phase: f64,
 }
 
 impl From<&ResonancePoint> for MeasuredPoint {
@@ -57,6 +59,23 @@ impl From<&ResonancePoint> for MeasuredPoint {
             response: estimate(at.a_m, at.u_a_m),
             omega: estimate(TAU * at.f_hz, TAU * at.u_f_hz),
             drive: estimate(at.e_m, at.u_e_m),
+            phase: at.phase_target_deg.to_radians(),
+        }
+    }
+}
+
+impl MeasuredPoint {
+    /// The point of phase resonance with this response, to first order: `E_R = E cos p` and `omega_R = omega + (omega/2) (E/A) sin p` for a phase of p
+    /// beyond phase resonance.
+    fn at_resonance(&self, definition: Definition) -> Self {
+        let (sine, cosine) = definition.at_phase(self.phase).off_resonance().sin_cos();
+        let turned = 0.5 * sine * self.drive.value / self.response.value * self.omega.value;
+        let omega = Estimate { value: self.omega.value + turned, ..self.omega };
+        Self {
+            omega,
+            drive: self.drive.scaled(cosine),
+            phase: -FRAC_PI_2,
+            ..*self
         }
     }
 }
@@ -534,8 +553,9 @@ impl<'a> Problem<'a> {
         let ends = ends.filter(|(high, low)| self.may_keep(order.len().saturating_sub(high + low)));
         let ends = ends.filter_map(|(high, low)| {
             let (rest, next) = self.rest(&order[high..order.len() - low], fit)?;
-            let [smallest, largest] = range_of(&next.x, self.definition)?;
-            let outermost = self.points[if high > 0 { order[0] } else { order[order.len() - 1] }].response;
+            let MeasuredPoint { response: outermost, phase, .. } =
+                self.points[if high > 0 { order[0] } else { order[order.len() - 1] }];
+            let [smallest, largest] = range_of(&next.x, self.definition.at_phase(phase))?;
             let aside = SIGNIFICANT * outermost.uncertainty;
             let has_ended = match high {
                 0 => outermost.value - aside < smallest,
@@ -623,7 +643,8 @@ impl<'a> Problem<'a> {
         let fits = equally_spaced(from.ln(), to.ln(), WIDTHS).filter_map(|width| {
             let b = width.exp();
             let mut rows = Vec::new();
-            for MeasuredPoint { response, omega: at, drive } in &self.points {
+            for point in &self.points {
+                let MeasuredPoint { response, omega: at, drive, .. } = point.at_resonance(self.definition);
                 let c = (response.value / b).max(manifold.c(manifold.b_min()));
                 let motion = undamped.backbone_at(manifold.b(c, BranchSide::Right)?);
                 let [u_omega, u_drive] = [expected.mass_ratio() * omega, drive.value].map(|one| THEORY * one);
@@ -698,7 +719,8 @@ impl<'a> Problem<'a> {
     /// The curve of the ideal cavity, with a cubic stiffness ([`Effect::Hardening`]), at a speed less a point, over its standard uncertainties.
     fn residual(&self, x: &Unknowns, point: usize, speed: f64) -> Option<Vector3<f64>> {
         let (omega0, b, epsilon) = (x[0].exp(), x[3].exp(), x[4].exp());
-        let [omega, c, g] = backbone_at_speed(&model(x, self.definition), speed)?;
+        let definition = self.definition.at_phase(self.points[point].phase);
+        let [omega, c, g] = backbone_at_speed(&model(x, definition), speed)?;
         let hardening = 1.0 + 0.375 * x[6] * c * c;
         Some(self.over_u(point, b * c, omega0 * omega * hardening, b * epsilon * g))
     }

@@ -32,11 +32,19 @@ pub use vines_model::regime::{Impact, Regime};
 pub enum IdentificationError {
     #[error("the loop is locked, but not as asked: {departure}. There the regime is {regime}")]
     OtherThanAsked { departure: Departure, regime: Regime },
+    #[error("{}", regime_in_words(*regime, [*sigma, *c], *silent))]
+    Regime {
+        regime: Regime,
+        sigma: f64,
+        c: f64,
+        /// Frequency, Hz, and response, m, of a rig that does not report impacts: nothing is then said of a particle.
+        silent: Option<[f64; 2]>,
+    },
     #[error(
-        "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the regime is {regime}, not symmetric 1:1 with two \
-         impacts per period. Try another [start] (the particle must be moving) or another G"
+        "the loop is locked at {f_hz:.5} Hz with a response of {a_m:.4e} m, but the motion repeats only after {periods} periods of the drive. Try another \
+         drive or another [start]"
     )]
-    Regime { regime: Regime, sigma: f64, c: f64 },
+    Repeats { periods: usize, f_hz: f64, a_m: f64 },
     #[error(
         "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the motion repeats only after {periods} periods of the drive: it is not 1:1. Try \
          another [start] (the particle must be moving) or another G"
@@ -61,6 +69,21 @@ pub enum IdentificationError {
     SensorAfterRelease { seconds: f64, what: &'static str },
 }
 
+/// That a lock is of another regime than the symmetric 1:1 one.
+fn regime_in_words(regime: Regime, [sigma, c]: [f64; 2], silent: Option<[f64; 2]>) -> String {
+    match silent {
+        Some([f_hz, a_m]) => format!(
+            "the loop is locked at {f_hz:.5} Hz with a response of {a_m:.4e} m, but the motion is {}, and not steady and nonlinear. Try another drive \
+             or another [start]",
+            regime.motion()
+        ),
+        None => format!(
+            "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the regime is {regime}, not symmetric 1:1 with two impacts per period. Try \
+             another [start] (the particle must be moving) or another G"
+        ),
+    }
+}
+
 /// What a record says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
@@ -81,11 +104,14 @@ pub struct Identification {
 pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, IdentificationError> {
     let knowledge = plan.knowledge;
     let lock = measure(record, plan).ok_or(IdentificationError::NoMotion)?;
-    let subharmonic = subharmonic(record.hold(), &knowledge, TAU * lock.at.f_hz);
-    // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
+    let ResonancePoint { f_hz, a_m, sigma, c, .. } = lock.at;
+    let silent = lock.regime_by_impacts.is_none().then_some([f_hz, a_m]);
+    let subharmonic = subharmonic(record.hold(), &knowledge, TAU * f_hz);
+    // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so. So is one without symmetry where
+    // there may be no cavity.
     let is_expected = match lock.regime {
         Regime::Symmetric | Regime::Unresolved => true,
-        Regime::Asymmetric => !knowledge.is_symmetric,
+        Regime::Asymmetric => !knowledge.is_symmetric || silent.is_some(),
         _ => false,
     };
     // Another phase or drive has another motion, of which the wanted one says nothing.
@@ -95,11 +121,13 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
         return Err(IdentificationError::OtherThanAsked { departure, regime: lock.regime });
     }
     if !is_expected {
-        return Err(IdentificationError::Regime { regime: lock.regime, sigma: lock.at.sigma, c: lock.at.c });
+        return Err(IdentificationError::Regime { regime: lock.regime, sigma, c, silent });
     }
-    let ResonancePoint { sigma, c, .. } = lock.at;
     if let Some(periods) = subharmonic {
-        return Err(IdentificationError::Subharmonic { periods, sigma, c });
+        return Err(match silent {
+            Some(_) => IdentificationError::Repeats { periods, f_hz, a_m },
+            None => IdentificationError::Subharmonic { periods, sigma, c },
+        });
     }
     on_target(&lock, plan.lock.lock.phase_tolerance)?;
     sensors_after_release(record, &knowledge)?;
@@ -153,8 +181,11 @@ pub struct Lock {
     pub held: bool,
     /// Impacts per period; NaN if the rig does not report them.
     pub impacts_per_period: f64,
-    /// The regime: from the impacts, or from the response alone if the rig does not report them.
+    /// The regime: from the impacts, or from the response alone if the rig does not report them. In files it is the motion without a particle.
+    #[serde(rename = "motion", serialize_with = "Regime::serialize_motion")]
     pub regime: Regime,
+    /// The regime determined from the impacts, if the rig reports them.
+    pub regime_by_impacts: Option<Regime>,
     /// Share of the samples before the release with the command at the limit of a shaker's amplifier, per cent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clipped_percent: Option<f64>,
@@ -265,6 +296,7 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
         held: record.held,
         impacts_per_period,
         regime,
+        regime_by_impacts: Some(regime).filter(|_| !impacts_per_period.is_nan()),
         clipped_percent: record.clipped_percent,
         command_v: mean_command(&record.samples[record.released - averaged..record.released], knowledge),
         friction: Friction::of(hold, (hold.len() - 1) as f64 * dt * omega.value / TAU),
@@ -351,6 +383,8 @@ pub struct ResonancePoint {
     /// Base amplitude over `b epsilon`.
     #[serde(rename = "G")]
     pub g: f64,
+    /// Target of the phase of the response relative to the base, both as displacements, degrees.
+    pub phase_target_deg: f64,
     /// Phase of the response relative to the base, minus the target, degrees.
     pub phase_error_deg: f64,
     /// Standard uncertainty of sigma.
@@ -382,6 +416,7 @@ impl ResonancePoint {
             sigma: d.sigma(omega.value),
             c: response.value / d.b,
             g: d.excitation(base.value),
+            phase_target_deg: d.definition.phase_in_degrees(),
             phase_error_deg: phase_error.value.to_degrees(),
             u_sigma: omega.uncertainty / d.omega_change(1.0),
             u_c: response.uncertainty / d.b,

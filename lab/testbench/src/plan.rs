@@ -298,11 +298,11 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
-    /// A rig that is as its drawing says; `phase`: target, rad.
-    pub fn of(plant: &Parameters, definition: Definition, amplitude: f64, sample_time: f64, phase: f64) -> Self {
+    /// A rig that is as its drawing says.
+    pub fn of(plant: &Parameters, definition: Definition, amplitude: f64, sample_time: f64) -> Self {
         let linear = LinearResponse::of(plant);
         let target = Target {
-            phase,
+            phase: definition.phase,
             measurands: definition.measurands(),
             omega0: linear.omega0,
             through_shaker: false,
@@ -370,9 +370,9 @@ impl Knowledge {
         (periods * TAU / self.linear.omega0 / self.sample_time).round() as usize
     }
 
-    /// Whether the target is phase resonance, for which theory and exact orbits hold.
+    /// Whether the target is phase resonance.
     pub fn is_at_phase_resonance(&self) -> bool {
-        self.target.phase == -FRAC_PI_2
+        self.numbers.definition.is_phase_resonance()
     }
 }
 
@@ -429,14 +429,7 @@ const LONGEST_DECAY: f64 = 5000.0;
 impl Scene {
     /// What the scene says of its rig.
     pub fn knowledge(&self) -> Knowledge {
-        let phase = self.controller.phase_target.to_radians();
-        let mut knowledge = Knowledge::of(
-            &self.plant,
-            self.definition(),
-            self.amplitude,
-            self.sample_time(),
-            phase,
-        );
+        let mut knowledge = Knowledge::of(&self.plant, self.definition(), self.amplitude, self.sample_time());
         knowledge.shaker = self.structure().and_then(|structure| structure.shaker_path());
         if let Some(path) = knowledge.shaker.as_mut().filter(|_| cfg!(feature = "tables")) {
             path.aliased = self.aliased(1.0).unwrap_or(0.0) as f32;

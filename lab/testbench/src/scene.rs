@@ -48,7 +48,7 @@ use vines_model::ArgumentError;
 use crate::rig::SimulatedStructure;
 
 pub use chain::ChainSettings;
-pub use controller::{ControllerSettings, KEYS, PhaseLock, key, refusal};
+pub use controller::{ControllerSettings, KEYS, PhaseLock, key, phase_target, refusal};
 pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
 pub use names::{Name, Names};
 pub use overrides::{Family, Override};
@@ -113,7 +113,7 @@ impl Scene {
         Dimensionless { definition: self.definition(), ..numbers }
     }
 
-    /// What counts as resonance of the oscillator or the driven mode. A force on a structure is what spring and damper of the oscillator pass on; its
+    /// What counts as resonance of the oscillator or the driven mode, at the phase target of the controller. A force on a structure is what spring and damper of the oscillator pass on; its
     /// sensors are those of [`Scene::resonance`].
     pub fn definition(&self) -> Definition {
         let by_force = self.structure().is_some_and(|one| one.excitation == Excitation::Force);
@@ -122,7 +122,8 @@ impl Scene {
         } else {
             self.resonance.reference
         };
-        Definition { reference, ..self.resonance }
+        let phase = self.controller.phase_target.to_radians();
+        Definition { reference, phase, ..self.resonance }
     }
 
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
@@ -507,7 +508,7 @@ impl Sections {
                            sensor; switch it on, or take the reference \"base\"";
             return Err(SceneError::text(origin, message));
         }
-        let Definition { sensor, reference, sensor_quantity, reference_quantity } = scene.resonance;
+        let Definition { sensor, reference, sensor_quantity, reference_quantity, .. } = scene.resonance;
         if sensor == Sensor::V && sensor_quantity != Measurand::Displacement {
             let name = sensor_quantity.name();
             let message = format!(

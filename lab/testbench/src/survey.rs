@@ -56,12 +56,13 @@ impl Scene {
             half_width: self.plant.half_width,
             restitution: self.plant.restitution,
         };
-        let target = self.controller.phase_target.to_radians();
         let mut orbits = StructureOrbits::new(&structure.host, particle);
         if let Some(shaker) = &structure.shaker {
             orbits = orbits.with_reference(shaker.reference_and_inertia(structure.excitation));
         }
-        orbits.with_response(&structure.response()).with_target(target)
+        orbits
+            .with_response(&structure.response())
+            .with_target(self.definition().phase)
     }
 
     /// Amplitude of the drive of the scene's structure, or of its reference behind a shaker: m for a base, N for a force.
@@ -269,10 +270,11 @@ pub fn without_other_modes(scene: &Scene, points: Vec<MeasuredPoint>) -> Vec<Mea
     else {
         return points;
     };
-    let numbers = scene.dimensionless();
     let moved = |mut point: MeasuredPoint| {
+        let definition = scene.definition().at_phase(point.phase);
+        let numbers = Dimensionless { definition, ..scene.dimensionless() };
         let response = point.response.value * structure.reading_per_response().abs();
-        let all = with_response(&orbits, response, point.omega.value)?;
+        let all = with_response(&orbits.clone().with_target(point.phase), response, point.omega.value)?;
         let all = of_driven_mode(&all, structure, &numbers);
         let alone = at_amplitude(&numbers, point.response.value / numbers.b)?;
         point.omega.value += numbers.omega0 * (alone.omega - all.omega);

@@ -1,8 +1,9 @@
 //! Guards the fit of a rig's parameters to points of its backbone: exact points, noise, points that do not belong, and what is refused.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use lovines::Cavity;
+use lovines::cavity::GRAVITY;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use vines_model::numerics::Estimate;
@@ -54,6 +55,7 @@ fn measured(motions: impl Iterator<Item = [f64; 3]>, uncertainty: f64, seed: u64
         response: estimate(response, uncertainty),
         omega: estimate(omega, 0.01 * uncertainty),
         drive: estimate(drive, uncertainty),
+        phase: -FRAC_PI_2,
     };
     motions.map(point).collect()
 }
@@ -164,6 +166,7 @@ fn a_local_minimum_does_not_reject_the_right_model() {
         response: Estimate { value: a, uncertainty: u_a },
         omega: Estimate { value: f, uncertainty: u_f }.scaled(std::f64::consts::TAU),
         drive: Estimate { value: e, uncertainty: u_e },
+        phase: -FRAC_PI_2,
     });
     let expected = Parameters {
         primary_mass: 1.0,
@@ -346,6 +349,99 @@ fn recorded_on(rig: Parameters, settings: &str) -> Recording {
         response: kept.iter().map(|one| one.response).collect(),
         drive: kept.iter().map(|one| one.reference.unwrap()).collect(),
     }
+}
+
+/// Points of the rig at these phase targets, degrees, in turn.
+fn points_at(phases: &[f64], uncertainty: f64, seed: u64) -> Vec<MeasuredPoint> {
+    let at = |n: usize| phases[n % phases.len()].to_radians();
+    let motions = (0..12).map(|n| {
+        let definition = Definition::default().at_phase(at(n));
+        let d = Dimensionless { definition, ..Dimensionless::of(&RIG, 0.0) };
+        let [omega, c, g] = backbone_at_speed(&d, 0.7 + 0.03 * n as f64).unwrap();
+        [c * d.b, d.omega0 * omega, d.amplitude(g)]
+    });
+    let points = measured(motions, uncertainty, seed).into_iter().enumerate();
+    points
+        .map(|(n, point)| MeasuredPoint { phase: at(n), ..point })
+        .collect()
+}
+
+#[test]
+fn points_at_any_phase_target_give_the_parameters_and_taken_for_phase_resonance_they_do_not() {
+    for phases in [&[-80.0][..], &[-110.0], &[-60.0], &[-90.0, -80.0, -100.0]] {
+        for seed in [0, 5] {
+            let points = points_at(phases, 1e-3, seed);
+            let fit = fitted(&points, &[]).unwrap();
+            let most = if seed == 0 { 1e-3 } else { 3.0 };
+            assert!(
+                worst(&fit) < most && !fit.is_rejected(),
+                "{phases:?}: {}, {fit:?}",
+                worst(&fit)
+            );
+            assert!(
+                contradiction(&points, Definition::default(), &RIG).is_none(),
+                "{phases:?}"
+            );
+        }
+        // Read as points of phase resonance they have other parameters, or none.
+        let mut points = points_at(phases, 1e-3, 5);
+        points.iter_mut().for_each(|point| point.phase = -FRAC_PI_2);
+        assert!(
+            contradiction(&points, Definition::default(), &RIG).is_some(),
+            "{phases:?}"
+        );
+    }
+}
+
+#[test]
+fn the_effect_that_explains_points_at_another_phase_target_is_found_at_this_phase() {
+    let friction = Cavity { kinetic_friction: 0.05, ..Cavity::IDEAL };
+    let (rig, phase) = (Parameters { cavity: friction, ..RIG }, -80_f64.to_radians());
+    let definition = Definition::default().at_phase(phase);
+    let motions = (0..10).map(|n| {
+        let motion = resonant_motion(&rig, definition, (0.36 + 0.03 * f64::from(n)) * RIG.half_width, None).unwrap();
+        [motion.response.norm(), motion.omega, motion.amplitude]
+    });
+    let points: Vec<MeasuredPoint> = measured(motions, 1e-4, 12)
+        .into_iter()
+        .map(|point| MeasuredPoint { phase, ..point })
+        .collect();
+    let known = ["b=0.0095±0.00003", "epsilon=0.00923±0.00003"].map(|one| one.parse().unwrap());
+    let found = explain(&points, Definition::default(), &wrong_scene().plant, &known, |_| {}).unwrap();
+    let best = found.explains().unwrap();
+    let off = (best.strength.value - 0.05) / best.strength.uncertainty;
+    assert!(
+        best.effect == Effect::Friction && off.abs() < 3.0,
+        "{:?}",
+        best.report()
+    );
+}
+
+#[test]
+fn a_recording_at_another_phase_target_gives_the_parameters_at_this_phase_and_is_else_refused_with_the_phase() {
+    let record = recorded(" chain.snr=60 controller.phase_target=-80");
+    let measurements = Measurements { recordings: vec![record], ..Measurements::default() };
+    let error = find(&measurements, &wrong_scene(), |_| {}).unwrap_err().to_string();
+    for part in [
+        "is -80.0 degrees (median)",
+        "asks for -90 degrees",
+        "controller.phase_target=-80.0",
+    ] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    let at_80 = scene("plant.r=0.75 plant.b=0.0105 plant.c=3.5 plant.k=11600 plant.M=3.9 controller.phase_target=-80");
+    let points: Vec<MeasuredPoint> = parts(&measurements.recordings, &at_80)
+        .unwrap()
+        .concat()
+        .iter()
+        .filter_map(|part| part.point)
+        .collect();
+    let fit = fit(&points, at_80.definition(), &at_80.plant, &[]).unwrap();
+    assert!(
+        points.len() >= 4 && worst(&fit) < 3.0 && !fit.is_rejected(),
+        "{}, {fit:?}",
+        worst(&fit)
+    );
 }
 
 /// Keeps what is read before each step.
@@ -601,6 +697,22 @@ fn without_knowns_an_ideal_fit_says_which_cavity_would_give_the_same_points() {
     assert!(!found.fit.is_rejected() && found.explanation.is_none(), "{found:?}");
     let effects: Vec<Effect> = found.alternatives.iter().map(|one| one.effect).collect();
     assert!(effects.contains(&Effect::Friction), "{effects:?}");
+    // No rig that is built with care has a stronger effect, whatever the points allow.
+    let strong = 0.05 * RIG.half_width * RIG.natural_frequency().powi(2);
+    for one in &found.alternatives {
+        let most = match one.effect {
+            Effect::Friction => 1.2 * strong / GRAVITY,
+            Effect::Tilt => 1.2 * (2.0 * strong / GRAVITY).to_degrees(),
+            Effect::Hardening => 1.2 * 0.05 * RIG.mass_ratio(),
+            Effect::Viscoelastic | Effect::Plastic => f64::INFINITY,
+        };
+        let b = one.report().possible_b_m / RIG.half_width;
+        assert!(
+            one.strength.value.abs() < most && (0.5..2.0).contains(&b),
+            "{:?}",
+            one.report()
+        );
+    }
     // So does one without a point that contradicts the others.
     let mut strange = measured.clone();
     strange.points[4].drive.value *= 1.01;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use phase_lock::{PARAMETERS, Parameter};
-use vines_testbench::scene::key;
+use vines_testbench::scene::{KEYS, key};
 
 /// The end of what stands above the rows.
 const HEAD: &str = "|---|---|---|---|---|---|\n";
@@ -32,7 +32,10 @@ fn the_page_of_the_settings_follows_from_the_table_and_the_keys_of_a_scene() {
         let Parameter { name, unit, .. } = parameter;
         let (allowed, meaning) = (allowed(parameter), parameter.description().trim_end_matches('.'));
         let (initial, key) = (initial(parameter), key(name));
-        format!("| `{name}` | {unit} | {allowed} | {initial} | `{key}` | {meaning} |\n")
+        let own = KEYS.iter().find(|(parameter, ..)| parameter == name);
+        let own = own.map_or("", |(.., unit)| unit);
+        let comma = if own.is_empty() { "" } else { ", " };
+        format!("| `{name}` | {unit} | {allowed} | {initial} | `{key}`{comma}{own} | {meaning} |\n")
     });
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/controller-settings.md");
     let present = std::fs::read_to_string(&path).unwrap();

@@ -5,7 +5,7 @@ use vines::comparison::{TrackedComparison, TrackedPoint};
 use vines::experiment::ExperimentError;
 use vines::identification::Regime;
 use vines::loop_check::check;
-use vines::plan::{LinearResponse, Plan};
+use vines::plan::Plan;
 use vines::rig::{BuiltIn, ControllerError, Rig, SensorsOnly, Simulated};
 use vines::scene::{Parameters, Scene};
 
@@ -126,23 +126,6 @@ fn tracked_from_sensors(
         plan = scene.plan_on(plan.knowledge.measured(linear.response));
     }
     tracked_by(&mut rig, &scene, &plan)
-}
-
-#[test]
-fn a_point_is_unexplained_only_beyond_the_uncertainty_of_the_measured_damping() {
-    let scene = scene("backbone.points=3 backbone.C_from=0.6 backbone.C_to=0.4");
-    let plan = scene.plan();
-    let unexplained = |uncertainty: f64| {
-        let true_linear = plan.knowledge.linear;
-        let measured = LinearResponse {
-            damping_rate: 1.17 * true_linear.damping_rate,
-            uncertainty: uncertainty * true_linear.damping_rate,
-            ..true_linear
-        };
-        let plan = scene.plan_on(plan.knowledge.measured(measured));
-        tracked_by(&mut *rig(&scene), &scene, &plan).unwrap().unexplained()
-    };
-    assert_eq!([0.1, 0.05].map(unexplained), [0, 3]);
 }
 
 #[test]

@@ -1,8 +1,12 @@
 //! Guards the program as its users meet it: output, exit codes and messages.
 
+use std::f64::consts::TAU;
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
+
+use vines::orbit::backbone_at_speed;
+use vines::scene::Scene;
 
 use crate::{fails, json, text, vines};
 
@@ -282,6 +286,129 @@ fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
         let other = r(&format!("fit {file}{columns} --json"));
         assert!((one / other - 1.0).abs() < 1e-7, "{one} {other}");
     }
+}
+
+#[test]
+fn a_backbone_at_another_phase_target_agrees_with_its_scene_and_gives_its_parameters() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display();
+    for phase in ["-80", "-105"] {
+        let tracked = vines(&format!(
+            "backbone --set controller.phase_target={phase} --set backbone.points=8 --out {out}"
+        ));
+        assert!(tracked.status.success(), "{tracked:?}");
+        assert!(!text(&tracked).contains("do not belong"), "{tracked:?}");
+        let table = fs::read_to_string(folder.path().join("tracked.csv")).unwrap();
+        let place = table
+            .lines()
+            .next()
+            .unwrap()
+            .split(',')
+            .position(|name| name == "phase_target_deg");
+        for row in table.lines().skip(1) {
+            let value: f64 = row.split(',').nth(place.unwrap()).unwrap().parse().unwrap();
+            assert_eq!(value, phase.parse::<f64>().unwrap());
+        }
+        for file in ["tracked.csv", "tracked.json"] {
+            let fit = json(&format!("fit {out}/{file} --set plant.r=0.75 --json"));
+            assert_eq!(fit["describes"], true, "{phase}, {file}");
+            let truth = Scene::load(None, &[]).unwrap().dimensionless();
+            for (n, value) in [(2, 0.65), (3, truth.b), (4, truth.epsilon)] {
+                let [found, u] = ["value", "uncertainty"].map(|name| fit["parameters"][n][name].as_f64().unwrap());
+                assert!(
+                    (found - value).abs() < 3.0 * u && u < 0.05 * value,
+                    "{phase}, {n}: {found} ± {u}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_phase_target_in_rad_is_refused_with_its_value_in_degrees() {
+    fails(
+        "backbone --set controller.phase_target=-1.5708",
+        2,
+        "controller.phase_target = -1.5708 degrees",
+    );
+    fails("identify --set controller.phase_target=-1.5708", 2, "write -90.0002");
+    for wrong in ["0", "180", "-200", "3.1415"] {
+        fails(
+            &format!("orbit --set controller.phase_target={wrong}"),
+            2,
+            "above pi in magnitude and below 180",
+        );
+    }
+}
+
+/// A table of twelve points of the default rig with these columns beside them, in a layout. The drive of the last four is twice the right one.
+fn table_of_points(head: &str, cells: impl Fn(usize) -> String, [delimiter, mark]: [&str; 2]) -> String {
+    let d = Scene::load(None, &[]).unwrap().dimensionless();
+    let names = ["f_Hz", "A_m", "E_m", "u_f_Hz", "u_A_m", "u_E_m"];
+    let head = [names.join(delimiter), head.replace(',', delimiter)].join(delimiter);
+    let rows = (0..12).map(|n| {
+        let [omega, c, g] = backbone_at_speed(&d, 0.75 + 0.025 * n as f64).unwrap();
+        let drive = d.amplitude(g) * if n < 8 { 1.0 } else { 2.0 };
+        let (f, a) = (omega * d.omega0 / TAU, c * d.b);
+        let numbers =
+            [f, a, drive, 1e-5 * f, 1e-3 * a, 1e-3 * drive].map(|one| format!("{one:.12}").replace('.', mark));
+        [numbers.join(delimiter), cells(n)].join(delimiter)
+    });
+    format!("{head}\n{}\n", rows.collect::<Vec<String>>().join("\n"))
+}
+
+#[test]
+fn truth_values_of_tables_are_read_in_every_dialect_and_unknown_words_are_refused_with_their_row() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("table.csv");
+    let out = file.display();
+    for (words, layout) in [
+        (["true", "false"], [",", "."]),
+        (["True", "False"], [",", "."]),
+        (["TRUE", "FALSE"], ["\t", "."]),
+        (["WAHR", "FALSCH"], [";", ","]),
+        (["wahr", "falsch"], [",", "."]),
+        (["1", "0"], [",", "."]),
+        (["1.0", "0.0"], [",", "."]),
+        (["1,0", "0,0"], [";", ","]),
+    ] {
+        for column in ["settled", "reached"] {
+            let cell = |n: usize| words[usize::from(n >= 8)].to_string();
+            fs::write(&file, table_of_points(column, cell, layout)).unwrap();
+            let fit = json(&format!("fit {out} --json"));
+            let count = fit["residuals"].as_array().unwrap().len();
+            assert!(count == 8 && fit["describes"] == true, "{words:?} {column}: {fit}");
+        }
+    }
+    for column in ["settled", "reached"] {
+        for word in ["ja", "yes", "2", "", "nan"] {
+            let cell = |n: usize| if n == 2 { word.to_string() } else { "true".into() };
+            fs::write(&file, table_of_points(column, cell, [",", "."])).unwrap();
+            fails(
+                &format!("fit {out}"),
+                2,
+                &format!("row 3: {column} = `{word}` is not known; allowed is true or false"),
+            );
+        }
+    }
+    for (column, right, word) in [
+        ("motion", "nonlinear, symmetric", "symmetric"),
+        ("regime", "symmetric 1:1", "1:1"),
+    ] {
+        let cell = |n: usize| if n == 4 { word.to_string() } else { right.into() };
+        fs::write(&file, table_of_points(column, cell, [";", "."])).unwrap();
+        fails(
+            &format!("fit {out}"),
+            2,
+            &format!("row 5: {column} = `{word}` is not known"),
+        );
+    }
+    fs::write(
+        &file,
+        table_of_points("phase_target_deg", |_| "-1.5708".into(), [",", "."]),
+    )
+    .unwrap();
+    fails(&format!("fit {out}"), 2, "row 1: phase_target_deg = -1.5708 degrees");
 }
 
 #[test]

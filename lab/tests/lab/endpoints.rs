@@ -222,15 +222,19 @@ fn measured_points_of_another_rig_end_with_the_parameters_that_fit_instead() {
 }
 
 #[test]
-fn a_backbone_without_a_single_impact_is_a_failure() {
-    for (check, part) in [("", "without impacts"), ("--no-check", "is not established")] {
+fn a_backbone_without_a_single_nonlinear_point_is_a_failure_and_is_told_without_a_particle() {
+    for (check, part) in [("", "near the linear response"), ("--no-check", "is not established")] {
         // The cavity is too wide for the particle to reach its walls.
         let rig = Server::start("rig --lock-step --sensors-only --set=plant.b=1");
         let done = run(&format!("backbone --rig {} {FEW} {check}", rig.1));
         let table = String::from_utf8_lossy(&done.stdout);
         assert_eq!(done.status.code(), Some(1), "{done:?}");
         assert!(String::from_utf8_lossy(&done.stderr).contains(part), "{done:?}");
-        assert!(table.contains("3 points") && !table.contains("1:1"), "{table}");
+        let told = table.to_string() + &String::from_utf8_lossy(&done.stderr);
+        assert!(table.contains("3 points"), "{table}");
+        for word in ["1:1", "impact", "particle", "sigma", "regime", "theory", "exact"] {
+            assert!(!told.contains(word), "{word}: {told}");
+        }
     }
 }
 

@@ -72,9 +72,9 @@ pub enum DriveCondition {
     Omega(f64),
     /// The amplitude of the base, m.
     Amplitude(f64),
-    /// The first harmonic of the response lags the reference by a quarter of a period.
+    /// The first harmonic of the response has the phase of the definition relative to the reference: at phase resonance it lags by a quarter of a period.
     PhaseResonance,
-    /// The part of the response's first harmonic that lags the reference by a quarter of a period, m.
+    /// The part of the response's first harmonic that has this phase, m.
     Response(f64),
     /// Response and frequency lie on a line: the place of a curve that crosses it, also where amplitude or frequency have an extremum.
     Across {
@@ -588,14 +588,16 @@ struct Turn {
 impl Equations<6> for Solver<'_> {
     fn at(&mut self, x: &Unknowns) -> Option<(Unknowns, Matrix6<f64>)> {
         let turn = self.turn(x)?;
-        let response = turn.response / self.scale[0];
+        // The phase of the definition becomes a lag of a quarter of a period.
+        let turned = Complex::from_polar(1.0, -FRAC_PI_2 - self.definition.phase);
+        let response = turn.response * turned / self.scale[0];
         let (mut residual, mut jacobian) = (Unknowns::zeros(), Matrix6::zeros());
         residual.fixed_rows_mut::<4>(0).copy_from(&turn.apart);
         let closing = turn.by - SMatrix::<f64, 4, 6>::identity();
         jacobian.fixed_rows_mut::<4>(0).copy_from(&closing);
         let unit = |n: usize| Unknowns::from_fn(|column, _| f64::from(u8::from(column == n)));
         let [in_phase, lagging] = [|z: &Complex<f64>| z.re, |z: &Complex<f64>| z.im]
-            .map(|part| Unknowns::from(turn.response_by.each_ref().map(part)));
+            .map(|part| Unknowns::from(turn.response_by.map(|by| part(&(by * turned)))));
         for (row, condition) in [4, 5].into_iter().zip(self.conditions) {
             let (value, by) = match condition {
                 DriveCondition::Omega(omega) => (x[4] - omega / self.scale[4], unit(4)),

@@ -333,7 +333,7 @@ impl StructureOrbits {
 
     /// The orbits of the study's oscillator, dimensionless.
     pub(super) fn of(scene: &Dimensionless) -> Self {
-        let Definition { reference, sensor, .. } = scene.definition;
+        let Definition { reference, sensor, phase, .. } = scene.definition;
         Self {
             excitation: Excitation::Base,
             sections: vec![section(scene.epsilon * scene.lambda)],
@@ -342,7 +342,7 @@ impl StructureOrbits {
             reference: None,
             of_particle: f64::from(u8::from(sensor == Sensor::V)),
             by_force: reference == Reference::Force,
-            target: -FRAC_PI_2,
+            target: phase,
         }
     }
 
@@ -476,7 +476,12 @@ impl StructureOrbits {
             numbers: Dimensionless {
                 omega0,
                 b: half_width,
-                definition: Definition { reference, sensor: Sensor::Q1, ..Definition::default() },
+                definition: Definition {
+                    reference,
+                    sensor: Sensor::Q1,
+                    phase: self.target,
+                    ..Definition::default()
+                },
                 ..Dimensionless::new(epsilon, 2.0 * delta / (epsilon * omega0), restitution, 0.0)
             },
             base_per_drive: cavity / omega0_squared.hypot(2.0 * delta * omega0),
@@ -520,9 +525,10 @@ impl StructureOrbits {
     /// beyond which symmetric motions are unstable.
     pub fn range(&self, driven: usize, points: usize) -> Option<StructureRange> {
         const FASTEST: f64 = 1.5;
-        let Dimensionless { omega0, b, epsilon, lambda, r, .. } = self.first_order(driven)?.numbers;
+        let Dimensionless { omega0, b, epsilon, lambda, r, definition, .. } = self.first_order(driven)?.numbers;
         let flow = SlowFlow::new(lambda, r);
-        let detunings = equally_spaced(0.0, FASTEST, GRID).map(|speed| flow.free_detuning(speed));
+        let detunings =
+            equally_spaced(0.0, FASTEST, GRID).map(|speed| flow.detuning_at(speed, definition.off_resonance()));
         let (low, high) = numerics::range((0.0, 0.0), detunings);
         // First-order theory leaves out detunings of order epsilon, and other modes.
         let omega = [low - 1.0, high + 1.0].map(|sigma| (1.0 + epsilon * sigma).clamp(SEARCHED[0], SEARCHED[1]));

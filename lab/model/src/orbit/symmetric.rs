@@ -459,7 +459,7 @@ pub fn backbone_at_speed(scene: &Dimensionless, speed: f64) -> Option<[f64; 3]> 
 pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Orbit> {
     let Dimensionless { epsilon, lambda, r, .. } = *scene;
     let flow = SlowFlow::new(lambda, r);
-    let guess = 1.0 + epsilon * flow.free_detuning(speed);
+    let guess = 1.0 + epsilon * flow.detuning_at(speed, scene.definition.off_resonance());
     // Of the first-order response; the exact one turns through half a circle without dissipation, too.
     let direction = Complex::new((flow.manifold.dissipation + epsilon) * speed, 1.0 - FRAC_PI_2 * speed);
     let orbits = StructureOrbits::of(scene);

@@ -15,7 +15,10 @@ use crate::{Dimensionless, Sensor};
 /// the sensor reads.
 pub fn resonant(scene: &Dimensionless) -> Vec<BackbonePoint> {
     let theory = Reading::of(scene);
-    let points = theory.flow.phase_resonant(scene.g).into_iter();
+    let points = theory
+        .flow
+        .phase_resonant(scene.g * scene.definition.off_resonance().cos())
+        .into_iter();
     points
         .filter_map(|point| theory.speed(point.b).map(|b| theory.resonance(b)))
         .collect()
@@ -98,7 +101,7 @@ impl<'a> Reading<'a> {
     /// Phase of v, rad, at which the motion of the particle speed `b` is resonant.
     fn phase(&self, b: f64) -> f64 {
         let Dimensionless { epsilon, lambda, definition, .. } = *self.scene;
-        definition.reference.phase(epsilon * lambda, 1.0) - FRAC_PI_2 - self.seen(b).arg()
+        definition.reference.phase(epsilon * lambda, 1.0) + definition.phase - self.seen(b).arg()
     }
 
     fn resonance(&self, b: f64) -> BackbonePoint {

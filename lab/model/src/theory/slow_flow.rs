@@ -108,6 +108,11 @@ impl SlowFlow {
         FRAC_2_PI * b * (1.0 - FRAC_PI_2 * b) / self.manifold.c(b).powi(2)
     }
 
+    /// The detuning at which a drive holds the particle speed `b` with v `off` beyond phase resonance, rad: `sigma_R - tan(off) loss/(2 C^2)` (eq. 12).
+    pub fn detuning_at(&self, b: f64, off: f64) -> f64 {
+        self.free_detuning(b) - off.tan() * self.loss(b) / (2.0 * self.manifold.c(b).powi(2))
+    }
+
     /// `points` points of the free decay along the manifold from the particle speed `b` on the right branch down to the fold, at equal steps
     /// of B, each with the slow time `epsilon omega0 t` since the release; None left of the fold, or without dissipation.
     pub fn decay(&self, b: f64, points: usize) -> Option<Vec<(f64, BackbonePoint)>> {

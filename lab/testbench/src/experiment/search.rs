@@ -418,8 +418,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         *confirmed = if criterion.is_met(&estimate) { *confirmed + 1 } else { 0 };
         let is_long = self.cycles.len() >= LONGEST;
         if let Some(why) = estimate.unsteady.filter(|_| is_long && *confirmed == 0) {
-            let (periods, c) = (self.cycles.len(), leg.response / self.b);
-            return Err(ExperimentError::NotSteady { periods, c, why });
+            let (periods, response) = (self.cycles.len(), leg.response);
+            return Err(ExperimentError::NotSteady { periods, response, why });
         }
         let settled = is_long || *confirmed >= CONFIRMED;
         if settled {
@@ -553,6 +553,11 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// The requested drive was not reached.
     fn not_reached(&self) -> ExperimentError {
         let (d, (low, high)) = (self.bench.plan.knowledge.numbers, self.held);
+        let is_silent = self
+            .bench
+            .samples
+            .last()
+            .is_some_and(|sample| sample.ground_truth.is_none());
         let of = |leg: Leg| [d.excitation(leg.drive), leg.response / d.b, d.sigma(leg.omega)];
         let found = SearchFound {
             tried: [self.tried.0, self.tried.1].map(|response| response / d.b),
@@ -564,6 +569,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             requested: d.g,
             lost: self.lost,
             unsettled: self.unsettled,
+            silent: is_silent.then_some(d.b),
         };
         ExperimentError::NotReached { periods: self.bench.periods, found: found.into() }
     }

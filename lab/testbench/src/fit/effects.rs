@@ -20,8 +20,8 @@ use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_
 
 use super::{
     FEWEST, Fit, FitError, Known, LEFT_OUT, LIMITS, LinearVerdict, MeasuredPoint, Nearest, Part, Problem, Quantity,
-    REJECTED, RecordFit, Recording, UNKNOWNS, Unknowns, across, at, checked, fit, follow, gradient, linear_verdicts,
-    parts, plant, shifted,
+    REJECTED, RecordFit, Recording, RecordingError, UNKNOWNS, Unknowns, across, at, checked, fit, follow, gradient,
+    linear_verdicts, parts, plant, shifted,
 };
 use crate::linear::MeasuredLinear;
 use crate::scene::{Parameters, Scene};
@@ -65,7 +65,7 @@ const NEAR: f64 = 1e-3;
 const FOUND: f64 = 1e-4;
 /// Smallest strength, over that from which the search begins.
 const SMALLEST: f64 = 1e-3;
-/// Strengths from which a search begins, a typical, a weak and a strong one, over that which gives the particle the acceleration `b omega0²`, or the
+/// Strengths from which a search begins, a typical, a weak and a strong one, the largest of a rig that is built with care, over that which gives the particle the acceleration `b omega0²`, or the
 /// suspension the additional stiffness `m omega0²`: a typical friction and tilt are about 0.03 and 2 degrees on the default rig.
 const STRENGTHS: [f64; 3] = [0.01, 0.001, 0.05];
 /// Smallest step to the largest strength that points allow, as a factor.
@@ -281,6 +281,8 @@ pub struct Found {
     pub record: Option<RecordFit>,
     /// Why their points are fitted instead.
     pub points_instead: Option<String>,
+    /// Recordings that are far from the phase target half of the time in which the base moves.
+    pub off_target: Vec<String>,
     /// What the effects say, if the ideal cavity does not describe all points.
     pub explanation: Option<Explanation>,
     /// If the ideal cavity describes the points: effects that describe them as well, with a half-width outside the interval of the fit.
@@ -298,11 +300,20 @@ pub fn find(measured: &Measurements, scene: &Scene, mut progress: impl FnMut(usi
     let parts = parts(recordings, scene)?;
     let of_parts = parts.iter().flatten().filter_map(|part| part.point);
     let points: Vec<MeasuredPoint> = measured_points.iter().copied().chain(of_parts).collect();
-    let linear = linear_verdicts(linear, &points, definition, expected, known)?;
-    let of_linear = linear.iter().map(|one| Known::Linear(one.linear));
-    let known: Vec<Known> = known.iter().copied().chain(of_linear).collect();
     let prepared = recordings.iter().map(|one| one.prepared(&scene.knowledge()));
     let prepared: Vec<Recording> = prepared.collect::<Result<_, _>>()?;
+    let off_target: Vec<String> = prepared
+        .iter()
+        .filter_map(|one| one.off_target(&scene.knowledge()))
+        .collect();
+    // Too few points say less than why there are no more.
+    let why = |error: FitError| match off_target.first() {
+        Some(message) => RecordingError::new(message.clone()).into(),
+        None => error,
+    };
+    let linear = linear_verdicts(linear, &points, definition, expected, known).map_err(why)?;
+    let of_linear = linear.iter().map(|one| Known::Linear(one.linear));
+    let known: Vec<Known> = known.iter().copied().chain(of_linear).collect();
     let followed = match recordings[..] {
         [] => None,
         _ => follow(&prepared, &parts, measured_points, definition, expected, &known),
@@ -321,9 +332,9 @@ pub fn find(measured: &Measurements, scene: &Scene, mut progress: impl FnMut(usi
         Some(record) => record.fit.clone(),
         // Nothing that was measured shows impacts.
         None if points.is_empty() && !recordings.is_empty() => {
-            return Err(recordings[0].without_points(&parts[0]).into());
+            return Err(prepared[0].without_points(&parts[0], &scene.knowledge()).into());
         }
-        None => fit(&points, definition, expected, &known)?,
+        None => fit(&points, definition, expected, &known).map_err(why)?,
     };
     let mut found = Found {
         plant: fit.plant(expected),
@@ -333,6 +344,7 @@ pub fn find(measured: &Measurements, scene: &Scene, mut progress: impl FnMut(usi
         linear,
         record,
         points_instead,
+        off_target,
         explanation: None,
         alternatives: Vec::new(),
     };
@@ -415,7 +427,7 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// The fit with the largest strength that the points allow. Half-width and mass ratio make up for an effect, so that all strengths up to this one give
+    /// The fit with the largest strength that the points allow, at most a strong one. Half-width and mass ratio make up for an effect, so that all strengths up to this one give
     /// the same points, and a search for the strength ends anywhere between. With a given strength the other parameters have one place: from a weak
     /// effect on the strength is doubled, and where this goes too far, by less and less.
     fn strongest(
@@ -429,12 +441,17 @@ impl Problem<'_> {
         let mut x = ideal.x;
         x[6] = sign * effect.start(&ideal.x, STRENGTHS[1])[6];
         let mut best = held(x)?;
-        let (mut before, mut factor) = (ideal.x, 2.0);
+        let (mut before, mut factor) = (ideal.x, 2.0_f64);
         before[6] = 0.0;
+        let strong = effect.start(&ideal.x, STRENGTHS[2])[6];
         for _ in 0..ROUNDS {
             // On the straight line through the last two.
             let here = best.fit.x;
-            let further = (factor - 1.0) * here[6] / (here[6] - before[6]);
+            let left = strong / here[6].abs();
+            if left < FINEST {
+                break;
+            }
+            let further = (factor.min(left) - 1.0) * here[6] / (here[6] - before[6]);
             match held(here + (here - before) * further) {
                 Some(next) => (before, best) = (here, next),
                 None if factor < FINEST => break,
@@ -522,8 +539,13 @@ struct Place {
 }
 
 impl PlantCurve<'_> {
-    /// The motion near `near` on the line across the curve `ahead` of it.
-    fn motion(&self, x: &Unknowns, near: &PlantMotion, tangent: [f64; 2], ahead: f64) -> Option<PlantMotion> {
+    /// The definition of resonance at the phase of a point.
+    fn definition(&self, n: usize) -> Definition {
+        self.problem.definition.at_phase(self.problem.points[n].phase)
+    }
+
+    /// The motion at the phase of a point near `near` on the line across the curve `ahead` of it.
+    fn motion(&self, x: &Unknowns, n: usize, near: &PlantMotion, tangent: [f64; 2], ahead: f64) -> Option<PlantMotion> {
         if !(0.0 < x[2] && x[2] <= 1.0) {
             return None;
         }
@@ -534,7 +556,7 @@ impl PlantCurve<'_> {
         ];
         let across = DriveCondition::Across { at, normal: tangent };
         let conditions = [DriveCondition::PhaseResonance, across];
-        periodic_motion(&self.plant(x), self.problem.definition, near, conditions).ok()
+        periodic_motion(&self.plant(x), self.definition(n), near, conditions).ok()
     }
 
     fn plant(&self, x: &Unknowns) -> Parameters {
@@ -548,8 +570,8 @@ impl PlantCurve<'_> {
 
     /// As [`PlantCurve::motion`], for a point.
     fn place(&self, x: &Unknowns, n: usize, near: &PlantMotion, tangent: [f64; 2], ahead: f64) -> Option<Place> {
-        let motion = self.motion(x, near, tangent, ahead)?;
-        let next = self.motion(x, &motion, tangent, STEP)?;
+        let motion = self.motion(x, n, near, tangent, ahead)?;
+        let next = self.motion(x, n, &motion, tangent, STEP)?;
         let [length, rate] = units(x);
         let change = [
             (next.response.norm() - motion.response.norm()) / length,
@@ -571,7 +593,7 @@ impl PlantCurve<'_> {
         let points = &self.problem.points;
         let order = self.problem.by_falling_response();
         let largest = points[order[0]].response.value;
-        let mut near = resonant_motion(&self.plant(x), self.problem.definition, largest, None).ok()?;
+        let mut near = resonant_motion(&self.plant(x), self.definition(order[0]), largest, None).ok()?;
         let (mut tangent, mut places) = ([1.0, 0.0], Vec::new());
         for n in order {
             let mut place = self.place(x, n, &near, tangent, 0.0)?;
@@ -619,7 +641,7 @@ impl Misfit<UNKNOWNS> for PlantCurve<'_> {
         self.problem.rows(x, at.iter().map(|place| place.along), |n, i| {
             let step = if i == 6 { STEP * x[6] } else { STEP };
             let slope = |step: f64| {
-                let motion = self.motion(&shifted(x, i, step), &at[n].motion, at[n].tangent, 0.0)?;
+                let motion = self.motion(&shifted(x, i, step), n, &at[n].motion, at[n].tangent, 0.0)?;
                 Some((self.residual(n, &motion) - at[n].residual) / step)
             };
             slope(step).or_else(|| slope(-step))

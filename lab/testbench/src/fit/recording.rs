@@ -12,7 +12,7 @@
 //! not reduce them: each counts with the factor √n.
 
 use std::collections::BTreeSet;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::fmt::{self, Display, Formatter};
 
 use serde::Serialize;
@@ -194,7 +194,7 @@ impl Recording {
         best_of_each_amplitude(&mut parts);
         let is_seen = 2 * anchors.iter().filter(|anchor| anchor.response.is_some()).count() >= anchors.len();
         if !is_seen && parts.iter().all(|part| part.candidate.is_none()) {
-            return Err(self.nothing(&parts, linear));
+            return Err(self.nothing(&parts, knowledge));
         }
         Ok(parts)
     }
@@ -412,7 +412,8 @@ impl Recording {
     }
 
     /// Why less than half of the recording has an oscillation near the natural frequency.
-    fn nothing(&self, parts: &[Part], linear: &LinearResponse) -> RecordingError {
+    fn nothing(&self, parts: &[Part], knowledge: &Knowledge) -> RecordingError {
+        let linear = &knowledge.linear;
         let Self { origin, channels: [response, _], .. } = self;
         let (hertz, strongest, rate) = (linear.omega0 / TAU, self.strongest(), 1.0 / self.sample_time);
         if (strongest / hertz - 1.0).abs() > FARTHEST {
@@ -421,17 +422,42 @@ impl Recording {
                  If the rate of {rate:.6} samples a second is wrong, give it with --rate; if the scene is wrong, give stiffness and mass with --scene"
             ));
         }
-        self.without_points(parts)
+        self.without_points(parts, knowledge)
     }
 
-    /// That nothing in the recording shows 1:1.
-    pub(super) fn without_points(&self, parts: &[Part]) -> RecordingError {
+    /// That the base moves, but half of the time far from the phase target, where a part gives no point. The recording is prepared.
+    pub(super) fn off_target(&self, knowledge: &Knowledge) -> Option<String> {
+        let (knowledge, target) = (self.knowledge(knowledge), knowledge.target.phase);
+        let error = |anchor: &Anchor| {
+            let error = anchor.response?.phase - anchor.drive?.phase - target;
+            Some(error - TAU * (error / TAU).round())
+        };
+        let mut errors: Vec<f64> = self.anchors(&knowledge).iter().filter_map(error).collect();
+        errors.sort_by(f64::total_cmp);
+        let (periods, error) = (errors.len(), *errors.get(errors.len() / 2)?);
+        let phase = target + error;
+        let phase = (phase - TAU * (phase / TAU).round()).to_degrees();
+        let Self { origin, channels: [response, drive], .. } = self;
+        (error.abs() > PHASE_RANGE).then(|| {
+            format!(
+                "{origin}: in the {periods} periods in which the base {drive} moves, the phase of the response {response} relative to it is {phase:.1} degrees \
+                 (median), and the scene asks for {} degrees. If the rig was held at this phase, give it: --set controller.phase_target={phase:.1}",
+                knowledge.numbers.definition.phase_in_degrees()
+            )
+        })
+    }
+
+    /// That nothing in the recording shows 1:1. The recording is prepared.
+    pub(super) fn without_points(&self, parts: &[Part], knowledge: &Knowledge) -> RecordingError {
         let Self { origin, channels: [response, drive], .. } = self;
         let regimes: BTreeSet<String> = parts.iter().map(|part| part.regime.to_string()).collect();
         let found = match regimes.into_iter().collect::<Vec<_>>().join(", ") {
             none if none.is_empty() => "no such stretch".into(),
             some => format!("found: {some}"),
         };
+        if let Some(message) = self.off_target(knowledge) {
+            return RecordingError(message);
+        }
         if parts.iter().all(|part| part.kind == Kind::Decay) && self.drive_is_named() {
             return RecordingError(format!(
                 "{origin}: the base {drive} rests, and the response {response} decays neither without impacts nor with those of a 1:1 motion: is channel \
@@ -439,8 +465,9 @@ impl Recording {
             ));
         }
         RecordingError(format!(
-            "{origin}: no stretch of {LEAST} periods near phase resonance is symmetric 1:1 ({found}). A point needs a held response, a slow sweep, or a \
-             decay, where the response {response} lags the base {drive} by a quarter of a period"
+            "{origin}: no stretch of {LEAST} periods near the phase target is symmetric 1:1 ({found}). A point needs a held response or a slow sweep, \
+             where the phase of the response {response} relative to the base {drive} is {} degrees, or a decay",
+            knowledge.numbers.definition.phase_in_degrees()
         ))
     }
 
@@ -653,15 +680,15 @@ fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], knowle
     let largest = manifold.c(B_SYMMETRY_BREAKING) * knowledge.numbers.b;
     let is_symmetric = regime == Regime::Symmetric || (regime == Regime::Unresolved && level.value < largest);
     let is_another = matches!(regime, Regime::Other | Regime::Asymmetric | Regime::Unknown);
-    let candidate = point(level, omega, drive).filter(|_| !is_another);
+    let candidate = point(level, omega, drive, knowledge.target.phase).filter(|_| !is_another);
     let point = candidate.filter(|_| is_symmetric);
     Part { seconds, kind, point, candidate, regime }
 }
 
-/// A point, if its uncertainties are small enough.
-fn point(response: Estimate, omega: Estimate, drive: Estimate) -> Option<MeasuredPoint> {
+/// A point at a phase of the response relative to the base, rad, if its uncertainties are small enough.
+fn point(response: Estimate, omega: Estimate, drive: Estimate, phase: f64) -> Option<MeasuredPoint> {
     let is_known = drive.uncertainty < LARGEST_DRIVE_UNCERTAINTY * drive.value && omega.uncertainty.is_finite();
-    (drive.value > 0.0 && is_known).then_some(MeasuredPoint { response, omega, drive })
+    (drive.value > 0.0 && is_known).then_some(MeasuredPoint { response, omega, drive, phase })
 }
 
 /// Slopes of drive and frequency over the amplitude.
@@ -715,11 +742,13 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
             let drive = Estimate::new(here[1], &[u_rate / gain, systematic]);
             let omega = Estimate::new(harmonic.omega, &[u_omega, systematic / units[1]]);
             let response = Estimate { value: harmonic.amplitude, uncertainty: u_amplitude };
+            // Without a drive, the motion is the one of phase resonance.
+            let point = point(response, omega, drive, -FRAC_PI_2);
             Part {
                 seconds: [time - half, time + half],
                 kind: Kind::Decay,
-                point: point(response, omega, drive),
-                candidate: point(response, omega, drive),
+                point,
+                candidate: point,
                 regime: Regime::Unresolved,
             }
         })

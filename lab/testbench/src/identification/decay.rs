@@ -131,7 +131,9 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
     let damping = knowledge.linear.damping_rate;
     let taken = |window: &SlidingFit| -window.fit.rate - damping * window.fit.amplitude;
     let at_release = mean(windows.iter().take(PER_PERIOD as usize).map(taken));
-    let is_linear = |window: &SlidingFit| !has_impacts && taken(window) < KEPT * at_release;
+    // A rig that loses no more than its linear damping has no impacts that could end.
+    let may_end = !has_impacts && at_release > 0.0;
+    let is_linear = |window: &SlidingFit| may_end && taken(window) < KEPT * at_release;
     let end = if windows.iter().any(is_linear) {
         DecayEnd::Linear
     } else if has_impacts && until + 2.0 * half_period < last.time {

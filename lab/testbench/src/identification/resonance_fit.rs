@@ -14,6 +14,13 @@
 //! Theta + integral of (g E/A) sin phi = const + omega_R t + domega_R/dA integral of (A - mean A).
 //! ```
 //!
+//! At another phase target, `p` beyond phase resonance, phi is the sum of p and the phase error. The drive `E_p = E_R/cos p` and the frequency
+//! `omega_p = omega_R - (g E_p/A) sin p` then hold A at the target; the left sides become
+//!
+//! ```text
+//! A/cos p - integral of g E (cos - tan p sin) of the error,    Theta + tan p A/mean A + integral of (g E/(A cos p)) sin of the error.
+//! ```
+//!
 //! Both are linear least squares, weighted by the noise that the fits of the periods find. Nothing in them is known of the rig but
 //! `omega0` and the damping. A slope is measured where the amplitude varies and has no influence where it does not; a prior, wide or from
 //! the neighbouring points of the backbone, bounds what noise may make of it.
@@ -96,7 +103,8 @@ impl ResonanceFit {
         let drives = drives(cycles, &motion, calibration);
         // At equal A, the drive belongs to another frequency than `omega_R` by `omega E sin phi/(2 A)`. It grows with the frequency: against damping
         // with omega, of v with its third power where the base moves the damper's other end; against impacts, of q1, with its square.
-        let Definition { sensor, reference, .. } = knowledge.numbers.definition;
+        let definition = knowledge.numbers.definition;
+        let Definition { sensor, reference, .. } = definition;
         let zeta = damping_rate / omega0;
         let lead = match sensor {
             Sensor::V => 2.0 * zeta,
@@ -106,24 +114,27 @@ impl ResonanceFit {
             Reference::Force => -zeta,
         };
         let beyond = |drive: Complex<f64>| lead * drive.im;
+        let (cosine, tangent) = (definition.off_resonance().cos(), definition.off_resonance().tan());
         // The integral of A' is A. Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
         let balanced = motion
             .into_iter()
             .zip(&drives)
             .map(|(cycle, DriveIntegrals { force, work })| {
-                let amplitude = cycle.amplitude - inertia * force.im - gain * (work.re + beyond(*work));
+                let force = force * Complex::from_polar(1.0, definition.off_resonance());
+                let amplitude = cycle.amplitude - inertia * force.im;
+                let turned = tangent * amplitude + gain / cosine * work.im - inertia * force.re;
                 (
-                    amplitude,
-                    cycle.phase + (gain * work.im - inertia * force.re) / response,
+                    amplitude / cosine - gain * (work.re + beyond(*work) - tangent * work.im),
+                    cycle.phase + turned / response,
                 )
             });
         let (amplitudes, phases): (Vec<f64>, Vec<f64>) = balanced.unzip();
         let scale = [base / response, gain * base / (response * response)];
         let unknown = || scale.map(|scale| Estimate { value: 0.0, uncertainty: WIDE * scale });
         let [by_base, by_omega] = slopes.unwrap_or_else(unknown);
-        let drive = Regression::fit(&columns, &amplitudes, Some((2, by_base.scaled(-gain))), noise)?;
-        let turning = Regression::fit(&columns, &phases, Some((2, by_omega)), noise / response)?;
+        let drive = Regression::fit(&columns, &amplitudes, Some((2, by_base.scaled(-gain))), noise / cosine)?;
+        let turning = Regression::fit(&columns, &phases, Some((2, by_omega)), noise / (response * cosine))?;
         let duration = cycles[cycles.len() - 1].time - cycles[0].time;
         let forces: Vec<f64> = drives.iter().map(|drive| drive.force.re).collect();
         let neglected = REMAINDER * inertia * (slope(&forces) * n / duration);

@@ -26,9 +26,22 @@ settings! {
         omega_min: f64 = 0.9,
         /// Highest frequency allowed, in units of omega0.
         omega_max: f64 = 1.1,
-        /// Phase of the response relative to the base, degrees.
+        /// Phase of the response relative to the base, degrees, above pi in magnitude and below 180: -90 is phase resonance.
         phase_target: f64 = -90.0,
     }
+}
+
+/// Refuses a phase target, degrees, that is one in rad, or at which no drive holds a motion.
+///
+/// # Errors
+/// A magnitude of pi or less, or of 180 degrees or more.
+pub fn phase_target(key: &'static str, value: f64) -> Result<(), SceneError> {
+    let in_rad = match value.abs() > PI {
+        true => String::new(),
+        false => format!(". If it is in rad, write {:.4}", value.to_degrees()),
+    };
+    let allowed = format!("must be in degrees, above pi in magnitude and below 180; -90 is phase resonance{in_rad}");
+    check(key, value, "degrees", value.abs() > PI && value.abs() < 180.0, allowed)
 }
 
 impl ControllerSettings {
@@ -67,7 +80,7 @@ impl ControllerSettings {
             high > low,
             format!("must be above omega_min = {low}"),
         )?;
-        within("controller.phase_target", self.phase_target, "degrees", [-180.0, 180.0])
+        phase_target("controller.phase_target", self.phase_target)
     }
 }
 
@@ -326,21 +339,25 @@ const IMPACTS: f64 = 1.1;
 
 // The `[phase_lock]` section: parameters of the controller that no other key sets, in SI units and by their names in `PhaseLock.fmu`.
 
-/// The parameters that other keys of a scene set, in units that suit any plant.
-pub const KEYS: [(&str, &str); 7] = [
-    ("sample_time", "controller.samples_per_period"),
-    ("omega_min", "controller.omega_min"),
-    ("omega_max", "controller.omega_max"),
-    ("amplitude", "excitation.G"),
-    ("phase_target", "controller.phase_target"),
-    ("bandwidth", "controller.bandwidth"),
-    ("reference_connected", "chain.reference"),
+/// The parameters that other keys of a scene set, these keys, and their units, which suit any plant.
+pub const KEYS: [(&str, &str, &str); 7] = [
+    (
+        "sample_time",
+        "controller.samples_per_period",
+        "samples in a natural period",
+    ),
+    ("omega_min", "controller.omega_min", "over omega0"),
+    ("omega_max", "controller.omega_max", "over omega0"),
+    ("amplitude", "excitation.G", "over b epsilon"),
+    ("phase_target", "controller.phase_target", "degrees"),
+    ("bandwidth", "controller.bandwidth", "over omega0"),
+    ("reference_connected", "chain.reference", ""),
 ];
 
 /// The key of the scene that sets a parameter of the controller.
 pub fn key(name: &str) -> String {
-    let key = KEYS.iter().find(|(parameter, _)| *parameter == name);
-    key.map_or_else(|| format!("phase_lock.{name}"), |(_, key)| (*key).to_string())
+    let key = KEYS.iter().find(|(parameter, ..)| *parameter == name);
+    key.map_or_else(|| format!("phase_lock.{name}"), |(_, key, _)| (*key).to_string())
 }
 
 /// The message for a refused configuration, with the keys of the scene.
@@ -417,12 +434,17 @@ impl PhaseLock {
 
 /// Name and value of a parameter, from the name and the value in the file.
 fn setting(name: &str, value: &Value) -> Result<(&'static str, Setting), ArgumentError> {
-    if let Some((_, key)) = KEYS.iter().find(|(parameter, _)| *parameter == name) {
-        return Err(format!("phase_lock.{name} is set by {key}").into());
+    if let Some((_, key, unit)) = KEYS.iter().find(|(parameter, ..)| *parameter == name) {
+        let unit = if unit.is_empty() {
+            String::new()
+        } else {
+            format!(" ({unit})")
+        };
+        return Err(format!("phase_lock.{name} is set by {key}{unit}").into());
     }
     let parameter = Parameter::find(name).ok_or_else(|| {
         let free = PARAMETERS.iter().map(|parameter| parameter.name);
-        let free: Vec<&str> = free.filter(|key| KEYS.iter().all(|(name, _)| name != key)).collect();
+        let free: Vec<&str> = free.filter(|key| KEYS.iter().all(|(name, ..)| name != key)).collect();
         format!(
             "the controller has no parameter `{name}`; expected one of {}",
             free.join(", ")

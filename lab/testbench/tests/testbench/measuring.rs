@@ -743,6 +743,7 @@ fn a_refusal_names_no_drive_below_zero() {
         requested: 1.1,
         lost: 4,
         unsettled: None,
+        silent: None,
     };
     assert!(!found.to_string().contains("G = -"), "{found}");
 }

@@ -239,7 +239,7 @@ fn every_parameter_of_the_controller_has_exactly_one_key_of_the_scene() {
     let before = paper(&[]).controller_config();
     for parameter in &PARAMETERS {
         let name = parameter.name;
-        let key = KEYS.iter().find(|(parameter, _)| *parameter == name);
+        let key = KEYS.iter().find(|(parameter, ..)| *parameter == name);
         let value = match (name, parameter.get(&before)) {
             ("reference_connected", _) => "false".into(),
             ("phase_target", _) => "-80.0".into(),
@@ -256,7 +256,7 @@ fn every_parameter_of_the_controller_has_exactly_one_key_of_the_scene() {
             _ => "3.5".to_owned(),
         };
         let own = format!("phase_lock.{name}={value}");
-        let setting = key.map_or_else(|| own.clone(), |(_, key)| format!("{key}={value}"));
+        let setting = key.map_or_else(|| own.clone(), |(_, key, _)| format!("{key}={value}"));
         let after = config(&setting).unwrap();
         assert_ne!(parameter.get(&after), parameter.get(&before), "{setting}");
         assert_eq!(config(&own).is_err(), key.is_some(), "{own}");

@@ -482,11 +482,12 @@ fn points_of_a_structure_without_its_other_modes_are_those_of_the_driven_mode() 
                 response: estimate(orbit.c * numbers.b),
                 omega: estimate(orbit.omega * numbers.omega0),
                 drive: estimate(numbers.amplitude(orbit.g)),
+                phase: scene.definition().phase,
             })
             .collect();
         let moved = without_other_modes(&scene, points.clone());
         assert!(points.len() > 10 && moved.len() == points.len(), "{name}");
-        for MeasuredPoint { response, omega, drive } in moved {
+        for MeasuredPoint { response, omega, drive, .. } in moved {
             let place = [numbers.sigma(omega.value), numbers.excitation(drive.value)];
             let off = alone.distance(response.value / numbers.b, place[0], place[1]).unwrap();
             assert!(off.nearest < 2e-5, "{name}: {off:?}");
