@@ -282,11 +282,11 @@ impl ExactCurve {
         let away = |[_, exact, drive, _]: &Place| (sigma - exact).abs().max((g - drive).abs());
         let places = pairs().filter_map(|pair| at(pair, c));
         let [_, exact, _, speed] = places.min_by(|one, other| away(one).total_cmp(&away(other)))?;
-        Some((self.from_polygon([c, sigma, g])?, [exact, speed]))
+        Some((self.to_polygon([c, sigma, g])?, [exact, speed]))
     }
 
     /// The distance of `(C, sigma, G)` from the polygon.
-    fn from_polygon(&self, point: [f64; 3]) -> Option<f64> {
+    fn to_polygon(&self, point: [f64; 3]) -> Option<f64> {
         let pairs = self.compared.iter().flat_map(|places| places.windows(2));
         let segments = pairs.map(|pair| {
             let [from, to] = [pair[0], pair[1]].map(|[c, sigma, g, _]| [c, sigma, g]);
@@ -297,7 +297,7 @@ impl ExactCurve {
 
     /// How far `(C, sigma, G)` lies from the curve; `None` where there is no curve.
     pub fn distance(&self, c: f64, sigma: f64, g: f64) -> Option<Distance> {
-        let polygon = self.from_polygon([c, sigma, g])?;
+        let polygon = self.to_polygon([c, sigma, g])?;
         let at = |c: f64, near: [f64; 2]| self.orbits.with_amplitude(c, near);
         let same = self.place(c, sigma, g).and_then(|(_, near)| at(c, near));
         let Some(same) = same else {
