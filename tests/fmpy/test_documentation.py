@@ -179,6 +179,9 @@ def value(number: str) -> tuple[float, float]:
     number = number.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")).replace("·10", "e")
     mantissa, _, exponent = number.partition("e")
     digits = len(mantissa.partition(".")[2])
+    if "." not in mantissa and len(mantissa) > 2:
+        # The zeros at the end of a large number are no digits of it.
+        digits = len(mantissa.rstrip("0")) - len(mantissa)
     return float(number), 0.5 * 10.0 ** (int(exponent or 0) - digits)
 
 
@@ -205,7 +208,8 @@ def test_every_number_of_a_table_is_made_by_its_command_or_stands_in_its_file(ab
     if source[1] == "from":
         made = "\n".join((ROOT / name).read_text() for name in source[2].split())
     else:
-        made = output_of(source[2], vines, tmp_path)
+        # Settings are numbers of a table, too.
+        made = source[2] + output_of(source[2], vines, tmp_path)
     printed = [value(number)[0] for number in re.findall(NUMBER, made)]
     missing = []
     for number in numbers(rows):
@@ -266,6 +270,7 @@ def test_the_commands_of_a_page_run_in_a_clone_print_what_it_shows_and_leave_the
     shutil.copytree(ROOT / "scenes", clone / "scenes", dirs_exist_ok=True)
     before = git("-C", clone, "status", "--porcelain")
     shell, output = Shell(vines, clone), ""
+    marked = {text for of, _, text in printed_blocks() if of == page}
     try:
         for kind, text in blocks(page):
             name = re.match(r"(?:#|/\*|<!--) (\w+\.\w+)\b", text)
@@ -277,7 +282,7 @@ def test_the_commands_of_a_page_run_in_a_clone_print_what_it_shows_and_leave_the
                 output = "".join(
                     shell.run(line, "fails" in flags) for line in lines if line.strip() and not line.startswith("#")
                 )
-            elif language == "text" and output:
+            elif language == "text" and output and text not in marked:
                 missing = missing_lines(text, output)
                 assert not missing, f"{page.name} shows what the program does not print: {missing}"
     finally:

@@ -14,7 +14,8 @@ SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 SSC = "{http://ssp-standard.org/SSP1/SystemStructureCommon}"
 OMS = "{https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd}"
 OSP = "{http://opensimulationplatform.com/SSP/OSPAnnotations}"
-SAMPLE_TIME = 0.0011343573395537938
+# 31 bits.
+SAMPLE_TIME = 0.001134357339651615
 
 
 def pack(vines: Path, folder: Path) -> Path:

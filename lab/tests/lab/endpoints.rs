@@ -251,7 +251,7 @@ fn endpoints_addresses_and_options_without_sense_are_refused_with_the_reason() {
         ("identify --rig udp://127.0.0.1", 2, "HOST:PORT"),
         ("identify --rig built-in --controller http://127.0.0.1:1", 2, "tcp://"),
         ("identify --rig built-in --controller udp://127.0.0.1:1", 2, "tcp://"),
-        ("identify --rig CONTROLLER", 1, "`v`"),
+        ("identify --rig CONTROLLER", 1, "no variable `e`"),
         ("identify --rig built-in --controller PLANT", 1, "`response`"),
         ("identify --rig helic://127.0.0.1 --key KEY", 2, "no authentication"),
         ("identify --rig helic://127.0.0.1:1", 1, "vines rig --protocol helic"),
