@@ -202,7 +202,10 @@ def renew(readme, bench):
     before, rest = text.split(BEGIN)
     after = rest.split(END)[1]
     table = markdown_table(*matrix(bench))
-    replace(readme, wrapped(f"{before}{BEGIN}\n{MATRIX_NOTE}\n\n<!-- from: validation/performance.csv -->\n{table}\n{END}{after}"))
+    replace(
+        readme,
+        wrapped(f"{before}{BEGIN}\n{MATRIX_NOTE}\n\n<!-- from: validation/performance.csv -->\n{table}\n{END}{after}"),
+    )
 
 
 def write(bench, growth, loop, run_times, folder):

@@ -1,4 +1,4 @@
-"""Run time per impact on a cantilever and a plate with 1, 2, 3, 5 and 8 modes: plant, closed form and Brent's method, heyoka, CVODE.
+"""Run time per impact on a cantilever and a plate of 1 to 8 modes: plant, Brent's method, heyoka, CVODE.
 
     python structures.py --worker PROGRAM -o FILE.csv [--pairs N]      scripts/bench --structures
 
@@ -125,7 +125,12 @@ def main():
         problems = [worker.ask({"structure": count, "family": family, "pairs": 1}, 60) for _ in range(options.pairs)]
         problem = problems[-1]
         plant, brent = (min(one["ns_per_impact"][n] for one in problems) for n in (0, 1))
-        row = {"structure": family, "modes": count, "impacts": problem["impacts"][0], "plant_ns_per_impact": round(plant)}
+        row = {
+            "structure": family,
+            "modes": count,
+            "impacts": problem["impacts"][0],
+            "plant_ns_per_impact": round(plant),
+        }
         row |= {"brent_over_plant": f"{brent / plant:.3g}", "brent_difference": f"{problem['brent_off']:.0e}"}
         for name, method in (("heyoka", heyoka), ("cvode_python", cvode)):
             seconds, impacts, off = method(problem)

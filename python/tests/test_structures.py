@@ -85,7 +85,7 @@ def test_modes_of_a_universal_file_are_mass_normalised_in_si_units(modes, units,
     assert scene.dimensionless["epsilon"] == pytest.approx(0.032 * 0.51**2, rel=1e-3)
 
 
-def test_what_is_out_of_phase_in_complex_shapes_is_named_and_left_out(tmp_path):
+def test_what_is_out_of_phase_in_complex_shapes_is_named_and_left_out():
     # Two modes of a structure whose damping is not modal, with modal A.
     file = SAMPLES / "modes_complex.uff"
     with pytest.warns(UserWarning, match="out of phase and left out") as noted:

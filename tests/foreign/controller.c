@@ -5,6 +5,7 @@
    -DDEAF        ignores signals from the first step on
    -DSTEPS       refuses steps and times that are not those that it has added up, has multiplied or expects, within DBL_EPSILON
    -DOWN_STEPS   makes steps of its own while they end within DBL_EPSILON of the end of a step; refuses to make another number than one */
+#define _GNU_SOURCE
 #include <complex.h>
 #include <float.h>
 #include <math.h>
@@ -51,6 +52,17 @@ Status fmi2SetReal(void *s, References r, size_t n, const double *v) { while (n-
 Status fmi2SetBoolean(void *s, References r, size_t n, const int *v) { while (n--) if (set(s, r[n], v[n])) return 3; return 0; }
 Status fmi2GetReal(void *s, References r, size_t n, double *v) { while (n--) v[n] = ((Loop *)s)->x[r[n]]; return 0; }
 Status fmi2GetBoolean(void *s, References r, size_t n, int *v) { while (n--) v[n] = ((Loop *)s)->x[r[n]] != 0; return 0; }
+#ifdef HANG
+/* Waits until the program catches the signals again that an FMU has ignored. */
+static void wait_for_handlers(void) {
+    struct sigaction interrupt, terminate;
+    do {
+        usleep(1000);
+        sigaction(SIGINT, NULL, &interrupt);
+        sigaction(SIGTERM, NULL, &terminate);
+    } while (interrupt.sa_handler == SIG_IGN || terminate.sa_handler == SIG_IGN);
+}
+#endif
 Status fmi2DoStep(void *instance, double time, double step, int no) {
     Loop *s = instance;
 #ifdef DEAF
@@ -65,6 +77,7 @@ Status fmi2DoStep(void *instance, double time, double step, int no) {
 #endif
 #ifdef HANG
     if (s->count == HANG) {
+        wait_for_handlers();
         fclose(fopen(getenv("HANGS"), "w"));
         for (;;) pause();
     }

@@ -1,6 +1,8 @@
 /* A linear oscillator on a moving base as an FMU, strict: only inputs can be set. It creates the file in the environment variable ZEROED when its
    drive becomes zero. -DHANG=n: it hangs in step n, and creates the file in HANGS. */
+#define _GNU_SOURCE
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -30,10 +32,22 @@ Status fmi2SetReal(void *instance, References r, size_t n, const double *v) {
     return 0;
 }
 Status fmi2GetReal(void *s, References r, size_t n, double *v) { while (n--) v[n] = ((Rig *)s)->x[r[n]]; return 0; }
+#ifdef HANG
+/* Waits until the program catches the signals again that an FMU has ignored. */
+static void wait_for_handlers(void) {
+    struct sigaction interrupt, terminate;
+    do {
+        usleep(1000);
+        sigaction(SIGINT, NULL, &interrupt);
+        sigaction(SIGTERM, NULL, &terminate);
+    } while (interrupt.sa_handler == SIG_IGN || terminate.sa_handler == SIG_IGN);
+}
+#endif
 Status fmi2DoStep(void *instance, double time, double step, int no) {
     Rig *s = instance;
 #ifdef HANG
     if (s->count == HANG) {
+        wait_for_handlers();
         create("HANGS");
         for (;;) pause();
     }

@@ -556,10 +556,7 @@ fn results_of_one_oscillator_say_so_where_the_scene_has_a_structure() {
     let tracked = text(&vines(&beam));
     assert!(
         tracked.contains("0 of 3 points are settled points")
-            && tracked
-                .matches("asymmetric 1:1; not settled: the motion is ")
-                .count()
-                == 3,
+            && tracked.matches("asymmetric 1:1; not settled: the motion is ").count() == 3,
         "{tracked}"
     );
     let table = scene.replace("frame", "slip-table");

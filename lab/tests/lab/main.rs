@@ -67,7 +67,18 @@ struct Running(Child, #[expect(dead_code, reason = "removed with it")] TempDir);
 
 impl Running {
     fn start(arguments: &[&str]) -> Self {
-        let mut command = Command::new(PROGRAM);
+        Self::spawn(Command::new(PROGRAM), arguments)
+    }
+
+    /// With the system's reactions to signals, where what started the test ignores some, as `nohup` does.
+    #[cfg(unix)]
+    fn start_with_default_signals(arguments: &[&str]) -> Self {
+        let mut command = Command::new("env");
+        command.args(["--default-signal", PROGRAM]);
+        Self::spawn(command, arguments)
+    }
+
+    fn spawn(mut command: Command, arguments: &[&str]) -> Self {
         // A folder of its own: two runs do not write into the same `out`.
         let folder = tempfile::tempdir().unwrap();
         command.args(arguments).current_dir(folder.path());

@@ -122,7 +122,7 @@ fn every_command_that_waits_ends_with_the_code_of_the_signal() {
     {
         let (signal, name, code) = [("INT", "SIGINT", 130), ("TERM", "SIGTERM", 143), ("HUP", "SIGHUP", 129)][n % 3];
         let line = format!("{command} --scene {}", pipe.display());
-        let program = Running::start(&words(&line));
+        let program = Running::start_with_default_signals(&words(&line));
         program.catches();
         let ended = program.ended_by(signal);
         assert_eq!(ended.status.code(), Some(code), "{command}: {ended:?}");

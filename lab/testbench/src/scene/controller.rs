@@ -469,7 +469,15 @@ fn setting(name: &str, value: &Value) -> Result<(&'static str, Setting), Argumen
             return Err(format!("phase_lock.{name} is a {given}, which is refused; allowed is {allowed}").into());
         }
     };
-    let accepted = parameter.set(&mut config, setting);
-    accepted.map_err(|error| format!("phase_lock.{}", ConfigError { unit: unit(error.unit), ..error }))?;
+    let refused = |error: ConfigError| format!("phase_lock.{}", ConfigError { unit: unit(error.unit), ..error });
+    // Before its number is converted to the units of the controller.
+    if let Setting::Real(number) = setting
+        && !parameter.range.contains(number)
+    {
+        let Parameter { name, unit, range, .. } = *parameter;
+        let error = ConfigError { name, value: Some(number), unit, allowed: range.allowed() };
+        return Err(refused(error).into());
+    }
+    parameter.set(&mut config, setting).map_err(refused)?;
     Ok((parameter.name, setting))
 }
