@@ -205,9 +205,12 @@ fn locked(scene: &CheckedScene, stop: &Arc<AtomicBool>) -> Result<Lock, Box<dyn 
     Ok(identification::identify(&record, &plan)?.lock)
 }
 
-/// Unit of a number of a scene that a sweep varies: `1` for a count, and for what a scene states relative to omega0, b or a period.
+/// Unit of a number of a scene that a sweep varies: `1` for a count, and for what a scene states relative to omega0, b or a period. That
+/// of noise is the one of its sensor: `1` without a scene.
 #[pyfunction]
-pub fn unit(key: &str, scene: &Scene) -> &'static str {
+#[pyo3(signature = (key, scene=None))]
+pub fn unit(key: &str, scene: Option<&Scene>) -> &'static str {
+    let of_reading = |channel: usize| scene.map_or("1", |scene| scene.scene.reading_units()[channel]);
     match key {
         "plant.M" | "plant.m" => "kg",
         "plant.k" => "N/m",
@@ -216,8 +219,8 @@ pub fn unit(key: &str, scene: &Scene) -> &'static str {
         "start.dq1" | "start.dq2" => "m/s",
         "controller.phase_target" => "degree",
         "chain.snr" => "dB",
-        "chain.response_noise" => scene.scene.reading_units()[0],
-        "chain.reference_noise" => scene.scene.reading_units()[1],
+        "chain.response_noise" => of_reading(0),
+        "chain.reference_noise" => of_reading(1),
         key => match key.strip_prefix("phase_lock.").and_then(Parameter::find) {
             Some(parameter) if !parameter.unit.is_empty() => parameter.unit,
             _ => "1",

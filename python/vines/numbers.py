@@ -92,7 +92,7 @@ def factor(unit: str, allowed: str) -> float | None:
 def stated(value: Any) -> str | None:
     """Return the unit that a number or an array carries; None without one."""
     # A DataArray around a quantity.
-    inner = getattr(value, "data", None) if hasattr(value, "dims") else None
+    inner: Any = getattr(value, "data", None) if hasattr(value, "dims") else None
     attributes = getattr(value, "attrs", None)
     of_attributes = attributes if isinstance(attributes, Mapping) else {}
     for holder in (inner, value):
@@ -106,7 +106,7 @@ def stated(value: Any) -> str | None:
 
 def _magnitude(value: Any) -> Any:
     """Return a number or an array without its unit; a mask stays."""
-    inner = getattr(value, "data", None) if hasattr(value, "dims") else None
+    inner: Any = getattr(value, "data", None) if hasattr(value, "dims") else None
     for holder in (inner, value):
         if isinstance(holder, np.ma.MaskedArray):
             return np.ma.MaskedArray(np.ma.getdata(holder).view(np.ndarray), np.ma.getmaskarray(holder))

@@ -361,7 +361,7 @@ def _uff(file: Path) -> Iterator[_Channel]:
     sets = package("pyuff").UFF(str(file)).read_sets()
     sets = sets if isinstance(sets, list) else [sets]
     functions = [one for one in sets if one.get("type") == 58]
-    stated = next((one for one in sets if one.get("type") == 164), {})
+    stated: Mapping[str, Any] = next((one for one in sets if one.get("type") == 164), {})
     directions = {n: f"{'+' if n > 0 else '-'}{'XYZ'[(abs(n) - 1) % 3]}" for n in range(-6, 7) if n}
 
     def texts(key: str) -> list[str]:

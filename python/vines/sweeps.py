@@ -176,7 +176,7 @@ def _axis(name: str, values: Any, scene: Scene) -> "xarray.Variable":
         dimensions, values = (values[0],), values[1]
     dimensions = getattr(values, "dims", dimensions)
     try:
-        numbers = reals(name, values, _native.unit(name))
+        numbers = reals(name, values, _native.unit(name, scene._native))
     except ValueError as error:
         raise ValueError(f"{error}: a list of numbers is allowed") from None
     if numbers.ndim != len(dimensions) or numbers.size == 0:
