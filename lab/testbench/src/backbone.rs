@@ -17,7 +17,7 @@ use crate::identification::{
 };
 use crate::plan::{Knowledge, Plan};
 use crate::record::Sample;
-use crate::rig::{Controller, HALVED, Move, Rig};
+use crate::rig::{Controller, Move, OFF, Rig};
 
 /// One point of the backbone.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -304,7 +304,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             .plan
             .knowledge
             .shaker()
-            .map_or(0.0, |path| 2.0 * HALVED / (TAU * path.speed));
+            .map_or(0.0, |path| 2.0 * OFF / (TAU * path.speed));
         let periods = MOVE.max(2.0 * slowest) + late;
         let expected = extrapolated(&self.states, level);
         let [amplitude, omega] = expected.map_or([0.0; 2], |there| [there[0] - drive, there[1] - omega]);

@@ -374,7 +374,7 @@ fn noise_of(readings: &[[f64; 3]], of: usize, target: &Target, step: f64) -> f64
 /// Largest relative error of an amplitude: later measurements of response and drive would be wrong by it.
 const FACTOR: f64 = 0.05;
 /// Largest unexplained phase of the response relative to the base, degrees. On the default scene 1 degree shifts sigma by 0.026.
-pub(crate) const PHASE: f64 = 1.0;
+const PHASE: f64 = 1.0;
 /// Largest relative difference of the clocks: later measurements of frequencies in hertz would be wrong by it.
 const CLOCK: f64 = 1e-3;
 /// Relative differences of natural frequency and damping from which they are reported, beyond their uncertainty.

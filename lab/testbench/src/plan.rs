@@ -224,11 +224,6 @@ pub struct ShakerPath {
     pub followed: u16,
     /// Largest amplitude, m, by which harmonics of the force beside the sampling frequency change its fundamental as it is read.
     pub aliased: f32,
-    /// Largest relative error of these numbers at the frequencies of the check, up to the bandwidth of the control to each side.
-    pub error: f64,
-    /// Reference per command of a structure that moves as it does, over [`Self::gain`], by the drawing: without impacts the response follows from the
-    /// reference, and no check can tell the two apart.
-    pub coupling: Complex64,
 }
 
 impl ShakerPath {
@@ -241,15 +236,18 @@ impl ShakerPath {
             (row, Complex64::ONE)
         });
         let [inverse, of_pole] = complex_fit(rows).map_or([Complex64::ONE; 2], |(found, _)| found.into());
-        let path = Self {
+        Self {
             gain: 1.0 / inverse,
             pole: of_pole / inverse,
             damping_rate,
             ..self
-        };
-        let error = |(omega, value): &(f64, Complex64)| (value / path.at(omega - omega0) - 1.0).norm();
-        let error = values.iter().map(error).fold(0.0, f64::max);
-        Self { error, ..path }
+        }
+    }
+
+    /// Largest relative error of reference over command at these frequencies.
+    pub(crate) fn error(&self, omega0: f64, values: &[(f64, Complex64)]) -> f64 {
+        let error = |(omega, value): &(f64, Complex64)| (value / self.at(omega - omega0) - 1.0).norm();
+        values.iter().map(error).fold(0.0, f64::max)
     }
 
     /// Reference over command at `omega0 + detuning`, rad/s.

@@ -20,7 +20,7 @@ use crate::scene::{Excitation, Release, Scene, SceneShaker, Structure};
 pub use chain::Chain;
 pub(crate) use chain::LowPass;
 pub use faulty::{RigFault, SensorFault, faulty};
-pub(crate) use reference_control::{BANDWIDTH, HALVED, speed};
+pub(crate) use reference_control::{BANDWIDTH, OFF, speed};
 pub(crate) use stages::derivative;
 pub use stages::{Interrupted, Measured, Scaled, SensorsOnly, Stoppable};
 
@@ -214,16 +214,14 @@ pub enum RigError {
         unit: &'static str,
     },
     #[error(
-        "the shaker does not follow its command, which makes {expected:.3e} {unit} by the path that the check has measured, and {sensor} has read {read:.3e} {unit} \
-         at {degrees:.0} degrees to it for {periods:.1} periods. The amplifier clips or is off, the stinger is broken, or a sensor or its sign is wrong"
+        "the shaker does not follow: {asked:.3e} {unit} are asked for, and the measured fundamental is off by {error:.3e} {unit} for {periods:.1} periods; {cause}"
     )]
     ReferenceOff {
-        expected: f64,
-        read: f64,
-        degrees: f64,
+        asked: f64,
+        error: f64,
         periods: f64,
         unit: &'static str,
-        sensor: &'static str,
+        cause: &'static str,
     },
     #[error(
         "the amplifier is at its limit: the drive asked for needs {times:.2} times the command that voltage_max or current_max of [shaker] allows; lower \

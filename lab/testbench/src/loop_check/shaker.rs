@@ -155,7 +155,7 @@ pub(super) fn check(
         quantity(
             "reference over command, largest relative error of its model",
             "",
-            [path.error, STEADY, 0.0],
+            [path.error(natural, &values), STEADY, 0.0],
             ROBUST,
             Some(Verdict::ShakerResonance),
         ),

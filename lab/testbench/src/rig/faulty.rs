@@ -94,11 +94,10 @@ impl RigFault {
     };
 
     /// Those of a scene with a shaker, beside the faults of its sensors.
-    pub const OF_SHAKER: [(&'static str, Self); 4] = [
+    pub const OF_SHAKER: [(&'static str, Self); 3] = [
         ("stinger breaks", Self::Electrodynamic(ShakerFault::StingerBreaks)),
         ("amplifier clips", Self::Electrodynamic(ShakerFault::AmplifierClips)),
         ("armature at its stop", Self::Electrodynamic(ShakerFault::AtStop)),
-        ("base sensor × 0.33", Self::Base(SensorFault::Gain(1.0 / 3.0))),
     ];
 }
 

@@ -4,16 +4,12 @@
 //! and a shaker makes of a command u the reference `F = K u - (r - d) z` ([`ShakerPath`]): the moving structure takes the force away. The command is
 //! the inverse, `u = (F + (r - d) z)/K`, with the *measured* response z: an observer predicts z and I from the command, `z' = K u + I - (s + r) z` and
 //! `I' = 0`, and corrects both by the reading. What is left of the error of the measured reference, by errors of K and r, is integrated.
-//!
-//! The path also watches the shaker: command, response and reference behind equal filters satisfy it whatever motion and setpoint are, up to its error,
-//! which the check has measured. A rest beyond that contradicts it, and ends the run before the integrator drives against it.
 
 use std::f64::consts::{LN_2, PI, TAU};
 
 use num_complex::Complex64;
 
 use super::{Drive, RigError};
-use crate::loop_check::PHASE;
 use crate::plan::{Knowledge, ShakerPath, Target};
 
 /// Bandwidth of the observer of response and impacts, over the natural frequency: at half of it, the force on an oscillator of 1.8 % drop-out
@@ -32,13 +28,13 @@ const HARMONICS: usize = 15;
 /// How many of them change as fast as the fundamental: chosen by trial on random shakers (studies/shakers.rs), a few of which overshoot limits with 1.
 const FAST: usize = 3;
 
-/// Share of the command's fundamental that an amplifier loses which has failed; clipping at half of the command loses 0.39.
+/// Share of the command's fundamental that an amplifier loses which has failed; clipping at half of the command loses 0.39. At the natural frequency
+/// this is the share of the reference, over the drop-out. An error of the whole reference is a failure whatever the drop-out: it is not the reference
+/// asked for that is left then. And a reference that never reaches this share is not there, of a broken stinger.
 const SHARE: f64 = 0.25;
-/// Phase for which a contradiction lasts, rad: behind the filters a clipping amplifier shows in half a period, a force cell that reads a third in three
-/// quarters, and both end the run within 1.5 periods. Healthy motions contradict the path for 0.4 periods at most (studies/shakers.rs).
-const OFF: f64 = 0.75 * TAU;
-/// Phase in which the control halves an error, rad.
-pub(crate) const HALVED: f64 = LN_2 / BANDWIDTH;
+/// Phase for which such an error lasts, rad: in this time the control halves an error. Impacts and drive change the reference all the time while the
+/// controller searches, where little of it is left.
+pub(crate) const OFF: f64 = LN_2 / BANDWIDTH;
 
 /// Offset and harmonics of a signal: an adaptive filter, as the controller's.
 #[derive(Debug, Clone, Default)]
@@ -71,36 +67,6 @@ fn rate_of(n: usize) -> f64 {
     if n < FAST { 1.0 } else { SECOND }
 }
 
-/// Command, response and reference as they are read, behind equal filters.
-#[derive(Debug, Clone, Default)]
-struct Watch {
-    signals: [Detector; 3],
-    /// The command that drives the rig, m.
-    command: Complex64,
-}
-
-impl Watch {
-    /// Takes scaled readings of response and reference at a phase of the oscillator, which turns by `turn` from sample to sample, rad.
-    fn take(&mut self, [response, reference]: [f64; 2], phase: f64, turn: f64) {
-        let command = (self.command * Complex64::cis(phase)).im;
-        let share = 1.0 - (-DETECTOR * turn).exp();
-        for (signal, value) in self.signals.iter_mut().zip([command, response, reference]) {
-            signal.take(value, phase, turn, share);
-        }
-    }
-
-    /// The reference, m, that the path makes of command and response, that which is read, and that of a structure which does not move, at a detuning,
-    /// rad/s. `units`: `z` and the reference, m, over their readings. Impacts keep the response `z` from being that of the reference; then
-    /// `F = (s + d) z + coupling (K u - (s + r) z)`.
-    fn references(&self, path: &ShakerPath, detuning: f64, units: [Complex64; 2]) -> [Complex64; 3] {
-        let [command, response, read] = [0, 1, 2].map(|n| self.signals[n].phasors[0]);
-        let (commanded, z) = (path.gain * command, units[0] * response);
-        let s = Complex64::new(0.0, detuning);
-        let expected = (s + path.damping_rate) * z + path.coupling * (commanded - (s + path.pole) * z);
-        [expected, units[1] * read, commanded]
-    }
-}
-
 /// The control, and its state. Phasors are those of sines, relative to the controller's oscillator.
 #[derive(Debug, Clone)]
 pub(crate) struct ReferenceControl {
@@ -129,10 +95,9 @@ pub(crate) struct ReferenceControl {
     times: f64,
     /// Samples so far with the command at its limit.
     pub clipped: usize,
-    watch: Watch,
-    /// Phase for which the readings have contradicted the command, and for which this has been at its limit, rad.
+    /// Phase for which the reference has been off, or the command at its limit, and for which the reading has been small, rad.
     off: f64,
-    limited: f64,
+    quiet: f64,
 }
 
 impl ReferenceControl {
@@ -154,16 +119,15 @@ impl ReferenceControl {
             command: Complex64::ZERO,
             times: 0.0,
             clipped: 0,
-            watch: Watch::default(),
             off: 0.0,
-            limited: 0.0,
+            quiet: 0.0,
         })
     }
 
     /// Takes the scaled readings of response and reference. Returns the command for the coming `step`, s, in which the controller asks for `drive`.
     ///
     /// # Errors
-    /// Readings that have contradicted the command for [`OFF`], or a command at its limit in which the control could have halved an error.
+    /// A reference that has not followed for [`OFF`], or for longer under a slow control.
     pub fn command(&mut self, [response, reading]: [f64; 2], drive: Drive, step: f64) -> Result<Drive, RigError> {
         let Drive { omega, amplitude, .. } = drive;
         let [of_response, displacement] = [0, 1].map(|channel| self.target.displacement(channel, omega));
@@ -179,37 +143,33 @@ impl ReferenceControl {
             self.error.take(error, phase, omega * step, share(DETECTOR));
             self.response.take(response, phase, omega * step, share(OBSERVER));
             self.impacts += SECOND * OBSERVER * self.path.speed * self.omega0 * (self.response.phasors[0] - predicted);
-            self.watch.take([response, reading], phase, omega * step);
         }
         let error = self.error.phasors[0] * displacement;
         let moved = (self.path.pole - self.damping_rate) / self.gain * self.response.phasors[0] * of_response;
-        let detuning = omega - self.omega0;
-        let [expected, read, commanded] =
-            self.watch
-                .references(&self.path, detuning, [of_response / self.gain, displacement]);
-        // The check lets the response be off by this phase.
-        let explained = self.path.error + PHASE.to_radians();
-        let unexplained = (expected - read).norm() - explained * commanded.norm();
-        let is_off = unexplained > (SHARE * commanded.norm()).min(read.norm());
+        let largest = self.asked * (SHARE / self.path.drop_out()).min(1.0);
         let is_driven = self.asked > 0.0 && amplitude > 0.0;
         let longer = |phase: f64, is: bool| if is && is_driven { phase + omega * step } else { 0.0 };
-        (self.off, self.limited) = (longer(self.off, is_off), longer(self.limited, self.times > 1.0));
-        if self.limited > HALVED / self.path.speed {
+        self.off = longer(self.off, error.norm() > largest || self.times > 1.0);
+        self.quiet = longer(self.quiet, reading.abs() * displacement.norm() < SHARE * self.asked);
+        let longest = OFF / self.path.speed;
+        if self.off > longest && self.times > 1.0 {
             return Err(RigError::AmplifierLimit { times: self.times });
         }
-        if self.off > OFF {
-            let (unit, sensor) = match self.path.by_force {
-                true => ("N", "the force cell"),
-                false => ("m", "the sensor on the table"),
+        if self.off.max(self.quiet) > longest {
+            let unit = ["m", "N"][usize::from(self.path.by_force)];
+            let cause = if self.quiet > longest {
+                "next to nothing is left: the sensor of the reference is dead, or the stinger is broken"
+            } else {
+                "the amplifier clips or is off, a sensor or its sign is wrong, too little is left at the resonance (the drop-out of `vines check`), or \
+                 irregular impacts on a heavy armature or table change it faster than the control follows"
             };
-            let degrees = (read / expected).arg().to_degrees();
-            let [expected, read] = [expected, read].map(|value| value.norm() / self.path.base_per_reference);
-            let periods = OFF / TAU;
-            return Err(RigError::ReferenceOff { expected, read, degrees, periods, unit, sensor });
+            let [asked, error] = [self.asked, error.norm()].map(|value| value / self.path.base_per_reference);
+            let periods = longest / TAU;
+            return Err(RigError::ReferenceOff { asked, error, periods, unit, cause });
         }
         if amplitude == 0.0 {
             self.correction = Complex64::ZERO;
-        } else if self.times <= 1.0 && !is_off {
+        } else if self.times <= 1.0 {
             self.correction += BANDWIDTH * self.path.speed * self.omega0 * step * error;
         }
         let inverse = (amplitude + self.correction + moved) / self.path.gain;
@@ -240,7 +200,6 @@ impl ReferenceControl {
         let ahead = (phase + angle - of_rig + PI).rem_euclid(TAU) - PI;
         let turn = (omega * step + ahead).clamp(0.5 * omega * step, 2.0 * omega * step);
         let amplitude = self.command.norm();
-        self.watch.command = Complex64::from_polar(amplitude, of_rig - phase);
         self.phases = [phase + omega * step, of_rig + turn].map(|phase| phase % TAU);
         Drive {
             omega: turn / step,

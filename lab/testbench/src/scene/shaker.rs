@@ -224,16 +224,6 @@ impl Structure {
         self.host.frequency_response(&reference, omega)
     }
 
-    /// What a volt adds to the reference at a frequency, rad/s, where impacts keep the response as it is.
-    fn reference_at_response(&self, shaker: &SceneShaker, omega: f64) -> Complex64 {
-        let of = |row: &Row| {
-            let by_command = self.host.frequency_response(row, omega);
-            [by_command, self.host.frequency_response_to_cavity(row, omega)]
-        };
-        let ([a, b], [c, d]) = (of(&shaker.reference(self.excitation, omega)), of(&self.response()));
-        a - b * c / d
-    }
-
     /// Distance of the nearest other pole from the pole of the driven mode after the release, rad/s: of what moves at the sensor, and oscillates.
     pub(crate) fn nearest_pole(&self) -> f64 {
         let cut = self.shaker.as_ref().filter(|shaker| shaker.release == Release::Cut);
@@ -287,14 +277,8 @@ impl Structure {
             base_per_command: self.base_per_command(),
             followed: 0,
             aliased: 0.0,
-            error: 0.0,
-            coupling: Complex64::ONE,
         };
         let path = path.fitted(mode.omega, damping_rate, &values);
-        let path = ShakerPath {
-            coupling: self.reference_at_response(shaker, mode.omega) / shaker.reference_per_command / path.gain,
-            ..path
-        };
         // A small module has no code for it, as it has no structures.
         if !cfg!(feature = "tables") {
             return Some(path);
