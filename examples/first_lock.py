@@ -12,7 +12,7 @@ found = vines.identify()
 lock, exact = found.lock, found.exact
 for name in ("sigma", "C", "B"):
     print(f"{name:5}  {lock[name]:.6f} ± {lock['u_' + name]:.1e}, exact orbit {getattr(exact, name):.6f}")
-print("regime:", lock["regime"])
+print("motion:", lock["motion"])
 
 # %% [markdown]
 # The decay lies left of both curves: it is not a steady motion, and its impacts follow late. The exact plant, released
