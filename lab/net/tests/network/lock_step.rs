@@ -239,13 +239,16 @@ impl Controller for Hot {
     }
 }
 
+/// How a session and its server end.
+type Outcome = (Option<Ended>, Result<(), ServerError>);
+
 /// Serves one session of what `make` gives, and returns the address, and how session and server end.
 fn serve_once(
     address: fn(SocketAddr) -> Address,
     service: Service,
     key: Option<Key>,
     mut make: impl FnMut() -> Result<Offered, ServerError> + Send + 'static,
-) -> (Address, JoinHandle<(Option<Ended>, Result<(), ServerError>)>) {
+) -> (Address, JoinHandle<Outcome>) {
     let mut server = Server::listen(address(([127, 0, 0, 1], 0).into()), service, key).unwrap();
     let at = server.address().unwrap();
     let serve = move || {
