@@ -445,7 +445,7 @@ def test_results_become_datasets_with_units():
     assert vines.theory(points=5).to_xarray().sigma.attrs["units"] == "1"
     assert vines.regime(sigma=-1.1).to_xarray().exponent < 0
     decay = vines.identify().to_xarray()
-    assert decay.sizes["point"] == 96
+    assert decay.sizes["point"] == 95
     assert decay.attrs["lock_regime_by_impacts"] == "symmetric 1:1"
     orbit = vines.orbits()[0].to_xarray()
     assert orbit.gamma.attrs["units"] == "rad"
@@ -486,7 +486,7 @@ def test_ctrl_c_ends_the_search_for_a_regime_at_any_frequency():
 
 
 def test_ctrl_c_ends_every_long_calculation_whatever_it_does(tmp_path):
-    long = vines.Scene(record={"hold_periods": 10_000_000})
+    long = vines.Scene(record={"hold_periods": 150_000})
     scene = vines.Scene(Path(__file__).parents[2] / "scenes/cantilever.toml")
     # Nobody writes this file.
     pipe = tmp_path / "pipe.csv"
@@ -494,7 +494,7 @@ def test_ctrl_c_ends_every_long_calculation_whatever_it_does(tmp_path):
     plant = vines.StructurePlant(scene)
     for work in [
         lambda: vines.identify(long),
-        lambda: plant.trajectory(1e6, 10**8, amplitude=1e-4, omega=55.0),
+        lambda: plant.trajectory(1e5, 3 * 10**6, amplitude=1e-4, omega=55.0),
         lambda: vines.read_recording(pipe),
         lambda: vines.fit_recordings(vines.read_recording(pipe)),
     ]:
