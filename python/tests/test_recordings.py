@@ -1,5 +1,6 @@
 """Recordings in files of other programs, and their fit."""
 
+import csv
 import importlib.util
 import json
 import os
@@ -154,18 +155,20 @@ def test_results_are_not_lost_where_the_encoding_has_no_sign_for_them(tracked, t
 
 
 def test_tables_of_points_of_other_programs_give_the_counts_of_the_program(tracked, tmp_path):
-    head, *rows = tracked
-    place = head.split(",").index("settled")
+    head, *rows = csv.reader(tracked)
+    place = head.index("settled")
 
     def row(number, words, delimiter):
-        cells = rows[number].split(",")
+        cells = list(rows[number])
         cells[place] = words[number >= 6]
-        return delimiter.join(cell.replace(".", ",") if delimiter == ";" else cell for cell in cells)
+        return [cell.replace(".", ",") if delimiter == ";" else cell for cell in cells]
 
     printed = set()
     for words, delimiter in (("true false", ","), ("True False", ","), ("WAHR FALSCH", ";"), ("1 0", ";")):
-        lines = [head.replace(",", delimiter), *(row(number, words.split(), delimiter) for number in range(8))]
-        (tmp_path / "a.csv").write_text("\n".join(lines), encoding="utf-16" if delimiter == ";" else "utf-8")
+        encoding = "utf-16" if delimiter == ";" else "utf-8"
+        with (tmp_path / "a.csv").open("w", newline="", encoding=encoding) as file:
+            table = csv.writer(file, delimiter=delimiter, lineterminator="\n")
+            table.writerows([head, *(row(number, words.split(), delimiter) for number in range(8))])
         code, out, err = call(*PYTHON, "fit", tmp_path / "a.csv")
         assert code == 0, err
         assert "6 points; " in out
