@@ -211,7 +211,7 @@ def fit_recordings(
     return _result(_native.fit(given._native, [], kept, _texts(known), _responses(linear)))
 
 
-#: What columns of truth values have, as `vines fit` reads them: of Python and NumPy, and of spreadsheets.
+#: What Boolean columns have, as `vines fit` reads them: of Python and NumPy, and of spreadsheets.
 _TRUTHS = {
     "true": True,
     "wahr": True,
@@ -225,7 +225,7 @@ _TRUTHS = {
 
 
 def _truths(name: str, values: Any) -> NDArray[np.bool_]:
-    """Return a column of truth values; any other value is a `ValueError`."""
+    """Return a Boolean column; any other value is a `ValueError`."""
     given = np.atleast_1d(np.asarray(values, dtype=object)).ravel()
     found = [_TRUTHS.get(str(one).strip().lower()) for one in given]
     if None in found:

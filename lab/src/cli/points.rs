@@ -247,11 +247,11 @@ fn objects(value: &Value) -> Option<Vec<Row>> {
     }
 }
 
-/// The words that a column of truth values has, in small letters: of this program, of Python, of spreadsheets in English and German, and numbers.
+/// The words that a Boolean column has, in small letters: of this program, of Python, of spreadsheets in English and German, and numbers.
 const TRUE: [&str; 4] = ["true", "wahr", "1", "1.0"];
 const FALSE: [&str; 4] = ["false", "falsch", "0", "0.0"];
 
-/// Columns of truth values.
+/// Boolean columns.
 const FLAGS: [&str; 2] = ["settled", "reached"];
 /// Columns of motions and regimes.
 const MOTIONS: [&str; 2] = ["motion", "regime"];
