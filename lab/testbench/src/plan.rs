@@ -391,7 +391,7 @@ pub struct Plan {
     /// Samples of the hold.
     pub hold: usize,
     /// Longest ramp of the drive after the controller was asked to release it, samples: in this time the response of the linear rig falls to
-    /// [`DECAYED`], so that after a longer ramp nothing is left to decay.
+    /// 5 % (where a decay counts as over), so that after a longer ramp nothing is left to decay.
     pub ramp: usize,
     /// Samples of the recorded decay.
     pub decay: usize,
