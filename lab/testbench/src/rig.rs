@@ -224,6 +224,17 @@ pub enum RigError {
         cause: &'static str,
     },
     #[error(
+        "the {} contradicts the command: by the path that the check has measured, command and response give {expected:.3e} {unit}, and {read:.3e} {unit} \
+         are read. Check the amplifier (does it clip?), the stinger, and the {} with its cable",
+        reference_of(unit),
+        sensor_of(unit)
+    )]
+    PathContradicted {
+        expected: f64,
+        read: f64,
+        unit: &'static str,
+    },
+    #[error(
         "the amplifier is at its limit: the drive asked for needs {times:.2} times the command that voltage_max or current_max of [shaker] allows; lower \
          the drive, or the responses of the backbone"
     )]
@@ -233,6 +244,20 @@ pub enum RigError {
          helic devices need a rig that does"
     )]
     NoHold,
+}
+
+/// What the control of a shaker reads, by its unit.
+fn reference_of(unit: &str) -> &'static str {
+    if unit == "N" { "force" } else { "table" }
+}
+
+/// The sensor of the reference, by its unit.
+fn sensor_of(unit: &str) -> &'static str {
+    if unit == "N" {
+        "force cell"
+    } else {
+        "sensor on the table"
+    }
 }
 
 /// Why a controller cannot go on.
@@ -399,6 +424,8 @@ pub struct SimulatedStructure {
     fault: Option<(ShakerFault, f64)>,
     /// Largest command so far, V.
     driven: f64,
+    /// The structure with its stinger, while this is cut by a release.
+    attached: Option<Structure>,
 }
 
 /// How a shaker fails.
@@ -430,6 +457,7 @@ impl SimulatedStructure {
             clipped_at,
             fault: None,
             driven: 0.0,
+            attached: None,
         })
     }
 
@@ -449,12 +477,10 @@ impl SimulatedStructure {
         Self { fault: Some((fault, seconds)), ..self }
     }
 
-    /// Cuts the stinger; the motion goes on.
-    fn break_stinger(&mut self) -> Result<(), RigError> {
-        let Some(broken) = self.structure.with_broken_stinger() else {
-            return Ok(());
-        };
-        let (structure, coordinates) = broken.map_err(|error| RigError::Failed(error.into()))?;
+    /// Goes on as another structure with the same coordinates: with a cut stinger, or with its own.
+    fn becomes(&mut self, structure: Structure) -> Result<(), RigError> {
+        let coordinates = self.structure.coordinates_with_shaker();
+        let coordinates = coordinates.map_err(|error| RigError::Failed(error.into()))?;
         let plant = &self.simulated.plant;
         let of = |derivative: usize| coordinates.iter().map(|row| plant.point(row)[derivative]).collect();
         let State { q2, dq2, .. } = plant.state();
@@ -465,14 +491,30 @@ impl SimulatedStructure {
         Ok(())
     }
 
-    /// What fails or is cut now: `command`, V, is the amplitude of the drive.
+    /// Cuts the stinger. Returns the structure with it.
+    fn cut_stinger(&mut self) -> Result<Option<Structure>, RigError> {
+        self.driven = 0.0;
+        let Some(cut) = self.structure.with_broken_stinger() else {
+            return Ok(None);
+        };
+        let attached = self.structure.clone();
+        self.becomes(cut.map_err(|error| RigError::Failed(error.into()))?)?;
+        Ok(Some(attached))
+    }
+
+    /// What fails, is cut or attached now: `command`, V, is the amplitude of the drive. The next drive begins with the stinger again: a check of the
+    /// loop ends with a release, too.
     fn change(&mut self, command: f64) -> Result<(), RigError> {
+        if command > 0.0
+            && let Some(attached) = self.attached.take()
+        {
+            self.becomes(attached)?;
+        }
         let begins = |(_, at): &mut (ShakerFault, f64)| self.simulated.clock.time() >= *at;
         let fault = self.fault.take_if(begins).map(|(fault, _)| fault);
         let Some(shaker) = &mut self.structure.shaker else {
             return Ok(());
         };
-        // A check of the loop drives with a hundredth.
         self.driven = command.max(self.driven);
         let is_released = command == 0.0 && self.driven > 0.0 && shaker.release == Release::Cut;
         match fault {
@@ -485,11 +527,9 @@ impl SimulatedStructure {
                     self.fault = Some((fault, 0.0));
                 }
             }
-            None if !is_released => {}
-            Some(ShakerFault::StingerBreaks) | None => {
-                self.driven = 0.0;
-                self.break_stinger()?;
-            }
+            Some(ShakerFault::StingerBreaks) => _ = self.cut_stinger()?,
+            None if is_released => self.attached = self.cut_stinger()?,
+            None => {}
         }
         Ok(())
     }

@@ -3,7 +3,8 @@
 //! Near the natural frequency a structure with the impact force I has the response `z' = F + I - (s + d) z` in phasors, where `s = i (omega - omega0)`,
 //! and a shaker makes of a command u the reference `F = K u - (r - d) z` ([`ShakerPath`]): the moving structure takes the force away. The command is
 //! the inverse, `u = (F + (r - d) z)/K`, with the *measured* response z: an observer predicts z and I from the command, `z' = K u + I - (s + r) z` and
-//! `I' = 0`, and corrects both by the reading. What is left of the error of the measured reference, by errors of K and r, is integrated.
+//! `I' = 0`, and corrects both by the reading. What is left of the error of the measured reference, by errors of K and r, is integrated. This correction
+//! is the reference that command and response make by the path, less the one that is read: beyond the reference asked for, they contradict each other.
 
 use std::f64::consts::{LN_2, PI, TAU};
 
@@ -98,6 +99,8 @@ pub(crate) struct ReferenceControl {
     /// Phase for which the reference has been off, or the command at its limit, and for which the reading has been small, rad.
     off: f64,
     quiet: f64,
+    /// Phase for which the correction has been beyond what is asked for, rad.
+    contradicted: f64,
 }
 
 impl ReferenceControl {
@@ -121,6 +124,7 @@ impl ReferenceControl {
             clipped: 0,
             off: 0.0,
             quiet: 0.0,
+            contradicted: 0.0,
         })
     }
 
@@ -151,12 +155,13 @@ impl ReferenceControl {
         let longer = |phase: f64, is: bool| if is && is_driven { phase + omega * step } else { 0.0 };
         self.off = longer(self.off, error.norm() > largest || self.times > 1.0);
         self.quiet = longer(self.quiet, reading.abs() * displacement.norm() < SHARE * self.asked);
+        self.contradicted = longer(self.contradicted, self.correction.norm() > self.asked);
         let longest = OFF / self.path.speed;
+        let unit = ["m", "N"][usize::from(self.path.by_force)];
         if self.off > longest && self.times > 1.0 {
             return Err(RigError::AmplifierLimit { times: self.times });
         }
         if self.off.max(self.quiet) > longest {
-            let unit = ["m", "N"][usize::from(self.path.by_force)];
             let cause = if self.quiet > longest {
                 "next to nothing is left: the sensor of the reference is dead, or the stinger is broken"
             } else {
@@ -166,6 +171,11 @@ impl ReferenceControl {
             let [asked, error] = [self.asked, error.norm()].map(|value| value / self.path.base_per_reference);
             let periods = longest / TAU;
             return Err(RigError::ReferenceOff { asked, error, periods, unit, cause });
+        }
+        if self.contradicted > longest {
+            let [expected, read] = [self.correction + self.asked, self.asked - error]
+                .map(|value| value.norm() / self.path.base_per_reference);
+            return Err(RigError::PathContradicted { expected, read, unit });
         }
         if amplitude == 0.0 {
             self.correction = Complex64::ZERO;

@@ -486,20 +486,22 @@ impl Structure {
         Ok(Self { shaker: Some(attached), ..structure })
     }
 
-    /// This structure after its stinger has broken, with the displacements of all coordinates before: both have the same coordinates.
-    pub(crate) fn with_broken_stinger(&self) -> Option<Result<(Self, Vec<Row>), String>> {
+    /// This structure after its stinger has broken; it has the same coordinates.
+    pub(crate) fn with_broken_stinger(&self) -> Option<Result<Self, String>> {
         let SceneShaker { shaker, compensated_mass, limits, release, without, .. } = self.shaker.as_ref()?;
         let stinger = [CUT * shaker.stinger[0], 0.0];
-        let broken =
-            (**without)
-                .clone()
-                .with_shaker(Shaker { stinger, ..*shaker }, *compensated_mass, *limits, *release);
-        let n = without.modes.len() + rows_beyond(self.excitation);
+        let broken = (**without).clone();
+        Some(broken.with_shaker(Shaker { stinger, ..*shaker }, *compensated_mass, *limits, *release))
+    }
+
+    /// The displacements of all coordinates of a structure with a shaker, by the sections.
+    pub(crate) fn coordinates_with_shaker(&self) -> Result<Vec<Row>, String> {
+        let n = self.modes.len() + rows_beyond(self.excitation);
         let coordinate = |place: usize| {
             let of_coordinate: Vec<f64> = (0..n).map(|other| f64::from(u8::from(other == place))).collect();
             self.host.row(&of_coordinate).map_err(|error| error.to_string())
         };
-        Some(broken.and_then(|broken| Ok((broken, (0..n).map(coordinate).collect::<Result<_, _>>()?))))
+        (0..n).map(coordinate).collect()
     }
 }
 
