@@ -120,7 +120,7 @@ mingw() {
 
 # build_platform PLATFORM FOLDER [options of cargo build]: the packages of the options, stripped and the same bytes wherever
 # they are built, in FOLDER/TRIPLE/release (or another profile, in `profile`;
-# or another command of cargo than build, in `verb`, and for `rustc` an option of the last step, in `linking`).
+# or another command of cargo than build, in `verb`).
 build_platform() (
     platform=$1 folder=$2
     triple=${TRIPLES[$platform]}
@@ -174,7 +174,7 @@ build_platform() (
     # Without increments: the same bytes wherever and whenever they are built.
     export CARGO_ENCODED_RUSTFLAGS CARGO_INCREMENTAL=0
     say "Building for $platform ($kind toolchain, $with linker) ..."
-    cargo "$verb" "${options[@]}" --target "$triple" ${linking:+-- "$linking"} || fail "cargo could not build for $platform"
+    cargo "$verb" "${options[@]}" --target "$triple" || fail "cargo could not build for $platform"
 )
 
 # pack_options PLATFORM ...: builds the libraries of the FMUs, and prints the options with which `vines pack` takes them, one on a line.

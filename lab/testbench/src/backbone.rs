@@ -202,10 +202,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             let mut before = n
                 .checked_sub(1)
                 .map(|before| (levels[before], self.points[before].regime));
-            // A small module has no code for levels between.
-            if cfg!(feature = "tables")
-                && let Some((from, _)) = before
-            {
+            if let Some((from, _)) = before {
                 for between in between(from, level) {
                     before = Some((between, self.hold(between)?.regime));
                 }
@@ -233,7 +230,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let (start, clipped) = (self.run.periods, self.run.clipped());
         let (to, periods) = self.step(level);
         self.run.hold_response(to)?;
-        if cfg!(feature = "tables") && self.plan.knowledge.shaker.is_some() {
+        if self.plan.knowledge.shaker.is_some() {
             // A fault is named from the last two periods.
             let kept = self.plan.knowledge.samples(2.5);
             self.run.samples.drain(..self.run.samples.len().saturating_sub(kept));
@@ -277,20 +274,13 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     /// Periods within which the loops, the control of a shaker and what rings beside the driven mode follow a move to this level, m.
     ///
     /// The move changes what rings by its own share at most, of which less than the precision is left.
-    #[cfg(feature = "tables")]
     fn followed(&self, level: f64) -> usize {
         let Knowledge { shaker, ringing, .. } = self.plan.knowledge;
         let of_control = shaker.map_or(0, |path| path.followed);
         let [from, ..] = self.states.last().unwrap_or(&self.closed);
         let share = (level / from - 1.0).abs() / self.plan.precision;
         let rung_down = (ringing * share.ln()).clamp(0.0, LONGEST as f64).ceil();
-        FOLLOWED.max(of_control.into()).max(rung_down as usize)
-    }
-
-    /// A small module has no code for structures.
-    #[cfg(not(feature = "tables"))]
-    fn followed(&self, _: f64) -> usize {
-        FOLLOWED
+        FOLLOWED.max(of_control).max(rung_down as usize)
     }
 
     /// The move to a level, m, and its periods: [`MOVE`], or as many as the drive needs for this change of the response; and behind a shaker, before and
@@ -303,7 +293,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let late = self
             .plan
             .knowledge
-            .shaker()
+            .shaker
             .map_or(0.0, |path| 2.0 * OFF / (TAU * path.speed));
         let periods = MOVE.max(2.0 * slowest) + late;
         let expected = extrapolated(&self.states, level);
@@ -360,7 +350,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
                 .map(|_| classify(averaged, self.run.sample_time, omega.value).1),
             tone: foreign_tone(averaged, knowledge, omega.value),
             drive_harmonics: knowledge
-                .shaker()
+                .shaker
                 .and_then(|_| drive_harmonics(averaged, knowledge, omega.value)),
             clipped_percent: None,
             command_v: mean_command(averaged, knowledge),

@@ -654,7 +654,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             return self.no_lock(command);
         }
         let mut evidence = evidence(self.samples, self.config, self.plan.units, fault);
-        if self.plan.knowledge.shaker().is_some() {
+        if self.plan.knowledge.shaker.is_some() {
             evidence.contradicts = contradicts(self.samples, self.sample_time);
         }
         let evidence = evidence.into();
@@ -688,7 +688,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
 
     /// Whether the bench judges the lock: of a controller that does not, and behind a filter, as controllers take noise for white.
     fn judges(&self, command: &Command) -> bool {
-        command.settled.is_none() || self.plan.knowledge.target.cut_off().is_some()
+        command.settled.is_none() || self.plan.knowledge.target.filter.is_some()
     }
 }
 
@@ -772,10 +772,8 @@ fn evidence(samples: &[Sample], config: &Config, units: Units, fault: Fault) -> 
             Some(("response_max", limit, " m"))
         }
         Fault::LockLost => Some(("lock.unlock_tolerance", Some(config.lock.unlock_tolerance), " rad")),
-        // The first periods contradict their drive. A small module has no code for this.
-        Fault::NoSignal if cfg!(feature = "tables") && config.signal_timeout.is_some_and(|limit| driven < limit) => {
-            None
-        }
+        // The first periods contradict their drive.
+        Fault::NoSignal if config.signal_timeout.is_some_and(|limit| driven < limit) => None,
         Fault::NoSignal => Some(("signal_timeout", config.signal_timeout, " s")),
         Fault::Implausible => Some(("residual_max", config.residual_max, " of the amplitude")),
         Fault::Sensor | Fault::TimedOut => None,

@@ -12,7 +12,6 @@ mod effects;
 mod known;
 mod record;
 mod recording;
-#[cfg(feature = "tables")]
 mod table;
 
 use std::cmp::Ordering;
@@ -36,7 +35,6 @@ pub use effects::{Candidate, Effect, EffectReport, Explanation, Found, Measureme
 pub use known::{Known, LinearVerdict, Quantity, linear_verdicts};
 pub use record::{LeftOut, RecordFit, follow};
 pub use recording::{Kind, LinearDecay, Part, Recording, RecordingError, parts};
-#[cfg(feature = "tables")]
 pub use table::plain_table;
 
 /// A measured point of the backbone: of phase resonance, or at another phase target.

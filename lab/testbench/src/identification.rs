@@ -308,7 +308,7 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
 
 /// Mean amplitude of the command of a shaker in samples, V; `None` without a shaker.
 pub(crate) fn mean_command(samples: &[Sample], knowledge: &Knowledge) -> Option<f64> {
-    let path = knowledge.shaker()?;
+    let path = knowledge.shaker?;
     Some(mean(samples.iter().map(|sample| sample.shaker_command)) / path.base_per_command)
 }
 
@@ -340,7 +340,7 @@ fn phase_error(held: &[Cycle], knowledge: &Knowledge) -> Estimate {
         [0, 1].map(|i| mean(held.iter().map(|cycle| cycle.noise[i])).sqrt() / (held.len() as f64).sqrt());
     let mut phase_noise = (noise / response.value).hypot(base_noise / base.value);
     // Behind a shaker noise of the readings turns the force itself, by more than that noise.
-    if knowledge.shaker().is_some() {
+    if knowledge.shaker.is_some() {
         phase_noise = phase_noise.hypot(phase_error.uncertainty);
     }
     Estimate { uncertainty: phase_noise, ..phase_error }
@@ -465,7 +465,7 @@ fn sensors_after_release(record: &Record, knowledge: &Knowledge) -> Result<(), I
     let scatters: Vec<f64> = response.chunks_exact(period).map(standard_deviation).collect();
     let linear = &knowledge.linear;
     // The coil of a shaker may take any share: only a reading that stays at one value is lost then.
-    let left = match knowledge.shaker() {
+    let left = match knowledge.shaker {
         Some(_) => 0.0,
         None => LEFT * (-2.0 * TAU * linear.damping_rate / linear.omega0).exp(),
     };

@@ -221,8 +221,7 @@ fn beside_driven_mode(readings: &[[f64; 3]], plan: &Plan, omega: f64, amplitude:
     let (target, step, delay) = (plan.knowledge.target, plan.knowledge.sample_time, plan.lock.delay);
     let (order, begin) = (target.measurands[0].order(), readings[0][0]);
     let mut beside: Vec<_> = readings.iter().map(|[phase, ..]| [*phase, 0.0, 0.0]).collect();
-    // A small module has no code for structures.
-    for (section, pair) in plan.beside.iter().filter(|_| cfg!(feature = "tables")) {
+    for (section, pair) in &plan.beside {
         let [x, v] = section.steady(omega).map(|steady| steady * amplitude);
         let started = Vector2::from([x, v].map(|steady| (steady * Complex64::cis(begin)).im));
         let harmonic = (x * pair[0] + v * pair[1]) * Complex64::new(0.0, omega).powi(order);

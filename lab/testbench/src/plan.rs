@@ -141,18 +141,13 @@ impl Target {
     pub fn displacement(&self, channel: usize, omega: f64) -> Complex64 {
         let order = self.measurands[channel].order();
         let turned = [Complex64::ONE, -Complex64::I, -Complex64::ONE][order as usize];
-        let passed = self.cut_off().map_or(1.0, |cut_off| LowPass::gain(cut_off, omega));
+        let passed = self.filter.map_or(1.0, |cut_off| LowPass::gain(cut_off, omega));
         turned * (self.omega0 / omega).powi(order) / passed
-    }
-
-    /// Cut-off of the filter, rad/s, if there is one; a small module has no code for it.
-    pub(crate) fn cut_off(&self) -> Option<f64> {
-        self.filter.filter(|_| cfg!(feature = "tables"))
     }
 
     /// Standard deviation of the noise on a smooth signal of a sensor: white, or, behind the filter, as correlated as that makes it.
     pub(crate) fn noise(&self, values: &[f64], sample_time: f64) -> f64 {
-        let Some(cut_off) = self.cut_off() else {
+        let Some(cut_off) = self.filter else {
             return noise(values);
         };
         // Over a quarter of the filter's period most of the correlation is gone.
@@ -163,7 +158,7 @@ impl Target {
 
     /// Power density of the noise of a sensor at the frequency `omega`, rad/s, over that of white noise with the same variance.
     pub(crate) fn colour(&self, omega: f64, sample_time: f64) -> f64 {
-        self.cut_off()
+        self.filter
             .map_or(1.0, |cut_off| LowPass::colour(cut_off, omega, sample_time))
     }
 
@@ -171,7 +166,7 @@ impl Target {
     pub(crate) fn colour_of_fundamental(&self, omega: f64, sample_time: f64, harmonics: usize) -> f64 {
         let at = |k: usize| self.colour(k as f64 * omega, sample_time);
         let highest = (PI / (omega * sample_time)) as usize;
-        match self.cut_off() {
+        match self.filter {
             Some(_) if highest > harmonics => at(1) / mean((harmonics + 1..=highest).map(at)),
             _ => 1.0,
         }
@@ -180,11 +175,7 @@ impl Target {
     /// Fundamental of the base over that of its samples, `sample_time` seconds apart, at the frequency `omega`, rad/s.
     pub(crate) fn base_per_sample(&self, omega: f64, sample_time: f64) -> f64 {
         let half = 0.5 * omega * sample_time;
-        if self.held && cfg!(feature = "tables") {
-            half.sin() / half
-        } else {
-            1.0
-        }
+        if self.held { half.sin() / half } else { 1.0 }
     }
 
     /// Amplitude of the scaled response whose displacement has this amplitude, m, at the frequency `omega`, rad/s.
@@ -221,9 +212,9 @@ pub struct ShakerPath {
     /// Base displacement per command, m/V, as the bench converts commands.
     pub base_per_command: f64,
     /// Periods within which the control follows a change of the response.
-    pub followed: u16,
+    pub followed: usize,
     /// Largest amplitude, m, by which harmonics of the force beside the sampling frequency change its fundamental as it is read.
-    pub aliased: f32,
+    pub aliased: f64,
 }
 
 impl ShakerPath {
@@ -290,8 +281,7 @@ pub struct Knowledge {
     pub shaker: Option<ShakerPath>,
     /// Distance of the nearest other pole of a structure from the pole of its driven mode after the release, rad/s; infinite without one.
     pub nearest_pole: f64,
-    /// Periods in which what rings beside the driven mode of a structure falls by a factor of e; 0 without it. A small module has no structures.
-    #[cfg(feature = "tables")]
+    /// Periods in which what rings beside the driven mode of a structure falls by a factor of e; 0 without it.
     pub ringing: f64,
 }
 
@@ -319,7 +309,6 @@ impl Knowledge {
             base_per_newton: None,
             shaker: None,
             nearest_pole: f64::INFINITY,
-            #[cfg(feature = "tables")]
             ringing: 0.0,
         }
     }
@@ -327,11 +316,6 @@ impl Knowledge {
     /// The linear response as data, if it was measured on the rig.
     pub fn measured_linear(&self) -> Option<MeasuredLinear> {
         self.is_measured.then(|| self.linear.data())
-    }
-
-    /// The shaker, where there can be one.
-    pub(crate) fn shaker(&self) -> Option<ShakerPath> {
-        self.shaker.filter(|_| cfg!(feature = "tables"))
     }
 
     /// Growth rate of the response at phase resonance per amplitude of the base, 1/s, at the frequency `omega`, rad/s: k/(2 omega) over the mass that
@@ -428,18 +412,18 @@ impl Scene {
     /// What the scene says of its rig.
     pub fn knowledge(&self) -> Knowledge {
         let mut knowledge = Knowledge::of(&self.plant, self.definition(), self.amplitude, self.sample_time());
-        knowledge.shaker = self.structure().and_then(|structure| structure.shaker_path());
-        if let Some(path) = knowledge.shaker.as_mut().filter(|_| cfg!(feature = "tables")) {
-            path.aliased = self.aliased(1.0).unwrap_or(0.0) as f32;
+        knowledge.shaker = self.structure.as_ref().and_then(|structure| structure.shaker_path());
+        if let Some(path) = &mut knowledge.shaker {
+            path.aliased = self.aliased(1.0).unwrap_or(0.0);
         }
         knowledge.target.through_shaker = knowledge.shaker.is_some();
-        let forced = self.structure().filter(|one| one.excitation == Excitation::Force);
+        let forced = self
+            .structure
+            .as_ref()
+            .filter(|one| one.excitation == Excitation::Force);
         knowledge.base_per_newton = forced.map(Structure::base_per_drive);
-        knowledge.nearest_pole = self.structure().map_or(f64::INFINITY, Structure::nearest_pole);
-        #[cfg(feature = "tables")]
-        {
-            knowledge.ringing = self.structure().map_or(0.0, Structure::ringing);
-        }
+        knowledge.nearest_pole = self.structure.as_ref().map_or(f64::INFINITY, Structure::nearest_pole);
+        knowledge.ringing = self.structure.as_ref().map_or(0.0, Structure::ringing);
         knowledge.target.held = self.chain.hold;
         knowledge.target.filter = self.chain.filter.map(|cut_off| cut_off * knowledge.linear.omega0);
         knowledge
@@ -455,7 +439,7 @@ impl Scene {
         // The decay lasts as long as the linear rig takes to fall to the share that is recorded.
         let relaxed = (-DECAYED.ln() * knowledge.linear.relaxation_periods()).min(LONGEST_DECAY);
         let decay = self.record.decay_periods.unwrap_or(relaxed);
-        let structure = self.structure().filter(|one| one.shaker.is_none());
+        let structure = self.structure.as_ref().filter(|one| one.shaker.is_none());
         let lock = self.lock_config(&knowledge);
         knowledge.target.delay = lock.delay;
         Plan {

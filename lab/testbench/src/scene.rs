@@ -97,14 +97,9 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The structure. Without the readers of files there is none: a small module then has no code for it.
-    pub(crate) fn structure(&self) -> Option<&Structure> {
-        self.structure.as_ref().filter(|_| cfg!(feature = "tables"))
-    }
-
     /// Whether response and reference are read one sample late, because a sensor needs differences of samples.
     pub(crate) fn is_late(&self) -> bool {
-        self.resonance.is_late() || self.structure().is_some_and(|one| one.compensated_mass() > 0.0)
+        self.resonance.is_late() || self.structure.as_ref().is_some_and(|one| one.compensated_mass() > 0.0)
     }
 
     /// The numbers that the dimensionless model, the theory and the exact orbits depend on.
@@ -116,7 +111,10 @@ impl Scene {
     /// What counts as resonance of the oscillator or the driven mode, at the phase target of the controller. A force on a structure is what spring and damper of the oscillator pass on; its
     /// sensors are those of [`Scene::resonance`].
     pub fn definition(&self) -> Definition {
-        let by_force = self.structure().is_some_and(|one| one.excitation == Excitation::Force);
+        let by_force = self
+            .structure
+            .as_ref()
+            .is_some_and(|one| one.excitation == Excitation::Force);
         let reference = if by_force {
             Reference::Force
         } else {
@@ -205,7 +203,10 @@ impl Scene {
     /// what the impacts on a particle of the speed b omega0, whose harmonics are 4/pi m b omega0², make of the force through structure and shaker, and
     /// through an anti-alias filter. `None` without a shaker or a drive.
     pub(crate) fn aliased(&self, times: f64) -> Option<f64> {
-        let (structure, shaker) = self.structure().and_then(|one| Some((one, one.shaker.as_ref()?)))?;
+        let (structure, shaker) = self
+            .structure
+            .as_ref()
+            .and_then(|one| Some((one, one.shaker.as_ref()?)))?;
         if self.amplitude <= 0.0 {
             return None;
         }
@@ -468,7 +469,7 @@ impl Sections {
                 .map_err(|error| SceneError::text(origin, format!("[structure]: {error}")))?;
         }
         let shaken = scene.structure.as_ref().filter(|one| one.shaker.is_some());
-        if let Some(structure) = shaken.filter(|_| cfg!(feature = "tables")) {
+        if let Some(structure) = shaken {
             if !scene.chain.reference {
                 let turn = structure
                     .shaker_path()
@@ -486,7 +487,7 @@ impl Sections {
         }
         let controller = table.get("controller");
         let is_sampled = || controller.is_some_and(|keys| keys.get("samples_per_period").is_some());
-        if cfg!(feature = "tables") && !is_sampled() {
+        if !is_sampled() {
             scene.controller.samples_per_period *= scene.oversampling();
         }
         scene.controller.check()?;
@@ -526,7 +527,7 @@ impl Sections {
             return Err(SceneError::text(origin, message));
         }
         let is_force = |one: &Structure| one.excitation == Excitation::Force;
-        if scene.structure().is_some_and(is_force) && reference_quantity != Measurand::Displacement {
+        if scene.structure.as_ref().is_some_and(is_force) && reference_quantity != Measurand::Displacement {
             let name = reference_quantity.name();
             let message = format!(
                 "resonance.reference_quantity = \"{name}\" where a force drives the structure: the reference is this force; drop the key, which belongs to \
@@ -534,8 +535,7 @@ impl Sections {
             );
             return Err(SceneError::text(origin, message));
         }
-        // A small module has no code for this.
-        if cfg!(feature = "tables") && !scene.chain.reference && reference_quantity != Measurand::Displacement {
+        if !scene.chain.reference && reference_quantity != Measurand::Displacement {
             let name = reference_quantity.name();
             let message = format!(
                 "resonance.reference_quantity = \"{name}\" with chain.reference = false: no sensor reads the base, and the reference is the displacement \

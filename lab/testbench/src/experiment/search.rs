@@ -400,7 +400,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Whether the response is held behind a shaker. The noise of the readings is then in the command, and through it in the force: the motion moves
     /// by more than the noise of the readings, which is all that controllers and [`Judge`](super::judge::Judge) allow for.
     fn behind_shaker(&self) -> bool {
-        self.bench.plan.knowledge.shaker().is_some()
+        self.bench.plan.knowledge.shaker.is_some()
     }
 
     /// Whether the periods at this level have settled, as a level of the tracked backbone does: drive and frequency are known as precisely as the scene
@@ -533,11 +533,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         Ok(leg)
     }
 
-    /// Notes a leg for the words of a search without a result. A small module has none.
+    /// Notes a leg for the words of a search without a result.
     fn note(&mut self, leg: &Leg) {
-        if !cfg!(feature = "tables") {
-            return;
-        }
         self.tried = range(self.tried, [leg.response]);
         self.impacts |= leg.departed;
         if !leg.symmetric {

@@ -114,12 +114,11 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
     // A pole nearer than the main lobe of the window, over 2 pi and its length and wider by 1 because of the amplitude's second degree, looks like a
     // part of the fundamental.
-    let (terms, window, lobe) = match knowledge.shaker() {
+    let (terms, window, lobe) = match knowledge.shaker {
         Some(_) => (BEHIND_SHAKER, HANN * window, 3.0),
         None => (TERMS, window, 2.0),
     };
-    // A small module has no code for structures.
-    if cfg!(feature = "tables") && knowledge.nearest_pole * window / omega < lobe {
+    if knowledge.nearest_pole * window / omega < lobe {
         return none(DecayEnd::OtherMode);
     }
     let mut windows = fitted(&values, [dt, window], omega, terms);
@@ -171,7 +170,7 @@ const ROUNDING: f64 = 1e-14;
 pub fn base_at_rest(record: &Record, knowledge: &Knowledge) -> Result<usize, Estimate> {
     let (decay, dt, target) = (record.decay(), record.sample_time, &knowledge.target);
     let readings: Option<Vec<f64>> = decay.iter().map(|sample| sample.sensors.reference).collect();
-    let readings = readings.filter(|_| knowledge.shaker().is_none());
+    let readings = readings.filter(|_| knowledge.shaker.is_none());
     let Some((readings, omega)) = readings.zip(last_driven(record)) else {
         return Ok((target.delay / dt).ceil() as usize);
     };
@@ -320,7 +319,8 @@ fn harmonic_of(values: &[f64], sample_time: f64, omega: f64, terms: Terms) -> Op
     let middle = 0.5 * (values.len() - 1) as f64;
     let count = values.len() as f64;
     // Their squares are Hann's window, whose mean is a half.
-    let weights = (cfg!(feature = "tables") && terms.is_hann)
+    let weights = terms
+        .is_hann
         .then(|| DVector::from_fn(values.len(), |n, _| (PI * (n as f64 + 0.5) / count).sin()));
     let mut right = DVector::from_column_slice(values);
     let share = if let Some(weights) = &weights {

@@ -184,10 +184,8 @@ impl Criterion {
             at,
             added: [0, 1].map(|i| {
                 let detuned = slope(i) * whole.remainders[2];
-                let path = self.knowledge.shaker.filter(|_| cfg!(feature = "tables"));
-                path.map_or(detuned, |path| {
-                    detuned.hypot(FRAC_1_SQRT_2 * f64::from(path.aliased) / units[i])
-                })
+                let path = self.knowledge.shaker;
+                path.map_or(detuned, |path| detuned.hypot(FRAC_1_SQRT_2 * path.aliased / units[i]))
             }),
             unsteady: match systematic / allowed[0].min(units[1] * allowed[1]) {
                 _ if whole.excess > EXCESS => Some(Unsteady::Scatter(Some(whole.excess))),

@@ -79,9 +79,7 @@ impl ResonanceFit {
         if cycles.len() < Self::FEWEST {
             return None;
         }
-        let cleaned = knowledge
-            .shaker()
-            .map(|_| without_aliases(cycles, knowledge.sample_time));
+        let cleaned = knowledge.shaker.map(|_| without_aliases(cycles, knowledge.sample_time));
         let cycles = cleaned.as_deref().unwrap_or(cycles);
         let LinearResponse { omega0, damping_rate, .. } = knowledge.linear;
         let omega = mean(cycles.iter().map(|cycle| cycle.omega));
@@ -462,9 +460,11 @@ impl Cycle {
             (response * base.conj() * Complex::from_polar(1.0, -target.phase)).arg()
         } else {
             let asked = DVector::from_iterator(samples.len(), samples.iter().map(|s| s.command.drive.displacement));
-            // The rigs of a small module measure their base.
-            let asked = cfg!(feature = "tables").then(|| basis.fit(&asked)).flatten();
-            match asked.map(|fit| fit.harmonic(1)).filter(|asked| *asked != Complex::ZERO) {
+            match basis
+                .fit(&asked)
+                .map(|fit| fit.harmonic(1))
+                .filter(|asked| *asked != Complex::ZERO)
+            {
                 // The drive of then. (The estimate of a controller is of some periods before.)
                 Some(asked) => {
                     let late = Complex::from_polar(1.0, mean_omega * target.delay - target.phase);

@@ -202,7 +202,7 @@ pub fn drive_harmonics(samples: &[Sample], knowledge: &Knowledge, omega: f64) ->
 /// Whether the reference shows an asymmetric motion: behind a shaker it also contains the impacts, and more of them where the stinger resonates.
 fn is_asymmetric_by_reference(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> bool {
     let content = knowledge
-        .shaker()
+        .shaker
         .and_then(|_| Content::of(samples, knowledge, omega, 1, ALL));
     content.is_some_and(|content| content.is_asymmetric(knowledge.target.measurands[1].order()))
 }

@@ -107,7 +107,7 @@ impl ReferenceControl {
     /// The control of a rig of which this is known, with readings that are late by `delay` seconds; `None` without a shaker.
     pub fn new(knowledge: &Knowledge, delay: f64) -> Option<Self> {
         Some(Self {
-            path: knowledge.shaker()?,
+            path: knowledge.shaker?,
             omega0: knowledge.linear.omega0,
             damping_rate: knowledge.linear.damping_rate,
             target: knowledge.target,

@@ -56,9 +56,9 @@ impl<R: Rig> Measured<R> {
         self
     }
 
-    /// Whether there is mass compensation; a small module has no code for it, as it has no structures.
+    /// Whether there is mass compensation.
     fn compensates(&self) -> bool {
-        cfg!(feature = "tables") && self.compensated > 0.0
+        self.compensated > 0.0
     }
 
     fn step_begins(&mut self, step: f64) {
@@ -169,21 +169,18 @@ impl<'a, R: Rig + ?Sized> Scaled<'a, R> {
 
     /// Samples so far with the command of a shaker at the limit of its amplifier; `None` without a shaker.
     pub fn clipped(&self) -> Option<usize> {
-        let control = self.control.as_ref().filter(|_| cfg!(feature = "tables"))?;
-        Some(control.clipped)
+        self.control.as_ref().map(|control| control.clipped)
     }
 
     /// Amplitude of the last command of a shaker, m as the bench converts commands; `None` without a shaker.
     pub fn shaker_command(&self) -> Option<f64> {
-        let control = self.control.as_ref().filter(|_| cfg!(feature = "tables"))?;
-        Some(control.amplitude())
+        self.control.as_ref().map(|control| control.amplitude())
     }
 
     fn command(&mut self, drive: Drive, step: f64) -> Result<Drive, RigError> {
         match &mut self.control {
-            // A small module has no code for it, as it has no structures.
-            Some(control) if cfg!(feature = "tables") => control.command(self.readings, drive, step),
-            _ => Ok(drive),
+            Some(control) => control.command(self.readings, drive, step),
+            None => Ok(drive),
         }
     }
 }

@@ -66,7 +66,7 @@ impl Scene {
         let (chain, d) = (&self.chain, self.dimensionless());
         let ratio = chain.snr.map_or(0.0, |snr| FRAC_1_SQRT_2 * 10_f64.powf(-snr / 20.0));
         let levels = [WORKING_LEVEL * d.b, self.amplitude];
-        let per_reading = match self.structure() {
+        let per_reading = match self.structure.as_ref() {
             Some(structure) => [
                 structure.reading_per_response().abs().recip(),
                 structure.base_per_drive(),

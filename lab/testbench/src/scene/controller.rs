@@ -155,7 +155,7 @@ impl Scene {
     /// The configuration behind a shaker, whose force cell reads the harmonics of impacts beside a fundamental that falls near the resonance. The
     /// detector averages over `1/(bandwidth sample_time)` samples: at this coherence, without drop-out, it knows the fundamental to a third.
     fn behind_shaker(knowledge: &Knowledge, config: Config) -> Config {
-        let Some(path) = knowledge.shaker() else {
+        let Some(path) = knowledge.shaker else {
             return config;
         };
         let known_to_a_third = 10.0 * config.bandwidth * knowledge.sample_time;
@@ -170,7 +170,7 @@ impl Scene {
     /// The units of limits: the controller of a structure works with the oscillator of its driven mode.
     pub(crate) fn units(&self) -> Units {
         let of_oscillator = Units { drive: 1.0, name: "m", response: 1.0 };
-        self.structure().map_or(of_oscillator, |structure| Units {
+        self.structure.as_ref().map_or(of_oscillator, |structure| Units {
             drive: structure.base_per_drive().recip(),
             name: structure.excitation.unit(),
             response: structure.reading_per_response().abs(),
@@ -218,7 +218,9 @@ impl Scene {
     /// speed b omega0 are impulses 2 m b omega0 of alternating sign. At worst they meet the mode in phase, which then sums them up to
     /// 1/(1 - exp(-pi zeta omega_n/omega0)) of one; here to the first order in the damping ratio.
     fn other_modes(&self) -> f64 {
-        let Some(structure) = self.structure() else { return 0.0 };
+        let Some(structure) = self.structure.as_ref() else {
+            return 0.0;
+        };
         let driven = structure.mode();
         let others = structure
             .modes
@@ -243,7 +245,11 @@ impl Scene {
     /// table through structure and shaker. A faster mode adds up successive impulses, less what it loses between them; slower changes the detector
     /// follows.
     fn in_reference(&self, knowledge: &Knowledge) -> f64 {
-        let Some((structure, shaker)) = self.structure().and_then(|one| Some((one, one.shaker.as_ref()?))) else {
+        let Some((structure, shaker)) = self
+            .structure
+            .as_ref()
+            .and_then(|one| Some((one, one.shaker.as_ref()?)))
+        else {
             return 0.0;
         };
         let omega = knowledge.linear.omega0;
@@ -273,12 +279,12 @@ impl Scene {
         self.amplitude.max(IMPACTS * linear * knowledge.numbers.b)
     }
 
-    /// Largest drive, m, that the converters of the base can show; infinite without them, as in a small module.
+    /// Largest drive, m, that the converters of the base can show; infinite without them.
     pub(super) fn drive_range(&self) -> f64 {
         let chain = &self.chain;
         match chain.adc_bits.filter(|_| chain.reference).or(chain.dac_bits) {
-            Some(_) if cfg!(feature = "tables") => self.dimensionless().amplitude(chain.base_range),
-            _ => f64::INFINITY,
+            Some(_) => self.dimensionless().amplitude(chain.base_range),
+            None => f64::INFINITY,
         }
     }
 

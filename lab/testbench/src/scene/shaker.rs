@@ -251,7 +251,6 @@ impl Structure {
     }
 
     /// Periods in which what rings beside the driven mode falls by a factor of e; 0 for one oscillator.
-    #[cfg(feature = "tables")]
     pub(crate) fn ringing(&self) -> f64 {
         let others = self.poles().into_iter().skip(1);
         let periods = others.map(|pole| self.mode().omega / (TAU * -pole.re));
@@ -279,10 +278,6 @@ impl Structure {
             aliased: 0.0,
         };
         let path = path.fitted(mode.omega, damping_rate, &values);
-        // A small module has no code for it, as it has no structures.
-        if !cfg!(feature = "tables") {
-            return Some(path);
-        }
         let response = self.response();
         let per_response = self.base_per_command() * self.reading_per_response().abs();
         let exact = |omega: f64| {
@@ -292,7 +287,7 @@ impl Structure {
         let speed = speed(&path, mode.omega, exact);
         // Both roots of the control are at half of its bandwidth.
         let of_control = FOLLOWED as f64 / SLOWEST_LOOP / (PI * BANDWIDTH * speed);
-        let followed = of_control.min(LONGEST as f64).ceil() as u16;
+        let followed = of_control.min(LONGEST as f64).ceil() as usize;
         Some(ShakerPath { speed, followed, ..path })
     }
 }

@@ -680,10 +680,7 @@ impl StructureSection {
         }
         let file = self.residues.as_deref().unwrap_or(Path::new(""));
         let residues = Residues::read(folder, file, self.reference.as_deref())?;
-        // Without files, no code for them.
-        if cfg!(feature = "tables")
-            && let Some(matrices) = residues.matrices()
-        {
+        if let Some(matrices) = residues.matrices() {
             let n = residues.points.len();
             return Parts::of_matrices(residues.points, Coupled::of_points(matrices, DVector::zeros(n)));
         }

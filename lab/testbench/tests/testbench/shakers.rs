@@ -283,7 +283,7 @@ fn edges_of_a_force_that_alias_are_smaller_than_the_precision_by_default() {
 #[test]
 fn what_rings_beside_the_driven_mode_is_that_of_structure_and_shaker_and_edges_that_alias_are_stated() {
     let scene = edged("");
-    let share = f64::from(scene.knowledge().shaker.unwrap().aliased) / scene.amplitude / scene.backbone.precision;
+    let share = scene.knowledge().shaker.unwrap().aliased / scene.amplitude / scene.backbone.precision;
     assert!(share > 0.1 && share <= 1.0, "{share}");
     // The second mode of the cantilever, which the shaker damps a little more.
     let scene = preset(0, &[]).unwrap();

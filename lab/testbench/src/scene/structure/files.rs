@@ -8,7 +8,6 @@ use num_complex::Complex64;
 use super::ROUNDING;
 
 /// Header and rows of numbers of the CSV file under `key`.
-#[cfg(feature = "tables")]
 fn table(folder: &Path, key: &str, file: &Path) -> Result<(Vec<String>, Vec<Vec<f64>>), String> {
     let title = format!("{key} ({})", file.display());
     let mut reader = csv::ReaderBuilder::new()
@@ -51,12 +50,6 @@ fn table(folder: &Path, key: &str, file: &Path) -> Result<(Vec<String>, Vec<Vec<
         );
     }
     Ok((header, rows))
-}
-
-/// Without the readers of tables, as in a browser.
-#[cfg(not(feature = "tables"))]
-fn table(_folder: &Path, key: &str, file: &Path) -> Result<(Vec<String>, Vec<Vec<f64>>), String> {
-    Err(format!("{key} ({}): this program reads no files", file.display()))
 }
 
 /// A square matrix with the names of its degrees of freedom.
