@@ -19,8 +19,9 @@ pub use vines_testbench::backbone::{LevelPoint, Tracked, track};
 pub use vines_testbench::comparison::{COMPARED_ABOVE, ExactCurve};
 use vines_testbench::experiment::{ExperimentError, run};
 pub use vines_testbench::identification::{Regime, ResonancePoint, decay_points, identify};
+pub use vines_testbench::linear::LinearResponse;
 pub use vines_testbench::loop_check::{Verdict, check};
-pub use vines_testbench::plan::{LinearResponse, Plan};
+pub use vines_testbench::plan::Plan;
 pub use vines_testbench::record::Record;
 pub use vines_testbench::rig::{
     BuiltIn, Chain, ControllerError, Rig, RigFault, SensorFault, SensorsOnly, Simulated, faulty,

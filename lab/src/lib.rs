@@ -18,6 +18,6 @@ pub use vines_helic as helic;
 pub use vines_model::{ArgumentError, curves, map, numerics, orbit, regime, theory};
 pub use vines_net as net;
 pub use vines_testbench::{
-    advice, backbone, cells, comparison, experiment, fit, identification, linear, live, loop_check, plan, record, rig,
-    scene, survey,
+    advice, backbone, cells, comparison, experiment, fit, identification, knowledge, linear, live, loop_check, plan,
+    record, rig, scene, survey,
 };

@@ -34,7 +34,13 @@ def circle(arrows: dict[str, set[str]]) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    ("folder", "ending", "pattern"), [("src", "rs", RUST), ("controller/src", "rs", RUST), ("live/page", "js", SCRIPT)]
+    ("folder", "ending", "pattern"),
+    [
+        ("src", "rs", RUST),
+        ("controller/src", "rs", RUST),
+        ("lab/testbench/src", "rs", RUST),
+        ("live/page", "js", SCRIPT),
+    ],
 )
 def test_no_file_depends_on_one_that_depends_on_it(folder, ending, pattern):
     arrows = imports(ROOT / folder, ending, pattern)

@@ -16,9 +16,9 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::{Value, json};
 use vines::curves;
+use vines::knowledge::Target;
 use vines::live::{Decay, HarmonicMotion, LastImpacts};
 use vines::numerics::equally_spaced;
-use vines::plan::Target;
 use vines::record::Sample;
 use vines::regime::Impact;
 use vines::rig::{Command, Controller, ControllerError, Move, Rig, Sensors};
@@ -108,7 +108,7 @@ impl Watch {
         Tap::around(rig, move |mut sample, step| {
             let drive = sample.command.drive;
             sample.command = Command { drive, ..command.get() };
-            sample.sensors = target.scaled(sample.sensors);
+            sample.sensors = sample.sensors.scaled(&target);
             // The receiver polls, so that this wakes no thread. A full channel, or a server that has ended, drops the sample.
             let _ = sender.try_send(Message::Sample(Numbered { number, sample, step }));
             number += 1;

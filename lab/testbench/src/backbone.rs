@@ -5,19 +5,21 @@
 //! the *response*, and the drive follows. The points before predict drive and frequency of the next one,
 //! so that the loops have little to correct.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use serde::Serialize;
 use vines_model::numerics::Estimate;
 
-use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, Search, Stage};
+use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, SLOWEST_LOOP, Search, Stage};
 use crate::identification::{
     Criterion, Cycle, LONGEST, LevelEstimate, Regime, ResonancePoint, Tone, Unsteady, classify, drive_harmonics,
     foreign_tone, is_off_target, mean_command, regime_by_response,
 };
-use crate::plan::{Knowledge, Plan};
+use crate::knowledge::Knowledge;
+use crate::plan::Plan;
 use crate::record::Sample;
 use crate::rig::{Controller, Move, OFF, Rig};
+use crate::shaker_path::{BANDWIDTH, ShakerPath};
 
 /// One point of the backbone.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -276,11 +278,13 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
     /// The move changes what rings by its own share at most, of which less than the precision is left.
     fn followed(&self, level: f64) -> usize {
         let Knowledge { shaker, ringing, .. } = self.plan.knowledge;
-        let of_control = shaker.map_or(0, |path| path.followed);
+        // Both roots of the control of a shaker are at half of its bandwidth.
+        let of_control = |path: ShakerPath| FOLLOWED as f64 / SLOWEST_LOOP / (PI * BANDWIDTH * path.speed);
+        let of_control = shaker.map_or(0.0, of_control).min(LONGEST as f64).ceil();
         let [from, ..] = self.states.last().unwrap_or(&self.closed);
         let share = (level / from - 1.0).abs() / self.plan.precision;
         let rung_down = (ringing * share.ln()).clamp(0.0, LONGEST as f64).ceil();
-        FOLLOWED.max(of_control).max(rung_down as usize)
+        FOLLOWED.max(of_control as usize).max(rung_down as usize)
     }
 
     /// The move to a level, m, and its periods: [`MOVE`], or as many as the drive needs for this change of the response; and behind a shaker, before and

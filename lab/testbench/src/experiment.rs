@@ -13,18 +13,17 @@ use thiserror::Error;
 use vines_model::numerics::mean;
 
 use crate::identification::{Cycle, Departure, Unsteady};
-use crate::plan::{Plan, Target, Units};
+use crate::knowledge::Target;
+use crate::plan::{DECAYED, Plan};
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError, Scaled, Sensors};
+use crate::scene::Units;
 use crate::scene::key;
 
 pub use judge::Condition;
 use judge::Judge;
 pub(crate) use search::Search;
 
-/// Share of its amplitude to which the response of the linear rig falls in the recorded decay. The 1:1 motion has a smaller range, from symmetry
-/// breaking to the fold, and impacts make the decay faster.
-pub(crate) const DECAYED: f64 = 0.05;
 /// The stage an experiment is in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {

@@ -12,7 +12,8 @@ use serde::Serialize;
 use thiserror::Error;
 use vines_model::numerics::{Estimate, SIGNIFICANT, mean, standard_deviation};
 
-use crate::plan::{Knowledge, Plan};
+use crate::knowledge::Knowledge;
+use crate::plan::Plan;
 use crate::record::{Record, Sample};
 use crate::scene::Measurand;
 

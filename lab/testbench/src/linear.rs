@@ -9,11 +9,15 @@
 //! With m/M = epsilon, a free particle leaves `f0` and `zeta`; a carried one gives `f0/sqrt(1 + epsilon)` and `zeta/sqrt(1 + epsilon)`, because
 //! the mass is M + m and the damper is the same.
 
+use std::f64::consts::{PI, TAU};
+
+use lovines::Parameters;
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
+use vines_model::Reference;
 use vines_model::numerics::{Estimate, SIGNIFICANT};
 
-use crate::plan::LinearResponse;
+use crate::shaker_path::ShakerPath;
 
 /// What the particle does while no wall touches it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -89,7 +93,7 @@ impl MeasuredLinear {
 const LARGEST_RATIO: f64 = 1.0 / (1.0 - 0.2);
 /// Largest third harmonic of the force of sliding friction over the force that carries the particle: of a square wave, whose height is at most
 /// that force.
-const FRICTION_THIRD: f64 = 4.0 / (3.0 * std::f64::consts::PI);
+const FRICTION_THIRD: f64 = 4.0 / (3.0 * PI);
 
 /// Whether walls must have touched the particle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,4 +152,82 @@ pub fn impacts_by_resonance(
 #[must_use]
 pub fn impacts_by_harmonic(third: Estimate, epsilon: f64) -> Impacts {
     beyond(third.value, third.uncertainty, FRICTION_THIRD * LARGEST_RATIO * epsilon)
+}
+
+/// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearResponse {
+    /// Natural frequency, rad/s.
+    pub omega0: f64,
+    /// Damping rate, rad/s.
+    pub damping_rate: f64,
+    /// Standard uncertainty of natural frequency and damping rate, rad/s.
+    pub uncertainty: f64,
+    /// Growth rate of the response at resonance per amplitude of the base, 1/s, with its phase relative to the base.
+    pub gain: Complex64,
+    /// Relative standard uncertainty of the gain.
+    pub u_gain: f64,
+    /// The state of the particle that it belongs to.
+    pub particle: ParticleState,
+    /// What a shaker makes of its command, if one was measured.
+    pub shaker: Option<ShakerPath>,
+}
+
+impl LinearResponse {
+    /// That of a plant whose particle is free.
+    pub fn of(plant: &Parameters) -> Self {
+        let omega0 = plant.natural_frequency();
+        Self {
+            omega0,
+            damping_rate: 0.5 * plant.damping / plant.primary_mass,
+            uncertainty: 0.0,
+            gain: Complex64::new(0.0, -0.5 * omega0),
+            u_gain: 0.0,
+            particle: ParticleState::Free,
+            shaker: None,
+        }
+    }
+
+    /// Natural frequency and damping ratio as data; both have the same uncertainty, the real and the imaginary part of one rate.
+    pub fn data(&self) -> MeasuredLinear {
+        MeasuredLinear {
+            f0: self.omega0 / TAU,
+            u_f0: self.uncertainty / TAU,
+            zeta: self.damping_rate / self.omega0,
+            u_zeta: self.uncertainty / self.omega0,
+            correlation: 0.0,
+            particle: self.particle,
+        }
+    }
+
+    /// Response over base at the frequency `omega`, rad/s.
+    pub fn at(&self, omega: f64) -> Complex64 {
+        self.gain / Complex64::new(self.damping_rate, omega - self.omega0)
+    }
+
+    /// `delta + i (omega - omega_d)`, 1/s, with which the amplitude approaches its steady value under a drive of the frequency `omega`, rad/s.
+    pub(crate) fn rate(&self, omega: f64) -> Complex64 {
+        let free = (self.omega0.powi(2) - self.damping_rate.powi(2)).max(0.0).sqrt();
+        Complex64::new(self.damping_rate, omega - free)
+    }
+
+    /// This rate times response over base, 1/s, of an oscillator that is moved through its spring and damper, or by the force in them.
+    pub(crate) fn oscillator_gain(&self, omega: f64, reference: Reference) -> Complex64 {
+        let (square, damper) = (self.omega0.powi(2), 2.0 * self.damping_rate * omega);
+        let force = match reference {
+            Reference::Base => Complex64::new(square, damper),
+            Reference::Force => Complex64::from(square * reference.per_base(self.bandwidth())),
+        };
+        force / (self.rate(-omega).conj())
+    }
+
+    /// Half-power bandwidth over omega0: twice the damping ratio, and base over response at resonance.
+    pub fn bandwidth(&self) -> f64 {
+        2.0 * self.damping_rate.max(0.0) / self.omega0
+    }
+
+    /// Natural periods in which the amplitude falls by a factor of e.
+    pub fn relaxation_periods(&self) -> f64 {
+        1.0 / (PI * self.bandwidth())
+    }
 }

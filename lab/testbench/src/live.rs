@@ -5,8 +5,8 @@ use std::f64::consts::{PI, TAU};
 
 use vines_model::regime::{Impact, MEASURED, Regime, end_of_synchrony, one_to_one};
 
-use crate::experiment::DECAYED;
 use crate::identification::{PER_PERIOD, WINDOW, harmonic};
+use crate::plan::DECAYED;
 
 /// Impacts that are kept to determine the regime from.
 const KEPT: usize = 40;

@@ -14,8 +14,10 @@ use phase_lock::Gains;
 use serde::Serialize;
 use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, complex_fit, mean, mean_square, standard_deviation};
 
+use crate::knowledge::Target;
+use crate::linear::LinearResponse;
 use crate::linear::{MeasuredLinear, ParticleState};
-use crate::plan::{LinearResponse, Plan, Target};
+use crate::plan::Plan;
 use crate::rig::{Drive, Rig, RigError, Scaled};
 
 /// Drives of the check, over the scene's drive: too small for impacts. The smaller one follows where the particle may have slid.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::plan::Target;
+use crate::knowledge::Target;
 use crate::rig::{Command, Drive, GroundTruth, Sensors};
 use crate::scene::Measurand;
 
@@ -52,7 +52,7 @@ pub fn write_row(text: &mut String, sample: &Sample) {
 pub fn table(samples: &[Sample], target: &Target) -> String {
     let mut text = headings(target.measurands);
     for sample in samples {
-        let sensors = target.unscaled(sample.sensors);
+        let sensors = sample.sensors.unscaled(target);
         write_row(&mut text, &Sample { sensors, ..*sample });
     }
     text

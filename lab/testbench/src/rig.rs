@@ -14,13 +14,13 @@ pub use phase_lock::{Fault, LoopState, Move};
 use thiserror::Error;
 use vines_model::{Definition, Sensor};
 
-pub use crate::scene::has_friction;
+use crate::knowledge::Target;
+pub use crate::knowledge::has_friction;
 use crate::scene::{Excitation, Release, Scene, SceneShaker, Structure};
 
 pub use chain::Chain;
-pub(crate) use chain::LowPass;
 pub use faulty::{RigFault, SensorFault, faulty};
-pub(crate) use reference_control::{BANDWIDTH, OFF, speed};
+pub(crate) use reference_control::OFF;
 pub(crate) use stages::derivative;
 pub use stages::{Interrupted, Measured, Scaled, SensorsOnly, Stoppable};
 
@@ -42,6 +42,26 @@ pub struct Sensors {
     pub response: f64,
     /// Motion of the base, m, m/s or m/s², where a sensor reads it.
     pub reference: Option<f64>,
+}
+
+impl Sensors {
+    /// Readings in SI units as displacements, m, as a loop with this target takes them.
+    #[must_use]
+    pub fn scaled(self, target: &Target) -> Self {
+        Self {
+            response: self.response * target.scale(0),
+            reference: self.reference.map(|value| value * target.scale(1)),
+        }
+    }
+
+    /// Readings in SI units, from [`Sensors::scaled`].
+    #[must_use]
+    pub fn unscaled(self, target: &Target) -> Self {
+        Self {
+            response: self.response / target.scale(0),
+            reference: self.reference.map(|value| value / target.scale(1)),
+        }
+    }
 }
 
 /// What only a simulated rig knows, in addition to its sensors.

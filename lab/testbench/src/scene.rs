@@ -36,7 +36,7 @@ use std::sync::LazyLock;
 
 use lovines::cavity::GRAVITY;
 use lovines::table::{LAWS, PARAMETERS, Parameter, Range, Values};
-use lovines::{Cavity, InvalidValue, Restitution, State};
+use lovines::{Cavity, InvalidValue, Plant, Restitution, State, StructureState};
 use phase_lock::{ConfigError, Number};
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -45,10 +45,10 @@ use structure::StructureSection;
 use toml::Table;
 use vines_model::ArgumentError;
 
-use crate::rig::SimulatedStructure;
+use crate::knowledge::{Knowledge, has_friction};
 
 pub use chain::ChainSettings;
-pub use controller::{ControllerSettings, KEYS, PhaseLock, key, phase_target, refusal};
+pub use controller::{ControllerSettings, KEYS, PhaseLock, Units, key, phase_target, refusal};
 pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
 pub use names::{Name, Names};
 pub use overrides::{Family, Override};
@@ -185,6 +185,26 @@ impl Scene {
         Self { controller, ..self }
     }
 
+    /// What the scene says of its rig.
+    pub fn knowledge(&self) -> Knowledge {
+        let mut knowledge = Knowledge::of(&self.plant, self.definition(), self.amplitude, self.sample_time());
+        knowledge.shaker = self.structure.as_ref().and_then(|structure| structure.shaker_path());
+        if let Some(path) = &mut knowledge.shaker {
+            path.aliased = self.aliased(1.0).unwrap_or(0.0);
+        }
+        knowledge.target.through_shaker = knowledge.shaker.is_some();
+        let forced = self
+            .structure
+            .as_ref()
+            .filter(|one| one.excitation == Excitation::Force);
+        knowledge.base_per_newton = forced.map(Structure::base_per_drive);
+        knowledge.nearest_pole = self.structure.as_ref().map_or(f64::INFINITY, Structure::nearest_pole);
+        knowledge.ringing = self.structure.as_ref().map_or(0.0, Structure::ringing);
+        knowledge.target.held = self.chain.hold;
+        knowledge.target.filter = self.chain.filter.map(|cut_off| cut_off * knowledge.linear.omega0);
+        knowledge
+    }
+
     /// Number of times the default samples that a shaker needs: a power of two, at most [`OVERSAMPLED`]; 1 without a shaker.
     ///
     /// Impacts put edges into its force, and harmonics beside the sampling frequency look like the fundamental: smaller than the precision asked of a
@@ -304,26 +324,6 @@ pub struct Implausible {
     pub name: &'static str,
     pub value: f64,
     pub unit: &'static str,
-}
-
-/// Whether a motion of a plant has a mirror image, half a period later, as in an ideal cavity: neither tilt nor walls of different restitution.
-/// Where it has none, the 1:1 motion is asymmetric. (Unequal gaps move the middle of the cavity only.)
-pub(crate) fn has_mirror_images(plant: &Parameters) -> bool {
-    let r = Restitution::Constant(plant.restitution);
-    let [plus, minus] = plant.cavity.restitution.map(|law| law.unwrap_or(r));
-    plant.cavity.tilt == 0.0 && plus == minus
-}
-
-/// Acceleration of the structure up to which static friction carries a particle that touches no wall, m/s²; 0 without friction.
-pub fn carried_up_to(plant: &Parameters) -> f64 {
-    let Cavity { kinetic_friction, static_friction, tilt, .. } = plant.cavity;
-    let held = static_friction.unwrap_or(kinetic_friction) * tilt.cos();
-    (GRAVITY * (held - tilt.sin().abs())).max(0.0)
-}
-
-/// Whether there is friction in the cavity.
-pub fn has_friction(plant: &Parameters) -> bool {
-    plant.cavity.kinetic_friction > 0.0 || plant.cavity.static_friction.is_some_and(|held| held > 0.0)
 }
 
 // The sections of a scene as written, before they are completed and checked.
@@ -465,7 +465,9 @@ impl Sections {
             controller_names: self.controller_names,
         };
         if let Some(structure) = &scene.structure {
-            SimulatedStructure::new(structure, scene.plant, scene.start)
+            let State { q2, dq2, .. } = scene.start;
+            let start = StructureState { q2, dq2, ..StructureState::default() };
+            Plant::with_host(structure.host.clone(), scene.plant, &start)
                 .map_err(|error| SceneError::text(origin, format!("[structure]: {error}")))?;
         }
         let shaken = scene.structure.as_ref().filter(|one| one.shaker.is_some());

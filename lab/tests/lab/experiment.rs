@@ -5,8 +5,9 @@ use vines::advice::{Reason, reason};
 use vines::comparison::Comparison;
 use vines::experiment::{self, ExperimentError};
 use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
+use vines::linear::LinearResponse;
 use vines::orbit::Orbit;
-use vines::plan::{LinearResponse, Plan};
+use vines::plan::Plan;
 use vines::record::{Record, Sample};
 use vines::rig::{
     BuiltIn, Command, Controller, ControllerError, Drive, Fault, Rig, RigError, Sensors, SensorsOnly, Simulated,

@@ -7,7 +7,7 @@ use vines_model::numerics::{mean, range};
 
 use super::Period;
 use crate::identification::Cycle;
-use crate::plan::Target;
+use crate::knowledge::Target;
 use crate::record::Sample;
 
 /// Range of noise, in standard deviations: ten independent normal values exceed it with a probability of 5 % (studentised range).

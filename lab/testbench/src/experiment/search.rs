@@ -19,8 +19,10 @@ use vines_model::numerics::{Estimate, HarmonicBasis, RANDOM, SIGNIFICANT, mean, 
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, SearchFound, Stage};
 use crate::identification::{ASYMMETRIC, Criterion, Cycle, LONGEST, ResonanceFit, degrees, without_tones};
+use crate::knowledge::Target;
+use crate::linear::LinearResponse;
 use crate::linear::{Impacts, impacts_by_resonance};
-use crate::plan::{LinearResponse, Plan, Target};
+use crate::plan::Plan;
 use crate::rig::{Controller, ControllerError, LoopState, Move, Rig};
 
 /// Phase error, rad, below which the control of the response begins: the drive then does 94 % of its largest work.

@@ -26,7 +26,8 @@ use super::{MeasuredPoint, decimals};
 use crate::identification::{
     Criterion, Cycle, Harmonic, LAG, LevelEstimate, Line, PHASE_RANGE, ResonanceFit, harmonic, regime_by_response,
 };
-use crate::plan::{Knowledge, LinearResponse, Target};
+use crate::knowledge::{Knowledge, Target};
+use crate::linear::LinearResponse;
 use crate::record::Sample;
 use crate::rig::{Command, Drive, Sensors};
 use crate::scene::Scene;

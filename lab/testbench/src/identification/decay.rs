@@ -9,7 +9,7 @@ use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean};
 use vines_model::regime::end_of_synchrony;
 
 use super::response::impacts;
-use crate::plan::{Knowledge, Target};
+use crate::knowledge::{Knowledge, Target};
 use crate::record::{Record, Sample};
 use crate::scene::Dimensionless;
 

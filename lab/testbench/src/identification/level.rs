@@ -11,7 +11,7 @@ use std::fmt::{self, Display, Formatter};
 use vines_model::numerics::{Estimate, RANDOM};
 
 use super::{Cycle, ResonanceFit};
-use crate::plan::Knowledge;
+use crate::knowledge::Knowledge;
 
 /// What is asked of a level.
 #[derive(Debug, Clone, Copy, PartialEq)]

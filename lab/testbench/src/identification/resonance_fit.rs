@@ -31,7 +31,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 use vines_model::numerics::{Estimate, HarmonicBasis, Regression, mean, slope};
 
 use super::harmonics_of;
-use crate::plan::{Knowledge, LinearResponse, Target};
+use crate::knowledge::{Knowledge, Target};
+use crate::linear::LinearResponse;
 use crate::record::{Sample, drive_phases};
 use crate::scene::{Definition, Measurand, Reference, Sensor};
 

@@ -15,8 +15,8 @@ use vines_model::numerics::{Estimate, HarmonicBasis, golden_section, mean};
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
 use super::{Cycle, harmonics_of};
+use crate::knowledge::{Knowledge, Target};
 use crate::linear::{Impacts, impacts_by_harmonic, impacts_by_resonance};
-use crate::plan::{Knowledge, Target};
 use crate::record::Sample;
 use crate::scene::{Definition, Dimensionless, Measurand, Sensor};
 

@@ -14,10 +14,12 @@ use super::{
     CheckedChannel, CheckedQuantity, DEAD, FACTOR, Linear, LoopCheck, NOTED, OpenLoop, PHASE, ROUNDS, Verdict, fitted,
     of_response, quantity,
 };
+use crate::linear::LinearResponse;
 use crate::linear::ParticleState;
-use crate::plan::{LinearResponse, Plan, ShakerPath};
+use crate::plan::Plan;
 use crate::rig::{Rig, RigError, Scaled};
 use crate::scene::{PLACES, frequencies};
+use crate::shaker_path::ShakerPath;
 
 /// Periods of a window, and most windows at a frequency.
 const WINDOW: [usize; 2] = [8, 100];

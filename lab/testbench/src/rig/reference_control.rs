@@ -11,23 +11,8 @@ use std::f64::consts::{LN_2, PI, TAU};
 use num_complex::Complex64;
 
 use super::{Drive, RigError};
-use crate::plan::{Knowledge, ShakerPath, Target};
-
-/// Bandwidth of the observer of response and impacts, over the natural frequency: at half of it, the force on an oscillator of 1.8 % drop-out
-/// (scenes/shaker-oscillator.toml) is so late behind the impacts that the loop does not settle.
-const OBSERVER: f64 = 0.6;
-/// Bandwidth of the detector of the error.
-const DETECTOR: f64 = 0.5 * OBSERVER;
-/// Rate of a second integrator over the bandwidth of the first: both roots of the loop are then equal, at half of this bandwidth. The
-/// harmonics above [`FAST`] change at this share of a detector's bandwidth.
-const SECOND: f64 = 0.25;
-/// Bandwidth of the control.
-pub(crate) const BANDWIDTH: f64 = SECOND * DETECTOR;
-/// Number of odd harmonics that both detectors know, as far as they are sampled. Impacts of one period are alternating impulses. A resonance of armature
-/// and stinger can make a harmonic of the force ten times the fundamental: unknown, it would be in the command, and another motion the result.
-const HARMONICS: usize = 15;
-/// How many of them change as fast as the fundamental: chosen by trial on random shakers (studies/shakers.rs), a few of which overshoot limits with 1.
-const FAST: usize = 3;
+use crate::knowledge::{Knowledge, Target};
+use crate::shaker_path::{BANDWIDTH, DETECTOR, HARMONICS, OBSERVER, SECOND, ShakerPath, rate_of};
 
 /// Share of the command's fundamental that an amplifier loses which has failed; clipping at half of the command loses 0.39. At the natural frequency
 /// this is the share of the reference, over the drop-out. An error of the whole reference is a failure whatever the drop-out: it is not the reference
@@ -61,11 +46,6 @@ impl Detector {
             *of += 2.0 * rate * share * residual * Complex64::I * rotor.conj();
         }
     }
-}
-
-/// Rate at which a detector changes a harmonic, by its place among the odd ones, over the rate of the fundamental.
-fn rate_of(n: usize) -> f64 {
-    if n < FAST { 1.0 } else { SECOND }
 }
 
 /// The control, and its state. Phasors are those of sines, relative to the controller's oscillator.
@@ -217,68 +197,6 @@ impl ReferenceControl {
             displacement: amplitude * of_rig.sin(),
         }
     }
-}
-
-/// Share of the bandwidths at which the control is slow enough for the other resonances of structure and shaker: 1, or the largest power of 1/2 at
-/// which it is stable (Nyquist) also when it is twice as fast; 1/16 if none is. `exact`: reference and response per command at a frequency, rad/s.
-pub(crate) fn speed(path: &ShakerPath, omega0: f64, exact: impl Fn(f64) -> [Complex64; 2]) -> f64 {
-    let is_stable = |speed: &f64| {
-        let of = |x: f64| return_difference(path, omega0, *speed, x, exact(omega0 * (1.0 + x)));
-        let turns: f64 = (-REACH..REACH)
-            .map(|n| turned(&of, [n, n + 1].map(|n| f64::from(n) * GRID), FINEST))
-            .sum();
-        turns > -PI
-    };
-    let slower = [1.0, 0.5, 0.25, 0.125].into_iter().find(is_stable);
-    match slower {
-        Some(1.0) => 1.0,
-        stable => 0.5 * stable.unwrap_or(0.125),
-    }
-}
-
-/// Detunings at which stability is judged, over omega0: a multiple of this to each side, and between where the phase turns fast.
-const GRID: f64 = 0.01;
-const REACH: i32 = 70;
-/// Number of times that such an interval is halved at most.
-const FINEST: u32 = 12;
-
-/// Phase by which a function turns between two points, rad.
-fn turned(of: &impl Fn(f64) -> Complex64, [begin, end]: [f64; 2], finest: u32) -> f64 {
-    let turn = (of(end) / of(begin)).arg();
-    if finest == 0 || turn.abs() < 0.5 {
-        return turn;
-    }
-    let middle = 0.5 * (begin + end);
-    turned(of, [begin, middle], finest - 1) + turned(of, [middle, end], finest - 1)
-}
-
-/// Return difference of the control at `omega0 (1 + x)`, times `s/(s + bandwidth)`, which takes the pole of the integrator away. It turns by -2 pi
-/// for every unstable pole of the closed loop.
-fn return_difference(
-    path: &ShakerPath,
-    omega0: f64,
-    speed: f64,
-    x: f64,
-    [reference, response]: [Complex64; 2],
-) -> Complex64 {
-    let s = Complex64::new(0.0, x);
-    let [observer, detector, bandwidth] = [OBSERVER, DETECTOR, BANDWIDTH].map(|bandwidth| bandwidth * speed);
-    // What offset and harmonics of a detector take of what it reads; the fundamental is at x = 0.
-    let orders = (0..HARMONICS).flat_map(|n| [1.0, -1.0].map(|sign| (n, sign * (2 * n + 1) as f64)));
-    let others = orders.filter(|(_, order)| *order != 1.0);
-    let comb: Complex64 = others
-        .map(|(n, order)| rate_of(n) / Complex64::new(0.0, 1.0 + x - order))
-        .sum();
-    let comb = comb + 1.0 / Complex64::new(0.0, 1.0 + x);
-    let (pole, damping) = (path.pole / omega0, path.damping_rate / omega0);
-    let gain = Complex64::new(0.0, -0.5);
-    // All times s.
-    let corrected = observer * (s + SECOND * observer) / (1.0 + observer * comb);
-    let rate = s * (s + pole) + corrected;
-    let observed = (s * gain * path.gain + corrected * response) / rate;
-    let error = detector / (s * (1.0 + detector * comb) + detector);
-    let moved = (pole - damping) / gain * observed;
-    (s * (1.0 - moved / path.gain) + bandwidth * error * reference / path.gain) / (s + bandwidth)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use vines_model::{Definition, Measurand, Reference};
 
 use super::reference_control::ReferenceControl;
 use super::{Drive, GroundTruth, Rig, RigError, RigStage, Sensors};
-use crate::plan::{Knowledge, Target};
+use crate::knowledge::{Knowledge, Target};
 use crate::scene::Structure;
 
 /// A rig whose response and reference are displacements, with the sensors of a definition of resonance.
@@ -187,7 +187,7 @@ impl<'a, R: Rig + ?Sized> Scaled<'a, R> {
 
 impl<R: Rig + ?Sized> Rig for Scaled<'_, R> {
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        let sensors = self.target.scaled(self.rig.sense()?);
+        let sensors = self.rig.sense()?.scaled(&self.target);
         self.readings = [sensors.response, sensors.reference.unwrap_or(0.0)];
         Ok(sensors)
     }

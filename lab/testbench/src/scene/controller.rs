@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
 use vines_model::ArgumentError;
 
-use crate::plan::{Knowledge, LinearResponse, Units};
+use crate::knowledge::Knowledge;
+use crate::linear::LinearResponse;
 
 use super::{Measurand, Scene, SceneError, check, given, positive, within};
 
@@ -311,6 +312,17 @@ impl Scene {
             ..config
         }
     }
+}
+
+/// In which units a scene gives limits: those of the drive and of the displacement at the sensor, where the bench has the metres of an oscillator.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Units {
+    /// Drive of the scene per metre of the bench.
+    pub drive: f64,
+    /// Unit of this drive, m or N.
+    pub name: &'static str,
+    /// Displacement at the sensor per metre of the bench.
+    pub response: f64,
 }
 
 /// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.

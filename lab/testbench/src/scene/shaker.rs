@@ -1,6 +1,6 @@
 //! The `[shaker]` section: an electrodynamic shaker between the command and a structure.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use lovines::host::Row;
 use lovines::oscillator::Regime;
@@ -10,10 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::structure::{HIGHEST, rows};
 use super::{Excitation, Structure};
-use crate::experiment::{FOLLOWED, SLOWEST_LOOP};
-use crate::identification::LONGEST;
-use crate::plan::ShakerPath;
-use crate::rig::{BANDWIDTH, speed};
+use crate::shaker_path::{BANDWIDTH, ShakerPath, speed};
 
 /// Points that a shaker adds to those of a structure.
 pub const ARMATURE: &str = "armature";
@@ -274,7 +271,6 @@ impl Structure {
             speed: 1.0,
             base_per_reference: self.base_per_drive(),
             base_per_command: self.base_per_command(),
-            followed: 0,
             aliased: 0.0,
         };
         let path = path.fitted(mode.omega, damping_rate, &values);
@@ -285,10 +281,7 @@ impl Structure {
             [reference, self.host.frequency_response(&response, omega) / per_response]
         };
         let speed = speed(&path, mode.omega, exact);
-        // Both roots of the control are at half of its bandwidth.
-        let of_control = FOLLOWED as f64 / SLOWEST_LOOP / (PI * BANDWIDTH * speed);
-        let followed = of_control.min(LONGEST as f64).ceil() as usize;
-        Some(ShakerPath { speed, followed, ..path })
+        Some(ShakerPath { speed, ..path })
     }
 }
 

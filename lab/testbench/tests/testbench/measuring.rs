@@ -798,7 +798,7 @@ fn no_motion_of_a_particle_is_a_foreign_tone() {
         let mut rig = rig(&scene, &[]);
         let samples: Vec<Sample> = (0..6000)
             .map(|n| {
-                let (time, sensors) = (step * f64::from(n), knowledge.target.scaled(rig.sense().unwrap()));
+                let (time, sensors) = (step * f64::from(n), rig.sense().unwrap().scaled(&knowledge.target));
                 rig.advance(drive, step).unwrap();
                 let command = Command { drive, ..Command::default() };
                 Sample { time, sensors, command, ..Sample::default() }
