@@ -1,4 +1,4 @@
-//! Exact periodic orbits: symmetric 1:1 ones at phase resonance in closed form, all others by shooting on the impact map.
+//! Exact periodic orbits: symmetric 1:1 ones at phase resonance in closed form, all others by shooting on the plant's own motion.
 //!
 //! Everything is dimensionless: lengths over b, velocities over `b omega0`, time `tau = omega0 t`. Half a period after an
 //! impact the state of a symmetric orbit is minus itself; the particle flies in straight lines at speed ±B, so the wall exerts
@@ -8,12 +8,12 @@
 mod continuation;
 mod flight;
 mod half_period;
-mod impact_map;
 mod multipliers;
 pub(crate) mod oscillator;
 mod periodic;
 mod plant;
 mod response;
+mod return_map;
 mod structure;
 mod symmetric;
 
@@ -21,13 +21,13 @@ use crate::Dimensionless;
 use serde::Serialize;
 
 pub use continuation::{Branch, BranchBifurcation, BranchEnd, ContinuationLimits, continue_both_ways};
-pub use impact_map::Bounce;
-pub use periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, settle};
+pub use periodic::{Bifurcation, Condition, Periodic, settle};
 pub(crate) use periodic::{NEAR, periodic_near};
 pub use plant::{
     DriveCondition, NoMotion, PlantMotion, periodic_motion, resonant_motion, resonant_motion_under, settled_motion,
 };
 pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, bifurcation_curves, response};
+pub use return_map::{Bounce, ImpactPattern, Unknowns};
 pub use structure::{
     FirstOrder, ModeFacts, OrbitCurve, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
     StructureOrbits, StructureRange, StructureStart,

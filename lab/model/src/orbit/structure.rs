@@ -605,7 +605,8 @@ impl StructureOrbits {
         }
     }
 
-    /// The orbit with its stability, or without it and without its start, if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
+    /// The orbit with its stability, or without it and without its start, if it is physical: the particle moves, and hits the other wall half a
+    /// period later, not earlier.
     fn accept(&self, motion: &SymmetricMotion, with_stability: bool) -> Option<StructureOrbit> {
         let orbit = self.told(motion);
         let sizes = [orbit.speed, orbit.response, orbit.drive];
