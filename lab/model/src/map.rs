@@ -18,8 +18,8 @@ use serde::Serialize;
 
 use crate::Dimensionless;
 use crate::numerics::{SIGNIFICANT, mean, standard_deviation};
-use crate::orbit::oscillator::ForcedOscillator;
 use crate::orbit::{NEAR, Periodic, periodic_near};
+use crate::oscillator::ForcedOscillator;
 use crate::regime::{Impact, Regime, synchrony};
 
 /// Default of the largest number of periods that a cell is followed.

@@ -9,12 +9,12 @@ mod continuation;
 mod flight;
 mod half_period;
 mod multipliers;
-pub(crate) mod oscillator;
 mod periodic;
 mod plant;
 mod response;
 mod return_map;
 mod structure;
+mod study;
 mod symmetric;
 
 use crate::Dimensionless;
@@ -32,10 +32,11 @@ pub use structure::{
     FirstOrder, ModeFacts, OrbitCurve, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
     StructureOrbits, StructureRange, StructureStart,
 };
-pub use symmetric::{
-    Particle, at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_backbone,
-    stable_resonant, symmetric_orbits, with_amplitude,
+pub use study::{
+    at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_backbone, stable_resonant,
+    symmetric_orbits, with_amplitude,
 };
+pub use symmetric::Particle;
 
 /// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

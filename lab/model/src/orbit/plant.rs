@@ -19,7 +19,7 @@ use super::Orbit;
 use super::periodic::NEAR;
 use super::return_map::plant_at;
 use super::stability;
-use super::symmetric::{at_amplitude, at_speed, stable_resonant};
+use super::study::{at_amplitude, at_speed, stable_resonant};
 use crate::numerics::{Equations, newton};
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
 use crate::{Definition, Dimensionless, Sensor};

@@ -10,7 +10,7 @@ use lovines::{Drive, Event, Parameters, Plant, State, Variation};
 use nalgebra::{Complex, Matrix4, Matrix4x6, RowVector6, Vector4, Vector6};
 use serde::Serialize;
 
-use super::oscillator::ForcedOscillator;
+use crate::oscillator::ForcedOscillator;
 use crate::{Definition, Dimensionless, Sensor};
 
 /// Unknowns of a periodic motion: (phase, q1, q1', q2') after its first impact, sigma, G.

@@ -14,13 +14,11 @@ use nalgebra::{Complex, Matrix2, Vector2};
 use serde::Serialize;
 
 use super::half_period::HalfPeriod;
-use super::oscillator::section;
-use super::periodic::wrapped;
-use super::symmetric::{
-    Interval, Particle, Reading, SEARCHED, SymmetricMotion, SymmetricMotions, harmonic, intervals, search,
-};
-use super::{AfterImpact, Bifurcation, ON_CIRCLE, Orbit, stability};
+use super::periodic::{Bifurcation, wrapped};
+use super::symmetric::{Interval, Particle, Reading, SymmetricMotion, SymmetricMotions, harmonic, intervals, search};
+use super::{AfterImpact, ON_CIRCLE, Orbit, stability};
 use crate::numerics::{self, Equations, equally_spaced, newton, try_bisection};
+use crate::oscillator::section;
 use crate::theory::SlowFlow;
 use crate::{Definition, Dimensionless, Reference, Sensor};
 
@@ -309,6 +307,8 @@ pub struct StructureOrbits {
     target: f64,
 }
 
+/// Frequencies searched, over omega0.
+pub(super) const SEARCHED: [f64; 2] = [0.2, 3.0];
 /// Number of frequencies at which orbits are searched over a range.
 const GRID: usize = 4000;
 /// Widths, in the angle along a loop, to which a change of stability and the end of a branch are located.

@@ -19,7 +19,7 @@ pub(crate) fn section(damping: f64) -> Section {
 /// The oscillator under the base of a scene at one frequency.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ForcedOscillator {
-    pub(super) free: Section,
+    pub(crate) free: Section,
     omega: f64,
     /// Harmonic response of q1 to the base.
     response: Complex<f64>,
