@@ -8,6 +8,7 @@ import pytest
 from references import ROOT
 
 RUST = r"^\s*(?:pub(?:\(crate\))? )?use crate::(?:\{\s*)?(\w+)|crate::(\w+)::"
+SIBLING = r"^\s*(?:pub(?:\(crate\))? )?use super::(?:\{\s*)?(\w+)|super::(\w+)::"
 SCRIPT = r"^import .* from \"\./(\w+)\.js\""
 
 
@@ -39,6 +40,8 @@ def circle(arrows: dict[str, set[str]]) -> set[str]:
         ("src", "rs", RUST),
         ("controller/src", "rs", RUST),
         ("lab/testbench/src", "rs", RUST),
+        ("lab/model/src", "rs", RUST),
+        ("lab/model/src/orbit", "rs", SIBLING),
         ("live/page", "js", SCRIPT),
     ],
 )

@@ -12,6 +12,7 @@ mod dimensionless;
 pub mod map;
 pub mod numerics;
 pub mod orbit;
+mod oscillator;
 pub mod regime;
 pub mod theory;
 

@@ -18,8 +18,8 @@ use serde::Serialize;
 
 use crate::Dimensionless;
 use crate::numerics::{SIGNIFICANT, mean, standard_deviation};
-use crate::orbit::oscillator::ForcedOscillator;
 use crate::orbit::{NEAR, Periodic, periodic_near};
+use crate::oscillator::ForcedOscillator;
 use crate::regime::{Impact, Regime, synchrony};
 
 /// Default of the largest number of periods that a cell is followed.
@@ -292,7 +292,7 @@ impl CellRun {
     fn without_impacts(&self) -> Option<RegimeResult> {
         let n = self.periods();
         let [q1, dq1, q2, dq2] = self.states[n];
-        let oscillator = ForcedOscillator::new(&self.scene, self.drive.omega, self.scene.g);
+        let oscillator = ForcedOscillator::new(&self.scene, self.drive.omega);
         let [steady, velocity] = oscillator.harmonic(0.0).into();
         let reach = (q1 - steady).hypot(dq1 - velocity) + oscillator.response(0.0).norm();
         (dq2 == 0.0 && reach + q2.abs() < 1.0).then(|| {

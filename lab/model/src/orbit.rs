@@ -1,4 +1,4 @@
-//! Exact periodic orbits: symmetric 1:1 ones at phase resonance in closed form, all others by shooting on the impact map.
+//! Exact periodic orbits: symmetric 1:1 ones at phase resonance in closed form, all others by shooting on the plant's own motion.
 //!
 //! Everything is dimensionless: lengths over b, velocities over `b omega0`, time `tau = omega0 t`. Half a period after an
 //! impact the state of a symmetric orbit is minus itself; the particle flies in straight lines at speed ±B, so the wall exerts
@@ -8,34 +8,35 @@
 mod continuation;
 mod flight;
 mod half_period;
-mod impact_map;
 mod multipliers;
-pub(crate) mod oscillator;
 mod periodic;
 mod plant;
 mod response;
+mod return_map;
 mod structure;
+mod study;
 mod symmetric;
 
 use crate::Dimensionless;
 use serde::Serialize;
 
 pub use continuation::{Branch, BranchBifurcation, BranchEnd, ContinuationLimits, continue_both_ways};
-pub use impact_map::Bounce;
-pub use periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, settle};
+pub use periodic::{Bifurcation, Condition, Periodic, settle};
 pub(crate) use periodic::{NEAR, periodic_near};
 pub use plant::{
     DriveCondition, NoMotion, PlantMotion, periodic_motion, resonant_motion, resonant_motion_under, settled_motion,
 };
 pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, bifurcation_curves, response};
+pub use return_map::{Bounce, ImpactPattern, Unknowns};
 pub use structure::{
     FirstOrder, ModeFacts, OrbitCurve, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
     StructureOrbits, StructureRange, StructureStart,
 };
-pub use symmetric::{
-    Particle, at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_backbone,
-    stable_resonant, symmetric_orbits, with_amplitude,
+pub use study::{
+    at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_backbone, stable_resonant,
+    symmetric_orbits, with_amplitude,
 };
+pub use symmetric::Particle;
 
 /// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

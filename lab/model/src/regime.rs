@@ -50,18 +50,6 @@ pub enum Regime {
 }
 
 impl Regime {
-    /// Those of the map; they exclude each other.
-    pub const SIMULATED: [Regime; 8] = [
-        Regime::NoImpacts,
-        Regime::Symmetric,
-        Regime::Asymmetric,
-        Regime::Several,
-        Regime::QuasiPeriodic,
-        Regime::Modulated,
-        Regime::Chaotic,
-        Regime::Undecided,
-    ];
-
     /// All of them.
     pub const ALL: [Regime; 12] = [
         Regime::NoImpacts,
@@ -77,6 +65,12 @@ impl Regime {
         Regime::NotEstablished,
         Regime::Unknown,
     ];
+
+    /// Those of the map, the first ones; they exclude each other.
+    pub const SIMULATED: [Regime; 8] = match Self::ALL.first_chunk() {
+        Some(simulated) => *simulated,
+        None => unreachable!(),
+    };
 
     /// What the response alone shows of it: words for a rig that may contain no particle.
     pub fn motion(&self) -> &'static str {

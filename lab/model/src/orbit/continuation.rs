@@ -1,4 +1,4 @@
-//! Continuation of periodic motions by pseudo-arclength: through folds, stable and unstable parts alike (docs/theory.md, eq. 27).
+//! Continuation of periodic motions by pseudo-arclength: through folds, stable and unstable parts alike (docs/regimes.md, eq. 27).
 //!
 //! The unknowns are the state after an impact, sigma and G; four equations close the motion and one more selects the curve:
 //! fixed G for a frequency response, phase resonance for the backbone. The step follows the tangent and shrinks where the
@@ -10,8 +10,8 @@
 use nalgebra::{Matrix4, Matrix6};
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
-use super::impact_map::Bounce;
-use super::periodic::{Bifurcation, Condition, ImpactPattern, Periodic, Unknowns, wrapped};
+use super::periodic::{Bifurcation, Condition, Periodic, wrapped};
+use super::return_map::{Bounce, ImpactPattern, Unknowns};
 use crate::Dimensionless;
 use crate::numerics::try_bisection;
 

@@ -6,60 +6,22 @@
 //!
 //! `f(z) = (1 - mu h1)² + h0 (kappa - mu² h2)`, `h_j = sum of c A^j F (F + z)^-1 k`.
 //!
-//! The polynomial f times all `det(F + z)` is a product of real quadratic factors, one for every section. From the factors of an orbit near this
-//! one, Newton's method corrects all in turn (A. A. Grau, "The simultaneous Newton improvement of a complete set of approximate factors of a
-//! polynomial", SIAM J. Numer. Anal. 8, 1971): the work grows as the square of the number of sections, that of a dense matrix as its cube.
+//! The zeros of the polynomial f times all `det(F + z)` are found together, each by Newton's method on the polynomial over its distances from all
+//! others (O. Aberth, "Iteration methods for finding all zeros of a polynomial simultaneously", Mathematics of Computation 27, 1973). They start
+//! beside the zeros of `det(F + z)`, where those of weakly coupled sections are: the work grows as the square of the number of sections, that of a
+//! dense matrix as its cube.
 
 use lovines::Section;
 use nalgebra::{Complex, Matrix2, RowVector2, Vector2};
 
-/// The quadratic `z² + u z + v`, and the polynomials modulo it: `a + b z` as `[a, b]`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Quadratic {
+/// The polynomial `a + b z` as `[a, b]`.
+type Line = [f64; 2];
+
+/// A section, or several with the same flow: `det(F + z) = z² + u z + v`, and its part `(a + b z)/det(F + z)` in h_j.
+struct Part {
     u: f64,
     v: f64,
-}
-
-impl Quadratic {
-    /// `det(F + z)`.
-    fn of_flow(flow: &Matrix2<f64>) -> Self {
-        Self { u: flow.trace(), v: flow.determinant() }
-    }
-
-    fn product(&self, [a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
-        let square = b * d;
-        [a * c - self.v * square, a * d + b * c - self.u * square]
-    }
-
-    fn inverse(&self, [a, b]: [f64; 2]) -> [f64; 2] {
-        let conjugate = a - b * self.u;
-        let norm = (a * conjugate + b * b * self.v).recip();
-        [conjugate * norm, -b * norm]
-    }
-
-    /// Another quadratic modulo this one.
-    fn reduced(&self, other: &Self) -> [f64; 2] {
-        [other.v - self.v, other.u - self.u]
-    }
-
-    fn roots(&self) -> [Complex<f64>; 2] {
-        let middle = -0.5 * self.u;
-        let square = middle * middle - self.v;
-        if square < 0.0 {
-            let root = (-square).sqrt();
-            return [-root, root].map(|im| Complex::new(middle, im));
-        }
-        // Without cancellation.
-        let far = middle + square.sqrt().copysign(middle);
-        let near = if far == 0.0 { 0.0 } else { self.v / far };
-        [near, far].map(Complex::from)
-    }
-}
-
-/// A section, or several with the same flow: `det(F + z)`, and its part `(beta_j + alpha_j z)/det(F + z)` in h_j.
-struct Part {
-    free: Quadratic,
-    parts: [[f64; 2]; 3],
+    parts: [Line; 3],
 }
 
 /// What the impact adds to the flows.
@@ -71,27 +33,26 @@ pub(super) struct Impact {
     pub kappa: f64,
 }
 
-/// Size of the last correction of the factors, and, where rounding lets it fall no further, the largest; their coefficients are of order one.
+/// Size of the last correction of a zero, over the larger of its modulus and 1, and, where rounding lets it fall no further, the largest.
 const CONVERGED: f64 = 1e-13;
 const ROUNDING: f64 = 1e-9;
-/// Largest number of rounds: few are needed, unless the start is too far away, or factors have a zero in common.
-const ROUNDS: usize = 12;
+/// Largest number of rounds: about ten are needed.
+const ROUNDS: usize = 60;
+/// Distance of the start from the zeros of `det(F + z)`, over their moduli. Exactly there, double ones would not part, and pairs could not become
+/// real. The number of rounds hardly depends on it.
+const BESIDE: f64 = 1e-3;
 
-/// The multipliers, in no order, near `start`, which has as many; `None` where the factors do not converge.
-pub(super) fn multipliers(
-    flows: &[(Section, Matrix2<f64>)],
-    impact: Impact,
-    start: &[[f64; 2]],
-) -> Option<Vec<Complex<f64>>> {
+/// The multipliers, in no order; `None` where the zeros do not converge.
+pub(super) fn multipliers(flows: &[(Section, Matrix2<f64>)], impact: Impact) -> Option<Vec<Complex<f64>>> {
     let mut sections: Vec<(Section, Part)> = Vec::new();
-    // The factors of sections whose flow another one has.
+    // The zeros of sections whose flow another one has.
     let mut alike = Vec::new();
     for (section, flow) in flows {
-        let free = Quadratic::of_flow(flow);
+        let (u, v) = (flow.trace(), flow.determinant());
         let field = field(section);
         let (kick, mut row) = (Vector2::from(section.kick), RowVector2::from(section.cavity));
         let parts = [0, 1, 2].map(|_| {
-            let part = [free.v * (row * kick)[0], (row * flow * kick)[0]];
+            let part = [v * (row * kick)[0], (row * flow * kick)[0]];
             row *= field;
             part
         });
@@ -101,40 +62,51 @@ pub(super) fn multipliers(
             for (sum, part) in other.parts.iter_mut().zip(parts) {
                 *sum = [sum[0] + part[0], sum[1] + part[1]];
             }
-            alike.push(free);
+            alike.extend(roots(u, v));
         } else {
-            sections.push((*section, Part { free, parts }));
+            sections.push((*section, Part { u, v, parts }));
         }
     }
     let parts: Vec<Part> = sections.into_iter().map(|(_, part)| part).collect();
-    // Real zeros that meet and become complex must be of one factor.
-    let factors = [false, true].into_iter().find_map(|shifted| {
-        let mut factors = factors_of(start, shifted);
-        for free in &alike {
-            let distance = |n: &usize| (factors[*n].u - free.u).hypot(factors[*n].v - free.v);
-            let nearest = (0..factors.len()).min_by(|one, other| distance(one).total_cmp(&distance(other)))?;
-            factors.swap_remove(nearest);
-        }
-        let is_whole = factors.len() == parts.len();
-        (is_whole && correct(&mut factors, &parts, impact).is_some()).then_some(factors)
-    })?;
-    Some(factors.iter().chain(&alike).flat_map(Quadratic::roots).collect())
+    let beside = |(n, zero): (usize, Complex<f64>)| zero * (1.0 + Complex::from_polar(BESIDE, n as f64));
+    let mut zeros: Vec<_> = parts
+        .iter()
+        .flat_map(|part| roots(part.u, part.v))
+        .enumerate()
+        .map(beside)
+        .collect();
+    correct(&mut zeros, &parts, impact)?;
+    Some(in_pairs(&zeros).chain(alike).collect())
 }
 
-/// Factors with these zeros, of which the complex ones are in pairs. Real ones are paired as they follow each other, from the first, or `shifted` from
-/// the second, with the first and the last as a pair.
-fn factors_of(zeros: &[[f64; 2]], shifted: bool) -> Vec<Quadratic> {
-    let pairs = zeros.iter().filter(|[_, im]| *im > 0.0);
-    let pairs = pairs.map(|[re, im]| Quadratic { u: -2.0 * re, v: re * re + im * im });
-    let mut real: Vec<f64> = zeros.iter().filter(|[_, im]| *im == 0.0).map(|[re, _]| *re).collect();
-    real.sort_unstable_by(f64::total_cmp);
-    if shifted && !real.is_empty() {
-        real.rotate_left(1);
+/// The zeros of `z² + u z + v`.
+fn roots(u: f64, v: f64) -> [Complex<f64>; 2] {
+    let middle = -0.5 * u;
+    let square = middle * middle - v;
+    if square < 0.0 {
+        let root = (-square).sqrt();
+        return [-root, root].map(|im| Complex::new(middle, im));
     }
-    let real = real
-        .chunks_exact(2)
-        .map(|pair| Quadratic { u: -pair[0] - pair[1], v: pair[0] * pair[1] });
-    pairs.chain(real).collect()
+    // Without cancellation.
+    let far = middle + square.sqrt().copysign(middle);
+    let near = if far == 0.0 { 0.0 } else { v / far };
+    [near, far].map(Complex::from)
+}
+
+/// The zeros, of which one is real if no other one is nearer to its conjugate than it is itself.
+fn in_pairs(zeros: &[Complex<f64>]) -> impl Iterator<Item = Complex<f64>> {
+    zeros.iter().enumerate().map(|(n, zero)| {
+        let from_conjugate = |(other, _): &(usize, &Complex<f64>)| (zeros[*other] - zero.conj()).norm_sqr();
+        let nearest = zeros
+            .iter()
+            .enumerate()
+            .min_by(|one, other| from_conjugate(one).total_cmp(&from_conjugate(other)));
+        if nearest.is_none_or(|(other, _)| other == n) {
+            zero.re.into()
+        } else {
+            *zero
+        }
+    })
 }
 
 /// The matrix of the vector field of a section.
@@ -143,70 +115,76 @@ fn field(section: &Section) -> Matrix2<f64> {
     Matrix2::new(0.0, 1.0, -oscillator.omega0_squared, -2.0 * oscillator.delta)
 }
 
-fn correct(factors: &mut [Quadratic], parts: &[Part], impact: Impact) -> Option<()> {
-    let mut last = f64::INFINITY;
+fn correct(zeros: &mut [Complex<f64>], parts: &[Part], impact: Impact) -> Option<()> {
+    // The last corrections; of a zero that is found, 0.
+    let mut last = vec![f64::INFINITY; zeros.len()];
     for _ in 0..ROUNDS {
-        let mut largest = 0.0_f64;
-        for n in 0..factors.len() {
-            let [v, u] = correction(parts, factors, impact, n);
-            if !(u.is_finite() && v.is_finite()) {
+        for n in 0..zeros.len() {
+            if last[n] == 0.0 {
+                continue;
+            }
+            let correction = correction(parts, zeros, impact, n);
+            let size = correction.norm() / zeros[n].norm().max(1.0);
+            if !size.is_finite() {
                 return None;
             }
-            factors[n].u += u;
-            factors[n].v += v;
-            largest = largest.max(u.abs()).max(v.abs());
+            zeros[n] -= correction;
+            let found = size < CONVERGED || size < ROUNDING && size > 0.5 * last[n];
+            last[n] = if found { 0.0 } else { size };
         }
-        if largest < CONVERGED || largest < ROUNDING && largest > 0.5 * last {
-            return has_trace(factors, parts, impact).then_some(());
+        if last.iter().all(|size| *size == 0.0) {
+            return has_trace(zeros, parts, impact).then_some(());
         }
-        last = largest;
     }
     None
 }
 
-/// Whether the sum of the zeros is the trace of the map: a zero that has left towards infinity is lost.
-fn has_trace(factors: &[Quadratic], parts: &[Part], Impact { mu, kappa }: Impact) -> bool {
-    let own = |Part { free, parts: [own, rate, _] }: &Part| 2.0 * mu * rate[1] - kappa * own[1] - free.u;
+/// Whether the sum of the zeros is the trace of the map: each is found once.
+fn has_trace(zeros: &[Complex<f64>], parts: &[Part], Impact { mu, kappa }: Impact) -> bool {
+    let own = |Part { u, parts: [own, rate, _], .. }: &Part| 2.0 * mu * rate[1] - kappa * own[1] - u;
     let trace: f64 = parts.iter().map(own).sum();
-    let sum: f64 = factors.iter().map(|factor| -factor.u).sum();
+    let sum: Complex<f64> = zeros.iter().sum();
     let size: f64 = parts.iter().map(|part| own(part).abs()).sum();
-    (trace - sum).abs() <= ROUNDING * size
+    (trace - sum).norm() <= ROUNDING * size
 }
 
-/// The correction `a + b z` of a factor: the polynomial over all other factors, modulo this one.
-fn correction(parts: &[Part], factors: &[Quadratic], Impact { mu, kappa }: Impact, n: usize) -> [f64; 2] {
-    let own = factors[n];
-    // Sums of the other sections in h_j, and their polynomials over the other factors.
-    let (mut sums, mut ratio) = ([[0.0; 2]; 3], [1.0, 0.0]);
-    for (part, factor) in parts
-        .iter()
-        .zip(factors)
-        .enumerate()
-        .filter(|(other, _)| *other != n)
-        .map(|(_, both)| both)
-    {
-        let free = own.reduced(&part.free);
-        let inverse = own.inverse(free);
-        for (sum, part) in sums.iter_mut().zip(part.parts) {
-            let [a, b] = own.product(part, inverse);
-            *sum = [sum[0] + a, sum[1] + b];
+/// The correction of a zero: the polynomial over its derivative, both over the distances from all others.
+fn correction(parts: &[Part], zeros: &[Complex<f64>], Impact { mu, kappa }: Impact, n: usize) -> Complex<f64> {
+    let z = zeros[n];
+    let free = |part: &Part| (z + part.u) * z + part.v;
+    let norms = parts.iter().map(|part| free(part).norm_sqr()).enumerate();
+    let nearest = norms
+        .min_by(|one, other| one.1.total_cmp(&other.1))
+        .map_or(0, |(own, _)| own);
+    // h_j without the nearest section, with derivatives, and the logarithmic derivative of all other factors.
+    let (mut sums, mut slopes, mut others) = ([Complex::ZERO; 3], [Complex::ZERO; 3], Complex::ZERO);
+    for part in parts[..nearest].iter().chain(&parts[nearest + 1..]) {
+        let inverse = free(part).inv();
+        let rate = (z + z + part.u) * inverse;
+        for ((sum, slope), [a, b]) in sums.iter_mut().zip(&mut slopes).zip(part.parts) {
+            let value = (z * b + a) * inverse;
+            *sum += value;
+            *slope += inverse * b - value * rate;
         }
-        ratio = own.product(ratio, own.product(free, own.inverse(own.reduced(factor))));
+        others += rate;
     }
-    let scaled = |[a, b]: [f64; 2], by: f64| [a * by, b * by];
-    let plus = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a + c, b + d];
-    let [others, others_rate, others_curve] = sums;
-    let Part { free, parts: [here, here_rate, here_curve] } = &parts[n];
-    // f det(F + z) with the own part of the section multiplied out, so that it is finite at the zeros of det(F + z).
-    let velocity = plus([1.0, 0.0], scaled(others_rate, -mu));
-    let curve = plus([kappa, 0.0], scaled(others_curve, -mu * mu));
-    let without = plus(own.product(velocity, velocity), own.product(others, curve));
-    let terms = [
-        own.product(own.reduced(free), without),
-        scaled(own.product(*here_rate, velocity), -2.0 * mu),
-        own.product(*here, curve),
-        scaled(own.product(others, *here_curve), -mu * mu),
-        [mu * mu * (here_rate[1] * here_rate[1] - here[1] * here_curve[1]), 0.0],
-    ];
-    own.product(terms.into_iter().fold([0.0; 2], plus), ratio)
+    for other in zeros[..n].iter().chain(&zeros[n + 1..]) {
+        others -= (z - other).inv();
+    }
+    // f det(F + z) with the own part of the nearest section multiplied out, so that it is finite at the zeros of det(F + z), and its derivative.
+    let Part { u, parts: own, .. } = &parts[nearest];
+    let [h0, h1, h2] = own.map(|[a, b]| z * b + a);
+    let ([s0, s1, s2], [ds0, ds1, ds2]) = (sums, slopes);
+    let (velocity, d_velocity) = (-s1 * mu + 1.0, -ds1 * mu);
+    let (curve, d_curve) = (-s2 * mu * mu + kappa, -ds2 * mu * mu);
+    let without = velocity * velocity + s0 * curve;
+    let d_without = velocity * d_velocity * 2.0 + ds0 * curve + s0 * d_curve;
+    let det = free(&parts[nearest]);
+    let value = det * without - h1 * velocity * (2.0 * mu) + h0 * curve - s0 * h2 * (mu * mu)
+        + mu * mu * (own[1][1] * own[1][1] - own[0][1] * own[2][1]);
+    let slope = (z + z + *u) * without + det * d_without - (velocity * own[1][1] + h1 * d_velocity) * (2.0 * mu)
+        + curve * own[0][1]
+        + h0 * d_curve
+        - (ds0 * h2 + s0 * own[2][1]) * (mu * mu);
+    value / (slope + value * others)
 }

@@ -1,170 +1,16 @@
 //! Periodic motions of any pattern of impacts: the equations that close and select them, Newton's method, stability, and the motion near a
-//! simulated state (docs/theory.md, eq. 26).
+//! simulated state (docs/regimes.md, eq. 26).
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use lovines::{InvalidValue, State};
-use nalgebra::{Complex, Matrix4, Matrix6, SVector, Vector4};
+use nalgebra::{Complex, Matrix4, Matrix6, RowVector6, SVector, Vector4};
 use serde::Serialize;
 
-use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll, unit_row};
-use super::oscillator::ForcedOscillator;
+use super::return_map::{Bounce, ImpactPattern, Impacts, ReturnMap, Unknowns, follow};
 use super::stability;
+use crate::Dimensionless;
 use crate::numerics::{Equations, newton};
-use crate::{Definition, Dimensionless, Sensor};
-
-/// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ImpactPattern {
-    /// Walls hit, one after another, over the map; the first is the one the motion starts from.
-    pub walls: Vec<f64>,
-    /// Half periods of the base over the map: even, except for a mirrored pattern, where it is odd.
-    pub half_periods: u32,
-    /// Minus itself after those half periods.
-    pub mirrored: bool,
-}
-
-impl ImpactPattern {
-    /// Two impacts per period, half a period apart: symmetric 1:1.
-    pub fn symmetric() -> Self {
-        Self { walls: vec![1.0], half_periods: 1, mirrored: true }
-    }
-
-    /// Two impacts per period, half a period apart.
-    pub fn is_symmetric(&self) -> bool {
-        self.mirrored && self.is_one_to_one()
-    }
-
-    /// Two impacts per period.
-    pub fn is_one_to_one(&self) -> bool {
-        self.periods() == 1 && self.impacts() == 2
-    }
-
-    /// As in a table.
-    pub fn name(&self) -> String {
-        let (impacts, periods) = (self.impacts(), self.periods());
-        match (impacts, periods) {
-            (2, 1) if self.mirrored => "symmetric 1:1".into(),
-            (2, 1) => "asymmetric 1:1".into(),
-            _ => {
-                let plural = |count: usize| if count == 1 { "" } else { "s" };
-                let mirrored = if self.mirrored { ", mirrored" } else { "" };
-                let (s, t) = (plural(impacts), plural(periods as usize));
-                format!("{impacts} impact{s} in {periods} period{t}{mirrored}")
-            }
-        }
-    }
-
-    /// The same pattern over a whole period, as after symmetry breaking.
-    pub fn doubled(&self) -> Self {
-        let mut walls = self.walls.clone();
-        if self.mirrored {
-            walls.extend(self.walls.iter().map(|wall| -wall));
-        } else {
-            walls.extend(&self.walls);
-        }
-        Self { walls, half_periods: 2 * self.half_periods, mirrored: false }
-    }
-
-    /// Impacts over the whole period of the motion.
-    pub fn impacts(&self) -> usize {
-        self.walls.len() * if self.mirrored { 2 } else { 1 }
-    }
-
-    /// Periods of the base over the whole period of the motion.
-    pub fn periods(&self) -> u32 {
-        if self.mirrored {
-            self.half_periods
-        } else {
-            self.half_periods / 2
-        }
-    }
-
-    pub(super) fn sign(&self) -> f64 {
-        if self.mirrored { -1.0 } else { 1.0 }
-    }
-
-    pub(super) fn turn(&self) -> f64 {
-        f64::from(self.half_periods) * PI
-    }
-}
-
-/// Unknowns of a periodic motion: (phase, q1, q1', q2') after its first impact, sigma, G.
-pub type Unknowns = SVector<f64, 6>;
-
-/// The return map of a pattern from one start.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ReturnMap {
-    /// Closing error of the motion.
-    residual: Vector4<f64>,
-    /// Derivative of the residual by the unknowns.
-    pub by: ByAll,
-    /// First harmonic of the response relative to the reference: `Im(S exp(i phase))`.
-    s: Complex<f64>,
-    /// Derivative of the return map by the state: its eigenvalues are the multipliers.
-    pub monodromy: Matrix4<f64>,
-}
-
-/// Follows the pattern from the unknowns `x`: its return map, and `bounce` of each state after an impact, from the start to the last before the return,
-/// with the time of flight after it. None if the impacts have another pattern or graze.
-fn follow(
-    scene: &Dimensionless,
-    pattern: &ImpactPattern,
-    x: &Unknowns,
-    mut bounce: impl FnMut(Bounce, f64),
-) -> Option<ReturnMap> {
-    let (sigma, g) = (x[4], x[5]);
-    let omega = 1.0 + scene.epsilon * sigma;
-    if !(omega > 0.0 && omega.is_finite() && g.is_finite()) {
-        return None;
-    }
-    let map = ImpactMap::new(scene, omega, g);
-    let start = Bounce::from_vector(&x.fixed_rows::<4>(0).into(), pattern.walls[0]);
-    let mut at = start;
-    // Derivatives of the state, Omega and G by the unknowns; Omega instead of sigma.
-    let mut by = Matrix6::identity();
-    let mut sum = Complex::new(0.0, 0.0);
-    for n in 0..pattern.walls.len() {
-        let step = map.step(&at)?;
-        let wall = match pattern.walls.get(n + 1) {
-            Some(wall) => *wall,
-            None => pattern.sign() * pattern.walls[0],
-        };
-        if step.next.wall != wall {
-            return None;
-        }
-        bounce(at, step.duration);
-        let after = step.by * by;
-        by.fixed_rows_mut::<4>(0).copy_from(&after);
-        at = step.next;
-        sum += Complex::from_polar(1.0, -at.phase) * step.impulse;
-    }
-
-    let residual = start.apart(&at, pattern.turn(), pattern.sign());
-    let mut by: ByAll = by.fixed_rows::<4>(0).into();
-    by.fixed_rows_mut::<3>(1).scale_mut(pattern.sign());
-    let monodromy: Matrix4<f64> = by.fixed_columns::<4>(0).into();
-    by.fixed_columns_mut::<4>(0)
-        .copy_from(&(monodromy - Matrix4::identity()));
-    by.column_mut(4).scale_mut(scene.epsilon);
-    let s = harmonic(scene, &map, pattern, sum);
-    Some(ReturnMap { residual, by, s, monodromy })
-}
-
-/// The first harmonic of the response relative to the reference, from the sum of the impulses over the map as phasors: the base through the
-/// oscillator, and the impulses through the oscillator and, for v, the particle.
-fn harmonic(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern, sum: Complex<f64>) -> Complex<f64> {
-    let ForcedOscillator { free, omega, g, unit: [unit, _], .. } = map.oscillator;
-    let Definition { sensor, reference, .. } = scene.definition;
-    let turned = Complex::from_polar(1.0, -reference.phase(scene.epsilon * scene.lambda, omega));
-    // (2i/duration) times the response to a force through the oscillator, less the response of a free mass: the impulse on the
-    // particle is the opposite one.
-    let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
-    let particle = f64::from(u8::from(sensor == Sensor::V));
-    let inner = free.stiffness(omega).inv() + particle / (omega * omega);
-    let [direct, impulses] = [unit, weight * inner].map(|z| z * turned);
-    map.oscillator.driven(direct * g) + impulses * sum
-}
 
 /// A phase in (-pi, pi].
 pub(super) fn wrapped(phase: f64) -> f64 {
@@ -255,10 +101,11 @@ impl Condition {
         pattern: &ImpactPattern,
         x: &Unknowns,
         map: &ReturnMap,
-    ) -> (f64, RowByAll) {
+    ) -> (f64, RowVector6<f64>) {
+        let unit = |n: usize| RowVector6::from_fn(|_, column| f64::from(u8::from(column == n)));
         match *self {
-            Condition::Sigma(sigma) => (x[4] - sigma, unit_row(4)),
-            Condition::Excitation(g) => (x[5] - g, unit_row(5)),
+            Condition::Sigma(sigma) => (x[4] - sigma, unit(4)),
+            Condition::Excitation(g) => (x[5] - g, unit(5)),
             Condition::Plane { through, normal } => (normal.dot(&(x - through)), normal.transpose()),
             Condition::Bifurcation(kind) => {
                 let value = |map: &ReturnMap| kind.test(&map.monodromy);
@@ -269,7 +116,7 @@ impl Condition {
                     follow(scene, pattern, &moved, |_, _| {}).map_or(f64::NAN, |map| value(&map))
                 };
                 let slope = |n: usize| (at(n, STEP) - at(n, -STEP)) / (2.0 * STEP);
-                (value(map), RowByAll::from_fn(|_, n| slope(n)))
+                (value(map), RowVector6::from_fn(|_, n| slope(n)))
             }
         }
     }
@@ -425,7 +272,7 @@ impl Periodic {
     /// (tau, q1, q1', q2, q2') at `points` equal steps over one period of the base, from a passage of the base through
     /// zero, upwards; dimensionless. The impacts fall between the points.
     pub fn motion(&self, scene: &Dimensionless, points: usize) -> Vec<[f64; 5]> {
-        let map = ImpactMap::new(scene, 1.0 + scene.epsilon * self.sigma, self.g);
+        let (scene, omega) = (Dimensionless { g: self.g, ..*scene }, 1.0 + scene.epsilon * self.sigma);
         // The bounces of the whole period; a mirrored pattern's other half is minus the first.
         let (half, mut bounces, mut period) = (self.pattern.turn(), self.bounces.clone(), self.pattern.turn());
         if self.pattern.mirrored {
@@ -444,8 +291,8 @@ impl Periodic {
             let last = bounces
                 .iter()
                 .min_by(|first, second| since(first).total_cmp(&since(second)))?;
-            let [q1, dq1, q2, dq2] = map.state(last, since(last) / map.oscillator.omega);
-            Some([phase / map.oscillator.omega, q1, dq1, q2, dq2])
+            let [q1, dq1, q2, dq2] = Impacts::after(&scene, self.sigma, last)?.state(since(last) / omega)?;
+            Some([phase / omega, q1, dq1, q2, dq2])
         };
         (0..points).filter_map(at).collect()
     }
@@ -480,13 +327,13 @@ pub fn settle(
 /// The periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at phase 0 of the base; one
 /// that is not unstable rather than an unstable one.
 pub(crate) fn periodic_near(scene: &Dimensionless, sigma: f64, state: [f64; 4]) -> Option<Periodic> {
-    let map = ImpactMap::new(scene, 1.0 + scene.epsilon * sigma, scene.g);
-    let first = map.first(state)?;
+    let mut impacts = Impacts::new(scene, sigma, 0.0, state)?;
+    let (_, first) = impacts.next()?;
     let Bounce { phase, q1, dq1, dq2, .. } = first;
     let guess = Unknowns::from([phase, q1, dq1, dq2, sigma, scene.g]);
     let conditions = [Condition::Sigma(sigma), Condition::Excitation(scene.g)];
     let mut unstable = None;
-    let found = patterns(&map, first, NEAR).take(MULTIPLES).find_map(|pattern| {
+    let found = patterns(impacts, first, NEAR).take(MULTIPLES).find_map(|pattern| {
         let found = Periodic::find(scene, &pattern, &guess, conditions)?;
         let close = (found.unknowns() - guess).norm() < 10.0 * NEAR;
         if close && found.is_unstable() {
@@ -499,7 +346,8 @@ pub(crate) fn periodic_near(scene: &Dimensionless, sigma: f64, state: [f64; 4]) 
         return unstable;
     };
     // The pattern may be a multiple of the motion's own pattern: near a period doubling the motion settles slowly, in alternation.
-    let shortest = patterns(&map, found.bounces[0], EXACT)
+    let impacts = Impacts::after(scene, sigma, &found.bounces[0])?;
+    let shortest = patterns(impacts, found.bounces[0], EXACT)
         .take_while(|pattern| pattern.walls.len() < found.bounces.len())
         .next();
     match shortest {
@@ -508,12 +356,11 @@ pub(crate) fn periodic_near(scene: &Dimensionless, sigma: f64, state: [f64; 4]) 
     }
 }
 
-/// The patterns that the bounces from `first` on repeat, from the shortest.
-fn patterns(map: &ImpactMap, first: Bounce, tolerance: f64) -> impl Iterator<Item = ImpactPattern> {
+/// The patterns that `impacts`, which follow `first`, repeat, from the shortest.
+fn patterns(impacts: Impacts, first: Bounce, tolerance: f64) -> impl Iterator<Item = ImpactPattern> {
     let half = std::f64::consts::PI;
     let mut walls = vec![first.wall];
-    let following = std::iter::successors(map.next(&first), |from| map.next(from));
-    following.take(LONGEST).filter_map(move |then| {
+    impacts.take(LONGEST).filter_map(move |(_, then)| {
         let half_periods = ((then.phase - first.phase) / half).round();
         let mirrored = half_periods % 2.0 == 1.0;
         let sign = if mirrored { -1.0 } else { 1.0 };

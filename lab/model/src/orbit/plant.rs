@@ -17,8 +17,9 @@ use thiserror::Error;
 
 use super::Orbit;
 use super::periodic::NEAR;
+use super::return_map::plant_at;
 use super::stability;
-use super::symmetric::{at_amplitude, at_speed, stable_resonant};
+use super::study::{at_amplitude, at_speed, stable_resonant};
 use crate::numerics::{Equations, newton};
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
 use crate::{Definition, Dimensionless, Sensor};
@@ -342,8 +343,6 @@ const SMALLEST_INCREASE: f64 = 1.0 / 64.0;
 
 // Newton's method
 
-/// Angular frequency, rad/s, of a base at rest that takes the phase to the section in hardly any time.
-const AT_ONCE: f64 = 1e9;
 /// The unknowns over their scales: (q1, q1', q2, q2') at the section, frequency, amplitude of the base.
 type Unknowns = Vector6<f64>;
 
@@ -411,13 +410,8 @@ impl<'a> Solver<'a> {
         if !(omega > 0.0 && omega.is_finite()) {
             return None;
         }
-        let (drive, still) = (Drive::harmonic(amplitude, omega), Drive::harmonic(0.0, AT_ONCE));
-        let state = State { q1, dq1, q2, dq2 };
-        let mut plant = Plant::new(*self.parameters, state).ok()?;
-        plant.begin(still).ok()?;
-        plant.advance(still, self.phase / AT_ONCE).ok()?;
-        plant.begin(drive).ok()?;
-        plant.set_state(state).ok()?;
+        let (drive, state) = (Drive::harmonic(amplitude, omega), State { q1, dq1, q2, dq2 });
+        let plant = plant_at(self.parameters, state, drive, self.phase)?;
         Some((plant, drive, TAU * f64::from(self.periods) / omega))
     }
 

@@ -7,8 +7,9 @@
 use serde::Serialize;
 
 use super::continuation::{Branch, BranchBifurcation, ContinuationLimits, branch_off, continue_both_ways};
-use super::periodic::{Bifurcation, Condition, ImpactPattern, LONGEST, Periodic};
-use super::symmetric::{least_excitation, symmetric_orbits};
+use super::periodic::{Bifurcation, Condition, LONGEST, Periodic};
+use super::return_map::ImpactPattern;
+use super::study::{least_excitation, symmetric_orbits};
 use crate::Dimensionless;
 use crate::numerics::{equally_spaced, golden_section};
 

@@ -14,13 +14,11 @@ use nalgebra::{Complex, Matrix2, Vector2};
 use serde::Serialize;
 
 use super::half_period::HalfPeriod;
-use super::oscillator::section;
-use super::periodic::wrapped;
-use super::symmetric::{
-    Interval, Particle, Reading, SEARCHED, SymmetricMotion, SymmetricMotions, harmonic, intervals, search,
-};
-use super::{AfterImpact, Bifurcation, ON_CIRCLE, Orbit, stability};
+use super::periodic::{Bifurcation, wrapped};
+use super::symmetric::{Interval, Particle, Reading, SymmetricMotion, SymmetricMotions, harmonic, intervals, search};
+use super::{AfterImpact, ON_CIRCLE, Orbit, stability};
 use crate::numerics::{self, Equations, equally_spaced, newton, try_bisection};
+use crate::oscillator::section;
 use crate::theory::SlowFlow;
 use crate::{Definition, Dimensionless, Reference, Sensor};
 
@@ -309,6 +307,8 @@ pub struct StructureOrbits {
     target: f64,
 }
 
+/// Frequencies searched, over omega0.
+pub(super) const SEARCHED: [f64; 2] = [0.2, 3.0];
 /// Number of frequencies at which orbits are searched over a range.
 const GRID: usize = 4000;
 /// Widths, in the angle along a loop, to which a change of stability and the end of a branch are located.
@@ -386,14 +386,14 @@ impl StructureOrbits {
         self.both(
             omega,
             |motions| motions.driven(reference),
-            |motion| self.accept(motion, Multipliers::Alone),
+            |motion| self.accept(motion, true),
         )
     }
 
     /// All orbits at phase resonance at the frequency `omega`, rad/s, under any drive: none or up to two.
     pub fn at_phase_resonance(&self, omega: f64) -> Vec<StructureOrbit> {
         let roots = SymmetricMotions::phase_resonant;
-        self.both(omega, roots, |motion| self.accept_resonant(motion, Multipliers::Alone))
+        self.both(omega, roots, |motion| self.accept_resonant(motion, true))
     }
 
     /// The orbit at phase resonance whose response has the amplitude `response`, near a frequency, rad/s, and a speed of the particle.
@@ -402,10 +402,7 @@ impl StructureOrbits {
     pub fn at_response(&self, response: f64, [omega, speed]: [f64; 2]) -> Option<StructureOrbit> {
         let mut equations = AtResponse { orbits: self, response, near: [omega, speed] };
         let found = newton(&mut equations, Vector2::repeat(1.0))?;
-        self.accept_resonant(
-            &self.motions(found[0] * omega)?.at(found[1] * speed),
-            Multipliers::Alone,
-        )
+        self.accept_resonant(&self.motions(found[0] * omega)?.at(found[1] * speed), true)
     }
 
     /// All orbits at phase resonance with a reference of the amplitude `reference` and frequencies in a range, rad/s, by rising response.
@@ -418,7 +415,7 @@ impl StructureOrbits {
         let found = search(grid, reference, |omega| self.motions(omega));
         let mut orbits: Vec<_> = found
             .iter()
-            .filter_map(|motion| self.accept_resonant(motion, Multipliers::Alone))
+            .filter_map(|motion| self.accept_resonant(motion, true))
             .collect();
         orbits.sort_unstable_by(|first, second| first.response.total_cmp(&second.response));
         let same = |first: f64, second: f64| (first - second).abs() < 1e-9 * first.abs();
@@ -434,16 +431,18 @@ impl StructureOrbits {
     /// The exact backbone; `progress` is called for every orbit that is tried.
     fn backbone_with(&self, range: &StructureRange, progress: &dyn Fn()) -> Vec<StructureBranch> {
         let roots = SymmetricMotions::phase_resonant;
-        self.branches(range, roots, |motion, multipliers| {
+        self.branches(range, roots, |motion, with_stability| {
             progress();
-            self.accept_resonant(motion, multipliers)
+            self.accept_resonant(motion, with_stability)
         })
     }
 
     /// The frequency response of the symmetric 1:1 motions with a reference of the amplitude `reference` within `range`, as curves.
     pub fn frequency_response(&self, reference: f64, range: &StructureRange) -> Vec<StructureBranch> {
         let roots = |motions: &SymmetricMotions| motions.driven(reference);
-        self.branches(range, roots, |motion, multipliers| self.accept(motion, multipliers))
+        self.branches(range, roots, |motion, with_stability| {
+            self.accept(motion, with_stability)
+        })
     }
 
     /// What each section and, last, the particle contribute to the disturbance of an orbit that grows fastest or decays slowest: shares
@@ -574,18 +573,18 @@ impl StructureOrbits {
         both.iter().flatten().filter_map(accept).collect()
     }
 
-    /// The orbit with its stability, if the phase of its response has the sign that is wanted.
-    fn accept_resonant(&self, motion: &SymmetricMotion, multipliers: Multipliers<'_>) -> Option<StructureOrbit> {
+    /// The orbit as [`Self::accept`], if the phase of its response has the sign that is wanted.
+    fn accept_resonant(&self, motion: &SymmetricMotion, with_stability: bool) -> Option<StructureOrbit> {
         if motion.cavity.norm() < ROUNDING * self.particle.half_width {
             // Without a drive, its phase is free.
             let turned = wrapped(motion.drive.arg() + motion.phase + FRAC_PI_2);
-            let mut orbit = self.accept(motion, multipliers)?;
+            let mut orbit = self.accept(motion, with_stability)?;
             orbit.phase = self.target;
             orbit.impact_phase = turned;
             return Some(orbit);
         }
         let resonant = motion.phase.sin() < -1e-12;
-        resonant.then(|| self.accept(motion, multipliers)).flatten()
+        resonant.then(|| self.accept(motion, with_stability)).flatten()
     }
 
     /// A motion as an orbit, of which neither start nor stability are examined.
@@ -606,8 +605,9 @@ impl StructureOrbits {
         }
     }
 
-    /// The orbit with its stability, if it is physical: the particle moves, and hits the other wall half a period later, not earlier.
-    fn accept(&self, motion: &SymmetricMotion, multipliers: Multipliers<'_>) -> Option<StructureOrbit> {
+    /// The orbit with its stability, or without it and without its start, if it is physical: the particle moves, and hits the other wall half a
+    /// period later, not earlier.
+    fn accept(&self, motion: &SymmetricMotion, with_stability: bool) -> Option<StructureOrbit> {
         let orbit = self.told(motion);
         let sizes = [orbit.speed, orbit.response, orbit.drive];
         let is_motion = orbit.speed > 0.0 && orbit.response > ROUNDING * self.particle.half_width;
@@ -615,11 +615,10 @@ impl StructureOrbits {
             return None;
         }
         let half = HalfPeriod::new(&self.sections, &self.particle, motion)?;
-        let multipliers = match multipliers {
-            Multipliers::Alone => half.multipliers(None),
-            Multipliers::Near(near) => half.multipliers(Some((near.omega, &near.multipliers))),
-            Multipliers::LeftOut => return Some(orbit),
-        };
+        if !with_stability {
+            return Some(orbit);
+        }
+        let multipliers = half.multipliers();
         let [stable, neutral] = stability(multipliers.last()?.norm());
         let (t, sign) = since_impact(motion);
         let state = |(section, impulsive): (&Section, Vector2<f64>)| {
@@ -656,7 +655,7 @@ impl StructureOrbits {
         &self,
         range: &StructureRange,
         roots: impl Fn(&SymmetricMotions) -> Option<[f64; 2]>,
-        accept: impl Fn(&SymmetricMotion, Multipliers<'_>) -> Option<StructureOrbit>,
+        accept: impl Fn(&SymmetricMotion, bool) -> Option<StructureOrbit>,
     ) -> Vec<StructureBranch> {
         let both = |omega: f64| {
             let motions = self.motions(omega)?;
@@ -669,12 +668,12 @@ impl StructureOrbits {
         {
             let [low, high] = [points[0].0, points[points.len() - 1].0];
             // Angles 0 to pi lead up along the first root, and pi to 2 pi back along the second one.
-            let at = |angle: f64, multipliers: Multipliers<'_>| {
+            let at = |angle: f64, with_stability: bool| {
                 let omega = 0.5 * (low + high) - 0.5 * (high - low) * angle.cos();
                 let second = usize::from(angle.rem_euclid(TAU) >= PI);
                 let motion = &both(omega.clamp(low, high))?[second];
                 (motion.speed <= range.speed)
-                    .then(|| accept(motion, multipliers))
+                    .then(|| accept(motion, with_stability))
                     .flatten()
             };
             let arcs = match turns {
@@ -696,19 +695,12 @@ impl StructureOrbits {
         [from, to]: [f64; 2],
         is_loop: bool,
         points: usize,
-        at: &impl Fn(f64, Multipliers<'_>) -> Option<StructureOrbit>,
+        at: &impl Fn(f64, bool) -> Option<StructureOrbit>,
     ) -> Vec<StructureBranch> {
         let count = (points as f64 * (to - from) / PI).ceil().max(2.0);
         let step = (to - from) / count;
         let angle = |n: usize| from + (n as f64 + 0.5) * step;
-        let mut samples: Vec<(f64, Option<StructureOrbit>)> = Vec::with_capacity(count as usize);
-        for n in 0..count as usize {
-            let orbit = at(
-                angle(n),
-                Multipliers::near(samples.last().and_then(|last| last.1.as_ref())),
-            );
-            samples.push((angle(n), orbit));
-        }
+        let mut samples: Vec<_> = (0..count as usize).map(|n| (angle(n), at(angle(n), true))).collect();
         // A loop begins where it is interrupted, or ends where it begins.
         let closed = is_loop && samples.iter().all(|(_, orbit)| orbit.is_some());
         if is_loop {
@@ -728,8 +720,8 @@ impl StructureOrbits {
                 .filter_map(|(angle, orbit)| Some((*angle, orbit.as_ref()?)))
                 .collect();
             if !inside.is_empty() {
-                let first = towards(from.checked_sub(1)).and_then(|gap| end(at, &run[0], gap));
-                let last = towards(Some(to)).and_then(|gap| end(at, &run[run.len() - 1], gap));
+                let first = towards(from.checked_sub(1)).and_then(|gap| end(at, run[0].0, gap));
+                let last = towards(Some(to)).and_then(|gap| end(at, run[run.len() - 1].0, gap));
                 let located = inside.windows(2).enumerate().filter_map(|(n, pair)| {
                     let change = self.change(at, pair[0], pair[1])?;
                     Some(StabilityChange { after: n + usize::from(first.is_some()), ..change })
@@ -752,7 +744,7 @@ impl StructureOrbits {
     /// Where the number of multipliers outside the unit circle changes between two neighbours.
     fn change(
         &self,
-        at: &impl Fn(f64, Multipliers<'_>) -> Option<StructureOrbit>,
+        at: &impl Fn(f64, bool) -> Option<StructureOrbit>,
         (from, first): (f64, &StructureOrbit),
         (to, second): (f64, &StructureOrbit),
     ) -> Option<StabilityChange> {
@@ -760,7 +752,7 @@ impl StructureOrbits {
         if outside == second.unstable() {
             return None;
         }
-        let at = |angle: f64| at(angle, Multipliers::Near(first));
+        let at = |angle: f64| at(angle, true);
         let like_first = |angle: f64| at(angle).map(|orbit| orbit.unstable() == outside).ok_or(());
         let (before, beyond) = try_bisection(from, to, LOCATED, like_first).ok()?;
         // The multipliers rise in modulus: the first one outside has just left, or is about to enter.
@@ -816,31 +808,8 @@ fn since_impact(motion: &SymmetricMotion) -> (f64, f64) {
 }
 
 /// The last orbit from `from`, where there is one, towards `to`, where there is none.
-fn end(
-    at: &impl Fn(f64, Multipliers<'_>) -> Option<StructureOrbit>,
-    (from, orbit): &(f64, Option<StructureOrbit>),
-    to: f64,
-) -> Option<StructureOrbit> {
-    let is_orbit = |angle: f64| Ok::<_, ()>(at(angle, Multipliers::LeftOut).is_some());
-    let (last, _) = try_bisection(*from, to, LOCATED, is_orbit).ok()?;
-    (last != *from)
-        .then(|| at(last, Multipliers::near(orbit.as_ref())))
-        .flatten()
-}
-
-/// How the multipliers of an orbit are found.
-#[derive(Clone, Copy)]
-enum Multipliers<'a> {
-    /// As eigenvalues of the dense matrix of the map.
-    Alone,
-    /// From those of an orbit near it.
-    Near(&'a StructureOrbit),
-    /// Not at all, where only the orbit counts.
-    LeftOut,
-}
-
-impl<'a> Multipliers<'a> {
-    fn near(orbit: Option<&'a StructureOrbit>) -> Self {
-        orbit.map_or(Self::Alone, Self::Near)
-    }
+fn end(at: &impl Fn(f64, bool) -> Option<StructureOrbit>, from: f64, to: f64) -> Option<StructureOrbit> {
+    let is_orbit = |angle: f64| Ok::<_, ()>(at(angle, false).is_some());
+    let (last, _) = try_bisection(from, to, LOCATED, is_orbit).ok()?;
+    (last != from).then(|| at(last, true)).flatten()
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::slow_flow::{B_SYMMETRY_BREAKING, SlowFlow, impacts_stable};
 use crate::numerics::{bisection, equally_spaced, golden_section};
-use crate::orbit::oscillator::section;
+use crate::oscillator::section;
 
 /// Smallest base amplitudes G, over `b epsilon`, at one detuning (docs/theory.md, eq. 19).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
