@@ -12,8 +12,6 @@ mod effects;
 mod known;
 mod record;
 mod recording;
-#[cfg(feature = "tables")]
-mod table;
 
 use std::cmp::Ordering;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -29,15 +27,16 @@ use vines_model::orbit::backbone_at_speed;
 use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, SlowFlow};
 
 use crate::identification::ResonancePoint;
+#[cfg(feature = "tables")]
+pub use crate::scene::table::plain_table;
+pub use crate::scene::table::{Channel, Contents};
 use crate::scene::{Dimensionless, Parameters};
 
-pub use channels::{Channel, Contents, Selection};
+pub use channels::Selection;
 pub use effects::{Candidate, Effect, EffectReport, Explanation, Found, Measurements, decimals, explain, find};
 pub use known::{Known, LinearVerdict, Quantity, linear_verdicts};
 pub use record::{LeftOut, RecordFit, follow};
 pub use recording::{Kind, LinearDecay, Part, Recording, RecordingError, parts};
-#[cfg(feature = "tables")]
-pub use table::plain_table;
 
 /// A measured point of the backbone: of phase resonance, or at another phase target.
 #[derive(Debug, Clone, Copy, PartialEq)]
