@@ -33,7 +33,7 @@ use crate::ArgumentError;
 use crate::fmu::process::Signal;
 use failure::Failure;
 use output::Results;
-pub use points::Source;
+pub use points::{Source, truth};
 
 const EXAMPLES: &str = "\
 Examples:

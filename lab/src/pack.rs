@@ -147,8 +147,6 @@ pub enum PackError {
     Description(#[from] fmi2_description::Error),
     #[error(transparent)]
     Archive(#[from] ZipError),
-    #[error("the description of LoViNes.fmu is not XML: {0}")]
-    Xml(#[from] xml::reader::Error),
 }
 
 /// Name and content of a file.

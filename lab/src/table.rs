@@ -17,8 +17,9 @@ impl Table {
     }
 
     /// With a row for each item; a row has as many cells as there are headings.
-    pub fn rows<R: Into<Vec<String>>>(mut self, rows: impl IntoIterator<Item = R>) -> Self {
-        self.rows.extend(rows.into_iter().map(Into::into));
+    pub fn rows<R: IntoIterator<Item: Into<Cell>>>(mut self, rows: impl IntoIterator<Item = R>) -> Self {
+        let texts = |row: R| row.into_iter().map(|cell| cell.into().0).collect();
+        self.rows.extend(rows.into_iter().map(texts));
         self
     }
 
@@ -82,16 +83,44 @@ pub fn number(value: f64) -> String {
     }
 }
 
-/// A row of a table: a name, then numbers.
-pub fn row(name: &str, numbers: impl IntoIterator<Item = f64>) -> Vec<String> {
-    std::iter::once(name.into())
-        .chain(numbers.into_iter().map(number))
-        .collect()
-}
-
 /// A number of a table with its standard uncertainty.
 pub fn with_uncertainty(value: f64, uncertainty: f64) -> String {
     format!("{value:.6} ± {uncertainty:.1e}")
+}
+
+/// A cell of a row: a word, a number, a number with its standard uncertainty, whether something holds, or nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell(String);
+
+/// A row of cells of different kinds.
+#[macro_export]
+macro_rules! cells {
+    ($($cell:expr),+ $(,)?) => { [$($crate::table::Cell::from($cell)),+] };
+}
+
+macro_rules! cell {
+    ($($kind:ty: $value:pat => $text:expr,)+) => {$(
+        impl From<$kind> for Cell {
+            fn from($value: $kind) -> Self {
+                Self($text)
+            }
+        }
+    )+};
+}
+
+cell! {
+    String: text => text,
+    &str: text => text.into(),
+    f64: value => number(value),
+    (f64, f64): (value, uncertainty) => with_uncertainty(value, uncertainty),
+    usize: count => count.to_string(),
+    bool: holds => if holds { "yes" } else { "no" }.into(),
+}
+
+impl<T: Into<Cell>> From<Option<T>> for Cell {
+    fn from(cell: Option<T>) -> Self {
+        cell.map_or_else(|| "-".into(), Into::into)
+    }
 }
 
 #[cfg(test)]
@@ -99,12 +128,22 @@ mod tests {
     use super::*;
 
     fn table() -> Table {
-        Table::new("what | C").rows([["a < b", "0.5"], ["c", "-10.25"]].map(|row| row.map(String::from)))
+        Table::new("what | C").rows([["a < b", "0.5"], ["c", "-10.25"]])
     }
 
     #[test]
     fn words_are_set_to_the_left_and_numbers_to_the_right() {
         assert_eq!(table().text(), "  what        C\n  a < b     0.5\n  c      -10.25\n");
+    }
+
+    #[test]
+    fn a_row_has_cells_of_every_kind() {
+        let row = cells!["a", -1e-9, (0.5, 0.012), 3, true, None::<f64>, Some("b")];
+        let text = Table::new("1 | 2 | 3 | 4 | 5 | 6 | 7").rows([row]).text();
+        assert_eq!(
+            text.lines().nth(1),
+            Some("  a  0.000000  0.500000 ± 1.2e-2  3  yes  -  b")
+        );
     }
 
     #[test]

@@ -80,6 +80,12 @@ pub fn is_unit(text: &str) -> bool {
     unit::is_unit(text)
 }
 
+/// A Boolean by its words in a table, or `None`.
+#[pyfunction]
+pub fn truth(word: &str) -> Option<bool> {
+    cli::truth(word)
+}
+
 /// `vines fit` with the words of a command line: its exit code, and what it prints on standard output and error. `read` returns the contents of a
 /// file, or JSON as bytes.
 #[pyfunction]

@@ -29,6 +29,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(experiments::recording, module)?,
         wrap_pyfunction!(files::command_line, module)?,
         wrap_pyfunction!(files::is_unit, module)?,
+        wrap_pyfunction!(files::truth, module)?,
         wrap_pyfunction!(files::si, module)?,
         wrap_pyfunction!(files::table, module)?,
         wrap_pyfunction!(files::utf8, module)?,

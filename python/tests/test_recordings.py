@@ -5,6 +5,7 @@ import importlib.util
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -140,6 +141,21 @@ def test_the_command_line_is_that_of_the_program_for_every_option_and_format(tra
         found.append([[common(str(part)) for part in text] for text in (*texts, written)])
     assert found[1] == found[0]
     assert found[2] == found[0]
+
+
+def test_a_signal_ends_a_long_calculation_with_its_exit_code(tracked, tmp_path):
+    # A fit of so many points outlasts the limit below by far.
+    (tmp_path / "a.csv").write_text("\n".join([tracked[0], *5000 * tracked[1:]]))
+    words = [*PYTHON, "fit", tmp_path / "a.csv"]
+    signals = (signal.SIGINT, signal.SIGTERM)
+    running = [subprocess.Popen(words, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in signals]
+    for number, one in zip(signals, running, strict=True):
+        assert one.stderr is not None
+        assert one.stderr.readline().startswith("fitting: ")
+        one.send_signal(number)
+        out, err = one.communicate(timeout=120)
+        assert (one.returncode, out) == (128 + number, "")
+        assert err.endswith(f"error: interrupted by {number.name}\n")
 
 
 def test_results_are_not_lost_where_the_encoding_has_no_sign_for_them(tracked, tmp_path):

@@ -211,23 +211,10 @@ def fit_recordings(
     return _result(_native.fit(given._native, [], kept, _texts(known), _responses(linear)))
 
 
-#: What Boolean columns have, as `vines fit` reads them: of Python and NumPy, and of spreadsheets.
-_TRUTHS = {
-    "true": True,
-    "wahr": True,
-    "1": True,
-    "1.0": True,
-    "false": False,
-    "falsch": False,
-    "0": False,
-    "0.0": False,
-}
-
-
 def _truths(name: str, values: Any) -> NDArray[np.bool_]:
     """Return a Boolean column; any other value is a `ValueError`."""
     given = np.atleast_1d(np.asarray(values, dtype=object)).ravel()
-    found = [_TRUTHS.get(str(one).strip().lower()) for one in given]
+    found = [_native.truth(str(one)) for one in given]
     if None in found:
         row = found.index(None)
         raise ValueError(f"{name} = {given[row]!r} in row {row + 1}: True or False is allowed")

@@ -1,13 +1,16 @@
-//! Reader of `modelDescription.xml` (FMI 2.0, clause 2.2), for the build step, the lab and the tests.
+//! Reader and writer of `modelDescription.xml` (FMI 2.0, clause 2.2), for the build step, the lab and the tests.
 //!
 //! Every description that the schema accepts is read, in any encoding that it declares. [`Description::left_out`] lists what the schema
 //! does not have. Whether a description is valid is for a validator to decide, such as FMPy's.
 #![forbid(unsafe_code)]
 #![allow(missing_docs)] // the names are those of the standard
 
+mod document;
 mod schema;
 
 use serde::{Deserialize, Deserializer, de};
+
+pub use document::Element;
 
 /// Structures of elements: `field: type = "@attribute"` or `"Element"`. What may be absent is an `Option`, or has a default.
 macro_rules! elements {

@@ -5,7 +5,10 @@ use vines::experiment::ExperimentError;
 use vines::fmu::{FmuController, FmuRig};
 use vines::loop_check::{CheckedChannel, CheckedQuantity, LoopCheck, Verdict, check};
 use vines::scene::{Excitation, Scene};
-use vines::table::{Table, number, with_uncertainty};
+use vines::{
+    cells,
+    table::{Table, number, with_uncertainty},
+};
 
 use super::failure::Failure;
 use super::options::{Endpoint, ReachArguments, SceneArguments};
@@ -124,7 +127,7 @@ pub(super) fn described(checked: &LoopCheck, scene: &Scene) -> String {
         let rows = checked.quantities.iter().map(|quantity| {
             let separator = if quantity.unit.is_empty() { "" } else { ", " };
             let name = format!("{}{separator}{}", quantity.name, quantity.unit);
-            [named(&name, scene), measured(quantity), number(quantity.expected)]
+            cells![named(&name, scene), measured(quantity), quantity.expected]
         });
         text += &format!("{}\n", Table::new("measured | value | scene").rows(rows).text());
     }

@@ -7,20 +7,22 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
-use vines::ArgumentError;
 use vines::fit::{
     Candidate, Effect, EffectReport, Explanation, Fit, FitReport, FittedParameter, Found, Known, LeftOut,
     LinearVerdict, MeasuredPoint, Measurements, Part, Quantity, Selection, decimals, find,
 };
 use vines::numerics::Estimate;
 use vines::report::fitted;
+use vines::scene::Scene;
 use vines::survey::without_other_modes;
 use vines::table::Table;
+use vines::{ArgumentError, cells};
 
 use super::failure::Failure;
 use super::options::{SceneArguments, positive};
 use super::output::{Results, Written, output, progress_bar, writable};
 use super::points::{Column, Measurement, Source, measurement};
+use super::summary::with_unit;
 
 const HELP: &str = "\
 A point has the frequency of phase resonance f, the amplitude A of the response and the amplitude E of the base, each with its standard
@@ -150,14 +152,14 @@ fn only_if_ideal(alternatives: &[EffectReport], is_assumed: bool) -> String {
     let texts: Vec<String> = alternatives
         .iter()
         .map(|one| {
-            let EffectReport { effect, symbol, unit, strength, uncertainty, possible_b_m, .. } = one;
-            let (space, digits) = (if unit.is_empty() { "" } else { " " }, decimals(strength.abs()));
+            let EffectReport {
+                effect, symbol, unit, strength, uncertainty, possible_b_m, ..
+            } = one;
             // Of those whose strength is given this is the largest.
             let up_to = if *uncertainty == 0.0 { "up to" } else { "with" };
-            format!(
-                "{effect} {up_to} {symbol} = {strength:.digits$}{space}{unit} (b = {:.2} mm) would give the same points",
-                1e3 * possible_b_m
-            )
+            let (digits, mm) = (decimals(strength.abs()), 1e3 * possible_b_m);
+            let strength = with_unit(&format!("{strength:.digits$}"), unit);
+            format!("{effect} {up_to} {symbol} = {strength} (b = {mm:.2} mm) would give the same points")
         })
         .collect();
     if texts.is_empty() {
@@ -177,10 +179,7 @@ fn explained(explanation: &Explanation) -> String {
     let without = chi_square(&explanation.ideal);
     let possible = explanation.possible().map(|candidate| {
         let EffectReport { effect, symbol, unit, left_out, .. } = candidate.report();
-        let (strength, space) = (
-            with_decimals(candidate.strength),
-            if unit.is_empty() { "" } else { " " },
-        );
+        let strength = with_unit(&with_decimals(candidate.strength), unit);
         let without = match left_out {
             0 => String::new(),
             _ => {
@@ -188,7 +187,7 @@ fn explained(explanation: &Explanation) -> String {
             }
         };
         let chi_square = chi_square(&candidate.fit);
-        format!("{effect} alone ({symbol} = {strength}{space}{unit}, chi-square {chi_square}{without})")
+        format!("{effect} alone ({symbol} = {strength}, chi-square {chi_square}{without})")
     });
     let possible: Vec<String> = possible.collect();
     match &possible[..] {
@@ -234,22 +233,25 @@ fn with_decimals(Estimate { value, uncertainty }: Estimate) -> String {
     format!("{value:.decimals$} ± {uncertainty:.decimals$}")
 }
 
+/// What the files contain.
+struct Gathered {
+    measured: Measurements,
+    /// Number of points that are left out.
+    skipped: usize,
+    /// How recordings were read, linear decays, and what counts as exact.
+    notes: Vec<String>,
+}
+
 /// `read` reads the files: the program plain tables and its own files, the Python package others as well.
-pub(super) fn run(
+fn gathered(
     arguments: &Arguments,
+    scene: &Scene,
     read: &dyn Fn(&Path) -> Result<Source, ArgumentError>,
-) -> Result<Results, Failure> {
-    let scene = arguments.scene.load()?;
+) -> Result<Gathered, Failure> {
     let modes = scene.structure.as_ref().map_or(1, |structure| structure.modes.len());
-    writable([&arguments.figure, &arguments.out].into_iter().flatten())?;
-    let selection = Selection {
-        response: arguments.response.clone(),
-        drive: arguments.drive.clone(),
-        time: arguments.time.clone(),
-        rate: arguments.rate,
-        late: arguments.late,
-    };
-    let mut measured = Measurements { known: arguments.known.clone(), ..Measurements::default() };
+    let Arguments { known, response, drive, time, rate, late, .. } = arguments.clone();
+    let selection = Selection { response, drive, time, rate, late };
+    let mut measured = Measurements { known, ..Measurements::default() };
     let (mut skipped, mut notes) = (0, Vec::new());
     for path in &arguments.points {
         let (phase, source) = (scene.definition().phase, read(path).map_err(Failure::input)?);
@@ -258,16 +260,15 @@ pub(super) fn run(
                 measured.points.extend(points);
                 skipped += left_out;
                 // Several files of one run have the same response.
-                measured
-                    .linear
-                    .extend(linear.filter(|one| !measured.linear.contains(one)));
+                let linear = linear.filter(|one| !measured.linear.contains(one));
+                measured.linear.extend(linear);
+            }
+            Measurement::Recording(_) if modes > 1 => {
+                return Err(Failure::input(format!(
+                    "a recording is fitted for one oscillator, and the structure has {modes} modes: give tracked.csv of `vines backbone`"
+                )));
             }
             Measurement::Recording(recording) => {
-                if modes > 1 {
-                    return Err(Failure::input(format!(
-                        "a recording is fitted for one oscillator, and the structure has {modes} modes: give tracked.csv of `vines backbone`"
-                    )));
-                }
                 notes.extend(recording.notes.iter().cloned());
                 match recording.linear_decay(&scene.knowledge()).map_err(Failure::run)? {
                     Some(decay) => {
@@ -279,23 +280,18 @@ pub(super) fn run(
             }
         }
     }
-    let has_shaker = scene
-        .structure
-        .as_ref()
-        .is_some_and(|structure| structure.shaker.is_some());
-    if modes > 1 || has_shaker {
+    let structure = scene.structure.as_ref();
+    let others = match structure.is_some_and(|structure| structure.shaker.is_some()) {
+        true => Some("the other modes and the shaker"),
+        false => (modes > 1).then_some("the other modes"),
+    };
+    if let Some(others) = others {
         let count = measured.points.len();
-        measured.points = without_other_modes(&scene, measured.points);
+        measured.points = without_other_modes(scene, measured.points);
         skipped += count - measured.points.len();
-        let others = if has_shaker {
-            "the other modes and the shaker"
-        } else {
-            "the other modes"
-        };
         notes.push(format!(
             "points are moved to where the driven mode alone would have them, by exact orbits with and without {others} of the scene"
-        ),
-        );
+        ));
     }
     notes.extend(arguments.known.iter().filter_map(|known| match known {
         Known::Value { quantity, estimate: Estimate { value, uncertainty: 0.0 } } => Some(format!(
@@ -304,19 +300,28 @@ pub(super) fn run(
         )),
         _ => None,
     }));
-    let lines: String = notes.iter().map(|note| format!("{note}\n")).collect();
+    Ok(Gathered { measured, skipped, notes })
+}
+
+/// `read`: as of [`gathered`].
+pub(super) fn run(
+    arguments: &Arguments,
+    read: &dyn Fn(&Path) -> Result<Source, ArgumentError>,
+) -> Result<Results, Failure> {
+    let scene = arguments.scene.load()?;
+    writable([&arguments.figure, &arguments.out].into_iter().flatten())?;
+    let Gathered { measured, skipped, notes } = gathered(arguments, &scene, read)?;
+    let lines = |lines: &[String]| lines.iter().map(|line| format!("{line}\n")).collect::<String>();
     if measured.points.is_empty() && measured.recordings.is_empty() && skipped == 0 && !notes.is_empty() {
-        let text = output(arguments.json, &serde_json::json!({ "notes": notes }), || lines)?;
+        let text = output(arguments.json, &serde_json::json!({ "notes": notes }), || lines(&notes))?;
         return Ok(Results::new(text, Written::default));
     }
     let bar = progress_bar(Effect::ALL.len() as u64, "fitting", "effects of a real cavity");
     let found = find(&measured, &scene, |done| bar.set_position(done as u64));
     bar.finish_and_clear();
     let found = found.map_err(Failure::run)?;
-    let (report, verdict) = (
-        found.fit.report(&scene.plant),
-        found.explanation.as_ref().map(explained),
-    );
+    let (report, record) = (found.fit.report(&scene.plant), found.record.as_ref());
+    let verdict = found.explanation.as_ref().map(explained);
     let alternatives: Vec<EffectReport> = found.alternatives.iter().map(Candidate::report).collect();
     let is_width = |known: &Known| matches!(known, Known::Value { quantity: Quantity::B, .. });
     let is_ideal = found.explanation.is_none() && !found.fit.is_rejected();
@@ -327,23 +332,21 @@ pub(super) fn run(
         alternatives: alternatives.clone(),
         linear: &found.linear,
         parts: &found.parts,
-        followed_periods: found.record.as_ref().map(|record| record.periods),
-        left_out_of_record: found.record.as_ref().map_or(&[], |record| &record.left_out),
+        followed_periods: record.map(|record| record.periods),
+        left_out_of_record: record.map_or(&[], |record| &record.left_out),
         points_instead: found.points_instead.as_deref(),
         off_target: &found.off_target,
-        notes,
+        notes: notes.clone(),
     };
     let text = output(arguments.json, &printed, || {
-        let instead = found.points_instead.as_ref().map(|instead| format!("{instead}\n"));
-        let verdict = verdict.as_ref().map(|verdict| format!("{verdict}\n"));
         [
-            lines,
+            lines(&notes),
             recorded(&found.parts),
             summary(&report, &found, skipped),
-            instead.unwrap_or_default(),
-            found.off_target.iter().map(|line| format!("{line}\n")).collect(),
+            lines(found.points_instead.as_slice()),
+            lines(&found.off_target),
             found.linear.iter().map(of_linear).collect(),
-            verdict.unwrap_or_default(),
+            lines(verdict.as_slice()),
             only_if_ideal(&alternatives, is_assumed),
         ]
         .concat()
@@ -408,7 +411,7 @@ fn summary(report: &FitReport, found: &Found, skipped: usize) -> String {
                 format!("{:+.1} u", (value - expected) / uncertainty),
             ],
         };
-        [symbol.to_string(), value, unit.to_string(), expected, difference]
+        cells![symbol, value, unit, expected, difference]
     });
     let mut text = Table::new("parameter | value | unit | scene | difference")
         .rows(rows)

@@ -12,7 +12,7 @@ use vines::helic::{DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
 use vines::scene::{Family, Implausible, Measurand, Names, Override, PAPER, Scene, SceneError};
-use vines::table::{Table, number};
+use vines::{cells, table::Table};
 
 use super::failure::Failure;
 use super::output::log_warnings;
@@ -173,7 +173,7 @@ impl Endpoint {
                 }
                 Some((name, unit)) => {
                     let unit = unit.clone().unwrap_or_else(|| "not declared".into());
-                    rows.push([ours.clone(), si.to_string(), name.clone(), unit, number(*factor)]);
+                    rows.push(cells![ours.clone(), si.to_string(), name.clone(), unit, *factor]);
                 }
             }
         }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lovines::{Event, State};
+use serde::Serialize;
 use serde_json::json;
 use vines::comparison::ExactCurve;
 use vines::orbit::{
@@ -14,11 +15,14 @@ use vines::orbit::{
 };
 use vines::report::responses;
 use vines::survey::{DETUNINGS, detunings, structure_curves};
-use vines::table::{Table, number, row};
 use vines::{
     ArgumentError,
     numerics::range,
     scene::{Dimensionless, Scene},
+};
+use vines::{
+    cells,
+    table::{Table, number},
 };
 
 use super::output::{Results, output, stability, writable};
@@ -266,19 +270,7 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
         None => scene.left_out().zip(stable_resonant(&numbers)),
         Some(_) => None,
     };
-    let events = motion.events.iter().map(|(phase, event)| {
-        // The wall of an impact, of coming to rest or of a release, or the direction of w' afterwards; w' just before an impact.
-        let (event, side, velocity) = match *event {
-            Event::Impact { wall, velocity, .. } => ("impact", Some(wall.sign()), Some(velocity)),
-            Event::Stuck { wall, .. } => ("rests on the wall", Some(wall.sign()), None),
-            Event::Released { wall, .. } => ("leaves the wall", Some(wall.sign()), None),
-            Event::Sticking { .. } => ("sticks to the floor", None, None),
-            Event::Slip { direction, .. } => ("slips", Some(direction), None),
-            Event::Reversal { direction, .. } => ("turns round", Some(direction), None),
-        };
-        (phase.to_degrees(), event, side, velocity)
-    });
-    let events: Vec<_> = events.collect();
+    let events = events(&motion);
     let State { q1, dq1, q2, dq2 } = motion.state;
     let PlantMotion {
         omega, amplitude, response, periods, impacts, rests, sticks, ..
@@ -301,9 +293,7 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
         "stable": stable,
         "neutral": neutral,
         "state": [q1, dq1, q2, dq2],
-        "events": events.iter().map(|(phase_deg, event, side, velocity)| {
-            json!({ "phase_deg": phase_deg, "event": event, "side": side, "velocity": velocity })
-        }).collect::<Vec<_>>(),
+        "events": events,
     });
     let ideal = ideal.map(|(left_out, orbit)| (left_out, orbit.sigma, orbit.c * numbers.b));
     if let Some(ideal) = &ideal {
@@ -311,10 +301,9 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
     }
     let title = "Periodic motion of the plant with all effects of its cavity";
     shown(&numbers, title, &result, arguments.json, || {
-        let rows = events.iter().map(|(phase, event, side, velocity)| {
-            let side = side.map_or("-".into(), |side| format!("{side:+}"));
-            let velocity = velocity.map_or("-".into(), number);
-            [number(*phase), event.to_string(), side, velocity]
+        let rows = events.iter().map(|one| {
+            let side = one.side.map(|side| format!("{side:+}"));
+            cells![one.phase_deg, one.event, side, one.velocity]
         });
         let table = Table::new("phase, degrees | event | side | w' before, m/s").rows(rows);
         let ideal = ideal.as_ref().map_or(String::new(), |(left_out, sigma, a_m)| {
@@ -336,6 +325,32 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
     })
 }
 
+/// An event of a motion.
+#[derive(Serialize)]
+struct MotionEvent {
+    phase_deg: f64,
+    event: &'static str,
+    /// The wall of an impact, of coming to rest or of a release, or the direction of w' afterwards.
+    side: Option<f64>,
+    /// w' just before an impact.
+    velocity: Option<f64>,
+}
+
+fn events(motion: &PlantMotion) -> Vec<MotionEvent> {
+    let of = |(phase, event): &(f64, Event)| {
+        let (event, side, velocity) = match *event {
+            Event::Impact { wall, velocity, .. } => ("impact", Some(wall.sign()), Some(velocity)),
+            Event::Stuck { wall, .. } => ("rests on the wall", Some(wall.sign()), None),
+            Event::Released { wall, .. } => ("leaves the wall", Some(wall.sign()), None),
+            Event::Sticking { .. } => ("sticks to the floor", None, None),
+            Event::Slip { direction, .. } => ("slips", Some(direction), None),
+            Event::Reversal { direction, .. } => ("turns round", Some(direction), None),
+        };
+        MotionEvent { phase_deg: phase.to_degrees(), event, side, velocity }
+    };
+    motion.events.iter().map(of).collect()
+}
+
 /// Multipliers in a line: real and imaginary parts.
 fn multipliers(multipliers: [[f64; 2]; 4]) -> String {
     multipliers.map(|[re, im]| format!("{re:.5}{im:+.5}i")).join(", ")
@@ -355,7 +370,7 @@ fn positive_frequency(scene: &Dimensionless, sigma: f64) -> Result<(), Failure> 
 fn shown(
     scene: &Dimensionless,
     title: &str,
-    result: &impl serde::Serialize,
+    result: &impl Serialize,
     json: bool,
     text: impl FnOnce() -> String,
 ) -> Result<String, Failure> {
@@ -369,10 +384,7 @@ fn described(pattern: &str, motion: &Periodic) -> String {
     let Periodic { sigma, c, b, gamma, .. } = motion;
     let rows = motion.bounces.iter().map(|impact| {
         let phase = impact.phase.to_degrees().rem_euclid(360.0);
-        row(
-            &format!("{:+}", impact.wall),
-            [phase, impact.q1, impact.dq1, impact.dq2],
-        )
+        cells![format!("{:+}", impact.wall), phase, impact.q1, impact.dq1, impact.dq2]
     });
     let table = Table::new("wall | phase, degrees | q1 | q1' after | q2' after").rows(rows);
     format!(
@@ -391,33 +403,21 @@ struct Place {
 }
 
 impl From<&Orbit> for Place {
-    fn from(orbit: &Orbit) -> Self {
-        let Orbit {
-            sigma,
-            g,
-            c,
-            gamma,
-            b,
-            multipliers: [.., largest],
-            stable,
-            neutral,
-            ..
-        } = *orbit;
+    fn from(one: &Orbit) -> Self {
         Self {
-            numbers: [sigma, g, c, gamma, b],
-            largest,
-            stability: stability(stable, neutral),
+            numbers: [one.sigma, one.g, one.c, one.gamma, one.b],
+            largest: one.multipliers[3],
+            stability: stability(one.stable, one.neutral),
         }
     }
 }
 
 impl From<&Periodic> for Place {
-    fn from(motion: &Periodic) -> Self {
-        let Periodic { sigma, g, c, gamma, b, stable, neutral, .. } = *motion;
+    fn from(one: &Periodic) -> Self {
         Self {
-            numbers: [sigma, g, c, gamma, b],
-            largest: motion.moduli()[3],
-            stability: stability(stable, neutral),
+            numbers: [one.sigma, one.g, one.c, one.gamma, one.b],
+            largest: one.moduli()[3],
+            stability: stability(one.stable, one.neutral),
         }
     }
 }
@@ -474,8 +474,7 @@ fn curve(name: &str, ends: &str, points: Vec<Place>, special: Vec<(Bifurcation, 
     );
     let thinned = points.iter().step_by(points.len().div_ceil(24));
     let rows = thinned.map(|Place { numbers: [sigma, g, c, gamma, b], largest, stability }| {
-        let numbers = [*sigma, *g, *c, gamma.to_degrees(), *b, *largest].map(number);
-        [numbers.to_vec(), vec![(*stability).into()]].concat()
+        cells![*sigma, *g, *c, gamma.to_degrees(), *b, *largest, *stability]
     });
     let table = Table::new("sigma | G | C | phase, degrees | B | largest mult. | stable");
     text += &table.rows(rows).text();
@@ -496,14 +495,10 @@ fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
         };
     }
     let rows = orbits.iter().map(|orbit| {
-        let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.gamma.to_degrees(), orbit.b];
-        let multipliers = orbit.multipliers.map(|modulus| format!("{modulus:.4}"));
-        [
-            &numbers.map(number)[..],
-            &multipliers,
-            &[stability(orbit.stable, orbit.neutral).into()],
-        ]
-        .concat()
+        let Orbit { sigma, omega, c, b, stable, neutral, .. } = *orbit;
+        let (phase, stable) = (orbit.gamma.to_degrees(), stability(stable, neutral));
+        let [m1, m2, m3, m4] = orbit.multipliers.map(|modulus| format!("{modulus:.4}"));
+        cells![sigma, omega, c, phase, b, m1, m2, m3, m4, stable]
     });
     Table::new("sigma | Omega | C | phase, degrees | B | mult1 | mult2 | mult3 | mult4 | stable")
         .rows(rows)

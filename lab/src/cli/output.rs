@@ -56,10 +56,6 @@ pub(super) fn stability(stable: bool, neutral: bool) -> &'static str {
     }
 }
 
-pub(super) fn yes_no(value: bool) -> String {
-    if value { "yes" } else { "no" }.into()
-}
-
 /// What a command has found, and what is left to do once that has been printed: a full disk hides no result.
 pub(super) struct Results {
     text: String,

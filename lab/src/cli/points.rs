@@ -247,9 +247,15 @@ fn objects(value: &Value) -> Option<Vec<Row>> {
     }
 }
 
-/// The words that a Boolean column has, in small letters: of this program, of Python, of spreadsheets in English and German, and numbers.
-const TRUE: [&str; 4] = ["true", "wahr", "1", "1.0"];
-const FALSE: [&str; 4] = ["false", "falsch", "0", "0.0"];
+/// A Boolean by the words that this program, Python, spreadsheets in English and German, and numbers have for it; `None` for others.
+#[must_use]
+pub fn truth(word: &str) -> Option<bool> {
+    match &*word.trim().to_lowercase() {
+        "true" | "wahr" | "1" | "1.0" => Some(true),
+        "false" | "falsch" | "0" | "0.0" => Some(false),
+        _ => None,
+    }
+}
 
 /// Boolean columns.
 const FLAGS: [&str; 2] = ["settled", "reached"];
@@ -264,12 +270,10 @@ fn is_symmetric(path: &Path, number: usize, row: &Row) -> Result<bool, ArgumentE
     };
     let mut is_kept = true;
     for (key, value) in FLAGS.into_iter().filter_map(|key| Some((key, row.get(key)?))) {
-        let word = value.trim().to_lowercase();
-        is_kept &= match (TRUE.contains(&&*word), FALSE.contains(&&*word)) {
-            (true, _) => true,
-            (_, true) => false,
-            _ => return refused(key, value, "true or false, WAHR or FALSCH, 1 or 0"),
-        };
+        match truth(value) {
+            Some(is_true) => is_kept &= is_true,
+            None => return refused(key, value, "true or false, WAHR or FALSCH, 1 or 0"),
+        }
     }
     for (key, value) in MOTIONS.into_iter().filter_map(|key| Some((key, row.get(key)?))) {
         let word = |regime: &Regime| match key {

@@ -8,7 +8,10 @@ use serde_json::json;
 use vines::orbit::{Bifurcation, StabilityChange, StructureBranch, StructureOrbit};
 use vines::scene::{Scene, Structure};
 use vines::survey::Survey;
-use vines::table::{Table, number};
+use vines::{
+    cells,
+    table::{Cell, Table},
+};
 
 use super::output::{Results, output, progress_bar, stability, writable};
 use super::{failure::Failure, options::SceneArguments};
@@ -80,18 +83,11 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
     let rows = survey.facts.modes.iter().enumerate().map(|(n, mode)| {
         let (order, distance) = mode.harmonic;
         let harmonic = match n == survey.driven {
-            true => "driven".into(),
+            true => "driven".to_owned(),
             false => format!("{order}, {:+.2}", (mode.ratio - f64::from(order)).signum() * distance),
         };
-        vec![
-            (n + 1).to_string(),
-            number(mode.omega0 / TAU),
-            number(mode.zeta),
-            number(mode.mass_ratio),
-            number(mode.ratio),
-            harmonic,
-            number(mode.influence),
-        ]
+        let (hertz, zeta, mass, ratio) = (mode.omega0 / TAU, mode.zeta, mode.mass_ratio, mode.ratio);
+        cells![n + 1, hertz, zeta, mass, ratio, harmonic, mode.influence]
     });
     let modes = Table::new("mode | frequency, Hz | damping | m phi² | ratio | harmonic | influence").rows(rows);
     text += &modes.text();
@@ -148,18 +144,16 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
         text += "warning: with all modes no orbit of the backbone is stable\n";
     }
     let rows = survey.behind_shaker.iter().map(|one| {
-        let percent = |of: f64| format!("{:+.3}", 100.0 * of);
         let [omega, drive] = one.at;
         let apart = one.by_sine.map(|[sine, by]| {
             let numbers = scene.dimensionless();
             [numbers.sigma(omega) - numbers.sigma(sine), drive / by - 1.0]
         });
-        let [sigma, by] = apart.map_or(["-".into(), "-".into()], |[sigma, by]| {
-            [format!("{sigma:+.2e}"), percent(by)]
-        });
-        let harmonics = one.harmonics.map(|harmonic| format!("{:.3}", 100.0 * harmonic));
-        let at = [number(one.response / b), number(omega / TAU), format!("{drive:.4e}")];
-        at.into_iter().chain(harmonics).chain([sigma, by]).collect::<Vec<_>>()
+        let sigma = apart.map(|[sigma, _]| format!("{sigma:+.2e}"));
+        let by = apart.map(|[_, by]| format!("{:+.3}", 100.0 * by));
+        let [third, fifth, seventh] = one.harmonics.map(|harmonic| format!("{:.3}", 100.0 * harmonic));
+        let (c, hertz, drive) = (one.response / b, omega / TAU, format!("{drive:.4e}"));
+        cells![c, hertz, drive, third, fifth, seventh, sigma, by]
     });
     let behind = Table::new(&format!(
         "C | frequency, Hz | drive, {unit} | 3rd, % | 5th, % | 7th, % | sigma less sine's | drive over sine's, %"
@@ -225,9 +219,9 @@ fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>;
 }
 
 /// An orbit; C is its response over that of the driven mode with the amplitude b at the cavity.
-fn row(orbit: &StructureOrbit, b: f64) -> Vec<String> {
+fn row(orbit: &StructureOrbit, b: f64) -> [Cell; 6] {
     let [response, drive] = [orbit.response, orbit.drive].map(|value| format!("{value:.4e}"));
-    let [hertz, c, growth] = [orbit.omega / TAU, orbit.response / b, orbit.growth()].map(number);
+    let (hertz, c) = (orbit.omega / TAU, orbit.response / b);
     let stable = stability(orbit.stable, orbit.neutral);
-    vec![hertz, response, c, drive, growth, stable.into()]
+    cells![hertz, response, c, drive, orbit.growth(), stable]
 }

@@ -2,6 +2,7 @@
 
 use vines::advice::Reason;
 use vines::backbone::LevelPoint;
+use vines::cells;
 use vines::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use vines::fit::{Contradiction, FittedParameter};
 use vines::identification::{DecayEnd, Friction, Lock, Regime, ResonancePoint, Tone};
@@ -9,7 +10,7 @@ use vines::numerics::SIGNIFICANT;
 use vines::orbit::Orbit;
 use vines::regime_map::Map;
 use vines::scene::{Definition, Dimensionless, Scene};
-use vines::table::{Table, row, with_uncertainty};
+use vines::table::{Table, with_uncertainty};
 
 /// The dimensionless numbers of a scene, in one line.
 pub(super) fn parameters(p: &Dimensionless) -> String {
@@ -131,6 +132,11 @@ pub(super) fn not_locked(reason: &Reason, scene: &Scene) -> String {
     }
 }
 
+/// A value with its unit, which may be empty.
+pub(super) fn with_unit(value: &str, unit: &str) -> String {
+    format!("{value} {unit}").trim_end().into()
+}
+
 /// How measured points contradict the scene.
 pub(super) fn contradicts(contradiction: &Contradiction) -> String {
     let Contradiction { points, chi_square, degrees, parameters } = contradiction;
@@ -144,8 +150,8 @@ pub(super) fn contradicts(contradiction: &Contradiction) -> String {
         Some(parameters) => {
             let texts = parameters.iter().map(|parameter| {
                 let FittedParameter { symbol, unit, value, uncertainty, expected } = parameter;
-                let space = if unit.is_empty() { "" } else { " " };
-                format!("{symbol} = {value:.4e} ± {uncertainty:.1e}{space}{unit} fits, the scene says {expected:.4e}")
+                let value = with_unit(&format!("{value:.4e} ± {uncertainty:.1e}"), unit);
+                format!("{symbol} = {value} fits, the scene says {expected:.4e}")
             });
             texts.collect::<Vec<String>>().join("; ")
         }
@@ -156,14 +162,10 @@ pub(super) fn contradicts(contradiction: &Contradiction) -> String {
 /// How often each regime occurs on a map.
 pub(super) fn regimes(map: &Map) -> Table {
     let inside = map.cells.iter().filter(|cell| cell.theory_stable).count();
-    let share = |count: usize, of: usize| match of {
-        0 => "-".into(),
-        _ => format!("{:.1} %", 100.0 * count as f64 / of as f64),
-    };
+    let share = |count: usize, of: usize| (of > 0).then(|| format!("{:.1} %", 100.0 * count as f64 / of as f64));
     let rows = Regime::SIMULATED.into_iter().map(|regime| {
         let (all, stable) = map.count(regime);
-        let shares = [share(all, map.cells.len()), share(stable, inside)];
-        [vec![regime.name().to_string(), all.to_string()], shares.into()].concat()
+        cells![regime.name(), all, share(all, map.cells.len()), share(stable, inside)]
     });
     Table::new("regime | cells | share | inside the theory's stable island").rows(rows)
 }
@@ -178,98 +180,88 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let units = Units::of(scene);
     let [hertz, response, drive] = units.values(at);
     let [(of_response, m), (of_drive, unit)] = &units.names;
-    if lock.regime_by_impacts.is_none() {
-        let mut notes = vec![stability(lock)];
-        notes.extend(lock.clipped_percent.map(clipped));
-        notes.extend(lock.tone.map(tone));
-        let notes: String = notes.iter().map(|note| format!("  ({note})\n")).collect();
-        return format!(
-            "Measured: {hertz} Hz, {of_response} {response} {m}, {of_drive} {drive} {unit}\nLocked after {:.0} periods{}: {}, phase error {:.1e} ± {:.1e} degrees\n{notes}\n{}\n",
+    let measured = format!("Measured: {hertz} Hz, {of_response} {response} {m}, {of_drive} {drive} {unit}\n");
+    let locked = |motion: String| {
+        format!(
+            "Locked after {:.0} periods{}: {motion}, phase error {:.1e} ± {:.1e} degrees\n",
             lock.periods_to_lock,
             held(lock, scene),
-            lock.regime.motion(),
             at.phase_error_deg,
-            at.u_phase_deg,
-            decay_in_metres(result, &units)
+            at.u_phase_deg
+        )
+    };
+    let lines = |notes: Vec<String>| notes.iter().map(|note| format!("  ({note})\n")).collect::<String>();
+    if lock.regime_by_impacts.is_none() {
+        let (locked, decay) = (locked(lock.regime.motion().into()), decay_in_metres(result, &units));
+        let notes = [
+            Some(stability(lock)),
+            lock.clipped_percent.map(clipped),
+            lock.tone.map(tone),
+        ];
+        return format!(
+            "{measured}{locked}{}\n{decay}\n",
+            lines(notes.into_iter().flatten().collect())
         );
     }
-    let b = lock.b.zip(lock.u_b).map_or("-".into(), |(b, u)| with_uncertainty(b, u));
-    let [sigma, c] = [(at.sigma, at.u_sigma), (at.c, at.u_c)].map(|(value, u)| with_uncertainty(value, u));
-    let g = with_uncertainty(at.g, at.u_g);
-    let measured = ["measured at the lock".to_string(), sigma, c, b];
-    let exact = result.exact.map(|orbit| {
-        let Orbit { sigma, c, b, .. } = orbit;
-        row("exact orbit", [sigma, c, b])
-    });
     let name = match result.curve.is_of_structure {
         true => "driven mode alone, first order",
         false => "theory, first order",
     };
-    let theory = result.theory.map(|point| row(name, [point.sigma, point.c, point.b]));
-    let table = Table::new(" | sigma | C | B").rows([measured]).rows(exact).rows(theory);
-    let held = held(lock, scene);
-    let mut text = format!(
-        "Measured: {hertz} Hz, {of_response} {response} {m}, {of_drive} {drive} {unit}\n{}, G = {}\nLocked after {:.0} periods{held}: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}",
+    let b = lock.b.zip(lock.u_b);
+    let own = cells!["measured at the lock", (at.sigma, at.u_sigma), (at.c, at.u_c), b];
+    let exact = result.exact.map(|one| cells!["exact orbit", one.sigma, one.c, one.b]);
+    let theory = result.theory.map(|one| cells![name, one.sigma, one.c, one.b]);
+    let table = Table::new(" | sigma | C | B").rows([Some(own), exact, theory].into_iter().flatten());
+    let exact = result.exact.as_ref().map_or(String::new(), |Orbit { g, .. }| {
+        format!("  (the exact orbit has the measured C, and the drive G = {g:.6}; theory is at the requested G)\n")
+    });
+    format!(
+        "{measured}{}, G = {}\n{}\n{}{SYMBOLS}{exact}{}\n{}\n{}\n",
         rig(&result.parameters),
-        g,
-        lock.periods_to_lock,
-        lock.regime,
-        lock.impacts(),
-        at.phase_error_deg,
-        at.u_phase_deg,
+        with_uncertainty(at.g, at.u_g),
+        locked(format!("{}, {}", lock.regime, lock.impacts())),
         table.text(),
-    );
-    text += SYMBOLS;
-    if let Some(Orbit { g, .. }) = result.exact {
-        text += &format!(
-            "  (the exact orbit has the measured C, and the drive G = {g:.6}; theory is at the requested G)\n"
-        );
-    }
-    let mut note = |note: &str| text += &format!("  ({note})\n");
-    note(&stability(lock));
-    if let Some(friction) = lock.friction {
-        note(&friction_text(&friction));
-    }
-    if let Some(share) = lock.clipped_percent {
-        note(&clipped(share));
-    }
-    if let Some(left_out) = &result.left_out {
-        note(&ideal("theory and exact orbits are", left_out));
-    }
+        lines(notes(result)),
+        decay(result),
+        agreement(result)
+    )
+}
+
+/// What is to be said of a lock beside its numbers.
+fn notes(result: &Comparison) -> Vec<String> {
+    let (lock, at, asked) = (&result.lock, &result.lock.at, result.parameters.g);
+    let mut notes = vec![stability(lock)];
+    notes.extend(lock.friction.as_ref().map(friction_text));
+    notes.extend(lock.clipped_percent.map(clipped));
+    let left_out = result.left_out.as_ref();
+    notes.extend(left_out.map(|left_out| ideal("theory and exact orbits are", left_out)));
     if result.exact.is_none() && result.theory.is_none() {
-        note(&format!(
+        notes.push(format!(
             "at the phase target, {} degrees, neither theory nor exact orbits have a motion to compare with",
             at.phase_target_deg
         ));
     }
-    if let Some(found) = lock.tone {
-        note(&tone(found));
-    }
+    notes.extend(lock.tone.map(tone));
     // The curve is the one of the decay.
     let is_resonance = result.parameters.definition.is_phase_resonance();
     let smallest = result.curve.places().iter().map(|[_, _, g, _]| *g).reduce(f64::min);
-    if let Some(smallest) = smallest.filter(|g| is_resonance && (at.g - g).abs() < SIGNIFICANT * at.u_g) {
-        note(&format!(
-            "the drive lies at the fold within its uncertainty: the smallest of the exact backbone is G = {smallest:.6}"
-        ));
-    }
-    let asked = result.parameters.g;
+    let fold = smallest.filter(|g| is_resonance && (at.g - g).abs() < SIGNIFICANT * at.u_g);
+    notes.extend(fold.map(|g| {
+        format!("the drive lies at the fold within its uncertainty: the smallest of the exact backbone is G = {g:.6}")
+    }));
     if (at.g - asked).abs() > SIGNIFICANT * at.u_g {
-        note(&format!("G = {asked} was asked for"));
+        notes.push(format!("G = {asked} was asked for"));
     }
     if result.exact.is_none() && !result.orbits.is_empty() {
-        note("no exact orbit has the measured C");
+        notes.push("no exact orbit has the measured C".into());
     }
-    for orbit in result.others() {
-        note(&format!(
-            "another stable orbit at this G, not followed: sigma = {:.4}, C = {:.4}, B = {:.4}",
-            orbit.sigma, orbit.c, orbit.b
-        ));
-    }
+    notes.extend(result.others().map(|Orbit { sigma, c, b, .. }| {
+        format!("another stable orbit at this G, not followed: sigma = {sigma:.4}, C = {c:.4}, B = {b:.4}")
+    }));
     if result.exact.as_ref().is_some_and(Orbit::is_unstable) {
-        note("the exact orbit is unstable under a constant drive and frequency; the loop holds it");
+        notes.push("the exact orbit is unstable under a constant drive and frequency; the loop holds it".into());
     }
-    format!("{text}\n{}\n{}\n", decay(result), agreement(result))
+    notes
 }
 
 /// That control holds the response, if it does.
@@ -439,17 +431,12 @@ pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
     let rows = points().map(|TrackedPoint { point, exact }| {
         let at = &point.at;
         let by_impacts = point.regime_by_impacts.unwrap_or(Regime::Unknown);
-        let pairs = [(at.c, at.u_c), (at.sigma, at.u_sigma), (at.g, at.u_g)];
-        let pairs = pairs.map(|(value, u)| with_uncertainty(value, u));
         let error = exact.and_then(|exact| Some(exact.sigma?.abs().max(exact.g?.abs())));
-        let others = [
-            format!("{:+.2}°", at.phase_error_deg),
-            format!("{:.1}", point.periods),
-            point.averaged.to_string(),
-            error.map_or("-".into(), |error| format!("{error:.1e}")),
-            remarks(point, format!("{} / {by_impacts}", point.regime), scene),
-        ];
-        pairs.into_iter().chain(others).collect::<Vec<_>>()
+        let [target, periods, averaged] = effort(point);
+        let error = error.map(|error| format!("{error:.1e}"));
+        let motion = remarks(point, format!("{} / {by_impacts}", point.regime), scene);
+        let (c, sigma, g) = ((at.c, at.u_c), (at.sigma, at.u_sigma), (at.g, at.u_g));
+        cells![c, sigma, g, target, periods, averaged, error, motion]
     });
     let headings = "C | sigma | G | off target | periods | averaged | error | regime by response / by impacts";
     let table = Table::new(headings).rows(rows);
@@ -477,6 +464,16 @@ pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
     format!("{}\n\n{}\n{duration}{worst}", rig(&result.parameters), table.text())
 }
 
+/// Distance from the phase target, and periods that a point took and that are averaged.
+fn effort(point: &LevelPoint) -> [String; 3] {
+    let error = point.at.phase_error_deg;
+    [
+        format!("{error:+.2}°"),
+        format!("{:.1}", point.periods),
+        point.averaged.to_string(),
+    ]
+}
+
 /// What is to be said of a point beside its motion.
 fn remarks(point: &LevelPoint, mut motion: String, scene: &Scene) -> String {
     if let Some(why) = point.unsettled(scene.knowledge().is_symmetric) {
@@ -492,13 +489,8 @@ fn remarks(point: &LevelPoint, mut motion: String, scene: &Scene) -> String {
 fn measured(result: &TrackedComparison, scene: &Scene) -> String {
     let units = Units::of(scene);
     let rows = result.points.iter().map(|TrackedPoint { point, .. }| {
-        let others = [
-            format!("{:+.2}°", point.at.phase_error_deg),
-            format!("{:.1}", point.periods),
-            point.averaged.to_string(),
-            remarks(point, point.regime.motion().into(), scene),
-        ];
-        units.values(&point.at).into_iter().chain(others).collect::<Vec<_>>()
+        let motion = remarks(point, point.regime.motion().into(), scene);
+        [&units.values(&point.at)[..], &effort(point), &[motion]].concat()
     });
     let [response, drive] = units.names.each_ref().map(|(name, unit)| format!("{name}, {unit}"));
     let headings = format!("frequency, Hz | {response} | {drive} | off target | periods | averaged | motion");

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 use vines::{
+    cells,
     report::theory,
-    table::{Table, row},
+    table::{Cell, Table},
     theory::{Activation, B_SYMMETRY_BREAKING, BranchSide, SlowFlow, backbone, resonant},
 };
 
-use super::output::{Results, output, writable, yes_no};
+use super::output::{Results, output, writable};
 use super::summary::parameters;
 use super::{failure::Failure, options::SceneArguments};
 
@@ -83,7 +84,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let text = output(arguments.json, &result, || {
         let rows = solutions.iter().map(|point| {
             let stable = [point.impacts_stable, point.slow_flow_stable];
-            cells(point.branch, [point.sigma, point.c, point.b], stable)
+            row(point.branch, [point.sigma, point.c, point.b], stable)
         });
         let mut text = format!(
             "First-order theory\n  {}\n\n\
@@ -98,7 +99,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         if let Some(equilibria) = &equilibria {
             let rows = equilibria.iter().map(|point| {
                 let stable = [point.impacts_stable, point.slow_flow_stable];
-                cells(point.branch, [point.c, point.b, point.gamma.to_degrees()], stable)
+                row(point.branch, [point.c, point.b, point.gamma.to_degrees()], stable)
             });
             let equilibria = table("branch | C | B | phase, degrees", rows);
             text += &format!("\nEquilibria at sigma = {sigma}\n{equilibria}");
@@ -123,17 +124,16 @@ fn thresholds(activation: &Activation, sigma: f64) -> String {
     )
 }
 
-fn cells(branch: BranchSide, numbers: [f64; 3], stable: [bool; 2]) -> Vec<String> {
+fn row(branch: BranchSide, numbers: [f64; 3], [impacts, slow_flow]: [bool; 2]) -> [Cell; 6] {
     let side = match branch {
         BranchSide::Left => "left",
         BranchSide::Right => "right",
     };
-    let mut cells = row(side, numbers);
-    cells.extend(stable.map(yes_no));
-    cells
+    let [first, second, third] = numbers;
+    cells![side, first, second, third, impacts, slow_flow]
 }
 
-fn table(headings: &str, rows: impl Iterator<Item = Vec<String>>) -> String {
+fn table(headings: &str, rows: impl Iterator<Item = [Cell; 6]>) -> String {
     let table = Table::new(&format!("{headings} | impacts stable | slow flow stable")).rows(rows);
     match table.is_empty() {
         true => "  none at this excitation\n".into(),

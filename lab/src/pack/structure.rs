@@ -5,14 +5,12 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::fmt::Display;
-use std::io;
 
 use fmi2_component::guid_of;
+use fmi2_description::{Element, Error};
 use lovines::table::PARAMETERS;
 use phase_lock::Value;
 use serde_json::json;
-use xml::reader::{EventReader, XmlEvent};
-use xml::writer::{EmitterConfig, EventWriter, XmlEvent as Written};
 
 use super::{Component, STARTS};
 use crate::scene::{ARMATURE, Channel, Excitation, Scene, SceneShaker, Structure, TABLE};
@@ -27,11 +25,7 @@ const FILE: &str = "structure.json";
 ///
 /// # Errors
 /// A description that is not XML.
-pub fn component(
-    oscillator: &Component,
-    structure: &Structure,
-    scene: &Scene,
-) -> Result<Component, xml::reader::Error> {
+pub fn component(oscillator: &Component, structure: &Structure, scene: &Scene) -> Result<Component, Error> {
     let starts = scene
         .start_values()
         .into_iter()
@@ -262,91 +256,11 @@ impl DriveKind {
 /// Signal, amplitude and total of the base of an oscillator.
 const BASE: [&str; 3] = ["e", "E", "base"];
 
-/// An element of a description.
-#[derive(Clone, Debug, Default)]
-struct Element {
-    name: String,
-    attributes: Vec<(String, String)>,
-    children: Vec<Element>,
-}
-
-impl Element {
-    fn new(name: &str, attributes: &[(&str, &dyn Display)]) -> Self {
-        let attributes = attributes
-            .iter()
-            .map(|(name, value)| ((*name).to_owned(), value.to_string()));
-        Self {
-            name: name.into(),
-            attributes: attributes.collect(),
-            children: Vec::new(),
-        }
-    }
-
-    fn with(mut self, child: Self) -> Self {
-        self.children.push(child);
-        self
-    }
-
-    /// The root of a document.
-    fn parse(xml: &str) -> Result<Self, xml::reader::Error> {
-        let mut open = vec![Self::default()];
-        for event in EventReader::new(xml.as_bytes()) {
-            match event? {
-                XmlEvent::StartElement { name, attributes, .. } => {
-                    let attributes = attributes.into_iter().map(|one| (one.name.local_name, one.value));
-                    let (name, attributes) = (name.local_name, attributes.collect());
-                    open.push(Self { name, attributes, children: Vec::new() });
-                }
-                XmlEvent::EndElement { .. } => {
-                    if let (Some(done), Some(parent)) = (open.pop(), open.last_mut()) {
-                        parent.children.push(done);
-                    }
-                }
-                _ => {}
-            }
-        }
-        Ok(open.swap_remove(0).children.pop().unwrap_or_default())
-    }
-
-    fn write<W: io::Write>(&self, writer: &mut EventWriter<W>) -> xml::writer::Result<()> {
-        let start = Written::start_element(self.name.as_str());
-        let attributes = self.attributes.iter();
-        writer.write(attributes.fold(start, |start, (name, value)| start.attr(name.as_str(), value)))?;
-        self.children.iter().try_for_each(|child| child.write(writer))?;
-        writer.write(Written::end_element())
-    }
-
-    fn get(&self, name: &str) -> &str {
-        let found = self.attributes.iter().find(|(other, _)| other == name);
-        found.map_or("", |(_, value)| value)
-    }
-
-    fn set(&mut self, name: &str, value: impl Display) {
-        match self.attributes.iter_mut().find(|(other, _)| other == name) {
-            Some((_, old)) => *old = value.to_string(),
-            None => self.attributes.push((name.into(), value.to_string())),
-        }
-    }
-
-    fn remove(&mut self, name: &str) {
-        self.attributes.retain(|(other, _)| other != name);
-    }
-
-    fn child(&mut self, name: &str) -> &mut Self {
-        let found = self.children.iter().position(|child| child.name == name);
-        let place = found.unwrap_or_else(|| {
-            self.children.push(Self { name: name.into(), ..Self::default() });
-            self.children.len() - 1
-        });
-        &mut self.children[place]
-    }
-}
-
 /// The description of a structure, from that of `LoViNes.fmu`.
 ///
 /// # Errors
 /// A text that is not XML.
-fn describe(oscillator: &str, facts: &Facts<'_>) -> Result<String, xml::reader::Error> {
+fn describe(oscillator: &str, facts: &Facts<'_>) -> Result<String, Error> {
     let mut root = Element::parse(oscillator)?;
     root.set("modelName", IDENTIFIER);
     root.set("guid", &facts.guid);
@@ -373,22 +287,21 @@ fn describe(oscillator: &str, facts: &Facts<'_>) -> Result<String, xml::reader::
         DriveKind::Command => &UNITS,
     };
     for (name, [kg, m, s, ampere]) in units {
-        let base = Element::new("BaseUnit", &[("kg", kg), ("m", m), ("s", s), ("A", ampere)]);
-        root.child("UnitDefinitions")
-            .children
-            .push(Element::new("Unit", &[("name", name)]).with(base));
+        let base = leaf("BaseUnit", &[("kg", kg), ("m", m), ("s", s), ("A", ampere)]);
+        let unit = Element::new("Unit", &[("name", name)], vec![base]);
+        root.child("UnitDefinitions").children.push(unit);
     }
     let variables = root.child("ModelVariables");
     variables.children = variables_of(std::mem::take(&mut variables.children), facts);
     let ([.., total], ..) = facts.drive.names();
     let structure = model_structure(&variables.children, total);
     root.children.push(structure);
-    let mut written = Vec::new();
-    let config = EmitterConfig::new().perform_indent(true).line_separator("\n");
-    // A vector takes every byte, and what was parsed has the form of XML.
-    root.write(&mut config.create_writer(&mut written))
-        .expect("a document in memory");
-    Ok(String::from_utf8_lossy(&written).into_owned() + "\n")
+    Ok(root.document())
+}
+
+/// An element without children.
+fn leaf(name: &str, attributes: &[(&str, &dyn Display)]) -> Element {
+    Element::new(name, attributes, Vec::new())
 }
 
 /// The variables of the structure, in the order of the oscillator's, and its points.
@@ -415,32 +328,26 @@ fn variables_of(oscillator: Vec<Element>, facts: &Facts<'_>) -> Vec<Element> {
                 channel.unit, facts.step
             )
         });
-        let mut add = |k: usize, name: String, meaning: String, content: Element| {
-            let variable = Element::new(
-                "ScalarVariable",
-                &[
-                    ("name", &name),
-                    ("valueReference", &(FIRST as usize + 3 * n + k)),
-                    ("causality", &"output"),
-                    ("variability", &"continuous"),
-                    ("initial", &"calculated"),
-                    ("description", &meaning),
-                ],
-            );
-            kept.push(variable.with(content));
+        let mut add = |k: usize, name: &str, meaning: &str, content: Element| {
+            let attributes: [(&str, &dyn Display); 6] = [
+                ("name", &name),
+                ("valueReference", &(FIRST as usize + 3 * n + k)),
+                ("causality", &"output"),
+                ("variability", &"continuous"),
+                ("initial", &"calculated"),
+                ("description", &meaning),
+            ];
+            kept.push(Element::new("ScalarVariable", &attributes, vec![content]));
         };
         if let Some(meaning) = channel.meaning {
-            let quantity = if channel.unit == "N" {
-                "Force"
-            } else {
-                "ElectricCurrent"
-            };
-            let content = Element::new("Real", &[("quantity", &quantity), ("unit", &channel.unit)]);
-            add(0, name.to_owned(), meaning.to_owned() + &limit, content);
+            let is_force = channel.unit == "N";
+            let quantity = if is_force { "Force" } else { "ElectricCurrent" };
+            let content = leaf("Real", &[("quantity", &quantity), ("unit", &channel.unit)]);
+            add(0, name, &(meaning.to_owned() + &limit), content);
             continue;
         }
         for (k, (symbol, quantity, kind, [unit, display])) in QUANTITIES.into_iter().enumerate() {
-            let mut content = Element::new("Real", &[("declaredType", &kind), ("unit", &unit)]);
+            let mut content = leaf("Real", &[("declaredType", &kind), ("unit", &unit)]);
             if !display.is_empty() {
                 content.set("displayUnit", display);
             }
@@ -450,7 +357,7 @@ fn variables_of(oscillator: Vec<Element>, facts: &Facts<'_>) -> Vec<Element> {
                 _ => format!("{quantity} of the structure at the point {name}"),
             };
             let meaning = if k == 0 { meaning + &limit } else { meaning };
-            add(k, format!("{symbol}[{name}]"), meaning, content);
+            add(k, &format!("{symbol}[{name}]"), &meaning, content);
         }
     }
     kept
@@ -464,7 +371,7 @@ fn adapt(variable: &mut Element, facts: &Facts<'_>) {
         variable.set("name", names[place]);
         variable.set("description", facts.drive.meaning(place));
         if !quantity.is_empty() {
-            variable.children[0] = Element::new("Real", &[("quantity", &quantity), ("unit", &unit)]);
+            variable.children[0] = leaf("Real", &[("quantity", &quantity), ("unit", &unit)]);
             if variable.get("causality") == "input" {
                 variable.children[0].set("start", 0);
             }
@@ -488,30 +395,20 @@ fn adapt(variable: &mut Element, facts: &Facts<'_>) {
 
 /// Which outputs there are. That of the drive follows its inputs at once, all others with the next step.
 fn model_structure(variables: &[Element], drive: &str) -> Element {
-    let inputs = variables
-        .iter()
-        .enumerate()
-        .filter(|(_, one)| one.get("causality") == "input");
-    let inputs: Vec<String> = inputs.map(|(n, _)| (n + 1).to_string()).collect();
-    let (mut outputs, mut unknowns) = (Element::new("Outputs", &[]), Element::new("InitialUnknowns", &[]));
-    for (n, variable) in variables
-        .iter()
-        .enumerate()
-        .filter(|(_, one)| one.get("causality") == "output")
-    {
-        let dependencies = if variable.get("name") == drive {
-            inputs.join(" ")
-        } else {
-            String::new()
-        };
-        let index = n + 1;
-        outputs = outputs.with(Element::new(
-            "Unknown",
-            &[("index", &index), ("dependencies", &dependencies)],
-        ));
-        if variable.get("initial") == "calculated" {
-            unknowns = unknowns.with(Element::new("Unknown", &[("index", &index)]));
-        }
-    }
-    Element::new("ModelStructure", &[]).with(outputs).with(unknowns)
+    let all = |causality| {
+        (1..)
+            .zip(variables)
+            .filter(move |(_, one)| one.get("causality") == causality)
+    };
+    let inputs: Vec<String> = all("input").map(|(n, _): (usize, _)| n.to_string()).collect();
+    let inputs = inputs.join(" ");
+    let outputs = all("output").map(|(n, one)| {
+        let dependencies = if one.get("name") == drive { &*inputs } else { "" };
+        leaf("Unknown", &[("index", &n), ("dependencies", &dependencies)])
+    });
+    let calculated = all("output").filter(|(_, one)| one.get("initial") == "calculated");
+    let unknowns = calculated.map(|(n, _)| leaf("Unknown", &[("index", &n)]));
+    let lists = [("Outputs", outputs.collect()), ("InitialUnknowns", unknowns.collect())];
+    let lists = lists.map(|(name, children)| Element::new(name, &[], children));
+    Element::new("ModelStructure", &[], lists.into())
 }

@@ -12,7 +12,6 @@ mod effects;
 mod known;
 mod record;
 mod recording;
-mod table;
 
 use std::cmp::Ordering;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -28,14 +27,15 @@ use vines_model::orbit::backbone_at_speed;
 use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, SlowFlow};
 
 use crate::identification::ResonancePoint;
+pub use crate::scene::table::plain_table;
+pub use crate::scene::table::{Channel, Contents};
 use crate::scene::{Dimensionless, Parameters};
 
-pub use channels::{Channel, Contents, Selection};
+pub use channels::Selection;
 pub use effects::{Candidate, Effect, EffectReport, Explanation, Found, Measurements, decimals, explain, find};
 pub use known::{Known, LinearVerdict, Quantity, linear_verdicts};
 pub use record::{LeftOut, RecordFit, follow};
 pub use recording::{Kind, LinearDecay, Part, Recording, RecordingError, parts};
-pub use table::plain_table;
 
 /// A measured point of the backbone: of phase resonance, or at another phase target.
 #[derive(Debug, Clone, Copy, PartialEq)]

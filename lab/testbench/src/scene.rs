@@ -27,6 +27,7 @@ mod names;
 mod overrides;
 mod shaker;
 mod structure;
+pub(crate) mod table;
 pub mod unit;
 
 use std::f64::consts::{PI, TAU};

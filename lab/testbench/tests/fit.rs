@@ -12,7 +12,7 @@ use vines_testbench::backbone::track;
 use vines_testbench::experiment::run;
 use vines_testbench::fit::{
     Channel, Contents, Effect, Fit, FitError, Kind, Known, MeasuredPoint, Measurements, Quantity, RecordFit, Recording,
-    RecordingError, Selection, contradiction, explain, find, fit, follow, linear_verdicts, parts, plain_table,
+    Selection, contradiction, explain, find, fit, follow, linear_verdicts, parts, plain_table,
 };
 use vines_testbench::linear::{MeasuredLinear, ParticleState};
 use vines_testbench::rig::{BuiltIn, Chain, Rig, RigError, RigStage, Sensors, Simulated};
@@ -937,7 +937,7 @@ fn chi_square_of_each_channel_shows_uncertainties_of_the_wrong_size() {
 }
 
 /// A table with the columns of `text`, read as a recording.
-fn read(text: &[u8], response: &str, drive: &str, time: Option<&str>) -> Result<Recording, RecordingError> {
+fn read(text: &[u8], response: &str, drive: &str, time: Option<&str>) -> Result<Recording, String> {
     let [response, drive] = [response, drive].map(|name| Some(name.into()));
     let selection = Selection {
         response,
@@ -945,7 +945,8 @@ fn read(text: &[u8], response: &str, drive: &str, time: Option<&str>) -> Result<
         time: time.map(Into::into),
         ..Selection::default()
     };
-    plain_table("mine.csv", text)?.recording(&selection)
+    let recording = plain_table("mine.csv", text)?.recording(&selection);
+    recording.map_err(|error| error.to_string())
 }
 
 #[test]
@@ -965,6 +966,8 @@ fn plain_tables_are_read_with_any_delimiter_names_and_units() {
         (0..200).map(row).collect()
     };
     let plain = read(format!("time,y,x\n{}", rows(",", ".")).as_bytes(), "y:mm", "x:µm", None).unwrap();
+    let ones = read(b"time,y,x\n1,1,1\n2,0,0\n3,1,1\n4,0,1\n", "y", "x", None).unwrap();
+    assert_eq!(ones.response, [1.0, 0.0, 1.0, 0.0], "ones are no row of units");
     assert!((plain.sample_time - 1e-3).abs() < 1e-15 && plain.response.len() == 200);
     let (y, x) = ("y", "x");
     let cases: [(String, &str, &str, Option<&str>); 7] = [

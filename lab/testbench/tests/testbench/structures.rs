@@ -365,11 +365,11 @@ fn matrices_that_are_not_symmetric_or_not_positive_are_refused_with_the_eigenval
     fs::write(folder.path().join("k.csv"), "2, -1\n-1, 4\n").unwrap();
     says(of(&folder, &scene, &[]), "no line of names");
     fs::write(folder.path().join("k.csv"), "").unwrap();
-    says(of(&folder, &scene, &[]), "no line of names");
+    says(of(&folder, &scene, &[]), "K (k.csv) is empty");
     fs::write(folder.path().join("k.csv"), "tip, tip\n2, -1\n-1, 4\n").unwrap();
     says(of(&folder, &scene, &[]), "two columns with the name tip");
     fs::write(folder.path().join("k.csv"), "tip, root\n2, x\n-1, 4\n").unwrap();
-    says(of(&folder, &scene, &[]), "`x` in row 1");
+    says(of(&folder, &scene, &[]), "`x` in line 2");
     fs::write(folder.path().join("k.csv"), "root, tip\n4, -1\n-1, 2\n").unwrap();
     says(of(&folder, &scene, &[]), "same order");
 }
@@ -628,10 +628,48 @@ fn mistakes_of_a_modal_model_are_refused_with_the_value_and_what_to_do() {
         with("k.csv", "tip, root\n2, -1\n-1.0000001, 4\n"),
         "K (k.csv) is not symmetric | they differ by 2.5e-8 of its largest | 1e-9 is allowed | mean of both",
     );
-    says(
-        with("k.csv", "tip; root\n2; -1\n-1; 4\n"),
-        "K (k.csv) has semicolons between its 2 columns | commas",
-    );
+}
+
+#[test]
+fn matrices_are_plain_tables_of_any_delimiter_and_what_is_none_is_refused_with_the_command() {
+    let scene = format!("{PLANT}{MATRICES}");
+    let with = |text: &str| {
+        let folder = matrices(GOOD);
+        fs::write(folder.path().join("k.csv"), text).unwrap();
+        of(&folder, &scene, &[])
+    };
+    let omegas = |scene: Scene| {
+        scene
+            .structure
+            .unwrap()
+            .modes
+            .iter()
+            .map(|mode| mode.omega)
+            .collect::<Vec<f64>>()
+    };
+    let expected = omegas(of(&matrices(GOOD), &scene, &[]).unwrap());
+    for text in [
+        "tip; root\n2; -1\n-1; 4\n",
+        "tip;root\n2,0;-1,0\n-1,0;4,0\n",
+        "tip\troot\n2\t-1\n-1\t4\n",
+    ] {
+        assert_eq!(omegas(with(text).unwrap()), expected, "{text}");
+    }
+    for (text, words) in [
+        ("    -1\n    55\n", "no line of names"),
+        (
+            "just words\n",
+            "no table of numbers | python -m vines structure FILE --cavity",
+        ),
+        ("# K\ntip, root\n2, -1\n-1, 4\n", "begins a comment"),
+        ("tip [mm], root\n2, -1\n-1, 4\n", "column tip: it states the unit mm"),
+        (
+            "tip, root\n2, -1\n-1, 4\n7\n",
+            "the last row is cut off | repair the row",
+        ),
+    ] {
+        says(with(text), words);
+    }
 }
 
 /// A structure with one mode and a light particle, and the same oscillator.

@@ -6,50 +6,46 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use num_complex::Complex64;
 
 use super::ROUNDING;
+use crate::scene::table::{Channel, Contents, plain_table};
 
-/// Header and rows of numbers of the CSV file under `key`.
-fn table(folder: &Path, key: &str, file: &Path) -> Result<(Vec<String>, Vec<Vec<f64>>), String> {
+/// The columns of the plain table under `key`: numbers under the names of points.
+fn table(folder: &Path, key: &str, file: &Path) -> Result<Vec<Channel>, String> {
     let title = format!("{key} ({})", file.display());
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(folder.join(file))
+    let bytes = std::fs::read(folder.join(file))
         .map_err(|error| format!("{title} cannot be read: {error}; paths are relative to the scene file"))?;
-    let unreadable = |error: csv::Error| format!("{title} cannot be read: {error}");
-    let header: Vec<String> = reader.headers().map_err(unreadable)?.iter().map(Into::into).collect();
-    if let [line] = &header[..]
-        && let Some((name, separator)) = [("semicolons", ';'), ("tabs", '\t')]
-            .into_iter()
-            .find(|(_, separator)| line.contains(*separator))
-    {
-        let count = line.split(separator).count();
-        return Err(format!(
-            "{title} has {name} between its {count} columns: write it with commas between columns, and with points in numbers"
-        ));
+    let no_table = |reason: String| {
+        format!(
+            "{}; it must be a plain table (CSV), and `python -m vines structure FILE --cavity POINT` makes a scene of a universal file (UFF 55)",
+            reason.replace("\n ", "")
+        )
+    };
+    let Contents { layout, is_cut_off, channels, first_line, .. } = plain_table(&title, &bytes).map_err(no_table)?;
+    if is_cut_off {
+        return Err(format!("{title}: {layout}, and all rows are needed; repair the row"));
     }
-    if header.is_empty() || header.iter().any(|name| name.is_empty() || name.parse::<f64>().is_ok()) {
-        return Err(format!(
-            "{title} has no line of names at its top: give each column the name of its point"
-        ));
+    let mut names: Vec<&str> = Vec::new();
+    for Channel { name, unit, values, texts, .. } in &channels {
+        if name.is_empty() || name.parse::<f64>().is_ok() {
+            return Err(no_table(format!(
+                "{title} has no line of names at its top: give each column the name of its point"
+            )));
+        }
+        if names.contains(&name.as_str()) {
+            return Err(format!("{title} has two columns with the name {name}"));
+        }
+        if !unit.is_empty() && (name.as_str(), unit.as_str()) != ("frequency", "Hz") {
+            return Err(format!(
+                "{title}, column {name}: it states the unit {unit}, and numbers must be in SI units (frequencies in Hz), without a unit"
+            ));
+        }
+        if let Some(n) = values.iter().position(|value| !value.is_finite()) {
+            let cell = texts.get(n).cloned().unwrap_or_else(|| values[n].to_string());
+            let line = first_line + n;
+            return Err(format!("{title} has `{cell}` in line {line}: expected a finite number"));
+        }
+        names.push(name);
     }
-    if let Some((_, name)) = (1..).zip(&header).find(|(n, name)| header[*n..].contains(name)) {
-        return Err(format!("{title} has two columns with the name {name}"));
-    }
-    let mut rows = Vec::new();
-    for (n, record) in reader.records().enumerate() {
-        let number = |cell: &str| {
-            let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
-            value.ok_or_else(|| format!("{title} has `{cell}` in row {}: expected a finite number", n + 1))
-        };
-        rows.push(
-            record
-                .map_err(unreadable)?
-                .iter()
-                .map(number)
-                .collect::<Result<_, _>>()?,
-        );
-    }
-    Ok((header, rows))
+    Ok(channels)
 }
 
 /// A square matrix with the names of its degrees of freedom.
@@ -62,16 +58,16 @@ pub(super) struct Matrix {
 
 impl Matrix {
     pub(super) fn read(folder: &Path, key: &str, file: &Path) -> Result<Self, String> {
-        let (names, rows) = table(folder, key, file)?;
-        let n = names.len();
-        if rows.len() != n {
+        let columns = table(folder, key, file)?;
+        let (n, rows) = (columns.len(), columns[0].values.len());
+        if rows != n {
             return Err(format!(
-                "{key} ({}) has {n} columns and {} rows: it must be square",
-                file.display(),
-                rows.len()
+                "{key} ({}) has {n} columns and {rows} rows: it must be square",
+                file.display()
             ));
         }
-        let values = DMatrix::from_fn(n, n, |row, column| rows[row][column]);
+        let values = DMatrix::from_fn(n, n, |row, column| columns[column].values[row]);
+        let names = columns.into_iter().map(|column| column.name).collect();
         Ok(Self {
             key: key.into(),
             file: file.display().to_string(),
@@ -194,17 +190,18 @@ impl Residues {
     /// From the columns `frequency`, Hz, `damping`, the ratio, and `re POINT` and `im POINT`, m/(N s), for every point: the residues of the
     /// receptance for a force at the point `reference`.
     pub(super) fn read(folder: &Path, file: &Path, reference: Option<&str>) -> Result<Self, String> {
-        let (header, rows) = table(folder, "residues", file)?;
+        let columns = table(folder, "residues", file)?;
         let title = format!("residues ({})", file.display());
         let column = |name: &str| {
-            header.iter().position(|own| own == name).ok_or_else(|| {
+            let found = columns.iter().find(|column| column.name == name);
+            found.map(|column| &column.values).ok_or_else(|| {
                 format!("{title} has no column `{name}`; needed are frequency (Hz), damping, and `re POINT` and `im POINT` (m/(N s)) for every point")
             })
         };
         let [frequency, damping] = [column("frequency")?, column("damping")?];
-        let points: Vec<String> = header
+        let points: Vec<String> = columns
             .iter()
-            .filter_map(|name| Some(name.strip_prefix("re ")?.trim().to_string()))
+            .filter_map(|column| Some(column.name.strip_prefix("re ")?.trim().to_string()))
             .collect();
         let places = points
             .iter()
@@ -224,9 +221,8 @@ impl Residues {
             )
         })?;
         let mut poles = Vec::new();
-        for (n, row) in rows.iter().enumerate() {
+        for (n, (&hertz, &zeta)) in frequency.iter().zip(damping).enumerate() {
             let number = n + 1;
-            let (hertz, zeta) = (row[frequency], row[damping]);
             if zeta >= 1.0 {
                 return Err(format!(
                     "mode {number} has the damping ratio {zeta}: critical or more, and a mode must oscillate; the ratio must be below 1"
@@ -241,7 +237,7 @@ impl Residues {
             let omega = std::f64::consts::TAU * hertz;
             let pole = Complex64::new(-zeta * omega, omega * (1.0 - zeta * zeta).sqrt());
             // By reciprocity R_ij = phi_i phi_j/(2 i omega_d), with real shapes where the damping is modal.
-            let scaled = |[re, im]: [usize; 2]| Complex64::new(row[re], row[im]) * Complex64::new(0.0, 2.0 * pole.im);
+            let scaled = |[re, im]: [&Vec<f64>; 2]| Complex64::new(re[n], im[n]) * Complex64::new(0.0, 2.0 * pole.im);
             let own = scaled(places[driven]).sqrt();
             if own.norm() == 0.0 {
                 return Err(format!(

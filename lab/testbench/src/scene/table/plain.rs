@@ -3,8 +3,7 @@
 
 use csv::StringRecord;
 
-use super::channels::{Channel, Contents};
-use super::recording::RecordingError;
+use super::{Channel, Contents};
 use crate::scene::{unit, utf8};
 
 /// Delimiters and decimal marks. Of two that read a table equally well it is the first.
@@ -25,8 +24,8 @@ const JUDGED: usize = 200;
 ///
 /// # Errors
 /// What is no plain table: another encoding, no row of numbers, or rows of different lengths. The message has the row.
-pub fn plain_table(origin: &str, bytes: &[u8]) -> Result<Contents, RecordingError> {
-    let refused = |message: String| Err(RecordingError::new(format!("{origin}{message}")));
+pub fn plain_table(origin: &str, bytes: &[u8]) -> Result<Contents, String> {
+    let refused = |message: String| Err(format!("{origin}{message}"));
     let text = match utf8(bytes) {
         Ok(text) => text,
         Err(encoding) => return refused(format!(" {encoding}")),
@@ -52,7 +51,8 @@ pub fn plain_table(origin: &str, bytes: &[u8]) -> Result<Contents, RecordingErro
         format!("delimiter {}, decimal mark `{decimal}`", shown(delimiter)),
         rows.len(),
     );
-    if rest > 2 && rows[rest - 1].len() < width {
+    let is_cut_off = rest > 2 && rows[rest - 1].len() < width;
+    if is_cut_off {
         rows.pop();
         layout += ", the last row is cut off and left out";
     }
@@ -79,9 +79,10 @@ pub fn plain_table(origin: &str, bytes: &[u8]) -> Result<Contents, RecordingErro
         true => cells(&rows.remove(0)),
         false => (1..=width).map(|n| n.to_string()).collect(),
     };
-    let are_units = |row: &StringRecord| {
-        row.iter().any(unit::is_unit) && row.iter().all(|cell| cell.is_empty() || unit::is_unit(cell))
-    };
+    // The unit 1 is a number, too.
+    let is_word = |cell: &str| unit::is_unit(cell) && number(cell, decimal).is_none();
+    let are_units =
+        |row: &StringRecord| row.iter().any(is_word) && row.iter().all(|cell| cell.is_empty() || unit::is_unit(cell));
     let units = match rows.first().is_some_and(|row| has_names && are_units(row)) {
         true => cells(&rows.remove(0)),
         false => vec![String::new(); width],
@@ -116,8 +117,9 @@ pub fn plain_table(origin: &str, bytes: &[u8]) -> Result<Contents, RecordingErro
     Ok(Contents {
         origin: origin.into(),
         layout,
-        first_line: rows.first().map_or(0, line),
+        is_cut_off,
         channels: names.into_iter().zip(units).enumerate().map(channel).collect(),
+        first_line: rows.first().map_or(0, line),
         advice: "; `python -m vines fit` with the same options reads dates, thousands and units in cells",
         refused: Vec::new(),
     })
