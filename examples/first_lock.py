@@ -21,7 +21,7 @@ print("motion:", lock["motion"])
 # %%
 axes = found.plot()
 decay = found.decay
-axes.plot(decay["sigma_predicted"], decay["C"], label="decay of the exact plant")
+axes.plot(decay["sigma_slow_flow"], decay["C"], label="decay of the slow flow")
 axes.set(xlim=(-2, 0), ylim=(0, 0.6), title="The free decay beside the backbone")
 axes.legend()
 axes.figure.savefig("first_lock.svg", metadata={"Date": None})

@@ -33,7 +33,6 @@ COLUMNS = {
     "sigma_theory": "sigma of the first-order backbone at the same C",
     "sigma_exact": "sigma of the exact backbone at the same C",
     "sigma_slow_flow": "sigma of the first-order decay with the drift of its manifold",
-    "sigma_predicted": "sigma of the decay of the exact plant, released on the exact orbit and evaluated alike",
     "phase_target_deg": "controller.phase_target: phase of the response to the reference that is held, degrees",
     "phase_error_deg": "phase of the response to the reference, less its target, degrees",
     "level": "requested level, C",

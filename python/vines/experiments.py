@@ -58,13 +58,12 @@ class Identification(Result):
         The exact phase-resonant orbit with the measured C, if there is one.
     decay : dict of ndarray
         Points along the free decay: t_s, f_Hz, A_m, tau, C, B, sigma, standard uncertainties, and at the same C
-        sigma_theory and sigma_exact of steady motions, and sigma_slow_flow and sigma_predicted of the decay that theory
-        and the exact plant predict.
+        sigma_theory and sigma_exact of steady motions, and sigma_slow_flow of the decay that theory predicts.
     decay_end : str
         What ended the points.
-    rms_sigma_error, rms_sigma_exact, rms_sigma_predicted : float or None
-        RMS of the decay's sigma minus theory, minus the exact backbone, and minus the decay that the exact plant
-        predicts, over C > 0.2.
+    rms_sigma_error, rms_sigma_exact, rms_sigma_slow_flow : float or None
+        RMS of the decay's sigma minus theory, minus the exact backbone, and minus the decay of the slow flow, over
+        C > 0.2.
     theory : Theory
         First-order theory of the scene.
     """
@@ -75,7 +74,7 @@ class Identification(Result):
     decay_end: str
     rms_sigma_error: float | None
     rms_sigma_exact: float | None
-    rms_sigma_predicted: float | None
+    rms_sigma_slow_flow: float | None
     theory: "Theory"
 
     def plot(self, ax: Any = None) -> Any:
@@ -136,7 +135,7 @@ def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "a
         lock=lock,
         exact=Orbit._of(found["exact"]) if found["exact"] else None,
         decay=_table(found["decay"]),
-        **{key: found[key] for key in ("decay_end", "rms_sigma_error", "rms_sigma_exact", "rms_sigma_predicted")},
+        **{key: found[key] for key in ("decay_end", "rms_sigma_error", "rms_sigma_exact", "rms_sigma_slow_flow")},
     )
 
 

@@ -115,9 +115,9 @@ pub fn backbone(result: &Comparison) -> Figure {
     panel.curve(theory, 2.0, THEORY, first_order_beside(&result.curve));
     add_exact(&mut panel, &result.curve, EXACT, ORBITS);
     let predicted = result.decay.iter();
-    let predicted = predicted.filter_map(|compared| Some((compared.sigma_predicted?, compared.point.c)));
+    let predicted = predicted.filter_map(|compared| Some((compared.sigma_slow_flow?, compared.point.c)));
     let predicted = predicted.filter(|(_, c)| *c > fold);
-    panel.add(Shape::Line(1.6), predicted, PREDICTED, "free decay, exact plant");
+    panel.add(Shape::Line(1.6), predicted, PREDICTED, "free decay, slow flow");
     let identified = decay().step_by(THINNED).map(|point| (point.sigma, point.c));
     circles(&mut panel, identified, IDENTIFIED);
     let place = (lock.sigma, lock.c);

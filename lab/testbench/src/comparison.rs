@@ -2,18 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use lovines::State;
 use serde::Serialize;
 use vines_model::numerics::{golden_section, mean_square};
 use vines_model::orbit::{Orbit, OrbitCurve, backbone};
 use vines_model::theory::{B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, SlowFlow, free_sigma, resonant};
 
 use crate::backbone::{LevelPoint, Tracked};
-use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime, WINDOW, decay_points};
+use crate::identification::{DecayEnd, FreeDecayPoint, Identification, Lock, Regime};
 use crate::linear::MeasuredLinear;
-use crate::plan::Plan;
-use crate::record::{Record, Sample};
-use crate::rig::{Command, Drive, Rig, Scaled, Simulated};
 use crate::scene::{Dimensionless, Scene};
 use crate::survey::{ExactOrbits, phase_resonant, structure_backbone};
 
@@ -55,8 +51,8 @@ pub struct Comparison {
     pub rms_sigma_error: Option<f64>,
     /// RMS of the decay's sigma minus the exact backbone's at the same C, over the same points.
     pub rms_sigma_exact: Option<f64>,
-    /// RMS of the decay's sigma minus `sigma_predicted`, over the same points.
-    pub rms_sigma_predicted: Option<f64>,
+    /// RMS of the decay's sigma minus `sigma_slow_flow`, over the same points.
+    pub rms_sigma_slow_flow: Option<f64>,
 }
 
 /// A point along the decay beside theory.
@@ -71,8 +67,6 @@ pub struct ComparedPoint {
     pub sigma_exact: Option<f64>,
     /// Detuning at this C of the decay that the slow flow predicts, to the first order in its rate; absent below the fold.
     pub sigma_slow_flow: Option<f64>,
-    /// Detuning at this C of the decay of the exact plant from the exact orbit; absent outside it.
-    pub sigma_predicted: Option<f64>,
 }
 
 impl Comparison {
@@ -107,7 +101,6 @@ impl Comparison {
                 ExactCurve::of_scene(&undriven, &resonant, [lock.at.sigma, lock.at.c])
             }
         };
-        let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene, &scene.plan_on(knowledge)));
         let decay: Vec<ComparedPoint> = found
             .decay
             .points
@@ -117,13 +110,12 @@ impl Comparison {
                 sigma_theory: free_sigma(&parameters, point.c),
                 sigma_exact: at(&curve.places, point.c).map(|place| place[1]),
                 sigma_slow_flow: by_slow_flow(&parameters, point.c),
-                sigma_predicted: at(&predicted, point.c).map(|place| place[1]),
             })
             .collect();
         Self {
             rms_sigma_error: rms(&decay, |row| Some(row.point.sigma - row.sigma_theory?)),
             rms_sigma_exact: rms(&decay, |row| Some(row.point.sigma - row.sigma_exact?)),
-            rms_sigma_predicted: rms(&decay, |row| Some(row.point.sigma - row.sigma_predicted?)),
+            rms_sigma_slow_flow: rms(&decay, |row| Some(row.point.sigma - row.sigma_slow_flow?)),
             parameters,
             left_out: scene.left_out_of_cavity(),
             linear: knowledge.measured_linear(),
@@ -483,53 +475,6 @@ pub struct LargestErrors {
     pub at_equal_c: f64,
     /// Largest distance from the nearest place of the exact backbone: the largest of the differences in C, sigma and G there.
     pub nearest: f64,
-}
-
-// The decay as theory and the exact plant predict it, integrated forward.
-
-/// C, sigma and rate along the decay of the scene's plant from `orbit` on, as it would be identified without noise; empty if the plant refuses
-/// the scene.
-fn predicted(orbit: &Orbit, scene: &Scene, plan: &Plan) -> Vec<[f64; 3]> {
-    let (d, step) = (plan.knowledge.numbers, plan.knowledge.sample_time);
-    let start = orbit.start;
-    let [q1, q2] = [start.q1, start.q2].map(|length| length * d.b);
-    let [dq1, dq2] = [start.dq1, start.dq2].map(|velocity| velocity * d.b * d.omega0);
-    // The start of a structure has more coordinates.
-    if scene.structure.is_some() {
-        return Vec::new();
-    }
-    let Ok(plant) = Simulated::new(scene.plant, State { q1, dq1, q2, dq2 }) else {
-        return Vec::new();
-    };
-    let mut rig = plant.with_sensors(scene.resonance);
-    let mut rig = Scaled::new(&mut rig, plan.knowledge.target);
-    let mut sample = |n: usize| -> Option<Sample> {
-        let sample = Sample {
-            time: n as f64 * step,
-            sensors: rig.sense().ok()?,
-            command: Command {
-                drive: Drive { omega: d.omega0 * orbit.omega, ..Drive::default() },
-                ..Command::default()
-            },
-            ground_truth: rig.ground_truth().ok()?,
-            ..Sample::default()
-        };
-        rig.advance(Drive::default(), step).ok()?;
-        Some(sample)
-    };
-    // The first sample stands for the hold, which gives the frequency at the release.
-    let samples = (0..plan.decay + 1).map_while(&mut sample).collect();
-    let record = Record {
-        sample_time: step,
-        samples,
-        settled: 0,
-        hold_end: 1,
-        released: 1,
-        held: false,
-        clipped_percent: None,
-    };
-    let points = decay_points(&record, &plan.knowledge, WINDOW).points;
-    points.iter().map(|point| [point.c, point.sigma, point.rate]).collect()
 }
 
 /// sigma of the slow flow at the amplitude `c` along the free decay: the backbone's, corrected to the first order in the rate of the decay; `None`
