@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use vines_testbench::rig::{Drive, FrictionTotals, GroundTruth, Measured, Rig, RigError, Sensors, has_friction};
+use vines_testbench::rig::{
+    Drive, ForceCell, FrictionTotals, GroundTruth, Measured, Rig, RigError, Sensors, has_friction,
+};
 use vines_testbench::scene::{
     Definition, Excitation, Measurand, Names, PLANT_PARAMETERS, Reference as ReferenceSignal, Scene, Sensor, Structure,
 };
@@ -219,6 +221,12 @@ impl Inside {
     }
 }
 
+impl ForceCell for FmuRig {
+    fn cell_displacement(&mut self) -> Result<f64, RigError> {
+        Ok(self.fmu.get_if(self.cell)?.unwrap_or(0.0))
+    }
+}
+
 impl Rig for FmuRig {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let response = self.fmu.get(self.response)?;
@@ -230,10 +238,6 @@ impl Rig for FmuRig {
                 reference: reference.map(|reference| reference * base),
             },
         })
-    }
-
-    fn cell_displacement(&mut self) -> Result<f64, RigError> {
-        Ok(self.fmu.get_if(self.cell)?.unwrap_or(0.0))
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {

@@ -183,10 +183,6 @@ impl<R: Rig> Rig for Reachable<R> {
         self.command(drive, Last::Held, |rig| rig.hold(drive, step))
     }
 
-    fn cell_displacement(&mut self) -> Result<f64, RigError> {
-        lock(&self.rig).cell_displacement()
-    }
-
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         lock(&self.rig).ground_truth()
     }

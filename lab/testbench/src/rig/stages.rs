@@ -12,6 +12,18 @@ use super::{Drive, GroundTruth, Rig, RigError, RigStage, Sensors};
 use crate::knowledge::{Knowledge, Target};
 use crate::scene::Structure;
 
+/// A rig that can tell where its force cell is.
+pub trait ForceCell {
+    /// Displacement of the force cell, m, from which the acceleration of the mass before it follows.
+    ///
+    /// # Errors
+    /// Errors of the implementation: a refused call.
+    fn cell_displacement(&mut self) -> Result<f64, RigError>;
+}
+
+/// [`ForceCell::cell_displacement`].
+type Displacement<R> = fn(&mut R) -> Result<f64, RigError>;
+
 /// A rig whose response and reference are displacements, with the sensors of a definition of resonance.
 ///
 /// Velocities and accelerations are differences of displacements: an accelerometer that averages over two sample periods with the weights of a
@@ -27,8 +39,8 @@ pub struct Measured<R> {
     now: Sensors,
     /// The readings before, the latest first, each with the time to the next one, s.
     before: [(Sensors, f64); 2],
-    /// Mass that is compensated behind a force cell, in the unit of the reference per m/s².
-    compensated: f64,
+    /// Mass that is compensated behind a force cell, in the unit of the reference per m/s², and the displacement of the cell, m.
+    compensated: Option<(f64, Displacement<R>)>,
     /// Displacements of the cell, m: now and before.
     cell: [f64; 3],
 }
@@ -42,23 +54,21 @@ impl<R: Rig> Measured<R> {
             plant: [plant.damping / plant.stiffness, plant.natural_frequency()],
             now: Sensors::default(),
             before: [(Sensors::default(), 0.0); 2],
-            compensated: 0.0,
+            compensated: None,
             cell: [0.0; 3],
         }
     }
 
     /// This rig with the mass compensation of a structure's force cell: less its mass times the acceleration there.
     #[must_use]
-    pub fn compensating(mut self, structure: Option<&Structure>) -> Self {
-        self.compensated = structure.map_or(0.0, |structure| {
-            structure.base_per_drive() * structure.compensated_mass()
-        });
+    pub fn compensating(mut self, structure: Option<&Structure>) -> Self
+    where
+        R: ForceCell,
+    {
+        let mass = |structure: &Structure| structure.base_per_drive() * structure.compensated_mass();
+        let mass = structure.map(mass).filter(|mass| *mass > 0.0);
+        self.compensated = mass.map(|mass| (mass, R::cell_displacement as Displacement<R>));
         self
-    }
-
-    /// Whether there is mass compensation.
-    fn compensates(&self) -> bool {
-        self.compensated > 0.0
     }
 
     fn step_begins(&mut self, step: f64) {
@@ -88,10 +98,10 @@ impl<R: Rig> RigStage for Measured<R> {
 
     fn sense(&mut self) -> Result<Sensors, RigError> {
         self.now = self.rig.sense()?;
-        if self.compensates() {
-            self.cell[0] = self.rig.cell_displacement()?;
+        if let Some((_, displacement)) = self.compensated {
+            self.cell[0] = displacement(&mut self.rig)?;
         }
-        if !(self.definition.is_late() || self.compensates()) {
+        if !(self.definition.is_late() || self.compensated.is_some()) {
             return Ok(self.now);
         }
         let [(middle, late), (first, early)] = self.before;
@@ -120,12 +130,10 @@ impl<R: Rig> RigStage for Measured<R> {
             Reference::Force => force(three),
         };
         let base = first.reference.zip(middle.reference).zip(self.now.reference);
-        let inertia = if self.compensates() {
+        let inertia = self.compensated.map_or(0.0, |(mass, _)| {
             let [now, middle, first] = self.cell;
-            self.compensated * derivative(Measurand::Acceleration, [first, middle, now], [early, late], omega0)
-        } else {
-            0.0
-        };
+            mass * derivative(Measurand::Acceleration, [first, middle, now], [early, late], omega0)
+        });
         Ok(Sensors {
             response: read(0, [first.response, middle.response, self.now.response]),
             reference: base.map(|((first, middle), now)| of_base([first, middle, now]) - inertia),
