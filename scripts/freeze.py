@@ -11,6 +11,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -94,7 +95,7 @@ def number(text: str) -> float | str:
 
 
 def table(text: str) -> dict[str, list]:
-    head, *rows = csv.reader(text.splitlines())
+    head, *rows = csv.reader(text.splitlines() or [""])
     return {name: [number(row[n]) for row in rows if n < len(row)] for n, name in enumerate(head)}
 
 
@@ -110,9 +111,12 @@ def run(commands: list[str]) -> dict:
         for line in commands:
             line = re.sub(r"^vines\b", str(VINES), line.replace("{program}", "program.py").replace("{}", port))
             if " --listen " in line:
-                quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
-                server = subprocess.Popen(["bash", "-c", "exec " + line], cwd=folder, text=True, **quiet)
-                server.stderr.readline()
+                said = folder / "server.txt"
+                with said.open("w") as text:
+                    quiet = {"stdout": text, "stderr": text}
+                    server = subprocess.Popen(["bash", "-c", "exec " + line], cwd=folder, **quiet)
+                while not said.read_text() and server.poll() is None:
+                    time.sleep(0.05)
                 continue
             done = subprocess.run(["bash", "-c", line], cwd=folder, capture_output=True, text=True, timeout=1800)
         if server:
@@ -197,7 +201,8 @@ def main() -> int:
         results = dict(zip(names, pool.map(run, (CASES[name] for name in names)), strict=True))
     if not options.compare:
         RECENT.parent.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(results)
+        before = json.loads(RECENT.read_text()) if options.only and RECENT.exists() else {}
+        text = json.dumps(before | results)
         if options.keep:
             KEPT.write_bytes(gzip.compress(text.encode(), mtime=0))
         else:
