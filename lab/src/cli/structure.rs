@@ -80,35 +80,7 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
         point(structure.cavity),
         point(structure.sensor)
     );
-    let rows = survey.facts.modes.iter().enumerate().map(|(n, mode)| {
-        let (order, distance) = mode.harmonic;
-        let harmonic = match n == survey.driven {
-            true => "driven".to_owned(),
-            false => format!("{order}, {:+.2}", (mode.ratio - f64::from(order)).signum() * distance),
-        };
-        let (hertz, zeta, mass, ratio) = (mode.omega0 / TAU, mode.zeta, mode.mass_ratio, mode.ratio);
-        cells![n + 1, hertz, zeta, mass, ratio, harmonic, mode.influence]
-    });
-    let modes = Table::new("mode | frequency, Hz | damping | m phi² | ratio | harmonic | influence").rows(rows);
-    text += &modes.text();
-    if structure.shaker.is_some() {
-        text += "  the modes of the structure with its shaker: a damping above 1 is that of two poles which do not oscillate\n";
-    }
-    if let Some(masses) = structure.mass_loading() {
-        text += &format!("  {masses}\n");
-    }
-    for (n, mode) in structure
-        .modes
-        .iter()
-        .enumerate()
-        .filter(|(_, mode)| mode.out_of_phase > 0.0)
-    {
-        text += &format!(
-            "  mode {}: {:.1} % of the shape are out of phase and left out\n",
-            n + 1,
-            100.0 * mode.out_of_phase
-        );
-    }
+    text += &modes(structure, survey);
     let b = scene.plant.half_width * structure.reading_per_response().abs();
     // The reference of an orbit, and what drives it.
     let (command, of_command) = match structure.shaker {
@@ -143,6 +115,57 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
     if is_lost {
         text += "warning: with all modes no orbit of the backbone is stable\n";
     }
+    text += &behind_shaker(scene, survey, b);
+    for (mode, StabilityChange { kind, orbit, .. }) in survey.taken() {
+        text += &format!(
+            "warning: mode {} takes the stability at C = {:.4}, {:.4} Hz, {:.4e} {of_command} ({})\n",
+            mode + 1,
+            orbit.response / b,
+            orbit.omega / TAU,
+            orbit.drive,
+            words(*kind)
+        );
+    }
+    text
+}
+
+/// The modes as a table, and what is to be said of them.
+fn modes(structure: &Structure, survey: &Survey) -> String {
+    let rows = survey.facts.modes.iter().enumerate().map(|(n, mode)| {
+        let (order, distance) = mode.harmonic;
+        let harmonic = match n == survey.driven {
+            true => "driven".to_owned(),
+            false => format!("{order}, {:+.2}", (mode.ratio - f64::from(order)).signum() * distance),
+        };
+        let (hertz, zeta, mass, ratio) = (mode.omega0 / TAU, mode.zeta, mode.mass_ratio, mode.ratio);
+        cells![n + 1, hertz, zeta, mass, ratio, harmonic, mode.influence]
+    });
+    let mut text = Table::new("mode | frequency, Hz | damping | m phi² | ratio | harmonic | influence")
+        .rows(rows)
+        .text();
+    if structure.shaker.is_some() {
+        text += "  the modes of the structure with its shaker: a damping above 1 is that of two poles which do not oscillate\n";
+    }
+    if let Some(masses) = structure.mass_loading() {
+        text += &format!("  {masses}\n");
+    }
+    for (n, mode) in structure
+        .modes
+        .iter()
+        .enumerate()
+        .filter(|(_, mode)| mode.out_of_phase > 0.0)
+    {
+        text += &format!(
+            "  mode {}: {:.1} % of the shape are out of phase and left out\n",
+            n + 1,
+            100.0 * mode.out_of_phase
+        );
+    }
+    text
+}
+
+/// The stable backbone behind a shaker as a table; empty without one.
+fn behind_shaker(scene: &Scene, survey: &Survey, b: f64) -> String {
     let rows = survey.behind_shaker.iter().map(|one| {
         let [omega, drive] = one.at;
         let apart = one.by_sine.map(|[sine, by]| {
@@ -156,24 +179,20 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
         cells![c, hertz, drive, third, fifth, seventh, sigma, by]
     });
     let behind = Table::new(&format!(
-        "C | frequency, Hz | drive, {unit} | 3rd, % | 5th, % | 7th, % | sigma less sine's | drive over sine's, %"
+        "C | frequency, Hz | drive, {} | 3rd, % | 5th, % | 7th, % | sigma less sine's | drive over sine's, %",
+        scene
+            .structure
+            .as_ref()
+            .map_or("", |structure| structure.excitation.unit())
     ))
     .rows(rows);
-    if !behind.is_empty() {
-        text += "\nThe stable backbone behind the shaker: harmonics of the drive, and distance from the backbone under a pure sine at the same C\n";
-        text += &behind.text();
+    if behind.is_empty() {
+        return String::new();
     }
-    for (mode, StabilityChange { kind, orbit, .. }) in survey.taken() {
-        text += &format!(
-            "warning: mode {} takes the stability at C = {:.4}, {:.4} Hz, {:.4e} {of_command} ({})\n",
-            mode + 1,
-            orbit.response / b,
-            orbit.omega / TAU,
-            orbit.drive,
-            words(*kind)
-        );
-    }
-    text
+    format!(
+        "\nThe stable backbone behind the shaker: harmonics of the drive, and distance from the backbone under a pure sine at the same C\n{}",
+        behind.text()
+    )
 }
 
 /// A bifurcation on a backbone.

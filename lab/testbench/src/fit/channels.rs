@@ -73,17 +73,7 @@ impl Contents {
         let (mut notes, mut units) = (Vec::new(), Vec::new());
         let motions = Measurand::ALL.map(Measurand::unit);
         let mut response = self.measured(response, "response", &motions, &mut units)?;
-        let mut drive = match (&selection.drive, self.commanded(selection)?) {
-            (None, Some(commanded)) => commanded,
-            (None, None) if self.find("reference")?.is_none() => Channel {
-                name: String::new(),
-                unit: "m".into(),
-                values: vec![0.0; response.values.len()],
-                clock: response.clock,
-                ..Channel::default()
-            },
-            (given, _) => self.measured(given.as_deref().unwrap_or("reference"), "drive", &motions, &mut units)?,
-        };
+        let mut drive = self.drive(selection, &response, &mut units)?;
         let time = self.time(selection, &mut notes)?;
         let [start, sample_time] = match (&time, selection.rate, response.clock) {
             (Some(time), rate, _) => self.fitted(time, rate, [&mut response, &mut drive], &mut notes)?,
@@ -146,6 +136,26 @@ impl Contents {
             drive: drive.values,
             notes,
         })
+    }
+
+    /// The motion of the base: measured, commanded by a run of `vines`, or at rest.
+    fn drive(
+        &self,
+        selection: &Selection,
+        response: &Channel,
+        notes: &mut Vec<String>,
+    ) -> Result<Channel, RecordingError> {
+        let motions = Measurand::ALL.map(Measurand::unit);
+        match (&selection.drive, self.commanded(selection)?) {
+            (None, Some(commanded)) => Ok(commanded),
+            (None, None) if self.find("reference")?.is_none() => Ok(Channel {
+                unit: "m".into(),
+                values: vec![0.0; response.values.len()],
+                clock: response.clock,
+                ..Channel::default()
+            }),
+            (given, _) => self.measured(given.as_deref().unwrap_or("reference"), "drive", &motions, notes),
+        }
     }
 
     /// The unit that the file states for the channel of this name, empty without one; `None` without such a channel.

@@ -33,12 +33,7 @@ pub fn plain_table(origin: &str, bytes: &[u8]) -> Result<Contents, String> {
     if text.trim().is_empty() {
         return refused(" is empty: it has no row of numbers".into());
     }
-    let judged = LAYOUTS.map(|(delimiter, decimal)| (delimiter, decimal, judged(&tail(text, delimiter), decimal)));
-    let best = judged
-        .into_iter()
-        .rev()
-        .max_by(|(.., one), (.., other)| one.total_cmp(other));
-    let Some((delimiter, decimal, _)) = best.filter(|(.., judgement)| judgement.numbers > 0) else {
+    let Some((delimiter, decimal)) = layout(text) else {
         let lines = text.lines().filter(|line| !line.is_empty()).take(3);
         let lines: Vec<String> = lines
             .map(|line| format!("\n  {}", line.chars().take(100).collect::<String>()))
@@ -98,6 +93,19 @@ pub fn plain_table(origin: &str, bytes: &[u8]) -> Result<Contents, String> {
             cell.replace(decimal, "")
         ));
     }
+    Ok(Contents {
+        origin: origin.into(),
+        layout,
+        is_cut_off,
+        channels: channels(names.into_iter().zip(units), &rows, decimal),
+        first_line: rows.first().map_or(0, line),
+        advice: "; `python -m vines fit` with the same options reads dates, thousands and units in cells",
+        refused: Vec::new(),
+    })
+}
+
+/// The columns of these names and units.
+fn channels(heads: impl Iterator<Item = (String, String)>, rows: &[StringRecord], decimal: char) -> Vec<Channel> {
     let channel = |(column, (name, unit)): (usize, (String, String))| {
         let (short, stated) = unit::split(&name);
         let of = |row: &StringRecord| number(&row[column], decimal).unwrap_or(f64::NAN);
@@ -114,45 +122,24 @@ pub fn plain_table(origin: &str, bytes: &[u8]) -> Result<Contents, String> {
             clock: None,
         }
     };
-    Ok(Contents {
-        origin: origin.into(),
-        layout,
-        is_cut_off,
-        channels: names.into_iter().zip(units).enumerate().map(channel).collect(),
-        first_line: rows.first().map_or(0, line),
-        advice: "; `python -m vines fit` with the same options reads dates, thousands and units in cells",
-        refused: Vec::new(),
-    })
+    heads.enumerate().map(channel).collect()
 }
 
-/// How well a layout reads rows: numbers and empty cells over all cells, and the number of cells of a row.
-struct Judgement {
-    numbers: usize,
-    share: f64,
-    width: usize,
-}
-
-impl Judgement {
-    fn total_cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.share.total_cmp(&other.share).then(self.width.cmp(&other.width))
-    }
-}
-
-fn judged(rows: &[StringRecord], decimal: char) -> Judgement {
-    let width = rows.first().map_or(0, StringRecord::len);
-    let cells: usize = rows.iter().map(StringRecord::len).sum();
-    let rows = rows.iter().filter(|row| row.len() == width);
-    let numbers = rows
-        .clone()
-        .flatten()
-        .filter(|cell| number(cell, decimal).is_some())
-        .count();
-    let empty = rows.flatten().filter(|cell| cell.is_empty()).count();
-    Judgement {
-        numbers,
-        share: (numbers + empty) as f64 / cells.max(1) as f64,
-        width,
-    }
+/// The layout of which the largest share of the cells are numbers or empty, and of several the one with most columns. `None` without a number.
+fn layout(text: &str) -> Option<(u8, char)> {
+    let judged = LAYOUTS.map(|(delimiter, decimal)| {
+        let rows = tail(text, delimiter);
+        let width = rows.first().map_or(0, StringRecord::len);
+        let cells: usize = rows.iter().map(StringRecord::len).sum();
+        let even = rows.iter().filter(|row| row.len() == width).flatten();
+        let numbers = even.clone().filter(|cell| number(cell, decimal).is_some()).count();
+        let empty = even.filter(|cell| cell.is_empty()).count();
+        let share = (numbers + empty) as f64 / cells.max(1) as f64;
+        ((delimiter, decimal), (share, width), numbers)
+    });
+    let compare = |one: (f64, usize), other: (f64, usize)| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1));
+    let best = judged.into_iter().rev().max_by(|one, other| compare(one.1, other.1));
+    best.filter(|(.., numbers)| *numbers > 0).map(|(layout, ..)| layout)
 }
 
 /// The rows that a layout is judged by, without the last one, which may be cut off.
