@@ -11,7 +11,7 @@ use crate::scene::Measurand;
 pub struct Sample {
     /// Time, s.
     pub time: f64,
-    /// What the sensors read: in SI units in a recording, otherwise in m, as [`Target::scaled`] says.
+    /// What the sensors read: in SI units in a recording, otherwise in m, as [`Sensors::scaled`](crate::rig::Sensors::scaled) says.
     pub sensors: Sensors,
     /// Output of the controller: the drive from this sample to the next.
     pub command: Command,

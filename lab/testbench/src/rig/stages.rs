@@ -153,7 +153,7 @@ impl<R: Rig> RigStage for Measured<R> {
 
 // What the bench makes of the readings of a rig.
 
-/// A rig whose readings are in m, as [`Target::scaled`] says, and whose shaker, if there is one, is commanded so that it drives as asked.
+/// A rig whose readings are in m, as [`Sensors::scaled`](crate::rig::Sensors::scaled) says, and whose shaker, if there is one, is commanded so that it drives as asked.
 pub struct Scaled<'a, R: ?Sized> {
     rig: &'a mut R,
     target: Target,
