@@ -29,7 +29,7 @@ pub use plant::{
 pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, bifurcation_curves, response};
 pub use return_map::{Bounce, ImpactPattern, Unknowns};
 pub use structure::{
-    FirstOrder, ModeFacts, OrbitCurve, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
+    FirstOrder, ModeFacts, OrbitCurve, SEARCHED, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
     StructureOrbits, StructureRange, StructureStart,
 };
 pub use study::{

@@ -1,8 +1,12 @@
 //! Guards the exact orbits of structures: against figures of an independent computation, against the study's oscillator, and along their curves.
 
+mod common;
+
 use std::f64::consts::FRAC_PI_2;
 
+use common::within;
 use lovines::{Excitation, Host, Mode};
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use vines_model::{
     Dimensionless, Reference,
     orbit::{
@@ -330,4 +334,44 @@ fn first_order_theory_of_the_driven_mode_approaches_the_exact_orbits_of_the_stru
         before = errors;
     }
     assert!(before.iter().all(|error| *error < 0.01), "{before:?}");
+}
+
+#[test]
+fn no_orbit_near_the_driven_mode_is_missing_however_small_the_mass_ratios_are() {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let mut crossings = 0;
+    for _ in 0..60 {
+        let mut decades = |low: f64, high: f64| 10_f64.powf(within(&mut random, [low, high]));
+        let mut mode = |omega: f64| Mode {
+            omega,
+            zeta: decades(-6.0, -2.0),
+            cavity: decades(-1.5, 0.0),
+            drive: decades(-1.0, 0.0),
+        };
+        let modes = [mode(1.0), mode(1.07), mode(2.6)];
+        let particle = Particle { mass: decades(-4.0, -1.5), ..PARTICLE };
+        let epsilon = particle.mass * modes[0].cavity.powi(2);
+        let host = Host::from_modes(Excitation::Force, &modes).unwrap();
+        let orbits = StructureOrbits::new(&host, particle);
+        // Equal steps of 0.005 in the detuning on both sides.
+        let at: Vec<_> = (-800..800)
+            .map(|n| orbits.at_phase_resonance(1.0 + epsilon * 0.005 * f64::from(n)))
+            .collect();
+        let middle = at.iter().flatten().map(|orbit| orbit.reference).fold(0.0, f64::max) / 3.0;
+        let found = orbits.resonant(middle, [0.2, 3.0]);
+        for pair in at.windows(2).filter(|pair| pair[0].len() == pair[1].len()) {
+            for (one, other) in pair[0].iter().zip(&pair[1]) {
+                if (one.reference > middle) != (other.reference > middle) {
+                    let between = |orbit: &&StructureOrbit| (one.omega..=other.omega).contains(&orbit.omega);
+                    assert!(
+                        found.iter().any(|orbit| between(&orbit)),
+                        "{modes:?} {particle:?} {}",
+                        one.omega
+                    );
+                    crossings += 1;
+                }
+            }
+        }
+    }
+    assert!(crossings > 30, "{crossings}");
 }

@@ -22,9 +22,9 @@ The first table has the modes:
   ratio       natural frequency over the driven mode's, and the nearest of its harmonics 3, 5 and 7, which impacts excite
   influence   what the mode adds to the conditions of impact, over what the driven mode alone has; far below 1 it leaves the motion, though
               not always its stability, as it is
-The second table has all exact symmetric 1:1 orbits at phase resonance under the scene's drive. The third has the stretches of the backbone
-that are stable or neutral, with the driven mode alone and with all modes, and the mode that carries the disturbance at each end. Warnings name the ends at
-which it is not the driven one.
+The second table has all exact symmetric 1:1 orbits at phase resonance under the scene's drive, from 0.2 to 3 times the frequency of the driven
+mode. The third has the stretches of the backbone that are stable or neutral, with the driven mode alone and with all modes, and the mode that
+carries the disturbance at each end. Warnings name the ends at which it is not the driven one.
 
 Examples:
   vines structure --scene scenes/cantilever.toml
@@ -97,7 +97,7 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
     ))
     .rows(rows);
     text += &match orbits.is_empty() {
-        true => "  none between controller.omega_min and controller.omega_max\n".into(),
+        true => "  none from 0.2 to 3 times the frequency of the driven mode\n".into(),
         false => orbits.text(),
     };
     text += "\nStable stretches of the backbone, with the driven mode alone and with all modes, and what ends them\n";

@@ -4,7 +4,7 @@
 use serde::Serialize;
 use vines_model::Dimensionless;
 use vines_model::orbit::{
-    self, Orbit, OrbitCurve, Particle, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
+    self, Orbit, OrbitCurve, Particle, SEARCHED, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
     StructureOrbits, StructureRange, at_amplitude,
 };
 
@@ -23,7 +23,8 @@ pub struct Survey {
     pub facts: StructureFacts,
     /// The section of the driven mode.
     pub driven: usize,
-    /// Orbits at phase resonance under the scene's drive, at frequencies that the controller may set.
+    /// Orbits at phase resonance under the scene's drive, from 0.2 to 3 times the frequency of the driven mode, and where the controller may set the
+    /// frequency.
     pub orbits: Vec<StructureOrbit>,
     /// Stable orbits of the backbone behind a shaker, by rising response, beside those under a pure sine.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -92,11 +93,13 @@ impl Survey {
         let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
         let driven = section_of(structure);
         let facts = orbits.facts(driven, scene.frequencies(), POINTS, progress)?;
+        let [low, high] = scene.frequencies();
+        let [least, most] = SEARCHED.map(|share| share * scene.plant.natural_frequency());
         Some(Self {
             behind_shaker: behind_shaker(scene, &facts.all).unwrap_or_default(),
             facts,
             driven,
-            orbits: orbits.resonant(scene.structure_drive()?, scene.frequencies()),
+            orbits: orbits.resonant(scene.structure_drive()?, [low.min(least), high.max(most)]),
         })
     }
 

@@ -307,10 +307,13 @@ pub struct StructureOrbits {
     target: f64,
 }
 
-/// Frequencies searched, over omega0.
-pub(super) const SEARCHED: [f64; 2] = [0.2, 3.0];
-/// Number of frequencies at which orbits are searched over a range.
+/// Frequencies searched, over the natural frequency of the oscillator or the driven mode.
+pub const SEARCHED: [f64; 2] = [0.2, 3.0];
+/// Least number of frequencies at which orbits are searched over a range.
 const GRID: usize = 4000;
+/// Difference of neighbouring frequencies over the distance from the nearest mode, which counts at least as its mass ratio: the detunings where it is of
+/// order one.
+const SPACING: f64 = 0.002;
 /// Widths, in the angle along a loop, to which a change of stability and the end of a branch are located.
 const LOCATED: f64 = 1e-11;
 /// Amplitudes over b that are rounding: of a response that is zero, and of the harmonic part of an orbit that needs no drive.
@@ -406,13 +409,8 @@ impl StructureOrbits {
     }
 
     /// All orbits at phase resonance with a reference of the amplitude `reference` and frequencies in a range, rad/s, by rising response.
-    pub fn resonant(&self, reference: f64, [low, high]: [f64; 2]) -> Vec<StructureOrbit> {
-        self.resonant_at(equally_spaced(low, high, GRID), reference)
-    }
-
-    /// As [`Self::resonant`], at frequencies of a grid and between them.
-    pub(super) fn resonant_at(&self, grid: impl IntoIterator<Item = f64>, reference: f64) -> Vec<StructureOrbit> {
-        let found = search(grid, reference, |omega| self.motions(omega));
+    pub fn resonant(&self, reference: f64, range: [f64; 2]) -> Vec<StructureOrbit> {
+        let found = search(self.grid(range), reference, |omega| self.motions(omega));
         let mut orbits: Vec<_> = found
             .iter()
             .filter_map(|motion| self.accept_resonant(motion, true))
@@ -421,6 +419,23 @@ impl StructureOrbits {
         let same = |first: f64, second: f64| (first - second).abs() < 1e-9 * first.abs();
         orbits.dedup_by(|first, second| same(first.omega, second.omega) && same(first.speed, second.speed));
         orbits
+    }
+
+    /// Frequencies from `low` to `high`, equally spaced far from the modes, and ever closer towards each: the orbits of a mode with a small mass ratio
+    /// epsilon are within some epsilon of its frequency.
+    fn grid(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
+        let modes = (0..self.sections.len()).filter_map(|n| self.first_order(n));
+        let modes: Vec<_> = modes.map(|mode| (mode.numbers.omega0, mode.numbers.epsilon)).collect();
+        let next = move |omega: f64| {
+            let distances = modes
+                .iter()
+                .map(|(omega0, epsilon)| (omega - omega0).hypot(epsilon * omega0));
+            let spacing = distances.fold(f64::INFINITY, f64::min) * SPACING;
+            omega + spacing.min((high - low) / GRID as f64)
+        };
+        std::iter::successors(Some(low), move |omega| Some(next(*omega)))
+            .take_while(move |omega| *omega < high)
+            .chain([high])
     }
 
     /// The exact backbone: the orbits at phase resonance within `range`, as curves.
@@ -662,10 +677,7 @@ impl StructureOrbits {
             Some(roots(&motions)?.map(|speed| motions.at(speed)))
         };
         let mut branches = Vec::new();
-        let [low, high] = range.omega;
-        for Interval { points, inside: turns } in
-            intervals(equally_spaced(low, high, GRID), |omega| both(omega).map(|_| ()))
-        {
+        for Interval { points, inside: turns } in intervals(self.grid(range.omega), |omega| both(omega).map(|_| ())) {
             let [low, high] = [points[0].0, points[points.len() - 1].0];
             // Angles 0 to pi lead up along the first root, and pi to 2 pi back along the second one.
             let at = |angle: f64, with_stability: bool| {

@@ -23,16 +23,13 @@ fn told(scene: &Dimensionless, found: &[StructureOrbit]) -> Vec<Orbit> {
         .collect()
 }
 
-/// Growth of e from one frequency to the next: equal steps around omega0, where the detuning is of order one, and equal ratios beyond.
-const GROWTH: f64 = 1.0004;
-
 /// All exact symmetric 1:1 orbits at resonance at the scene's G, by rising C; empty where there are none.
 ///
-/// Frequencies between 0.2 and 3 omega0 are searched on a grid of about 0.001 in the detuning where that is of
-/// order one, and every root is refined to the last bit.
+/// Frequencies between 0.2 and 3 omega0 are searched, 0.002 and less apart in the detuning where that is of order one, and every root is refined to
+/// the last bit.
 pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
     let orbits = StructureOrbits::of(scene);
-    told(scene, &orbits.resonant_at(grid(scene.epsilon), scene.epsilon * scene.g))
+    told(scene, &orbits.resonant(scene.epsilon * scene.g, SEARCHED))
 }
 
 /// The stable one of [`phase_resonant`] with the smallest C.
@@ -92,18 +89,6 @@ pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
 pub(super) fn least_excitation(scene: &Dimensionless, sigma: f64) -> f64 {
     let motions = StructureOrbits::of(scene).motions(1.0 + scene.epsilon * sigma);
     motions.map_or(f64::INFINITY, |motions| motions.least_drive() / scene.epsilon)
-}
-
-/// Frequencies `1 + epsilon (e - 1/e) / 2` for growing e.
-fn grid(epsilon: f64) -> impl Iterator<Item = f64> {
-    let [low, high] = SEARCHED.map(|omega| {
-        let x = (omega - 1.0) / epsilon;
-        (x.abs() + (x * x + 1.0).sqrt()).powi(if x < 0.0 { -1 } else { 1 })
-    });
-    std::iter::successors(Some(low), |e| Some(e * GROWTH))
-        .take_while(move |e| *e < high)
-        .chain([high])
-        .map(move |e| 1.0 + 0.5 * epsilon * (e - 1.0 / e))
 }
 
 /// Largest last step of the frequency, as a share of epsilon, and of the speed.
