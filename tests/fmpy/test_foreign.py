@@ -190,7 +190,7 @@ def test_a_network_controller_that_does_not_release_the_drive_is_an_error(vines,
         (tmp_path / "controller.py").write_text(code.replace(released, instead))
         with subprocess.Popen([sys.executable, tmp_path / "controller.py", str(port)]) as server:
             try:
-                for _ in range(100):
+                while server.poll() is None:
                     with socket.socket() as link:
                         if link.connect_ex(("127.0.0.1", port)) == 0:
                             break

@@ -18,6 +18,7 @@ use crate::record::{Record, Sample};
 use crate::scene::Measurand;
 
 pub use asked::Departure;
+pub(crate) use asked::SAME_DRIVE;
 pub(crate) use decay::PER_PERIOD;
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, base_at_rest, decay_points, harmonic};
 pub use level::{Criterion, LevelEstimate, Unsteady};
@@ -282,13 +283,14 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
     let [stated_base, stated_omega] = level.stated();
     let requested = plan.requested(omega.value);
+    let at = ResonancePoint::new(
+        [level.response, stated_base, stated_omega, phase_error(&held, knowledge)],
+        knowledge,
+    );
     Some(Lock {
-        at: ResonancePoint::new(
-            [level.response, stated_base, stated_omega, phase_error(&held, knowledge)],
-            knowledge,
-        ),
+        at,
         requested_e_m: requested,
-        at_requested_drive: !asked::is_another(stated_base.value - requested, stated_base.uncertainty, requested),
+        at_requested_drive: !asked::is_another(at.e_m - requested, at.u_e_m, requested),
         b: b.map(|b| b.value),
         u_b: b.map(|b| b.uncertainty),
         averaged: approach.len(),
@@ -404,6 +406,7 @@ impl ResonancePoint {
     /// From the amplitudes of response and base, m, the frequency, rad/s, and the phase error, rad.
     pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], knowledge: &Knowledge) -> Self {
         let d = &knowledge.numbers;
+        let [response, base, omega] = knowledge.linear.resolved([response, base, omega]);
         let force = |amplitude: f64| Some(amplitude / knowledge.base_per_newton?);
         Self {
             f_hz: omega.value / TAU,

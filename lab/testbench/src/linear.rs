@@ -154,6 +154,10 @@ pub fn impacts_by_harmonic(third: Estimate, epsilon: f64) -> Impacts {
     beyond(third.value, third.uncertainty, FRICTION_THIRD * LARGEST_RATIO * epsilon)
 }
 
+/// Resolution of a stated point: of response and drive, relative, and of the frequency over the half-power bandwidth. No sensor and no drawing shows
+/// more.
+const RESOLUTION: f64 = 1e-4;
+
 /// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearResponse {
@@ -224,6 +228,16 @@ impl LinearResponse {
     /// Half-power bandwidth over omega0: twice the damping ratio, and base over response at resonance.
     pub fn bandwidth(&self) -> f64 {
         2.0 * self.damping_rate.max(0.0) / self.omega0
+    }
+
+    /// A point as it is stated: response, m, drive, m, and frequency, rad/s, whose uncertainties contain [`RESOLUTION`].
+    pub(crate) fn resolved(&self, [response, drive, omega]: [Estimate; 3]) -> [Estimate; 3] {
+        let with = |Estimate { value, uncertainty }, unit: f64| Estimate::new(value, &[uncertainty, RESOLUTION * unit]);
+        [
+            with(response, response.value),
+            with(drive, drive.value),
+            with(omega, self.bandwidth() * self.omega0),
+        ]
     }
 
     /// Natural periods in which the amplitude falls by a factor of e.

@@ -429,6 +429,9 @@ fn a_recording_at_another_phase_target_gives_the_parameters_at_this_phase_and_is
     ] {
         assert!(error.contains(part), "{part}: {error}");
     }
+    let stated = error.rsplit("controller.phase_target=").next().unwrap();
+    let stated: f64 = stated.trim().parse().unwrap();
+    assert!((stated + 80.0).abs() < 0.5, "{stated}");
     let at_80 = scene("plant.r=0.75 plant.b=0.0105 plant.c=3.5 plant.k=11600 plant.M=3.9 controller.phase_target=-80");
     let points: Vec<MeasuredPoint> = parts(&measurements.recordings, &at_80)
         .unwrap()
@@ -436,12 +439,14 @@ fn a_recording_at_another_phase_target_gives_the_parameters_at_this_phase_and_is
         .iter()
         .filter_map(|part| part.point)
         .collect();
-    let fit = fit(&points, at_80.definition(), &at_80.plant, &[]).unwrap();
+    let found = fit(&points, at_80.definition(), &at_80.plant, &[]).unwrap();
     assert!(
-        points.len() >= 4 && worst(&fit) < 3.0 && !fit.is_rejected(),
-        "{}, {fit:?}",
-        worst(&fit)
+        points.len() >= 4 && worst(&found) < 3.0 && !found.is_rejected(),
+        "{}, {found:?}",
+        worst(&found)
     );
+    let found = find(&measurements, &at_80, |_| {}).unwrap();
+    assert!(worst(&found.fit) < 3.0, "{}", worst(&found.fit));
 }
 
 /// Keeps what is read before each step.

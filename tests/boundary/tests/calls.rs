@@ -2,8 +2,6 @@
 //! Random sequences of calls, of which `scripts/stress` makes many more; the exported symbols. What holds for every component is tested in
 //! `fmi2-component/tests/`.
 
-use std::time::{Duration, Instant};
-
 use fmi2_boundary::{Fmu, Functions, Interface::CoSimulation, Master, call, fuzz::Fuzzer, refused};
 use fmi2_component::Status;
 use object::{Object, ObjectSymbol};
@@ -24,17 +22,12 @@ const THETA: u32 = 35;
 const MU_K: u32 = 36;
 const R_LAW: u32 = 38;
 
-/// No call may take longer, on a busy machine and with nothing optimised but the plant.
-const PATIENCE: Duration = Duration::from_secs(60);
-
-/// Asserts that a call is an error with one line that contains `reason`, takes bounded time, and changes nothing.
+/// Asserts that a call is an error with one line that contains `reason`, and changes nothing.
 #[track_caller]
 fn harmless(m: &Master, reason: &str, call: impl FnOnce() -> Status) {
     let before = m.bytes();
     let _ = m.heard();
-    let began = Instant::now();
     m.expect(call(), Status::Error, &[reason]);
-    assert!(began.elapsed() < PATIENCE, "{:?}", began.elapsed());
     assert_eq!(m.bytes(), before);
 }
 
@@ -77,9 +70,7 @@ fn a_step_that_ends_at_its_most_reversals_says_how_many_impacts_it_had() {
 #[test]
 fn a_step_of_absurdly_many_impacts_ends_with_an_error_and_a_reset_helps() {
     let m = Master::started(&Fmu::plant(), CoSimulation, &[(B, 1e-9), (R, 1.0), (DQ2, 1e8)]);
-    let began = Instant::now();
     refused!(m.fmi2DoStep(0.0, 1.0, 1) => "there are 10000000 impacts, 0 releases and ");
-    assert!(began.elapsed() < PATIENCE, "{:?}", began.elapsed());
     m.well(call!(m.fmi2Reset()));
     m.start();
     m.well(m.step(0.0, 0.1));

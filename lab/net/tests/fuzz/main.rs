@@ -99,7 +99,7 @@ impl Wire {
     fn connect(to: SocketAddr, is_tcp: bool) -> Self {
         if is_tcp {
             let stream = TcpStream::connect(to).expect("the server has not ended");
-            stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+            stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
             return Self::Tcp(stream);
         }
         Self::Udp([(); 2].map(|()| {

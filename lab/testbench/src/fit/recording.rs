@@ -681,13 +681,14 @@ fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], knowle
     let largest = manifold.c(B_SYMMETRY_BREAKING) * knowledge.numbers.b;
     let is_symmetric = regime == Regime::Symmetric || (regime == Regime::Unresolved && level.value < largest);
     let is_another = matches!(regime, Regime::Other | Regime::Asymmetric | Regime::Unknown);
-    let candidate = point(level, omega, drive, knowledge.target.phase).filter(|_| !is_another);
+    let candidate = point([level, drive, omega], knowledge.target.phase, &knowledge.linear).filter(|_| !is_another);
     let point = candidate.filter(|_| is_symmetric);
     Part { seconds, kind, point, candidate, regime }
 }
 
-/// A point at a phase of the response relative to the base, rad, if its uncertainties are small enough.
-fn point(response: Estimate, omega: Estimate, drive: Estimate, phase: f64) -> Option<MeasuredPoint> {
+/// A point from response, drive and frequency at a phase of the response relative to the base, rad, if its uncertainties are small enough.
+fn point(measured: [Estimate; 3], phase: f64, linear: &LinearResponse) -> Option<MeasuredPoint> {
+    let [response, drive, omega] = linear.resolved(measured);
     let is_known = drive.uncertainty < LARGEST_DRIVE_UNCERTAINTY * drive.value && omega.uncertainty.is_finite();
     (drive.value > 0.0 && is_known).then_some(MeasuredPoint { response, omega, drive, phase })
 }
@@ -744,7 +745,7 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
             let omega = Estimate::new(harmonic.omega, &[u_omega, systematic / units[1]]);
             let response = Estimate { value: harmonic.amplitude, uncertainty: u_amplitude };
             // Without a drive, the motion is the one of phase resonance.
-            let point = point(response, omega, drive, -FRAC_PI_2);
+            let point = point([response, drive, omega], -FRAC_PI_2, linear);
             Part {
                 seconds: [time - half, time + half],
                 kind: Kind::Decay,

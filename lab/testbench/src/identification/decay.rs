@@ -11,7 +11,6 @@ use vines_model::regime::end_of_synchrony;
 use super::response::impacts;
 use crate::knowledge::{Knowledge, Target};
 use crate::record::{Record, Sample};
-use crate::scene::Dimensionless;
 
 /// One point along the decay, in SI units, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -143,7 +142,7 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
     let points = windows
         .iter()
         .take_while(|window| decay[window.samples.end - 1].time <= until && !is_linear(window))
-        .map(|window| window.point(decay, &d))
+        .map(|window| window.point(decay, knowledge))
         .collect();
     DecayPoints { points, end }
 }
@@ -208,8 +207,16 @@ struct SlidingFit {
 }
 
 impl SlidingFit {
-    fn point(&self, decay: &[Sample], d: &Dimensionless) -> FreeDecayPoint {
+    fn point(&self, decay: &[Sample], knowledge: &Knowledge) -> FreeDecayPoint {
         let Harmonic { amplitude, omega, rate, uncertainties, .. } = self.fit;
+        let d = &knowledge.numbers;
+        let estimate = |value, uncertainty| Estimate { value, uncertainty };
+        let measured = [
+            estimate(amplitude, uncertainties[0]),
+            estimate(0.0, 0.0),
+            estimate(omega, uncertainties[1]),
+        ];
+        let [u_amplitude, _, u_omega] = knowledge.linear.resolved(measured).map(|one| one.uncertainty);
         let speeds = decay[self.samples.clone()]
             .iter()
             .map(|s| s.ground_truth.map(|w| w.particle_velocity.abs()));
@@ -217,16 +224,16 @@ impl SlidingFit {
             t_s: self.time,
             f_hz: omega / TAU,
             a_m: amplitude,
-            u_f_hz: uncertainties[1] / TAU,
-            u_a_m: uncertainties[0],
+            u_f_hz: u_omega / TAU,
+            u_a_m: u_amplitude,
             tau: d.omega0 * self.time,
             c: amplitude / d.b,
             // The mean is the value at the middle of the straight line that fits best.
             b: speeds.collect::<Option<Vec<f64>>>().map(|speeds| d.speed(mean(speeds))),
             sigma: d.sigma(omega),
             rate: rate / (d.b * d.omega0),
-            u_c: uncertainties[0] / d.b,
-            u_sigma: uncertainties[1] / d.omega_change(1.0),
+            u_c: u_amplitude / d.b,
+            u_sigma: u_omega / d.omega_change(1.0),
         }
     }
 }

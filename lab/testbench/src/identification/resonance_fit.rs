@@ -54,15 +54,13 @@ pub struct ResonanceFit {
     /// Coefficients: constant, time, and integral of the amplitude's deviation.
     drive: Regression,
     turning: Regression,
-    /// Sizes of the neglected terms of `E_R`, m, and `omega_R`, rad/s, with what the uncertainty of g adds to them, and of the amplitude, m, that both
-    /// belong to.
+    /// What the phase error and the uncertainty of g add to the uncertainty of `E_R`, m, of `omega_R`, rad/s, and of the amplitude, m, that both belong
+    /// to.
     pub remainders: [f64; 3],
     /// Standard uncertainties of `E_R` and `omega_R` by the phase errors and the base within the integrals.
     within: [f64; 2],
 }
 
-/// Bound of the coefficient of the neglected second-order terms, relative to the coefficient of the terms that are kept.
-const REMAINDER: f64 = 0.7;
 /// Variance of integrated white noise in a slope, which weighs it by a parabola, over its variance in a mean: 6/5.
 const PARABOLA: f64 = 1.2;
 /// Prior standard deviation of an unknown slope, in units of its natural scale: `E/A`, and `g E/A²`. Vibro-impact rigs have slopes from -1 to 3
@@ -91,14 +89,12 @@ impl ResonanceFit {
         let base = mean(cycles.iter().map(|cycle| cycle.base.norm()));
         let phase_error = mean(cycles.iter().map(|cycle| cycle.phase_error));
         let [noise, base_noise] = [0, 1].map(|i| mean(cycles.iter().map(|cycle| cycle.noise[i])).sqrt());
-        // Rounding is the least noise.
-        let noise = noise.max(1e-14 * response);
         let middle = mean(cycles.iter().map(|cycle| cycle.time));
         let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
         let deviation = integral(&time, motion.iter().map(|cycle| cycle.amplitude - response));
         let columns = [vec![1.0; cycles.len()], time, deviation];
         let total = |value: fn(&Cycle) -> f64| cycles.iter().map(value).sum::<f64>();
-        let calibration = total(|cycle| cycle.base.norm()) / total(|cycle| cycle.commanded[0].norm());
+        let calibration = total(|cycle| cycle.base.norm()) / total(|cycle| cycle.commanded.norm());
         let drives = drives(cycles, &motion, calibration);
         // At equal A, the drive belongs to another frequency than `omega_R` by `omega E sin phi/(2 A)`. It grows with the frequency: against damping
         // with omega, of v with its third power where the base moves the damper's other end; against impacts, of q1, with its square.
@@ -135,8 +131,6 @@ impl ResonanceFit {
         let drive = Regression::fit(&columns, &amplitudes, Some((2, by_base.scaled(-gain))), noise / cosine)?;
         let turning = Regression::fit(&columns, &phases, Some((2, by_omega)), noise / (response * cosine))?;
         let duration = cycles[cycles.len() - 1].time - cycles[0].time;
-        let forces: Vec<f64> = drives.iter().map(|drive| drive.force.re).collect();
-        let neglected = REMAINDER * inertia * (slope(&forces) * n / duration);
         let phase_noise = (noise / response).hypot(base_noise / base);
         let change = slope(&cycles.iter().map(Cycle::amplitude).collect::<Vec<f64>>());
         // What the drive adds to the balances is as uncertain as g.
@@ -156,8 +150,8 @@ impl ResonanceFit {
             drive,
             turning,
             remainders: [
-                Estimate::new(0.0, &[neglected / gain, added[0] / gain, detuned * base]).uncertainty,
-                Estimate::new(0.0, &[neglected / response, added[1], detuned * gain * base / response]).uncertainty,
+                Estimate::new(0.0, &[added[0] / gain, detuned * base]).uncertainty,
+                Estimate::new(0.0, &[added[1], detuned * gain * base / response]).uncertainty,
                 detuned * response,
             ],
             within: [
@@ -296,7 +290,7 @@ fn without_aliases(cycles: &[Cycle], sample_time: f64) -> Vec<Cycle> {
         let base = cycle.base - aliased;
         Cycle {
             base,
-            commanded: [base, cycle.commanded[1]],
+            commanded: base,
             phase_error: cycle.phase_error - (base * cycle.base.conj()).arg(),
             noise: [cycle.noise[0], n * (variance + stays)],
             ..*cycle
@@ -328,7 +322,7 @@ struct DriveIntegrals {
 /// The drive of each period; `calibration`: measured over commanded amplitude of the base.
 fn drives(cycles: &[Cycle], motion: &[PeriodResponse], calibration: f64) -> Vec<DriveIntegrals> {
     let relative = |cycle: &Cycle| {
-        let turned = cycle.response * cycle.commanded[0].conj();
+        let turned = cycle.response * cycle.commanded.conj();
         turned / turned.norm()
     };
     // Target phase, and phase of the base relative to the command.
@@ -341,15 +335,14 @@ fn drives(cycles: &[Cycle], motion: &[PeriodResponse], calibration: f64) -> Vec<
         .iter()
         .zip(motion)
         .map(|(cycle, motion)| {
-            let [middle, change] = cycle.commanded;
-            let growth = (change * middle.conj()).re / middle.norm();
+            let amplitude = cycle.commanded.norm();
             let corrected = Complex::from_polar(1.0, motion.correction);
             let share = relative(cycle) * corrected * turn / turn.norm() * calibration;
             let before = sum;
-            sum += share * cycle.duration * middle.norm();
+            sum += share * cycle.duration * amplitude;
             DriveIntegrals {
-                force: share * middle.norm(),
-                work: before + share * cycle.duration * (0.5 * middle.norm() - growth / 6.0),
+                force: share * amplitude,
+                work: before + share * cycle.duration * 0.5 * amplitude,
             }
         })
         .collect()
@@ -366,8 +359,8 @@ pub struct Cycle {
     pub drive_phase: f64,
     /// Mean frequency of the drive, rad/s.
     pub omega: f64,
-    /// Fundamental of the commanded base motion, m, without noise, or of the measured reference behind a shaker; and its change over half the period.
-    pub commanded: [Complex<f64>; 2],
+    /// Fundamental of the commanded base motion, m, without noise, or of the measured reference behind a shaker.
+    pub commanded: Complex<f64>,
     /// Fundamental of the response relative to the drive's phase, m: `Im a exp(i phase)`.
     pub response: Complex<f64>,
     /// Fundamental of the base, m: measured if a sensor reads it, otherwise commanded.
@@ -441,16 +434,16 @@ impl Cycle {
         let before = |n: usize| samples[n.saturating_sub(1)].command.drive.amplitude;
         let motion =
             |amplitude: &dyn Fn(usize) -> f64| DVector::from_fn(samples.len(), |n, _| amplitude(n) * phases[n].sin());
-        let commanded = drifting.fit(&motion(&|n| 0.5 * (before(n) + samples[n].command.drive.amplitude)))?;
+        let mut commanded = drifting
+            .fit(&motion(&|n| 0.5 * (before(n) + samples[n].command.drive.amplitude)))?
+            .harmonic(1);
         let as_read = basis.fit(&motion(&before))?.harmonic(1);
         let measured = samples.iter().all(|s| s.sensors.reference.is_some());
-        let mut commanded = [commanded.harmonic(1), commanded.drift(1)];
         let (base, base_noise) = if measured {
             let (mut base, noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
             match target.through_shaker {
-                // One period does not separate a drift of the fundamental from the harmonics of a force cell.
-                true => commanded = [base, Complex::ZERO],
-                false => base = base * commanded[0] / as_read,
+                true => commanded = base,
+                false => base = base * commanded / as_read,
             }
             (base, noise)
         } else {
