@@ -18,7 +18,7 @@ use nalgebra::DVector;
 use vines_model::numerics::{Estimate, HarmonicBasis, RANDOM, SIGNIFICANT, mean, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, SearchFound, Stage};
-use crate::identification::{ASYMMETRIC, Criterion, Cycle, LONGEST, ResonanceFit, SAME_DRIVE, degrees, without_tones};
+use crate::identification::{ASYMMETRIC, Criterion, Cycle, LONGEST, ResonanceFit, degrees, without_tones};
 use crate::knowledge::Target;
 use crate::linear::LinearResponse;
 use crate::linear::{Impacts, impacts_by_resonance};
@@ -45,6 +45,12 @@ const LOST: f64 = 0.8;
 /// Smallest slope of the holding drive over the response under a constant drive, over their ratio, which is the slope without impacts: with less,
 /// an error of 1 % of the drive moves the response by more than 10 %, and the motion takes ten times as long to settle.
 const SMALLEST_SLOPE: f64 = 0.1;
+/// Relative error of the response, and error of the frequency over the half-power bandwidth E/A, at which the response that the requested drive
+/// holds has been found.
+const FOUND: f64 = 1e-4;
+/// Relative error of the drive at which a constant drive takes over where the drive rises faster than in proportion to the response: a quarter of
+/// what a leg changes.
+const CLOSE: f64 = 0.25 * STEP;
 /// Share of a straight line that is followed where its bend is not known.
 const CAUTIOUS: f64 = 0.5;
 /// Largest number of levels that are held for it.
@@ -305,12 +311,16 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 next = Some(predicted.response);
                 continue;
             }
-            if !self.is_found(leg, &predicted) {
+            let by_drive = predicted.is_root && !self.target.through_shaker;
+            // A motion that follows the drive faster than in proportion settles by itself.
+            let is_steep = by_drive && predicted.slope * leg.response > leg.drive;
+            let is_close = is_steep && (leg.drive - self.requested).abs() < CLOSE * leg.drive;
+            if !(is_close || self.is_found(leg, &predicted)) {
                 next = Some(predicted.response).filter(|to| predicted.is_root || levels.is_new(*to));
                 continue;
             }
             // The condition of stability under a constant drive.
-            let is_stable = predicted.is_root && predicted.slope > SMALLEST_SLOPE * leg.drive / leg.response;
+            let is_stable = by_drive && predicted.slope > SMALLEST_SLOPE * leg.drive / leg.response;
             if is_stable {
                 self.bench.hold_drive()?;
             }
@@ -325,7 +335,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
             levels
                 .legs
-                .retain(|level| (level.response - leg.response).abs() > SAME_DRIVE * leg.response);
+                .retain(|level| (level.response - leg.response).abs() > FOUND * leg.response);
             next = Some(leg.response);
         }
         // The sweep goes on from there.
@@ -333,11 +343,13 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         Ok(None)
     }
 
-    /// Whether a held level is where the requested drive holds the response: drive and response are as near as counts as the requested drive.
+    /// Whether a held level is where the requested drive holds the response.
     fn is_found(&self, leg: &Leg, predicted: &Predicted) -> bool {
-        let difference = (leg.drive - self.requested).abs();
-        let is_near = (predicted.response - leg.response).abs() < SAME_DRIVE * leg.response;
-        predicted.is_root && is_near && difference < SAME_DRIVE * self.requested || difference < leg.noise
+        let bandwidth = leg.drive / leg.response;
+        let change = predicted.response - leg.response;
+        let is_near = change.abs() < FOUND * leg.response
+            && (predicted.turning * change).abs() < FOUND * bandwidth * self.linear.omega0;
+        predicted.is_root && is_near || (self.requested - leg.drive).abs() < leg.noise
     }
 
     /// Holds the response at a level, m, until its drive changes by less than by what it differs from the requested one; behind a shaker, until it has
@@ -637,6 +649,8 @@ struct Predicted {
     response: f64,
     /// Slope of the drive over the response there.
     slope: f64,
+    /// Slope of the frequency over the response there, rad/s per m.
+    turning: f64,
     /// The requested drive is there.
     is_root: bool,
 }
@@ -654,9 +668,7 @@ impl Levels {
 
     /// Whether no level has been held here, m.
     fn is_new(&self, to: f64) -> bool {
-        self.legs
-            .iter()
-            .all(|level| (level.response - to).abs() > SAME_DRIVE * to)
+        self.legs.iter().all(|level| (level.response - to).abs() > FOUND * to)
     }
 
     /// The prediction by the parabola through three levels: two between which the drive passes the requested one, rising with the response
@@ -676,6 +688,7 @@ impl Levels {
             return Some(Predicted {
                 response: leg.response - self.share * (leg.drive - requested) / self.slope,
                 slope: self.slope,
+                turning: f64::INFINITY,
                 is_root: true,
             });
         };
@@ -728,6 +741,11 @@ impl Levels {
         };
         let span = (STEP * highest.response).max(highest.response - lowest.response);
         let is_near = (lowest.response - span..highest.response + span).contains(&response);
-        is_near.then_some(Predicted { response, slope: rise + 2.0 * bend * ahead, is_root })
+        is_near.then(|| Predicted {
+            response,
+            slope: rise + 2.0 * bend * ahead,
+            turning: (b.omega - a.omega) / width,
+            is_root,
+        })
     }
 }
