@@ -18,7 +18,6 @@ use crate::record::{Record, Sample};
 use crate::scene::Measurand;
 
 pub use asked::Departure;
-pub(crate) use asked::SAME_DRIVE;
 pub(crate) use decay::PER_PERIOD;
 pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, base_at_rest, decay_points, harmonic};
 pub use level::{Criterion, LevelEstimate, Unsteady};

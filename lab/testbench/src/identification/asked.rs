@@ -10,7 +10,7 @@ use crate::record::Sample;
 use crate::scene::Dimensionless;
 
 /// Relative difference of a drive from the requested one up to which it is this drive, whatever its uncertainty.
-pub(crate) const SAME_DRIVE: f64 = 0.01;
+const SAME_DRIVE: f64 = 0.01;
 
 /// Whether a drive that differs by `difference` with the standard uncertainty `u` is another one than `requested`; all in m.
 pub(super) fn is_another(difference: f64, u: f64, requested: f64) -> bool {
