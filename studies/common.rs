@@ -12,22 +12,22 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 pub use rayon::prelude::*;
+pub use vines_bench::backbone::{LevelPoint, Tracked, track};
+pub use vines_bench::comparison::{COMPARED_ABOVE, ExactCurve};
+use vines_bench::experiment::{ExperimentError, run};
+pub use vines_bench::identification::{Regime, ResonancePoint, decay_points, identify};
+pub use vines_bench::linear::LinearResponse;
+pub use vines_bench::loop_check::{Verdict, check};
+pub use vines_bench::plan::Plan;
+pub use vines_bench::record::Record;
+pub use vines_bench::rig::{
+    BuiltIn, Chain, ControllerError, Rig, RigFault, SensorFault, SensorsOnly, Simulated, faulty,
+};
+pub use vines_bench::scene::{Override, Scene};
+pub use vines_bench::survey::structure_backbone;
 pub use vines_model::numerics::{Estimate, mean, mean_square, range};
 pub use vines_model::orbit::{Orbit, exact_backbone, phase_resonant, resonant_motion};
 pub use vines_model::{Definition, Dimensionless};
-pub use vines_testbench::backbone::{LevelPoint, Tracked, track};
-pub use vines_testbench::comparison::{COMPARED_ABOVE, ExactCurve};
-use vines_testbench::experiment::{ExperimentError, run};
-pub use vines_testbench::identification::{Regime, ResonancePoint, decay_points, identify};
-pub use vines_testbench::linear::LinearResponse;
-pub use vines_testbench::loop_check::{Verdict, check};
-pub use vines_testbench::plan::Plan;
-pub use vines_testbench::record::Record;
-pub use vines_testbench::rig::{
-    BuiltIn, Chain, ControllerError, Rig, RigFault, SensorFault, SensorsOnly, Simulated, faulty,
-};
-pub use vines_testbench::scene::{Override, Scene};
-pub use vines_testbench::survey::structure_backbone;
 
 /// Any error of a study.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;

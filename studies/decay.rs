@@ -16,8 +16,8 @@ mod common;
 use std::path::Path;
 
 use common::*;
-use vines_testbench::identification::WINDOW;
-use vines_testbench::rig::{RigError, RigStage, Sensors, SimulatedStructure};
+use vines_bench::identification::WINDOW;
+use vines_bench::rig::{RigError, RigStage, Sensors, SimulatedStructure};
 
 /// Windows of the fit, periods.
 const WINDOWS: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0];

@@ -12,7 +12,7 @@ mod common;
 use std::{cell::Cell, rc::Rc};
 
 use common::*;
-use vines_testbench::experiment::ExperimentError;
+use vines_bench::experiment::ExperimentError;
 
 /// Periods to the lock and all of them, of an experiment or of a tracked backbone that does not end early, or why it ends.
 fn run(rig: &mut dyn Rig, plan: &Plan, tracks: bool) -> Result<[f64; 2], ExperimentError> {

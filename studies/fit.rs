@@ -31,12 +31,12 @@ use nalgebra::{Matrix4, Matrix5, RowVector4, SMatrix, Vector4};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
-use vines_testbench::fit::{
+use vines_bench::fit::{
     Effect, Fit, Known, MeasuredPoint, Quantity, RecordFit, Recording, at, explain, fit, follow, linear_verdicts, parts,
 };
-use vines_testbench::linear::MeasuredLinear;
-use vines_testbench::rig::{Drive, RigError, RigStage, Sensors};
-use vines_testbench::scene::{Measurand, Sensor};
+use vines_bench::linear::MeasuredLinear;
+use vines_bench::rig::{Drive, RigError, RigStage, Sensors};
+use vines_bench::scene::{Measurand, Sensor};
 
 /// Measured points, the scene of the client, and the rig.
 type Points = (Vec<MeasuredPoint>, Scene, Parameters);

@@ -21,9 +21,9 @@ use std::rc::Rc;
 
 use common::*;
 use lovines::StructureState;
-use vines_testbench::rig::{RigError, RigStage, Sensors, SimulatedStructure};
-use vines_testbench::scene::{SceneShaker, Structure};
-use vines_testbench::survey::contradiction;
+use vines_bench::rig::{RigError, RigStage, Sensors, SimulatedStructure};
+use vines_bench::scene::{SceneShaker, Structure};
+use vines_bench::survey::contradiction;
 
 /// A structure with its shaker, and the dimensionless numbers of the shaker: mass ratio, suspension and stinger over omega0, coil.
 fn text(uniform: Uniform) -> (String, [f64; 4]) {

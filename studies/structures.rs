@@ -21,8 +21,8 @@ mod common;
 
 use common::*;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
-use vines_testbench::advice::can_be_held;
-use vines_testbench::survey::phase_resonant as orbits_of;
+use vines_bench::advice::can_be_held;
+use vines_bench::survey::phase_resonant as orbits_of;
 
 /// Largest error of a correct lock: in sigma and C, and of the drive, relative.
 const TOLERANCE: f64 = 2e-3;

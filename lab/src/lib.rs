@@ -7,17 +7,19 @@ extern crate self as vines;
 
 pub mod cli;
 mod files;
+pub mod fmu_rig;
 pub mod pack;
 pub mod regime_map;
 pub mod report;
 pub mod table;
 
 pub use files::{FileError, ResultFolder, create_folder_of, writable, write_file};
+pub use vines_bench::{
+    advice, backbone, cells, comparison, experiment, fit, identification, knowledge, linear, live, loop_check, plan,
+    record, rig, scene, survey,
+};
 pub use vines_fmu as fmu;
 pub use vines_helic as helic;
 pub use vines_model::{ArgumentError, curves, map, numerics, orbit, regime, theory};
 pub use vines_net as net;
-pub use vines_testbench::{
-    advice, backbone, cells, comparison, experiment, fit, identification, knowledge, linear, live, loop_check, plan,
-    record, rig, scene, survey,
-};
+pub use vines_rig::unit;

@@ -9,14 +9,7 @@ use pyo3::{
     types::PyBytes,
 };
 use serde_json::json;
-use vines_model::{
-    Measurand,
-    map::CellRun,
-    numerics::Estimate,
-    orbit,
-    theory::{SlowFlow, resonant},
-};
-use vines_testbench::{
+use vines_bench::{
     backbone::track,
     comparison::{Comparison, TrackedComparison},
     experiment,
@@ -27,6 +20,13 @@ use vines_testbench::{
     linear::MeasuredLinear,
     rig::{BuiltIn, Simulated, Stoppable},
     scene::{Scene as Checked, phase_target},
+};
+use vines_model::{
+    Measurand,
+    map::CellRun,
+    numerics::Estimate,
+    orbit,
+    theory::{SlowFlow, resonant},
 };
 
 use crate::{
@@ -126,7 +126,7 @@ pub fn fit(
     };
     let (checked, scene) = (scene.scene.clone(), &scene.scene);
     let found = calculate(py, move || {
-        measured.points = vines_testbench::survey::without_other_modes(&checked, measured.points);
+        measured.points = vines_bench::survey::without_other_modes(&checked, measured.points);
         find(&measured, &checked, |_| {})
     })?;
     let found = found.map_err(invalid)?;
@@ -201,7 +201,7 @@ pub fn recording(
     let [response, drive, time] = options;
     let selection = Selection { response, drive, time, rate, late };
     let contents = contents_of(path, contents);
-    let read = move || contents.recording(&selection);
+    let read = move || Recording::of(&contents, &selection);
     let Recording {
         origin,
         channels,
@@ -270,7 +270,7 @@ pub fn orbits(py: Python<'_>, scene: &Scene, sigma: Option<Real>) -> PyResult<St
     let scene = scene.scene.clone();
     json(&calculate(py, move || match sigma {
         Some(sigma) => orbit::symmetric_orbits(&numbers, sigma),
-        None => vines_testbench::survey::phase_resonant(&scene, &numbers),
+        None => vines_bench::survey::phase_resonant(&scene, &numbers),
     })?)
 }
 

@@ -12,7 +12,7 @@ use vines::{
     ArgumentError,
     cli::{self, Source},
     fit::{Channel, Contents, plain_table},
-    scene::{self, unit},
+    scene, unit,
 };
 
 use crate::{scene::invalid, wait::wait_apart};

@@ -3,7 +3,7 @@
 use std::fmt::Display;
 
 use pyo3::{exceptions::PyValueError, prelude::*};
-use vines_testbench::scene::{Family, Override, SceneError};
+use vines_bench::scene::{Family, Override, SceneError};
 
 /// A `ValueError`, whose message has the value, its unit and what is allowed.
 pub fn invalid(error: impl Display) -> PyErr {
@@ -19,13 +19,13 @@ pub fn json(value: &impl serde::Serialize) -> PyResult<String> {
 #[derive(Clone)]
 pub struct Scene {
     pub family: Family,
-    pub scene: vines_testbench::scene::Scene,
+    pub scene: vines_bench::scene::Scene,
 }
 
 impl Scene {
     /// Refuses a structure where there is one oscillator only.
     pub fn one_oscillator(&self, what: &str) -> PyResult<()> {
-        let refusal = |structure: &vines_testbench::scene::Structure| {
+        let refusal = |structure: &vines_bench::scene::Structure| {
             let section = structure.section();
             invalid(format!(
                 "{what} one oscillator: the scene has a {section}; drop it, and give M, k and c"

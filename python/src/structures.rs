@@ -11,7 +11,7 @@ use pyo3::{
     exceptions::{PyKeyboardInterrupt, PyRuntimeError},
     prelude::*,
 };
-use vines_testbench::{
+use vines_bench::{
     rig::{RigError, SimulatedStructure},
     scene::Structure,
 };

@@ -9,18 +9,18 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
 use phase_lock::Parameter;
 use pyo3::prelude::*;
 use rayon::prelude::*;
-use vines_model::{
-    map::{CellRun, RegimeResult, SteadyResponse},
-    orbit::{Orbit, symmetric_orbits},
-    regime::Regime,
-};
-use vines_testbench::{
+use vines_bench::{
     cells::{self, Cell},
     experiment,
     identification::{self, Lock},
     plan::Plan,
     rig::{BuiltIn, Simulated, Stoppable},
     scene::Scene as CheckedScene,
+};
+use vines_model::{
+    map::{CellRun, RegimeResult, SteadyResponse},
+    orbit::{Orbit, symmetric_orbits},
+    regime::Regime,
 };
 
 use crate::{

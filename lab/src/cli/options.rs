@@ -7,12 +7,12 @@ use std::sync::{Arc, OnceLock};
 use clap::Args;
 use phase_lock::Config;
 use vines::ArgumentError;
-use vines::fmu::{Connection, FmuController, FmuError, FmuRig};
+use vines::fmu::{Connection, FmuController, FmuError};
 use vines::helic::{DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
 use vines::scene::{Family, Implausible, Measurand, Names, Override, PAPER, Scene, SceneError};
-use vines::{cells, table::Table};
+use vines::{cells, fmu_rig, table::Table};
 
 use super::failure::Failure;
 use super::output::log_warnings;
@@ -219,7 +219,7 @@ impl Endpoint {
         let (mut pace, mut timing) = (None, Arc::default());
         let rig: Box<dyn Rig> = match self {
             Self::BuiltIn => Simulated::without_chain(scene)?,
-            Self::Fmu(file) => reachable(FmuRig::load(file, scene)?, scene.sample_time()),
+            Self::Fmu(file) => reachable(fmu_rig::load(file, scene)?, scene.sample_time()),
             Self::Network(address) if address.starts_with("helic://") => {
                 reachable(helic(address, scene, scope)?, scene.sample_time())
             }

@@ -161,12 +161,14 @@ pub(super) fn measurement(
     }
     if !is_named && contents.unit("response").is_none() {
         let names = COLUMNS.map(|(_, name, _)| name).join(", ");
-        return Err(refused(contents.refused(&format!(
+        return Err(refused(RecordingError::new(contents.refusal(&format!(
             " has neither the channels of a recording nor columns of points ({names}). Name the channels with --response NAME:UNIT and --drive \
              NAME:UNIT, or the columns of points with --column"
-        ))));
+        )))));
     }
-    Ok(Measurement::Recording(contents.recording(selection).map_err(refused)?))
+    Ok(Measurement::Recording(
+        Recording::of(&contents, selection).map_err(refused)?,
+    ))
 }
 
 /// Points in what `vines identify`, `backbone` and `check` write as JSON.

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use vines::ArgumentError;
-use vines::fmu::FmuRig;
+use vines::fmu_rig;
 use vines::helic::{self, Device};
 use vines::net::{Address, LinkError, Role, Served, Server, ServerError, Service, Session, resolve};
 use vines::rig::{BuiltIn, Rig, RigError, RigFault, SensorsOnly, Simulated, faulty};
@@ -57,7 +57,7 @@ pub(super) struct RigArguments {
     #[command(flatten)]
     watch: WatchArguments,
 
-    /// The protocol: `vines` (docs/network-protocol.md), or `helic`, as a device of helic-daq (lab/helic/README.md)
+    /// The protocol: `vines` (docs/network-protocol.md), or `helic`, as a device of helic-daq (rigs/helic/README.md)
     #[arg(long, value_enum, default_value_t = Protocol::Vines)]
     protocol: Protocol,
 
@@ -173,14 +173,14 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
                 "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic",
             ));
         }
-        Endpoint::Fmu(file) => drop(FmuRig::load(file, &scene).map_err(Failure::run)?),
+        Endpoint::Fmu(file) => drop(fmu_rig::load(file, &scene).map_err(Failure::run)?),
         Endpoint::BuiltIn => {}
     }
     let (serving, json) = (&arguments.serving, arguments.serving.json);
     let watch = arguments.watch.start("vines rig", &scene)?;
     let make = || -> Result<Box<dyn Rig>, RigError> {
         let rig: Box<dyn Rig> = match (&arguments.rig, arguments.fault) {
-            (Endpoint::Fmu(file), _) => reachable(FmuRig::load(file, &scene)?, scene.sample_time()),
+            (Endpoint::Fmu(file), _) => reachable(fmu_rig::load(file, &scene)?, scene.sample_time()),
             (_, Some(Fault { kind, seconds })) => {
                 Box::new(faulty(&scene, kind, seconds, move |zero| print_reaction(zero, json))?)
             }

@@ -108,7 +108,7 @@ impl Watch {
         Tap::around(rig, move |mut sample, step| {
             let drive = sample.command.drive;
             sample.command = Command { drive, ..command.get() };
-            sample.sensors = sample.sensors.scaled(&target);
+            sample.sensors = target.scaled(sample.sensors);
             // The receiver polls, so that this wakes no thread. A full channel, or a server that has ended, drops the sample.
             let _ = sender.try_send(Message::Sample(Numbered { number, sample, step }));
             number += 1;

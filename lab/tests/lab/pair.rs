@@ -7,7 +7,8 @@ use std::{
 };
 
 use vines::experiment::{self, ExperimentError};
-use vines::fmu::{FmuController, FmuRig};
+use vines::fmu::FmuController;
+use vines::fmu_rig;
 use vines::identification::identify;
 use vines::pack::{Binary, components_of, own_libraries, pack_bench};
 use vines::rig::{Controller, Drive, Rig, Simulated};
@@ -21,7 +22,7 @@ fn the_fmu_has_the_bits_of_the_plant_in_a_real_cavity() {
     let friction = "plant.mu_k=0.1 plant.mu_s=0.2 plant.theta=0.3 start.dq2=0.5";
     let walls = "plant.b_plus=0.011 plant.r_minus=0.6 plant.r_min=0.2 plant.r_scatter=0.1 plant.seed=5";
     let scene = Scene::load(None, &overrides(&format!("{friction} {walls}"))).unwrap();
-    let mut fmu = FmuRig::load(Path::new(&fmus()[0]), &scene).unwrap();
+    let mut fmu = fmu_rig::load(Path::new(&fmus()[0]), &scene).unwrap();
     let mut own = Simulated::new(scene.plant, scene.start).unwrap();
     let drive = Drive {
         omega: 0.99 * scene.dimensionless().omega0,
@@ -59,7 +60,7 @@ fn the_fmu_of_a_structure_has_the_bits_of_the_simulated_one() {
         assert_eq!(name, "Structure.fmu");
         let path = folder.path().join(name);
         fs::write(&path, content).unwrap();
-        let mut fmu = FmuRig::load(&path, &scene).unwrap();
+        let mut fmu = fmu_rig::load(&path, &scene).unwrap();
         let mut own = Simulated::without_chain(&scene).unwrap();
         for n in 0..3000_u32 {
             assert_eq!(fmu.sense().unwrap(), own.sense().unwrap(), "{preset}, sample {n}");
@@ -145,9 +146,9 @@ fn fmus_with_other_names_and_units_without_an_oscillator_and_without_settled_loc
 
     // Drive and response both with the opposite sign: the motion is the same.
     let unmapped = Scene { rig_names: Names::default(), ..scene.clone() };
-    let missing = FmuRig::load(&rig_file, &unmapped).err().unwrap().to_string();
+    let missing = fmu_rig::load(&rig_file, &unmapped).err().unwrap().to_string();
     assert!(missing.contains("`e`") && missing.contains("[rig.names]"), "{missing}");
-    let mut fmu = FmuRig::load(&rig_file, &scene).unwrap();
+    let mut fmu = fmu_rig::load(&rig_file, &scene).unwrap();
     let found = locked(&mut fmu, &mut own_loop(&scene), &scene).unwrap();
     let expected = locked(&mut *rig(&scene), &mut built_in(&scene), &scene).unwrap();
     println!("sigma = {found} and {expected}");

@@ -4,11 +4,11 @@ use std::f64::consts::{PI, TAU};
 
 use lovines::{Event, Plant, Wall};
 use phase_lock::Output;
+use vines_bench::experiment::{ExperimentError, exchange};
+use vines_bench::live::{Decay, HarmonicMotion, LastImpacts};
+use vines_bench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Sensors};
+use vines_bench::scene::Scene;
 use vines_model::regime::{Impact, Regime};
-use vines_testbench::experiment::{ExperimentError, exchange};
-use vines_testbench::live::{Decay, HarmonicMotion, LastImpacts};
-use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Sensors};
-use vines_testbench::scene::Scene;
 
 use crate::message::Message;
 use crate::rig::NoisyRig;

@@ -13,9 +13,9 @@
 
 use std::cell::RefCell;
 
+use vines_bench::live::HarmonicMotion;
 use vines_model::curves;
 use vines_model::regime::Regime;
-use vines_testbench::live::HarmonicMotion;
 
 use crate::bench::{Bench, regime_at};
 use crate::message::Message;

@@ -3,8 +3,8 @@
 
 use lovines::InvalidValue;
 use phase_lock::ConfigError;
-use vines_testbench::experiment::ExperimentError;
-use vines_testbench::rig::{ControllerError, RigError};
+use vines_bench::experiment::ExperimentError;
+use vines_bench::rig::{ControllerError, RigError};
 
 /// A text and the numbers in it.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use lovines::{Event, Plant};
 use oorandom::Rand64;
+use vines_bench::live::LastImpacts;
+use vines_bench::rig::{Drive, Rig, RigError, Sensors};
 use vines_model::regime::Impact;
-use vines_testbench::live::LastImpacts;
-use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 
 /// The plant and the noise of its sensors.
 #[derive(Clone)]

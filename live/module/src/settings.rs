@@ -1,7 +1,7 @@
 //! Settings of the page, and the scene that they make.
 
 use lovines::{Parameters, State};
-use vines_testbench::scene::{
+use vines_bench::scene::{
     BackboneSettings, ChainSettings, ControllerSettings, Definition, Dimensionless, Names, PhaseLock, RecordSettings,
     Scene,
 };

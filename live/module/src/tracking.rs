@@ -4,9 +4,9 @@
 use std::cell::Cell;
 
 use phase_lock::Move;
-use vines_testbench::backbone;
-use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors};
-use vines_testbench::scene::Scene;
+use vines_bench::backbone;
+use vines_bench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors};
+use vines_bench::scene::Scene;
 
 use crate::message::Message;
 use crate::rig::NoisyRig;

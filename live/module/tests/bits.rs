@@ -2,14 +2,14 @@
 
 use std::f64::consts::TAU;
 
+use vines_bench::experiment::run;
+use vines_bench::identification::{WINDOW, decay_points};
+use vines_bench::live::HarmonicMotion;
+use vines_bench::record::Record;
+use vines_bench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors, Simulated};
+use vines_bench::scene::{PAPER, Scene};
 use vines_live::bench::{Bench, Row, regime_at};
 use vines_live::settings::{default_scene, index, settings_of};
-use vines_testbench::experiment::run;
-use vines_testbench::identification::{WINDOW, decay_points};
-use vines_testbench::live::HarmonicMotion;
-use vines_testbench::record::Record;
-use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors, Simulated};
-use vines_testbench::scene::{PAPER, Scene};
 
 fn paper() -> Scene {
     Scene::parse("paper.toml", PAPER, &[]).unwrap()

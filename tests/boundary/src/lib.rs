@@ -2,7 +2,7 @@
 //!
 //! This is a crate of its own because all libraries export the same names: they can be loaded into one program, but
 //! not linked into one. The master keeps what its logger hears, and does nothing that it is not told to; a master that simulates is in
-//! `lab/fmu`.
+//! `rigs/fmu`.
 
 #![allow(clippy::macro_metavars_in_unsafe)] // `call!` is for tests, whose calls are all unsafe
 

@@ -1,0 +1,959 @@
+//! The experiment: lock at phase resonance, hold, release, record the decay.
+//!
+//! It follows the state of the controller: a controller that switches the drive off ends the experiment at once.
+
+mod judge;
+mod search;
+
+use std::f64::consts::TAU;
+use std::fmt::{self, Display, Formatter};
+
+use phase_lock::Config;
+use thiserror::Error;
+use vines_model::numerics::mean;
+
+use crate::identification::{Cycle, Departure, Unsteady};
+use crate::record::{Record, Sample};
+use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError, Scaled, Sensors};
+use vines_scene::knowledge::Target;
+use vines_scene::plan::{DECAYED, Plan};
+use vines_scene::scene::Units;
+use vines_scene::scene::key;
+
+pub use judge::Condition;
+use judge::Judge;
+pub(crate) use search::Search;
+
+/// The stage an experiment is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// The loop searches for phase resonance.
+    Locking,
+    /// Phase resonance is held and measured.
+    Holding,
+    /// The controller ramps the drive down.
+    Releasing,
+    /// The drive is off.
+    Decaying,
+    /// The response is held at one level after another.
+    Tracking,
+}
+
+impl Stage {
+    /// Samples of the stage in an experiment, at most: the time limits for the lock and for the release, the hold, or the recorded decay.
+    pub fn samples(self, plan: &Plan) -> usize {
+        let Plan { lock, hold, ramp, decay, .. } = plan;
+        match self {
+            Self::Locking => lock
+                .acquire_timeout
+                .map_or(usize::MAX, |seconds| (seconds / lock.sample_time).round() as usize),
+            Self::Holding => *hold,
+            Self::Releasing => *ramp,
+            Self::Decaying => *decay,
+            Self::Tracking => usize::MAX,
+        }
+    }
+
+    /// What the experiment does in it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Locking => "searching for phase resonance",
+            Self::Holding => "holding the lock",
+            Self::Tracking => "tracking the backbone",
+            Self::Releasing => "releasing the drive",
+            Self::Decaying => "recording the decay",
+        }
+    }
+}
+
+/// A phase error in degrees, in words.
+fn phase_in_words(error: Option<f64>) -> String {
+    error.map_or_else(
+        || "the phase cannot be measured, or the controller does not report its phase error".into(),
+        |degrees| format!("the phase error is {degrees:.3} degrees"),
+    )
+}
+
+/// A drive beside the requested amplitude, m, in words.
+fn drive_in_words(drive: Drive, requested: f64) -> String {
+    let (of, value) = match drive.amplitude {
+        0.0 => ("E = 0, but a displacement of", drive.displacement.abs()),
+        amplitude => ("E =", amplitude),
+    };
+    let share = short(value / requested);
+    format!("{of} {} m, {share} times the requested drive", short(value))
+}
+
+/// What a lock waits for that the bench judges, in words.
+fn unmet_in_words(unmet: Option<Condition>) -> String {
+    unmet.map_or_else(String::new, |Condition { name, key, found, allowed }| {
+        format!(
+            "; the bench judges the lock, as the controller does not: the {name} is {found:.1e}, and phase_lock.lock.{key} with the noise of the \
+             readings allows {allowed:.1e}"
+        )
+    })
+}
+
+/// What a search for the requested drive has found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchFound {
+    /// Least and largest C of the response that was tried.
+    pub tried: [f64; 2],
+    /// Whether impacts have begun.
+    pub impacts: bool,
+    /// Least and largest G at which a symmetric 1:1 motion was held, and G, C and sigma where G was nearest to the requested one; `None` without one.
+    pub held: Option<([f64; 2], [f64; 3])>,
+    /// Largest G that was allowed.
+    pub strongest: f64,
+    /// Requested G.
+    pub requested: f64,
+    /// How often the motion was lost, or not found.
+    pub lost: u32,
+    /// Whether the time ended while a motion was to settle, and if so, whether under the constant drive.
+    pub unsettled: Option<bool>,
+    /// Half-width of the drawing, m, if the rig does not report impacts: nothing is then said of a particle.
+    pub silent: Option<f64>,
+}
+
+impl SearchFound {
+    /// The requested drive as G, unless the rig does not report impacts.
+    fn requested_in_words(&self) -> String {
+        self.silent
+            .map_or_else(|| format!(", G = {:.4}", self.requested), |_| String::new())
+    }
+
+    /// What was found on a rig that does not report impacts, in m. `b`: the length of one in C.
+    fn without_impacts(&self, b: f64) -> String {
+        let [low, high] = self.tried.map(|c| short(c * b));
+        let tried = format!("at responses from {low} to {high} m ");
+        match (self.held, self.impacts, self.unsettled) {
+            (None, false, _) => {
+                tried
+                    + "the motion stayed near the linear response. Allow a larger drive (phase_lock.amplitude_max), or track it with `vines backbone`"
+            }
+            (None, true, _) => {
+                tried + "no motion was steady and nonlinear. Try another drive, or track it with `vines backbone`"
+            }
+            (Some(_), _, Some(_)) => {
+                tried + "the motion did not settle. Allow more time (phase_lock.acquire_timeout), or try another drive"
+            }
+            (Some((_, [_, c, _])), _, None) => format!(
+                "{tried}the drive was nearest to the requested one at {} m. Allow more time (phase_lock.acquire_timeout), or try another drive",
+                short(c * b)
+            ),
+        }
+    }
+}
+
+impl Display for SearchFound {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if let Some(b) = self.silent {
+            return f.write_str(&self.without_impacts(b));
+        }
+        let [low, high] = self.tried;
+        let Some(([least, largest], [g, c, sigma])) = self.held else {
+            write!(f, "at responses from C = {low:.3} to {high:.3} ")?;
+            return match (self.impacts, self.lost) {
+                (_, 0) => f.write_str("no motion was symmetric 1:1 yet. Allow more time (phase_lock.acquire_timeout)"),
+                (true, _) => f.write_str("impacts began, but no motion was symmetric 1:1. Try another G"),
+                (false, _) => write!(
+                    f,
+                    "no impacts began, with drives up to G = {:.2}. Give the particle a velocity (start.dq2), or allow a larger drive \
+                     (phase_lock.amplitude_max, which a converter's chain.base_range bounds)",
+                    self.strongest
+                ),
+            };
+        };
+        write!(
+            f,
+            "with the response under control, the motion was symmetric 1:1 at drives from G = {least:.4} to {largest:.4}, nearest at G = {g:.4}, \
+             C = {c:.4}, sigma = {sigma:.4}; "
+        )?;
+        f.write_str(match (self.unsettled, self.lost) {
+            (Some(true), _) => {
+                "there it did not settle under the constant drive. Allow more time (phase_lock.acquire_timeout), or try another G"
+            }
+            (Some(false), _) => {
+                "there it did not settle, although its response was under control. Allow more time (phase_lock.acquire_timeout), or try another G"
+            }
+            (None, 0) => "the time ended on the way. Allow more (phase_lock.acquire_timeout)",
+            _ if (least..=largest).contains(&self.requested) => "nearer it was lost. Try another G",
+            _ => "beyond it was lost. Ask for a G well within this range",
+        })
+    }
+}
+
+/// What the sensors read in the last period before a fault, and the limit of the scene that was exceeded, in the units of the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evidence {
+    /// Last reading of the response, m.
+    pub response: f64,
+    /// Last reading of the base or the force, if a sensor reads it.
+    pub reference: Option<f64>,
+    /// Its unit, m or N.
+    pub unit: &'static str,
+    /// Largest response of the period, m.
+    pub largest: f64,
+    /// After the loss of a lock, the mean phase error of the period, degrees; `None` inside: it is not known.
+    pub phase_error: Option<Option<f64>>,
+    /// Setting of the controller, its value, and the value's unit.
+    pub limit: Option<(&'static str, Option<f64>, &'static str)>,
+    /// Which channel behind a shaker contradicts the drive, and how.
+    pub contradicts: Option<String>,
+}
+
+impl Display for Evidence {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if let Some(error) = self.phase_error {
+            write!(f, "over the last period {}; ", phase_in_words(error))?;
+        }
+        if let Some(contradicts) = &self.contradicts {
+            write!(f, "{contradicts}; ")?;
+        }
+        write!(f, "the response read {} m", short(self.response))?;
+        if let Some(reference) = self.reference {
+            let name = ["base", "force"][usize::from(self.unit == "N")];
+            write!(f, ", and the {name} {} {}", short(reference), self.unit)?;
+        }
+        write!(f, "; in the last period at most {} m", short(self.largest))?;
+        if let Some((name, value, unit)) = self.limit {
+            let value = value.map_or_else(|| "none".into(), short);
+            write!(f, "; {} is {value}{unit}", key(name))?;
+        }
+        Ok(())
+    }
+}
+
+/// Why an experiment ended early.
+#[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
+pub enum ExperimentError {
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
+    #[error(
+        "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s{}",
+        phase_in_words(*phase_error), unmet_in_words(*unmet)
+    )]
+    NoLock {
+        periods: f64,
+        /// Degrees.
+        phase_error: Option<f64>,
+        omega: f64,
+        /// What kept the bench from taking the motion as settled, if the controller does not judge its lock itself.
+        unmet: Option<Condition>,
+    },
+    #[error("no lock within {periods:.0} periods at the requested drive{}: {found}", found.requested_in_words())]
+    NotReached { periods: f64, found: Box<SearchFound> },
+    #[error("no lock: the motion, held at a response of {response:.4e} m for {periods} periods, is not steady: {why}")]
+    NotSteady {
+        periods: usize,
+        response: f64,
+        why: Unsteady,
+    },
+    #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}; {evidence}", stage.name())]
+    Tripped {
+        periods: f64,
+        stage: Stage,
+        fault: Fault,
+        evidence: Box<Evidence>,
+    },
+    #[error(
+        "the 1:1 motion, held at {held:.4e} m (C = {:.4}), is {regime} at {level:.4e} m (C = {:.4}): the backbone ends between the two, or the \
+         step was too large",
+        held / b, level / b
+    )]
+    MotionLost {
+        held: f64,
+        level: f64,
+        b: f64,
+        regime: crate::identification::Regime,
+    },
+    #[error("phase or drive are not as asked: {departure}. The run ended with: {error}")]
+    OtherThanAsked { departure: Departure, error: Box<Self> },
+    #[error(
+        "the controller does not release the drive: {periods:.1} periods after `active` became false, it commands {}. A ramp may take {allowed:.1} \
+         periods, in which a free response falls to {} %; the drive is off",
+        drive_in_words(*drive, *requested), 100.0 * DECAYED
+    )]
+    NotReleased {
+        /// Natural periods.
+        periods: f64,
+        allowed: f64,
+        drive: Drive,
+        /// m
+        requested: f64,
+    },
+    #[error(
+        "the controller drives again: {periods:.1} periods after it released the drive, it commands {}; the drive is off",
+        drive_in_words(*drive, *requested)
+    )]
+    DrivesAgain {
+        /// Natural periods.
+        periods: f64,
+        drive: Drive,
+        /// m
+        requested: f64,
+    },
+    #[error(
+        "the motion, steady at a response of {held:.4e} m, is irregular at {level:.4e} m: it ends between the two, or the step was too large"
+    )]
+    SteadyLost { held: f64, level: f64 },
+    #[error("the scene has no drive, E = 0, so that nothing can lock")]
+    NoDrive,
+    #[error("the controller answered {name} = {value} {unit}; it must be {allowed}. The drive is off")]
+    Command {
+        name: &'static str,
+        value: f64,
+        unit: &'static str,
+        allowed: &'static str,
+    },
+    #[error(
+        "the controller asked for {} {}, and {} allows {} {}; the drive is off. Its output E is {}",
+        short(*amplitude * units.drive), units.name, key("amplitude_max"), short(*limit * units.drive), units.name,
+        match units.name {
+            "N" => format!("the force over {} N/m, in m", short(units.drive)),
+            _ => "the amplitude of the base in metres".into(),
+        }
+    )]
+    DriveTooLarge {
+        /// m
+        amplitude: f64,
+        /// m
+        limit: f64,
+        units: Units,
+    },
+    #[error(
+        "the response read {} m, and {} allows {} m, but the controller did not stop; the drive is off",
+        short(*response * units.response), key("response_max"), short(*limit * units.response)
+    )]
+    ResponseTooLarge {
+        /// m
+        response: f64,
+        /// m
+        limit: f64,
+        units: Units,
+    },
+    #[error(
+        "the controller asked for omega = {} rad/s; the scene allows {} to {} rad/s ({}, {}), and a factor of 2 pi lies between. omega is an \
+         angular frequency in rad/s, not in Hz; the drive is off",
+        short(*omega), short(allowed[0]), short(allowed[1]), key("omega_min"), key("omega_max")
+    )]
+    Hertz { omega: f64, allowed: [f64; 2] },
+}
+
+/// Runs the whole experiment. `progress` receives the stage, the samples taken in it, and their largest number.
+pub fn run(
+    rig: &mut (impl Rig + ?Sized),
+    controller: &mut (impl Controller + ?Sized),
+    plan: &Plan,
+    progress: impl FnMut(Stage, usize, usize),
+) -> Result<Record, ExperimentError> {
+    run_into(&mut Vec::new(), rig, controller, plan, progress)
+}
+
+/// [`run`], which leaves what was measured in `samples` if the experiment ends early.
+pub fn run_into(
+    samples: &mut Vec<Sample>,
+    rig: &mut (impl Rig + ?Sized),
+    controller: &mut (impl Controller + ?Sized),
+    plan: &Plan,
+    mut progress: impl FnMut(Stage, usize, usize),
+) -> Result<Record, ExperimentError> {
+    let mut report = |stage: Stage, taken| progress(stage, taken, stage.samples(plan));
+    let mut bench = ControlLoop::new(rig, controller, plan, &plan.lock, samples, &mut report)?;
+    let conducted = match conduct(&mut bench) {
+        Ok(conducted) => conducted,
+        Err(error) => {
+            bench.switch_off();
+            return Err(bench.beside_what_was_asked(error));
+        }
+    };
+    drop(bench);
+    let samples = std::mem::take(samples);
+    Ok(Record { samples, ..conducted })
+}
+
+/// The experiment from the search to the end of the decay; the record is without its samples.
+fn conduct<R: Rig + ?Sized, C: Controller + ?Sized>(
+    bench: &mut ControlLoop<'_, R, C>,
+) -> Result<Record, ExperimentError> {
+    let plan = bench.plan;
+    let held = if plan.knowledge.is_at_phase_resonance() {
+        Search::new(bench).lock()?
+    } else {
+        None
+    };
+    // A controller that cannot control the response waits for the lock under the constant drive.
+    while held.is_none() && !bench.settled {
+        bench.sample(Stage::Locking)?;
+    }
+    let settled = bench.taken - 1;
+    for _ in 0..plan.hold {
+        bench.sample(Stage::Holding)?;
+    }
+    let (hold_end, clipped_percent) = (bench.taken, bench.clipped_percent([0; 2]));
+    let mut released = hold_end;
+    if plan.decay > 0 {
+        released = bench.release()?;
+        for _ in 1..plan.decay {
+            bench.sample(Stage::Decaying)?;
+        }
+    }
+    Ok(Record {
+        sample_time: plan.knowledge.sample_time,
+        samples: Vec::new(),
+        settled,
+        held: held == Some(true),
+        hold_end,
+        released,
+        clipped_percent,
+    })
+}
+
+// Rig and controller, sample by sample. Whatever fails, the rig is left with a drive of zero as far as it still takes one.
+
+/// Slowest time constant of the loops, periods.
+pub(crate) const SLOWEST_LOOP: f64 = 5.0;
+/// Periods within which the loops and the particle follow a change of their setpoint.
+pub(crate) const FOLLOWED: usize = 8;
+/// Observations in succession that are not taken for chance: periods, or legs of the search.
+pub(crate) const CONFIRMED: u32 = 3;
+
+/// Rig and controller, and the samples so far.
+pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
+    rig: Scaled<'a, R>,
+    pub controller: &'a mut C,
+    pub plan: &'a Plan,
+    /// Of the controller; its limits guard the rig whatever controls it.
+    pub config: &'a Config,
+    /// s
+    pub sample_time: f64,
+    pub samples: &'a mut Vec<Sample>,
+    /// Samples since the start.
+    pub taken: usize,
+    /// Phase of the drive since the start, turns.
+    pub periods: f64,
+    /// Latest output of the controller.
+    pub last: Command,
+    /// Whether the lock has settled, as the controller says, or else the bench.
+    pub settled: bool,
+    judge: Judge,
+    /// Time limit for the lock, samples.
+    limit: usize,
+    /// Receives the stage and the samples taken in it.
+    progress: &'a mut dyn FnMut(Stage, usize),
+    /// The present stage, and the samples before it.
+    stage: (Stage, usize),
+    /// Whether the response is under control, so that the drive is what holds it and not the requested one.
+    holds_response: bool,
+    /// Whether the rig was left with a drive.
+    driven: bool,
+}
+
+/// One sample of rig and controller, at a time, s, and until the next one a step, s, later: the rig is read, the controller answers, and the rig is
+/// driven. `before_drive` may refuse the drive.
+///
+/// # Errors
+/// A failure of the rig or of the controller, or the refusal.
+pub fn exchange(
+    rig: &mut (impl Rig + ?Sized),
+    controller: &mut (impl Controller + ?Sized),
+    active: bool,
+    [time, step]: [f64; 2],
+    before_drive: impl FnOnce(&Sample) -> Result<(), ExperimentError>,
+) -> Result<Sample, ExperimentError> {
+    let sensors = rig.sense()?;
+    let command = controller.sample(sensors, active)?;
+    let ground_truth = rig.ground_truth()?;
+    let sample = Sample { time, sensors, command, ground_truth, ..Sample::default() };
+    before_drive(&sample)?;
+    rig.advance(command.drive, step)?;
+    Ok(sample)
+}
+
+/// A period of the drive in a record: its first sample, and the phase of the drive there, turns.
+pub(crate) type Period = (usize, f64);
+
+impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
+    /// Before the first sample.
+    pub fn new(
+        rig: &'a mut R,
+        controller: &'a mut C,
+        plan: &'a Plan,
+        config: &'a Config,
+        samples: &'a mut Vec<Sample>,
+        progress: &'a mut dyn FnMut(Stage, usize),
+    ) -> Result<Self, ExperimentError> {
+        if plan.amplitude == 0.0 {
+            return Err(ExperimentError::NoDrive);
+        }
+        Ok(Self {
+            rig: Scaled::controlled(rig, &plan.knowledge, config.delay),
+            controller,
+            plan,
+            config,
+            sample_time: plan.knowledge.sample_time,
+            samples,
+            taken: 0,
+            periods: 0.0,
+            last: Command::default(),
+            settled: false,
+            judge: Judge::new(config, plan.knowledge.target),
+            limit: Stage::Locking.samples(plan),
+            progress,
+            stage: (Stage::Locking, 0),
+            holds_response: false,
+            driven: false,
+        })
+    }
+
+    /// One sample. Before the release, a controller that switches the drive off is an error; after it, one that drives.
+    pub fn sample(&mut self, stage: Stage) -> Result<(), ExperimentError> {
+        if self.stage.0 != stage {
+            self.stage = (stage, self.taken);
+        }
+        let active = !matches!(stage, Stage::Releasing | Stage::Decaying);
+        let clock = [self.taken as f64 * self.sample_time, self.sample_time];
+        let is_latched = |command: &Command| command.state.is_some_and(LoopState::is_latched);
+        let (requested, since_release) = (self.plan.amplitude, self.natural_periods(self.taken - self.stage.1 + 1));
+        let (config, units) = (self.config, self.plan.units);
+        let (samples, driven) = (&mut *self.samples, &mut self.driven);
+        let before_drive = |sample: &Sample| {
+            let command = checked(sample.command)?;
+            samples.push(*sample);
+            let is_off = is_off(command.drive);
+            if stage == Stage::Decaying && !is_off {
+                let drive = command.drive;
+                return Err(ExperimentError::DrivesAgain { periods: since_release, drive, requested });
+            }
+            if (active || !is_off) && !is_latched(&command) {
+                guard(config, units, sample.sensors.response, command.drive)?;
+            }
+            *driven = true;
+            Ok(())
+        };
+        let Sample { command, .. } = exchange(&mut self.rig, self.controller, active, clock, before_drive)?;
+        if let Some((last, command)) = self.samples.last_mut().zip(self.rig.shaker_command()) {
+            last.shaker_command = command;
+        }
+        self.driven = !is_off(command.drive);
+        self.taken += 1;
+        self.last = command;
+        self.periods += command.drive.omega * self.sample_time / TAU;
+        if active && is_latched(&command) {
+            self.ramp_down(command)?;
+            return Err(self.tripped(stage, &command));
+        }
+        self.settled = match command.settled {
+            settled if stage == Stage::Locking && self.judges(&command) => {
+                self.judge.sample(self.samples, self.periods) || settled == Some(true)
+            }
+            settled => settled == Some(true),
+        };
+        (self.progress)(stage, self.taken - self.stage.1);
+        if stage == Stage::Locking && self.taken >= self.limit {
+            return Err(self.no_lock(&command));
+        }
+        Ok(())
+    }
+
+    /// These samples, in natural periods.
+    fn natural_periods(&self, samples: usize) -> f64 {
+        samples as f64 * self.sample_time * self.plan.knowledge.linear.omega0 / TAU
+    }
+
+    /// Asks the controller to release the drive, and waits for the end of its ramp. Returns the index of the first sample without a drive.
+    fn release(&mut self) -> Result<usize, ExperimentError> {
+        let Plan { ramp, amplitude, .. } = *self.plan;
+        for _ in 0..ramp.max(1) {
+            self.sample(Stage::Releasing)?;
+            if is_off(self.last.drive) {
+                return Ok(self.taken - 1);
+            }
+        }
+        let allowed = self.natural_periods(ramp);
+        Err(ExperimentError::NotReleased {
+            periods: allowed,
+            allowed,
+            drive: self.last.drive,
+            requested: amplitude,
+        })
+    }
+
+    /// Samples so far, and of these the ones with the command of a shaker at the limit of its amplifier.
+    pub fn clipped(&self) -> [usize; 2] {
+        [self.taken, self.rig.clipped().unwrap_or(0)]
+    }
+
+    /// Share of the samples with the command at this limit, per cent, since [`Self::clipped`] has returned `before`; `None` without a shaker.
+    pub fn clipped_percent(&self, before: [usize; 2]) -> Option<f64> {
+        let clipped = self.rig.clipped()? - before[1];
+        Some(100.0 * clipped as f64 / (self.taken - before[0]).max(1) as f64)
+    }
+
+    /// Samples to the end of the present period of the drive.
+    pub fn period(&mut self, stage: Stage) -> Result<Period, ExperimentError> {
+        let begin = (self.samples.len(), self.periods);
+        while self.periods < begin.1.floor() + 1.0 {
+            self.sample(stage)?;
+        }
+        Ok(begin)
+    }
+
+    /// Controls the amplitude of the response; the move is one of its displacement.
+    pub fn hold_response(&mut self, to: Move) -> Result<(), ControllerError> {
+        let target = self.plan.knowledge.target;
+        let omega = self.last.drive.omega + to.omega;
+        let to = Move {
+            response: target.reading(to.response, omega),
+            growth: target.reading(to.growth, omega),
+            ..to
+        };
+        self.controller.hold_response(to, target.phase_of_readings())?;
+        self.holds_response = true;
+        Ok(())
+    }
+
+    /// Controls the drive again.
+    pub fn hold_drive(&mut self) -> Result<(), ControllerError> {
+        self.holds_response = false;
+        self.controller.hold_drive()
+    }
+
+    /// The fit of the samples since the beginning of the last period; `None` without a motion.
+    pub fn cycle(&self, (begin, turns): Period, target: Target) -> Option<Cycle> {
+        Cycle::of(&self.samples[begin..], self.sample_time, turns * TAU, target)
+    }
+
+    fn advance(&mut self, drive: Drive) -> Result<(), ExperimentError> {
+        self.driven = true;
+        self.rig.advance(drive, self.sample_time)?;
+        self.driven = !is_off(drive);
+        Ok(())
+    }
+
+    /// Follows the controller's ramp after a fault until the drive is off.
+    fn ramp_down(&mut self, mut command: Command) -> Result<(), ExperimentError> {
+        while command.drive.amplitude > 0.0 {
+            let asked = self.controller.sample(self.rig.sense()?, true)?;
+            // A ramp never rises, whatever the controller says.
+            let falls = |amplitude: &f64| *amplitude < command.drive.amplitude;
+            let falling = Some(asked.drive).filter(|drive| falls(&drive.amplitude));
+            command = checked(Command { drive: falling.unwrap_or_default(), ..asked })?;
+            self.advance(command.drive)?;
+        }
+        Ok(())
+    }
+
+    fn tripped(&self, stage: Stage, command: &Command) -> ExperimentError {
+        let fault = command.fault.unwrap_or(Fault::LockLost);
+        if fault == Fault::TimedOut {
+            return self.no_lock(command);
+        }
+        let mut evidence = evidence(self.samples, self.config, self.plan.units, fault);
+        if self.plan.knowledge.shaker.is_some() {
+            evidence.contradicts = contradicts(self.samples, self.sample_time);
+        }
+        let evidence = evidence.into();
+        ExperimentError::Tripped { periods: self.periods, stage, fault, evidence }
+    }
+
+    /// The error at the end of a run, after what the controller does otherwise than asked: that another phase or drive has another motion is no fault of
+    /// the motion. While the response is under control, the drive follows from it.
+    fn beside_what_was_asked(&self, error: ExperimentError) -> ExperimentError {
+        let is_of_motion = matches!(
+            error,
+            ExperimentError::NoLock { .. } | ExperimentError::ResponseTooLarge { .. } | ExperimentError::Tripped { .. }
+        );
+        let last = &self.samples[self.samples.len().saturating_sub(self.plan.hold)..];
+        let departure = Departure::of(last, self.plan).filter(|_| is_of_motion && !self.holds_response);
+        match departure {
+            Some(departure) => ExperimentError::OtherThanAsked { departure, error: error.into() },
+            None => error,
+        }
+    }
+
+    /// The error of a search without a result.
+    fn no_lock(&self, command: &Command) -> ExperimentError {
+        ExperimentError::NoLock {
+            periods: self.periods,
+            phase_error: command.phase_error.map(f64::to_degrees),
+            omega: command.drive.omega,
+            unmet: self.judge.unmet().filter(|_| self.judges(command)),
+        }
+    }
+
+    /// Whether the bench judges the lock: of a controller that does not, and behind a filter, as controllers take noise for white.
+    fn judges(&self, command: &Command) -> bool {
+        command.settled.is_none() || self.plan.knowledge.target.filter.is_some()
+    }
+}
+
+impl<R: Rig + ?Sized, C: ?Sized> ControlLoop<'_, R, C> {
+    fn switch_off(&mut self) {
+        if self.driven {
+            self.driven = false;
+            // The run has ended; an error of the rig would not change its result.
+            let _ = self.rig.advance(Drive::default(), self.sample_time);
+        }
+    }
+}
+
+/// An error or a panic must not leave the rig driven.
+impl<R: Rig + ?Sized, C: ?Sized> Drop for ControlLoop<'_, R, C> {
+    fn drop(&mut self) {
+        self.switch_off();
+    }
+}
+
+/// Whether a drive moves nothing: neither a rig that takes its amplitude nor one that takes its samples.
+fn is_off(drive: Drive) -> bool {
+    drive.amplitude == 0.0 && drive.displacement == 0.0
+}
+
+/// Refuses a drive or a response beyond the limits of the scene, before the rig gets the drive.
+fn guard(config: &Config, units: Units, response: f64, drive: Drive) -> Result<(), ExperimentError> {
+    let Config { amplitude_max, response_max, omega_min, omega_max, .. } = *config;
+    let Drive { omega, amplitude, .. } = drive;
+    // A controller may compute in single precision.
+    let beyond = |value: f64, limit: Option<f64>| limit.filter(|limit| value > limit * (1.0 + 1e-6));
+    if let Some(limit) = beyond(amplitude, amplitude_max) {
+        return Err(ExperimentError::DriveTooLarge { amplitude, limit, units });
+    }
+    if let Some(limit) = beyond(response.abs(), response_max) {
+        return Err(ExperimentError::ResponseTooLarge { response, limit, units });
+    }
+    let allowed = [omega_min, omega_max];
+    let is_allowed = |omega: f64| (omega_min..=omega_max).contains(&omega);
+    if amplitude > 0.0 && !is_allowed(omega) && (is_allowed(omega * TAU) || is_allowed(omega / TAU)) {
+        return Err(ExperimentError::Hertz { omega, allowed });
+    }
+    Ok(())
+}
+
+/// A command with values that a rig and an identification can take.
+fn checked(command: Command) -> Result<Command, ExperimentError> {
+    let Drive { omega, amplitude, displacement } = command.drive;
+    let error = |(name, value, unit, allowed)| ExperimentError::Command { name, value, unit, allowed };
+    let positive = [("omega", omega, "rad/s"), ("E", amplitude, "m")]
+        .map(|(name, value, unit)| (name, value, unit, "a finite number, 0 or above"));
+    let finite = [
+        ("drive", displacement, "m"),
+        ("phase_error", command.phase_error.unwrap_or(0.0), "rad"),
+    ]
+    .map(|(name, value, unit)| (name, value, unit, "a finite number"));
+    let refused = positive
+        .into_iter()
+        .find(|(_, value, ..)| !(value.is_finite() && *value >= 0.0))
+        .or_else(|| finite.into_iter().find(|(_, value, ..)| !value.is_finite()));
+    refused.map_or(Ok(command), |refused| Err(error(refused)))
+}
+
+/// What was read before a fault.
+fn evidence(samples: &[Sample], config: &Config, units: Units, fault: Fault) -> Evidence {
+    let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
+    let driven = samples.len() as f64 * config.sample_time;
+    let samples = &samples[samples.len().saturating_sub(period)..];
+    let largest = samples
+        .iter()
+        .map(|sample| sample.sensors.response.abs())
+        .fold(0.0, f64::max);
+    let last = samples.last().map(|sample| sample.sensors).unwrap_or_default();
+    let phase_error = (fault == Fault::LockLost).then(|| {
+        let errors: Option<Vec<f64>> = samples.iter().map(|sample| sample.command.phase_error).collect();
+        errors.map(|errors| mean(errors).to_degrees())
+    });
+    let limit = match fault {
+        Fault::ResponseTooLarge => {
+            let limit = config.response_max.map(|limit| limit * units.response);
+            Some(("response_max", limit, " m"))
+        }
+        Fault::LockLost => Some(("lock.unlock_tolerance", Some(config.lock.unlock_tolerance), " rad")),
+        // The first periods contradict their drive.
+        Fault::NoSignal if config.signal_timeout.is_some_and(|limit| driven < limit) => None,
+        Fault::NoSignal => Some(("signal_timeout", config.signal_timeout, " s")),
+        Fault::Implausible => Some(("residual_max", config.residual_max, " of the amplitude")),
+        Fault::Sensor | Fault::TimedOut => None,
+    };
+    Evidence {
+        response: last.response * units.response,
+        reference: last.reference.map(|value| value * units.drive),
+        unit: units.name,
+        largest: largest * units.response,
+        phase_error,
+        limit,
+        contradicts: None,
+    }
+}
+
+/// Which channel behind a shaker contradicts the drive: one whose reading has stopped, or the one that differs more from what it read a period before.
+fn contradicts(samples: &[Sample], sample_time: f64) -> Option<String> {
+    if let Some(stopped) = stopped(samples, sample_time) {
+        return Some(stopped.into());
+    }
+    // The loop may have changed the frequency since the fault.
+    let mut left = TAU;
+    let is_in_period = |sample: &&Sample| {
+        let turn = sample.command.drive.omega * sample_time;
+        left -= turn;
+        left > 0.5 * turn
+    };
+    let period = 1 + samples.iter().rev().take_while(is_in_period).count();
+    let (before, now) = samples[samples.len().checked_sub(2 * period)?..].split_at(period);
+    let percent = |of: fn(Sensors) -> f64| {
+        let pairs = now.iter().zip(before);
+        let changes = pairs.map(|(now, before)| (of(now.sensors) - of(before.sensors)).abs());
+        let readings = before.iter().map(|sample| of(sample.sensors).abs());
+        100.0 * changes.fold(0.0, f64::max) / readings.fold(0.0, f64::max)
+    };
+    let response = percent(|sensors| sensors.response);
+    let force = percent(|sensors| sensors.reference.unwrap_or(0.0));
+    Some(if force > response {
+        format!(
+            "the force contradicts its past: it changed by {force:.0} % of its amplitude from one period to the next, the response by {response:.0} %. \
+             Check the amplifier, the stinger, and the force cell with its cable"
+        )
+    } else {
+        format!(
+            "the response contradicts its past: it changed by {response:.0} % of its amplitude from one period to the next, the force by {force:.0} %. \
+             Check its sensor and cable, and whether the motion is irregular"
+        )
+    })
+}
+
+/// Share of a period for which a reading that has not changed has stopped: one of more than 26 steps of its converter changes in this time.
+const STOPPED: f64 = 1.0 / 16.0;
+
+/// Which channel reads no number, or still reads what it did before.
+fn stopped(samples: &[Sample], sample_time: f64) -> Option<&'static str> {
+    let last = samples.last()?.sensors;
+    let has_stopped = |of: fn(Sensors) -> f64| {
+        let is_last = |sample: &&Sample| of(sample.sensors) == of(last);
+        let unchanged = samples.iter().rev().take_while(is_last);
+        let turns = unchanged.map(|sample| sample.command.drive.omega * sample_time / TAU);
+        turns.sum::<f64>() > STOPPED
+    };
+    let force = |sensors: Sensors| sensors.reference.unwrap_or(0.0);
+    match (has_stopped(force), has_stopped(|sensors| sensors.response)) {
+        _ if !force(last).is_finite() => Some("the force cell reads no number"),
+        _ if !last.response.is_finite() => Some("the sensor of the response reads no number"),
+        (true, true) => Some("response and force stay at one value: both sensors, or the clock, have stopped"),
+        (false, true) => Some("the response stays at one value: its sensor is dead, frozen or saturates"),
+        (true, false) if force(last) == 0.0 => Some(NOTHING),
+        (true, false) => Some(CLIPPED),
+        (false, false) => None,
+    }
+}
+
+/// A force cell that reads zero, and one that reads one value.
+const NOTHING: &str = "the force cell reads nothing: it or its cable is dead, or the stinger is broken";
+const CLIPPED: &str = "the force cell stays at one value: it saturates or is frozen; check its range";
+
+/// Five digits, with an exponent if the number is very small or large.
+fn short(value: f64) -> String {
+    let rounded: f64 = format!("{value:.4e}").parse().unwrap_or(value);
+    format!("{rounded:?}").trim_end_matches(".0").into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vines_scene::scene::Scene;
+
+    #[test]
+    fn a_fault_is_stated_with_the_readings_and_the_limit_of_the_scene() {
+        let scene = Scene::load(None, &["phase_lock.response_max=0.3".parse().unwrap()]).unwrap();
+        let mut samples = vec![Sample::default(); 150];
+        for (n, sample) in samples.iter_mut().enumerate() {
+            sample.sensors = Sensors { response: 0.2, reference: Some(0.01) };
+            sample.command.phase_error = Some(if n < 50 { 9.0 } else { 0.25 });
+        }
+        samples[140].sensors.response = -0.301_234_9;
+        // The largest reading of the last period, also if the controller switched the drive off a few samples later.
+        let read = "the response read 0.2 m, and the base 0.01 m; in the last period at most 0.30123 m";
+        for (fault, limit) in [
+            (Fault::ResponseTooLarge, "phase_lock.response_max is 0.3 m"),
+            (Fault::LockLost, "phase_lock.lock.unlock_tolerance is 0.2 rad"),
+            (Fault::LockLost, "the phase error is 14.324 degrees"),
+        ] {
+            let text = evidence(&samples, &scene.controller_config(), scene.plan().units, fault).to_string();
+            assert!(text.contains(read) && text.contains(limit), "{text}");
+        }
+        // Under a force, 0.01 m of the driven mode's base are newtons, and its response is read at the sensor.
+        let text = include_str!("../../../scenes/frame.toml");
+        let force = Scene::parse("frame.toml", text, &[]).unwrap();
+        let structure = force.structure.as_ref().unwrap();
+        let [newtons, metres] = [
+            0.01 / structure.base_per_drive(),
+            0.2 * structure.reading_per_response().abs(),
+        ]
+        .map(short);
+        let text = evidence(&samples, &force.controller_config(), force.plan().units, Fault::Sensor).to_string();
+        assert!(
+            text.contains(&format!("the response read {metres} m, and the force {newtons} N")),
+            "{text}"
+        );
+    }
+
+    /// What is said of these readings of response and force, which begin as sines of 100 samples per period.
+    fn words(read: fn(usize, f64) -> [f64; 2]) -> String {
+        let mut samples = vec![Sample::default(); 200];
+        for (n, sample) in samples.iter_mut().enumerate() {
+            let [response, force] = read(n, (TAU * n as f64 / 100.0).sin());
+            sample.sensors = Sensors { response, reference: Some(force) };
+            sample.command.drive.omega = TAU;
+        }
+        contradicts(&samples, 0.01).unwrap_or_default()
+    }
+
+    #[test]
+    fn the_channel_that_contradicts_its_past_is_named_with_its_change() {
+        for (words, expected) in [
+            (
+                words(|n, sine| [if n < 130 { sine } else { -sine }, 0.1 * sine]),
+                "the response contradicts its past: it changed by 200 %",
+            ),
+            (
+                words(|n, sine| [sine, if n < 130 { sine } else { 0.3 * sine }]),
+                "the force contradicts its past: it changed by 70 %",
+            ),
+            // The loop has already answered.
+            (
+                words(|n, sine| {
+                    [
+                        sine * if n < 130 { 1.0 } else { 1.2 },
+                        if n < 130 { sine } else { -sine },
+                    ]
+                }),
+                "by 200 % of its amplitude from one period to the next, the response by 20 %",
+            ),
+        ] {
+            assert!(words.contains(expected), "{words}");
+        }
+    }
+
+    #[test]
+    fn a_reading_that_has_stopped_is_named_whatever_the_other_channel_does() {
+        for (words, expected) in [
+            (words(|_, sine| [sine, f64::NAN]), "force cell reads no number"),
+            (words(|_, sine| [f64::NAN, sine]), "response reads no number"),
+            (
+                words(|n, sine| [sine, if n < 180 { sine } else { 0.9 }]),
+                "it saturates",
+            ),
+            (
+                words(|n, sine| [sine, if n < 180 { sine } else { 0.0 }]),
+                "reads nothing",
+            ),
+            (
+                words(|n, sine| [if n < 180 { sine } else { 0.9 }, sine]),
+                "the response stays",
+            ),
+            (words(|n, sine| [if n < 180 { sine } else { 0.9 }; 2]), "both sensors"),
+        ] {
+            assert!(words.contains(expected), "{words}");
+        }
+    }
+}

@@ -1,0 +1,480 @@
+//! What a record says: the locked point, its regime, and the backbone along the free decay.
+
+mod asked;
+mod decay;
+mod level;
+mod resonance_fit;
+mod response;
+
+use std::f64::consts::TAU;
+
+use serde::Serialize;
+use thiserror::Error;
+use vines_model::numerics::{Estimate, SIGNIFICANT, mean, standard_deviation};
+
+use crate::record::{Record, Sample};
+use vines_scene::knowledge::Knowledge;
+use vines_scene::plan::Plan;
+use vines_scene::scene::Measurand;
+
+pub use asked::Departure;
+pub(crate) use decay::PER_PERIOD;
+pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, base_at_rest, decay_points, harmonic};
+pub use level::{Criterion, LevelEstimate, Unsteady};
+pub(crate) use level::{LAG, LONGEST, is_off_target};
+pub use resonance_fit::{Cycle, ResonanceFit};
+pub(crate) use response::{ASYMMETRIC, Line, degrees, subharmonic, without_tones};
+pub use response::{Tone, classify, drive_harmonics, foreign_tone, impacts, regime_by_response};
+pub use vines_model::regime::{Impact, Regime};
+
+/// Why a record cannot be identified.
+#[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
+pub enum IdentificationError {
+    #[error("the loop is locked, but not as asked: {departure}. There the regime is {regime}")]
+    OtherThanAsked { departure: Departure, regime: Regime },
+    #[error("{}", regime_in_words(*regime, [*sigma, *c], *silent))]
+    Regime {
+        regime: Regime,
+        sigma: f64,
+        c: f64,
+        /// Frequency, Hz, and response, m, of a rig that does not report impacts: nothing is then said of a particle.
+        silent: Option<[f64; 2]>,
+    },
+    #[error(
+        "the loop is locked at {f_hz:.5} Hz with a response of {a_m:.4e} m, but the motion repeats only after {periods} periods of the drive. Try another \
+         drive or another [start]"
+    )]
+    Repeats { periods: usize, f_hz: f64, a_m: f64 },
+    #[error(
+        "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the motion repeats only after {periods} periods of the drive: it is not 1:1. Try \
+         another [start] (the particle must be moving) or another G"
+    )]
+    Subharmonic { periods: usize, sigma: f64, c: f64 },
+    #[error(
+        "the hold contains no periodic motion: the response or the base reads zero; check the sensors and record.hold_periods"
+    )]
+    NoMotion,
+    #[error(
+        "the phase was {error:.3} ± {uncertainty:.3} degrees off its target while the lock was held; phase_lock.lock.phase_tolerance allows \
+         {tolerance:.3} degrees. The controller holds another phase than controller.phase_target, or a channel has become late"
+    )]
+    OffTarget {
+        error: f64,
+        uncertainty: f64,
+        tolerance: f64,
+    },
+    #[error(
+        "a sensor {what} {seconds:.3} s after the release, so that the decay is not recorded: check its cable and converter"
+    )]
+    SensorAfterRelease { seconds: f64, what: &'static str },
+}
+
+/// That a lock is of another regime than the symmetric 1:1 one.
+fn regime_in_words(regime: Regime, [sigma, c]: [f64; 2], silent: Option<[f64; 2]>) -> String {
+    match silent {
+        Some([f_hz, a_m]) => format!(
+            "the loop is locked at {f_hz:.5} Hz with a response of {a_m:.4e} m, but the motion is {}, and not steady and nonlinear. Try another drive \
+             or another [start]",
+            regime.motion()
+        ),
+        None => format!(
+            "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the regime is {regime}, not symmetric 1:1 with two impacts per period. Try \
+             another [start] (the particle must be moving) or another G"
+        ),
+    }
+}
+
+/// What a record says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identification {
+    /// What is known of the rig.
+    pub knowledge: Knowledge,
+    /// The locked point as measured.
+    pub lock: Lock,
+    /// The decay, from the release on; without points if it is shorter than the window of the fit.
+    pub decay: DecayPoints,
+    /// Amplitude of the base after the release, m, where it is least, if the base never rests.
+    pub base_after_release: Option<Estimate>,
+}
+
+/// Identifies the record of an experiment.
+///
+/// # Errors
+/// No motion, a lock in another regime than the symmetric 1:1 one or off its phase, and a sensor that fails in the decay.
+pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, IdentificationError> {
+    let knowledge = plan.knowledge;
+    let lock = measure(record, plan).ok_or(IdentificationError::NoMotion)?;
+    let ResonancePoint { f_hz, a_m, sigma, c, .. } = lock.at;
+    let silent = lock.regime_by_impacts.is_none().then_some([f_hz, a_m]);
+    let subharmonic = subharmonic(record.hold(), &knowledge, TAU * f_hz);
+    // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so. So is one without symmetry where
+    // there may be no cavity.
+    let is_expected = match lock.regime {
+        Regime::Symmetric | Regime::Unresolved => true,
+        Regime::Asymmetric => !knowledge.is_symmetric || silent.is_some(),
+        _ => false,
+    };
+    // Another phase or drive has another motion, of which the wanted one says nothing.
+    if (!is_expected || subharmonic.is_some())
+        && let Some(departure) = Departure::of(record.hold(), plan)
+    {
+        return Err(IdentificationError::OtherThanAsked { departure, regime: lock.regime });
+    }
+    if !is_expected {
+        return Err(IdentificationError::Regime { regime: lock.regime, sigma, c, silent });
+    }
+    if let Some(periods) = subharmonic {
+        return Err(match silent {
+            Some(_) => IdentificationError::Repeats { periods, f_hz, a_m },
+            None => IdentificationError::Subharmonic { periods, sigma, c },
+        });
+    }
+    on_target(&lock, plan.lock.lock.phase_tolerance)?;
+    sensors_after_release(record, &knowledge)?;
+    Ok(Identification {
+        knowledge,
+        lock,
+        decay: decay_points(record, &knowledge, WINDOW),
+        base_after_release: base_at_rest(record, &knowledge).err(),
+    })
+}
+
+/// Largest number of harmonics that are fitted: a bound of the work.
+const MOST_HARMONICS: usize = 60;
+
+/// Number of harmonics that belong to the motion in a response of which the sensor measures this, `least` of a displacement: an impact makes those of
+/// a velocity fall as 1/n, and those of an acceleration not at all. What is not fitted counts as noise, for which two fifths of the samples remain.
+pub(crate) fn harmonics_of(measurand: Measurand, samples_per_period: f64, least: usize) -> usize {
+    match measurand {
+        Measurand::Displacement => least,
+        _ => ((0.42 * samples_per_period) as usize).clamp(least, MOST_HARMONICS),
+    }
+}
+
+// The locked point.
+
+/// The locked point as measured.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Lock {
+    /// The point: frequency and base amplitude of phase resonance at the mean amplitude of the response before the release.
+    #[serde(flatten)]
+    pub at: ResonancePoint,
+    /// Requested amplitude of the base, m; of a base that is held from sample to sample, which moves a little less than its samples, what is left.
+    #[serde(rename = "E_requested_m")]
+    pub requested_e_m: f64,
+    /// Whether the drive of the point is the requested one: within 1 %, or within three standard uncertainties if these are more.
+    pub at_requested_drive: bool,
+    /// Mean particle speed over `b omega0`; absent if the rig does not report it.
+    #[serde(rename = "B")]
+    pub b: Option<f64>,
+    /// Standard uncertainty of B; absent where B is.
+    #[serde(rename = "u_B")]
+    pub u_b: Option<f64>,
+    /// Number of periods that the point is estimated from: the hold, and the periods before it with about the same amplitude and drive.
+    pub averaged: usize,
+    /// Growth of a disturbance per period, relative, up to which these periods would not show it: from 1e-6 of the response to the deviation that ends
+    /// them.
+    pub unseen_growth: f64,
+    /// From the start to the settled lock, in periods of the locked motion.
+    pub periods_to_lock: f64,
+    /// Whether control holds the response, because a constant drive would hold it hardly, or not.
+    pub held: bool,
+    /// Impacts per period; NaN if the rig does not report them.
+    pub impacts_per_period: f64,
+    /// The regime: from the impacts, or from the response alone if the rig does not report them. In files it is the motion without a particle.
+    #[serde(rename = "motion", serialize_with = "Regime::serialize_motion")]
+    pub regime: Regime,
+    /// The regime determined from the impacts, if the rig reports them.
+    pub regime_by_impacts: Option<Regime>,
+    /// Share of the samples before the release with the command at the limit of a shaker's amplifier, per cent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clipped_percent: Option<f64>,
+    /// Mean amplitude of the command of a shaker over the averaged periods, V.
+    #[serde(rename = "command_V", skip_serializing_if = "Option::is_none")]
+    pub command_v: Option<f64>,
+    /// What friction did over the hold; absent without friction, or if the rig does not report it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction: Option<Friction>,
+    /// A tone in the response that is not part of the motion; not looked for in a simulation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tone: Option<Tone>,
+}
+
+/// What friction in the cavity did over the hold, per period of the motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Friction {
+    /// How often the particle stuck to the floor inside the cavity.
+    pub sticks_per_period: f64,
+    /// How long it stuck there, s.
+    #[serde(rename = "stuck_s_per_period")]
+    pub stuck_time: f64,
+    /// Energy lost to friction, J.
+    #[serde(rename = "friction_J_per_period")]
+    pub loss: f64,
+}
+
+impl Friction {
+    fn of(hold: &[Sample], periods: f64) -> Option<Self> {
+        let totals = |sample: &Sample| sample.ground_truth?.friction;
+        let (first, last) = (totals(hold.first()?)?, totals(hold.last()?)?);
+        Some(Self {
+            sticks_per_period: (last.sticks - first.sticks) as f64 / periods,
+            stuck_time: (last.stuck_time - first.stuck_time) / periods,
+            loss: (last.loss - first.loss) / periods,
+        })
+    }
+}
+
+impl Lock {
+    /// The number of impacts per period, or the note that the regime was determined without it.
+    pub fn impacts(&self) -> String {
+        if self.impacts_per_period.is_nan() {
+            "determined from the response alone".into()
+        } else {
+            format!("{:.3} impacts per period", self.impacts_per_period)
+        }
+    }
+}
+
+/// Largest number of periods before the release that are evaluated.
+const MOST: f64 = 240.0;
+/// Largest relative deviation from the amplitude of the hold, in addition to noise, of the periods from which the lock is evaluated.
+const SPREAD: f64 = 0.008;
+/// Smallest disturbance of a motion, relative to the response: less than the noise of any rig.
+const SMALLEST: f64 = 1e-6;
+/// Largest phase error of a period that is evaluated, rad: the balances are of the first order in it.
+pub(crate) const PHASE_RANGE: f64 = 0.1;
+
+/// The locked point of a record; `None` without a motion.
+fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
+    let knowledge = &plan.knowledge;
+    let d = &knowledge.numbers;
+    let (dt, hold) = (record.sample_time, record.hold());
+    let held = Cycle::all(hold, dt, knowledge.target);
+    let cycles = before_release(record, knowledge);
+    let approach = approached(&cycles, &held);
+    let largest = mean(held.iter().map(Cycle::amplitude));
+    // The balances say which drive and frequency belong to a response, whether it rests or not.
+    let level = Criterion {
+        knowledge: *knowledge,
+        precision: 1.0,
+        largest,
+        before: [None; 2],
+    }
+    .best(approach)?;
+    let [base, omega] = level.at;
+    let of_level = &approach[approach.len() - level.periods..];
+    let averaged = of_level.iter().map(|cycle| cycle.samples).sum::<usize>();
+    let speed = |sample: &Sample| Some(d.speed(sample.ground_truth?.particle_velocity.abs()));
+    let speeds: Option<Vec<f64>> = record.samples[record.hold_end - averaged..record.hold_end]
+        .iter()
+        .map(speed)
+        .collect();
+    let b = speeds.map(|speeds| {
+        let periods = speeds.chunks(averaged.div_ceil(level.periods));
+        Estimate::mean(&periods.map(|c| mean(c.iter().copied())).collect::<Vec<f64>>())
+    });
+    let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
+        (count, Regime::Unknown) => (count, regime_by_response(hold, knowledge, base, omega)),
+        by_impacts => by_impacts,
+    };
+    let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
+    let [stated_base, stated_omega] = level.stated();
+    let requested = plan.requested(omega.value);
+    let at = ResonancePoint::new(
+        [level.response, stated_base, stated_omega, phase_error(&held, knowledge)],
+        knowledge,
+    );
+    Some(Lock {
+        at,
+        requested_e_m: requested,
+        at_requested_drive: !asked::is_another(at.e_m - requested, at.u_e_m, requested),
+        b: b.map(|b| b.value),
+        u_b: b.map(|b| b.uncertainty),
+        averaged: approach.len(),
+        unseen_growth: (SPREAD / SMALLEST).powf(1.0 / approach.len() as f64) - 1.0,
+        periods_to_lock: record.settled as f64 * dt * omega.value / TAU,
+        held: record.held,
+        impacts_per_period,
+        regime,
+        regime_by_impacts: Some(regime).filter(|_| !impacts_per_period.is_nan()),
+        clipped_percent: record.clipped_percent,
+        command_v: mean_command(&record.samples[record.released - averaged..record.released], knowledge),
+        friction: Friction::of(hold, (hold.len() - 1) as f64 * dt * omega.value / TAU),
+        tone: (!is_simulated)
+            .then(|| foreign_tone(hold, knowledge, omega.value))
+            .flatten(),
+    })
+}
+
+/// Mean amplitude of the command of a shaker in samples, V; `None` without a shaker.
+pub(crate) fn mean_command(samples: &[Sample], knowledge: &Knowledge) -> Option<f64> {
+    let path = knowledge.shaker?;
+    Some(mean(samples.iter().map(|sample| sample.shaker_command)) / path.base_per_command)
+}
+
+/// The last periods before the release.
+fn before_release(record: &Record, knowledge: &Knowledge) -> Vec<Cycle> {
+    let most = knowledge.samples(MOST);
+    let samples = &record.samples[record.hold_end.saturating_sub(most.max(record.hold().len()))..record.hold_end];
+    Cycle::all(samples, record.sample_time, knowledge.target)
+}
+
+/// Those with about the amplitude and the drive of the hold; at least as many as the hold has, and as a level needs.
+fn approached<'a>(cycles: &'a [Cycle], held: &[Cycle]) -> &'a [Cycle] {
+    let near = |value: fn(&Cycle) -> f64| {
+        let values: Vec<f64> = held.iter().map(value).collect();
+        let (level, scatter) = (mean(values.iter().copied()), standard_deviation(&values));
+        move |cycle: &Cycle| (value(cycle) - level).abs() <= (SPREAD * level).max(4.0 * scatter)
+    };
+    let (response, drive) = (near(Cycle::amplitude), near(|cycle| cycle.base.norm()));
+    let is_near = |cycle: &&Cycle| response(cycle) && drive(cycle) && cycle.phase_error.abs() <= PHASE_RANGE;
+    let near = cycles.iter().rev().take_while(is_near).count();
+    let fewest = held.len().max(2 * ResonanceFit::FEWEST);
+    &cycles[cycles.len() - near.max(fewest).min(cycles.len())..]
+}
+
+/// Mean phase error over the hold, rad.
+fn phase_error(held: &[Cycle], knowledge: &Knowledge) -> Estimate {
+    let LevelEstimate { response, phase_error, at: [base, _], .. } = LevelEstimate::means(held);
+    let [noise, base_noise] =
+        [0, 1].map(|i| mean(held.iter().map(|cycle| cycle.noise[i])).sqrt() / (held.len() as f64).sqrt());
+    let mut phase_noise = (noise / response.value).hypot(base_noise / base.value);
+    // Behind a shaker noise of the readings turns the force itself, by more than that noise.
+    if knowledge.shaker.is_some() {
+        phase_noise = phase_noise.hypot(phase_error.uncertainty);
+    }
+    Estimate { uncertainty: phase_noise, ..phase_error }
+}
+
+// A measured point of phase resonance.
+
+/// A point of phase resonance as measured, in hertz and metres, and dimensionless with the parameters of the scene.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ResonancePoint {
+    /// Frequency, Hz.
+    #[serde(rename = "f_Hz")]
+    pub f_hz: f64,
+    /// Amplitude of the fundamental of the response, m.
+    #[serde(rename = "A_m")]
+    pub a_m: f64,
+    /// Base amplitude, m, measured if a sensor reads the base, otherwise commanded.
+    #[serde(rename = "E_m")]
+    pub e_m: f64,
+    /// Standard uncertainty of the frequency, Hz.
+    #[serde(rename = "u_f_Hz")]
+    pub u_f_hz: f64,
+    /// Standard uncertainty of the response, m.
+    #[serde(rename = "u_A_m")]
+    pub u_a_m: f64,
+    /// Standard uncertainty of the base amplitude, m.
+    #[serde(rename = "u_E_m")]
+    pub u_e_m: f64,
+    /// Of a structure that a force drives, its amplitude, N.
+    #[serde(rename = "F_N", skip_serializing_if = "Option::is_none")]
+    pub f_n: Option<f64>,
+    /// Standard uncertainty of the force, N.
+    #[serde(rename = "u_F_N", skip_serializing_if = "Option::is_none")]
+    pub u_f_n: Option<f64>,
+    /// Detuning.
+    pub sigma: f64,
+    /// Amplitude of the fundamental of the response over b.
+    #[serde(rename = "C")]
+    pub c: f64,
+    /// Base amplitude over `b epsilon`.
+    #[serde(rename = "G")]
+    pub g: f64,
+    /// Target of the phase of the response relative to the base, both as displacements, degrees.
+    pub phase_target_deg: f64,
+    /// Phase of the response relative to the base, minus the target, degrees.
+    pub phase_error_deg: f64,
+    /// Standard uncertainty of sigma.
+    pub u_sigma: f64,
+    /// Standard uncertainty of C.
+    #[serde(rename = "u_C")]
+    pub u_c: f64,
+    /// Standard uncertainty of G.
+    #[serde(rename = "u_G")]
+    pub u_g: f64,
+    /// Standard uncertainty of the phase error, degrees.
+    pub u_phase_deg: f64,
+}
+
+impl ResonancePoint {
+    /// From the amplitudes of response and base, m, the frequency, rad/s, and the phase error, rad.
+    pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], knowledge: &Knowledge) -> Self {
+        let d = &knowledge.numbers;
+        let [response, base, omega] = knowledge.linear.resolved([response, base, omega]);
+        let force = |amplitude: f64| Some(amplitude / knowledge.base_per_newton?);
+        Self {
+            f_hz: omega.value / TAU,
+            a_m: response.value,
+            e_m: base.value,
+            u_f_hz: omega.uncertainty / TAU,
+            u_a_m: response.uncertainty,
+            u_e_m: base.uncertainty,
+            f_n: force(base.value),
+            u_f_n: force(base.uncertainty),
+            sigma: d.sigma(omega.value),
+            c: response.value / d.b,
+            g: d.excitation(base.value),
+            phase_target_deg: d.definition.phase_in_degrees(),
+            phase_error_deg: phase_error.value.to_degrees(),
+            u_sigma: omega.uncertainty / d.omega_change(1.0),
+            u_c: response.uncertainty / d.b,
+            u_g: d.excitation(base.uncertainty),
+            u_phase_deg: phase_error.uncertainty.to_degrees(),
+        }
+    }
+}
+
+// What makes a record useless: a phase off its target while the lock was held, and a sensor that fails after the release.
+
+/// Share of a free response that impacts leave in two periods at least. They take the share pi epsilon G_imp/C in each, with
+/// G_imp = (4/pi) R B^2/C: 0.14 at epsilon = 0.05, r = 0.65, C = 0.5.
+const LEFT: f64 = 0.1;
+/// Steps of a converter below which the scatter of a response says nothing.
+const STEPS: f64 = 8.0;
+
+/// Refuses a lock whose phase is farther from its target than the tolerance of the lock, rad.
+fn on_target(lock: &Lock, tolerance: f64) -> Result<(), IdentificationError> {
+    let tolerance = tolerance.to_degrees();
+    let error = lock.at.phase_error_deg;
+    if error.abs() <= tolerance + SIGNIFICANT * lock.at.u_phase_deg {
+        return Ok(());
+    }
+    Err(IdentificationError::OffTarget { error, uncertainty: lock.at.u_phase_deg, tolerance })
+}
+
+/// Refuses a decay in which a sensor reads no number, or in which the response is lost within two periods.
+fn sensors_after_release(record: &Record, knowledge: &Knowledge) -> Result<(), IdentificationError> {
+    let decay = record.decay();
+    let failed = |n: usize, what| {
+        let seconds = n as f64 * record.sample_time;
+        Err(IdentificationError::SensorAfterRelease { seconds, what })
+    };
+    let reads_numbers = |sample: &Sample| {
+        let sensors = sample.sensors;
+        (sensors.response + sensors.reference.unwrap_or_default()).is_finite()
+    };
+    if let Some(n) = decay.iter().position(|sample| !reads_numbers(sample)) {
+        return failed(n, "reads no number");
+    }
+    let period = knowledge.samples(1.0);
+    let response: Vec<f64> = decay.iter().map(|sample| sample.sensors.response).collect();
+    let changes = response.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let step = changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min);
+    let scatters: Vec<f64> = response.chunks_exact(period).map(standard_deviation).collect();
+    let linear = &knowledge.linear;
+    // The coil of a shaker may take any share: only a reading that stays at one value is lost then.
+    let left = match knowledge.shaker {
+        Some(_) => 0.0,
+        None => LEFT * (-2.0 * TAU * linear.damping_rate / linear.omega0).exp(),
+    };
+    let is_lost = |three: &[f64]| three[0] > STEPS * step && three[2] <= left * three[0];
+    match scatters.windows(3).position(is_lost) {
+        Some(n) => failed((n + 1) * period, "stops reading the response"),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,217 @@
+//! One level: the window of the fit, and the judge of whether the motion is steady.
+//!
+//! The balances ([`ResonanceFit`]) give drive and frequency of phase resonance from any window of periods, with their standard uncertainties.
+//! What is not noise shows as a difference between the two halves of the window beyond their noise; it counts as a part of the
+//! uncertainty. A level is settled when the uncertainties are as small as the scene asks: noise lengthens the window, and so does a
+//! transient.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+use std::fmt::{self, Display, Formatter};
+
+use vines_model::numerics::{Estimate, RANDOM};
+
+use super::{Cycle, ResonanceFit};
+use vines_scene::knowledge::Knowledge;
+
+/// What is asked of a level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Criterion {
+    /// What is known of the rig.
+    pub knowledge: Knowledge,
+    /// Largest standard uncertainty of the drive E, as a share of it, and of the frequency, as a share of `omega0 E/A` at the largest level A.
+    pub precision: f64,
+    /// The largest level, m.
+    pub largest: f64,
+    /// The last two points before, the nearest last: amplitude of the response, m, drive, m, and frequency, rad/s.
+    pub before: [Option<[f64; 3]>; 2],
+}
+
+/// A point of the backbone from a window of periods.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LevelEstimate {
+    /// Number of periods.
+    pub periods: usize,
+    /// Mean amplitude of the response, m.
+    pub response: Estimate,
+    /// Mean phase error, rad.
+    pub phase_error: Estimate,
+    /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
+    pub at: [Estimate; 2],
+    /// What no level waits for, in addition to their uncertainties: the phase error where friction or gravity move the fold, and edges of the force of
+    /// a shaker that alias, whose phase is arbitrary.
+    pub added: [f64; 2],
+    /// Why more than noise is larger than the precision; `None` if the fit describes the window, and the systematic part of the uncertainty is
+    /// small enough.
+    pub unsteady: Option<Unsteady>,
+}
+
+/// What is not noise in a window of periods.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Unsteady {
+    /// Scatter of the periods over what the noise of the sensors explains; `None` where no balance describes them.
+    Scatter(Option<f64>),
+    /// Systematic part of the uncertainty of drive or frequency over what the precision allows.
+    Drift(f64),
+}
+
+impl Display for Unsteady {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Scatter(None) => write!(f, "no balance describes its periods"),
+            Self::Scatter(Some(times)) => write!(
+                f,
+                "its periods scatter {times:.1} times as much as noise of the response explains: it is modulated or irregular, or noise of the drive moves it"
+            ),
+            Self::Drift(times) => write!(
+                f,
+                "its drive or frequency drifts {times:.1} times as much as backbone.precision allows"
+            ),
+        }
+    }
+}
+
+/// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 near the
+/// fold, 0.03 rad change sigma at equal C by 1.1e-3.
+const LARGEST_PHASE_ERROR: f64 = 0.02;
+/// Delay of the impacts behind a change of the amplitude, periods: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
+/// (studies/tracking.rs).
+pub(crate) const LAG: f64 = 1.6;
+/// Largest scatter of the periods about the fit, over the noise of the sensors: chi-square per degree of freedom is then at most 4.
+const EXCESS: f64 = 2.0;
+/// Relative standard uncertainty of the slope of a straight line through two points: away from the fold the slope changes by less from level to
+/// level.
+const SLOPE: f64 = 0.5;
+/// Periods after which a level is taken, settled or not.
+pub(crate) const LONGEST: usize = 150;
+/// Shares of the periods that are considered, from the last one backwards.
+const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
+
+/// Whether a mean phase error, rad, with this standard uncertainty is too large for a level.
+pub(crate) fn is_off_target(error: f64, u: f64) -> bool {
+    error.abs() > LARGEST_PHASE_ERROR + RANDOM * u
+}
+
+impl Criterion {
+    /// The window with the smallest uncertainties, from the last of these periods backwards; `None` for too few.
+    pub fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
+        let n = cycles.len();
+        let counts = WINDOWS.map(|share| (share * n as f64).round() as usize);
+        let considered = counts.into_iter().filter(|count| *count >= 2 * ResonanceFit::FEWEST);
+        considered
+            .filter_map(|count| self.of(&cycles[n - count..]))
+            .filter(|estimate| {
+                estimate
+                    .at
+                    .iter()
+                    .all(|part| (part.value + part.uncertainty).is_finite())
+            })
+            .min_by(|first, second| self.size(first).total_cmp(&self.size(second)))
+    }
+
+    /// Whether the uncertainties are small enough, and the phase is near its target.
+    pub fn is_met(&self, estimate: &LevelEstimate) -> bool {
+        let Estimate { value, uncertainty } = estimate.phase_error;
+        self.size(estimate) <= 1.0 && !is_off_target(value, uncertainty)
+    }
+
+    /// Largest uncertainty over the largest allowed.
+    fn size(&self, estimate: &LevelEstimate) -> f64 {
+        let allowed = self.allowed(estimate.at[0].value);
+        let [base, omega] = [0, 1].map(|i| estimate.at[i].uncertainty / allowed[i]);
+        base.max(omega)
+    }
+
+    /// Largest uncertainties allowed of the drive, m, and of the frequency, rad/s, at this drive, m.
+    fn allowed(&self, drive: f64) -> [f64; 2] {
+        let (base, omega0) = (self.precision * drive.abs(), self.knowledge.linear.omega0);
+        [base, omega0 * base / self.largest]
+    }
+
+    /// Slopes of drive and frequency over the amplitude at a point: of the parabola through it and the two before, with its distance from the
+    /// line through it and the one before as a part of the uncertainty. `None` for the first point.
+    fn slopes(&self, here: [f64; 3]) -> Option<[Estimate; 2]> {
+        let [before, last] = self.before;
+        let last = last?;
+        let between = |from: [f64; 3], to: [f64; 3]| [1, 2].map(|i| (to[i] - from[i]) / (to[0] - from[0]));
+        let line = between(last, here);
+        let bend = before.map_or([0.0; 2], |before| {
+            let earlier = between(before, last);
+            let ahead = (here[0] - last[0]) / (here[0] - before[0]);
+            [0, 1].map(|i| (line[i] - earlier[i]) * ahead)
+        });
+        let slopes = [0, 1].map(|i| Estimate::new(line[i] + bend[i], &[bend[i], SLOPE * line[i]]));
+        slopes.iter().all(|slope| slope.value.is_finite()).then_some(slopes)
+    }
+
+    /// The point of a window.
+    fn of(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
+        let fit = |cycles: &[Cycle], slopes| ResonanceFit::of(cycles, &self.knowledge, slopes);
+        let whole = fit(cycles, None)?;
+        let [base, omega] = whole.at(0.0).map(|value| value.value);
+        let known = self.slopes([whole.response.value, base, omega]);
+        let (first, second) = cycles.split_at(cycles.len() / 2);
+        let (whole, first, second) = (fit(cycles, known)?, fit(first, known)?, fit(second, known)?);
+        let amplitude = whole.response.value;
+        let [first, second] = [first, second].map(|half| half.at(amplitude - half.response.value));
+        let (estimates, own) = (whole.at(0.0), whole.slopes());
+        let slope = |i: usize| {
+            let known = known.map_or(0.0, |slopes| slopes[i].value.abs());
+            own[i].value.abs().max(known).hypot(own[i].uncertainty)
+        };
+        // Systematic errors come from the force of the impacts, a phasor: an error that one balance shows can be hidden in the other.
+        let (units, change) = ([1.0, amplitude / whole.gain], LAG * whole.change);
+        let systematic = [0, 1].map(|i| {
+            let noise = first[i].uncertainty.hypot(second[i].uncertainty);
+            let drift = ((first[i].value - second[i].value).abs() - RANDOM * noise).max(0.0);
+            let late = slope(i) * change;
+            units[i] * drift.hypot(late)
+        });
+        let systematic = systematic[0].hypot(systematic[1]);
+        let at = [0, 1].map(|i| {
+            // The noise of the amplitude moves drive and frequency along their slopes.
+            let aside = slope(i) * whole.u_level;
+            let total = estimates[i];
+            Estimate::new(
+                total.value,
+                &[total.uncertainty, aside, systematic / units[i], whole.remainders[i]],
+            )
+        });
+        let allowed = self.allowed(at[0].value);
+        Some(LevelEstimate {
+            periods: cycles.len(),
+            response: whole.response,
+            phase_error: whole.phase_error,
+            at,
+            added: [0, 1].map(|i| {
+                let detuned = slope(i) * whole.remainders[2];
+                let path = self.knowledge.shaker;
+                path.map_or(detuned, |path| detuned.hypot(FRAC_1_SQRT_2 * path.aliased / units[i]))
+            }),
+            unsteady: match systematic / allowed[0].min(units[1] * allowed[1]) {
+                _ if whole.excess > EXCESS => Some(Unsteady::Scatter(Some(whole.excess))),
+                times if times > 1.0 => Some(Unsteady::Drift(times)),
+                _ => None,
+            },
+        })
+    }
+}
+
+impl LevelEstimate {
+    /// Means over the periods, of a motion that no balance describes.
+    pub fn means(cycles: &[Cycle]) -> Self {
+        let mean = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&cycles.iter().map(value).collect::<Vec<f64>>());
+        Self {
+            periods: cycles.len(),
+            response: mean(&Cycle::amplitude),
+            phase_error: mean(&|cycle| cycle.phase_error),
+            at: [mean(&|cycle| cycle.base.norm()), mean(&|cycle| cycle.omega)],
+            added: [0.0; 2],
+            unsteady: Some(Unsteady::Scatter(None)),
+        }
+    }
+
+    /// Drive, m, and frequency, rad/s, with all of their uncertainty.
+    pub fn stated(&self) -> [Estimate; 2] {
+        [0, 1].map(|i| Estimate::new(self.at[i].value, &[self.at[i].uncertainty, self.added[i]]))
+    }
+}

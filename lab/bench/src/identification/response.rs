@@ -1,0 +1,427 @@
+//! The regime from the response alone, as on a real rig.
+//!
+//! Two impacts per period at even intervals excite odd harmonics, and uneven impacts even ones, too: most of all those near another mode of the
+//! structure, so that as many are fitted as the samples can show. Irregular impacts make amplitude
+//! and phase fluctuate, which leaves a residual. The motion without impacts is the linear mode: response over base is as in a
+//! linear test at small amplitude, which the loop check makes.
+
+use std::f64::consts::{PI, TAU};
+use std::fmt::{self, Display, Formatter};
+
+use nalgebra::DVector;
+use num_complex::Complex64;
+use serde::Serialize;
+use vines_model::numerics::{Estimate, HarmonicBasis, golden_section, mean};
+use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
+
+use super::{Cycle, harmonics_of};
+use crate::record::Sample;
+use vines_scene::knowledge::{Knowledge, Target};
+use vines_scene::linear::{Impacts, impacts_by_harmonic, impacts_by_resonance};
+use vines_scene::scene::{Definition, Dimensionless, Measurand, Sensor};
+
+/// Largest residual of a steady motion, relative to the amplitude, unless it is noise.
+const STEADY: f64 = 3e-3;
+/// Smallest standard deviation of third differences, scaled to white noise, over the residual of a motion with noise alone: white noise has 1.
+const NOISE_SHARE: f64 = 0.5;
+/// Largest number of foreign tones that are subtracted: mains hum and its harmonics.
+const LINES: usize = 8;
+/// Smallest significant harmonic, in standard errors.
+const SIGNIFICANT: f64 = 4.0;
+/// Smallest even harmonic of an asymmetric motion, over the larger odd one next to it: of the second over the third, symmetric motions have about
+/// 0.01, irregular ones 2 and more.
+pub(crate) const ASYMMETRIC: f64 = 0.5;
+/// Harmonics that are fitted to a displacement.
+const HARMONICS: usize = 5;
+
+/// All harmonics that the samples can show.
+const ALL: Measurand = Measurand::Acceleration;
+
+/// Degrees of the amplitudes of the harmonics in time: quadratic for the fundamental, constant for the others.
+pub(crate) fn degrees(measurand: Measurand, samples_per_period: f64) -> Vec<Option<usize>> {
+    let count = harmonics_of(measurand, samples_per_period, HARMONICS);
+    [Some(2)].into_iter().chain(vec![Some(0); count - 1]).collect()
+}
+
+/// The harmonics that belong to what `measurand` says, for `n` samples `turn` rad of the motion apart.
+fn basis(n: usize, turn: f64, measurand: Measurand) -> HarmonicBasis {
+    let phases: Vec<f64> = (0..n).map(|n| n as f64 * turn).collect();
+    HarmonicBasis::new(&phases, 1, &degrees(measurand, TAU / turn))
+}
+
+/// Harmonic content of the response, relative to its fundamental.
+#[derive(Debug, Clone)]
+struct Content {
+    /// Amplitude of the fundamental, m.
+    amplitude: f64,
+    /// Amplitudes of the harmonics from the second on, relative.
+    harmonics: Vec<f64>,
+    /// Their standard errors: by noise, and what a change of the motion adds, as both halves of the samples show.
+    errors: Vec<f64>,
+    /// RMS of the residual, relative, and its part that is noise.
+    rest: f64,
+    noise: f64,
+    /// Foreign tones, which are not part of the residual.
+    tones: Vec<Line>,
+}
+
+impl Content {
+    /// Whether a residual is left that is not noise.
+    fn is_irregular(&self) -> bool {
+        self.rest > STEADY && self.noise < NOISE_SHARE * self.rest
+    }
+
+    /// Whether an even harmonic is more than noise and more than [`ASYMMETRIC`] of the larger odd one next to it, as displacements. `order`: how
+    /// often the sensor differentiates them. The probability of a false alarm does not depend on the number of harmonics.
+    fn is_asymmetric(&self, order: i32) -> bool {
+        let displacement = |n: usize| {
+            self.harmonics
+                .get(n - 2)
+                .map_or(0.0, |harmonic| harmonic / (n as f64).powi(order))
+        };
+        let even = (2..self.harmonics.len() + 2).step_by(2);
+        let significant = (SIGNIFICANT.powi(2) + 2.0 * (even.len() as f64).ln()).sqrt();
+        let neighbour = |n: usize| displacement(n + 1).max(if n > 2 { displacement(n - 1) } else { 0.0 });
+        even.clone().any(|n| {
+            self.harmonics[n - 2] > significant * self.errors[n - 2] && displacement(n) > ASYMMETRIC * neighbour(n)
+        })
+    }
+
+    /// Fits what a channel reads, 0 the response or 1 the reference, with as many harmonics as belong to what `measurand` says; `None` for too few
+    /// samples or no motion.
+    fn of(samples: &[Sample], knowledge: &Knowledge, omega: f64, channel: usize, measurand: Measurand) -> Option<Self> {
+        let (sample_time, d) = (knowledge.sample_time, knowledge.numbers);
+        let reading = |sample: &Sample| match channel {
+            0 => sample.sensors.response,
+            _ => sample.sensors.reference.unwrap_or(f64::NAN),
+        };
+        // The phase of the response is more uniform than the phase of a drive that a loop still corrects.
+        let (n, turn) = (samples.len(), omega * sample_time);
+        let mut values = DVector::from_iterator(n, samples.iter().map(reading));
+        let of_all = basis(n, turn, measurand);
+        if n < 2 * of_all.terms() {
+            return None;
+        }
+        let fitted = |values: &DVector<f64>| Self::fitted(&of_all, values, [omega, sample_time], &knowledge.target);
+        let (mut content, mut rest) = fitted(&values)?;
+        let mut lines: Vec<Line> = Vec::new();
+        // Tones and harmonics are fitted in turn: what a tone has in common with the harmonics remains in the residual.
+        while channel == 0 && content.is_irregular() && lines.len() < LINES {
+            let line = Line::strongest(rest.as_slice());
+            let is_known = |known: &Line| (known.turn - line.turn).abs() < TAU / n as f64;
+            if !line.is_foreign(&d, sample_time) && !lines.iter().any(is_known) {
+                break;
+            }
+            values -= DVector::from_fn(n, |n, _| line.at(n));
+            lines.push(line);
+            (content, rest) = fitted(&values)?;
+        }
+        // A change of the motion shows in both halves.
+        let half = n / 2;
+        let of_half = basis(half, turn, measurand);
+        let [first, second] =
+            [0, n - half].map(|from| of_half.fit(&DVector::from_column_slice(&values.as_slice()[from..][..half])));
+        let halves = [first?, second?];
+        for (n, error) in (2..).zip(&mut content.errors) {
+            // Harmonics keep their phase relative to the fundamental.
+            let [one, two] = halves.each_ref().map(|fit| {
+                let (size, phase) = fit.harmonic(1).to_polar();
+                fit.harmonic(n) * Complex64::cis(-(n as f64) * phase) / size
+            });
+            *error = error.hypot(0.5 * (one - two).norm());
+        }
+        Some(Self { tones: lines, ..content })
+    }
+
+    /// The content of these values, and their residual, for a motion of the frequency `omega`, rad/s.
+    fn fitted(
+        basis: &HarmonicBasis,
+        values: &DVector<f64>,
+        [omega, sample_time]: [f64; 2],
+        target: &Target,
+    ) -> Option<(Self, DVector<f64>)> {
+        let n = values.len();
+        let fit = basis.fit(values)?;
+        let rest = basis.residual(values, &fit);
+        let amplitude = fit.harmonic(1).norm();
+        if amplitude == 0.0 || !amplitude.is_finite() {
+            return None;
+        }
+        let rms = (rest.norm_squared() / (n - basis.terms()) as f64).sqrt() / amplitude;
+        // Behind a filter a converter and a remainder of the motion are as white as before.
+        let coloured = |k: usize| target.colour(k as f64 * omega, sample_time).max(1.0);
+        let error = |k: usize| rms * (2.0 / n as f64 * coloured(k)).sqrt();
+        let harmonics: Vec<f64> = (2..=fit.harmonics())
+            .map(|n| fit.harmonic(n).norm() / amplitude)
+            .collect();
+        let content = Self {
+            amplitude,
+            errors: (2..=fit.harmonics()).map(error).collect(),
+            harmonics,
+            rest: rms,
+            noise: target.noise(rest.as_slice(), sample_time) / amplitude,
+            tones: Vec::new(),
+        };
+        Some((content, rest))
+    }
+}
+
+/// The largest foreign tone in the response of these samples, if they would be irregular with it. `omega` (rad/s) is the frequency of the motion.
+pub fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Tone> {
+    let content = Content::of(samples, knowledge, omega, 0, ALL)?;
+    let tones = content.tones.iter();
+    let largest = tones.max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
+    Some(Tone {
+        hertz: largest.turn / (TAU * knowledge.sample_time),
+        share: largest.amplitude() / content.amplitude,
+    })
+}
+
+/// These samples without the foreign tones in their response; `None` if there are none.
+pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Vec<Sample>> {
+    let tones = Content::of(samples, knowledge, omega, 0, knowledge.target.measurands[0])?.tones;
+    let mut cleaned = samples.to_vec();
+    for (n, sample) in cleaned.iter_mut().enumerate() {
+        sample.sensors.response -= tones.iter().map(|line| line.at(n)).sum::<f64>();
+    }
+    (!tones.is_empty()).then_some(cleaned)
+}
+
+/// Harmonics 2 to 7 of the reference over its first; `None` without a reference, and for fewer than two samples per period of the last.
+pub fn drive_harmonics(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<[f64; 6]> {
+    let turn = omega * knowledge.sample_time;
+    let values: Option<Vec<f64>> = samples.iter().map(|sample| sample.sensors.reference).collect();
+    let values = values.filter(|_| 7.0 * turn < PI)?;
+    let phases: Vec<f64> = (0..values.len()).map(|n| n as f64 * turn).collect();
+    let degrees: [_; 7] = std::array::from_fn(|n| Some(if n == 0 { 2 } else { 0 }));
+    let fit = HarmonicBasis::new(&phases, 1, &degrees).fit(&DVector::from_vec(values))?;
+    let first = fit.harmonic(1).norm();
+    (first > 0.0).then(|| std::array::from_fn(|n| fit.harmonic(n + 2).norm() / first))
+}
+
+/// Whether the reference shows an asymmetric motion: behind a shaker it also contains the impacts, and more of them where the stinger resonates.
+fn is_asymmetric_by_reference(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> bool {
+    let content = knowledge
+        .shaker
+        .and_then(|_| Content::of(samples, knowledge, omega, 1, ALL));
+    content.is_some_and(|content| content.is_asymmetric(knowledge.target.measurands[1].order()))
+}
+
+/// Longest cycle of periods that a bifurcation of a 1:1 motion leads to and locks in place: the strong resonances are those of one to four periods.
+const LONGEST_CYCLE: usize = 4;
+
+/// The number of periods after which the motion in these samples of a hold repeats, if it is more than one. `omega` (rad/s): its frequency.
+///
+/// The responses of the periods are a complex number each. Without their trend, noise is as large at a subharmonic as at other frequencies,
+/// or smaller, because loops are slow. A subharmonic of the power P, of n periods with the remaining power Q, then exceeds `P/Q` with the probability
+/// `(1 + P/Q)^-(n-4)`. The samples that differ from their harmonics within a period are noise at least.
+pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<usize> {
+    let cleaned = without_tones(samples, knowledge, omega);
+    let cycles = Cycle::all(
+        cleaned.as_deref().unwrap_or(samples),
+        knowledge.sample_time,
+        knowledge.target,
+    );
+    let trend = HarmonicBasis::new(&vec![0.0; cycles.len()], 2, &[]);
+    let sum: Complex64 = cycles.iter().map(|cycle| cycle.response).sum();
+    // Parts in phase with the mean, and a quarter of a period beside it.
+    let deviations = |turn: Complex64| {
+        let part = |cycle: &Cycle| (cycle.response * turn * sum.conj()).re / sum.norm();
+        let values = DVector::from_iterator(cycles.len(), cycles.iter().map(part));
+        Some(trend.residual(&values, &trend.fit(&values)?))
+    };
+    let (along, beside) = (deviations(Complex64::ONE)?, deviations(-Complex64::I)?);
+    let free = cycles.len() as f64 - 4.0;
+    let noise = 2.0 * mean(cycles.iter().map(|cycle| cycle.noise[0]));
+    let (total, least) = (along.norm_squared() + beside.norm_squared(), free * noise);
+    let chance = |turns: f64| {
+        let values = along.iter().zip(&beside).map(|(re, im)| Complex64::new(*re, *im));
+        let line = values
+            .enumerate()
+            .map(|(k, value)| value * Complex64::cis(-TAU * turns * k as f64));
+        let power = line.sum::<Complex64>().norm_sqr() / cycles.len() as f64;
+        (1.0 + power / (total - power).max(least)).powf(-free)
+    };
+    // Two quarters of a turn are a half.
+    let turns = (2..=LONGEST_CYCLE).flat_map(|m| (1..m).filter(move |j| *j == 1 || m % j > 0).map(move |j| (m, j)));
+    let lines: Vec<(usize, f64)> = turns.map(|(m, j)| (m, chance(j as f64 / m as f64))).collect();
+    let (periods, chance) = lines.iter().min_by(|one, other| one.1.total_cmp(&other.1))?;
+    (chance * (lines.len() as f64) < (-0.5 * SIGNIFICANT.powi(2)).exp()).then_some(*periods)
+}
+
+/// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase target,
+/// and `omega` (rad/s) its frequency.
+///
+/// Impacts need evidence: frequency and loss that no particle between carried and free produces; without a linear response that was measured on
+/// the rig, a third harmonic that none produces.
+pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
+    let Some(content) = Content::of(samples, knowledge, omega.value, 0, ALL) else {
+        return Regime::Unknown;
+    };
+    if content.is_irregular() {
+        return Regime::Other;
+    }
+    let Dimensionless { epsilon, definition, omega0, .. } = knowledge.numbers;
+    let target = knowledge.target;
+    let coloured = target.colour(omega.value, knowledge.sample_time);
+    let noise = content.rest * (2.0 * coloured / samples.len() as f64).sqrt();
+    let amplitude = content.amplitude * target.displacement(0, omega.value).norm();
+    let response = Estimate::new(amplitude, &[noise * amplitude]);
+    // The parameters of a simulation are known.
+    let is_known = knowledge.is_measured || samples.iter().any(|sample| sample.ground_truth.is_some());
+    // The force on the mass M over its inertia in the fundamental.
+    let square = (3.0 * omega.value / omega0).powi(2);
+    let force = |harmonic: f64| 9.0 * (square - 1.0) * harmonic / over_v(definition, square);
+    let third_harmonic = content.harmonics[1];
+    let third = Estimate {
+        value: force(third_harmonic),
+        uncertainty: force(content.errors[1]),
+    };
+    let significant = SIGNIFICANT * content.errors[1];
+    let impacts = match is_known {
+        true => impacts_by_resonance(&knowledge.linear, [response, base, omega], target.phase, epsilon),
+        false if third_harmonic > significant => impacts_by_harmonic(third, epsilon),
+        false => Impacts::Doubtful,
+    };
+    match impacts {
+        Impacts::NotNeeded if is_known => Regime::NoImpacts,
+        Impacts::NotNeeded | Impacts::Doubtful => Regime::NotEstablished,
+        Impacts::Needed if content.is_asymmetric(target.measurands[0].order()) => Regime::Asymmetric,
+        Impacts::Needed if is_asymmetric_by_reference(samples, knowledge, omega.value) => Regime::Asymmetric,
+        Impacts::Needed if third_harmonic > significant => Regime::Symmetric,
+        Impacts::Needed => Regime::Unresolved,
+    }
+}
+
+// Foreign tones: lines in the response that no motion of the particle produces.
+//
+// The response belongs to a linear oscillator, which only its base and the particle excite. The particle stays in its cavity: a line of its
+// relative position has at most the amplitude 4b/π, as a square wave has. With x = ω/ω0, a line of the response v therefore has at most
+// the amplitude `4 epsilon b/(π |x² - 1|)`, of q1 x² times as much, of its velocity x³ and of its acceleration x⁴ times as much, whatever the
+// motion: irregular, period-doubled or quasi-periodic. A larger line comes from a sensor or a cable, for instance from the mains.
+
+/// Smallest foreign tone, over the largest line of a motion: epsilon and b are known within a factor of two.
+const ABOVE: f64 = 2.0;
+
+/// Largest number of values in which a line is searched for: the work grows with the square of it.
+const SEARCHED: usize = 2048;
+
+/// A sine in the response that is not part of the motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Tone {
+    /// Frequency, Hz.
+    pub hertz: f64,
+    /// Amplitude over the response.
+    pub share: f64,
+}
+
+impl Display for Tone {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "a foreign tone of {:.1} Hz, {:.1} % of the response",
+            self.hertz,
+            100.0 * self.share
+        )
+    }
+}
+
+/// A line of a signal.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Line {
+    /// Frequency, rad per sample.
+    pub turn: f64,
+    /// Amplitudes of the cosine and the sine.
+    parts: [f64; 2],
+}
+
+impl Line {
+    /// The strongest line of these values; where there are many, the strongest of the last ones.
+    pub fn strongest(values: &[f64]) -> Self {
+        let power = |values: &[f64], turn: f64| transform(values, turn).iter().map(|part| part * part).sum::<f64>();
+        let highest = |values: &[f64], turn: f64, width: f64| {
+            golden_section(turn - width, turn + width, |turn| -power(values, turn))
+        };
+        let last = &values[values.len().saturating_sub(SEARCHED)..];
+        let [bin, fine] = [last.len(), values.len()].map(|count| PI / count as f64);
+        let bins = (1..last.len()).map(|k| k as f64 * bin);
+        let (coarse, _) = bins
+            .map(|turn| (turn, power(last, turn)))
+            .fold((bin, 0.0), |best, next| if next.1 > best.1 { next } else { best });
+        let turn = highest(values, highest(last, coarse, bin), fine);
+        let scale = 2.0 / values.len() as f64;
+        Self {
+            turn,
+            parts: transform(values, turn).map(|part| scale * part),
+        }
+    }
+
+    pub fn amplitude(&self) -> f64 {
+        self.parts[0].hypot(self.parts[1])
+    }
+
+    /// The value at a sample.
+    pub fn at(&self, sample: usize) -> f64 {
+        let (sine, cosine) = (self.turn * sample as f64).sin_cos();
+        self.parts[0] * cosine + self.parts[1] * sine
+    }
+
+    /// Whether no motion of the particle produces it.
+    pub fn is_foreign(&self, d: &Dimensionless, sample_time: f64) -> bool {
+        let square = (self.turn / (sample_time * d.omega0)).powi(2);
+        let largest = 4.0 / PI * d.epsilon * d.b * over_v(d.definition, square) / (square - 1.0).abs();
+        self.amplitude() > ABOVE * largest
+    }
+}
+
+/// A line of what a sensor reads over the line of v, relative to their fundamentals; `square`: of its frequency over omega0.
+fn over_v(definition: Definition, square: f64) -> f64 {
+    match definition.sensor {
+        Sensor::V => 1.0,
+        Sensor::Q1 => square * square.sqrt().powi(definition.sensor_quantity.order()),
+    }
+}
+
+/// Sums of the values times cosine and sine.
+fn transform(values: &[f64], turn: f64) -> [f64; 2] {
+    let (sine, cosine) = turn.sin_cos();
+    let (mut sums, mut rotor) = ([0.0; 2], [1.0, 0.0]);
+    for value in values {
+        sums = [sums[0] + value * rotor[0], sums[1] + value * rotor[1]];
+        rotor = [rotor[0] * cosine - rotor[1] * sine, rotor[1] * cosine + rotor[0] * sine];
+    }
+    sums
+}
+
+// The regime, from the impacts that a simulated rig reports.
+
+/// The impacts in the samples; of several between two samples, the last one.
+pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
+    let truths: Vec<_> = samples.iter().filter_map(|sample| sample.ground_truth).collect();
+    truths
+        .windows(2)
+        .filter(|pair| pair[1].impacts > pair[0].impacts)
+        .map(|pair| Impact { time: pair[1].impact_time, velocity: pair[1].impact_velocity })
+        .collect()
+}
+
+/// Impacts per period of `omega` (rad/s) over the samples, and the regime they make.
+pub fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64, Regime) {
+    let mut truths = samples.iter().filter_map(|sample| sample.ground_truth);
+    let (Some(first), Some(last)) = (truths.next(), truths.next_back()) else {
+        return (f64::NAN, Regime::Unknown);
+    };
+    let impacts = impacts(samples);
+    let (Some(from), Some(to)) = (impacts.first(), impacts.last()) else {
+        return (0.0, Regime::NoImpacts);
+    };
+    let (span, period) = (to.time - from.time, TAU / omega);
+    // Counted from impact to impact, so that the ends of the record have no influence.
+    let count = (last.impacts - first.impacts) as f64;
+    let per_period = if span > 0.0 {
+        (count - 1.0) * period / span
+    } else {
+        count * period / (samples.len() as f64 * sample_time)
+    };
+    (per_period, one_to_one(&impacts, per_period, MEASURED))
+}

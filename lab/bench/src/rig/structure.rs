@@ -1,0 +1,237 @@
+//! A simulated structure as a rig, which measures the oscillator of its driven mode; with the limits of a shaker, and what fails.
+
+use lovines::{Parameters, Plant, Refused, Row, State, StructureState};
+use vines_model::Sensor;
+
+use super::{Clock, Drive, ForceCell, Rig, RigError, RigStage, Sensors, Simulated};
+use vines_scene::scene::{Excitation, Release, SceneShaker, Structure};
+
+/// A simulated structure. Its drive is the base displacement that moves the oscillator of the driven mode as the drive moves the mode, and its
+/// response the displacement of the driven mode at the cavity that the sensor would read: both m, and the loop, its limits and results are
+/// those of one oscillator.
+#[derive(Clone)]
+pub struct SimulatedStructure {
+    simulated: Simulated<lovines::Structure>,
+    structure: Structure,
+    /// The displacement at the sensor, by the sections.
+    sensor: Row,
+    /// Base displacement per command, and displacement at the sensor per displacement at the cavity.
+    base_per_command: f64,
+    reading_per_response: f64,
+    /// Largest command that the amplifier passes on, V.
+    clipped_at: f64,
+    /// What fails, and when, s.
+    fault: Option<(ShakerFault, f64)>,
+    /// Largest command so far, V.
+    driven: f64,
+    /// The structure with its stinger, while this is cut by a release.
+    attached: Option<Structure>,
+}
+
+/// How a shaker fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShakerFault {
+    /// The stinger breaks.
+    StingerBreaks,
+    /// The amplifier clips at half of the present command.
+    AmplifierClips,
+    /// The armature is at its stop: where it is now, or as soon as it moves outwards.
+    AtStop,
+}
+
+impl SimulatedStructure {
+    /// A structure at rest, and its particle at `start`; of `parameters` those of the particle and its cavity count.
+    pub fn new(structure: &Structure, parameters: Parameters, start: State) -> Result<Self, Refused> {
+        let start = StructureState { q2: start.q2, dq2: start.dq2, ..StructureState::default() };
+        let plant = Plant::with_host(structure.host.clone(), parameters, &start)?;
+        let clipped_at = structure
+            .shaker
+            .as_ref()
+            .map_or(f64::INFINITY, SceneShaker::largest_command);
+        Ok(Self {
+            simulated: Simulated { plant, sensor: Sensor::Q1, clock: Clock::default() },
+            sensor: structure.response(),
+            base_per_command: structure.base_per_command(),
+            reading_per_response: structure.reading_per_response().abs(),
+            structure: structure.clone(),
+            clipped_at,
+            fault: None,
+            driven: 0.0,
+            attached: None,
+        })
+    }
+
+    /// The plant.
+    pub fn plant(&self) -> &Plant<lovines::Structure> {
+        &self.simulated.plant
+    }
+
+    /// The structure as it is now: with its stinger, or without.
+    pub fn structure(&self) -> &Structure {
+        &self.structure
+    }
+
+    /// With a fault of the shaker that begins after some seconds.
+    #[must_use]
+    pub fn failing(self, fault: ShakerFault, seconds: f64) -> Self {
+        Self { fault: Some((fault, seconds)), ..self }
+    }
+
+    /// Goes on as another structure with the same coordinates: with a cut stinger, or with its own.
+    fn becomes(&mut self, structure: Structure) -> Result<(), RigError> {
+        let coordinates = self.structure.coordinates_with_shaker();
+        let coordinates = coordinates.map_err(|error| RigError::Failed(error.into()))?;
+        let plant = &self.simulated.plant;
+        let of = |derivative: usize| coordinates.iter().map(|row| plant.point(row)[derivative]).collect();
+        let State { q2, dq2, .. } = plant.state();
+        let state = StructureState { displacements: of(0), velocities: of(1), q2, dq2 };
+        self.simulated.plant.replace_host(structure.host.clone(), &state)?;
+        self.sensor = structure.response();
+        self.structure = structure;
+        Ok(())
+    }
+
+    /// Cuts the stinger. Returns the structure with it.
+    fn cut_stinger(&mut self) -> Result<Option<Structure>, RigError> {
+        self.driven = 0.0;
+        let Some(cut) = self.structure.with_broken_stinger() else {
+            return Ok(None);
+        };
+        let attached = self.structure.clone();
+        self.becomes(cut.map_err(|error| RigError::Failed(error.into()))?)?;
+        Ok(Some(attached))
+    }
+
+    /// What fails, is cut or attached now: `command`, V, is the amplitude of the drive. The next drive begins with the stinger again: a check of the
+    /// loop ends with a release, too.
+    fn change(&mut self, command: f64) -> Result<(), RigError> {
+        if command > 0.0
+            && let Some(attached) = self.attached.take()
+        {
+            self.becomes(attached)?;
+        }
+        let begins = |(_, at): &mut (ShakerFault, f64)| self.simulated.clock.time() >= *at;
+        let fault = self.fault.take_if(begins).map(|(fault, _)| fault);
+        let Some(shaker) = &mut self.structure.shaker else {
+            return Ok(());
+        };
+        self.driven = command.max(self.driven);
+        let is_released = command == 0.0 && self.driven > 0.0 && shaker.release == Release::Cut;
+        match fault {
+            Some(ShakerFault::AmplifierClips) => self.clipped_at = 0.5 * command,
+            Some(fault @ ShakerFault::AtStop) => {
+                let [at, velocity, _] = self.simulated.plant.point(&shaker.rows.armature);
+                if at * velocity > 0.0 {
+                    shaker.limits.stroke = Some(at.abs());
+                } else {
+                    self.fault = Some((fault, 0.0));
+                }
+            }
+            Some(ShakerFault::StingerBreaks) => _ = self.cut_stinger()?,
+            None if is_released => self.attached = self.cut_stinger()?,
+            None => {}
+        }
+        Ok(())
+    }
+
+    /// Advances under a drive, m, N or V; a command is clipped, and the other limits of a shaker are looked at.
+    ///
+    /// # Errors
+    /// A value that is not allowed; a limit of the shaker.
+    pub fn step(&mut self, drive: lovines::Drive, step: f64) -> Result<(), RigError> {
+        self.commanded(drive.amplitude.hypot(drive.signal[0]), drive, step)
+    }
+
+    /// The same under a command of this amplitude, of which a held sample can be zero.
+    fn commanded(&mut self, command: f64, drive: lovines::Drive, step: f64) -> Result<(), RigError> {
+        self.change(command)?;
+        let Some(shaker) = &self.structure.shaker else {
+            return self.simulated.step(drive, step);
+        };
+        let Simulated { plant, clock, .. } = &mut self.simulated;
+        plant.set_time(clock.time());
+        plant.advance_within(self.clipped_at, drive, step)?;
+        clock.advance(step);
+        let rows = &shaker.rows;
+        let limits = &shaker.limits;
+        for (name, key, row, per_command, limit, unit) in [
+            (
+                "voltage",
+                "voltage_max",
+                &rows.voltage,
+                rows.voltage_per_command,
+                limits.voltage,
+                "V",
+            ),
+            (
+                "current",
+                "current_max",
+                &rows.current,
+                rows.current_per_command,
+                limits.current,
+                "A",
+            ),
+            (
+                "displacement of the armature",
+                "stroke_max",
+                &rows.armature,
+                0.0,
+                limits.stroke,
+                "m",
+            ),
+            ("force", "force_max", &rows.force, 0.0, limits.force, "N"),
+        ] {
+            let value = plant.point(row)[0] + per_command * plant.base_displacement();
+            // The command is clipped at the limit itself.
+            if let Some(limit) = limit.filter(|limit| value.abs() > limit * (1.0 + 1e-9)) {
+                return Err(RigError::ShakerLimit { name, key, value, limit, unit });
+            }
+        }
+        Ok(())
+    }
+
+    /// The reference as a base displacement, m: the drive, the force cell or the table.
+    fn reference(&self) -> f64 {
+        let plant = &self.simulated.plant;
+        let Some(SceneShaker { rows, .. }) = &self.structure.shaker else {
+            return plant.base_displacement() * self.base_per_command;
+        };
+        let row = match self.structure.excitation {
+            Excitation::Base => &rows.end,
+            Excitation::Force => &rows.force,
+        };
+        self.structure.base_per_drive() * plant.point(row)[0]
+    }
+}
+
+impl ForceCell for SimulatedStructure {
+    fn cell_displacement(&mut self) -> Result<f64, RigError> {
+        let shaker = self.structure.shaker.as_ref();
+        Ok(shaker.map_or(0.0, |shaker| self.simulated.plant.point(&shaker.rows.end)[0]))
+    }
+}
+
+impl RigStage for SimulatedStructure {
+    fn inner(&mut self) -> &mut dyn Rig {
+        &mut self.simulated
+    }
+
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        let [displacement, ..] = self.simulated.plant.point(&self.sensor);
+        Ok(Sensors {
+            response: displacement / self.reading_per_response,
+            reference: Some(self.reference()),
+        })
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        let amplitude = drive.amplitude / self.base_per_command;
+        self.step(lovines::Drive::harmonic(amplitude, drive.omega), step)
+    }
+
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        let [command, sample] =
+            [drive.amplitude.hypot(drive.displacement), drive.displacement].map(|value| value / self.base_per_command);
+        self.commanded(command, lovines::Drive::held(sample), step)
+    }
+}

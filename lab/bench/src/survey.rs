@@ -1,0 +1,289 @@
+//! Exact orbits of a scene, whose host is one oscillator or a structure: at phase resonance, along the backbone, and what a structure's other
+//! modes do to both.
+
+use serde::Serialize;
+use vines_model::Dimensionless;
+use vines_model::orbit::{
+    self, Orbit, OrbitCurve, SEARCHED, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
+    StructureOrbits, StructureRange, at_amplitude,
+};
+
+use crate::fit::{self, Contradiction, MeasuredPoint};
+use vines_scene::scene::{Scene, Structure};
+
+/// Orbits on a curve.
+const POINTS: usize = 400;
+/// Detunings of one oscillator's backbone.
+pub const DETUNINGS: [f64; 2] = [-6.0, 6.0];
+
+/// What is known of a structure without driving it. The response is the displacement at the sensor, m.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Survey {
+    /// The sections of the host, which are its modes, and the backbone with the driven one alone and with all.
+    pub facts: StructureFacts,
+    /// The section of the driven mode.
+    pub driven: usize,
+    /// Orbits at phase resonance under the scene's drive, from 0.2 to 3 times the frequency of the driven mode, and where the controller may set the
+    /// frequency.
+    pub orbits: Vec<StructureOrbit>,
+    /// Stable orbits of the backbone behind a shaker, by rising response, beside those under a pure sine.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub behind_shaker: Vec<BehindShaker>,
+}
+
+/// An orbit of the backbone of structure and shaker under a sine of the command, and the orbit of the structure alone with the same response under a
+/// sine of the reference, which is the force, N, or the displacement of the table, m. They differ by the harmonics of the reference.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BehindShaker {
+    /// Amplitude of the response, m.
+    pub response: f64,
+    /// Frequency, rad/s, and amplitude of the reference.
+    pub at: [f64; 2],
+    /// Harmonics 3, 5 and 7 of the reference over its first; a symmetric motion has no even ones.
+    pub harmonics: [f64; 3],
+    /// The same under a sine of the reference, if there is such an orbit.
+    pub by_sine: Option<[f64; 2]>,
+}
+
+impl Survey {
+    /// Number of orbits that are tried where the backbone is one curve.
+    pub const ORBITS: usize = 2 * POINTS;
+
+    /// The survey of a scene's structure; `None` without one.
+    pub fn of(scene: &Scene) -> Option<Self> {
+        Self::with(scene, &|| ())
+    }
+
+    /// The survey; `progress` is called for every orbit of the backbone that is tried, about [`Self::ORBITS`] times.
+    pub fn with(scene: &Scene, progress: &dyn Fn()) -> Option<Self> {
+        let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
+        let driven = section_of(structure);
+        let facts = orbits.facts(driven, scene.frequencies(), POINTS, progress)?;
+        let [low, high] = scene.frequencies();
+        let [least, most] = SEARCHED.map(|share| share * scene.plant.natural_frequency());
+        Some(Self {
+            behind_shaker: behind_shaker(scene, &facts.all).unwrap_or_default(),
+            facts,
+            driven,
+            orbits: orbits.resonant(scene.structure_drive()?, [low.min(least), high.max(most)]),
+        })
+    }
+
+    /// Where another mode takes the stability of the backbone.
+    pub fn taken(&self) -> impl Iterator<Item = (usize, &StabilityChange)> {
+        let stretches = self.facts.all.iter().flat_map(StructureBranch::stable);
+        stretches
+            .flat_map(|(_, ends)| ends)
+            .flatten()
+            .filter_map(|change| Some((change.section().filter(|mode| *mode != self.driven)?, change)))
+    }
+}
+
+/// Orbits of the longest stable stretch of a backbone that are compared with those under a sine.
+const COMPARED: usize = 9;
+
+/// Orbits of this backbone behind the scene's shaker, and under a pure sine; `None` without a shaker.
+fn behind_shaker(scene: &Scene, backbone: &[StructureBranch]) -> Option<Vec<BehindShaker>> {
+    let structure = scene.structure.as_ref()?;
+    let shaker = structure.shaker.as_ref()?;
+    let alone = scene.orbits_of(&shaker.alone);
+    let stretches = backbone.iter().flat_map(StructureBranch::stable).map(|(run, _)| run);
+    let run = stretches.max_by_key(|run| run.len())?;
+    let mut orbits: Vec<&StructureOrbit> = run.iter().step_by(run.len().div_ceil(COMPARED)).collect();
+    orbits.sort_by(|one, other| one.response.total_cmp(&other.response));
+    let compared = |orbit: &StructureOrbit| {
+        // The impulses of two impacts per period, as a force.
+        let impulses = 4.0 * scene.plant.particle_mass * orbit.speed * orbit.omega / std::f64::consts::PI;
+        let harmonic = |order: f64| {
+            let omega = order * orbit.omega;
+            let reference = shaker.reference(structure.excitation, omega);
+            let per_force = structure.host.frequency_response_to_cavity(&reference, omega);
+            impulses * per_force.norm() / orbit.reference
+        };
+        BehindShaker {
+            response: orbit.response,
+            at: [orbit.omega, orbit.reference],
+            harmonics: [3.0, 5.0, 7.0].map(harmonic),
+            by_sine: with_response(&alone, orbit.response, orbit.omega).map(|sine| [sine.omega, sine.reference]),
+        }
+    };
+    Some(orbits.into_iter().map(compared).collect())
+}
+
+/// The orbit at phase resonance with this response, m, near a frequency, rad/s.
+fn with_response(orbits: &StructureOrbits, response: f64, omega: f64) -> Option<StructureOrbit> {
+    let distance = |orbit: &StructureOrbit| (orbit.response - response).abs();
+    let found = orbits.at_phase_resonance(omega).into_iter();
+    let near = found.min_by(|one, other| distance(one).total_cmp(&distance(other)))?;
+    orbits.at_response(response, [omega, near.speed])
+}
+
+/// The exact phase-resonant orbits of a scene under its drive, by rising C; `numbers` are those of its oscillator or driven mode.
+pub fn phase_resonant(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
+    let of_structure = || {
+        let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
+        let found = orbits.resonant(scene.structure_drive()?, scene.frequencies());
+        Some(
+            found
+                .iter()
+                .map(|orbit| of_driven_mode(orbit, structure, numbers))
+                .collect(),
+        )
+    };
+    of_structure().unwrap_or_else(|| orbit::phase_resonant(numbers))
+}
+
+/// The exact backbone of a scene's structure, curve by curve; `None` for one oscillator.
+pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<Vec<Orbit>>> {
+    let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
+    // Other modes may have the motion that the loop finds.
+    let range = orbits.range(section_of(structure), POINTS)?.with(scene.frequencies());
+    let told = |orbit: &StructureOrbit| of_driven_mode(orbit, structure, numbers);
+    let curves = orbits.backbone(&range).into_iter();
+    Some(curves.map(|branch| branch.orbits.iter().map(told).collect()).collect())
+}
+
+/// The stable orbits of a scene's exact backbone, with those where its stable stretches begin and end.
+pub fn stable_backbone(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
+    let of_structure = || {
+        let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
+        let range = orbits.range(section_of(structure), POINTS)?.with(scene.frequencies());
+        let branches = orbits.backbone(&range);
+        let stable = branches
+            .iter()
+            .flat_map(StructureBranch::stable_to_their_ends)
+            .flatten();
+        Some(stable.map(|orbit| of_driven_mode(orbit, structure, numbers)).collect())
+    };
+    let alone = || {
+        orbit::stable_backbone(numbers, DETUNINGS, POINTS)
+            .into_iter()
+            .flatten()
+            .collect()
+    };
+    of_structure().unwrap_or_else(alone)
+}
+
+/// The exact orbits of a scene at phase resonance, one by one, in the numbers of its oscillator or driven mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExactOrbits {
+    numbers: Dimensionless,
+    /// Of a structure: its orbits, base per drive and reading per response.
+    structure: Option<(StructureOrbits, [f64; 2])>,
+}
+
+impl ExactOrbits {
+    /// Those of the oscillator or the structure of a scene.
+    pub fn of(scene: &Scene, numbers: &Dimensionless) -> Self {
+        let structure = scene.structure.as_ref().zip(scene.structure_orbits());
+        let structure = structure.map(|(structure, orbits)| {
+            let units = [structure.base_per_drive(), structure.reading_per_response().abs()];
+            (orbits, units)
+        });
+        Self { numbers: *numbers, structure }
+    }
+
+    /// Those of an oscillator.
+    pub fn of_oscillator(numbers: &Dimensionless) -> Self {
+        Self { numbers: *numbers, structure: None }
+    }
+
+    /// The orbit with the response C, near a detuning and a speed of the particle.
+    pub fn with_amplitude(&self, c: f64, [sigma, speed]: [f64; 2]) -> Option<Orbit> {
+        let d = &self.numbers;
+        let Some((orbits, [per_drive, per_response])) = &self.structure else {
+            return orbit::with_amplitude(d, c, [sigma, speed]);
+        };
+        let near = [d.omega(sigma), speed * d.b * d.omega0];
+        let found = orbits.at_response(c * d.b * per_response, near)?;
+        Some(found.in_numbers(d, *per_drive, *per_response))
+    }
+}
+
+/// Curves of the exact symmetric 1:1 orbits of a scene's structure at these detunings: at phase resonance, or the frequency response under the
+/// scene's drive. `None` for one oscillator.
+pub fn structure_curves(
+    scene: &Scene,
+    numbers: &Dimensionless,
+    sigma: [f64; 2],
+    is_response: bool,
+) -> Option<Vec<OrbitCurve>> {
+    let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
+    let range = StructureRange::at_any_speed(numbers, sigma, POINTS);
+    let branches = match is_response {
+        true => orbits.frequency_response(scene.structure_drive()?, &range),
+        false => orbits.backbone(&range),
+    };
+    let [per_drive, per_response] = [structure.base_per_drive(), structure.reading_per_response().abs()];
+    let told = branches
+        .iter()
+        .map(|branch| branch.in_numbers(numbers, per_drive, per_response));
+    Some(told.collect())
+}
+
+/// Detunings of a structure's backbone and of the frequencies that the controller may set.
+pub fn detunings(scene: &Scene, numbers: &Dimensionless) -> Option<[f64; 2]> {
+    let orbits = scene.structure_orbits()?;
+    let range = orbits.range(section_of(scene.structure.as_ref()?), POINTS)?;
+    Some(range.with(scene.frequencies()).omega.map(|omega| numbers.sigma(omega)))
+}
+
+/// Measured points of a structure as its driven mode alone would have them.
+///
+/// A point is moved by the difference, in frequency and drive, between the exact orbits with its response at the scene's parameters: of the driven mode
+/// alone, and of all modes near the frequency of the point. Points where one of them does not exist are left out. Those of one mode without a shaker stay.
+pub fn without_other_modes(scene: &Scene, points: Vec<MeasuredPoint>) -> Vec<MeasuredPoint> {
+    let host = scene.structure.as_ref().zip(scene.structure_orbits());
+    let Some((structure, orbits)) =
+        host.filter(|(structure, _)| structure.modes.len() > 1 || structure.shaker.is_some())
+    else {
+        return points;
+    };
+    let moved = |mut point: MeasuredPoint| {
+        let definition = scene.definition().at_phase(point.phase);
+        let numbers = Dimensionless { definition, ..scene.dimensionless() };
+        let response = point.response.value * structure.reading_per_response().abs();
+        let all = with_response(&orbits.clone().with_target(point.phase), response, point.omega.value)?;
+        let all = of_driven_mode(&all, structure, &numbers);
+        let alone = at_amplitude(&numbers, point.response.value / numbers.b)?;
+        point.omega.value += numbers.omega0 * (alone.omega - all.omega);
+        point.drive.value += numbers.amplitude(alone.g - all.g);
+        Some(point)
+    };
+    points.into_iter().filter_map(moved).collect()
+}
+
+/// How measured points contradict their scene; `None` where they do not, or cannot tell, or where the cavity of the scene is not ideal. The points of a
+/// structure are compared as its driven mode alone would have them.
+pub fn contradiction(scene: &Scene, points: Vec<MeasuredPoint>) -> Option<Contradiction> {
+    if scene.left_out_of_cavity().is_some() {
+        return None;
+    }
+    let points = without_other_modes(scene, points);
+    fit::contradiction(&points, scene.definition(), &scene.plant)
+}
+
+/// An orbit of a structure in the numbers of its driven mode: C is the response over that of the mode with the amplitude b at the cavity.
+fn of_driven_mode(orbit: &StructureOrbit, structure: &Structure, numbers: &Dimensionless) -> Orbit {
+    orbit.in_numbers(
+        numbers,
+        structure.base_per_drive(),
+        structure.reading_per_response().abs(),
+    )
+}
+
+/// The section of the driven mode: the nearest in frequency.
+fn section_of(structure: &Structure) -> usize {
+    let distance = |n: &usize| {
+        let oscillator = &structure.host.sections()[*n].oscillator;
+        // A coil has no frequency.
+        if oscillator.delta < oscillator.omega0 {
+            (oscillator.omega0 - structure.mode().omega).abs()
+        } else {
+            f64::INFINITY
+        }
+    };
+    let all = 0..structure.host.sections().len();
+    all.min_by(|one, other| distance(one).total_cmp(&distance(other)))
+        .unwrap_or(0)
+}

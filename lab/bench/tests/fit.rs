@@ -1,0 +1,1373 @@
+//! Guards the fit of a rig's parameters to points of its backbone: exact points, noise, points that do not belong, and what is refused.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use lovines::Cavity;
+use lovines::cavity::GRAVITY;
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use vines_bench::backbone::track;
+use vines_bench::experiment::run;
+use vines_bench::fit::{
+    Channel, Contents, Effect, Fit, FitError, Kind, Known, MeasuredPoint, Measurements, Quantity, RecordFit, Recording,
+    Selection, contradiction, explain, find, fit, follow, linear_verdicts, parts, plain_table,
+};
+use vines_bench::linear::{MeasuredLinear, ParticleState};
+use vines_bench::rig::{BuiltIn, Chain, Rig, RigError, RigStage, Sensors, Simulated};
+use vines_bench::scene::{Definition, Dimensionless, Measurand, Parameters, Scene, Sensor};
+use vines_model::numerics::Estimate;
+use vines_model::orbit::{backbone_at_speed, resonant_motion};
+
+/// The rig that the points belong to.
+const RIG: Parameters = Parameters {
+    primary_mass: 3.9,
+    stiffness: 11.5e3,
+    damping: 3.0,
+    particle_mass: 0.036,
+    half_width: 0.0095,
+    restitution: 0.55,
+    cavity: Cavity::IDEAL,
+};
+/// What a fit finds without a scale.
+const FITTED: &[Quantity] = Quantity::ALL.split_at(5).0;
+
+/// The default scene with these settings.
+fn scene(settings: &str) -> Scene {
+    let overrides: Vec<_> = settings.split(' ').map(|one| one.parse().unwrap()).collect();
+    Scene::load(None, &overrides).unwrap()
+}
+
+/// A scene with the wrong restitution, half-width, damping and stiffness.
+fn wrong_scene() -> Scene {
+    scene("plant.r=0.75 plant.b=0.0105 plant.c=3.5 plant.k=11600 plant.M=3.9")
+}
+
+/// Response, m, frequency, rad/s, and drive, m, measured with this relative standard uncertainty of both amplitudes, and a hundredth of it of the
+/// frequency. `seed` 0: without noise.
+fn measured(motions: impl Iterator<Item = [f64; 3]>, uncertainty: f64, seed: u64) -> Vec<MeasuredPoint> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut estimate = |value: f64, relative: f64| {
+        let normal: f64 = StandardNormal.sample(&mut random);
+        let noise = if seed == 0 { 0.0 } else { relative * normal };
+        Estimate { value: value * (1.0 + noise), uncertainty: value * relative }
+    };
+    let point = |[response, omega, drive]: [f64; 3]| MeasuredPoint {
+        response: estimate(response, uncertainty),
+        omega: estimate(omega, 0.01 * uncertainty),
+        drive: estimate(drive, uncertainty),
+        phase: -FRAC_PI_2,
+    };
+    motions.map(point).collect()
+}
+
+/// Twelve points of the rig from the fold on.
+fn points(uncertainty: f64, seed: u64) -> Vec<MeasuredPoint> {
+    let d = Dimensionless::of(&RIG, 0.0);
+    let motions = (0..12).map(|n| {
+        let [omega, c, g] = backbone_at_speed(&d, 0.7 + 0.03 * f64::from(n)).unwrap();
+        [c * d.b, d.omega0 * omega, d.amplitude(g)]
+    });
+    measured(motions, uncertainty, seed)
+}
+
+/// The fit of a client that believes in the default scene.
+fn fitted(points: &[MeasuredPoint], known: &[&str]) -> Result<Fit, FitError> {
+    let known: Vec<Known> = known.iter().map(|one| one.parse().unwrap()).collect();
+    fit(
+        points,
+        Definition::default(),
+        &Scene::load(None, &[]).unwrap().plant,
+        &known,
+    )
+}
+
+/// Largest error of the five parameters over their standard uncertainties.
+fn worst(fit: &Fit) -> f64 {
+    let pulls = FITTED.iter().map(|quantity| pull(fit, *quantity).abs());
+    pulls.fold(0.0, f64::max)
+}
+
+/// Error over the standard uncertainty.
+fn pull(fit: &Fit, quantity: Quantity) -> f64 {
+    let estimate = fit.estimate(quantity).unwrap();
+    (estimate.value - quantity.of_plant(&RIG)) / estimate.uncertainty
+}
+
+#[test]
+fn exact_points_give_the_parameters_of_another_rig_than_the_expected_one() {
+    let fit = fitted(&points(1e-4, 0), &[]).unwrap();
+    assert!(worst(&fit) < 1e-3, "{fit:?}");
+    assert!(fit.chi_square < 1e-6 && fit.left_out.is_empty() && !fit.is_rejected());
+    // What points do not separate is said; these do.
+    assert!(fit.undetermined().is_empty());
+    let near = fitted(&points(2e-2, 0)[..3], &[]).unwrap();
+    assert!(near.undetermined().contains(&Quantity::R), "{near:?}");
+}
+
+#[test]
+fn through_noise_the_stated_intervals_hold_the_parameters_and_chi_square_its_degrees_of_freedom() {
+    let (mut within, mut chi_square) = (0, 0.0);
+    for seed in 1..=60 {
+        let fit = fitted(&points(2e-3, seed), &[]).unwrap();
+        within += FITTED.iter().filter(|one| pull(&fit, **one).abs() <= 1.96).count();
+        chi_square += fit.chi_square / fit.degrees as f64 / 60.0;
+    }
+    println!("{within} of 300 within 1.96 u, chi-square {chi_square:.2} per degree of freedom");
+    assert!((270..=297).contains(&within) && (0.85..1.15).contains(&chi_square));
+}
+
+#[test]
+fn points_of_another_motion_are_left_out_and_named_and_points_that_no_parameters_describe_rejected() {
+    let mut strange = points(2e-3, 5);
+    strange[3].omega.value *= 1.003;
+    strange[11].drive.value *= 1.2;
+    let fit = fitted(&strange, &[]).unwrap();
+    assert!(fit.left_out == [3, 11] && worst(&fit) < 4.0, "{fit:?}");
+    let mut bent = points(1e-3, 6);
+    let (first, last) = (bent[0].response.value, bent[11].response.value);
+    for point in &mut bent {
+        // A structure whose frequency depends on the amplitude by itself, and a loss that grows with it.
+        let share = (point.response.value - first) / (last - first);
+        point.drive.value *= 1.0 + 0.1 * (6.0 * share).sin();
+    }
+    let fit = fitted(&bent, &[]).unwrap();
+    assert!(fit.is_rejected() && fit.left_out.is_empty(), "{:?}", fit.p_value());
+}
+
+/// Frequency, Hz, response, m, and drive, m, with their standard uncertainties, of a rig with epsilon = 0.003406 and r = 0.4643: chi-square has a
+/// local minimum of 1436 near r = 0.33.
+#[rustfmt::skip]
+const TWO_MINIMA: [[f64; 6]; 20] = [
+    [0.158768, 0.814408, 0.0044, 1.5e-05, 2.9000000000000004e-05, 8.8e-05],
+    [0.158755, 0.7838339999999999, 0.004301999999999999, 1.4e-05, 2.8e-05, 9.900000000000001e-05],
+    [0.1587428, 0.751993, 0.004218, 6.800000000000001e-06, 2.6e-05, 7.5e-05],
+    [0.1587359, 0.721641, 0.004141, 5.8e-06, 2.5e-05, 5.800000000000001e-05],
+    [0.1587301, 0.6923940000000001, 0.004081, 5.7e-06, 2.4e-05, 6e-05],
+    [0.1587244, 0.664393, 0.004019999999999999, 5.7e-06, 2.4e-05, 5.4e-05],
+    [0.1587187, 0.637564, 0.003964, 5.6e-06, 2.3e-05, 5e-05],
+    [0.158713, 0.611924, 0.003914, 5.1e-06, 2.2e-05, 4.2999999999999995e-05],
+    [0.1587078, 0.587219, 0.0038690000000000005, 4.9e-06, 2.1000000000000002e-05, 5e-05],
+    [0.1587028, 0.5635990000000001, 0.003816, 4.8e-06, 2e-05, 4.9000000000000005e-05],
+    [0.158696, 0.5382790000000001, 0.00379, 1.5e-05, 1.9e-05, 0.00015],
+    [0.1587009, 0.5326989999999999, 0.003745, 4.6e-06, 1.9e-05, 4.2999999999999995e-05],
+    [0.15869, 0.511703, 0.003743, 3.8e-06, 1.7000000000000003e-05, 7.2e-05],
+    [0.1586911914, 0.4975909, 0.0037048899999999997, 8.4e-09, 3.3e-06, 1.0000000000000001e-07],
+    [0.1586802, 0.482037, 0.003693, 9e-06, 4.9000000000000005e-05, 5.5e-05],
+    [0.158681, 0.447517, 0.00366, 1.9e-05, 4.7000000000000004e-05, 0.00011],
+    [0.158676, 0.413229, 0.003599, 1.4e-05, 4.2999999999999995e-05, 7.5e-05],
+    [0.158685, 0.379313, 0.0036000000000000003, 2.5e-05, 3.7e-05, 0.00012],
+    [0.158697, 0.34557, 0.0035600000000000002, 4.4e-05, 3.5000000000000004e-05, 0.00019],
+    [0.15873, 0.312032, 0.0035600000000000002, 0.00012, 3.4000000000000007e-05, 0.00046],
+];
+
+#[test]
+fn a_local_minimum_does_not_reject_the_right_model() {
+    let points = TWO_MINIMA.map(|[f, a, e, u_f, u_a, u_e]| MeasuredPoint {
+        response: Estimate { value: a, uncertainty: u_a },
+        omega: Estimate { value: f, uncertainty: u_f }.scaled(std::f64::consts::TAU),
+        drive: Estimate { value: e, uncertainty: u_e },
+        phase: -FRAC_PI_2,
+    });
+    let expected = Parameters {
+        primary_mass: 1.0,
+        stiffness: 0.990114,
+        damping: 0.0032557,
+        particle_mass: 0.00336825,
+        half_width: 0.958659,
+        restitution: 0.302077,
+        cavity: Cavity::IDEAL,
+    };
+    let fit = fit(&points, Definition::default(), &expected, &[]).unwrap();
+    let r = fit.estimate(Quantity::R).unwrap();
+    assert!(
+        fit.chi_square < 5.0 && (r.value - 0.4643).abs() < 0.2 * r.uncertainty,
+        "{fit:?}"
+    );
+}
+
+#[test]
+fn the_restitution_that_the_scene_states_does_not_matter() {
+    let rig = Parameters { restitution: 0.9, ..RIG };
+    let d = Dimensionless::of(&rig, 0.0);
+    let motions = (0..10).map(|n| {
+        let [omega, c, g] = backbone_at_speed(&d, 0.67 + 0.04 * f64::from(n)).unwrap();
+        [c * d.b, d.omega0 * omega, d.amplitude(g)]
+    });
+    let points = measured(motions, 2e-3, 2);
+    for restitution in [0.1, 0.3, 0.5, 0.7, 0.99] {
+        let expected = Parameters { restitution, ..RIG };
+        let r = fit(&points, Definition::default(), &expected, &[]).map(|fit| fit.estimate(Quantity::R).unwrap());
+        let is_right = |r: &Estimate| (r.value - 0.9).abs() < 3.0 * r.uncertainty && r.uncertainty < 0.05;
+        assert!(r.as_ref().is_ok_and(is_right), "{restitution}: {r:?}");
+    }
+}
+
+#[test]
+fn the_largest_responses_are_left_out_where_they_belong_to_another_motion() {
+    let d = Dimensionless::of(&RIG, 0.0);
+    let motions = || {
+        (0..30).map(|n| {
+            let [omega, c, g] = backbone_at_speed(&d, 0.7 + 0.0135 * f64::from(n)).unwrap();
+            [c * d.b, d.omega0 * omega, d.amplitude(g)]
+        })
+    };
+    // Beyond the loss of symmetry frequency and drive leave the curve: too little to contradict any parameters.
+    let bent = motions().enumerate().map(|(n, [a, omega, e])| match n {
+        26.. => [a, omega * (1.0 - 1e-4), e * 1.006],
+        _ => [a, omega, e],
+    });
+    let points = measured(bent, 2e-3, 3);
+    let found = fitted(&points, &[]).unwrap();
+    assert!(found.left_out == [26, 27, 28, 29] && worst(&found) < 3.0, "{found:?}");
+    // A structure that hardens: no motion ends, and the misfit shows most at both ends.
+    for seed in 1..=12 {
+        let hard = motions().map(|[a, omega, e]| [a, omega * (1.0 + 1e-3 * (a / d.b).powi(2)), e]);
+        let hard = fitted(&measured(hard, 3e-3, seed), &[]).unwrap();
+        assert!(hard.is_rejected() && hard.left_out.is_empty(), "{seed}: {hard:?}");
+    }
+    let whole = fitted(&measured(motions(), 2e-3, 3), &[]).unwrap();
+    assert!(whole.left_out.is_empty() && worst(&whole) < 3.0, "{whole:?}");
+}
+
+#[test]
+fn a_known_mass_gives_si_units_and_a_value_that_is_known_exactly_is_kept_and_helps_the_others() {
+    let exact = points(1e-4, 0);
+    assert!(fitted(&exact, &[]).unwrap().estimate(Quantity::Stiffness).is_none());
+    let fit = fitted(&exact, &["m=0.036±0.0004"]).unwrap();
+    let relative = |quantity: Quantity| fit.estimate(quantity).unwrap().scaled(1.0 / quantity.of_plant(&RIG));
+    let [mass, stiffness] = [Quantity::PrimaryMass, Quantity::Stiffness].map(relative);
+    assert!((mass.value - 1.0).abs() < 1e-3 && (stiffness.value - 1.0).abs() < 1e-3);
+    // The relative uncertainty of the mass is at least that of the one that is known.
+    assert!((1.0 / 90.0..0.03).contains(&(mass.uncertainty / mass.value)));
+    assert!((fit.plant(&RIG).damping / RIG.damping - 1.0).abs() < 1e-2);
+    let [free, fixed] = [&[][..], &["b=0.0095"]].map(|known| fitted(&points(2e-3, 7), known).unwrap());
+    let r = |fit: &Fit| fit.estimate(Quantity::R).unwrap().uncertainty;
+    assert!((fixed.estimate(Quantity::B).unwrap().value - 0.0095).abs() < 1e-10);
+    assert!(r(&fixed) < 0.8 * r(&free), "{} {}", r(&fixed), r(&free));
+}
+
+#[test]
+fn the_linear_response_is_data_for_the_state_of_the_particle_that_agrees_with_the_points() {
+    let points = points(2e-3, 9);
+    let alone = fitted(&points, &[]).unwrap();
+    let [omega0, epsilon] = [RIG.natural_frequency(), RIG.mass_ratio()];
+    let zeta = Quantity::Zeta.of_plant(&RIG);
+    let response = |added: f64, u: f64| MeasuredLinear {
+        f0: omega0 / std::f64::consts::TAU / f64::sqrt(1.0 + added),
+        u_f0: 1e-5 * u,
+        zeta: zeta / f64::sqrt(1.0 + added),
+        u_zeta: 1e-3 * u * zeta,
+        correlation: 0.3,
+        particle: ParticleState::Unknown,
+    };
+    let judged = |linear| {
+        let expected = Scene::load(None, &[]).unwrap().plant;
+        linear_verdicts(&[linear], &points, Definition::default(), &expected, &[]).unwrap()[0].linear
+    };
+    let u = |fit: &Fit| fit.estimate(Quantity::R).unwrap().uncertainty;
+    for (added, state) in [(0.0, ParticleState::Free), (epsilon, ParticleState::Carried)] {
+        let judged = judged(response(added, 1.0));
+        assert_eq!(judged.particle, state);
+        let expected = Scene::load(None, &[]).unwrap().plant;
+        let fit = fit(&points, Definition::default(), &expected, &[Known::Linear(judged)]).unwrap();
+        assert!(
+            worst(&fit) < 3.0 && u(&fit) < 0.8 * u(&alone) && fit.degrees == alone.degrees + 2,
+            "{fit:?}"
+        );
+    }
+    // Half carried along: no state agrees. With a large uncertainty both do.
+    assert_eq!(judged(response(0.5 * epsilon, 1.0)).particle, ParticleState::Unknown);
+    assert_eq!(judged(response(0.0, 1e4)).particle, ParticleState::Unknown);
+}
+
+#[test]
+fn too_few_points_and_numbers_that_are_not_positive_are_refused() {
+    let all = points(1e-3, 0);
+    assert!(matches!(fitted(&all[..2], &[]), Err(FitError::TooFew(2))));
+    let broken: [fn(&mut MeasuredPoint); 3] = [
+        |point| point.response.value = f64::NAN,
+        |point| point.drive.value = -1e-4,
+        |point| point.omega.uncertainty = 0.0,
+    ];
+    for damage in broken {
+        let mut points = all.clone();
+        damage(&mut points[4]);
+        let message = fitted(&points, &[]).unwrap_err().to_string();
+        assert!(message.starts_with("point 5: "), "{message}");
+    }
+    for text in ["q=1", "r", "r=x", "m=-1", "m=0.03±-1"] {
+        assert!(text.parse::<Known>().is_err(), "{text}");
+    }
+}
+
+#[test]
+fn points_of_another_rig_contradict_the_scene_and_those_of_its_own_do_not() {
+    let points = points(2e-3, 8);
+    assert!(contradiction(&points, Definition::default(), &RIG).is_none());
+    let wrong = Parameters { restitution: 0.65, ..RIG };
+    let found = contradiction(&points, Definition::default(), &wrong).unwrap();
+    let parameters = found.parameters.expect("another restitution fits");
+    let r = parameters.iter().find(|parameter| parameter.symbol == "r").unwrap();
+    assert!((r.value - 0.55).abs() < 0.01 && r.expected == 0.65, "{r:?}");
+}
+
+/// A recording of a backbone at 60 dB that is tracked on [`RIG`], and cut in the middle of its first and its last level.
+fn recording() -> Recording {
+    recorded(" chain.snr=60")
+}
+
+/// That recording by sensors of q1 and the base that measure these quantities.
+fn recorded_as([response, base]: [Measurand; 2]) -> Recording {
+    recorded(&format!(
+        " chain.snr=60 resonance.sensor=q1 resonance.sensor_quantity={} resonance.reference_quantity={}",
+        response.name(),
+        base.name()
+    ))
+}
+
+fn recorded(settings: &str) -> Recording {
+    recorded_on(RIG, settings)
+}
+
+fn recorded_on(rig: Parameters, settings: &str) -> Recording {
+    let scene = scene(&format!(
+        "backbone.C_from=0.65 backbone.C_to=0.25 backbone.points=10{settings}"
+    ));
+    let rig = Simulated::new(rig, scene.start).unwrap();
+    let rig = rig.with_sensors(scene.resonance);
+    let mut rig = Recorder { rig: Chain::around(Box::new(rig), &scene), read: Vec::new() };
+    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
+    track(&mut rig, &mut controller, &scene.plan(), |_, _| {}).unwrap();
+    let kept = &rig.read[3000..rig.read.len() - 500];
+    Recording {
+        origin: "record.csv".into(),
+        channels: ["y".into(), "x".into()],
+        start: 0.0,
+        measurands: scene.resonance.measurands(),
+        notes: Vec::new(),
+        sample_time: scene.sample_time(),
+        response: kept.iter().map(|one| one.response).collect(),
+        drive: kept.iter().map(|one| one.reference.unwrap()).collect(),
+    }
+}
+
+/// Points of the rig at these phase targets, degrees, in turn.
+fn points_at(phases: &[f64], uncertainty: f64, seed: u64) -> Vec<MeasuredPoint> {
+    let at = |n: usize| phases[n % phases.len()].to_radians();
+    let motions = (0..12).map(|n| {
+        let definition = Definition::default().at_phase(at(n));
+        let d = Dimensionless { definition, ..Dimensionless::of(&RIG, 0.0) };
+        let [omega, c, g] = backbone_at_speed(&d, 0.7 + 0.03 * n as f64).unwrap();
+        [c * d.b, d.omega0 * omega, d.amplitude(g)]
+    });
+    let points = measured(motions, uncertainty, seed).into_iter().enumerate();
+    points
+        .map(|(n, point)| MeasuredPoint { phase: at(n), ..point })
+        .collect()
+}
+
+#[test]
+fn points_at_any_phase_target_give_the_parameters_and_taken_for_phase_resonance_they_do_not() {
+    for phases in [&[-80.0][..], &[-110.0], &[-60.0], &[-90.0, -80.0, -100.0]] {
+        for seed in [0, 5] {
+            let points = points_at(phases, 1e-3, seed);
+            let fit = fitted(&points, &[]).unwrap();
+            let most = if seed == 0 { 1e-3 } else { 3.0 };
+            assert!(
+                worst(&fit) < most && !fit.is_rejected(),
+                "{phases:?}: {}, {fit:?}",
+                worst(&fit)
+            );
+            assert!(
+                contradiction(&points, Definition::default(), &RIG).is_none(),
+                "{phases:?}"
+            );
+        }
+        // Read as points of phase resonance they have other parameters, or none.
+        let mut points = points_at(phases, 1e-3, 5);
+        points.iter_mut().for_each(|point| point.phase = -FRAC_PI_2);
+        assert!(
+            contradiction(&points, Definition::default(), &RIG).is_some(),
+            "{phases:?}"
+        );
+    }
+}
+
+#[test]
+fn the_effect_that_explains_points_at_another_phase_target_is_found_at_this_phase() {
+    let friction = Cavity { kinetic_friction: 0.05, ..Cavity::IDEAL };
+    let (rig, phase) = (Parameters { cavity: friction, ..RIG }, -80_f64.to_radians());
+    let definition = Definition::default().at_phase(phase);
+    let motions = (0..10).map(|n| {
+        let motion = resonant_motion(&rig, definition, (0.36 + 0.03 * f64::from(n)) * RIG.half_width, None).unwrap();
+        [motion.response.norm(), motion.omega, motion.amplitude]
+    });
+    let points: Vec<MeasuredPoint> = measured(motions, 1e-4, 12)
+        .into_iter()
+        .map(|point| MeasuredPoint { phase, ..point })
+        .collect();
+    let known = ["b=0.0095±0.00003", "epsilon=0.00923±0.00003"].map(|one| one.parse().unwrap());
+    let found = explain(&points, Definition::default(), &wrong_scene().plant, &known, |_| {}).unwrap();
+    let best = found.explains().unwrap();
+    let off = (best.strength.value - 0.05) / best.strength.uncertainty;
+    assert!(
+        best.effect == Effect::Friction && off.abs() < 3.0,
+        "{:?}",
+        best.report()
+    );
+}
+
+#[test]
+fn a_recording_at_another_phase_target_gives_the_parameters_at_this_phase_and_is_else_refused_with_the_phase() {
+    let record = recorded(" chain.snr=60 controller.phase_target=-80");
+    let measurements = Measurements { recordings: vec![record], ..Measurements::default() };
+    let error = find(&measurements, &wrong_scene(), |_| {}).unwrap_err().to_string();
+    for part in [
+        "is -80.0 degrees (median)",
+        "asks for -90 degrees",
+        "controller.phase_target=-80.0",
+    ] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    let stated = error.rsplit("controller.phase_target=").next().unwrap();
+    let stated: f64 = stated.trim().parse().unwrap();
+    assert!((stated + 80.0).abs() < 0.5, "{stated}");
+    let at_80 = scene("plant.r=0.75 plant.b=0.0105 plant.c=3.5 plant.k=11600 plant.M=3.9 controller.phase_target=-80");
+    let points: Vec<MeasuredPoint> = parts(&measurements.recordings, &at_80)
+        .unwrap()
+        .concat()
+        .iter()
+        .filter_map(|part| part.point)
+        .collect();
+    let found = fit(&points, at_80.definition(), &at_80.plant, &[]).unwrap();
+    assert!(
+        points.len() >= 4 && worst(&found) < 3.0 && !found.is_rejected(),
+        "{}, {found:?}",
+        worst(&found)
+    );
+    let found = find(&measurements, &at_80, |_| {}).unwrap();
+    assert!(worst(&found.fit) < 3.0, "{}", worst(&found.fit));
+}
+
+/// Keeps what is read before each step.
+struct Recorder {
+    rig: Box<dyn Rig>,
+    read: Vec<Sensors>,
+}
+
+impl RigStage for Recorder {
+    fn inner(&mut self) -> &mut dyn Rig {
+        &mut *self.rig
+    }
+
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.read.push(self.rig.sense()?);
+        Ok(self.read[self.read.len() - 1])
+    }
+}
+
+#[test]
+fn a_recording_that_begins_and_ends_in_the_middle_of_a_level_gives_the_parameters() {
+    let scene = wrong_scene();
+    let parts = parts(&[recording()], &scene).unwrap().concat();
+    let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
+    let held = parts.iter().filter(|part| part.kind == Kind::Held).count();
+    assert!(held >= 4, "{parts:?}");
+    let fit = fit(&points, Definition::default(), &scene.plant, &[]).unwrap();
+    let mut estimates = FITTED.iter().map(|quantity| fit.estimate(*quantity).unwrap());
+    let are_narrow = estimates.all(|one| one.uncertainty < 0.2 * one.value);
+    assert!(worst(&fit) < 3.0 && are_narrow && !fit.is_rejected(), "{fit:?}");
+}
+
+#[test]
+fn the_plant_follows_a_record_and_determines_the_parameters_better_than_its_points() {
+    let (scene, mut record) = (wrong_scene(), recording());
+    // A second in which the sensor reads another motion.
+    let from = record.response.len() / 2;
+    let odd = from..from + (1.0 / record.sample_time) as usize;
+    record.response[odd].iter_mut().for_each(|value| *value *= 1.02);
+    // Later, two seconds of uneven impacts: a second harmonic of 0.1 %.
+    let [second, turn] = [
+        1.0 / record.sample_time,
+        2.0 * RIG.natural_frequency() * record.sample_time,
+    ];
+    let uneven = from + (8.0 * second) as usize..from + (10.0 * second) as usize;
+    for n in uneven.clone() {
+        record.response[n] += 5e-6 * (turn * n as f64).sin();
+    }
+    let parts = parts(&[record.clone()], &scene).unwrap();
+    let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
+    let start = fit(&points, Definition::default(), &scene.plant, &[]).unwrap();
+    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+    let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
+    assert!(
+        worst(&followed.fit) < 3.0 && !followed.fit.is_rejected(),
+        "{followed:?}"
+    );
+    assert!(
+        followed.colour.abs() < 0.15,
+        "innovations are white: {}",
+        followed.colour
+    );
+    let u = |fit: &Fit| fit.estimate(Quantity::R).unwrap().uncertainty;
+    assert!(u(&followed.fit) < 0.5 * u(&start), "{} {}", u(&followed.fit), u(&start));
+    for middle in [from as f64 + 0.5 * second, uneven.start as f64 + second] {
+        let middle = middle * record.sample_time;
+        let is_named = |[begin, end]: [f64; 2]| begin < middle && middle < end;
+        let mut left_out = followed.left_out.iter();
+        assert!(
+            left_out.any(|one| is_named(one.seconds)),
+            "{middle} s: {:?}",
+            followed.left_out
+        );
+    }
+}
+
+#[test]
+fn a_record_that_contradicts_the_plant_leaves_its_points_and_says_so() {
+    let scene = scene("chain.snr=60");
+    let found = |record: Recording| {
+        let recordings = vec![record];
+        let found = find(&Measurements { recordings, ..Measurements::default() }, &scene, |_| {}).unwrap();
+        assert!(found.record.is_none());
+        found.points_instead.unwrap()
+    };
+    // Tilt and friction: b would be 8 % off, 23 times its uncertainty.
+    let cavity = Cavity { tilt: 0.03, kinetic_friction: 0.02, ..Cavity::IDEAL };
+    let strange = recorded_on(Parameters { cavity, ..scene.plant }, " chain.snr=60");
+    assert_eq!(
+        found(strange),
+        "the plant does not follow the recordings: their points are fitted instead, and show less"
+    );
+    // An amplifier whose gain changes from period to period, by as much as the noise of a period.
+    let mut unsteady = recording();
+    for (n, period) in unsteady.response.chunks_mut(100).enumerate() {
+        let gain = 1.0 + 4e-4 * ((0.618 * n as f64).fract() - 0.5);
+        period.iter_mut().for_each(|value| *value *= gain);
+    }
+    let instead = found(unsteady);
+    let says = "the recordings, followed period by period, contradict the model (chi-square ";
+    assert!(instead.starts_with(says), "{instead}");
+}
+
+#[test]
+fn a_record_without_noise_is_followed_to_its_end() {
+    let (scene, record) = (wrong_scene(), recorded(""));
+    let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
+    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+    let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
+    assert!(
+        worst(&followed.fit) < 3.0 && !followed.fit.is_rejected(),
+        "{followed:?}"
+    );
+    let seconds = record.response.len() as f64 * record.sample_time;
+    let followed_for = followed.periods as f64 * std::f64::consts::TAU / RIG.natural_frequency();
+    let r = followed.fit.estimate(Quantity::R).unwrap();
+    assert!(
+        followed_for > 0.8 * seconds && r.uncertainty < 1e-4,
+        "{followed_for} s of {seconds} s, r = {r:?}"
+    );
+}
+
+#[test]
+fn a_record_is_followed_near_the_fold_where_only_its_filter_holds_the_particle() {
+    let scene = scene("chain.snr=60");
+    let Parameters { primary_mass, stiffness, .. } = RIG;
+    let rig = Parameters {
+        damping: 0.035 * (stiffness * primary_mass).sqrt(),
+        particle_mass: 0.0163 * primary_mass,
+        restitution: 0.75,
+        ..RIG
+    };
+    let record = recorded_on(rig, " chain.snr=60 backbone.C_to=0.1 backbone.points=14");
+    let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
+    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+    let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
+    assert!(followed.left_out.is_empty(), "{:?}", followed.left_out);
+    for quantity in FITTED {
+        let Estimate { value, uncertainty } = followed.fit.estimate(*quantity).unwrap();
+        let error = (value - quantity.of_plant(&rig)) / uncertainty;
+        assert!(error.abs() < 3.0, "{quantity:?}: {error} u");
+    }
+}
+
+#[test]
+fn a_record_behind_an_anti_alias_filter_determines_the_parameters_as_well() {
+    let scene = wrong_scene();
+    let u = |filter: &str| {
+        let record = recorded(&format!(" chain.snr=60{filter}"));
+        let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
+        let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+        let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
+        assert!(
+            worst(&followed.fit) < 3.0 && !followed.fit.is_rejected(),
+            "{filter}: {followed:?}"
+        );
+        followed.fit.estimate(Quantity::R).unwrap().uncertainty
+    };
+    // Noise is white, or is so only below the cut-off.
+    let [white, filtered] = ["", " chain.filter=10"].map(u);
+    assert!(filtered < 1.3 * white, "{filtered} {white}");
+}
+
+/// A recording of a lock and its decay, on [`RIG`] with this cavity.
+fn locked(scene: &Scene, cavity: Cavity) -> Recording {
+    let rig = Simulated::new(Parameters { cavity, ..RIG }, scene.start).unwrap();
+    let mut rig = Chain::around(Box::new(rig.with_sensors(scene.resonance)), scene);
+    let mut controller = BuiltIn::new(&scene.plan().lock).unwrap();
+    let record = run(&mut *rig, &mut controller, &scene.plan(), |_, _, _| {}).unwrap();
+    let sensors = || record.samples.iter().map(|one| one.sensors);
+    Recording {
+        sample_time: record.sample_time,
+        response: sensors().map(|one| one.response).collect(),
+        drive: sensors().map(|one| one.reference.unwrap()).collect(),
+        ..recording()
+    }
+}
+
+#[test]
+fn the_plant_follows_a_lock_and_its_decay_whatever_the_natural_frequency_that_the_scene_states() {
+    let record = locked(&scene("chain.snr=60"), Cavity::IDEAL);
+    // With a stiffness that is 1 % too low, a particle that is carried along explains each point.
+    for k in [11600, 11385] {
+        let scene = scene(&format!(
+            "plant.r=0.75 plant.b=0.0105 plant.c=3.5 plant.M=3.9 plant.k={k}"
+        ));
+        let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
+        let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+        let found = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
+        let r = found.fit.estimate(Quantity::R).unwrap();
+        assert!(
+            worst(&found.fit) < 3.0 && !found.fit.is_rejected() && r.uncertainty < 0.01,
+            "{r:?} {found:?}"
+        );
+    }
+}
+
+/// The fit of a record without impacts, of a rig with this friction and a scene with this stiffness, N/m.
+fn followed_without_impacts(kinetic_friction: f64, stiffness: u32) -> Option<RecordFit> {
+    let rests = scene("chain.snr=60 excitation.G=0.7 controller.samples_per_period=40").at_rest();
+    let record = locked(&rests, Cavity { kinetic_friction, ..Cavity::IDEAL });
+    let scene = scene(&format!("plant.M=3.9 plant.c=3.5 plant.k={stiffness}"));
+    let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
+    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+    follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[])
+}
+
+#[test]
+fn a_record_without_impacts_is_not_followed_whatever_the_natural_frequency_that_the_scene_states() {
+    let found = followed_without_impacts(0.0, 11400);
+    assert!(found.is_none(), "{found:?}");
+}
+
+#[test]
+fn a_record_of_a_particle_that_slides_without_impacts_is_not_followed() {
+    let found = followed_without_impacts(0.02, 11500);
+    assert!(found.is_none(), "{found:?}");
+}
+
+#[test]
+fn without_knowns_an_ideal_fit_says_which_cavity_would_give_the_same_points() {
+    // From the fold on, where a motion with other parameters may not exist.
+    let rig = Parameters {
+        particle_mass: 0.0064 * RIG.primary_mass,
+        damping: 0.0064 * 0.98 * RIG.primary_mass * RIG.natural_frequency(),
+        restitution: 0.79,
+        cavity: Cavity { kinetic_friction: 0.09, ..Cavity::IDEAL },
+        ..RIG
+    };
+    let motion = |c: f64| {
+        let motion = resonant_motion(&rig, Definition::default(), c * RIG.half_width, None).ok()?;
+        Some([c * RIG.half_width, motion.omega, motion.amplitude])
+    };
+    let motions = (0..29).filter_map(|n| motion(0.14 + 0.02 * f64::from(n)));
+    let points = measured(motions, 1e-3, 12);
+    let found = find(
+        &Measurements { points, ..Measurements::default() },
+        &wrong_scene(),
+        |_| {},
+    )
+    .unwrap();
+    let with_friction = found.alternatives.iter().find(|one| one.effect == Effect::Friction);
+    let with_friction = with_friction.unwrap_or_else(|| panic!("{:?}", found.explanation));
+    // The largest friction that the points allow, and with it the half-width: the rig is between this and the ideal cavity.
+    let (b, ideal) = (with_friction.report().possible_b_m, found.plant.half_width);
+    let reaches = with_friction.strength.value >= 0.09 && (0.98 * b..ideal).contains(&RIG.half_width);
+    assert!(reaches, "{:?}: {b} to {ideal}", with_friction.strength);
+    let friction = Cavity { kinetic_friction: 0.05, ..Cavity::IDEAL };
+    let motions = || (0..10).map(|n| motion_at(friction, (0.36 + 0.03 * f64::from(n)) * RIG.half_width));
+    let points = measured(motions(), 1e-4, 12);
+    let mut measured = Measurements { points, ..Measurements::default() };
+    let found = find(&measured, &wrong_scene(), |_| {}).unwrap();
+    assert!(!found.fit.is_rejected() && found.explanation.is_none(), "{found:?}");
+    let effects: Vec<Effect> = found.alternatives.iter().map(|one| one.effect).collect();
+    assert!(effects.contains(&Effect::Friction), "{effects:?}");
+    // No rig that is built with care has a stronger effect, whatever the points allow.
+    let strong = 0.05 * RIG.half_width * RIG.natural_frequency().powi(2);
+    for one in &found.alternatives {
+        let most = match one.effect {
+            Effect::Friction => 1.2 * strong / GRAVITY,
+            Effect::Tilt => 1.2 * (2.0 * strong / GRAVITY).to_degrees(),
+            Effect::Hardening => 1.2 * 0.05 * RIG.mass_ratio(),
+            Effect::Viscoelastic | Effect::Plastic => f64::INFINITY,
+        };
+        let b = one.report().possible_b_m / RIG.half_width;
+        assert!(
+            one.strength.value.abs() < most && (0.5..2.0).contains(&b),
+            "{:?}",
+            one.report()
+        );
+    }
+    // So does one without a point that contradicts the others.
+    let mut strange = measured.clone();
+    strange.points[4].drive.value *= 1.01;
+    let found = find(&strange, &wrong_scene(), |_| {}).unwrap();
+    let effects = found.alternatives.iter().map(|one| one.effect);
+    assert!(
+        found.fit.left_out == [4] && effects.collect::<Vec<_>>().contains(&Effect::Friction),
+        "{found:?}"
+    );
+    // A tilt contradicts every ideal cavity, and is found without knowns as well.
+    let tilt = Cavity { tilt: 0.06, ..Cavity::IDEAL };
+    let motions = (0..9).map(|n| motion_at(tilt, (0.3 + 0.04 * f64::from(n)) * RIG.half_width));
+    let tilted = self::measured(motions, 2e-4, 12);
+    let tilted = explain(&tilted, Definition::default(), &wrong_scene().plant, &[], |_| {}).unwrap();
+    let possible: Vec<Effect> = tilted.possible().map(|one| one.effect).collect();
+    let fits = tilted
+        .candidates
+        .iter()
+        .map(|one| (one.effect, one.fit.chi_square, one.fit.left_out.len()));
+    assert!(
+        possible == [Effect::Tilt],
+        "{} {:?}",
+        tilted.ideal.chi_square,
+        fits.collect::<Vec<_>>()
+    );
+    // A ruler and a scale decide.
+    measured.known = ["b=0.0095±0.00003", "epsilon=0.00923±0.00003"]
+        .map(|one| one.parse().unwrap())
+        .into();
+    let explanation = find(&measured, &wrong_scene(), |_| {}).unwrap().explanation.unwrap();
+    assert!(
+        explanation
+            .explains()
+            .is_some_and(|best| best.effect == Effect::Friction),
+        "{explanation:?}"
+    );
+}
+
+#[test]
+fn channels_that_are_no_recording_of_a_rig_near_resonance_are_refused_with_what_to_do() {
+    let scene = wrong_scene();
+    let mut good = recording();
+    good.response.truncate(6000);
+    good.drive.truncate(6000);
+    let each = |values: &mut Vec<f64>, of: fn(f64) -> f64| values.iter_mut().for_each(|value| *value = of(*value));
+    /// What breaks a recording, and what its message contains.
+    type Case<'a> = (&'a dyn Fn(&mut Recording), &'a [&'a str]);
+    let clip = |one: &mut Recording| each(&mut one.response, |value| value.clamp(-5e-3, 5e-3));
+    let reverse = |one: &mut Recording| each(&mut one.drive, |value| -value);
+    let cut = |one: &mut Recording| {
+        one.response.truncate(500);
+        one.drive.truncate(500);
+    };
+    let cases: [Case; 9] = [
+        (
+            &|one| one.response[17] = f64::NAN,
+            &["channel y", "sample 18", "repair"],
+        ),
+        (&|one| one.drive.truncate(5999), &["y has 6000 samples", "x has 5999"]),
+        (&clip, &["channel y is clipped", "reduce the gain"]),
+        (&|one| one.drive.fill(0.0), &["base x rests", "connected"]),
+        (&|one| std::mem::swap(&mut one.response, &mut one.drive), &["swapped"]),
+        (&reverse, &["wrong sign", "--drive x:-1"]),
+        (&|one| one.sample_time *= 3.0, &["strongest oscillation", "--rate"]),
+        (&|one| one.sample_time *= 30.0, &["needed: give the rate with --rate"]),
+        (&cut, &["at least 16 are needed"]),
+    ];
+    for (damage, words) in cases {
+        let mut damaged = good.clone();
+        damage(&mut damaged);
+        let knowledge = scene.knowledge();
+        let parts = damaged.linear_decay(&knowledge).and_then(|_| damaged.parts(&knowledge));
+        let message = parts.unwrap_err().to_string();
+        let is_complete = words.iter().all(|word| message.contains(word));
+        assert!(message.starts_with("record.csv") && is_complete, "{message}");
+    }
+}
+
+#[test]
+fn the_effect_that_explains_a_misfit_is_named_with_its_strength() {
+    let known = ["b=0.0095±0.00003", "epsilon=0.00923±0.00003"].map(|one| one.parse().unwrap());
+    let friction = Cavity { kinetic_friction: 0.03, ..Cavity::IDEAL };
+    let tilt = Cavity { tilt: 0.1, ..Cavity::IDEAL };
+    let cases = [
+        (friction, Effect::Friction, 0.03),
+        (tilt, Effect::Tilt, 0.1_f64.to_degrees()),
+        (Cavity::IDEAL, Effect::Hardening, 1e-3),
+    ];
+    for (cavity, effect, strength) in cases {
+        // The periodic motions of the rig, with the uncertainties of 60 dB. Harmonic balance: a cubic stiffness moves their frequency.
+        let h = if effect == Effect::Hardening { strength } else { 0.0 };
+        let motions = (0..10).map(|n| {
+            let c = 0.36 + 0.03 * f64::from(n);
+            let [response, omega, drive] = motion_at(cavity, c * RIG.half_width);
+            [response, omega * (1.0 + 0.75 * h * c * c).sqrt(), drive]
+        });
+        let points = measured(motions, 1e-4, 11);
+        let found = explain(&points, Definition::default(), &wrong_scene().plant, &known, |_| {}).unwrap();
+        let best = found.explains().unwrap_or_else(|| panic!("{found:?}"));
+        let Estimate { value, uncertainty } = best.strength;
+        assert!(best.effect == effect && found.ideal.is_rejected(), "{found:?}");
+        assert!(
+            (value - strength).abs() < 3.0 * uncertainty && uncertainty < 0.2 * strength,
+            "{found:?}"
+        );
+    }
+}
+
+/// Response, m, frequency, rad/s, and drive, m, of the rig with a cavity at this amplitude of the response.
+fn motion_at(cavity: Cavity, amplitude: f64) -> [f64; 3] {
+    let rig = Parameters { cavity, ..RIG };
+    let motion = resonant_motion(&rig, Definition::default(), amplitude, None).unwrap();
+    [amplitude, motion.omega, motion.amplitude]
+}
+
+#[test]
+fn unequal_gaps_leave_the_points_as_they_are() {
+    let half = RIG.half_width;
+    let (b_plus, b_minus) = (Some(1.1 * half), Some(0.9 * half));
+    let skewed = Cavity { b_plus, b_minus, ..Cavity::IDEAL };
+    let [ideal, skewed] = [Cavity::IDEAL, skewed].map(|cavity| motion_at(cavity, 0.5 * half));
+    assert!((ideal[1] / skewed[1] - 1.0).abs() < 1e-11 && (ideal[2] / skewed[2] - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_decay_without_impacts_gives_the_natural_frequency_and_the_damping_with_and_without_a_channel_of_the_base() {
+    let scene = wrong_scene();
+    let (omega0, zeta, dt) = (RIG.natural_frequency(), 0.01, 1e-3);
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
+    let response = |n: i32| {
+        let time = dt * f64::from(n);
+        1e-3 * (-zeta * omega0 * time).exp() * (omega0 * time).sin()
+    };
+    let response: Vec<f64> = (0..6000).map(|n| response(n) + 1e-6 * noise()).collect();
+    for name in ["", "x"] {
+        let drive = response
+            .iter()
+            .map(|_| if name.is_empty() { 0.0 } else { 1e-7 * noise() });
+        let record = Recording {
+            channels: ["y".into(), name.into()],
+            sample_time: dt,
+            drive: drive.collect(),
+            response: response.clone(),
+            ..recording()
+        };
+        let decay = record.linear_decay(&scene.knowledge()).unwrap().unwrap();
+        for (estimate, truth) in [(decay.omega, omega0), (decay.zeta, zeta)] {
+            assert!((estimate.value - truth).abs() < 4.0 * estimate.uncertainty, "{decay}");
+            assert!(estimate.uncertainty < 0.01 * truth, "{decay}");
+        }
+    }
+    assert_eq!(recording().linear_decay(&scene.knowledge()).unwrap(), None);
+}
+
+#[test]
+fn levels_whose_base_is_not_recorded_are_no_linear_decay() {
+    let (scene, omega0, dt) = (wrong_scene(), wrong_scene().dimensionless().omega0, 1e-3);
+    // Each level is 3 % below the one before, and is held for 20 periods.
+    let level = |time: f64| 1e-3 * 0.97_f64.powf((time * omega0 / TAU / 20.0).floor());
+    let response = (0..30_000)
+        .map(|n| f64::from(n) * dt)
+        .map(|time| level(time) * (omega0 * time).sin());
+    let record = Recording {
+        sample_time: dt,
+        drive: vec![0.0; 30_000],
+        response: response.collect(),
+        ..recording()
+    };
+    assert_eq!(record.linear_decay(&scene.knowledge()).unwrap(), None);
+    let measured = Measurements { recordings: vec![record], ..Measurements::default() };
+    let message = find(&measured, &scene, |_| {}).unwrap_err().to_string();
+    assert!(
+        message.contains("the base x rests") && message.contains("connected"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_slow_drift_of_five_amplitudes_leaves_the_fit_as_it_is() {
+    let (scene, still) = (wrong_scene(), recording());
+    let mut drifting = still.clone();
+    let count = still.response.len() as f64;
+    for (n, value) in drifting.response.iter_mut().enumerate() {
+        *value += 0.02 * (n as f64 / count).powi(2);
+    }
+    let [still, drifting] = [still, drifting].map(|one| {
+        let parts = parts(&[one], &scene).unwrap().concat();
+        let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
+        fit(&points, Definition::default(), &scene.plant, &[]).unwrap()
+    });
+    for quantity in FITTED {
+        let [one, other] = [&still, &drifting].map(|fit| fit.estimate(*quantity).unwrap());
+        assert!(
+            (one.value - other.value).abs() < 0.5 * one.uncertainty,
+            "{quantity:?}: {one:?} {other:?}"
+        );
+    }
+    assert!(!drifting.is_rejected(), "{}", drifting.chi_square);
+}
+
+#[test]
+fn chi_square_of_each_channel_shows_uncertainties_of_the_wrong_size() {
+    let right = fitted(&points(2e-3, 3), &[]).unwrap();
+    assert!(
+        right.channels.iter().all(|one| one.verdict().is_none()),
+        "{:?}",
+        right.channels
+    );
+    let total: f64 = right.channels.iter().map(|one| one.expected).sum();
+    assert!((total - right.degrees as f64).abs() < 1e-6, "{total} {}", right.degrees);
+    // A point may lie anywhere along the curve: an error of one amplitude shows in the other as well.
+    for (factor, verdict) in [(0.2, std::cmp::Ordering::Less), (5.0, std::cmp::Ordering::Greater)] {
+        let mut points = points(2e-3, 3);
+        for point in &mut points {
+            point.drive.uncertainty *= factor;
+            point.response.uncertainty *= factor;
+        }
+        let tests = fitted(&points, &[]).unwrap().channels;
+        assert!(tests.iter().any(|one| one.verdict() == Some(verdict)), "{tests:?}");
+    }
+}
+
+/// A table with the columns of `text`, read as a recording.
+fn read(text: &[u8], response: &str, drive: &str, time: Option<&str>) -> Result<Recording, String> {
+    let [response, drive] = [response, drive].map(|name| Some(name.into()));
+    let selection = Selection {
+        response,
+        drive,
+        time: time.map(Into::into),
+        ..Selection::default()
+    };
+    let recording = Recording::of(&plain_table("mine.csv", text)?, &selection);
+    recording.map_err(|error| error.to_string())
+}
+
+#[test]
+fn plain_tables_are_read_with_any_delimiter_names_and_units() {
+    let rows = |delimiter: &str, decimal: &str| -> String {
+        let row = |n: i32| {
+            let [time, y, x] = [
+                f64::from(n) * 1e-3,
+                (0.05 * f64::from(n)).sin(),
+                10.0 * (0.05 * f64::from(n)).cos(),
+            ];
+            [time, y, x]
+                .map(|value| value.to_string().replace('.', decimal))
+                .join(delimiter)
+                + "\n"
+        };
+        (0..200).map(row).collect()
+    };
+    let plain = read(format!("time,y,x\n{}", rows(",", ".")).as_bytes(), "y:mm", "x:µm", None).unwrap();
+    let ones = read(b"time,y,x\n1,1,1\n2,0,0\n3,1,1\n4,0,1\n", "y", "x", None).unwrap();
+    assert_eq!(ones.response, [1.0, 0.0, 1.0, 0.0], "ones are no row of units");
+    assert!((plain.sample_time - 1e-3).abs() < 1e-15 && plain.response.len() == 200);
+    let (y, x) = ("y", "x");
+    let cases: [(String, &str, &str, Option<&str>); 7] = [
+        (format!("time;y;x\ns;mm;µm\n{}", rows(";", ",")), y, x, None),
+        (
+            format!("\u{feff}time [s]\ty (mm)\tx [um]\n{}", rows("\t", ".")),
+            y,
+            x,
+            None,
+        ),
+        (format!("Zeit [s]|y (mm)|x [um]\n{}", rows("|", ".")), y, x, None),
+        (rows("  ", "."), "2:mm", "3:um", Some("1")),
+        (
+            format!("clock,y,x\n{}0.2,0.0", rows(",", ".")),
+            "y:mm",
+            "x:1e-6",
+            Some("clock:s"),
+        ),
+        (
+            format!("\"time\",\"y : top\",x\n{}", rows(",", ".")),
+            "y : top:mm",
+            "x:um",
+            None,
+        ),
+        (format!("time,y,x\n{}", rows(",", ".")), "y:1V/mm", "x:um", None),
+    ];
+    for (text, response, drive, time) in cases {
+        let one = read(text.as_bytes(), response, drive, time).unwrap_or_else(|error| panic!("{error}"));
+        assert!((one.sample_time - plain.sample_time).abs() < 1e-12, "{:?}", one.notes);
+        assert_eq!((&one.response, &one.drive), (&plain.response, &plain.drive));
+    }
+}
+
+#[test]
+fn a_table_of_another_dialect_is_refused_with_its_row_and_never_read_as_another_number() {
+    let row = |n: i32, cell: &str| format!("{};{cell};{}\n", 1e-3 * f64::from(n), n % 7);
+    let table = |cell: &str| -> Vec<u8> {
+        let rows: String = (0..50).map(|n| row(n, cell)).collect();
+        format!("time;y;x\n{rows}").into_bytes()
+    };
+    let utf16: Vec<u8> = "time;y\n1;2\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let stamps: String = (0..300).map(|n| format!("{};{};{}\n", n / 110, n % 5, n % 7)).collect();
+    let cases = [
+        (
+            table("1,595.442"),
+            "row 2: `1,595.442` is not a number; `python -m vines fit`",
+        ),
+        (table("1.0D-03"), "row 2: `1.0D-03` is not a number"),
+        (table("0.1 mm"), "row 2: `0.1 mm` is not a number"),
+        (
+            [&[0xff, 0xfe], &utf16[..]].concat(),
+            "mine.csv is UTF-16; save it as UTF-8",
+        ),
+        (utf16, "has bytes of zero, as UTF-16"),
+        (b"time;\xb5\n1;2\n".to_vec(), "is not UTF-8 in line 1"),
+        (
+            b"# time;y;x\n0;1;2\n1;2;3\n".to_vec(),
+            "row 1: `# time` begins a comment",
+        ),
+        (
+            b"time;y;x\n0;1;2;3\n1;2;3\n2;3;4\n".to_vec(),
+            "row 2: it has 4 values, and row 1 has 3",
+        ),
+        (
+            b"time;y;x\n1;2,310;1\n2;1,595;2\n3;1,595;3\n".to_vec(),
+            "`2,310` may be 2.310 or 2310",
+        ),
+        (
+            format!("time;y;x\n{stamps}").into_bytes(),
+            "the times have steps of 1.000000 s, and up to 110 samples have the same time, which does not tell the time of a sample: give the \
+             samples a second with --rate",
+        ),
+    ];
+    for (text, words) in cases {
+        let message = read(&text, "y", "x", None).unwrap_err().to_string();
+        assert!(message.starts_with("mine.csv") && message.contains(words), "{message}");
+    }
+}
+
+#[test]
+fn a_rate_replaces_times_that_are_too_coarse_and_contradictions_are_named() {
+    let row = |n: i32| format!("{};{};{}\n", n / 110, n % 5, n % 7);
+    let text = format!("time;y;x\n{}", (0..1000).map(row).collect::<String>());
+    let contents = plain_table("mine.csv", text.as_bytes()).unwrap();
+    for (rate, has_contradiction) in [(110.0, false), (220.0, true)] {
+        let selection = Selection {
+            response: Some("y".into()),
+            drive: Some("x".into()),
+            rate: Some(rate),
+            ..Selection::default()
+        };
+        let one = Recording::of(&contents, &selection).unwrap();
+        assert!((one.sample_time * rate - 1.0).abs() < 1e-12 && one.response.len() == 1000);
+        let says = |words: &str| one.notes.iter().any(|note| note.contains(words));
+        assert!(says("samples a second that was given is used"), "{:?}", one.notes);
+        assert_eq!(says("the recording takes"), has_contradiction, "{:?}", one.notes);
+    }
+}
+
+#[test]
+fn the_time_is_the_channel_in_a_unit_of_time_and_no_temperature() {
+    let rows: String = (0..50)
+        .map(|n| format!("{},{n},{n},20\n", 1e-3 * f64::from(n)))
+        .collect();
+    let time = |header: &str| read(format!("{header}\n{rows}").as_bytes(), "y", "x", None);
+    for header in [
+        "Zeit [s],y,x,T [°C]",
+        "clock (s),y,x,T",
+        "t,y,x,T [°C]",
+        "t,y,x,delay [s]",
+    ] {
+        let found = time(header);
+        match header {
+            // Which of the two is the time, is not said.
+            "clock (s),y,x,T" => assert!(
+                found
+                    .unwrap_err()
+                    .to_string()
+                    .contains("all 50 samples have the time 20 s")
+            ),
+            _ => assert!((found.unwrap().sample_time - 1e-3).abs() < 1e-12, "{header}"),
+        }
+    }
+    let message = time("Zeit [s],y,x,delay [s]").unwrap_err().to_string();
+    assert!(message.contains("has several times, Zeit and delay"), "{message}");
+}
+
+#[test]
+fn a_table_that_cannot_be_read_is_refused_with_what_was_understood() {
+    let good = |n: i32| format!("{},{},{}\n", 1e-3 * f64::from(n), n % 7, n % 5);
+    let good: String = (0..50).map(good).collect();
+    let table = |header: &str| format!("{header}\n{good}");
+    let gap = table("time,y,x").replace("0.02,", "0.9,");
+    let cases = [
+        (String::new(), "y", "x", "is empty"),
+        ("just words\nand more".into(), "y", "x", "begins with\n  just words"),
+        (table("time,y,y"), "y", "x", "numbers 2 and 3"),
+        (table("time,y,x"), "z", "x", "has no channel `z`; it has time, y, x"),
+        (table("time,y,x"), "y:furlong", "x", "the unit furlong is unknown"),
+        (
+            table("time,y [V],x"),
+            "y",
+            "x",
+            "the unit V is a voltage, and says nothing without",
+        ),
+        (
+            table("time,y,x"),
+            "y:N",
+            "x",
+            "the unit N is a force, and this structure is driven",
+        ),
+        (
+            table("time,y,x"),
+            "y",
+            "x:kN",
+            "the unit kN is a force, and this structure is driven",
+        ),
+        (
+            table("time,y [rad/s],x"),
+            "y",
+            "x",
+            "the unit rad/s is one of frequencies",
+        ),
+        (table("time,y [Hz],x"), "y", "x", "the unit Hz is one of frequencies"),
+        (table("time,y (deg),x"), "y", "x", "the unit deg is one of angles"),
+        (table("time,y (ms),x"), "y", "x", "the unit ms is one of times"),
+        (
+            table("time [mm],y,x"),
+            "y",
+            "x",
+            "the unit mm is one of lengths; the time needs s",
+        ),
+        (
+            table("time,y [m/s²],x"),
+            "y:100mV/g",
+            "x",
+            "100mV/g is a sensitivity, and the file states m/s², which is no voltage",
+        ),
+        (table("clock,y,x"), "y", "x", "has no channel with the time"),
+        (gap, "y", "x", "row 22: the time goes from 0.019 s to 0.9 s"),
+    ];
+    for (text, response, drive, words) in cases {
+        let message = read(text.as_bytes(), response, drive, None).unwrap_err().to_string();
+        assert!(message.starts_with("mine.csv") && message.contains(words), "{message}");
+        assert!(
+            text.is_empty() || words.contains("begins") || words.contains("row") || message.contains("1  "),
+            "{message}"
+        );
+    }
+}
+
+#[test]
+fn the_unit_of_a_channel_its_multiple_or_the_sensitivity_of_its_sensor_says_what_it_measures() {
+    const G: f64 = 9.806_65;
+    for (header, channel, measurand, factor) in [
+        ("y", "y:m/s²", Measurand::Acceleration, 1.0),
+        ("y", "y:g", Measurand::Acceleration, G),
+        ("y [g]", "y", Measurand::Acceleration, G),
+        ("y [m/s^2]", "y", Measurand::Acceleration, 1.0),
+        ("y", "y:-1g", Measurand::Acceleration, -G),
+        ("y", "y:0.0024g", Measurand::Acceleration, 0.0024 * G),
+        ("y", "y:100mV/g", Measurand::Acceleration, 10.0 * G * 1e-3),
+        ("y [V]", "y:100mV/g", Measurand::Acceleration, 10.0 * G),
+        ("y [V]", "y:9.81m/s²/V", Measurand::Acceleration, 9.81),
+        ("y (mV)", "y:10mV/(m/s²)", Measurand::Acceleration, 0.1),
+        ("y", "y:mm/s", Measurand::Velocity, 1e-3),
+        ("y [V]", "y:125mm/s/V", Measurand::Velocity, 0.125),
+        ("y", "y:µm", Measurand::Displacement, 1e-6),
+        ("y [V]", "y:-8V/mm", Measurand::Displacement, -0.125e-3),
+        ("y [V]", "y:0.5mm/mV", Measurand::Displacement, 0.5),
+        ("y", "y:-0.5", Measurand::Displacement, -0.5),
+    ] {
+        for is_response in [true, false] {
+            let rows: String = (0..50).map(|n| format!("{},{n},{n}\n", 1e-3 * f64::from(n))).collect();
+            let text = format!("time,{header},x\n{rows}");
+            let [response, drive] = if is_response {
+                [channel, "x:m"]
+            } else {
+                ["x:m", channel]
+            };
+            let one = read(text.as_bytes(), response, drive, None).unwrap_or_else(|error| panic!("{error}"));
+            let (of, values) = if is_response {
+                (0, &one.response)
+            } else {
+                (1, &one.drive)
+            };
+            assert_eq!(one.measurands[of], measurand, "{header} {channel}");
+            assert!(
+                (values[7] / (7.0 * factor) - 1.0).abs() < 1e-12,
+                "{header} {channel}: {}",
+                values[7]
+            );
+            assert_eq!(one.notes.len(), 1, "{:?}", one.notes);
+        }
+    }
+    // What is assumed, or contradicts the file, is said.
+    let rows: String = (0..50).map(|n| format!("{},{n},{n}\n", 1e-3 * f64::from(n))).collect();
+    for (header, channel, words) in [
+        ("y", "y", "channel y has no unit and is read in m"),
+        ("y [m/s²]", "y:mm", "read in mm, as given, though the file states m/s²"),
+    ] {
+        let one = read(format!("time,{header},x\n{rows}").as_bytes(), channel, "x:m", None).unwrap();
+        assert!(one.notes[1].contains(words), "{:?}", one.notes);
+    }
+}
+
+#[test]
+fn a_channel_of_the_base_that_is_late_by_a_known_time_is_shifted() {
+    let (step, omega) = (1e-3, 55.0);
+    let channel = |name: &str, late: f64| Channel {
+        name: name.into(),
+        unit: "mm".into(),
+        values: (0..500)
+            .map(|n| f64::sin(omega * (step * f64::from(n) - late)))
+            .collect(),
+        clock: Some([2.0, step]),
+        ..Channel::default()
+    };
+    for late in [1e-3, 0.4e-3, -0.7e-3] {
+        let channels = vec![channel("y", 0.0), channel("x", late)];
+        let contents = Contents { origin: "mine.csv".into(), channels, ..Contents::default() };
+        let selection = Selection {
+            response: Some("y".into()),
+            drive: Some("x".into()),
+            late: Some(late),
+            ..Selection::default()
+        };
+        let one = Recording::of(&contents, &selection).unwrap();
+        let apart = one
+            .response
+            .iter()
+            .zip(&one.drive)
+            .map(|(y, x)| (y - x).abs())
+            .fold(0.0, f64::max);
+        // Of an amplitude of 1e-3.
+        assert!(apart < 1e-8 && one.response.len() == 499, "{late}: {apart:e}");
+        let first = 1e-3 * f64::sin(omega * (one.start - 2.0));
+        assert!((one.response[0] - first).abs() < 1e-15 && one.notes[0].contains("as given, and is corrected"));
+        let message = Recording::of(&contents, &Selection { late: Some(7.0), ..selection }).unwrap_err();
+        assert!(message.to_string().contains("samples later"), "{message}");
+    }
+}
+
+#[test]
+fn velocities_and_accelerations_give_the_parameters_that_displacements_give() {
+    let scene = Scene {
+        resonance: Definition { sensor: Sensor::Q1, ..Definition::default() },
+        ..wrong_scene()
+    };
+    for (of_response, of_base) in [(2, 2), (1, 0), (0, 1)] {
+        let measurands = [of_response, of_base].map(|order| Measurand::ALL[order]);
+        let record = recorded_as(measurands);
+        let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
+        let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
+        let of_points = fit(&points, scene.resonance, &scene.plant, &[]).unwrap();
+        let prepared = [record.prepared(&scene.knowledge()).unwrap()];
+        let followed = follow(&prepared, &parts, &[], scene.resonance, &scene.plant, &[]).unwrap();
+        println!(
+            "{measurands:?}: worst {:.2} u of {} points, {:.2} u of {} periods",
+            worst(&of_points),
+            points.len(),
+            worst(&followed.fit),
+            followed.periods
+        );
+        for fit in [&of_points, &followed.fit] {
+            let mut estimates = FITTED.iter().map(|quantity| fit.estimate(*quantity).unwrap());
+            let are_narrow = estimates.all(|one| one.uncertainty < 0.2 * one.value);
+            assert!(
+                worst(fit) < 3.0 && are_narrow && !fit.is_rejected(),
+                "{measurands:?} {fit:?}"
+            );
+        }
+        let [r, of_points] = [&followed.fit, &of_points].map(|fit| fit.estimate(Quantity::R).unwrap());
+        assert!(r.uncertainty < 0.2 * of_points.uncertainty, "{r:?} {of_points:?}");
+        assert!(followed.periods > 200 && followed.left_out.is_empty(), "{followed:?}");
+    }
+    // The scene's sensor reads v, and no accelerometer does.
+    let message = recorded_as([Measurand::Acceleration, Measurand::Displacement]).parts(&wrong_scene().knowledge());
+    let message = message.unwrap_err().to_string();
+    assert!(message.contains("set resonance.sensor = \"q1\""), "{message}");
+}
+
+#[test]
+fn the_clock_is_fitted_and_the_phase_of_the_base_says_which_times_hold() {
+    let omega = 60.0;
+    let record = |time: &dyn Fn(f64) -> f64, at: &dyn Fn(f64) -> f64| {
+        let row = |n: i32| {
+            let n = f64::from(n);
+            let [y, x] = [0.3, 0.0].map(|lag| f64::sin(omega * at(n) - lag));
+            format!("{},{y},{x}\n", time(n))
+        };
+        let text = (0..4000).map(row).collect::<String>();
+        read(format!("time,y,x\n{text}").as_bytes(), "y", "x", None).unwrap()
+    };
+    let even = |n: f64| 100.0 + 1.133_8e-3 * n;
+    let shaken = |n: f64| even(n) + 3e-4 * (n * n).sin();
+    let rounded = |n: f64| (1e3 * even(n)).round() / 1e3;
+    // Even samples with six digits of time, or with times that are wrong: the fitted clock holds.
+    for time in [&rounded as &dyn Fn(f64) -> f64, &shaken] {
+        let one = record(time, &even);
+        assert!(one.notes[0].contains("rounded"), "{:?}", one.notes);
+        assert!((one.sample_time / 1.133_8e-3 - 1.0).abs() < 1.5e-5 && one.response.len() == 4000);
+    }
+    // A clock with the resolution of a sample repeats a time, or leaves one out.
+    for step in [0.9995e-3, 1.0005e-3] {
+        let even = |n: f64| 100.0 + step * n;
+        let one = record(&|n| (1e3 * even(n)).round() / 1e3, &even);
+        assert!(one.notes[0].contains("rounded"), "{:?}", one.notes);
+        assert!((one.sample_time / step - 1.0).abs() < 1e-5 && one.response.len() == 4000);
+    }
+    // Samples that are taken at uneven times are interpolated.
+    let one = record(&shaken, &shaken);
+    assert!(one.notes[0].contains("interpolated"), "{:?}", one.notes);
+    let worst = one
+        .drive
+        .iter()
+        .enumerate()
+        .skip(2)
+        .take(3900)
+        .map(|(n, value)| (value - f64::sin(omega * (one.start + (one.sample_time * n as f64)))).abs());
+    let worst = worst.fold(0.0, f64::max);
+    assert!(worst < 0.05, "{worst}");
+}
+
+#[test]
+fn channels_with_clocks_of_their_own_are_aligned() {
+    let wave = |start: f64, step: f64, count: i32| {
+        (0..count)
+            .map(|n| (50.0 * (start + step * f64::from(n))).sin())
+            .collect()
+    };
+    let channel = |name: &str, start: f64, step: f64, count: i32| Channel {
+        name: name.into(),
+        unit: "mm".into(),
+        values: wave(start, step, count),
+        clock: Some([start, step]),
+        ..Channel::default()
+    };
+    let channels = vec![
+        channel("rig/y", 0.0, 1e-3, 1000),
+        channel("rig/x", 0.0104, 0.5e-3, 1500),
+    ];
+    let contents = Contents { origin: "a.tdms".into(), channels, ..Contents::default() };
+    let selection = Selection {
+        response: Some("y".into()),
+        drive: Some("x".into()),
+        ..Selection::default()
+    };
+    let one = Recording::of(&contents, &selection).unwrap();
+    assert!(one.response.len() == one.drive.len() && one.response.len() > 700 && one.notes[0].contains("begins"));
+    let worst = one
+        .response
+        .iter()
+        .zip(&one.drive)
+        .map(|(y, x)| (y - x).abs())
+        .fold(0.0, f64::max);
+    assert!(worst < 1e-9, "{worst}");
+}

@@ -1,0 +1,868 @@
+//! Guards the section `[structure]`: what its three forms say, and a sentence for every mistake.
+
+use std::f64::consts::TAU;
+use std::fs;
+
+use num_complex::Complex;
+use tempfile::TempDir;
+use vines_bench::comparison::{Comparison, ExactCurve};
+use vines_bench::fit::{MeasuredPoint, contradiction};
+use vines_bench::identification::IdentificationError;
+use vines_bench::loop_check::{CheckedQuantity, Verdict, check};
+use vines_bench::rig::Simulated;
+use vines_bench::scene::{Excitation, Scene, SceneError, Structure};
+use vines_bench::survey::{Survey, phase_resonant, structure_backbone, without_other_modes};
+use vines_model::numerics::Estimate;
+use vines_model::orbit::{Orbit, StructureOrbit};
+
+use super::common::off_backbone;
+use super::{identified, paper, tracked};
+
+/// A beam by two modes; `changes` are pairs of a text and its replacement.
+fn beam(changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
+    of(&TempDir::new().unwrap(), BEAM, changes)
+}
+
+fn of(folder: &TempDir, text: &str, changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
+    let text = changes.iter().fold(text.to_string(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    });
+    let file = folder.path().join("beam.toml");
+    fs::write(&file, text).unwrap();
+    Scene::load(Some(&file), &[])
+}
+
+const BEAM: &str = "\
+[plant]
+m = 0.032
+b = 0.01
+r = 0.65
+[structure]
+excitation = \"force\"
+cavity = \"tip\"
+drive = \"root\"
+modes = [
+    { frequency = 8.8156, damping = 0.006, shape = { root = 0.1, tip = 0.51252, middle = 0.0 } },
+    { frequency = 55.274, damping = 0.006, shape = { root = 0.3, tip = -0.51252, middle = 0.4 } },
+]
+[excitation]
+F = 1.2
+";
+
+const PLANT: &str = "[plant]\nm = 0.0084\nb = 1\nr = 0.65\n[excitation]\nG = 1.1\n[structure]\ncavity = \"tip\"\n";
+const MATRICES: &str = "M = \"m.csv\"\nC = \"c.csv\"\nK = \"k.csv\"\n";
+
+/// A folder with the matrices M, C and K of two degrees of freedom, each in three numbers: diagonal and coupling.
+fn matrices([m, c, k]: [[f64; 3]; 3]) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    for (name, [a, b, d]) in [("m.csv", m), ("c.csv", c), ("k.csv", k)] {
+        fs::write(folder.path().join(name), format!("tip, root\n{a}, {b}\n{b}, {d}\n")).unwrap();
+    }
+    folder
+}
+
+const GOOD: [[f64; 3]; 3] = [[1.0, 0.0, 2.0], [0.02, -0.01, 0.04], [2.0, -1.0, 4.0]];
+
+/// A refusal is one sentence with these parts, which `|` separates.
+fn says(result: Result<Scene, SceneError>, parts: &str) {
+    let message = result.expect_err(parts).to_string();
+    for part in parts.split(" | ") {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+    assert!(!message.contains('\n'), "{message}");
+}
+
+#[test]
+fn a_force_through_much_damping_is_checked_and_its_points_belong_to_the_scene() {
+    let oscillator = "[plant]\nm = 0.032\nb = 0.01\nr = 0.65\n[structure]\nexcitation = \"force\"\ncavity = \"c\"\ndrive = \"c\"\n\
+                      modes = [{ frequency = 8.8, damping = 0.02, shape = { c = 0.5 } }]\n[excitation]\nG = 2.5\n[start]\ndq2 = 0.5\n";
+    let of_base = [
+        "plant.c=9",
+        "resonance.reference=force",
+        "resonance.sensor=q1",
+        "excitation.G=2.5",
+    ];
+    for scene in [of(&TempDir::new().unwrap(), oscillator, &[]).unwrap(), paper(&of_base)] {
+        let found = check(&mut *Simulated::of(&scene.clone().at_rest()).unwrap(), &scene.plan()).unwrap();
+        assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+        assert!(
+            found
+                .quantities
+                .iter()
+                .all(|one| (one.measured - one.expected).abs() < 0.02),
+            "{found:?}"
+        );
+        let points = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap().points;
+        let points: Vec<MeasuredPoint> = points
+            .iter()
+            .filter(|one| one.settled)
+            .map(|one| (&one.at).into())
+            .collect();
+        assert!(points.len() > 20, "{}", points.len());
+        assert!(contradiction(&points, scene.definition(), &scene.plant).is_none());
+    }
+}
+
+#[test]
+fn the_check_of_a_damped_beam_takes_no_other_mode_for_a_late_response() {
+    // Beside the drive, the second mode adds half of the driven one's static response.
+    let damped = [
+        ("damping = 0.006", "damping = 0.03"),
+        ("root = 0.3", "root = 0.45"),
+        ("F = 1.2", "F = 5"),
+    ];
+    let scene = beam(&damped).unwrap();
+    let found = check(&mut *Simulated::of(&scene).unwrap(), &scene.plan()).unwrap();
+    assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+}
+
+#[test]
+fn the_check_of_two_close_modes_takes_no_beat_for_a_delay_whether_the_drawing_is_exact_or_not() {
+    let close = [
+        (
+            "frequency = 8.8156, damping = 0.006",
+            "frequency = 8.8156, damping = 0.00015",
+        ),
+        (
+            "frequency = 55.274, damping = 0.006",
+            "frequency = 9.2488, damping = 0.00126",
+        ),
+        ("root = 0.3, tip = -0.51252", "root = 0.06, tip = 0.18"),
+    ];
+    let scene = beam(&close).unwrap();
+    let on = |rig: &Scene| check(&mut *Simulated::of(rig).unwrap(), &scene.plan()).unwrap();
+    let found = on(&scene);
+    assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+    // The beat lasts longer than the check: it is known from the drawing.
+    assert_eq!(found.quantities.len(), 6);
+    let off = |one: &CheckedQuantity| (one.measured - one.expected).abs();
+    assert!(found.quantities.iter().all(|one| off(one) < 2e-4), "{found:?}");
+    let found = on(&beam(&[&close[..], &[("9.2488", "9.26")]].concat()).unwrap());
+    assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+    // Where the rig has another beat, the uncertainties cover what it does.
+    let covered = |one: &CheckedQuantity| off(one) <= 1e-6 + 4.0 * one.uncertainty;
+    assert!(found.quantities.iter().all(covered), "{found:?}");
+}
+
+#[test]
+fn the_driven_mode_of_a_table_is_the_oscillator_of_knowledge_and_plan() {
+    let scene = beam(&[]).unwrap();
+    let structure = scene.structure.as_ref().unwrap();
+    assert_eq!(structure.points, ["middle", "root", "tip"]);
+    assert_eq!(structure.excitation, Excitation::Force);
+    let knowledge = scene.knowledge();
+    assert!((knowledge.linear.omega0 / (TAU * 8.8156) - 1.0).abs() < 1e-14);
+    assert!((knowledge.linear.damping_rate / (0.006 * TAU * 8.8156) - 1.0).abs() < 1e-14);
+    assert!((knowledge.numbers.epsilon - 0.032 * 0.51252_f64.powi(2)).abs() < 1e-15);
+    // F at the drive and a base of the amplitude E, through spring and damper, move the mode alike; the sensor is at the drive unless it says otherwise.
+    let stiffness = knowledge.linear.omega0.powi(2) * 1.0_f64.hypot(2.0 * 0.006) / 0.51252;
+    assert!((scene.amplitude * stiffness / (0.1 * 1.2) - 1.0).abs() < 1e-14);
+    assert!((structure.reading_per_response() - 0.1 / 0.51252).abs() < 1e-15);
+    let second = beam(&[("[excitation]", "mode = 2\nsensor = \"middle\"\n[excitation]")]);
+    let second = second.unwrap();
+    assert!((second.knowledge().linear.omega0 / (TAU * 55.274) - 1.0).abs() < 1e-14);
+    // Cavity and drive move in opposite directions: the sensor's sign makes the resonance the same.
+    assert!(second.structure.unwrap().reading_per_response() > 0.0);
+}
+
+#[test]
+fn limits_are_in_newton_and_of_the_displacement_at_the_sensor() {
+    let limits = "[resonance]\nsensor_quantity = \"velocity\"\n[phase_lock]\namplitude_max = 3\nresponse_max = 0.004\n[excitation]";
+    let scene = beam(&[("[excitation]", limits)]).unwrap();
+    let config = scene.controller_config();
+    assert!((config.amplitude_max.unwrap() / (3.0 * scene.amplitude / 1.2) - 1.0).abs() < 1e-14);
+    assert!((config.response_max.unwrap() / (0.004 * 0.51252 / 0.1) - 1.0).abs() < 1e-14);
+    // A velocity at phase resonance is in phase with the force.
+    assert!(config.phase_target.abs() < 1e-15 && scene.knowledge().is_at_phase_resonance());
+}
+
+#[test]
+fn matrices_give_modes_and_the_participation_of_the_base() {
+    let folder = matrices(GOOD);
+    let scene = of(&folder, &format!("{PLANT}{MATRICES}"), &[]).unwrap();
+    let structure = scene.structure.unwrap();
+    // The damping is proportional to the stiffness here: modal.
+    assert!(structure.rows.iter().flatten().all(|[_, velocity]| *velocity == 0.0));
+    for mode in &structure.modes {
+        let norm = mode.shape[0].powi(2) + 2.0 * mode.shape[1].powi(2);
+        assert!((norm - 1.0).abs() < 1e-14);
+        assert!((mode.drive - (mode.shape[0] + 2.0 * mode.shape[1])).abs() < 1e-14);
+        assert!((mode.zeta - 0.005 * mode.omega).abs() < 1e-14);
+    }
+    // sum phi Gamma = 1 at every point: the set is complete.
+    let complete: f64 = structure.modes.iter().map(|mode| mode.shape[0] * mode.drive).sum();
+    assert!((complete - 1.0).abs() < 1e-14);
+    let folder = matrices([GOOD[0], [0.02, 0.0, 0.0], GOOD[2]]);
+    let coupled = of(&folder, &format!("{PLANT}{MATRICES}"), &[]).unwrap();
+    let rows = coupled.structure.unwrap().rows;
+    assert!(rows.iter().flatten().any(|[_, velocity]| *velocity != 0.0));
+}
+
+#[test]
+fn residues_of_a_real_mode_give_its_mass_normalised_shape() {
+    let folder = TempDir::new().unwrap();
+    let omega = TAU * 8.8156 * (1.0 - 0.006_f64.powi(2)).sqrt();
+    let [tip, root] = [0.51252 * 0.1, 0.1 * 0.1].map(|product| -product / (2.0 * omega));
+    let text = format!("frequency, damping, re tip, im tip, re root, im root\n8.8156, 0.006, 0, {tip}, 0, {root}\n");
+    fs::write(folder.path().join("beam.csv"), &text).unwrap();
+    let residues = "excitation = \"force\"\ndrive = \"root\"\nresidues = \"beam.csv\"\nreference = \"root\"\n";
+    let scene = of(&folder, &format!("{PLANT}{residues}"), &[]).unwrap();
+    let structure = scene.structure.unwrap();
+    let mode = structure.mode();
+    assert!(
+        (mode.shape[0] - 0.51252).abs() < 1e-12 && (mode.shape[1] - 0.1).abs() < 1e-12,
+        "{mode:?}"
+    );
+    assert!(mode.out_of_phase < 1e-15);
+    fs::write(folder.path().join("beam.csv"), text.replace(", -", ", ")).unwrap();
+    says(of(&folder, &format!("{PLANT}{residues}"), &[]), "negative modal mass");
+    fs::write(folder.path().join("beam.csv"), &text).unwrap();
+    let without = format!("{PLANT}{}", residues.replace("reference = \"root\"\n", ""));
+    says(of(&folder, &without, &[]), "`reference` is missing | tip, root");
+    says(
+        of(
+            &folder,
+            &format!("{PLANT}{residues}"),
+            &[("\"beam.csv\"", "\"none.csv\"")],
+        ),
+        "residues (none.csv) | relative to the scene",
+    );
+    let base = [("excitation = \"force\"\ndrive = \"root\"\n", "")];
+    says(
+        of(&folder, &format!("{PLANT}{residues}"), &base),
+        "residues of a receptance belong to excitation",
+    );
+}
+
+#[test]
+fn complex_residues_of_as_many_points_as_modes_give_the_structure_of_the_matrices() {
+    let folder = matrices([GOOD[0], [0.02, 0.0, 0.0], GOOD[2]]);
+    let force = "excitation = \"force\"\ndrive = \"tip\"\n";
+    let given = of(&folder, &format!("{PLANT}{force}{MATRICES}"), &[])
+        .unwrap()
+        .structure
+        .unwrap();
+    let csv = |digits: usize| {
+        let mut text = "frequency, damping, re tip, im tip, re root, im root\n".to_string();
+        for (n, section) in given.host.sections().iter().enumerate() {
+            let (delta, omega) = (section.oscillator.delta, section.oscillator.omega0);
+            let pole = Complex::new(-delta, (omega * omega - delta * delta).sqrt());
+            let [k0, k1] = section.kick;
+            let [x, v] = [k1 + 2.0 * delta * k0 + pole * k0, pole * k1 - omega * omega * k0];
+            text += &format!("{}, {}", omega / TAU, delta / omega);
+            for row in &given.rows {
+                let residue = (x * row[n][0] + v * row[n][1]) / Complex::new(0.0, 2.0 * pole.im);
+                text += &format!(", {:.digits$e}, {:.digits$e}", residue.re, residue.im);
+            }
+            text += "\n";
+        }
+        text
+    };
+    let text = format!("{PLANT}{force}residues = \"beam.csv\"\nreference = \"tip\"\n");
+    let off = |csv: &str| {
+        fs::write(folder.path().join("beam.csv"), csv).unwrap();
+        let found = of(&folder, &text, &[]).unwrap().structure.unwrap();
+        let response = |structure: &Structure, omega: f64| structure.host.frequency_response(&structure.rows[1], omega);
+        let relative = |omega: &f64| (response(&found, *omega) / response(&given, *omega) - 1.0).norm();
+        [0.0, 0.3, 0.9, 1.1, 2.0, 5.0].iter().map(relative).fold(0.0, f64::max)
+    };
+    assert!(off(&csv(16)) < 1e-11, "{}", off(&csv(16)));
+    assert!(off(&csv(4)) < 1e-2, "{}", off(&csv(4)));
+    // Parts out of phase that do not cancel are errors of the measurement: real modes remain.
+    let noisy = csv(16);
+    let lines: Vec<&str> = noisy.lines().collect();
+    let one: Vec<f64> = lines[1].split(", ").map(|cell| cell.parse().unwrap()).collect();
+    let turned = format!(
+        "{}, {}, {}, {}, {}, {}",
+        one[0], one[1], -one[2], one[3], -one[4], one[5]
+    );
+    fs::write(folder.path().join("beam.csv"), [lines[0], &turned, lines[2]].join("\n")).unwrap();
+    let real = of(&folder, &text, &[]).unwrap().structure.unwrap();
+    assert!(real.rows.iter().flatten().all(|[_, velocity]| *velocity == 0.0) && real.modes[0].out_of_phase > 1e-4);
+}
+
+#[test]
+fn points_that_do_not_exist_are_refused_with_a_list_of_those_that_do() {
+    says(
+        beam(&[("\"tip\"", "\"top\"")]),
+        "cavity = \"top\" is no point | middle, root, tip",
+    );
+    says(
+        beam(&[("\"root\"", "\"end\"")]),
+        "drive = \"end\" is no point | middle, root, tip",
+    );
+    says(beam(&[("cavity = \"tip\"", "")]), "`cavity` is missing");
+    says(beam(&[("drive = \"root\"", "")]), "`drive` is missing");
+    says(
+        beam(&[("cavity", "masses = { top = 0.005 }\ncavity")]),
+        "masses = \"top\" is no point | middle, root, tip",
+    );
+    for mass in ["0", "-0.005", "nan"] {
+        says(
+            beam(&[("cavity", &format!("masses = {{ tip = {mass} }}\ncavity"))]),
+            "kg at tip | positive",
+        );
+    }
+}
+
+#[test]
+fn a_cavity_at_a_node_of_the_driven_mode_is_refused_because_no_impact_can_drive_it() {
+    says(
+        beam(&[("cavity = \"tip\"", "cavity = \"middle\"")]),
+        "cavity at middle | node of the driven mode 1 | no impact can drive it",
+    );
+    says(
+        beam(&[("[excitation]", "sensor = \"middle\"\n[excitation]")]),
+        "sensor at middle | node",
+    );
+    says(
+        beam(&[("drive = \"root\"", "drive = \"middle\"")]),
+        "force at middle does not drive mode 1",
+    );
+}
+
+#[test]
+fn damping_above_critical_is_refused_where_a_mode_is_asked_for() {
+    says(
+        beam(&[(
+            "frequency = 8.8156, damping = 0.006",
+            "frequency = 8.8156, damping = 1.2",
+        )]),
+        "mode 1 | 1.2 | below 1",
+    );
+    let folder = matrices([GOOD[0], [8.0, 0.0, 16.0], GOOD[2]]);
+    says(
+        of(&folder, &format!("{PLANT}{MATRICES}"), &[]),
+        "mode 1 by rising frequency | has the damping ratio | below 1",
+    );
+}
+
+#[test]
+fn matrices_that_are_not_symmetric_or_not_positive_are_refused_with_the_eigenvalue() {
+    let scene = format!("{PLANT}{MATRICES}");
+    let folder = matrices(GOOD);
+    fs::write(folder.path().join("k.csv"), "tip, root\n2, -1\n-1.1, 4\n").unwrap();
+    says(
+        of(&folder, &scene, &[]),
+        "K (k.csv) is not symmetric | (root, tip) is -1.1 | (tip, root) is -1",
+    );
+    let indefinite = |matrix: [[f64; 3]; 3]| of(&matrices(matrix), &scene, &[]);
+    says(
+        indefinite([GOOD[0], GOOD[1], [1.0, 2.0, 1.0]]),
+        "K (k.csv) is not positive definite | eigenvalue 1 of 2 | -1.0000e0 N/m",
+    );
+    says(
+        indefinite([[1.0, 1.0, 1.0], GOOD[1], GOOD[2]]),
+        "M (m.csv) is not positive definite | kg",
+    );
+    says(
+        indefinite([GOOD[0], [0.0, 0.1, 0.0], GOOD[2]]),
+        "C (c.csv) is not positive semidefinite | -1.0000e-1 N s/m",
+    );
+    fs::write(folder.path().join("k.csv"), "tip, root\n2, -1\n").unwrap();
+    says(of(&folder, &scene, &[]), "2 columns and 1 rows | square");
+    fs::write(folder.path().join("k.csv"), "2, -1\n-1, 4\n").unwrap();
+    says(of(&folder, &scene, &[]), "no line of names");
+    fs::write(folder.path().join("k.csv"), "").unwrap();
+    says(of(&folder, &scene, &[]), "K (k.csv) is empty");
+    fs::write(folder.path().join("k.csv"), "tip, tip\n2, -1\n-1, 4\n").unwrap();
+    says(of(&folder, &scene, &[]), "two columns with the name tip");
+    fs::write(folder.path().join("k.csv"), "tip, root\n2, x\n-1, 4\n").unwrap();
+    says(of(&folder, &scene, &[]), "`x` in line 2");
+    fs::write(folder.path().join("k.csv"), "root, tip\n4, -1\n-1, 2\n").unwrap();
+    says(of(&folder, &scene, &[]), "same order");
+}
+
+#[test]
+fn shapes_that_are_not_mass_normalised_are_refused_with_their_norm() {
+    let folder = matrices(GOOD);
+    let modes =
+        "M = \"m.csv\"\nmodes = [{ frequency = 0.2, damping = 0.01, shape = { tip = 0.6, root = 0.565685 } }]\n";
+    let scene = of(&folder, &format!("{PLANT}{modes}"), &[]).unwrap();
+    assert!((scene.structure.unwrap().mode().drive - (0.6 + 2.0 * 0.565685)).abs() < 1e-12);
+    says(
+        of(&folder, &format!("{PLANT}{modes}"), &[("0.565685", "1.2")]),
+        "mode 1 is not mass-normalised | 1.8000",
+    );
+    says(
+        of(&folder, &format!("{PLANT}{modes}"), &[("root =", "side =")]),
+        "no shape at root",
+    );
+}
+
+#[test]
+fn what_contradicts_the_structure_is_refused() {
+    says(
+        beam(&[("m = 0.032", "m = 0.032\nk = 1e4")]),
+        "[plant] has `k` beside [structure]",
+    );
+    says(beam(&[("F = 1.2", "E = 1e-4")]), "[excitation] | F (N)");
+    says(beam(&[("F = 1.2", "F = 1.2\nG = 1")]), "[excitation] has more than one");
+    let reference = "[resonance]\nreference = \"force\"\n[excitation]";
+    says(
+        beam(&[("[excitation]", reference)]),
+        "resonance.reference | beside [structure]",
+    );
+    says(
+        beam(&[("[excitation]", "[start]\nq1 = 0.1\n[excitation]")]),
+        "a structure starts at rest",
+    );
+    says(
+        beam(&[("[excitation]", "mode = 3\n[excitation]")]),
+        "mode = 3 | modes 1 to 2",
+    );
+    says(
+        beam(&[("[excitation]", "M = \"m.csv\"\nK = \"k.csv\"\n[excitation]")]),
+        "exactly one description",
+    );
+    says(
+        beam(&[("excitation = \"force\"", "excitation = \"base\"")]),
+        "no participation",
+    );
+    says(
+        beam(&[(", middle = 0.4", "")]),
+        "mode 2 has its shape at the points root, tip",
+    );
+    says(
+        beam(&[(
+            "damping = 0.006, shape = { root = 0.3",
+            "damping = -1, shape = { root = 0.3",
+        )]),
+        "mode 2 | damping = -1",
+    );
+}
+
+#[test]
+fn the_presets_say_which_mode_takes_the_stability_of_the_1_1_motion() {
+    let survey = |name: &str| {
+        let file = format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        Survey::of(&Scene::load(Some(file.as_ref()), &[]).unwrap()).unwrap()
+    };
+    // The study's operating point is unstable on a cantilever, and symmetry breaks through its third mode.
+    let cantilever = survey("cantilever");
+    assert!(cantilever.orbits.iter().all(|orbit| !orbit.stable));
+    let modes: Vec<usize> = cantilever.taken().map(|(mode, _)| mode + 1).collect();
+    assert!(modes.contains(&2) && modes.contains(&3), "{modes:?}");
+    // A second mode near the third harmonic gives a stable motion where one mode has none.
+    let resonant = survey("resonant");
+    let [orbit] = &resonant.orbits[..] else {
+        panic!("{:?}", resonant.orbits)
+    };
+    let alone = |omega: f64| {
+        let branches = &resonant.facts.alone;
+        let all = branches.iter().flat_map(|branch| &branch.orbits);
+        all.min_by(|one, other| (one.omega - omega).abs().total_cmp(&(other.omega - omega).abs()))
+            .unwrap()
+            .stable
+    };
+    assert!(orbit.stable && !alone(orbit.omega));
+    // The stable motion of the frame lies between its modes, and the backbone passes through it.
+    let frame = survey("frame");
+    let [orbit] = frame.orbits.iter().filter(|orbit| orbit.stable).collect::<Vec<_>>()[..] else {
+        panic!("{:?}", frame.orbits)
+    };
+    let near = |one: &&StructureOrbit| (one.drive / orbit.drive - 1.0).hypot(one.omega / orbit.omega - 1.0) < 0.01;
+    let curve = frame.facts.all.iter().flat_map(|branch| &branch.orbits);
+    assert!(curve.filter(near).any(|one| one.stable));
+}
+
+#[test]
+fn points_of_a_structure_without_its_other_modes_are_those_of_the_driven_mode() {
+    for name in ["cantilever", "resonant", "frame"] {
+        let file = format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let scene = Scene::load(Some(file.as_ref()), &[]).unwrap();
+        let numbers = scene.dimensionless();
+        let alone = ExactCurve::of(&numbers);
+        let orbits = structure_backbone(&scene, &numbers).unwrap().into_iter().flatten();
+        let estimate = |value| Estimate { value, uncertainty: 1e-9 };
+        let points: Vec<MeasuredPoint> = orbits
+            .filter(|orbit| orbit.stable && (0.3..0.6).contains(&orbit.c))
+            .map(|orbit| MeasuredPoint {
+                response: estimate(orbit.c * numbers.b),
+                omega: estimate(orbit.omega * numbers.omega0),
+                drive: estimate(numbers.amplitude(orbit.g)),
+                phase: scene.definition().phase,
+            })
+            .collect();
+        let moved = without_other_modes(&scene, points.clone());
+        assert!(points.len() > 10 && moved.len() == points.len(), "{name}");
+        for MeasuredPoint { response, omega, drive, .. } in moved {
+            let place = [numbers.sigma(omega.value), numbers.excitation(drive.value)];
+            let off = alone.distance(response.value / numbers.b, place[0], place[1]).unwrap();
+            assert!(off.nearest < 2e-5, "{name}: {off:?}");
+        }
+    }
+}
+
+/// A preset of `scenes/`.
+fn preset(name: &str, settings: &[&str]) -> Scene {
+    let file = format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let settings: Vec<_> = settings.iter().map(|one| one.parse().unwrap()).collect();
+    Scene::load(Some(file.as_ref()), &settings).unwrap()
+}
+
+#[test]
+fn a_level_of_a_structure_waits_until_less_than_the_precision_is_left_of_what_rings_beside_the_driven_mode() {
+    assert_eq!(paper(&[]).knowledge().ringing, 0.0);
+    // The second mode at three times the frequency takes nine periods to fall by a factor of e.
+    let settings = [
+        "backbone.precision=9e-4",
+        "backbone.C_from=0.7",
+        "backbone.C_to=0.54",
+        "backbone.points=5",
+    ];
+    let scene = preset("resonant", &settings);
+    let tracked = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+    let curves = structure_backbone(&scene, &scene.dimensionless()).unwrap();
+    for point in &tracked.points {
+        let [_, ratio] = off_backbone(&curves, &point.at, 0.0);
+        // Without the wait up to 5 u.
+        assert!(point.settled && ratio < 2.5, "{ratio} u: {point:?}");
+    }
+}
+
+#[test]
+fn the_loop_finds_the_stable_exact_orbits_of_the_presets_and_refuses_what_is_asymmetric() {
+    for (name, settings) in [
+        ("resonant", &[][..]),
+        ("frame", &[]),
+        ("cantilever", &["excitation.G=1.05"]),
+        (
+            "cantilever",
+            &["excitation.G=1.05", "resonance.sensor_quantity=velocity"],
+        ),
+    ] {
+        // Long enough for the response to come to rest.
+        let scene = preset(name, &[settings, &["record.hold_periods=480"]].concat());
+        let at = identified(&scene).unwrap().lock.at;
+        let orbits = phase_resonant(&scene, &scene.dimensionless());
+        let near = |orbit: &Orbit| orbit.stable && (orbit.sigma - at.sigma).abs().max((orbit.c - at.c).abs()) < 1e-4;
+        assert!(orbits.iter().any(near), "{name}: {at:?}");
+    }
+    let refused = identified(&preset("cantilever", &[]));
+    assert!(
+        matches!(refused, Err(IdentificationError::Regime { .. })),
+        "{refused:?}"
+    );
+}
+
+#[test]
+fn points_of_a_structure_are_compared_with_the_exact_orbit_of_their_response_not_with_a_polygon() {
+    let scene = preset("frame", &[]);
+    let (numbers, structure) = (scene.dimensionless(), scene.structure.as_ref().unwrap());
+    let [per_drive, per_response] = [structure.base_per_drive(), structure.reading_per_response().abs()];
+    let orbits = scene.structure_orbits().unwrap();
+    let mut compared = 0;
+    for n in 0..60 {
+        let omega = structure.mode().omega * (0.98 + 0.0007 * f64::from(n));
+        for orbit in orbits.at_phase_resonance(omega) {
+            let orbit = orbit.in_numbers(&numbers, per_drive, per_response);
+            if !orbit.stable {
+                continue;
+            }
+            compared += 1;
+            let curve = ExactCurve::of_scene(&scene, &numbers, [orbit.sigma, orbit.c]);
+            // The polygon is off by up to 2e-4.
+            for off in [0.0, 1e-3] {
+                let distance = curve.distance(orbit.c, orbit.sigma + off, orbit.g).unwrap();
+                let (sigma, g) = (distance.sigma.unwrap() - off, distance.g.unwrap());
+                assert!(
+                    sigma.abs() < 1e-8 && g.abs() < 1e-8 && distance.nearest <= off + 1e-8,
+                    "{distance:?}"
+                );
+            }
+        }
+    }
+    assert!(compared > 5, "{compared}");
+}
+
+#[test]
+fn the_exact_orbit_beside_a_lock_has_the_measured_response() {
+    let scene = preset("resonant", &["chain.snr=40", "chain.seed=3"]);
+    let found = Comparison::of(&identified(&scene).unwrap(), &scene);
+    let (at, exact) = (found.lock.at, found.exact.unwrap());
+    assert!((exact.c / at.c - 1.0).abs() < 1e-9, "{} {}", exact.c, at.c);
+    assert!((exact.sigma - at.sigma).abs() < 4.0 * at.u_sigma && (exact.g - at.g).abs() < 4.0 * at.u_g);
+}
+
+#[test]
+fn mistakes_of_a_modal_model_are_refused_with_the_value_and_what_to_do() {
+    says(
+        beam(&[("frequency = 8.8156", "frequency = 0.0")]),
+        "mode 1 has frequency = 0 Hz | leave out rigid-body modes",
+    );
+    says(
+        beam(&[("tip = 0.51252", "tip = inf")]),
+        "mode 1 (8.8156 Hz) has the shape at tip = inf | finite",
+    );
+    // The number is that of the table as it is written, not that by rising frequency.
+    let swapped = [
+        ("frequency = 8.8156, damping = 0.006", "frequency = 99.0, damping = 1.5"),
+        ("frequency = 55.274", "frequency = 8.8"),
+    ];
+    says(beam(&swapped), "mode 1 (99 Hz) has damping = 1.5 | below 1");
+    says(
+        beam(&[
+            ("tip = 0.51252", "tip = 7e-9"),
+            ("root = 0.1", "root = 1e-9"),
+            ("middle = 0.0", "middle = 1e-9"),
+        ]),
+        "cavity at tip is at a node of the driven mode 1 | 7.0000e-9 1/sqrt(kg) | choose another point or mode",
+    );
+    let scene = format!("{PLANT}{MATRICES}");
+    let with = |name: &str, text: &str| {
+        let folder = matrices(GOOD);
+        fs::write(folder.path().join(name), text).unwrap();
+        of(&folder, &scene, &[])
+    };
+    says(
+        with("k.csv", "tip, root\n2, -2\n-2, 2\n"),
+        "K (k.csv) is not positive definite | eigenvalue 1 of 2 | 1 of them are 0 within rounding | rigid-body modes | suspension",
+    );
+    says(
+        with("m.csv", "tip, root\n1, 0\n0, 0\n"),
+        "M (m.csv) is not positive definite | without mass: here root | static condensation",
+    );
+    says(
+        with("k.csv", "tip, root\n2, -1\n-1.0000001, 4\n"),
+        "K (k.csv) is not symmetric | they differ by 2.5e-8 of its largest | 1e-9 is allowed | mean of both",
+    );
+}
+
+#[test]
+fn matrices_are_plain_tables_of_any_delimiter_and_what_is_none_is_refused_with_the_command() {
+    let scene = format!("{PLANT}{MATRICES}");
+    let with = |text: &str| {
+        let folder = matrices(GOOD);
+        fs::write(folder.path().join("k.csv"), text).unwrap();
+        of(&folder, &scene, &[])
+    };
+    let omegas = |scene: Scene| {
+        scene
+            .structure
+            .unwrap()
+            .modes
+            .iter()
+            .map(|mode| mode.omega)
+            .collect::<Vec<f64>>()
+    };
+    let expected = omegas(of(&matrices(GOOD), &scene, &[]).unwrap());
+    for text in [
+        "tip; root\n2; -1\n-1; 4\n",
+        "tip;root\n2,0;-1,0\n-1,0;4,0\n",
+        "tip\troot\n2\t-1\n-1\t4\n",
+    ] {
+        assert_eq!(omegas(with(text).unwrap()), expected, "{text}");
+    }
+    for (text, words) in [
+        ("    -1\n    55\n", "no line of names"),
+        (
+            "just words\n",
+            "no table of numbers | python -m vines structure FILE --cavity",
+        ),
+        ("# K\ntip, root\n2, -1\n-1, 4\n", "begins a comment"),
+        ("tip [mm], root\n2, -1\n-1, 4\n", "column tip: it states the unit mm"),
+        (
+            "tip, root\n2, -1\n-1, 4\n7\n",
+            "the last row is cut off | repair the row",
+        ),
+    ] {
+        says(with(text), words);
+    }
+}
+
+/// A structure with one mode and a light particle, and the same oscillator.
+fn light(epsilon: f64) -> (Scene, Scene) {
+    let zeta = 0.715 * epsilon;
+    let plant = format!("[plant]\nm = {epsilon:?}\nb = 1\nr = 0.65\n[excitation]\nG = 1.1\n");
+    let mode = format!("{{ frequency = 1.0, damping = {zeta:?}, participation = 1.0, shape = {{ tip = 1.0 }} }}");
+    let text = format!("{plant}[structure]\ncavity = \"tip\"\nmodes = [{mode}]\n");
+    let oscillator = format!(
+        "[plant]\nepsilon = {epsilon:?}\nlambda = 1.43\nr = 0.65\n[resonance]\nsensor = \"q1\"\n[excitation]\nG = 1.1\n"
+    );
+    let oscillator = Scene::parse("oscillator", &oscillator, &[]).unwrap();
+    (of(&TempDir::new().unwrap(), &text, &[]).unwrap(), oscillator)
+}
+
+#[test]
+fn a_structure_with_a_light_particle_has_the_orbits_of_the_same_oscillator() {
+    for epsilon in [1e-2, 1e-4, 1e-5, 1e-6] {
+        let (structure, oscillator) = light(epsilon);
+        let survey = Survey::of(&structure).unwrap();
+        let expected = phase_resonant(&oscillator, &oscillator.dimensionless());
+        assert_eq!(survey.orbits.len(), expected.len(), "orbits at epsilon = {epsilon:e}");
+        let stable = survey
+            .facts
+            .all
+            .iter()
+            .flat_map(|branch| &branch.orbits)
+            .any(|orbit| orbit.stable);
+        assert!(stable, "no stable orbit of the backbone at epsilon = {epsilon:e}");
+    }
+}
+
+#[test]
+fn all_orbits_of_a_structure_are_found_also_outside_the_frequencies_of_the_controller() {
+    let narrow = preset("frame", &["controller.omega_min=0.999", "controller.omega_max=1.001"]);
+    let wide = preset("frame", &["controller.omega_min=0.5", "controller.omega_max=1.8"]);
+    let [narrow, wide] = [narrow, wide].map(|scene| Survey::of(&scene).unwrap().orbits.len());
+    assert_eq!(narrow, wide);
+}
+
+#[test]
+fn an_exact_orbit_of_a_structure_with_close_modes_lies_on_its_exact_backbone() {
+    let shapes = [(0.649, 1.246), (0.165, -0.775)];
+    let modes = [(5.0704, 0.01589), (6.2527, 0.00943)].into_iter().zip(shapes);
+    let modes: String = modes
+        .map(|((hertz, zeta), (cavity, base))| {
+            format!(
+                "{{ frequency = {hertz}, damping = {zeta}, participation = {base}, shape = {{ tip = {cavity} }} }},"
+            )
+        })
+        .collect();
+    let plant = "[plant]\nm = 0.0382595\nb = 0.0111956\nr = 0.837702\n[excitation]\nG = 1.1\n";
+    let text = format!("{plant}[structure]\ncavity = \"tip\"\nmodes = [{modes}]\n");
+    let scene = of(&TempDir::new().unwrap(), &text, &[]).unwrap();
+    let d = scene.dimensionless();
+    for orbit in structure_backbone(&scene, &d)
+        .unwrap()
+        .iter()
+        .flatten()
+        .filter(|orbit| orbit.stable)
+    {
+        let curve = ExactCurve::of_scene(&scene, &d, [orbit.sigma, orbit.c]);
+        let distance = curve.distance(orbit.c, orbit.sigma, orbit.g).unwrap();
+        let largest = distance
+            .nearest
+            .max(distance.sigma.unwrap().abs())
+            .max(distance.g.unwrap().abs());
+        assert!(largest < 1e-9, "{orbit:?}: {distance:?}");
+    }
+}
+
+/// Three modes driven at a fold of the drive, where the response under a constant drive creeps for 170 periods.
+const CREEPS: &str = "\
+[plant]
+m = 0.003720020936297249
+b = 1
+r = 0.6870721082506526
+[controller]
+omega_min = 0.8
+omega_max = 1.2
+[record]
+decay_periods = 3
+[structure]
+cavity = \"cavity\"
+modes = [
+    { frequency = 1.0, damping = 0.0009944962363544133, participation = 0.5486082929398451, shape = { cavity = 1.0 } },
+    { frequency = 1.673000632248855, damping = 0.0025446822037978305, participation = -0.5005783797770201, shape = { cavity = -0.18136673640084544 } },
+    { frequency = 3.4275159041901726, damping = 0.0011474693065931267, participation = 0.16328510963539963, shape = { cavity = 0.3859031127171879 } },
+]
+[excitation]
+G = 0.8772107836386811
+";
+
+#[test]
+fn the_uncertainty_of_a_lock_covers_what_a_response_that_still_creeps_is_off() {
+    let scene = of(&TempDir::new().unwrap(), CREEPS, &[]).unwrap();
+    let at = identified(&scene).unwrap().lock.at;
+    let curve = ExactCurve::of_scene(&scene, &scene.dimensionless(), [at.sigma, at.c]);
+    let distance = curve.distance(at.c, at.sigma, at.g).unwrap();
+    let (sigma, g) = (distance.sigma.unwrap().abs(), distance.g.unwrap().abs());
+    assert!(
+        at.u_sigma < 2e-3 && sigma < 2.0 * at.u_sigma && g < 2.0 * at.u_g,
+        "{distance:?}: {at:?}"
+    );
+}
+
+/// Receptances and base responses of modes at points, by the sum over the modes.
+struct Modal<'a>(&'a Structure, f64);
+
+impl Modal<'_> {
+    fn sum(&self, of: impl Fn(usize) -> Complex<f64>) -> Complex<f64> {
+        let Self(structure, omega) = self;
+        let modes = structure.modes.iter().enumerate().map(|(n, mode)| {
+            let stiffness = mode.omega.powi(2) - omega * omega;
+            of(n) / Complex::new(stiffness, 2.0 * mode.zeta * mode.omega * omega)
+        });
+        modes.sum()
+    }
+
+    fn receptance(&self, to: usize, from: usize) -> Complex<f64> {
+        self.sum(|n| Complex::from(self.0.modes[n].shape[to] * self.0.modes[n].shape[from]))
+    }
+
+    fn driven(&self, to: usize) -> Complex<f64> {
+        self.sum(|n| {
+            let mode = &self.0.modes[n];
+            let by = match self.0.excitation {
+                Excitation::Force => Complex::from(1.0),
+                Excitation::Base => Complex::new(mode.omega.powi(2), 2.0 * mode.zeta * mode.omega * self.1),
+            };
+            mode.shape[to] * mode.drive * by
+        })
+    }
+}
+
+/// The inertia of a mass is a force at its point: the response with it follows from receptances without it.
+#[test]
+fn a_mass_at_a_point_changes_the_response_as_its_inertia_does() {
+    let cantilever = include_str!("../../../../scenes/cantilever.toml");
+    let text = |masses: &str| {
+        [BEAM, cantilever].map(|text| text.replace("cavity = \"tip\"", &format!("cavity = \"tip\"\n{masses}")))
+    };
+    for (bare, loaded) in text("").iter().zip(text("masses = { middle = 0.3 }")) {
+        let [bare, loaded] = [bare, &loaded].map(|text| Scene::parse("scene", text, &[]).unwrap().structure.unwrap());
+        let at = bare.points.iter().position(|point| point == "middle").unwrap();
+        for hertz in [2.0, 8.7, 9.5, 54.0, 150.0] {
+            let omega = TAU * hertz;
+            let bare = Modal(&bare, omega);
+            let inertia = 0.3 * omega * omega;
+            let moved = bare.driven(at) / (1.0 - inertia * bare.receptance(at, at));
+            for (point, row) in loaded.rows.iter().enumerate() {
+                let expected = bare.driven(point) + bare.receptance(point, at) * inertia * moved;
+                let error = (loaded.host.frequency_response(row, omega) / expected - 1.0).norm();
+                assert!(error < 1e-11, "{hertz} Hz, point {point}: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn modes_with_a_mass_are_the_roots_of_the_frequency_equation() {
+    let mass = 0.05;
+    let loaded = beam(&[("cavity", "masses = { tip = 0.05 }\ncavity")])
+        .unwrap()
+        .structure
+        .unwrap();
+    // (first - (1 + m a²) x) (second - (1 + m b²) x) = (m a b x)², with the squared frequency x and the shapes a and b at the tip.
+    let [first, second] = [8.8156, 55.274].map(|hertz: f64| (TAU * hertz).powi(2));
+    let [a, b] = [mass * 0.51252_f64.powi(2); 2];
+    let (quadratic, linear) = (1.0 + a + b, first * (1.0 + b) + second * (1.0 + a));
+    let root = (linear * linear - 4.0 * quadratic * first * second).sqrt();
+    let said = loaded.mass_loading().unwrap();
+    for (mode, (bare, sign)) in loaded.modes.iter().zip([(first, -1.0), (second, 1.0)]) {
+        let expected = ((linear + sign * root) / (2.0 * quadratic)).sqrt();
+        assert!((mode.omega / expected - 1.0).abs() < 1e-13, "{} {expected}", mode.omega);
+        let lower = format!("{:.3}", 100.0 * (1.0 - expected / bare.sqrt()));
+        assert!(
+            said.contains(&lower) && said.contains("0.05 kg at tip"),
+            "{said}, {lower}"
+        );
+    }
+}
+
+#[test]
+fn a_mass_on_matrices_is_a_mass_in_the_matrix() {
+    let [c, k] = [[0.05, -0.02, 0.3], [4000.0, -900.0, 9000.0]];
+    let of_masses = |mass: [f64; 3], masses: &str| {
+        let folder = matrices([mass, c, k]);
+        let scene = of(&folder, &format!("{PLANT}{MATRICES}{masses}"), &[]);
+        scene.unwrap().structure.unwrap()
+    };
+    let loaded = of_masses([1.0, 0.1, 0.8], "masses = { root = 0.25 }");
+    let heavier = of_masses([1.0, 0.1, 1.05], "");
+    assert_eq!(loaded.host.sections(), heavier.host.sections());
+    assert_eq!(loaded.rows, heavier.rows);
+}

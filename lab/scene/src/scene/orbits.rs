@@ -1,0 +1,40 @@
+//! The exact orbits of a scene's structure, and where they are looked for.
+
+use vines_model::orbit::{Particle, StructureOrbits};
+
+use super::{Scene, Structure};
+
+impl Scene {
+    /// The exact orbits of the scene's structure; `None` without one. The response is the displacement at the sensor.
+    pub fn structure_orbits(&self) -> Option<StructureOrbits> {
+        self.structure.as_ref().map(|structure| self.orbits_of(structure))
+    }
+
+    /// The exact orbits of a structure with the particle of this scene.
+    pub fn orbits_of(&self, structure: &Structure) -> StructureOrbits {
+        let particle = Particle {
+            mass: self.plant.particle_mass,
+            half_width: self.plant.half_width,
+            restitution: self.plant.restitution,
+        };
+        let mut orbits = StructureOrbits::new(&structure.host, particle);
+        if let Some(shaker) = &structure.shaker {
+            orbits = orbits.with_reference(shaker.reference_and_inertia(structure.excitation));
+        }
+        orbits
+            .with_response(&structure.response())
+            .with_target(self.definition().phase)
+    }
+
+    /// Amplitude of the drive of the scene's structure, or of its reference behind a shaker: m for a base, N for a force.
+    pub fn structure_drive(&self) -> Option<f64> {
+        self.structure
+            .as_ref()
+            .map(|structure| self.amplitude / structure.base_per_drive())
+    }
+
+    /// The frequencies that the controller may set, rad/s.
+    pub fn frequencies(&self) -> [f64; 2] {
+        [self.controller.omega_min, self.controller.omega_max].map(|share| share * self.plant.natural_frequency())
+    }
+}

@@ -1,0 +1,85 @@
+//! The FMU of a scene's plant as its rig.
+
+use std::path::Path;
+
+use vines_bench::rig::{Measured, has_friction};
+use vines_bench::scene::{Excitation, Measurand, Scene, Sensor, Structure};
+use vines_fmu::{Asked, FmuError, FmuRig};
+
+/// The amplitude of a drive, its signal, and the reference, with their unit.
+fn drive_names(structure: Option<&Structure>) -> [(&'static str, &'static str); 3] {
+    let reference = match structure.map(|structure| structure.excitation) {
+        Some(Excitation::Force) => ("force", "N"),
+        Some(Excitation::Base) if has_shaker(structure) => ("q[table]", "m"),
+        _ => ("base", "m"),
+    };
+    let (names, unit) = match reference {
+        _ if has_shaker(structure) => (["u_amplitude", "u"], "V"),
+        ("force", unit) => (["F_amplitude", "F"], unit),
+        (_, unit) => (["E", "e"], unit),
+    };
+    [(names[0], unit), (names[1], unit), reference]
+}
+
+fn has_shaker(structure: Option<&Structure>) -> bool {
+    structure.is_some_and(|structure| structure.shaker.is_some())
+}
+
+/// The displacement at the sensor of a structure.
+fn at_sensor(structure: &Structure) -> String {
+    format!("q[{}]", structure.points[structure.sensor])
+}
+
+/// The displacement of a structure's force cell whose mass is compensated.
+fn at_cell(structure: &Structure) -> Option<String> {
+    let drive = structure.drive.filter(|_| structure.compensated_mass() > 0.0)?;
+    Some(format!("q[{}]", structure.points[drive]))
+}
+
+/// Loads the plant at `path` with parameters and start of the scene, and gives it the sensors of the scene.
+///
+/// # Errors
+/// Errors of the FMU.
+pub fn load(path: &Path, scene: &Scene) -> Result<Measured<FmuRig>, FmuError> {
+    let (names, definition) = (&scene.rig_names, scene.resonance);
+    let structure = scene.structure.as_ref();
+    let response = match (structure, definition.sensor) {
+        _ if names.mapped("response").is_some() => "response".to_owned(),
+        (Some(structure), _) => at_sensor(structure),
+        (None, Sensor::V) => "v".to_owned(),
+        (None, Sensor::Q1) => "q1".to_owned(),
+    };
+    let mut starts = scene.start_values();
+    // A structure starts at rest.
+    starts.retain(|(name, _)| structure.is_none() || !["q1", "der(q1)"].contains(name));
+    let of_driven_mode = structure.map(|structure| {
+        [
+            structure.base_per_command(),
+            structure.base_per_drive(),
+            structure.reading_per_response(),
+        ]
+    });
+    let rig = FmuRig::load(
+        path,
+        &Asked {
+            names,
+            definition,
+            sample_time: scene.sample_time(),
+            drive: drive_names(structure),
+            response,
+            cell: structure.and_then(at_cell),
+            starts,
+            has_friction: has_friction(&scene.plant),
+            of_driven_mode,
+        },
+    )?;
+    // A variable that the scene names is what it is measured as; velocities and accelerations of our own variables are differences.
+    let mut differences = definition;
+    if names.mapped("response").is_some() {
+        differences.sensor_quantity = Measurand::Displacement;
+    }
+    if names.mapped("base").is_some() {
+        differences.reference_quantity = Measurand::Displacement;
+    }
+    Ok(Measured::new(rig, differences, &scene.plant).compensating(structure))
+}
