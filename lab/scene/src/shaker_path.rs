@@ -79,7 +79,7 @@ pub const OBSERVER: f64 = 0.6;
 /// Bandwidth of the detector of the error.
 pub const DETECTOR: f64 = 0.5 * OBSERVER;
 /// Rate of a second integrator over the bandwidth of the first: both roots of the loop are then equal, at half of this bandwidth. The
-/// harmonics above [`FAST`] change at this share of a detector's bandwidth.
+/// harmonics above `FAST` change at this share of a detector's bandwidth.
 pub const SECOND: f64 = 0.25;
 /// Bandwidth of the control.
 pub const BANDWIDTH: f64 = SECOND * DETECTOR;
