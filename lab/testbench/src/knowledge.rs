@@ -86,7 +86,7 @@ impl Target {
     }
 
     /// Phase of the reading of the response relative to the reading of the reference, rad, from -pi to pi.
-    pub fn phase_of_readings(&self) -> f64 {
+    pub(crate) fn phase_of_readings(&self) -> f64 {
         let [response, reference] = self.measurands.map(Measurand::lead);
         let phase = self.phase + (response - reference);
         phase - TAU * (phase / TAU).round()
@@ -149,7 +149,7 @@ impl Knowledge {
     }
 
     /// The linear response as data, if it was measured on the rig.
-    pub fn measured_linear(&self) -> Option<MeasuredLinear> {
+    pub(crate) fn measured_linear(&self) -> Option<MeasuredLinear> {
         self.is_measured.then(|| self.linear.data())
     }
 
@@ -202,7 +202,7 @@ pub(crate) fn has_mirror_images(plant: &Parameters) -> bool {
 }
 
 /// Acceleration of the structure up to which static friction carries a particle that touches no wall, m/s²; 0 without friction.
-pub fn carried_up_to(plant: &Parameters) -> f64 {
+pub(crate) fn carried_up_to(plant: &Parameters) -> f64 {
     let Cavity { kinetic_friction, static_friction, tilt, .. } = plant.cavity;
     let held = static_friction.unwrap_or(kinetic_friction) * tilt.cos();
     (GRAVITY * (held - tilt.sin().abs())).max(0.0)

@@ -118,7 +118,7 @@ fn beyond(distance: f64, uncertainty: f64, radius: f64) -> Impacts {
 /// What a motion says of impacts by its frequency and its loss: response, m, base, m, and frequency, rad/s, at the phase `target` of the response
 /// relative to the base, rad. `epsilon`: the mass ratio in the drawing.
 #[must_use]
-pub fn impacts_by_resonance(
+pub(crate) fn impacts_by_resonance(
     linear: &LinearResponse,
     [response, base, omega]: [Estimate; 3],
     target: f64,
@@ -150,7 +150,7 @@ pub fn impacts_by_resonance(
 
 /// What the third harmonic of the structure's motion says of impacts: the force that excites it, over the force of the mass M in the fundamental.
 #[must_use]
-pub fn impacts_by_harmonic(third: Estimate, epsilon: f64) -> Impacts {
+pub(crate) fn impacts_by_harmonic(third: Estimate, epsilon: f64) -> Impacts {
     beyond(third.value, third.uncertainty, FRICTION_THIRD * LARGEST_RATIO * epsilon)
 }
 

@@ -58,7 +58,7 @@ impl Sensors {
 
     /// Readings in SI units, from [`Sensors::scaled`].
     #[must_use]
-    pub fn unscaled(self, target: &Target) -> Self {
+    pub(crate) fn unscaled(self, target: &Target) -> Self {
         Self {
             response: self.response / target.scale(0),
             reference: self.reference.map(|value| value / target.scale(1)),

@@ -69,7 +69,7 @@ const WIDE: f64 = 3.0;
 
 impl ResonanceFit {
     /// Fewest periods: one more than the coefficients.
-    pub const FEWEST: usize = 4;
+    pub(crate) const FEWEST: usize = 4;
 
     /// From at least four periods of a rig of which this is known; `slopes`: of `E_R` and `omega_R` over the amplitude, from neighbouring points of the
     /// backbone.

@@ -86,7 +86,7 @@ impl Scene {
 
 impl ChainSettings {
     /// Whether anything is switched on.
-    pub fn is_on(&self) -> bool {
+    pub(crate) fn is_on(&self) -> bool {
         let Self {
             adc_bits,
             dac_bits,
@@ -112,7 +112,7 @@ impl ChainSettings {
 
     /// Delay from the drive to the sensors, in units of 1/omega0, for samples `step` apart: on average, a held sample lags by half a
     /// sample.
-    pub fn total_delay(&self, step: f64) -> f64 {
+    pub(crate) fn total_delay(&self, step: f64) -> f64 {
         let held = if self.hold { 0.5 } else { 0.0 };
         (f64::from(self.delay) + held) * step + self.filter_delay()
     }

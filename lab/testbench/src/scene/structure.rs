@@ -126,7 +126,7 @@ impl Structure {
     }
 
     /// Shape of a mode at the cavity, 1/sqrt(kg).
-    pub fn at_cavity(&self, mode: &StructureMode) -> f64 {
+    pub(crate) fn at_cavity(&self, mode: &StructureMode) -> f64 {
         mode.shape[self.cavity]
     }
 
